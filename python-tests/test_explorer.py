@@ -792,7 +792,7 @@ def test_the_keyboard_reaches_everything(page: Any, address: str) -> None:
 
 def test_few_fixed_steps_show_what_is_not_there(page: Any, address: str) -> None:
     opened(page, address, "preset=paper&steps=80")
-    assert "80 steps a period show" in page.inner_text("#spurious")
+    assert "80 steps per period" in page.inner_text("#spurious")
     assert page.locator("#fixed svg").count() == 1
 
 

@@ -316,7 +316,7 @@ def test_rows_of_states_are_runs_of_their_own(regular):
         assert float(one.tip_max) == float(many.tip_max[k])
     both = nanotap.orbit(regular, state=states, omega=[2.9, 3.0])
     assert both.tip_max.dims == ("omega", "start")
-    with pytest.raises(ValueError, match="rows of them"):
+    with pytest.raises(ValueError, match="one per row"):
         nanotap.simulate(regular, state=np.zeros((2, 2, 6)))
 
 

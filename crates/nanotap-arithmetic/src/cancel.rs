@@ -1,26 +1,26 @@
-//! A flag that ends work.
+//! A flag that cancels long computations.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, OnceLock};
 use std::time::{Duration, Instant};
 
-/// How long work with a [grace period](CancelFlag::with_grace) may go on.
+/// Time that a computation with a [grace period](CancelFlag::with_grace) may continue.
 const GRACE: Duration = Duration::from_millis(300);
 
-/// A flag that ends work from outside. Clones share the flag. The default can never be set.
+/// A flag that cancels a computation. Clones share the flag. The default can never be set.
 ///
-/// Systems carry it and poll it on every stretch of a motion, so that a loop over motions ends
-/// early, with errors, even where it does not poll the flag itself. It is no part of what a system
-/// is: two flags always compare equal.
+/// Systems carry the flag and poll it on every segment of a motion, so that a loop over motions
+/// ends early, with errors, even if it does not poll the flag itself. The flag is not part of a
+/// system's identity: two flags always compare equal.
 #[derive(Clone, Debug, Default)]
 pub struct CancelFlag {
     flag: Option<Arc<AtomicBool>>,
-    /// When this flag was first polled after it was set, where it has a grace period.
+    /// Time of the first poll after the flag was set, if there is a grace period.
     grace: Option<Arc<OnceLock<Instant>>>,
 }
 
 impl CancelFlag {
-    /// A flag that is not set and can be.
+    /// Creates a flag that is not set.
     pub fn new() -> Self {
         Self {
             flag: Some(Arc::default()),
@@ -28,8 +28,8 @@ impl CancelFlag {
         }
     }
 
-    /// The same flag, seen as set only 0.3 s after it was first polled as set: for work that brings
-    /// finished results into a report.
+    /// The same flag, which appears set only 0.3 s after the first poll that found it set: for code
+    /// that turns finished results into a report.
     #[must_use]
     pub fn with_grace(&self) -> Self {
         Self {
@@ -38,14 +38,14 @@ impl CancelFlag {
         }
     }
 
-    /// Sets the flag: work that polls it ends soon.
+    /// Sets the flag: computations that poll it end soon.
     pub fn cancel(&self) {
         if let Some(flag) = &self.flag {
             flag.store(true, Ordering::SeqCst);
         }
     }
 
-    /// Whether the flag is set.
+    /// True if the flag is set.
     #[inline]
     pub fn is_cancelled(&self) -> bool {
         match &self.flag {
@@ -54,7 +54,7 @@ impl CancelFlag {
         }
     }
 
-    /// Whether the grace period is over, if there is one.
+    /// True if there is no grace period or it is over.
     #[cold]
     fn is_late(&self) -> bool {
         self.grace

@@ -22,7 +22,7 @@ static FORCE: AtomicBool = AtomicBool::new(false);
 /// What this command was asked to write.
 static CLAIMED: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
 
-/// How the tables begin that commands write, and what stands in those of datasets.
+/// Beginnings of the tables that commands write, and columns of those of datasets.
 const TABLES: [&str; 13] = [
     "line,direction,",
     "tau,tip,tip_rate",
@@ -59,6 +59,9 @@ pub(crate) fn claim<'a>(path: &Path, endings: &[&'a str]) -> Result<&'a str, Fai
     }
     if path.is_dir() {
         return Err(refused(path, "it is a folder"));
+    }
+    if path.exists() && !path.is_file() {
+        return Err(refused(path, "it is not a regular file"));
     }
     if !FORCE.load(Ordering::Relaxed) && path.is_file() {
         let there = fs::read(path).map_err(|error| refused(path, error))?;
@@ -107,7 +110,6 @@ fn is_ours(ending: &str, bytes: &[u8]) -> bool {
             let rest = bytes.get(first.len() + 1..).unwrap_or_default();
             first == signature(rest)
         }
-        "gsf" => first == "Gwyddion Simple Field 1.0",
         _ => bytes
             .windows(MADE_BY.len())
             .any(|window| window == MADE_BY.as_bytes()),

@@ -1,4 +1,4 @@
-//! What is said of a motion: observables, energy, spectrum, multipliers. Shared by every
+//! The text of a motion: observables, energy, spectrum, multipliers. Shared by every
 //! command that shows motions.
 
 use std::fmt::Write as _;

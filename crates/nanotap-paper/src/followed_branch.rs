@@ -55,7 +55,7 @@ impl FollowedBranch {
             }
             _ => Err(PaperError::Failed {
                 what: format!("the period-{period} branch"),
-                why: format!("a run from rest at Ω = {entry} does not settle on it"),
+                why: format!("a run from rest at Ω = {entry} does not converge to it"),
             }),
         }
     }
@@ -164,7 +164,7 @@ impl FollowedBranch {
 
     /// Table of its bifurcations, by Ω.
     pub(super) fn table(&self, caption: &str) -> Table {
-        let mut table = Table::new(caption, ["Ω", "what happens", "known to"]);
+        let mut table = Table::new(caption, ["Ω", "bifurcation", "uncertainty"]);
         let mut sorted: Vec<&Bifurcation> = self.bifurcations.iter().collect();
         sorted.sort_by(|a, b| a.parameter.total_cmp(&b.parameter));
         for b in sorted {
@@ -172,8 +172,8 @@ impl FollowedBranch {
                 BifurcationKind::Fold => "fold",
                 BifurcationKind::Crossing => "another branch crosses",
                 BifurcationKind::Flip => "flip (period doubling)",
-                BifurcationKind::NeimarkSacker { .. } => "Neimark–Sacker: a torus is born",
-                BifurcationKind::Grazing { .. } => "grazing: a contact is born or dies",
+                BifurcationKind::NeimarkSacker { .. } => "Neimark–Sacker: a torus bifurcates",
+                BifurcationKind::Grazing { .. } => "grazing: a contact appears or vanishes",
             };
             table.row([
                 format!("{:.10}", b.parameter),

@@ -86,7 +86,7 @@ impl CaseCore {
     }
 }
 
-/// The built-in catalogue and others beside it.
+/// The built-in catalogue and further ones.
 fn catalogue_of(others: &[(String, String)]) -> Result<Arc<Catalogue>, Failure> {
     let mut catalogue = Catalogue::shared();
     for (origin, text) in others {
@@ -116,7 +116,7 @@ impl Variants {
 
 #[pymethods]
 impl CaseCore {
-    /// From the name and text of a case file, if there is one, `key=value` words beside it,
+    /// From the name and text of a case file, if there is one, `key=value` words for it,
     /// and names and texts of catalogues.
     #[new]
     fn new(
@@ -188,7 +188,7 @@ impl CaseCore {
         Ok(report.transpose().map_err(Failure::from)?)
     }
 
-    /// Of a physical case, every parameter beside its physical quantity, JSON.
+    /// Of a physical case, every parameter with its physical quantity, JSON.
     #[getter]
     fn mapping(&self) -> PyResult<String> {
         let rows: Vec<MappingDocument> = self

@@ -11,10 +11,10 @@ use nanotap::dataset::gsf::Field;
 use nanotap::dataset::{self, Share, Store, Work, WorkError, table};
 use nanotap::figure as figures;
 use nanotap::study::basin;
-use nanotap::study::sweep;
+use nanotap::study::registry;
+use nanotap::study::sweep::Summary;
 use nanotap::study::threads::{checked, install};
 use nanotap::study::window::Window;
-use nanotap::study::{self, registry};
 use nanotap_figures::Figure;
 use numpy::PyReadonlyArray1;
 use pyo3::prelude::*;
@@ -28,7 +28,7 @@ use crate::watch::watched;
 /// A sweep or basin that was checked: its chunks are pure functions of it.
 #[pyclass(frozen, module = "nanotap._nanotap")]
 pub(crate) struct Recipe {
-    recipe: Arc<study::recipe::Recipe>,
+    recipe: Arc<registry::DatasetPlan>,
 }
 
 #[pymethods]
@@ -51,7 +51,7 @@ impl Recipe {
         let studied = case.studied(py)?;
         let done = watched(py, progress, move |control| {
             Ok(install(threads, || {
-                entry.recipe(&studied, request, control)
+                entry.plan(&studied, request, control)
             })??)
         })?;
         Ok(Self {
@@ -131,7 +131,7 @@ impl Recipe {
 #[pyclass(frozen, module = "nanotap._nanotap")]
 pub(crate) struct Receiver {
     store: Store,
-    recipe: Arc<study::recipe::Recipe>,
+    recipe: Arc<registry::DatasetPlan>,
 }
 
 #[pymethods]
@@ -195,7 +195,7 @@ pub(crate) fn summary(path: PathBuf) -> PyResult<String> {
         Ok(if kind == "basin" {
             serde_json::to_string(&basin::shares(&store)?)?
         } else {
-            serde_json::to_string(&sweep::summary(&store)?)?
+            serde_json::to_string(&Summary::of(&store)?)?
         })
     };
     Ok(summary()?)

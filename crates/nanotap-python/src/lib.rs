@@ -1,9 +1,9 @@
-//! The Python door: what crosses between Python and the library. No physics and no
+//! The Python module: what crosses between Python and the library. No physics and no
 //! numerics here, and nothing that Python itself says better.
 //!
 //! Results cross as the documents of the terminal's JSON and as numpy arrays; the package
 //! `nanotap` makes typed objects, xarray Datasets and pandas tables of them. Work runs on
-//! a thread of its own while the caller waits outside the interpreter lock
+//! a separate thread while the caller waits outside the interpreter lock
 //! ([`watch`]), so that Ctrl-C is heard and a panic becomes an exception.
 
 #![allow(

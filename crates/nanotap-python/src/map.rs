@@ -18,7 +18,7 @@ use crate::watch::watched;
 type Rows<'py> = Bound<'py, PyArray2<f64>>;
 type Matrices<'py> = Bound<'py, PyArray3<f64>>;
 
-/// Drive periods that run where they are asked for; longer work is watched, so that Ctrl-C
+/// Drive periods that run on the calling thread; longer work is watched, so that Ctrl-C
 /// stops it.
 const AT_ONCE: usize = 4096;
 /// The same under a nonlinear force, whose periods take a thousand times longer.

@@ -9,12 +9,12 @@ use nanotap::map::MOST_NUMBERS;
 use nanotap::model::Model;
 use nanotap::model::beam::Modes;
 use nanotap::observe::time_series::{self, state_names};
-use nanotap::study::modes::{ModesRequest, ModesStudy};
-use nanotap::study::orbit::{OrbitRequest, OrbitStudy};
+use nanotap::study::modes::{ModesOptions, ModesStudy};
+use nanotap::study::orbit::{OrbitOptions, OrbitStudy};
 use nanotap::study::registry::{Document, Study as _};
 use nanotap::study::request::read;
 use nanotap::study::setpoint::at_setpoint;
-use nanotap::study::simulate::{SimulateReport, SimulateRequest, SimulateStudy};
+use nanotap::study::simulate::{SimulateOptions, SimulateReport, SimulateStudy};
 use nanotap::study::threads::install;
 use nanotap::{Error, ErrorKind};
 use numpy::{PyArray1, PyArray2, PyArrayMethods};
@@ -46,7 +46,7 @@ pub(crate) fn modes<'py>(
     request: &str,
 ) -> PyResult<(String, Row<'py>, Rows<'py>)> {
     let studied = case.studied(py)?;
-    let request: ModesRequest = read(json(request)?).map_err(Failure::from)?;
+    let request: ModesOptions = read(json(request)?).map_err(Failure::from)?;
     let table = ModesStudy::run(&studied, &request, &Control::default()).map_err(Failure::from)?;
     let beam = Modes::new(table.modes).map_err(|error| Failure::input(error.to_string()))?;
     let points = request.points;
@@ -97,7 +97,7 @@ pub(crate) fn simulate<'py>(
     series_periods: usize,
 ) -> PyResult<(Bound<'py, PyAny>, Table<'py>)> {
     let studied = case.studied(py)?;
-    let request: SimulateRequest = read(json(request)?).map_err(Failure::from)?;
+    let request: SimulateOptions = read(json(request)?).map_err(Failure::from)?;
     let done = watched_alone(py, None, move |control| {
         let report = SimulateStudy::run(&studied, &request, control)?;
         let (names, values) = match &report {
@@ -126,7 +126,7 @@ pub(crate) fn orbit<'py>(
     request: &str,
 ) -> PyResult<Bound<'py, PyAny>> {
     let studied = case.studied(py)?;
-    let request: OrbitRequest = read(json(request)?).map_err(Failure::from)?;
+    let request: OrbitOptions = read(json(request)?).map_err(Failure::from)?;
     // An orbit of a given period may have to be searched for from starts all over.
     let searched = request.period.is_some() && request.state.is_none();
     let work = move |control: &Control<'_>| {
@@ -174,7 +174,7 @@ fn report(
         }
         OrbitStudy::NAME => {
             // Single results alone show harmonics.
-            let request = OrbitRequest {
+            let request = OrbitOptions {
                 harmonics: 0,
                 ..read(request)?
             };

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use nanotap::Error;
 use nanotap::study::fit::Table;
-use nanotap::study::lyapunov::{LyapunovRequest, LyapunovStudy};
+use nanotap::study::lyapunov::{LyapunovOptions, LyapunovStudy};
 use nanotap::study::registry::{self, Document, Study as _};
 use nanotap::study::request::read;
 use nanotap::study::threads::install;
@@ -78,7 +78,7 @@ pub(crate) fn lyapunov<'py>(
     request: &str,
 ) -> PyResult<(String, Bound<'py, PyArray2<f64>>)> {
     let studied = case.studied(py)?;
-    let request: LyapunovRequest = read(json(request)?).map_err(Failure::from)?;
+    let request: LyapunovOptions = read(json(request)?).map_err(Failure::from)?;
     let done = watched(py, None, move |control| {
         let report = LyapunovStudy::run(&studied, &request, control)?;
         let rows = report.section.iter().flat_map(|p| {

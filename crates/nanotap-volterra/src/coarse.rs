@@ -1024,7 +1024,14 @@ impl Work {
                         tables.carry(level, branch, &self.stages, to, &mut self.columns);
                     }
                     if let Some((sums, omega)) = &mut self.sums {
-                        tables.add_force(sums, *omega, level.length, &self.now, &self.next, &self.stages);
+                        tables.add_force(
+                            sums,
+                            *omega,
+                            level.length,
+                            &self.now,
+                            &self.next,
+                            &self.stages,
+                        );
                     }
                     std::mem::swap(&mut self.now, &mut self.next);
                     self.now.force = tables.force(self.now.branch, self.now.gap, self.now.rate);

@@ -180,12 +180,10 @@ impl Flow {
         &self.system
     }
 
-    /// Sets the offset of the gap; call [`Flow::start`] next.
-    ///
-    /// # Errors
-    /// When the offset is not finite.
-    pub fn set_offset(&mut self, offset: f64) -> Result<(), VolterraError> {
-        Arc::make_mut(&mut self.system).set_offset(offset)
+    /// The system, to change its offset; a copy where others share it. Start the motion anew
+    /// afterwards.
+    pub fn system_mut(&mut self) -> &mut System {
+        Arc::make_mut(&mut self.system)
     }
 
     /// What the runs so far have cost.

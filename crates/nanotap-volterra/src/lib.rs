@@ -106,7 +106,6 @@
 
 pub mod averaging;
 pub mod coarse;
-pub mod dual;
 pub mod error;
 pub mod flow;
 pub mod kernel;

@@ -419,16 +419,16 @@ impl Trajectory {
         self.integrate(1, |s, out| out[0] = s.force * s.rate)[0]
     }
 
-    /// The fraction of time spent where `inside` says.
+    /// The time spent on the branches that `inside` accepts.
+    pub fn time_on(&self, inside: impl Fn(usize) -> bool) -> f64 {
+        let stretches = self.stretches().filter(|s| inside(s.branch));
+        stretches.map(|s| s.length).sum()
+    }
+
+    /// The same as a fraction of the span.
     pub fn fraction(&self, inside: impl Fn(usize) -> bool) -> f64 {
         let (start, end) = self.span();
-        let time: f64 = self
-            .pieces
-            .iter()
-            .filter(|p| inside(p.branch))
-            .map(|p| p.end_time() - p.start)
-            .sum();
-        time / (end - start)
+        self.time_on(inside) / (end - start)
     }
 
     /// The local extrema of an output inside the span, in order.

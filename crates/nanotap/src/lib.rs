@@ -1,10 +1,10 @@
 //! Tapping-mode atomic force microscopy, exactly: beam modes, Galerkin matrices,
 //! contact laws, observables and studies.
 //!
-//! The rooms depend on each other in this order: a [`model`] holds the equations; a [`case`]
-//! states what is studied and maps to a model; [`observe`] reads off a motion what an
-//! experimenter would; a [`map`](mod@map) is for algorithms of one's own; a [`study`] runs and reports; a [`figure`] shows a report;
-//! a [`dataset`] keeps many motions on disk.
+//! The modules depend on each other in this order: a [`model`] holds the equations; a [`case`] is the
+//! user's input and maps to a model; [`observe`] computes the observables of a motion; a
+//! [`map`](mod@map) is for your own algorithms; a [`study`] runs and reports; a [`figure`] shows a
+//! report; a [`dataset`] keeps many motions on disk.
 
 #![cfg_attr(
     test,

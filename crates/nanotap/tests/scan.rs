@@ -4,7 +4,7 @@
 use nanotap::case::Case;
 use nanotap::case::file::Source;
 use nanotap::control::Control;
-use nanotap::study::kind::Study as _;
+use nanotap::study::Study as _;
 use nanotap::study::scan::{ScanOptions, ScanReport, ScanStudy};
 use serde_json::{Value, json};
 
@@ -159,7 +159,12 @@ fn compare(name: &str) {
             let expected = pixels[key].as_array().unwrap();
             assert_eq!(expected.len(), values.len());
             for (pixel, (value, expected)) in values.iter().zip(expected).enumerate() {
-                near(value * factor, expected, 1e-8, &what(&format!("{key} of pixel {pixel}")));
+                near(
+                    value * factor,
+                    expected,
+                    1e-8,
+                    &what(&format!("{key} of pixel {pixel}")),
+                );
             }
         }
     }

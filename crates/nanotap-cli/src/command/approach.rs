@@ -12,9 +12,8 @@ use nanotap::figure::approach::approach_figure;
 use nanotap::number::shortest;
 use nanotap::observe::table::shown_phase;
 use nanotap::observe::{Observables, Set, columns};
-use nanotap::study::approach::{ApproachPoint, ApproachReport, ApproachRequest, ApproachStudy};
+use nanotap::study::approach::{ApproachOptions, ApproachPoint, ApproachReport, ApproachStudy};
 use nanotap::study::frequency_modulation::{COLUMNS, ModulatedColumn, ModulationReport};
-use nanotap::study::registry::Study as _;
 use nanotap::study::simulate::Classification;
 use serde::Serialize;
 
@@ -35,7 +34,7 @@ pub(crate) struct Arguments {
     case: CaseArguments,
 
     #[command(flatten)]
-    request: Request<ApproachRequest>,
+    request: Request<ApproachOptions>,
 
     #[command(flatten)]
     threads: ThreadsArgument,
@@ -58,12 +57,8 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     let request = arguments.request.read()?;
     arguments.out.check()?;
     arguments.plot.check()?;
-    let case = GivenCase::with_any_distance(&arguments.case, output)?;
-    let report = progress::study::<ApproachStudy, _>(|control| {
-        arguments
-            .threads
-            .install(|| ApproachStudy::run(&case, &request, control))
-    })??;
+    let case = GivenCase::for_study(&arguments.case, true, output)?;
+    let report = progress::study::<ApproachStudy>(&case, &request, &arguments.threads)?;
     if report.cancelled {
         output.warning("stopped before it was done");
     }

@@ -12,7 +12,6 @@ use nanotap::study::attractors::{
 };
 use nanotap::study::orbit::spectral_radius;
 use nanotap::study::proof::ProofReport;
-use nanotap::study::registry::Study as _;
 
 use crate::failure::Failure;
 use crate::given_case::GivenCase;
@@ -34,11 +33,7 @@ pub(crate) struct Arguments {
 pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure> {
     let (request, case) = arguments.study.read(output)?;
     let model = case.model()?;
-    let found = progress::study::<AttractorsStudy, _>(|control| {
-        arguments
-            .threads
-            .install(|| AttractorsStudy::run(&case, &request, control))
-    })??;
+    let found = progress::study::<AttractorsStudy>(&case, &request, &arguments.threads)?;
     arguments.study.out.write(|| csv(&model, &found))?;
     arguments
         .study

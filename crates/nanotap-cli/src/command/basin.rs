@@ -1,20 +1,20 @@
 //! `nanotap basin`: basins of attraction on a slice of initial states.
 
 use std::path::{Path, PathBuf};
-use std::time::Instant;
 
 use clap::Args;
 use nanotap::figure::basin::figure;
-use nanotap::study::basin::{Basin, BasinOptions, BasinRequest, Shares, shares};
+use nanotap::study::DatasetStudy as _;
+use nanotap::study::basin::{BasinOptions, BasinStudy, Shares, SliceRange};
 
 use crate::arguments::{CaseArguments, PlotArgument};
 use crate::dataset::{DatasetArguments, DatasetReport, derived_name};
 use crate::failure::Failure;
 use crate::given_case::GivenCase;
+use crate::number;
 use crate::output::Output;
 use crate::request::Request;
 use crate::table::{Align, Table};
-use crate::{number, progress};
 
 /// Basins of attraction on a two-dimensional slice of initial states.
 #[derive(Args, Debug)]
@@ -28,7 +28,7 @@ pub(crate) struct Arguments {
     attractors: Option<PathBuf>,
 
     #[command(flatten)]
-    request: Request<BasinRequest>,
+    request: Request<BasinOptions>,
 
     #[command(flatten)]
     dataset: DatasetArguments,
@@ -37,34 +37,25 @@ pub(crate) struct Arguments {
 }
 
 pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure> {
-    let begun = Instant::now();
-    let mut request = arguments.request.read()?;
-    request.attractors = arguments.attractors.as_deref().map(states).transpose()?;
-    let options = request.options()?;
+    let mut options = arguments.request.read()?;
+    options.attractors = arguments.attractors.as_deref().map(states).transpose()?;
+    let axes = options.axes()?;
     let case = GivenCase::of(&arguments.case, output)?;
-    let dataset = &arguments.dataset;
     let name = derived_name(
         arguments.case.file.as_deref(),
-        &["basin", &options.x.name, &options.y.name],
+        &["basin", &axes[0].name, &axes[1].name],
     );
-    let destination = dataset.destination(&name, arguments.plot.plot.as_deref())?;
-    arguments.plot.check()?;
-    let basin = progress::watched("basin", "starts of the census", false, |control| {
-        dataset
-            .threads
-            .install(|| Basin::new(&case, &options, control))
-    })??;
-    let store = dataset.compute(
-        &destination.store,
-        basin.schema(),
-        ["basin", "rows"],
+    let done = arguments.dataset.run::<BasinStudy>(
+        &case,
+        &options,
+        &name,
+        BasinStudy::COUNTED,
+        options.seed,
+        &arguments.plot,
+        figure,
         output,
-        |store, work| basin.compute(store, work),
     )?;
-    let plot = arguments.plot.plot.as_deref();
-    let seed = request.seed;
-    let done = DatasetReport::of(&store, destination, plot, begun, seed, shares, figure)?;
-    output.study(&case, &done, |done| text(&case, &options, done))
+    output.study(&case, &done, |done| text(&case, &axes, done))
 }
 
 /// The states on the attractors that a file of `nanotap attractors --json` names.
@@ -98,15 +89,15 @@ fn states(path: &Path) -> Result<Vec<Vec<f64>>, Failure> {
         .collect()
 }
 
-fn text(case: &GivenCase, options: &BasinOptions, done: &DatasetReport<Shares>) -> String {
+fn text(case: &GivenCase, [x, y]: &[SliceRange; 2], done: &DatasetReport<Shares>) -> String {
     let heading = format!(
         "{}: {}, {} by {} starts over {} and {}",
         case.title(),
         case.summary(),
-        options.x.count,
-        options.y.count,
-        options.x.name,
-        options.y.name
+        x.count,
+        y.count,
+        x.name,
+        y.name
     );
     done.text(&heading, parts)
 }

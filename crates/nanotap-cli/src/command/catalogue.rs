@@ -25,7 +25,7 @@ pub(crate) struct Arguments {
     catalogue: Vec<PathBuf>,
 }
 
-/// What was asked for, in SI.
+/// The requested entry, in SI.
 #[derive(Serialize)]
 struct Listed<'a> {
     levers: Vec<&'a Lever>,

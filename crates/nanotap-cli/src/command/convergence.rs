@@ -7,13 +7,13 @@ use nanotap::case::physical::quantity::format_electronvolts;
 use nanotap::figure::motion::convergence_figure;
 use nanotap::observe::table::shown_phase;
 use nanotap::study::convergence::{Convergence, ConvergenceStudy};
-use nanotap::study::registry::Study as _;
 
 use crate::failure::Failure;
 use crate::given_case::GivenCase;
 use crate::output::Output;
 use crate::study_arguments::StudyArguments;
 use crate::table::{Align, Table};
+use crate::threads::ThreadsArgument;
 use crate::{motion, number, progress, style};
 
 /// The same motion with N = 1 … K modes: how many are enough.
@@ -21,9 +21,7 @@ pub(crate) type Arguments = StudyArguments<ConvergenceStudy>;
 
 pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure> {
     let (request, case) = arguments.read(output)?;
-    let result = progress::study::<ConvergenceStudy, _>(|control| {
-        ConvergenceStudy::run(&case, &request, control)
-    })?;
+    let result = progress::study::<ConvergenceStudy>(&case, &request, &ThreadsArgument::default())?;
     arguments.out.write(|| csv(&result))?;
     arguments
         .plot

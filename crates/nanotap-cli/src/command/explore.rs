@@ -42,7 +42,7 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     // A page that is served has no end to wait for.
     progress::end();
     serve(&options, |address| {
-        // Whoever reads it from a pipe waits for this line.
+        // A reader of the pipe waits for this line.
         let mut out = std::io::stdout().lock();
         let _ = writeln!(out, "{address}");
         let _ = out.flush();

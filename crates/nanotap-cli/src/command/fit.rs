@@ -7,8 +7,7 @@ use clap::Args;
 use nanotap::case::Key;
 use nanotap::figure::fit::fit_figure;
 use nanotap::number::shortest;
-use nanotap::study::fit::{FitReport, FitRequest, FitStudy, FittedParameter, Table as Data};
-use nanotap::study::registry::Study as _;
+use nanotap::study::fit::{FitOptions, FitReport, FitStudy, FittedParameter, Table as Data};
 use serde::Serialize;
 
 use crate::arguments::{CaseArguments, PlotArgument};
@@ -36,7 +35,7 @@ pub(crate) struct Arguments {
     also: Vec<PathBuf>,
 
     #[command(flatten)]
-    request: Request<FitRequest>,
+    request: Request<FitOptions>,
 
     #[command(flatten)]
     threads: ThreadsArgument,
@@ -80,12 +79,8 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
         }
         request.data.push(Data::read(path)?);
     }
-    let case = GivenCase::with_any_distance(&arguments.case, output)?;
-    let report = progress::study::<FitStudy, _>(|control| {
-        arguments
-            .threads
-            .install(|| FitStudy::run(&case, &request, control))
-    })??;
+    let case = GivenCase::for_study(&arguments.case, true, output)?;
+    let report = progress::study::<FitStudy>(&case, &request, &arguments.threads)?;
     if let (Some(path), Some(ending)) = (&arguments.out, ending) {
         match ending {
             "toml" if !report.case_files.is_empty() => {
@@ -117,7 +112,7 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     }
 }
 
-/// Where the case of one curve is written: `best-CURVE.toml` beside `best.toml`.
+/// Where the case of one curve is written: `best-CURVE.toml` next to `best.toml`.
 fn of_curve(path: &Path, curve: &str, index: usize) -> PathBuf {
     let name = Path::new(curve)
         .file_stem()

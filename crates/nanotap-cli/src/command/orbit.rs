@@ -6,8 +6,7 @@ use clap::Args;
 use nanotap::figure::motion::orbit_figure;
 use nanotap::model::Model;
 use nanotap::observe::{PhysicalMotion, Set, time_series};
-use nanotap::study::orbit::{MAX_DETERMINANT_DEFECT, OrbitReport, OrbitRequest, OrbitStudy};
-use nanotap::study::registry::Study as _;
+use nanotap::study::orbit::{MAX_DETERMINANT_DEFECT, OrbitOptions, OrbitReport, OrbitStudy};
 
 use crate::arguments::{CaseArguments, OutArgument, PlotArgument};
 use crate::failure::Failure;
@@ -16,6 +15,7 @@ use crate::motion;
 use crate::output::Output;
 use crate::request::Request;
 use crate::table::{Align, Table};
+use crate::threads::ThreadsArgument;
 use crate::{file, number, progress, series, style};
 
 /// A periodic orbit by Newton, stable or not.
@@ -25,7 +25,7 @@ pub(crate) struct Arguments {
     case: CaseArguments,
 
     #[command(flatten)]
-    request: Request<OrbitRequest>,
+    request: Request<OrbitOptions>,
 
     /// Write the harmonics to this file (.csv)
     #[arg(long, value_name = "PATH")]
@@ -44,8 +44,7 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     }
     let case = GivenCase::of(&arguments.case, output)?;
     let model = case.model()?;
-    let found =
-        progress::study::<OrbitStudy, _>(|control| OrbitStudy::run(&case, &request, control))?;
+    let found = progress::study::<OrbitStudy>(&case, &request, &ThreadsArgument::default())?;
     let found = &found;
     for key in request.derivatives.iter().flat_map(|name| case.key(name)) {
         case.say_held(&[key], output);

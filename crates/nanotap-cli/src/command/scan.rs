@@ -1,10 +1,10 @@
 //! `nanotap scan`: a line or an image under feedback.
 
+use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
 use nanotap::figure::scan::scan_figure;
-use nanotap::study::registry::Study as _;
 use nanotap::study::scan::report::LoopReport;
 use nanotap::study::scan::{
     CHANNELS, Direction, LineStatistics, Method, ScanOptions, ScanReport, ScanStudy, pixels_csv,
@@ -52,22 +52,16 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
         }
     }
     arguments.plot.check()?;
-    let case = GivenCase::with_any_distance(&arguments.case, output)?;
-    let report = progress::study::<ScanStudy, _>(|control| {
-        arguments
-            .threads
-            .install(|| ScanStudy::run(&case, &request, control))
-    })??;
+    let case = GivenCase::for_study(&arguments.case, true, output)?;
+    let report = progress::study::<ScanStudy>(&case, &request, &arguments.threads)?;
     for warning in &report.warnings {
         output.warning(warning);
     }
     if let Some(path) = &arguments.out {
         if ending == Some("gsf") {
             for channel in CHANNELS {
-                let bytes = report
-                    .field(&channel)
-                    .to_gsf()
-                    .map_err(|error| nanotap::Error::from(error))?;
+                let bytes = report.field(&channel).to_gsf();
+                let bytes = bytes.map_err(nanotap::Error::from)?;
                 file::write(&of_channel(path, channel.name), &bytes)?;
             }
         } else {
@@ -87,6 +81,9 @@ fn of_channel(path: &Path, channel: &str) -> PathBuf {
 fn nm(length: f64, digits: usize) -> String {
     number::significant(1e9 * length, digits)
 }
+
+/// Rows of the table of lines.
+const SHOWN: usize = 20;
 
 fn text(case: &GivenCase, report: &ScanReport) -> String {
     let method = match report.method {
@@ -111,7 +108,6 @@ fn text(case: &GivenCase, report: &ScanReport) -> String {
         ("parachuting (nm)", Align::Point),
         ("overshoot (nm)", Align::Point),
     ]);
-    const SHOWN: usize = 20;
     for line in report.lines.iter().take(SHOWN) {
         table.row(row(line));
     }
@@ -122,7 +118,7 @@ fn text(case: &GivenCase, report: &ScanReport) -> String {
         table.render()
     );
     if report.lines.len() > SHOWN {
-        text.push_str(&format!("  … {} rows in all\n", report.lines.len()));
+        let _ = writeln!(text, "  … {} rows in all", report.lines.len());
     }
     if let Some(error) = &report.error {
         text.push_str(&motion::paragraph(&format!(

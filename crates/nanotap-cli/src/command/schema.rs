@@ -1,5 +1,4 @@
-//! `nanotap schema`: what studies are asked for and report, and what a case states, as JSON
-//! schema.
+//! `nanotap schema`: the JSON schemas of options and reports of studies, and of a case.
 
 use clap::Args;
 use nanotap::case::schema;
@@ -9,7 +8,7 @@ use serde_json::{Map, Value, json};
 use crate::failure::Failure;
 use crate::output;
 
-/// What the schema of a case is called beside those of the studies.
+/// The name of the schema of a case.
 const CASE: &str = "case";
 
 /// The JSON schema of what a study is asked for and reports, or of a case.

@@ -7,7 +7,6 @@ use nanotap::figure::motion::{fixed_step_figure, simulation_figure};
 use nanotap::model::Model;
 use nanotap::observe::Set;
 use nanotap::study::fixed_step::FixedStepRun;
-use nanotap::study::registry::Study as _;
 use nanotap::study::simulate::{Classification, SimulateReport, SimulateStudy, Simulation};
 
 use crate::failure::Failure;
@@ -16,6 +15,7 @@ use crate::motion;
 use crate::output::Output;
 use crate::study_arguments::StudyArguments;
 use crate::table::{Align, Table};
+use crate::threads::ThreadsArgument;
 use crate::{number, progress, series, style};
 
 /// One run: its steady state, or how it gets there.
@@ -24,9 +24,7 @@ pub(crate) type Arguments = StudyArguments<SimulateStudy>;
 pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure> {
     let (request, case) = arguments.read(output)?;
     let model = case.model()?;
-    let report = progress::study::<SimulateStudy, _>(|control| {
-        SimulateStudy::run(&case, &request, control)
-    })?;
+    let report = progress::study::<SimulateStudy>(&case, &request, &ThreadsArgument::default())?;
     let units = case.units();
     match &report {
         SimulateReport::Exact(report) => {

@@ -1,5 +1,5 @@
-//! A study that has no text of its own: every study of the registry is a command, with the flags
-//! of its request, and prints its document.
+//! Studies without a hand-written text: every study of the registry is a command, with the flags of
+//! its options, and prints its document.
 
 use clap::{ArgMatches, Args as _, Command, FromArgMatches, Subcommand};
 use nanotap::study::registry::{STUDIES, StudyEntry, study};
@@ -68,11 +68,7 @@ fn command_of(entry: &StudyEntry) -> Command {
 
 pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure> {
     let entry = arguments.entry;
-    let case = if entry.any_distance {
-        GivenCase::with_any_distance(&arguments.case, output)?
-    } else {
-        GivenCase::of(&arguments.case, output)?
-    };
+    let case = GivenCase::for_study(&arguments.case, entry.any_distance, output)?;
     let request = Value::Object(arguments.given.clone());
     let document = progress::watched(entry.name, entry.counted, entry.partial, |control| {
         entry.document(&case, request, control)

@@ -37,7 +37,7 @@ fn json_has_the_frequencies_of_the_paper_and_of_the_exact_beam() {
 }
 
 #[test]
-fn text_sets_galerkin_beside_exact() {
+fn text_compares_galerkin_with_the_exact_beam() {
     let folder = Folder::with_paper_case();
     let outcome = folder.run(&["modes", "case.toml"]);
     assert_eq!((outcome.code, outcome.stderr.as_str()), (0, ""));

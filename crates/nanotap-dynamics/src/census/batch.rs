@@ -76,8 +76,8 @@ impl<'s, 'a: 's, M: StroboscopicMap> Turn<'s, 'a, M> {
         let mut map = map.clone();
         let cancelled = || control.is_cancelled();
         // Of few starts most places side by side would be empty.
-        if map.side_by_side() > 1 && starts.len() >= LEAST_TOGETHER {
-            let most = map.side_by_side().max(LEAST_TOGETHER);
+        if map.batch_size() > 1 && starts.len() >= LEAST_TOGETHER {
+            let most = map.batch_size().max(LEAST_TOGETHER);
             let parts = SHARES * rayon::current_num_threads();
             let places = || (self.left() / parts).clamp(LEAST_TOGETHER, most);
             let followed = |place, followed| match followed {

@@ -5,7 +5,6 @@
 //! `d = a0`; it lets go at `a³ = πwR²/(8E*)`, where at held ends `F = −(5/6)πwR`: whether the
 //! tip is attached is a state, and no force acts while it is not.
 
-use crate::dual::Scalar;
 use crate::law::{Approach, Remark};
 use crate::laws::elastic::{deep, reduced_modulus};
 use crate::laws::entry::{
@@ -13,6 +12,7 @@ use crate::laws::entry::{
     WORK_OF_ADHESION,
 };
 use crate::laws::formula::{Edge, Formula, Way};
+use nanotap_arithmetic::Scalar;
 use std::f64::consts::PI;
 
 /// See the module.
@@ -125,7 +125,7 @@ fn contact_radius_root<S: Scalar>(c: &[S], gap: S) -> S {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::dual::Dual;
+    use nanotap_arithmetic::Dual;
 
     /// Where the neck lets go the force is −(5/6)πwR whatever the modulus (Johnson, Kendall, Roberts
     /// 1971), on every scale: no rounding of the gap puts the end on the side where the force's slope

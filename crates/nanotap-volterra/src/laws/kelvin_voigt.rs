@@ -7,13 +7,13 @@
 //! then where the tip is not: no force, until the tip is outside or presses again; a surface
 //! that pulls stays until `d = a0`.
 
-use crate::dual::Scalar;
 use crate::law::{Approach, Remark};
 use crate::laws::elastic::{Shape, deep};
 use crate::laws::entry::{
     CONTACT_DISTANCE, Entry, HALF_ANGLE, MODULUS, POISSON, ParameterEntry, Part, RADIUS, VISCOSITY,
 };
 use crate::laws::formula::{Edge, Formula, Way};
+use nanotap_arithmetic::Scalar;
 
 /// See the module.
 #[derive(Clone, Copy, Debug)]

@@ -24,6 +24,7 @@ mod family;
 pub mod file;
 pub mod force_table;
 pub mod key;
+mod moving_gap;
 pub mod near_name;
 pub mod physical;
 mod quantities;
@@ -44,6 +45,7 @@ use serde::{Serialize, Serializer};
 pub use error::{CaseError, NoSuchKey, ValueOfKeyError};
 pub use family::{Family, PlaneFamily};
 pub use key::Key;
+pub use moving_gap::MovingGap;
 pub use stated::{Value, ValueError};
 
 use file::{CaseFileError, Described, Source};

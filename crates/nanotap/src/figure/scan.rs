@@ -97,7 +97,11 @@ fn bands(report: &ScanReport, factor: f64, state: Interaction) -> Vec<(f64, f64)
     let states = &report.trace.state[0];
     let step = factor * report.size[0] / states.len().max(1) as f64;
     let mut bands: Vec<(f64, f64)> = Vec::new();
-    for (k, _) in states.iter().enumerate().filter(|(_, s)| **s == Some(state)) {
+    for (k, _) in states
+        .iter()
+        .enumerate()
+        .filter(|(_, s)| **s == Some(state))
+    {
         let (from, to) = (step * k as f64, step * (k + 1) as f64);
         match bands.last_mut() {
             Some(last) if (last.1 - from).abs() < 0.5 * step => last.1 = to,

@@ -35,7 +35,8 @@ use std::sync::Arc;
 
 use nalgebra::DMatrix;
 use nanotap_dynamics::{
-    Control, PeriodicOrbit, ShootingError, ShootingOptions, StroboscopicMap as _, close_orbit,
+    Control, PeriodicOrbit, Scheduling as _, ShootingError, ShootingOptions, StroboscopicMap as _,
+    close_orbit,
 };
 use nanotap_flow::FlowError;
 use nanotap_volterra::VolterraError;
@@ -335,7 +336,7 @@ impl Map {
     ///
     /// # Errors
     /// When the state does not fit, the motion cannot be followed, or the span makes no sense
-    /// or is longer than [`motion::MOST_PERIODS`].
+    /// or is longer than [`motion::MAX_PERIODS`].
     pub fn flow(&self, state: &[f64], from: f64, length: f64) -> Result<Motion, MapError> {
         self.fits(state, 1)?;
         Motion::follow(&self.model, state, from, length)

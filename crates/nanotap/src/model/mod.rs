@@ -18,7 +18,6 @@ pub mod enclosed;
 pub mod exact_beam;
 pub mod galerkin;
 mod grazed;
-pub mod higher_modes;
 mod measured_modes;
 mod motion_error;
 pub mod nonlinear;
@@ -91,9 +90,9 @@ pub struct Model {
     pub memory: usize,
     /// Phase of a second tone in rad.
     pub second_phase: f64,
-    /// What a sample's memory that is overwritten at the end of each contact does to
-    /// volumes of states.
-    pub forgetting: Option<Forgetting>,
+    /// How an internal variable of the surface that is overwritten at the end of each contact
+    /// changes volumes of states.
+    pub memory_reset: Option<MemoryReset>,
     /// The flow under a nonlinear force law; the system is then free flight alone.
     pub nonlinear: Option<Arc<Nonlinear>>,
     /// State at drive phase 0 from which a motion starts when no other is given; `None`: rest.
@@ -120,13 +119,13 @@ impl RigidStop {
     }
 }
 
-/// A memory `s` that is set anew when contact ends, fades in flight at a rate, and acts on
-/// the beam when it is met again.
+/// An internal variable `s` of the surface that is overwritten when contact ends, decays in flight,
+/// and acts on the beam when the tip meets the surface again.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Forgetting {
-    /// Its rate in flight, ≤ 0.
+pub struct MemoryReset {
+    /// Its rate in flight, in 1/time of the model, ≤ 0.
     pub rate: f64,
-    /// How much the state changes per change of `s` where contact begins.
+    /// Change of the state per change of `s` where contact begins.
     pub kick: nalgebra::DVector<f64>,
 }
 
@@ -151,6 +150,8 @@ pub(crate) struct PowersOnDemand {
     known: OnceLock<Vec<Powers>>,
     /// What they follow from, where they are not known from the start.
     equations: Option<Arc<Galerkin>>,
+    /// Gap of the model, where it is another than that of the equations.
+    gap: Option<f64>,
 }
 
 impl PowersOnDemand {
@@ -159,7 +160,18 @@ impl PowersOnDemand {
         Self {
             known: OnceLock::new(),
             equations: Some(Arc::new(equations)),
+            gap: None,
         }
+    }
+
+    /// The equations at the model's gap.
+    fn equations(&self) -> Option<Arc<Galerkin>> {
+        let known = self.equations.as_ref()?;
+        let Some(gap) = self.gap else {
+            return Some(Arc::clone(known));
+        };
+        let case = known.case.clone().with(Parameter::Alpha5, gap);
+        Galerkin::new(&case).ok().map(Arc::new)
     }
 }
 
@@ -168,6 +180,7 @@ impl From<Vec<Powers>> for PowersOnDemand {
         Self {
             known: known.into(),
             equations: None,
+            gap: None,
         }
     }
 }
@@ -175,7 +188,8 @@ impl From<Vec<Powers>> for PowersOnDemand {
 impl PartialEq for PowersOnDemand {
     /// Whether they are the same, worked out or not.
     fn eq(&self, other: &Self) -> bool {
-        self.equations == other.equations && (self.equations.is_some() || self.known == other.known)
+        let of = |powers: &Self| (powers.equations.clone(), powers.gap);
+        of(self) == of(other) && (self.equations.is_some() || self.known == other.known)
     }
 }
 
@@ -240,14 +254,19 @@ impl Model {
         if let Some(law) = &case.law {
             return Self::under(law, galerkin, &drive);
         }
-        let law = case.contact_law(None);
-        let beam = Beam::new(&galerkin, &drive, law.has_memory)?;
+        Self::on(&case.contact_law(None), galerkin, drive)
+    }
+
+    /// The beam on a piecewise-linear sample.
+    fn on(law: &contact::law::Law, galerkin: Galerkin, drive: Drive) -> Result<Self, ModelError> {
+        let beam = Beam::new(&galerkin, &drive, law.internal)?;
         let regimes = vec![
             beam.regime(Regime::Free, &law.flight, true)?,
             beam.regime(Regime::Contact, &law.contact, law.plain_contact)?,
         ];
-        let system = Arc::new(System::new(drive.clone(), regimes, beam.transitions(&law))?);
-        let outputs = beam.outputs(&law);
+        let system = Arc::new(System::new(drive.clone(), regimes, beam.transitions(law))?);
+        let outputs = beam.outputs(law);
+        let second_phase = galerkin.case.get(Parameter::Tone2Phase).to_radians();
         Ok(Self {
             contact: vec![false, true],
             tip: outputs.tip,
@@ -257,9 +276,9 @@ impl Model {
             power: PowersOnDemand::of(galerkin),
             rigid_stop: None,
             beam: Some(outputs.beam),
-            memory: usize::from(law.has_memory),
-            forgetting: outputs.forgetting,
-            second_phase: case.tone2_phase.to_radians(),
+            memory: law.internal,
+            memory_reset: outputs.memory_reset,
+            second_phase,
             nonlinear: None,
             start: None,
             system,
@@ -272,14 +291,14 @@ impl Model {
             let flight = contact::no_sample(memory).flight;
             beam.regime(Regime::Free, &flight, true)
         };
-        let bare = Beam::new(&galerkin, drive, false)?;
-        let nonlinear = Nonlinear::new(law, &bare, &free(&bare, false)?, drive)?;
-        let memory = nonlinear.remembers;
+        let bare = Beam::new(&galerkin, drive, 0)?;
+        let nonlinear = Nonlinear::new(law, &bare, &free(&bare, 0)?, drive)?;
+        let memory = nonlinear.discrete_entries();
         let beam = Beam::new(&galerkin, drive, memory)?;
         let regime = free(&beam, memory)?;
         let outputs = beam.outputs(&contact::no_sample(memory));
         let system = System::new(drive.clone(), vec![regime], vec![Vec::new()])?;
-        let second_phase = galerkin.case.tone2_phase.to_radians();
+        let second_phase = galerkin.case.get(Parameter::Tone2Phase).to_radians();
         Ok(Self {
             contact: vec![false],
             tip: outputs.tip,
@@ -289,8 +308,8 @@ impl Model {
             beam: Some(outputs.beam),
             power: PowersOnDemand::of(galerkin),
             rigid_stop: None,
-            memory: usize::from(memory),
-            forgetting: None,
+            memory,
+            memory_reset: None,
             second_phase,
             nonlinear: Some(Arc::new(nonlinear)),
             start: None,
@@ -300,8 +319,8 @@ impl Model {
 
     /// The equations of the cantilever that this is the model of.
     fn equations_of(&self, case: &Cantilever) -> Result<Arc<Galerkin>, ModelError> {
-        match &self.power.equations {
-            Some(known) => Ok(Arc::clone(known)),
+        match self.power.equations() {
+            Some(known) => Ok(known),
             None => Ok(Arc::new(Galerkin::new(case)?)),
         }
     }
@@ -309,22 +328,53 @@ impl Model {
     /// What feeds and drains energy; an entry a regime.
     pub fn power(&self) -> &[Powers] {
         self.power.known.get_or_init(|| {
-            let Some(galerkin) = &self.power.equations else {
+            let Some(galerkin) = self.power.equations() else {
                 return Vec::new();
             };
             let drive = self.system.drive();
             if self.nonlinear.is_some() {
-                let flight = contact::no_sample(self.memory > 0).flight;
+                let flight = contact::no_sample(self.memory).flight;
                 let free = &self.system.regimes()[0];
-                return Beam::new(galerkin, drive, self.memory > 0)
+                return Beam::new(&galerkin, drive, self.memory)
                     .map(|beam| vec![beam.powers_in(free, &flight)])
                     .unwrap_or_default();
             }
             let law = galerkin.case.contact_law(None);
-            Beam::new(galerkin, drive, law.has_memory)
+            Beam::new(&galerkin, drive, law.internal)
                 .map(|beam| beam.powers(&law, &self.system))
                 .unwrap_or_default()
         })
+    }
+
+    /// Calls `visit` with every constant of its outputs: the numbers that move with the gap, apart
+    /// from those of its system.
+    pub(crate) fn each_output_constant(&mut self, visit: &mut dyn FnMut(&mut f64)) {
+        let outputs = [&mut self.gap, &mut self.height].into_iter();
+        for output in outputs.chain(&mut self.force) {
+            visit(&mut output.constant);
+        }
+        if let Some(stop) = &mut self.rigid_stop {
+            visit(&mut stop.tip);
+        }
+        if self.power.equations.is_some() {
+            return;
+        }
+        for powers in self.power.known.get_mut().into_iter().flatten() {
+            let products = [&mut powers.drive, &mut powers.beam, &mut powers.sample];
+            let products = products.into_iter().chain([&mut powers.stored]).flatten();
+            for product in products {
+                visit(&mut product.a.constant);
+                visit(&mut product.b.constant);
+            }
+        }
+    }
+
+    /// Tells what follows from the equations that the gap is another.
+    pub(crate) fn set_gap_of_equations(&mut self, gap: f64) {
+        if self.power.equations.is_some() {
+            self.power.known = OnceLock::new();
+            self.power.gap = Some(gap);
+        }
     }
 
     /// Where the undriven system can rest, the tip farthest away first: of a piecewise-linear one
@@ -484,25 +534,25 @@ pub fn cantilever_tangent(
     }
     if model.nonlinear.is_some() {
         // Free flight alone.
-        let memory = model.memory > 0;
+        let memory = model.memory;
         let beam = Beam::new(&galerkin, model.system.drive(), memory)?;
         let change = beam.derivative(parameter);
         tangent.regimes[0] = change.regime(&beam, &contact::no_sample(memory).flight);
         return Ok(tangent);
     }
     let law = case.contact_law(Some(parameter));
-    let beam = Beam::new(&galerkin, model.system.drive(), law.has_memory)?;
+    let beam = Beam::new(&galerkin, model.system.drive(), law.internal)?;
     let change = beam.derivative(parameter);
-    for (r, answer) in [&law.flight, &law.contact].into_iter().enumerate() {
-        tangent.regimes[r] = change.regime(&beam, answer);
+    for (r, response) in [&law.flight, &law.contact].into_iter().enumerate() {
+        tangent.regimes[r] = change.regime(&beam, response);
     }
     tangent.guards = vec![
         vec![change.combined(&beam, &law.gap)],
-        vec![change.combined(&beam, &law.hold)],
+        vec![change.combined(&beam, &law.release_guard)],
     ];
-    if let Some(left) = &law.left {
-        let change = change.combined(&beam, left);
-        tangent.resets[1][0] = Some(beam.memory_jump(&change, 0.0));
+    if let Some(values) = &law.release_reset {
+        let changes = values.iter().map(|value| change.combined(&beam, value));
+        tangent.resets[1][0] = Some(beam.memory_jump(changes, 0.0));
     }
     Ok(tangent)
 }
@@ -518,11 +568,11 @@ pub(crate) fn cantilever_model_tangent(
 ) -> Result<ModelTangent, ModelError> {
     let galerkin = model.equations_of(case)?;
     let law = if model.nonlinear.is_some() {
-        contact::no_sample(model.memory > 0)
+        contact::no_sample(model.memory)
     } else {
         case.contact_law(Some(parameter))
     };
-    let beam = Beam::new(&galerkin, model.system.drive(), law.has_memory)?;
+    let beam = Beam::new(&galerkin, model.system.drive(), law.internal)?;
     let change = beam.derivative(parameter);
     let second_phase = f64::from(u8::from(parameter == Parameter::Tone2Phase));
     Ok(ModelTangent {
@@ -531,7 +581,7 @@ pub(crate) fn cantilever_model_tangent(
         force: [&law.flight, &law.contact]
             .iter()
             .take(model.force.len())
-            .map(|answer| change.combined(&beam, &answer.force))
+            .map(|response| change.combined(&beam, &response.force))
             .collect(),
         beam_power: change.beam_power(&beam, parameter),
         height: change.into_height(),
@@ -552,6 +602,139 @@ impl From<ModelError> for crate::Error {
                 "change the law of the sample in the case",
             ),
             ModelError::Flow(error) => error.into(),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use nanotap_dynamics::StroboscopicMap as _;
+
+    use super::*;
+    use crate::model::contact::dual::Dual;
+    use crate::model::contact::entry::{Damper, Entry, Numbers, any};
+    use crate::model::contact::law::{Bilinear, Law, LinearForm, SampleResponse};
+    use crate::model::parameter::{ParameterEntry, SampleKey, Unit};
+    use crate::model::strobe::Strobe;
+
+    /// A number of a relaxing arm.
+    const fn arm(name: &'static str, unit: Unit) -> ParameterEntry {
+        let key = SampleKey::Own {
+            meaning: "number of an arm",
+            zero: true,
+        };
+        ParameterEntry::new(name, name, "number of an arm")
+            .of(unit, name, name)
+            .stated_by(key)
+    }
+
+    /// A generalised Maxwell sample of two arms, as a file of the table would declare it.
+    static TWO_ARMS: Entry = Entry {
+        name: "two-arms",
+        meaning: "spring parallel to two relaxing arms",
+        formula: "",
+        damper: Damper::InArm {
+            not_alpha6: "",
+            not_damping: "",
+            arm: |own| [own[0], own[0] * own[1]],
+        },
+        numbers: &[
+            arm("stiffness1", Unit::Stiffness),
+            arm("time1", Unit::Time),
+            arm("stiffness2", Unit::Stiffness),
+            arm("time2", Unit::Time),
+        ],
+        needs: "",
+        attracts: false,
+        objection: any,
+        like: None,
+        law: maxwell,
+    };
+
+    /// Spring and arms [stiffness, time]: with w_k the elongation of a damper, in contact
+    /// ẇ_k = (−V_T − w_k)/τ_k, and the whole pushes with −K (V_T + Σ k_k w_k/K).
+    fn maxwell(numbers: Numbers<'_>) -> Law {
+        let one = Dual::constant(1.0);
+        let arms: Vec<[Dual; 2]> = numbers.own.chunks(2).map(|arm| [arm[0], arm[1]]).collect();
+        let all = arms.iter().fold(numbers.stiffness, |sum, [k, _]| sum + *k);
+        let elongations = arms
+            .iter()
+            .enumerate()
+            .map(|(i, [k, _])| LinearForm::internal(i, *k / all));
+        let recovered = elongations.fold(LinearForm::default(), |sum, of| sum.plus(&of));
+        let response = |force, indentation: &LinearForm| {
+            let springs = arms.iter().enumerate().map(|(i, [k, time])| {
+                let spring = indentation.plus(&LinearForm::internal(i, -one));
+                (spring, *k, *time)
+            });
+            let springs: Vec<_> = springs.collect();
+            let energy =
+                |(spring, k, _): &(LinearForm, Dual, Dual)| Bilinear::square(0.5 * k.value, spring);
+            SampleResponse {
+                force,
+                rates: springs
+                    .iter()
+                    .map(|(of, _, time)| of.times(one / *time))
+                    .collect(),
+                dissipated: springs
+                    .iter()
+                    .map(|(of, k, time)| Bilinear::square(k.value / time.value, of))
+                    .collect(),
+                stored: springs.iter().map(energy).collect(),
+            }
+        };
+        let gap = LinearForm::height(one).plus(&recovered);
+        Law {
+            internal: arms.len(),
+            release_guard: gap.times(-one),
+            release_reset: None,
+            onsets: None,
+            flight: response(LinearForm::default(), &recovered),
+            contact: response(gap.times(-all), &LinearForm::height(-one)),
+            gap,
+            plain_contact: false,
+        }
+    }
+
+    /// Two equal arms are one arm of double stiffness, and an arm without stiffness is none.
+    #[test]
+    fn a_law_with_two_internal_variables_is_one_entry() {
+        let case = Cantilever {
+            alpha6: 0.0,
+            omega: 20.0,
+            ..Cantilever::paper()
+        };
+        let model = |own: &[f64]| {
+            let own: Vec<Dual> = own.iter().map(|&number| Dual::constant(number)).collect();
+            let stiffness = Dual::constant(case.alpha4);
+            let law = (TWO_ARMS.law)(Numbers {
+                stiffness,
+                damping: Dual::constant(0.0),
+                own: &own,
+            });
+            let galerkin = Galerkin::new(&case).unwrap();
+            Model::on(&law, galerkin, drive_of(&case).unwrap()).unwrap()
+        };
+        let solid = crate::model::contact::ContactLaw::StandardLinearSolid;
+        let single = Model::cantilever(&case.clone().on(solid, &[40.0, 0.05])).unwrap();
+        let mut map = Strobe::new(&single);
+        for (numbers, same) in [
+            ([20.0, 0.05, 20.0, 0.05], true),
+            ([40.0, 0.05, 0.0, 3.0], false),
+        ] {
+            let pair = model(&numbers);
+            assert_eq!((pair.memory, pair.dimension()), (2, 8));
+            let mut both = Strobe::new(&pair);
+            let mut expected = vec![0.05, 0.0, 0.0, -0.5, 0.0, 0.0, 0.02];
+            let mut state = [&expected[..], &[expected[6]]].concat();
+            for _ in 0..6 {
+                map.advance(&mut expected).unwrap();
+                both.advance(&mut state).unwrap();
+                for (found, expected) in state.iter().zip(&expected) {
+                    assert!((found - expected).abs() < 1e-11, "{state:?} {expected:?}");
+                }
+                assert!(!same || (state[7] - expected[6]).abs() < 1e-11);
+            }
         }
     }
 }

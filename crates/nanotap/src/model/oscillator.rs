@@ -315,7 +315,7 @@ impl Oscillator {
             rigid_stop,
             beam: None,
             memory: 0,
-            forgetting: None,
+            memory_reset: None,
             nonlinear: None,
             start: None,
             second_phase: 0.0,

@@ -16,7 +16,7 @@ use nanotap_arithmetic::ComplexFunctions as _;
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, PoisonError};
 
-use nanotap_flow::accumulate::{Accumulator, Request};
+use nanotap_flow::accumulate::{Accumulator, Functional, Request};
 use nanotap_flow::flow::SegmentView;
 use nanotap_flow::trajectory::Recorder;
 use nanotap_flow::{Complex, Flow, FlowError, Output, Trajectory};
@@ -464,14 +464,14 @@ fn least_heights(model: &Model, beam: &BeamOutputs, state: &[f64]) -> Result<Vec
     let keys: Vec<_> = (0..=count)
         .map(|i| {
             let height = request.output(&beam.height(i as f64 / count as f64));
-            request.least(height)
+            request.add(Functional::Least(height))
         })
         .collect();
     let mut heights = Accumulator::new(&request.plan(&model.system)?);
     let mut flow = Flow::new(Arc::clone(&model.system));
     flow.start(state, 0.0)?;
     flow.run_period(&mut heights)?;
-    Ok(keys.iter().map(|key| heights.extremum(*key)).collect())
+    Ok(keys.iter().map(|key| heights.values()[*key].re).collect())
 }
 
 /// Looks for the clearance of motions under a nonlinear force: the places of the beam are

@@ -2,18 +2,18 @@
 //! names and, of a physical case, those that have a unit in SI under their names in SI with
 //! the unit in brackets.
 
-use super::table::{Observable, Observables, Set};
+use super::table::{Observable, ObservableSet, Observables};
 use super::{Dimension, PhysicalMotion};
 use crate::case::physical::quantity::JOULES_PER_ELECTRONVOLT;
 
 /// The observables that SI says more of than the model.
-fn with_units(set: Set) -> impl Iterator<Item = &'static Observable> {
+fn with_units(set: ObservableSet) -> impl Iterator<Item = &'static Observable> {
     set.iter()
         .filter(|o| o.is_number && o.dimension.kind().is_some())
 }
 
 /// Names of the columns of `set`, of a physical case too.
-pub fn columns(set: Set, physical: bool) -> Vec<String> {
+pub fn columns(set: ObservableSet, physical: bool) -> Vec<String> {
     let numbers = set.iter().filter(|o| o.is_number);
     let mut names: Vec<String> = numbers.map(|o| o.name.to_owned()).collect();
     if physical {
@@ -31,7 +31,7 @@ pub fn columns(set: Set, physical: bool) -> Vec<String> {
 /// The numbers of these columns: empty where a motion has none or is not known, and without
 /// those in SI where `physical` is `None`.
 pub fn cells(
-    set: Set,
+    set: ObservableSet,
     observables: Option<&Observables>,
     physical: Option<Option<&PhysicalMotion>>,
 ) -> Vec<Option<f64>> {

@@ -46,7 +46,7 @@ impl<'a> Contacts<'a> {
     /// Of a motion of `model` that is still to run.
     pub fn of(model: &'a Model) -> Self {
         let drive = model.system.drive();
-        let gap = if model.forgetting.is_some() {
+        let gap = if model.memory_reset.is_some() {
             &model.height
         } else {
             &model.gap

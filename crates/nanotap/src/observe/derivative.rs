@@ -2,9 +2,8 @@
 //!
 //! An orbit x of period n is a zero of Pⁿ(x; θ) − x, so that by the implicit function theorem
 //! dx/dθ = (1 − DPⁿ)⁻¹ ∂Pⁿ/∂θ. With this start the sensitivity of the flow is the orbit's own,
-//! and a [`Variation`] has of every integral, Fourier coefficient and extremum that observables
-//! are read from its derivative; the observables are then read once more, each number with its
-//! derivative beside it. Where the period varies, derivatives are at constant drive phase.
+//! and a [`Variation`] gives every integral, Fourier coefficient and extremum that observables are
+//! read from with its derivative; the observables are then read as numbers with derivatives. Where the period varies, derivatives are at constant drive phase.
 //!
 //! Under a nonlinear force the same is read off the variation's dense output
 //! ([`gather`](super::varied_motion)). Keys that change the lever's modes, by mass or damping, are the
@@ -14,22 +13,23 @@ use std::borrow::Cow;
 use std::sync::Arc;
 
 use nalgebra::{DMatrix, DVector};
-use nanotap_flow::variation::{Variation, Varied, VariedOutput, Wanted};
-use nanotap_flow::{Flow, FlowError, Output};
+use nanotap_arithmetic::Dual;
+use nanotap_flow::variation::{Speeds, Variation, VariedOutput};
+use nanotap_flow::{Flow, FlowError, Output, accumulate};
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::ser::{Serialize, SerializeMap, Serializer};
 use serde_json::{Map, Value as Json, json};
 
 use super::clearance::Clearance;
-use super::measure::{beginnings, contact_regimes, frequency};
-use super::measured::{Beginnings, Found, Impacts, Measured, Need, Signal, Tone};
+use super::functional::{Requirements, Signal, Tone};
+use super::measure::beginnings;
+use super::measured::{Beginnings, Found, Impacts, Measured};
 use super::number::Phasor;
-use super::table::{OBSERVABLES, Observable, Observables, Set};
+use super::record::measure;
+use super::table::{OBSERVABLES, Observable, ObservableSet, Observables};
 use super::value::Value;
-use super::varied_motion::{Change, Gathered, gather};
-use super::watch::measure;
+use super::varied_motion::{Change, Varied, gather};
 use crate::case::{Case, CaseError, Key};
-use crate::model::contact::dual::Dual;
 use crate::model::nonlinear::{self, Nonlinear};
 use crate::model::strobe::Strobe;
 use crate::model::{Model, ModelTangent, MotionError, Tangent, TangentKind};
@@ -48,7 +48,10 @@ pub enum DerivativeError {
     NotIsolated,
 }
 
-/// The derivative of a periodic orbit and of what is observed of it.
+/// The derivatives of observables.
+type Changes = Vec<(&'static Observable, Value)>;
+
+/// The derivative of a periodic orbit and of its observables.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Derivative {
     /// The unit of the key in SI; none of a number of the equations.
@@ -74,7 +77,7 @@ impl Derivative {
         key: Key,
         (state, period): (&[f64], usize),
         observed: &Observables,
-        set: Set,
+        set: ObservableSet,
     ) -> Result<Self, DerivativeError> {
         let of_map = case.tangent(model, key)?;
         let start = orbit_derivative(model, of_map.clone(), state, period)?;
@@ -85,14 +88,13 @@ impl Derivative {
             (nonlinear, by) => nonlinear.as_ref().zip(by),
         };
         let tangent = case.model_tangent(model, key)?;
-        let mut followed = Followed::new(model, &tangent, set, observed.beam_clearance_xi);
-        match under {
+        let followed = Followed::new(model, &tangent, set, observed.beam_clearance_xi);
+        let observables = match under {
             None => followed
                 .run(state, &start, period)
                 .map_err(MotionError::from)?,
             Some((nonlinear, by)) => followed.run_under(nonlinear, state, by(&start), period)?,
-        }
-        let observables = followed.changes(set);
+        };
         let physical = case
             .physical()
             .map(|view| {
@@ -125,7 +127,7 @@ impl Derivative {
         key: Key,
         (state, period): (&[f64], usize),
         start: Vec<f64>,
-        set: Set,
+        set: ObservableSet,
     ) -> Result<Self, DerivativeError> {
         let size = |values: &[f64]| values.iter().fold(0.0, |m: f64, v| m.max(v.abs()));
         let value = case.get(key);
@@ -249,13 +251,13 @@ pub(crate) fn first_harmonic_changes(
     by: &DMatrix<f64>,
 ) -> Result<DMatrix<f64>, DerivativeError> {
     let n = state.len();
-    let set = Set::FIRST_HARMONIC;
+    let set = ObservableSet::FIRST_HARMONIC;
     let mut rows = DMatrix::zeros(2, n + keys.len());
     let Some(nonlinear) = &model.nonlinear else {
         let mut of = |column: usize, tangent: &ModelTangent, start: &[f64]| {
-            let mut followed = Followed::new(model, tangent, set, None);
-            followed.run(state, start, 1).map_err(MotionError::from)?;
-            for (row, (_, change)) in followed.changes(set).iter().enumerate().take(2) {
+            let followed = Followed::new(model, tangent, set, None);
+            let changes = followed.run(state, start, 1).map_err(MotionError::from)?;
+            for (row, (_, change)) in changes.iter().enumerate().take(2) {
                 rows[(row, column)] = change.number().unwrap_or(f64::NAN);
             }
             Ok::<_, DerivativeError>(())
@@ -325,15 +327,12 @@ fn tip_changes(
     changes: &[Change],
 ) -> Result<Vec<[f64; 2]>, MotionError> {
     let tip = nanotap_volterra::VariedOutput::fixed(nonlinear.output(&model.tip, 0.0));
-    let wanted = Wanted {
-        fouriers: vec![(0, frequency(model, Tone::First))],
-        ..Wanted::default()
-    };
-    let gathered = gather(nonlinear, state, 1, changes, (&[tip], &wanted), None)?;
-    let of = |gathered: &Gathered| {
-        let integral = phasor(gathered.fouriers[0]);
-        let component = integral.times(Dual::constant(2.0) / dual(gathered.duration));
-        [component.norm().derivative, component.lag().derivative]
+    let first = accumulate::Functional::Fourier(0, Tone::First.frequency(model));
+    let gathered = gather(nonlinear, state, 1, changes, (&[tip], &[first]), None)?;
+    let of = |varied: &Varied| {
+        let integral = Phasor::from(varied.values[0]);
+        let component = integral.times(Dual::constant(2.0) / varied.duration);
+        [component.norm().derivative(), component.lag().derivative()]
     };
     Ok(gathered.iter().map(of).collect())
 }
@@ -386,112 +385,73 @@ fn orbit_derivative(
         .ok_or(DerivativeError::NotIsolated)
 }
 
-/// An orbit on its way, and what is gathered of it.
+/// An orbit and a change of it, to be followed together.
 struct Followed<'a> {
     model: &'a Model,
     tangent: &'a ModelTangent,
-    needs: Vec<(Need, Place)>,
-    /// Each with its output.
-    signals: Vec<Signal>,
-    outputs: Vec<VariedOutput>,
-    wanted: Wanted,
+    set: ObservableSet,
+    required: Requirements,
+    /// Where the beam comes nearest to the sample, if the change of its clearance is wanted.
     clearance: Option<f64>,
-    /// What was found, once it ran.
-    found: Option<Found<Dual>>,
-}
-
-/// Where a need stands among what is wanted.
-#[derive(Clone, Copy)]
-enum Place {
-    Extremum(usize),
-    Integral(usize),
-    Product(usize),
-    Fourier(usize),
 }
 
 impl<'a> Followed<'a> {
-    fn new(model: &'a Model, tangent: &'a ModelTangent, set: Set, clearance: Option<f64>) -> Self {
-        let mut asked = Measured::<Dual>::nothing(model);
-        Observables::changes(set, &mut asked);
-        let mut followed = Self {
+    fn new(
+        model: &'a Model,
+        tangent: &'a ModelTangent,
+        set: ObservableSet,
+        clearance: Option<f64>,
+    ) -> Self {
+        let mut measured = Measured::<Dual>::of(model, None);
+        Observables::changes(set, &mut measured);
+        Self {
             model,
             tangent,
-            needs: Vec::new(),
-            signals: Vec::new(),
-            outputs: Vec::new(),
-            wanted: Wanted::default(),
+            set,
+            required: measured.required,
             clearance,
-            found: None,
-        };
-        for need in asked.asked {
-            let place = followed.want(need);
-            followed.needs.push((need, place));
-        }
-        followed
-    }
-
-    fn want(&mut self, need: Need) -> Place {
-        let channel = |of: &mut Self, signal: Signal| {
-            if let Some(known) = of.signals.iter().position(|known| *known == signal) {
-                return known;
-            }
-            of.signals.push(signal);
-            of.outputs.push(varied(signal, of.model, of.tangent));
-            of.signals.len() - 1
-        };
-        match need {
-            Need::Least(signal) | Need::Greatest(signal) => {
-                let sign = if matches!(need, Need::Least(_)) {
-                    -1.0
-                } else {
-                    1.0
-                };
-                let output = channel(self, signal);
-                self.wanted.extrema.push((output, sign));
-                Place::Extremum(self.wanted.extrema.len() - 1)
-            }
-            Need::Integral(signal) => {
-                let output = channel(self, signal);
-                self.wanted.integrals.push(output);
-                Place::Integral(self.wanted.integrals.len() - 1)
-            }
-            Need::Product(a, b) => {
-                let (a, b) = (channel(self, a), channel(self, b));
-                self.wanted.products.push((a, b));
-                Place::Product(self.wanted.products.len() - 1)
-            }
-            Need::Fourier(signal, tone) => {
-                let output = channel(self, signal);
-                self.wanted
-                    .fouriers
-                    .push((output, frequency(self.model, tone)));
-                Place::Fourier(self.wanted.fouriers.len() - 1)
-            }
         }
     }
 
-    /// Follows the orbit, which changes by `start` at its beginning.
-    fn run(&mut self, state: &[f64], start: &[f64], period: usize) -> Result<(), FlowError> {
+    /// The outputs that are followed: the required signals, and the height of the point of the beam
+    /// that comes nearest to the sample.
+    fn outputs(&self) -> Vec<VariedOutput> {
+        let signals = self.required.signals.iter();
+        let own = signals.map(|signal| varied(*signal, self.model, self.tangent));
+        own.chain(self.lowest()).collect()
+    }
+
+    /// The functionals of these outputs, the least of that height last.
+    fn functionals(&self) -> Vec<accumulate::Functional> {
+        let lowest = self.lowest().map(|_| self.required.signals.len());
+        let mut all = self.required.numbered(self.model);
+        all.extend(lowest.map(accumulate::Functional::Least));
+        all
+    }
+
+    /// The height of the point of the beam that comes nearest to the sample.
+    fn lowest(&self) -> Option<VariedOutput> {
+        let (xi, beam) = self.clearance.zip(self.model.beam.as_ref())?;
+        // The base moves as the tip's height does, apart from the beam's shape.
+        let zero = self.model.tip.scaled(0.0);
+        let change = zero.plus(1.0, &tones_of(&self.tangent.base));
+        let system = &self.model.system;
+        Some(VariedOutput::same(system, &beam.height(xi), &change))
+    }
+
+    /// Follows the orbit of a piecewise-linear model, which changes by `start` at its beginning.
+    fn run(&self, state: &[f64], start: &[f64], period: usize) -> Result<Changes, FlowError> {
         let model = self.model;
-        let (mut outputs, mut wanted) = (self.outputs.clone(), self.wanted.clone());
-        // Beside what observables read: time in contact, speeds, the beam's least height.
+        let (mut outputs, mut functionals) = (self.outputs(), self.functionals());
+        // In addition: the time in contact.
         let zero = model.tip.scaled(0.0);
-        let regimes = 0..model.contact.len();
-        let touching = |r| {
-            zero.clone()
-                .with_constant(f64::from(u8::from(model.contact[r])))
-        };
+        let touching = |contact: &bool| zero.clone().with_constant(f64::from(u8::from(*contact)));
         outputs.push(VariedOutput {
-            value: regimes.map(touching).collect(),
+            value: model.contact.iter().map(touching).collect(),
             change: vec![zero.clone(); model.contact.len()],
         });
-        wanted.integrals.push(outputs.len() - 1);
-        wanted.speeds = beginnings(model).collect();
-        if let Some(height) = self.lowest() {
-            outputs.push(height);
-            wanted.extrema.push((outputs.len() - 1, -1.0));
-        }
-        let mut flow = Flow::new(std::sync::Arc::clone(&model.system));
+        functionals.push(accumulate::Functional::Integral(outputs.len() - 1));
+        let mut flow = Flow::new(Arc::clone(&model.system));
         flow.start(state, 0.0)?;
         let mut variation = Variation::new(
             &model.system,
@@ -499,48 +459,44 @@ impl<'a> Followed<'a> {
             flow.regime(),
             start,
             outputs,
-            wanted,
+            functionals,
+            beginnings(model),
         );
         for _ in 0..period {
             flow.run_period(&mut variation)?;
         }
         variation.finish();
-        let mut gathered = Gathered {
-            duration: variation.duration,
-            contact_time: contact_regimes(model)
-                .next()
-                .map_or_else(Varied::default, |_| {
-                    variation.integrals[self.wanted.integrals.len()]
-                }),
-            ..Gathered::default()
-        };
-        for speed in &variation.speeds {
-            if speed.value > gathered.greatest_speed.value {
-                gathered.greatest_speed = *speed;
+        let contact_time = variation
+            .values
+            .pop()
+            .filter(|_| model.contact.contains(&true));
+        let mut greatest_speed = Dual::default();
+        for (_, speeds) in &variation.speeds {
+            if speeds.greatest.value > greatest_speed.value {
+                greatest_speed = speeds.greatest;
             }
         }
-        let impacts = self.impacts(&variation);
-        gathered.integrals = variation.integrals;
-        gathered.products = variation.products;
-        gathered.fouriers = variation.fouriers;
-        gathered.extrema = variation.extrema;
-        let mut found = self.read(&gathered, period);
-        found.impacts = impacts;
-        self.found = Some(found);
-        Ok(())
+        let impacts = self.impacts(&variation.speeds);
+        let gathered = Varied {
+            values: variation.values,
+            greatest_speed,
+            contact_time: contact_time.map_or_else(Dual::default, |time| time.re),
+            duration: variation.duration,
+        };
+        Ok(self.changes(gathered, impacts, period))
     }
 
-    /// What impacts on a rigid stop did.
-    fn impacts(&self, variation: &Variation<'_>) -> Impacts<Dual> {
+    /// The impacts on a rigid stop.
+    fn impacts(&self, speeds: &[((usize, usize), Speeds)]) -> Impacts<Dual> {
         let Some(stop) = self.model.rigid_stop else {
             return Impacts::default();
         };
         let by = self.tangent.rigid_stop;
         let (mut bounced, mut stuck) = ([Dual::default(); 2], [Dual::default(); 2]);
-        for (k, (from, to)) in beginnings(self.model).enumerate() {
+        for ((from, to), speeds) in speeds {
             let sums = if from == to { &mut bounced } else { &mut stuck };
-            sums[0] = sums[0] + dual(variation.summed_speeds[k]);
-            sums[1] = sums[1] + dual(variation.squared_speeds[k]);
+            sums[0] = sums[0] + speeds.sum;
+            sums[1] = sums[1] + speeds.squares;
         }
         let stop = [
             Dual::new(stop.mass, by.mass),
@@ -550,93 +506,59 @@ impl<'a> Followed<'a> {
         Impacts::new(stop, bounced, stuck)
     }
 
-    /// The same under a nonlinear force.
+    /// Follows the orbit of a model under a nonlinear force.
     fn run_under(
-        &mut self,
+        &self,
         nonlinear: &Arc<Nonlinear>,
         state: &[f64],
         change: Change,
         period: usize,
-    ) -> Result<(), MotionError> {
+    ) -> Result<Changes, MotionError> {
         let under = |output: &VariedOutput, force: f64| nanotap_volterra::VariedOutput {
             value: nonlinear.output(&output.value[0], force),
             changes: vec![nonlinear.output(&output.change[0], 0.0)],
         };
-        let signals = self.signals.iter().zip(&self.outputs);
-        let mut outputs: Vec<_> = signals
-            .map(|(signal, output)| under(output, signal.force_part(nonlinear)))
+        let forces = self
+            .required
+            .signals
+            .iter()
+            .map(|s| s.force_part(nonlinear));
+        let outputs = self.outputs();
+        let outputs = outputs.iter().zip(forces.chain([0.0]));
+        let outputs: Vec<_> = outputs
+            .map(|(output, force)| under(output, force))
             .collect();
-        let mut wanted = self.wanted.clone();
-        if let Some(height) = self.lowest() {
-            outputs.push(under(&height, 0.0));
-            wanted.extrema.push((outputs.len() - 1, -1.0));
-        }
         let rate = under(&varied(Signal::HeightRate, self.model, self.tangent), 0.0);
-        let asked = (outputs.as_slice(), &wanted);
-        let gathered = gather(nonlinear, state, period, &[change], asked, Some(&rate))?;
-        self.found = gathered.first().map(|gathered| self.read(gathered, period));
-        Ok(())
+        let wanted = (outputs.as_slice(), &*self.functionals());
+        let gathered = gather(nonlinear, state, period, &[change], wanted, Some(&rate))?;
+        let gathered = gathered.into_iter().next().unwrap_or_default();
+        Ok(self.changes(gathered, Impacts::default(), period))
     }
 
-    /// The height of the point of the beam that comes nearest to the sample.
-    fn lowest(&self) -> Option<VariedOutput> {
-        let (xi, beam) = self.clearance.zip(self.model.beam.as_ref())?;
-        // The base moves as the tip's height does beside the beam's shape.
-        let zero = self.model.tip.scaled(0.0);
-        let change = zero.plus(1.0, &tones_of(&self.tangent.base));
-        let system = &self.model.system;
-        Some(VariedOutput::same(system, &beam.height(xi), &change))
-    }
-
-    fn read(&self, gathered: &Gathered, period: usize) -> Found<Dual> {
-        let real = |number: Varied<f64>| Phasor {
-            re: dual(number),
-            im: Dual::default(),
-        };
-        let value = |place| match place {
-            Place::Extremum(at) => real(gathered.extrema[at]),
-            Place::Integral(at) => real(gathered.integrals[at]),
-            Place::Product(at) => real(gathered.products[at]),
-            Place::Fourier(at) => phasor(gathered.fouriers[at]),
-        };
-        let heights = gathered.extrema.get(self.wanted.extrema.len());
-        let values = self.needs.iter();
-        Found {
-            values: values.map(|&(need, place)| (need, value(place))).collect(),
-            duration: dual(gathered.duration),
+    fn changes(&self, gathered: Varied, impacts: Impacts<Dual>, period: usize) -> Changes {
+        let required = &self.required.functionals;
+        let lowest = gathered.values.get(required.len()).map(|value| value.re);
+        let values = gathered.values.into_iter().map(Phasor::from);
+        let found = Found {
+            values: required.iter().copied().zip(values).collect(),
+            duration: gathered.duration,
             periods: period as u64,
-            contact_time: dual(gathered.contact_time),
+            contact_time: gathered.contact_time,
             contacts: Beginnings {
-                greatest_speed: dual(gathered.greatest_speed),
+                greatest_speed: gathered.greatest_speed,
                 ..Beginnings::default()
             },
             stored: Dual::default(),
             stored_by_sample: Dual::default(),
-            clearance: self.clearance.zip(heights).map(|(xi, height)| Clearance {
-                height: dual(*height),
+            clearance: self.clearance.zip(lowest).map(|(xi, height)| Clearance {
+                height,
                 xi,
                 period: 0.0,
             }),
-            impacts: Impacts::default(),
+            impacts,
             second_phase: Dual::new(self.model.second_phase, self.tangent.second_phase),
-        }
-    }
-
-    fn changes(&mut self, set: Set) -> Vec<(&'static Observable, Value)> {
-        let mut measured = Measured::nothing(self.model);
-        measured.found = self.found.take();
-        Observables::changes(set, &mut measured)
-    }
-}
-
-const fn dual(number: Varied<f64>) -> Dual {
-    Dual::new(number.value, number.change)
-}
-
-fn phasor(number: Varied<nanotap_flow::Complex>) -> Phasor<Dual> {
-    Phasor {
-        re: Dual::new(number.value.re, number.change.re),
-        im: Dual::new(number.value.im, number.change.im),
+        };
+        Observables::changes(self.set, &mut Measured::of(self.model, Some(found)))
     }
 }
 

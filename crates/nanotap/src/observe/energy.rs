@@ -58,8 +58,8 @@ pub(super) fn balance<D: Number>(
     stored: D,
 ) -> EnergyBalance<D> {
     // Signed works cancel; the damping and the stored energy say how much moved.
-    let (drive, gain) = (drive_work.plain().abs(), stored.plain().abs());
-    let moved = drive + beam_damping.plain() + sample_damping.plain() + gain;
+    let (drive, gain) = (drive_work.value().abs(), stored.value().abs());
+    let moved = drive + beam_damping.value() + sample_damping.value() + gain;
     let rest = drive_work - beam_damping - sample_damping - stored;
     EnergyBalance {
         drive_work,

@@ -1,131 +1,30 @@
-//! What observables are read from: signals, what is gathered of them, and what follows.
-
-use nanotap_flow::{Complex, Output};
+//! Measurements of a motion, from which observables are read.
 
 use super::above_rounding;
 use super::clearance::Clearance;
 use super::energy::{EnergyBalance, PowerTerm, balance};
+use super::functional::{Functional, Requirements, Signal, Tone};
 use super::number::{Number, Phasor};
+use super::table::{ObservableSet, Observables};
 use crate::model::Model;
-use crate::model::nonlinear::Nonlinear;
 
-/// A scalar along a motion.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Signal {
-    /// Tip deflection W.
-    Tip,
-    /// Height of the tip over the undeformed surface, V_T.
-    Height,
-    /// Its rate.
-    HeightRate,
-    /// Force of the sample on the tip.
-    Force,
-    /// Slope at the tip; 0 of an oscillator.
-    Slope,
-    /// A factor of a power that is fed in or taken.
-    Power(PowerTerm),
-}
-
-impl Signal {
-    /// What it is in a model with a nonlinear law.
-    pub(super) fn reading(self, model: &Model, nonlinear: &Nonlinear) -> nanotap_volterra::Output {
-        nonlinear.output(&self.outputs(model)[0], self.force_part(nonlinear))
-    }
-
-    /// How much of a nonlinear law's force is in it beside its output.
-    pub(super) fn force_part(self, nonlinear: &Nonlinear) -> f64 {
-        match self {
-            Self::Force => 1.0,
-            Self::Power(term) => term.force_part(nonlinear),
-            _ => 0.0,
-        }
-    }
-
-    /// What it is in `model`, an entry a regime.
-    pub(super) fn outputs(self, model: &Model) -> Vec<Output> {
-        let same = |output: &Output| vec![output.clone(); model.system.regimes().len()];
-        match self {
-            Self::Tip => same(&model.tip),
-            Self::Height => same(&model.height),
-            Self::HeightRate => {
-                let drive = model.system.drive();
-                let rate =
-                    |r: &nanotap_flow::Regime| model.height.rate(r.matrix(), r.forcing(), drive);
-                model.system.regimes().iter().map(rate).collect()
-            }
-            Self::Force => model.force.clone(),
-            Self::Slope => same(
-                &model
-                    .beam
-                    .as_ref()
-                    .map_or_else(|| model.tip.scaled(0.0), |beam| beam.slope.clone()),
-            ),
-            Self::Power(term) => term.outputs(model),
-        }
-    }
-}
-
-/// A frequency of the drive.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Tone {
-    /// The drive's, of several tones the first.
-    First,
-    /// The second tone's.
-    Second,
-    /// So many times the drive's.
-    Harmonic(u32),
-}
-
-/// What is gathered.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Need {
-    Least(Signal),
-    Greatest(Signal),
-    Integral(Signal),
-    Product(Signal, Signal),
-    Fourier(Signal, Tone),
-}
-
-impl Need {
-    /// The signals that it is made of.
-    pub(super) const fn signals(&self) -> (Signal, Option<Signal>) {
-        match *self {
-            Self::Least(signal)
-            | Self::Greatest(signal)
-            | Self::Integral(signal)
-            | Self::Fourier(signal, _) => (signal, None),
-            Self::Product(a, b) => (a, Some(b)),
-        }
-    }
-
-    /// What it is of no time.
-    pub(super) const fn nothing(&self) -> Complex {
-        Complex::new(
-            match self {
-                Self::Least(_) => f64::INFINITY,
-                Self::Greatest(_) => f64::NEG_INFINITY,
-                _ => 0.0,
-            },
-            0.0,
-        )
-    }
-}
-
-/// What observables are read from. Before a run it is empty, and notes what they ask for.
+/// The measurements that observables are read from. Before a run there are none, and reading notes
+/// which are required.
 pub(super) struct Measured<'a, D = f64> {
     pub(super) model: &'a Model,
-    pub(super) asked: Vec<Need>,
-    pub(super) asked_ends: bool,
-    pub(super) asked_clearance: bool,
+    pub(super) required: Requirements,
     pub(super) found: Option<Found<D>>,
 }
 
-/// What was gathered of a motion.
+/// The measurements of a motion.
 pub(super) struct Found<D> {
-    pub(super) values: Vec<(Need, Phasor<D>)>,
+    /// The values of the required functionals, in their order.
+    pub(super) values: Vec<(Functional, Phasor<D>)>,
+    /// Length of time.
     pub(super) duration: D,
     /// Whole drive periods.
     pub(super) periods: u64,
+    /// Time in contact.
     pub(super) contact_time: D,
     pub(super) contacts: Beginnings<D>,
     /// Gain of stored energy.
@@ -133,10 +32,16 @@ pub(super) struct Found<D> {
     /// The part of it that a nonlinear law stores.
     pub(super) stored_by_sample: D,
     pub(super) clearance: Option<Clearance<D>>,
-    /// What impacts on a rigid stop did.
     pub(super) impacts: Impacts<D>,
     /// Phase of the second tone in rad.
     pub(super) second_phase: D,
+}
+
+impl Found<f64> {
+    /// The observables.
+    pub(super) fn observables(self, model: &Model, set: ObservableSet) -> Observables {
+        Observables::read(set, &mut Measured::of(model, Some(self)))
+    }
 }
 
 /// The contacts that began.
@@ -147,7 +52,7 @@ pub(super) struct Beginnings<D> {
     pub(super) greatest_speed: D,
 }
 
-/// What impacts on a rigid stop did: nothing where there is none.
+/// The impacts on a rigid stop, if there is one.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Impacts<D> {
     /// Sum of their impulses on the tip.
@@ -175,32 +80,27 @@ impl<D: Number> Impacts<D> {
 }
 
 impl<'a, D: Number> Measured<'a, D> {
-    /// Before the run.
-    pub(super) const fn nothing(model: &'a Model) -> Self {
+    /// With these measurements, or before the run.
+    pub(super) fn of(model: &'a Model, found: Option<Found<D>>) -> Self {
         Self {
             model,
-            asked: Vec::new(),
-            asked_ends: false,
-            asked_clearance: false,
-            found: None,
+            required: Requirements::default(),
+            found,
         }
     }
 
-    /// What was gathered; 0 before the run.
-    fn value(&mut self, need: Need) -> Phasor<D> {
-        if let Some(found) = &self.found {
-            let known = found.values.iter().find(|(known, _)| *known == need);
-            let nothing = Phasor {
-                re: D::from(f64::NAN),
-                im: D::default(),
-            };
-            known.map_or(nothing, |(_, value)| *value)
-        } else {
-            if !self.asked.contains(&need) {
-                self.asked.push(need);
-            }
-            Phasor::default()
-        }
+    /// The value of a functional; 0 before the run.
+    fn value(&mut self, functional: Functional) -> Phasor<D> {
+        let Some(found) = &self.found else {
+            self.required.add(functional);
+            return Phasor::default();
+        };
+        let known = found.values.iter().find(|(known, _)| *known == functional);
+        let unknown = Phasor {
+            re: D::from(f64::NAN),
+            im: D::default(),
+        };
+        known.map_or(unknown, |(_, value)| *value)
     }
 
     fn gathered(&self, read: impl Fn(&Found<D>) -> D) -> D {
@@ -209,12 +109,12 @@ impl<'a, D: Number> Measured<'a, D> {
 
     /// The least value of a signal.
     pub(super) fn least(&mut self, signal: Signal) -> D {
-        self.value(Need::Least(signal)).re
+        self.value(Functional::Least(signal)).re
     }
 
     /// Its greatest value.
     pub(super) fn greatest(&mut self, signal: Signal) -> D {
-        self.value(Need::Greatest(signal)).re
+        self.value(Functional::Greatest(signal)).re
     }
 
     /// Both.
@@ -224,12 +124,12 @@ impl<'a, D: Number> Measured<'a, D> {
 
     /// The time mean of a signal.
     pub(super) fn mean(&mut self, signal: Signal) -> D {
-        self.value(Need::Integral(signal)).re / self.duration()
+        self.value(Functional::Integral(signal)).re / self.duration()
     }
 
     /// `∫ a b dt`.
     fn product(&mut self, a: Signal, b: Signal) -> D {
-        self.value(Need::Product(a, b)).re
+        self.value(Functional::Product(a, b)).re
     }
 
     /// The time mean of the force of the sample on the tip, impulses of a rigid stop included.
@@ -250,7 +150,7 @@ impl<'a, D: Number> Measured<'a, D> {
 
     /// The component `Re(c e^{iωt})` of a signal at a frequency of the drive.
     pub(super) fn component(&mut self, signal: Signal, tone: Tone) -> Phasor<D> {
-        let c = self.value(Need::Fourier(signal, tone));
+        let c = self.value(Functional::Fourier(signal, tone));
         let duration = self.duration();
         Phasor {
             re: c.re * 2.0 / duration,
@@ -271,7 +171,7 @@ impl<'a, D: Number> Measured<'a, D> {
         if whole > 0 {
             whole as f64
         } else {
-            self.duration().plain() / self.model.period()
+            self.duration().value() / self.model.period()
         }
     }
 
@@ -285,6 +185,13 @@ impl<'a, D: Number> Measured<'a, D> {
         self.found
             .as_ref()
             .map_or_else(Beginnings::default, |found| found.contacts)
+    }
+
+    /// The time mean of the force while tip and sample touch; `None` without contact.
+    pub(super) fn mean_contact_force(&mut self) -> Option<D> {
+        let impulse = self.mean(Signal::Force) * self.duration();
+        let time = self.contact_time();
+        (time.value() > 0.0).then(|| impulse / time)
     }
 
     /// Whether the model is a beam.
@@ -309,7 +216,7 @@ impl<'a, D: Number> Measured<'a, D> {
     pub(super) fn least_force(&mut self) -> D {
         const ROUNDING: f64 = 1e-12;
         let (least, peak) = (self.least(Signal::Force), self.peak_force());
-        if least.plain().abs() <= ROUNDING * peak.plain() {
+        if least.value().abs() <= ROUNDING * peak.value() {
             0.0.into()
         } else {
             least
@@ -337,15 +244,15 @@ impl<'a, D: Number> Measured<'a, D> {
         let (force, depth) = if self.model.nonlinear.is_some() {
             // An attraction stores without contact.
             let [near, far] = self.range(Signal::Height);
-            let pull = -self.least(Signal::Force).plain();
+            let pull = -self.least(Signal::Force).value();
             (
-                self.peak_force().plain().max(pull),
-                (far.plain() - near.plain()),
+                self.peak_force().value().max(pull),
+                (far.value() - near.value()),
             )
         } else {
-            (self.peak_force().plain(), self.indentation().plain())
+            (self.peak_force().value(), self.indentation().value())
         };
-        if above_rounding(work.plain(), force, depth) == 0.0 {
+        if above_rounding(work.value(), force, depth) == 0.0 {
             0.0.into()
         } else {
             work
@@ -393,7 +300,7 @@ impl<'a, D: Number> Measured<'a, D> {
 
     /// What the drive feeds in, and what takes it.
     pub(super) fn energy_balance(&mut self) -> EnergyBalance<D> {
-        self.asked_ends = true;
+        self.required.stored = true;
         let model = self.model;
         let mut work = |terms: Vec<PowerTerm>| -> D {
             terms.into_iter().fold(D::default(), |sum, a| {
@@ -418,7 +325,7 @@ impl<'a, D: Number> Measured<'a, D> {
 
     /// Where the beam comes nearest to the sample.
     pub(super) fn clearance(&mut self) -> Option<Clearance<D>> {
-        self.asked_clearance = true;
+        self.required.clearance = true;
         // The beam's end stands a fixed height over the tip.
         self.least(Signal::Height);
         self.found.as_ref()?.clearance

@@ -13,6 +13,7 @@ use super::{Dimension, Harmonic, Spectrum};
 use crate::case::physical::quantity::JOULES_PER_ELECTRONVOLT;
 use crate::case::physical::sample::{Hertz, HertzMismatch};
 use crate::case::physical::{Physical, Scales};
+use crate::model::parameter::Parameter;
 
 /// What an experimenter would measure of a motion; SI units, angles in degrees. Written out
 /// by the observables' names in SI, energies in electronvolts too.
@@ -78,7 +79,7 @@ impl PhysicalMotion {
         let omega = view.cantilever.omega;
         let harmonics = spectrum.map_or(&[][..], |spectrum| &spectrum.harmonics);
         // A stiffness given as a number since is not Hertz's.
-        let own = |h: &Hertz| h.stiffness() == view.parameters.contact_stiffness;
+        let own = |h: &Hertz| h.stiffness() == view.parameters.get(Parameter::Alpha4);
         let hertz = view.sample.hertz.filter(own);
         Self {
             setting: Some(Setting {

@@ -15,14 +15,15 @@ use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::{Serialize, Serializer, ser::SerializeMap};
 use serde_json::Map;
 
-use super::measured::{Measured, Signal, Tone};
+use super::functional::{Signal, Tone};
+use super::measured::Measured;
 use super::number::{Number as _, Phasor};
 use super::value::{Measurable, Value, Varying};
 use super::{Dimension, EnergyBalance};
 use crate::case::physical::Scales;
 use crate::model::contact::dual::Dual;
 
-use Signal::{Force, Height, Slope, Tip};
+use Signal::{Height, Slope, Tip};
 
 /// One observable.
 #[derive(Debug)]
@@ -73,9 +74,9 @@ impl Observable {
 
 /// A choice of observables.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Set(u64);
+pub struct ObservableSet(u64);
 
-impl Set {
+impl ObservableSet {
     /// None.
     pub const NONE: Self = Self(0);
 
@@ -154,7 +155,7 @@ macro_rules! observables {
             };
 
             /// As `measured` has them.
-            pub(super) fn read(set: Set, measured: &mut Measured<'_>) -> Self {
+            pub(super) fn read(set: ObservableSet, measured: &mut Measured<'_>) -> Self {
                 let mut all = Self { periods: measured.periods(), ..Self::UNKNOWN };
                 $(if set.contains(&OBSERVABLES[Row::$name as usize]) {
                     #[allow(clippy::redundant_closure_call)] // the table writes closures
@@ -166,7 +167,7 @@ macro_rules! observables {
             /// How those of `set` change, as `measured` has them; what jumps, or where
             /// nothing is measured, is left out.
             pub(super) fn changes(
-                set: Set,
+                set: ObservableSet,
                 measured: &mut Measured<'_, Dual>,
             ) -> Vec<(&'static Observable, Value)> {
                 let mut all = Vec::new();
@@ -193,7 +194,7 @@ macro_rules! observables {
             }
         }
 
-        impl Set {
+        impl ObservableSet {
             /// What sweeps, branches and curves record of every motion.
             pub const COMMON: Self = Self($(observables!(@$where $name))|*);
 
@@ -319,7 +320,7 @@ observables! {
         "root mean square of the tip deflection about its mean",
         |m| {
             let mean = m.mean(Tip);
-            (m.mean_product(Tip, Tip) - mean * mean).at_least(0.0).sqrt()
+            (m.mean_product(Tip, Tip) - mean * mean).at_least(0.0).root()
         };
     gap_range: [f64; 2], Length, rare,
         "gap", "least and greatest height of the tip over the undeformed surface",
@@ -329,11 +330,7 @@ observables! {
         |m| m.least_force();
     contact_force: Option<f64>, Force, rare,
         "mean force in contact", "time mean of the force of the sample on the tip while they touch",
-        |m| {
-            let impulse = m.mean(Force) * m.duration();
-            let time = m.contact_time();
-            (time.plain() > 0.0).then(|| impulse / time)
-        };
+        |m| m.mean_contact_force();
     drive_power: f64, Power, rare,
         "power of the drive", "mean power of the drive",
         |m| m.energy_balance().drive_work / m.duration();

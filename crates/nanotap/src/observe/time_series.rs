@@ -1,15 +1,11 @@
 //! A motion as a table, a row an instant: for files and for Python.
 
-use std::sync::Arc;
+use nanotap_flow::Output;
 
-use nanotap_flow::trajectory::Recorder;
-use nanotap_flow::{Flow, Output};
-
-use crate::model::recording::each_period;
 use crate::model::{Model, MotionError};
 
-/// Most rows of a time series, in all: they fill some gigabytes.
-pub const MOST_ROWS: usize = 10_000_000;
+/// Maximum number of rows of a time series: they fill some gigabytes.
+pub const MAX_ROWS: usize = 10_000_000;
 
 /// The columns before the state.
 const COLUMNS: [&str; 6] = ["tau", "tip", "tip_rate", "gap", "force", "contact"];
@@ -54,7 +50,7 @@ pub(crate) fn with_modes(state: &[f64], memory: usize, modes: usize) -> Vec<f64>
 /// period.
 ///
 /// # Errors
-/// When there would be more than [`MOST_ROWS`] rows, and when the flow fails.
+/// When there would be more than [`MAX_ROWS`] rows, and when the flow fails.
 pub fn sample(
     model: &Model,
     start: &[f64],
@@ -63,92 +59,36 @@ pub fn sample(
     mut row: impl FnMut(&[f64]),
 ) -> Result<(), MotionError> {
     let rows = periods.saturating_mul(resolution).saturating_add(1);
-    if rows > MOST_ROWS {
-        let most = MOST_ROWS;
-        return Err(MotionError::TooManyRows { rows, most });
-    }
-    let outputs = Outputs::new(model);
-    let instants = |period: usize| {
-        let last = usize::from(period + 1 == periods);
-        (0..resolution + last).map(|k| model.period() * k as f64 / resolution as f64)
-    };
-    if let Some(nonlinear) = &model.nonlinear {
-        let (mut end, mut count) = (start.to_vec(), 0);
-        return each_period(nonlinear, &mut end, periods, |_, period| {
-            let tau = count as f64 * model.period();
-            for phase in instants(count) {
-                let Some(sample) = period.at(phase.min(period.span().1)) else {
-                    continue;
-                };
-                let mut state = sample.state.as_slice().to_vec();
-                if nonlinear.remembers {
-                    state.push(sample.branch as f64);
-                }
-                let contact = nonlinear.contact[sample.branch];
-                row(&outputs.row(model, contact, sample.force, &state, phase, tau + phase));
-            }
-            count += 1;
+    if rows > MAX_ROWS {
+        return Err(MotionError::TooManyRows {
+            rows,
+            most: MAX_ROWS,
         });
     }
-    let mut flow = Flow::new(Arc::clone(&model.system));
-    flow.start(start, 0.0)?;
-    let mut state = vec![0.0; model.dimension()];
+    let tip_rate = model.tip_rate();
+    let mut record = model.recorder(start)?;
     for period in 0..periods {
-        let mut recorder = Recorder::default();
-        flow.run_period(&mut recorder)?;
-        let trajectory = recorder.finish(Arc::clone(&model.system));
-        for phase in instants(period) {
-            let Some(segment) = trajectory.segment_at(phase) else {
+        let recording = record(1)?;
+        let last = usize::from(period + 1 == periods);
+        for k in 0..resolution + last {
+            let phase = model.period() * k as f64 / resolution as f64;
+            let Some(instant) = recording.instant(phase) else {
                 continue;
             };
-            let Some(at) = trajectory.state_at(phase) else {
-                continue;
-            };
-            state.copy_from_slice(&at);
-            let tau = period as f64 * model.period() + phase;
-            let contact = model.contact[segment.regime];
-            let force = model.force[segment.regime].at(model.system.drive(), &state, phase);
-            row(&outputs.row(model, contact, force, &state, phase, tau));
+            let at = |output: &Output| output.at(model.system.drive(), &instant.state, phase);
+            let contact = model.touches(instant.regime);
+            let mut numbers = vec![
+                period as f64 * model.period() + phase,
+                at(&model.tip),
+                at(&tip_rate),
+                at(&model.height),
+                model.force_at(&instant),
+                f64::from(u8::from(contact)),
+            ];
+            numbers.extend_from_slice(&instant.state);
+            model.set_surface(&mut numbers[COLUMNS.len()..], contact, at(&model.height));
+            row(&numbers);
         }
     }
     Ok(())
-}
-
-struct Outputs {
-    tip_rate: Output,
-}
-
-impl Outputs {
-    fn new(model: &Model) -> Self {
-        Self {
-            tip_rate: model.tip_rate(),
-        }
-    }
-
-    fn row(
-        &self,
-        model: &Model,
-        contact: bool,
-        force: f64,
-        state: &[f64],
-        phase: f64,
-        tau: f64,
-    ) -> Vec<f64> {
-        let at = |output: &Output| output.at(model.system.drive(), state, phase);
-        let mut row = vec![
-            tau,
-            at(&model.tip),
-            at(&self.tip_rate),
-            at(&model.height),
-            force,
-            f64::from(u8::from(contact)),
-        ];
-        row.extend_from_slice(state);
-        // In contact the surface is where the tip holds it. A memory that the end of the contact
-        // sets anew knows nothing of that.
-        if model.forgetting.is_some() && contact {
-            row[COLUMNS.len() + model.dimension() - model.memory] = at(&model.height);
-        }
-        row
-    }
 }

@@ -5,7 +5,7 @@ use std::fmt;
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::table::{Observables, Set};
+use super::table::{ObservableSet, Observables};
 use crate::model::Model;
 
 /// A ratio that a force law takes to be small, and that a motion makes large.
@@ -21,9 +21,9 @@ pub struct OutOfRange {
 
 impl OutOfRange {
     /// `set` with what [`OutOfRange::of`] looks at.
-    pub fn observed_with(model: &Model, set: Set) -> Set {
+    pub fn observed_with(model: &Model, set: ObservableSet) -> ObservableSet {
         match model.nonlinear {
-            Some(_) => set.union(Set::GAP),
+            Some(_) => set.union(ObservableSet::GAP),
             None => set,
         }
     }

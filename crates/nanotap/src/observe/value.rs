@@ -150,8 +150,8 @@ pub(super) trait Varying {
 
 impl Varying for Dual {
     fn change(self) -> Value {
-        if self.derivative.is_finite() {
-            Value::Number(self.derivative)
+        if self.derivative().is_finite() {
+            Value::Number(self.derivative())
         } else {
             Value::Absent
         }
@@ -160,7 +160,7 @@ impl Varying for Dual {
 
 impl Varying for [Dual; 2] {
     fn change(self) -> Value {
-        let ends = self.map(|end| end.derivative);
+        let ends = self.map(|end| end.derivative());
         if ends.iter().all(|end| end.is_finite()) {
             Value::Range(ends)
         } else {
@@ -172,10 +172,10 @@ impl Varying for [Dual; 2] {
 impl Varying for EnergyBalance<Dual> {
     fn change(self) -> Value {
         let energies = EnergyBalance {
-            drive_work: self.drive_work.derivative,
-            beam_damping: self.beam_damping.derivative,
-            sample_damping: self.sample_damping.derivative,
-            stored: self.stored.derivative,
+            drive_work: self.drive_work.derivative(),
+            beam_damping: self.beam_damping.derivative(),
+            sample_damping: self.sample_damping.derivative(),
+            stored: self.stored.derivative(),
             residual: 0.0,
         };
         if energies.drive_work.is_finite() {

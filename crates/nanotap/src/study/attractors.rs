@@ -4,7 +4,7 @@
 use nanotap_arithmetic::ComplexFunctions as _;
 use nanotap_dynamics::{
     AttractorKind, Census, CensusEnd, CensusOptions, ClassifyOptions, Control, Fraction,
-    OrbitSearch, PeriodicOrbit, StartBox, StartBoxError, StartSet, census_of, find_orbits,
+    OrbitSearch, PeriodicOrbit, StartBox, StartSet, census_of, find_orbits,
 };
 use nanotap_volterra::coarse;
 use schemars::JsonSchema;
@@ -17,91 +17,16 @@ use crate::model::Model;
 use crate::model::strobe::Strobe;
 use crate::observe::time_series::state_names;
 use crate::observe::{Observables, PhysicalMotion, Set, measure};
+use crate::study::Study;
 use crate::study::approach::states_near;
 use crate::study::averaged_orbits::averaged_orbits;
 use crate::study::in_si::InSi;
-use crate::study::kind::Study;
 use crate::study::limits::MOST_PERIOD;
-use crate::study::orbit::{OrbitError, OrbitReport, report};
+use crate::study::orbit::{OrbitReport, report};
 use crate::study::proof::Prover;
-use crate::study::simulate::{Classification, SimulateError, largest_exponent};
-use crate::study::start_box::{box_with, default_box, default_starts};
+use crate::study::simulate::{Classification, largest_exponent};
+use crate::study::start_box::{box_with, default_starts};
 use crate::study::value::Intervals;
-
-/// How to look for attractors.
-#[derive(Clone, Debug, PartialEq)]
-pub struct AttractorsOptions {
-    /// Starts drawn evenly from the box; `None`: starts of every size, besides rest and the
-    /// linear responses, until the share of starts that may lead to motions not found is small
-    /// (the box is not used then).
-    pub starts: Option<usize>,
-    /// Seed of the starts.
-    pub seed: u64,
-    /// Where a given number of starts lies; `None`: [`default_box`].
-    pub start_box: Option<StartBox>,
-    /// Budgets of each start.
-    pub classify: ClassifyOptions,
-    /// Starts settled before any attractor is known.
-    pub pilots: usize,
-    /// Share of drawn starts that may lead to motions not found, with 95 % confidence, at which no more
-    /// are drawn; `None`: [`NONLINEAR_UNSEEN`] under a nonlinear law, else [`CensusOptions`]'s.
-    pub unseen: Option<f64>,
-    /// Periods in drive periods and states at drive phase 0 of orbits that are known near the model, in
-    /// addition to those from averaging: Newton closes them before any start is drawn.
-    pub seeds: Vec<(usize, Vec<f64>)>,
-    /// Longest period of unstable orbits to list; 0: none.
-    pub unstable: usize,
-    /// Harmonics reported of each orbit.
-    pub harmonics: usize,
-}
-
-impl Default for AttractorsOptions {
-    fn default() -> Self {
-        let census = CensusOptions::default();
-        Self {
-            starts: None,
-            seed: 1,
-            start_box: None,
-            classify: census.classify,
-            pilots: census.pilots,
-            unseen: None,
-            seeds: Vec::new(),
-            unstable: 0,
-            harmonics: 20,
-        }
-    }
-}
-
-/// Why there was no census.
-#[derive(Clone, Debug, thiserror::Error)]
-pub enum AttractorsError {
-    /// Nothing to start from.
-    #[error("at least one start is needed, 0 were asked for")]
-    NoStarts,
-    /// More than fit in memory.
-    #[error("{starts} starts are too many; {MOST_STARTS} at most")]
-    TooManyStarts {
-        /// How many were asked for.
-        starts: usize,
-    },
-    /// The box makes no sense.
-    #[error(transparent)]
-    Box(#[from] StartBoxError),
-    /// The box has another dimension than the model.
-    #[error("the box has {found} sides where {expected} are needed")]
-    Dimension {
-        /// Its sides.
-        found: usize,
-        /// The dimension of the model.
-        expected: usize,
-    },
-    /// An attractor could not be followed once more.
-    #[error(transparent)]
-    Motion(#[from] SimulateError),
-    /// An orbit could not be followed once more.
-    #[error(transparent)]
-    Orbit(#[from] OrbitError),
-}
 
 /// What a census found.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
@@ -332,6 +257,8 @@ const STARTS_IN_A_BOX: usize = 256;
 pub const NONLINEAR_UNSEEN: f64 = 0.01;
 /// Drive periods of all starts together after which no more are drawn under a nonlinear law.
 const NONLINEAR_PERIODS: usize = 600_000;
+/// Harmonics reported of each orbit.
+const HARMONICS: usize = 20;
 /// Drive periods over which a motion that does not repeat is observed.
 pub const OBSERVED_PERIODS: usize = 512;
 /// A state this many times larger than the box has left every bound.
@@ -340,28 +267,31 @@ const OUT_OF_BOUNDS: f64 = 1e6;
 /// Takes the census.
 ///
 /// # Errors
-/// [`AttractorsError`] when the options make no sense.
+/// When the options are not valid for the model, or an attractor cannot be measured.
 pub fn attractors(
     model: &Model,
     options: &AttractorsOptions,
     control: &Control<'_>,
-) -> Result<Attractors, AttractorsError> {
-    match options.starts {
-        Some(0) => return Err(AttractorsError::NoStarts),
+) -> Result<Attractors, Error> {
+    let in_box = !options.sides.0.is_empty();
+    let starts = options.starts.or(in_box.then_some(STARTS_IN_A_BOX));
+    match starts {
+        Some(0) => {
+            return Err(Error::input(
+                "at least one start is needed, 0 were asked for",
+                "give 1 or more {starts}",
+            ));
+        }
         Some(starts) if starts > MOST_STARTS => {
-            return Err(AttractorsError::TooManyStarts { starts });
+            return Err(Error::input(
+                format!("{starts} starts are too many; {MOST_STARTS} at most"),
+                "give fewer {starts}",
+            ));
         }
         _ => {}
     }
-    let start_box = options
-        .start_box
-        .clone()
-        .map_or_else(|| default_box(model), Ok)?;
-    if start_box.dimension() != model.dimension() {
-        let (found, expected) = (start_box.dimension(), model.dimension());
-        return Err(AttractorsError::Dimension { found, expected });
-    }
-    let set = match options.starts {
+    let start_box = box_with(model, &options.sides.numbers()?)?;
+    let set = match starts {
         Some(count) => StartSet::given(start_box.starts_until(options.seed, count, control)),
         None => default_starts(model, options.seed)?,
     };
@@ -405,16 +335,17 @@ fn budgets(model: &Model, options: &AttractorsOptions, start_box: &StartBox) -> 
     let unseen = options.unseen.unwrap_or(usual);
     let times = (usual / unseen).max(1.0);
     CensusOptions {
-        pilots: options.pilots,
-        classify: bounded(&options.classify, start_box),
+        classify: bounded(options, start_box),
         unseen,
         max_starts: ((times * default.max_starts as f64) as usize).min(MOST_STARTS),
         max_periods: (times * periods as f64) as usize,
+        ..default
     }
 }
 
 /// The budgets of each start with a bound on the states that fits the box.
-fn bounded(classify: &ClassifyOptions, start_box: &StartBox) -> ClassifyOptions {
+fn bounded(options: &AttractorsOptions, start_box: &StartBox) -> ClassifyOptions {
+    let classify = ClassifyOptions::default();
     let widest = start_box
         .lower()
         .iter()
@@ -427,7 +358,8 @@ fn bounded(classify: &ClassifyOptions, start_box: &StartBox) -> ClassifyOptions 
     };
     ClassifyOptions {
         bound,
-        ..classify.clone()
+        max_period: options.max_period,
+        ..classify
     }
 }
 
@@ -438,12 +370,12 @@ fn described(
     (options, budgets): (&AttractorsOptions, &CensusOptions),
     sides: Vec<Side>,
     unstable: Option<Vec<InSi<OrbitReport>>>,
-) -> Result<Attractors, AttractorsError> {
+) -> Result<Attractors, Error> {
     let starts = found.outcomes_by_start.len();
     let attractors = found
         .attractors
         .iter()
-        .map(|a| one(model, &a.kind, &a.state, a.fraction, options.harmonics))
+        .map(|a| one(model, &a.kind, &a.state, a.fraction))
         .collect::<Result<_, _>>()?;
     let transient_chaos = found
         .transient_chaos
@@ -511,11 +443,9 @@ fn one(
     kind: &AttractorKind,
     state: &[f64],
     fraction: Fraction,
-    harmonics: usize,
-) -> Result<AttractorReport, AttractorsError> {
-    let non_periodic = || -> Result<Option<NonPeriodic>, AttractorsError> {
-        let observables =
-            measure(model, state, OBSERVED_PERIODS, Set::ALL).map_err(SimulateError::from)?;
+) -> Result<AttractorReport, Error> {
+    let non_periodic = || -> Result<Option<NonPeriodic>, Error> {
+        let observables = measure(model, state, OBSERVED_PERIODS, Set::ALL)?;
         Ok(Some(NonPeriodic {
             period: None,
             state: state.to_vec(),
@@ -573,7 +503,7 @@ fn one(
         ),
         lyapunov_errors: spectrum.map(|s| s.errors.clone()),
         evidence,
-        orbit: orbit.map(|o| report(model, o, harmonics)).transpose()?,
+        orbit: orbit.map(|o| report(model, o, HARMONICS)).transpose()?,
         non_periodic,
         physical: None,
     })
@@ -597,7 +527,7 @@ fn unstable_orbits(
     searched: &[Vec<f64>],
     options: &AttractorsOptions,
     control: &Control<'_>,
-) -> Result<Vec<InSi<OrbitReport>>, AttractorsError> {
+) -> Result<Vec<InSi<OrbitReport>>, Error> {
     let search = OrbitSearch {
         max_period: options.unstable,
         ..OrbitSearch::default()
@@ -607,17 +537,17 @@ fn unstable_orbits(
         .filter(|orbit| !orbit.is_stable())
         .map(|orbit| {
             Ok(InSi {
-                motion: report(model, orbit, options.harmonics)?,
+                motion: report(model, orbit, HARMONICS)?,
                 physical: None,
             })
         })
         .collect()
 }
 
-/// What a census is asked for.
+/// Options of a census.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
-pub struct AttractorsRequest {
+pub struct AttractorsOptions {
     /// Starts, spread evenly over one box of states. Without it, starts of every size, from the
     /// resonant response down to below the gap, go on until the share of starts that may lead to
     /// motions not found is below {unseen}, or 5000 starts or 2,000,000 drive periods (600,000 under a
@@ -645,44 +575,24 @@ pub struct AttractorsRequest {
     pub unstable: usize,
     /// Prove in interval arithmetic that each orbit exists, is alone, and is stable or not
     pub prove: bool,
+    /// Periods in drive periods and states at drive phase 0 of orbits that are known near the model, in
+    /// addition to those from averaging: Newton closes them before any start is drawn.
+    #[serde(skip)]
+    pub seeds: Vec<(usize, Vec<f64>)>,
 }
 
-impl Default for AttractorsRequest {
+impl Default for AttractorsOptions {
     fn default() -> Self {
-        let options = AttractorsOptions::default();
         Self {
-            starts: options.starts,
-            unseen: options.unseen,
-            seed: options.seed,
+            starts: None,
+            unseen: None,
+            seed: 1,
             sides: Intervals::default(),
-            max_period: options.classify.max_period,
-            unstable: options.unstable,
+            max_period: ClassifyOptions::default().max_period,
+            unstable: 0,
             prove: false,
+            seeds: Vec::new(),
         }
-    }
-}
-
-impl AttractorsRequest {
-    /// How to look for the attractors of `model`.
-    ///
-    /// # Errors
-    /// When a side of the box is none.
-    pub fn options(&self, model: &Model) -> Result<AttractorsOptions, Error> {
-        let default = AttractorsOptions::default();
-        Ok(AttractorsOptions {
-            starts: self
-                .starts
-                .or((!self.sides.0.is_empty()).then_some(STARTS_IN_A_BOX)),
-            seed: self.seed,
-            unseen: self.unseen,
-            start_box: Some(box_with(model, &self.sides.numbers()?)?),
-            classify: ClassifyOptions {
-                max_period: self.max_period,
-                ..default.classify.clone()
-            },
-            unstable: self.unstable,
-            ..default
-        })
     }
 }
 
@@ -695,19 +605,18 @@ impl Study for AttractorsStudy {
     const ABOUT: &'static str = "Every motion that coexists: a census from many seeded starts";
     const COUNTED: &'static str = "starts";
     const PARTIAL: bool = true;
-    type Request = AttractorsRequest;
+    type Options = AttractorsOptions;
     type Report = Attractors;
 
     fn compute(
         case: &Case,
-        request: &AttractorsRequest,
+        options: &AttractorsOptions,
         control: &Control<'_>,
     ) -> Result<Attractors, Error> {
         let model = case.model()?;
-        let options = request.options(&model)?;
         // A piecewise-linear census takes less time than the approach.
         let known = match model.nonlinear {
-            Some(_) => states_near(case, options.classify.max_period, control)?,
+            Some(_) => states_near(case, options.max_period, control)?,
             None => Vec::new(),
         };
         let seeds = known.into_iter().filter_map(|orbit| {
@@ -716,31 +625,15 @@ impl Study for AttractorsStudy {
         });
         let options = AttractorsOptions {
             seeds: seeds.collect(),
-            ..options
+            ..options.clone()
         };
         let mut found = attractors(&model, &options, control)?;
-        if request.prove {
+        if options.prove {
             found.prove(case);
         }
         Ok(match case.physical() {
             Some(resolved) => found.in_si(resolved),
             None => found,
         })
-    }
-}
-
-impl From<AttractorsError> for crate::Error {
-    fn from(error: AttractorsError) -> Self {
-        match error {
-            AttractorsError::NoStarts => Self::input(error.to_string(), "give 1 or more {starts}"),
-            AttractorsError::TooManyStarts { .. } => {
-                Self::input(error.to_string(), "give fewer {starts}")
-            }
-            AttractorsError::Box(_) | AttractorsError::Dimension { .. } => {
-                Self::input(error.to_string(), "change it with {box}")
-            }
-            AttractorsError::Motion(error) => error.into(),
-            AttractorsError::Orbit(error) => error.into(),
-        }
     }
 }

@@ -10,11 +10,11 @@ use crate::model::beam::MAX_MODES;
 use crate::model::cantilever::Cantilever;
 use crate::model::{Model, ModelError};
 use crate::observe::time_series::with_modes;
-use crate::study::kind::{Study, cantilever};
 use crate::study::limits::MOST_PERIOD;
 use crate::study::mode_share::ReadingsReport;
 use crate::study::orbit::{OrbitOptions, OrbitReport, orbit, spectral_radius};
 use crate::study::simulate::Classification;
+use crate::study::{Study, cantilever};
 
 /// A motion at each number of modes.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
@@ -77,11 +77,10 @@ const COMPARED_POINTS: usize = 400;
 /// When the case makes no sense.
 pub fn convergence(
     case: &Cantilever,
-    largest: usize,
-    tolerance: f64,
-    options: &OrbitOptions,
+    options: &ConvergenceOptions,
     control: &Control<'_>,
 ) -> Result<Convergence, ModelError> {
+    let (largest, tolerance) = (options.largest, options.tolerance);
     let mut orbits: Vec<Option<OrbitReport>> = Vec::new();
     let mut motions = Vec::new();
     let models: Vec<Model> = (1..=largest)
@@ -92,8 +91,9 @@ pub fn convergence(
         .collect::<Result<_, _>>()?;
     for (modes, model) in (1..).zip(&models) {
         let guess = OrbitOptions {
+            period: options.period,
             state: carried(orbits.last(), modes),
-            ..options.clone()
+            ..OrbitOptions::default()
         };
         let found = orbit(model, &guess).or_else(|_| {
             orbit(
@@ -104,7 +104,7 @@ pub fn convergence(
                 },
             )
         });
-        motions.push(motion(modes, found.as_ref().map_err(ToString::to_string)));
+        motions.push(motion(modes, found.as_ref().map_err(Error::message)));
         orbits.push(found.ok());
     }
     let difference = differences(&orbits, &models);
@@ -125,7 +125,7 @@ pub fn convergence(
 }
 
 /// The state of the motion with one mode less, the new mode at rest: a guess near which
-/// the same motion is looked for. Only where a period was asked for or found.
+/// the same motion is looked for. Only where a period was given or found.
 fn carried(previous: Option<&Option<OrbitReport>>, modes: usize) -> Option<Vec<f64>> {
     let previous = previous?.as_ref()?;
     let memory = previous.state.len() - 2 * (modes - 1);
@@ -227,10 +227,10 @@ fn verdict(
     }
 }
 
-/// What the study of convergence is asked for.
+/// Options of a convergence study.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
-pub struct ConvergenceRequest {
+pub struct ConvergenceOptions {
     /// Largest number of modes
     #[schemars(range(min = 2, max = MAX_MODES), extend("x-value" = "K"))]
     pub largest: usize,
@@ -242,7 +242,7 @@ pub struct ConvergenceRequest {
     pub period: Option<usize>,
 }
 
-impl Default for ConvergenceRequest {
+impl Default for ConvergenceOptions {
     fn default() -> Self {
         Self {
             largest: 10,
@@ -252,31 +252,24 @@ impl Default for ConvergenceRequest {
     }
 }
 
-/// How many modes are enough.
+/// Number of modes that is enough.
 #[derive(Clone, Copy, Debug)]
 pub struct ConvergenceStudy;
 
 impl Study for ConvergenceStudy {
     const NAME: &'static str = "convergence";
     const ABOUT: &'static str = "The same motion with N = 1 … K modes: how many are enough";
-    type Request = ConvergenceRequest;
+    type Options = ConvergenceOptions;
     type Report = Convergence;
 
     fn compute(
         case: &Case,
-        request: &ConvergenceRequest,
+        options: &ConvergenceOptions,
         control: &Control<'_>,
     ) -> Result<Convergence, Error> {
-        let options = OrbitOptions {
-            period: request.period,
-            ..OrbitOptions::default()
-        };
-        let (largest, tolerance) = (request.largest, request.tolerance);
         Ok(convergence(
             cantilever(case, Self::NAME)?,
-            largest,
-            tolerance,
-            &options,
+            options,
             control,
         )?)
     }

@@ -1,4 +1,4 @@
-//! Proofs of periodic orbits: what Newton found becomes a theorem, or is said not to.
+//! Proofs of periodic orbits: a theorem about the orbit that Newton found, or the reason why there is none.
 //!
 //! A proof is about the model's dimensionless numbers, each standing for every decimal number
 //! that is read as it; see [`enclosed`] for the equations and [`nanotap_proof`] for the method.
@@ -215,7 +215,7 @@ fn statement(theorem: &Theorem, about: &str) -> String {
          exists; its states at drive phase 0 are known to {state:.1e}",
         theorem.period
     );
-    match &theorem.alone {
+    match &theorem.isolation {
         Some(alone) => {
             let time = largest(&mut theorem.switches.iter().map(|s| s.time.radius()));
             let _ = write!(
@@ -268,7 +268,7 @@ impl TheoremReport {
                     begins: switch.to != 0 || switch.from == switch.to,
                 })
                 .collect(),
-            unique_within: theorem.alone.as_ref().map(|alone| UniqueWithin {
+            unique_within: theorem.isolation.as_ref().map(|alone| UniqueWithin {
                 time: alone.time,
                 state: alone.state.clone(),
             }),

@@ -1,11 +1,11 @@
-//! What a study is asked for: a plain struct whose fields, with their documentation, defaults
+//! The options of a study: a plain struct whose fields, with their documentation, defaults
 //! and ranges, are declared once. Every front end reads the declaration from its JSON schema:
 //! the terminal makes flags of it, Python keyword arguments, and both give back JSON, which
 //! [`read`] checks and turns into the struct.
 //!
-//! Beside JSON schema's own words a property may have `x-value` (what the terminal calls a
+//! In addition to JSON schema's words a property may have `x-value` (what the terminal calls a
 //! value in its help), `x-bare` (the value of a flag that is given without one) and
-//! `x-required`; of one with `x-own` the terminal has an option of its own.
+//! `x-required`; for one with `x-own` the terminal has a hand-written option.
 
 use std::borrow::Cow;
 use std::collections::BTreeMap;
@@ -30,6 +30,10 @@ pub fn answer_schema<T: JsonSchema>() -> Schema {
 pub fn schema<T: JsonSchema>() -> Schema {
     let settings = SchemaSettings::draft2020_12().with(|s| s.inline_subschemas = true);
     let mut schema = settings.into_generator().into_root_schema_for::<T>();
+    // The title is part of what the terminal prints.
+    if let Some(name) = T::schema_name().strip_suffix("Options") {
+        schema.insert("title".into(), format!("{name}Request").into());
+    }
     let required: Vec<Value> = properties(&schema)
         .filter(Property::is_required)
         .map(|property| property.name.into())

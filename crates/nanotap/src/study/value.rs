@@ -11,6 +11,7 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use serde_json::Value;
 
 use crate::Error;
+use crate::case::quantity::Kind;
 use crate::case::{Case, Key};
 
 /// Most fixed steps a drive period.
@@ -25,6 +26,15 @@ impl Amount {
     /// As it was written; a number in the fewest digits that give it back.
     pub fn text(&self) -> &str {
         &self.0
+    }
+
+    /// A value of `key`, in the unit of the key.
+    pub fn of_key(key: Key, value: f64) -> Self {
+        match key.kind() {
+            Kind::Number => value.into(),
+            kind if key.is_physical() => Self(format!("{value} {}", kind.si_unit())),
+            _ => value.into(),
+        }
     }
 
     fn of(value: &Value) -> Option<Self> {
@@ -79,23 +89,36 @@ impl JsonSchema for Amount {
     }
 }
 
-/// The parameter that is called `name`, and values of it, each behind the option that gives it.
+/// Values of a parameter, each with the name of the option that gives it.
 ///
 /// # Errors
-/// When there is no such parameter, or a value is none.
-pub(crate) fn key_and_ends<const N: usize>(
+/// When a value is not valid for the parameter.
+pub(crate) fn values<const N: usize>(
     case: &Case,
-    name: &str,
+    key: Key,
     given: [(&str, &Amount); N],
-) -> Result<(Key, [f64; N]), Error> {
-    let key = case.key(name)?;
+) -> Result<[f64; N], Error> {
     let mut values = [0.0; N];
     for (value, (option, amount)) in values.iter_mut().zip(given) {
-        *value = case
-            .value(key, amount.text())
-            .map_err(|error| Error::from(error).at(option))?;
+        let read = case.value(key, amount.text());
+        *value = read.map_err(|error| Error::from(error).at(option))?;
     }
-    Ok((key, values))
+    Ok(values)
+}
+
+/// A value of a parameter, if it is given, with the name of the option that gives it.
+///
+/// # Errors
+/// When it is not valid for the parameter.
+pub(crate) fn value(
+    case: &Case,
+    key: Key,
+    option: &str,
+    amount: Option<&Amount>,
+) -> Result<Option<f64>, Error> {
+    amount
+        .map(|amount| values(case, key, [(option, amount)]).map(|[value]| value))
+        .transpose()
 }
 
 /// A name with two ends, `alpha4=5:40`.
@@ -110,6 +133,15 @@ pub struct Interval {
 }
 
 impl Interval {
+    /// `key` from `low` to `high`, in the unit of the key.
+    pub fn of_key(key: Key, low: f64, high: f64) -> Self {
+        Self {
+            name: key.path().to_owned(),
+            low: Amount::of_key(key, low),
+            high: Amount::of_key(key, high),
+        }
+    }
+
     fn parse(text: &str) -> Result<Self, String> {
         let wrong =
             || format!("`{text}` is no name with two ends; write it as in a1=-1:1 or alpha4=5:40");
@@ -143,6 +175,17 @@ impl Interval {
 /// Names with their ends: `["a1=-1:1"]` or `{"a1": [-1, 1]}`.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Intervals(pub Vec<Interval>);
+
+impl<S: Into<String>> FromIterator<(S, f64, f64)> for Intervals {
+    fn from_iter<I: IntoIterator<Item = (S, f64, f64)>>(intervals: I) -> Self {
+        let interval = |(name, low, high): (S, f64, f64)| Interval {
+            name: name.into(),
+            low: low.into(),
+            high: high.into(),
+        };
+        Self(intervals.into_iter().map(interval).collect())
+    }
+}
 
 impl Serialize for Intervals {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {

@@ -1,7 +1,7 @@
 //! The operating window: where, over two parameters, the lever taps with one motion and no
 //! other, and where a second state, subharmonics or chaos threaten.
 //!
-//! Every point is a census of its own: motions from rest, from the linear responses and from
+//! Every point has a census: motions from rest, from the linear responses and from
 //! seeded starts of every size, each named as in a [sweep](crate::study::sweep), whose datasets,
 //! chunks and resumption serve here too. Then come the states of a lever that is moved slowly,
 //! coming from far and from the nearest distance ([`approach`](crate::study::approach)), and the
@@ -11,7 +11,7 @@
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 
-use nanotap_dynamics::Control;
+use nanotap_dynamics::{Control, SameMotion};
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::{Deserialize, Serialize};
 
@@ -19,12 +19,11 @@ use crate::Error;
 use crate::case::Case;
 use crate::dataset::{Store, StoreError, Values};
 use crate::study::attractors::MOST_STARTS;
-use crate::study::kind::DatasetStudy;
 use crate::study::limits::MOST_PERIOD;
-use crate::study::recipe::Recipe;
 use crate::study::simulate::Classification;
-use crate::study::sweep::{FromNeighbour, Starts, Sweep, SweepRequest, class_of, from_neighbours};
+use crate::study::sweep::{FromNeighbour, Starts, Sweep, SweepOptions, class_of, from_neighbours};
 use crate::study::value::Axes;
+use crate::study::{DatasetPlan, DatasetStudy};
 
 /// What there is at one point, from the safest to the least.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -218,7 +217,7 @@ impl Window {
         })
     }
 
-    /// The same, kept beside the dataset in `window.json`.
+    /// The same, stored with the dataset in `window.json`.
     ///
     /// # Errors
     /// As [`Window::of`], and when the file system refuses.
@@ -229,9 +228,6 @@ impl Window {
         Ok(window)
     }
 }
-
-/// Relative difference beyond which two orbits are two.
-const DIFFERENT: f64 = 1e-6;
 
 /// What the motions of one point come to. What is there counts before what could not be named.
 fn condition(motions: &[Seen]) -> Condition {
@@ -248,8 +244,8 @@ fn condition(motions: &[Seen]) -> Condition {
     }
     let orbits: Vec<&Seen> = motions.iter().filter(|m| m.period == 1).collect();
     let differ = |a: &Seen, b: &Seen| {
-        let apart = |x: f64, y: f64| (x - y).abs() > DIFFERENT * x.abs().max(y.abs());
-        apart(a.amplitude, b.amplitude) || apart(a.maximum, b.maximum)
+        let same = SameMotion::numbers;
+        !same(a.amplitude, b.amplitude) || !same(a.maximum, b.maximum)
     };
     if orbits
         .first()
@@ -265,10 +261,10 @@ fn condition(motions: &[Seen]) -> Condition {
     }
 }
 
-/// What an operating window is asked for.
+/// Options of an operating window.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
-pub struct WindowRequest {
+pub struct WindowOptions {
     /// A parameter and its values, as in gap.tip=5nm:25nm:41, drive.free_amplitude=10nm:60nm:26,
     /// omega=2:4:81, or any that ascend, omega=2,2.5,4; twice, the first is the horizontal axis
     #[schemars(extend("x-value" = "KEY=VALUES", "x-required" = true))]
@@ -284,7 +280,7 @@ pub struct WindowRequest {
     pub max_period: usize,
 }
 
-impl Default for WindowRequest {
+impl Default for WindowOptions {
     fn default() -> Self {
         Self {
             over: Axes::default(),
@@ -295,7 +291,7 @@ impl Default for WindowRequest {
     }
 }
 
-impl WindowRequest {
+impl WindowOptions {
     /// The census at each point as a sweep.
     ///
     /// # Errors
@@ -308,17 +304,15 @@ impl WindowRequest {
                 "give {over} twice, as in {over} gap.tip=5nm:25nm:41 {over} drive.frequency=320kHz:340kHz:41",
             ));
         }
-        let request = SweepRequest {
+        let options = SweepOptions {
             over: self.over.clone(),
-            starts: Some(self.starts),
-            seed: self.seed,
             // What a motion is counts, not its course.
             periods: 1,
             max_period: self.max_period,
-            ..SweepRequest::default()
+            ..SweepOptions::default()
         };
         let (count, seed) = (self.starts, self.seed);
-        Ok(request.sweep(case)?.from(Starts::Spread { count, seed })?)
+        Sweep::from(case, options, Starts::Spread { count, seed })
     }
 }
 
@@ -332,11 +326,15 @@ impl DatasetStudy for WindowStudy {
                                  one motion, and where a second state, subharmonics or chaos \
                                  threaten";
     const COUNTED: &'static str = "values";
-    type Request = WindowRequest;
+    type Options = WindowOptions;
     type Report = Window;
 
-    fn plan(case: &Case, request: &WindowRequest, _: &Control<'_>) -> Result<Recipe, Error> {
-        Ok(Box::new(request.sweep(case)?))
+    fn prepare(
+        case: &Case,
+        options: &WindowOptions,
+        _: &Control<'_>,
+    ) -> Result<DatasetPlan, Error> {
+        Ok(Box::new(options.sweep(case)?))
     }
 
     fn report(store: &Store) -> Result<Window, StoreError> {

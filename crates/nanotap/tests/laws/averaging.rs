@@ -1,14 +1,14 @@
 //! Orbits from averaging, and the approximate map, on reference cases.
 //!
-//! `tests/reference/census` has cases and the orbits to expect, each closed by the exact flow,
-//! from a census with an independent program.
+//! `tests/reference/census` contains cases and their orbits, closed by the exact flow, from a
+//! census with an independent program.
 
 use nanotap::case::Case;
 use nanotap::case::file::Source;
 use nanotap::model::Model;
 use nanotap::model::strobe::Strobe;
 use nanotap::study::averaged_orbits::{averaged_distances, averaged_orbits};
-use nanotap_dynamics::StroboscopicMap;
+use nanotap_dynamics::{Scheduling as _, StroboscopicMap};
 use std::path::Path;
 
 /// The cases of the folder with their expected orbits.
@@ -70,9 +70,9 @@ fn averaging_finds_every_period_1_orbit() {
     }
 }
 
-/// The approximate map returns to each orbit within its error.
+/// Starting on an orbit, the approximate map stays on it within its error.
 #[test]
-fn the_coarse_map_keeps_orbits() {
+fn the_approximate_map_preserves_orbits() {
     for (name, model, expected) in cases() {
         let mut exact = Strobe::new(&model);
         let mut coarse = exact.coarse().unwrap();
@@ -91,8 +91,8 @@ fn the_coarse_map_keeps_orbits() {
     }
 }
 
-/// `c01`, whose free amplitude is 20 nm, at a setpoint of 0.9: Newton's method in the distance, by
-/// the independent program of the cases, gives 18.220, 17.653 and 17.465 nm.
+/// `c01`, with a free amplitude of 20 nm, at a setpoint of 0.9: Newton's method in the distance, in
+/// the independent program, gives 18.220, 17.653 and 17.465 nm.
 #[test]
 fn averaging_finds_every_distance_of_a_setpoint() {
     let (_, model, _) = cases().swap_remove(0);

@@ -169,7 +169,11 @@ impl Document {
         }
         if table.trim() == SCAN {
             let read = DeValue::parse(value).map_or_else(
-                |_| value.parse().map_or_else(|_| value.into(), |x: f64| x.into()),
+                |_| {
+                    value
+                        .parse()
+                        .map_or_else(|_| value.into(), |x: f64| x.into())
+                },
                 |value| json::json(value.get_ref()),
             );
             let options = self.scan.get_or_insert_default();

@@ -23,8 +23,6 @@ use std::path::Path;
 
 pub use document::{Document, Entry, Header};
 pub use problem::{CaseFileError, Place, Problem, SHOWN, Source};
-#[cfg(test)]
-use reader::parse;
 pub(crate) use reader::{Described, cosine_term, modes, parse_with_scan, word};
 
 use toml::de::{DeTable, DeValue};

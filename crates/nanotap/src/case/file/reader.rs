@@ -30,19 +30,6 @@ pub(crate) enum Described {
 /// The entries that count, by key.
 type Known<'a> = BTreeMap<Key, &'a Entry>;
 
-/// Reads a text, if there is one, and puts the `key=value` words of `overrides` in place of
-/// what it says.
-///
-/// # Errors
-/// Everything that is wrong with the text and the words, each with its place.
-#[cfg(test)]
-pub(crate) fn parse(
-    source: Option<Source>,
-    overrides: &[String],
-) -> Result<Described, CaseFileError> {
-    Ok(parse_with_scan(source, overrides)?.0)
-}
-
 /// A case and its table `[scan]`, if it has one.
 pub(crate) type DescribedWithScan = (
     Described,

@@ -400,10 +400,8 @@ fn laws_and_drives_are_read_and_checked() {
         "relaxation_time=0.005",
     ];
     let read = dimensionless(PAPER, &solid);
-    assert_eq!(
-        (read.relaxation_stiffness, read.relaxation_time),
-        (40.0, 0.005)
-    );
+    let numbers = Parameter::of_law(read.contact).map(|own| read.get(own));
+    assert!(numbers.eq([40.0, 0.005]));
     // The solid's damper is its arm's, so a file without alpha6 lacks nothing.
     let file = PAPER.replace("alpha6 = 0.2\n", "");
     assert_eq!(dimensionless(&file, &[solid[0], solid[2], solid[3]]), read);
@@ -462,16 +460,15 @@ fn a_case_written_out_is_read_back() {
     };
     assert_eq!(dimensionless(&to_toml(&case), &[]), case);
     let case = Cantilever {
-        contact: ContactLaw::StandardLinearSolid,
         alpha6: 0.0,
-        relaxation_stiffness: 40.0,
-        relaxation_time: 0.1 / 3.0,
         actuation: Actuation::Distributed,
         tone2_ratio: "25/4".parse().ok(),
-        tone2_amplitude: 0.01,
-        tone2_phase: -12.5,
         ..Cantilever::paper()
     };
+    let case = case
+        .on(ContactLaw::StandardLinearSolid, &[40.0, 0.1 / 3.0])
+        .with(Parameter::Tone2Amplitude, 0.01)
+        .with(Parameter::Tone2Phase, -12.5);
     assert_eq!(dimensionless(&to_toml(&case), &[]), case);
 }
 

@@ -1,7 +1,7 @@
 //! A key of a case: what it is called, what it takes, and which keys say the same.
 //!
-//! The entries themselves stand in `keys`, once. Whatever reads, checks,
-//! varies, explains or documents a key asks here.
+//! The entries are in `keys`; whatever reads, checks, varies, explains or documents a key uses
+//! them.
 
 mod keys;
 
@@ -14,12 +14,15 @@ use serde::{Serialize, Serializer};
 
 use super::near_name::near_name;
 use super::quantity::Kind;
-use crate::model::cantilever;
 use crate::model::contact::ContactLaw;
+use crate::model::drive_form::Actuation;
 use crate::model::oscillator::{self, OscillatorParameter};
-use crate::model::parameter::Parameter;
-pub use keys::Key;
+use crate::model::parameter::{Applies, Parameter, Unit};
 use keys::{ALTERNATIVES, TABLE};
+
+/// A key of a case: an index into the table of keys.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct Key(u8);
 
 /// A table of a case file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -273,8 +276,40 @@ pub struct Entry {
     pub means: Means,
     /// The parameter that becomes impossible when a physical quantity is: named in refusals.
     pub feeds: Option<Parameter>,
+    /// Which contact laws it belongs to, of a quantity of tip or sample.
+    pub laws: Laws,
+    /// The parameter of nonlinear laws that it states, where that is called otherwise.
+    pub law_parameter: Option<&'static str>,
     /// What it is, in one line.
     pub meaning: &'static str,
+}
+
+/// Which contact laws a key belongs to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Laws {
+    /// Every law, or none: it does not describe the contact.
+    All,
+    /// Some laws, linear ones among them.
+    Some,
+    /// Some nonlinear laws.
+    Nonlinear,
+}
+
+/// What a quantity measures that is measured in this unit, under this actuation.
+pub const fn kind_of(unit: Unit, actuation: Actuation) -> Kind {
+    match unit {
+        Unit::Number => Kind::Number,
+        Unit::Mass => Kind::Mass,
+        Unit::Length => Kind::Length,
+        Unit::Time => Kind::Time,
+        Unit::Frequency => Kind::Frequency,
+        Unit::Stiffness => Kind::Stiffness,
+        Unit::Damping => Kind::Damping,
+        Unit::Force => Kind::Force,
+        Unit::Drive if matches!(actuation, Actuation::Base) => Kind::Length,
+        Unit::Drive => Kind::Force,
+        Unit::Degrees => Kind::Angle,
+    }
 }
 
 /// Quantities that each say the same in another way: at most one of the ways is stated.
@@ -296,9 +331,14 @@ static PATHS: LazyLock<Vec<String>> = LazyLock::new(|| {
 });
 
 impl Key {
-    /// What is known of it.
+    /// All keys, in the order of the table.
+    pub fn all() -> impl Iterator<Item = Self> + Clone {
+        (0..TABLE.len() as u8).map(Self)
+    }
+
+    /// Entry of the table.
     pub fn entry(self) -> &'static Entry {
-        &TABLE[self as usize]
+        &TABLE[usize::from(self.0)]
     }
 
     /// Its table.
@@ -313,7 +353,7 @@ impl Key {
 
     /// Its name in the whole case: `alpha1`, `cantilever.k`.
     pub fn path(self) -> &'static str {
-        &PATHS[self as usize]
+        &PATHS[usize::from(self.0)]
     }
 
     /// Its second name.
@@ -364,10 +404,32 @@ impl Key {
     }
 
     /// The key of a parameter of the cantilever.
-    pub fn of(parameter: Parameter) -> Self {
-        let is = |key: &Self| key.entry().means == Means::Cantilever(parameter);
-        // A test sees that every parameter has its key.
-        Self::all().find(is).unwrap_or(Self::Alpha1)
+    pub const fn of(parameter: Parameter) -> Self {
+        // The table begins with them.
+        Self(parameter.index() as u8)
+    }
+
+    /// The key that states a parameter of nonlinear laws.
+    pub(crate) fn of_law_parameter(name: &str) -> Option<Self> {
+        let is = |key: &Self| match key.entry().law_parameter {
+            Some(other) if other == name => true,
+            _ => key.section() == Section::Sample && key.name() == name,
+        };
+        Self::all().find(is)
+    }
+
+    /// The key of `[sample]` that states a number of a linear contact law.
+    pub(crate) fn stating(number: Parameter) -> Option<Self> {
+        Section::Sample
+            .keys()
+            .find(|key| key.name() == number.name())
+    }
+
+    /// The number of a linear contact law that it states, of a key of `[sample]`.
+    pub(crate) fn law_number(self) -> Option<Parameter> {
+        let stated = |of: &Parameter| of.entry().stated_by.is_some() && of.name() == self.name();
+        let number = Parameter::every().find(stated);
+        number.filter(|_| self.section() == Section::Sample)
     }
 
     /// The key of a parameter of an oscillator.
@@ -380,7 +442,7 @@ impl Key {
     pub fn range(self) -> Range {
         let (low, high) = match self.entry().means {
             Means::Nothing => return self.entry().range,
-            Means::Cantilever(parameter) => cantilever::range(parameter),
+            Means::Cantilever(parameter) => parameter.entry().range,
             Means::Oscillator(parameter) => oscillator::range(parameter),
         };
         Range {
@@ -429,12 +491,12 @@ impl Key {
 
     /// Its value where it need not be written, with a sample of this law.
     pub(crate) fn default_under(self, law: ContactLaw) -> Option<f64> {
-        let solid = law == ContactLaw::StandardLinearSolid;
-        let moves = law == ContactLaw::MovingSurface;
-        match (self, self.entry().default) {
-            (Self::Alpha6, _) if solid => Some(0.0),
-            (Self::RelaxationStiffness | Self::RelaxationTime, _) if !solid => Some(0.0),
-            (Self::SurfaceStiffness | Self::SurfaceDamping, _) if !moves => Some(0.0),
+        match (
+            self.parameter().map(|of| of.entry().applies),
+            self.entry().default,
+        ) {
+            (Some(Applies::Damper), _) if !law.has_damper() => Some(0.0),
+            (Some(Applies::Law(other)), _) if other != law => Some(0.0),
             (_, Default::Number(value)) => Some(value),
             _ => None,
         }

@@ -15,6 +15,7 @@
 //! ```
 
 use std::collections::BTreeMap;
+use std::fmt;
 use std::path::Path;
 use std::sync::{Arc, LazyLock};
 
@@ -25,7 +26,7 @@ use super::elastic::Elastic;
 use super::error::PhysicalError;
 use crate::case::key::Key;
 use crate::case::near_name::near_names;
-use crate::case::quantity::{Kind, QuantityError};
+use crate::case::quantity::Kind;
 
 /// A lever as its box describes it. No quality factor: that depends on what surrounds it.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -65,50 +66,23 @@ pub struct Material {
     pub source: String,
 }
 
-/// Why a catalogue cannot be read.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-pub enum CatalogueError {
-    /// The file cannot be opened.
-    #[error("catalogue {origin}: {reason}")]
-    File {
-        /// The file.
-        origin: String,
-        /// What the system says.
-        reason: String,
-    },
-    /// Not the TOML it should be; the reason names line and column.
-    #[error("catalogue {origin}: {reason}")]
-    Format {
-        /// The file.
-        origin: String,
-        /// What is wrong.
-        reason: String,
-    },
-    /// A quantity that cannot be read.
-    #[error("catalogue {origin}, {entry}.{key}: {source}")]
-    Quantity {
-        /// The file.
-        origin: String,
-        /// The lever or material.
-        entry: String,
-        /// The key.
-        key: &'static str,
-        /// What is wrong.
-        source: Box<QuantityError>,
-    },
-    /// A quantity with an impossible value, or dimensions given in part.
-    #[error("catalogue {origin}, {entry}.{key}: {reason}")]
-    Impossible {
-        /// The file.
-        origin: String,
-        /// The lever or material.
-        entry: String,
-        /// The key.
-        key: &'static str,
-        /// What is wrong.
-        reason: &'static str,
-    },
+/// A catalogue that cannot be read.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("catalogue {origin}: {reason}")]
+pub struct CatalogueError {
+    /// The file, with entry and key where the fault is in one.
+    pub origin: String,
+    /// What is wrong.
+    pub reason: String,
+}
+
+impl CatalogueError {
+    fn new(origin: impl Into<String>, reason: impl fmt::Display) -> Self {
+        Self {
+            origin: origin.into(),
+            reason: reason.to_string(),
+        }
+    }
 }
 
 #[derive(Deserialize)]
@@ -179,22 +153,19 @@ impl Catalogue {
     /// # Errors
     /// [`CatalogueError`] names the entry and key at fault; nothing is added then.
     pub fn extend(&mut self, text: &str, origin: &str) -> Result<(), CatalogueError> {
-        let file: File = toml::from_str(text).map_err(|error| CatalogueError::Format {
-            origin: origin.to_owned(),
-            reason: error.to_string().trim_end().to_owned(),
-        })?;
-        let levers = file
-            .lever
-            .into_iter()
-            .map(|(name, text)| Ok((folded(&name), text.read(name, origin)?)))
-            .collect::<Result<Vec<_>, CatalogueError>>()?;
-        let materials = file
-            .material
-            .into_iter()
-            .map(|(name, text)| Ok((folded(&name), text.read(name, origin)?)))
-            .collect::<Result<Vec<_>, CatalogueError>>()?;
-        self.levers.extend(levers);
-        self.materials.extend(materials);
+        let file: File = toml::from_str(text)
+            .map_err(|error| CatalogueError::new(origin, error.to_string().trim_end()))?;
+        let mut added = Self::default();
+        for (name, text) in file.lever {
+            let lever = text.read(name, origin)?;
+            added.levers.insert(folded(&lever.name), lever);
+        }
+        for (name, text) in file.material {
+            let material = text.read(name, origin)?;
+            added.materials.insert(folded(&material.name), material);
+        }
+        self.levers.extend(added.levers);
+        self.materials.extend(added.materials);
         Ok(())
     }
 
@@ -204,10 +175,8 @@ impl Catalogue {
     /// [`CatalogueError`] if the file cannot be opened or read.
     pub fn extend_from_file(&mut self, path: &Path) -> Result<(), CatalogueError> {
         let origin = path.display().to_string();
-        let text = std::fs::read_to_string(path).map_err(|error| CatalogueError::File {
-            origin: origin.clone(),
-            reason: error.to_string(),
-        })?;
+        let text =
+            std::fs::read_to_string(path).map_err(|error| CatalogueError::new(&*origin, error))?;
         self.extend(&text, &origin)
     }
 
@@ -226,18 +195,10 @@ impl Catalogue {
     /// # Errors
     /// [`PhysicalError::UnknownName`] with the nearest name.
     pub fn lever(&self, key: Key, name: &str) -> Result<&Lever, PhysicalError> {
-        let wanted = folded(name);
-        self.levers
-            .get(&wanted)
-            .or_else(|| self.levers().find(|lever| answers(&lever.aliases, &wanted)))
-            .ok_or_else(|| {
-                unknown(
-                    key,
-                    name,
-                    "lever",
-                    self.levers().map(|lever| (&lever.name, &lever.aliases)),
-                )
-            })
+        find(&self.levers, name, |lever| &lever.aliases).ok_or_else(|| {
+            let all = self.levers().map(|lever| (&lever.name, &lever.aliases));
+            unknown(key, name, "lever", all)
+        })
     }
 
     /// The material that answers to `name`; `key` is what asked for it.
@@ -245,24 +206,26 @@ impl Catalogue {
     /// # Errors
     /// [`PhysicalError::UnknownName`] with the nearest name.
     pub fn material(&self, key: Key, name: &str) -> Result<&Material, PhysicalError> {
-        let wanted = folded(name);
-        self.materials
-            .get(&wanted)
-            .or_else(|| {
-                self.materials()
-                    .find(|material| answers(&material.aliases, &wanted))
-            })
-            .ok_or_else(|| {
-                let names = self
-                    .materials()
-                    .map(|material| (&material.name, &material.aliases));
-                unknown(key, name, "material", names)
-            })
+        find(&self.materials, name, |material| &material.aliases).ok_or_else(|| {
+            let all = self
+                .materials()
+                .map(|material| (&material.name, &material.aliases));
+            unknown(key, name, "material", all)
+        })
     }
 }
 
-fn answers(aliases: &[String], wanted: &str) -> bool {
-    aliases.iter().any(|alias| folded(alias) == wanted)
+/// The entry that answers to a name.
+fn find<'a, T>(
+    entries: &'a BTreeMap<String, T>,
+    name: &str,
+    aliases: impl Fn(&T) -> &Vec<String>,
+) -> Option<&'a T> {
+    let wanted = folded(name);
+    let answers = |entry: &&T| aliases(entry).iter().any(|alias| folded(alias) == wanted);
+    entries
+        .get(&wanted)
+        .or_else(|| entries.values().find(answers))
 }
 
 fn unknown<'a>(
@@ -305,38 +268,25 @@ struct EntryReader<'a> {
 }
 
 impl EntryReader<'_> {
-    fn positive(&self, key: &'static str, text: &str, kind: Kind) -> Result<f64, CatalogueError> {
-        let value = kind
-            .parse(text)
-            .map_err(|source| CatalogueError::Quantity {
-                origin: self.origin.to_owned(),
-                entry: self.entry.to_owned(),
-                key,
-                source: Box::new(source),
-            })?;
-        if value > 0.0 {
-            Ok(value)
-        } else {
-            Err(self.impossible(key, "it must be above zero"))
+    fn positive(&self, key: &str, text: &str, kind: Kind) -> Result<f64, CatalogueError> {
+        match kind.parse(text) {
+            Ok(value) if value > 0.0 => Ok(value),
+            Ok(_) => Err(self.impossible(key, "it must be above zero")),
+            Err(error) => Err(self.impossible(key, error)),
         }
     }
 
     fn optional(
         &self,
-        key: &'static str,
+        key: &str,
         text: Option<&str>,
         kind: Kind,
     ) -> Result<Option<f64>, CatalogueError> {
         text.map(|text| self.positive(key, text, kind)).transpose()
     }
 
-    fn impossible(&self, key: &'static str, reason: &'static str) -> CatalogueError {
-        CatalogueError::Impossible {
-            origin: self.origin.to_owned(),
-            entry: self.entry.to_owned(),
-            key,
-            reason,
-        }
+    fn impossible(&self, key: &str, reason: impl fmt::Display) -> CatalogueError {
+        CatalogueError::new(format!("{}, {}.{key}", self.origin, self.entry), reason)
     }
 }
 

@@ -56,7 +56,7 @@ mod view;
 pub use catalogue::{Catalogue, CatalogueError};
 pub use error::PhysicalError;
 pub use lever::{BeamGeometry, Lever, LeverData};
-pub use mapping::{MappingRow, PhysicalParameters, Scales};
+pub use mapping::{MappingRow, Scales};
 pub use remark::{Remark, Severity};
 pub use view::Physical;
 

@@ -7,6 +7,7 @@ use crate::case::key::Key;
 use crate::case::quantity::Kind;
 use crate::model::drive_form::Actuation;
 use crate::model::exact_beam;
+use crate::model::parameter::Parameter;
 
 impl Physical {
     /// All remarks, in the order in which the case is read.
@@ -40,7 +41,7 @@ impl Physical {
             remarks.push(Remark::note(format!(
                 "gap.tip is not given: {}, the setpoint amplitude, until the setpoint is \
                  solved for",
-                Kind::Length.format(self.parameters.tip_gap)
+                Kind::Length.format(self.parameters.get(Parameter::Alpha5))
             )));
         }
         if !reader.has(Key::GapBeam) && self.tip.height.is_none() {
@@ -60,7 +61,10 @@ impl Physical {
     fn clearance_remarks(&self) -> Vec<Remark> {
         let mut remarks = Vec::new();
         let base = match self.cantilever.actuation {
-            Actuation::Base => self.parameters.drive_amplitude + self.parameters.tone2_amplitude,
+            Actuation::Base => {
+                self.parameters.get(Parameter::Alpha2)
+                    + self.parameters.get(Parameter::Tone2Amplitude)
+            }
             Actuation::Tip | Actuation::Distributed => 0.0,
         };
         if base >= self.scales.length {
@@ -72,7 +76,7 @@ impl Physical {
             )));
         }
         let softness = (self.lever.k / self.sample.stiffness).sqrt().min(1.0);
-        let static_depth = (-self.parameters.tip_gap).max(0.0) * self.lever.k
+        let static_depth = (-self.parameters.get(Parameter::Alpha5)).max(0.0) * self.lever.k
             / (self.lever.k + self.sample.stiffness);
         let depth = (self.free_amplitude + base) * softness + static_depth;
         if depth >= self.tip_height {

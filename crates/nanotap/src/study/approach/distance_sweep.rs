@@ -16,7 +16,7 @@ use std::fmt;
 use nanotap_dynamics::{
     Bifurcation, BifurcationKind, Branch, BranchEnd, BranchPoint, ClassifyOptions,
     ContinuationOptions, Control, Direction, LyapunovOptions, MotionKind, PeriodicOrbit,
-    ShootingOptions, StroboscopicMap as _, UndecidedReason, classify, close_orbit,
+    Scheduling as _, ShootingOptions, UndecidedReason, classify, close_orbit,
     close_orbit_from_points, continue_orbit, switch_at_flip,
 };
 
@@ -217,7 +217,7 @@ impl<'a> DistanceSweep<'a> {
         let far = if swings { far.max(BEYOND * reach) } else { far };
         let sweep = SweepOptions {
             max_period,
-            ..SweepOptions::new(Vec::new())
+            ..SweepOptions::default()
         };
         let model = case.with(case.gap_key(), far).model()?;
         // The slowest decay of the free lever, by its trace.

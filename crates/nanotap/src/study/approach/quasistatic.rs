@@ -7,12 +7,11 @@ use rayon::prelude::*;
 
 use super::distance_sweep::{DistanceSweep, End, Met, Motion, Piece, Place, is_same};
 use super::ramp::ramp;
-use super::{
-    ApproachError, ApproachPoint, Curve, Hysteresis, StateJump, Way, branching, difference,
-};
+use super::{ApproachPoint, Curve, Hysteresis, StateJump, Way, branching, difference};
+use crate::Error;
 use crate::case::{Case, CaseError};
 use crate::study::FreeMotion;
-use crate::study::branch::{BranchReport, BranchesThrough};
+use crate::study::branch::{BranchReport, BranchesThrough, Range};
 use crate::study::simulate::Classification;
 
 /// What is reported of a curve.
@@ -64,12 +63,12 @@ pub(super) fn found(
     free: &FreeMotion,
     distances: &[f64],
     control: &Control<'_>,
-) -> Result<Found, ApproachError> {
+) -> Result<Found, Error> {
     let (case, options) = (curve.case, curve.options);
     let (from, to) = (distances[0], distances[distances.len() - 1]);
     let range = (to, from);
     let mut sweep = DistanceSweep::new(case, range, free.reach, options.max_period, control)?;
-    let (ways, first) = if options.speed.is_none() {
+    let (ways, first) = if curve.speed.is_none() {
         Ways::of(&mut sweep, from, to)?
     } else {
         let mut place = sweep.free()?;
@@ -88,11 +87,11 @@ pub(super) fn found(
         ways: &ways,
         distances,
     };
-    let table = match options.speed {
+    let table = match curve.speed {
         Some(speed) => ramp(curve, speed, distances, &sweep.state(&first), control)?,
         None => written.table(control)?,
     };
-    let coexisting = match options.speed {
+    let coexisting = match curve.speed {
         None => written.coexisting(&table)?,
         Some(_) => Vec::new(),
     };
@@ -111,7 +110,7 @@ fn branches(
     sweep: &DistanceSweep<'_>,
     (near, far): (f64, f64),
     control: &Control<'_>,
-) -> Result<Option<BranchReport>, ApproachError> {
+) -> Result<Option<BranchReport>, Error> {
     if !curve.options.branches {
         return Ok(None);
     }
@@ -119,8 +118,13 @@ fn branches(
         progress: None,
         ..*control
     };
-    let how = branching(curve.case.gap_key(), (far, near), curve.options);
-    let mut branches = BranchesThrough::new(curve.case, &how)?;
+    let how = branching(curve.options);
+    let range = Range {
+        key: curve.case.gap_key(),
+        from: far,
+        to: near,
+    };
+    let mut branches = BranchesThrough::new(curve.case, range, &how)?;
     // A doubled branch is followed from its flip, as deep as the options say.
     let is_doubled = |k: &usize| {
         let ends = sweep.stretches[*k].ends.iter();
@@ -172,7 +176,7 @@ impl Written<'_> {
     fn table(&self, control: &Control<'_>) -> Result<Vec<ApproachPoint>, CaseError> {
         let count = self.distances.len();
         let done = AtomicUsize::new(0);
-        let told = || {
+        let report = || {
             if let Some(progress) = control.progress {
                 progress(done.fetch_add(1, Ordering::Relaxed) + 1, 2 * count);
             }
@@ -200,7 +204,7 @@ impl Written<'_> {
                     _ => false,
                 };
                 let there = of(Way::Approach, there)?;
-                told();
+                report();
                 let back = if same {
                     let same = there.clone();
                     same.map(|row| ApproachPoint {
@@ -210,7 +214,7 @@ impl Written<'_> {
                 } else {
                     of(Way::Retract, back)?
                 };
-                told();
+                report();
                 Ok((there, back))
             })
             .collect();

@@ -1,16 +1,16 @@
-//! The orbits at the places of a curve, branch by branch, and which branch the data are on.
+//! The orbits at the rows of a curve, branch by branch, and the branch of each row.
 //!
-//! A motion is followed along the curve as the instrument saw it: from each row's orbit Newton
-//! closes the next one's, in halves of the way where it must; where that fails the branch has
-//! ended, and the motion goes on from where it is to the next attractor. The same is done from
-//! the curve's end to its beginning, which finds the other side of a hysteresis. With other
-//! parameters than those behind the data the motion may stay on a branch that the data have left,
-//! both ways; where no orbit found swings as was measured, one is looked for where it would, and
-//! followed both ways. Orbits of one period that continue each other are one branch. Of the branches, each row gets one by the
-//! least sum of squared residuals and of a price for every change of branch (the shortest path
-//! through the table of rows and branches, found row by row).
+//! A motion is followed along the curve as in the measurement: Newton finds the orbit of each row
+//! from that of the previous one, in smaller steps if necessary. If that fails, the branch has
+//! ended, and the motion continues to the next attractor. The same is done from the end of the
+//! curve to its beginning, which finds the other side of a hysteresis. With wrong parameters the
+//! motion may stay on one branch in both directions while the data are on another. Where none of
+//! the orbits resembles the measured motion, an orbit near it is searched for and followed in both
+//! directions. Orbits of one period that continue each other form a branch. Each row is assigned to
+//! a branch so that the sum of squared residuals and of a penalty for every change of branch is
+//! minimal (the shortest path through the table of rows and branches, row by row).
 //!
-//! Fails by omission: branches that none of these meets.
+//! Fails by omission: branches that none of these searches finds.
 
 use nanotap_dynamics::{
     ClassifyOptions, LyapunovOptions, MotionKind, PeriodicOrbit, ShootingOptions,
@@ -31,33 +31,34 @@ pub(super) struct Candidate {
 /// The orbits at each row.
 pub(super) type Rows = Vec<Vec<Candidate>>;
 
-/// A curve whose rows' cases are known.
+/// A curve with the cases of its rows.
 pub(super) struct Along<'a> {
-    /// The case at each row, and at places between.
+    /// Returns the case at a row, and at positions between rows.
     pub(super) at: &'a dyn Fn(&[f64]) -> Option<Case>,
-    /// Where the rows are.
+    /// The positions of the rows.
     pub(super) places: &'a [Vec<f64>],
-    /// A state at drive phase 0 that swings as was measured at a row, if amplitude and phase were.
+    /// Returns a state at drive phase 0 with the measured amplitude and phase of a row, if both
+    /// were measured.
     pub(super) measured: &'a dyn Fn(usize, &Model) -> Option<Vec<f64>>,
-    /// Longest period looked for.
+    /// Longest period of the orbits in drive periods.
     pub(super) max_period: usize,
 }
 
-/// Distance of two orbits, in parts of their size, that do not continue each other in one step.
+/// Largest distance of orbits that continue each other in one step, as a fraction of their size.
 const FAR: f64 = 0.3;
-/// Drive periods of a motion that has not repeated after the transient, until it is looked at for
-/// the last time.
+/// Number of drive periods after the transient at which a motion that has not repeated is examined
+/// for the last time.
 const LAST_LOOK: usize = 64;
-/// Halvings of the way from one row to the next.
+/// Largest number of halvings of the step from one row to the next.
 const HALVINGS: usize = 4;
-/// Distance of an orbit from the state that was measured, in parts of that, beyond which it is
-/// another motion.
+/// Largest distance of an orbit from the measured state, as a fraction of that state, at which the
+/// two are the same motion.
 const UNLIKE: f64 = 0.2;
-/// Runs from states that were measured, of which none need find anything.
+/// Largest number of runs from measured states.
 const RUNS: usize = 6;
 
 impl Along<'_> {
-    /// The orbits at every row.
+    /// Finds the orbits at every row.
     pub(super) fn discover(&self) -> Rows {
         let mut rows: Rows = vec![Vec::new(); self.places.len()];
         let mut branches = 0;
@@ -74,15 +75,15 @@ impl Along<'_> {
         rows
     }
 
-    /// The orbits at every row that continue those found beside other parameters; `None` where one
-    /// of them has no continuation.
+    /// Continues the orbits found for other parameters to every row; `None` if one of them has no
+    /// continuation.
     pub(super) fn continued_from(&self, before: &Rows) -> Option<Rows> {
         let row = |(place, candidates): (&Vec<f64>, &Vec<Candidate>)| {
             let model = (self.at)(place)?.model().ok()?;
             let mut map = Strobe::new(&model);
             let one = |candidate: &Candidate| {
                 let orbit = continued(&mut map, &candidate.orbit)?;
-                let near = orbit.distance_to(&candidate.orbit).1 <= FAR * candidate.orbit.scale();
+                let near = orbit.is_near(&candidate.orbit, FAR);
                 (orbit.is_stable() && near).then_some(Candidate {
                     branch: candidate.branch,
                     orbit,
@@ -93,10 +94,10 @@ impl Along<'_> {
         self.places.iter().zip(before).map(row).collect()
     }
 
-    /// Adds the branches of motions that swing as was measured where no orbit does so far.
+    /// Adds the branches of motions near the measured one at rows where no orbit is near it.
     fn as_measured(&self, rows: &mut Rows, branches: &mut usize) {
         let count = rows.len();
-        // Rows that fail are neighbours: the next one tried is some way off.
+        // Rows that fail are usually neighbours: the next one tried is some distance away.
         let apart = count / (2 * RUNS) + 1;
         let (mut runs, mut row) = (0, 0);
         while row < count && runs < RUNS {
@@ -106,7 +107,7 @@ impl Along<'_> {
             };
             runs += 1;
             let found = self.settled(row, Some(&state));
-            let new = found.filter(|o| !rows[row].iter().any(|known| same(&known.orbit, o)));
+            let new = found.filter(|o| !rows[row].iter().any(|known| known.orbit.is_same_as(o)));
             let Some(orbit) = new else {
                 row += apart;
                 continue;
@@ -122,11 +123,11 @@ impl Along<'_> {
         }
     }
 
-    /// The state that was measured at a row, where none of the orbits there is like it.
+    /// The measured state at a row, if no known orbit is near it.
     fn unlike(&self, row: usize, known: &[Candidate]) -> Option<Vec<f64>> {
         let model = (self.at)(&self.places[row])?.model().ok()?;
         let state = (self.measured)(row, &model)?;
-        // Rates in parts of the drive's.
+        // Velocities relative to those of the drive.
         let modes = (state.len() - model.memory) / 2;
         let weight = |k: usize| match k / modes {
             0 => 1.0,
@@ -146,7 +147,7 @@ impl Along<'_> {
         (!known.iter().any(like)).then_some(state)
     }
 
-    /// Follows a new branch over the rows in this order, the first of which has its orbit.
+    /// Follows a new branch over the rows in this order, from the orbit of the first one.
     fn along(&self, rows: &mut Rows, candidate: &Candidate, order: &[usize]) {
         let mut last = candidate.orbit.clone();
         for pair in order.windows(2) {
@@ -154,7 +155,9 @@ impl Along<'_> {
             let Some(orbit) = self.follow(a, b, &last, HALVINGS) else {
                 return;
             };
-            let known = rows[pair[1]].iter().any(|known| same(&known.orbit, &orbit));
+            let known = rows[pair[1]]
+                .iter()
+                .any(|known| known.orbit.is_same_as(&orbit));
             if known {
                 return;
             }
@@ -192,7 +195,9 @@ impl Along<'_> {
                 continue;
             };
             state = orbit.states.first().cloned();
-            let known = rows[row].iter().find(|known| same(&known.orbit, &orbit));
+            let known = rows[row]
+                .iter()
+                .find(|known| known.orbit.is_same_as(&orbit));
             let candidate = if let Some(known) = known {
                 known.clone()
             } else {
@@ -209,8 +214,8 @@ impl Along<'_> {
         }
     }
 
-    /// The branch of an orbit that was found anew: that of an orbit at the nearest row with any,
-    /// if that continues to this one.
+    /// The branch of a newly found orbit: that of an orbit at the nearest row with any, if it
+    /// continues to this one.
     fn known(&self, rows: &Rows, row: usize, orbit: &PeriodicOrbit) -> Option<usize> {
         let here = &self.places[row];
         let away = |k: &usize| {
@@ -222,12 +227,12 @@ impl Along<'_> {
         let mut there = rows[near].iter();
         let continues = there.find(|candidate| {
             let found = self.follow(&self.places[near], here, &candidate.orbit, HALVINGS);
-            found.is_some_and(|found| same(&found, orbit))
+            found.is_some_and(|found| found.is_same_as(orbit))
         });
         continues.map(|candidate| candidate.branch)
     }
 
-    /// The orbit at `to` that continues the one at `from`, if it attracts.
+    /// The orbit at `to` that continues the one at `from`, if it is stable.
     fn follow(
         &self,
         from: &[f64],
@@ -240,7 +245,7 @@ impl Along<'_> {
             continued(&mut Strobe::new(&model), orbit)
         });
         // Beyond a fold Newton may find an orbit of another branch.
-        let near = |found: &PeriodicOrbit| found.distance_to(orbit).1 <= FAR * orbit.scale();
+        let near = |found: &PeriodicOrbit| found.is_near(orbit, FAR);
         let closed = closed.filter(|found| found.is_stable() && near(found));
         if closed.is_some() || halvings == 0 {
             return closed;
@@ -250,23 +255,23 @@ impl Along<'_> {
         self.follow(&middle, to, &half, halvings - 1)
     }
 
-    /// Where the motion at a row goes from a state, or from rest.
+    /// The orbit that the motion at a row reaches from a state, or from rest.
     fn settled(&self, row: usize, state: Option<&[f64]>) -> Option<PeriodicOrbit> {
         let model = (self.at)(&self.places[row])?.model().ok()?;
         settled(&model, state, self.max_period)
     }
 }
 
-/// The orbit of up to `max_period` drive periods at which the motion from a state, or from rest,
-/// comes to repeat.
+/// The orbit of up to `max_period` drive periods that the motion from a state, or from rest,
+/// reaches.
 pub(super) fn settled(
     model: &Model,
     state: Option<&[f64]>,
     max_period: usize,
 ) -> Option<PeriodicOrbit> {
     let rest = vec![0.0; model.dimension()];
-    // Only whether it comes to repeat matters: exponents of a motion that does not would take
-    // longer than all the rest of a fit.
+    // Only periodic motions matter: computing the exponents of other motions would take longer than
+    // the rest of the fit.
     let options = ClassifyOptions {
         max_period,
         long_period: max_period,
@@ -286,7 +291,7 @@ pub(super) fn settled(
     }
 }
 
-/// The orbit of this map that Newton finds from another's, of the same period.
+/// The orbit of this map that Newton finds from another orbit of the same period.
 pub(super) fn continued(map: &mut Strobe, orbit: &PeriodicOrbit) -> Option<PeriodicOrbit> {
     if orbit.dimension() != map.dimension() {
         return None;
@@ -297,16 +302,11 @@ pub(super) fn continued(map: &mut Strobe, orbit: &PeriodicOrbit) -> Option<Perio
         .filter(|found| found.period == orbit.period)
 }
 
-/// Whether two orbits are one: rounding is far below, and two branches far above.
-fn same(a: &PeriodicOrbit, b: &PeriodicOrbit) -> bool {
-    a.is_same_as(b) || a.distance_to(b).1 <= 1e-7 * a.scale()
-}
-
-/// Least cost up to a candidate, and the row and candidate before it.
+/// Lowest cost of a path to a candidate, and the row and candidate before it.
 type Reached = (f64, Option<(usize, usize)>);
 
-/// The branch of each row: the path of least cost, each change of branch at `price`; `costs`
-/// has one a candidate. `None` where a row has no orbit.
+/// The branch of each row: the path of lowest cost, with a penalty of `price` for each change of
+/// branch. `costs` has one entry per candidate. `None` where a row has no orbit.
 pub(super) fn path(rows: &Rows, costs: &[Vec<f64>], price: f64) -> Vec<Option<usize>> {
     let mut best: Vec<Vec<Reached>> = Vec::new();
     let mut last: Option<usize> = None;
@@ -349,10 +349,10 @@ pub(super) fn path(rows: &Rows, costs: &[Vec<f64>], price: f64) -> Vec<Option<us
     chosen
 }
 
-/// Takes the last row before and the first row after each change of branch away from the other
-/// branch, if it is there only because its own has no orbit there: with parameters that are not
-/// yet those behind the data a branch ends too early, and a row that is left to the other one
-/// would bend everything towards it. `costs` as for [`path`]; `dear` is more than noise costs.
+/// Removes the last row before and the first row after each change of branch from the other branch,
+/// if it is assigned to that branch only because its own has no orbit there. With slightly wrong
+/// parameters a branch ends too early, and a row assigned to the other branch would bias the fit.
+/// `costs` as in [`path`]; `dear` is more than the cost of noise.
 pub(super) fn leave_ends(rows: &Rows, costs: &[Vec<f64>], dear: f64, chosen: &mut [Option<usize>]) {
     let branch = |chosen: &[Option<usize>], row: usize| {
         chosen[row].map(|candidate| rows[row][candidate].branch)

@@ -1,20 +1,20 @@
-//! The same data under several contact laws.
+//! Fits of the same data under several contact laws.
 
 use super::report::{ComparedLaw, FitReport};
-use super::{FitRequest, fit_one, names};
+use super::{FitOptions, fit_one, names};
 use crate::Error;
 use crate::case::under_law::LawName;
 use crate::case::{Case, Key};
 use crate::control::Control;
 
-/// Difference of Akaike's criterion from which on the worse of two laws has next to no support
+/// Difference of Akaike's criterion above which the worse of two laws has essentially no support
 /// (Burnham & Anderson, Model Selection and Multimodel Inference, 2nd ed. 2002, Sect. 2.6).
 const DECIDED: f64 = 10.0;
 
-/// Fits each law of the request; the report is that of the best, with all of them in `laws`.
+/// Fits each law of the request. The report is that of the best law, with all laws in `laws`.
 pub(super) fn compare(
     case: &Case,
-    request: &FitRequest,
+    request: &FitOptions,
     control: &Control<'_>,
 ) -> Result<FitReport, Error> {
     let laws = names(&request.laws)
@@ -51,7 +51,7 @@ pub(super) fn compare(
                 let all = names(given).into_iter();
                 all.filter(|name| takes(law, name)).collect()
             };
-            let mut request = FitRequest {
+            let mut request = FitOptions {
                 laws: Vec::new(),
                 free: of_law(&request.free),
                 per_curve: of_law(&request.per_curve),
@@ -60,7 +60,7 @@ pub(super) fn compare(
             request.bounds.0.retain(|bound| takes(law, &bound.name));
             fit_one(&case, &request, control)
         });
-        // A law whose fit was stopped before it found anything is not judged.
+        // A law whose fit was cancelled without a result is not judged.
         if fitted.is_ok() || !control.is_cancelled() {
             found.push((law.text(), fitted));
         }
@@ -87,13 +87,13 @@ pub(super) fn compare(
     Ok(report)
 }
 
-/// Whether a parameter can be free under a law: what is no key of the sample always can.
+/// True if a parameter can be free under a law; keys outside the sample always can.
 fn takes(law: &LawName, name: &str) -> bool {
     Key::find(name).is_none_or(|key| law.takes(key))
 }
 
-/// Where keys begin that the case does not state: in the middle of their bounds.
-fn middles(request: &FitRequest) -> Vec<(Key, f64)> {
+/// Initial values of keys that the case does not state: the middle of their bounds.
+fn middles(request: &FitOptions) -> Vec<(Key, f64)> {
     let middle = |bound: &crate::study::value::Interval| {
         let key = Key::find(&bound.name)?;
         let read = |text: &str| key.kind().parse(text).ok();
@@ -105,7 +105,7 @@ fn middles(request: &FitRequest) -> Vec<(Key, f64)> {
     request.bounds.0.iter().filter_map(middle).collect()
 }
 
-/// The middle of two bounds, of positive ones that of their logarithms.
+/// The middle of two bounds; of positive ones, the geometric mean.
 pub(super) fn between(low: f64, high: f64) -> f64 {
     if low > 0.0 {
         (low * high).sqrt()
@@ -157,7 +157,7 @@ fn table(found: &[(String, Result<FitReport, Error>)]) -> Vec<ComparedLaw> {
     found.iter().map(row).collect()
 }
 
-/// What is to be kept in mind of the choice.
+/// Cautions about the choice of a law.
 fn cautions(best: &str, laws: &[ComparedLaw]) -> Vec<String> {
     let mut cautions = Vec::new();
     let near: Vec<&str> = laws

@@ -1,8 +1,8 @@
-//! What a fit may change: keys of the case, and what is not quite known of the instrument.
+//! Free parameters of a fit: keys of the case, and corrections of the instrument.
 //!
-//! `X.offset` is added to the values of a column X: to where its rows were measured, or to what
-//! the model says was measured. `X.scale` multiplies what the model says. `gap.offset` is that
-//! of the distance.
+//! `X.offset` is added to the values of a column X: to the positions of its rows, or to the model's
+//! values of an observable. `X.scale` multiplies the model's values. `gap.offset` is the offset of
+//! the distance.
 
 use crate::Error;
 use crate::case::{Case, Key};
@@ -17,28 +17,28 @@ use super::quantity::Quantity;
 pub(super) enum Target {
     /// A key of the case.
     Key(Key),
-    /// What is added to a swept key, by its place.
+    /// Offset of a swept key, by its index.
     Place(usize),
-    /// What is added to an observable, by its column.
+    /// Offset of an observable, by its column.
     Offset(usize),
-    /// What multiplies an observable, by its column.
+    /// Factor of an observable, by its column.
     Scale(usize),
 }
 
 /// A free parameter.
 #[derive(Clone, Debug)]
 pub(super) struct Parameter {
-    /// Its name: `sample.stiffness`, `gap.offset`.
+    /// Name: `sample.stiffness`, `gap.offset`.
     pub(super) name: String,
     /// What it changes.
     pub(super) target: Target,
     /// The curve that it belongs to; `None`: all.
     pub(super) curve: Option<usize>,
-    /// Where the fit begins.
+    /// Initial value.
     pub(super) start: f64,
     /// Its bounds.
     pub(super) bounds: (f64, f64),
-    /// Over which size it may be elsewhere.
+    /// Scale of the range of initial values.
     pub(super) size: f64,
 }
 
@@ -64,7 +64,8 @@ impl Parameter {
         self.curve.is_none_or(|own| own == curve)
     }
 
-    /// The derivatives of a row's values by an offset or a scale of a column; zero of others.
+    /// Derivatives of a row's values by an offset or a scale of a column; zero for other
+    /// parameters.
     pub(super) fn direct(&self, values: &[f64]) -> Vec<f64> {
         let mut by = vec![0.0; values.len()];
         match self.target {
@@ -76,7 +77,7 @@ impl Parameter {
     }
 }
 
-/// The unit of a key in SI, `1` for none.
+/// Unit of a key in SI, `1` if there is none.
 pub(super) fn unit_of(key: Key) -> &'static str {
     if key.is_physical() {
         key.kind().si_unit()
@@ -85,7 +86,7 @@ pub(super) fn unit_of(key: Key) -> &'static str {
     }
 }
 
-/// The parameters called `free` and, one a curve, `per_curve`.
+/// Creates the parameters called `free` and, one per curve, `per_curve`.
 pub(super) fn parameters(
     case: &Case,
     data: &Data,
@@ -188,7 +189,7 @@ fn parameter(
         ));
     }
     let range = key.range();
-    // The range's own ends may be excluded.
+    // The ends of the valid range may be excluded.
     let inside = |end: f64, excluded: bool, to: f64| {
         if excluded && end.is_finite() {
             end + to * f64::EPSILON.max(1e-9 * start.abs())
@@ -268,7 +269,7 @@ fn nuisance(
     })
 }
 
-/// Sets the bounds of a parameter, and brings its start between them.
+/// Sets the bounds of a parameter and moves its initial value between them.
 fn bound(
     case: &Case,
     data: &Data,

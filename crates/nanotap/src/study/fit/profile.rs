@@ -1,4 +1,4 @@
-//! 95 % intervals by the profile of the likelihood: where the least chi2 with one parameter held
+//! 95 % intervals from the profile of the likelihood: where the least chi2 with one parameter fixed
 //! exceeds the least of all by the square of Student's (or the normal) quantile.
 
 use super::problem::{Point, Problem};
@@ -7,25 +7,25 @@ use super::solve::{
 };
 use super::statistics::Information;
 
-/// Looks at the profile on each side.
+/// Largest number of evaluations of the profile on each side.
 const LOOKS: usize = 6;
-/// Steps of the other parameters at each look.
+/// Largest number of steps of the other parameters per evaluation.
 const STEPS: usize = 4;
-/// What a step must promise of chi2 to be taken.
+/// Smallest predicted gain of chi2 for which a step is taken.
 const FLAT: f64 = 1e-3;
-/// How well the quantile is met, in standard errors.
+/// Accuracy of the quantile, in standard errors.
 const CLOSE: f64 = 0.01;
 
-/// What the profiles tell.
+/// Result of the profiles.
 pub(super) enum Profile {
-    /// The interval of each parameter; no end where it is not determined, or beyond a bound.
+    /// The interval of each parameter; an end is missing if it is undetermined or beyond a bound.
     Intervals(Vec<[Option<f64>; 2]>),
-    /// Parameters at which chi2 is less than at the best values: those are a local minimum.
+    /// Parameters with a smaller chi2 than the best values, which are therefore a local minimum.
     Lower(Vec<f64>),
 }
 
-/// The intervals of half-width `width` in standard errors, unless chi2 is lower by more than
-/// `deeper` beside them.
+/// Computes the intervals of half-width `width` in standard errors, unless chi2 nearby is lower by
+/// more than `deeper`.
 pub(super) fn profile(
     problem: &Problem<'_>,
     best: &Solution<Point>,
@@ -65,17 +65,16 @@ enum End {
     Lower(Vec<f64>),
 }
 
-/// Where chi2 is least with one parameter held.
+/// The minimum of chi2 with one parameter fixed.
 struct Least {
     x: Vec<f64>,
     point: Point,
     chi2: f64,
 }
 
-/// Where the profile of a parameter reaches the quantile on one side: of the root of what chi2
-/// gained, which is straight where the model is linear, by regula falsi from the standard error.
-/// Each look begins where the one before it ended inside the interval, as the others went from the
-/// best values to there.
+/// The value of a parameter at which its profile reaches the quantile on one side. Regula falsi on
+/// the square root of the gain of chi2, which is linear for a linear model, starting from the
+/// standard error. Each evaluation starts from the end of the last one inside the interval.
 fn end(
     problem: &Problem<'_>,
     best: &Solution<Point>,
@@ -87,7 +86,7 @@ fn end(
     let bounds: Vec<(f64, f64)> = problem.parameters.iter().map(|p| p.bounds).collect();
     let (low, high) = bounds[k];
     let at = |t: f64| stepped(best.x[k], side * t * error, low);
-    // What chi2 gained and where, so many standard errors from the best value.
+    // Gain of chi2 and the minimum, at this many standard errors from the best value.
     let mut inner: (f64, f64, Option<Least>) = (0.0, 0.0, None);
     let mut outer: Option<(f64, f64)> = None;
     let mut t = width;
@@ -108,7 +107,7 @@ fn end(
                     let gone = step_between(best.x[j], from[j], bounds[j].0);
                     gone * t / inner.0
                 } else {
-                    // Where it would be if the model were linear.
+                    // Its value for a linear model.
                     side * t * error * information.covariance[(j, k)]
                         / information.covariance[(k, k)]
                 };
@@ -123,7 +122,7 @@ fn end(
         {
             return End::Lower(found.x.clone());
         }
-        // Where a branch ends the profile has a wall.
+        // At the end of a branch the profile is discontinuous.
         let gained = found.as_ref().map_or(f64::INFINITY, |found| {
             (found.chi2 - best.cost).max(0.0).sqrt()
         });
@@ -152,11 +151,10 @@ fn end(
     }
 }
 
-/// The least chi2 with parameter `k` held, from a point near it; `None` where rows have no orbit
-/// that had one.
+/// The least chi2 with parameter `k` fixed, from a nearby point; `None` if rows lose their orbits.
 ///
-/// By steps with the Jacobian at the best values, which is good near by; where these do not end in
-/// a minimum, because the valley of chi2 bends, by a fit of the others.
+/// It uses steps with the Jacobian at the best values, which is accurate nearby. If these do not
+/// end in a minimum, because the valley of chi2 is curved, the other parameters are fitted.
 fn least(
     problem: &Problem<'_>,
     x: Vec<f64>,
@@ -186,15 +184,15 @@ fn least(
     })
 }
 
-/// Where a few steps led.
+/// Result of a few steps.
 struct Steps {
     x: Vec<f64>,
     point: Point,
-    /// chi2 there, if no further step promises to make it less.
+    /// chi2 after them, if no further step promises to reduce it.
     least: Option<f64>,
 }
 
-/// As far as a few steps with a Jacobian of near by come.
+/// Takes a few steps with the Jacobian of a nearby point.
 fn few_steps(
     problem: &Problem<'_>,
     mut x: Vec<f64>,
@@ -209,7 +207,7 @@ fn few_steps(
         let least = Some(cost);
         return Some(Steps { x, point, least });
     }
-    // What the data do not determine stays where it is.
+    // Combinations that the data do not determine are not changed.
     let mut normal = others.tr_mul(&others);
     for j in 0..normal.ncols() {
         normal[(j, j)] = (1.0 + 1e-10) * normal[(j, j)] + f64::MIN_POSITIVE;

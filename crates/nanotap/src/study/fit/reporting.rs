@@ -1,4 +1,4 @@
-//! From the best values to the report.
+//! Construction of the report from the best values.
 
 use std::collections::BTreeMap;
 
@@ -18,27 +18,27 @@ use super::report::{
 use super::search::{Found, Search, UNLIKELY, branches_of};
 use super::statistics::{self, Information, information, persistence, student};
 
-/// What chi2 may be lower beside the best values.
+/// Smallest reduction of chi2 near the best values that counts.
 const DEEPER: f64 = 0.1;
-/// Times that a fit goes on from where its profile found a lower chi2.
+/// Largest number of times that a fit continues from a lower chi2 of its profile.
 const DEEPER_ROUNDS: usize = 4;
-/// Rows of which a remark speaks singly.
+/// Largest number of rows that a remark lists.
 const SAID: usize = 8;
 
 impl Search<'_> {
-    /// The problem in the standard errors, and with the jumps, of what was found.
+    /// The problem with the standard errors and the jumps of a result.
     fn problem_of(&self, found: &Found) -> Problem<'_> {
         let mut problem = self.weighted(found.noise.clone(), None);
         problem.jumps.clone_from(&found.jumps);
         problem
     }
 
-    /// The criteria of Akaike and of Schwarz; standard errors that were estimated count as
-    /// parameters, and values of rows without an orbit as missed by their column's spread.
+    /// The criteria of Akaike and of Schwarz. Estimated standard errors count as parameters, and
+    /// values of rows without an orbit as residuals of their column's spread.
     fn criteria(&self, found: &Found) -> [f64; 2] {
         let rows = self.problem.data.rows();
         let point = &found.solution.point;
-        // Another law may have no fold to compare: the jumps are left out.
+        // Another law may have no fold: the jumps are left out.
         let mut deviance = found.solution.cost - self.squared_jumps(found);
         let mut estimated = vec![false; found.noise.len()];
         for (row, point) in rows.zip(point.iter()) {
@@ -59,7 +59,7 @@ impl Search<'_> {
         [2.0, nanotap_arithmetic::ln(count)].map(|price| deviance + price * parameters)
     }
 
-    /// All that was found, from so many starts.
+    /// Creates the report of a result from this many initial values.
     pub(super) fn report(&self, found: Found, starts: usize) -> FitReport {
         let (found, intervals) = self.with_intervals(found);
         let found = &found;
@@ -139,7 +139,7 @@ impl Search<'_> {
         }
     }
 
-    /// What the Jacobian at the best values says of the parameters.
+    /// Information about the parameters from the Jacobian at the best values.
     fn information(&self, found: &Found) -> Information {
         let parameters = self.problem.parameters.iter();
         let sizes: Vec<f64> = parameters
@@ -152,8 +152,8 @@ impl Search<'_> {
         information(&found.solution.jacobian, &sizes)
     }
 
-    /// The intervals of the parameters. Where chi2 is found to be lower beside the best values than
-    /// there, the fit goes on from that place.
+    /// The intervals of the parameters. If chi2 is lower near the best values, the fit continues
+    /// from there.
     fn with_intervals(&self, mut found: Found) -> (Found, Vec<[Option<f64>; 2]>) {
         let mut rounds = DEEPER_ROUNDS;
         loop {
@@ -190,13 +190,13 @@ impl Search<'_> {
         }
     }
 
-    /// Whether a fit describes as much of the data better than another.
+    /// True if one fit describes as much of the data better than another.
     fn is_better(&self, this: &Found, other: &Found) -> bool {
         let deviance = |of: &Found| self.criteria(of)[0] + self.squared_jumps(of);
         this.jumps.len() >= other.jumps.len() && deviance(this) < deviance(other)
     }
 
-    /// What the places of jumps add to chi2.
+    /// Contribution of the jumps to chi2.
     fn squared_jumps(&self, found: &Found) -> f64 {
         let problem = self.problem_of(found);
         let (x, point) = (&found.solution.x, &found.solution.point);
@@ -227,7 +227,7 @@ impl Search<'_> {
             .collect()
     }
 
-    /// Which rows have no orbit, and how the lever moves there instead.
+    /// Lists the rows without an orbit, and the motion of the lever there.
     fn without_orbit(&self, found: &Found) -> String {
         let (problem, x) = (&self.problem, &found.solution.x);
         let rows = problem.rows();
@@ -274,7 +274,7 @@ impl Search<'_> {
         )
     }
 
-    /// Why the model does not describe the data, and what else puts the result in doubt.
+    /// Determines why the model does not describe the data, and adds other warnings.
     fn judge(
         &self,
         found: &Found,
@@ -337,7 +337,7 @@ impl Search<'_> {
     }
 }
 
-/// The rows with what the model says.
+/// The rows with the model's values.
 fn rows(problem: &Problem<'_>, found: &Found) -> Vec<FittedRow> {
     let data = problem.data;
     let x = &found.solution.x;
@@ -369,7 +369,7 @@ fn rows(problem: &Problem<'_>, found: &Found) -> Vec<FittedRow> {
         .collect()
 }
 
-/// The jumps of the data with the folds behind them.
+/// The jumps of the data with their folds.
 fn jumps(problem: &Problem<'_>, found: &Found) -> Vec<FittedJump> {
     let (x, point) = (&found.solution.x, &found.solution.point);
     let rows = problem.rows();
@@ -389,7 +389,7 @@ fn jumps(problem: &Problem<'_>, found: &Found) -> Vec<FittedJump> {
     found.jumps.iter().enumerate().filter_map(jump).collect()
 }
 
-/// What the orbits say that the data are not on.
+/// The values of the orbits on which the data are not.
 fn others(problem: &Problem<'_>, found: &Found) -> Vec<OtherOrbit> {
     let data = problem.data;
     let x = &found.solution.x;
@@ -399,10 +399,10 @@ fn others(problem: &Problem<'_>, found: &Found) -> Vec<OtherOrbit> {
     for (curve, rows) in found.candidates.iter().enumerate() {
         for (row, candidates) in rows.iter().enumerate() {
             let at = problem.place(x, curve, &data.curves[curve].rows[row]);
-            let besides = candidates
+            let others_here = candidates
                 .iter()
                 .filter(|c| c.branch != chosen[first + row]);
-            for candidate in besides {
+            for candidate in others_here {
                 let values = problem.values(x, curve, &at, candidate);
                 let Some(values) = values else { continue };
                 let columns = data.columns.iter().zip(values).enumerate();
@@ -422,7 +422,7 @@ fn others(problem: &Problem<'_>, found: &Found) -> Vec<OtherOrbit> {
     others
 }
 
-/// What the data do not determine, in words.
+/// Descriptions of what the data do not determine.
 fn undetermined(
     information: &Information,
     parameters: &[Parameter],

@@ -175,8 +175,11 @@ mod tests {
         for quality in [0.1, 0.499_999_999, 0.5, 0.500_000_001, 3.0, 200.0] {
             let (frequency, t) = (1.3, 0.4);
             let omega = TAU * frequency;
-            let matrix =
-                nalgebra::DMatrix::from_row_slice(2, 2, &[0.0, t, -omega * omega * t, -omega * t / quality]);
+            let matrix = nalgebra::DMatrix::from_row_slice(
+                2,
+                2,
+                &[0.0, t, -omega * omega * t, -omega * t / quality],
+            );
             let expected = nanotap_arithmetic::matrix_exp(&matrix);
             let map = oscillator_map([frequency, quality], t);
             for i in 0..2 {

@@ -24,14 +24,15 @@ impl HeightImage {
     /// When the file cannot be read, is not a PNG image, or is too large.
     pub(super) fn read(path: &Path, height: f64, size: [f64; 2]) -> Result<Self, Error> {
         let name = path.display();
-        let refuse = |what: String| {
-            Error::input(format!("{name}: {what}"), "name a greyscale image in PNG")
-        };
+        let refuse =
+            |what: String| Error::input(format!("{name}: {what}"), "name a greyscale image in PNG");
         let file = std::fs::File::open(path)
             .map_err(|error| Error::files(format!("{name}: cannot be read: {error}")))?;
         let mut decoder = png::Decoder::new(std::io::BufReader::new(file));
         decoder.set_transformations(png::Transformations::EXPAND);
-        let mut reader = decoder.read_info().map_err(|error| refuse(error.to_string()))?;
+        let mut reader = decoder
+            .read_info()
+            .map_err(|error| refuse(error.to_string()))?;
         let info = reader.info();
         let (columns, rows) = (info.width as usize, info.height as usize);
         if columns.saturating_mul(rows) > MAX_PIXELS {

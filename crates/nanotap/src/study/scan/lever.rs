@@ -134,7 +134,7 @@ impl Lever {
     /// When the case has no model, a second tone, or a rigid sample.
     pub(super) fn new(case: &Case, engine: Engine) -> Result<Self, Error> {
         let model = case.model()?;
-        let cantilever = crate::study::kind::cantilever(case, "scan")?;
+        let cantilever = crate::study::cantilever(case, "scan")?;
         if model.system.drive().frequencies().len() != 1 {
             return Err(Error::input(
                 "a scan needs a drive of one tone",
@@ -352,11 +352,7 @@ impl Readout {
         let period = self.period;
         let mut turned = self.turned_drive + self.turned_column * sums.harmonic;
         let mut still = -period * self.still_constant - self.still_column * sums.impulse;
-        for ((change, a), b) in change
-            .iter()
-            .zip(self.turned.iter())
-            .zip(self.still.iter())
-        {
+        for ((change, a), b) in change.iter().zip(self.turned.iter()).zip(self.still.iter()) {
             turned -= a * *change;
             still += b * change;
         }
@@ -532,7 +528,7 @@ impl LinearLever {
 impl NonlinearLever {
     fn advance(&mut self, state: &mut [f64], gap: f64) -> Result<ForceSums, MotionError> {
         let law = self.law;
-        self.flow.set_offset(self.offset + gap)?;
+        self.flow.system_mut().set_offset(self.offset + gap)?;
         let beam = &state[..law.dimension];
         match law.branch(state) {
             Some(branch) => self.flow.start_on(beam, 0.0, branch)?,

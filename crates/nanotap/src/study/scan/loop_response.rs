@@ -3,8 +3,8 @@
 use std::f64::consts::TAU;
 
 use nalgebra::{DMatrix, DVector};
-use nanotap_arithmetic::eigenvalues;
 use nanotap_arithmetic::ComplexFunctions as _;
+use nanotap_arithmetic::eigenvalues;
 use nanotap_flow::Complex;
 
 use super::feedback::oscillator_map;

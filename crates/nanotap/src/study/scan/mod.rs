@@ -35,7 +35,7 @@ pub use table::{CHANNELS, Channel, pixels_csv};
 
 use crate::Error;
 use crate::case::Case;
-use crate::study::kind::Study;
+use crate::study::Study;
 use plan::Plan;
 use recorder::LineRecord;
 use run::{Recorded, run};
@@ -47,7 +47,7 @@ pub struct ScanStudy;
 impl Study for ScanStudy {
     const NAME: &'static str = "scan";
     const ABOUT: &'static str = "Scan of a line or an image under feedback, drive period by period";
-    type Request = ScanOptions;
+    type Options = ScanOptions;
     type Report = ScanReport;
 
     const COUNTED: &'static str = "drive periods";
@@ -59,13 +59,17 @@ impl Study for ScanStudy {
         control: &Control<'_>,
     ) -> Result<ScanReport, Error> {
         let plan = Plan::new(case, options, control)?;
-        let quality_factor = case.physical().map_or(1.0, |view| view.lever.quality_factor);
+        let quality_factor = case
+            .physical()
+            .map_or(1.0, |view| view.lever.quality_factor);
         let memory = quality_factor / std::f64::consts::PI;
         let (recorded, settled) = run(&plan, memory, control)?;
         let gap = plan.z0 / plan.length_unit;
         let gap = recorded.lines.first().map_or(gap, |line| {
             let first = line.pixels.height.first().copied().unwrap_or(plan.z0);
-            let surface = plan.surface.height(plan.position(0, false), line.statistics.y);
+            let surface = plan
+                .surface
+                .height(plan.position(0, false), line.statistics.y);
             (first - surface) / plan.length_unit
         });
         let feedback = loop_response::loop_report(&plan, &settled, gap, quality_factor)?;
@@ -195,9 +199,7 @@ fn warnings(
     }
     if plan.periods < plan.pixels {
         warnings.push("a line has fewer drive periods than pixels".into());
-    } else if (plan.periods as f64)
-        < quality_factor / std::f64::consts::PI * plan.pixels as f64
-    {
+    } else if (plan.periods as f64) < quality_factor / std::f64::consts::PI * plan.pixels as f64 {
         warnings.push(
             "the lever's memory is longer than a pixel: neighbouring pixels are not independent"
                 .into(),

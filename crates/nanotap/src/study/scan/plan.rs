@@ -14,9 +14,9 @@ use super::options::{
 };
 use super::profile::{Samples, Surface};
 use crate::Error;
+use crate::case::Case;
 use crate::case::key::Key;
 use crate::case::physical::{Kind, Physical};
-use crate::case::Case;
 use crate::study::setpoint::at_setpoint;
 
 /// A scan, checked. Lengths in m, times in s.
@@ -76,7 +76,10 @@ impl Plan {
         let options = options.over(case)?;
         let view = case.physical().ok_or_else(|| {
             Error::input(
-                format!("{}: a scan needs a case in physical quantities", case.title()),
+                format!(
+                    "{}: a scan needs a case in physical quantities",
+                    case.title()
+                ),
                 "state the lever in [cantilever], [drive] and [sample], with units",
             )
         })?;
@@ -215,7 +218,10 @@ impl Plan {
     /// Material at a position along the line.
     pub(super) fn material(&self, x: f64) -> usize {
         let here = |&&(from, to, _): &&(f64, f64, usize)| x >= from && x < to;
-        self.segments.iter().find(here).map_or(0, |segment| segment.2)
+        self.segments
+            .iter()
+            .find(here)
+            .map_or(0, |segment| segment.2)
     }
 }
 
@@ -325,7 +331,10 @@ fn setpoint(options: &ScanOptions, case: &Case, view: &Physical) -> Result<f64, 
 
 /// The distance at which the amplitude of a lever that comes from far has fallen to the setpoint.
 fn found_distance(case: &Case, setpoint: f64, control: &Control<'_>) -> Result<f64, Error> {
-    let words = [format!("drive.setpoint={setpoint:?}"), "gap.tip=".to_owned()];
+    let words = [
+        format!("drive.setpoint={setpoint:?}"),
+        "gap.tip=".to_owned(),
+    ];
     let case = case.restated(&words)?;
     let (found, _) = at_setpoint(case.cancelled_by(control), control)
         .map_err(|error| Error::from(error).context("z0 is not given"))?;
@@ -471,11 +480,7 @@ fn dynamic(options: &ScanOptions, setpoint: f64) -> Result<Option<[f64; 2]>, Err
     }
 }
 
-fn surface(
-    options: &ScanOptions,
-    case: &Case,
-    size: [f64; 2],
-) -> Result<Surface, Error> {
+fn surface(options: &ScanOptions, case: &Case, size: [f64; 2]) -> Result<Surface, Error> {
     let radius = case.get(Key::TipRadius);
     let tip_radius = if radius.is_finite() { radius } else { 0.0 };
     let mut surface = Surface::new(&options.surface, tip_radius)?;
@@ -553,4 +558,3 @@ fn word((key, value): (&String, &Value)) -> String {
     };
     format!("sample.{key}={text}")
 }
-

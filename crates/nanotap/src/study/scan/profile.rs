@@ -283,7 +283,9 @@ impl Samples {
             let numbers: Option<Vec<f64>> = cells.iter().map(|cell| cell.parse().ok()).collect();
             if columns.is_none() && numbers.is_none() {
                 for (factor, cell) in factors.iter_mut().zip(&cells) {
-                    let unit = cell.rsplit_once('(').and_then(|(_, rest)| rest.split_once(')'));
+                    let unit = cell
+                        .rsplit_once('(')
+                        .and_then(|(_, rest)| rest.split_once(')'));
                     if let Some((unit, _)) = unit {
                         *factor = Kind::Length
                             .parse(&format!("1 {unit}"))
@@ -294,7 +296,10 @@ impl Samples {
                 continue;
             }
             let Some(numbers) = numbers else {
-                return Err(refuse(index + 1, format!("`{line}` is not a row of numbers")));
+                return Err(refuse(
+                    index + 1,
+                    format!("`{line}` is not a row of numbers"),
+                ));
             };
             let expected = *columns.get_or_insert(numbers.len());
             if numbers.len() != expected || !(1..=2).contains(&expected) {
@@ -326,12 +331,7 @@ impl Samples {
 
     /// Refuses samples that are not finite, not sorted, or too steep; `first` is the row of the
     /// first.
-    fn checked(
-        at: Vec<f64>,
-        heights: Vec<f64>,
-        name: &str,
-        first: usize,
-    ) -> Result<Self, Error> {
+    fn checked(at: Vec<f64>, heights: Vec<f64>, name: &str, first: usize) -> Result<Self, Error> {
         if heights.is_empty() || heights.len() > MAX_SAMPLES {
             return Err(Error::input(
                 format!("{name}: {} samples of the height", heights.len()),
@@ -356,7 +356,10 @@ impl Samples {
                 return refuse(k + 1, what, "sort the rows by position, each once");
             }
             if slope.abs() > STEEPEST {
-                let what = format!("the height changes {:.0} times as much as the position", slope);
+                let what = format!(
+                    "the height changes {:.0} times as much as the position",
+                    slope
+                );
                 return refuse(
                     k + 1,
                     what,

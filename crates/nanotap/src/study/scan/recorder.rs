@@ -398,8 +398,11 @@ impl BranchTracker {
         if self.candidate >= self.patience {
             self.candidate = 0;
             self.established = Some(to);
-            self.pending
-                .extend(self.change.take().map(|change| (change, 10 * self.patience)));
+            self.pending.extend(
+                self.change
+                    .take()
+                    .map(|change| (change, 10 * self.patience)),
+            );
         }
     }
 

@@ -125,10 +125,7 @@ impl Runner<'_, '_> {
     }
 
     fn settle(&mut self, line: usize, periods: usize) -> Result<(), Error> {
-        let (x, y) = (
-            self.plan.position(0, false),
-            self.plan.line_position(line),
-        );
+        let (x, y) = (self.plan.position(0, false), self.plan.line_position(line));
         (0..periods).try_for_each(|_| self.run_period(x, y).map(|_| ()))
     }
 

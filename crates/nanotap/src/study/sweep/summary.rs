@@ -26,7 +26,10 @@ pub struct Summary {
 
 impl Summary {
     /// Counts the runs of a finished dataset.
-    pub(super) fn of(store: &Store) -> Result<Self, StoreError> {
+    ///
+    /// # Errors
+    /// When a chunk is missing or damaged.
+    pub fn of(store: &Store) -> Result<Self, StoreError> {
         store.require_all()?;
         let mut summary = Self {
             from_neighbours: from_neighbours(store)?,

@@ -1,6 +1,7 @@
-//! Bifurcations located by other threads while the branch goes on.
+//! Bifurcations located by other threads during the continuation of a branch.
 //!
-//! A step along a branch waits for the one before it; what lies between two of its points does not.
+//! Each step along a branch needs the one before it, but the search between two known points does
+//! not.
 
 use std::sync::{Mutex, PoisonError};
 
@@ -10,19 +11,19 @@ use crate::continuation::bifurcation::{Bifurcation, Tests, between};
 use crate::continuation::solver::{BranchSolver, Node};
 use crate::control::Control;
 use crate::map::MapFamily;
-use crate::orbit::side_by_side::is_alone;
+use crate::orbit::parallel::is_single_threaded;
 
-/// Who locates the bifurcations of one branch.
-pub(crate) struct Locating<'s, 'scope> {
+/// Spawns tasks that locate the bifurcations of one branch.
+pub(crate) struct BifurcationTasks<'s, 'scope> {
     pub(crate) scope: &'s Scope<'scope>,
-    /// What other threads have found, in whatever order.
+    /// Results of the tasks, in no particular order.
     pub(crate) found: &'scope Mutex<Vec<Bifurcation>>,
     pub(crate) control: &'scope Control<'scope>,
 }
 
-impl<'scope> Locating<'_, 'scope> {
-    /// The bifurcations between two neighbouring nodes, or none, where another thread is to find
-    /// them.
+impl<'scope> BifurcationTasks<'_, 'scope> {
+    /// Returns the bifurcations between two neighbouring nodes, or an empty list if a spawned task
+    /// will find them.
     pub(crate) fn between<'a: 'scope, F: MapFamily + 'scope>(
         &self,
         solver: &mut BranchSolver<'a, F>,
@@ -31,7 +32,7 @@ impl<'scope> Locating<'_, 'scope> {
         step: f64,
         after_point: usize,
     ) -> Vec<Bifurcation> {
-        if is_alone() || !Tests::any_changes(tests, solver.n) {
+        if is_single_threaded() || !Tests::any_changes(tests, solver.n) {
             return between(solver, nodes, tests, step, after_point);
         }
         let mut solver = solver.another();

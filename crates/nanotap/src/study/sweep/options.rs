@@ -1,23 +1,22 @@
-//! What a sweep is asked for.
+//! Options of a sweep.
 
-use nanotap_dynamics::Control;
+use nanotap_dynamics::{ClassifyOptions, Control, LyapunovOptions};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::{Follow, Over, Starts, Summary, Sweep, SweepOptions};
+use super::{Follow, Over, Starts, Summary, Sweep};
 use crate::Error;
 use crate::case::Case;
 use crate::dataset::{Store, StoreError};
 use crate::study::attractors::MOST_STARTS;
-use crate::study::kind::DatasetStudy;
 use crate::study::limits::{MOST_PERIOD, MOST_PERIODS};
-use crate::study::recipe::Recipe;
 use crate::study::value::{Axes, Intervals};
+use crate::study::{DatasetPlan, DatasetStudy};
 
-/// What a sweep is asked for.
+/// Options of a sweep.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
-pub struct SweepRequest {
+pub struct SweepOptions {
     /// A parameter and its values, as in omega=2:4:400 (first, last, how many), or
     /// alpha4=1:1000:50:log in equal ratios, or any that ascend, omega=2,2.5,4; modes too; of a physical case also
     /// drive.frequency=60kHz:80kHz:200; once or twice
@@ -56,64 +55,81 @@ pub struct SweepRequest {
     pub max_period: usize,
 }
 
-impl Default for SweepRequest {
+impl Default for SweepOptions {
     fn default() -> Self {
-        let options = SweepOptions::new(Vec::new());
         Self {
             over: Axes::default(),
             starts: None,
             seed: 1,
             sides: Intervals::default(),
             state: None,
-            follow: options.follow,
-            periods: options.periods,
+            follow: Follow::Off,
+            periods: 100,
             strobe: None,
-            transient: options.transient,
-            max_period: options.max_period,
+            transient: None,
+            max_period: 64,
         }
     }
 }
 
-impl SweepRequest {
-    /// The sweep of `case`, checked.
-    ///
-    /// # Errors
-    /// When a parameter or a start is none, or there is too much of something.
-    pub fn sweep(&self, case: &Case) -> Result<Sweep, Error> {
-        let starts = match (self.starts, &self.state) {
-            (Some(_), Some(_)) => {
-                return Err(Error::input(
-                    "starts and state: the starts are drawn, or given",
-                    "leave {starts} or {state} out",
-                ));
-            }
-            (None, _) if self.sides != Intervals::default() => {
-                return Err(Error::option(
-                    "box",
-                    "the sides are those of the starts",
-                    "say how many with {starts}",
-                ));
-            }
-            (Some(count), None) => Starts::Seeded {
+impl SweepOptions {
+    /// Default options for parameters with their values, each as in `omega=2:4:400`.
+    pub fn over<S: Into<String>>(axes: impl IntoIterator<Item = S>) -> Self {
+        Self {
+            over: Axes(axes.into_iter().map(Into::into).collect()),
+            ..Self::default()
+        }
+    }
+
+    /// Number of runs over these parameters.
+    pub fn runs(&self, over: &[Over]) -> usize {
+        let values = over.iter().map(|over| over.count).product::<usize>();
+        values * self.starts.unwrap_or(1) * self.follow.directions().len().max(1)
+    }
+
+    /// Where motions start.
+    pub(super) fn starts(&self) -> Result<Starts, Error> {
+        match (self.starts, &self.state) {
+            (Some(_), Some(_)) => Err(Error::input(
+                "starts and state: the starts are drawn, or given",
+                "leave {starts} or {state} out",
+            )),
+            (None, _) if self.sides != Intervals::default() => Err(Error::option(
+                "box",
+                "the sides are those of the starts",
+                "say how many with {starts}",
+            )),
+            (Some(count), None) => Ok(Starts::Seeded {
                 count,
                 seed: self.seed,
                 sides: self.sides.numbers()?,
-            },
-            (None, Some(state)) => Starts::Given(state.clone()),
-            (None, None) => Starts::Rest,
-        };
-        let over = self.over.0.iter();
-        let over = over.map(|axis| Over::parse(axis, case));
-        let options = SweepOptions {
-            starts,
-            follow: self.follow,
-            periods: self.periods,
-            strobe: self.strobe.unwrap_or(self.periods).min(self.periods),
-            transient: self.transient,
+            }),
+            (None, Some(state)) => Ok(Starts::Given(state.clone())),
+            (None, None) => Ok(Starts::Rest),
+        }
+    }
+
+    /// States kept of each run.
+    pub(super) fn strobe(&self) -> usize {
+        self.strobe.unwrap_or(self.periods).min(self.periods)
+    }
+
+    /// The budgets of each run: a tenth of what one run alone would be given.
+    pub(in crate::study) fn classify(&self) -> ClassifyOptions {
+        ClassifyOptions {
             max_period: self.max_period,
-            ..SweepOptions::new(over.collect::<Result<_, _>>()?)
-        };
-        Ok(Sweep::new(case.clone(), options)?)
+            max_transient: 512,
+            lyapunov: LyapunovOptions {
+                alignment: 50,
+                min_periods: 250,
+                max_periods: 2000,
+                absolute_error: 5e-3,
+                relative_error: 0.1,
+            },
+            birkhoff_periods: 2048,
+            torus_digits: 6.0,
+            ..ClassifyOptions::default()
+        }
     }
 }
 
@@ -126,14 +142,14 @@ impl DatasetStudy for SweepStudy {
     const ABOUT: &'static str =
         "How the motion changes with one or two parameters, from any number of starts";
     const COUNTED: &'static str = "values";
-    type Request = SweepRequest;
+    type Options = SweepOptions;
     type Report = Summary;
 
-    fn plan(case: &Case, request: &SweepRequest, _: &Control<'_>) -> Result<Recipe, Error> {
-        Ok(Box::new(request.sweep(case)?))
+    fn prepare(case: &Case, options: &SweepOptions, _: &Control<'_>) -> Result<DatasetPlan, Error> {
+        Ok(Box::new(Sweep::new(case, options.clone())?))
     }
 
     fn report(store: &Store) -> Result<Summary, StoreError> {
-        super::summary(store)
+        Summary::of(store)
     }
 }

@@ -1,7 +1,7 @@
-//! Curves of bifurcation points in two parameters.
+//! Curves of codimension-one bifurcations in two parameters.
 //!
-//! Unknown are the first state x of the orbit and both parameters; the equations are
-//! Pⁿ(x) = x and one scalar g = 0, followed by pseudo-arclength:
+//! The unknowns are the first state x of the orbit and both parameters. The equations are Pⁿ(x) = x
+//! and one scalar equation g = 0, solved by pseudo-arclength continuation:
 //!
 //! | kind | g |
 //! |---|---|
@@ -10,14 +10,14 @@
 //! | Neimark–Sacker | |μ|² − 1 of the complex pair nearest the circle |
 //! | grazing | the extremum of the switching function, followed in time |
 //!
-//! DPⁿ and the derivatives with respect to the parameters are exact; the gradient of
-//! g is by central differences, which costs Newton some speed but the solution no
-//! digit.
+//! DPⁿ and the derivatives with respect to the parameters are exact. The gradient of g is computed
+//! by central differences, which slows Newton down but does not affect the accuracy of the
+//! solution.
 //!
-//! Fails: at points where two such events meet (a fold or flip at a grazing, where
-//! DPⁿ is not differentiable; a Neimark–Sacker curve at its ends, where the pair
-//! becomes real) the curve may end with steps too small; DPⁿ is multiplied out, so an
-//! orbit along which errors grow by more than about 1e10 is not resolved.
+//! Fails: where two such events meet (a fold or flip at a grazing, where DPⁿ is not differentiable;
+//! the ends of a Neimark–Sacker curve, where the pair becomes real) the curve may end because steps
+//! become too small. DPⁿ is multiplied out, so an orbit along which errors grow by more than about
+//! 1e10 is not resolved.
 
 mod end;
 mod follow;
@@ -31,29 +31,29 @@ use solver::CurveSolver;
 
 pub use end::CurveEnd;
 
-/// How a locus is followed. Steps are fractions of the box of parameters.
+/// Options of the continuation of a curve. Steps are fractions of the parameter box.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CurveOptions {
-    /// Range of the first parameter, lower end first.
+    /// Range of the first parameter, lower end first, in its unit.
     pub first: (f64, f64),
-    /// Range of the second parameter.
+    /// Range of the second parameter, lower end first, in its unit.
     pub second: (f64, f64),
-    /// First step.
+    /// First step in scaled arclength.
     pub initial_step: f64,
-    /// Shortest step.
+    /// Shortest step in scaled arclength.
     pub min_step: f64,
-    /// Longest step.
+    /// Longest step in scaled arclength.
     pub max_step: f64,
     /// Largest turn of the tangent over one step, in radians.
     pub max_angle: f64,
-    /// Points after which each half of the curve is cut.
+    /// Number of points at which each half of the curve is cut.
     pub max_points: usize,
-    /// A state with an entry above this has left the domain.
+    /// Largest entry of a state inside the domain, in units of the state.
     pub bound: f64,
 }
 
 impl CurveOptions {
-    /// Defaults for a box of parameters.
+    /// Default options for a box of parameters.
     pub fn over(first: (f64, f64), second: (f64, f64)) -> Self {
         Self {
             first,
@@ -68,34 +68,33 @@ impl CurveOptions {
     }
 }
 
-/// One point of a locus.
+/// One point of a curve of bifurcations.
 #[derive(Clone, Debug)]
 pub struct CurvePoint {
-    /// First parameter.
+    /// Value of the first parameter.
     pub first: f64,
-    /// Second parameter.
+    /// Value of the second parameter.
     pub second: f64,
-    /// The orbit there. Its error estimate is large where the parameters do not
-    /// determine it (folds).
+    /// The orbit. At folds its error estimate is large, because the parameters do not determine it.
     pub orbit: PeriodicOrbit,
 }
 
 /// A curve of bifurcation points.
 #[derive(Clone, Debug)]
 pub struct BifurcationCurve {
-    /// What happens along it (angle or time: at the starting point).
+    /// Kind of the bifurcation. Angle or time is that of the starting point.
     pub kind: BifurcationKind,
-    /// Points in order, from one end through the starting point to the other.
+    /// Points in order, from one end through the starting point to the other end.
     pub points: Vec<CurvePoint>,
-    /// Why it ends, at the first and at the last point.
+    /// Why it ends at the first and at the last point.
     pub ends: [CurveEnd; 2],
 }
 
-/// Follows the bifurcation `point`, found at this value of the second parameter,
-/// both ways through the box.
+/// Follows the bifurcation `point`, found at this value of the second parameter, in both directions
+/// through the box.
 ///
 /// # Errors
-/// If the options make no sense or the point cannot be corrected.
+/// If the options are invalid or the corrector fails at the point.
 pub fn trace_curve<F: TwoParameterFamily>(
     family: &F,
     point: &Bifurcation,
@@ -143,7 +142,7 @@ fn check(options: &CurveOptions, first: f64, second: f64) -> Result<(), Continua
         let usable = range.0 < range.1 && (range.1 - range.0).is_finite();
         if !usable || !(range.0..=range.1).contains(&value) {
             return Err(ContinuationError::BadOptions(format!(
-                "the start {value} must lie in a finite range that runs upwards, {} … {} given",
+                "the starting value {value} must lie in a finite range with ascending ends, got {} … {}",
                 range.0, range.1
             )));
         }
@@ -151,7 +150,7 @@ fn check(options: &CurveOptions, first: f64, second: f64) -> Result<(), Continua
     let steps = [options.min_step, options.initial_step, options.max_step];
     if !(steps[0] > 0.0 && steps[0] <= steps[1] && steps[1] <= steps[2] && steps[2].is_finite()) {
         return Err(ContinuationError::BadOptions(format!(
-            "steps must satisfy 0 < min ≤ initial ≤ max, {steps:?} given"
+            "steps must satisfy 0 < min ≤ initial ≤ max, got {steps:?}"
         )));
     }
     Ok(())

@@ -1,5 +1,5 @@
-//! What the frequency shift tells of a force, and a force of the frequency shift, where the
-//! oscillation is a sinusoid: formulas to stand beside the orbit.
+//! The frequency shift from a force, and the force from a frequency shift, of a sinusoidal
+//! oscillation: formulas to compare with the orbit.
 //!
 //! To first order in the force (F. J. Giessibl, Phys. Rev. B 56, 16010 (1997), from the
 //! Hamilton–Jacobi perturbation theory) the shift of an oscillation of amplitude A about the
@@ -69,7 +69,7 @@ impl<'a> Averages<'a> {
         }
     }
 
-    /// The force at these distances, met one after the other.
+    /// The force at these distances, evaluated quasi-statically, in this order.
     fn forces(&self, gaps: impl Iterator<Item = f64>) -> Vec<f64> {
         match self.force {
             StaticForce::Nonlinear(nonlinear) => {
@@ -115,8 +115,8 @@ impl<'a> Averages<'a> {
 }
 
 /// The force at each distance of a curve of relative shifts, as Sader and Jarvis find it from
-/// what lies beyond it. `curve` has least distances and shifts Δf/f₀, in any order; what comes
-/// back stands in the order of the curve. Between its points the curve is a cubic; beyond the
+/// what lies beyond it. `curve` has least distances and shifts Δf/f₀, in any order; the
+/// forces are in the order of the curve. Between its points the curve is a cubic; beyond the
 /// farthest one it goes on by the power law of its end where it decays like one.
 pub fn sader_jarvis(curve: &[(f64, f64)], amplitude: f64, stiffness: f64) -> Vec<f64> {
     let mut order: Vec<usize> = (0..curve.len()).collect();

@@ -4,9 +4,9 @@ use nanotap::case::Case;
 use nanotap::model::Model;
 use serde::Deserialize;
 
-use crate::answer::Refusal;
+use crate::api_error::ApiError;
 use crate::figures::Views;
-use crate::preset::Wanted;
+use crate::preset::CaseSpec;
 
 /// Largest number of modes of a motion that follows a slider.
 const MOST_MODES: usize = 20;
@@ -14,8 +14,8 @@ const MOST_MODES: usize = 20;
 /// A motion as requested by the page.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(crate) struct Asked {
-    pub(crate) case: Wanted,
+pub(crate) struct MotionRequest {
+    pub(crate) case: CaseSpec,
     /// Initial state; empty: rest; `n:state`: an orbit of period n near the state.
     #[serde(default)]
     pub(crate) start: String,
@@ -35,7 +35,7 @@ pub(crate) struct Start {
 }
 
 impl Start {
-    pub(crate) fn parse(text: &str) -> Result<Self, Refusal> {
+    pub(crate) fn parse(text: &str) -> Result<Self, ApiError> {
         if text.is_empty() {
             return Ok(Self::default());
         }
@@ -44,7 +44,7 @@ impl Start {
             None => (None, text),
         };
         let wrong = || {
-            Refusal::input(
+            ApiError::input(
                 format!("`{text}` is no state"),
                 "numbers are needed, as in 0.1,-0.02,0.3",
             )
@@ -69,14 +69,14 @@ impl Start {
 }
 
 /// The model of a case that is small enough to follow a slider.
-pub(crate) fn model_of(case: &Case) -> Result<Model, Refusal> {
+pub(crate) fn model_of(case: &Case) -> Result<Model, ApiError> {
     if let Some(cantilever) = case.cantilever()
         && cantilever.modes > MOST_MODES
     {
-        return Err(Refusal::input(
+        return Err(ApiError::input(
             format!("modes = {} are too many for the explorer", cantilever.modes),
             format!("{MOST_MODES} at most; the terminal takes more"),
         ));
     }
-    case.model().map_err(Refusal::of)
+    case.model().map_err(ApiError::of)
 }

@@ -1,21 +1,21 @@
-//! One point of a curve of bifurcations: the equations, Newton and the tangent.
+//! One point of a curve of bifurcations: equations, Newton corrector and tangent.
 
 use nalgebra::{DMatrix, DVector};
 
+use crate::codim1_curves::{CurveOptions, CurvePoint};
 use crate::continuation::{Bifurcation, BifurcationKind, ContinuationError, OrbitTangency};
-use crate::curve::{CurveOptions, CurvePoint};
 use crate::failure::{MapFailure, advance_with_jacobian, advance_with_tangencies, finite};
 use crate::map::{StroboscopicMap, TwoParameterFamily};
 use crate::orbit::Multipliers;
-use crate::orbit::shooting::{MOST_SETTINGS, Segments, set_discrete_entries};
+use crate::orbit::shooting::{MAX_DISCRETE_UPDATES, Segments, set_discrete_entries};
 use crate::vector::{distance, norm, unit};
 
-/// Part of the unit in which its branch was followed up to which an orbit has no size of its own.
-const NO_SIZE: f64 = 1e-6;
+/// Largest orbit without a size, as a fraction of the state scale of its branch.
+const MIN_ORBIT_SIZE: f64 = 1e-6;
 
-/// Steps of differences, as parts of the scales.
-const LONGEST_DIFFERENCE: f64 = 1e-6;
-const SHORTEST_DIFFERENCE: f64 = 1e-8;
+/// Steps of the central differences, as fractions of the scales.
+const MAX_DIFFERENCE_STEP: f64 = 1e-6;
+const MIN_DIFFERENCE_STEP: f64 = 1e-8;
 
 /// A solution u = (x, first, second) with its tangent, of unit scaled length.
 #[derive(Clone, Debug)]
@@ -25,7 +25,7 @@ pub(super) struct CurveNode {
     pub(super) iterations: usize,
 }
 
-/// A_{n−1} … A_0.
+/// The product A_{n−1} … A_0.
 fn product(factors: &[DMatrix<f64>]) -> DMatrix<f64> {
     let d = factors.first().map_or(0, DMatrix::nrows);
     factors
@@ -33,7 +33,7 @@ fn product(factors: &[DMatrix<f64>]) -> DMatrix<f64> {
         .fold(DMatrix::identity(d, d), |product, a| a * product)
 }
 
-/// The run of n periods from x.
+/// The trajectory of n periods from x.
 struct Trajectory {
     segments: Segments,
     /// Pⁿ(x).
@@ -42,7 +42,7 @@ struct Trajectory {
     by_parameter: [DVector<f64>; 2],
 }
 
-/// What one evaluation gives.
+/// Values and derivatives of the equations at one point.
 struct Evaluation {
     /// Pⁿ(x) − x.
     gap: Vec<f64>,
@@ -57,15 +57,15 @@ pub(super) struct CurveSolver<'a, F> {
     family: &'a F,
     pub(super) kind: BifurcationKind,
     pub(super) d: usize,
-    /// How many entries of a state are continuous; the others are whole numbers that the map sets.
+    /// Number of continuous entries of a state. The others are whole numbers that the map sets.
     pub(super) continuous: usize,
     pub(super) n: usize,
     pub(super) scales: Vec<f64>,
     /// Column and row that border DPⁿ ∓ 1.
     pub(super) borders: (DVector<f64>, DVector<f64>),
-    /// Size of the orbit at the beginning.
+    /// Size of the first orbit.
     least: f64,
-    /// Time of the grazing extremum.
+    /// Time of the grazing extremum in drive periods.
     pub(super) time: f64,
 }
 
@@ -73,9 +73,10 @@ impl<'a, F: TwoParameterFamily> CurveSolver<'a, F> {
     pub(super) fn new(family: &'a F, point: &Bifurcation, options: &CurveOptions) -> Self {
         let d = point.orbit.dimension();
         let mut size = point.orbit.scale();
-        // An orbit at the origin has no size: that by which it moves along its branch is its unit.
+        // An orbit at the origin has no size; its unit is the distance by which it moves along its
+        // branch.
         let moved = norm(&point.node.tangent);
-        if size <= NO_SIZE * moved {
+        if size <= MIN_ORBIT_SIZE * moved {
             size = moved;
         }
         let mut scales = vec![if size > 0.0 { size } else { 1.0 }; d];
@@ -132,7 +133,7 @@ impl<'a, F: TwoParameterFamily> CurveSolver<'a, F> {
         })
     }
 
-    /// Everything at u; the borders are brought up to date on the way.
+    /// Evaluates the equations at u and updates the borders.
     fn evaluate(&mut self, u: &[f64]) -> Result<Evaluation, MapFailure> {
         let Trajectory {
             segments,
@@ -165,7 +166,7 @@ impl<'a, F: TwoParameterFamily> CurveSolver<'a, F> {
         Ok(map)
     }
 
-    /// The function that vanishes on the locus, from the Jacobians of an orbit.
+    /// The scalar g, which vanishes on the curve, from the Jacobians of an orbit.
     fn scalar_of(
         &self,
         jacobians: &[DMatrix<f64>],
@@ -190,7 +191,7 @@ impl<'a, F: TwoParameterFamily> CurveSolver<'a, F> {
         value.filter(|v| v.is_finite()).ok_or(MapFailure::NotFinite)
     }
 
-    /// That function for the run from `x`, without derivatives by parameters.
+    /// The scalar g for the trajectory from `x`, without derivatives with respect to parameters.
     fn scalar_alone(&self, map: &mut F::Map, x: &[f64]) -> Result<f64, MapFailure> {
         if let BifurcationKind::Grazing { .. } = self.kind {
             let value = self.tangency(map, x)?.map(|t| t.value);
@@ -205,7 +206,7 @@ impl<'a, F: TwoParameterFamily> CurveSolver<'a, F> {
         self.scalar_of(&jacobians, &product(&jacobians))
     }
 
-    /// Solution of [[M + shift, b], [cᵀ, 0]] (v, g) = (0, 1), transposed if asked.
+    /// Solution of [[M + shift, b], [cᵀ, 0]] (v, g) = (0, 1), transposed on request.
     fn bordered(
         &self,
         monodromy: &DMatrix<f64>,
@@ -231,7 +232,7 @@ impl<'a, F: TwoParameterFamily> CurveSolver<'a, F> {
         (length.is_finite() && length > 0.0).then(|| (v / length, solution[d]))
     }
 
-    /// Replaces the borders by the null vectors themselves, for good conditioning.
+    /// Replaces the borders by the null vectors, for good conditioning.
     fn refresh_borders(&mut self, monodromy: &DMatrix<f64>) {
         let shift = match self.kind {
             BifurcationKind::Fold | BifurcationKind::Crossing => -1.0,
@@ -246,7 +247,7 @@ impl<'a, F: TwoParameterFamily> CurveSolver<'a, F> {
         }
     }
 
-    /// The extremum nearest in time to the one followed, over the switch that it is nearest to.
+    /// The extremum nearest in time to the one followed, of the switching function nearest to zero.
     fn tangency(&self, map: &mut F::Map, x: &[f64]) -> Result<Option<OrbitTangency>, MapFailure> {
         let mut state = x.to_vec();
         let mut one = Vec::new();
@@ -269,15 +270,15 @@ impl<'a, F: TwoParameterFamily> CurveSolver<'a, F> {
         Ok(nearest.map(|(_, t)| t))
     }
 
-    /// The step of the differences, in units of the scales: short against the distance to the next
-    /// grazing, near which derivatives of the map change fast.
+    /// Step of the differences in units of the scales: short compared with the distance to the next
+    /// grazing, near which the derivatives of the map change fast.
     fn difference_step(&self, map: &mut F::Map, x: &[f64]) -> f64 {
         if let BifurcationKind::Grazing { .. } = self.kind {
-            return LONGEST_DIFFERENCE;
+            return MAX_DIFFERENCE_STEP;
         }
         let all = self.all_tangencies(map, x).into_iter();
         let closest = all.fold(f64::INFINITY, |m, t| m.min(t.value.abs())) / self.scales[0];
-        (0.01 * closest).clamp(SHORTEST_DIFFERENCE, LONGEST_DIFFERENCE)
+        (0.01 * closest).clamp(MIN_DIFFERENCE_STEP, MAX_DIFFERENCE_STEP)
     }
 
     fn gradient(&self, u: &[f64]) -> Result<Vec<f64>, MapFailure> {
@@ -320,7 +321,7 @@ impl<'a, F: TwoParameterFamily> CurveSolver<'a, F> {
         matrix
     }
 
-    /// Newton from `guess` in the plane across `row`; tangent along `orientation`.
+    /// Newton from `guess` in the plane perpendicular to `row`; tangent along `orientation`.
     pub(super) fn correct(
         &mut self,
         guess: &[f64],
@@ -333,7 +334,7 @@ impl<'a, F: TwoParameterFamily> CurveSolver<'a, F> {
         let mut iterations = 0;
         let matrix = loop {
             let mut e = self.evaluate(&u).map_err(|e| e.to_string())?;
-            for _ in 0..MOST_SETTINGS {
+            for _ in 0..MAX_DISCRETE_UPDATES {
                 if !set_discrete_entries(&mut u[..d], &e.gap, d, self.continuous) {
                     break;
                 }
@@ -358,7 +359,7 @@ impl<'a, F: TwoParameterFamily> CurveSolver<'a, F> {
                 *v += s;
             }
             iterations += 1;
-            // The next step would be smaller by the error of the gradient, 1e-8 or so.
+            // Further steps are limited by the error of the gradient, about 1e-8.
             let stalled = size > 0.5 * last;
             if size <= 1e-11 || (stalled && size <= 1e-9) {
                 break self.matrix(&e, &gradient, orientation);
@@ -416,8 +417,8 @@ impl<'a, F: TwoParameterFamily> CurveSolver<'a, F> {
         })
     }
 
-    /// Measures the state in units of the orbit as it is at `node` from here on, but not
-    /// less than at the beginning.
+    /// Measures the state in units of the orbit at `node` from now on, but at least in units of the
+    /// first orbit.
     pub(super) fn rescale(&mut self, node: &mut CurveNode) {
         let scale = norm(&node.u[..self.continuous]).max(self.least);
         if scale > 0.0 {
@@ -429,7 +430,7 @@ impl<'a, F: TwoParameterFamily> CurveSolver<'a, F> {
         }
     }
 
-    /// Every extremum of the switching functions along the orbit.
+    /// All extrema of the switching functions along the orbit.
     pub(super) fn tangencies(&self, node: &CurveNode) -> Vec<OrbitTangency> {
         match self.map_at(&node.u) {
             Ok(mut map) => self.all_tangencies(&mut map, &node.u[..self.d]),
@@ -437,7 +438,7 @@ impl<'a, F: TwoParameterFamily> CurveSolver<'a, F> {
         }
     }
 
-    /// The same of the run from `x`, as far as it can be followed.
+    /// All extrema along the trajectory from `x`, up to the first failure of the map.
     fn all_tangencies(&self, map: &mut F::Map, x: &[f64]) -> Vec<OrbitTangency> {
         let mut found = Vec::new();
         let mut state = x.to_vec();

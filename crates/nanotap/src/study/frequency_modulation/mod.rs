@@ -2,7 +2,7 @@
 //! frequency and the strength of the drive.
 //!
 //! What the instrument settles on is a periodic orbit whose frequency and drive strength are
-//! unknowns beside its state: [`HeldOrbit`]. How far the frequency is from that of the free lever
+//! unknowns in addition to its state: [`HeldOrbit`]. How far the frequency is from that of the free lever
 //! at the same amplitude and phase ([`FreeOscillation`]) is the frequency shift; how much stronger
 //! the drive is than there, the excitation, tells what the sample takes.
 //!
@@ -16,19 +16,25 @@ pub mod held;
 pub(crate) mod walk;
 
 pub use average::Averages;
-pub use curve::modulated_approach;
+pub use curve::frequency_modulation;
 pub use free::FreeOscillation;
-pub use held::{Driven, Held, HeldError, HeldOrbit};
+pub use held::{Driven, Held, HeldOrbit};
 
+use nanotap_dynamics::Control;
 use schemars::JsonSchema;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
-use super::{ApproachPoint, Way};
+use crate::Error;
+use crate::case::Case;
 use crate::case::physical::quantity::JOULES_PER_ELECTRONVOLT;
 use crate::case::physical::{Kind, Physical};
 use crate::model::parameter::Parameter;
+use crate::study::Study;
+use crate::study::approach::{ApproachOptions, ApproachPoint, ApproachReport, Way};
+use crate::study::limits::MOST_DISTANCES;
+use crate::study::value::Amount;
 
-/// What frequency modulation tells at one distance.
+/// Frequency modulation at one distance.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct Modulated {
     /// Frequency of the drive, in the model's unit.
@@ -41,7 +47,7 @@ pub struct Modulated {
     pub relative_shift: f64,
     /// Strength of the drive over that of the free lever: the excitation channel.
     pub drive_ratio: f64,
-    /// Energy that the sample takes in a period as the excitation tells it,
+    /// Energy that the sample takes in a period, from the excitation,
     /// E₀ (drive ratio − f/f₀) with what the free lever loses in a period, in the model's unit.
     pub drive_dissipation: f64,
     /// Least distance of a sinusoidal oscillation, a driven base's motion included, in the model's
@@ -98,7 +104,7 @@ pub struct ModulatedInSi {
     pub drive_strength: f64,
     /// Frequency shift Δf, Hz.
     pub frequency_shift: f64,
-    /// Energy that the sample takes in a period as the excitation tells it, J.
+    /// Energy that the sample takes in a period, from the excitation, J.
     pub drive_dissipation: f64,
     /// The same in eV.
     #[serde(rename = "drive_dissipation_eV")]
@@ -132,7 +138,7 @@ impl Modulated {
     }
 }
 
-/// One of the numbers that frequency modulation tells, as a column of a table or an axis.
+/// One of the numbers of frequency modulation, as a column of a table or an axis.
 #[derive(Clone, Copy, Debug)]
 pub struct ModulatedColumn {
     /// Its name in tables.
@@ -260,4 +266,75 @@ pub struct Ended {
     pub gap: f64,
     /// Why there is none beyond.
     pub reason: String,
+}
+
+/// Options of a curve under frequency modulation.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct FrequencyModulationOptions {
+    /// Distance at which to begin, in units of the case ("30 nm") or as alpha5; without it, 1.25
+    /// times the free amplitude towards the sample
+    #[schemars(extend("x-value" = "DISTANCE"))]
+    pub from: Option<Amount>,
+    /// Distance at which to turn back; without it, 0
+    #[schemars(extend("x-value" = "DISTANCE"))]
+    pub to: Option<Amount>,
+    /// Distances each way
+    #[schemars(range(min = 2, max = MOST_DISTANCES), extend("x-value" = "P"))]
+    pub points: usize,
+    /// Phase behind the drive to hold, in degrees
+    #[schemars(range(min = 0, max = 180), extend("x-value" = "DEGREES"))]
+    pub phase: f64,
+    /// Frequency shift whose distances to find, in units of the case ("-50 Hz") or as omega
+    #[schemars(extend("x-value" = "SHIFT"))]
+    pub shift: Option<Amount>,
+    /// Least distance of the oscillation to keep, in units of the case ("1 nm") or as alpha5: the
+    /// amplitude then changes with the distance
+    #[schemars(extend("x-value" = "DISTANCE"))]
+    pub closest: Option<Amount>,
+}
+
+impl Default for FrequencyModulationOptions {
+    fn default() -> Self {
+        let ApproachOptions {
+            from,
+            to,
+            points,
+            phase,
+            shift,
+            closest,
+            ..
+        } = ApproachOptions::default();
+        Self {
+            from,
+            to,
+            points,
+            phase,
+            shift,
+            closest,
+        }
+    }
+}
+
+/// Approach and retract curve under frequency modulation.
+#[derive(Clone, Copy, Debug)]
+pub struct FrequencyModulationStudy;
+
+impl Study for FrequencyModulationStudy {
+    const NAME: &'static str = "frequency-modulation";
+    const ABOUT: &'static str = "Frequency shift and excitation against the distance to the sample, \
+                                 with amplitude and phase held";
+    const COUNTED: &'static str = "distances";
+    const ANY_DISTANCE: bool = true;
+    const PARTIAL: bool = true;
+    type Options = FrequencyModulationOptions;
+    type Report = ApproachReport;
+
+    fn compute(
+        case: &Case,
+        options: &FrequencyModulationOptions,
+        control: &Control<'_>,
+    ) -> Result<ApproachReport, Error> {
+        frequency_modulation(case, options, control)
+    }
 }

@@ -1,8 +1,8 @@
-//! Numbers that carry first derivatives, so that every law is written once.
+//! Dual numbers: a value with its first derivatives, so that every formula is written once.
 
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
-/// What a law's formula needs of a number: a plain `f64` or one with derivatives.
+/// A number in a formula: a plain `f64` or one with derivatives.
 pub trait Scalar:
     Copy
     + Add<Output = Self>
@@ -35,13 +35,13 @@ pub trait Scalar:
     /// The cube root of a number above zero.
     #[must_use]
     fn cbrt(self) -> Self {
-        let root = nanotap_arithmetic::cbrt(self.value());
+        let root = crate::cbrt(self.value());
         self.chain(root, root / (3.0 * self.value()))
     }
     /// `e^x`.
     #[must_use]
     fn exp(self) -> Self {
-        let e = nanotap_arithmetic::exp(self.value());
+        let e = crate::exp(self.value());
         self.chain(e, e)
     }
     /// `1/x`.
@@ -53,8 +53,14 @@ pub trait Scalar:
     /// `tan x`.
     #[must_use]
     fn tan(self) -> Self {
-        let t = nanotap_arithmetic::tan(self.value());
+        let t = crate::tan(self.value());
         self.chain(t, 1.0 + t * t)
+    }
+    /// Sine and cosine of an angle in rad.
+    #[must_use]
+    fn sin_cos(self) -> (Self, Self) {
+        let (sin, cos) = crate::sin_cos(self.value());
+        (self.chain(sin, cos), self.chain(cos, -sin))
     }
     /// `x²`.
     #[must_use]
@@ -75,9 +81,9 @@ impl Scalar for f64 {
     }
 }
 
-/// A value and `K` derivatives.
+/// A value and its derivatives by `K` variables.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Dual<const K: usize> {
+pub struct Dual<const K: usize = 1> {
     /// The value.
     pub value: f64,
     /// The derivatives.
@@ -92,6 +98,14 @@ impl<const K: usize> Dual<K> {
         Self { value, slopes }
     }
 
+    /// A number that no variable changes.
+    pub const fn constant(value: f64) -> Self {
+        Self {
+            value,
+            slopes: [0.0; K],
+        }
+    }
+
     #[inline]
     fn zip(self, other: Self, value: f64, a: f64, b: f64) -> Self {
         let mut slopes = [0.0; K];
@@ -102,13 +116,43 @@ impl<const K: usize> Dual<K> {
     }
 }
 
+impl Dual<1> {
+    /// A value and its derivative by the one variable.
+    pub const fn new(value: f64, derivative: f64) -> Self {
+        Self {
+            value,
+            slopes: [derivative],
+        }
+    }
+
+    /// The derivative by the one variable.
+    pub const fn derivative(self) -> f64 {
+        self.slopes[0]
+    }
+
+    /// An angle in degrees, in rad.
+    #[must_use]
+    pub const fn to_radians(self) -> Self {
+        Self::new(self.value.to_radians(), self.slopes[0].to_radians())
+    }
+}
+
+impl<const K: usize> Default for Dual<K> {
+    fn default() -> Self {
+        Self::constant(0.0)
+    }
+}
+
+impl<const K: usize> From<f64> for Dual<K> {
+    fn from(value: f64) -> Self {
+        Self::constant(value)
+    }
+}
+
 impl<const K: usize> Scalar for Dual<K> {
     #[inline]
     fn constant(value: f64) -> Self {
-        Self {
-            value,
-            slopes: [0.0; K],
-        }
+        Self::constant(value)
     }
     #[inline]
     fn value(self) -> f64 {
@@ -171,6 +215,25 @@ impl<const K: usize> Mul<f64> for Dual<K> {
     #[inline]
     fn mul(self, other: f64) -> Self {
         self.chain(self.value * other, other)
+    }
+}
+
+impl<const K: usize> Mul<Dual<K>> for f64 {
+    type Output = Dual<K>;
+    #[inline]
+    fn mul(self, other: Dual<K>) -> Dual<K> {
+        other * self
+    }
+}
+
+impl<const K: usize> Div<f64> for Dual<K> {
+    type Output = Self;
+    #[inline]
+    fn div(self, by: f64) -> Self {
+        Self {
+            value: self.value / by,
+            slopes: self.slopes.map(|slope| slope / by),
+        }
     }
 }
 

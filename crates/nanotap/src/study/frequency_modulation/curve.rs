@@ -5,33 +5,51 @@ use nanotap_dynamics::Control;
 use super::average::sader_jarvis;
 use super::walk::{HeldWalk, Stepped};
 use super::{
-    Averages, Driven, Ended, FreeOscillation, Held, HeldOrbit, Jump, Modulated, ModulationReport,
-    OPEN_LOOP,
+    Averages, Driven, Ended, FreeOscillation, FrequencyModulationOptions, Held, HeldOrbit, Jump,
+    Modulated, ModulationReport, OPEN_LOOP,
 };
 use crate::case::{Case, Key};
-use crate::model::contact::ContactLaw;
+use crate::model::cantilever::Cantilever;
 use crate::observe::{PhysicalMotion, Set, measure};
 use crate::study::FreeMotion;
 use crate::study::approach::{
-    ApproachError, ApproachOptions, ApproachPoint, ApproachReport, Way, beam_clearance, distances,
-    hysteresis,
+    ApproachPoint, ApproachReport, Distances, Way, beam_clearance, hysteresis,
 };
 use crate::study::simulate::Classification;
+use crate::study::value::value;
+use crate::{Error, ErrorKind};
 
 /// How far beyond the first distance the free oscillation is put, if Newton needs a way there.
 const BEYOND: f64 = 8.0;
 
-/// Brings the sample near and takes it away while amplitude and `phase` are held.
+/// Computes the curve of frequency shifts of `case`, both ways.
 ///
 /// # Errors
-/// [`ApproachError`] when the options make no sense for the case, or there is no orbit where the
-/// curve begins.
-pub fn modulated_approach(
+/// When the options are not valid for the case, or there is no orbit where the curve begins.
+pub fn frequency_modulation(
     case: &Case,
-    options: &ApproachOptions,
-    phase: f64,
+    options: &FrequencyModulationOptions,
     control: &Control<'_>,
-) -> Result<ApproachReport, ApproachError> {
+) -> Result<ApproachReport, Error> {
+    curve(case, options, control).map_err(|error| match error.kind {
+        ErrorKind::Numerics => error.remedy("begin farther away, with {from}"),
+        _ => error,
+    })
+}
+
+fn curve(
+    case: &Case,
+    options: &FrequencyModulationOptions,
+    control: &Control<'_>,
+) -> Result<ApproachReport, Error> {
+    let distance = |option, given: &Option<_>| value(case, case.gap_key(), option, given.as_ref());
+    let phase = options.phase;
+    let closest = distance("closest", &options.closest)?;
+    let shift = value(case, case.drive_keys()[0], "shift", options.shift.as_ref())?;
+    let (from, to) = (
+        distance("from", &options.from)?,
+        distance("to", &options.to)?,
+    );
     let model = case.model()?;
     let held = Held {
         amplitude: FreeMotion::of(&model).amplitude,
@@ -44,10 +62,16 @@ pub fn modulated_approach(
         phase,
         reach: free.reach,
     };
-    let distances = distances(&far, options)?;
+    let points = options.points;
+    let distances = Distances {
+        from,
+        to,
+        points,
+        closest,
+    };
+    let distances = distances.values(&far)?;
     let (from, to) = (distances[0], distances[distances.len() - 1]);
     let reach = free.reach / free.amplitude;
-    let closest = options.closest;
     // Where the least distance is kept, the amplitude of the first distance is held up to there.
     let free = closest.map_or(free.clone(), |closest| {
         free.with_amplitude((from - closest) / reach)
@@ -85,7 +109,7 @@ pub fn modulated_approach(
                 break;
             }
             let stepped = match walk.step(gap, control) {
-                Err(error) if table.is_empty() => return Err(error.into()),
+                Err(error) if table.is_empty() => return Err(error),
                 stepped => stepped,
             };
             let orbit = match stepped {
@@ -107,7 +131,7 @@ pub fn modulated_approach(
                     failed.get_or_insert_with(|| Ended {
                         way,
                         gap: walk.gap(),
-                        reason: error.to_string(),
+                        reason: error.message(),
                     });
                     missed += 1;
                     if missed > MISSED {
@@ -138,11 +162,9 @@ pub fn modulated_approach(
         invert(&mut table, &free);
     }
     for point in &mut table {
-        curve.tell_in_si(point);
+        curve.add_si(point);
     }
-    let setpoints = options
-        .shift
-        .map(|shift| curve.setpoints(held, shift, &table, control));
+    let setpoints = shift.map(|shift| curve.setpoints(held, shift, &table, control));
     Ok(ApproachReport {
         jumps: Vec::new(),
         parameter: case.gap_key().path(),
@@ -209,7 +231,7 @@ impl Curve<'_> {
             let way = pair[0].way;
             let (gap, held, orbit) = self.crossing(held, shift, [&pair[0], &pair[1]], control)?;
             let mut point = self.point(way, gap, orbit, held.amplitude).ok()?;
-            self.tell_in_si(&mut point);
+            self.add_si(&mut point);
             Some(point)
         });
         found.collect()
@@ -257,14 +279,12 @@ impl Curve<'_> {
         (off.abs() <= 1e-6 * shift.abs()).then(|| (gap, walk.held(gap), orbit))
     }
 
-    /// What frequency modulation tells of an orbit of this amplitude.
+    /// The numbers of frequency modulation of an orbit of this amplitude.
     fn modulated(&self, orbit: &HeldOrbit, amplitude: f64, gap: f64) -> Modulated {
-        // A rigid stop has no static force, and a moving surface one of its own height.
-        let moves = self
-            .case
-            .cantilever()
-            .is_some_and(|c| c.contact == ContactLaw::MovingSurface && c.law.is_none());
-        let known = !self.case.has_rigid_stop() && !moves;
+        // A rigid stop has no static force; that of a surface that attracts depends on where it is.
+        let cantilever = self.case.cantilever();
+        let attracts = cantilever.is_some_and(Cantilever::has_attractive_surface);
+        let known = !self.case.has_rigid_stop() && !attracts;
         let averages = known.then(|| self.averages(amplitude));
         let free = self.free.with_amplitude(amplitude);
         Modulated::of(orbit, &free, averages.as_ref(), gap)
@@ -280,8 +300,8 @@ impl Curve<'_> {
         Averages::new(&self.model, spring, swing, self.free.stiffness)
     }
 
-    /// Adds what frequency modulation tells in SI.
-    fn tell_in_si(&self, point: &mut ApproachPoint) {
+    /// Adds the numbers of frequency modulation in SI.
+    fn add_si(&self, point: &mut ApproachPoint) {
         if let Some(view) = self.case.physical() {
             point.modulation_si = point.modulation.map(|m| m.in_si(view));
         }
@@ -293,10 +313,9 @@ impl Curve<'_> {
         gap: f64,
         orbit: HeldOrbit,
         amplitude: f64,
-    ) -> Result<ApproachPoint, ApproachError> {
+    ) -> Result<ApproachPoint, Error> {
         let view = self.case.physical();
-        let observables = measure(&orbit.model, &orbit.orbit.states[0], 1, Set::COMMON)
-            .map_err(super::HeldError::from)?;
+        let observables = measure(&orbit.model, &orbit.orbit.states[0], 1, Set::COMMON)?;
         let modulation = self.modulated(&orbit, amplitude, gap);
         Ok(ApproachPoint {
             way,

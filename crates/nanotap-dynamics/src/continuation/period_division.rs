@@ -1,11 +1,11 @@
-//! Where a branch runs into one of shorter period.
+//! Detection of a branch that meets one of shorter period.
 
 use crate::continuation::bifurcation::collapse;
 use crate::continuation::solver::{BranchSolver, Node};
 use crate::map::MapFamily;
 use crate::vector::norm;
 
-/// The first proper divisor of the period whose branch was met, the step and the
+/// Returns the first proper divisor of the period whose branch is met, with the step and the
 /// parameter there.
 pub(crate) fn shortest_collapse<F: MapFamily>(
     solver: &mut BranchSolver<'_, F>,
@@ -20,8 +20,8 @@ pub(crate) fn shortest_collapse<F: MapFamily>(
     })
 }
 
-/// The divisor of the period whose branch Newton has slipped onto: the difference of
-/// states that many periods apart has all but vanished within one step.
+/// Returns the divisor of the period to whose branch Newton has converged: the difference of the
+/// states that many periods apart has nearly vanished within one step.
 pub(crate) fn slipped<F: MapFamily>(
     solver: &BranchSolver<'_, F>,
     from: &Node,
@@ -32,8 +32,8 @@ pub(crate) fn slipped<F: MapFamily>(
     (1..n).find(|&m| n.is_multiple_of(m) && gap(to, m) <= 1e-3 * gap(from, m))
 }
 
-/// Where the difference f of states `m` periods apart vanishes, from two nodes on one
-/// side: beside a flip (or any symmetric birth) the parameter is even in f.
+/// Where the difference f of states `m` periods apart vanishes, extrapolated from two nodes on one
+/// side: near a flip (or any symmetric bifurcation) the parameter is an even function of f.
 pub(crate) fn meeting<F: MapFamily>(
     solver: &BranchSolver<'_, F>,
     far: &Node,
@@ -50,14 +50,13 @@ mod tests {
     use super::*;
     use crate::continuation::solver::tests::{bare, solver};
 
-    /// Both points of the logistic map's orbit of period 2, which is born at r = 3.
+    /// Both points of the period-2 orbit of the logistic map, which bifurcates at r = 3.
     fn doubled(r: f64) -> Node {
         let root = ((r + 1.0) * (r - 3.0)).sqrt();
         bare(r, &[r + 1.0 + root, r + 1.0 - root].map(|x| x / (2.0 * r)))
     }
 
-    /// The gap is √((r + 1)(r − 3))/r: its square is nearly straight beside r = 3, where it
-    /// vanishes.
+    /// The gap is √((r + 1)(r − 3))/r: its square is nearly linear near r = 3, where it vanishes.
     #[test]
     fn a_doubled_branch_points_to_where_it_was_born() {
         let solver = solver(2);
@@ -66,7 +65,7 @@ mod tests {
             let curvature: f64 = (far - 3.0) * (near - 3.0);
             assert!((met - 3.0).abs() < curvature, "{met}");
         }
-        // Too far from it yet: the gap has hardly shrunk.
+        // Still too far away: the gap has hardly shrunk.
         assert_eq!(meeting(&solver, &doubled(3.04), &doubled(3.02), 1), None);
     }
 

@@ -1,15 +1,15 @@
-//! From one point of a curve to its end.
+//! The continuation loop of a curve in one direction.
 
+use crate::codim1_curves::end::CurveEnd;
+use crate::codim1_curves::solver::{CurveNode, CurveSolver};
+use crate::codim1_curves::{CurveOptions, CurvePoint};
 use crate::continuation::ContinuationError;
 use crate::control::Control;
-use crate::curve::end::CurveEnd;
-use crate::curve::solver::{CurveNode, CurveSolver};
-use crate::curve::{CurveOptions, CurvePoint};
 use crate::map::TwoParameterFamily;
 use crate::vector::norm;
 
 impl<F: TwoParameterFamily> CurveSolver<'_, F> {
-    /// The points from `start` along its tangent, and why there are no more.
+    /// The points from `start` along its tangent, and why the curve ends.
     pub(super) fn follow(
         &mut self,
         start: &CurveNode,
@@ -31,7 +31,7 @@ impl<F: TwoParameterFamily> CurveSolver<'_, F> {
                 .zip(&node.tangent)
                 .map(|(u, t)| u + step * t)
                 .collect();
-            // Onto the edge of the box if the step would lead out of it.
+            // Shorten the step to the edge of the box if it would leave it.
             let leaving = [(d, options.first), (d + 1, options.second)]
                 .into_iter()
                 .filter_map(|(i, (low, high))| {

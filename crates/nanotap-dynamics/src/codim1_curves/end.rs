@@ -1,67 +1,67 @@
-//! Why a curve of bifurcations ends.
+//! The reason why a curve of bifurcations ends.
 
 use crate::continuation::{BifurcationKind, OrbitTangency};
 use crate::orbit::PeriodicOrbit;
 use nanotap_arithmetic::ComplexFunctions as _;
 
-/// Distance of a second multiplier from ±1, or of an angle from 0 and π, within which
-/// two events are taken to meet.
-const TOGETHER: f64 = 0.03;
-/// An extremum of a switching function this small, as a part of the largest, counts as
-/// a touch.
-const TOUCH: f64 = 1e-3;
+/// Distance of a second multiplier from ±1, or of an angle from 0 and π, within which two
+/// bifurcations coincide.
+const COINCIDENCE: f64 = 0.03;
+/// Largest extremum of a switching function, as a fraction of the largest one, that counts as a
+/// grazing.
+const GRAZING_VALUE: f64 = 1e-3;
 
 /// Why a curve of bifurcations ends.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum CurveEnd {
-    /// It leaves the window of the two parameters.
+    /// It leaves the box of the two parameters.
     #[error("leaves the window")]
     Window,
-    /// It came back to its beginning.
+    /// It returned to its first point.
     #[error("closed")]
     Closed,
-    /// The orbit grazes there: the map is not twice differentiable, and another curve
-    /// begins or none does.
+    /// The orbit grazes: the map is not twice differentiable there, and the curve does not continue
+    /// smoothly.
     #[error("meets a grazing at ({first}, {second})")]
     Grazing {
-        /// First parameter.
+        /// Value of the first parameter.
         first: f64,
-        /// Second parameter.
+        /// Value of the second parameter.
         second: f64,
     },
-    /// A second condition is met there.
+    /// A second bifurcation condition holds there.
     #[error("meets a {what} (codimension two) at ({first}, {second})")]
     CodimensionTwo {
-        /// Which one.
+        /// Name of the second condition.
         what: &'static str,
-        /// First parameter.
+        /// Value of the first parameter.
         first: f64,
-        /// Second parameter.
+        /// Value of the second parameter.
         second: f64,
     },
-    /// A state outgrew the bound.
+    /// A state exceeded the bound.
     #[error("a state left the domain")]
     LeftDomain,
-    /// No point was found at the shortest step, and nothing special is near.
+    /// The corrector failed at the shortest step, for no known reason.
     #[error("no further point beyond ({first}, {second}) at the shortest step: {reason}")]
     StepTooSmall {
-        /// First parameter.
+        /// Value of the first parameter.
         first: f64,
-        /// Second parameter.
+        /// Value of the second parameter.
         second: f64,
-        /// What failed there.
+        /// Reason of the failure.
         reason: String,
     },
-    /// The allowed number of points was used up.
+    /// The largest number of points was reached.
     #[error("cut after the allowed number of points")]
     PointLimit,
-    /// The caller stopped it.
+    /// The caller cancelled the computation.
     #[error("stopped by the caller")]
     Cancelled,
 }
 
 impl CurveEnd {
-    /// What is met there, in a word: nothing at the edge of the window, or of a closed curve.
+    /// Short name of the event at the end; `None` at the edge of the box and on a closed curve.
     pub fn meets(&self) -> Option<&'static str> {
         match self {
             Self::Window | Self::Closed => None,
@@ -71,7 +71,7 @@ impl CurveEnd {
         }
     }
 
-    /// True if the curve was cut rather than came to an end.
+    /// True if the curve was cut: what lies beyond its last point is unknown.
     pub fn is_failure(&self) -> bool {
         match self {
             Self::Window | Self::Closed | Self::Grazing { .. } | Self::CodimensionTwo { .. } => {
@@ -83,8 +83,8 @@ impl CurveEnd {
         }
     }
 
-    /// What a curve of this kind ran into where no further point was found: its last
-    /// orbit, the extrema along it, and what failed.
+    /// The event where the corrector failed, from the last orbit, the extrema along it, and the
+    /// reason of the failure.
     pub(crate) fn at_last_point(
         kind: BifurcationKind,
         (first, second): (f64, f64),
@@ -95,7 +95,7 @@ impl CurveEnd {
         let largest = tangencies.iter().fold(0.0f64, |m, t| m.max(t.value.abs()));
         let touches = tangencies
             .iter()
-            .filter(|t| t.value.abs() <= TOUCH * largest)
+            .filter(|t| t.value.abs() <= GRAZING_VALUE * largest)
             .count();
         let on_a_grazing = matches!(kind, BifurcationKind::Grazing { .. });
         if touches > usize::from(on_a_grazing) {
@@ -116,19 +116,19 @@ impl CurveEnd {
     }
 }
 
-/// The condition that an orbit on a curve of this kind meets besides the curve's own.
+/// The second condition that an orbit satisfies on a curve of this kind.
 fn second_condition(kind: BifurcationKind, orbit: &PeriodicOrbit) -> Option<&'static str> {
     let near = |value: f64| {
         orbit
             .multipliers
             .iter()
-            .filter(|m| (*m - value).modulus() <= TOGETHER)
+            .filter(|m| (*m - value).modulus() <= COINCIDENCE)
             .count()
     };
     let pair = orbit
         .multipliers
         .iter()
-        .any(|m| m.im > TOGETHER && (m.modulus() - 1.0).abs() <= TOGETHER);
+        .any(|m| m.im > COINCIDENCE && (m.modulus() - 1.0).abs() <= COINCIDENCE);
     let (plus, minus) = (near(1.0), near(-1.0));
     match kind {
         BifurcationKind::NeimarkSacker { .. } if plus > 1 => Some("1:1 resonance"),
@@ -170,8 +170,8 @@ mod tests {
         }
     }
 
-    /// Kuznetsov, "Elements of Applied Bifurcation Theory", tables of bifurcations of maps of
-    /// codimension two: which multipliers lie on the circle together.
+    /// Kuznetsov, "Elements of Applied Bifurcation Theory", tables of codimension-two bifurcations
+    /// of maps: the multipliers on the unit circle.
     #[test]
     fn two_conditions_at_once_have_a_name() {
         use BifurcationKind::{Crossing, Flip, Fold};
@@ -221,7 +221,7 @@ mod tests {
         }
     }
 
-    /// One touch is a grazing on a curve of folds; on a curve of grazings it takes another.
+    /// One grazing extremum ends a curve of folds; a curve of grazings ends at a second one.
     #[test]
     fn a_touch_ends_a_curve() {
         let end = |kind, values: &[f64]| {

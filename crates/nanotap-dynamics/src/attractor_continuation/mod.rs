@@ -1,23 +1,23 @@
-//! Attractors all over a grid of parameter values: none that is known at one value is
-//! missed at its neighbours.
+//! Continuation of attractors over a grid of parameter values: an attractor known at one value is
+//! sought at its neighbours.
 //!
-//! A census is taken at every value. Then each attractor is tried at the neighbouring
-//! values: of an orbit Newton looks for the same orbit there; where that fails, or finds
-//! it unstable, the motion from its state is classified; of chaos and tori likewise. One
-//! that is seen to go on at the neighbouring value from there need not be tried from here.
-//! What is new at a value is tried at its neighbours in turn, both ways, until no value
-//! gains an attractor (global continuation, as Datseris, Luiz Rossi and Wagemakers,
-//! Chaos 33, 073151, 2023, with Newton in place of recurrences).
+//! A census is taken at every value. Then each attractor is tried at the neighbouring values. For
+//! an orbit, Newton closes the orbit there; if that fails or the orbit is unstable, the motion from
+//! its state is classified. The motions from the states of chaotic attractors and tori are
+//! classified too. An attractor already found at the neighbouring value is not tried again in the
+//! other direction. New attractors are tried at their neighbours in turn, until no value gains one
+//! (global continuation, as Datseris, Luiz Rossi and Wagemakers, Chaos 33, 073151, 2023, with
+//! Newton in place of recurrences).
 //!
-//! Attractors at neighbouring values that are one another's continuation (Newton from
-//! either closes the other, with little change of place) form a branch.
+//! Attractors at neighbouring values that continue each other (Newton from either one closes the
+//! other, at a small distance) form a branch.
 //!
-//! The rounds are taken one after the other over the whole grid, so the result is the
-//! same for any number of threads.
+//! Rounds over the whole grid run in sequence, so the result does not depend on the number of
+//! threads.
 //!
-//! Fails: an attractor whose whole range lies between two values of the grid, or that no
-//! census meets anywhere in its range, stays unseen; one that moves by more than half
-//! its size from value to value is found but not joined to its branch.
+//! Fails: an attractor that exists only between two values of the grid, or that no census finds
+//! anywhere, is missed. An attractor that moves by more than half its size from value to value is
+//! found but not joined to its branch.
 
 use std::collections::{BTreeMap, HashSet};
 
@@ -31,23 +31,23 @@ use crate::control::Control;
 use crate::map::{MapFamily, StroboscopicMap};
 use crate::orbit::{PeriodicOrbit, close_orbit_from_points};
 
-/// Part of an orbit's size by which it may move from one value to the next and still be
-/// called the same.
-const CONTINUITY: f64 = 0.5;
+/// Largest distance between an orbit and its continuation at the next value, as a fraction of the
+/// orbit's size.
+const MAX_DISPLACEMENT: f64 = 0.5;
 
-/// How attractors are sought over a grid.
+/// Options of the continuation of attractors over a grid.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct GlobalOptions {
-    /// The census at every value. What it may leave unseen there, neighbours can show.
+pub struct AttractorContinuationOptions {
+    /// Options of the census at every value.
     pub census: CensusOptions,
 }
 
-/// What is known at one value of the grid.
+/// Result at one value of the grid.
 #[derive(Clone, Debug)]
-pub struct GlobalValue {
-    /// The attractors: those of the census, then those that neighbours showed.
-    pub attractors: Vec<GlobalAttractor>,
-    /// The census; `None` if there is no map at this value or the work was stopped.
+pub struct AttractorsAtValue {
+    /// The attractors: those of the census, then those found from neighbours.
+    pub attractors: Vec<ContinuedAttractor>,
+    /// The census; `None` if there is no map at this value or the computation was cancelled.
     pub census: Option<Census>,
     /// Why there is no map at this value.
     pub failure: Option<String>,
@@ -55,31 +55,31 @@ pub struct GlobalValue {
 
 /// An attractor at one value of the grid.
 #[derive(Clone, Debug)]
-pub struct GlobalAttractor {
-    /// The attractor. One that a neighbour showed has a fraction of no starts.
+pub struct ContinuedAttractor {
+    /// The attractor. If it was found from a neighbour, its fraction counts no starts.
     pub attractor: Attractor,
-    /// Index of the value whose attractor led to it; `None` if the census found it.
-    pub shown_by: Option<usize>,
-    /// Number of the branch on which it lies, counted from 0 in the order of the grid.
+    /// Index of the value from which it was found; `None` if the census found it.
+    pub found_from: Option<usize>,
+    /// Number of its branch, counted from 0 in the order of the grid.
     pub branch: usize,
 }
 
-/// The attractors of a one-parameter family at each of `values`, in their order.
-/// `starts` gives the starts at the value with this index.
-pub fn attractors_along<F: MapFamily>(
+/// Finds the attractors of a one-parameter family at each of `values`, in their order. `starts`
+/// returns the initial states for the value with this index.
+pub fn continue_attractors<F: MapFamily>(
     family: &F,
     values: &[f64],
     starts: impl Fn(usize, &F::Map) -> StartSet + Sync,
-    options: &GlobalOptions,
+    options: &AttractorContinuationOptions,
     control: &Control<'_>,
-) -> Vec<GlobalValue> {
+) -> Vec<AttractorsAtValue> {
     let at = |k: usize| family.at(values[k]).map_err(|e| e.to_string());
     let neighbours = grid_neighbours(&[values.len()]);
-    over_graph(values.len(), at, neighbours, starts, options, control)
+    continue_over_graph(values.len(), at, neighbours, starts, options, control)
 }
 
-/// The values beside each value of a grid of one or two parameters with so many values each;
-/// the index of a value runs fastest along the first.
+/// Neighbours of each value in a grid of one or two parameters with the given numbers of values.
+/// The index runs fastest along the first parameter.
 pub fn grid_neighbours(shape: &[usize]) -> impl Fn(usize) -> Vec<usize> + use<> {
     let columns = shape.first().copied().unwrap_or(1).max(1);
     let rows = shape.get(1).copied().unwrap_or(1);
@@ -97,38 +97,38 @@ pub fn grid_neighbours(shape: &[usize]) -> impl Fn(usize) -> Vec<usize> + use<> 
     }
 }
 
-/// One attractor of one value.
-type Place = (usize, usize);
+/// Index of a value and of an attractor there.
+type AttractorIndex = (usize, usize);
 
-/// What came of trying an attractor at a neighbouring value.
+/// Result of trying an attractor at a neighbouring value.
 struct Trial {
-    from: Place,
+    from: AttractorIndex,
     at: usize,
     kind: AttractorKind,
     state: Vec<f64>,
-    /// Whether it is the same attractor, moved a little.
+    /// Whether it is the continuation of the attractor.
     continued: bool,
 }
 
-fn over_graph<M: StroboscopicMap>(
+fn continue_over_graph<M: StroboscopicMap>(
     count: usize,
     at: impl Fn(usize) -> Result<M, String> + Sync,
     neighbours: impl Fn(usize) -> Vec<usize>,
     starts: impl Fn(usize, &M) -> StartSet + Sync,
-    options: &GlobalOptions,
+    options: &AttractorContinuationOptions,
     control: &Control<'_>,
-) -> Vec<GlobalValue> {
+) -> Vec<AttractorsAtValue> {
     let quiet = Control {
         cancel: control.cancel,
         progress: None,
     };
     let done = std::sync::atomic::AtomicUsize::new(0);
-    let values: Vec<GlobalValue> = (0..count)
+    let values: Vec<AttractorsAtValue> = (0..count)
         .into_par_iter()
         .with_max_len(1)
         .map(|k| {
             if control.is_cancelled() {
-                return GlobalValue {
+                return AttractorsAtValue {
                     attractors: Vec::new(),
                     census: None,
                     failure: None,
@@ -136,7 +136,7 @@ fn over_graph<M: StroboscopicMap>(
             }
             let value = match at(k) {
                 Ok(map) => from_census(census_of(&map, &starts(k, &map), &options.census, &quiet)),
-                Err(failure) => GlobalValue {
+                Err(failure) => AttractorsAtValue {
                     attractors: Vec::new(),
                     census: None,
                     failure: Some(failure),
@@ -146,56 +146,56 @@ fn over_graph<M: StroboscopicMap>(
             value
         })
         .collect();
-    shared(values, at, neighbours, &options.census.classify, control)
+    share_attractors(values, at, neighbours, &options.census.classify, control)
 }
 
-/// Orbits that are known at some values, tried at the neighbouring ones in turn until no
-/// value gains one: the last step of [`attractors_along`] where runs were made already.
-/// `known` has the stable orbits at each value, `at` is the map there, `neighbours` are the
-/// values beside it ([`grid_neighbours`]).
-pub fn orbits_shared<M: StroboscopicMap>(
+/// Tries the orbits known at some values at the neighbouring values, until no value gains one: the
+/// last step of [`continue_attractors`] for runs that exist already. `known` contains the stable
+/// orbits at each value, `at` returns the map there, and `neighbours` the indices of neighbouring
+/// values ([`grid_neighbours`]).
+pub fn share_orbits<M: StroboscopicMap>(
     known: Vec<Vec<PeriodicOrbit>>,
     at: impl Fn(usize) -> Result<M, String> + Sync,
     neighbours: impl Fn(usize) -> Vec<usize>,
     classify: &ClassifyOptions,
     control: &Control<'_>,
-) -> Vec<GlobalValue> {
-    let values = known.into_iter().map(|orbits| GlobalValue {
+) -> Vec<AttractorsAtValue> {
+    let values = known.into_iter().map(|orbits| AttractorsAtValue {
         attractors: orbits
             .into_iter()
-            .map(|orbit| GlobalAttractor {
+            .map(|orbit| ContinuedAttractor {
                 attractor: Attractor {
                     state: orbit.states[0].clone(),
                     kind: AttractorKind::Periodic(orbit),
                     fraction: Fraction::new(0, 0),
                     first_start: None,
                 },
-                shown_by: None,
+                found_from: None,
                 branch: 0,
             })
             .collect(),
         census: None,
         failure: None,
     });
-    shared(values.collect(), at, neighbours, classify, control)
+    share_attractors(values.collect(), at, neighbours, classify, control)
 }
 
-/// Tries what is known at each value at its neighbours until none gains anything.
-fn shared<M: StroboscopicMap>(
-    mut values: Vec<GlobalValue>,
+/// Tries the attractors of each value at its neighbours until no value gains one.
+fn share_attractors<M: StroboscopicMap>(
+    mut values: Vec<AttractorsAtValue>,
     at: impl Fn(usize) -> Result<M, String> + Sync,
     neighbours: impl Fn(usize) -> Vec<usize>,
     classify: &ClassifyOptions,
     control: &Control<'_>,
-) -> Vec<GlobalValue> {
-    let mut links: Vec<(Place, Place)> = Vec::new();
-    // Attractors that are known to go on at a neighbouring value.
-    let mut continued: HashSet<(Place, usize)> = HashSet::new();
-    let mut fresh: Vec<Place> = places(&values);
-    while !fresh.is_empty() && !control.is_cancelled() {
-        // Two neighbouring values, and what is to be tried from either at the other.
-        let mut pairs: BTreeMap<[usize; 2], Vec<Place>> = BTreeMap::new();
-        for from in fresh.drain(..) {
+) -> Vec<AttractorsAtValue> {
+    let mut links: Vec<(AttractorIndex, AttractorIndex)> = Vec::new();
+    // Attractors whose continuation at a neighbouring value is known.
+    let mut continued: HashSet<(AttractorIndex, usize)> = HashSet::new();
+    let mut untried: Vec<AttractorIndex> = indices(&values);
+    while !untried.is_empty() && !control.is_cancelled() {
+        // Two neighbouring values, and the attractors of either one to be tried at the other.
+        let mut pairs: BTreeMap<[usize; 2], Vec<AttractorIndex>> = BTreeMap::new();
+        for from in untried.drain(..) {
             for at in neighbours(from.0) {
                 if values[at].failure.is_none() && !continued.contains(&(from, at)) {
                     let pair = [from.0.min(at), from.0.max(at)];
@@ -207,9 +207,9 @@ fn shared<M: StroboscopicMap>(
         let trials: Vec<Vec<Trial>> = pairs
             .into_par_iter()
             .with_max_len(1)
-            .map(|(pair, places)| {
+            .map(|(pair, indices)| {
                 let cancelled = || control.is_cancelled();
-                trials(&values, pair, &places, &at, classify, cancelled)
+                try_neighbours(&values, pair, &indices, &at, classify, cancelled)
             })
             .collect();
         for trial in trials.into_iter().flatten() {
@@ -218,17 +218,17 @@ fn shared<M: StroboscopicMap>(
                 .iter()
                 .position(|a| a.attractor.kind.is_same_as(&trial.kind));
             let index = index.unwrap_or_else(|| {
-                known.push(GlobalAttractor {
+                known.push(ContinuedAttractor {
                     attractor: Attractor {
                         kind: trial.kind,
                         fraction: Fraction::new(0, 0),
                         first_start: None,
                         state: trial.state,
                     },
-                    shown_by: Some(trial.from.0),
+                    found_from: Some(trial.from.0),
                     branch: 0,
                 });
-                fresh.push((trial.at, known.len() - 1));
+                untried.push((trial.at, known.len() - 1));
                 known.len() - 1
             });
             if trial.continued {
@@ -242,12 +242,12 @@ fn shared<M: StroboscopicMap>(
     values
 }
 
-/// What comes of trying attractors of two neighbouring values, each at the other: of orbits by
-/// Newton, then of those that were not seen to go on, in either direction, by a run.
-fn trials<M: StroboscopicMap>(
-    values: &[GlobalValue],
+/// Tries attractors of two neighbouring values, each at the other value: orbits by Newton, then
+/// those without a continuation in either direction by a run.
+fn try_neighbours<M: StroboscopicMap>(
+    values: &[AttractorsAtValue],
     pair: [usize; 2],
-    places: &[Place],
+    indices: &[AttractorIndex],
     at: impl Fn(usize) -> Result<M, String>,
     classify: &ClassifyOptions,
     cancelled: impl Fn() -> bool,
@@ -255,16 +255,16 @@ fn trials<M: StroboscopicMap>(
     if cancelled() {
         return Vec::new();
     }
-    let known = |(k, a): Place| &values[k].attractors[a].attractor;
+    let known = |(k, a): AttractorIndex| &values[k].attractors[a].attractor;
     let mut maps = pair.map(|k| at(k).ok());
     let mut trials: Vec<Trial> = Vec::new();
     for by_newton in [true, false] {
-        for &from in places {
+        for &from in indices {
             let at = usize::from(from.0 == pair[0]);
-            let goes_on = |trial: &Trial| {
+            let continues = |trial: &Trial| {
                 trial.at == from.0 && trial.continued && trial.kind.is_same_as(&known(from).kind)
             };
-            if trials.iter().any(|t| t.from == from || goes_on(t)) {
+            if trials.iter().any(|t| t.from == from || continues(t)) {
                 continue;
             }
             if cancelled() {
@@ -272,9 +272,9 @@ fn trials<M: StroboscopicMap>(
             }
             let Some(map) = &mut maps[at] else { continue };
             let found = if by_newton {
-                closed(map, known(from), classify)
+                close_from(map, known(from), classify)
             } else {
-                arrived(map, known(from), classify)
+                classify_from(map, known(from), classify)
             };
             trials.extend(found.map(|(kind, state, continued)| Trial {
                 from,
@@ -288,24 +288,24 @@ fn trials<M: StroboscopicMap>(
     trials
 }
 
-fn from_census(census: Census) -> GlobalValue {
+fn from_census(census: Census) -> AttractorsAtValue {
     let attractors = census
         .attractors
         .iter()
-        .map(|attractor| GlobalAttractor {
+        .map(|attractor| ContinuedAttractor {
             attractor: attractor.clone(),
-            shown_by: None,
+            found_from: None,
             branch: 0,
         })
         .collect();
-    GlobalValue {
+    AttractorsAtValue {
         attractors,
         census: Some(census),
         failure: None,
     }
 }
 
-fn places(values: &[GlobalValue]) -> Vec<Place> {
+fn indices(values: &[AttractorsAtValue]) -> Vec<AttractorIndex> {
     values
         .iter()
         .enumerate()
@@ -313,15 +313,15 @@ fn places(values: &[GlobalValue]) -> Vec<Place> {
         .collect()
 }
 
-/// The attractor to which a neighbour's leads, a state on it, and whether it is the same one.
-type Led = (AttractorKind, Vec<f64>, bool);
+/// Attractor reached from a neighbour's, a state on it, and whether it is the continuation.
+type Reached = (AttractorKind, Vec<f64>, bool);
 
-/// The stable orbit that Newton closes from a neighbour's.
-fn closed<M: StroboscopicMap>(
+/// The stable orbit that Newton closes from a neighbour's orbit.
+fn close_from<M: StroboscopicMap>(
     map: &mut M,
     attractor: &Attractor,
     options: &ClassifyOptions,
-) -> Option<Led> {
+) -> Option<Reached> {
     let AttractorKind::Periodic(orbit) = &attractor.kind else {
         return None;
     };
@@ -330,17 +330,17 @@ fn closed<M: StroboscopicMap>(
     if !closed.is_stable() {
         return None;
     }
-    let continued = is_continuation(orbit, &closed);
+    let continued = orbit.is_near(&closed, MAX_DISPLACEMENT);
     let state = closed.states[0].clone();
     Some((AttractorKind::Periodic(closed), state, continued))
 }
 
-/// The attractor at which a run from a neighbour's arrives.
-fn arrived<M: StroboscopicMap>(
+/// The attractor that the motion from a neighbour's attractor reaches.
+fn classify_from<M: StroboscopicMap>(
     map: &mut M,
     attractor: &Attractor,
     options: &ClassifyOptions,
-) -> Option<Led> {
+) -> Option<Reached> {
     let classified = classify(map, &attractor.state, options);
     let (kind, continued) = match classified.kind {
         MotionKind::Periodic(orbit) | MotionKind::TransientChaos { orbit, .. } => {
@@ -362,15 +362,9 @@ fn arrived<M: StroboscopicMap>(
     Some((kind, classified.state, continued))
 }
 
-/// True if the second orbit is the first moved by little of its size.
-fn is_continuation(orbit: &PeriodicOrbit, closed: &PeriodicOrbit) -> bool {
-    let size = orbit.scale().max(closed.scale());
-    orbit.distance_to(closed).1 <= CONTINUITY * size
-}
-
-/// Gives linked attractors one number, in the order of the grid.
-fn number_branches(values: &mut [GlobalValue], links: &[(Place, Place)]) {
-    let all = places(values);
+/// Assigns one number to linked attractors, in the order of the grid.
+fn number_branches(values: &mut [AttractorsAtValue], links: &[(AttractorIndex, AttractorIndex)]) {
+    let all = indices(values);
     let offset: Vec<usize> = values
         .iter()
         .scan(0, |sum, v| {
@@ -379,7 +373,7 @@ fn number_branches(values: &mut [GlobalValue], links: &[(Place, Place)]) {
             Some(before)
         })
         .collect();
-    let index = |(k, a): Place| offset[k] + a;
+    let index = |(k, a): AttractorIndex| offset[k] + a;
     let mut parent: Vec<usize> = (0..all.len()).collect();
     for &(a, b) in links {
         let (a, b) = (root(&mut parent, index(a)), root(&mut parent, index(b)));
@@ -387,13 +381,13 @@ fn number_branches(values: &mut [GlobalValue], links: &[(Place, Place)]) {
     }
     let mut numbers: Vec<Option<usize>> = vec![None; all.len()];
     let mut next = 0;
-    for &place in &all {
-        let r = root(&mut parent, index(place));
+    for &(value, attractor) in &all {
+        let r = root(&mut parent, index((value, attractor)));
         let number = *numbers[r].get_or_insert_with(|| {
             next += 1;
             next - 1
         });
-        values[place.0].attractors[place.1].branch = number;
+        values[value].attractors[attractor].branch = number;
     }
 }
 

@@ -1,35 +1,35 @@
-//! The periods of an orbit computed side by side.
+//! Parallel computation of the periods of an orbit.
 //!
-//! In multiple shooting each period starts from a point of its own, so that none waits for
-//! another. Where a period is costly they are shared out among the threads of the pool in which
-//! the caller runs; outside one they follow each other.
+//! In multiple shooting each period starts from its own point, so the periods are independent. If a
+//! period is costly, they are shared among the threads of the caller's pool; outside a pool they
+//! run in sequence.
 
 use crate::failure::MapFailure;
 use crate::map::StroboscopicMap;
 
-/// Does `one` for every item, with a clone of the map where that is on another thread.
+/// Calls `one` for every item, with a clone of the map on other threads.
 ///
 /// # Errors
-/// That of the first item that fails.
-pub(crate) fn side_by_side<M: StroboscopicMap, T: Send>(
+/// The error of the first item that fails.
+pub(crate) fn for_each_period<M: StroboscopicMap, T: Send>(
     map: &mut M,
     items: &mut [T],
     one: &(impl Fn(&mut M, &mut T) -> Result<(), MapFailure> + Sync),
 ) -> Result<(), MapFailure> {
-    if !map.is_costly() || is_alone() {
+    if !map.is_costly() || is_single_threaded() {
         return items.iter_mut().try_for_each(|item| one(map, item));
     }
-    // Two stretches a thread: they do not take equally long.
+    // Two chunks per thread, because they take different times.
     let longest = items.len().div_ceil(2 * rayon::current_num_threads());
-    shared_out(map, items, longest.max(1), one)
+    in_chunks(map, items, longest.max(1), one)
 }
 
-/// Whether no other thread of a pool can take work from this one.
-pub(crate) fn is_alone() -> bool {
+/// True if no other thread of the pool can take work from this one.
+pub(crate) fn is_single_threaded() -> bool {
     rayon::current_thread_index().is_none() || rayon::current_num_threads() == 1
 }
 
-fn shared_out<M: StroboscopicMap, T: Send>(
+fn in_chunks<M: StroboscopicMap, T: Send>(
     map: &mut M,
     items: &mut [T],
     longest: usize,
@@ -41,8 +41,8 @@ fn shared_out<M: StroboscopicMap, T: Send>(
     let (first, second) = items.split_at_mut(items.len() / 2);
     let mut other = map.clone();
     let (first, second) = rayon::join(
-        || shared_out(map, first, longest, one),
-        || shared_out(&mut other, second, longest, one),
+        || in_chunks(map, first, longest, one),
+        || in_chunks(&mut other, second, longest, one),
     );
     first.and(second)
 }
@@ -54,11 +54,17 @@ mod tests {
     use super::*;
     use crate::orbit::{ShootingOptions, close_orbit};
 
-    /// 1 − 1.76 x², near the parameter 1.7549 of the superstable orbit of period 3; beyond 1.5 it
-    /// refuses.
+    /// 1 − 1.76 x², near the parameter 1.7549 of the superstable orbit of period 3; fails beyond
+    /// 1.5.
     #[derive(Clone)]
     struct Quadratic {
         costly: bool,
+    }
+
+    impl crate::Scheduling for Quadratic {
+        fn is_costly(&self) -> bool {
+            self.costly
+        }
     }
 
     impl StroboscopicMap for Quadratic {
@@ -70,10 +76,6 @@ mod tests {
 
         fn period(&self) -> f64 {
             1.0
-        }
-
-        fn is_costly(&self) -> bool {
-            self.costly
         }
 
         fn advance(&mut self, state: &mut [f64]) -> Result<(), Self::Error> {
@@ -100,7 +102,7 @@ mod tests {
     }
 
     #[test]
-    fn an_orbit_is_the_same_to_the_last_digit_on_any_number_of_threads() {
+    fn an_orbit_is_the_same_to_the_last_digit_for_any_number_of_threads() {
         let closed = |costly: bool| {
             let options = ShootingOptions::default();
             close_orbit(&mut Quadratic { costly }, &[0.0], 3, &options).unwrap()
@@ -114,18 +116,21 @@ mod tests {
     }
 
     #[test]
-    fn every_period_is_computed_and_the_first_failure_told() {
+    fn every_period_is_computed_and_the_first_failure_returned() {
         let starts: Vec<f64> = (0..37).map(|k| f64::from(k) * 0.1).collect();
         for threads in [1, 2, 5] {
             let mut ends = starts.clone();
-            let told = in_pool(threads, || {
+            let result = in_pool(threads, || {
                 let mut map = Quadratic { costly: true };
-                side_by_side(&mut map, &mut ends, &|map, end| {
+                for_each_period(&mut map, &mut ends, &|map, end| {
                     map.advance(std::slice::from_mut(end))
                         .map_err(MapFailure::refused)
                 })
             });
-            assert!(told.unwrap_err().to_string().ends_with("1.6"), "{threads}");
+            assert!(
+                result.unwrap_err().to_string().ends_with("1.6"),
+                "{threads}"
+            );
             for (end, start) in ends.iter().zip(&starts).take(16) {
                 assert_eq!(*end, 1.0 - 1.76 * start * start);
             }

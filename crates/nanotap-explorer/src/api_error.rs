@@ -8,9 +8,9 @@ use serde_json::{Value, json};
 
 /// The reason of a failed request, with the terminal's message.
 #[derive(Clone, Debug)]
-pub(crate) struct Refusal(Error);
+pub(crate) struct ApiError(Error);
 
-impl Refusal {
+impl ApiError {
     /// From any error of the library.
     pub(crate) fn of(error: impl Into<Error>) -> Self {
         Self(error.into())
@@ -32,13 +32,13 @@ impl Refusal {
     }
 }
 
-impl From<Error> for Refusal {
+impl From<Error> for ApiError {
     fn from(error: Error) -> Self {
         Self(error)
     }
 }
 
-impl IntoResponse for Refusal {
+impl IntoResponse for ApiError {
     fn into_response(self) -> Response {
         let status = match self.0.kind {
             ErrorKind::BadInput | ErrorKind::Numerics => StatusCode::UNPROCESSABLE_ENTITY,

@@ -1,32 +1,32 @@
-//! Whether a branch passes an orbit that is known already, at whichever of its strobes.
+//! Recognition of a known orbit on a branch, whichever strobe it starts from.
 //!
-//! In the plane across the branch in which the known orbit lies, Newton finds the branch's own
-//! orbit: the two are one if they agree to a small part of the step. So it is round folds too,
-//! beside which the parameter does not tell an orbit from its neighbour.
+//! Newton finds the orbit of the branch in the plane perpendicular to the branch that contains the
+//! known orbit. The two are the same if they agree to a small fraction of the step. This also works
+//! near folds, where two orbits have nearly the same parameter value.
 
 use crate::continuation::BranchPoint;
 use crate::continuation::solver::{BranchSolver, Node};
 use crate::map::MapFamily;
 use crate::vector::difference;
 
-/// Part of a step within which two orbits in one plane across it are the same.
-const SAME: f64 = 1e-3;
-/// How far beyond its ends the chord between two points is followed, in its lengths.
-const BEYOND: f64 = 0.1;
+/// Largest distance of equal orbits, as a fraction of the step.
+const ORBIT_TOLERANCE: f64 = 1e-3;
+/// How far the chord between two points is extended beyond its ends, as a fraction of its length.
+const CHORD_EXTENSION: f64 = 0.1;
 
-/// A place where a branch passes a known orbit.
+/// A point where a branch contains a known orbit.
 struct Passage {
-    /// The step there from the point before.
+    /// Step from the previous point.
     at: f64,
-    /// The branch's point there.
+    /// The solution there.
     node: Node,
-    /// The known orbit's strobe at which the branch's orbit begins.
+    /// Strobe of the known orbit with which the branch's orbit begins.
     strobe: usize,
 }
 
-/// Where the branch from `from` along its tangent passes an orbit with these strobes at
-/// `parameter`, with a step within `reach`; no further beside the tangent than `size`, by which
-/// the branch's points move on the way.
+/// Finds the point where the branch from `from` along its tangent contains an orbit with these
+/// strobes at `parameter`, for steps within `reach`. The point lies at most `size` away from the
+/// tangent; `size` is the distance by which the branch's points move on the way.
 fn passage<F: MapFamily>(
     solver: &mut BranchSolver<'_, F>,
     from: &Node,
@@ -46,13 +46,13 @@ fn passage<F: MapFamily>(
             return None;
         }
         let node = solver.along(from, at).ok()?;
-        let same = solver.separation(node.solution(), known) <= SAME * size;
+        let same = solver.separation(node.solution(), known) <= ORBIT_TOLERANCE * size;
         same.then_some(Passage { at, node, strobe })
     })
 }
 
-/// The step from `from`, no longer than the one that leads to `to`, after which a branch is back
-/// at its first node, at any strobe, and on the same way: it is closed.
+/// Step from `from`, at most the one that leads to `to`, after which the branch returns to its
+/// first node, at any strobe and in the same direction: the branch is closed.
 pub(crate) fn closing<F: MapFamily>(
     solver: &mut BranchSolver<'_, F>,
     first: &Node,
@@ -90,6 +90,6 @@ pub(crate) fn lies_between<F: MapFamily>(
         slope: slope / length,
         iterations: 0,
     };
-    let reach = (-BEYOND * length, (1.0 + BEYOND) * length);
+    let reach = (-CHORD_EXTENSION * length, (1.0 + CHORD_EXTENSION) * length);
     passage(solver, &chord, (orbit, parameter), reach, size).is_some()
 }

@@ -11,12 +11,13 @@
 //! not: at a lever's resonance without damping, and at folds of the resonance curve.
 
 use nalgebra::{DMatrix, DVector};
-use nanotap_dynamics::{MultiplierError, Multipliers, PeriodicOrbit, StroboscopicMap as _};
+use nanotap_dynamics::{Multipliers, PeriodicOrbit, StroboscopicMap as _};
 
-use crate::case::{Case, CaseError, Key};
+use crate::Error;
+use crate::case::{Case, Key};
+use crate::model::Model;
 use crate::model::strobe::Strobe;
-use crate::model::{Model, MotionError};
-use crate::observe::{DerivativeError, Set, first_harmonic_changes, measure};
+use crate::observe::{Set, first_harmonic_changes, measure};
 
 /// What the loop holds.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -25,62 +26,6 @@ pub struct Held {
     pub amplitude: f64,
     /// Its phase behind the drive, degrees.
     pub phase: f64,
-}
-
-/// Why there is no orbit with an amplitude and a phase.
-#[derive(Clone, Debug, thiserror::Error)]
-pub enum HeldError {
-    /// The case makes no sense.
-    #[error(transparent)]
-    Case(#[from] CaseError),
-    /// No amplitude to hold.
-    #[error("an amplitude of {amplitude} cannot be held: it must be finite and above zero")]
-    Amplitude {
-        /// What was given.
-        amplitude: f64,
-    },
-    /// No phase to hold.
-    #[error("a phase of {phase}° cannot be held: it must lie between 0° and 180°")]
-    Phase {
-        /// What was given.
-        phase: f64,
-    },
-    /// The free lever never lags so.
-    #[error("near {near} the free lever has no frequency at which it lags by {phase}°")]
-    NoPhase {
-        /// What was given.
-        phase: f64,
-        /// The resonance, with its unit.
-        near: String,
-    },
-    /// The motion could not be followed.
-    #[error(transparent)]
-    Flow(#[from] MotionError),
-    /// Its derivatives could not be had.
-    #[error(transparent)]
-    Derivative(#[from] DerivativeError),
-    /// Its multipliers could not be had.
-    #[error(transparent)]
-    Multipliers(#[from] MultiplierError),
-    /// The linear system of a Newton step has no solution.
-    #[error(
-        "the equations for orbit, frequency and strength are singular: the orbit turns back here"
-    )]
-    Singular,
-    /// The curve breaks off again and again.
-    #[error("the orbits with this amplitude and phase break off again and again on the way")]
-    Breaks,
-    /// Newton found nothing.
-    #[error(
-        "Newton finds no orbit with this amplitude and phase: after {iterations} steps the \
-         equations are off by {residual:.1e} of the amplitude"
-    )]
-    Diverged {
-        /// Steps that were made.
-        iterations: usize,
-        /// Largest residual, relative.
-        residual: f64,
-    },
 }
 
 /// A drive and a state at its phase 0; in the model's units.
@@ -148,13 +93,21 @@ impl Held {
     ///
     /// # Errors
     /// When amplitude or phase make no sense.
-    pub fn check(self) -> Result<Self, HeldError> {
+    pub fn check(self) -> Result<Self, Error> {
         let Self { amplitude, phase } = self;
         if !(amplitude > 0.0 && amplitude.is_finite()) {
-            return Err(HeldError::Amplitude { amplitude });
+            return Err(Error::input(
+                format!(
+                    "an amplitude of {amplitude} cannot be held: it must be finite and above zero"
+                ),
+                "give drive.free_amplitude, or alpha2",
+            ));
         }
         if !(phase > 0.0 && phase < 180.0) {
-            return Err(HeldError::Phase { phase });
+            return Err(Error::input(
+                format!("a phase of {phase}° cannot be held: it must lie between 0° and 180°"),
+                "give a {phase} of 90",
+            ));
         }
         Ok(self)
     }
@@ -163,7 +116,7 @@ impl Held {
     ///
     /// # Errors
     /// When there is none near, with the reason.
-    pub fn close(self, case: &Case, guess: &Driven) -> Result<HeldOrbit, HeldError> {
+    pub fn close(self, case: &Case, guess: &Driven) -> Result<HeldOrbit, Error> {
         self.check()?;
         let case = equations_of(case);
         let mut at = self.at(&case, guess.clone(), &[])?;
@@ -186,11 +139,7 @@ impl Held {
                 .filter(|step| step.iter().all(|v| v.is_finite()));
             rows = Some(known);
             let Some(step) = step else {
-                return if small {
-                    at.finish()
-                } else {
-                    Err(HeldError::Singular)
-                };
+                return if small { at.finish() } else { Err(singular()) };
             };
             let n = at.driven.state.len();
             let mut damping = 1_f64;
@@ -214,17 +163,11 @@ impl Held {
                 }
                 damping *= 0.5;
                 if damping < SHORTEST {
-                    return Err(HeldError::Diverged {
-                        iterations: iteration,
-                        residual,
-                    });
+                    return Err(diverged(iteration, residual));
                 }
             }
         }
-        Err(HeldError::Diverged {
-            iterations: STEPS,
-            residual: at.residual.amax(),
-        })
+        Err(diverged(STEPS, at.residual.amax()))
     }
 
     /// How drive and state of an orbit change with keys of the case while amplitude and phase are
@@ -233,13 +176,13 @@ impl Held {
     /// the case's own drive keep their dependence on it, as in [`close`](Self::close).
     ///
     /// # Errors
-    /// When the case makes no sense beside the value of a key, or where the orbit turns back.
+    /// When the case is not valid next to the value of a key, or where the orbit turns back.
     pub(crate) fn changes(
         self,
         case: &Case,
         orbit: Driven,
         keys: &[(Key, f64)],
-    ) -> Result<Vec<Driven>, HeldError> {
+    ) -> Result<Vec<Driven>, Error> {
         let of: Vec<Key> = keys.iter().map(|(key, _)| *key).collect();
         let at = self.at(case, orbit, &of)?;
         let rows = at.first_harmonic_rows(self)?;
@@ -258,7 +201,7 @@ impl Held {
             let solved = factors
                 .solve(&right)
                 .filter(|step| step.iter().all(|v| v.is_finite()))
-                .ok_or(HeldError::Singular)?;
+                .ok_or_else(singular)?;
             Ok(Driven {
                 frequency: solved[n] * columns[n],
                 strength: solved[n + 1] * columns[n + 1],
@@ -270,7 +213,7 @@ impl Held {
 
     /// The equations and what the map gives of their derivatives by state, frequency, strength
     /// and the values of `more` keys.
-    fn at(self, case: &Case, driven: Driven, more: &[Key]) -> Result<At, HeldError> {
+    fn at(self, case: &Case, driven: Driven, more: &[Key]) -> Result<At, Error> {
         let case = case.with_drive(driven.frequency, driven.strength);
         let model = case.model()?;
         let keys: Vec<Key> = case.drive_keys().iter().chain(more).copied().collect();
@@ -328,6 +271,21 @@ impl Held {
     }
 }
 
+/// The error of a Newton step whose linear system has no solution.
+fn singular() -> Error {
+    Error::numerics(
+        "the equations for orbit, frequency and strength are singular: the orbit turns back here",
+    )
+}
+
+/// The error of Newton steps that do not close an orbit, with their largest relative residual.
+fn diverged(steps: usize, residual: f64) -> Error {
+    Error::numerics(format!(
+        "Newton finds no orbit with this amplitude and phase: after {steps} steps the equations are \
+         off by {residual:.1e} of the amplitude"
+    ))
+}
+
 /// An angle in degrees, in (−180, 180].
 fn turn(degrees: f64) -> f64 {
     let rest = degrees.rem_euclid(360.0);
@@ -351,7 +309,7 @@ struct At {
 impl At {
     /// ∂(|c|/A, −arg c) by state, frequency and strength, relative to their sizes, and by the
     /// values of further keys.
-    fn first_harmonic_rows(&self, held: Held) -> Result<DMatrix<f64>, HeldError> {
+    fn first_harmonic_rows(&self, held: Held) -> Result<DMatrix<f64>, Error> {
         let mut rows = first_harmonic_changes(
             &self.case,
             &self.model,
@@ -405,7 +363,7 @@ impl At {
         }
     }
 
-    fn finish(self) -> Result<HeldOrbit, HeldError> {
+    fn finish(self) -> Result<HeldOrbit, Error> {
         let multipliers = Multipliers::of_product(std::slice::from_ref(&self.jacobian))?;
         let n = self.sizes.len();
         let residual = (0..n).fold(0.0, |m: f64, k| {
@@ -432,30 +390,12 @@ impl At {
     }
 }
 
-impl From<HeldError> for crate::Error {
-    fn from(error: HeldError) -> Self {
-        match error {
-            HeldError::Case(error) => error.into(),
-            HeldError::Derivative(error) => error.into(),
-            HeldError::Amplitude { .. } => {
-                Self::input(error.to_string(), "give drive.free_amplitude, or alpha2")
-            }
-            HeldError::Phase { .. } => Self::input(error.to_string(), "give a {phase} of 90"),
-            HeldError::NoPhase { .. } => Self::input(
-                error.to_string(),
-                "give another {phase}, or drive the lever at its tip",
-            ),
-            other => Self::numerics(other.to_string()).remedy("begin farther away, with {from}"),
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::study::frequency_modulation::FreeOscillation;
 
-    /// Newton's matrix against central differences of the equations, beside an orbit that is not
+    /// Newton's matrix against central differences of the equations, near an orbit that is not
     /// closed, in the exact engine and under a nonlinear force, driven at the base.
     #[test]
     fn newtons_matrix_is_the_derivative_of_the_equations() {
@@ -496,7 +436,7 @@ mod tests {
             let n = matrix.nrows();
             for column in 0..n {
                 let step = 1e-5;
-                let beside = |side: f64| {
+                let at_side = |side: f64| {
                     let mut change = DVector::zeros(n);
                     change[column] = side * step;
                     let there = held.at(&case, at.moved(&change, 1.0), &[]).unwrap();
@@ -506,7 +446,7 @@ mod tests {
                     }
                     residual
                 };
-                let difference = (beside(1.0) - beside(-1.0)) / (2.0 * step);
+                let difference = (at_side(1.0) - at_side(-1.0)) / (2.0 * step);
                 let error = (difference - matrix.column(column)).amax();
                 let size = matrix.column(column).amax();
                 assert!(

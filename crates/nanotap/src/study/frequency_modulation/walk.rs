@@ -2,7 +2,8 @@
 
 use nanotap_dynamics::Control;
 
-use super::held::{Driven, Held, HeldError, HeldOrbit};
+use super::held::{Driven, Held, HeldOrbit};
+use crate::Error;
 use crate::case::Case;
 
 /// Continuation from distance to distance.
@@ -90,11 +91,7 @@ impl<'a> HeldWalk<'a> {
     ///
     /// # Errors
     /// Why there is none.
-    pub(crate) fn step(
-        &mut self,
-        target: f64,
-        control: &Control<'_>,
-    ) -> Result<Stepped, HeldError> {
+    pub(crate) fn step(&mut self, target: f64, control: &Control<'_>) -> Result<Stepped, Error> {
         let start = self.last.as_ref().map_or(target, |(gap, _)| *gap);
         let whole = target - start;
         let shortest = whole.abs() * 0.5_f64.powi(HALVINGS);
@@ -127,7 +124,7 @@ impl<'a> HeldWalk<'a> {
                 _ if step.abs() > shortest && !control.is_cancelled() => step *= 0.5,
                 found => {
                     if breaks.len() == BREAKS || control.is_cancelled() {
-                        return Err(found.err().unwrap_or(HeldError::Breaks));
+                        return Err(found.err().unwrap_or_else(broken));
                     }
                     let (next, orbit) = self.beyond(target, at, shortest, found.err())?;
                     breaks.push([at, next]);
@@ -147,8 +144,8 @@ impl<'a> HeldWalk<'a> {
         target: f64,
         at: f64,
         shortest: f64,
-        failed: Option<HeldError>,
-    ) -> Result<(f64, HeldOrbit), HeldError> {
+        failed: Option<Error>,
+    ) -> Result<(f64, HeldOrbit), Error> {
         let mut failed = failed;
         let mut next = target;
         loop {
@@ -167,7 +164,7 @@ impl<'a> HeldWalk<'a> {
                 }
             }
             if (next - at).abs() <= shortest {
-                return Err(failed.unwrap_or(HeldError::Breaks));
+                return Err(failed.unwrap_or_else(broken));
             }
             next = at + 0.5 * (next - at);
         }
@@ -229,6 +226,11 @@ impl<'a> HeldWalk<'a> {
         let drive = (guess.frequency / found.frequency - 1.0).abs();
         state.fold(drive, f64::max)
     }
+}
+
+/// The error of a curve that breaks off too often.
+fn broken() -> Error {
+    Error::numerics("the orbits with this amplitude and phase break off again and again on the way")
 }
 
 impl Driven {

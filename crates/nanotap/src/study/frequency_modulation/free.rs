@@ -4,12 +4,12 @@ use nalgebra::{DMatrix, DVector};
 use nanotap_arithmetic::ComplexFunctions as _;
 use nanotap_flow::Complex;
 
-use super::held::{Driven, Held, HeldError, equations_of};
+use super::held::{Driven, Held, equations_of};
+use crate::Error;
 use crate::case::{Case, Key};
 use crate::model::Model;
 use crate::model::cantilever::Cantilever;
 use crate::model::contact::ContactLaw;
-use crate::model::contact::moving_surface::MovingSurface;
 use crate::model::drive_form::Actuation;
 use crate::model::strobe::Strobe;
 use crate::observe::{Set, measure};
@@ -49,20 +49,26 @@ impl FreeOscillation {
     ///
     /// # Errors
     /// When the case makes no sense, or the lever has no such phase there.
-    pub fn of(case: &Case, held: Held) -> Result<Self, HeldError> {
+    pub fn of(case: &Case, held: Held) -> Result<Self, Error> {
         let alone = alone(&equations_of(case), held);
         let own = alone.omega();
         let start = nearest_resonance(&alone.model()?, own);
         // 1/G is nearly a parabola in the frequency, so that the secant method finds where its
         // part across the phase vanishes.
-        let turned = |frequency: f64| -> Result<Complex, HeldError> {
+        let turned = |frequency: f64| -> Result<Complex, Error> {
             let inverse = inverse_response(&alone, frequency)?;
             let (sin, cos) = nanotap_arithmetic::sin_cos(held.phase.to_radians());
             Ok(inverse * Complex::new(cos, -sin))
         };
-        let none = || HeldError::NoPhase {
-            phase: held.phase,
-            near: alone.shown(alone.drive_keys()[0], start),
+        let none = || {
+            Error::input(
+                format!(
+                    "near {} the free lever has no frequency at which it lags by {}°",
+                    alone.shown(alone.drive_keys()[0], start),
+                    held.phase
+                ),
+                "give another {phase}, or drive the lever at its tip",
+            )
         };
         let (mut a, mut b) = (start, start * (1.0 + 1e-6));
         let (mut fa, mut fb) = (turned(a)?.im, turned(b)?.im);
@@ -154,7 +160,7 @@ impl FreeOscillation {
         case: &Case,
         held: Held,
         keys: &[(Key, f64)],
-    ) -> Result<Vec<[f64; 2]>, HeldError> {
+    ) -> Result<Vec<[f64; 2]>, Error> {
         let alone = alone(&equations_of(case), held);
         let mut driven = self.driven();
         driven.state.truncate(alone.model()?.dimension());
@@ -196,14 +202,10 @@ fn alone(case: &Case, held: Held) -> Case {
     match case.cantilever() {
         Some(cantilever) => Case::from(Cantilever {
             law: None,
-            contact: ContactLaw::SpringDamper,
             alpha4: 0.0,
             alpha5: far,
             alpha6: 0.0,
-            relaxation_stiffness: 0.0,
-            relaxation_time: 0.0,
-            surface: MovingSurface::NONE,
-            ..cantilever.clone()
+            ..cantilever.clone().on(ContactLaw::SpringDamper, &[])
         }),
         None => case.with(Key::OscillatorGap, far),
     }
@@ -225,7 +227,7 @@ fn nearest_resonance(model: &Model, frequency: f64) -> f64 {
 }
 
 /// Strength of the drive over the amplitude of the free tip, with its phase.
-fn inverse_response(case: &Case, frequency: f64) -> Result<Complex, HeldError> {
+fn inverse_response(case: &Case, frequency: f64) -> Result<Complex, Error> {
     let free = FreeMotion::of(&case.with_drive(frequency, 1.0).model()?);
     let (sin, cos) = nanotap_arithmetic::sin_cos(free.phase.to_radians());
     Ok(Complex::new(cos, sin) / free.amplitude)
@@ -241,7 +243,7 @@ fn stiffness(
     frequency: f64,
     held: Held,
     [strength, swing, lag]: [f64; 3],
-) -> Result<f64, HeldError> {
+) -> Result<f64, Error> {
     let at_tip = match case.cantilever() {
         Some(cantilever) => Case::from(Cantilever {
             actuation: Actuation::Tip,
@@ -253,7 +255,7 @@ fn stiffness(
         let (sin, cos) = nanotap_arithmetic::sin_cos(degrees.to_radians());
         Complex::new(cos, -sin)
     };
-    let across = |frequency: f64| -> Result<f64, HeldError> {
+    let across = |frequency: f64| -> Result<f64, Error> {
         Ok((inverse_response(case, frequency)? * turned(held.phase)).im)
     };
     let step = 1e-5;
@@ -264,7 +266,7 @@ fn stiffness(
 }
 
 /// The steady motion of a linear system, at drive phase 0.
-fn steady_state(model: &Model) -> Result<Vec<f64>, HeldError> {
+fn steady_state(model: &Model) -> Result<Vec<f64>, Error> {
     let n = model.dimension();
     let mut map = Strobe::new(model);
     let mut at = vec![0.0; n];

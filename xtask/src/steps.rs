@@ -49,6 +49,12 @@ pub(crate) static STEPS: &[Step] = &[
         run: |workspace, _| lint(workspace),
     },
     Step {
+        name: "features",
+        about: "clippy of the library with no feature and with each one alone",
+        takes_options: false,
+        run: |workspace, _| features(workspace),
+    },
+    Step {
         name: "test-rust",
         about: "the Rust tests",
         takes_options: false,
@@ -158,6 +164,17 @@ fn lint(workspace: &Workspace) -> Result<Tally, String> {
     let mut command = workspace.cargo(&["clippy", "--workspace", "--all-targets", "--release"]);
     command.args(["--", "-D", "warnings"]);
     check(&workspace.root, &mut command)
+}
+
+fn features(workspace: &Workspace) -> Result<Tally, String> {
+    let mut tally = Tally::default();
+    for feature in ["", "dataset", "figures", "fit", "fm", "proof"] {
+        let mut command = workspace.cargo(&["clippy", "--release", "--package", "nanotap"]);
+        command.args(["--no-default-features", "--features", feature]);
+        command.args(["--", "-D", "warnings"]);
+        tally += check(&workspace.root, &mut command)?;
+    }
+    Ok(tally)
 }
 
 /// Writes Python's functions from the schemas that the program prints, or checks that they are up

@@ -6,7 +6,6 @@ use std::path::PathBuf;
 
 use clap::Args;
 use nanotap::case::physical::Kind;
-use nanotap::case::physical::quantity::format_electronvolts;
 use nanotap::case::units::Units;
 use nanotap::figure::approach::approach_figure;
 use nanotap::number::shortest;
@@ -158,12 +157,7 @@ fn thinned(table: &Table, step: usize, report: &ApproachReport) -> String {
 
 fn text(case: &GivenCase, report: &ApproachReport) -> String {
     let units = case.units();
-    let shown = |kind: Kind, value: f64| {
-        units.si(kind).map_or_else(
-            || number::significant(value, 5),
-            |unit| kind.format(unit * value),
-        )
-    };
+    let shown = |kind: Kind, value: f64| number::quantity(&units, kind, value, [5, 4]);
     let heading = format!(
         "{}: {}, distances from {} to {} and back",
         case.title(),
@@ -444,8 +438,5 @@ fn modulated(
 }
 
 fn energy(value: f64, units: &Units) -> String {
-    units.si(Kind::Energy).map_or_else(
-        || number::significant(value, 4),
-        |unit| format_electronvolts(unit * value),
-    )
+    number::quantity(units, Kind::Energy, value, [4, 4])
 }

@@ -3,6 +3,7 @@
 use std::fmt::Write as _;
 
 use clap::Args;
+use nanotap::case::physical::Kind;
 use nanotap::case::units::Units;
 use nanotap::figure::attractors::attractors_figure;
 use nanotap::model::Model;
@@ -298,17 +299,8 @@ fn table(attractors: &[AttractorReport], units: &Units) -> String {
 }
 
 fn tip(low: f64, high: f64, units: &Units) -> String {
-    let kind = nanotap::case::physical::Kind::Length;
-    units.si(kind).map_or_else(
-        || {
-            format!(
-                "{} … {}",
-                number::significant(low, 5),
-                number::significant(high, 5)
-            )
-        },
-        |unit| format!("{} … {}", kind.format(unit * low), kind.format(unit * high)),
-    )
+    let [low, high] = [low, high].map(|v| number::quantity(units, Kind::Length, v, [5, 4]));
+    format!("{low} … {high}")
 }
 
 /// Starts without a verdict, those with one reason together.

@@ -184,12 +184,7 @@ fn text(case: &GivenCase, report: &BranchReport) -> String {
         )
     };
     let shown = |value, digits| of_key(report.key, value, digits);
-    let length = |value: f64| {
-        case.units().si(Kind::Length).map_or_else(
-            || number::significant(value, 5),
-            |unit| Kind::Length.format_digits(unit * value, 5),
-        )
-    };
+    let length = |value: f64| number::quantity(&case.units(), Kind::Length, value, [5, 5]);
     let heading = format!(
         "{}: {} from {} to {}",
         case.title(),

@@ -4,7 +4,6 @@ use std::fmt::Write as _;
 
 use nanotap::case::key::kind_of;
 use nanotap::case::physical::Kind;
-use nanotap::case::quantity::format_electronvolts;
 use nanotap::case::units::Units;
 use nanotap::figure::contact_laws::sample_figure;
 use nanotap::model::parameter::Parameter;
@@ -55,12 +54,7 @@ fn csv(result: &Comparison, units: &Units) -> String {
 
 fn text(case: &GivenCase, result: &Comparison) -> String {
     let units = case.units();
-    let shown = |kind: Kind, value: f64| {
-        units.si(kind).map_or_else(
-            || number::significant(value, 5),
-            |unit| kind.format_digits(unit * value, 5),
-        )
-    };
+    let shown = |kind: Kind, value: f64| number::quantity(&units, kind, value, [5, 5]);
     let heading = format!(
         "{}: the period-{} orbit on each sample at {}",
         case.title(),
@@ -94,10 +88,7 @@ fn text(case: &GivenCase, result: &Comparison) -> String {
             cells.extend([
                 number::significant(orbit.spectral_radius, 5),
                 shown(Kind::Length, o.first_harmonic),
-                units.si(Kind::Energy).map_or_else(
-                    || number::significant(o.dissipation, 5),
-                    |unit| format_electronvolts(unit * o.dissipation),
-                ),
+                shown(Kind::Energy, o.dissipation),
                 shown(Kind::Force, o.peak_force),
                 shown(Kind::Force, least),
                 shown(Kind::Length, o.indentation),

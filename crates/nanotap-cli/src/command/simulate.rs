@@ -2,6 +2,7 @@
 
 use std::fmt::Write as _;
 
+use nanotap::case::physical::Kind;
 use nanotap::case::units::Units;
 use nanotap::figure::motion::{fixed_step_figure, simulation_figure};
 use nanotap::model::Model;
@@ -157,12 +158,8 @@ fn rk4_text(case: &GivenCase, run: &FixedStepRun) -> String {
             number::significant(run.tip_max, 6)
         ),
     ]);
-    if let Some(unit) = units.si(nanotap::case::physical::Kind::Length) {
-        let metres = nanotap::case::physical::Kind::Length;
-        table.row(["amplitude", &metres.format(unit * run.amplitude)]);
-    } else {
-        table.row(["amplitude", &number::significant(run.amplitude, 6)]);
-    }
+    let amplitude = number::quantity(&units, Kind::Length, run.amplitude, [6, 4]);
+    table.row(["amplitude", &amplitude]);
     table.row([
         "contact",
         &format!(

@@ -73,7 +73,7 @@ fn long_work(study: &str) -> Option<Vec<&'static str>> {
             "--values",
             "10000",
         ],
-        "approach" => vec!["soft.toml", "--points", "20000"],
+        "approach" | "frequency-modulation" => vec!["soft.toml", "--points", "20000"],
         "fit" => vec![
             "curve.csv",
             "soft.toml",

@@ -265,7 +265,7 @@ fn a_dataset_of_another_case_is_not_touched() {
             "contact_stiffness=25",
         ]))
         .refused(&[
-            "s.zarr was made otherwise",
+            "s.zarr belongs to another case",
             "case.alpha4: 20.0 there, 25.0 here",
             "--out",
         ]);

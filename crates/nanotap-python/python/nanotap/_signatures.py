@@ -23,6 +23,7 @@ __all__ = [
     "contact_laws",
     "convergence",
     "fit",
+    "frequency_modulation",
     "lyapunov",
     "modes",
     "orbit",
@@ -457,6 +458,60 @@ def approach(
     """
     options = _arguments.options("approach", locals())
     return _studies.approach(case, options, threads, progress)
+
+def frequency_modulation(
+    case: Case,
+    *,
+    from_: float | str | None = None,
+    to: float | str | None = None,
+    points: int = 80,
+    phase: float = 90.0,
+    shift: float | str | None = None,
+    closest: float | str | None = None,
+    threads: int | None = None,
+    progress: Progress = None,
+) -> Record:
+    """Frequency shift and excitation against the distance to the sample, with amplitude
+    and phase held.
+
+    Parameters
+    ----------
+    case : Case
+        What is studied.
+    from_ : float | str | None
+        Distance at which to begin, in units of the case ("30 nm") or as alpha5;
+        without it, 1.25 times the free amplitude towards the sample.
+    to : float | str | None
+        Distance at which to turn back; without it, 0.
+    points : int
+        Distances each way (2 to 20000).
+    phase : float
+        Phase behind the drive to hold, in degrees.
+    shift : float | str | None
+        Frequency shift whose distances to find, in units of the case ("-50 Hz") or
+        as omega.
+    closest : float | str | None
+        Least distance of the oscillation to keep, in units of the case ("1 nm") or
+        as alpha5: the amplitude then changes with the distance.
+    threads : int | None
+        Threads; without it, one a core.
+    progress : Progress
+        Whether to show a bar, or a function that is called with what is done and
+        the total.
+
+    Returns
+    -------
+    What the terminal's JSON has, by its names.
+
+    Raises
+    ------
+    ValueError
+        An argument is not valid.
+    RuntimeError
+        The computation failed.
+    """
+    options = _arguments.options("frequency-modulation", locals())
+    return _studies.document("frequency-modulation", case, options, threads, progress)
 
 def fit(
     case: Case,

@@ -183,7 +183,7 @@ mod tests {
             "sample.hamaker=1e-19 J",
             "drive.frequency=70 kHz",
             "drive.free_amplitude=10 nm",
-            "gap.tip=8 nm",
+            "gap.tip=1 nm",
         ];
         cases.push(Case::parse(None, &words.map(str::to_owned)).unwrap());
         cases

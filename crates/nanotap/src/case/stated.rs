@@ -11,6 +11,7 @@ use nanotap_volterra::VolterraError;
 use crate::model::contact::ContactLaw;
 use crate::model::drive_form::{FrequencyRatio, RatioError};
 use crate::model::sample_law::SampleLaw;
+use crate::model::words::plain;
 
 /// A value of a key.
 #[derive(Clone, Debug, PartialEq)]
@@ -112,7 +113,6 @@ impl Key {
                 Value::Number(kind.parse(text)?, kind)
             }
             Takes::Word(words) => {
-                let plain = |word: &str| word.trim().to_lowercase().replace(['_', ' '], "-");
                 let given = plain(text);
                 let word = words.iter().find(|word| plain(word) == given);
                 Value::Word(word.ok_or_else(|| ValueError::Word {

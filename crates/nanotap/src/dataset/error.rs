@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 #[derive(Debug, thiserror::Error)]
 pub enum StoreError {
     /// The path exists and is not a dataset.
-    #[error("{} is there already and is not a dataset: {what}", path.display())]
+    #[error("{} already exists and is not a dataset: {what}", path.display())]
     Occupied {
         /// Path of the store.
         path: PathBuf,
@@ -23,7 +23,7 @@ pub enum StoreError {
     },
     /// The store belongs to another case or other options.
     #[error(
-        "{} was made otherwise: {}",
+        "{} belongs to another case or other options: {}",
         path.display(),
         differences.join("; ")
     )]

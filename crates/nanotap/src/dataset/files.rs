@@ -97,7 +97,7 @@ fn followed(path: &Path) -> io::Result<PathBuf> {
             None => to,
         };
     }
-    Err(io::Error::other("its links go round in circles"))
+    Err(io::Error::other("its symbolic links form a cycle"))
 }
 
 /// A unique name next to `path`: several runs, even on several machines, may write the same file at

@@ -27,7 +27,7 @@ pub struct Field {
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum FieldError {
     /// The values do not fill the axes.
-    #[error("{found} values where {columns} by {rows} are needed")]
+    #[error("got {found} values, expected {columns} × {rows}")]
     Size {
         /// Number of values.
         found: usize,
@@ -37,7 +37,9 @@ pub enum FieldError {
         rows: usize,
     },
     /// The values of an axis are not equidistant and ascending.
-    #[error("the {axis} axis does not rise in equal steps, as the pixels of a GSF file do")]
+    #[error(
+        "a GSF file needs equal steps, but the values of the {axis} axis are not ascending and equidistant"
+    )]
     Steps {
         /// `horizontal` or `vertical`.
         axis: &'static str,

@@ -37,7 +37,7 @@ pub fn merge(sources: &[PathBuf], target: &Path) -> Result<Merged, StoreError> {
         stores.push(store);
     }
     let Some(first) = stores.first() else {
-        let what = "no store was given to merge".into();
+        let what = "there is no store to merge".into();
         return Err(StoreError::NotAStore {
             path: target.into(),
             what,

@@ -36,6 +36,16 @@ impl Values {
         self.len() == 0
     }
 
+    /// The values as numbers; none of words.
+    pub fn numbers(self) -> Vec<f64> {
+        match self {
+            Self::Real(values) => values,
+            Self::Whole(values) => values.into_iter().map(f64::from).collect(),
+            Self::Code(values) => values.into_iter().map(f64::from).collect(),
+            Self::Text(_) => Vec::new(),
+        }
+    }
+
     pub(crate) fn kind(&self) -> Kind {
         match self {
             Self::Real(_) => Kind::Real,

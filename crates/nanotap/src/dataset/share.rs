@@ -13,7 +13,7 @@ pub struct Share {
 
 /// An invalid share.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("`{given}` is not a share: write i/n with 1 ≤ i ≤ n, as in 2/8 for the second of eight")]
+#[error("`{given}` is not a share: expected i/n with 1 ≤ i ≤ n, as in 2/8 for the second of eight")]
 pub struct ShareError {
     /// The given text.
     pub given: String,

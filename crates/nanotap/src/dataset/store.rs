@@ -87,10 +87,10 @@ impl Store {
                 return Err(refuse(if path.exists() {
                     "it has no .zmetadata"
                 } else {
-                    "it is not there"
+                    "it does not exist"
                 }));
             }
-            Err(_) if path.is_file() => return Err(refuse("it is a file, no folder")),
+            Err(_) if path.is_file() => return Err(refuse("it is a file, not a folder")),
             Err(error) => return Err(StoreError::io("read", &document)(error)),
         };
         let (parsed, metadata) = if let Ok(parsed) = serde_json::from_str::<Value>(&metadata) {
@@ -198,7 +198,7 @@ impl Store {
         let variables = &self.schema.variables;
         if chunk >= self.chunks() || files.len() != variables.len() {
             return Err(damaged(format!(
-                "{} files of chunk {chunk} where {} files of one of {} chunks are expected",
+                "got {} files of chunk {chunk}, expected {} files of one of {} chunks",
                 files.len(),
                 variables.len(),
                 self.chunks()
@@ -256,6 +256,36 @@ impl Store {
             Values::Code(v) => Values::Code(unpadded(grid, block, &v, stride)),
             Values::Text(v) => Values::Text(unpadded(grid, block, &v, stride)),
         })
+    }
+
+    /// Calls a function for each entry of a finished dataset, with the entry and its numbers of some
+    /// variables.
+    ///
+    /// # Errors
+    /// When a variable or a chunk is missing or damaged.
+    pub fn each<const N: usize>(
+        &self,
+        names: [&str; N],
+        mut call: impl FnMut(&[usize], [f64; N]),
+    ) -> Result<(), StoreError> {
+        for chunk in 0..self.chunks() {
+            let block = self.schema.grid.block(chunk);
+            let column = |name: &&str| {
+                let missing = || StoreError::NotAStore {
+                    path: self.path.clone(),
+                    what: format!("it is no sweep: it has no variable `{name}`"),
+                };
+                let variable = self.schema.index_of(name).ok_or_else(missing)?;
+                Ok(self.read_chunk(&block, variable)?.numbers())
+            };
+            let columns = names.iter().map(column).collect::<Result<Vec<_>, _>>()?;
+            let number = |k: usize, flat: usize| columns[k].get(flat).copied();
+            for (flat, entry) in block.entries().enumerate() {
+                let row = std::array::from_fn(|k| number(k, flat).unwrap_or(f64::NAN));
+                call(&entry, row);
+            }
+        }
+        Ok(())
     }
 
     /// Returns an error if chunks are missing.
@@ -593,7 +623,7 @@ pub(super) fn mismatch(path: &Path, there: &str, here: &str) -> StoreError {
         differences.retain(|d| !d.starts_with(LAYOUT));
     }
     if differences.is_empty() {
-        differences.push("its variables are not those of this version".into());
+        differences.push("its variables are those of another version".into());
     }
     StoreError::Mismatch {
         path: path.into(),
@@ -657,7 +687,7 @@ fn schema_of(path: &Path, documents: &Value) -> Result<Option<Schema>, StoreErro
         path: path.into(),
         what,
     };
-    let too_large = |name: &str| strange(format!("`{name}` has sizes that no dataset has"));
+    let too_large = |name: &str| strange(format!("the sizes of `{name}` are invalid"));
     // Names and sizes are checked before files are opened or memory is allocated.
     let arrays = documents.as_object().into_iter().flatten();
     let arrays = arrays.filter_map(|(key, _)| key.strip_suffix("/.zarray"));
@@ -668,7 +698,9 @@ fn schema_of(path: &Path, documents: &Value) -> Result<Option<Schema>, StoreErro
         .filter_map(Value::as_str)
         .collect();
     if let Some(name) = arrays.chain(names.iter().copied()).find(|n| !is_name(n)) {
-        return Err(strange(format!("`{name}` is no name of a variable")));
+        return Err(strange(format!(
+            "`{name}` is not a valid name of a variable"
+        )));
     }
     let chunks = entries(schema.grid.axes.iter().map(Axis::chunks));
     if entries(schema.grid.axes.iter().map(|axis| axis.length)).is_none()
@@ -765,7 +797,7 @@ impl ArrayDocument {
 }
 
 fn make_folder(path: &Path) -> Result<(), StoreError> {
-    fs::create_dir_all(path).map_err(StoreError::io("make the folder", path))
+    fs::create_dir_all(path).map_err(StoreError::io("create the folder", path))
 }
 
 fn write_if_other(path: &Path, bytes: &[u8]) -> Result<(), StoreError> {

@@ -40,7 +40,7 @@ pub enum WorkError {
     },
     /// Cancelled after the last chunk.
     #[error(
-        "stopped; every chunk is finished, motions of neighbouring values are still to be tried"
+        "stopped; every chunk is finished, but orbits have not been continued to neighbouring values"
     )]
     Neighbours,
     /// The threads could not be started.

@@ -111,7 +111,7 @@ pub(super) fn decode(file: &[u8], kind: Kind, count: usize) -> Result<Values, St
     let size = count * kind.size();
     let bytes = decompress_to_vec_zlib_with_limit(file, size).map_err(|e| e.to_string())?;
     if bytes.len() != size {
-        return Err(format!("{} bytes where {size} are expected", bytes.len()));
+        return Err(format!("got {} bytes, expected {size}", bytes.len()));
     }
     Ok(match kind {
         Kind::Real => {

@@ -1,4 +1,4 @@
-//! A motion between its strobes: every instant of it in closed form.
+//! A motion between its strobes, in closed form at every instant.
 
 use std::sync::Arc;
 
@@ -21,29 +21,29 @@ pub struct Motion {
     recording: Recording,
     events: Vec<ContactEvent>,
     span: [f64; 2],
-    /// The only instant of a span of no length.
+    /// The only instant of a span of zero length.
     start: Instant,
 }
 
-/// An instant of a motion; the model's units.
+/// An instant of a motion, in the model's units.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Point {
-    /// When, in the model's time, 0 at drive phase 0 of the first period.
+    /// Time, 0 at drive phase 0 of the first period.
     pub tau: f64,
     /// State, of length n.
     pub state: Vec<f64>,
-    /// Tip deflection W, of an oscillator x.
+    /// Tip deflection W; x for an oscillator.
     pub tip: f64,
-    /// Its rate.
+    /// Rate of the tip deflection.
     pub tip_rate: f64,
-    /// Height of the tip over the undeformed surface, V_T.
+    /// Height V_T of the tip above the undeformed surface.
     pub gap: f64,
     /// Force of the sample on the tip.
     pub force: f64,
-    /// What ends the present regime by falling to zero: in flight the gap, in contact what
-    /// keeps the contact. Not a number where nothing ends it.
+    /// Guard of the present regime, which ends when the guard falls to zero: the gap in flight, the
+    /// condition of contact in contact. NaN if nothing ends the regime.
     pub guard: f64,
-    /// Whether tip and sample touch.
+    /// Whether tip and sample are in contact.
     pub contact: bool,
 }
 
@@ -88,7 +88,7 @@ impl Motion {
                     "under a nonlinear force law it must begin at drive phase 0",
                 ));
             }
-            // Whole periods, which are read up to the end.
+            // Whole periods, evaluated up to the end of the span.
             let periods = ((length / period).ceil() as usize).max(1);
             let options = Kept {
                 recorded: periods,
@@ -120,17 +120,17 @@ impl Motion {
         Ok(motion(recording, contacts.events(), regime, end))
     }
 
-    /// Where it begins and ends, in the model's time.
+    /// Beginning and end of the span, in the model's time.
     pub fn span(&self) -> [f64; 2] {
         self.span
     }
 
-    /// Contacts begun and ended, in order of time.
+    /// Beginnings and ends of contacts, in order of time.
     pub fn events(&self) -> &[ContactEvent] {
         &self.events
     }
 
-    /// The recording itself, for closed-form integrals, extrema and harmonics of any output.
+    /// The recording, for closed-form integrals, extrema and harmonics of any output.
     pub fn recording(&self) -> &Recording {
         &self.recording
     }

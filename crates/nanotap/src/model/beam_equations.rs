@@ -301,16 +301,18 @@ impl<'a> Beam<'a> {
         Reset { matrix, offset }
     }
 
-    /// What the joined system shows.
-    pub(crate) fn outputs(&self, law: &Law) -> Outputs {
+    /// Outputs of the joined system of so many regimes.
+    pub(crate) fn outputs(&self, law: &Law, regimes: usize) -> Outputs {
         let modes = &self.galerkin.modes;
         Outputs {
             tip: self.layout.row(&modes.tip, 0),
             gap: self.combined(&law.gap),
             height: self.height.clone(),
             force: [&law.flight, &law.contact]
+                .into_iter()
+                .take(regimes)
                 .map(|response| self.combined(&response.force))
-                .into(),
+                .collect(),
             beam: BeamOutputs {
                 modes: Arc::clone(modes),
                 slope: self.layout.row(&modes.tip_slope, 0),
@@ -346,10 +348,9 @@ impl<'a> Beam<'a> {
 
     /// Energy flows in each regime.
     pub(crate) fn powers(&self, law: &Law, system: &System) -> Vec<Powers> {
-        [&law.flight, &law.contact]
-            .into_iter()
-            .enumerate()
-            .map(|(r, response)| self.powers_in(&system.regimes()[r], response))
+        let regimes = system.regimes().iter().zip([&law.flight, &law.contact]);
+        regimes
+            .map(|(regime, response)| self.powers_in(regime, response))
             .collect()
     }
 
@@ -360,11 +361,7 @@ impl<'a> Beam<'a> {
     /// through the medium, takes α3 ∫(Ẇ + ẏ)² dξ; the sample takes and stores what its law
     /// says. The printed Eq. (14) is a further force on the modes, whose work counts as the
     /// drive's.
-    pub(crate) fn powers_in(
-        &self,
-        flow: &nanotap_flow::Regime,
-        response: &SampleResponse,
-    ) -> Powers {
+    fn powers_in(&self, flow: &nanotap_flow::Regime, response: &SampleResponse) -> Powers {
         let (case, modes) = (&self.galerkin.case, &self.galerkin.modes);
         let (base, force) = (self.base(), self.combined(&response.force));
         let rate = |o: &Output| o.rate(flow.matrix(), flow.forcing(), self.drive);

@@ -13,29 +13,16 @@ use crate::model::contact::law::Law;
 use crate::model::drive_form::{Actuation, FrequencyRatio};
 use crate::model::parameter::{Applies, LARGEST_ALPHA, Numbers, OMEGA_RANGE, Parameter, Unit};
 use crate::model::sample_law::SampleLaw;
+use crate::model::words::words;
 use crate::number::shortest;
 
-/// Which cosine term the drive has in Eq. (14) of the paper.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum CosineTerm {
-    /// −α2 α3 Ω I cos Ωτ, as Eq. (6) has it.
-    #[default]
-    Corrected,
-    /// −α2 α3 I cos Ωτ, as Eq. (14) is printed; kept for comparison.
-    Printed,
-}
-
-impl CosineTerm {
-    /// Both forms.
-    pub const ALL: [Self; 2] = [Self::Corrected, Self::Printed];
-
-    /// Its name in case files.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Corrected => "corrected",
-            Self::Printed => "printed",
-        }
+words! {
+    /// Which cosine term the drive has in Eq. (14) of the paper.
+    CosineTerm {
+        /// −α2 α3 Ω I cos Ωτ, as Eq. (6) has it.
+        Corrected = "corrected",
+        /// −α2 α3 I cos Ωτ, as Eq. (14) is printed; kept for comparison.
+        Printed = "printed",
     }
 }
 

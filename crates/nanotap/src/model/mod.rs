@@ -14,6 +14,7 @@ mod beam_equations;
 pub mod cantilever;
 pub mod contact;
 pub mod drive_form;
+#[cfg(feature = "proof")]
 pub mod enclosed;
 pub mod exact_beam;
 pub mod galerkin;
@@ -28,6 +29,7 @@ pub mod sample_law;
 pub mod spectrum;
 pub mod strobe;
 mod tangent;
+pub mod words;
 
 use std::sync::{Arc, OnceLock};
 
@@ -41,10 +43,10 @@ pub use tangent::ModelTangent;
 use crate::model::beam::Modes;
 use crate::model::beam_equations::Beam;
 use crate::model::cantilever::{Cantilever, CantileverError};
+use crate::model::contact::law::Law;
 use crate::model::galerkin::{Galerkin, Regime};
 use crate::model::nonlinear::{Equilibrium, Nonlinear, Variation};
 use crate::model::parameter::Parameter;
-use crate::model::sample_law::SampleLaw;
 
 /// Why a cantilever or an oscillator has no model.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -251,24 +253,37 @@ impl Model {
     pub fn cantilever(case: &Cantilever) -> Result<Self, ModelError> {
         let galerkin = Galerkin::new(case)?;
         let drive = drive_of(case)?;
-        if let Some(law) = &case.law {
-            return Self::under(law, galerkin, &drive);
-        }
-        Self::on(&case.contact_law(None), galerkin, drive)
+        let Some(law) = &case.law else {
+            return Self::on(&case.contact_law(None), galerkin, drive, None);
+        };
+        let bare = Beam::new(&galerkin, &drive, 0)?;
+        let free = bare.regime(Regime::Free, &contact::no_sample(0).flight, true)?;
+        let nonlinear = Nonlinear::new(law, &bare, &free, &drive)?;
+        let flight = contact::no_sample(nonlinear.discrete_entries());
+        Self::on(&flight, galerkin, drive, Some(nonlinear))
     }
 
-    /// The beam on a piecewise-linear sample.
-    fn on(law: &contact::law::Law, galerkin: Galerkin, drive: Drive) -> Result<Self, ModelError> {
+    /// The beam on a piecewise-linear sample, or in flight alone with the flow under a `nonlinear`
+    /// law.
+    fn on(
+        law: &Law,
+        galerkin: Galerkin,
+        drive: Drive,
+        nonlinear: Option<Nonlinear>,
+    ) -> Result<Self, ModelError> {
         let beam = Beam::new(&galerkin, &drive, law.internal)?;
-        let regimes = vec![
-            beam.regime(Regime::Free, &law.flight, true)?,
-            beam.regime(Regime::Contact, &law.contact, law.plain_contact)?,
-        ];
-        let system = Arc::new(System::new(drive.clone(), regimes, beam.transitions(law))?);
-        let outputs = beam.outputs(law);
+        let mut regimes = vec![beam.regime(Regime::Free, &law.flight, true)?];
+        let mut transitions = vec![Vec::new()];
+        if nonlinear.is_none() {
+            regimes.push(beam.regime(Regime::Contact, &law.contact, law.plain_contact)?);
+            transitions = beam.transitions(law);
+        }
+        let contact: Vec<bool> = (0..regimes.len()).map(|r| r > 0).collect();
+        let outputs = beam.outputs(law, regimes.len());
+        let system = Arc::new(System::new(drive.clone(), regimes, transitions)?);
         let second_phase = galerkin.case.get(Parameter::Tone2Phase).to_radians();
         Ok(Self {
-            contact: vec![false, true],
+            contact,
             tip: outputs.tip,
             gap: outputs.gap,
             height: outputs.height,
@@ -279,42 +294,20 @@ impl Model {
             memory: law.internal,
             memory_reset: outputs.memory_reset,
             second_phase,
-            nonlinear: None,
+            nonlinear: nonlinear.map(Arc::new),
             start: None,
             system,
         })
     }
 
-    /// The beam under a nonlinear force law.
-    fn under(law: &SampleLaw, galerkin: Galerkin, drive: &Drive) -> Result<Self, ModelError> {
-        let free = |beam: &Beam<'_>, memory| {
-            let flight = contact::no_sample(memory).flight;
-            beam.regime(Regime::Free, &flight, true)
-        };
-        let bare = Beam::new(&galerkin, drive, 0)?;
-        let nonlinear = Nonlinear::new(law, &bare, &free(&bare, 0)?, drive)?;
-        let memory = nonlinear.discrete_entries();
-        let beam = Beam::new(&galerkin, drive, memory)?;
-        let regime = free(&beam, memory)?;
-        let outputs = beam.outputs(&contact::no_sample(memory));
-        let system = System::new(drive.clone(), vec![regime], vec![Vec::new()])?;
-        let second_phase = galerkin.case.get(Parameter::Tone2Phase).to_radians();
-        Ok(Self {
-            contact: vec![false],
-            tip: outputs.tip,
-            gap: outputs.height.clone(),
-            force: vec![outputs.height.scaled(0.0)],
-            height: outputs.height,
-            beam: Some(outputs.beam),
-            power: PowersOnDemand::of(galerkin),
-            rigid_stop: None,
-            memory,
-            memory_reset: None,
-            second_phase,
-            nonlinear: Some(Arc::new(nonlinear)),
-            start: None,
-            system: Arc::new(system),
-        })
+    /// The contact law of the piecewise-linear system, with derivatives by a parameter: that of the
+    /// case, or none under a nonlinear law.
+    fn law_of(&self, case: &Cantilever, parameter: Option<Parameter>) -> Law {
+        if self.nonlinear.is_some() {
+            contact::no_sample(self.memory)
+        } else {
+            case.contact_law(parameter)
+        }
     }
 
     /// The equations of the cantilever that this is the model of.
@@ -331,16 +324,8 @@ impl Model {
             let Some(galerkin) = self.power.equations() else {
                 return Vec::new();
             };
-            let drive = self.system.drive();
-            if self.nonlinear.is_some() {
-                let flight = contact::no_sample(self.memory).flight;
-                let free = &self.system.regimes()[0];
-                return Beam::new(&galerkin, drive, self.memory)
-                    .map(|beam| vec![beam.powers_in(free, &flight)])
-                    .unwrap_or_default();
-            }
-            let law = galerkin.case.contact_law(None);
-            Beam::new(&galerkin, drive, law.internal)
+            let law = self.law_of(&galerkin.case, None);
+            Beam::new(&galerkin, self.system.drive(), law.internal)
                 .map(|beam| beam.powers(&law, &self.system))
                 .unwrap_or_default()
         })
@@ -532,24 +517,20 @@ pub fn cantilever_tangent(
     if parameter == Parameter::Omega {
         tangent.log_period = -1.0 / case.omega;
     }
-    if model.nonlinear.is_some() {
-        // Free flight alone.
-        let memory = model.memory;
-        let beam = Beam::new(&galerkin, model.system.drive(), memory)?;
-        let change = beam.derivative(parameter);
-        tangent.regimes[0] = change.regime(&beam, &contact::no_sample(memory).flight);
-        return Ok(tangent);
-    }
-    let law = case.contact_law(Some(parameter));
+    let law = model.law_of(case, Some(parameter));
     let beam = Beam::new(&galerkin, model.system.drive(), law.internal)?;
     let change = beam.derivative(parameter);
-    for (r, response) in [&law.flight, &law.contact].into_iter().enumerate() {
-        tangent.regimes[r] = change.regime(&beam, response);
+    let responses = [&law.flight, &law.contact];
+    for (regime, response) in tangent.regimes.iter_mut().zip(responses) {
+        *regime = change.regime(&beam, response);
     }
-    tangent.guards = vec![
-        vec![change.combined(&beam, &law.gap)],
-        vec![change.combined(&beam, &law.release_guard)],
-    ];
+    if model.nonlinear.is_some() {
+        return Ok(tangent);
+    }
+    let guards = [&law.gap, &law.release_guard].into_iter();
+    tangent.guards = guards
+        .map(|guard| vec![change.combined(&beam, guard)])
+        .collect();
     if let Some(values) = &law.release_reset {
         let changes = values.iter().map(|value| change.combined(&beam, value));
         tangent.resets[1][0] = Some(beam.memory_jump(changes, 0.0));
@@ -567,11 +548,7 @@ pub(crate) fn cantilever_model_tangent(
     parameter: Parameter,
 ) -> Result<ModelTangent, ModelError> {
     let galerkin = model.equations_of(case)?;
-    let law = if model.nonlinear.is_some() {
-        contact::no_sample(model.memory)
-    } else {
-        case.contact_law(Some(parameter))
-    };
+    let law = model.law_of(case, Some(parameter));
     let beam = Beam::new(&galerkin, model.system.drive(), law.internal)?;
     let change = beam.derivative(parameter);
     let second_phase = f64::from(u8::from(parameter == Parameter::Tone2Phase));
@@ -613,7 +590,7 @@ mod tests {
     use super::*;
     use crate::model::contact::dual::Dual;
     use crate::model::contact::entry::{Damper, Entry, Numbers, any};
-    use crate::model::contact::law::{Bilinear, Law, LinearForm, SampleResponse};
+    use crate::model::contact::law::{Bilinear, LinearForm, SampleResponse};
     use crate::model::parameter::{ParameterEntry, SampleKey, Unit};
     use crate::model::strobe::Strobe;
 
@@ -713,7 +690,7 @@ mod tests {
                 own: &own,
             });
             let galerkin = Galerkin::new(&case).unwrap();
-            Model::on(&law, galerkin, drive_of(&case).unwrap()).unwrap()
+            Model::on(&law, galerkin, drive_of(&case).unwrap(), None).unwrap()
         };
         let solid = crate::model::contact::ContactLaw::StandardLinearSolid;
         let single = Model::cantilever(&case.clone().on(solid, &[40.0, 0.05])).unwrap();

@@ -3,6 +3,7 @@
 
 use std::sync::Arc;
 
+use crate::model::words::plain;
 use nanotap_volterra::laws::entry::{Entry, ParameterEntry};
 use nanotap_volterra::laws::polyline::Rows;
 use nanotap_volterra::laws::{TableLaw, all, build_sum, law};
@@ -37,9 +38,7 @@ impl SampleLaw {
     /// # Errors
     /// [`VolterraError::UnknownLaw`] for the first name that is none.
     pub fn terms(text: &str) -> Result<Vec<&'static TableLaw>, VolterraError> {
-        text.split('+')
-            .map(|name| law(&name.trim().to_lowercase().replace(['_', ' '], "-")))
-            .collect()
+        text.split('+').map(|name| law(&plain(name))).collect()
     }
 
     /// These laws with `values`, the parameters of all terms one after the other, in the model's

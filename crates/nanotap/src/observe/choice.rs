@@ -1,4 +1,4 @@
-//! A choice of observables as a request gives it: their names.
+//! Parsing of a choice of observables from their names.
 
 use std::borrow::Cow;
 

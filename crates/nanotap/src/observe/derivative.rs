@@ -1,13 +1,14 @@
-//! Derivatives of what is observed of a periodic orbit with respect to a key of the case.
+//! Derivatives of the observables of a periodic orbit with respect to a key of the case.
 //!
-//! An orbit x of period n is a zero of Pⁿ(x; θ) − x, so that by the implicit function theorem
-//! dx/dθ = (1 − DPⁿ)⁻¹ ∂Pⁿ/∂θ. With this start the sensitivity of the flow is the orbit's own,
-//! and a [`Variation`] gives every integral, Fourier coefficient and extremum that observables are
-//! read from with its derivative; the observables are then read as numbers with derivatives. Where the period varies, derivatives are at constant drive phase.
+//! An orbit x of period n is a zero of Pⁿ(x; θ) − x, so that dx/dθ = (1 − DPⁿ)⁻¹ ∂Pⁿ/∂θ by the
+//! implicit function theorem. With this initial value the sensitivity of the flow is that of the
+//! orbit, and a [`Variation`] gives every integral, Fourier coefficient and extremum with its
+//! derivative. Observables are then computed from numbers with derivatives. If the period varies,
+//! derivatives are at constant drive phase.
 //!
-//! Under a nonlinear force the same is read off the variation's dense output
-//! ([`gather`](super::varied_motion)). Keys that change the lever's modes, by mass or damping, are the
-//! exception: there the engine's map is differenced, and what is observed with it.
+//! Under a nonlinear force the same values come from the dense output of the variation
+//! ([`gather`](super::varied_motion)). The exception are keys that change the modes of the lever by
+//! mass or damping: there map and observables are differenced.
 
 use std::borrow::Cow;
 use std::sync::Arc;
@@ -37,7 +38,7 @@ use crate::model::{Model, ModelTangent, MotionError, Tangent, TangentKind};
 /// Why an orbit has no derivative.
 #[derive(Clone, Debug, thiserror::Error)]
 pub enum DerivativeError {
-    /// The case makes no sense beside this value of the key.
+    /// The case is invalid near this value of the key.
     #[error(transparent)]
     Case(#[from] CaseError),
     /// The flow failed.
@@ -48,29 +49,29 @@ pub enum DerivativeError {
     NotIsolated,
 }
 
-/// The derivatives of observables.
+/// Derivatives of observables.
 type Changes = Vec<(&'static Observable, Value)>;
 
 /// The derivative of a periodic orbit and of its observables.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Derivative {
-    /// The unit of the key in SI; none of a number of the equations.
+    /// SI unit of the key; `None` for a number of the equations.
     pub unit: Option<&'static str>,
-    /// Of the state at drive phase 0, of length n.
+    /// Derivative of the state at drive phase 0, length n.
     pub state: Vec<f64>,
-    /// Of observables in the model's units; those that jump are left out.
+    /// Derivatives of observables in the model's units, without discontinuous ones.
     pub observables: Vec<(&'static Observable, Value)>,
-    /// The same in SI, of a physical case.
+    /// Derivatives of observables in SI, for a physical case.
     pub physical: Option<Vec<(&'static Observable, Value)>>,
 }
 
 impl Derivative {
-    /// Of the orbit of `period` drive periods from `state`, of the observables `set`, with
-    /// respect to `key`; `observed` is what is observed of it, all of `set` and the beam's
-    /// clearance if its derivative is wanted.
+    /// Derivatives of the orbit of `period` drive periods from `state`, and of its observables
+    /// `set`, with respect to `key`. `observed` contains the observables in `set`, and the
+    /// clearance of the beam if its derivative is requested.
     ///
     /// # Errors
-    /// When the case makes no sense beside the value, or the orbit is not isolated.
+    /// If the case is invalid near the value, or the orbit is not isolated.
     pub fn of(
         case: &Case,
         model: &Model,
@@ -120,8 +121,8 @@ impl Derivative {
         })
     }
 
-    /// The same under a nonlinear force by a key that changes the modes: what is observed of the
-    /// orbit, which changes by `start`, is differenced along it, centrally.
+    /// Derivatives under a nonlinear force with respect to a key that changes the modes: central
+    /// differences along the change `start` of the orbit.
     fn by_differences(
         case: &Case,
         key: Key,
@@ -131,8 +132,8 @@ impl Derivative {
     ) -> Result<Self, DerivativeError> {
         let size = |values: &[f64]| values.iter().fold(0.0, |m: f64, v| m.max(v.abs()));
         let value = case.get(key);
-        // What balances the engine's error with the third derivative: the orbit changes by this
-        // part of itself, or the key does where the orbit does not follow it.
+        // Balances the error of the engine with the third derivative: a relative change of the
+        // orbit, or of the key if the orbit does not depend on it.
         let by_orbit = STEP * size(state) / size(&start);
         let by_key = STEP * if value == 0.0 { 1.0 } else { value.abs() };
         let step = if by_orbit.is_finite() {
@@ -141,11 +142,11 @@ impl Derivative {
             by_key
         };
         let observed = |side: f64| -> Result<(Observables, Option<Observables>), DerivativeError> {
-            let beside = case.with(key, value + side * step);
+            let varied = case.with(key, value + side * step);
             let change = state.iter().zip(&start);
             let from: Vec<f64> = change.map(|(x, by)| x + side * step * by).collect();
-            let seen = measure(&beside.model()?, &from, period, set)?;
-            let si = beside.physical().map(|view| seen.in_si(&view.scales));
+            let seen = measure(&varied.model()?, &from, period, set)?;
+            let si = varied.physical().map(|view| seen.in_si(&view.scales));
             Ok((seen, si))
         };
         let (low, high) = (observed(-1.0)?, observed(1.0)?);
@@ -165,13 +166,13 @@ impl Derivative {
         })
     }
 
-    /// The derivative of an observable that is one number, in the model's units.
+    /// Derivative of a scalar observable in the model's units.
     pub fn number(&self, observable: &Observable) -> Option<f64> {
         let known = self.observables.iter().find(|(o, _)| *o == observable);
         known.and_then(|(_, change)| change.number())
     }
 
-    /// The same in SI.
+    /// Derivative of a scalar observable in SI.
     pub fn number_in_si(&self, observable: &Observable) -> Option<f64> {
         let all = self.physical.as_ref()?;
         let known = all.iter().find(|(o, _)| *o == observable);
@@ -180,7 +181,7 @@ impl Derivative {
 }
 
 impl Serialize for Derivative {
-    /// A map: `unit`, `state`, the observables by name, and `physical` by their names in SI.
+    /// A map: `unit`, `state`, the observables by name, and `physical` by SI names.
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         let mut map = serializer.serialize_map(None)?;
         if let Some(unit) = self.unit {
@@ -235,13 +236,13 @@ impl JsonSchema for Derivative {
     }
 }
 
-/// How amplitude and phase (degrees) of the tip's first harmonic change over one drive period that
-/// starts in `state`, closed or not: a column a number of the state, then one a key, `2 × (n + k)`.
-/// `sizes` are those of the numbers of the state, `by` (`n × k`) how the end of the period changes
-/// with the keys.
+/// Derivatives of amplitude and phase (degrees) of the tip's first harmonic over one drive period
+/// from `state`, closed or not: one column per entry of the state, then one per key,
+/// `2 × (n + k)`. `sizes` are the scales of the entries of the state, and `by` (`n × k`) contains
+/// the derivatives of the end of the period by the keys.
 ///
 /// # Errors
-/// When the flow fails, or the case makes no sense beside the value of a key.
+/// If the flow fails, or the case is invalid near the value of a key.
 pub(crate) fn first_harmonic_changes(
     case: &Case,
     model: &Model,
@@ -274,7 +275,7 @@ pub(crate) fn first_harmonic_changes(
         return Ok(rows);
     };
     let mut changes = Vec::new();
-    // Columns of the changes; those with a parameter stand last.
+    // Columns of the derivatives; those with a parameter come last.
     let mut columns = Vec::new();
     for k in 0..n - model.memory {
         let mut start = vec![0.0; n];
@@ -293,7 +294,7 @@ pub(crate) fn first_harmonic_changes(
             changes.push(by(&vec![0.0; n]));
             continue;
         }
-        // The same change of the motion, if the key may change so far.
+        // The same change of the motion, if the key allows it.
         let change = (0..n).fold(0.0, |m: f64, i| m.max(by[(i, k)].abs() / sizes[i]));
         let value = case.get(*key);
         let farthest = if value == 0.0 {
@@ -301,12 +302,12 @@ pub(crate) fn first_harmonic_changes(
         } else {
             3e-3 * value.abs()
         };
-        let step = (BESIDE / change).min(farthest);
-        let beside = |side: f64| -> Result<Observables, DerivativeError> {
+        let step = (HARMONIC_STEP / change).min(farthest);
+        let observables_at = |side: f64| -> Result<Observables, DerivativeError> {
             let there = case.with(*key, value + side * step).model()?;
             Ok(measure(&there, state, 1, set)?)
         };
-        let (low, high) = (beside(-1.0)?, beside(1.0)?);
+        let (low, high) = (observables_at(-1.0)?, observables_at(1.0)?);
         let turn = (high.phase - low.phase + 180.0).rem_euclid(360.0) - 180.0;
         rows[(0, n + k)] = (high.first_harmonic - low.first_harmonic) / (2.0 * step);
         rows[(1, n + k)] = turn / (2.0 * step);
@@ -319,7 +320,7 @@ pub(crate) fn first_harmonic_changes(
     Ok(rows)
 }
 
-/// How amplitude and phase of the tip's first harmonic over one drive period change.
+/// Derivatives of amplitude and phase of the tip's first harmonic over one drive period.
 fn tip_changes(
     model: &Model,
     nonlinear: &Arc<Nonlinear>,
@@ -337,14 +338,14 @@ fn tip_changes(
     Ok(gathered.iter().map(of).collect())
 }
 
-/// Part of the amplitude by which a motion changes where its first harmonic is differenced, by keys
-/// that change the modes.
-const BESIDE: f64 = 1e-4;
+/// Relative change of the amplitude in differences of the first harmonic by keys that change the
+/// modes.
+const HARMONIC_STEP: f64 = 1e-4;
 
-/// Part of an orbit by which it changes where what is observed is differenced.
+/// Relative change of an orbit in differences of its observables.
 const STEP: f64 = 2e-4;
 
-/// A change of the motion that begins with a change of the state, where the engine knows it.
+/// The change of a motion for a change of its initial state, if the engine computes it.
 type Along<'a> = Box<dyn Fn(&[f64]) -> Change + 'a>;
 
 fn linearised(tangent: &Tangent) -> Option<Along<'_>> {
@@ -385,13 +386,13 @@ fn orbit_derivative(
         .ok_or(DerivativeError::NotIsolated)
 }
 
-/// An orbit and a change of it, to be followed together.
+/// An orbit and its derivative, followed together.
 struct Followed<'a> {
     model: &'a Model,
     tangent: &'a ModelTangent,
     set: ObservableSet,
     required: Requirements,
-    /// Where the beam comes nearest to the sample, if the change of its clearance is wanted.
+    /// Position of the lowest point of the beam, if the derivative of its clearance is requested.
     clearance: Option<f64>,
 }
 
@@ -413,15 +414,14 @@ impl<'a> Followed<'a> {
         }
     }
 
-    /// The outputs that are followed: the required signals, and the height of the point of the beam
-    /// that comes nearest to the sample.
+    /// The outputs: the required signals, and the height of the lowest point of the beam.
     fn outputs(&self) -> Vec<VariedOutput> {
         let signals = self.required.signals.iter();
         let own = signals.map(|signal| varied(*signal, self.model, self.tangent));
         own.chain(self.lowest()).collect()
     }
 
-    /// The functionals of these outputs, the least of that height last.
+    /// The functionals of these outputs; the least height of the beam is last.
     fn functionals(&self) -> Vec<accumulate::Functional> {
         let lowest = self.lowest().map(|_| self.required.signals.len());
         let mut all = self.required.numbered(self.model);
@@ -429,21 +429,22 @@ impl<'a> Followed<'a> {
         all
     }
 
-    /// The height of the point of the beam that comes nearest to the sample.
+    /// The height of the lowest point of the beam.
     fn lowest(&self) -> Option<VariedOutput> {
         let (xi, beam) = self.clearance.zip(self.model.beam.as_ref())?;
-        // The base moves as the tip's height does, apart from the beam's shape.
+        // The base contributes as to the tip's height, apart from the beam's shape.
         let zero = self.model.tip.scaled(0.0);
         let change = zero.plus(1.0, &tones_of(&self.tangent.base));
         let system = &self.model.system;
         Some(VariedOutput::same(system, &beam.height(xi), &change))
     }
 
-    /// Follows the orbit of a piecewise-linear model, which changes by `start` at its beginning.
+    /// Follows the orbit of a piecewise-linear model with the derivative `start` of its initial
+    /// state.
     fn run(&self, state: &[f64], start: &[f64], period: usize) -> Result<Changes, FlowError> {
         let model = self.model;
         let (mut outputs, mut functionals) = (self.outputs(), self.functionals());
-        // In addition: the time in contact.
+        // Additionally the contact time.
         let zero = model.tip.scaled(0.0);
         let touching = |contact: &bool| zero.clone().with_constant(f64::from(u8::from(*contact)));
         outputs.push(VariedOutput {
@@ -486,7 +487,7 @@ impl<'a> Followed<'a> {
         Ok(self.changes(gathered, impacts, period))
     }
 
-    /// The impacts on a rigid stop.
+    /// Impacts on a rigid stop.
     fn impacts(&self, speeds: &[((usize, usize), Speeds)]) -> Impacts<Dual> {
         let Some(stop) = self.model.rigid_stop else {
             return Impacts::default();
@@ -562,7 +563,7 @@ impl<'a> Followed<'a> {
     }
 }
 
-/// The tones of an output alone.
+/// The tones of an output without its other parts.
 fn tones_of(output: &Output) -> Output {
     let mut tones = output.scaled(0.0);
     tones.tones.clone_from(&output.tones);

@@ -1,4 +1,4 @@
-//! The signals of a motion and the functionals of them that observables are read from.
+//! The signals of a motion and the functionals from which observables are computed.
 
 use nanotap_flow::{Output, accumulate};
 
@@ -16,15 +16,15 @@ pub(super) type Functional = accumulate::Functional<Signal, Tone>;
 pub(super) enum Signal {
     /// Tip deflection W.
     Tip,
-    /// Height of the tip over the undeformed surface, V_T.
+    /// Height V_T of the tip above the undeformed surface.
     Height,
     /// Its rate.
     HeightRate,
     /// Force of the sample on the tip.
     Force,
-    /// Slope at the tip; 0 of an oscillator.
+    /// Slope at the tip; 0 for an oscillator.
     Slope,
-    /// A factor of a power that is fed in or taken.
+    /// A factor of a power.
     Power(PowerTerm),
 }
 
@@ -38,7 +38,7 @@ impl Signal {
         }
     }
 
-    /// The signal as outputs of the state, an entry a regime.
+    /// The signal as outputs of the state, one per regime.
     pub(super) fn outputs(self, model: &Model) -> Vec<Output> {
         let same = |output: &Output| vec![output.clone(); model.system.regimes().len()];
         match self {
@@ -65,11 +65,11 @@ impl Signal {
 /// A frequency of the drive.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Tone {
-    /// The drive's, of several tones the first.
+    /// The drive frequency; with two tones, that of the first.
     First,
     /// The second tone's.
     Second,
-    /// A multiple of the drive's.
+    /// A multiple of the drive frequency.
     Harmonic(u32),
 }
 
@@ -100,14 +100,14 @@ pub(super) struct Requirements {
 }
 
 impl Requirements {
-    /// Those of a set.
+    /// The measurements that `set` requires.
     pub(super) fn of(model: &Model, set: ObservableSet) -> Self {
         let mut measured = Measured::<f64>::of(model, None);
         Observables::read(set, &mut measured);
         measured.required
     }
 
-    /// Adds a functional, unless it is among them.
+    /// Adds a functional if it is new.
     pub(super) fn add(&mut self, functional: Functional) {
         if self.functionals.contains(&functional) {
             return;
@@ -123,7 +123,7 @@ impl Requirements {
         );
     }
 
-    /// The functionals, in order, of the signals by number.
+    /// The functionals, in order, with their signals as indices.
     pub(super) fn numbered(&self, model: &Model) -> Vec<accumulate::Functional> {
         // Every signal of a functional was added with it.
         let number = |signal| self.signals.iter().position(|s| *s == signal).unwrap_or(0);

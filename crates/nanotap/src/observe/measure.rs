@@ -1,8 +1,8 @@
-//! Measures a piecewise-linear motion while it runs.
+//! Measurement of a piecewise-linear motion during a run.
 //!
 //! The functionals that observables require are accumulated by `nanotap_flow`'s
 //! [accumulator](nanotap_flow::accumulate): extrema from zeros of rates, integrals in closed form,
-//! nothing from samples.
+//! never from samples.
 
 use std::sync::Arc;
 
@@ -27,16 +27,16 @@ use crate::model::{Model, MotionError};
 pub(super) struct PiecewiseLinear<'a> {
     model: &'a Model,
     required: Requirements,
-    /// The number in the plan of each required functional.
+    /// The index of each required functional in the plan.
     numbers: Vec<usize>,
     plan: Arc<Plan>,
 }
 
 impl<'a> PiecewiseLinear<'a> {
-    /// Of the observables `set`.
+    /// For the observables `set`.
     ///
     /// # Errors
-    /// When a number of the model is not finite.
+    /// If a number of the model is not finite.
     pub(super) fn new(model: &'a Model, set: ObservableSet) -> Result<Self, FlowError> {
         let required = Requirements::of(model, set);
         let mut request = Request::new();
@@ -92,7 +92,7 @@ impl Engine for PiecewiseLinear<'_> {
     }
 }
 
-/// A run that is measured.
+/// A run with measurement.
 struct ExactRun<'a> {
     flow: Flow,
     measurement: Measurement<'a>,
@@ -128,14 +128,14 @@ struct Measurement<'a> {
     records: bool,
 }
 
-/// An extremum that begins anew with every drive period.
+/// An extremum that restarts in every drive period.
 struct PerPeriodExtremum {
-    /// Its number in the plan.
+    /// Index in the plan.
     number: usize,
     is_least: bool,
-    /// Over all periods that have ended.
+    /// Extremum over all finished periods.
     overall: f64,
-    /// Of each of them.
+    /// Extremum of each finished period.
     each: Vec<f64>,
 }
 
@@ -150,7 +150,7 @@ impl PerPeriodExtremum {
 }
 
 impl Measurement<'_> {
-    /// Begins an extremum anew with each period, if it is required.
+    /// Restarts an extremum in each period, if it is required.
     fn restart_each_period(&mut self, functional: Functional) {
         let Some(number) = self.of.number(functional) else {
             return;
@@ -218,7 +218,7 @@ impl Measurement<'_> {
     }
 }
 
-/// The regimes that are contact.
+/// The regimes in contact.
 pub(super) fn contact_regimes(model: &Model) -> impl Iterator<Item = usize> + '_ {
     (0..model.contact.len()).filter(|&regime| model.contact[regime])
 }

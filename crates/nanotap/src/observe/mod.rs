@@ -1,6 +1,6 @@
-//! What can be read off a motion: extrema, contact, forces, energy, harmonics,
-//! beam clearance. Everything is exact on the piecewise closed form: extrema from
-//! roots of rates, integrals in closed form, never from samples.
+//! Observables of a motion: extrema, contact, forces, energy, harmonics, beam clearance. They are
+//! exact for the piecewise closed form: extrema are roots of rates, integrals are in closed form;
+//! nothing comes from samples.
 
 mod choice;
 mod clearance;
@@ -44,8 +44,8 @@ pub use value::Value;
 
 use crate::model::Model;
 
-/// `work` on a sample, or 0 where it is the rounding of what the contact stores and gives back,
-/// force times indentation.
+/// `work` on a sample, or 0 if it is only the rounding of the energy stored and returned by the
+/// contact, force times indentation.
 fn above_rounding(work: f64, peak_force: f64, indentation: f64) -> f64 {
     const ROUNDING: f64 = 1e-12;
     if work.abs() <= ROUNDING * peak_force * indentation {
@@ -55,7 +55,7 @@ fn above_rounding(work: f64, peak_force: f64, indentation: f64) -> f64 {
     }
 }
 
-/// Whether a switch begins a contact: from flight into contact, or an impact.
+/// True if a switch begins a contact: from flight into contact, or an impact.
 pub fn begins_contact(model: &Model, from: usize, to: usize) -> bool {
     !model.touches(from) && (model.touches(to) || from == to)
 }

@@ -1,5 +1,5 @@
-//! Measures a motion under a nonlinear force while it runs: extrema of the dense output, integrals by
-//! the quadrature that its polynomials need.
+//! Measurement of a motion under a nonlinear force during a run: extrema of the dense output,
+//! integrals by quadrature.
 
 use std::sync::Arc;
 
@@ -28,7 +28,7 @@ pub(super) struct Nonlinear<'a> {
 }
 
 impl<'a> Nonlinear<'a> {
-    /// Of the observables `set`.
+    /// For the observables `set`.
     pub(super) fn new(
         model: &'a Model,
         nonlinear: &'a Arc<nonlinear::Nonlinear>,
@@ -77,14 +77,14 @@ struct NonlinearRun<'a> {
     of: &'a Nonlinear<'a>,
     flow: Flow,
     state: Vec<f64>,
-    /// The functionals' values.
+    /// Values of the functionals.
     values: Vec<Complex>,
     periods: usize,
     contact_time: f64,
     contacts: Beginnings<f64>,
     events: Vec<ContactEvent>,
     clearance: Option<SampledClearance>,
-    /// Energy stored by lever and law at the beginning, and so far.
+    /// Energy stored in lever and law at the beginning, and now.
     energies: [(f64, f64); 2],
     lows: Vec<f64>,
     highs: Vec<f64>,
@@ -205,7 +205,7 @@ impl NonlinearRun<'_> {
         }
     }
 
-    /// Lists contacts that begin and end.
+    /// Lists the beginnings and ends of contacts.
     fn take_switches(&mut self, period: &Trajectory) {
         let nonlinear = self.of.nonlinear;
         for switch in period.switches() {

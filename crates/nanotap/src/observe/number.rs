@@ -1,4 +1,4 @@
-//! The numbers that observables are made of: plain, or with a derivative beside them.
+//! The numbers from which observables are computed: plain, or with a derivative.
 
 use std::ops::Div;
 
@@ -9,7 +9,7 @@ use nanotap_arithmetic::{Dual, Scalar};
 pub(super) trait Number: Scalar + Default + From<f64> + Div<f64, Output = Self> {
     /// Whether it has a derivative.
     const VARIES: bool;
-    /// At least `low`.
+    /// Returns at least `low`.
     fn at_least(self, low: f64) -> Self;
     /// √(x² + y²).
     fn hypotenuse(self, y: Self) -> Self;
@@ -17,7 +17,7 @@ pub(super) trait Number: Scalar + Default + From<f64> + Div<f64, Output = Self> 
     fn degrees(self, x: Self) -> Self;
     /// Sine and cosine.
     fn turn(self) -> (Self, Self);
-    /// The square root; at zero it has no finite derivative.
+    /// The square root; its derivative at zero is infinite.
     fn root(self) -> Self;
 }
 
@@ -89,12 +89,12 @@ impl<D> From<Complex<D>> for Phasor<D> {
 }
 
 impl<D: Number> Phasor<D> {
-    /// Its amplitude.
+    /// Amplitude.
     pub(super) fn norm(self) -> D {
         self.re.hypotenuse(self.im)
     }
 
-    /// Its lag φ: `Re(c e^{iθ}) = |c| sin(θ − φ)`, degrees in (−180, 180].
+    /// Phase lag φ: `Re(c e^{iθ}) = |c| sin(θ − φ)`, degrees in (−180, 180].
     pub(super) fn lag(self) -> D {
         let degrees = -self.re.degrees(D::from(0.0) - self.im);
         if degrees.value() <= -180.0 {
@@ -104,7 +104,7 @@ impl<D: Number> Phasor<D> {
         }
     }
 
-    /// In other units.
+    /// Scales by `factor`.
     pub(super) fn times(self, factor: D) -> Self {
         Self {
             re: self.re * factor,
@@ -112,7 +112,7 @@ impl<D: Number> Phasor<D> {
         }
     }
 
-    /// Turned back by an angle in rad.
+    /// Rotates back by an angle in radians.
     pub(super) fn turned_back(self, angle: D) -> Self {
         let (sin, cos) = angle.turn();
         Self {

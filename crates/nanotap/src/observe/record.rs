@@ -1,4 +1,4 @@
-//! Runs a motion and records it.
+//! Recording of motions.
 
 use super::clearance::Clearance;
 use super::contact_event::ContactEvent;
@@ -9,40 +9,40 @@ use super::table::{ObservableSet, Observables};
 use crate::model::recording::Recording;
 use crate::model::{Model, MotionError};
 
-/// What is recorded of a motion in addition to its observables.
+/// What to record in addition to the observables.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct RecordOptions {
     /// Number of drive periods at the beginning that are recorded.
     pub recorded: usize,
-    /// Number of drive periods at the end of which the final states are kept.
+    /// Number of drive periods whose final states are recorded, counted from the end.
     pub states: usize,
     /// Whether contact events are listed.
     pub events: bool,
-    /// Whether the extrema of the tip deflection in every period are listed, if they are in the
-    /// set of observables.
+    /// Whether the extrema of the tip deflection in every period are listed, if they are
+    /// observables of the set.
     pub each_period: bool,
 }
 
-/// A motion that was recorded.
+/// A recorded motion.
 #[derive(Clone, Debug)]
 pub struct Recorded {
     /// The observables, in the model's units.
     pub observables: Observables,
-    /// Its first periods.
+    /// Recording of the first periods.
     pub recording: Recording,
     /// States at the ends of its last periods, in order.
     pub states: Vec<Vec<f64>>,
-    /// The state at its end.
+    /// The final state.
     pub end: Vec<f64>,
-    /// Its contact events.
+    /// The contact events.
     pub events: Vec<ContactEvent>,
-    /// Least tip deflection of each period, in the model's units.
+    /// Smallest tip deflection of each period, in the model's units.
     pub lows: Vec<f64>,
-    /// Greatest tip deflection of each period, in the model's units.
+    /// Largest tip deflection of each period, in the model's units.
     pub highs: Vec<f64>,
 }
 
-/// The engine of a model, prepared to measure its motions.
+/// The engine of a model, prepared for the measurement of its motions.
 pub(super) trait Engine {
     /// Starts a run at drive phase 0.
     fn start(
@@ -52,19 +52,19 @@ pub(super) trait Engine {
     ) -> Result<Box<dyn Run + '_>, MotionError>;
 }
 
-/// A motion that is measured while it runs.
+/// A motion with measurement during the run.
 pub(super) trait Run {
-    /// Runs one drive period, which is recorded if `record`.
+    /// Runs one drive period and records it if `record`.
     fn period(&mut self, record: bool) -> Result<(), MotionError>;
     /// The present state.
     fn state(&self) -> Vec<f64>;
-    /// The measurements of the periods that ran.
+    /// The measurements over the periods so far.
     fn finish(self: Box<Self>) -> Result<Measurements, MotionError>;
 }
 
 /// The measurements of a run.
 pub(super) struct Measurements {
-    /// `None` of a run of no length.
+    /// `None` for a run of zero length.
     pub(super) found: Option<Found<f64>>,
     pub(super) recording: Recording,
     pub(super) events: Vec<ContactEvent>,
@@ -72,7 +72,7 @@ pub(super) struct Measurements {
     pub(super) highs: Vec<f64>,
 }
 
-/// Records motions of one model, for which its engine is prepared once.
+/// Records motions of one model, whose engine is prepared once.
 pub struct Recorder<'a> {
     model: &'a Model,
     set: ObservableSet,
@@ -80,10 +80,10 @@ pub struct Recorder<'a> {
 }
 
 impl<'a> Recorder<'a> {
-    /// For the observables `set` of `model`.
+    /// Prepares the observables `set` of `model`.
     ///
     /// # Errors
-    /// When a number of the model is not finite.
+    /// If a number of the model is not finite.
     pub fn new(model: &'a Model, set: ObservableSet) -> Result<Self, MotionError> {
         let engine: Box<dyn Engine + 'a> = match &model.nonlinear {
             Some(nonlinear) => Box::new(Nonlinear::new(model, nonlinear, set)),
@@ -95,7 +95,7 @@ impl<'a> Recorder<'a> {
     /// Records `periods` drive periods from `start` at drive phase 0.
     ///
     /// # Errors
-    /// When the flow fails.
+    /// If the flow fails.
     pub fn record(
         &self,
         start: &[f64],
@@ -128,7 +128,7 @@ impl<'a> Recorder<'a> {
 /// Records `periods` drive periods of `model` from `start` at drive phase 0.
 ///
 /// # Errors
-/// When the flow fails.
+/// If the flow fails.
 pub fn record(
     model: &Model,
     start: &[f64],
@@ -142,7 +142,7 @@ pub fn record(
 /// Measures `periods` drive periods of `model` from `state` at drive phase 0.
 ///
 /// # Errors
-/// When the flow fails.
+/// If the flow fails.
 pub fn measure(
     model: &Model,
     state: &[f64],
@@ -153,11 +153,11 @@ pub fn measure(
 }
 
 impl Clearance {
-    /// Over `periods` drive periods from `state` at drive phase 0; `None` of a model that is not a
-    /// beam.
+    /// The clearance over `periods` drive periods from `state` at drive phase 0; `None` for a model
+    /// that is not a beam.
     ///
     /// # Errors
-    /// When the flow fails.
+    /// If the flow fails.
     pub fn of(model: &Model, state: &[f64], periods: usize) -> Result<Option<Self>, MotionError> {
         let seen = measure(model, state, periods, ObservableSet::CLEARANCE)?;
         let place = seen.beam_clearance.zip(seen.beam_clearance_xi);

@@ -1,13 +1,13 @@
-//! Every observable, once: its name, its dimension, its words, and how it follows from what
-//! was [measured](super::measure). JSON, CSV, datasets, figures, the terminal and Python
-//! read this table; a new observable is one entry here.
+//! The table of observables: name, dimension, description, and how each follows from the
+//! [measurements](super::measure). JSON, CSV, datasets, figures, the terminal and Python read this
+//! table; a new observable is one entry.
 //!
 //! # Phase
-//! Phases are lags: of the tip deflection behind the drive sin Ωτ (of a driven base: behind
-//! the base's displacement), 90° at the free resonance of a lever with high Q. Data hold them
-//! in (−180°, 180°]. People who tap read them from 0° to 180°, and a lever driven through its
-//! base lags by a little more than 180° far above resonance; so text and figures show them
-//! in (−90°, 270°], where a response to tapping never jumps: see [`shown_phase`].
+//! Phases are lags of the tip deflection behind the drive sin Ωτ (for a driven base: behind the
+//! displacement of the base), 90° at the free resonance of a lever with high Q. Data contain them
+//! in (−180°, 180°]. In tapping mode phases are read from 0° to 180°, and a lever driven through
+//! its base lags by slightly more than 180° far above resonance. Text and figures therefore show
+//! them in (−90°, 270°], where the response of a tapping lever never jumps: see [`shown_phase`].
 
 use std::borrow::Cow;
 
@@ -25,24 +25,24 @@ use crate::model::contact::dual::Dual;
 
 use Signal::{Height, Slope, Tip};
 
-/// One observable.
+/// An observable.
 #[derive(Debug)]
 pub struct Observable {
-    /// Its name in JSON, in CSV headers, in datasets, at the terminal and in Python.
+    /// Name in JSON, CSV headers, datasets, at the terminal and in Python.
     pub name: &'static str,
-    /// Its name among quantities in SI, where experimenters have one of their own.
+    /// Name among quantities in SI, if experimenters use another one.
     pub si_name: &'static str,
-    /// Its dimension.
+    /// Dimension.
     pub dimension: Dimension,
-    /// A few words and its symbol between `$`: the label of an axis.
+    /// Short description and symbol (between `$`): the label of an axis.
     pub label: &'static str,
-    /// What it is.
+    /// Description.
     pub words: &'static str,
-    /// Its value.
+    /// Returns the value.
     pub of: fn(&Observables) -> Value,
-    /// Whether it is one number, as a curve needs it.
+    /// Whether it is a single number, as a curve needs.
     pub is_number: bool,
-    /// The JSON schema of its value.
+    /// JSON schema of the value.
     pub(super) schema: fn(&mut SchemaGenerator) -> Schema,
     row: usize,
 }
@@ -56,12 +56,12 @@ impl PartialEq for Observable {
 impl Eq for Observable {}
 
 impl Observable {
-    /// The observable of this name.
+    /// The observable with this name.
     pub fn named(name: &str) -> Option<&'static Self> {
         OBSERVABLES.iter().find(|o| o.name == name)
     }
 
-    /// The label of an axis, of a cantilever or an oscillator.
+    /// Label of an axis, for a cantilever or an oscillator.
     pub fn axis_label(&self, beam: bool) -> String {
         if beam {
             return self.label.to_owned();
@@ -72,41 +72,41 @@ impl Observable {
     }
 }
 
-/// A choice of observables.
+/// A set of observables.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ObservableSet(u64);
 
 impl ObservableSet {
-    /// None.
+    /// The empty set.
     pub const NONE: Self = Self(0);
 
-    /// Every one that there is.
+    /// All observables.
     pub const ALL: Self = Self(u64::MAX >> (64 - OBSERVABLES.len()));
 
-    /// With one more.
+    /// Adds an observable.
     #[must_use]
     pub const fn with(self, observable: &Observable) -> Self {
         Self(self.0 | 1 << observable.row)
     }
 
-    /// Whether this is one of them.
+    /// True if the set contains the observable.
     pub const fn contains(self, observable: &Observable) -> bool {
         self.0 >> observable.row & 1 == 1
     }
 
-    /// Those of both.
+    /// The union of two sets.
     #[must_use]
     pub const fn union(self, other: Self) -> Self {
         Self(self.0 | other.0)
     }
 
-    /// They, in the order of the table.
+    /// The observables of the set, in the order of the table.
     pub fn iter(self) -> impl Iterator<Item = &'static Observable> {
         OBSERVABLES.iter().filter(move |o| self.contains(o))
     }
 }
 
-/// A phase as text and figures show it: in (−90°, 270°].
+/// Converts a phase to the range of text and figures, (−90°, 270°].
 pub fn shown_phase(degrees: f64) -> f64 {
     if degrees <= -90.0 {
         degrees + 360.0
@@ -120,7 +120,7 @@ macro_rules! observables {
         $name:ident $(as $si_name:literal)?: $type:ty, $dimension:ident, $where:ident,
         $label:literal, $words:literal, $read:expr;
     )*) => {
-        /// The table.
+        /// The table of observables.
         pub static OBSERVABLES: &[Observable] = &[$(Observable {
             name: stringify!($name),
             si_name: observables!(@si $name $($si_name)?),
@@ -133,28 +133,27 @@ macro_rules! observables {
             row: Row::$name as usize,
         }),*];
 
-        /// The table's rows.
+        /// Rows of the table.
         #[allow(non_camel_case_types, reason = "the observables' own names")]
         #[derive(Clone, Copy)]
         enum Row { $($name),* }
 
-        /// Observables of a motion; in the model's own units, or in SI. What nobody asked for
-        /// is not a number.
+        /// Observables of a motion, in the model's units or in SI. Unrequested fields are NaN.
         #[derive(Clone, Copy, Debug, PartialEq)]
         pub struct Observables {
-            /// Length of time observed, in drive periods.
+            /// Observed time in drive periods.
             pub periods: f64,
             $(#[doc = $words] pub $name: $type,)*
         }
 
         impl Observables {
-            /// Nothing is known.
+            /// All fields unknown.
             pub const UNKNOWN: Self = Self {
                 periods: 0.0,
                 $($name: <$type as Measurable>::ABSENT,)*
             };
 
-            /// As `measured` has them.
+            /// Computes the observables of `set` from the measurements.
             pub(super) fn read(set: ObservableSet, measured: &mut Measured<'_>) -> Self {
                 let mut all = Self { periods: measured.periods(), ..Self::UNKNOWN };
                 $(if set.contains(&OBSERVABLES[Row::$name as usize]) {
@@ -164,8 +163,8 @@ macro_rules! observables {
                 all
             }
 
-            /// How those of `set` change, as `measured` has them; what jumps, or where
-            /// nothing is measured, is left out.
+            /// Derivatives of the observables of `set`, from `measured`; discontinuous ones are
+            /// left out.
             pub(super) fn changes(
                 set: ObservableSet,
                 measured: &mut Measured<'_, Dual>,
@@ -184,7 +183,7 @@ macro_rules! observables {
                 all
             }
 
-            /// The same in SI.
+            /// Converts to SI.
             #[must_use]
             pub fn in_si(&self, scales: &Scales) -> Self {
                 Self {
@@ -195,17 +194,17 @@ macro_rules! observables {
         }
 
         impl ObservableSet {
-            /// What sweeps, branches and curves record of every motion.
+            /// The observables that sweeps, branches and curves record for every motion.
             pub const COMMON: Self = Self($(observables!(@$where $name))|*);
 
-            /// What a lock-in amplifier reads: amplitude and phase at the drive's frequency.
+            /// The readings of a lock-in amplifier: amplitude and phase at the drive frequency.
             pub const FIRST_HARMONIC: Self =
                 Self(1 << Row::first_harmonic as usize | 1 << Row::phase as usize);
 
-            /// The least and the greatest gap.
+            /// Minimum and maximum of the gap.
             pub(super) const GAP: Self = Self(1 << Row::gap_range as usize);
 
-            /// Where and when the beam is lowest.
+            /// Position and time of the lowest point of the beam.
             pub(super) const CLEARANCE: Self = Self(
                 1 << Row::beam_clearance as usize
                     | 1 << Row::beam_clearance_xi as usize
@@ -380,7 +379,7 @@ fn change_of<R: Varying>(
 }
 
 impl Serialize for Observables {
-    /// As a map from names to values; what is absent is left out.
+    /// A map from names to values, without absent ones.
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         let mut map = serializer.serialize_map(None)?;
         for observable in OBSERVABLES {
@@ -394,7 +393,7 @@ impl Serialize for Observables {
 }
 
 impl Observable {
-    /// The JSON schema of its value, with what it is and its `x-unit`.
+    /// JSON schema of the value, with its description and `x-unit`.
     pub(super) fn described(&self, generator: &mut SchemaGenerator, unit: &str) -> Schema {
         let mut schema = (self.schema)(generator);
         schema.insert("description".into(), self.words.into());

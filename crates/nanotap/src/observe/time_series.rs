@@ -1,25 +1,25 @@
-//! A motion as a table, a row an instant: for files and for Python.
+//! A motion as a table with one row per instant, for files and for Python.
 
 use nanotap_flow::Output;
 
 use crate::model::{Model, MotionError};
 
-/// Maximum number of rows of a time series: they fill some gigabytes.
+/// Largest number of rows of a time series: they take some gigabytes.
 pub const MAX_ROWS: usize = 10_000_000;
 
 /// The columns before the state.
 const COLUMNS: [&str; 6] = ["tau", "tip", "tip_rate", "gap", "force", "contact"];
 
 /// The columns of [`sample`], in order: `tau`, `tip` (W or x), `tip_rate`, `gap`, `force`,
-/// `contact` (1 in contact, else 0), then the state (`a1 … aN, v1 … vN` and `s1` of a sample
-/// with a memory, or `x, v`).
+/// `contact` (1 in contact, otherwise 0), then the state (`a1 … aN, v1 … vN` and `s1` for a sample
+/// with memory, or `x, v`).
 pub fn columns(model: &Model) -> Vec<String> {
     let mut names: Vec<String> = COLUMNS.map(str::to_owned).to_vec();
     names.extend(state_names(model));
     names
 }
 
-/// What the numbers of a state are called.
+/// Names of the entries of a state.
 pub fn state_names(model: &Model) -> Vec<String> {
     if model.beam.is_none() {
         return vec!["x".to_owned(), "v".to_owned()];
@@ -32,8 +32,8 @@ pub fn state_names(model: &Model) -> Vec<String> {
         .collect()
 }
 
-/// A state of a beam as one with `modes` modes: more are at rest, fewer are cut off. The
-/// last `memory` numbers are the sample's.
+/// Converts a state of a beam to `modes` modes: additional modes are at rest, others are cut off.
+/// The last `memory` entries are the sample's.
 pub(crate) fn with_modes(state: &[f64], memory: usize, modes: usize) -> Vec<f64> {
     let (beam, sample) = state.split_at(state.len().saturating_sub(memory));
     let (displacements, velocities) = beam.split_at(beam.len() / 2);
@@ -45,12 +45,11 @@ pub(crate) fn with_modes(state: &[f64], memory: usize, modes: usize) -> Vec<f64>
     [fitted(displacements), fitted(velocities), sample.to_vec()].concat()
 }
 
-/// Hands `periods` drive periods from the state `start` at drive phase 0 to `row`,
-/// `resolution` equally spaced instants each and the very end; memory is that of one
-/// period.
+/// Calls `row` for `resolution` equidistant instants in each of `periods` drive periods from the
+/// state `start` at drive phase 0, and for the end. The memory needed is that of one period.
 ///
 /// # Errors
-/// When there would be more than [`MAX_ROWS`] rows, and when the flow fails.
+/// If there would be more than [`MAX_ROWS`] rows, or the flow fails.
 pub fn sample(
     model: &Model,
     start: &[f64],

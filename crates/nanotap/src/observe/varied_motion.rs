@@ -1,8 +1,8 @@
-//! How functionals of a motion under a nonlinear force change.
+//! Derivatives of functionals of a motion under a nonlinear force.
 //!
-//! The engine gives the change of the motion along the whole run ([`nanotap_volterra::variation`]);
-//! here integrals, Fourier coefficients and extrema are taken of it, by the quadrature that their
-//! values come from, period by period.
+//! The engine computes the derivative of the motion along the whole run
+//! ([`nanotap_volterra::variation`]). Integrals, Fourier coefficients and extrema are taken of it,
+//! with the quadrature of their values, period by period.
 
 use std::sync::Arc;
 
@@ -14,35 +14,36 @@ use nanotap_volterra::{Flow, Parameter, VariedOutput};
 use crate::model::MotionError;
 use crate::model::nonlinear::Nonlinear;
 
-/// A direction in which a motion changes.
+/// A direction in which a motion varies.
 #[derive(Clone, Debug)]
 pub(super) struct Change {
-    /// Of the state at its beginning.
+    /// Change of the initial state.
     pub(super) start: Vec<f64>,
-    /// Of drive, distance and law; `None` where they stay.
+    /// Change of drive, distance and law; `None` if they are constant.
     pub(super) parameter: Option<Parameter>,
-    /// Of ln T.
+    /// Change of ln T.
     pub(super) log_period: f64,
 }
 
 /// Measurements of a motion with their derivatives in one direction.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Varied {
-    /// The functionals' values.
+    /// Values of the functionals.
     pub(super) values: Vec<Complex<Dual>>,
-    /// The greatest speed at which a contact began.
+    /// Largest speed at which a contact began.
     pub(super) greatest_speed: Dual,
-    /// Time in contact.
+    /// Contact time.
     pub(super) contact_time: Dual,
-    /// Length of time.
+    /// Duration.
     pub(super) duration: Dual,
 }
 
-/// Follows `periods` drive periods from `state` and gathers, for each of the changes, the functionals
-/// of the outputs; `rate` is that of the tip's height. Changes with a parameter are last.
+/// Follows `periods` drive periods from `state` and computes, for each of the changes, the
+/// functionals of the outputs. `rate` is the rate of the tip's height. Changes with a parameter
+/// come last.
 ///
 /// # Errors
-/// When the flow fails.
+/// If the flow fails.
 pub(super) fn gather(
     nonlinear: &Arc<Nonlinear>,
     state: &[f64],
@@ -77,7 +78,8 @@ pub(super) fn gather(
                 let value = |output| Dual::new(at.values[output], at.change(output, column));
                 let values: Vec<Dual> = numbers.map(value).collect();
                 let weight = Dual::new(at.weight, at.widening[column]);
-                // The frequency falls as the period grows; what ran before ends at the same phase.
+                // The frequency falls as the period grows; the previous periods end at the same
+                // phase.
                 let turn = at.shifts[column] - changes[column].log_period * at.time;
                 let time = Dual::new(before + at.time, turn);
                 for (sum, functional) in varied.values.iter_mut().zip(functionals) {

@@ -4,10 +4,12 @@
 pub mod approach;
 pub mod attractors;
 pub mod averaged_orbits;
+#[cfg(feature = "dataset")]
 pub mod basin;
 pub mod branch;
 pub mod contact_laws;
 pub mod convergence;
+#[cfg(feature = "fit")]
 pub mod fit;
 mod free_motion;
 pub mod frequency_modulation;
@@ -22,13 +24,17 @@ pub mod registry;
 pub mod request;
 pub mod scan;
 pub mod setpoint;
+mod short_run;
 pub mod simulate;
 pub mod start_box;
+#[cfg(feature = "dataset")]
 pub mod sweep;
 pub mod threads;
 pub mod value;
+#[cfg(feature = "dataset")]
 pub mod window;
 
+#[cfg(feature = "dataset")]
 use std::fmt::Debug;
 
 use nanotap_dynamics::Control;
@@ -43,6 +49,7 @@ pub use simulate::fixed_step;
 use crate::Error;
 use crate::case::Case;
 use crate::case::document::CaseDocument;
+#[cfg(feature = "dataset")]
 use crate::dataset::{Schema, Store, StoreError, Work, WorkError};
 use crate::model::cantilever::Cantilever;
 use registry::StudyEntry;
@@ -55,9 +62,15 @@ pub static STUDIES: &[StudyEntry] = &[
     StudyEntry::of::<attractors::AttractorsStudy>(),
     StudyEntry::of::<branch::BranchStudy>(),
     StudyEntry::of::<approach::ApproachStudy>(),
+    #[cfg(feature = "fm")]
+    StudyEntry::of::<frequency_modulation::FrequencyModulationStudy>(),
+    #[cfg(feature = "fit")]
     StudyEntry::of::<fit::FitStudy>(),
+    #[cfg(feature = "dataset")]
     StudyEntry::dataset::<sweep::SweepStudy>(),
+    #[cfg(feature = "dataset")]
     StudyEntry::dataset::<window::WindowStudy>(),
+    #[cfg(feature = "dataset")]
     StudyEntry::dataset::<basin::BasinStudy>(),
     StudyEntry::of::<lyapunov::LyapunovStudy>(),
     StudyEntry::of::<convergence::ConvergenceStudy>(),
@@ -112,6 +125,7 @@ pub trait Study {
 }
 
 /// A study whose report is a dataset, computed chunk by chunk.
+#[cfg(feature = "dataset")]
 pub trait DatasetStudy {
     /// Name in every front end.
     const NAME: &'static str;
@@ -158,9 +172,11 @@ pub trait DatasetStudy {
 }
 
 /// The checked computation of a dataset: its chunks are pure functions of it.
+#[cfg(feature = "dataset")]
 pub type DatasetPlan = Box<dyn Computation>;
 
 /// The computation of a dataset.
+#[cfg(feature = "dataset")]
 pub trait Computation: Debug + Send + Sync {
     /// The dataset's schema.
     fn schema(&self) -> &Schema;

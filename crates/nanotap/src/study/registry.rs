@@ -32,7 +32,7 @@
 //!
 //! A sweep, a window and basins leave a dataset: [`StudyEntry::plan`] gives what computes it
 //! chunk by chunk. A figure is drawn from the report itself, by the study's function in
-//! [`figure`](crate::figure).
+//! `figure`.
 
 use nanotap_dynamics::Control;
 use schemars::Schema;
@@ -42,7 +42,9 @@ use crate::Error;
 use crate::case::Case;
 use crate::study::request::{answer_schema, read, schema};
 use crate::study::setpoint::at_setpoint;
-pub use crate::study::{DatasetPlan, DatasetStudy, Document, STUDIES, Study};
+#[cfg(feature = "dataset")]
+pub use crate::study::{DatasetPlan, DatasetStudy};
+pub use crate::study::{Document, STUDIES, Study};
 
 /// A study without its types.
 #[derive(Clone, Copy, Debug)]
@@ -71,6 +73,7 @@ pub enum Run {
     /// To the JSON of its document.
     Document(fn(&Case, Value, &Control<'_>) -> Result<String, Error>),
     /// To what is to be computed into a dataset.
+    #[cfg(feature = "dataset")]
     Dataset(fn(&Case, Value, &Control<'_>) -> Result<DatasetPlan, Error>),
 }
 
@@ -97,6 +100,7 @@ impl StudyEntry {
         }
     }
 
+    #[cfg(feature = "dataset")]
     pub(super) const fn dataset<S: DatasetStudy>() -> Self {
         Self {
             name: S::NAME,
@@ -125,6 +129,7 @@ impl StudyEntry {
     ) -> Result<String, Error> {
         match self.run {
             Run::Document(run) => run(case, request, control),
+            #[cfg(feature = "dataset")]
             Run::Dataset(_) => Err(Error::input(
                 format!("{} leaves a dataset, not a document", self.name),
                 "compute its plan into a folder",
@@ -136,6 +141,7 @@ impl StudyEntry {
     ///
     /// # Errors
     /// Those of the study; and when its report is a document.
+    #[cfg(feature = "dataset")]
     pub fn plan(
         &self,
         case: &Case,

@@ -17,7 +17,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::Error;
 use crate::case::Case;
-use crate::dataset::{Store, StoreError, Values};
+use crate::dataset::{Store, StoreError};
 use crate::study::attractors::MOST_STARTS;
 use crate::study::limits::MOST_PERIOD;
 use crate::study::simulate::Classification;
@@ -147,46 +147,31 @@ impl Window {
     pub fn of(store: &Store) -> Result<Self, StoreError> {
         store.require_all()?;
         let schema = store.schema();
-        let wrong = || StoreError::NotAStore {
-            path: store.path().into(),
-            what: "it is no sweep over two parameters".into(),
-        };
         if schema.grid.axes.len() != 3 {
-            return Err(wrong());
+            return Err(StoreError::NotAStore {
+                path: store.path().into(),
+                what: "it is no sweep over two parameters".into(),
+            });
         }
         let [rows, columns] = [0, 1].map(|axis| schema.grid.axes[axis].length);
-        let index = |name| schema.index_of(name).ok_or_else(wrong);
-        let variables = [
-            index("classification")?,
-            index("period")?,
-            index("first_harmonic")?,
-            index("tip_max")?,
-            index("contact_fraction")?,
-        ];
         let mut seen: Vec<Vec<Seen>> = (0..rows * columns).map(|_| Vec::new()).collect();
-        for chunk in 0..store.chunks() {
-            let block = schema.grid.block(chunk);
-            let read = |k: usize| store.read_chunk(&block, variables[k]);
-            let (
-                Values::Code(classes),
-                Values::Whole(periods),
-                Values::Real(amplitudes),
-                Values::Real(maxima),
-                Values::Real(contacts),
-            ) = (read(0)?, read(1)?, read(2)?, read(3)?, read(4)?)
-            else {
-                return Err(wrong());
-            };
-            for (flat, entry) in block.entries().enumerate() {
-                seen[entry[0] * columns + entry[1]].push(Seen {
-                    class: class_of(classes[flat]),
-                    period: periods[flat],
-                    amplitude: amplitudes[flat],
-                    maximum: maxima[flat],
-                    contact: contacts[flat],
-                });
-            }
-        }
+        let variables = [
+            "classification",
+            "period",
+            "first_harmonic",
+            "tip_max",
+            "contact_fraction",
+        ];
+        store.each(variables, |entry, row| {
+            let [class, period, amplitude, maximum, contact] = row;
+            seen[entry[0] * columns + entry[1]].push(Seen {
+                class: class_of(class as u8),
+                period: period as i32,
+                amplitude,
+                maximum,
+                contact,
+            });
+        })?;
         for motion in from_neighbours(store)? {
             let point = motion.at[1] * columns + motion.at[0];
             if let Some(seen) = seen.get_mut(point) {

@@ -760,8 +760,8 @@ fn invalid_tables_are_refused_with_their_place() {
             "distance (nm),phase,phase error (deg)\n1,9,-1\n",
             &["line 2", "column 3"],
         ),
-        ("distance (nm)\n1\n", &["nothing measured"]),
-        ("phase\n1\n", &["where"]),
+        ("distance (nm)\n1\n", &["measured quantity"]),
+        ("phase\n1\n", &["positions"]),
         ("distance (nm),phase\n10,9\n", &["cannot determine"]),
     ] {
         let message = refused(text);
@@ -925,7 +925,7 @@ fn a_table_of_approach_is_fitted_unchanged() {
     let counted = report
         .remarks
         .iter()
-        .any(|r| r.starts_with("3 rows of neither way"));
+        .any(|r| r.starts_with("3 rows of neither direction"));
     assert!(counted, "{:?}", report.remarks);
 }
 

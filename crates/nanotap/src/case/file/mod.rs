@@ -23,7 +23,7 @@ use std::path::Path;
 
 pub use document::{Document, Entry, Header};
 pub use problem::{CaseFileError, Place, Problem, SHOWN, Source};
-pub(crate) use reader::{Described, cosine_term, modes, parse_with_scan, word};
+pub(crate) use reader::{Described, modes, parse_with_scan, word};
 
 use toml::de::{DeTable, DeValue};
 

@@ -300,14 +300,6 @@ pub(crate) fn word<T: core::default::Default + std::str::FromStr>(
     }
 }
 
-/// Which form of Eq. (14) is stated.
-pub(crate) fn cosine_term(stated: &Stated) -> CosineTerm {
-    match stated.get(Key::CosineTerm) {
-        Some(Value::Word(word)) if *word == CosineTerm::Printed.name() => CosineTerm::Printed,
-        _ => CosineTerm::Corrected,
-    }
-}
-
 /// How many modes are stated.
 pub(crate) fn modes(stated: &Stated) -> usize {
     stated
@@ -327,7 +319,7 @@ fn cantilever(
         alpha5: 0.0,
         contact: law,
         actuation: word::<Actuation>(stated, Key::Actuation)?,
-        cosine_term: cosine_term(stated),
+        cosine_term: word(stated, Key::CosineTerm)?,
         tone2_ratio: match stated.get(Key::Tone2Ratio) {
             Some(Value::Ratio(ratio)) => Some(*ratio),
             _ => None,

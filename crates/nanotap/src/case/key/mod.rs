@@ -16,54 +16,35 @@ use super::near_name::near_name;
 use super::quantity::Kind;
 use crate::model::contact::ContactLaw;
 use crate::model::drive_form::Actuation;
-use crate::model::oscillator::{self, OscillatorParameter};
+use crate::model::oscillator::OscillatorParameter;
 use crate::model::parameter::{Applies, Parameter, Unit};
+use crate::model::words::words;
 use keys::{ALTERNATIVES, TABLE};
 
 /// A key of a case: an index into the table of keys.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct Key(u8);
 
-/// A table of a case file.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub enum Section {
-    /// `[model]`: dimensionless numbers.
-    Model,
-    /// `[cantilever]`
-    Cantilever,
-    /// `[tip]`
-    Tip,
-    /// `[sample]`
-    Sample,
-    /// `[drive]`
-    Drive,
-    /// `[gap]`
-    Gap,
+words! {
+    /// A table of a case file.
+    #[derive(PartialOrd, Ord)]
+    Section {
+        /// `[model]`: dimensionless numbers.
+        Model = "model",
+        /// `[cantilever]`
+        Cantilever = "cantilever",
+        /// `[tip]`
+        Tip = "tip",
+        /// `[sample]`
+        Sample = "sample",
+        /// `[drive]`
+        Drive = "drive",
+        /// `[gap]`
+        Gap = "gap",
+    }
 }
 
 impl Section {
-    /// Every section.
-    pub const ALL: [Self; 6] = [
-        Self::Model,
-        Self::Cantilever,
-        Self::Tip,
-        Self::Sample,
-        Self::Drive,
-        Self::Gap,
-    ];
-
-    /// Its name, without brackets.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Model => "model",
-            Self::Cantilever => "cantilever",
-            Self::Tip => "tip",
-            Self::Sample => "sample",
-            Self::Drive => "drive",
-            Self::Gap => "gap",
-        }
-    }
-
     /// The section of this name.
     pub fn find(name: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|section| section.name() == name)
@@ -80,31 +61,19 @@ impl Section {
     }
 }
 
-/// What `[model]` describes, by its key `kind`.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
-pub enum ModelKind {
-    /// The cantilever.
-    #[default]
-    Cantilever,
-    /// An oscillator with a soft stop.
-    VibroImpact,
-    /// An oscillator with a rigid stop.
-    Impact,
+words! {
+    /// What `[model]` describes, by its key `kind`.
+    ModelKind {
+        /// The cantilever.
+        Cantilever = "cantilever",
+        /// An oscillator with a soft stop.
+        VibroImpact = "vibro_impact",
+        /// An oscillator with a rigid stop.
+        Impact = "impact",
+    }
 }
 
 impl ModelKind {
-    /// Every kind.
-    pub const ALL: [Self; 3] = [Self::Cantilever, Self::VibroImpact, Self::Impact];
-
-    /// The word of the key `kind`.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Cantilever => "cantilever",
-            Self::VibroImpact => "vibro_impact",
-            Self::Impact => "impact",
-        }
-    }
-
     /// The keys that `[model]` takes for it, numbers first.
     pub fn keys(self) -> impl Iterator<Item = Key> + Clone {
         Key::all().filter(move |key| key.entry().models.contains(&self))
@@ -443,7 +412,7 @@ impl Key {
         let (low, high) = match self.entry().means {
             Means::Nothing => return self.entry().range,
             Means::Cantilever(parameter) => parameter.entry().range,
-            Means::Oscillator(parameter) => oscillator::range(parameter),
+            Means::Oscillator(parameter) => parameter.range(),
         };
         Range {
             low,

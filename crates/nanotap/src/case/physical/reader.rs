@@ -32,6 +32,15 @@ impl<'a> Reader<'a> {
         }
     }
 
+    /// The first of these keys that is stated, with its quantity in SI, within its range.
+    pub(crate) fn first(self, keys: &[Key]) -> Result<Option<(Key, f64)>, PhysicalError> {
+        let mut found = None;
+        for &key in keys {
+            found = found.or(self.number(key)?.map(|value| (key, value)));
+        }
+        Ok(found)
+    }
+
     /// A word.
     pub(crate) fn word(self, key: Key) -> Option<&'static str> {
         match self.stated.get(key)? {

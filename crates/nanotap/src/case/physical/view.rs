@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 
 use nalgebra::Complex;
 
-use super::drive::{Drive, DriveFrequency, DriveStrength, FIRST, SECOND, Setpoint};
+use super::drive::{Drive, FIRST, Given, SECOND};
 use super::error::PhysicalError;
 use super::free_response::{free_response, response_at};
 use super::lever::{Lever, LeverData};
@@ -13,7 +13,7 @@ use super::mapping::{MappingRow, Scales, mapping_table};
 use super::reader::Reader;
 use super::sample::Sample;
 use super::tip::Tip;
-use crate::case::file::{cosine_term, modes};
+use crate::case::file::{modes, word};
 use crate::case::key::{Key, Laws, ModelKind};
 use crate::case::quantity::Kind;
 use crate::case::stated::{Stated, Value};
@@ -236,16 +236,16 @@ fn mapped(reader: Reader<'_>, known: Option<Lever>) -> Result<Physical, Physical
     let drive = Drive::read(reader)?;
     let lever = known.map_or_else(|| Lever::resolve(&data), Ok)?;
     let frequency = match drive.frequency {
-        DriveFrequency::Absolute(frequency) => frequency,
-        DriveFrequency::Ratio(ratio) => ratio * lever.f0,
+        (Key::DriveFrequencyRatio, ratio) => ratio * lever.f0,
+        (_, frequency) => frequency,
     };
-    let ratio = drive.second.map(|s| s.frequency.ratio(frequency));
+    let ratio = drive.second.map(|second| second.ratio(frequency));
     let like = Cantilever {
         modes: modes(reader.stated),
-        cosine_term: cosine_term(reader.stated),
+        cosine_term: word(reader.stated, Key::CosineTerm).unwrap_or_default(),
         contact: sample.law,
         actuation: drive.actuation,
-        tone2_ratio: ratio.transpose()?,
+        tone2_ratio: ratio.transpose()?.flatten(),
         ..Cantilever::paper()
     };
     // The free response does not depend on g0, so any length serves as unit here: g0 = 1 m,
@@ -400,30 +400,32 @@ fn setpoint_ratio(
 ) -> Result<Option<f64>, PhysicalError> {
     match drive.setpoint {
         None => Ok(None),
-        Some(Setpoint::Ratio(ratio)) => Ok(Some(ratio)),
-        Some(Setpoint::Amplitude(amplitude)) if amplitude < free_amplitude => {
+        Some((Kind::Length, amplitude)) if amplitude < free_amplitude => {
             Ok(Some(amplitude / free_amplitude))
         }
-        Some(Setpoint::Amplitude(_)) => Err(reader.impossible(
+        Some((Kind::Length, _)) => Err(reader.impossible(
             Key::DriveSetpoint,
             format!(
                 "it must be below the free amplitude, {}",
                 Kind::Length.format(free_amplitude)
             ),
         )),
+        Some((_, ratio)) => Ok(Some(ratio)),
     }
 }
 
 /// Amplitude of the drive and of the free tip, one from the other by the `gain` from the
 /// first to the second, both in SI.
-fn applied(strength: DriveStrength, gain: f64, key: Key) -> Result<(f64, f64), PhysicalError> {
-    match strength {
-        DriveStrength::Applied(applied) => Ok((applied, applied * gain)),
-        DriveStrength::Free(free) if (free / gain).is_finite() => Ok((free / gain, free)),
-        DriveStrength::Free(free) => Err(PhysicalError::impossible(
-            key,
-            Kind::Length.format(free),
-            "the lever does not move at this drive frequency",
-        )),
+fn applied((stated, value): Given, gain: f64, free: Key) -> Result<(f64, f64), PhysicalError> {
+    if stated != free {
+        return Ok((value, value * gain));
     }
+    if (value / gain).is_finite() {
+        return Ok((value / gain, value));
+    }
+    Err(PhysicalError::impossible(
+        free,
+        Kind::Length.format(value),
+        "the lever does not move at this drive frequency",
+    ))
 }

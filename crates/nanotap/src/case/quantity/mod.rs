@@ -20,6 +20,7 @@ use std::str::FromStr;
 use serde::Serialize;
 
 use format::engineering;
+pub(crate) use format::prefix_of;
 use parser::read;
 
 /// Elementary charge in coulomb, hence joules in one electronvolt; exact in the SI of 2019.

@@ -14,12 +14,8 @@ pub(crate) mod dual;
 pub mod entry;
 pub(crate) mod law;
 
-use std::fmt;
-use std::str::FromStr;
-
-use serde::{Serialize, Serializer};
-
 use crate::model::parameter::{Applies, Parameter, ParameterEntry, SampleKey};
+use crate::model::words::words;
 use dual::Dual;
 use entry::{Damper, Entry, Numbers};
 use law::Law;
@@ -29,15 +25,13 @@ macro_rules! laws {
     ($($law:ident = $file:ident;)*) => {
         $(mod $file;)*
 
-        /// A piecewise-linear contact law.
-        #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
-        #[expect(missing_docs, reason = "each entry has a meaning")]
-        pub enum ContactLaw { #[default] $($law),* }
+        words! {
+            /// A piecewise-linear contact law.
+            #[expect(missing_docs, reason = "each entry has a meaning")]
+            ContactLaw { $($law = $file::ENTRY.name),* }
+        }
 
         impl ContactLaw {
-            /// Every law.
-            pub const ALL: [Self; [$(stringify!($law)),*].len()] = [$(Self::$law),*];
-
             /// Entry of the table.
             pub const fn entry(self) -> &'static Entry {
                 match self { $(Self::$law => &$file::ENTRY),* }
@@ -88,11 +82,6 @@ pub(crate) fn numbers() -> Vec<ParameterEntry> {
 }
 
 impl ContactLaw {
-    /// Name in case files.
-    pub const fn name(self) -> &'static str {
-        self.entry().name
-    }
-
     /// What it is, in a few words.
     pub const fn meaning(self) -> &'static str {
         self.entry().meaning
@@ -123,41 +112,6 @@ impl ContactLaw {
 pub(crate) fn no_sample(internal: usize) -> Law {
     let none = Dual::constant(0.0);
     spring_damper::with_idle_variables(none, none, internal)
-}
-
-impl fmt::Display for ContactLaw {
-    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-        formatter.pad(self.name())
-    }
-}
-
-impl Serialize for ContactLaw {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        serializer.serialize_str(self.name())
-    }
-}
-
-/// A word that names no contact law.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("`{given}` is no contact law; there are {}", ContactLaw::ALL.map(ContactLaw::name).join(", "))]
-pub struct UnknownContactLaw {
-    /// The word.
-    pub given: String,
-}
-
-impl FromStr for ContactLaw {
-    type Err = UnknownContactLaw;
-
-    /// Reads a law's name; underscores and blanks do for hyphens, and case does not matter.
-    fn from_str(given: &str) -> Result<Self, UnknownContactLaw> {
-        let word = given.trim().to_lowercase().replace(['_', ' '], "-");
-        Self::ALL
-            .into_iter()
-            .find(|law| law.name() == word)
-            .ok_or_else(|| UnknownContactLaw {
-                given: given.to_owned(),
-            })
-    }
 }
 
 #[cfg(test)]

@@ -108,6 +108,36 @@ pub struct ApproachPoint {
     pub orbit: Option<PeriodicOrbit>,
 }
 
+impl ApproachPoint {
+    /// A motion of `case` on a way at a distance.
+    pub(in crate::study) fn new(
+        case: &Case,
+        (way, gap): (Way, f64),
+        classification: Classification,
+        observables: Option<Observables>,
+        orbit: Option<PeriodicOrbit>,
+    ) -> Self {
+        let view = case.physical();
+        let seen = observables.as_ref();
+        Self {
+            way,
+            gap,
+            zc: view.map(|view| gap * view.scales.length),
+            classification,
+            period: orbit.as_ref().map(|orbit| orbit.period),
+            spectral_radius: orbit.as_ref().map(PeriodicOrbit::spectral_radius),
+            physical: seen
+                .zip(view)
+                .map(|(seen, view)| PhysicalMotion::of(seen, view)),
+            observables,
+            reason: None,
+            modulation: None,
+            modulation_si: None,
+            orbit,
+        }
+    }
+}
+
 /// A jump of a slowly moved lever from one motion to another.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct StateJump {
@@ -343,23 +373,15 @@ impl Curve<'_> {
             Ok(None) => (met.classification, None, Some(met.evidence)),
             Err(error) => (Classification::Undecided, None, Some(error.to_string())),
         };
-        let view = self.case.physical();
         ApproachPoint {
-            way,
-            gap,
-            zc: view.map(|view| gap * view.scales.length),
-            classification,
-            period: met.orbit.as_ref().map(|orbit| orbit.period),
-            spectral_radius: met.orbit.as_ref().map(PeriodicOrbit::spectral_radius),
-            physical: observables
-                .as_ref()
-                .zip(view)
-                .map(|(seen, view)| PhysicalMotion::of(seen, view)),
-            observables,
             reason,
-            modulation: None,
-            modulation_si: None,
-            orbit: met.orbit,
+            ..ApproachPoint::new(
+                self.case,
+                (way, gap),
+                classification,
+                observables,
+                met.orbit,
+            )
         }
     }
 }

@@ -8,7 +8,7 @@ use super::{ApproachPoint, Curve, Way};
 use crate::Error;
 use crate::case::MovingGap;
 use crate::model::{Model, MotionError};
-use crate::observe::{PhysicalMotion, Set, measure};
+use crate::observe::{Set, measure};
 
 /// Most drive periods there and back.
 const MAX_PERIODS: usize = 2_000_000;
@@ -95,19 +95,11 @@ fn row(
     state: &[f64],
 ) -> Result<ApproachPoint, MotionError> {
     let seen = measure(model, state, 1, Set::COMMON)?;
-    let view = curve.case.physical();
-    Ok(ApproachPoint {
-        way,
-        gap,
-        zc: view.map(|view| gap * view.scales.length),
-        classification: MOVING,
-        period: None,
-        spectral_radius: None,
-        physical: view.map(|view| PhysicalMotion::of(&seen, view)),
-        observables: Some(seen),
-        reason: None,
-        modulation: None,
-        modulation_si: None,
-        orbit: None,
-    })
+    Ok(ApproachPoint::new(
+        curve.case,
+        (way, gap),
+        MOVING,
+        Some(seen),
+        None,
+    ))
 }

@@ -32,7 +32,7 @@ pub(super) struct Candidate {
 pub(super) type Rows = Vec<Vec<Candidate>>;
 
 /// A curve with the cases of its rows.
-pub(super) struct Along<'a> {
+pub(super) struct RowCases<'a> {
     /// Returns the case at a row, and at positions between rows.
     pub(super) at: &'a dyn Fn(&[f64]) -> Option<Case>,
     /// The positions of the rows.
@@ -45,33 +45,33 @@ pub(super) struct Along<'a> {
 }
 
 /// Largest distance of orbits that continue each other in one step, as a fraction of their size.
-const FAR: f64 = 0.3;
+const MAX_CONTINUATION_DISTANCE: f64 = 0.3;
 /// Number of drive periods after the transient at which a motion that has not repeated is examined
 /// for the last time.
-const LAST_LOOK: usize = 64;
+const LAST_CHECK_PERIODS: usize = 64;
 /// Largest number of halvings of the step from one row to the next.
-const HALVINGS: usize = 4;
+const MAX_HALVINGS: usize = 4;
 /// Largest distance of an orbit from the measured state, as a fraction of that state, at which the
 /// two are the same motion.
-const UNLIKE: f64 = 0.2;
+const MAX_MOTION_DISTANCE: f64 = 0.2;
 /// Largest number of runs from measured states.
-const RUNS: usize = 6;
+const MAX_RUNS: usize = 6;
 
-impl Along<'_> {
+impl RowCases<'_> {
     /// Finds the orbits at every row.
     pub(super) fn discover(&self) -> Rows {
         let mut rows: Rows = vec![Vec::new(); self.places.len()];
         let mut branches = 0;
         let count = self.places.len();
-        self.pass(&mut rows, &mut branches, (0..count).collect(), None);
+        self.follow_motion(&mut rows, &mut branches, (0..count).collect(), None);
         let last = rows.last().and_then(|row| row.first()).cloned();
-        self.pass(
+        self.follow_motion(
             &mut rows,
             &mut branches,
             (0..count).rev().collect(),
             last.as_ref(),
         );
-        self.as_measured(&mut rows, &mut branches);
+        self.add_measured_motions(&mut rows, &mut branches);
         rows
     }
 
@@ -82,8 +82,8 @@ impl Along<'_> {
             let model = (self.at)(place)?.model().ok()?;
             let mut map = Strobe::new(&model);
             let one = |candidate: &Candidate| {
-                let orbit = continued(&mut map, &candidate.orbit)?;
-                let near = orbit.is_near(&candidate.orbit, FAR);
+                let orbit = newton_continuation(&mut map, &candidate.orbit)?;
+                let near = orbit.is_near(&candidate.orbit, MAX_CONTINUATION_DISTANCE);
                 (orbit.is_stable() && near).then_some(Candidate {
                     branch: candidate.branch,
                     orbit,
@@ -95,18 +95,18 @@ impl Along<'_> {
     }
 
     /// Adds the branches of motions near the measured one at rows where no orbit is near it.
-    fn as_measured(&self, rows: &mut Rows, branches: &mut usize) {
+    fn add_measured_motions(&self, rows: &mut Rows, branches: &mut usize) {
         let count = rows.len();
         // Rows that fail are usually neighbours: the next one tried is some distance away.
-        let apart = count / (2 * RUNS) + 1;
+        let apart = count / (2 * MAX_RUNS) + 1;
         let (mut runs, mut row) = (0, 0);
-        while row < count && runs < RUNS {
-            let Some(state) = self.unlike(row, &rows[row]) else {
+        while row < count && runs < MAX_RUNS {
+            let Some(state) = self.unmatched_state(row, &rows[row]) else {
                 row += 1;
                 continue;
             };
             runs += 1;
-            let found = self.settled(row, Some(&state));
+            let found = self.settle(row, Some(&state));
             let new = found.filter(|o| !rows[row].iter().any(|known| known.orbit.is_same_as(o)));
             let Some(orbit) = new else {
                 row += apart;
@@ -118,13 +118,13 @@ impl Along<'_> {
             rows[row].push(candidate.clone());
             let on: Vec<usize> = (row..count).collect();
             let back: Vec<usize> = (0..=row).rev().collect();
-            self.along(rows, &candidate, &on);
-            self.along(rows, &candidate, &back);
+            self.follow_branch(rows, &candidate, &on);
+            self.follow_branch(rows, &candidate, &back);
         }
     }
 
     /// The measured state at a row, if no known orbit is near it.
-    fn unlike(&self, row: usize, known: &[Candidate]) -> Option<Vec<f64>> {
+    fn unmatched_state(&self, row: usize, known: &[Candidate]) -> Option<Vec<f64>> {
         let model = (self.at)(&self.places[row])?.model().ok()?;
         let state = (self.measured)(row, &model)?;
         // Velocities relative to those of the drive.
@@ -142,17 +142,17 @@ impl Along<'_> {
         let like = |candidate: &Candidate| {
             let states = candidate.orbit.states.iter();
             let mut distances = states.map(|at| length(&|k| at[k] - state[k]));
-            distances.any(|distance| distance <= UNLIKE * size)
+            distances.any(|distance| distance <= MAX_MOTION_DISTANCE * size)
         };
         (!known.iter().any(like)).then_some(state)
     }
 
     /// Follows a new branch over the rows in this order, from the orbit of the first one.
-    fn along(&self, rows: &mut Rows, candidate: &Candidate, order: &[usize]) {
+    fn follow_branch(&self, rows: &mut Rows, candidate: &Candidate, order: &[usize]) {
         let mut last = candidate.orbit.clone();
         for pair in order.windows(2) {
             let [a, b] = [pair[0], pair[1]].map(|k| self.places[k].as_slice());
-            let Some(orbit) = self.follow(a, b, &last, HALVINGS) else {
+            let Some(orbit) = self.follow(a, b, &last, MAX_HALVINGS) else {
                 return;
             };
             let known = rows[pair[1]]
@@ -170,7 +170,7 @@ impl Along<'_> {
     }
 
     /// Follows the motion over the rows in this order.
-    fn pass(
+    fn follow_motion(
         &self,
         rows: &mut Rows,
         branches: &mut usize,
@@ -183,11 +183,11 @@ impl Along<'_> {
         for row in order {
             let continued = last.as_ref().and_then(|(before, candidate)| {
                 let [a, b] = [*before, row].map(|k| self.places[k].as_slice());
-                let orbit = self.follow(a, b, &candidate.orbit, HALVINGS)?;
+                let orbit = self.follow(a, b, &candidate.orbit, MAX_HALVINGS)?;
                 Some((orbit, Some(candidate.branch)))
             });
             let found = continued.or_else(|| {
-                let orbit = self.settled(row, state.as_deref())?;
+                let orbit = self.settle(row, state.as_deref())?;
                 Some((orbit, None))
             });
             let Some((orbit, branch)) = found else {
@@ -201,7 +201,7 @@ impl Along<'_> {
             let candidate = if let Some(known) = known {
                 known.clone()
             } else {
-                let branch = branch.or_else(|| self.known(rows, row, &orbit));
+                let branch = branch.or_else(|| self.branch_of(rows, row, &orbit));
                 let branch = branch.unwrap_or_else(|| {
                     *branches += 1;
                     *branches - 1
@@ -216,7 +216,7 @@ impl Along<'_> {
 
     /// The branch of a newly found orbit: that of an orbit at the nearest row with any, if it
     /// continues to this one.
-    fn known(&self, rows: &Rows, row: usize, orbit: &PeriodicOrbit) -> Option<usize> {
+    fn branch_of(&self, rows: &Rows, row: usize, orbit: &PeriodicOrbit) -> Option<usize> {
         let here = &self.places[row];
         let away = |k: &usize| {
             let place = self.places[*k].iter().zip(here);
@@ -226,7 +226,7 @@ impl Along<'_> {
         let near = others.min_by(|a, b| away(a).total_cmp(&away(b)))?;
         let mut there = rows[near].iter();
         let continues = there.find(|candidate| {
-            let found = self.follow(&self.places[near], here, &candidate.orbit, HALVINGS);
+            let found = self.follow(&self.places[near], here, &candidate.orbit, MAX_HALVINGS);
             found.is_some_and(|found| found.is_same_as(orbit))
         });
         continues.map(|candidate| candidate.branch)
@@ -242,10 +242,10 @@ impl Along<'_> {
     ) -> Option<PeriodicOrbit> {
         let closed = (self.at)(to).and_then(|case| {
             let model = case.model().ok()?;
-            continued(&mut Strobe::new(&model), orbit)
+            newton_continuation(&mut Strobe::new(&model), orbit)
         });
         // Beyond a fold Newton may find an orbit of another branch.
-        let near = |found: &PeriodicOrbit| found.is_near(orbit, FAR);
+        let near = |found: &PeriodicOrbit| found.is_near(orbit, MAX_CONTINUATION_DISTANCE);
         let closed = closed.filter(|found| found.is_stable() && near(found));
         if closed.is_some() || halvings == 0 {
             return closed;
@@ -256,15 +256,15 @@ impl Along<'_> {
     }
 
     /// The orbit that the motion at a row reaches from a state, or from rest.
-    fn settled(&self, row: usize, state: Option<&[f64]>) -> Option<PeriodicOrbit> {
+    fn settle(&self, row: usize, state: Option<&[f64]>) -> Option<PeriodicOrbit> {
         let model = (self.at)(&self.places[row])?.model().ok()?;
-        settled(&model, state, self.max_period)
+        settle(&model, state, self.max_period)
     }
 }
 
 /// The orbit of up to `max_period` drive periods that the motion from a state, or from rest,
 /// reaches.
-pub(super) fn settled(
+pub(super) fn settle(
     model: &Model,
     state: Option<&[f64]>,
     max_period: usize,
@@ -277,8 +277,8 @@ pub(super) fn settled(
         long_period: max_period,
         lyapunov: LyapunovOptions {
             alignment: 0,
-            min_periods: LAST_LOOK,
-            max_periods: LAST_LOOK,
+            min_periods: LAST_CHECK_PERIODS,
+            max_periods: LAST_CHECK_PERIODS,
             ..LyapunovOptions::default()
         },
         birkhoff_periods: 0,
@@ -292,7 +292,10 @@ pub(super) fn settled(
 }
 
 /// The orbit of this map that Newton finds from another orbit of the same period.
-pub(super) fn continued(map: &mut Strobe, orbit: &PeriodicOrbit) -> Option<PeriodicOrbit> {
+pub(super) fn newton_continuation(
+    map: &mut Strobe,
+    orbit: &PeriodicOrbit,
+) -> Option<PeriodicOrbit> {
     if orbit.dimension() != map.dimension() {
         return None;
     }
@@ -352,8 +355,13 @@ pub(super) fn path(rows: &Rows, costs: &[Vec<f64>], price: f64) -> Vec<Option<us
 /// Removes the last row before and the first row after each change of branch from the other branch,
 /// if it is assigned to that branch only because its own has no orbit there. With slightly wrong
 /// parameters a branch ends too early, and a row assigned to the other branch would bias the fit.
-/// `costs` as in [`path`]; `dear` is more than the cost of noise.
-pub(super) fn leave_ends(rows: &Rows, costs: &[Vec<f64>], dear: f64, chosen: &mut [Option<usize>]) {
+/// `costs` as in [`path`]; `max_noise_cost` is more than the cost of noise.
+pub(super) fn release_branch_ends(
+    rows: &Rows,
+    costs: &[Vec<f64>],
+    max_noise_cost: f64,
+    chosen: &mut [Option<usize>],
+) {
     let branch = |chosen: &[Option<usize>], row: usize| {
         chosen[row].map(|candidate| rows[row][candidate].branch)
     };
@@ -365,7 +373,8 @@ pub(super) fn leave_ends(rows: &Rows, costs: &[Vec<f64>], dear: f64, chosen: &mu
             continue;
         }
         for (here, other) in [(row - 1, b), (row, a)] {
-            let is_dear = before[here].is_some_and(|candidate| costs[here][candidate] > dear);
+            let is_dear =
+                before[here].is_some_and(|candidate| costs[here][candidate] > max_noise_cost);
             let has_other = rows[here].iter().any(|candidate| candidate.branch == other);
             if is_dear && !has_other {
                 chosen[here] = None;

@@ -31,7 +31,7 @@ pub struct Data {
     /// The measured quantities, each once.
     pub columns: Vec<Column>,
     /// The keys that rows set, first the one that varies along the curves.
-    pub swept: Vec<Swept>,
+    pub swept: Vec<SweptKey>,
     /// Number of rows that belong to neither direction and are left out.
     pub left_out: usize,
 }
@@ -53,14 +53,14 @@ pub struct Column {
 
 /// A key that rows set.
 #[derive(Clone, Debug)]
-pub struct Swept {
+pub struct SweptKey {
     /// The key.
     pub key: Key,
-    /// What the data call it.
+    /// Name of the column in the data.
     pub name: String,
-    /// The unit that the data give it; empty for none.
+    /// Unit in the data; empty if there is none.
     pub unit: String,
-    /// A unit of the data in that of the key.
+    /// Factor from the unit of the data to that of the key.
     pub factor: f64,
 }
 
@@ -123,14 +123,14 @@ impl Data {
         if data.columns.is_empty() {
             return Err(Error::option(
                 "data",
-                "nothing measured is among the columns",
+                "no column is a measured quantity",
                 "name them as in: distance (nm), amplitude (nm), phase (deg)",
             ));
         }
         if data.swept.is_empty() {
             return Err(Error::option(
                 "data",
-                "no column says where the values were measured",
+                "no column gives the positions of the measured values",
                 "give `distance (nm)`, or another key of the case such as `drive.frequency (kHz)`",
             ));
         }
@@ -142,11 +142,11 @@ impl Data {
             return Err(Error::option(
                 "data",
                 format!(
-                    "`{}` stands beside a curve under frequency modulation, which holds amplitude \
+                    "`{}` cannot be combined with a curve under frequency modulation, which holds amplitude \
                      and phase",
                     observed.name
                 ),
-                "name the {columns} that count: frequency_shift, drive_ratio",
+                "select {columns}: frequency_shift, drive_ratio",
             ));
         }
         data.finish();
@@ -194,12 +194,12 @@ impl Data {
             if let Some(before) = roles.iter().position(|known| known.is_same(&role)) {
                 return Err(Error::input(
                     format!(
-                        "{}: column {} `{}` says the same",
+                        "{}: column {} `{}` is the same quantity",
                         table.place(None, index),
                         before + 1,
                         table.columns[before].0
                     ),
-                    "name the columns that count, with {columns}",
+                    "select columns with {columns}",
                 ));
             }
             roles.push(role);
@@ -246,7 +246,7 @@ impl Data {
             Role::Set(key, factor) => {
                 let known = self.swept.iter().position(|swept| swept.key == *key);
                 known.unwrap_or_else(|| {
-                    self.swept.push(Swept {
+                    self.swept.push(SweptKey {
                         key: *key,
                         name: header.name.clone(),
                         unit: header.unit.clone(),
@@ -299,7 +299,7 @@ impl Data {
                 (Role::Way, Entry::Text(word)) => {
                     row.way = way(word);
                     if row.way.is_none() {
-                        return refuse(format!("`{word}` is no direction"), DIRECTIONS);
+                        return refuse(format!("`{word}` is not a direction"), DIRECTIONS);
                     }
                     None
                 }
@@ -312,12 +312,12 @@ impl Data {
                     None
                 }
                 (Role::Way, Entry::Number(number)) => {
-                    return refuse(format!("{number} is no direction"), DIRECTIONS);
+                    return refuse(format!("{number} is not a direction"), DIRECTIONS);
                 }
                 (_, Entry::Text(text)) => {
                     return refuse(
-                        format!("`{text}` is no number"),
-                        "write numbers with a point, and leave empty what is not known",
+                        format!("`{text}` is not a number"),
+                        "write numbers with a decimal point, and leave missing values empty",
                     );
                 }
                 (_, Entry::Number(number)) if !number.is_finite() => {
@@ -332,8 +332,8 @@ impl Data {
                 Role::Error(quantity, factor) => {
                     if number <= 0.0 {
                         return refuse(
-                            format!("{number} is no standard error"),
-                            "it must be above zero; leave it empty where it is not known",
+                            format!("{number} is not a standard error"),
+                            "it must be above zero; leave it empty if it is unknown",
                         );
                     }
                     let at = self.columns.iter().position(|c| c.quantity == *quantity);
@@ -350,9 +350,9 @@ impl Data {
                 match column {
                     Some(column) => {
                         let place = table.place(Some(index), column);
-                        format!("{place}: where the row was measured is missing")
+                        format!("{place}: the position of the row is missing")
                     }
-                    None => format!("{} does not say {key}, as the others do", table.name),
+                    None => format!("{} does not give {key}, as the other tables do", table.name),
                 },
                 "give it in every row of every table",
             ));
@@ -410,7 +410,7 @@ pub(super) fn is_distance(key: Key) -> bool {
     matches!(key, Key::GapTip | Key::Alpha5 | Key::OscillatorGap)
 }
 
-const DIRECTIONS: &str = "write approach or retract, of other sweeps up or down";
+const DIRECTIONS: &str = "write approach or retract; for other sweeps, up or down";
 
 /// Parses a direction: an upward sweep comes first, as an approach does.
 fn way(word: &str) -> Option<Way> {
@@ -506,8 +506,8 @@ impl Header {
             return match column.role(case, own_amplitude)? {
                 Role::Measured(quantity, factor) => Ok(Role::Error(quantity, factor)),
                 _ => Err(Error::input(
-                    format!("errors are taken of what was measured, and `{of}` is set"),
-                    "leave the column away",
+                    format!("`{of}` is set, not measured, and has no standard error"),
+                    "omit the column",
                 )),
             };
         }
@@ -531,11 +531,11 @@ impl Header {
                 .parse(&format!("1 {unit}"))
                 .map_err(|error| Error::input(error.to_string(), "change the unit in brackets")),
             (_, None, unit) => Err(Error::input(
-                format!("`{unit}` is no unit here"),
+                format!("`{unit}` is not a unit of this quantity"),
                 if case.is_physical() {
-                    "it has none: leave the brackets away"
+                    "it has no unit: omit the brackets"
                 } else {
-                    "a dimensionless case has its own units: leave the brackets away, or give a \
+                    "a dimensionless case has its own units: omit the brackets, or give a \
                      case in physical quantities"
                 },
             )),
@@ -573,8 +573,8 @@ pub(super) fn set(name: &str, case: &Case) -> Result<Key, Error> {
         Error::input(
             format!("`{name}` is neither an observable nor a key of the case"),
             match near {
-                Some(near) => format!("did you mean `{near}`? or name the {{columns}} that count"),
-                None => "name the {columns} that count".to_owned(),
+                Some(near) => format!("did you mean `{near}`? or select {{columns}}"),
+                None => "select {columns}".to_owned(),
             },
         )
     })

@@ -24,7 +24,7 @@ use nanotap_dynamics::{
 use crate::case::{Case, Family, Key};
 use crate::map::Map;
 
-use super::data::Swept;
+use super::data::SweptKey;
 
 /// Two neighbouring rows of a curve on different branches.
 #[derive(Clone, Debug)]
@@ -73,7 +73,7 @@ impl Fold {
     /// with the other values that the row sets.
     pub(super) fn beyond(
         base: &Case,
-        swept: &Swept,
+        swept: &SweptKey,
         (at, orbit): (f64, &PeriodicOrbit),
         (jump, offset): (&Jump, f64),
     ) -> Option<Self> {
@@ -192,7 +192,7 @@ mod tests {
         let MotionKind::Periodic(orbit) = end.kind else {
             panic!("{end:?}")
         };
-        let swept = Swept {
+        let swept = SweptKey {
             key: Key::GapTip,
             name: "distance".into(),
             unit: "nm".into(),

@@ -25,7 +25,7 @@ pub(super) fn compare(
     if let Some(twice) = (1..laws.len()).find(|k| laws[..*k].contains(&laws[*k])) {
         return Err(Error::option(
             "laws",
-            format!("{} stands there twice", laws[twice].text()),
+            format!("{} is listed twice", laws[twice].text()),
             "name each law once",
         ));
     }
@@ -34,8 +34,8 @@ pub(super) fn compare(
             if !laws.iter().any(|law| takes(law, &name)) {
                 return Err(Error::option(
                     option,
-                    format!("none of these laws takes {name}"),
-                    "free what at least one of them has",
+                    format!("none of these laws has the parameter {name}"),
+                    "free parameters of at least one of them",
                 ));
             }
         }
@@ -74,7 +74,7 @@ pub(super) fn compare(
     let Some(best) = best else {
         return Err(Error::new(
             crate::ErrorKind::Stopped,
-            "stopped before anything was fitted",
+            "stopped before the first fit was finished",
         ));
     };
     let compared = table(&found);
@@ -167,7 +167,7 @@ fn cautions(best: &str, laws: &[ComparedLaw]) -> Vec<String> {
         .collect();
     if !near.is_empty() {
         cautions.push(format!(
-            "the data hardly tell {best} from {}: Akaike's criterion differs by less than {DECIDED}",
+            "the data hardly distinguish {best} from {}: Akaike's criterion differs by less than {DECIDED}",
             near.join(" and ")
         ));
     }
@@ -175,7 +175,7 @@ fn cautions(best: &str, laws: &[ComparedLaw]) -> Vec<String> {
     let by_bic = known.min_by(|a, b| a.bic.unwrap_or(0.0).total_cmp(&b.bic.unwrap_or(0.0)));
     if let Some(other) = by_bic.filter(|law| law.law != best) {
         cautions.push(format!(
-            "Schwarz's criterion, which counts parameters more, prefers {}",
+            "Schwarz's criterion, with a larger penalty for parameters, prefers {}",
             other.law
         ));
     }

@@ -38,7 +38,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 pub use crate::case::table::{Entry, MOST_ROWS, Table};
-pub use data::{Column, Curve, Data, Row, Swept};
+pub use data::{Column, Curve, Data, Row, SweptKey};
 pub use quantity::Quantity;
 pub use report::{
     ComparedLaw, CurveCase, FitReport, FittedColumn, FittedJump, FittedParameter, FittedRow,
@@ -58,9 +58,9 @@ use crate::study::setpoint::at_setpoint;
 use crate::study::value::Intervals;
 
 /// Largest number of initial values of a fit.
-const MOST_STARTS: usize = 1000;
+const MAX_STARTS: usize = 1000;
 /// Longest period of the orbits in drive periods.
-const MOST_PERIOD: usize = 64;
+const MAX_PERIOD: usize = 64;
 
 /// Options of a fit.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -86,13 +86,13 @@ pub struct FitOptions {
     #[schemars(extend("x-value" = "LAW,…"))]
     pub laws: Vec<String>,
     /// Initial values to try until the data are described
-    #[schemars(range(min = 1, max = MOST_STARTS), extend("x-value" = "S"))]
+    #[schemars(range(min = 1, max = MAX_STARTS), extend("x-value" = "S"))]
     pub starts: usize,
     /// Seed of the further initial values
     #[schemars(extend("x-value" = "K"))]
     pub seed: u64,
     /// Longest period of the orbits, in drive periods
-    #[schemars(range(min = 1, max = MOST_PERIOD), extend("x-value" = "N"))]
+    #[schemars(range(min = 1, max = MAX_PERIOD), extend("x-value" = "N"))]
     pub max_period: usize,
     /// Use the locations of jumps at folds as data
     #[schemars(extend("x-no" = "Only the rows count, not the places of jumps"))]
@@ -175,7 +175,7 @@ fn with_search<R>(
     work: impl FnOnce(&Search<'_>) -> Result<R, Error>,
 ) -> Result<R, Error> {
     if request.data.is_empty() {
-        return Err(Error::option("data", "there are no data", "give a table"));
+        return Err(Error::option("data", "no data were given", "give a table"));
     }
     let data = Data::read(case, &request.data, &names(&request.columns))?;
     let sets_distance = data.swept.iter().any(|s| data::is_distance(s.key));
@@ -232,8 +232,8 @@ pub fn residuals(
         let count = search.problem.parameters.len();
         if values.len() != count {
             return Err(Error::input(
-                format!("{} values for {count} parameters", values.len()),
-                "give one a parameter",
+                format!("got {} values for {count} parameters", values.len()),
+                "give one value per parameter",
             ));
         }
         let problem = search.weighted(search.rough_noise(), None);

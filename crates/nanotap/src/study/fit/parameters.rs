@@ -32,7 +32,7 @@ pub(super) struct Parameter {
     pub(super) name: String,
     /// What it changes.
     pub(super) target: Target,
-    /// The curve that it belongs to; `None`: all.
+    /// Index of its curve; `None`: all curves.
     pub(super) curve: Option<usize>,
     /// Initial value.
     pub(super) start: f64,
@@ -97,7 +97,7 @@ pub(super) fn parameters(
     if free.is_empty() && per_curve.is_empty() {
         return Err(Error::option(
             "free",
-            "nothing is free",
+            "no parameter is free",
             "name keys of the case, as in sample.stiffness,gap.offset",
         ));
     }
@@ -113,7 +113,7 @@ pub(super) fn parameters(
             {
                 return Err(Error::option(
                     option,
-                    format!("{name} is free twice"),
+                    format!("{name} is listed twice"),
                     "name each parameter once",
                 ));
             }
@@ -137,7 +137,7 @@ pub(super) fn parameters(
         return Err(Error::option(
             "bounds",
             format!("{} is not free", unknown.name),
-            "bound what is named in {free} or {per_curve}",
+            "bounds need a parameter in {free} or {per_curve}",
         ));
     }
     let count = data.count();
@@ -166,13 +166,13 @@ fn parameter(
         return nuisance(case, data, name, of, what);
     }
     let key = case.key(name)?;
-    let same = |swept: &&data::Swept| {
+    let same = |swept: &&data::SweptKey| {
         swept.key == key || key.alternatives().any(|(other, _)| other == swept.key)
     };
     if let Some(swept) = data.swept.iter().find(same) {
         return Err(Error::input(
-            format!("{name} is what the column `{}` sets", swept.name),
-            format!("free {}.offset for an error of it", swept.name),
+            format!("{name} is set by the column `{}`", swept.name),
+            format!("free {}.offset to allow for an error", swept.name),
         ));
     }
     let mut start = case.get(key);
@@ -184,7 +184,7 @@ fn parameter(
     }
     if !start.is_finite() {
         return Err(Error::input(
-            format!("the case does not say where {name} begins"),
+            format!("{name} has no initial value in the case"),
             "give it a value in the case, or {bounds}",
         ));
     }
@@ -227,7 +227,7 @@ fn nuisance(
     let swept = || {
         let key = data::set(of, case).ok()?;
         let same =
-            |swept: &data::Swept| swept.key == key || is_distance(swept.key) && is_distance(key);
+            |swept: &data::SweptKey| swept.key == key || is_distance(swept.key) && is_distance(key);
         data.swept.iter().position(same)
     };
     let (target, start, size, bounds) = match (column, what) {
@@ -253,7 +253,7 @@ fn nuisance(
                     .chain(data.swept.iter().map(|s| s.name.as_str()))
                     .collect();
                 return Err(Error::input(
-                    format!("{name}: `{of}` is no column that has one"),
+                    format!("{name}: `{of}` is not a column with this correction"),
                     format!("there are {}", names.join(", ")),
                 ));
             }
@@ -298,7 +298,7 @@ fn bound(
     if !(low < high && low <= most && high >= least) {
         return Err(Error::input(
             format!(
-                "{}: nothing lies between {} and {}",
+                "{}: the bounds {} and {} are not in ascending order",
                 parameter.name, ends[0], ends[1]
             ),
             "give the lower bound first",
@@ -313,5 +313,5 @@ fn bound(
 }
 
 fn no_number(amount: &Amount) -> Error {
-    Error::input(format!("`{amount}` is no number"), "give a number")
+    Error::input(format!("`{amount}` is not a number"), "give a number")
 }

@@ -8,13 +8,13 @@ use super::solve::{
 use super::statistics::Information;
 
 /// Largest number of evaluations of the profile on each side.
-const LOOKS: usize = 6;
+const MAX_EVALUATIONS: usize = 6;
 /// Largest number of steps of the other parameters per evaluation.
-const STEPS: usize = 4;
+const MAX_STEPS: usize = 4;
 /// Smallest predicted gain of chi2 for which a step is taken.
-const FLAT: f64 = 1e-3;
+const MIN_GAIN: f64 = 1e-3;
 /// Accuracy of the quantile, in standard errors.
-const CLOSE: f64 = 0.01;
+const QUANTILE_TOLERANCE: f64 = 0.01;
 
 /// Result of the profiles.
 pub(super) enum Profile {
@@ -66,7 +66,7 @@ enum End {
 }
 
 /// The minimum of chi2 with one parameter fixed.
-struct Least {
+struct ConstrainedMinimum {
     x: Vec<f64>,
     point: Point,
     chi2: f64,
@@ -87,10 +87,10 @@ fn end(
     let (low, high) = bounds[k];
     let at = |t: f64| stepped(best.x[k], side * t * error, low);
     // Gain of chi2 and the minimum, at this many standard errors from the best value.
-    let mut inner: (f64, f64, Option<Least>) = (0.0, 0.0, None);
+    let mut inner: (f64, f64, Option<ConstrainedMinimum>) = (0.0, 0.0, None);
     let mut outer: Option<(f64, f64)> = None;
     let mut t = width;
-    for _ in 0..LOOKS {
+    for _ in 0..MAX_EVALUATIONS {
         let value = at(t);
         if value < low || value > high {
             return End::None;
@@ -126,7 +126,7 @@ fn end(
         let gained = found.as_ref().map_or(f64::INFINITY, |found| {
             (found.chi2 - best.cost).max(0.0).sqrt()
         });
-        if (gained - width).abs() < CLOSE {
+        if (gained - width).abs() < QUANTILE_TOLERANCE {
             return End::At(value);
         }
         if gained < width {
@@ -161,23 +161,23 @@ fn least(
     point: Point,
     best: &Solution<Point>,
     k: usize,
-) -> Option<Least> {
+) -> Option<ConstrainedMinimum> {
     let lost = |point: &Point| point.iter().filter(|row| row.lost).count();
     let most = lost(&best.point);
     if lost(&point) > most {
         return None;
     }
-    let Steps { x, point, least } = few_steps(problem, x, point, best, k)?;
+    let StepResult { x, point, least } = few_steps(problem, x, point, best, k)?;
     if let Some(chi2) = least {
-        return Some(Least { x, point, chi2 });
+        return Some(ConstrainedMinimum { x, point, chi2 });
     }
     let held = x[k];
     let parameters = problem.parameters.iter().enumerate();
     let bounds: Vec<(f64, f64)> = parameters
         .map(|(j, p)| if j == k { (held, held) } else { p.bounds })
         .collect();
-    let solution = minimise(problem, x, point, &bounds, FLAT)?;
-    (lost(&solution.point) <= most).then_some(Least {
+    let solution = minimise(problem, x, point, &bounds, MIN_GAIN)?;
+    (lost(&solution.point) <= most).then_some(ConstrainedMinimum {
         x: solution.x,
         point: solution.point,
         chi2: solution.cost,
@@ -185,7 +185,7 @@ fn least(
 }
 
 /// Result of a few steps.
-struct Steps {
+struct StepResult {
     x: Vec<f64>,
     point: Point,
     /// chi2 after them, if no further step promises to reduce it.
@@ -199,13 +199,13 @@ fn few_steps(
     mut point: Point,
     best: &Solution<Point>,
     k: usize,
-) -> Option<Steps> {
+) -> Option<StepResult> {
     let others = best.jacobian.clone().remove_column(k);
     let mut residuals = problem.residuals(&x, &point);
     let mut cost = residuals.norm_squared();
     if others.ncols() == 0 {
         let least = Some(cost);
-        return Some(Steps { x, point, least });
+        return Some(StepResult { x, point, least });
     }
     // Combinations that the data do not determine are not changed.
     let mut normal = others.tr_mul(&others);
@@ -214,10 +214,10 @@ fn few_steps(
     }
     let factor = normal.lu();
     let mut least = None;
-    for _ in 0..STEPS {
+    for _ in 0..MAX_STEPS {
         let step = factor.solve(&others.tr_mul(&residuals))?;
         let promised = cost - (&residuals - &others * &step).norm_squared();
-        if promised.is_nan() || promised <= FLAT {
+        if promised.is_nan() || promised <= MIN_GAIN {
             least = Some(cost);
             break;
         }
@@ -237,5 +237,5 @@ fn few_steps(
         (x, point, cost) = (next, at, then.norm_squared());
         residuals = then;
     }
-    Some(Steps { x, point, least })
+    Some(StepResult { x, point, least })
 }

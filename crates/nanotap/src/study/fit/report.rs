@@ -140,7 +140,7 @@ pub struct Undetermined {
     pub words: String,
     /// The parameters in it.
     pub keys: Vec<String>,
-    /// Their changes, in parts of their sizes, of length 1 together.
+    /// Their changes relative to their sizes, with total length 1.
     pub direction: Vec<f64>,
     /// Change of the residuals for this change, in standard errors: below 1.
     pub singular_value: f64,

@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 
 use crate::case::Case;
 
-use super::MOST_PERIOD;
-use super::branches::settled;
+use super::MAX_PERIOD;
+use super::branches::settle;
 use super::data::Data;
 use super::jumps::Jump;
 use super::parameters::{self, Parameter};
@@ -15,15 +15,15 @@ use super::report::{
     CurveCase, FitReport, FittedColumn, FittedJump, FittedParameter, FittedRow, OtherOrbit,
     Reading, Undetermined,
 };
-use super::search::{Found, Search, UNLIKELY, branches_of};
+use super::search::{Found, MIN_PROBABILITY, Search, branches_of};
 use super::statistics::{self, Information, information, persistence, student};
 
 /// Smallest reduction of chi2 near the best values that counts.
-const DEEPER: f64 = 0.1;
+const MIN_REDUCTION: f64 = 0.1;
 /// Largest number of times that a fit continues from a lower chi2 of its profile.
-const DEEPER_ROUNDS: usize = 4;
+const MAX_CONTINUATIONS: usize = 4;
 /// Largest number of rows that a remark lists.
-const SAID: usize = 8;
+const MAX_LISTED_ROWS: usize = 8;
 
 impl Search<'_> {
     /// The problem with the standard errors and the jumps of a result.
@@ -155,7 +155,7 @@ impl Search<'_> {
     /// The intervals of the parameters. If chi2 is lower near the best values, the fit continues
     /// from there.
     fn with_intervals(&self, mut found: Found) -> (Found, Vec<[Option<f64>; 2]>) {
-        let mut rounds = DEEPER_ROUNDS;
+        let mut rounds = MAX_CONTINUATIONS;
         loop {
             let information = self.information(&found);
             let width = if self.all_given() {
@@ -166,7 +166,11 @@ impl Search<'_> {
             let profiled = self.request.profile && !self.control.is_cancelled();
             let profiled = profiled.then(|| {
                 let problem = self.problem_of(&found);
-                let deeper = if rounds > 0 { DEEPER } else { f64::INFINITY };
+                let deeper = if rounds > 0 {
+                    MIN_REDUCTION
+                } else {
+                    f64::INFINITY
+                };
                 profile(&problem, &found.solution, &information, width, deeper)
             });
             let Some(profiled) = profiled.filter(|_| !self.control.is_cancelled()) else {
@@ -235,31 +239,39 @@ impl Search<'_> {
         let lost: Vec<_> = rows.iter().zip(points).filter(|(_, p)| p.lost).collect();
         let lines: Vec<String> = lost
             .iter()
-            .take(SAID)
+            .take(MAX_LISTED_ROWS)
             .map(|(r, _)| r.1.line.to_string())
             .collect();
-        let lines = lines.join(", ") + if lost.len() > SAID { ", …" } else { "" };
+        let lines = lines.join(", ")
+            + if lost.len() > MAX_LISTED_ROWS {
+                ", …"
+            } else {
+                ""
+            };
         if problem.held.is_some() {
             return format!(
-                "{} of {} rows have no orbit with the amplitude and phase that are held and do not \
+                "{} of {} rows have no orbit with the given amplitude and phase and do not \
                  count: lines {lines}",
                 lost.len(),
                 rows.len()
             );
         }
         let cases = problem.cases(x);
-        let longer = lost.iter().take(SAID).filter_map(|((curve, row), _)| {
-            let case = problem.case_at(&cases[*curve], &problem.place(x, *curve, row));
-            let orbit = settled(&case.model().ok()?, None, MOST_PERIOD)?;
-            (orbit.period > problem.max_period).then_some(orbit.period)
-        });
+        let longer = lost
+            .iter()
+            .take(MAX_LISTED_ROWS)
+            .filter_map(|((curve, row), _)| {
+                let case = problem.case_at(&cases[*curve], &problem.place(x, *curve, row));
+                let orbit = settle(&case.model().ok()?, None, MAX_PERIOD)?;
+                (orbit.period > problem.max_period).then_some(orbit.period)
+            });
         let longer: Vec<usize> = longer.collect();
         let said = match longer.iter().max() {
             None => String::new(),
             Some(most) => {
                 let periods: Vec<String> = longer.iter().map(usize::to_string).collect();
                 format!(
-                    "; from rest the motion comes to repeat there after {} periods, which a \
+                    "; from rest the motion there repeats after {} periods, which a \
                      max_period of {most} takes",
                     periods.join(", ")
                 )
@@ -287,7 +299,7 @@ impl Search<'_> {
         let mut remarks = Vec::new();
         if data.left_out > 0 {
             remarks.push(format!(
-                "{} rows of neither way are left out: which motion a curve shows is told by its \
+                "{} rows of neither direction are left out: the motion of a curve follows from its \
                  own rows",
                 data.left_out
             ));
@@ -314,7 +326,7 @@ impl Search<'_> {
                 ));
             }
         }
-        let unlikely = p_value.filter(|p| *p < UNLIKELY).map(|_| {
+        let unlikely = p_value.filter(|p| *p < MIN_PROBABILITY).map(|_| {
             format!(
                 "chi2 = {:.4e} with {} degrees of freedom: the residuals are larger than the \
                  standard errors that the data give",
@@ -329,7 +341,7 @@ impl Search<'_> {
         let reason = if 2 * lost > point.len() {
             Some("more than half of the rows have no periodic orbit".to_owned())
         } else if nothing {
-            Some("the residuals are as large as the data vary".to_owned())
+            Some("the residuals are as large as the variation of the data".to_owned())
         } else {
             unlikely
         };
@@ -453,7 +465,7 @@ fn undetermined(
             let changes: Vec<String> = parts.iter().map(change).collect();
             let names: Vec<String> = parts.iter().map(|k| name(*k)).collect();
             format!(
-                "the data do not tell {} apart: changing {} leaves what was measured as it is",
+                "the data do not separate {}: changing {} does not change the measured values",
                 names.join(" and "),
                 changes.join(" and ")
             )

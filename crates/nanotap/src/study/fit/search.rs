@@ -29,23 +29,23 @@ pub(super) struct Found {
 }
 
 /// Standard error of a rough fit, as a fraction of a column's spread.
-const ROUGH: f64 = 0.03;
+const ROUGH_ERROR: f64 = 0.03;
 /// Rough standard errors above which a residual counts by its logarithm.
-const FAR: f64 = 3.0;
+const ROBUST_LIMIT: f64 = 3.0;
 /// Mean squared rough residual above which the data are not described.
-const POOR: f64 = 1.0;
+const MAX_MISFIT: f64 = 1.0;
 /// Number of residuals of a column from which on their signs distinguish noise from a misfit.
-const TELLING: usize = 12;
+const MIN_RESIDUALS: usize = 12;
 /// Largest mean squared residual of a description, relative to the column's spread.
-const SMALL: f64 = 0.1;
+const SMALL_MISFIT: f64 = 0.1;
 /// Largest correlation of neighbouring residuals of noise, in standard errors.
-const INDEPENDENT: f64 = 2.0;
+const MAX_CORRELATION: f64 = 2.0;
 /// Probability of chi2 below which the model does not describe the data.
-pub(super) const UNLIKELY: f64 = 1e-6;
+pub(super) const MIN_PROBABILITY: f64 = 1e-6;
 /// Relative difference below which two misfits are equal.
-const SAME: f64 = 1e-3;
+const MISFIT_TOLERANCE: f64 = 1e-3;
 /// Largest number of times that branches are assigned again.
-const ROUNDS: usize = 6;
+const MAX_ROUNDS: usize = 6;
 
 impl<'a> Search<'a> {
     pub(super) fn run(&self) -> Result<FitReport, Error> {
@@ -69,7 +69,8 @@ impl<'a> Search<'a> {
                 best = Some(found);
             }
             // Two initial values that lead to the same minimum are enough to accept it.
-            if good || least.is_some_and(|least| (misfit - least).abs() <= SAME * least) {
+            if good || least.is_some_and(|least| (misfit - least).abs() <= MISFIT_TOLERANCE * least)
+            {
                 break;
             }
         }
@@ -77,11 +78,11 @@ impl<'a> Search<'a> {
             if self.control.is_cancelled() {
                 Error::new(
                     crate::ErrorKind::Stopped,
-                    "stopped before anything was fitted",
+                    "stopped before the first fit was finished",
                 )
             } else {
                 Error::numerics(format!(
-                    "no periodic orbit was found where the data are, from {tried} start(s)"
+                    "no periodic orbit was found for the data, from {tried} initial value(s)"
                 ))
                 .remedy("change the case, or give {bounds} and more {starts}")
             }
@@ -144,19 +145,19 @@ impl<'a> Search<'a> {
     pub(super) fn rough_noise(&self) -> Vec<f64> {
         let columns = self.problem.data.columns.iter();
         columns
-            .map(|c| ROUGH * c.spread.max(f64::MIN_POSITIVE))
+            .map(|c| ROUGH_ERROR * c.spread.max(f64::MIN_POSITIVE))
             .collect()
     }
 
     /// Fits from initial values until branches and parameters are approximately right.
     fn rough(&self, mut x: Vec<f64>) -> Vec<f64> {
-        let mut problem = self.weighted(self.rough_noise(), Some(FAR));
+        let mut problem = self.weighted(self.rough_noise(), Some(ROBUST_LIMIT));
         // Given errors are much smaller; they are used in the end.
         let plain = plain_errors(problem.data);
         problem.data = &plain;
         let mut before: Option<Vec<usize>> = None;
         let mut known: Option<Vec<Rows>> = None;
-        for _ in 0..ROUNDS {
+        for _ in 0..MAX_ROUNDS {
             if self.control.is_cancelled() {
                 break;
             }
@@ -184,7 +185,7 @@ impl<'a> Search<'a> {
         let mut noise = self.rough_noise();
         let mut found: Option<Found> = None;
         let mut steps = 0;
-        for _ in 0..ROUNDS {
+        for _ in 0..MAX_ROUNDS {
             if self.control.is_cancelled() {
                 break;
             }
@@ -299,8 +300,8 @@ impl<'a> Search<'a> {
 
     /// True if the model describes the data: the residuals are small, or noise.
     fn describes(&self, found: &Found) -> bool {
-        (self.misfit(found) < POOR * ROUGH * ROUGH || self.leaves_noise(found))
-            && (!self.all_given() || self.probability(found) > UNLIKELY)
+        (self.misfit(found) < MAX_MISFIT * ROUGH_ERROR * ROUGH_ERROR || self.leaves_noise(found))
+            && (!self.all_given() || self.probability(found) > MIN_PROBABILITY)
     }
 
     /// True if the residuals are smaller than the spread, do not keep their sign from row to row,
@@ -319,10 +320,10 @@ impl<'a> Search<'a> {
                 let count = left.len() as f64;
                 // The largest of n normal deviates is about √(2 ln n).
                 let usual = (2.0 * nanotap_arithmetic::ln(count)).sqrt() + 0.5;
-                left.len() >= TELLING
+                left.len() >= MIN_RESIDUALS
                     && largest < usual * (squares / count).sqrt()
-                    && squares < SMALL * count
-                    && persistence(&left) < INDEPENDENT
+                    && squares < SMALL_MISFIT * count
+                    && persistence(&left) < MAX_CORRELATION
             })
     }
 

@@ -39,13 +39,13 @@ pub(super) struct Solution<P> {
 }
 
 /// Largest number of steps, accepted or rejected.
-const MOST_STEPS: usize = 60;
+const MAX_STEPS: usize = 60;
 /// Largest damping.
-const MOST_DAMPING: f64 = 1e16;
+const MAX_DAMPING: f64 = 1e16;
 /// Largest change of a logarithm in one step.
-const MOST_FOLD: f64 = 2.0;
+const MAX_LOG_CHANGE: f64 = 2.0;
 /// Change of the residuals, in standard errors, below which a value counts as zero.
-const NOTHING: f64 = 1e-3;
+const NEGLIGIBLE: f64 = 1e-3;
 
 /// True if a value is varied by its logarithm: it is positive and cannot be negative.
 fn by_logarithm(x: f64, low: f64) -> bool {
@@ -73,7 +73,7 @@ pub(super) fn step_between(x: f64, to: f64, low: f64) -> f64 {
 /// The value after a step that ends at the bounds.
 pub(super) fn moved(x: f64, step: f64, (low, high): (f64, f64)) -> f64 {
     let most = if by_logarithm(x, low) {
-        MOST_FOLD * x
+        MAX_LOG_CHANGE * x
     } else {
         f64::INFINITY
     };
@@ -124,7 +124,7 @@ fn without_nothing<L: LeastSquares>(
     let Solution { x, jacobian, .. } = found;
     let is_nothing = |j: usize| {
         let shows = x[j] * jacobian.column(j).norm();
-        bounds[j].0 == 0.0 && x[j] > 0.0 && shows < NOTHING
+        bounds[j].0 == 0.0 && x[j] > 0.0 && shows < NEGLIGIBLE
     };
     if !(0..x.len()).any(is_nothing) {
         return None;
@@ -135,7 +135,7 @@ fn without_nothing<L: LeastSquares>(
     let mut point = problem.point(&bare, (x, &found.point))?;
     let residuals = problem.residuals(&bare, &point);
     let cost = residuals.norm_squared();
-    if cost > found.cost + NOTHING * NOTHING {
+    if cost > found.cost + NEGLIGIBLE * NEGLIGIBLE {
         return None;
     }
     let jacobian = problem.jacobian(&bare, &mut point)?;
@@ -167,7 +167,7 @@ fn descend<L: LeastSquares>(
     let count = x.len();
     let mut scale = DVector::from_element(count, 0.0);
     let (mut damping, mut growth) = (1e-3, 2.0);
-    for _ in 0..MOST_STEPS {
+    for _ in 0..MAX_STEPS {
         let cost = residuals.norm_squared();
         // Units in which a step is one of the logarithm.
         let unit = |j: usize| {
@@ -215,7 +215,7 @@ fn descend<L: LeastSquares>(
                 .iter()
                 .zip(step.iter())
                 .all(|(&j, step)| (taken[j] - step).abs() <= 1e-9 * step.abs());
-            if whole || damping > MOST_DAMPING {
+            if whole || damping > MAX_DAMPING {
                 break;
             }
             damping *= growth;
@@ -239,7 +239,7 @@ fn descend<L: LeastSquares>(
         } else {
             damping *= growth;
             growth *= 2.0;
-            if damping > MOST_DAMPING {
+            if damping > MAX_DAMPING {
                 break;
             }
         }

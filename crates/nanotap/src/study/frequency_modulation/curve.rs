@@ -10,7 +10,7 @@ use super::{
 };
 use crate::case::{Case, Key};
 use crate::model::cantilever::Cantilever;
-use crate::observe::{PhysicalMotion, Set, measure};
+use crate::observe::{Set, measure};
 use crate::study::FreeMotion;
 use crate::study::approach::{
     ApproachPoint, ApproachReport, Distances, Way, beam_clearance, hysteresis,
@@ -314,22 +314,13 @@ impl Curve<'_> {
         orbit: HeldOrbit,
         amplitude: f64,
     ) -> Result<ApproachPoint, Error> {
-        let view = self.case.physical();
         let observables = measure(&orbit.model, &orbit.orbit.states[0], 1, Set::COMMON)?;
         let modulation = self.modulated(&orbit, amplitude, gap);
+        let kind = Classification::Periodic;
+        let (seen, orbit) = (Some(observables), Some(orbit.orbit));
         Ok(ApproachPoint {
-            way,
-            gap,
-            zc: view.map(|view| gap * view.scales.length),
-            classification: Classification::Periodic,
-            period: Some(1),
-            spectral_radius: Some(orbit.orbit.spectral_radius()),
-            physical: view.map(|view| PhysicalMotion::of(&observables, view)),
-            observables: Some(observables),
-            reason: None,
             modulation: Some(modulation),
-            modulation_si: None,
-            orbit: Some(orbit.orbit),
+            ..ApproachPoint::new(self.case, (way, gap), kind, seen, orbit)
         })
     }
 }

@@ -9,15 +9,24 @@
 //! [`Averages`] are the usual approximations of the shift, and
 //! [`sader_jarvis`](average::sader_jarvis) gives the force back from a curve of shifts.
 
+#[cfg(feature = "fm")]
 pub mod average;
+#[cfg(feature = "fm")]
 mod curve;
+#[cfg(feature = "fm")]
 pub mod free;
+#[cfg(feature = "fm")]
 pub mod held;
+#[cfg(feature = "fm")]
 pub(crate) mod walk;
 
+#[cfg(feature = "fm")]
 pub use average::Averages;
+#[cfg(feature = "fm")]
 pub use curve::frequency_modulation;
+#[cfg(feature = "fm")]
 pub use free::FreeOscillation;
+#[cfg(feature = "fm")]
 pub use held::{Driven, Held, HeldOrbit};
 
 use nanotap_dynamics::Control;
@@ -68,6 +77,7 @@ pub struct Modulated {
     pub sader_jarvis_force: Option<f64>,
 }
 
+#[cfg(feature = "fm")]
 impl Modulated {
     /// Of an orbit with the tip at rest at `gap`.
     pub fn of(
@@ -76,20 +86,35 @@ impl Modulated {
         averages: Option<&Averages>,
         gap: f64,
     ) -> Self {
-        let relative = (orbit.frequency - free.frequency) / free.frequency;
-        let ratio = orbit.strength / free.strength;
         let known = averages.map(|averages| averages.at(gap));
+        let own = [free.frequency, free.strength, free.loss];
         Self {
-            drive_frequency: orbit.frequency,
-            drive_strength: orbit.strength,
-            frequency_shift: orbit.frequency - free.frequency,
-            relative_shift: relative,
-            drive_ratio: ratio,
-            drive_dissipation: free.loss * (ratio - 1.0 - relative),
             closest: gap - free.reach,
             first_order_shift: known.map(|k| k.first_order),
             giessibl_shift: known.map(|k| k.giessibl),
             static_force: known.map(|k| k.force),
+            ..Self::of_drive([orbit.frequency, orbit.strength], own)
+        }
+    }
+
+    /// Of a drive's frequency and strength, against those of the free lever and its loss.
+    pub(in crate::study) fn of_drive(
+        [frequency, strength]: [f64; 2],
+        [free_frequency, free_strength, free_loss]: [f64; 3],
+    ) -> Self {
+        let relative = (frequency - free_frequency) / free_frequency;
+        let ratio = strength / free_strength;
+        Self {
+            drive_frequency: frequency,
+            drive_strength: strength,
+            frequency_shift: frequency - free_frequency,
+            relative_shift: relative,
+            drive_ratio: ratio,
+            drive_dissipation: free_loss * (ratio - 1.0 - relative),
+            closest: f64::NAN,
+            first_order_shift: None,
+            giessibl_shift: None,
+            static_force: None,
             sader_jarvis_force: None,
         }
     }
@@ -314,6 +339,22 @@ impl Default for FrequencyModulationOptions {
             closest,
         }
     }
+}
+
+/// Stands for the curve of a build without the feature `fm`.
+///
+/// # Errors
+/// Always.
+#[cfg(not(feature = "fm"))]
+pub fn frequency_modulation(
+    _: &Case,
+    _: &FrequencyModulationOptions,
+    _: &Control<'_>,
+) -> Result<ApproachReport, Error> {
+    Err(Error::input(
+        "this program was built without frequency modulation",
+        "build it with the feature `fm`",
+    ))
 }
 
 /// Approach and retract curve under frequency modulation.

@@ -32,6 +32,12 @@ pub(super) const CLASSES: [Classification; 5] = [
     Classification::Undecided,
 ];
 
+/// The classification of a code; none of a missing one.
+pub(crate) fn class_of(code: u8) -> Option<Classification> {
+    let index = usize::from(code).checked_sub(1)?;
+    CLASSES.get(index).copied()
+}
+
 /// The code of a classification.
 fn code(classification: Classification) -> u8 {
     CLASSES

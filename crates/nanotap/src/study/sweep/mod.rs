@@ -27,15 +27,14 @@
 mod check;
 mod dataset;
 mod follow;
-mod motions;
 mod neighbours;
 mod options;
 mod over;
 mod run;
 mod summary;
 
+pub(crate) use dataset::class_of;
 pub use follow::Follow;
-pub(crate) use motions::{Motions, class_of};
 pub use neighbours::{FromNeighbour, from_neighbours};
 pub use options::{SweepOptions, SweepStudy};
 pub use over::{Over, Spacing};

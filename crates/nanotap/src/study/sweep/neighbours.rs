@@ -22,12 +22,13 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::run::is_on;
-use super::{Motions, Runs, Starts};
+use super::{Runs, Starts};
 use crate::case::{Case, CaseError, Key};
-use crate::dataset::{Store, StoreError, Values, WorkError};
+use crate::dataset::{Store, StoreError, WorkError};
 use crate::model::strobe::Strobe;
 use crate::observe::{Set, measure};
 use crate::study::approach::{states_at, states_near};
+use crate::study::short_run::short_run;
 
 /// The file of a sweep's dataset that keeps them.
 const FILE: &str = "neighbours.json";
@@ -114,7 +115,7 @@ impl Runs {
             .collect();
         let (own, known): (Vec<usize>, Vec<_>) = known.into_iter().unzip();
         let at = |k: usize| map_at(k).map_err(|error: CaseError| error.to_string());
-        let classify = self.options.classify();
+        let classify = short_run(self.options.max_period);
         let values = share_orbits(known, at, neighbours, &classify, control);
         let mut found = Vec::new();
         for (k, value) in values.into_iter().enumerate() {
@@ -224,13 +225,14 @@ impl Runs {
         let columns = columns.map_or(stride, |c| c.values.len());
         let of_chunk = |chunk: usize| -> Result<Vec<(usize, OrbitState)>, StoreError> {
             let block = schema.grid.block(chunk);
-            let periods = Motions::read(store, chunk)?.periods;
-            let Values::Real(rows) = store.read_chunk(&block, strobe)? else {
-                return Ok(Vec::new());
+            let periods = match schema.index_of("period") {
+                Some(period) => store.read_chunk(&block, period)?.numbers(),
+                None => Vec::new(),
             };
+            let rows = store.read_chunk(&block, strobe)?.numbers();
             let mut found = Vec::new();
             for (flat, entry) in block.entries().enumerate() {
-                let period = usize::try_from(periods[flat]).unwrap_or(0);
+                let period = periods.get(flat).map_or(0, |period| *period as usize);
                 let end = (flat + 1) * stride;
                 let state = rows.get(end - columns..end).unwrap_or_default();
                 if period > 0 && state.iter().all(|v| v.is_finite()) {

@@ -1,6 +1,6 @@
 //! Options of a sweep.
 
-use nanotap_dynamics::{ClassifyOptions, Control, LyapunovOptions};
+use nanotap_dynamics::Control;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -112,24 +112,6 @@ impl SweepOptions {
     /// States kept of each run.
     pub(super) fn strobe(&self) -> usize {
         self.strobe.unwrap_or(self.periods).min(self.periods)
-    }
-
-    /// The budgets of each run: a tenth of what one run alone would be given.
-    pub(in crate::study) fn classify(&self) -> ClassifyOptions {
-        ClassifyOptions {
-            max_period: self.max_period,
-            max_transient: 512,
-            lyapunov: LyapunovOptions {
-                alignment: 50,
-                min_periods: 250,
-                max_periods: 2000,
-                absolute_error: 5e-3,
-                relative_error: 0.1,
-            },
-            birkhoff_periods: 2048,
-            torus_digits: 6.0,
-            ..ClassifyOptions::default()
-        }
     }
 }
 

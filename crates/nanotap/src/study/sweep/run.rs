@@ -14,6 +14,7 @@ use crate::model::strobe::Strobe;
 use crate::model::{Model, MotionError};
 use crate::observe::time_series::with_modes;
 use crate::observe::{Kept, Observables, Set, Watched, Watcher};
+use crate::study::short_run::short_run;
 use crate::study::simulate::{Classification, Named};
 use crate::study::start_box::{box_with, default_starts};
 
@@ -229,7 +230,7 @@ impl<'a> Runner<'a> {
         Self {
             scales: case.physical().map(|view| view.scales),
             options,
-            classify: options.classify(),
+            classify: short_run(options.max_period),
             map: Strobe::new(model),
             known: Vec::new(),
             chaos: Vec::new(),

@@ -380,21 +380,8 @@ fn modulated(case: &Case, free: &Free, driven: &Driven) -> Option<Modulated> {
     let sizes = Sizes::of(case)?;
     let frequency = driven.frequency * sizes.frequency;
     let strength = driven.strength * sizes.strength;
-    let relative = (frequency - free.frequency) / free.frequency;
-    let ratio = strength / free.strength;
-    Some(Modulated {
-        drive_frequency: frequency,
-        drive_strength: strength,
-        frequency_shift: frequency - free.frequency,
-        relative_shift: relative,
-        drive_ratio: ratio,
-        drive_dissipation: free.loss * (ratio - 1.0 - relative),
-        closest: f64::NAN,
-        first_order_shift: None,
-        giessibl_shift: None,
-        static_force: None,
-        sader_jarvis_force: None,
-    })
+    let of_free = [free.frequency, free.strength, free.loss];
+    Some(Modulated::of_drive([frequency, strength], of_free))
 }
 
 impl HeldRow {

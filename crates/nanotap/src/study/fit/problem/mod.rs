@@ -14,7 +14,9 @@ use crate::model::Model;
 use crate::model::strobe::Strobe;
 use crate::observe::{Derivative, Observables, Set, measure};
 
-use crate::study::fit::branches::{Along, Candidate, Rows, continued, leave_ends, path};
+use crate::study::fit::branches::{
+    Candidate, RowCases, Rows, newton_continuation, path, release_branch_ends,
+};
 use crate::study::fit::data::{Column, Data, Row};
 use crate::study::fit::jumps::{Fold, Jump};
 use crate::study::fit::parameters::{Parameter, Target};
@@ -346,7 +348,7 @@ impl Problem<'_> {
                 };
                 let measured =
                     |row: usize, model: &Model| self.measured(x, curve, &of.rows[row], model);
-                let along = Along {
+                let along = RowCases {
                     at: &at,
                     measured: &measured,
                     places: &places,
@@ -405,7 +407,7 @@ impl Problem<'_> {
             (0..self.data.columns.len()).all(|column| {
                 let value = point[k].values[column];
                 let difference = self.difference(x, curve, row, column, value);
-                difference.is_none_or(|d| d.abs() < NEAR * self.error(row, column))
+                difference.is_none_or(|d| d.abs() < MAX_JUMP_RESIDUAL * self.error(row, column))
             })
         };
         let bases = self.cases(x);
@@ -436,7 +438,7 @@ impl Problem<'_> {
                 rows: [before, k],
                 first: run,
                 between,
-                reach: REACH * (high - low),
+                reach: FOLD_REACH * (high - low),
             });
         }
         let folds = jumps
@@ -532,9 +534,9 @@ impl Problem<'_> {
         places: &[Vec<f64>],
         rows: &Rows,
     ) -> Point {
-        const PRICE: f64 = 20.0;
+        const BRANCH_CHANGE_COST: f64 = 20.0;
         // One residual of eight standard errors.
-        const DEAR: f64 = 18.0;
+        const MAX_NOISE_COST: f64 = 18.0;
         let measured = &self.data.curves[curve].rows;
         let seen: Vec<Vec<Option<RowPoint>>> = (0..rows.len())
             .into_par_iter()
@@ -566,8 +568,8 @@ impl Problem<'_> {
             .enumerate()
             .map(|(row, points)| points.iter().map(|point| cost(row, point)).collect())
             .collect();
-        let mut chosen = path(rows, &costs, PRICE);
-        leave_ends(rows, &costs, DEAR, &mut chosen);
+        let mut chosen = path(rows, &costs, BRANCH_CHANGE_COST);
+        release_branch_ends(rows, &costs, MAX_NOISE_COST, &mut chosen);
         let pick = |(row, chosen): (usize, Option<usize>)| {
             let found = chosen.and_then(|k| seen[row][k].clone());
             found.unwrap_or_else(|| RowPoint::nothing(self.data.columns.len()))
@@ -621,9 +623,9 @@ impl Problem<'_> {
 }
 
 /// Largest residual, in standard errors, of rows next to a jump that counts.
-const NEAR: f64 = 6.0;
+const MAX_JUMP_RESIDUAL: f64 = 6.0;
 /// Largest distance of a fold beyond its jump, as a fraction of the length of the curve.
-const REACH: f64 = 0.5;
+const FOLD_REACH: f64 = 0.5;
 
 impl LeastSquares for Problem<'_> {
     type Point = Point;
@@ -656,7 +658,7 @@ impl LeastSquares for Problem<'_> {
                     }
                 }
                 let model = case.model().ok()?;
-                let orbit = continued(&mut Strobe::new(&model), &guess)?;
+                let orbit = newton_continuation(&mut Strobe::new(&model), &guess)?;
                 self.seen(Arc::new((case, model)), before_point.branch, orbit)
             };
             follow().unwrap_or_else(lost)

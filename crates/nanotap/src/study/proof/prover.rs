@@ -1,14 +1,9 @@
-//! Proofs of periodic orbits: a theorem about the orbit that Newton found, or the reason why there is none.
-//!
-//! A proof is about the model's dimensionless numbers, each standing for every decimal number
-//! that is read as it; see [`enclosed`] for the equations and [`nanotap_proof`] for the method.
+//! Proofs of the orbits of one case.
 
 use std::fmt::Write as _;
 
 use nanotap_flow::Trajectory;
 use nanotap_proof::{Candidate, Interval, ProofError, Stability, Switch, System, Theorem, prove};
-use schemars::JsonSchema;
-use serde::Serialize;
 
 use crate::case::Case;
 use crate::model::cantilever::{Cantilever, CosineTerm};
@@ -19,64 +14,7 @@ use crate::model::oscillator::{Oscillator, OscillatorParameter};
 use crate::model::recording::Recording;
 use crate::number::shortest;
 
-/// What was proved of a periodic orbit.
-#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
-pub struct ProofReport {
-    /// Whether the orbit was proved to exist.
-    pub proved: bool,
-    /// The theorem, or why there is none.
-    pub statement: String,
-    /// What is known, if it exists.
-    #[serde(flatten)]
-    pub theorem: Option<TheoremReport>,
-}
-
-/// A theorem's numbers. An interval is its lower and its upper bound, both exact.
-#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
-pub struct TheoremReport {
-    /// Minimal period in drive periods.
-    pub period: usize,
-    /// State at drive phase 0, entry by entry.
-    pub state: Vec<[f64; 2]>,
-    /// When contact begins and ends.
-    pub switches: Vec<SwitchReport>,
-    /// How far from it no other orbit of the same contacts is.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub unique_within: Option<UniqueWithin>,
-    /// Discs that hold the multipliers.
-    pub multipliers: Vec<DiscReport>,
-    /// What is proved: stable, unstable or undecided.
-    pub stability: &'static str,
-}
-
-/// A switch between flight and contact.
-#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
-pub struct SwitchReport {
-    /// Time from drive phase 0 on.
-    pub time: [f64; 2],
-    /// Whether contact begins or ends; an impact on a rigid stop begins one that lasts no time.
-    pub begins: bool,
-}
-
-/// No other orbit of the same period and contacts has every switch so near.
-#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
-pub struct UniqueWithin {
-    /// Difference of the time of every switch.
-    pub time: f64,
-    /// Difference of each entry of the state at every switch.
-    pub state: Vec<f64>,
-}
-
-/// A disc of complex numbers.
-#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
-pub struct DiscReport {
-    /// Its centre: real and imaginary part.
-    pub center: [f64; 2],
-    /// Its radius.
-    pub radius: f64,
-    /// How many multipliers it holds.
-    pub count: usize,
-}
+use super::{DiscReport, ProofReport, SwitchReport, TheoremReport, UniqueWithin};
 
 /// Why an orbit is not proved.
 #[derive(Clone, Debug, thiserror::Error)]

@@ -23,7 +23,8 @@ static FORCE: AtomicBool = AtomicBool::new(false);
 static CLAIMED: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
 
 /// Beginnings of the tables that commands write, and columns of those of datasets.
-const TABLES: [&str; 12] = [
+const TABLES: [&str; 13] = [
+    "line,direction,",
     "tau,tip,tip_rate",
     "order,tip,tip_lag_degrees",
     "attractor,classification,",

@@ -16,6 +16,7 @@ mod merge;
 mod modes;
 mod orbit;
 mod paper;
+mod scan;
 mod schema;
 mod simulate;
 mod study;
@@ -111,6 +112,8 @@ pub(crate) enum Own {
     Branch(branch::Arguments),
     /// Compute amplitude, phase, force and energy against the distance, both ways
     Approach(approach::Arguments),
+    /// Simulate a line or an image under feedback
+    Scan(scan::Arguments),
     /// Fit parameters of lever and sample to measured curves
     Fit(fit::Arguments),
     /// Sweep one or two parameters, from any number of initial states
@@ -154,6 +157,7 @@ pub(crate) fn run(command: &Command, output: &Output) -> Result<(), Failure> {
         Own::Attractors(arguments) => attractors::run(arguments, output),
         Own::Branch(arguments) => branch::run(arguments, output),
         Own::Approach(arguments) => approach::run(arguments, output),
+        Own::Scan(arguments) => scan::run(arguments, output),
         Own::Fit(arguments) => fit::run(arguments, output),
         Own::Sweep(arguments) => sweep::run(arguments, output),
         Own::Window(arguments) => window::run(arguments, output),

@@ -67,6 +67,10 @@ pub const DEFAULT_MODES: usize = 3;
 pub struct Case {
     title: Arc<str>,
     what: What,
+    /// Table `[scan]` of its file, with the words that were set in addition.
+    scan: Option<Arc<serde_json::Map<String, serde_json::Value>>>,
+    /// Folder to which names of files in `[scan]` are relative; `None` where files are not read.
+    folder: Option<Arc<Path>>,
     /// Flag that cancels the motions of its models.
     cancel: CancelFlag,
 }
@@ -110,6 +114,8 @@ impl Case {
         Self {
             title: "case".into(),
             what,
+            scan: None,
+            folder: None,
             cancel: CancelFlag::default(),
         }
     }
@@ -126,7 +132,12 @@ impl Case {
         catalogue: &Arc<Catalogue>,
     ) -> Result<Self, CaseFileError> {
         let overrides = file::with_tables(overrides)?;
-        Self::parse_with(path.map(file::read).transpose()?, &overrides, catalogue)
+        let case = Self::parse_with(path.map(file::read).transpose()?, &overrides, catalogue)?;
+        let folder = path.and_then(Path::parent).unwrap_or_else(|| Path::new(""));
+        Ok(Self {
+            folder: Some(folder.into()),
+            ..case
+        })
     }
 
     /// Parses a case from a text and `key=value` words, with the built-in levers and materials.
@@ -147,7 +158,8 @@ impl Case {
         catalogue: &Arc<Catalogue>,
     ) -> Result<Self, CaseFileError> {
         let title = source.as_ref().map(|source| source.name.clone());
-        let what = match file::parse(source, overrides)? {
+        let (described, scan) = file::parse_with_scan(source, overrides)?;
+        let what = match described {
             Described::Cantilever(cantilever) => What::Cantilever(cantilever),
             Described::Oscillator(oscillator) => What::Oscillator(oscillator),
             Described::Physical(stated) => {
@@ -156,7 +168,10 @@ impl Case {
                 What::Quantities(Box::new(quantities.possible()?))
             }
         };
-        let case = Self::new(what);
+        let case = Self {
+            scan: scan.map(Arc::new),
+            ..Self::new(what)
+        };
         Ok(match title {
             Some(title) => case.called(&title),
             None => case,
@@ -188,6 +203,45 @@ impl Case {
             cancel: self.cancel.with_grace(),
             ..self.clone()
         }
+    }
+
+    /// The table `[scan]` of its file, as JSON: options of the study `scan`.
+    pub fn scan(&self) -> Option<&serde_json::Map<String, serde_json::Value>> {
+        self.scan.as_deref()
+    }
+
+    /// The path of a file that `[scan]` names, relative to the case file.
+    ///
+    /// # Errors
+    /// When the case was not read from a file: nothing is then read from disk.
+    pub(crate) fn relative_file(&self, name: &str) -> Result<std::path::PathBuf, crate::Error> {
+        let folder = self.folder.as_ref().ok_or_else(|| {
+            crate::Error::input(
+                format!("{name}: a case that was not read from a file cannot name other files"),
+                "load the case from a file",
+            )
+        })?;
+        Ok(folder.join(name))
+    }
+
+    /// The same case with `key=value` words that replace what it states.
+    ///
+    /// # Errors
+    /// As [`parse`](Self::parse).
+    pub(crate) fn restated(&self, words: &[String]) -> Result<Self, CaseFileError> {
+        let source = Source {
+            name: self.title.to_string(),
+            text: self.to_toml(),
+        };
+        let catalogue = match &self.what {
+            What::Quantities(quantities) => quantities.catalogue(),
+            _ => Catalogue::shared(),
+        };
+        let restated = Self::parse_with(Some(source), words, &catalogue)?;
+        Ok(Self {
+            what: restated.what,
+            ..self.clone()
+        })
     }
 
     /// Flag that cancels the motions of its models.
@@ -356,9 +410,8 @@ impl Case {
             _ => return self.clone(),
         };
         Self {
-            title: Arc::clone(&self.title),
             what,
-            cancel: self.cancel.clone(),
+            ..self.clone()
         }
     }
 
@@ -653,9 +706,8 @@ impl Case {
         quantities.notes.push(note);
         quantities.start = Some(state);
         Ok(Self {
-            title: Arc::clone(&self.title),
             what: What::Quantities(Box::new(quantities.mapped(true).possible()?)),
-            cancel: self.cancel.clone(),
+            ..self.clone()
         })
     }
 }

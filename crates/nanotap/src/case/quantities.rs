@@ -44,6 +44,10 @@ impl Quantities {
         quantities.mapped(false)
     }
 
+    pub(super) fn catalogue(&self) -> Arc<Catalogue> {
+        Arc::clone(&self.catalogue)
+    }
+
     pub(super) fn reader(&self) -> Reader<'_> {
         Reader {
             stated: &self.stated,

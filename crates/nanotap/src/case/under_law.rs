@@ -64,9 +64,8 @@ impl Case {
             }
         }
         Ok(Self {
-            title: self.title.clone(),
             what: What::Quantities(Box::new(quantities.mapped(true).possible()?)),
-            cancel: self.cancel.clone(),
+            ..self.clone()
         })
     }
 }

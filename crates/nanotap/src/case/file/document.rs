@@ -8,6 +8,7 @@ use toml::de::{DeTable, DeValue};
 use crate::case::force_table::table_of;
 use crate::case::table::Table;
 
+use super::json;
 use super::problem::{CaseFileError, Place, Problem, Source};
 
 /// A value as written.
@@ -98,7 +99,12 @@ pub struct Document {
     pub headers: Vec<Header>,
     /// The entries of the file, then the overrides.
     pub entries: Vec<Entry>,
+    /// The table `[scan]`, options of a study.
+    pub scan: Option<serde_json::Map<String, serde_json::Value>>,
 }
+
+/// The table of a case file that is options of the study of the same name.
+const SCAN: &str = "scan";
 
 impl Document {
     /// Reads a TOML text.
@@ -118,7 +124,9 @@ impl Document {
         for (key, value) in table.get_ref() {
             let name: &str = key.get_ref();
             let place = Place::Span(key.span());
-            if let DeValue::Table(inner) = value.get_ref() {
+            if let (SCAN, DeValue::Table(inner)) = (name, value.get_ref()) {
+                document.scan = Some(json::table(inner));
+            } else if let DeValue::Table(inner) = value.get_ref() {
                 document.headers.push(Header {
                     name: name.to_owned(),
                     place,
@@ -159,6 +167,19 @@ impl Document {
         let (table, key) = name.split_once('.').unwrap_or(("model", name));
         if key.is_empty() || table.is_empty() {
             return Err(Problem::new(place, "no key before the `=`").help(shape));
+        }
+        if table.trim() == SCAN {
+            let read = DeValue::parse(value).map_or_else(
+                |_| {
+                    value
+                        .parse()
+                        .map_or_else(|_| value.into(), |x: f64| x.into())
+                },
+                |value| json::json(value.get_ref()),
+            );
+            let options = self.scan.get_or_insert_default();
+            json::put(options, key, (!value.is_empty()).then_some(read));
+            return Ok(());
         }
         let read = |value: &str| {
             DeValue::parse(value).map_or_else(

@@ -13,6 +13,7 @@
 //! alternatives of its key in the file.
 
 mod document;
+mod json;
 mod problem;
 mod reader;
 mod refusal;
@@ -22,7 +23,7 @@ use std::path::Path;
 
 pub use document::{Document, Entry, Header};
 pub use problem::{CaseFileError, Place, Problem, SHOWN, Source};
-pub(crate) use reader::{Described, modes, parse, word};
+pub(crate) use reader::{Described, modes, parse_with_scan, word};
 
 use toml::de::{DeTable, DeValue};
 
@@ -172,6 +173,23 @@ fn table_named(text: &str) -> Option<(std::ops::Range<usize>, String)> {
         return None;
     };
     Some((value.span(), file_named(name)?.to_owned()))
+}
+
+/// The text of a file of at most so many bytes.
+///
+/// # Errors
+/// When it cannot be read, is longer, or is not text.
+pub(crate) fn text_within(path: &Path, limit: u64) -> Result<String, crate::Error> {
+    let name = path.display();
+    let mut bytes = Vec::new();
+    std::fs::File::open(path)
+        .and_then(|file| file.take(limit + 1).read_to_end(&mut bytes))
+        .map_err(|error| crate::Error::files(format!("{name}: cannot be read: {error}")))?;
+    let refuse = |what: String| crate::Error::input(format!("{name}: {what}"), "name a CSV file");
+    if bytes.len() as u64 > limit {
+        return Err(refuse(format!("longer than {limit} bytes")));
+    }
+    String::from_utf8(bytes).map_err(|_| refuse("not text in UTF-8".into()))
 }
 
 fn text_of(path: &Path) -> Result<Source, CaseFileError> {

@@ -211,10 +211,10 @@ impl std::error::Error for CaseFileError {}
 
 impl From<CaseFileError> for crate::Error {
     fn from(error: CaseFileError) -> Self {
-        use crate::error::{ErrorPlace, ErrorProblem, SourceText};
+        use crate::error::{ErrorPlace, ErrorProblem, SourceText, cut};
         let place = |place| match place {
             Place::Span(span) => ErrorPlace::Span(span),
-            Place::Override(written) => ErrorPlace::Override(written),
+            Place::Override(written) => ErrorPlace::Override(cut(written)),
             Place::Whole => ErrorPlace::Whole,
         };
         let in_file = error.source.is_some();
@@ -228,7 +228,7 @@ impl From<CaseFileError> for crate::Error {
             .into_iter()
             .map(|problem| ErrorProblem {
                 place: place(problem.place),
-                message: problem.message,
+                message: cut(problem.message),
                 label: problem.label,
                 remedy: problem.help.map(|help| remedy(help, &problem.words)),
             })

@@ -30,14 +30,20 @@ pub(crate) enum Described {
 /// The effective entries by key.
 type Known<'a> = BTreeMap<Key, &'a Entry>;
 
+/// A case and its table `[scan]`, if it has one.
+pub(crate) type DescribedWithScan = (
+    Described,
+    Option<serde_json::Map<String, serde_json::Value>>,
+);
+
 /// Reads a text, if there is one, with the `key=value` words of `overrides`.
 ///
 /// # Errors
 /// All problems of the text and the words, each with its place.
-pub(crate) fn parse(
+pub(crate) fn parse_with_scan(
     source: Option<Source>,
     overrides: &[String],
-) -> Result<Described, CaseFileError> {
+) -> Result<DescribedWithScan, CaseFileError> {
     let mut document = source.map_or_else(|| Ok(Document::default()), Document::parse)?;
     let mut problems = Problems::default();
     for written in overrides {
@@ -46,7 +52,7 @@ pub(crate) fn parse(
         }
     }
     match described(&document, &mut problems) {
-        Some(described) if problems.is_empty() => Ok(described),
+        Some(described) if problems.is_empty() => Ok((described, document.scan)),
         _ => Err(CaseFileError::of(document.source, problems)),
     }
 }

@@ -279,8 +279,8 @@ def test_maps_are_fields_of_gwyddion(mapped, bistable, tmp_path):
     np.testing.assert_array_equal(read_gsf(path)[1][::-1], basin.attractor)
     for arguments, words in (
         ({"variable": "nothing"}, "unknown `nothing`"),
-        ({"variable": "strobe"}, "a map has two axes"),
-        ({"start": 3}, "none of the 1 starts"),
+        ({"variable": "strobe"}, "a map has two"),
+        ({"start": 3}, "out of range; there are 1 starts"),
     ):
         with pytest.raises(ValueError, match=words):
             export.gsf(mapped, path, **arguments)

@@ -125,7 +125,7 @@ fn an_error_in_a_case_is_shown_with_its_line() {
     ]);
     assert!(
         !refused.stderr.contains("lacks"),
-        "said once: {}",
+        "printed once: {}",
         refused.stderr
     );
     // Without a line to point at, the nearest key is offered below.
@@ -215,7 +215,7 @@ fn files_other_than_case_files_are_refused() {
 
 #[test]
 fn a_key_that_is_stated_twice_is_refused() {
-    case(format!("{PAPER}omega = 2\n"), &[]).refused(&["case.toml:10:1", "stands here twice"]);
+    case(format!("{PAPER}omega = 2\n"), &[]).refused(&["case.toml:10:1", "duplicate key"]);
     case(format!("{PAPER}drive_frequency = 2\n"), &[])
         .refused(&["`omega` and `drive_frequency` are the same key", "keep one"]);
 }

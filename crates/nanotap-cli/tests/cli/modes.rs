@@ -102,7 +102,7 @@ fn shapes_are_written_and_drawn() {
         .refused(&["shapes.jpeg", "use .svg, .png or .pdf"]);
     folder
         .run(&["modes", "case.toml", "--out", "shapes"])
-        .refused(&["shapes: unsupported file extension format", ".csv"]);
+        .refused(&["shapes: unsupported file extension", ".csv"]);
 }
 
 #[test]

@@ -50,5 +50,5 @@ fn a_case_states_its_keys_with_dimension_and_range() {
 fn an_unknown_schema_is_refused_with_the_known_ones() {
     Folder::new()
         .run(&["schema", "orbits"])
-        .refused(&["no study `orbits`", "orbit", "case"]);
+        .refused(&["unknown study `orbits`", "orbit", "case"]);
 }

@@ -246,7 +246,7 @@ fn shares_merge_to_the_bytes_of_one_machine() {
         .refused(&["nowhere.zarr", "does not exist"]);
     folder
         .run(&["merge", "a.zarr", "--out", "m.csv"])
-        .refused(&["end the name in .zarr"]);
+        .refused(&["use .zarr"]);
     folder
         .run(&["merge", "--out", "m.zarr"])
         .refused(&["DATASET"]);

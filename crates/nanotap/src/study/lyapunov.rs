@@ -76,7 +76,7 @@ pub struct LyapunovReport {
     pub section_at: Section,
 }
 
-/// Measures the spectrum of `model`'s motion and cuts it.
+/// Computes the Lyapunov spectrum and a Poincaré section of the motion of `model`.
 ///
 /// # Errors
 /// When the initial state is invalid, the flow fails, or the work was cancelled.

@@ -192,11 +192,11 @@ fn tables_that_are_not_functions_are_refused_with_their_place() {
     refused(&rows("1,0\n"), &["at least two rows"]);
     refused(&rows("0,1\n1,0\n0.5,0\n"), &["row 3", "turns back"]);
     refused(&rows("0,1\n1,0.5\n1,0\n"), &["row 3", "would jump"]);
-    refused(&rows("0,1\n1,nan\n"), &["line 3", "there is no number"]);
+    refused(&rows("0,1\n1,nan\n"), &["line 3", "missing number"]);
     refused(&rows("0,1\n1,inf\n"), &["row 2", "not finite"]);
     refused(
         &rows("0,1\n1,x\n"),
-        &["line 3", "column 2", "`x` is no number"],
+        &["line 3", "column 2", "`x` is not a number"],
     );
     refused(&rows("0,1\n1\n"), &["line 3", "1 fields"]);
     refused("gap,force (nN)\n0,1\n1,0\n", &["`gap`", "unit"]);

@@ -15,7 +15,7 @@
 //! A value that *varies* in a study ([`Case::with`]: a sweep, a branch, a window) is one knob
 //! of one instrument, and the others stay as they are: the drive keeps its own amplitude (a
 //! piezo its voltage), the sample its distance, g₀ its length, and a second tone its place
-//! among the harmonics of the first. [`Case::held`] says which numbers these are. Stated
+//! among the harmonics of the first. [`Case::implied_constants`] says which numbers these are. Stated
 //! beside the varied value they give the same point again.
 
 pub mod document;
@@ -68,14 +68,14 @@ pub const DEFAULT_MODES: usize = 3;
 #[derive(Clone, Debug, PartialEq)]
 pub struct Case {
     title: Arc<str>,
-    what: What,
+    what: CaseKind,
     /// What ends the motions of its models from outside.
     cancel: CancelFlag,
 }
 
 /// The kinds of case.
 #[derive(Clone, Debug, PartialEq)]
-enum What {
+enum CaseKind {
     Cantilever(Cantilever),
     Oscillator(Oscillator),
     Quantities(Box<Quantities>),
@@ -97,18 +97,18 @@ pub struct ParameterUnit {
 
 impl From<Cantilever> for Case {
     fn from(cantilever: Cantilever) -> Self {
-        Self::new(What::Cantilever(cantilever))
+        Self::new(CaseKind::Cantilever(cantilever))
     }
 }
 
 impl From<Oscillator> for Case {
     fn from(oscillator: Oscillator) -> Self {
-        Self::new(What::Oscillator(oscillator))
+        Self::new(CaseKind::Oscillator(oscillator))
     }
 }
 
 impl Case {
-    fn new(what: What) -> Self {
+    fn new(what: CaseKind) -> Self {
         Self {
             title: "case".into(),
             what,
@@ -150,12 +150,12 @@ impl Case {
     ) -> Result<Self, CaseFileError> {
         let title = source.as_ref().map(|source| source.name.clone());
         let what = match file::parse(source, overrides)? {
-            Described::Cantilever(cantilever) => What::Cantilever(cantilever),
-            Described::Oscillator(oscillator) => What::Oscillator(oscillator),
+            Described::Cantilever(cantilever) => CaseKind::Cantilever(cantilever),
+            Described::Oscillator(oscillator) => CaseKind::Oscillator(oscillator),
             Described::Physical(stated) => {
                 let catalogue = Arc::clone(catalogue);
                 let quantities = Quantities::new(stated, catalogue);
-                What::Quantities(Box::new(quantities.possible()?))
+                CaseKind::Quantities(Box::new(quantities.validated()?))
             }
         };
         let case = Self::new(what);
@@ -207,16 +207,16 @@ impl Case {
     /// quantities make no sense.
     pub fn cantilever(&self) -> Option<&Cantilever> {
         match &self.what {
-            What::Cantilever(cantilever) => Some(cantilever),
-            What::Oscillator(_) => None,
-            What::Quantities(_) => self.physical().map(|view| &view.cantilever),
+            CaseKind::Cantilever(cantilever) => Some(cantilever),
+            CaseKind::Oscillator(_) => None,
+            CaseKind::Quantities(_) => self.physical().map(|view| &view.cantilever),
         }
     }
 
     /// The oscillator that it is, if it is one.
     pub const fn oscillator(&self) -> Option<&Oscillator> {
         match &self.what {
-            What::Oscillator(oscillator) => Some(oscillator),
+            CaseKind::Oscillator(oscillator) => Some(oscillator),
             _ => None,
         }
     }
@@ -224,19 +224,19 @@ impl Case {
     /// What is known of it in SI, if it is a physical case and makes sense.
     pub fn physical(&self) -> Option<&Physical> {
         match &self.what {
-            What::Quantities(quantities) => quantities.view.as_deref().ok(),
+            CaseKind::Quantities(quantities) => quantities.view.as_deref().ok(),
             _ => None,
         }
     }
 
     /// Whether it was stated in physical quantities.
     pub const fn is_physical(&self) -> bool {
-        matches!(self.what, What::Quantities(_))
+        matches!(self.what, CaseKind::Quantities(_))
     }
 
     /// What had to be assumed, and what puts it in doubt.
     pub fn remarks(&self) -> Vec<Remark> {
-        let (What::Quantities(quantities), Some(view)) = (&self.what, self.physical()) else {
+        let (CaseKind::Quantities(quantities), Some(view)) = (&self.what, self.physical()) else {
             return Vec::new();
         };
         let mut remarks = view.remarks(quantities.reader());
@@ -247,7 +247,7 @@ impl Case {
 
     /// What its file says and does not count, because a key that was set beside it says the same.
     pub fn replaced(&self) -> Vec<Remark> {
-        let What::Quantities(quantities) = &self.what else {
+        let CaseKind::Quantities(quantities) = &self.what else {
             return Vec::new();
         };
         let replaced = quantities.stated.origin.replaced.iter();
@@ -262,7 +262,7 @@ impl Case {
     /// The numbers of the equations that it has.
     pub fn keys(&self) -> Vec<Key> {
         match &self.what {
-            What::Oscillator(oscillator) => crate::model::oscillator::OscillatorParameter::ALL
+            CaseKind::Oscillator(oscillator) => crate::model::oscillator::OscillatorParameter::ALL
                 .into_iter()
                 .filter(|parameter| oscillator.get(*parameter).is_some())
                 .map(Key::of_oscillator)
@@ -304,7 +304,7 @@ impl Case {
 
     fn model_kind(&self) -> ModelKind {
         match &self.what {
-            What::Oscillator(oscillator) => match oscillator.stop {
+            CaseKind::Oscillator(oscillator) => match oscillator.stop {
                 Stop::Soft { .. } => ModelKind::VibroImpact,
                 Stop::Rigid { .. } => ModelKind::Impact,
             },
@@ -315,15 +315,15 @@ impl Case {
     /// The value of a key, in SI of a physical quantity; NaN where the case does not have it.
     pub fn get(&self, key: Key) -> f64 {
         let found = match (&self.what, key.entry().means) {
-            (What::Oscillator(oscillator), key::Means::Oscillator(parameter)) => {
+            (CaseKind::Oscillator(oscillator), key::Means::Oscillator(parameter)) => {
                 oscillator.get(parameter)
             }
-            (What::Oscillator(_), _) => None,
+            (CaseKind::Oscillator(_), _) => None,
             (_, key::Means::Cantilever(parameter)) => {
                 self.cantilever().map(|case| case.get(parameter))
             }
             (_, _) if key == Key::Modes => self.cantilever().map(|case| case.modes as f64),
-            (What::Quantities(quantities), _) => quantities.get(key),
+            (CaseKind::Quantities(quantities), _) => quantities.get(key),
             _ => None,
         };
         found.unwrap_or(f64::NAN)
@@ -332,7 +332,7 @@ impl Case {
     /// What a physical case states of a key.
     pub fn stated(&self, key: Key) -> Option<&Value> {
         match &self.what {
-            What::Quantities(quantities) => quantities.stated.get(key),
+            CaseKind::Quantities(quantities) => quantities.stated.get(key),
             _ => None,
         }
     }
@@ -343,18 +343,18 @@ impl Case {
     #[must_use]
     pub fn with(&self, key: Key, value: f64) -> Self {
         let what = match (&self.what, key.entry().means) {
-            (What::Cantilever(cantilever), key::Means::Cantilever(parameter)) => {
-                What::Cantilever(cantilever.clone().with(parameter, value))
+            (CaseKind::Cantilever(cantilever), key::Means::Cantilever(parameter)) => {
+                CaseKind::Cantilever(cantilever.clone().with(parameter, value))
             }
-            (What::Cantilever(cantilever), _) if key == Key::Modes => {
-                What::Cantilever(cantilever.clone().with_modes(value as usize))
+            (CaseKind::Cantilever(cantilever), _) if key == Key::Modes => {
+                CaseKind::Cantilever(cantilever.clone().with_modes(value as usize))
             }
-            (What::Oscillator(oscillator), key::Means::Oscillator(parameter)) => {
-                What::Oscillator(oscillator.with(parameter, value))
+            (CaseKind::Oscillator(oscillator), key::Means::Oscillator(parameter)) => {
+                CaseKind::Oscillator(oscillator.with(parameter, value))
             }
-            (What::Quantities(quantities), means) => match means {
+            (CaseKind::Quantities(quantities), means) => match means {
                 key::Means::Oscillator(_) => return self.clone(),
-                _ => What::Quantities(Box::new(quantities.with(key, value))),
+                _ => CaseKind::Quantities(Box::new(quantities.with(key, value))),
             },
             _ => return self.clone(),
         };
@@ -368,14 +368,14 @@ impl Case {
     /// The numbers that stay while a quantity varies though they were not stated as such:
     /// stated beside the value of `key` they give the same case again. Empty where all that
     /// was stated simply stays.
-    pub fn held(&self, key: Key) -> Vec<(Key, f64)> {
-        let What::Quantities(quantities) = &self.what else {
+    pub fn implied_constants(&self, key: Key) -> Vec<(Key, f64)> {
+        let CaseKind::Quantities(quantities) = &self.what else {
             return Vec::new();
         };
         let (true, Ok(view)) = (key.is_physical(), &quantities.view) else {
             return Vec::new();
         };
-        let held = view.held(&quantities.stated);
+        let held = view.implied_constants(&quantities.stated);
         held.iter()
             .filter(|(other, value)| {
                 let same = quantities.stated.get(*other) == Some(*value);
@@ -392,9 +392,9 @@ impl Case {
     /// When it makes no sense or cannot be solved in closed form.
     pub fn model(&self) -> Result<Model, CaseError> {
         let model = match &self.what {
-            What::Cantilever(cantilever) => Model::cantilever(cantilever)?,
-            What::Oscillator(oscillator) => oscillator.model()?,
-            What::Quantities(quantities) => {
+            CaseKind::Cantilever(cantilever) => Model::cantilever(cantilever)?,
+            CaseKind::Oscillator(oscillator) => oscillator.model()?,
+            CaseKind::Quantities(quantities) => {
                 let model = Model::cantilever(&quantities.view()?.cantilever)?;
                 let start = quantities.start.as_ref();
                 Model {
@@ -442,7 +442,7 @@ impl Case {
 
     fn oscillator_parameter(&self, key: Key) -> Option<(&Oscillator, OscillatorParameter)> {
         match (&self.what, key.entry().means) {
-            (What::Oscillator(oscillator), key::Means::Oscillator(parameter)) => {
+            (CaseKind::Oscillator(oscillator), key::Means::Oscillator(parameter)) => {
                 Some((oscillator, parameter))
             }
             _ => None,
@@ -452,9 +452,9 @@ impl Case {
     /// The numbers of a cantilever's equations that change with a key, each with its derivative.
     fn parameters_by(&self, key: Key) -> Result<Slopes, CaseError> {
         match (&self.what, key.entry().means) {
-            (What::Oscillator(_), _) => Ok(Slopes::default()),
+            (CaseKind::Oscillator(_), _) => Ok(Slopes::default()),
             (_, key::Means::Cantilever(parameter)) => Ok((vec![(parameter, 1.0)], Vec::new())),
-            (What::Quantities(quantities), _) if key.is_physical() => {
+            (CaseKind::Quantities(quantities), _) if key.is_physical() => {
                 quantities.view()?;
                 Ok(quantities.derivatives(key)?)
             }
@@ -478,7 +478,7 @@ impl Case {
         &self,
         key: Key,
     ) -> Result<Option<(Scales, Scales, f64)>, CaseError> {
-        let What::Quantities(quantities) = &self.what else {
+        let CaseKind::Quantities(quantities) = &self.what else {
             return Ok(None);
         };
         if !key.is_physical() {
@@ -567,7 +567,7 @@ impl Case {
     /// The key of the distance between tip and sample, in the model's unit of length.
     pub const fn gap_key(&self) -> Key {
         match self.what {
-            What::Oscillator(_) => Key::OscillatorGap,
+            CaseKind::Oscillator(_) => Key::OscillatorGap,
             _ => Key::Alpha5,
         }
     }
@@ -583,7 +583,7 @@ impl Case {
     /// The keys of the drive's frequency and strength among the numbers of the equations.
     pub const fn drive_keys(&self) -> [Key; 2] {
         match self.what {
-            What::Oscillator(_) => [Key::OscillatorOmega, Key::Forcing],
+            CaseKind::Oscillator(_) => [Key::OscillatorOmega, Key::Forcing],
             _ => [Key::Omega, Key::Alpha2],
         }
     }
@@ -591,7 +591,7 @@ impl Case {
     /// Drive frequency, in the model's unit; NaN where physical quantities make no sense.
     pub fn omega(&self) -> f64 {
         match &self.what {
-            What::Oscillator(oscillator) => oscillator.omega,
+            CaseKind::Oscillator(oscillator) => oscillator.omega,
             _ => self.cantilever().map_or(f64::NAN, |case| case.omega),
         }
     }
@@ -604,7 +604,7 @@ impl Case {
     /// Whether the distance is left to a setpoint: `drive.setpoint` without `gap.tip`.
     pub fn leaves_distance_to_setpoint(&self) -> bool {
         match &self.what {
-            What::Quantities(quantities) => {
+            CaseKind::Quantities(quantities) => {
                 quantities.stated.has(Key::DriveSetpoint) && !quantities.stated.has(Key::GapTip)
             }
             _ => false,
@@ -614,7 +614,7 @@ impl Case {
     /// The same with its distance left to the setpoint, if `original` leaves its distance so.
     #[must_use]
     pub(crate) fn leaving_distance_as(self, original: &Self) -> Self {
-        let (What::Quantities(quantities), Some(setpoint)) =
+        let (CaseKind::Quantities(quantities), Some(setpoint)) =
             (&self.what, original.stated(Key::DriveSetpoint))
         else {
             return self;
@@ -626,7 +626,7 @@ impl Case {
         quantities.stated.remove(Key::GapTip);
         quantities.stated.put(Key::DriveSetpoint, setpoint.clone());
         Self {
-            what: What::Quantities(Box::new(quantities.mapped(true))),
+            what: CaseKind::Quantities(Box::new(quantities.mapped(true))),
             ..self
         }
     }
@@ -644,7 +644,7 @@ impl Case {
         note: Remark,
         state: Vec<f64>,
     ) -> Result<Self, CaseFileError> {
-        let What::Quantities(quantities) = &self.what else {
+        let CaseKind::Quantities(quantities) = &self.what else {
             return Ok(self.clone());
         };
         let mut quantities = quantities.clone();
@@ -659,7 +659,7 @@ impl Case {
         quantities.start = Some(state);
         Ok(Self {
             title: Arc::clone(&self.title),
-            what: What::Quantities(Box::new(quantities.mapped(true).possible()?)),
+            what: CaseKind::Quantities(Box::new(quantities.mapped(true).validated()?)),
             cancel: self.cancel.clone(),
         })
     }
@@ -684,9 +684,9 @@ impl Serialize for Case {
     /// by `section.key`.
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         let quantities = match &self.what {
-            What::Cantilever(cantilever) => return cantilever.serialize(serializer),
-            What::Oscillator(oscillator) => return oscillator.serialize(serializer),
-            What::Quantities(quantities) => quantities,
+            CaseKind::Cantilever(cantilever) => return cantilever.serialize(serializer),
+            CaseKind::Oscillator(oscillator) => return oscillator.serialize(serializer),
+            CaseKind::Quantities(quantities) => quantities,
         };
         let cantilever = self.cantilever();
         quantities.document(cantilever).serialize(serializer)

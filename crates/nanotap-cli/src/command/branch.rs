@@ -60,7 +60,7 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     arguments.out.check()?;
     arguments.plot.check()?;
     let case = GivenCase::of(&arguments.case, output)?;
-    case.say_held(&[options.range(&case)?.key], output);
+    case.note_constants(&[options.range(&case)?.key], output);
     if let Some(shown) = arguments.show.and_then(Shown::observable) {
         options.observables = options.observables.with(shown);
     }

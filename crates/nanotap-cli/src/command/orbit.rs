@@ -47,7 +47,7 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     let found = progress::study::<OrbitStudy>(&case, &request, &ThreadsArgument::default())?;
     let found = &found;
     for key in request.derivatives.iter().flat_map(|name| case.key(name)) {
-        case.say_held(&[key], output);
+        case.note_constants(&[key], output);
     }
     let orbit = &found.motion;
     if let Some(asked) = request.period.filter(|n| *n != orbit.period) {

@@ -16,9 +16,9 @@ use super::section::{Picture, Section, Table};
 use super::{PaperError, rerun};
 use nanotap::case::{Case, Key};
 use nanotap::model::Model;
+use nanotap::model::model_map::ModelMap;
 use nanotap::model::oscillator::{Oscillator, OscillatorParameter, Stop};
-use nanotap::model::strobe::Strobe;
-use nanotap::observe::{Set, measure};
+use nanotap::observe::{ObservableSet, measure};
 use nanotap::study::start_box::default_box;
 
 /// The coefficient of restitution.
@@ -209,7 +209,7 @@ impl Orbit {
             why,
         };
         let model = oscillator.model()?;
-        let mut map = Strobe::new(&model);
+        let mut map = ModelMap::new(&model);
         let area = default_box(&model).map_err(|error| failed(error.to_string()))?;
         let found = area.starts(SEED, 32).into_iter().find_map(|start| {
             match classify(&mut map, &start, &ClassifyOptions::default()).kind {
@@ -228,7 +228,7 @@ impl Orbit {
     fn near(oscillator: Oscillator, guess: &Self) -> Result<Self, PaperError> {
         let model = oscillator.model()?;
         let orbit = close_orbit(
-            &mut Strobe::new(&model),
+            &mut ModelMap::new(&model),
             &guess.closed.states[0],
             1,
             &ShootingOptions::default(),
@@ -249,7 +249,7 @@ impl Orbit {
             what: "the orbit's extrema".into(),
             why,
         };
-        let o = measure(model, &orbit.states[0], 1, Set::ALL)
+        let o = measure(model, &orbit.states[0], 1, ObservableSet::ALL)
             .map_err(|error| failed(error.to_string()))?;
         Ok(Self {
             oscillator,

@@ -18,8 +18,8 @@ use super::time_step::Grid;
 use nanotap::case::Case;
 use nanotap::model::Model;
 use nanotap::model::cantilever::Cantilever;
+use nanotap::model::model_map::ModelMap;
 use nanotap::model::parameter::Parameter;
-use nanotap::model::strobe::Strobe;
 use nanotap::study::start_box::default_box;
 
 /// Longest period of the unstable orbits that are searched for.
@@ -402,7 +402,7 @@ fn period_three(subject: &Case) -> Result<Option<(f64, PeriodicOrbit)>, PaperErr
         what: "the box of initial states".into(),
         why: error.to_string(),
     })?;
-    let mut map = Strobe::new(&model);
+    let mut map = ModelMap::new(&model);
     let found = area.starts(SEED, 32).into_iter().find_map(|start| {
         match classify(&mut map, &start, &ClassifyOptions::default()).kind {
             MotionKind::Periodic(orbit) if orbit.period == 3 => Some(orbit),
@@ -429,7 +429,7 @@ impl Returns {
             what: "a run on the chaotic attractor".into(),
             why: error.to_string(),
         };
-        let mut map = Strobe::new(model);
+        let mut map = ModelMap::new(model);
         let mut states = vec![state.to_vec()];
         for k in 0..watched {
             let mut next = states[k].clone();

@@ -1,4 +1,4 @@
-//! Dissipation beside any elastic law: viscosity that grows with the contact radius, and
+//! Dissipation in addition to any elastic law: viscosity that grows with the contact radius, and
 //! damping that falls off across the gap.
 //!
 //! `−η √(Rδ) ḋ` in contact (Garcia, Gómez et al.; used by dForce) and `−γ₀ e^{−d/x} ḋ` at any

@@ -1,8 +1,8 @@
-//! The stroboscopic map of a case, for algorithms of one's own.
+//! The stroboscopic map of a case, for users' own algorithms.
 //!
 //! A [`Map`] takes the state at drive phase 0 to the state one drive period later, exactly, and
 //! knows its derivatives with respect to the state and to every key of the case. It does not
-//! change, so that threads may share one; each call has a work space of its own.
+//! change, so that threads may share one; each call has a separate work space.
 //!
 //! ```
 //! use nanotap::Map;
@@ -26,7 +26,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! A loop that advances one state for long goes faster with a work space of its own:
+//! A loop that advances one state for long goes faster with a separate work space:
 //! [`Map::strobe`], which also is what `nanotap_dynamics` analyses.
 
 pub mod motion;
@@ -45,11 +45,11 @@ use rayon::prelude::*;
 pub use motion::{Motion, Point};
 
 use crate::case::{Case, CaseError, Key};
-use crate::model::strobe::{Strobe, together};
+use crate::model::model_map::{ModelMap, together};
 use crate::model::{Model, MotionError, Tangent};
 
-/// Most numbers that [`Map::iterate`] returns.
-pub const MOST_NUMBERS: usize = 200_000_000;
+/// Maximum number of values that [`Map::iterate`] returns.
+pub const MAX_NUMBERS: usize = 200_000_000;
 
 /// Drive periods between two looks at whether the work is to stop.
 pub(crate) const UNINTERRUPTED: usize = 1024;
@@ -74,7 +74,7 @@ pub enum MapError {
     /// More than fits.
     #[error("{states} states are too many; {most} at most")]
     TooMany {
-        /// How many were asked for.
+        /// Number requested.
         states: usize,
         /// How many there may be.
         most: usize,
@@ -114,7 +114,7 @@ pub struct Map {
     case: Arc<Case>,
     model: Arc<Model>,
     /// A work space, to be copied.
-    strobe: Strobe,
+    strobe: ModelMap,
 }
 
 /// The map at a state, to first order.
@@ -140,7 +140,7 @@ impl Map {
         }
         let model = case.model()?;
         Ok(Self {
-            strobe: Strobe::new(&model),
+            strobe: ModelMap::new(&model),
             model: Arc::new(model),
             case: Arc::new(case.clone()),
         })
@@ -166,9 +166,9 @@ impl Map {
         self.model.period()
     }
 
-    /// The map with a work space of its own, to advance one state again and again, and for
+    /// The map with a separate work space, to advance one state again and again, and for
     /// the algorithms of `nanotap_dynamics`.
-    pub fn strobe(&self) -> Strobe {
+    pub fn strobe(&self) -> ModelMap {
         self.strobe.clone()
     }
 
@@ -201,7 +201,7 @@ impl Map {
             return advance(&mut self.strobe(), states, periods, control);
         }
         let together = together(&self.strobe, rows);
-        let some = |strobe: &mut Strobe, (number, states): (usize, &mut [f64])| {
+        let some = |strobe: &mut ModelMap, (number, states): (usize, &mut [f64])| {
             advance_all(strobe, states, periods, control)
                 .map_err(|error| error.after(number * together))
         };
@@ -219,7 +219,7 @@ impl Map {
     ///
     /// # Errors
     /// When the state does not fit, its motion cannot be followed, there would be more than
-    /// [`MOST_NUMBERS`] numbers, or the work was stopped.
+    /// [`MAX_NUMBERS`] numbers, or the work was stopped.
     pub fn iterate(
         &self,
         state: &[f64],
@@ -228,7 +228,7 @@ impl Map {
         control: &Control<'_>,
     ) -> Result<Vec<f64>, MapError> {
         self.fits(state, 1)?;
-        let most = MOST_NUMBERS / self.dimension();
+        let most = MAX_NUMBERS / self.dimension();
         if count > most {
             return Err(MapError::TooMany {
                 states: count,
@@ -252,8 +252,8 @@ impl Map {
     /// `k = periods`.
     ///
     /// # Errors
-    /// When the state does not fit, its motion cannot be followed, or the case makes no sense
-    /// beside the value of a key.
+    /// When the state does not fit, its motion cannot be followed, or the case is not valid
+    /// near the value of a key.
     pub fn linearised(
         &self,
         state: &[f64],
@@ -302,7 +302,7 @@ impl Map {
     ) -> Result<Linearised, MapError> {
         self.fits(state, 1)?;
         let n = self.dimension();
-        let mut strobe = Strobe::with_tangents(&self.model, tangents.to_vec());
+        let mut strobe = ModelMap::with_tangents(&self.model, tangents.to_vec());
         let mut at = Linearised {
             state: state.to_vec(),
             jacobian: DMatrix::identity(n, n),
@@ -361,10 +361,10 @@ impl Map {
     }
 }
 
-/// Replaces `state` by what comes of it after `periods` drive periods; every so often looks
-/// whether the work is to stop.
+/// Replaces `state` by its image after `periods` drive periods; polls at intervals whether the work is
+/// to stop.
 fn advance(
-    strobe: &mut Strobe,
+    strobe: &mut ModelMap,
     state: &mut [f64],
     periods: usize,
     control: &Control<'_>,
@@ -374,9 +374,9 @@ fn advance(
     })
 }
 
-/// The same of many states, one after the other.
+/// The same for many states.
 fn advance_all(
-    strobe: &mut Strobe,
+    strobe: &mut ModelMap,
     states: &mut [f64],
     periods: usize,
     control: &Control<'_>,

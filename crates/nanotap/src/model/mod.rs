@@ -7,7 +7,7 @@
 //! [`Model`] and asks no more where it came from.
 //!
 //! A sample with a [nonlinear] force law is no regime: such a model has free flight
-//! alone as a linear system, and the flow under the force beside it.
+//! alone as a linear system, and the flow under the force in addition.
 
 pub mod beam;
 mod beam_equations;
@@ -20,6 +20,7 @@ pub mod galerkin;
 mod grazed;
 pub mod higher_modes;
 mod measured_modes;
+pub mod model_map;
 mod motion_error;
 pub mod nonlinear;
 pub mod oscillator;
@@ -27,7 +28,6 @@ pub mod parameter;
 pub mod recording;
 pub mod sample_law;
 pub mod spectrum;
-pub mod strobe;
 mod tangent;
 
 use std::sync::{Arc, OnceLock};
@@ -144,7 +144,7 @@ pub struct Powers {
     pub stored: Vec<Product>,
 }
 
-/// [`Powers`] of every regime, worked out when first asked for: of the thousands of models
+/// [`Powers`] of every regime, computed when first used: of the thousands of models
 /// that a sweep sets up, few ever are.
 #[derive(Clone, Debug)]
 pub(crate) struct PowersOnDemand {
@@ -427,7 +427,7 @@ pub struct Tangent(pub(crate) TangentKind);
 /// The engines' own terms.
 #[derive(Clone, Debug)]
 pub(crate) enum TangentKind {
-    Exact(SystemTangent),
+    PiecewiseLinear(SystemTangent),
     Nonlinear(Variation),
 }
 
@@ -435,7 +435,7 @@ impl Tangent {
     /// Of a model that does not change.
     pub(crate) fn zeros(model: &Model) -> Self {
         Self(match &model.nonlinear {
-            None => TangentKind::Exact(SystemTangent::zeros(&model.system)),
+            None => TangentKind::PiecewiseLinear(SystemTangent::zeros(&model.system)),
             Some(_) => TangentKind::Nonlinear(Variation::none()),
         })
     }
@@ -458,13 +458,13 @@ impl Tangent {
         for &(parameter, slope) in slopes {
             sum.add(slope, &cantilever_tangent(case, model, parameter)?);
         }
-        Ok(Self(TangentKind::Exact(sum)))
+        Ok(Self(TangentKind::PiecewiseLinear(sum)))
     }
 }
 
 impl From<SystemTangent> for Tangent {
     fn from(tangent: SystemTangent) -> Self {
-        Self(TangentKind::Exact(tangent))
+        Self(TangentKind::PiecewiseLinear(tangent))
     }
 }
 

@@ -25,9 +25,9 @@ use crate::model::beam_equations::{Beam, BeamTangent};
 use crate::model::cantilever::Cantilever;
 use crate::model::galerkin::Galerkin;
 use crate::model::grazed::grazed;
+use crate::model::model_map::EngineMap;
 use crate::model::parameter::Parameter;
 use crate::model::sample_law::SampleLaw;
-use crate::model::strobe::EngineMap;
 use crate::model::{Model, ModelError, MotionError};
 
 /// Forces a step.
@@ -356,7 +356,7 @@ impl Nonlinear {
             .sum()
     }
 
-    /// The force at these gaps, met one after the other without haste.
+    /// The force at these gaps, evaluated quasi-statically, in this order.
     pub fn force_curve(&self, gaps: impl IntoIterator<Item = f64>) -> Vec<[f64; 2]> {
         let law = self.system.law();
         let mut last: Option<(f64, usize)> = None;

@@ -44,12 +44,12 @@ pub struct Clearance<D = f64> {
 const PLACES_PER_MODE: usize = 8;
 /// Width of the interval of places in which the beam is lowest.
 const PLACE: f64 = 1e-9;
-/// The place nearest to the clamp at which a slope is asked for.
+/// The place nearest to the clamp at which a slope is evaluated.
 const CLAMP: f64 = 1e-6;
 /// Slopes of a beam that is level.
 const LEVEL: f64 = 1e-13;
 /// Newton's steps to the moment of a least height, …
-const MOST_STEPS: usize = 12;
+const MAX_STEPS: usize = 12;
 /// … the last of which is shorter than this part of a drive period.
 const SAME_MOMENT: f64 = 1e-9;
 /// A least height that was followed is the least over all time where both agree as well as this.
@@ -172,13 +172,13 @@ impl RecordedBeam<'_> {
     /// The least height of one place near the moment `from`, in drive periods: Newton's method
     /// on its rate. Only of an exact motion.
     fn least_near(&self, xi: f64, from: f64) -> Option<Clearance> {
-        let Recording::Exact(trajectory) = self.recording else {
+        let Recording::PiecewiseLinear(trajectory) = self.recording else {
             return None;
         };
         let height = self.beam.height(xi);
         let mut time = from * self.model.period();
         let mut piece = trajectory.piece_at(&height, time)?;
-        for _ in 0..MOST_STEPS {
+        for _ in 0..MAX_STEPS {
             let jet = piece.signal.jet(time - piece.start);
             if jet.curvature <= 0.0 {
                 return None;
@@ -264,7 +264,7 @@ fn valleys(heights: &[f64]) -> Vec<Valley> {
 
 /// Periods whose least height is found exactly, those with the lowest bounds first; the rest
 /// of the motions that need more is as the ones before it.
-const MOST_PERIODS: usize = 64;
+const MAX_PERIODS: usize = 64;
 /// Two periods whose modal coordinates at the start differ by less than this, as a part of
 /// the greatest, are one.
 const SAME: f64 = 1e-10;
@@ -394,7 +394,7 @@ impl ClearanceSearch {
                 start,
             });
         }
-        if self.candidates.len() >= 4 * MOST_PERIODS {
+        if self.candidates.len() >= 4 * MAX_PERIODS {
             self.candidates = self.lowest();
         }
         self.higher = 0.0;
@@ -416,7 +416,7 @@ impl ClearanceSearch {
                     let bound = known.bound;
                     *known = Candidate { bound, ..candidate };
                 }
-            } else if kept.len() < MOST_PERIODS {
+            } else if kept.len() < MAX_PERIODS {
                 kept.push(candidate);
             }
         }
@@ -440,7 +440,7 @@ impl ClearanceSearch {
             let beam = RecordedBeam {
                 model,
                 beam,
-                recording: &Recording::Exact(period),
+                recording: &Recording::PiecewiseLinear(period),
             };
             let heights = least_heights(model, beam.beam, &state)?;
             let Some(here) = beam.lowest(&heights) else {

@@ -30,14 +30,14 @@ use super::table::{OBSERVABLES, Observable, ObservableSet, Observables};
 use super::value::Value;
 use super::varied_motion::{Change, Varied, gather};
 use crate::case::{Case, CaseError, Key};
+use crate::model::model_map::ModelMap;
 use crate::model::nonlinear::{self, Nonlinear};
-use crate::model::strobe::Strobe;
 use crate::model::{Model, ModelTangent, MotionError, Tangent, TangentKind};
 
 /// Why an orbit has no derivative.
 #[derive(Clone, Debug, thiserror::Error)]
 pub enum DerivativeError {
-    /// The case makes no sense beside this value of the key.
+    /// The case is not valid at a neighbouring value of the key.
     #[error(transparent)]
     Case(#[from] CaseError),
     /// The flow failed.
@@ -70,7 +70,7 @@ impl Derivative {
     /// clearance if its derivative is wanted.
     ///
     /// # Errors
-    /// When the case makes no sense beside the value, or the orbit is not isolated.
+    /// When the case is not valid near the value, or the orbit is not isolated.
     pub fn of(
         case: &Case,
         model: &Model,
@@ -141,11 +141,11 @@ impl Derivative {
             by_key
         };
         let observed = |side: f64| -> Result<(Observables, Option<Observables>), DerivativeError> {
-            let beside = case.with(key, value + side * step);
+            let neighbour = case.with(key, value + side * step);
             let change = state.iter().zip(&start);
             let from: Vec<f64> = change.map(|(x, by)| x + side * step * by).collect();
-            let seen = measure(&beside.model()?, &from, period, set)?;
-            let si = beside.physical().map(|view| seen.in_si(&view.scales));
+            let seen = measure(&neighbour.model()?, &from, period, set)?;
+            let si = neighbour.physical().map(|view| seen.in_si(&view.scales));
             Ok((seen, si))
         };
         let (low, high) = (observed(-1.0)?, observed(1.0)?);
@@ -241,7 +241,7 @@ impl JsonSchema for Derivative {
 /// with the keys.
 ///
 /// # Errors
-/// When the flow fails, or the case makes no sense beside the value of a key.
+/// When the flow fails, or the case is not valid near the value of a key.
 pub(crate) fn first_harmonic_changes(
     case: &Case,
     model: &Model,
@@ -301,12 +301,12 @@ pub(crate) fn first_harmonic_changes(
         } else {
             3e-3 * value.abs()
         };
-        let step = (BESIDE / change).min(farthest);
-        let beside = |side: f64| -> Result<Observables, DerivativeError> {
+        let step = (DISPLACEMENT / change).min(farthest);
+        let neighbour = |side: f64| -> Result<Observables, DerivativeError> {
             let there = case.with(*key, value + side * step).model()?;
             Ok(measure(&there, state, 1, set)?)
         };
-        let (low, high) = (beside(-1.0)?, beside(1.0)?);
+        let (low, high) = (neighbour(-1.0)?, neighbour(1.0)?);
         let turn = (high.phase - low.phase + 180.0).rem_euclid(360.0) - 180.0;
         rows[(0, n + k)] = (high.first_harmonic - low.first_harmonic) / (2.0 * step);
         rows[(1, n + k)] = turn / (2.0 * step);
@@ -339,7 +339,7 @@ fn tip_changes(
 
 /// Part of the amplitude by which a motion changes where its first harmonic is differenced, by keys
 /// that change the modes.
-const BESIDE: f64 = 1e-4;
+const DISPLACEMENT: f64 = 1e-4;
 
 /// Part of an orbit by which it changes where what is observed is differenced.
 const STEP: f64 = 2e-4;
@@ -368,7 +368,7 @@ fn orbit_derivative(
     period: usize,
 ) -> Result<Vec<f64>, DerivativeError> {
     let n = state.len();
-    let mut map = Strobe::with_tangents(model, vec![tangent]);
+    let mut map = ModelMap::with_tangents(model, vec![tangent]);
     let mut x = state.to_vec();
     let (mut one, mut by) = (DMatrix::zeros(n, n), DMatrix::zeros(n, 1));
     let (mut all, mut change) = (DMatrix::identity(n, n), DMatrix::zeros(n, 1));

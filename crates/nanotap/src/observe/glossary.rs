@@ -1,5 +1,5 @@
-//! What the entries of results mean, and their units: the observables, and what stands beside
-//! them in documents, time series and datasets. For those who show results with their words.
+//! What the entries of results mean, and their units: the observables, and the other entries
+//! of documents, time series and datasets. For those who show results with their words.
 
 use std::collections::BTreeMap;
 
@@ -25,8 +25,8 @@ pub struct Glossary {
     pub physical: BTreeMap<String, Entry>,
 }
 
-/// What stands beside the observables.
-const BESIDE: &[(&str, &str, &str)] = &[
+/// The other entries.
+const OTHERS: &[(&str, &str, &str)] = &[
     ("strobe", "state at drive phase 0", STATE),
     ("start", "state where the recording starts", STATE),
     ("state", "state at drive phase 0", STATE),
@@ -97,7 +97,7 @@ const PERIODS: &str = Dimension::Periods.model_unit();
 
 /// The words.
 pub fn glossary() -> Glossary {
-    let beside = BESIDE
+    let others = OTHERS
         .iter()
         .map(|&(name, words, unit)| (name.to_owned(), Entry { words, unit }));
     let model = OBSERVABLES.iter().map(|o| {
@@ -124,7 +124,7 @@ pub fn glossary() -> Glossary {
         physical.insert(name.to_owned(), Entry { words, unit });
     }
     Glossary {
-        model: beside.chain(model).collect(),
+        model: others.chain(model).collect(),
         physical,
     }
 }

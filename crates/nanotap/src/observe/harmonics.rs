@@ -36,7 +36,7 @@ pub struct Spectrum {
     pub thd: f64,
     /// Phase lag of the tip deflection behind the drive, degrees in (−180, 180]; 90 at
     /// the free resonance of a lever with high Q. Written out with the
-    /// [`Observables`](super::Observables), which stand beside the spectrum.
+    /// [`Observables`](super::Observables), which are reported with the spectrum.
     #[serde(skip)]
     pub phase: f64,
     /// Amplitude of the tip deflection at the drive's frequency; written out as `phase`.

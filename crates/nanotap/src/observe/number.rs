@@ -1,4 +1,4 @@
-//! The numbers that observables are made of: plain, or with a derivative beside them.
+//! The numbers that observables are made of: plain, or with a derivative.
 
 use std::ops::Div;
 

@@ -22,7 +22,7 @@ pub struct PhysicalMotion {
     pub observables: Observables,
     /// A over the free amplitude A₀: the setpoint ratio of this motion.
     pub amplitude_ratio: f64,
-    /// What stands beside them where one motion is told alone.
+    /// The setting, where a single motion is reported.
     pub setting: Option<Setting>,
 }
 
@@ -146,8 +146,8 @@ impl JsonSchema for PhysicalMotion {
         let ratio = json!({"type": "number", "description": "A over the free amplitude"});
         properties.insert("A_ratio".to_owned(), ratio);
         let setting = Setting::json_schema(generator).to_value();
-        if let Some(Json::Object(beside)) = setting.get("properties") {
-            properties.extend(beside.clone());
+        if let Some(Json::Object(entries)) = setting.get("properties") {
+            properties.extend(entries.clone());
         }
         json_schema!({
             "type": "object",

@@ -138,8 +138,8 @@ macro_rules! observables {
         #[derive(Clone, Copy)]
         enum Row { $($name),* }
 
-        /// Observables of a motion; in the model's own units, or in SI. What nobody asked for
-        /// is not a number.
+        /// Observables of a motion; in the model's own units, or in SI. Unrequested fields
+        /// are NaN.
         #[derive(Clone, Copy, Debug, PartialEq)]
         pub struct Observables {
             /// Length of time observed, in drive periods.

@@ -14,7 +14,7 @@ use crate::Error;
 use crate::case::Case;
 use crate::control::Control;
 use crate::map::UNINTERRUPTED;
-use crate::model::strobe::Strobe;
+use crate::model::model_map::ModelMap;
 use crate::model::{Model, MotionError};
 use crate::observe::begins_contact;
 use crate::study::Study;
@@ -82,7 +82,7 @@ pub struct LyapunovReport {
 /// A map that goes no further once the work is to stop.
 #[derive(Clone)]
 struct Stoppable<'a> {
-    map: Strobe,
+    map: ModelMap,
     control: Control<'a>,
 }
 
@@ -192,7 +192,7 @@ pub fn lyapunov(
     check_periods(options.periods)?;
     check_states(model, options.points, "points")?;
     let mut map = Stoppable {
-        map: Strobe::new(model),
+        map: ModelMap::new(model),
         control: *control,
     };
     let defaults = SpectrumOptions::default();

@@ -22,7 +22,7 @@ use nanotap_dynamics::{
 
 use crate::case::{Case, CaseError, Family};
 use crate::model::Model;
-use crate::model::strobe::Strobe;
+use crate::model::model_map::ModelMap;
 use crate::study::branch::kind_name;
 use crate::study::simulate::{Classification, Named};
 use crate::study::sweep::SweepOptions;
@@ -271,7 +271,7 @@ impl<'a> DistanceSweep<'a> {
         if let Some(response) = response.filter(|x| x.iter().all(|v| v.is_finite())) {
             let shared = start.len().min(response.len());
             start[..shared].copy_from_slice(&response[..shared]);
-            let mut map = Strobe::new(&model);
+            let mut map = ModelMap::new(&model);
             let closed = close_orbit(&mut map, &start, 1, &ShootingOptions::default());
             if let Ok(orbit) = closed
                 && orbit.is_stable()
@@ -305,7 +305,7 @@ impl<'a> DistanceSweep<'a> {
             ..self.classify.clone()
         };
         match self.model(gap) {
-            Ok(model) => named(&mut Strobe::new(&model), start, &options),
+            Ok(model) => named(&mut ModelMap::new(&model), start, &options),
             Err(error) => Met::undecided(error.to_string(), start),
         }
     }
@@ -317,7 +317,7 @@ impl<'a> DistanceSweep<'a> {
             Ok(model) => model,
             Err(error) => return Met::undecided(error.to_string(), start),
         };
-        let mut map = Strobe::new(&model);
+        let mut map = ModelMap::new(&model);
         let options = ClassifyOptions {
             max_transient: GRID_TRANSIENT,
             long_period: self.classify.max_period,
@@ -448,7 +448,7 @@ impl<'a> DistanceSweep<'a> {
                 .fold(0.0, |m: f64, (x, y)| m.max((x - y).abs()));
             let model = self.model(gap).ok()?;
             let options = ShootingOptions::default();
-            let mut map = Strobe::new(&model);
+            let mut map = ModelMap::new(&model);
             let closed = close_orbit_from_points(&mut map, &between, stretch.period, &options);
             if let Ok(orbit) = closed
                 && orbit.period == stretch.period
@@ -777,7 +777,7 @@ impl<'a> DistanceSweep<'a> {
 }
 
 /// What a run of a map goes to.
-fn named(map: &mut Strobe, start: &[f64], options: &ClassifyOptions) -> Met {
+fn named(map: &mut ModelMap, start: &[f64], options: &ClassifyOptions) -> Met {
     let classified = classify(map, start, options);
     let named = Named::of(&classified.kind);
     Met {

@@ -6,9 +6,9 @@ use nanotap_dynamics::{Control, StroboscopicMap as _};
 use super::quasistatic::MOVING;
 use super::{ApproachPoint, Curve, Way};
 use crate::Error;
-use crate::model::strobe::Strobe;
+use crate::model::model_map::ModelMap;
 use crate::model::{Model, MotionError};
-use crate::observe::{PhysicalMotion, Set, measure};
+use crate::observe::{ObservableSet, PhysicalMotion, measure};
 
 /// Most drive periods there and back.
 const MAX_PERIODS: usize = 2_000_000;
@@ -73,7 +73,7 @@ pub(super) fn ramp(
             if k == periods {
                 table.push(row(curve, way, gap, &here, &state).map_err(failed)?);
             }
-            Strobe::new(&here).advance(&mut state).map_err(failed)?;
+            ModelMap::new(&here).advance(&mut state).map_err(failed)?;
             if control.is_cancelled() {
                 break;
             }
@@ -93,7 +93,7 @@ fn row(
     model: &Model,
     state: &[f64],
 ) -> Result<ApproachPoint, MotionError> {
-    let seen = measure(model, state, 1, Set::COMMON)?;
+    let seen = measure(model, state, 1, ObservableSet::COMMON)?;
     let view = curve.case.physical();
     Ok(ApproachPoint {
         way,

@@ -19,7 +19,7 @@ use nanotap_dynamics::{
 
 use crate::case::Case;
 use crate::model::Model;
-use crate::model::strobe::Strobe;
+use crate::model::model_map::ModelMap;
 
 /// An orbit at a row.
 #[derive(Clone, Debug)]
@@ -79,7 +79,7 @@ impl Along<'_> {
     pub(super) fn continued_from(&self, before: &Rows) -> Option<Rows> {
         let row = |(place, candidates): (&Vec<f64>, &Vec<Candidate>)| {
             let model = (self.at)(place)?.model().ok()?;
-            let mut map = Strobe::new(&model);
+            let mut map = ModelMap::new(&model);
             let one = |candidate: &Candidate| {
                 let orbit = continued(&mut map, &candidate.orbit)?;
                 let near = orbit.is_near(&candidate.orbit, FAR);
@@ -241,7 +241,7 @@ impl Along<'_> {
     ) -> Option<PeriodicOrbit> {
         let closed = (self.at)(to).and_then(|case| {
             let model = case.model().ok()?;
-            continued(&mut Strobe::new(&model), orbit)
+            continued(&mut ModelMap::new(&model), orbit)
         });
         // Beyond a fold Newton may find an orbit of another branch.
         let near = |found: &PeriodicOrbit| found.is_near(orbit, FAR);
@@ -283,7 +283,7 @@ pub(super) fn settled(
         birkhoff_periods: 0,
         ..ClassifyOptions::default()
     };
-    let end = classify(&mut Strobe::new(model), state.unwrap_or(&rest), &options);
+    let end = classify(&mut ModelMap::new(model), state.unwrap_or(&rest), &options);
     match end.kind {
         MotionKind::Periodic(orbit) | MotionKind::TransientChaos { orbit, .. } => Some(orbit),
         _ => None,
@@ -291,7 +291,7 @@ pub(super) fn settled(
 }
 
 /// The orbit of this map that Newton finds from another's, of the same period.
-pub(super) fn continued(map: &mut Strobe, orbit: &PeriodicOrbit) -> Option<PeriodicOrbit> {
+pub(super) fn continued(map: &mut ModelMap, orbit: &PeriodicOrbit) -> Option<PeriodicOrbit> {
     if orbit.dimension() != map.dimension() {
         return None;
     }

@@ -10,7 +10,7 @@ use super::{
 };
 use crate::case::{Case, Key};
 use crate::model::contact::ContactLaw;
-use crate::observe::{PhysicalMotion, Set, measure};
+use crate::observe::{ObservableSet, PhysicalMotion, measure};
 use crate::study::FreeMotion;
 use crate::study::approach::{
     ApproachPoint, ApproachReport, Distances, Way, beam_clearance, hysteresis,
@@ -317,7 +317,12 @@ impl Curve<'_> {
         amplitude: f64,
     ) -> Result<ApproachPoint, Error> {
         let view = self.case.physical();
-        let observables = measure(&orbit.model, &orbit.orbit.states[0], 1, Set::COMMON)?;
+        let observables = measure(
+            &orbit.model,
+            &orbit.orbit.states[0],
+            1,
+            ObservableSet::COMMON,
+        )?;
         let modulation = self.modulated(&orbit, amplitude, gap);
         Ok(ApproachPoint {
             way,

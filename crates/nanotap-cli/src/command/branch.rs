@@ -7,7 +7,7 @@ use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use nanotap::case::physical::Kind;
 use nanotap::figure::branch::{Shown, case_figure};
 use nanotap::number::shortest;
-use nanotap::observe::{Set, columns, time_series};
+use nanotap::observe::{ObservableSet, columns, time_series};
 use nanotap::study::branch::{BranchOptions, BranchReport, BranchStudy, PointReport};
 use nanotap::study::orbit::spectral_radius;
 
@@ -107,7 +107,7 @@ fn shorten(report: &mut BranchReport, output: &Output) {
 
 /// A row a point, branch by branch; `kind` is empty but for bifurcations, which follow the
 /// points of their branch.
-fn csv(report: &BranchReport, observed: Set, names: &[String]) -> String {
+fn csv(report: &BranchReport, observed: ObservableSet, names: &[String]) -> String {
     let physical = report.points.iter().any(|p| p.physical.is_some());
     let mut header: Vec<String> = [
         "branch",

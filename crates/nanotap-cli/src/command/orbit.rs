@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use clap::Args;
 use nanotap::figure::motion::orbit_figure;
 use nanotap::model::Model;
-use nanotap::observe::{PhysicalMotion, Set, time_series};
+use nanotap::observe::{ObservableSet, PhysicalMotion, time_series};
 use nanotap::study::orbit::{MAX_DETERMINANT_DEFECT, OrbitOptions, OrbitReport, OrbitStudy};
 
 use crate::arguments::{CaseArguments, OutArgument, PlotArgument};
@@ -111,7 +111,12 @@ fn harmonics_csv(orbit: &OrbitReport, physical: Option<&PhysicalMotion>) -> Stri
     csv
 }
 
-fn text(case: &GivenCase, model: &Model, orbit: &OrbitReport, chosen: Option<Set>) -> String {
+fn text(
+    case: &GivenCase,
+    model: &Model,
+    orbit: &OrbitReport,
+    chosen: Option<ObservableSet>,
+) -> String {
     let units = case.units();
     let heading = format!("{}: {}", case.title(), case.summary());
     let mut text = format!("{}\n\n", style::bold(&heading));

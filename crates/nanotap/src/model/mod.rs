@@ -20,6 +20,7 @@ pub mod exact_beam;
 pub mod galerkin;
 mod grazed;
 mod measured_modes;
+pub mod model_map;
 mod motion_error;
 pub mod nonlinear;
 pub mod oscillator;
@@ -27,7 +28,6 @@ pub mod parameter;
 pub mod recording;
 pub mod sample_law;
 pub mod spectrum;
-pub mod strobe;
 mod tangent;
 pub mod words;
 
@@ -462,7 +462,7 @@ pub struct Tangent(pub(crate) TangentKind);
 /// The engines' own terms.
 #[derive(Clone, Debug)]
 pub(crate) enum TangentKind {
-    Exact(SystemTangent),
+    PiecewiseLinear(SystemTangent),
     Nonlinear(Variation),
 }
 
@@ -470,7 +470,7 @@ impl Tangent {
     /// Of a model that does not change.
     pub(crate) fn zeros(model: &Model) -> Self {
         Self(match &model.nonlinear {
-            None => TangentKind::Exact(SystemTangent::zeros(&model.system)),
+            None => TangentKind::PiecewiseLinear(SystemTangent::zeros(&model.system)),
             Some(_) => TangentKind::Nonlinear(Variation::none()),
         })
     }
@@ -493,13 +493,13 @@ impl Tangent {
         for &(parameter, slope) in slopes {
             sum.add(slope, &cantilever_tangent(case, model, parameter)?);
         }
-        Ok(Self(TangentKind::Exact(sum)))
+        Ok(Self(TangentKind::PiecewiseLinear(sum)))
     }
 }
 
 impl From<SystemTangent> for Tangent {
     fn from(tangent: SystemTangent) -> Self {
-        Self(TangentKind::Exact(tangent))
+        Self(TangentKind::PiecewiseLinear(tangent))
     }
 }
 

@@ -6,8 +6,8 @@ use super::*;
 use crate::model::contact::dual::Dual;
 use crate::model::contact::entry::{Damper, Entry, Numbers, any};
 use crate::model::contact::law::{Bilinear, LinearForm, SampleResponse};
+use crate::model::model_map::ModelMap;
 use crate::model::parameter::{ParameterEntry, SampleKey, Unit};
-use crate::model::strobe::Strobe;
 
 /// A number of a relaxing arm.
 const fn arm(name: &'static str, unit: Unit) -> ParameterEntry {
@@ -109,14 +109,14 @@ fn a_law_with_two_internal_variables_is_one_entry() {
     };
     let solid = crate::model::contact::ContactLaw::StandardLinearSolid;
     let single = Model::cantilever(&case.clone().on(solid, &[40.0, 0.05])).unwrap();
-    let mut map = Strobe::new(&single);
+    let mut map = ModelMap::new(&single);
     for (numbers, same) in [
         ([20.0, 0.05, 20.0, 0.05], true),
         ([40.0, 0.05, 0.0, 3.0], false),
     ] {
         let pair = model(&numbers);
         assert_eq!((pair.memory, pair.dimension()), (2, 8));
-        let mut both = Strobe::new(&pair);
+        let mut both = ModelMap::new(&pair);
         let mut expected = vec![0.05, 0.0, 0.0, -0.5, 0.0, 0.0, 0.02];
         let mut state = [&expected[..], &[expected[6]]].concat();
         for _ in 0..6 {

@@ -149,7 +149,7 @@ def test_dimensions_are_named(physical):
     tables["drive"]["frequency"] = "65.7 nm"
     with pytest.raises(ValueError, match="frequency"):
         nanotap.Case(**tables)
-    with pytest.raises(ValueError, match="there is no such file"):
+    with pytest.raises(ValueError, match="no such file"):
         nanotap.Case.from_file("nowhere.toml")
     with pytest.raises(ValueError, match="cannot be read"):
         nanotap.Case(catalogue="nowhere.toml", **GIVEN)

@@ -680,7 +680,7 @@ def test_a_click_on_a_basin_starts_a_run_there(page: Any, address: str) -> None:
     ("shows", "legend"),
     [
         ("kinds of motion", "period 1"),
-        ("greatest force", ""),
+        ("peak force", ""),
         ("number of motions", "one"),
     ],
 )
@@ -697,7 +697,7 @@ def test_a_map_of_two_parameters_and_a_click_on_it(
     )
     assert legend in said
     if not legend:
-        assert "greatest force on the tip" in said
+        assert "peak force on the tip" in said
     page.mouse.click(*spot(page, "study-figure", 0, 0.6, 0.5))
     until(page, lambda: "set.alpha4=" in page.url and "set.omega=" in page.url)
     alpha4, omega = (

@@ -193,7 +193,7 @@ def test_the_terminals_own_picture_is_to_be_had(regular, tmp_path):
     nanotap.sweep(regular, over={"omega": (2.9, 3.0, 4)}, periods=3, out=out)
     assert b"<svg" in nanotap._nanotap.figure(out, "svg")
     assert nanotap._nanotap.figure(out, "png").startswith(b"\x89PNG")
-    with pytest.raises(ValueError, match="there are svg, png and pdf"):
+    with pytest.raises(ValueError, match="expected svg, png or pdf"):
         nanotap._nanotap.figure(out, "gif")
 
 

@@ -317,6 +317,8 @@ def annotation(option: str, declared: dict[str, Any], default: str | None) -> st
         return "str | Sequence[str] | Mapping[str, Any]"
     elif "object" not in known and declared.get("items") == {"type": "string"}:
         return "Sequence[str] | None"
+    elif declared.get("x-own") and "object" in known:
+        return "Any"
     elif option in {"x", "y"}:
         return "str | Mapping[str, Any]"
     elif option == "attractors":

@@ -21,13 +21,13 @@ use crate::{number, progress, style};
 /// Where a dataset goes, and which part of it is computed here.
 #[derive(Args, Clone, Debug)]
 pub(crate) struct DatasetArguments {
-    /// The dataset: a folder ending in .zarr, which xarray.open_zarr opens; with an ending of
-    /// .csv, a table with a line a start, beside the folder of that name. Without it, a name
-    /// is derived. Where it is there already, the work goes on where it stopped
+    /// The dataset: a folder with extension .zarr, which xarray.open_zarr opens; with .csv, also a
+    /// table with a row per start, next to the folder. Default: a name derived from the case. An
+    /// unfinished dataset is continued
     #[arg(long, value_name = "PATH")]
     pub(crate) out: Option<PathBuf>,
 
-    /// Compute one of n shares only, as in 2/8; `nanotap merge` puts the shares together
+    /// Compute only one of n shares, as in 2/8; `nanotap merge` merges the shares
     #[arg(long, value_name = "I/N", default_value_t = Share::WHOLE, hide_default_value = true)]
     pub(crate) chunk: Share,
 

@@ -30,7 +30,7 @@ pub(crate) fn report(mut error: Failure) -> u8 {
     } else {
         error.problems.iter().map(plain).collect()
     };
-    anstream::eprint!("{text}");
+    anstream::eprint!("{}", style::safe(&text));
     code
 }
 

@@ -136,7 +136,7 @@ impl GivenCase {
 /// What the case is called in a heading: its file, or that it was typed.
 fn title(arguments: &CaseArguments) -> String {
     arguments.file.as_ref().map_or_else(
-        || "the case that was typed".to_owned(),
+        || "case from --set".to_owned(),
         |file| file.display().to_string(),
     )
 }

@@ -159,9 +159,9 @@ fn observables(o: &Observables, units: &Units, beam: bool) -> String {
         } else {
             table.row(words("impacts", "", &count));
         }
-        let greatest = "greatest at which a contact begins";
+        let greatest = "largest at which a contact begins";
         let speed = o.impact_speed;
-        table.row(row("speed of approach", speed, 5, Kind::Velocity, greatest));
+        table.row(row("impact speed", speed, 5, Kind::Velocity, greatest));
         if o.contact_fraction > 0.0 {
             let force = format!("up to {}", number::significant(o.peak_force, 6));
             let mean = format!("mean {}", number::significant(o.mean_force, 4));
@@ -171,7 +171,7 @@ fn observables(o: &Observables, units: &Units, beam: bool) -> String {
                 &si(Kind::Force, o.peak_force),
                 &mean,
             ]);
-            let depth = "greatest depth below the resting surface";
+            let depth = "largest depth below the surface at rest";
             table.row(row("indentation", o.indentation, 5, Kind::Length, depth));
         }
     } else {
@@ -183,7 +183,7 @@ fn observables(o: &Observables, units: &Units, beam: bool) -> String {
             "pull of the sample",
             &format!("up to {}", number::significant(-o.least_force, 6)),
             &si(Kind::Force, -o.least_force),
-            "greatest force on the tip towards the sample",
+            "largest force on the tip towards the sample",
         ]);
     }
     if o.peak_force > 0.0 || o.least_force < 0.0 {
@@ -203,7 +203,7 @@ fn observables(o: &Observables, units: &Units, beam: bool) -> String {
         } else {
             format!("at ξ = {}", number::significant(xi, 3))
         };
-        let least = format!("least height of the beam, {place}");
+        let least = format!("smallest height of the beam, {place}");
         table.row(row("beam clearance", height, 5, Kind::Length, &least));
     }
     if let Some([low, high]) = o.slope_range {

@@ -67,7 +67,7 @@ impl Output {
     pub(crate) fn note(&self, text: &str) {
         if !self.quiet {
             progress::clear();
-            anstream::eprintln!("{}", style::note(&page::remark(text)));
+            anstream::eprintln!("{}", style::safe(&style::note(&page::remark(text))));
         }
     }
 
@@ -78,7 +78,7 @@ impl Output {
     )]
     pub(crate) fn warning(&self, text: &str) {
         progress::clear();
-        anstream::eprintln!("{}", style::warning(&page::remark(text)));
+        anstream::eprintln!("{}", style::safe(&style::warning(&page::remark(text))));
     }
 }
 
@@ -86,7 +86,7 @@ impl Output {
 pub(crate) fn print(text: &str) -> Result<(), Failure> {
     progress::end();
     let mut stream = anstream::stdout().lock();
-    let written = stream.write_all(text.as_bytes());
+    let written = stream.write_all(style::safe(text).as_bytes());
     printed(written.and_then(|()| stream.flush()))
 }
 

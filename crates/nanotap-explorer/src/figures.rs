@@ -66,7 +66,7 @@ pub(crate) fn picture(figure: &Figure, format: &str) -> Result<(&'static str, Ve
         "csv" => ("text/csv", csv(figure).into_bytes()),
         other => {
             return Err(ApiError::input(
-                format!("there is no format `{other}`"),
+                format!("unknown format `{other}`"),
                 "there are svg, png, pdf and csv",
             ));
         }

@@ -39,7 +39,7 @@ impl Shows {
     pub(crate) const fn words(self) -> &'static str {
         match self {
             Self::Motions => "kinds of motion",
-            Self::Force => "greatest force",
+            Self::Force => "peak force",
             Self::States => "number of motions",
         }
     }
@@ -90,7 +90,7 @@ fn force(store: &Store, grid: &CategoryMap) -> Result<Heatmap, StoreError> {
         (1.0, String::new())
     };
     let values: Vec<f64> = greatest.iter().map(|force| factor * force).collect();
-    let scale = Axis::linear("greatest force on the tip").unit(unit);
+    let scale = Axis::linear("peak force on the tip").unit(unit);
     Ok(Heatmap::new(
         grid.columns,
         grid.rows,

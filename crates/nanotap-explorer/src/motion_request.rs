@@ -45,7 +45,7 @@ impl Start {
         };
         let wrong = || {
             ApiError::input(
-                format!("`{text}` is no state"),
+                format!("`{text}` is not a state"),
                 "numbers are needed, as in 0.1,-0.02,0.3",
             )
         };

@@ -164,7 +164,7 @@ impl CaseSpec {
             .ok_or_else(|| {
                 let known: Vec<&str> = app.presets.iter().map(|p| p.name.as_str()).collect();
                 ApiError::input(
-                    format!("there is no case called `{}`", self.preset),
+                    format!("no case called `{}`", self.preset),
                     format!("there are {}", known.join(", ")),
                 )
             })

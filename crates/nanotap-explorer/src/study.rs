@@ -165,8 +165,8 @@ impl Studied<'_> {
         request: &Map<String, Value>,
         use_it: impl FnOnce(&Store) -> Result<T, ApiError>,
     ) -> Result<T, ApiError> {
-        let entry = study_named(name)
-            .ok_or_else(|| ApiError::failed(format!("there is no study `{name}`")))?;
+        let entry =
+            study_named(name).ok_or_else(|| ApiError::failed(format!("unknown study `{name}`")))?;
         let plan = entry.plan(case, Value::Object(request.clone()), self.control)?;
         let scratch = Scratch::within(&self.app.scratch)?;
         let store =

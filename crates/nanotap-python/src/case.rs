@@ -15,8 +15,8 @@ use pyo3::prelude::*;
 use crate::failure::Failure;
 use crate::watch::watched;
 
-/// A checked case. It keeps what it was made of, text for text, so that it can be made
-/// again with changes, and elsewhere.
+/// A checked case. It keeps the texts that it was made of, so that it can be made again with
+/// changes, also in another process.
 #[pyclass(frozen, module = "nanotap._nanotap")]
 pub(crate) struct CaseCore {
     case: Arc<Case>,
@@ -95,7 +95,7 @@ fn catalogue_of(others: &[(String, String)]) -> Result<Arc<Catalogue>, Failure> 
     Ok(catalogue)
 }
 
-/// A case of which some keys vary.
+/// A case with keys that vary.
 pub(crate) struct Variants {
     source: Option<Source>,
     fixed: Vec<String>,
@@ -145,7 +145,7 @@ impl CaseCore {
         Ok(Self::make(Some(source), overrides, catalogues)?)
     }
 
-    /// What it was made of.
+    /// The texts that it was made of.
     #[getter]
     #[expect(
         clippy::type_complexity,
@@ -202,7 +202,7 @@ impl CaseCore {
         Ok(serde_json::to_string(&rows).map_err(Failure::from)?)
     }
 
-    /// Assumptions (`note`) and doubts (`warning`) about a physical case.
+    /// Assumptions (`note`) and warnings (`warning`) of a physical case.
     #[getter]
     fn remarks(&self) -> Vec<(&'static str, String)> {
         let remarks = self.case.remarks();
@@ -257,8 +257,7 @@ fn text_of(path: &Path) -> Result<String, Failure> {
         .map_err(|error| Failure::input(format!("{}: cannot be read: {error}", path.display())))
 }
 
-/// A key of a case file: its name, the other name that it goes by, and its SI unit, empty of what
-/// is no quantity.
+/// A key of a case file: its name, its second name, and its SI unit (empty without a unit).
 type KeyRow = (&'static str, &'static str, &'static str);
 
 /// The keys of a case file by table.

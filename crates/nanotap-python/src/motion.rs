@@ -1,4 +1,4 @@
-//! Single motions: modes, runs, orbits, and what is observed of many cases at once.
+//! Single motions: modes, runs, orbits, and observables of many cases at once.
 
 use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -87,8 +87,7 @@ fn rows(
     Ok(values)
 }
 
-/// One run: its document, and its time series or, of fixed steps, its curve. Of the time
-/// series `series_periods` are taken.
+/// A run: its document, and `series_periods` of its time series or, for fixed steps, its curve.
 #[pyfunction]
 pub(crate) fn simulate<'py>(
     py: Python<'py>,
@@ -183,14 +182,14 @@ fn report(
             )?)?)
         }
         other => Err(Error::input(
-            format!("{other} is no study of single motions"),
+            format!("{other} is not a study of single motions"),
             format!("there are {} and {}", SimulateStudy::NAME, OrbitStudy::NAME),
         )),
     }
 }
 
-/// The columns of what was found, why there is nothing (empty where there is something), the
-/// names of entries along `state` and `energy`, and whether Ctrl-C stopped it.
+/// The columns of the results, the reason of each failure (empty on success), the names of the
+/// entries along `state` and `energy`, and whether Ctrl-C stopped the work.
 type Found = (
     Vec<Column>,
     Vec<String>,
@@ -293,7 +292,7 @@ pub(crate) fn observe(
     Ok((columns(py, &reports)?, reasons, labels, done.interrupted))
 }
 
-/// What the entries of results mean, and their units: JSON.
+/// Meaning and units of the entries of results, JSON.
 #[pyfunction]
 pub(crate) fn glossary() -> PyResult<String> {
     Ok(serde_json::to_string(&nanotap::observe::glossary::glossary()).map_err(Failure::from)?)

@@ -118,6 +118,7 @@ pub mod trajectory;
 pub mod variation;
 
 mod bracket;
+mod force_sums;
 mod gap_table;
 mod linear;
 mod quadrature;
@@ -129,6 +130,7 @@ pub type Complex = nalgebra::Complex<f64>;
 pub use coarse::Coarse;
 pub use error::{Refusal, VolterraError};
 pub use flow::{Flow, Switch};
+pub use force_sums::ForceSums;
 pub use kernel::Kernel;
 pub use law::{Approach, Exit, Force, ForceLaw, Guard, Remark};
 pub use modes::Modes;

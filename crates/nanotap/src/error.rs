@@ -23,16 +23,16 @@ pub enum ErrorKind {
     Stopped,
 }
 
-/// A text that problems point into.
+/// A text to which problems point.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct SourceText {
-    /// What the reader calls it: the path as it was given.
+    /// Name for messages: the path as given.
     pub name: String,
     /// The whole text.
     pub text: String,
 }
 
-/// Where a problem lies.
+/// Place of a problem.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum ErrorPlace {
     /// Nowhere in particular, or all of the file.
@@ -45,7 +45,7 @@ pub enum ErrorPlace {
     Span(Range<usize>),
 }
 
-/// One thing that is wrong.
+/// A problem of a case.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ErrorProblem {
     /// Where.
@@ -69,16 +69,28 @@ pub struct Error {
     pub problems: Vec<ErrorProblem>,
 }
 
-/// A text shortened for a message, which may quote input of any length.
-fn cut(text: String) -> String {
-    const LONGEST: usize = 2000;
-    const ENDS: [usize; 2] = [1500, 300];
+/// A text for a message, which may quote input of any length: long words and long texts are shortened.
+pub(crate) fn cut(text: String) -> String {
+    const MAX_WORD: usize = 200;
+    const MAX_TEXT: usize = 2000;
+    let is_long = |word: &str| word.chars().count() > MAX_WORD;
+    let text = if text.split_whitespace().any(is_long) {
+        let words = text.split(' ').map(|word| shortened(word, MAX_WORD));
+        words.collect::<Vec<_>>().join(" ")
+    } else {
+        text
+    };
+    shortened(&text, MAX_TEXT)
+}
+
+/// The first four fifths and the end of a text that is longer than `max` characters.
+fn shortened(text: &str, max: usize) -> String {
     let count = text.chars().count();
-    if count <= LONGEST {
-        return text;
+    if count <= max {
+        return text.to_owned();
     }
-    let start = text.chars().take(ENDS[0]);
-    let end = text.chars().skip(count - ENDS[1]);
+    let start = text.chars().take(max * 4 / 5);
+    let end = text.chars().skip(count - max / 10);
     start.chain(" … ".chars()).chain(end).collect()
 }
 
@@ -286,11 +298,8 @@ impl From<nanotap_figures::FigureError> for Error {
         use nanotap_figures::FigureError;
         match error {
             FigureError::UnknownEnding { path } => Self::input(
-                format!(
-                    "{}: the ending says no format that can be drawn",
-                    path.display()
-                ),
-                "end the name in .svg, .png or .pdf",
+                format!("{}: unsupported file extension", path.display()),
+                "use .svg, .png or .pdf",
             ),
             error @ FigureError::Write { .. } => Self::files(error.to_string()),
             other => Self::numerics(other.to_string()),

@@ -148,7 +148,7 @@ fn step_of(report: &ApproachReport) -> usize {
 fn thinned(table: &Table, step: usize, report: &ApproachReport) -> String {
     let all = report.table.len();
     let left_out = if step > 1 {
-        format!("  every {step}th of {all} (--out writes all)\n")
+        format!("  one in {step} of {all} distances (--out writes all)\n")
     } else {
         String::new()
     };
@@ -238,7 +238,7 @@ fn text(case: &GivenCase, report: &ApproachReport) -> String {
     }
     if !report.returned && !report.cancelled {
         text.push_str(&motion::paragraph(
-            "the way back does not end in the motion with which the way there began: begin farther \
+            "the retraction does not end in the motion in which the approach began: begin farther \
              away, with --from",
         ));
     }
@@ -407,7 +407,7 @@ fn modulated(
     }
     if modulation.setpoints.as_ref().is_some_and(Vec::is_empty) {
         text.push_str(&motion::paragraph(
-            "no distance of the curve has the frequency shift that was asked for",
+            "no distance of the curve has the requested frequency shift",
         ));
     }
     for jump in &modulation.jumps {

@@ -1,4 +1,4 @@
-//! `nanotap attractors`: a census of every motion that coexists.
+//! `nanotap attractors`: coexisting attractors by sampling initial states.
 
 use std::fmt::Write as _;
 
@@ -22,7 +22,7 @@ use crate::table::{Align, Table};
 use crate::threads::ThreadsArgument;
 use crate::{motion, number, progress, style};
 
-/// Every motion that coexists: a census from many seeded starts.
+/// Find coexisting attractors by sampling initial states.
 #[derive(Args, Debug)]
 pub(crate) struct Arguments {
     #[command(flatten)]
@@ -130,7 +130,7 @@ fn text(case: &GivenCase, found: &Attractors) -> String {
         let _ = writeln!(
             text,
             "\n  {}",
-            style::bold("transient chaos: it is no attractor")
+            style::bold("transient chaos, not an attractor")
         );
         text.push_str(&motion::paragraph(&format!(
             "mean lifetime {:.0} drive periods (95 %: {:.0} … {:.0}) from {} escapes ({}); {} still wander \

@@ -16,14 +16,13 @@ use crate::output::Output;
 use crate::request::Request;
 use crate::table::{Align, Table};
 
-/// Basins of attraction on a two-dimensional slice of initial states.
+/// Compute basins of attraction on a two-dimensional slice of initial states.
 #[derive(Args, Debug)]
 pub(crate) struct Arguments {
     #[command(flatten)]
     case: CaseArguments,
 
-    /// The attractors, from `nanotap attractors --json`; without it, a census in the slice
-    /// finds them
+    /// The attractors, from `nanotap attractors --json`; default: found by sampling the slice
     #[arg(long, value_name = "FILE", conflicts_with = "starts")]
     attractors: Option<PathBuf>,
 
@@ -68,7 +67,7 @@ fn states(path: &Path) -> Result<Vec<Vec<f64>>, Failure> {
     };
     let text = std::fs::read_to_string(path).map_err(|error| refuse(error.to_string()))?;
     let document: serde_json::Value =
-        serde_json::from_str(&text).map_err(|error| refuse(format!("it is no JSON: {error}")))?;
+        serde_json::from_str(&text).map_err(|error| refuse(format!("not JSON: {error}")))?;
     let list = document["attractors"]
         .as_array()
         .filter(|list| !list.is_empty())

@@ -32,11 +32,11 @@ pub(crate) struct Arguments {
     #[command(flatten)]
     request: Request<BranchOptions>,
 
-    /// What --plot shows against the parameter
+    /// Observable that --plot shows against the parameter
     #[arg(long, value_name = "OBSERVABLE", value_parser = shown())]
     show: Option<Shown>,
 
-    /// List every point in the JSON document, however long it becomes
+    /// List every point in the JSON document, whatever its length
     #[arg(long)]
     all_points: bool,
 
@@ -52,7 +52,7 @@ pub(crate) struct Arguments {
 fn shown() -> impl TypedValueParser<Value = Shown> {
     let choices = Shown::choices().map(|(name, what)| PossibleValue::new(name).help(what));
     PossibleValuesParser::new(choices)
-        .try_map(|name| Shown::named(&name).ok_or_else(|| format!("nothing is called {name}")))
+        .try_map(|name| Shown::named(&name).ok_or_else(|| format!("unknown observable {name}")))
 }
 
 pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure> {

@@ -1,4 +1,4 @@
-//! `nanotap case`: the case, checked and view.
+//! `nanotap case`: check a case and print it resolved.
 
 use clap::Args;
 use nanotap::ErrorKind;
@@ -25,7 +25,7 @@ use crate::output::Output;
 use crate::table::{Align, Table};
 use crate::{file, motion, number, style};
 
-/// Check a case and show it resolved.
+/// Check a case and print it resolved.
 #[derive(Args, Debug)]
 pub(crate) struct Arguments {
     #[command(flatten)]
@@ -47,7 +47,7 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
         if let Some(path) = &arguments.out.out {
             return Err(Failure::input(
                 format!("--out {}: an oscillator is not written out", path.display()),
-                "leave --out away, or take --json",
+                "omit --out, or use --json",
             ));
         }
         return output.result(&document, |_| oscillator(&case, given));
@@ -88,7 +88,7 @@ fn write_out(out: &OutArgument, case: &Cantilever) -> Result<(), Failure> {
                 "--out {}: a nonlinear force law has no dimensionless case file",
                 path.display()
             ),
-            "leave --out away, or take --json, which has the law in the model's units",
+            "omit --out, or use --json, which has the law in the model's units",
         ));
     }
     file::write_case(path, &case_file::to_toml(case))

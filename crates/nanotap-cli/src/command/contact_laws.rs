@@ -17,7 +17,7 @@ use crate::table::{Align, Table};
 use crate::threads::ThreadsArgument;
 use crate::{motion, number, progress, style};
 
-/// The same lever and drive on every contact law: what difference the sample makes.
+/// Compare contact laws under the same lever and drive.
 pub(crate) type Arguments = StudyArguments<ContactLawsStudy>;
 
 pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure> {

@@ -15,7 +15,7 @@ use crate::table::{Align, Table};
 use crate::threads::ThreadsArgument;
 use crate::{motion, number, progress, style};
 
-/// The same motion with N = 1 … K modes: how many are enough.
+/// Compare the motion with 1 to K modes: how many are enough.
 pub(crate) type Arguments = StudyArguments<ConvergenceStudy>;
 
 pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure> {
@@ -143,7 +143,7 @@ fn readings(case: &GivenCase, result: &Convergence) -> String {
     }
     format!(
         "  {}\n{}\n  {}\n",
-        style::bold("what one reads, and the part of each mode with the most modes"),
+        style::bold("readings, and the share of each mode with the most modes"),
         table.render(),
         style::bold(&report.reading_verdict)
     )

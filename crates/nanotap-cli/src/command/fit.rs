@@ -19,7 +19,7 @@ use crate::table::{Align, Table};
 use crate::threads::ThreadsArgument;
 use crate::{file, motion, number, progress, style};
 
-/// Parameters of lever and sample from measured curves.
+/// Fit parameters of lever and sample to measured curves.
 #[derive(Args, Debug)]
 pub(crate) struct Arguments {
     /// The measured curve (CSV), its columns named as in `distance (nm)`, `amplitude (nm)`,
@@ -30,7 +30,7 @@ pub(crate) struct Arguments {
     #[command(flatten)]
     case: CaseArguments,
 
-    /// A further measured curve, fitted together with the first; may be repeated
+    /// Another measured curve, fitted together with the first; may be repeated
     #[arg(long, value_name = "DATA")]
     also: Vec<PathBuf>,
 
@@ -40,8 +40,8 @@ pub(crate) struct Arguments {
     #[command(flatten)]
     threads: ThreadsArgument,
 
-    /// Write the case of the best fit (.toml), with --per-curve one a curve (NAME-CURVE.toml), or
-    /// the rows with model and residuals (.csv)
+    /// Write the case of the best fit (.toml), with --per-curve one per curve
+    /// (NAME-CURVE.toml), or the rows with model and residuals (.csv)
     #[arg(long, value_name = "PATH")]
     out: Option<PathBuf>,
 
@@ -70,10 +70,7 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     for path in std::iter::once(&arguments.data).chain(&arguments.also) {
         if path.extension().is_some_and(|ending| ending == "toml") {
             return Err(Failure::input(
-                format!(
-                    "{}: a case file stands where the data are named",
-                    path.display()
-                ),
+                format!("{}: expected a data file, got a case file", path.display()),
                 "name the data first, then the case: nanotap fit DATA CASE",
             ));
         }

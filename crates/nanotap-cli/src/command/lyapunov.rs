@@ -13,7 +13,7 @@ use crate::table::{Align, Table};
 use crate::threads::ThreadsArgument;
 use crate::{motion, number, progress, style};
 
-/// Lyapunov spectrum with error bars, and a Poincaré section.
+/// Compute the Lyapunov spectrum with error bars, and a Poincaré section.
 pub(crate) type Arguments = StudyArguments<LyapunovStudy>;
 
 pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure> {

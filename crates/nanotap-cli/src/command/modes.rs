@@ -15,7 +15,7 @@ use crate::table::{Align, Table};
 use crate::threads::ThreadsArgument;
 use crate::{motion, number, progress, style};
 
-/// Mode shapes and frequencies, in free flight and in contact.
+/// Compute mode shapes and frequencies, in free flight and in contact.
 pub(crate) type Arguments = StudyArguments<ModesStudy>;
 
 pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure> {
@@ -128,7 +128,7 @@ fn frequencies(galerkin: &[f64], exact: &[f64], eigenvalues: Option<&[[f64; 2]]>
     let mut text = table.render();
     match eigenvalues {
         None => {
-            text.push_str("  damped: eigenvalues too close to critical damping to tell apart\n");
+            text.push_str("  damped: eigenvalues too close to critical damping to distinguish\n");
         }
         Some(list) if paired.is_none() => {
             text.push_str("  overdamped: not every mode oscillates; the eigenvalues are\n");

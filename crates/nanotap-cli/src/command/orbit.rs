@@ -18,7 +18,7 @@ use crate::table::{Align, Table};
 use crate::threads::ThreadsArgument;
 use crate::{file, number, progress, series, style};
 
-/// A periodic orbit by Newton, stable or not.
+/// Compute a periodic orbit by Newton's method, stable or not.
 #[derive(Args, Debug)]
 pub(crate) struct Arguments {
     #[command(flatten)]
@@ -52,7 +52,7 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     let orbit = &found.motion;
     if let Some(asked) = request.period.filter(|n| *n != orbit.period) {
         output.note(&format!(
-            "an orbit of period {asked} was asked for; Newton closed one that repeats every {} already",
+            "requested an orbit of period {asked}; Newton converged to one that repeats every {}",
             number::counted(orbit.period, "period", "periods")
         ));
     }
@@ -130,7 +130,7 @@ fn text(case: &GivenCase, model: &Model, orbit: &OrbitReport, chosen: Option<Set
             .to_owned()
     };
     text.push_str(&motion::paragraph(&format!(
-        "Newton closed it to {:.1e}; it is known to {:.1e}; {check}",
+        "Newton residual {:.1e}; error estimate {:.1e}; {check}",
         orbit.residual, orbit.error
     )));
     let _ = writeln!(text, "\n  {}", style::bold("state at drive phase 0"));

@@ -11,7 +11,7 @@ use crate::output;
 /// The name of the schema of a case.
 const CASE: &str = "case";
 
-/// The JSON schema of what a study is asked for and reports, or of a case.
+/// Print the JSON schema of a study's options and report, or of a case.
 #[derive(Args, Debug)]
 pub(crate) struct Arguments {
     /// A study, or `case` for the keys of a case; without it, all of them by name
@@ -30,7 +30,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         Some(name) => all.remove(name).ok_or_else(|| {
             let known: Vec<&str> = all.keys().map(String::as_str).collect();
             Failure::input(
-                format!("there is no study `{name}`"),
+                format!("unknown study `{name}`"),
                 format!("there are {}", known.join(", ")),
             )
         })?,

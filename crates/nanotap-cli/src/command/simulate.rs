@@ -1,4 +1,4 @@
-//! `nanotap simulate`: one run.
+//! `nanotap simulate`: a single motion.
 
 use std::fmt::Write as _;
 
@@ -19,7 +19,7 @@ use crate::table::{Align, Table};
 use crate::threads::ThreadsArgument;
 use crate::{number, progress, series, style};
 
-/// One run: its steady state, or how it gets there.
+/// Simulate a motion: its steady state or its transient.
 pub(crate) type Arguments = StudyArguments<SimulateStudy>;
 
 pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure> {
@@ -46,7 +46,7 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
                 .plot
                 .draw(|| fixed_step_figure(&model, run, &units))?;
             output.note(
-                "rk4 is the paper's own method, kept to show what a time step does; nothing it says is certified",
+                "rk4 is the paper's method, kept to show the effect of a time step; its results are not certified",
             );
         }
     }
@@ -68,13 +68,13 @@ fn text(case: &GivenCase, model: &Model, run: &Simulation, chosen: Option<Set>) 
     text.push_str(&motion::paragraph(&run.evidence));
     if run.classification == Classification::Undecided {
         text.push_str(&motion::paragraph(
-            "What follows is what was recorded; it need not be what remains in the end.",
+            "The following describes the recorded motion, which need not be the final one.",
         ));
     }
     // Far above rounding and what Newton leaves.
     if let Some(distance) = run.distance_to_orbit.filter(|d| *d > 1e-6) {
         text.push_str(&motion::paragraph(&format!(
-            "What follows is the way there, not yet the orbit: at its end the state is still {} % of the orbit's \
+            "The following describes the transient, not yet the orbit: at its end the state is still {} % of the orbit's \
              size away. Without --transient the orbit itself is shown.",
             number::significant(100.0 * distance, 2)
         )));
@@ -172,7 +172,7 @@ fn rk4_text(case: &GivenCase, run: &FixedStepRun) -> String {
         style::bold(&heading),
         table.render(),
         style::bold(&format!(
-            "the exact flow from where it ended: {}",
+            "exact flow from its final state: {}",
             motion::verdict(run.exact.classification, run.exact.period)
         )),
         motion::paragraph(&run.exact.evidence),

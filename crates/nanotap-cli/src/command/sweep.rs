@@ -15,7 +15,7 @@ use crate::output::Output;
 use crate::request::Request;
 use crate::table::{Align, Table};
 
-/// How the motion changes with one or two parameters, from any number of starts.
+/// Sweep one or two parameters, from any number of initial states.
 #[derive(Args, Debug)]
 pub(crate) struct Arguments {
     #[command(flatten)]
@@ -24,8 +24,8 @@ pub(crate) struct Arguments {
     #[command(flatten)]
     request: Request<SweepOptions>,
 
-    /// What --plot shows; without it the response over drive.frequency or over two parameters of
-    /// a physical case, else the diagram
+    /// Kind of --plot; default: the response over drive.frequency or over two parameters of a
+    /// physical case, else the diagram
     #[arg(long, value_enum)]
     show: Option<Show>,
 
@@ -38,11 +38,11 @@ pub(crate) struct Arguments {
 /// What a picture shows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 enum Show {
-    /// Greatest deflection in each drive period: a bifurcation diagram; over two parameters a map
-    /// of what motions there are
+    /// Largest deflection in each drive period: a bifurcation diagram; over two parameters a map of
+    /// the motions
     Diagram,
     /// Amplitude and phase at the drive's frequency: a resonance curve; over two parameters also
-    /// maps of amplitude, phase, greatest force, dissipation and contact
+    /// maps of amplitude, phase, peak force, dissipation and contact
     Response,
 }
 

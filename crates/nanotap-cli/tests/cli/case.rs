@@ -254,6 +254,14 @@ fn control_characters_of_a_file_do_not_reach_the_terminal() {
     assert!(!outcome.stderr.contains('\u{1b}'), "{:?}", outcome.stderr);
 }
 
+/// A key of 100,000 letters is quoted by its beginning and end.
+#[test]
+fn long_words_are_shortened_in_messages() {
+    let outcome = case(PAPER, &["--set", &format!("{}=1", "x".repeat(100_000))]);
+    outcome.refused(&["xxx … xxx", "is not a key of [model]"]);
+    assert!(outcome.stderr.len() < 3000, "{}", outcome.stderr.len());
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(64))]
 

@@ -282,7 +282,7 @@ fn merge_refuses_invalid_names_and_sizes() {
     for name in ["../outside", "/tmp/outside", "..", "a/b", ".hidden"] {
         folder.write("s.zarr/.zmetadata", whole.replace(variable, name));
         let outcome = folder.run(&["merge", "s.zarr", "--out", "never.zarr"]);
-        outcome.refused(&[name, "no name of a variable"]);
+        outcome.refused(&[name, "not a valid name of a variable"]);
         assert!(!folder.path().join("never.zarr").exists());
     }
     let long = whole.replace("[\\\"omega\\\",4,", "[\\\"omega\\\",4000000000000000000,");

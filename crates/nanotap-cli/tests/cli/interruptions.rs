@@ -73,7 +73,7 @@ fn long_work(study: &str) -> Option<Vec<&'static str>> {
             "--values",
             "10000",
         ],
-        "approach" | "frequency-modulation" => vec!["soft.toml", "--points", "20000"],
+        "approach" | "fm" => vec!["soft.toml", "--points", "20000"],
         "fit" => vec![
             "curve.csv",
             "soft.toml",
@@ -91,6 +91,7 @@ fn long_work(study: &str) -> Option<Vec<&'static str>> {
         "basin" => vec!["case.toml", "--x", "a1=-1:1:2000", "--y", "v1=-1:1:2000"],
         "lyapunov" => vec!["case.toml", "--periods", "100000000"],
         "orbit" | "convergence" | "contact-laws" => vec!["case.toml", "--period", "10000"],
+        "scan" => vec!["scan.toml"],
         other => panic!("say how long work of {other} is requested"),
     })
 }
@@ -99,6 +100,9 @@ fn folder() -> Folder {
     let folder = Folder::with_paper_case();
     folder.write("stiff.toml", STIFF);
     folder.write("setpoint.toml", SETPOINT);
+    let scan = include_str!("../../../../docs/cases/scan-step.toml");
+    let scan = scan.replace("periods = 5000 ", "periods = 5000000 ");
+    folder.write("scan.toml", scan);
     folder.write(
         "soft.toml",
         SETPOINT

@@ -33,7 +33,7 @@ fn needed(study: &str) -> &'static [&'static str] {
 /// Options that the option `name` needs in order to have an effect.
 fn companions(study: &str, name: &str) -> &'static [&'static str] {
     match name {
-        "points" if study == "frequency-modulation" => &[],
+        "points" if study == "fm" => &[],
         "strobe" | "events" => &["--periods", "2000000"],
         "points" => &["--out", "points.csv"],
         "resolution" => &["--out", "series.csv"],

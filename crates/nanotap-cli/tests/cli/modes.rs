@@ -99,10 +99,10 @@ fn shapes_are_written_and_drawn() {
     assert_eq!(folder.names(), ["case.toml", "shapes.csv", "shapes.svg"]);
     folder
         .run(&["modes", "case.toml", "--plot", "shapes.jpeg"])
-        .refused(&["shapes.jpeg", "end the name in .svg, .png or .pdf"]);
+        .refused(&["shapes.jpeg", "use .svg, .png or .pdf"]);
     folder
         .run(&["modes", "case.toml", "--out", "shapes"])
-        .refused(&["shapes: the ending says no format", ".csv"]);
+        .refused(&["shapes: unsupported file extension format", ".csv"]);
 }
 
 #[test]

@@ -196,7 +196,7 @@ fn replaced_keys_are_reported() {
         include_str!("../../../../docs/cases/dforce-dmt.toml"),
     );
     let set = ["lever.toml", "--set", "sample.adhesion_force=5 nN"];
-    let said = "note: sample.adhesion_force, set beside the file, takes the place of its \
+    let said = "note: sample.adhesion_force, set in addition to the file, replaces its \
                 sample.hamaker = \"3e-20 J\"";
     for command in ["case", "modes"] {
         let run = folder.run(&[&[command], &set[..]].concat());

@@ -243,7 +243,7 @@ fn shares_merge_to_the_bytes_of_one_machine() {
         .refused(&["--chunk 1/2", "merge the shares"]);
     folder
         .run(&["merge", "nowhere.zarr", "--out", "m.zarr"])
-        .refused(&["nowhere.zarr", "not there"]);
+        .refused(&["nowhere.zarr", "does not exist"]);
     folder
         .run(&["merge", "a.zarr", "--out", "m.csv"])
         .refused(&["end the name in .zarr"]);

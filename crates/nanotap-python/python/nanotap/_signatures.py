@@ -23,7 +23,7 @@ __all__ = [
     "contact_laws",
     "convergence",
     "fit",
-    "frequency_modulation",
+    "fm",
     "lyapunov",
     "modes",
     "orbit",
@@ -80,7 +80,7 @@ def simulate(
     progress: Progress = None,
     **parameters: Varied,
 ) -> "xr.Dataset":
-    """One run: its steady state, or how it gets there.
+    """Simulate a motion: its steady state or its transient.
 
     Parameters
     ----------
@@ -189,7 +189,7 @@ def orbit(
     progress: Progress = None,
     **parameters: Varied,
 ) -> "Orbit | xr.Dataset":
-    """A periodic orbit by Newton, stable or not.
+    """Compute a periodic orbit by Newton's method, stable or not.
 
     Parameters
     ----------
@@ -248,7 +248,7 @@ def attractors(
     threads: int | None = None,
     progress: Progress = None,
 ) -> Attractors:
-    """Every motion that coexists: a census from many seeded starts.
+    """Find coexisting attractors by sampling initial states.
 
     Parameters
     ----------
@@ -459,7 +459,7 @@ def approach(
     options = _arguments.options("approach", locals())
     return _studies.approach(case, options, threads, progress)
 
-def frequency_modulation(
+def fm(
     case: Case,
     *,
     from_: float | str | None = None,
@@ -510,8 +510,8 @@ def frequency_modulation(
     RuntimeError
         The computation failed.
     """
-    options = _arguments.options("frequency-modulation", locals())
-    return _studies.document("frequency-modulation", case, options, threads, progress)
+    options = _arguments.options("fm", locals())
+    return _studies.document("fm", case, options, threads, progress)
 
 def fit(
     case: Case,
@@ -850,7 +850,7 @@ def convergence(
     tolerance: float = 0.01,
     period: int | None = None,
 ) -> Convergence:
-    """The same motion with N = 1 … K modes: how many are enough.
+    """Compare the motion with 1 to K modes: how many are enough.
 
     Parameters
     ----------
@@ -889,7 +889,7 @@ def contact_laws(
     threads: int | None = None,
     progress: Progress = None,
 ) -> Record:
-    """The same lever and drive on every contact law: what difference the sample makes.
+    """Compare contact laws under the same lever and drive.
 
     Parameters
     ----------

@@ -1,5 +1,5 @@
-//! Dissipation beside any elastic law: viscosity that grows with the contact radius, and
-//! damping that falls off across the gap.
+//! Dissipation added to any elastic law: viscosity that grows with the contact radius, and damping
+//! that falls off across the gap.
 //!
 //! `−η √(Rδ) ḋ` in contact (Garcia, Gómez et al.; used by dForce) and `−γ₀ e^{−d/x} ḋ` at any
 //! gap (Gotsmann, Seidel, Anczykowski, Fuchs, Phys. Rev. B 60, 1999).

@@ -1,4 +1,4 @@
-//! A case as a document: every parameter, and what stands behind it in SI.
+//! A case as a document: every parameter, with its physical quantity in SI.
 
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
@@ -12,7 +12,7 @@ use crate::model::nonlinear::Equilibrium;
 use crate::model::oscillator::{Oscillator, OscillatorParameter, Stop};
 use crate::model::parameter::Parameter;
 
-/// A case, checked and view.
+/// A checked case as a document.
 #[derive(Clone, Debug, Serialize)]
 #[serde(untagged)]
 pub enum CaseDocument {
@@ -32,15 +32,15 @@ pub struct CantileverDocument {
     pub case: Cantilever,
     /// Drive period 2π/Ω.
     pub period: f64,
-    /// Where the undriven lever can rest over a sample that attracts.
+    /// Rest positions of the undriven lever over an attractive sample.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub equilibria: Vec<Equilibrium>,
-    /// What is known of it in SI.
+    /// Quantities in SI, for a physical case.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub physical: Option<PhysicalSummary>,
 }
 
-/// The physical quantities behind a case, in SI, frequencies in Hz.
+/// The physical quantities of a case in SI, frequencies in Hz.
 #[derive(Clone, Debug, Serialize)]
 pub struct PhysicalSummary {
     /// Spring constant at the tip, N/m.
@@ -60,9 +60,9 @@ pub struct PhysicalSummary {
     pub drive_frequency: f64,
     /// Free amplitude of the tip, m.
     pub free_amplitude: f64,
-    /// Its phase behind the drive.
+    /// Phase lag of the free deflection, degrees.
     pub free_phase_degrees: f64,
-    /// What phases are counted from.
+    /// Reference of phases.
     pub phase_reference: &'static str,
     /// Free amplitude of the second tone, m, if there is one.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -79,7 +79,7 @@ pub struct PhysicalSummary {
     pub contact_stiffness: f64,
     /// Contact damping, N s/m.
     pub contact_damping: f64,
-    /// Quantities of the contact law alone by parameter, in SI.
+    /// Further quantities of the contact law by parameter, in SI.
     #[serde(flatten, serialize_with = "as_map")]
     pub contact_law: Vec<(Parameter, f64)>,
     /// Parameters of a nonlinear force law, in place of contact stiffness and damping.
@@ -116,7 +116,7 @@ pub struct LawParameterDocument {
 }
 
 impl PhysicalSummary {
-    /// What is known of a physical case.
+    /// The quantities of a physical case.
     pub fn of(view: &Physical) -> Self {
         let Physical {
             lever,
@@ -243,7 +243,7 @@ pub fn equilibria(case: &Case) -> Vec<Equilibrium> {
     model.map_or_else(|_| Vec::new(), |model| model.equilibria())
 }
 
-/// One parameter between the two worlds, as a document.
+/// A dimensionless parameter with its physical quantity, as a document.
 #[derive(Clone, Debug, Serialize)]
 pub struct MappingDocument {
     /// The key of the dimensionless model.

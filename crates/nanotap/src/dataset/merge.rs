@@ -37,7 +37,7 @@ pub fn merge(sources: &[PathBuf], target: &Path) -> Result<Merged, StoreError> {
         stores.push(store);
     }
     let Some(first) = stores.first() else {
-        let what = "there is no store to merge".into();
+        let what = "no dataset to merge".into();
         return Err(StoreError::NotAStore {
             path: target.into(),
             what,

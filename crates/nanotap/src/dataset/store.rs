@@ -273,7 +273,7 @@ impl Store {
             let column = |name: &&str| {
                 let missing = || StoreError::NotAStore {
                     path: self.path.clone(),
-                    what: format!("it is no sweep: it has no variable `{name}`"),
+                    what: format!("not a sweep: it has no variable `{name}`"),
                 };
                 let variable = self.schema.index_of(name).ok_or_else(missing)?;
                 Ok(self.read_chunk(&block, variable)?.numbers())
@@ -418,14 +418,14 @@ fn documents(schema: &Schema) -> Vec<(String, String)> {
             .to_string()
             .into(),
     );
-    let beside: Vec<&str> = schema
+    let coordinates: Vec<&str> = schema
         .coordinates
         .iter()
         .filter(|c| c.dimensions.as_slice() != [c.name.clone()])
         .map(|c| c.name.as_str())
         .collect();
-    if !beside.is_empty() {
-        root.insert(COORDINATES.into(), beside.join(" ").into());
+    if !coordinates.is_empty() {
+        root.insert(COORDINATES.into(), coordinates.join(" ").into());
     }
     let mut all = vec![
         (zarr::GROUP.to_owned(), zarr::group()),

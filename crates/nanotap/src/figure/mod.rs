@@ -12,6 +12,7 @@ pub mod fit;
 pub mod modes;
 pub mod motion;
 pub mod panels;
+pub mod scan;
 pub mod shown;
 #[cfg(feature = "dataset")]
 pub mod sweep;

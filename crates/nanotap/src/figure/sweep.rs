@@ -375,7 +375,7 @@ pub fn response(store: &Store) -> Result<Figure, StoreError> {
         .share_x();
     for (name, label) in [
         ("first_harmonic", "amplitude $A$"),
-        ("phase", "phase behind the drive (°)"),
+        ("phase", "phase lag (°)"),
     ] {
         let index = schema.index_of(name).unwrap_or(0);
         let mut curves: BTreeMap<(String, usize), Vec<(f64, f64)>> = BTreeMap::new();
@@ -433,7 +433,7 @@ fn maps(store: &Store) -> Result<Figure, StoreError> {
     let mut figure = Figure::new(3, 2)
         .width(DOUBLE_COLUMN)
         .height(195.0)
-        .with(motions.title("what motions there are"));
+        .with(motions.title("motions"));
     let mut values = Vec::new();
     for shown in SHOWN.into_iter().filter_map(Shown::named) {
         values.push((shown, of_first_start(store, shown)?));

@@ -556,9 +556,9 @@ impl BeamTangent {
         base
     }
 
-    /// The derivatives of the factors of what the beam's damping takes, as they stand in
-    /// [`Powers::beam`]: α3 ȧ_j and ȧ_j of every mode, α3 ẏ and 2 I·ȧ + ẏ; then those of
-    /// measured modes.
+    /// The derivatives of the factors of the beam's damping power, in the order of
+    /// [`Powers::beam`]: α3 ȧ_j and ȧ_j of every mode, α3 ẏ and 2 I·ȧ + ẏ; then those of measured
+    /// modes.
     pub(crate) fn beam_power(&self, beam: &Beam<'_>, parameter: Parameter) -> Vec<[Output; 2]> {
         let (layout, case) = (beam.layout, &beam.galerkin.case);
         let by = f64::from(u8::from(parameter == Parameter::Alpha3));

@@ -313,7 +313,7 @@ pub struct CantileverError {
     pub key: &'static str,
     /// The value given.
     pub value: f64,
-    /// What would be right.
+    /// The remedy.
     pub reason: Reason,
 }
 
@@ -406,11 +406,11 @@ impl fmt::Display for Reason {
                 OMEGA_RANGE.0, OMEGA_RANGE.1
             ),
             Self::Law(reason) => formatter.write_str(reason),
-            Self::SpringOfLaw => formatter
-                .write_str("must be 0 beside a nonlinear force law, which is all of the sample"),
-            Self::NoSecondTone => formatter.write_str(
-                "there is no second tone: give tone2_ratio, as in \"25/4\", or leave this out",
+            Self::SpringOfLaw => formatter.write_str(
+                "must be 0 with a nonlinear force law, which describes the whole sample",
             ),
+            Self::NoSecondTone => formatter
+                .write_str("no second tone: give tone2_ratio, as in \"25/4\", or leave this out"),
             Self::OtherLaw(law) => write!(
                 formatter,
                 "belongs to contact = \"{law}\"; leave it out with any other"

@@ -3,8 +3,8 @@
 //! A tone is A sin(wτ + θ). Driven through the base (the paper's piezo), the clamped end
 //! moves by A in units of g₀. Driven directly, a force of amplitude A in units of EI g₀/L³ (a
 //! third of k g₀) acts on the tip (a magnet) or is spread evenly over the beam (light, heat),
-//! the clamped end is at rest, and the gap has no motion of its own. A static force A at the
-//! tip would bend it by A/3.
+//! the clamped end is at rest, and the gap is not modulated. A static force A at the tip would bend it
+//! by A/3.
 //!
 //! A second tone has p/q of the first one's frequency. Both repeat after q periods of the
 //! first, so that the stroboscopic map is of that period.
@@ -55,9 +55,11 @@ const NEAR: f64 = 1e-9;
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum RatioError {
     /// Not a ratio at all.
-    #[error("\"{given}\" is no ratio of frequencies; write it as in \"25/4\", with whole numbers")]
+    #[error(
+        "\"{given}\" is not a ratio of frequencies; write it as in \"25/4\", with whole numbers"
+    )]
     Form {
-        /// What was given.
+        /// The given text.
         given: String,
     },
     /// Zero, or too large.
@@ -76,7 +78,7 @@ pub enum RatioError {
     One,
     /// Not a ratio of small whole numbers.
     #[error(
-        "the ratio {ratio} of the two frequencies is no fraction with a denominator up to {}, so the drive \
+        "the ratio {ratio} of the two frequencies is not a fraction with a denominator up to {}, so the drive \
          would not repeat; the nearest is {nearest}", LARGEST.0
     )]
     Irrational {

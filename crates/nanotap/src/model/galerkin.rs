@@ -396,7 +396,7 @@ mod tests {
         }
     }
 
-    /// All entries of a set of equations, one after the other.
+    /// All entries of a set of equations, in sequence.
     fn entries(g: &GalerkinDerivative) -> Vec<f64> {
         let mut all: Vec<f64> = g.mass.iter().copied().collect();
         for r in Regime::ALL.map(Regime::index) {

@@ -2,8 +2,8 @@
 //!
 //! Damping proportional to mass gives the higher modes a quality factor in proportion to their
 //! frequency, several times that of real levers in air; and no lever is uniform. With the free
-//! modes v of the Galerkin equations, K v = ω² M v and vᵀMv = 1, and u = Mv, a mode with
-//! numbers of its own gets
+//! modes v of the Galerkin equations, K v = ω² M v and vᵀMv = 1, and u = Mv, a mode with its own
+//! frequency and quality factor gets
 //!
 //! ```text
 //! M + (s − 1) uuᵀ,   C + (sω′/Q − vᵀCv) uuᵀ,   K + (sω′² − ω²) uuᵀ,

@@ -4,10 +4,10 @@
 //! State: `(a_1 … a_N, ȧ_1 … ȧ_N)` for the cantilever, after which comes the memory of a
 //! sample that recovers (see [`contact`]), zero at rest; `(x, ẋ)` for an
 //! oscillator. Regime 0 is free flight. Everything that analyses or shows a motion works on a
-//! [`Model`] and asks no more where it came from.
+//! [`Model`].
 //!
-//! A sample with a [nonlinear] force law is no regime: such a model has free flight
-//! alone as a linear system, and the flow under the force beside it.
+//! A sample with a [nonlinear] force law is no regime: such a model has free flight alone as a
+//! linear system, and a separate flow under the force.
 
 pub mod beam;
 mod beam_equations;
@@ -145,8 +145,8 @@ pub struct Powers {
     pub stored: Vec<Product>,
 }
 
-/// [`Powers`] of every regime, worked out when first asked for: of the thousands of models
-/// that a sweep sets up, few ever are.
+/// [`Powers`] of every regime, computed on first use: few of the thousands of models that a sweep
+/// sets up need them.
 #[derive(Clone, Debug)]
 pub(crate) struct PowersOnDemand {
     known: OnceLock<Vec<Powers>>,

@@ -361,7 +361,7 @@ impl Nonlinear {
             .sum()
     }
 
-    /// The force at these gaps, met one after the other without haste.
+    /// The force at these gaps, evaluated quasi-statically, in this order.
     pub fn force_curve(&self, gaps: impl IntoIterator<Item = f64>) -> Vec<[f64; 2]> {
         let law = self.system.law();
         let mut last: Option<(f64, usize)> = None;

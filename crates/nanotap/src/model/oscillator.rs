@@ -60,7 +60,7 @@ pub struct OscillatorError {
     pub key: &'static str,
     /// Its value.
     pub value: f64,
-    /// What would be right.
+    /// The remedy.
     pub expected: &'static str,
 }
 

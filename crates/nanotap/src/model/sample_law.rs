@@ -15,7 +15,7 @@ use serde::{Serialize, Serializer};
 #[derive(Clone, Debug)]
 pub struct SampleLaw {
     terms: Vec<&'static TableLaw>,
-    /// The parameters of the terms, one after the other.
+    /// The parameters of all terms, in sequence.
     values: Vec<f64>,
     /// The rows of a table, in whatever units its factors are measured in.
     rows: Option<Arc<Rows>>,
@@ -41,8 +41,8 @@ impl SampleLaw {
         text.split('+').map(|name| law(&plain(name))).collect()
     }
 
-    /// These laws with `values`, the parameters of all terms one after the other, in the model's
-    /// units, and the rows of a table if it is one of them.
+    /// These laws with `values`, the parameters of all terms in sequence, in the model's units, and
+    /// the rows of a table if it is one of them.
     ///
     /// # Errors
     /// When a value makes no sense, rows are missing, or two of the laws cannot be added.
@@ -64,7 +64,7 @@ impl SampleLaw {
         self.entries().map(|entry| entry.name)
     }
 
-    /// What is said of each term.
+    /// The table entry of each term.
     pub fn entries(&self) -> impl Iterator<Item = &'static Entry> {
         self.terms.iter().map(|term| term.entry)
     }

@@ -34,7 +34,7 @@ fn unknown(name: &str) -> String {
         || format!("; there are {}", names.join(", ")),
         |near| format!("; did you mean `{near}`?"),
     );
-    format!("there is no observable `{name}`{hint}")
+    format!("unknown observable `{name}`{hint}")
 }
 
 impl JsonSchema for ObservableSet {

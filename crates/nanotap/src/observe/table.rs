@@ -220,10 +220,10 @@ macro_rules! observables {
 
 observables! {
     tip_max: f64, Length, common,
-        "greatest tip deflection $W_{max}$", "greatest tip deflection W",
+        "largest tip deflection $W_{max}$", "largest tip deflection W",
         |m| m.greatest(Tip);
     tip_min: f64, Length, common,
-        "least tip deflection $W_{min}$", "least tip deflection W",
+        "smallest tip deflection $W_{min}$", "smallest tip deflection W",
         |m| m.least(Tip);
     amplitude: f64, Length, common,
         "amplitude (half of peak to peak)", "half of peak to peak of the tip deflection",
@@ -236,32 +236,32 @@ observables! {
         "amplitude of the tip deflection at the drive frequency: what a lock-in amplifier reads",
         |m| m.component(Tip, Tone::First).norm();
     phase: f64, Angle, common,
-        "phase behind the drive (°)",
-        "lag of the tip deflection at the drive frequency behind the drive",
+        "phase lag (°)",
+        "phase lag of the tip deflection behind the drive, at the drive frequency",
         |m| m.component(Tip, Tone::First).lag();
     indentation: f64, Length, common,
-        "indentation", "greatest depth of the tip below the resting surface",
+        "indentation", "largest depth of the tip below the surface at rest",
         |m| m.indentation();
     mean_force: f64, Force, common,
         "mean force", "time mean of the force of the sample on the tip",
         |m| m.mean_force();
     dissipation as "E_dis": f64, Energy, common,
-        "dissipation $E_{dis}$", "energy that the sample takes in one drive period",
+        "dissipation $E_{dis}$", "energy dissipated in the sample in one drive period",
         |m| m.dissipation();
     virial: f64, Energy, common,
-        "virial ⟨$F W$⟩", "time mean of force times tip deflection, the force counted along it",
+        "virial ⟨$F W$⟩", "time mean of force times tip deflection; sign: along the deflection",
         |m| m.along_tip() * m.mean_virial();
     contact_fraction: f64, Number, common,
-        "part of the time in contact", "part of the time in contact",
+        "contact time / period", "contact time / period",
         |m| m.contact_time() / m.duration();
     contacts_per_period: f64, PerPeriod, common,
-        "contacts a drive period", "contacts begun a drive period",
+        "contacts per drive period", "contacts begun per drive period",
         |m| m.contacts().count as f64 / m.periods();
     peak_force as "F_max": f64, Force, common,
-        "greatest force $F_{max}$", "greatest force of the sample on the tip",
+        "peak force $F_{max}$", "largest force of the sample on the tip",
         |m| m.peak_force();
     impact_speed: f64, Velocity, common,
-        "speed of approach", "greatest speed at which a contact begins",
+        "impact speed", "largest speed at which a contact begins",
         |m| m.contacts().greatest_speed;
     contact_time: f64, Time, common,
         "contact time", "time in contact in one drive period",
@@ -271,8 +271,8 @@ observables! {
         "amplitude of the tip deflection at the frequency of the second tone",
         |m| m.second_tone().map(Phasor::norm);
     tone2_lag: Option<f64>, Angle, rare,
-        "phase behind the second tone (°)",
-        "lag of the tip deflection behind the second tone",
+        "phase lag at the second tone (°)",
+        "phase lag of the tip deflection behind the second tone",
         |m| m.second_tone().map(Phasor::lag);
     second_harmonic: f64, Length, rare,
         "amplitude of the second harmonic",
@@ -322,22 +322,22 @@ observables! {
             (m.mean_product(Tip, Tip) - mean * mean).at_least(0.0).root()
         };
     gap_range: [f64; 2], Length, rare,
-        "gap", "least and greatest height of the tip over the undeformed surface",
+        "gap", "smallest and largest height of the tip above the undeformed surface",
         |m| m.range(Height);
     least_force: f64, Force, rare,
-        "least force", "least force of the sample on the tip: below zero where it pulls",
+        "smallest force", "smallest force of the sample on the tip; negative where it attracts",
         |m| m.least_force();
     contact_force: Option<f64>, Force, rare,
-        "mean force in contact", "time mean of the force of the sample on the tip while they touch",
+        "mean force in contact", "time mean of the force of the sample on the tip during contact",
         |m| m.mean_contact_force();
     drive_power: f64, Power, rare,
         "power of the drive", "mean power of the drive",
         |m| m.energy_balance().drive_work / m.duration();
     sample_power: f64, Power, rare,
-        "power that the sample takes", "mean power that the sample takes",
+        "power dissipated in the sample", "mean power dissipated in the sample",
         |m| m.dissipation() * m.periods() / m.duration();
     slope_range: Option<[f64; 2]>, Slope, rare,
-        "slope at the tip", "least and greatest slope at the tip",
+        "slope at the tip", "smallest and largest slope at the tip",
         |m| m.is_beam().then(|| m.range(Slope));
     optical_amplitude: Option<f64>, Length, rare,
         "amplitude read by an optical lever",
@@ -355,13 +355,13 @@ observables! {
         "phase of the tip's own motion (°)", "lag of the tip's height behind the base that moves it",
         |m| m.tip_motion().map(Phasor::lag);
     energy_balance: EnergyBalance, Energy, rare,
-        "energy", "energies over the recording; the residual as a part of what was moved",
+        "energy", "energies over the recording; the residual relative to the energy exchanged",
         |m| m.energy_balance();
     beam_clearance: Option<f64>, Length, rare,
-        "beam clearance", "least height of the beam above the sample",
+        "beam clearance", "smallest height of the beam above the sample",
         |m| m.clearance().map(|c| c.height);
     beam_clearance_xi: Option<f64>, Place, rare,
-        "place of the beam clearance $ξ$", "where the beam is lowest, clamp 0 to tip 1",
+        "position of the beam clearance $ξ$", "where the beam is lowest: 0 at the clamp, 1 at the tip",
         |m| m.clearance().map(|c| c.xi);
     beam_clearance_period: Option<f64>, Periods, rare,
         "time of the beam clearance", "when the beam is lowest",

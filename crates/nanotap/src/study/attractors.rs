@@ -8,7 +8,7 @@ use nanotap_dynamics::{
 };
 use nanotap_volterra::coarse;
 use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 
 use crate::Error;
 use crate::case::Case;
@@ -24,7 +24,8 @@ use crate::study::in_si::InSi;
 use crate::study::limits::MOST_PERIOD;
 use crate::study::orbit::{OrbitReport, report};
 use crate::study::proof::Prover;
-use crate::study::simulate::{Classification, largest_exponent};
+use crate::study::request::options;
+use crate::study::simulate::{Classification, largest_exponent, orbit_evidence, torus_evidence};
 use crate::study::start_box::{box_with, default_starts};
 use crate::study::value::Intervals;
 
@@ -278,7 +279,7 @@ pub fn attractors(
     match starts {
         Some(0) => {
             return Err(Error::input(
-                "at least one start is needed, 0 were asked for",
+                "expected at least one start, got 0",
                 "give 1 or more {starts}",
             ));
         }
@@ -454,29 +455,16 @@ fn one(
     };
     let (classification, spectrum, evidence, orbit, non_periodic) = match kind {
         AttractorKind::Periodic(orbit) => {
-            let evidence = format!(
-                "Newton closed a period-{} orbit (residual {:.1e}); largest |multiplier| {:.6}",
-                orbit.period,
-                orbit.residual,
-                orbit.spectral_radius()
-            );
+            let evidence = orbit_evidence(orbit);
             (Classification::Periodic, None, evidence, Some(orbit), None)
         }
-        AttractorKind::QuasiPeriodic(torus) => {
-            let evidence = format!(
-                "{}; Birkhoff averages agree to {:.1} digits; nearest return {:.1e}",
-                largest_exponent(&torus.spectrum),
-                torus.birkhoff_digits,
-                torus.nearest_return
-            );
-            (
-                Classification::QuasiPeriodic,
-                Some(&torus.spectrum),
-                evidence,
-                None,
-                non_periodic()?,
-            )
-        }
+        AttractorKind::QuasiPeriodic(torus) => (
+            Classification::QuasiPeriodic,
+            Some(&torus.spectrum),
+            torus_evidence(torus),
+            None,
+            non_periodic()?,
+        ),
         AttractorKind::Chaotic { spectrum, lifetime } => {
             let evidence = format!(
                 "{}; none of {} starts escaped in {:.0} periods together (mean lifetime above {:.0} at 95 %)",
@@ -544,55 +532,40 @@ fn unstable_orbits(
         .collect()
 }
 
-/// Options of a census.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct AttractorsOptions {
-    /// Starts, spread evenly over one box of states. Without it, starts of every size, from the
-    /// resonant response down to below the gap, go on until the share of starts that may lead to
-    /// motions not found is below {unseen}, or 5000 starts or 2,000,000 drive periods (600,000 under a
-    /// nonlinear law) are done
-    #[schemars(range(min = 1, max = MOST_STARTS), extend("x-value" = "S"))]
-    pub starts: Option<usize>,
-    /// Share of starts that may lead to motions not found, with 95 % confidence, at which no more are
-    /// drawn. Without it, 0.01 under a nonlinear law and 0.002 under a piecewise-linear one; a smaller
-    /// one raises the limits of {starts} and drive periods in proportion
-    #[schemars(range(min = 1e-5, max = 0.5), extend("x-value" = "PART"))]
-    pub unseen: Option<f64>,
-    /// Seed of the starts: the same seed gives the same answer on any number of threads
-    #[schemars(extend("x-value" = "K"))]
-    pub seed: u64,
-    /// Sides of one box of starts, as in a1=-1:1 or v2=-4:4; the others are derived from the linear
-    /// response to the drive. 256 starts if {starts} says no number
-    #[serde(rename = "box")]
-    #[schemars(extend("x-value" = "COORDINATE=LOW:HIGH"))]
-    pub sides: Intervals,
-    /// Longest period looked for
-    #[schemars(range(min = 1, max = MOST_PERIOD), extend("x-value" = "N"))]
-    pub max_period: usize,
-    /// Also list unstable orbits up to this period
-    #[schemars(range(min = 0, max = MOST_PERIOD), extend("x-value" = "N", "x-bare" = "4"))]
-    pub unstable: usize,
-    /// Prove in interval arithmetic that each orbit exists, is alone, and is stable or not
-    pub prove: bool,
-    /// Periods in drive periods and states at drive phase 0 of orbits that are known near the model, in
-    /// addition to those from averaging: Newton closes them before any start is drawn.
-    #[serde(skip)]
-    pub seeds: Vec<(usize, Vec<f64>)>,
-}
-
-impl Default for AttractorsOptions {
-    fn default() -> Self {
-        Self {
-            starts: None,
-            unseen: None,
-            seed: 1,
-            sides: Intervals::default(),
-            max_period: ClassifyOptions::default().max_period,
-            unstable: 0,
-            prove: false,
-            seeds: Vec::new(),
-        }
+options! {
+    /// Options of a census.
+    pub struct AttractorsOptions {
+        /// Starts, spread evenly over one box of states. Without it, starts of every size, from the
+        /// resonant response down to below the gap, go on until the share of starts that may lead to
+        /// motions not found is below {unseen}, or 5000 starts or 2,000,000 drive periods (600,000 under a
+        /// nonlinear law) are done
+        #[schemars(range(min = 1, max = MOST_STARTS), extend("x-value" = "S"))]
+        pub starts: Option<usize> = None,
+        /// Share of starts that may lead to motions not found, with 95 % confidence, at which no more are
+        /// drawn. Without it, 0.01 under a nonlinear law and 0.002 under a piecewise-linear one; a smaller
+        /// one raises the limits of {starts} and drive periods in proportion
+        #[schemars(range(min = 1e-5, max = 0.5), extend("x-value" = "PART"))]
+        pub unseen: Option<f64> = None,
+        /// Seed of the starts: the same seed gives the same answer on any number of threads
+        #[schemars(extend("x-value" = "K"))]
+        pub seed: u64 = 1,
+        /// Sides of one box of starts, as in a1=-1:1 or v2=-4:4; the others are derived from the linear
+        /// response to the drive. 256 starts if {starts} says no number
+        #[serde(rename = "box")]
+        #[schemars(extend("x-value" = "COORDINATE=LOW:HIGH"))]
+        pub sides: Intervals = Intervals::default(),
+        /// Longest period looked for
+        #[schemars(range(min = 1, max = MOST_PERIOD), extend("x-value" = "N"))]
+        pub max_period: usize = ClassifyOptions::default().max_period,
+        /// Also list unstable orbits up to this period
+        #[schemars(range(min = 0, max = MOST_PERIOD), extend("x-value" = "N", "x-bare" = "4"))]
+        pub unstable: usize = 0,
+        /// Prove in interval arithmetic that each orbit exists, is alone, and is stable or not
+        pub prove: bool = false,
+        /// Periods in drive periods and states at drive phase 0 of orbits that are known near the model, in
+        /// addition to those from averaging: Newton closes them before any start is drawn.
+        #[serde(skip)]
+        pub seeds: Vec<(usize, Vec<f64>)> = Vec::new(),
     }
 }
 
@@ -602,7 +575,7 @@ pub struct AttractorsStudy;
 
 impl Study for AttractorsStudy {
     const NAME: &'static str = "attractors";
-    const ABOUT: &'static str = "Every motion that coexists: a census from many seeded starts";
+    const ABOUT: &'static str = "Find coexisting attractors by sampling initial states";
     const COUNTED: &'static str = "starts";
     const PARTIAL: bool = true;
     type Options = AttractorsOptions;

@@ -30,6 +30,7 @@ use crate::model::strobe::{Strobe, together};
 use crate::observe::time_series::state_names;
 use crate::study::attractors::MOST_STARTS;
 use crate::study::limits::{MOST_PERIOD, MOST_PERIODS};
+use crate::study::request::options;
 use crate::study::simulate::{Classification, starting_state};
 use crate::study::{Computation, DatasetPlan, DatasetStudy};
 
@@ -89,12 +90,12 @@ impl SliceRange {
         };
         let number = |text: &str| match text.parse::<f64>() {
             Ok(value) if value.is_finite() => Ok(value),
-            _ => Err(refuse(format!("`{text}` is no finite number"))),
+            _ => Err(refuse(format!("`{text}` is not a finite number"))),
         };
         let (from, to) = (number(from)?, number(to)?);
         let count = count
             .parse()
-            .map_err(|_| refuse(format!("`{count}` is no whole number")))?;
+            .map_err(|_| refuse(format!("`{count}` is not a whole number")))?;
         if !(2..=MOST).contains(&count) {
             return Err(refuse(format!(
                 "{count} points; from 2 to {MOST} can be had"
@@ -613,50 +614,35 @@ pub(crate) fn entries(store: &Store) -> Vec<String> {
     text.split(' ').map(Into::into).collect()
 }
 
-/// Options of basins of attraction.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct BasinOptions {
-    /// The horizontal axis, as in a1=-1:1:200: entry of the state, first value, last value, how
-    /// many (a1…aN, v1…vN; oscillator: x, v)
-    #[schemars(extend("x-value" = "ENTRY=FROM:TO:COUNT", "x-required" = true))]
-    pub x: String,
-    /// The vertical axis
-    #[schemars(extend("x-value" = "ENTRY=FROM:TO:COUNT", "x-required" = true))]
-    pub y: String,
-    /// The other entries of the state, in full: a1,…,aN,v1,…,vN; without it, 0
-    #[schemars(extend("x-value" = "A1,…"))]
-    pub state: Option<Vec<f64>>,
-    /// States on the attractors, or what a census found; without it, a census in the slice
-    /// finds them
-    #[schemars(extend("x-own" = true))]
-    pub attractors: Option<Vec<Vec<f64>>>,
-    /// Starts of the census
-    #[schemars(range(min = 1, max = MOST_STARTS), extend("x-value" = "S"))]
-    pub starts: usize,
-    /// Seed of the census
-    #[schemars(extend("x-value" = "K"))]
-    pub seed: u64,
-    /// Drive periods after which a point is called unsettled
-    #[schemars(range(min = 1, max = MOST_PERIODS), extend("x-value" = "P"))]
-    pub periods: usize,
-    /// Longest period looked for
-    #[schemars(range(min = 1, max = MOST_PERIOD), extend("x-value" = "N"))]
-    pub max_period: usize,
-}
-
-impl Default for BasinOptions {
-    fn default() -> Self {
-        Self {
-            x: String::new(),
-            y: String::new(),
-            state: None,
-            attractors: None,
-            starts: 64,
-            seed: 1,
-            periods: 1000,
-            max_period: 64,
-        }
+options! {
+    /// Options of basins of attraction.
+    pub struct BasinOptions {
+        /// The horizontal axis, as in a1=-1:1:200: entry of the state, first value, last value, how
+        /// many (a1…aN, v1…vN; oscillator: x, v)
+        #[schemars(extend("x-value" = "ENTRY=FROM:TO:COUNT", "x-required" = true))]
+        pub x: String = String::new(),
+        /// The vertical axis
+        #[schemars(extend("x-value" = "ENTRY=FROM:TO:COUNT", "x-required" = true))]
+        pub y: String = String::new(),
+        /// The other entries of the state, in full: a1,…,aN,v1,…,vN; without it, 0
+        #[schemars(extend("x-value" = "A1,…"))]
+        pub state: Option<Vec<f64>> = None,
+        /// States on the attractors, or what a census found; without it, a census in the slice
+        /// finds them
+        #[schemars(extend("x-own" = true))]
+        pub attractors: Option<Vec<Vec<f64>>> = None,
+        /// Starts of the census
+        #[schemars(range(min = 1, max = MOST_STARTS), extend("x-value" = "S"))]
+        pub starts: usize = 64,
+        /// Seed of the census
+        #[schemars(extend("x-value" = "K"))]
+        pub seed: u64 = 1,
+        /// Drive periods after which a point is called unsettled
+        #[schemars(range(min = 1, max = MOST_PERIODS), extend("x-value" = "P"))]
+        pub periods: usize = 1000,
+        /// Longest period looked for
+        #[schemars(range(min = 1, max = MOST_PERIOD), extend("x-value" = "N"))]
+        pub max_period: usize = 64,
     }
 }
 
@@ -708,7 +694,8 @@ pub struct BasinStudy;
 
 impl DatasetStudy for BasinStudy {
     const NAME: &'static str = "basin";
-    const ABOUT: &'static str = "Basins of attraction on a two-dimensional slice of initial states";
+    const ABOUT: &'static str =
+        "Compute basins of attraction on a two-dimensional slice of initial states";
     const COUNTED: &'static str = "rows";
     type Options = BasinOptions;
     type Report = Shares;

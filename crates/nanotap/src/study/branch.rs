@@ -9,7 +9,7 @@ use nanotap_dynamics::{
 };
 use rayon::prelude::*;
 use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 
 use crate::case::{Case, Key, ParameterUnit, PlaneFamily};
 use crate::model::Model;
@@ -19,6 +19,7 @@ use crate::observe::{Observables, PhysicalMotion, Set, measure};
 use crate::study::Study;
 use crate::study::limits::{MOST_DOUBLINGS, MOST_PERIOD, MOST_SEED_STARTS};
 use crate::study::orbit::{OrbitOptions, orbit, pairs};
+use crate::study::request::options;
 use crate::study::start_box::default_starts;
 use crate::study::value::{Amount, Interval, values};
 use crate::{Error, ErrorKind};
@@ -515,6 +516,11 @@ fn described(case: &Case, range: Range, observables: Set, diagram: &Diagram) -> 
     // Branches that were followed are measured, also of work that was cancelled.
     let case = &case.with_grace();
     let key = range.key;
+    let measured = Measured {
+        case,
+        range,
+        observables,
+    };
     let mut report = BranchReport {
         parameter: key.path(),
         from: range.from,
@@ -557,44 +563,16 @@ fn described(case: &Case, range: Range, observables: Set, diagram: &Diagram) -> 
         report
             .branches
             .push(summary(branch, parent, *depth, end(branch)));
-        // An orbit that grazes may be closed and yet not be measured: the rest stands.
-        let unmeasured = |parameter, what: &str, error: &Error| FailureReport {
-            parameter,
-            reason: format!(
-                "the {what} is left out, its motion cannot be measured: {}",
-                error.message()
-            ),
-        };
-        let points: Vec<_> = (branch.points.par_iter())
-            .with_max_len(1)
-            .filter(|_| !case.cancel().is_cancelled())
-            .map(|p| {
-                point(case, range, observables, index, p)
-                    .map_err(|error| unmeasured(p.parameter, "point", &error))
-            })
-            .collect();
-        for point in points {
-            match point {
-                Ok(point) => report.points.push(point),
-                Err(_) if case.cancel().is_cancelled() => {}
-                Err(failure) => report.failures.push(failure),
-            }
-        }
-        let bifurcations: Vec<_> = (branch.bifurcations.par_iter())
-            .with_max_len(1)
-            .filter(|_| !case.cancel().is_cancelled())
-            .map(|b| {
-                bifurcation(case, range, observables, index, b)
-                    .map_err(|error| unmeasured(b.parameter, kind_name(b.kind), &error))
-            })
-            .collect();
-        for bifurcation in bifurcations {
-            match bifurcation {
-                Ok(found) => report.bifurcations.push(found),
-                Err(_) if case.cancel().is_cancelled() => {}
-                Err(failure) => report.failures.push(failure),
-            }
-        }
+        let failures = &mut report.failures;
+        let points = measured.all(&branch.points, failures, |p| {
+            (p.parameter, "point", measured.point(index, p))
+        });
+        report.points.extend(points);
+        let bifurcations = measured.all(&branch.bifurcations, failures, |b| {
+            let found = measured.bifurcation(index, b);
+            (b.parameter, kind_name(b.kind), found)
+        });
+        report.bifurcations.extend(bifurcations);
         // What the user stopped is no failure of the branch.
         let stopped = matches!(branch.end, BranchEnd::Cancelled);
         if branch.end.is_failure() && !stopped {
@@ -669,70 +647,97 @@ fn summary(branch: &Branch, parent: Option<usize>, depth: usize, end: String) ->
     }
 }
 
-/// What an orbit looks like, in the model's units and, where physical quantities vary, in SI.
-fn seen(
-    case: &Case,
+/// Observables of the orbits of a branch.
+struct Measured<'a> {
+    case: &'a Case,
     range: Range,
     observables: Set,
-    parameter: f64,
-    orbit: &PeriodicOrbit,
-) -> Result<(Observables, Option<PhysicalMotion>), Error> {
-    let here = case.with(range.key, parameter);
-    let model = range.model(case, parameter)?;
-    let start = orbit.states.first().map_or(&[][..], Vec::as_slice);
-    let observables = measure(&model, start, orbit.period, observables)?;
-    let physical = here
-        .physical()
-        .map(|view| PhysicalMotion::of(&observables, view));
-    Ok((observables, physical))
 }
 
-fn point(
-    case: &Case,
-    range: Range,
-    observables: Set,
-    branch: usize,
-    p: &BranchPoint,
-) -> Result<PointReport, Error> {
-    let (observables, physical) = seen(case, range, observables, p.parameter, &p.orbit)?;
-    Ok(PointReport {
-        branch,
-        period: p.orbit.period,
-        parameter: p.parameter,
-        state: p.orbit.states.first().cloned().unwrap_or_default(),
-        multipliers: pairs(&p.orbit.multipliers),
-        stable: p.orbit.is_stable(),
-        observables,
-        physical,
-    })
-}
+impl Measured<'_> {
+    /// The items of a branch that `one` measures, with the failures of the others: an orbit that
+    /// grazes may be closed and yet not be measured.
+    fn all<T: Sync, R: Send>(
+        &self,
+        items: &[T],
+        failures: &mut Vec<FailureReport>,
+        one: impl Fn(&T) -> (f64, &'static str, Result<R, Error>) + Sync,
+    ) -> Vec<R> {
+        let is_cancelled = || self.case.cancel().is_cancelled();
+        let found: Vec<_> = items
+            .par_iter()
+            .with_max_len(1)
+            .filter(|_| !is_cancelled())
+            .map(&one)
+            .collect();
+        let mut all = Vec::with_capacity(found.len());
+        for (parameter, what, found) in found {
+            match found {
+                Ok(found) => all.push(found),
+                Err(_) if is_cancelled() => {}
+                Err(error) => failures.push(FailureReport {
+                    parameter,
+                    reason: format!(
+                        "the {what} is left out, its motion cannot be measured: {}",
+                        error.message()
+                    ),
+                }),
+            }
+        }
+        all
+    }
 
-fn bifurcation(
-    case: &Case,
-    range: Range,
-    observables: Set,
-    branch: usize,
-    b: &Bifurcation,
-) -> Result<BifurcationReport, Error> {
-    let (observables, physical) = seen(case, range, observables, b.parameter, &b.orbit)?;
-    let (angle, time) = match b.kind {
-        BifurcationKind::NeimarkSacker { angle } => (Some(angle.to_degrees()), None),
-        BifurcationKind::Grazing { time } => (None, Some(time)),
-        _ => (None, None),
-    };
-    Ok(BifurcationReport {
-        kind: kind_name(b.kind),
-        branch,
-        period: b.orbit.period,
-        parameter: b.parameter,
-        uncertainty: b.uncertainty,
-        state: b.orbit.states.first().cloned().unwrap_or_default(),
-        multipliers: pairs(&b.orbit.multipliers),
-        angle,
-        time,
-        observables,
-        physical,
-    })
+    /// Observables in the model's units and, of a physical case, in SI.
+    fn seen(
+        &self,
+        parameter: f64,
+        orbit: &PeriodicOrbit,
+    ) -> Result<(Observables, Option<PhysicalMotion>), Error> {
+        let here = self.case.with(self.range.key, parameter);
+        let model = self.range.model(self.case, parameter)?;
+        let start = orbit.states.first().map_or(&[][..], Vec::as_slice);
+        let observables = measure(&model, start, orbit.period, self.observables)?;
+        let physical = here
+            .physical()
+            .map(|view| PhysicalMotion::of(&observables, view));
+        Ok((observables, physical))
+    }
+
+    fn point(&self, branch: usize, p: &BranchPoint) -> Result<PointReport, Error> {
+        let (observables, physical) = self.seen(p.parameter, &p.orbit)?;
+        Ok(PointReport {
+            branch,
+            period: p.orbit.period,
+            parameter: p.parameter,
+            state: p.orbit.states.first().cloned().unwrap_or_default(),
+            multipliers: pairs(&p.orbit.multipliers),
+            stable: p.orbit.is_stable(),
+            observables,
+            physical,
+        })
+    }
+
+    fn bifurcation(&self, branch: usize, b: &Bifurcation) -> Result<BifurcationReport, Error> {
+        let (observables, physical) = self.seen(b.parameter, &b.orbit)?;
+        let (angle, time) = match b.kind {
+            BifurcationKind::NeimarkSacker { angle } => (Some(angle.to_degrees()), None),
+            BifurcationKind::Grazing { time } => (None, Some(time)),
+            _ => (None, None),
+        };
+        Ok(BifurcationReport {
+            kind: kind_name(b.kind),
+            branch,
+            period: b.orbit.period,
+            parameter: b.parameter,
+            uncertainty: b.uncertainty,
+            state: b.orbit.states.first().cloned().unwrap_or_default(),
+            multipliers: pairs(&b.orbit.multipliers),
+            angle,
+            time,
+            observables,
+            physical,
+        })
+    }
 }
 
 /// Periods over which Lyapunov exponents are measured at most where seeds are looked for:
@@ -826,78 +831,56 @@ fn crossings(curve: &CurveReport, second: f64) -> impl Iterator<Item = f64> {
         })
 }
 
-/// Options of branches.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct BranchOptions {
-    /// The parameter, as the case file calls it (omega, alpha4, gap …); of a physical case also
-    /// a quantity of it (drive.frequency, gap.tip, sample.stiffness …)
-    #[schemars(extend("x-value" = "KEY", "x-required" = true))]
-    pub parameter: String,
-    /// Its value at the start; of a physical case also with a unit, as in "70 kHz"
-    #[schemars(extend("x-value" = "VALUE", "x-required" = true))]
-    pub from: Amount,
-    /// The other end of its range
-    #[schemars(extend("x-value" = "VALUE", "x-required" = true))]
-    pub to: Amount,
-    /// Period of the orbit at the start; without it, that of the motion to which a run converges
-    #[schemars(range(min = 1, max = MOST_PERIOD), extend("x-value" = "N"))]
-    pub period: Option<usize>,
-    /// State near which the orbit at the start is looked for: a1,…,aN,v1,…,vN
-    #[schemars(extend("x-value" = "A1,…"))]
-    pub state: Option<Vec<f64>>,
-    /// Also follow the doubled branches at flips, so many doublings deep
-    #[schemars(range(min = 0, max = MOST_DOUBLINGS), extend("x-value" = "DEPTH", "x-bare" = "1"))]
-    pub switch: Option<usize>,
-    /// Assemble the whole picture: every stable orbit of a census at several values, followed
-    /// both ways and through two doublings (or as {switch} says)
-    pub diagram: bool,
-    /// Of the {diagram}: values of the parameter at which a census is taken
-    #[schemars(range(min = 2, max = 10_000), extend("x-value" = "K"))]
-    pub values: usize,
-    /// Of the {diagram}: starts at each
-    #[schemars(range(min = 1, max = MOST_SEED_STARTS), extend("x-value" = "S"))]
-    pub starts: usize,
-    /// Of the {diagram}: seed of the starts
-    #[schemars(extend("x-value" = "K"))]
-    pub seed: u64,
-    /// A second parameter and its range, as in alpha4=5:40: the bifurcation curves are traced in
-    /// both
-    #[schemars(extend("x-value" = "KEY=LOW:HIGH"))]
-    pub second: Option<Interval>,
-    /// Longest step, as a part of the range
-    #[schemars(range(min = 0.0, max = 1.0), extend("x-value" = "PART"))]
-    pub max_step: f64,
-    /// Observables of every orbit.
-    #[serde(skip)]
-    pub observables: Set,
-    /// Whether doubled branches end at their first orbit that is not stable.
-    #[serde(skip)]
-    pub stable_doublings: bool,
-    /// A branch is left where a disturbance grows by more than this in the orbit's period.
-    #[serde(skip)]
-    pub max_multiplier: f64,
-}
-
-impl Default for BranchOptions {
-    fn default() -> Self {
-        Self {
-            parameter: String::new(),
-            from: Amount::default(),
-            to: Amount::default(),
-            period: None,
-            state: None,
-            switch: None,
-            diagram: false,
-            values: 65,
-            starts: 16,
-            seed: 1,
-            second: None,
-            max_step: 0.01,
-            observables: Set::COMMON,
-            stable_doublings: false,
-            max_multiplier: ContinuationOptions::over(0.0, 1.0).max_multiplier,
-        }
+options! {
+    /// Options of branches.
+    pub struct BranchOptions {
+        /// The parameter, as the case file calls it (omega, alpha4, gap …); of a physical case also
+        /// a quantity of it (drive.frequency, gap.tip, sample.stiffness …)
+        #[schemars(extend("x-value" = "KEY", "x-required" = true))]
+        pub parameter: String = String::new(),
+        /// Its value at the start; of a physical case also with a unit, as in "70 kHz"
+        #[schemars(extend("x-value" = "VALUE", "x-required" = true))]
+        pub from: Amount = Amount::default(),
+        /// The other end of its range
+        #[schemars(extend("x-value" = "VALUE", "x-required" = true))]
+        pub to: Amount = Amount::default(),
+        /// Period of the orbit at the start; without it, that of the motion to which a run converges
+        #[schemars(range(min = 1, max = MOST_PERIOD), extend("x-value" = "N"))]
+        pub period: Option<usize> = None,
+        /// State near which the orbit at the start is looked for: a1,…,aN,v1,…,vN
+        #[schemars(extend("x-value" = "A1,…"))]
+        pub state: Option<Vec<f64>> = None,
+        /// Also follow the doubled branches at flips, so many doublings deep
+        #[schemars(range(min = 0, max = MOST_DOUBLINGS), extend("x-value" = "DEPTH", "x-bare" = "1"))]
+        pub switch: Option<usize> = None,
+        /// Assemble the whole picture: every stable orbit of a census at several values, followed
+        /// both ways and through two doublings (or as {switch} says)
+        pub diagram: bool = false,
+        /// Of the {diagram}: values of the parameter at which a census is taken
+        #[schemars(range(min = 2, max = 10_000), extend("x-value" = "K"))]
+        pub values: usize = 65,
+        /// Of the {diagram}: starts at each
+        #[schemars(range(min = 1, max = MOST_SEED_STARTS), extend("x-value" = "S"))]
+        pub starts: usize = 16,
+        /// Of the {diagram}: seed of the starts
+        #[schemars(extend("x-value" = "K"))]
+        pub seed: u64 = 1,
+        /// A second parameter and its range, as in alpha4=5:40: the bifurcation curves are traced in
+        /// both
+        #[schemars(extend("x-value" = "KEY=LOW:HIGH"))]
+        pub second: Option<Interval> = None,
+        /// Longest step, as a part of the range
+        #[schemars(range(min = 0.0, max = 1.0), extend("x-value" = "PART"))]
+        pub max_step: f64 = 0.01,
+        /// Observables of every orbit.
+        #[serde(skip)]
+        pub observables: Set = Set::COMMON,
+        /// Whether doubled branches end at their first orbit that is not stable.
+        #[serde(skip)]
+        pub stable_doublings: bool = false,
+        /// A branch is left where a disturbance grows by more than this in the orbit's period.
+        #[serde(skip)]
+        pub max_multiplier: f64 = ContinuationOptions::over(0.0, 1.0).max_multiplier,
     }
 }
 
@@ -943,7 +926,7 @@ impl BranchOptions {
         }
         Err(Error::input(
             format!(
-                "a longest step of {} is no part of the range: between 0 and 1 is needed",
+                "expected a longest step between 0 and 1 of the range, got {}",
                 self.max_step
             ),
             "give a {max_step} of 0.01",

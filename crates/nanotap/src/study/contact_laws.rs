@@ -8,7 +8,7 @@
 
 use nanotap_dynamics::{ClassifyOptions, Control, ShootingOptions, classify, close_orbit};
 use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 use serde_json::{Map, Value};
 
 use crate::Error;
@@ -25,6 +25,7 @@ use crate::observe::Observables;
 use crate::study::branch::{BranchOptions, BranchReport, Range, branches_through};
 use crate::study::limits::MOST_PERIOD;
 use crate::study::orbit::{OrbitOptions, OrbitReport, no_period, orbit, spectral_radius};
+use crate::study::request::options;
 use crate::study::simulate::{Classification, Named};
 use crate::study::value::{Amount, values};
 use crate::study::{Study, cantilever};
@@ -287,32 +288,21 @@ fn force_loop(height: &Curve, force: &Curve) -> Vec<[f64; 2]> {
     points.collect()
 }
 
-/// Options of the comparison of contact laws.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct ContactLawsOptions {
-    /// Period of the orbits compared
-    #[schemars(range(min = 1, max = MOST_PERIOD), extend("x-value" = "N"))]
-    pub period: usize,
-    /// Stiffness of the relaxing arm; without it, the case's, or twice alpha4
-    #[schemars(extend("x-value" = "K"))]
-    pub arm: Option<f64>,
-    /// Lowest drive frequency to which the orbits are followed
-    #[schemars(extend("x-value" = "OMEGA"))]
-    pub from: Option<Amount>,
-    /// Highest drive frequency to which the orbits are followed
-    #[schemars(extend("x-value" = "OMEGA"))]
-    pub to: Option<Amount>,
-}
-
-impl Default for ContactLawsOptions {
-    fn default() -> Self {
-        Self {
-            period: 1,
-            arm: None,
-            from: None,
-            to: None,
-        }
+options! {
+    /// Options of the comparison of contact laws.
+    pub struct ContactLawsOptions {
+        /// Period of the orbits compared
+        #[schemars(range(min = 1, max = MOST_PERIOD), extend("x-value" = "N"))]
+        pub period: usize = 1,
+        /// Stiffness of the relaxing arm; without it, the case's, or twice alpha4
+        #[schemars(extend("x-value" = "K"))]
+        pub arm: Option<f64> = None,
+        /// Lowest drive frequency to which the orbits are followed
+        #[schemars(extend("x-value" = "OMEGA"))]
+        pub from: Option<Amount> = None,
+        /// Highest drive frequency to which the orbits are followed
+        #[schemars(extend("x-value" = "OMEGA"))]
+        pub to: Option<Amount> = None,
     }
 }
 
@@ -339,8 +329,7 @@ pub struct ContactLawsStudy;
 
 impl Study for ContactLawsStudy {
     const NAME: &'static str = "contact-laws";
-    const ABOUT: &'static str =
-        "The same lever and drive on every contact law: what difference the sample makes";
+    const ABOUT: &'static str = "Compare contact laws under the same lever and drive";
     type Options = ContactLawsOptions;
     type Report = Comparison;
 

@@ -2,7 +2,7 @@
 
 use nanotap_dynamics::Control;
 use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 
 use crate::Error;
 use crate::case::Case;
@@ -13,6 +13,7 @@ use crate::observe::time_series::with_modes;
 use crate::study::limits::MOST_PERIOD;
 use crate::study::mode_share::ReadingsReport;
 use crate::study::orbit::{OrbitOptions, OrbitReport, orbit, spectral_radius};
+use crate::study::request::options;
 use crate::study::simulate::Classification;
 use crate::study::{Study, cantilever};
 
@@ -227,28 +228,18 @@ fn verdict(
     }
 }
 
-/// Options of a convergence study.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct ConvergenceOptions {
-    /// Largest number of modes
-    #[schemars(range(min = 2, max = MAX_MODES), extend("x-value" = "K"))]
-    pub largest: usize,
-    /// Difference of the tip deflection, as a part of the amplitude, that is small enough
-    #[schemars(range(min = f64::MIN_POSITIVE), extend("x-value" = "D"))]
-    pub tolerance: f64,
-    /// Period of the orbit to compare; without it, the motion to which a run from rest converges
-    #[schemars(range(min = 1, max = MOST_PERIOD), extend("x-value" = "N"))]
-    pub period: Option<usize>,
-}
-
-impl Default for ConvergenceOptions {
-    fn default() -> Self {
-        Self {
-            largest: 10,
-            tolerance: 0.01,
-            period: None,
-        }
+options! {
+    /// Options of a convergence study.
+    pub struct ConvergenceOptions {
+        /// Largest number of modes
+        #[schemars(range(min = 2, max = MAX_MODES), extend("x-value" = "K"))]
+        pub largest: usize = 10,
+        /// Difference of the tip deflection, as a part of the amplitude, that is small enough
+        #[schemars(range(min = f64::MIN_POSITIVE), extend("x-value" = "D"))]
+        pub tolerance: f64 = 0.01,
+        /// Period of the orbit to compare; without it, the motion to which a run from rest converges
+        #[schemars(range(min = 1, max = MOST_PERIOD), extend("x-value" = "N"))]
+        pub period: Option<usize> = None,
     }
 }
 
@@ -258,7 +249,7 @@ pub struct ConvergenceStudy;
 
 impl Study for ConvergenceStudy {
     const NAME: &'static str = "convergence";
-    const ABOUT: &'static str = "The same motion with N = 1 … K modes: how many are enough";
+    const ABOUT: &'static str = "Compare the motion with 1 to K modes: how many are enough";
     type Options = ConvergenceOptions;
     type Report = Convergence;
 

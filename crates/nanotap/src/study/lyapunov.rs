@@ -1,9 +1,6 @@
 //! Lyapunov spectrum and Poincaré section of any motion.
 
-use nalgebra::DMatrix;
-use nanotap_dynamics::{
-    ClassifyOptions, Scheduling, StroboscopicMap, Tangency, classify, lyapunov_spectrum,
-};
+use nanotap_dynamics::{ClassifyOptions, StroboscopicMap as _, classify, lyapunov_spectrum};
 use nanotap_flow::FlowError;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -13,12 +10,12 @@ pub use nanotap_dynamics::LyapunovOptions as SpectrumOptions;
 use crate::Error;
 use crate::case::Case;
 use crate::control::Control;
-use crate::map::UNINTERRUPTED;
 use crate::model::strobe::Strobe;
 use crate::model::{Model, MotionError};
 use crate::observe::begins_contact;
 use crate::study::Study;
 use crate::study::limits::MOST_PERIODS;
+use crate::study::request::options;
 use crate::study::simulate::{Classification, Named, check_periods, check_states, starting_state};
 
 /// Where a motion is cut.
@@ -79,106 +76,6 @@ pub struct LyapunovReport {
     pub section_at: Section,
 }
 
-/// A map that goes no further once the work is to stop.
-#[derive(Clone)]
-struct Stoppable<'a> {
-    map: Strobe,
-    control: Control<'a>,
-}
-
-/// Why a period was not computed.
-#[derive(Debug, thiserror::Error)]
-enum Unfinished {
-    #[error("stopped")]
-    Stopped,
-    #[error(transparent)]
-    Flow(#[from] MotionError),
-}
-
-impl Stoppable<'_> {
-    fn goes_on(&self) -> Result<(), Unfinished> {
-        if self.control.is_cancelled() {
-            return Err(Unfinished::Stopped);
-        }
-        Ok(())
-    }
-}
-
-impl Scheduling for Stoppable<'_> {}
-
-impl StroboscopicMap for Stoppable<'_> {
-    type Error = Unfinished;
-
-    fn dimension(&self) -> usize {
-        self.map.dimension()
-    }
-
-    fn period(&self) -> f64 {
-        self.map.period()
-    }
-
-    fn discrete_entries(&self) -> usize {
-        self.map.discrete_entries()
-    }
-
-    fn advance(&mut self, state: &mut [f64]) -> Result<(), Unfinished> {
-        self.goes_on()?;
-        Ok(self.map.advance(state)?)
-    }
-
-    fn advance_by(&mut self, state: &mut [f64], periods: usize) -> Result<(), Unfinished> {
-        let mut left = periods;
-        while left > 0 {
-            self.goes_on()?;
-            let next = left.min(UNINTERRUPTED);
-            self.map.advance_by(state, next)?;
-            left -= next;
-        }
-        Ok(())
-    }
-
-    fn advance_with_jacobian(
-        &mut self,
-        state: &mut [f64],
-        jacobian: &mut DMatrix<f64>,
-    ) -> Result<(), Unfinished> {
-        self.goes_on()?;
-        Ok(self.map.advance_with_jacobian(state, jacobian)?)
-    }
-
-    fn advance_with_jacobian_and_determinant(
-        &mut self,
-        state: &mut [f64],
-        jacobian: &mut DMatrix<f64>,
-    ) -> Result<Option<f64>, Unfinished> {
-        self.goes_on()?;
-        let map = &mut self.map;
-        Ok(map.advance_with_jacobian_and_determinant(state, jacobian)?)
-    }
-
-    fn log_determinant_bound(&self) -> f64 {
-        self.map.log_determinant_bound()
-    }
-
-    fn advance_with_tangencies(
-        &mut self,
-        state: &mut [f64],
-        tangencies: &mut Vec<Tangency>,
-    ) -> Result<(), Unfinished> {
-        self.goes_on()?;
-        Ok(self.map.advance_with_tangencies(state, tangencies)?)
-    }
-}
-
-impl From<Unfinished> for Error {
-    fn from(error: Unfinished) -> Self {
-        match error {
-            Unfinished::Stopped => Self::stopped(),
-            Unfinished::Flow(error) => error.into(),
-        }
-    }
-}
-
 /// Measures the spectrum of `model`'s motion and cuts it.
 ///
 /// # Errors
@@ -191,10 +88,8 @@ pub fn lyapunov(
     let mut state = starting_state(model, options.state.as_deref())?;
     check_periods(options.periods)?;
     check_states(model, options.points, "points")?;
-    let mut map = Stoppable {
-        map: Strobe::new(model),
-        control: *control,
-    };
+    let model = &model.clone().cancelled_by(&control.flag());
+    let mut map = Strobe::new(model);
     let defaults = SpectrumOptions::default();
     // The tangent vectors align themselves during the last periods of the transient.
     let alignment = defaults.alignment.min(options.transient);
@@ -215,9 +110,11 @@ pub fn lyapunov(
         FlowError::NotFinite { what }.into()
     })?;
     let named = Named::of(&classify(&mut map, &start, &ClassifyOptions::default()).kind);
-    map.goes_on()?;
+    if control.is_cancelled() {
+        return Err(Error::stopped());
+    }
     let section_at = options.section_at();
-    let section = cut(model, &start, section_at, options.points, control)?;
+    let section = section(model, &start, section_at, options.points)?;
     Ok(LyapunovReport {
         classification: named.classification,
         period: named.orbit.map(|o| o.period),
@@ -249,20 +146,6 @@ pub fn section(
     at: Section,
     points: usize,
 ) -> Result<Vec<SectionPoint>, MotionError> {
-    match cut(model, start, at, points, &Control::default()) {
-        Ok(points) => Ok(points),
-        Err(Unfinished::Flow(error)) => Err(error),
-        Err(Unfinished::Stopped) => Ok(Vec::new()),
-    }
-}
-
-fn cut(
-    model: &Model,
-    start: &[f64],
-    at: Section,
-    points: usize,
-    control: &Control<'_>,
-) -> Result<Vec<SectionPoint>, Unfinished> {
     /// Periods watched for each point.
     const RAREST: usize = 8;
     let tip_rate = model.tip_rate();
@@ -284,9 +167,6 @@ fn cut(
     for _ in 0..points.saturating_mul(RAREST) {
         if found.len() >= points {
             break;
-        }
-        if control.is_cancelled() {
-            return Err(Unfinished::Stopped);
         }
         let recorded = record(1)?;
         match at {
@@ -321,39 +201,26 @@ pub enum SectionKind {
 /// Most points of a section: 300 MB with three modes.
 pub const MOST_SECTION_POINTS: usize = 2_000_000;
 
-/// Options of the Lyapunov spectrum.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct LyapunovOptions {
-    /// Drive periods averaged over
-    #[schemars(range(min = 1, max = MOST_PERIODS), extend("x-value" = "P"))]
-    pub periods: usize,
-    /// Drive periods discarded first
-    #[schemars(range(min = 0, max = MOST_PERIODS), extend("x-value" = "T"))]
-    pub transient: usize,
-    /// State at the start, drive phase 0: a1,…,aN,v1,…,vN (oscillator: x,v); without it, rest
-    #[schemars(extend("x-value" = "A1,…"))]
-    pub state: Option<Vec<f64>>,
-    /// Where the section is taken
-    pub section: SectionKind,
-    /// Drive phase of the section in degrees
-    #[schemars(extend("x-value" = "DEGREES"))]
-    pub phase: f64,
-    /// Points of the section
-    #[schemars(range(min = 0, max = MOST_SECTION_POINTS), extend("x-value" = "K"))]
-    pub points: usize,
-}
-
-impl Default for LyapunovOptions {
-    fn default() -> Self {
-        Self {
-            periods: 20_000,
-            transient: 1000,
-            state: None,
-            section: SectionKind::default(),
-            phase: 0.0,
-            points: 5000,
-        }
+options! {
+    /// Options of the Lyapunov spectrum.
+    pub struct LyapunovOptions {
+        /// Drive periods averaged over
+        #[schemars(range(min = 1, max = MOST_PERIODS), extend("x-value" = "P"))]
+        pub periods: usize = 20_000,
+        /// Drive periods discarded first
+        #[schemars(range(min = 0, max = MOST_PERIODS), extend("x-value" = "T"))]
+        pub transient: usize = 1000,
+        /// State at the start, drive phase 0: a1,…,aN,v1,…,vN (oscillator: x,v); without it, rest
+        #[schemars(extend("x-value" = "A1,…"))]
+        pub state: Option<Vec<f64>> = None,
+        /// Where the section is taken
+        pub section: SectionKind = SectionKind::default(),
+        /// Drive phase of the section in degrees
+        #[schemars(extend("x-value" = "DEGREES"))]
+        pub phase: f64 = 0.0,
+        /// Points of the section
+        #[schemars(range(min = 0, max = MOST_SECTION_POINTS), extend("x-value" = "K"))]
+        pub points: usize = 5000,
     }
 }
 
@@ -373,7 +240,8 @@ pub struct LyapunovStudy;
 
 impl Study for LyapunovStudy {
     const NAME: &'static str = "lyapunov";
-    const ABOUT: &'static str = "Lyapunov spectrum with error bars, and a Poincaré section";
+    const ABOUT: &'static str =
+        "Compute the Lyapunov spectrum with error bars, and a Poincaré section";
     type Options = LyapunovOptions;
     type Report = LyapunovReport;
 

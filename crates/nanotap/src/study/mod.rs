@@ -22,6 +22,7 @@ pub mod orbit;
 pub mod proof;
 pub mod registry;
 pub mod request;
+pub mod scan;
 pub mod setpoint;
 mod short_run;
 pub mod simulate;
@@ -74,6 +75,7 @@ pub static STUDIES: &[StudyEntry] = &[
     StudyEntry::of::<lyapunov::LyapunovStudy>(),
     StudyEntry::of::<convergence::ConvergenceStudy>(),
     StudyEntry::of::<contact_laws::ContactLawsStudy>(),
+    StudyEntry::of::<scan::ScanStudy>(),
 ];
 
 /// A study whose report is a document.

@@ -3,7 +3,7 @@
 
 use nalgebra::Complex;
 use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 
 use crate::Error;
 use crate::case::Case;
@@ -14,6 +14,7 @@ use crate::model::exact_beam;
 use crate::model::galerkin::{Galerkin, Regime};
 use crate::model::spectrum::{self, Spectrum, TipLoad};
 use crate::study::limits::MOST_POINTS;
+use crate::study::request::options;
 use crate::study::{Study, cantilever};
 
 /// The modes of a case. Frequencies are Ω of the undamped equations, ascending, N of each.
@@ -101,18 +102,12 @@ pub fn damping_ratio([re, im]: [f64; 2]) -> f64 {
     if size == 0.0 { 0.0 } else { -re / size }
 }
 
-/// Options of the mode table.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct ModesOptions {
-    /// Points along the beam in the table of mode shapes
-    #[schemars(range(min = 2, max = MOST_POINTS), extend("x-value" = "P"))]
-    pub points: usize,
-}
-
-impl Default for ModesOptions {
-    fn default() -> Self {
-        Self { points: 201 }
+options! {
+    /// Options of the mode table.
+    pub struct ModesOptions {
+        /// Points along the beam in the table of mode shapes
+        #[schemars(range(min = 2, max = MOST_POINTS), extend("x-value" = "P"))]
+        pub points: usize = 201,
     }
 }
 
@@ -122,7 +117,8 @@ pub struct ModesStudy;
 
 impl Study for ModesStudy {
     const NAME: &'static str = "modes";
-    const ABOUT: &'static str = "Mode shapes and frequencies, in free flight and in contact";
+    const ABOUT: &'static str =
+        "Compute mode shapes and frequencies, in free flight and in contact";
     type Options = ModesOptions;
     type Report = ModeTable;
 

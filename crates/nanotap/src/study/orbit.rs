@@ -11,7 +11,7 @@ use nanotap_dynamics::{
 };
 use nanotap_flow::Trajectory;
 use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 
 use crate::Error;
 use crate::case::Case;
@@ -26,6 +26,7 @@ use crate::study::Study;
 use crate::study::in_si::InSi;
 use crate::study::limits::{MOST_PERIOD, MOST_SAMPLES};
 use crate::study::proof::{ProofReport, Prover};
+use crate::study::request::options;
 use crate::study::simulate::{Named, starting_state};
 use crate::study::start_box::default_box;
 
@@ -439,44 +440,30 @@ fn log_determinant(model: &Model, trajectory: &Trajectory) -> f64 {
     flow + impacts
 }
 
-/// Options of a periodic orbit.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct OrbitOptions {
-    /// Its period in drive periods; without it, that of the motion to which a run converges
-    #[schemars(range(min = 1, max = MOST_PERIOD), extend("x-value" = "N"))]
-    pub period: Option<usize>,
-    /// State to look near, at drive phase 0: a1,…,aN,v1,…,vN (oscillator: x,v)
-    #[schemars(extend("x-value" = "A1,…"))]
-    pub state: Option<Vec<f64>>,
-    /// Harmonics of the drive frequency to report
-    #[schemars(range(min = 0, max = MOST_HARMONICS), extend("x-value" = "H"))]
-    pub harmonics: usize,
-    /// Observables to measure; without it, every one that there is, the beam's clearance included
-    #[schemars(extend("x-value" = "NAME,…"))]
-    pub observables: Option<Set>,
-    /// Samples a drive period in the time series
-    #[schemars(range(min = 1, max = MOST_SAMPLES), extend("x-value" = "S"))]
-    pub resolution: usize,
-    /// Keys of the case by which to differentiate the orbit and all that is observed of it;
-    /// what stays is what stays in a sweep
-    #[schemars(extend("x-value" = "KEY,…"))]
-    pub derivatives: Vec<String>,
-    /// Prove in interval arithmetic that it exists, is alone, and is stable or not
-    pub prove: bool,
-}
-
-impl Default for OrbitOptions {
-    fn default() -> Self {
-        Self {
-            period: None,
-            state: None,
-            harmonics: 20,
-            observables: None,
-            resolution: 200,
-            derivatives: Vec::new(),
-            prove: false,
-        }
+options! {
+    /// Options of a periodic orbit.
+    pub struct OrbitOptions {
+        /// Its period in drive periods; without it, that of the motion to which a run converges
+        #[schemars(range(min = 1, max = MOST_PERIOD), extend("x-value" = "N"))]
+        pub period: Option<usize> = None,
+        /// State to look near, at drive phase 0: a1,…,aN,v1,…,vN (oscillator: x,v)
+        #[schemars(extend("x-value" = "A1,…"))]
+        pub state: Option<Vec<f64>> = None,
+        /// Harmonics of the drive frequency to report
+        #[schemars(range(min = 0, max = MOST_HARMONICS), extend("x-value" = "H"))]
+        pub harmonics: usize = 20,
+        /// Observables to measure; without it, every one that there is, the beam's clearance included
+        #[schemars(extend("x-value" = "NAME,…"))]
+        pub observables: Option<Set> = None,
+        /// Samples a drive period in the time series
+        #[schemars(range(min = 1, max = MOST_SAMPLES), extend("x-value" = "S"))]
+        pub resolution: usize = 200,
+        /// Keys of the case by which to differentiate the orbit and all that is observed of it;
+        /// what stays is what stays in a sweep
+        #[schemars(extend("x-value" = "KEY,…"))]
+        pub derivatives: Vec<String> = Vec::new(),
+        /// Prove in interval arithmetic that it exists, is alone, and is stable or not
+        pub prove: bool = false,
     }
 }
 
@@ -486,7 +473,7 @@ pub struct OrbitStudy;
 
 impl Study for OrbitStudy {
     const NAME: &'static str = "orbit";
-    const ABOUT: &'static str = "A periodic orbit by Newton, stable or not";
+    const ABOUT: &'static str = "Compute a periodic orbit by Newton's method, stable or not";
     type Options = OrbitOptions;
     type Report = InSi<OrbitReport>;
 

@@ -20,6 +20,33 @@ use crate::Error;
 use crate::case::near_name::near_name;
 use crate::number::shortest;
 
+/// Declares the options of a study: each field with its documentation, its schema and its default.
+macro_rules! options {
+    (
+        $(#[$about:meta])*
+        pub struct $name:ident {
+            $($(#[$of_field:meta])* pub $field:ident: $type:ty = $default:expr,)*
+        }
+    ) => {
+        $(#[$about])*
+        #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+        #[derive(schemars::JsonSchema)]
+        #[serde(default, deny_unknown_fields)]
+        pub struct $name {
+            $($(#[$of_field])* pub $field: $type,)*
+        }
+
+        impl Default for $name {
+            fn default() -> Self {
+                Self {
+                    $($field: $default,)*
+                }
+            }
+        }
+    };
+}
+pub(crate) use options;
+
 /// The JSON schema of what a study answers: what recurs stands under `$defs`.
 pub fn answer_schema<T: JsonSchema>() -> Schema {
     let settings = SchemaSettings::draft2020_12().for_serialize();
@@ -287,7 +314,7 @@ pub fn read<R: JsonSchema + DeserializeOwned>(given: Value) -> Result<R, Error> 
                 Some(near) => format!("did you mean {{{near}}}?"),
                 None => format!("there are {}", known.join(", ")),
             };
-            return Err(Error::option(name, "there is no such option", remedy));
+            return Err(Error::option(name, "unknown option", remedy));
         };
         property.check(value)?;
     }
@@ -415,7 +442,7 @@ mod tests {
             ),
             (
                 json!({"cuont": 2}),
-                "cuont: there is no such option; did you mean count?",
+                "cuont: unknown option; did you mean count?",
             ),
             (
                 json!({"way": "left"}),

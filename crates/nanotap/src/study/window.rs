@@ -13,13 +13,14 @@ use std::collections::BTreeMap;
 
 use nanotap_dynamics::{Control, SameMotion};
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 
 use crate::Error;
 use crate::case::Case;
 use crate::dataset::{Store, StoreError};
 use crate::study::attractors::MOST_STARTS;
 use crate::study::limits::MOST_PERIOD;
+use crate::study::request::options;
 use crate::study::simulate::Classification;
 use crate::study::sweep::{FromNeighbour, Starts, Sweep, SweepOptions, class_of, from_neighbours};
 use crate::study::value::Axes;
@@ -150,7 +151,7 @@ impl Window {
         if schema.grid.axes.len() != 3 {
             return Err(StoreError::NotAStore {
                 path: store.path().into(),
-                what: "it is no sweep over two parameters".into(),
+                what: "not a sweep over two parameters".into(),
             });
         }
         let [rows, columns] = [0, 1].map(|axis| schema.grid.axes[axis].length);
@@ -246,33 +247,22 @@ fn condition(motions: &[Seen]) -> Condition {
     }
 }
 
-/// Options of an operating window.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct WindowOptions {
-    /// A parameter and its values, as in gap.tip=5nm:25nm:41, drive.free_amplitude=10nm:60nm:26,
-    /// omega=2:4:81, or any that ascend, omega=2,2.5,4; twice, the first is the horizontal axis
-    #[schemars(extend("x-value" = "KEY=VALUES", "x-required" = true))]
-    pub over: Axes,
-    /// Starts of the census at each point: rest, the linear responses, and draws of every size
-    #[schemars(range(min = 1, max = MOST_STARTS), extend("x-value" = "S"))]
-    pub starts: usize,
-    /// Seed of the starts
-    #[schemars(extend("x-value" = "K"))]
-    pub seed: u64,
-    /// Longest period looked for
-    #[schemars(range(min = 1, max = MOST_PERIOD), extend("x-value" = "N"))]
-    pub max_period: usize,
-}
-
-impl Default for WindowOptions {
-    fn default() -> Self {
-        Self {
-            over: Axes::default(),
-            starts: 16,
-            seed: 1,
-            max_period: 32,
-        }
+options! {
+    /// Options of an operating window.
+    pub struct WindowOptions {
+        /// A parameter and its values, as in gap.tip=5nm:25nm:41, drive.free_amplitude=10nm:60nm:26,
+        /// omega=2:4:81, or any that ascend, omega=2,2.5,4; twice, the first is the horizontal axis
+        #[schemars(extend("x-value" = "KEY=VALUES", "x-required" = true))]
+        pub over: Axes = Axes::default(),
+        /// Starts of the census at each point: rest, the linear responses, and draws of every size
+        #[schemars(range(min = 1, max = MOST_STARTS), extend("x-value" = "S"))]
+        pub starts: usize = 16,
+        /// Seed of the starts
+        #[schemars(extend("x-value" = "K"))]
+        pub seed: u64 = 1,
+        /// Longest period looked for
+        #[schemars(range(min = 1, max = MOST_PERIOD), extend("x-value" = "N"))]
+        pub max_period: usize = 32,
     }
 }
 

@@ -287,7 +287,7 @@ fn other_folders_are_left_unchanged() {
         Store::open(&folder.join("nowhere"))
             .unwrap_err()
             .to_string()
-            .contains("not there")
+            .contains("does not exist")
     );
     assert_eq!(bytes(&strange).len(), 1);
 }

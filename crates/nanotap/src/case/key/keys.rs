@@ -61,7 +61,7 @@ fn number(parameter: Parameter) -> Entry {
     }
 }
 
-/// The key of `[sample]` that states a number of one contact law alone.
+/// The key of `[sample]` for a number that belongs to one contact law.
 fn of_law(parameter: Parameter) -> Option<Entry> {
     let entry = parameter.entry();
     let Some(SampleKey::Own { meaning, zero }) = entry.stated_by else {
@@ -128,7 +128,7 @@ const fn quantity(
     }
 }
 
-/// Something of a physical case that is no quantity.
+/// An entry of a physical case that is not a quantity.
 const fn other(section: Section, name: &'static str, takes: Takes, meaning: &'static str) -> Entry {
     Entry {
         section,
@@ -229,7 +229,7 @@ impl Key {
     pub const Omega: Self = Self::of(Parameter::Omega);
 }
 
-/// Where the keys after those of contact laws begin.
+/// Index of the first key after those of contact laws.
 const AFTER_LAWS: usize = Parameter::COUNT + Before::ENTRIES.len() + OWN_KEYS;
 
 pub(super) static TABLE: LazyLock<Vec<Entry>> = LazyLock::new(|| {
@@ -253,7 +253,7 @@ Before from Parameter::COUNT => {
     Damping = oscillator(Of::Damping, "c", OSCILLATORS, "damper").such_as(0.0);
     Forcing = oscillator(Of::Forcing, "F", OSCILLATORS, "amplitude of the force F cos ωt");
     OscillatorOmega = oscillator(Of::Omega, "ω", OSCILLATORS, "frequency of the force").such_as(2.5);
-    OscillatorGap = oscillator(Of::Gap, "gap", OSCILLATORS, "where the stop stands; contact at x ≥ gap")
+    OscillatorGap = oscillator(Of::Gap, "gap", OSCILLATORS, "position of the stop; contact at x ≥ gap")
         .such_as(0.0);
     StopStiffness = oscillator(Of::ContactStiffness, "k₁", SOFT, "spring of the stop").such_as(20.0);
     StopDamping = oscillator(Of::ContactDamping, "c₁", SOFT, "damper of the stop").such_as(0.2);
@@ -406,7 +406,7 @@ After from AFTER_LAWS => {
 }
 }
 
-/// Quantities that say the same in different ways.
+/// Alternative quantities.
 pub(super) static ALTERNATIVES: &[Alternatives] = &[
     Alternatives {
         ways: &[&[Key::LeverQ], &[Key::FluidDensity, Key::FluidViscosity]],

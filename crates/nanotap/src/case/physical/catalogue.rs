@@ -1,5 +1,5 @@
-//! Real levers and materials by name, from `catalogue.toml` beside this file and from files
-//! of the user's own in the same format:
+//! Levers and materials by name, from `catalogue.toml` in this folder and from users' files in the
+//! same format:
 //!
 //! ```toml
 //! [lever."my lever"]
@@ -28,12 +28,13 @@ use crate::case::key::Key;
 use crate::case::near_name::near_names;
 use crate::case::quantity::Kind;
 
-/// A lever as its box describes it. No quality factor: that depends on what surrounds it.
+/// A lever as in its data sheet. The quality factor is not included, because it depends on the
+/// medium.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Lever {
     /// Its name.
     pub name: String,
-    /// Other names it answers to.
+    /// Alternative names.
     pub aliases: Vec<String>,
     /// Spring constant in N/m.
     pub k: f64,
@@ -46,7 +47,7 @@ pub struct Lever {
     pub tip_radius: Option<f64>,
     /// Height of the tip in m.
     pub tip_height: Option<f64>,
-    /// Where the numbers come from.
+    /// Source of the numbers.
     pub source: String,
 }
 
@@ -55,14 +56,14 @@ pub struct Lever {
 pub struct Material {
     /// Its name.
     pub name: String,
-    /// Other names it answers to.
+    /// Alternative names.
     pub aliases: Vec<String>,
     /// Young's modulus and Poisson's ratio.
     #[serde(flatten)]
     pub elastic: Elastic,
-    /// Density in kg/m³, where a tip may be made of it.
+    /// Density in kg/m³, if tips are made of it.
     pub density: Option<f64>,
-    /// Where the numbers come from.
+    /// Source of the numbers.
     pub source: String,
 }
 
@@ -70,7 +71,7 @@ pub struct Material {
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("catalogue {origin}: {reason}")]
 pub struct CatalogueError {
-    /// The file, with entry and key where the fault is in one.
+    /// The file, with the entry and key at fault, if any.
     pub origin: String,
     /// What is wrong.
     pub reason: String,
@@ -129,7 +130,7 @@ pub struct Catalogue {
 }
 
 impl Catalogue {
-    /// The levers and materials that come with the program.
+    /// The built-in levers and materials.
     ///
     /// # Errors
     /// None as shipped (a test reads them all); [`CatalogueError`] if the file in the source
@@ -140,7 +141,7 @@ impl Catalogue {
         Ok(catalogue)
     }
 
-    /// The same, read once.
+    /// The built-in catalogue, parsed once.
     pub fn shared() -> Arc<Self> {
         static BUILTIN: LazyLock<Arc<Catalogue>> =
             LazyLock::new(|| Arc::new(Catalogue::builtin().unwrap_or_default()));
@@ -190,7 +191,7 @@ impl Catalogue {
         self.materials.values()
     }
 
-    /// The lever that answers to `name`; `key` is what asked for it.
+    /// The lever called `name`; `key` is named in errors.
     ///
     /// # Errors
     /// [`PhysicalError::UnknownName`] with the nearest name.
@@ -201,7 +202,7 @@ impl Catalogue {
         })
     }
 
-    /// The material that answers to `name`; `key` is what asked for it.
+    /// The material called `name`; `key` is named in errors.
     ///
     /// # Errors
     /// [`PhysicalError::UnknownName`] with the nearest name.
@@ -215,7 +216,7 @@ impl Catalogue {
     }
 }
 
-/// The entry that answers to a name.
+/// The entry with a name or alias.
 fn find<'a, T>(
     entries: &'a BTreeMap<String, T>,
     name: &str,
@@ -253,7 +254,7 @@ fn unknown<'a>(
     }
 }
 
-/// A name as it is compared: lower case, letters and digits only.
+/// The form of a name for comparison: lower case, letters and digits only.
 fn folded(name: &str) -> String {
     name.chars()
         .filter(|c| !matches!(c, ' ' | '-' | '_'))

@@ -64,7 +64,7 @@ impl SecondTone {
 }
 
 impl Drive {
-    /// What `[drive]` says.
+    /// Reads `[drive]`.
     pub(crate) fn read(reader: Reader<'_>) -> Result<Self, PhysicalError> {
         let keys = [Key::DriveFrequency, Key::DriveFrequencyRatio];
         let frequency = reader.first(&keys)?.ok_or_else(|| {
@@ -99,15 +99,15 @@ impl Drive {
     }
 }
 
-/// How the strength of a tone is stated: as the base's motion, as a force on the lever, as a
-/// free amplitude of the tip.
+/// Keys for the strength of a tone: motion of the base, force on the lever, free amplitude of the
+/// tip.
 pub(crate) const FIRST: [Key; 3] = [
     Key::DriveAmplitude,
     Key::DriveForce,
     Key::DriveFreeAmplitude,
 ];
 
-/// The same of a second tone.
+/// Keys for the strength of the second tone.
 pub(crate) const SECOND: [Key; 3] = [
     Key::SecondAmplitude,
     Key::SecondForce,

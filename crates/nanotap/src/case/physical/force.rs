@@ -1,4 +1,4 @@
-//! A nonlinear force law of the sample, from the quantities that a case states.
+//! The nonlinear force law of a sample, from stated quantities.
 
 use std::f64::consts::PI;
 use std::sync::Arc;
@@ -27,7 +27,7 @@ const VACUUM: f64 = 8.854_187_812_8e-12;
 pub struct SampleForce {
     /// The laws.
     pub terms: Vec<&'static TableLaw>,
-    /// Their parameters, one term after the other.
+    /// Their parameters, term by term.
     pub values: Vec<f64>,
     /// The rows of a table, in m and N.
     pub table: Option<ForceTable>,
@@ -39,17 +39,17 @@ impl PartialEq for SampleForce {
     }
 }
 
-/// The keys that only nonlinear laws take, or some laws.
+/// The keys that belong to nonlinear laws only, or to some laws.
 fn keys_of(laws: Laws) -> impl Iterator<Item = Key> {
     Key::all().filter(move |key| key.entry().laws == laws)
 }
 
-/// The keys that some contact law takes and another does not.
+/// The keys that belong to some contact laws only.
 pub(crate) fn keys_of_contacts() -> impl Iterator<Item = Key> {
     keys_of(Laws::Nonlinear).chain(keys_of(Laws::Some))
 }
 
-/// Whether nonlinear laws take a key of [`keys_of_contacts`].
+/// True if these nonlinear laws have a key of [`keys_of_contacts`].
 pub(crate) fn takes(terms: &[&'static TableLaw], key: Key) -> bool {
     let mut parameters = terms.iter().flat_map(|term| term.entry.parameters);
     parameters.clone().any(|p| key_of(p) == key)
@@ -58,7 +58,7 @@ pub(crate) fn takes(terms: &[&'static TableLaw], key: Key) -> bool {
         || ADHESION.contains(&key) && adhesion_of(terms).is_some()
 }
 
-/// Whether a linear contact takes a key of [`keys_of_contacts`].
+/// True if a linear contact has a key of [`keys_of_contacts`].
 pub(crate) fn linear_takes(law: ContactLaw, key: Key) -> bool {
     if let Some(number) = key.law_number() {
         return number.entry().applies == Applies::Law(law);
@@ -69,7 +69,7 @@ pub(crate) fn linear_takes(law: ContactLaw, key: Key) -> bool {
     }
 }
 
-/// The nonlinear laws that take a key, in brackets; empty where there are none.
+/// The nonlinear laws with a key, in brackets; empty if there are none.
 fn laws_with(key: Key) -> String {
     let with = |law: &&'static TableLaw| takes(std::slice::from_ref(law), key);
     let names: Vec<&str> = laws::all().filter(with).map(|law| law.entry.name).collect();
@@ -94,7 +94,7 @@ fn unit(key: Key) -> f64 {
 }
 
 impl SampleForce {
-    /// What `[sample]` says, if its law is nonlinear.
+    /// Reads `[sample]` if its law is nonlinear.
     pub(crate) fn read(reader: Reader<'_>, tip: &Tip) -> Result<Option<Self>, PhysicalError> {
         let Some(name) = reader.name(Key::SampleLaw) else {
             let law = crate::case::file::word(reader.stated, Key::SampleLaw).unwrap_or_default();
@@ -128,7 +128,7 @@ impl SampleForce {
                 }
             }
             let reason = format!(
-                "it is no part of sample.law = \"{name}\", which takes {}{}",
+                "it is not a parameter of sample.law = \"{name}\", which takes {}{}",
                 keys.join(", "),
                 laws_with(key)
             );
@@ -161,7 +161,7 @@ impl SampleForce {
         Ok(Some(force))
     }
 
-    /// The value of a parameter: stated, following from another, or the law's default.
+    /// The value of a parameter: stated, derived, or the default of the law.
     fn value(
         &self,
         reader: Reader<'_>,
@@ -202,7 +202,7 @@ impl SampleForce {
         })
     }
 
-    /// Hamaker constant or work of adhesion from whichever of the three was stated.
+    /// Hamaker constant or work of adhesion, from the stated one of three quantities.
     fn adhesion(
         &self,
         reader: Reader<'_>,
@@ -234,8 +234,7 @@ impl SampleForce {
         }))
     }
 
-    /// The same contact under other laws, as far as what is known of it says their parameters:
-    /// these laws first.
+    /// The same contact under other laws whose parameters are known; the present laws come first.
     pub fn others(&self) -> Vec<Self> {
         let known = |key: Key| self.get(key).map(|value| value * unit(key));
         let distance = known(Key::SampleIntermolecularDistance).unwrap_or(DISTANCE);
@@ -310,7 +309,7 @@ impl SampleForce {
         })
     }
 
-    /// What had to be assumed of the law, and what puts it in doubt.
+    /// Assumptions and warnings about the law.
     pub(crate) fn remarks(&self, reader: Reader<'_>, tip: &Tip) -> Vec<Remark> {
         let mut remarks = Vec::new();
         let has = |name: &str| self.parameters().any(|(p, _, _)| p.name == name);
@@ -371,7 +370,7 @@ impl SampleForce {
     }
 }
 
-/// The ways to say how strongly tip and sample attract.
+/// Alternatives for the strength of the adhesion.
 const ADHESION: [Key; 3] = [
     Key::SampleHamaker,
     Key::SampleWorkOfAdhesion,

@@ -1,4 +1,4 @@
-//! What the tip does far from the sample, in closed form.
+//! Response of the tip far from the sample, in closed form.
 
 use nalgebra::Complex;
 

@@ -13,7 +13,7 @@ use crate::model::cantilever::Cantilever;
 use crate::model::drive_form::Actuation;
 use crate::model::parameter::{Numbers, Parameter, Unit};
 
-/// The SI value of the model's unit of each kind.
+/// SI values of the model's units.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Scales {
     /// Deflections and gaps: g₀ in m.
@@ -107,11 +107,11 @@ pub struct MappingRow {
     pub parameter: Parameter,
     /// Its value.
     pub value: f64,
-    /// What it is made of, e.g. "K1 L^3/(EI) = 3 K1/k".
+    /// Formula, such as "K1 L^3/(EI) = 3 K1/k".
     pub formula: &'static str,
     /// The physical quantity's name.
     pub quantity: &'static str,
-    /// What it measures.
+    /// Kind of quantity.
     pub kind: Kind,
     /// Its value in SI (a frequency in Hz).
     pub si: f64,

@@ -1,4 +1,4 @@
-//! What had to be assumed in mapping a case, and what puts it in doubt.
+//! Assumptions and warnings about the mapping of a case.
 
 use super::reader::Reader;
 use super::remark::Remark;
@@ -30,7 +30,7 @@ impl Physical {
             && let Ok(beam) = exact_beam::frequencies(self.cantilever.alpha1, 0.0, 2)
         {
             remarks.push(Remark::note(format!(
-                "f2 stands beside the tip's mass: the second mode has this frequency, {} of the \
+                "f2 and the tip mass are both given: the second mode has the frequency f2, {} of the \
                  uniform beam's",
                 Kind::Number.format_digits(f2 * beam[0] / (self.lever.f0 * beam[1]), 4)
             )));

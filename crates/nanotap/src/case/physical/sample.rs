@@ -52,17 +52,17 @@ impl Hertz {
     }
 }
 
-/// Part of Hertz's stiffness by which it may differ where the tip in fact gets to.
+/// Largest relative deviation of Hertz's stiffness at the actual indentation.
 const STIFFNESS_IN_DOUBT: f64 = 0.25;
 
-/// A stiffness that was taken at another indentation than the motion's.
+/// A stiffness linearised at an indentation that differs from that of the motion.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
 pub struct HertzMismatch {
-    /// Indentation at which the stiffness was taken, m.
+    /// Indentation of the linearisation, m.
     pub assumed_indentation: f64,
-    /// That stiffness, N/m.
+    /// Stiffness at that indentation, N/m.
     pub assumed_stiffness: f64,
-    /// Stiffness at the greatest depth of the motion, N/m.
+    /// Stiffness at the largest indentation of the motion, N/m.
     pub stiffness: f64,
 }
 
@@ -85,7 +85,7 @@ impl Hertz {
     }
 }
 
-/// How much a sample dissipates.
+/// Damping of a sample.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum SampleDamping {
     /// Damper C₁ in N s/m.
@@ -94,27 +94,27 @@ pub enum SampleDamping {
     LossTangent(f64),
 }
 
-/// The sample as the case file has it, with the tip that touches it.
+/// The sample of a case file, with the tip.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Sample {
     /// Contact stiffness K₁ in N/m.
     pub stiffness: f64,
-    /// The contact it comes from, if it is Hertz's.
+    /// The Hertz contact from which it follows, if any.
     pub hertz: Option<Hertz>,
-    /// Its damping; none given counts as zero.
+    /// Damping; zero if not stated.
     pub damping: Option<SampleDamping>,
-    /// How it answers the tip.
+    /// Contact law.
     pub law: ContactLaw,
-    /// The numbers that only its law has, in SI.
+    /// Further parameters of the law, in SI.
     pub numbers: Vec<f64>,
-    /// Its elastic constants, where they are known.
+    /// Elastic constants, if known.
     pub elastic: Option<Elastic>,
-    /// A nonlinear force law in place of all these.
+    /// A nonlinear force law in place of the above.
     pub force: Option<SampleForce>,
 }
 
 impl Sample {
-    /// What `[sample]` says.
+    /// Reads `[sample]`.
     pub(crate) fn read(reader: Reader<'_>, tip: &Tip) -> Result<Self, PhysicalError> {
         if let Some(force) = SampleForce::read(reader, tip)? {
             return Ok(Self {
@@ -151,7 +151,7 @@ impl Sample {
         })
     }
 
-    /// What had to be assumed of the sample, and what puts it in doubt.
+    /// Assumptions and warnings about the sample.
     pub(crate) fn remarks(&self, reader: Reader<'_>, tip: &Tip) -> Vec<Remark> {
         if let Some(force) = &self.force {
             return force.remarks(reader, tip);
@@ -203,7 +203,7 @@ impl Sample {
     }
 }
 
-/// The numbers that only `law` has, in SI; those of other laws must not be stated.
+/// The further parameters of `law`, in SI; those of other laws must not be stated.
 fn read_numbers(reader: Reader<'_>, law: ContactLaw) -> Result<Vec<f64>, PhysicalError> {
     let refuse = |keys: &[Key], reason: &str| {
         let given = keys.iter().find(|key| reader.has(**key));

@@ -1070,7 +1070,7 @@ fn a_force_on_the_lever_gives_its_free_amplitude() {
     }
 }
 
-/// Both tones have the free amplitudes that were asked for, by the closed form of each.
+/// Both tones have the requested free amplitudes, by the closed form of each.
 #[test]
 fn a_second_tone_has_its_own_free_amplitude() {
     let resolved = resolve(&changed(&[
@@ -1131,7 +1131,10 @@ fn samples_have_their_laws() {
 #[test]
 fn laws_and_drives_are_refused_with_what_would_be_right() {
     let cases: [(&[Entry], &str); 12] = [
-        (&[("sample", "law", "hertz")], "it is no part of sample.law"),
+        (
+            &[("sample", "law", "hertz")],
+            "it is not a parameter of sample.law",
+        ),
         (
             &[("sample", "thickness", "50 nm")],
             "it belongs to a nonlinear force law (laws with it: thin-sphere, thin-cone, \
@@ -1184,7 +1187,7 @@ fn laws_and_drives_are_refused_with_what_would_be_right() {
 }
 
 /// A silicon lever of 200 µm × 30 µm × 2 µm in water: ω = ω_vac (1 + πρb/(4ρ_c h) Γ_r)^(−1/2) and
-/// Q = (4ρ_c h/(πρb) + Γ_r)/Γ_i, Sader's Eqs. (30) and (31), solved beside with SciPy's Bessel
+/// Q = (4ρ_c h/(πρb) + Γ_r)/Γ_i, Sader's Eqs. (30) and (31), solved separately with SciPy's Bessel
 /// functions; with damping the resonance curve peaks a little off.
 #[test]
 fn a_fluid_slows_and_damps_a_lever() {

@@ -1,4 +1,4 @@
-//! A case as an experimenter states it, mapped to the model: the view in SI.
+//! A physical case mapped to the model: the view in SI.
 
 use nanotap_arithmetic::ComplexFunctions as _;
 use std::f64::consts::TAU;
@@ -22,7 +22,7 @@ use crate::model::drive_form::Actuation;
 use crate::model::exact_beam;
 use crate::model::parameter::{Numbers, Parameter, Unit};
 
-/// Height of the tip where nothing tells it; tips of silicon levers are 10 to 15 µm high.
+/// Default height of the tip; tips of silicon levers are 10 to 15 µm high.
 pub(super) const USUAL_TIP_HEIGHT: f64 = 10e-6;
 
 /// A physical case with its dimensionless parameters and the units between the two.
@@ -36,7 +36,7 @@ pub struct Physical {
     pub lever: Lever,
     /// The sample.
     pub sample: Sample,
-    /// The physical quantities behind the dimensionless numbers, in SI.
+    /// The physical quantities of the dimensionless numbers, in SI.
     pub parameters: Numbers,
     /// Free amplitude A₀ of the tip's deflection at the drive frequency, in m.
     pub free_amplitude: f64,
@@ -49,15 +49,15 @@ pub struct Physical {
     pub setpoint: Option<f64>,
     /// Height of the tip, g₀ − g₁, in m.
     pub tip_height: f64,
-    /// What was known of the lever.
+    /// Data of the lever.
     pub(super) data: LeverData,
     /// The tip.
     pub(super) tip: Tip,
 }
 
 impl Physical {
-    /// What the stated quantities come to. Where neither lever nor tip nor modes changed, the
-    /// `lever` that they gave before is taken.
+    /// Maps the stated quantities. If lever, tip and modes are unchanged, the previous `lever` is
+    /// used.
     ///
     /// # Errors
     /// [`PhysicalError`] if the quantities contradict each other or describe something
@@ -66,7 +66,7 @@ impl Physical {
         mapped(reader, lever).map_err(|error| named(reader, error))
     }
 
-    /// The same with dimensionless numbers put in place of those that were mapped.
+    /// The same view with some dimensionless numbers replaced.
     pub(crate) fn with_numbers(
         mut self,
         numbers: &[(Parameter, f64)],
@@ -93,7 +93,7 @@ impl Physical {
         mapping_table(&self.cantilever, &self.scales)
     }
 
-    /// What phases are counted from.
+    /// Reference of phases.
     pub const fn phase_reference(&self) -> &'static str {
         match self.cantilever.actuation {
             Actuation::Base => "displacement of the clamped end",
@@ -102,12 +102,12 @@ impl Physical {
         }
     }
 
-    /// Whether a fluid tells mass and damping.
+    /// True if a fluid determines mass and damping.
     pub const fn is_in_fluid(&self) -> bool {
         self.data.fluid.is_some()
     }
 
-    /// The key of the drive's own strength: of the base's motion, or of the force.
+    /// Key of the drive strength: the motion of the base, or the force.
     pub(crate) fn strength_key(&self, keys: [Key; 3]) -> Key {
         match self.cantilever.actuation {
             Actuation::Base => keys[0],
@@ -115,8 +115,7 @@ impl Physical {
         }
     }
 
-    /// The value of a quantity in SI, stated or following from what is; `None` where nothing
-    /// tells it.
+    /// The value of a quantity in SI, stated or derived; `None` if it is unknown.
     pub(crate) fn value(&self, key: Key) -> Option<f64> {
         let second = self.cantilever.tone2_ratio;
         let quantity = |parameter| self.parameters.get(parameter);
@@ -180,8 +179,8 @@ impl Physical {
     /// What stays while a quantity varies, said as numbers of their own. An experimenter who
     /// turns one knob leaves the others: the drive keeps its own amplitude (a piezo its
     /// voltage, not the lever's answer to it), the second tone its place among the harmonics
-    /// of the first, the sample its place, and the unit of length g₀ stays so that all values
-    /// are told in one.
+    /// of the first, the sample its place, and the unit of length g₀ stays so that all values have
+    /// the same unit.
     pub(crate) fn held(&self, stated: &Stated) -> Stated {
         let mut held = stated.clone();
         held.set(Key::GapBeam, self.scales.length);
@@ -209,7 +208,7 @@ impl Physical {
     }
 }
 
-/// Names the stated key behind a parameter that the model does not take.
+/// Names the stated key that causes an invalid parameter.
 fn named(reader: Reader<'_>, error: PhysicalError) -> PhysicalError {
     let PhysicalError::Model { key: None, error } = error else {
         return error;
@@ -287,7 +286,7 @@ fn mapped(reader: Reader<'_>, known: Option<Lever>) -> Result<Physical, Physical
     let setpoint = setpoint_ratio(reader, &drive, free_amplitude)?;
     let tip_gap = match (reader.number(Key::GapTip)?, setpoint) {
         (Some(gap), _) => gap,
-        // Until the setpoint is solved for.
+        // Before the setpoint is solved for.
         (None, Some(ratio)) => ratio * free_amplitude,
         (None, None) => {
             return Err(PhysicalError::missing(
@@ -346,8 +345,8 @@ fn mapped(reader: Reader<'_>, known: Option<Lever>) -> Result<Physical, Physical
     })
 }
 
-/// Measured numbers of the second and third mode, in SI; 0 where there are none. A second resonance without a tip's mass
-/// tells that mass, and is the beam's own with it.
+/// Measured data of the second and third mode, in SI; 0 if there are none. Without a stated tip
+/// mass the second resonance determines it.
 fn measured_modes(reader: Reader<'_>, tip: &Tip, lever: &Lever) -> Result<Numbers, PhysicalError> {
     let number = |key| reader.number(key).map(Option::unwrap_or_default);
     let beam = exact_beam::frequencies(lever.tip_mass_ratio, 0.0, 3)?;
@@ -376,7 +375,7 @@ fn measured_modes(reader: Reader<'_>, tip: &Tip, lever: &Lever) -> Result<Number
         .with(Parameter::Mode3Stiffness, number(Key::LeverK3)?))
 }
 
-/// The lever alone, driven with unit amplitude.
+/// The lever without sample, driven with unit amplitude.
 fn free_case(lever: &Lever, frequency: f64, like: &Cantilever) -> Cantilever {
     Cantilever {
         modes: like.modes,
@@ -414,8 +413,8 @@ fn setpoint_ratio(
     }
 }
 
-/// Amplitude of the drive and of the free tip, one from the other by the `gain` from the
-/// first to the second, both in SI.
+/// Amplitudes of the drive and of the free tip in SI, one from the other by the `gain` between
+/// them.
 fn applied((stated, value): Given, gain: f64, free: Key) -> Result<(f64, f64), PhysicalError> {
     if stated != free {
         return Ok((value, value * gain));

@@ -1,4 +1,5 @@
-//! Numbers with units as people type them: `"2.8 N/m"`, `"75 kHz"`, `"30 µm"`, `"1e-3 N s/m"`.
+//! Parsing and formatting of quantities with units: `"2.8 N/m"`, `"75 kHz"`, `"30 µm"`, `"1e-3 N
+//! s/m"`.
 //!
 //! A value is read into SI under a dimension check and written back with an engineering
 //! prefix. Decimal prefixes are folded into the number's own exponent before it is converted
@@ -28,8 +29,8 @@ pub const JOULES_PER_ELECTRONVOLT: f64 = 1.602_176_634e-19;
 
 /// Exponents of the base units kilogram, metre, second, radian and coulomb.
 ///
-/// The radian counts as a unit of its own here, so that an angular frequency in rad/s cannot
-/// be taken for a frequency in Hz, a factor 2π apart.
+/// The radian counts as a base unit here, so that an angular frequency in rad/s cannot be confused
+/// with a frequency in Hz, a factor of 2π.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Dimension {
     /// Exponent of the kilogram.
@@ -181,7 +182,7 @@ kinds! {
 }
 
 impl Kind {
-    /// SI unit in which [`Kind::parse`] answers.
+    /// SI unit of the result of [`Kind::parse`].
     pub const fn si_unit(self) -> &'static str {
         match self {
             Self::Number => "1",

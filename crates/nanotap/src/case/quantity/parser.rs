@@ -102,7 +102,7 @@ enum Token {
 }
 
 /// Reads `N s/m`, `N·s·m^-1`, `kg/(m s^2)`, `kg m⁻³`: factors joined by a space, `·` or `*`,
-/// a slash, powers. A product after a slash must stand in parentheses.
+/// a slash, powers. A product after a slash must be in parentheses.
 struct UnitParser<'a> {
     tokens: Vec<Token>,
     at: usize,
@@ -268,7 +268,7 @@ impl<'a> UnitParser<'a> {
                 inner
             }
             Some(Token::Integer(_)) => {
-                return Err(self.malformed("a second number stands where a unit was expected"));
+                return Err(self.malformed("a second number where a unit was expected"));
             }
             _ => return Err(self.malformed("a unit is missing")),
         };

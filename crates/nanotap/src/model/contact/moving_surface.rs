@@ -49,7 +49,7 @@ pub(super) static ENTRY: Entry = Entry {
             .of(Unit::Force, "adhesion force F", "F L^3/(EI g0) = 3 F/(k g0)")
             .stated_by(SampleKey::Shared),
     ],
-    needs: "a moving surface has a spring and a damper of its own, as in \
+    needs: "a moving surface needs its own spring and damper, as in \
             surface_stiffness = \"2 N/m\" and surface_damping = \"1e-6 N s/m\"",
     attracts: true,
     objection,

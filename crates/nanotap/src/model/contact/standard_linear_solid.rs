@@ -22,7 +22,7 @@ use crate::model::parameter::{ParameterEntry, SampleKey, Unit};
 /// Its entry.
 pub(super) static ENTRY: Entry = Entry {
     name: "standard-linear-solid",
-    meaning: "spring beside a relaxing arm, as a surface that recovers",
+    meaning: "spring in parallel with a relaxing arm, as a surface that recovers",
     formula: "−K1 h + Fm, Fm + τm dFm/dt = −km τm dh/dt, while this pushes, then none",
     damper: Damper::InArm {
         not_alpha6: "must be 0 with contact = \"standard-linear-solid\", whose damper is its \

@@ -36,6 +36,7 @@ use crate::study::frequency_modulation::{
     FrequencyModulationOptions, Modulated, ModulatedInSi, ModulationReport, frequency_modulation,
 };
 use crate::study::limits::{MOST_DISTANCES, MOST_DOUBLINGS, MOST_PERIOD};
+use crate::study::request::options;
 use crate::study::simulate::Classification;
 use crate::study::value::{Amount, value};
 use crate::study::{FreeMotion, Study};
@@ -114,11 +115,10 @@ impl ApproachPoint {
         case: &Case,
         (way, gap): (Way, f64),
         classification: Classification,
-        observables: Option<Observables>,
+        observables: Option<&Observables>,
         orbit: Option<PeriodicOrbit>,
     ) -> Self {
         let view = case.physical();
-        let seen = observables.as_ref();
         Self {
             way,
             gap,
@@ -126,10 +126,10 @@ impl ApproachPoint {
             classification,
             period: orbit.as_ref().map(|orbit| orbit.period),
             spectral_radius: orbit.as_ref().map(PeriodicOrbit::spectral_radius),
-            physical: seen
+            physical: observables
                 .zip(view)
                 .map(|(seen, view)| PhysicalMotion::of(seen, view)),
-            observables,
+            observables: observables.copied(),
             reason: None,
             modulation: None,
             modulation_si: None,
@@ -324,7 +324,7 @@ impl Distances {
             ));
         }
         let last = (self.points - 1) as f64;
-        // Amplitudes at a kept least distance stand in equal ratios.
+        // Amplitudes at a fixed least distance are in equal ratios.
         let between = |share: f64| match closest {
             Some(closest) if share > 0.0 && share < 1.0 => {
                 let ratio = (to - closest) / (from - closest);
@@ -379,7 +379,7 @@ impl Curve<'_> {
                 self.case,
                 (way, gap),
                 classification,
-                observables,
+                observables.as_ref(),
                 met.orbit,
             )
         }
@@ -478,65 +478,47 @@ fn difference(a: &ApproachPoint, b: &ApproachPoint, free_amplitude: f64) -> Opti
     differ.then_some(amplitudes)
 }
 
-/// Options of an approach curve.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct ApproachOptions {
-    /// Distance at which to begin, in units of the case ("30 nm") or as alpha5; without it, 1.25
-    /// times what the free tip swings towards the sample
-    #[schemars(extend("x-value" = "DISTANCE"))]
-    pub from: Option<Amount>,
-    /// Distance at which to turn back; without it, 0
-    #[schemars(extend("x-value" = "DISTANCE"))]
-    pub to: Option<Amount>,
-    /// Distances each way
-    #[schemars(range(min = 2, max = MOST_DISTANCES), extend("x-value" = "P"))]
-    pub points: usize,
-    /// Also continue the branches that coexist, stable and unstable
-    #[schemars(extend("x-no" = "Only follow the motion: continue no branches"))]
-    pub branches: bool,
-    /// Doublings of branches to follow, as far as their orbits are stable
-    #[schemars(range(min = 0, max = MOST_DOUBLINGS), extend("x-value" = "DEPTH"))]
-    pub switch: usize,
-    /// Longest period looked for
-    #[schemars(range(min = 1, max = MOST_PERIOD), extend("x-value" = "N"))]
-    pub max_period: usize,
-    /// Speed of the approach and of the retraction, in units of the case ("500 nm/s") or as alpha5
-    /// a unit of time: the distance changes each drive period and the lever does not settle;
-    /// without it, both are so slow that it always does
-    #[schemars(extend("x-value" = "SPEED"))]
-    pub speed: Option<Amount>,
-    /// Frequency modulation: hold amplitude (the case's free amplitude) and phase by frequency and
-    /// strength of the drive, and tell the frequency shift
-    pub fm: bool,
-    /// Phase behind the drive that frequency modulation holds, in degrees
-    #[schemars(range(min = 0, max = 180), extend("x-value" = "DEGREES"))]
-    pub phase: f64,
-    /// Frequency shift of frequency modulation whose distances are to be found, in units of the
-    /// case ("-50 Hz") or as omega
-    #[schemars(extend("x-value" = "SHIFT"))]
-    pub shift: Option<Amount>,
-    /// Least distance of the oscillation that frequency modulation keeps, in units of the case
-    /// ("1 nm") or as alpha5: the amplitude then changes with the distance
-    #[schemars(extend("x-value" = "DISTANCE"))]
-    pub closest: Option<Amount>,
-}
-
-impl Default for ApproachOptions {
-    fn default() -> Self {
-        Self {
-            from: None,
-            to: None,
-            points: 80,
-            branches: true,
-            switch: 1,
-            max_period: 32,
-            speed: None,
-            fm: false,
-            phase: 90.0,
-            shift: None,
-            closest: None,
-        }
+options! {
+    /// Options of an approach curve.
+    pub struct ApproachOptions {
+        /// Distance at which to begin, in units of the case ("30 nm") or as alpha5; without it, 1.25
+        /// times what the free tip swings towards the sample
+        #[schemars(extend("x-value" = "DISTANCE"))]
+        pub from: Option<Amount> = None,
+        /// Distance at which to turn back; without it, 0
+        #[schemars(extend("x-value" = "DISTANCE"))]
+        pub to: Option<Amount> = None,
+        /// Distances each way
+        #[schemars(range(min = 2, max = MOST_DISTANCES), extend("x-value" = "P"))]
+        pub points: usize = 80,
+        /// Also continue the branches that coexist, stable and unstable
+        #[schemars(extend("x-no" = "Only follow the motion: continue no branches"))]
+        pub branches: bool = true,
+        /// Doublings of branches to follow, as far as their orbits are stable
+        #[schemars(range(min = 0, max = MOST_DOUBLINGS), extend("x-value" = "DEPTH"))]
+        pub switch: usize = 1,
+        /// Longest period looked for
+        #[schemars(range(min = 1, max = MOST_PERIOD), extend("x-value" = "N"))]
+        pub max_period: usize = 32,
+        /// Speed of the approach and of the retraction, in units of the case ("500 nm/s") or as alpha5
+        /// a unit of time: the distance changes each drive period and the lever does not settle;
+        /// without it, both are so slow that it always does
+        #[schemars(extend("x-value" = "SPEED"))]
+        pub speed: Option<Amount> = None,
+        /// Frequency modulation: hold amplitude (the case's free amplitude) and phase by frequency and
+        /// strength of the drive, and tell the frequency shift
+        pub fm: bool = false,
+        /// Phase behind the drive that frequency modulation holds, in degrees
+        #[schemars(range(min = 0, max = 180), extend("x-value" = "DEGREES"))]
+        pub phase: f64 = 90.0,
+        /// Frequency shift of frequency modulation whose distances are to be found, in units of the
+        /// case ("-50 Hz") or as omega
+        #[schemars(extend("x-value" = "SHIFT"))]
+        pub shift: Option<Amount> = None,
+        /// Least distance of the oscillation that frequency modulation keeps, in units of the case
+        /// ("1 nm") or as alpha5: the amplitude then changes with the distance
+        #[schemars(extend("x-value" = "DISTANCE"))]
+        pub closest: Option<Amount> = None,
     }
 }
 

@@ -99,7 +99,7 @@ fn row(
         curve.case,
         (way, gap),
         MOVING,
-        Some(seen),
+        Some(&seen),
         None,
     ))
 }

@@ -34,8 +34,6 @@ mod solve;
 mod statistics;
 
 use nanotap_dynamics::Control;
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
 
 pub use crate::case::table::{Entry, MOST_ROWS, Table};
 pub use data::{Column, Curve, Data, Row, SweptKey};
@@ -54,6 +52,7 @@ use solve::LeastSquares as _;
 use crate::Error;
 use crate::case::Case;
 use crate::study::Study;
+use crate::study::request::options;
 use crate::study::setpoint::at_setpoint;
 use crate::study::value::Intervals;
 
@@ -62,65 +61,46 @@ const MAX_STARTS: usize = 1000;
 /// Longest period of the orbits in drive periods.
 const MAX_PERIOD: usize = 64;
 
-/// Options of a fit.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct FitOptions {
-    /// Measured curves: tables whose columns are named as in `distance (nm)`, `amplitude (nm)`,
-    /// `phase (deg)`
-    #[schemars(extend("x-own" = true))]
-    pub data: Vec<Table>,
-    /// Parameters to find: keys of the case, gap.offset, and NAME.offset or NAME.scale of a column
-    #[schemars(extend("x-value" = "KEY,…"))]
-    pub free: Vec<String>,
-    /// Parameters to find with one value per curve
-    #[schemars(extend("x-value" = "KEY,…"))]
-    pub per_curve: Vec<String>,
-    /// Bounds of parameters, as in sample.stiffness="1 N/m:100 N/m"
-    #[schemars(extend("x-value" = "KEY=LOW:HIGH"))]
-    pub bounds: Intervals,
-    /// Columns of the data to use; default: all
-    #[schemars(extend("x-value" = "NAME,…"))]
-    pub columns: Vec<String>,
-    /// Contact laws to compare, as in hertz,dmt; default: the law of the case
-    #[schemars(extend("x-value" = "LAW,…"))]
-    pub laws: Vec<String>,
-    /// Initial values to try until the data are described
-    #[schemars(range(min = 1, max = MAX_STARTS), extend("x-value" = "S"))]
-    pub starts: usize,
-    /// Seed of the further initial values
-    #[schemars(extend("x-value" = "K"))]
-    pub seed: u64,
-    /// Longest period of the orbits, in drive periods
-    #[schemars(range(min = 1, max = MAX_PERIOD), extend("x-value" = "N"))]
-    pub max_period: usize,
-    /// Use the locations of jumps at folds as data
-    #[schemars(extend("x-no" = "Only the rows count, not the places of jumps"))]
-    pub jumps: bool,
-    /// Phase lag that the loop maintains, in degrees, for curves of a frequency shift
-    #[schemars(range(min = 0, max = 180), extend("x-value" = "DEGREES"))]
-    pub phase: f64,
-    /// Intervals from the profile of the likelihood
-    #[schemars(extend("x-no" = "Intervals from the standard errors alone"))]
-    pub profile: bool,
-}
-
-impl Default for FitOptions {
-    fn default() -> Self {
-        Self {
-            data: Vec::new(),
-            free: Vec::new(),
-            per_curve: Vec::new(),
-            bounds: Intervals::default(),
-            columns: Vec::new(),
-            laws: Vec::new(),
-            starts: 8,
-            seed: 0,
-            max_period: 4,
-            jumps: true,
-            phase: 90.0,
-            profile: true,
-        }
+options! {
+    /// Options of a fit.
+    pub struct FitOptions {
+        /// Measured curves: tables whose columns are named as in `distance (nm)`, `amplitude (nm)`,
+        /// `phase (deg)`
+        #[schemars(extend("x-own" = true))]
+        pub data: Vec<Table> = Vec::new(),
+        /// Parameters to find: keys of the case, gap.offset, and NAME.offset or NAME.scale of a column
+        #[schemars(extend("x-value" = "KEY,…"))]
+        pub free: Vec<String> = Vec::new(),
+        /// Parameters to find with one value per curve
+        #[schemars(extend("x-value" = "KEY,…"))]
+        pub per_curve: Vec<String> = Vec::new(),
+        /// Bounds of parameters, as in sample.stiffness="1 N/m:100 N/m"
+        #[schemars(extend("x-value" = "KEY=LOW:HIGH"))]
+        pub bounds: Intervals = Intervals::default(),
+        /// Columns of the data to use; default: all
+        #[schemars(extend("x-value" = "NAME,…"))]
+        pub columns: Vec<String> = Vec::new(),
+        /// Contact laws to compare, as in hertz,dmt; default: the law of the case
+        #[schemars(extend("x-value" = "LAW,…"))]
+        pub laws: Vec<String> = Vec::new(),
+        /// Initial values to try until the data are described
+        #[schemars(range(min = 1, max = MAX_STARTS), extend("x-value" = "S"))]
+        pub starts: usize = 8,
+        /// Seed of the further initial values
+        #[schemars(extend("x-value" = "K"))]
+        pub seed: u64 = 0,
+        /// Longest period of the orbits, in drive periods
+        #[schemars(range(min = 1, max = MAX_PERIOD), extend("x-value" = "N"))]
+        pub max_period: usize = 4,
+        /// Use the locations of jumps at folds as data
+        #[schemars(extend("x-no" = "Only the rows count, not the places of jumps"))]
+        pub jumps: bool = true,
+        /// Phase lag that the loop maintains, in degrees, for curves of a frequency shift
+        #[schemars(range(min = 0, max = 180), extend("x-value" = "DEGREES"))]
+        pub phase: f64 = 90.0,
+        /// Intervals from the profile of the likelihood
+        #[schemars(extend("x-no" = "Intervals from the standard errors alone"))]
+        pub profile: bool = true,
     }
 }
 
@@ -130,7 +110,7 @@ pub struct FitStudy;
 
 impl Study for FitStudy {
     const NAME: &'static str = "fit";
-    const ABOUT: &'static str = "Parameters of lever and sample from measured curves";
+    const ABOUT: &'static str = "Fit parameters of lever and sample to measured curves";
     const COUNTED: &'static str = "starts";
     const ANY_DISTANCE: bool = true;
     const PARTIAL: bool = true;

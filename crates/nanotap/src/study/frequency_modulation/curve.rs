@@ -317,7 +317,7 @@ impl Curve<'_> {
         let observables = measure(&orbit.model, &orbit.orbit.states[0], 1, Set::COMMON)?;
         let modulation = self.modulated(&orbit, amplitude, gap);
         let kind = Classification::Periodic;
-        let (seen, orbit) = (Some(observables), Some(orbit.orbit));
+        let (seen, orbit) = (Some(&observables), Some(orbit.orbit));
         Ok(ApproachPoint {
             modulation: Some(modulation),
             ..ApproachPoint::new(self.case, (way, gap), kind, seen, orbit)

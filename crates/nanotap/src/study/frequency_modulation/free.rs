@@ -20,7 +20,7 @@ use crate::study::FreeMotion;
 pub struct FreeOscillation {
     /// Amplitude of the tip's deflection at the drive's frequency.
     pub amplitude: f64,
-    /// Its phase behind the drive, degrees.
+    /// Phase lag behind the drive, degrees.
     pub phase: f64,
     /// The frequency at which the lever lags by that phase.
     pub frequency: f64,

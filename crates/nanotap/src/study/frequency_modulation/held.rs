@@ -24,7 +24,7 @@ use crate::observe::{Set, first_harmonic_changes, measure};
 pub struct Held {
     /// Amplitude of the tip's deflection at the drive's frequency, in the model's unit of length.
     pub amplitude: f64,
-    /// Its phase behind the drive, degrees.
+    /// Phase lag behind the drive, degrees.
     pub phase: f64,
 }
 

@@ -31,7 +31,7 @@ pub use held::{Driven, Held, HeldOrbit};
 
 use nanotap_dynamics::Control;
 use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 
 use crate::Error;
 use crate::case::Case;
@@ -39,8 +39,9 @@ use crate::case::physical::quantity::JOULES_PER_ELECTRONVOLT;
 use crate::case::physical::{Kind, Physical};
 use crate::model::parameter::Parameter;
 use crate::study::Study;
-use crate::study::approach::{ApproachOptions, ApproachPoint, ApproachReport, Way};
+use crate::study::approach::{ApproachPoint, ApproachReport, Way};
 use crate::study::limits::MOST_DISTANCES;
+use crate::study::request::options;
 use crate::study::value::Amount;
 
 /// Frequency modulation at one distance.
@@ -222,7 +223,7 @@ pub const COLUMNS: [ModulatedColumn; 8] = [
     },
     ModulatedColumn {
         name: "sader_jarvis_force",
-        label: "force after Sader, Jarvis",
+        label: "force (Sader–Jarvis)",
         kind: Some(Kind::Force),
         of: |m| m.sader_jarvis_force,
     },
@@ -233,7 +234,7 @@ pub const COLUMNS: [ModulatedColumn; 8] = [
 pub struct ModulationReport {
     /// The amplitude that is held, in the model's unit of length.
     pub amplitude: f64,
-    /// The phase behind the drive that is held, degrees.
+    /// Phase lag kept by the feedback, degrees.
     pub phase: f64,
     /// Frequency of the free lever at this phase, in the model's unit.
     pub free_frequency: f64,
@@ -293,51 +294,29 @@ pub struct Ended {
     pub reason: String,
 }
 
-/// Options of a curve under frequency modulation.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct FrequencyModulationOptions {
-    /// Distance at which to begin, in units of the case ("30 nm") or as alpha5; without it, 1.25
-    /// times the free amplitude towards the sample
-    #[schemars(extend("x-value" = "DISTANCE"))]
-    pub from: Option<Amount>,
-    /// Distance at which to turn back; without it, 0
-    #[schemars(extend("x-value" = "DISTANCE"))]
-    pub to: Option<Amount>,
-    /// Distances each way
-    #[schemars(range(min = 2, max = MOST_DISTANCES), extend("x-value" = "P"))]
-    pub points: usize,
-    /// Phase behind the drive to hold, in degrees
-    #[schemars(range(min = 0, max = 180), extend("x-value" = "DEGREES"))]
-    pub phase: f64,
-    /// Frequency shift whose distances to find, in units of the case ("-50 Hz") or as omega
-    #[schemars(extend("x-value" = "SHIFT"))]
-    pub shift: Option<Amount>,
-    /// Least distance of the oscillation to keep, in units of the case ("1 nm") or as alpha5: the
-    /// amplitude then changes with the distance
-    #[schemars(extend("x-value" = "DISTANCE"))]
-    pub closest: Option<Amount>,
-}
-
-impl Default for FrequencyModulationOptions {
-    fn default() -> Self {
-        let ApproachOptions {
-            from,
-            to,
-            points,
-            phase,
-            shift,
-            closest,
-            ..
-        } = ApproachOptions::default();
-        Self {
-            from,
-            to,
-            points,
-            phase,
-            shift,
-            closest,
-        }
+options! {
+    /// Options of a curve under frequency modulation.
+    pub struct FrequencyModulationOptions {
+        /// Distance at which to begin, in units of the case ("30 nm") or as alpha5; without it, 1.25
+        /// times the free amplitude towards the sample
+        #[schemars(extend("x-value" = "DISTANCE"))]
+        pub from: Option<Amount> = None,
+        /// Distance at which to turn back; without it, 0
+        #[schemars(extend("x-value" = "DISTANCE"))]
+        pub to: Option<Amount> = None,
+        /// Distances each way
+        #[schemars(range(min = 2, max = MOST_DISTANCES), extend("x-value" = "P"))]
+        pub points: usize = 80,
+        /// Phase behind the drive to hold, in degrees
+        #[schemars(range(min = 0, max = 180), extend("x-value" = "DEGREES"))]
+        pub phase: f64 = 90.0,
+        /// Frequency shift whose distances to find, in units of the case ("-50 Hz") or as omega
+        #[schemars(extend("x-value" = "SHIFT"))]
+        pub shift: Option<Amount> = None,
+        /// Least distance of the oscillation to keep, in units of the case ("1 nm") or as alpha5: the
+        /// amplitude then changes with the distance
+        #[schemars(extend("x-value" = "DISTANCE"))]
+        pub closest: Option<Amount> = None,
     }
 }
 
@@ -362,7 +341,7 @@ pub fn frequency_modulation(
 pub struct FrequencyModulationStudy;
 
 impl Study for FrequencyModulationStudy {
-    const NAME: &'static str = "frequency-modulation";
+    const NAME: &'static str = "fm";
     const ABOUT: &'static str = "Frequency shift and excitation against the distance to the sample, \
                                  with amplitude and phase held";
     const COUNTED: &'static str = "distances";

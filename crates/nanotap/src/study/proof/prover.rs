@@ -174,18 +174,18 @@ fn statement(theorem: &Theorem, about: &str) -> String {
     let _ = match theorem.multipliers.stability() {
         Stability::Stable => write!(
             text,
-            "; its multipliers, known to {reach:.1e}, are all inside the unit circle: it is asymptotically stable"
+            "; its multipliers, with an error below {reach:.1e}, are all inside the unit circle: it is asymptotically stable"
         ),
         Stability::Unstable => write!(
             text,
-            "; of its multipliers, known to {reach:.1e}, at least one is outside the unit circle: it is unstable"
+            "; of its multipliers, with an error below {reach:.1e}, at least one is outside the unit circle: it is unstable"
         ),
         Stability::Undecided if discs.is_empty() => {
             write!(text, "; its multipliers could not be enclosed")
         }
         Stability::Undecided => write!(
             text,
-            "; its multipliers are known to {reach:.1e}, which leaves open whether it is stable"
+            "; its multipliers have an error of up to {reach:.1e}, which leaves its stability open"
         ),
     };
     text

@@ -5,7 +5,9 @@ pub mod fixed_step;
 use std::time::Instant;
 
 pub use nanotap_dynamics::ClassifyOptions;
-use nanotap_dynamics::{LyapunovSpectrum, MotionKind, PeriodicOrbit, StroboscopicMap, classify};
+use nanotap_dynamics::{
+    LyapunovSpectrum, MotionKind, PeriodicOrbit, StroboscopicMap, Torus, classify,
+};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -20,6 +22,7 @@ use crate::observe::{ContactEvent, Kept, Observables, OutOfRange, Set, watch};
 use crate::study::Study;
 use crate::study::in_si::InSi;
 use crate::study::limits::{MOST_PERIOD, MOST_PERIODS, MOST_SAMPLES, MOST_STATE_NUMBERS};
+use crate::study::request::options;
 use crate::study::value::Steps;
 use fixed_step::{FixedStepRun, fixed_step_run};
 
@@ -172,7 +175,7 @@ pub fn simulate(model: &Model, options: &SimulateOptions) -> Result<Simulation, 
 pub(in crate::study) fn check_periods(periods: usize) -> Result<(), Error> {
     if periods == 0 {
         return Err(Error::input(
-            "at least one period must be recorded, 0 were asked for",
+            "expected at least one recorded period, got 0",
             "give 1 or more {periods}",
         ));
     }
@@ -297,6 +300,26 @@ pub(crate) fn largest_exponent(spectrum: &LyapunovSpectrum) -> String {
     )
 }
 
+/// Why a motion is periodic, in words.
+pub(crate) fn orbit_evidence(orbit: &PeriodicOrbit) -> String {
+    format!(
+        "Newton closed a period-{} orbit (residual {:.1e}); largest |multiplier| {:.6}",
+        orbit.period,
+        orbit.residual,
+        orbit.spectral_radius()
+    )
+}
+
+/// Why a motion is quasi-periodic, in words.
+pub(crate) fn torus_evidence(torus: &Torus) -> String {
+    format!(
+        "{}; Birkhoff averages agree to {:.1} digits; nearest return {:.1e}",
+        largest_exponent(&torus.spectrum),
+        torus.birkhoff_digits,
+        torus.nearest_return
+    )
+}
+
 /// A verdict in the words of the output.
 #[derive(Clone, Debug)]
 pub struct Named {
@@ -313,15 +336,7 @@ pub struct Named {
 impl Named {
     /// Names a verdict.
     pub fn of(verdict: &MotionKind) -> Self {
-        let exponent = largest_exponent;
-        let periodic = |orbit: &PeriodicOrbit| {
-            format!(
-                "Newton closed a period-{} orbit (residual {:.1e}); largest |multiplier| {:.6}",
-                orbit.period,
-                orbit.residual,
-                orbit.spectral_radius()
-            )
-        };
+        let (exponent, periodic) = (largest_exponent, orbit_evidence);
         let (classification, orbit, spectrum, evidence) = match verdict {
             MotionKind::Periodic(orbit) => {
                 (Classification::Periodic, Some(orbit), None, periodic(orbit))
@@ -344,12 +359,7 @@ impl Named {
                 Classification::QuasiPeriodic,
                 None,
                 Some(&torus.spectrum),
-                format!(
-                    "{}; Birkhoff averages agree to {:.1} digits; nearest return {:.1e}",
-                    exponent(&torus.spectrum),
-                    torus.birkhoff_digits,
-                    torus.nearest_return
-                ),
+                torus_evidence(torus),
             ),
             MotionKind::Chaotic(chaos) => (
                 Classification::Chaotic,
@@ -406,66 +416,48 @@ pub enum Grid {
     Stage,
 }
 
-/// Options of one run.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct SimulateOptions {
-    /// Drive periods recorded
-    #[schemars(range(min = 1, max = MOST_RECORDED), extend("x-value" = "P"))]
-    pub periods: usize,
-    /// Drive periods discarded first; without it, as many as the motion is measured to need; 0:
-    /// from the start
-    #[schemars(range(min = 0, max = MOST_PERIODS), extend("x-value" = "T"))]
-    pub transient: Option<usize>,
-    /// State at the start, drive phase 0: a1,…,aN,v1,…,vN (oscillator: x,v); without it, rest
-    #[schemars(extend("x-value" = "A1,…"))]
-    pub state: Option<Vec<f64>>,
-    /// How many of the last states at drive phase 0 to keep
-    #[schemars(range(min = 0, max = MOST_LISTED), extend("x-value" = "K"))]
-    pub strobe: usize,
-    /// How many contacts and releases to list at most, the first ones
-    #[schemars(range(min = 0, max = MOST_LISTED), extend("x-value" = "K"))]
-    pub events: usize,
-    /// Longest period looked for
-    #[schemars(range(min = 1, max = MOST_PERIOD), extend("x-value" = "N"))]
-    pub max_period: usize,
-    /// Observables to measure; without it, every one that there is, the beam's clearance included
-    #[schemars(extend("x-value" = "NAME,…"))]
-    pub observables: Option<Set>,
-    /// Samples a drive period in the time series
-    #[schemars(range(min = 1, max = MOST_SAMPLES), extend("x-value" = "S"))]
-    pub resolution: usize,
-    /// How the motion is computed
-    pub method: Method,
-    /// Of rk4: steps a drive period, in free flight and (after a comma) in contact
-    #[schemars(extend("x-value" = "FREE,CONTACT"))]
-    pub steps: Steps,
-    /// Of rk4: where within a step the regime is looked at
-    pub switching: Grid,
+options! {
+    /// Options of one run.
+    pub struct SimulateOptions {
+        /// Drive periods recorded
+        #[schemars(range(min = 1, max = MOST_RECORDED), extend("x-value" = "P"))]
+        pub periods: usize = 50,
+        /// Drive periods discarded first; without it, as many as the motion is measured to need; 0:
+        /// from the start
+        #[schemars(range(min = 0, max = MOST_PERIODS), extend("x-value" = "T"))]
+        pub transient: Option<usize> = None,
+        /// State at the start, drive phase 0: a1,…,aN,v1,…,vN (oscillator: x,v); without it, rest
+        #[schemars(extend("x-value" = "A1,…"))]
+        pub state: Option<Vec<f64>> = None,
+        /// How many of the last states at drive phase 0 to keep
+        #[schemars(range(min = 0, max = MOST_LISTED), extend("x-value" = "K"))]
+        pub strobe: usize = 1,
+        /// How many contacts and releases to list at most, the first ones
+        #[schemars(range(min = 0, max = MOST_LISTED), extend("x-value" = "K"))]
+        pub events: usize = LISTED_EVENTS,
+        /// Longest period looked for
+        #[schemars(range(min = 1, max = MOST_PERIOD), extend("x-value" = "N"))]
+        pub max_period: usize = ClassifyOptions::default().max_period,
+        /// Observables to measure; without it, every one that there is, the beam's clearance included
+        #[schemars(extend("x-value" = "NAME,…"))]
+        pub observables: Option<Set> = None,
+        /// Samples a drive period in the time series
+        #[schemars(range(min = 1, max = MOST_SAMPLES), extend("x-value" = "S"))]
+        pub resolution: usize = 200,
+        /// How the motion is computed
+        pub method: Method = Method::default(),
+        /// Of rk4: steps a drive period, in free flight and (after a comma) in contact
+        #[schemars(extend("x-value" = "FREE,CONTACT"))]
+        pub steps: Steps = Steps::default(),
+        /// Of rk4: where within a step the regime is looked at
+        pub switching: Grid = Grid::default(),
+    }
 }
 
 /// Most drive periods recorded: their events fill some hundred megabytes.
 pub const MOST_RECORDED: usize = 2_000_000;
 /// Most events, and states at drive phase 0, that are listed.
 const MOST_LISTED: usize = 1_000_000;
-
-impl Default for SimulateOptions {
-    fn default() -> Self {
-        Self {
-            periods: 50,
-            transient: None,
-            state: None,
-            strobe: 1,
-            events: LISTED_EVENTS,
-            max_period: ClassifyOptions::default().max_period,
-            observables: None,
-            resolution: 200,
-            method: Method::default(),
-            steps: Steps::default(),
-            switching: Grid::default(),
-        }
-    }
-}
 
 impl SimulateOptions {
     /// Budgets for naming the motion.
@@ -493,7 +485,7 @@ pub struct SimulateStudy;
 
 impl Study for SimulateStudy {
     const NAME: &'static str = "simulate";
-    const ABOUT: &'static str = "One run: its steady state, or how it gets there";
+    const ABOUT: &'static str = "Simulate a motion: its steady state or its transient";
     type Options = SimulateOptions;
     type Report = SimulateReport;
 

@@ -157,13 +157,13 @@ fn variables(options: &SweepOptions, states: usize, si: bool) -> Vec<Variable> {
         ),
         real(
             "period_max",
-            "greatest tip deflection of each recorded drive period",
+            "largest tip deflection of each recorded drive period",
             length,
         )
         .along(PERIODS, options.periods),
         real(
             "period_min",
-            "least tip deflection of each recorded drive period",
+            "smallest tip deflection of each recorded drive period",
             length,
         )
         .along(PERIODS, options.periods),

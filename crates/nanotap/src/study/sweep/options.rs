@@ -1,8 +1,6 @@
 //! Options of a sweep.
 
 use nanotap_dynamics::Control;
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
 
 use super::{Follow, Over, Starts, Summary, Sweep};
 use crate::Error;
@@ -10,65 +8,49 @@ use crate::case::Case;
 use crate::dataset::{Store, StoreError};
 use crate::study::attractors::MOST_STARTS;
 use crate::study::limits::{MOST_PERIOD, MOST_PERIODS};
+use crate::study::request::options;
 use crate::study::value::{Axes, Intervals};
 use crate::study::{DatasetPlan, DatasetStudy};
 
-/// Options of a sweep.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct SweepOptions {
-    /// A parameter and its values, as in omega=2:4:400 (first, last, how many), or
-    /// alpha4=1:1000:50:log in equal ratios, or any that ascend, omega=2,2.5,4; modes too; of a physical case also
-    /// drive.frequency=60kHz:80kHz:200; once or twice
-    #[schemars(extend("x-value" = "KEY=VALUES", "x-required" = true))]
-    pub over: Axes,
-    /// Quasi-random starts at each value, spread over a box of states; without it, one start
-    /// from rest
-    #[schemars(range(min = 1, max = MOST_STARTS), extend("x-value" = "S"))]
-    pub starts: Option<usize>,
-    /// Seed of the starts
-    #[schemars(extend("x-value" = "K"))]
-    pub seed: u64,
-    /// Sides of the box, as in a1=-1:1 or v2=-4:4; the others are derived from the linear response
-    /// to the drive
-    #[serde(rename = "box")]
-    #[schemars(extend("x-value" = "COORDINATE=LOW:HIGH"))]
-    pub sides: Intervals,
-    /// Start from this state at drive phase 0: a1,…,aN,v1,…,vN (oscillator: x,v)
-    #[schemars(extend("x-value" = "A1,…"))]
-    pub state: Option<Vec<f64>>,
-    /// Start each value from the last state of the one before, along the first parameter: up,
-    /// down or both. A whole line is then one piece of work, lost when interrupted
-    #[schemars(extend("x-value" = "WAY"))]
-    pub follow: Follow,
-    /// Drive periods recorded
-    #[schemars(range(min = 1, max = MOST_PERIODS), extend("x-value" = "P"))]
-    pub periods: usize,
-    /// States kept, at the end of each of the last periods; without it, of every recorded one
-    #[schemars(range(min = 0, max = MOST_PERIODS), extend("x-value" = "K"))]
-    pub strobe: Option<usize>,
-    /// Drive periods discarded first; without it, as many as the motion is measured to need
-    #[schemars(range(min = 0, max = MOST_PERIODS), extend("x-value" = "T"))]
-    pub transient: Option<usize>,
-    /// Longest period looked for
-    #[schemars(range(min = 1, max = MOST_PERIOD), extend("x-value" = "N"))]
-    pub max_period: usize,
-}
-
-impl Default for SweepOptions {
-    fn default() -> Self {
-        Self {
-            over: Axes::default(),
-            starts: None,
-            seed: 1,
-            sides: Intervals::default(),
-            state: None,
-            follow: Follow::Off,
-            periods: 100,
-            strobe: None,
-            transient: None,
-            max_period: 64,
-        }
+options! {
+    /// Options of a sweep.
+    pub struct SweepOptions {
+        /// A parameter and its values, as in omega=2:4:400 (first, last, how many), or
+        /// alpha4=1:1000:50:log in equal ratios, or any that ascend, omega=2,2.5,4; modes too; of a physical case also
+        /// drive.frequency=60kHz:80kHz:200; once or twice
+        #[schemars(extend("x-value" = "KEY=VALUES", "x-required" = true))]
+        pub over: Axes = Axes::default(),
+        /// Quasi-random starts at each value, spread over a box of states; without it, one start
+        /// from rest
+        #[schemars(range(min = 1, max = MOST_STARTS), extend("x-value" = "S"))]
+        pub starts: Option<usize> = None,
+        /// Seed of the starts
+        #[schemars(extend("x-value" = "K"))]
+        pub seed: u64 = 1,
+        /// Sides of the box, as in a1=-1:1 or v2=-4:4; the others are derived from the linear response
+        /// to the drive
+        #[serde(rename = "box")]
+        #[schemars(extend("x-value" = "COORDINATE=LOW:HIGH"))]
+        pub sides: Intervals = Intervals::default(),
+        /// Start from this state at drive phase 0: a1,…,aN,v1,…,vN (oscillator: x,v)
+        #[schemars(extend("x-value" = "A1,…"))]
+        pub state: Option<Vec<f64>> = None,
+        /// Start each value from the last state of the one before, along the first parameter: up,
+        /// down or both. A whole line is then one piece of work, lost when interrupted
+        #[schemars(extend("x-value" = "WAY"))]
+        pub follow: Follow = Follow::Off,
+        /// Drive periods recorded
+        #[schemars(range(min = 1, max = MOST_PERIODS), extend("x-value" = "P"))]
+        pub periods: usize = 100,
+        /// States kept, at the end of each of the last periods; without it, of every recorded one
+        #[schemars(range(min = 0, max = MOST_PERIODS), extend("x-value" = "K"))]
+        pub strobe: Option<usize> = None,
+        /// Drive periods discarded first; without it, as many as the motion is measured to need
+        #[schemars(range(min = 0, max = MOST_PERIODS), extend("x-value" = "T"))]
+        pub transient: Option<usize> = None,
+        /// Longest period looked for
+        #[schemars(range(min = 1, max = MOST_PERIOD), extend("x-value" = "N"))]
+        pub max_period: usize = 64,
     }
 }
 
@@ -121,8 +103,7 @@ pub struct SweepStudy;
 
 impl DatasetStudy for SweepStudy {
     const NAME: &'static str = "sweep";
-    const ABOUT: &'static str =
-        "How the motion changes with one or two parameters, from any number of starts";
+    const ABOUT: &'static str = "Sweep one or two parameters, from any number of initial states";
     const COUNTED: &'static str = "values";
     type Options = SweepOptions;
     type Report = Summary;

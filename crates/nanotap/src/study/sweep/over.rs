@@ -66,13 +66,11 @@ impl Over {
                 "{what}; write it as in omega=2:4:400, omega=2:200:50:log, or omega=2,2.5,4"
             ))
         };
-        let (name, range) = given
-            .split_once('=')
-            .ok_or_else(|| form("there is no `=`"))?;
+        let (name, range) = given.split_once('=').ok_or_else(|| form("missing `=`"))?;
         let key = key(given, name.trim(), case)?;
         let number = |which, text: &str| {
             let no_number =
-                |value: &str| wrong(&format_args!("{which} `{value}` is no finite number"));
+                |value: &str| wrong(&format_args!("{which} `{value}` is not a finite number"));
             match case.value(key, text) {
                 Ok(value) if value.is_finite() => Ok(value),
                 Ok(_) => Err(no_number(text)),
@@ -93,9 +91,9 @@ impl Over {
                 key,
                 from: number("the first value", from)?,
                 to: number("the last value", to)?,
-                count: count
-                    .parse()
-                    .map_err(|_| wrong(&format_args!("the count `{count}` is no whole number")))?,
+                count: count.parse().map_err(|_| {
+                    wrong(&format_args!("the count `{count}` is not a whole number"))
+                })?,
                 spacing,
                 listed: Vec::new(),
             }

@@ -9,7 +9,7 @@ use crate::case::physical::remark::Remark;
 use crate::case::quantity::Kind;
 use crate::model::parameter::{Numbers, Parameter};
 
-/// Steps to the resonance in the fluid; each gains about a digit.
+/// Largest number of iterations for the resonance in the fluid; each gains about a digit.
 const MOST_ITERATIONS: usize = 60;
 
 impl Fluid {
@@ -88,7 +88,7 @@ impl Fluid {
         Ok(found)
     }
 
-    /// What follows from it.
+    /// Note about the fluid.
     pub(crate) fn remark(self, lever: &Lever, width: f64) -> Remark {
         Remark::note(format!(
             "in a fluid of {} and {} the lever resonates at {} with Q = {} (Re = {}; Sader 1998), a \

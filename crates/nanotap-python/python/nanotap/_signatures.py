@@ -23,7 +23,7 @@ __all__ = [
     "contact_laws",
     "convergence",
     "fit",
-    "frequency_modulation",
+    "fm",
     "lyapunov",
     "modes",
     "orbit",
@@ -461,7 +461,7 @@ def approach(
     options = _arguments.options("approach", locals())
     return _studies.approach(case, options, threads, progress)
 
-def frequency_modulation(
+def fm(
     case: Case,
     *,
     from_: float | str | None = None,
@@ -512,8 +512,8 @@ def frequency_modulation(
     RuntimeError
         The computation failed.
     """
-    options = _arguments.options("frequency-modulation", locals())
-    return _studies.document("frequency-modulation", case, options, threads, progress)
+    options = _arguments.options("fm", locals())
+    return _studies.document("fm", case, options, threads, progress)
 
 def fit(
     case: Case,

@@ -2,8 +2,8 @@
 
     python crates/nanotap-python/signatures.py target/release/nanotap [--check]
 
-Names, defaults, documentation and ranges are the library's; only what is Python's own (extra
-arguments, what comes back) stands here.
+Names, defaults, documentation and ranges come from the library; only extra arguments and return
+values of Python are stated here.
 """
 
 import json
@@ -15,7 +15,7 @@ from typing import Any
 
 TARGET = Path(__file__).parent / "python" / "nanotap" / "_signatures.py"
 
-THREADS = ("threads", "int | None", "None", "Threads; without it, one a core.")
+THREADS = ("threads", "int | None", "None", "Number of threads; default: one per core.")
 PROGRESS = (
     "progress",
     "Progress",
@@ -23,8 +23,8 @@ PROGRESS = (
     "Whether to show a bar, or a function that is called with the finished and the total count.",
 )
 ARRAYS = (
-    ("threads", "int | None", "None", "Of arrays: threads; without it, one a core."),
-    ("progress", "Progress", "None", "Of arrays: as everywhere, a bar or a function."),
+    ("threads", "int | None", "None", "Number of threads for arrays; default: one per core."),
+    ("progress", "Progress", "None", "Progress of arrays: whether to show a bar, or a function as in other studies."),
 )
 SERIES = (
     "series",
@@ -47,7 +47,7 @@ DATASET = (
         "chunk",
         "str",
         '"1/1"',
-        'One of n shares only, as in "2/8"; `merge` puts the shares together.',
+        'Only one of n shares, as in "2/8"; `merge` merges the shares.',
     ),
     THREADS,
     (

@@ -37,7 +37,7 @@ def modes(
     *,
     points: int = 201,
 ) -> Modes:
-    """Mode shapes and frequencies, in free flight and in contact.
+    """Compute mode shapes and frequencies, in free flight and in contact.
 
     Parameters
     ----------
@@ -117,23 +117,24 @@ def simulate(
         Of rk4: where within a step the regime is looked at; `step`: Once a step;
         `stage`: At every stage of a step.
     series : int | None
-        Periods of the time series, from the start of the recording; without it, all
-        up to 100.
+        Number of periods of the time series, from the start of the recording;
+        default: all, up to 100.
     threads : int | None
-        Of arrays: threads; without it, one a core.
+        Number of threads for arrays; default: one per core.
     progress : Progress
-        Of arrays: as everywhere, a bar or a function.
+        Progress of arrays: whether to show a bar, or a function as in other
+        studies.
     **parameters : Varied
-        Keys of the case to change. Arrays (one-dimensional, or xarray's DataArrays)
-        make a Dataset over them, each a dimension.
+        Keys of the case to change. Arrays (one-dimensional, or xarray DataArrays)
+        give a Dataset with one dimension per array.
 
     Returns
     -------
-    What was observed, by the names of the terminal's JSON: `classification`,
+    The observables, with the names of the terminal's JSON: `classification`,
     `period`, `tip_max` …; `strobe` over `strobe_period` and `state`; `events`
     (their times) with `event_kind`; and the time series `tip`, `gap`, `force` …
-    over `tau`. Over arrays, what is a number in each run, and `failure` where there
-    is none.
+    over `tau`. Over arrays, the numeric observables of each run, and `failure` for
+    a run that failed.
 
     Raises
     ------
@@ -213,16 +214,17 @@ def orbit(
     prove : bool
         Prove in interval arithmetic that it exists, is alone, and is stable or not.
     threads : int | None
-        Of arrays: threads; without it, one a core.
+        Number of threads for arrays; default: one per core.
     progress : Progress
-        Of arrays: as everywhere, a bar or a function.
+        Progress of arrays: whether to show a bar, or a function as in other
+        studies.
     **parameters : Varied
-        Keys of the case to change. Arrays (one-dimensional, or xarray's DataArrays)
-        make a Dataset over them, each a dimension.
+        Keys of the case to change. Arrays (one-dimensional, or xarray DataArrays)
+        give a Dataset with one dimension per array.
 
     Returns
     -------
-    The orbit, or over arrays a Dataset of what is observed of each, with `failure`
+    The orbit; over arrays, a Dataset of the observables of each, with `failure`
     where there is none.
 
     Raises
@@ -280,10 +282,10 @@ def attractors(
         Prove in interval arithmetic that each orbit exists, is alone, and is stable
         or not.
     threads : int | None
-        Threads; without it, one a core.
+        Number of threads; default: one per core.
     progress : Progress
-        Whether to show a bar, or a function that is called with what is done and
-        the total.
+        Whether to show a bar, or a function that is called with the finished and
+        the total count.
 
     Returns
     -------
@@ -355,18 +357,18 @@ def branch(
     max_step : float
         Longest step, as a part of the range.
     threads : int | None
-        Threads; without it, one a core.
+        Number of threads; default: one per core.
     progress : Progress
-        Whether to show a bar, or a function that is called with what is done and
-        the total.
+        Whether to show a bar, or a function that is called with the finished and
+        the total count.
 
     Returns
     -------
     The orbits over `point` (`branch`, the parameter by its name, `stable`,
     `tip_max`, `states` …) and the bifurcations over `bifurcation`
     (`bifurcation_kind`, `bifurcation_parameter`, `bifurcation_states` …); curves in
-    two parameters over `locus_point`. The attributes say of each branch why it
-    ends, and what could not be followed.
+    two parameters over `locus_point`. The attributes state why each branch ends,
+    and list failures.
 
     Raises
     ------
@@ -434,20 +436,20 @@ def approach(
         of the case ("1 nm") or as alpha5: the amplitude then changes with the
         distance.
     threads : int | None
-        Threads; without it, one a core.
+        Number of threads; default: one per core.
     progress : Progress
-        Whether to show a bar, or a function that is called with what is done and
-        the total.
+        Whether to show a bar, or a function that is called with the finished and
+        the total count.
 
     Returns
     -------
-    What is observed over `way` (approach, retract) and the distance (by the name of
-    its parameter, with `zc` in metres for a physical case): `first_harmonic`,
+    The observables over `way` (approach, retract) and the distance (with the name
+    of its parameter, with `zc` in metres for a physical case): `first_harmonic`,
     `phase`, `peak_force`, `dissipation` … and in SI `physical_A`, `physical_F_max`,
-    `physical_E_dis` …; the branches over `branch_point`; where the lever jumps in
-    the attribute `jumps`. With `fm=True` also `relative_shift`, `drive_ratio`,
-    `sader_jarvis_force` … and in SI `physical_frequency_shift` …, with what is held
-    in the attribute `modulation`.
+    `physical_E_dis` …; the branches over `branch_point`; the jumps in the attribute
+    `jumps`. With `fm=True` also `relative_shift`, `drive_ratio`,
+    `sader_jarvis_force` … and in SI `physical_frequency_shift` …, with the settings
+    of the loop in the attribute `modulation`.
 
     Raises
     ------
@@ -477,7 +479,7 @@ def fm(
     Parameters
     ----------
     case : Case
-        What is studied.
+        The case.
     from_ : float | str | None
         Distance at which to begin, in units of the case ("30 nm") or as alpha5;
         without it, 1.25 times the free amplitude towards the sample.
@@ -494,19 +496,19 @@ def fm(
         Least distance of the oscillation to keep, in units of the case ("1 nm") or
         as alpha5: the amplitude then changes with the distance.
     threads : int | None
-        Threads; without it, one a core.
+        Number of threads; default: one per core.
     progress : Progress
-        Whether to show a bar, or a function that is called with what is done and
-        the total.
+        Whether to show a bar, or a function that is called with the finished and
+        the total count.
 
     Returns
     -------
-    What the terminal's JSON has, by its names.
+    The document, with the names of the terminal's JSON.
 
     Raises
     ------
     ValueError
-        An argument is not valid.
+        An argument is invalid; the message names it.
     RuntimeError
         The computation failed.
     """
@@ -531,7 +533,7 @@ def fit(
     threads: int | None = None,
     progress: Progress = None,
 ) -> Fit:
-    """Parameters of lever and sample from measured curves.
+    """Fit parameters of lever and sample to measured curves.
 
     Parameters
     ----------
@@ -544,32 +546,31 @@ def fit(
         Parameters to find: keys of the case, gap.offset, and NAME.offset or
         NAME.scale of a column.
     per_curve : Sequence[str] | None
-        Parameters to find, one value a curve.
+        Parameters to find with one value per curve.
     bounds : Mapping[str, tuple[float | str, float | str]] | str | None
         Bounds of parameters, as in sample.stiffness="1 N/m:100 N/m".
     columns : Sequence[str] | None
-        Columns of the data that count; without it, all.
+        Columns of the data to use; default: all.
     laws : Sequence[str] | None
-        Contact laws to compare, as in hertz,dmt; without it, the case's own.
+        Contact laws to compare, as in hertz,dmt; default: the law of the case.
     starts : int
-        Starts to try as long as nothing describes the data (1 to 1000).
+        Initial values to try until the data are described (1 to 1000).
     seed : int
-        Seed of the further starts.
+        Seed of the further initial values.
     max_period : int
-        Longest period of the orbits looked for (1 to 64).
+        Longest period of the orbits, in drive periods (1 to 64).
     jumps : bool
-        The place at which the data jump from a branch that ends in a fold counts
-        too.
+        Use the locations of jumps at folds as data.
     phase : float
-        Phase behind the drive that the loop held, in degrees, of curves of a
-        frequency shift.
+        Phase lag that the loop maintains, in degrees, for curves of a frequency
+        shift.
     profile : bool
-        Intervals by the profile of the likelihood.
+        Intervals from the profile of the likelihood.
     threads : int | None
-        Threads; without it, one a core.
+        Number of threads; default: one per core.
     progress : Progress
-        Whether to show a bar, or a function that is called with what is done and
-        the total.
+        Whether to show a bar, or a function that is called with the finished and
+        the total count.
 
     Returns
     -------
@@ -606,7 +607,7 @@ def sweep(
     client: "Client | None" = None,
     progress: Progress = None,
 ) -> "xr.Dataset":
-    """How the motion changes with one or two parameters, from any number of starts.
+    """Sweep one or two parameters, from any number of initial states.
 
     Parameters
     ----------
@@ -644,22 +645,22 @@ def sweep(
     max_period : int
         Longest period looked for (1 to 10000).
     out : Path | None
-        The dataset, a folder ending in .zarr; where it is there already, the work
-        goes on where it stopped. Without it, everything is in memory.
+        The dataset, a folder with the extension .zarr; an existing one is resumed.
+        Without it, everything is in memory.
     chunk : str
-        One of n shares only, as in "2/8"; `merge` puts the shares together.
+        Only one of n shares, as in "2/8"; `merge` merges the shares.
     threads : int | None
-        Threads; without it, one a core.
+        Number of threads; default: one per core.
     client : "Client | None"
-        A Dask client, on whose workers the chunks are computed: the same bytes.
+        A Dask client on whose workers the chunks are computed, with the same bytes.
     progress : Progress
-        Whether to show a bar, or a function that is called with what is done and
-        the total.
+        Whether to show a bar, or a function that is called with the finished and
+        the total count.
 
     Returns
     -------
     The dataset, as `open` opens it: lazily from `out`. After Ctrl-C, the `result`
-    of the exception is the dataset with what is finished, and the same call goes on
+    of the exception is the finished part of the dataset, and the same call resumes
     in `out`.
 
     Raises
@@ -703,21 +704,21 @@ def window(
     max_period : int
         Longest period looked for (1 to 10000).
     out : Path | None
-        The dataset, a folder ending in .zarr; where it is there already, the work
-        goes on where it stopped. Without it, everything is in memory.
+        The dataset, a folder with the extension .zarr; an existing one is resumed.
+        Without it, everything is in memory.
     threads : int | None
-        Threads; without it, one a core.
+        Number of threads; default: one per core.
     client : "Client | None"
-        A Dask client, on whose workers the chunks are computed: the same bytes.
+        A Dask client on whose workers the chunks are computed, with the same bytes.
     progress : Progress
-        Whether to show a bar, or a function that is called with what is done and
-        the total.
+        Whether to show a bar, or a function that is called with the finished and
+        the total count.
 
     Returns
     -------
     The sweep with `condition` over both parameters: no-contact, one-period-1,
-    second-state, subharmonic, irregular or undecided; `share` says how much of each
-    there is.
+    second-state, subharmonic, irregular or undecided; `share` is the fraction of
+    each.
 
     Raises
     ------
@@ -746,7 +747,7 @@ def basin(
     client: "Client | None" = None,
     progress: Progress = None,
 ) -> "xr.Dataset":
-    """Basins of attraction on a two-dimensional slice of initial states.
+    """Compute basins of attraction on a two-dimensional slice of initial states.
 
     Parameters
     ----------
@@ -771,17 +772,17 @@ def basin(
     max_period : int
         Longest period looked for (1 to 10000).
     out : Path | None
-        The dataset, a folder ending in .zarr; where it is there already, the work
-        goes on where it stopped. Without it, everything is in memory.
+        The dataset, a folder with the extension .zarr; an existing one is resumed.
+        Without it, everything is in memory.
     chunk : str
-        One of n shares only, as in "2/8"; `merge` puts the shares together.
+        Only one of n shares, as in "2/8"; `merge` merges the shares.
     threads : int | None
-        Threads; without it, one a core.
+        Number of threads; default: one per core.
     client : "Client | None"
-        A Dask client, on whose workers the chunks are computed: the same bytes.
+        A Dask client on whose workers the chunks are computed, with the same bytes.
     progress : Progress
-        Whether to show a bar, or a function that is called with what is done and
-        the total.
+        Whether to show a bar, or a function that is called with the finished and
+        the total count.
 
     Returns
     -------
@@ -808,7 +809,7 @@ def lyapunov(
     phase: float = 0.0,
     points: int = 5000,
 ) -> Lyapunov:
-    """Lyapunov spectrum with error bars, and a Poincaré section.
+    """Compute the Lyapunov spectrum with error bars, and a Poincaré section.
 
     Parameters
     ----------
@@ -904,14 +905,14 @@ def contact_laws(
     to : float | str | None
         Highest drive frequency to which the orbits are followed.
     threads : int | None
-        Threads; without it, one a core.
+        Number of threads; default: one per core.
     progress : Progress
-        Whether to show a bar, or a function that is called with what is done and
-        the total.
+        Whether to show a bar, or a function that is called with the finished and
+        the total count.
 
     Returns
     -------
-    What the terminal's JSON has, by its names.
+    The document, with the names of the terminal's JSON.
 
     Raises
     ------

@@ -3,7 +3,7 @@
 use crate::Error;
 use crate::study::limits::MOST_THREADS;
 
-/// The number of threads, if it can be had; `None`: one a core.
+/// The number of threads, if it is available; `None`: one per core.
 ///
 /// # Errors
 /// When there are none, or more than any machine has.
@@ -18,7 +18,7 @@ pub fn checked(threads: Option<usize>) -> Result<Option<usize>, Error> {
     }
 }
 
-/// Does `work` on so many threads; `None`: one a core.
+/// Runs `work` on this number of threads; `None`: one per core.
 ///
 /// # Errors
 /// As [`checked`], and when the threads cannot be started.

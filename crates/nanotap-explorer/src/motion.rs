@@ -232,7 +232,7 @@ fn fixed_step(
     );
     Ok(Some(json!({
         "words": format!(
-            "{steps} steps a period show {shown}. The exact flow goes from there to: {}",
+            "{steps} steps per period show {shown}. The exact flow goes from there to: {}",
             run.exact.evidence
         ),
         "figure": drawn(&fixed_step_figure(model, &run, &case.units()))?,

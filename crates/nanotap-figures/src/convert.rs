@@ -4,7 +4,7 @@
 
 use pdf_writer::{Content, Finish as _, Name, Pdf, Rect as Box, Ref, TextStr};
 use resvg::tiny_skia::{Color, Pixmap, Transform};
-use resvg::usvg::{Options, Tree};
+use resvg::usvg::{ImageRendering, Options, Tree};
 
 use crate::MADE_BY;
 use crate::colour::Colour;
@@ -124,6 +124,8 @@ pub(crate) fn path_raster(path: &Path) -> Option<Raster> {
 fn tree(svg: &str, dpi: f64) -> Result<Tree, String> {
     let options = Options {
         dpi: dpi as f32,
+        // The reader takes "pixelated" from style sheets only, which a page's policy may forbid.
+        image_rendering: ImageRendering::Pixelated,
         ..Options::default()
     };
     Tree::from_str(svg, &options).map_err(|error| error.to_string())

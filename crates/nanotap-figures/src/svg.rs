@@ -296,7 +296,7 @@ impl Page {
         let _ = writeln!(
             self.body,
             "<g{clip}><image x=\"{}\" y=\"{}\" width=\"{}\" height=\"{}\" preserveAspectRatio=\"none\" \
-             style=\"image-rendering:pixelated\" xlink:href=\"data:image/png;base64,{data}\"/></g>",
+             image-rendering=\"pixelated\" xlink:href=\"data:image/png;base64,{data}\"/></g>",
             number(raster.rect.left),
             number(raster.rect.top),
             number(raster.rect.width()),

@@ -617,30 +617,29 @@ pub(crate) fn entries(store: &Store) -> Vec<String> {
 options! {
     /// Options of basins of attraction.
     pub struct BasinOptions {
-        /// The horizontal axis, as in a1=-1:1:200: entry of the state, first value, last value, how
-        /// many (a1…aN, v1…vN; oscillator: x, v)
+        /// Horizontal axis, as in a1=-1:1:200: entry of the state (a1…aN, v1…vN; oscillator: x, v),
+        /// first value, last value, count
         #[schemars(extend("x-value" = "ENTRY=FROM:TO:COUNT", "x-required" = true))]
         pub x: String = String::new(),
-        /// The vertical axis
+        /// Vertical axis, in the same form
         #[schemars(extend("x-value" = "ENTRY=FROM:TO:COUNT", "x-required" = true))]
         pub y: String = String::new(),
-        /// The other entries of the state, in full: a1,…,aN,v1,…,vN; without it, 0
+        /// State with the other entries: a1,…,aN,v1,…,vN; default: 0
         #[schemars(extend("x-value" = "A1,…"))]
         pub state: Option<Vec<f64>> = None,
-        /// States on the attractors, or what a census found; without it, a census in the slice
-        /// finds them
+        /// States on the attractors, or the result of a census; default: a census in the slice
         #[schemars(extend("x-own" = true))]
         pub attractors: Option<Vec<Vec<f64>>> = None,
-        /// Starts of the census
+        /// Initial states of the census
         #[schemars(range(min = 1, max = MOST_STARTS), extend("x-value" = "S"))]
         pub starts: usize = 64,
         /// Seed of the census
         #[schemars(extend("x-value" = "K"))]
         pub seed: u64 = 1,
-        /// Drive periods after which a point is called unsettled
+        /// Drive periods after which a point counts as unsettled
         #[schemars(range(min = 1, max = MOST_PERIODS), extend("x-value" = "P"))]
         pub periods: usize = 1000,
-        /// Longest period looked for
+        /// Longest period of orbits, in drive periods
         #[schemars(range(min = 1, max = MOST_PERIOD), extend("x-value" = "N"))]
         pub max_period: usize = 64,
     }

@@ -291,10 +291,10 @@ fn force_loop(height: &Curve, force: &Curve) -> Vec<[f64; 2]> {
 options! {
     /// Options of the comparison of contact laws.
     pub struct ContactLawsOptions {
-        /// Period of the orbits compared
+        /// Period of the compared orbits
         #[schemars(range(min = 1, max = MOST_PERIOD), extend("x-value" = "N"))]
         pub period: usize = 1,
-        /// Stiffness of the relaxing arm; without it, the case's, or twice alpha4
+        /// Stiffness of the relaxing arm; default: that of the case, or twice alpha4
         #[schemars(extend("x-value" = "K"))]
         pub arm: Option<f64> = None,
         /// Lowest drive frequency to which the orbits are followed

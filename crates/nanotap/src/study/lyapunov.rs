@@ -204,21 +204,21 @@ pub const MOST_SECTION_POINTS: usize = 2_000_000;
 options! {
     /// Options of the Lyapunov spectrum.
     pub struct LyapunovOptions {
-        /// Drive periods averaged over
+        /// Drive periods of the average
         #[schemars(range(min = 1, max = MOST_PERIODS), extend("x-value" = "P"))]
         pub periods: usize = 20_000,
-        /// Drive periods discarded first
+        /// Drive periods of the discarded transient
         #[schemars(range(min = 0, max = MOST_PERIODS), extend("x-value" = "T"))]
         pub transient: usize = 1000,
-        /// State at the start, drive phase 0: a1,…,aN,v1,…,vN (oscillator: x,v); without it, rest
+        /// Initial state at drive phase 0: a1,…,aN,v1,…,vN (oscillator: x,v); default: rest
         #[schemars(extend("x-value" = "A1,…"))]
         pub state: Option<Vec<f64>> = None,
-        /// Where the section is taken
+        /// Poincaré section
         pub section: SectionKind = SectionKind::default(),
         /// Drive phase of the section in degrees
         #[schemars(extend("x-value" = "DEGREES"))]
         pub phase: f64 = 0.0,
-        /// Points of the section
+        /// Number of points of the section
         #[schemars(range(min = 0, max = MOST_SECTION_POINTS), extend("x-value" = "K"))]
         pub points: usize = 5000,
     }

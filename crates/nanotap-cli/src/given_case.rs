@@ -76,11 +76,11 @@ impl GivenCase {
         Self(case)
     }
 
-    /// Says what stays while these keys vary, as the words that make one of the points again.
-    pub(crate) fn say_held(&self, keys: &[Key], output: &Output) {
+    /// Prints the keys that stay constant while these keys vary, as the words that reproduce a point.
+    pub(crate) fn note_constants(&self, keys: &[Key], output: &Output) {
         let mut words: Vec<String> = Vec::new();
         for key in keys {
-            for (held, value) in self.held(*key) {
+            for (held, value) in self.implied_constants(*key) {
                 let word = format!("--set {held}=\"{}\"", held.kind().format_exact(value));
                 if !keys.contains(&held) && !words.contains(&word) {
                     words.push(word);

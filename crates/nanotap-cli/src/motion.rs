@@ -9,7 +9,7 @@ use nanotap::case::units::Units;
 use nanotap::model::Model;
 use nanotap::observe::table::shown_phase;
 use nanotap::observe::{
-    Derivative, Harmonic, Observables, OutOfRange, PhysicalMotion, Set, Spectrum, Value,
+    Derivative, Harmonic, ObservableSet, Observables, OutOfRange, PhysicalMotion, Spectrum, Value,
     time_series,
 };
 use nanotap::study::proof::ProofReport;
@@ -37,14 +37,19 @@ pub(crate) fn lag(phase: f64, tone: &str, digits: usize) -> String {
 }
 
 /// What was observed: tip, gap, contact, force and energy; of a choice of observables a row each.
-pub(crate) fn observed(o: &Observables, chosen: Option<Set>, units: &Units, beam: bool) -> String {
+pub(crate) fn observed(
+    o: &Observables,
+    chosen: Option<ObservableSet>,
+    units: &Units,
+    beam: bool,
+) -> String {
     match chosen {
         Some(chosen) => choice(o, chosen, units),
         None => format!("{}\n{}", observables(o, units, beam), energy(o, units)),
     }
 }
 
-fn choice(o: &Observables, chosen: Set, units: &Units) -> String {
+fn choice(o: &Observables, chosen: ObservableSet, units: &Units) -> String {
     let mut table = Table::new([
         ("", Align::Left),
         ("", Align::Left),

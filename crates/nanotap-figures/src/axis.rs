@@ -278,12 +278,12 @@ impl View {
         share.is_finite().then(|| share.clamp(-1e6, 1e6))
     }
 
-    pub(crate) fn ticks(self, most: usize) -> Ticks {
+    pub(crate) fn ticks(self, max_count: usize) -> Ticks {
         let (low, high) = (self.from.min(self.to), self.from.max(self.to));
         if self.log {
-            ticks::logarithmic(low, high, most)
+            ticks::logarithmic(low, high, max_count)
         } else {
-            ticks::linear(low, high, most)
+            ticks::linear(low, high, max_count)
         }
     }
 }

@@ -325,7 +325,7 @@ fn axes(scene: &mut Scene, prepared: &Prepared, spot: &Spot, style: &Style) {
 /// The ticks below a panel, their labels and the axis label.
 fn horizontal_axis(scene: &mut Scene, prepared: &Prepared, spot: &Spot, style: &Style) {
     let rect = spot.rect;
-    let mut beside = 0.0;
+    let mut note_width = 0.0;
     if prepared.panel.x.marked() {
         let marks = Marks::new(&prepared.panel.x, prepared.x, rect.width(), false, style);
         let at = |share: f64| rect.left + share * rect.width();
@@ -344,7 +344,7 @@ fn horizontal_axis(scene: &mut Scene, prepared: &Prepared, spot: &Spot, style: &
                 scene.words(words.place(base, Across::Centre, Upright::Baseline, INK));
             }
             if let Some(note) = marks.note {
-                beside = note.width + style.gap;
+                note_width = note.width + style.gap;
                 let base = rect.bottom + spot.sides.bottom_marks + style.pad + note.cap_height();
                 let end = Point::new(rect.right, base);
                 scene.words(note.place(end, Across::Right, Upright::Baseline, INK));
@@ -356,7 +356,7 @@ fn horizontal_axis(scene: &mut Scene, prepared: &Prepared, spot: &Spot, style: &
         let base =
             rect.bottom + spot.sides.bottom_marks + spot.sides.bottom_label - words.descent();
         let end = if layout::shares_row(prepared, rect.width(), style) {
-            rect.right - beside
+            rect.right - note_width
         } else {
             rect.right
         };

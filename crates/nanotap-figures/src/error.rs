@@ -28,7 +28,7 @@ pub enum FigureError {
         reason: String,
     },
     /// A figure could not be read from JSON or written as JSON.
-    #[error("this is no figure in JSON: {0}")]
+    #[error("cannot read or write the figure as JSON: {0}")]
     Json(serde_json::Error),
     /// The picture would have no pixels, or too many.
     #[error(

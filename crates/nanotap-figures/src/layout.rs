@@ -252,8 +252,8 @@ pub(crate) fn title_height(panel: &Prepared, style: &Style) -> f64 {
 pub(crate) fn shares_row(panel: &Prepared, width: f64, style: &Style) -> bool {
     let marks = Marks::new(&panel.panel.x, panel.x, width, false, style);
     let label = Words::set(&panel.panel.x.words(), style.label, false);
-    let beside = |note: Words| label.width + style.gap + note.width <= width;
-    label.width > 0.0 && marks.note.is_none_or(beside)
+    let fits = |note: Words| label.width + style.gap + note.width <= width;
+    label.width > 0.0 && marks.note.is_none_or(fits)
 }
 
 /// Distance of a colour bar from the item to its left, and its width, mm.

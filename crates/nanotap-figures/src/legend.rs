@@ -233,7 +233,7 @@ impl Occupancy {
     fn any(&self, area: Rect) -> bool {
         let (left, top) = self.cell(Point::new(area.left, area.top));
         let (right, bottom) = self.cell(Point::new(area.right, area.bottom));
-        let clamp = |v: f64, most: usize| (v.max(0.0) as usize).min(most - 1);
+        let clamp = |v: f64, count: usize| (v.max(0.0) as usize).min(count - 1);
         (clamp(top, Self::ROWS)..=clamp(bottom, Self::ROWS)).any(|row| {
             (clamp(left, Self::COLUMNS)..=clamp(right, Self::COLUMNS))
                 .any(|column| self.cells[row * Self::COLUMNS + column])
@@ -242,14 +242,14 @@ impl Occupancy {
 }
 
 /// Draws the legend of a panel in `rect`; `above` is the bottom of the rows above the panel, and
-/// `beside` the left edge of the column to the right of it.
+/// `right` the left edge of the column to the right of it.
 pub(crate) fn draw(
     scene: &mut Scene,
     prepared: &Prepared,
     stand: Stand,
     rect: Rect,
     above: f64,
-    beside: f64,
+    right: f64,
     style: &Style,
 ) {
     let entries = &prepared.entries;
@@ -263,7 +263,7 @@ pub(crate) fn draw(
             });
         }
         Stand::Right => scene.group("legend", "", |scene| {
-            draw_column(scene, entries, beside, rect.top, style);
+            draw_column(scene, entries, right, rect.top, style);
         }),
         Stand::Above => scene.group("legend", "", |scene| {
             let rows = rows(entries, rect.width(), style);

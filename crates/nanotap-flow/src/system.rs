@@ -916,7 +916,7 @@ fn packed_rates(regime: &Regime, drive: &Drive) -> Vec<ComplexVector> {
     layout::list(&rates)
 }
 
-/// What counts as rounding beside the numbers that a difference is made of.
+/// Relative size up to which a difference counts as rounding.
 const NEGLIGIBLE: f64 = 1e-13;
 
 /// Oscillations of a mode in one drive period that are followed.

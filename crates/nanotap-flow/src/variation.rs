@@ -24,7 +24,6 @@ use crate::observer::{Observer, SegmentView, SwitchView};
 use crate::regime::ModalOutput;
 use crate::search::sign_changes;
 use crate::sensitivity::{Propagator, Sensitivity, SystemTangent};
-use crate::signal::Signal;
 use crate::{Complex, Drive, Output, Regime, System};
 
 /// An output and its derivative with respect to the parameter at constant state and drive
@@ -215,14 +214,7 @@ impl<'a> Variation<'a> {
                 continue;
             };
             let [value, _] = &self.modal[r][output];
-            let signal = Signal::of(
-                regime,
-                drive,
-                value,
-                segment.modal,
-                segment.phase,
-                segment.length,
-            );
+            let signal = segment.signal(value);
             let rate = signal.differentiated(segment.length);
             let inside = sign_changes(&rate, segment.length);
             let places = std::iter::once(0.0).chain(inside).chain([segment.length]);
@@ -260,17 +252,7 @@ fn varied(
     time: f64,
 ) -> Dual {
     let along: f64 = value.modal.iter().zip(s).map(|(w, s)| (w * s).re).sum();
-    Dual::new(
-        value_of(value, q, drive, time),
-        along + value_of(change, q, drive, time),
-    )
-}
-
-fn value_of(output: &ModalOutput, q: &[Complex], drive: &Drive, time: f64) -> f64 {
-    let modes: f64 = output.modal.iter().zip(q).map(|(w, q)| (w * q).re).sum();
-    let tones = output.tones.iter().enumerate();
-    let tones: f64 = tones.map(|(k, z)| (z * drive.phasor(k, time)).re).sum();
-    output.constant + modes + tones
+    Dual::new(value.at(drive, q, time), along + change.at(drive, q, time))
 }
 
 impl Observer for Variation<'_> {
@@ -280,7 +262,7 @@ impl Observer for Variation<'_> {
         }
         let (regime, drive) = (segment.regime(), segment.system.drive());
         self.look_for_extrema(segment);
-        // Products have twice the rate, Fourier integrals the frequency beside it.
+        // Products have twice the rate, Fourier integrals the frequency in addition.
         let modes = regime.basis().eigenvalues.iter().map(|l| l.modulus());
         let tones = drive.frequencies().iter().copied();
         let fastest = 2.0 * modes.chain(tones).fold(0.0, f64::max);
@@ -330,7 +312,7 @@ impl Observer for Variation<'_> {
             -moves / view.rate
         };
         let rate = varied(&guard.rate, view.modal, s, drive, view.phase);
-        let curvature = value_of(&guard.curvature, view.modal, drive, view.phase);
+        let curvature = guard.curvature.at(drive, view.modal, view.phase);
         let speed = Dual::new(
             rate.value.abs(),
             (rate.derivative() + curvature * by) * rate.value.signum(),
@@ -346,26 +328,15 @@ impl Observer for Variation<'_> {
         for (index, rate) in std::mem::take(&mut self.at_end) {
             self.values[index].re.slopes[0] += rate * by;
         }
-        let mut x = vec![0.0; view.system.dimension()];
-        let modal = view.modal.iter().copied();
-        view.system.regimes()[from].to_state(drive, modal, view.phase, &mut x);
-        let transition = &view.system.transitions()[from][view.transition];
-        let reset = if view.stuck {
-            transition.sticking.as_ref().map(|sticking| &sticking.reset)
-        } else {
-            transition.reset.as_ref()
-        };
-        let after = reset.map_or_else(
+        let x = view.state();
+        let after = view.reset().map_or_else(
             || x.clone(),
-            |reset| {
-                let x = nalgebra::DVector::from_column_slice(&x);
-                let after = &reset.matrix * x + reset.offset.at(drive, view.phase);
-                after.as_slice().to_vec()
-            },
+            |reset| &reset.matrix * &x + reset.offset.at(drive, view.phase),
         );
         // The integrand before the switch in place of that after it, for as long as it moves.
         for (regime, x, by) in [(from, &x, by), (view.switch.to, &after, -by)] {
-            let value = |o: &VariedOutput| o.value[regime].at(drive, x, view.phase).into();
+            let value =
+                |o: &VariedOutput| o.value[regime].at(drive, x.as_slice(), view.phase).into();
             let values: Vec<Dual> = self.outputs.iter().map(value).collect();
             self.add_node(Dual::new(0.0, by), view.phase, &values);
         }

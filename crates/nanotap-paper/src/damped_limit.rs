@@ -6,8 +6,8 @@ use nanotap_dynamics::{ClassifyOptions, MotionKind, ShootingOptions, classify, c
 use super::PaperError;
 use nanotap::model::Model;
 use nanotap::model::cantilever::Cantilever;
+use nanotap::model::model_map::ModelMap;
 use nanotap::model::parameter::Parameter;
-use nanotap::model::strobe::Strobe;
 use nanotap::study::orbit::{OrbitReport, report};
 
 /// Halvings of the damping before it is set to zero.
@@ -31,7 +31,11 @@ pub(super) fn response(undamped: &Cantilever) -> Result<(Model, OrbitReport), Pa
     };
     let model = damped(1.0)?;
     let rest = vec![0.0; model.dimension()];
-    let classified = classify(&mut Strobe::new(&model), &rest, &ClassifyOptions::default());
+    let classified = classify(
+        &mut ModelMap::new(&model),
+        &rest,
+        &ClassifyOptions::default(),
+    );
     let (MotionKind::Periodic(mut orbit) | MotionKind::TransientChaos { mut orbit, .. }) =
         classified.kind
     else {
@@ -45,7 +49,7 @@ pub(super) fn response(undamped: &Cantilever) -> Result<(Model, OrbitReport), Pa
         model = damped(factor)?;
         let start = orbit.states[0].clone();
         orbit = close_orbit(
-            &mut Strobe::new(&model),
+            &mut ModelMap::new(&model),
             &start,
             orbit.period,
             &ShootingOptions::default(),

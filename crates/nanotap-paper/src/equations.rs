@@ -395,7 +395,7 @@ pub(super) fn scaling(_: &Runs<'_>, section: Section) -> Result<Section, PaperEr
     use nanotap_dynamics::StroboscopicMap as _;
     let map_of = |alpha2: f64| -> Result<_, PaperError> {
         let case = Cantilever::paper().with(Parameter::Alpha2, alpha2);
-        Ok(nanotap::model::strobe::Strobe::new(
+        Ok(nanotap::model::model_map::ModelMap::new(
             &nanotap::model::Model::cantilever(&case)?,
         ))
     };

@@ -11,7 +11,7 @@ use super::frequency_sweep::maxima;
 use super::runs::Runs;
 use super::section::Table;
 use nanotap::case::{Case, Key};
-use nanotap::model::strobe::Strobe;
+use nanotap::model::model_map::ModelMap;
 
 /// The key of the drive frequency.
 pub(super) const OMEGA: Key = Key::Omega;
@@ -43,7 +43,7 @@ impl FollowedBranch {
     ) -> Result<Self, PaperError> {
         let model = case.with(OMEGA, entry).model()?;
         let classified = classify(
-            &mut Strobe::new(&model),
+            &mut ModelMap::new(&model),
             &vec![0.0; model.dimension()],
             &ClassifyOptions::default(),
         );

@@ -14,7 +14,7 @@ use super::PaperError;
 use super::runs::{Runs, SEED};
 use nanotap::case::{Case, Key};
 use nanotap::model::Model;
-use nanotap::model::strobe::Strobe;
+use nanotap::model::model_map::ModelMap;
 use nanotap::study::start_box::default_box;
 
 /// Drive periods for which maxima of a motion that does not repeat are drawn.
@@ -139,7 +139,12 @@ fn column(subject: &Case, at: f64, starts: usize) -> Result<Column, PaperError> 
         ..CensusOptions::default()
     };
     let starts = area.starts(SEED, starts);
-    let found = census(&Strobe::new(&model), &starts, &options, &Control::default());
+    let found = census(
+        &ModelMap::new(&model),
+        &starts,
+        &options,
+        &Control::default(),
+    );
     let seen = |kind, state: &[f64], periods| -> Result<FoundMotion, PaperError> {
         let maxima = maxima(&model, state, periods)?;
         Ok(FoundMotion { kind, maxima })
@@ -157,7 +162,7 @@ fn column(subject: &Case, at: f64, starts: usize) -> Result<Column, PaperError> 
     }
     if let Some((start, _)) = found.undecided.first() {
         let mut state = starts[*start].clone();
-        let mut map = Strobe::new(&model);
+        let mut map = ModelMap::new(&model);
         for _ in 0..options.classify.max_transient {
             map.advance(&mut state).map_err(not_drawn)?;
         }
@@ -319,7 +324,7 @@ mod tests {
         )
         .unwrap();
         let classified = classify(
-            &mut Strobe::new(&model),
+            &mut ModelMap::new(&model),
             &[0.0; 6],
             &ClassifyOptions::default(),
         );

@@ -16,9 +16,9 @@ use super::section::{Picture, Section, Table};
 use super::{PaperError, rerun};
 use nanotap::case::{Case, Key};
 use nanotap::model::Model;
+use nanotap::model::model_map::ModelMap;
 use nanotap::model::oscillator::{Oscillator, OscillatorParameter, Stop};
-use nanotap::model::strobe::Strobe;
-use nanotap::observe::{Set, measure};
+use nanotap::observe::{ObservableSet, measure};
 use nanotap::study::start_box::default_box;
 
 /// The coefficient of restitution.
@@ -206,7 +206,7 @@ impl Orbit {
     fn find(oscillator: Oscillator) -> Result<Self, PaperError> {
         let what = format!("a period-1 orbit at ω = {ENTRY}");
         let model = oscillator.model()?;
-        let mut map = Strobe::new(&model);
+        let mut map = ModelMap::new(&model);
         let area = default_box(&model).map_err(PaperError::failed(&what))?;
         let found = area.starts(SEED, 32).into_iter().find_map(|start| {
             match classify(&mut map, &start, &ClassifyOptions::default()).kind {
@@ -225,7 +225,7 @@ impl Orbit {
     fn near(oscillator: Oscillator, guess: &Self) -> Result<Self, PaperError> {
         let model = oscillator.model()?;
         let orbit = close_orbit(
-            &mut Strobe::new(&model),
+            &mut ModelMap::new(&model),
             &guess.closed.states[0],
             1,
             &ShootingOptions::default(),
@@ -239,7 +239,7 @@ impl Orbit {
         model: &Model,
         orbit: PeriodicOrbit,
     ) -> Result<Self, PaperError> {
-        let o = measure(model, &orbit.states[0], 1, Set::ALL)
+        let o = measure(model, &orbit.states[0], 1, ObservableSet::ALL)
             .map_err(PaperError::failed("the orbit's extrema"))?;
         Ok(Self {
             oscillator,

@@ -15,8 +15,8 @@ use super::{PaperError, rerun};
 use nanotap::case::Case;
 use nanotap::model::Model;
 use nanotap::model::cantilever::Cantilever;
-use nanotap::model::strobe::Strobe;
-use nanotap::observe::{Observables, Set, measure};
+use nanotap::model::model_map::ModelMap;
+use nanotap::observe::{ObservableSet, Observables, measure};
 use nanotap::study::orbit::{OrbitReport, report};
 use nanotap::study::proof::Prover;
 use nanotap::study::start_box::default_box;
@@ -112,7 +112,7 @@ impl<'a> Runs<'a> {
             },
             ..CensusOptions::default()
         };
-        let map = Strobe::new(&model);
+        let map = ModelMap::new(&model);
         let census =
             self.controlled(|control| census(&map, &starts.starts(SEED, count), &options, control));
         if census.cancelled {
@@ -147,7 +147,7 @@ impl<'a> Runs<'a> {
         if let Some(known) = self.found.borrow().iter().find(same) {
             return Ok(Rc::clone(&known.orbits));
         }
-        let map = Strobe::new(&counted.model);
+        let map = ModelMap::new(&counted.model);
         let count = self.either(64, 12);
         let orbits: Rc<[PeriodicOrbit]> = self
             .controlled(|control| find_orbits(&map, &starts.starts(SEED, count), &search, control))
@@ -256,7 +256,7 @@ impl Counted {
 
     /// Observables of a motion that does not repeat, over [`OBSERVED_PERIODS`] periods from `state`.
     pub(super) fn watch(&self, state: &[f64]) -> Result<Observables, PaperError> {
-        measure(&self.model, state, OBSERVED_PERIODS, Set::ALL)
+        measure(&self.model, state, OBSERVED_PERIODS, ObservableSet::ALL)
             .map_err(PaperError::failed("a run to observe"))
     }
 

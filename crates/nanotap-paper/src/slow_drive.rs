@@ -18,8 +18,8 @@ use super::time_step::Grid;
 use nanotap::case::Case;
 use nanotap::model::Model;
 use nanotap::model::cantilever::Cantilever;
+use nanotap::model::model_map::ModelMap;
 use nanotap::model::parameter::Parameter;
-use nanotap::model::strobe::Strobe;
 use nanotap::study::start_box::default_box;
 
 /// Longest period of the unstable orbits that are searched for.
@@ -385,7 +385,7 @@ fn period_three(subject: &Case) -> Result<Option<(f64, PeriodicOrbit)>, PaperErr
     let omega = 3.15;
     let model = subject.with(OMEGA, omega).model()?;
     let area = default_box(&model).map_err(PaperError::failed("the box of initial states"))?;
-    let mut map = Strobe::new(&model);
+    let mut map = ModelMap::new(&model);
     let found = area.starts(SEED, 32).into_iter().find_map(|start| {
         match classify(&mut map, &start, &ClassifyOptions::default()).kind {
             MotionKind::Periodic(orbit) if orbit.period == 3 => Some(orbit),
@@ -409,7 +409,7 @@ struct Returns {
 impl Returns {
     fn of(model: &Model, state: &[f64], watched: usize) -> Result<Self, PaperError> {
         let failed = PaperError::failed("a run on the chaotic attractor");
-        let mut map = Strobe::new(model);
+        let mut map = ModelMap::new(model);
         let mut states = vec![state.to_vec()];
         for k in 0..watched {
             let mut next = states[k].clone();

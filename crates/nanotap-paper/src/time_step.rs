@@ -13,8 +13,8 @@ use super::section::{Picture, Section, Table};
 use super::{PaperError, rerun};
 use nanotap::model::Model;
 use nanotap::model::cantilever::Cantilever;
+use nanotap::model::model_map::ModelMap;
 use nanotap::model::parameter::Parameter;
-use nanotap::model::strobe::Strobe;
 
 /// Longest period that is searched for.
 pub(super) const MAX_PERIOD: usize = 64;
@@ -48,7 +48,7 @@ pub(super) struct GridMotion {
     tip_range: (f64, f64),
     /// State at drive phase 0.
     pub(super) state: Vec<f64>,
-    /// Strobe states of one repetition (or of [`MAX_PERIOD`] drive periods).
+    /// ModelMap states of one repetition (or of [`MAX_PERIOD`] drive periods).
     strobes: Vec<Vec<f64>>,
     /// Number of initial states that lead to it.
     pub(super) count: usize,
@@ -343,7 +343,7 @@ impl GridMotion {
     /// Whether the exact flow leads to a period-1 orbit, and whether Newton's method finds an exact
     /// orbit of the same period from the strobe states.
     fn exactly(&self, model: &Model) -> (bool, bool) {
-        let mut map = Strobe::new(model);
+        let mut map = ModelMap::new(model);
         let classified = classify(&mut map, &self.state, &ClassifyOptions::default());
         let vanishes = matches!(&classified.kind, MotionKind::Periodic(orbit) if orbit.period == 1);
         let closes = self.period.is_some_and(|period| {

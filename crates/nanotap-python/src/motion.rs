@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use nanotap::case::Case;
 use nanotap::control::Control;
-use nanotap::map::MOST_NUMBERS;
+use nanotap::map::MAX_NUMBERS;
 use nanotap::model::Model;
 use nanotap::model::beam::Modes;
 use nanotap::observe::time_series::{self, state_names};
@@ -72,9 +72,9 @@ fn rows(
     let numbers = periods
         .saturating_mul(resolution)
         .saturating_mul(time_series::columns(model).len());
-    if numbers > MOST_NUMBERS {
+    if numbers > MAX_NUMBERS {
         let words =
-            format!("a time series of {numbers} numbers is too long; {MOST_NUMBERS} at most");
+            format!("a time series of {numbers} numbers is too long; {MAX_NUMBERS} at most");
         return Err(Failure(Error::input(
             words,
             "take fewer {periods} or a lower {resolution}",

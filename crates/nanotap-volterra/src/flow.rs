@@ -92,7 +92,7 @@ pub struct Flow {
 }
 
 impl Clone for Flow {
-    /// With a system of its own: threads that counted their use of one at every period would wait for
+    /// With a separate system: threads that counted references to one at every period would wait for
     /// each other.
     fn clone(&self) -> Self {
         Self {

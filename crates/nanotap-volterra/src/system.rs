@@ -37,7 +37,7 @@ pub struct Drive {
 /// How well steps are resolved.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Options {
-    /// How much the error of one step may move the gap. Rounding sets a floor of its own.
+    /// How much the error of one step may move the gap. Rounding sets a separate floor.
     pub tolerance: f64,
     /// The largest number of steps of one run.
     pub max_steps: usize,

@@ -62,7 +62,7 @@ pub struct Reading<'a> {
     pub shifts: &'a [f64],
     /// Of every output.
     pub values: &'a [f64],
-    /// Of every output its changes, one after the other.
+    /// The changes of every output, output by output.
     pub changes: &'a [f64],
 }
 
@@ -91,7 +91,7 @@ struct Reader {
     changes: Vec<ChangeReader>,
 }
 
-/// Its change with one column, beside what the change of the motion does.
+/// Its change with one column, apart from that through the motion.
 struct ChangeReader {
     row: Vec<f64>,
     constant: f64,

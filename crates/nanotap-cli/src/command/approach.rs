@@ -10,7 +10,7 @@ use nanotap::case::units::Units;
 use nanotap::figure::approach::approach_figure;
 use nanotap::number::shortest;
 use nanotap::observe::table::shown_phase;
-use nanotap::observe::{Observables, Set, columns};
+use nanotap::observe::{ObservableSet, Observables, columns};
 use nanotap::study::approach::{ApproachOptions, ApproachPoint, ApproachReport, ApproachStudy};
 use nanotap::study::frequency_modulation::{COLUMNS, ModulatedColumn, ModulationReport};
 use nanotap::study::simulate::Classification;
@@ -91,7 +91,7 @@ fn csv(report: &ApproachReport, units: &Units) -> String {
     ]
     .map(str::to_owned)
     .to_vec();
-    header.extend(columns::columns(Set::COMMON, physical));
+    header.extend(columns::columns(ObservableSet::COMMON, physical));
     if physical {
         header.push("zc (m)".to_owned());
     }
@@ -105,7 +105,11 @@ fn csv(report: &ApproachReport, units: &Units) -> String {
     for p in report.table.iter().chain(&report.coexisting) {
         let si = physical.then_some(p.physical.as_ref());
         let mut row = vec![p.spectral_radius];
-        row.extend(columns::cells(Set::COMMON, p.observables.as_ref(), si));
+        row.extend(columns::cells(
+            ObservableSet::COMMON,
+            p.observables.as_ref(),
+            si,
+        ));
         if physical {
             row.push(p.zc);
         }

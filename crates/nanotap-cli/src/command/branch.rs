@@ -7,7 +7,7 @@ use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use nanotap::case::physical::Kind;
 use nanotap::figure::branch::{Shown, case_figure};
 use nanotap::number::shortest;
-use nanotap::observe::{Set, columns, time_series};
+use nanotap::observe::{ObservableSet, columns, time_series};
 use nanotap::study::branch::{BranchOptions, BranchReport, BranchStudy, PointReport};
 use nanotap::study::orbit::spectral_radius;
 
@@ -60,7 +60,7 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     arguments.out.check()?;
     arguments.plot.check()?;
     let case = GivenCase::of(&arguments.case, output)?;
-    case.say_held(&[options.range(&case)?.key], output);
+    case.note_constants(&[options.range(&case)?.key], output);
     if let Some(shown) = arguments.show.and_then(Shown::observable) {
         options.observables = options.observables.with(shown);
     }
@@ -107,7 +107,7 @@ fn shorten(report: &mut BranchReport, output: &Output) {
 
 /// A row a point, branch by branch; `kind` is empty but for bifurcations, which follow the
 /// points of their branch.
-fn csv(report: &BranchReport, observed: Set, names: &[String]) -> String {
+fn csv(report: &BranchReport, observed: ObservableSet, names: &[String]) -> String {
     let physical = report.points.iter().any(|p| p.physical.is_some());
     let mut header: Vec<String> = [
         "branch",

@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use clap::Args;
 use nanotap::figure::motion::orbit_figure;
 use nanotap::model::Model;
-use nanotap::observe::{PhysicalMotion, Set, time_series};
+use nanotap::observe::{ObservableSet, PhysicalMotion, time_series};
 use nanotap::study::orbit::{MAX_DETERMINANT_DEFECT, OrbitOptions, OrbitReport, OrbitStudy};
 
 use crate::arguments::{CaseArguments, OutArgument, PlotArgument};
@@ -47,7 +47,7 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     let found = progress::study::<OrbitStudy>(&case, &request, &ThreadsArgument::default())?;
     let found = &found;
     for key in request.derivatives.iter().flat_map(|name| case.key(name)) {
-        case.say_held(&[key], output);
+        case.note_constants(&[key], output);
     }
     let orbit = &found.motion;
     if let Some(asked) = request.period.filter(|n| *n != orbit.period) {
@@ -111,7 +111,12 @@ fn harmonics_csv(orbit: &OrbitReport, physical: Option<&PhysicalMotion>) -> Stri
     csv
 }
 
-fn text(case: &GivenCase, model: &Model, orbit: &OrbitReport, chosen: Option<Set>) -> String {
+fn text(
+    case: &GivenCase,
+    model: &Model,
+    orbit: &OrbitReport,
+    chosen: Option<ObservableSet>,
+) -> String {
     let units = case.units();
     let heading = format!("{}: {}", case.title(), case.summary());
     let mut text = format!("{}\n\n", style::bold(&heading));

@@ -6,7 +6,7 @@ use nanotap::case::physical::Kind;
 use nanotap::case::units::Units;
 use nanotap::figure::motion::{fixed_step_figure, simulation_figure};
 use nanotap::model::Model;
-use nanotap::observe::Set;
+use nanotap::observe::ObservableSet;
 use nanotap::study::fixed_step::FixedStepRun;
 use nanotap::study::simulate::{Classification, SimulateReport, SimulateStudy, Simulation};
 
@@ -56,7 +56,12 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     })
 }
 
-fn text(case: &GivenCase, model: &Model, run: &Simulation, chosen: Option<Set>) -> String {
+fn text(
+    case: &GivenCase,
+    model: &Model,
+    run: &Simulation,
+    chosen: Option<ObservableSet>,
+) -> String {
     let units = case.units();
     let heading = format!("{}: {}", case.title(), case.summary());
     let mut text = format!("{}\n\n", style::bold(&heading));

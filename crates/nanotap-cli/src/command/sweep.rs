@@ -51,7 +51,7 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     let case = GivenCase::of(&arguments.case, output)?;
     let over = options.over.parse(&case)?;
     let keys: Vec<Key> = over.iter().map(|over| over.key).collect();
-    case.say_held(&keys, output);
+    case.note_constants(&keys, output);
     let names: Vec<&str> = keys.iter().map(|key| key.path()).collect();
     let name = derived_name(
         arguments.case.file.as_deref(),

@@ -267,16 +267,7 @@ impl Accumulator {
 const DROWNED: f64 = 128.0 * f64::EPSILON;
 
 fn signal(plan: &Plan, segment: &SegmentView<'_>, channel: usize) -> Signal {
-    let output = &plan.regimes[segment.regime].outputs[channel];
-    let drive = segment.system.drive();
-    Signal::of(
-        segment.regime(),
-        drive,
-        output,
-        segment.modal,
-        segment.phase,
-        segment.length,
-    )
+    segment.signal(&plan.regimes[segment.regime].outputs[channel])
 }
 
 impl Observer for Accumulator {

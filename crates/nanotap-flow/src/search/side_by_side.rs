@@ -1,11 +1,11 @@
 //! The walk along the points of a table for eight signals side by side, a lane each.
 //!
-//! In a lane of its own a signal cannot stop early, so the proof has to be cheap everywhere. Most of a
+//! In a separate lane a signal cannot stop early, so the proof has to be cheap everywhere. Most of a
 //! flight is far from zero, and there the slow terms' values are enough: between two points they keep
 //! above the lower one, less than what curvature takes from a chord, and every other term takes its
 //! amplitude at most. What that leaves open, mostly the first interval of a flight and the last ones,
 //! is looked at as in the walk of a single signal ([`walk`](super::walk)), with all followed terms, by
-//! the quintic's Bernstein coefficients: each lane looks at an open interval of its own then.
+//! the quintic's Bernstein coefficients: each lane then examines its own next open interval.
 
 use super::interval::Quintic;
 use super::table::Table;

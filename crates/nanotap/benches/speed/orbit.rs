@@ -2,7 +2,7 @@
 
 use divan::Bencher;
 use nanotap::model::cantilever::Cantilever;
-use nanotap::model::strobe::Strobe;
+use nanotap::model::model_map::ModelMap;
 use nanotap_dynamics::{ShootingOptions, close_orbit};
 
 use crate::cases::{self, MODES};
@@ -14,7 +14,7 @@ fn newton(bencher: Bencher<'_, '_>, modes: usize) {
         omega: 3.5,
         ..cases::paper(modes)
     };
-    let mut map = Strobe::new(&cases::model(&case));
+    let mut map = ModelMap::new(&cases::model(&case));
     let mut state = vec![0.0; 2 * modes];
     cases::settled(&case).state(&mut state);
     let options = ShootingOptions::default();

@@ -3,7 +3,7 @@
 use divan::Bencher;
 use divan::counter::ItemsCount;
 use nanotap::model::cantilever::Cantilever;
-use nanotap::observe::{Set, measure};
+use nanotap::observe::{ObservableSet, measure};
 use nanotap_flow::{Ensemble, Flow, FlowError};
 use std::sync::Arc;
 
@@ -92,16 +92,16 @@ fn together(
 /// The same, with the observables that sweeps record.
 #[divan::bench(args = MODES)]
 fn measured(bencher: Bencher<'_, '_>, modes: usize) {
-    recorded(bencher, modes, Set::COMMON);
+    recorded(bencher, modes, ObservableSet::COMMON);
 }
 
 /// The same, with all observables, including the beam's clearance.
 #[divan::bench(args = MODES)]
 fn measured_all(bencher: Bencher<'_, '_>, modes: usize) {
-    recorded(bencher, modes, Set::ALL);
+    recorded(bencher, modes, ObservableSet::ALL);
 }
 
-fn recorded(bencher: Bencher<'_, '_>, modes: usize, set: Set) {
+fn recorded(bencher: Bencher<'_, '_>, modes: usize, set: ObservableSet) {
     let model = cases::model(&cases::paper(modes));
     let mut state = vec![0.0; 2 * modes];
     damped(modes, DAMPINGS[1]).state(&mut state);

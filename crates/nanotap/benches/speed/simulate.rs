@@ -2,7 +2,7 @@
 
 use divan::Bencher;
 use divan::counter::ItemsCount;
-use nanotap::observe::Set;
+use nanotap::observe::ObservableSet;
 use nanotap::study::simulate::{SimulateOptions, simulate};
 
 use crate::cases;
@@ -23,16 +23,16 @@ fn bare(bencher: Bencher<'_, '_>, modes: usize) {
 /// The same as a run that keeps its last state only.
 #[divan::bench(args = [3], sample_count = 3, sample_size = 1)]
 fn strobe_only(bencher: Bencher<'_, '_>, modes: usize) {
-    run(bencher, modes, Set::NONE);
+    run(bencher, modes, ObservableSet::NONE);
 }
 
 /// The same with all observables.
 #[divan::bench(args = [3], sample_count = 3, sample_size = 1)]
 fn everything(bencher: Bencher<'_, '_>, modes: usize) {
-    run(bencher, modes, Set::ALL);
+    run(bencher, modes, ObservableSet::ALL);
 }
 
-fn run(bencher: Bencher<'_, '_>, modes: usize, observables: Set) {
+fn run(bencher: Bencher<'_, '_>, modes: usize, observables: ObservableSet) {
     let model = cases::model(&cases::paper(modes));
     let options = SimulateOptions {
         periods: PERIODS,

@@ -13,7 +13,7 @@
 //!
 //! A value that *varies* in a study ([`Case::with`]: a sweep, a branch, a window) changes alone, as
 //! one control of an instrument does. Constant are the drive amplitude (the voltage of a piezo),
-//! the distance of the sample, g₀, and the ratio of a second tone to the first. [`Case::held`]
+//! the distance of the sample, g₀, and the ratio of a second tone to the first. [`Case::implied_constants`]
 //! lists these numbers; stated together with the varied value they give the same point.
 
 pub mod document;
@@ -66,7 +66,7 @@ pub const DEFAULT_MODES: usize = 3;
 #[derive(Clone, Debug, PartialEq)]
 pub struct Case {
     title: Arc<str>,
-    what: What,
+    what: CaseKind,
     /// Table `[scan]` of its file, with the words that were set in addition.
     scan: Option<Arc<serde_json::Map<String, serde_json::Value>>>,
     /// Folder to which names of files in `[scan]` are relative; `None` where files are not read.
@@ -77,7 +77,7 @@ pub struct Case {
 
 /// Kind of a case, with its data.
 #[derive(Clone, Debug, PartialEq)]
-enum What {
+enum CaseKind {
     Cantilever(Cantilever),
     Oscillator(Oscillator),
     Quantities(Box<Quantities>),
@@ -99,18 +99,18 @@ pub struct ParameterUnit {
 
 impl From<Cantilever> for Case {
     fn from(cantilever: Cantilever) -> Self {
-        Self::new(What::Cantilever(cantilever))
+        Self::new(CaseKind::Cantilever(cantilever))
     }
 }
 
 impl From<Oscillator> for Case {
     fn from(oscillator: Oscillator) -> Self {
-        Self::new(What::Oscillator(oscillator))
+        Self::new(CaseKind::Oscillator(oscillator))
     }
 }
 
 impl Case {
-    fn new(what: What) -> Self {
+    fn new(what: CaseKind) -> Self {
         Self {
             title: "case".into(),
             what,
@@ -160,12 +160,12 @@ impl Case {
         let title = source.as_ref().map(|source| source.name.clone());
         let (described, scan) = file::parse_with_scan(source, overrides)?;
         let what = match described {
-            Described::Cantilever(cantilever) => What::Cantilever(cantilever),
-            Described::Oscillator(oscillator) => What::Oscillator(oscillator),
+            Described::Cantilever(cantilever) => CaseKind::Cantilever(cantilever),
+            Described::Oscillator(oscillator) => CaseKind::Oscillator(oscillator),
             Described::Physical(stated) => {
                 let catalogue = Arc::clone(catalogue);
                 let quantities = Quantities::new(stated, catalogue);
-                What::Quantities(Box::new(quantities.possible()?))
+                CaseKind::Quantities(Box::new(quantities.validated()?))
             }
         };
         let case = Self {
@@ -234,7 +234,7 @@ impl Case {
             text: self.to_toml(),
         };
         let catalogue = match &self.what {
-            What::Quantities(quantities) => quantities.catalogue(),
+            CaseKind::Quantities(quantities) => quantities.catalogue(),
             _ => Catalogue::shared(),
         };
         let restated = Self::parse_with(Some(source), words, &catalogue)?;
@@ -258,16 +258,16 @@ impl Case {
     /// invalid.
     pub fn cantilever(&self) -> Option<&Cantilever> {
         match &self.what {
-            What::Cantilever(cantilever) => Some(cantilever),
-            What::Oscillator(_) => None,
-            What::Quantities(_) => self.physical().map(|view| &view.cantilever),
+            CaseKind::Cantilever(cantilever) => Some(cantilever),
+            CaseKind::Oscillator(_) => None,
+            CaseKind::Quantities(_) => self.physical().map(|view| &view.cantilever),
         }
     }
 
     /// The oscillator, if the case is one.
     pub const fn oscillator(&self) -> Option<&Oscillator> {
         match &self.what {
-            What::Oscillator(oscillator) => Some(oscillator),
+            CaseKind::Oscillator(oscillator) => Some(oscillator),
             _ => None,
         }
     }
@@ -275,19 +275,19 @@ impl Case {
     /// The view in SI, for a valid physical case.
     pub fn physical(&self) -> Option<&Physical> {
         match &self.what {
-            What::Quantities(quantities) => quantities.view.as_deref().ok(),
+            CaseKind::Quantities(quantities) => quantities.view.as_deref().ok(),
             _ => None,
         }
     }
 
     /// True if it was stated in physical quantities.
     pub const fn is_physical(&self) -> bool {
-        matches!(self.what, What::Quantities(_))
+        matches!(self.what, CaseKind::Quantities(_))
     }
 
     /// Assumptions and warnings.
     pub fn remarks(&self) -> Vec<Remark> {
-        let (What::Quantities(quantities), Some(view)) = (&self.what, self.physical()) else {
+        let (CaseKind::Quantities(quantities), Some(view)) = (&self.what, self.physical()) else {
             return Vec::new();
         };
         let mut remarks = view.remarks(quantities.reader());
@@ -298,7 +298,7 @@ impl Case {
 
     /// Notes about entries of the file that overrides replace.
     pub fn replaced(&self) -> Vec<Remark> {
-        let What::Quantities(quantities) = &self.what else {
+        let CaseKind::Quantities(quantities) = &self.what else {
             return Vec::new();
         };
         let replaced = quantities.stated.origin.replaced.iter();
@@ -313,7 +313,7 @@ impl Case {
     /// Keys of the numbers of its equations.
     pub fn keys(&self) -> Vec<Key> {
         match &self.what {
-            What::Oscillator(oscillator) => crate::model::oscillator::OscillatorParameter::ALL
+            CaseKind::Oscillator(oscillator) => crate::model::oscillator::OscillatorParameter::ALL
                 .into_iter()
                 .filter(|parameter| oscillator.get(*parameter).is_some())
                 .map(Key::of_oscillator)
@@ -355,7 +355,7 @@ impl Case {
 
     fn model_kind(&self) -> ModelKind {
         match &self.what {
-            What::Oscillator(oscillator) => match oscillator.stop {
+            CaseKind::Oscillator(oscillator) => match oscillator.stop {
                 Stop::Soft { .. } => ModelKind::VibroImpact,
                 Stop::Rigid { .. } => ModelKind::Impact,
             },
@@ -366,15 +366,15 @@ impl Case {
     /// Value of a key, in SI for a physical quantity; NaN if the case does not have it.
     pub fn get(&self, key: Key) -> f64 {
         let found = match (&self.what, key.entry().means) {
-            (What::Oscillator(oscillator), key::Means::Oscillator(parameter)) => {
+            (CaseKind::Oscillator(oscillator), key::Means::Oscillator(parameter)) => {
                 oscillator.get(parameter)
             }
-            (What::Oscillator(_), _) => None,
+            (CaseKind::Oscillator(_), _) => None,
             (_, key::Means::Cantilever(parameter)) => {
                 self.cantilever().map(|case| case.get(parameter))
             }
             (_, _) if key == Key::Modes => self.cantilever().map(|case| case.modes as f64),
-            (What::Quantities(quantities), _) => quantities.get(key),
+            (CaseKind::Quantities(quantities), _) => quantities.get(key),
             _ => None,
         };
         found.unwrap_or(f64::NAN)
@@ -383,7 +383,7 @@ impl Case {
     /// The stated value of a key of a physical case.
     pub fn stated(&self, key: Key) -> Option<&Value> {
         match &self.what {
-            What::Quantities(quantities) => quantities.stated.get(key),
+            CaseKind::Quantities(quantities) => quantities.stated.get(key),
             _ => None,
         }
     }
@@ -394,18 +394,18 @@ impl Case {
     #[must_use]
     pub fn with(&self, key: Key, value: f64) -> Self {
         let what = match (&self.what, key.entry().means) {
-            (What::Cantilever(cantilever), key::Means::Cantilever(parameter)) => {
-                What::Cantilever(cantilever.clone().with(parameter, value))
+            (CaseKind::Cantilever(cantilever), key::Means::Cantilever(parameter)) => {
+                CaseKind::Cantilever(cantilever.clone().with(parameter, value))
             }
-            (What::Cantilever(cantilever), _) if key == Key::Modes => {
-                What::Cantilever(cantilever.clone().with_modes(value as usize))
+            (CaseKind::Cantilever(cantilever), _) if key == Key::Modes => {
+                CaseKind::Cantilever(cantilever.clone().with_modes(value as usize))
             }
-            (What::Oscillator(oscillator), key::Means::Oscillator(parameter)) => {
-                What::Oscillator(oscillator.with(parameter, value))
+            (CaseKind::Oscillator(oscillator), key::Means::Oscillator(parameter)) => {
+                CaseKind::Oscillator(oscillator.with(parameter, value))
             }
-            (What::Quantities(quantities), means) => match means {
+            (CaseKind::Quantities(quantities), means) => match means {
                 key::Means::Oscillator(_) => return self.clone(),
-                _ => What::Quantities(Box::new(quantities.with(key, value))),
+                _ => CaseKind::Quantities(Box::new(quantities.with(key, value))),
             },
             _ => return self.clone(),
         };
@@ -418,14 +418,14 @@ impl Case {
     /// The numbers that stay constant while `key` varies, although they were not stated: stated
     /// together with the value of `key` they give the same case. Empty if the stated values stay
     /// constant.
-    pub fn held(&self, key: Key) -> Vec<(Key, f64)> {
-        let What::Quantities(quantities) = &self.what else {
+    pub fn implied_constants(&self, key: Key) -> Vec<(Key, f64)> {
+        let CaseKind::Quantities(quantities) = &self.what else {
             return Vec::new();
         };
         let (true, Ok(view)) = (key.is_physical(), &quantities.view) else {
             return Vec::new();
         };
-        let held = view.held(&quantities.stated);
+        let held = view.implied_constants(&quantities.stated);
         held.iter()
             .filter(|(other, value)| {
                 let same = quantities.stated.get(*other) == Some(*value);
@@ -442,9 +442,9 @@ impl Case {
     /// If the case is invalid or has no solution in closed form.
     pub fn model(&self) -> Result<Model, CaseError> {
         let model = match &self.what {
-            What::Cantilever(cantilever) => Model::cantilever(cantilever)?,
-            What::Oscillator(oscillator) => oscillator.model()?,
-            What::Quantities(quantities) => {
+            CaseKind::Cantilever(cantilever) => Model::cantilever(cantilever)?,
+            CaseKind::Oscillator(oscillator) => oscillator.model()?,
+            CaseKind::Quantities(quantities) => {
                 let model = Model::cantilever(&quantities.view()?.cantilever)?;
                 let start = quantities.start.as_ref();
                 Model {
@@ -492,7 +492,7 @@ impl Case {
 
     fn oscillator_parameter(&self, key: Key) -> Option<(&Oscillator, OscillatorParameter)> {
         match (&self.what, key.entry().means) {
-            (What::Oscillator(oscillator), key::Means::Oscillator(parameter)) => {
+            (CaseKind::Oscillator(oscillator), key::Means::Oscillator(parameter)) => {
                 Some((oscillator, parameter))
             }
             _ => None,
@@ -502,9 +502,9 @@ impl Case {
     /// The parameters of the cantilever that depend on a key, with their derivatives.
     fn parameters_by(&self, key: Key) -> Result<Slopes, CaseError> {
         match (&self.what, key.entry().means) {
-            (What::Oscillator(_), _) => Ok(Slopes::default()),
+            (CaseKind::Oscillator(_), _) => Ok(Slopes::default()),
             (_, key::Means::Cantilever(parameter)) => Ok((vec![(parameter, 1.0)], Vec::new())),
-            (What::Quantities(quantities), _) if key.is_physical() => {
+            (CaseKind::Quantities(quantities), _) if key.is_physical() => {
                 quantities.view()?;
                 Ok(quantities.derivatives(key)?)
             }
@@ -527,7 +527,7 @@ impl Case {
         &self,
         key: Key,
     ) -> Result<Option<(Scales, Scales, f64)>, CaseError> {
-        let What::Quantities(quantities) = &self.what else {
+        let CaseKind::Quantities(quantities) = &self.what else {
             return Ok(None);
         };
         if !key.is_physical() {
@@ -616,7 +616,7 @@ impl Case {
     /// Key of the tip–sample distance in the model's unit of length.
     pub const fn gap_key(&self) -> Key {
         match self.what {
-            What::Oscillator(_) => Key::OscillatorGap,
+            CaseKind::Oscillator(_) => Key::OscillatorGap,
             _ => Key::Alpha5,
         }
     }
@@ -632,7 +632,7 @@ impl Case {
     /// Keys of the frequency and strength of the drive in the model's units.
     pub const fn drive_keys(&self) -> [Key; 2] {
         match self.what {
-            What::Oscillator(_) => [Key::OscillatorOmega, Key::Forcing],
+            CaseKind::Oscillator(_) => [Key::OscillatorOmega, Key::Forcing],
             _ => [Key::Omega, Key::Alpha2],
         }
     }
@@ -640,7 +640,7 @@ impl Case {
     /// Drive frequency in the model's unit; NaN if the physical quantities are invalid.
     pub fn omega(&self) -> f64 {
         match &self.what {
-            What::Oscillator(oscillator) => oscillator.omega,
+            CaseKind::Oscillator(oscillator) => oscillator.omega,
             _ => self.cantilever().map_or(f64::NAN, |case| case.omega),
         }
     }
@@ -653,7 +653,7 @@ impl Case {
     /// True if the distance follows from a setpoint: `drive.setpoint` without `gap.tip`.
     pub fn leaves_distance_to_setpoint(&self) -> bool {
         match &self.what {
-            What::Quantities(quantities) => {
+            CaseKind::Quantities(quantities) => {
                 quantities.stated.has(Key::DriveSetpoint) && !quantities.stated.has(Key::GapTip)
             }
             _ => false,
@@ -663,7 +663,7 @@ impl Case {
     /// The same case with its distance following from the setpoint, if that of `original` does.
     #[must_use]
     pub(crate) fn leaving_distance_as(self, original: &Self) -> Self {
-        let (What::Quantities(quantities), Some(setpoint)) =
+        let (CaseKind::Quantities(quantities), Some(setpoint)) =
             (&self.what, original.stated(Key::DriveSetpoint))
         else {
             return self;
@@ -675,7 +675,7 @@ impl Case {
         quantities.stated.remove(Key::GapTip);
         quantities.stated.put(Key::DriveSetpoint, setpoint.clone());
         Self {
-            what: What::Quantities(Box::new(quantities.mapped(true))),
+            what: CaseKind::Quantities(Box::new(quantities.mapped(true))),
             ..self
         }
     }
@@ -692,7 +692,7 @@ impl Case {
         note: Remark,
         state: Vec<f64>,
     ) -> Result<Self, CaseFileError> {
-        let What::Quantities(quantities) = &self.what else {
+        let CaseKind::Quantities(quantities) = &self.what else {
             return Ok(self.clone());
         };
         let mut quantities = quantities.clone();
@@ -706,7 +706,7 @@ impl Case {
         quantities.notes.push(note);
         quantities.start = Some(state);
         Ok(Self {
-            what: What::Quantities(Box::new(quantities.mapped(true).possible()?)),
+            what: CaseKind::Quantities(Box::new(quantities.mapped(true).validated()?)),
             ..self.clone()
         })
     }
@@ -731,9 +731,9 @@ impl Serialize for Case {
     /// `section.key`.
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         let quantities = match &self.what {
-            What::Cantilever(cantilever) => return cantilever.serialize(serializer),
-            What::Oscillator(oscillator) => return oscillator.serialize(serializer),
-            What::Quantities(quantities) => quantities,
+            CaseKind::Cantilever(cantilever) => return cantilever.serialize(serializer),
+            CaseKind::Oscillator(oscillator) => return oscillator.serialize(serializer),
+            CaseKind::Quantities(quantities) => quantities,
         };
         let cantilever = self.cantilever();
         quantities.document(cantilever).serialize(serializer)

@@ -9,7 +9,7 @@ use std::sync::Arc;
 use nanotap_dynamics::StroboscopicMap as _;
 
 use super::{Case, CaseError};
-use crate::model::strobe::ModelMap;
+use crate::model::model_map::ModelMap;
 use crate::model::{Model, MotionError};
 
 /// The map and the model of a case at a gap that can be changed for the price of a few additions.
@@ -135,7 +135,7 @@ mod tests {
     use crate::model::cantilever::Cantilever;
     use crate::model::contact::ContactLaw;
     use crate::model::oscillator::{Oscillator, Stop};
-    use crate::observe::{Set, measure};
+    use crate::observe::{ObservableSet, measure};
 
     /// Every contact law, a nonlinear law, and both stops.
     fn cases() -> Vec<Case> {
@@ -205,8 +205,8 @@ mod tests {
                 ModelMap::new(&fresh).advance(&mut expected).unwrap();
                 moving.set(gap).unwrap();
                 let here = moving.model().unwrap();
-                let [seen, known] =
-                    [here, &fresh].map(|model| measure(model, &state, 1, Set::ALL).unwrap());
+                let [seen, known] = [here, &fresh]
+                    .map(|model| measure(model, &state, 1, ObservableSet::ALL).unwrap());
                 let size = known.peak_force.abs() + 1e-3;
                 assert!((seen.peak_force - known.peak_force).abs() < 1e-10 * size);
                 let [sample, other] = [&seen, &known].map(|of| of.energy_balance.sample_damping);

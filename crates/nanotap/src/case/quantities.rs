@@ -71,7 +71,7 @@ impl Quantities {
     }
 
     /// Returns it if it is valid.
-    pub(super) fn possible(self) -> Result<Self, CaseFileError> {
+    pub(super) fn validated(self) -> Result<Self, CaseFileError> {
         match &self.view {
             Ok(_) => Ok(self),
             Err(error) => Err((**error).clone()),
@@ -100,7 +100,7 @@ impl Quantities {
             return varied.mapped(false);
         }
         if let (false, Ok(view)) = (self.held, &self.view) {
-            varied.stated = view.held(&self.stated);
+            varied.stated = view.implied_constants(&self.stated);
             varied.held = true;
         }
         varied.stated.set(key, value);

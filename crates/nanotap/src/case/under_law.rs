@@ -3,7 +3,7 @@
 use super::key::Key;
 use super::physical::force::{keys_of_contacts, linear_takes, takes};
 use super::stated::Value;
-use super::{Case, What};
+use super::{Case, CaseKind};
 use crate::Error;
 use crate::model::contact::ContactLaw;
 use crate::model::sample_law::SampleLaw;
@@ -45,7 +45,7 @@ impl Case {
     /// # Errors
     /// When the case is not a physical one, or does not say all that the law needs.
     pub(crate) fn under_law(&self, law: &LawName, more: &[(Key, f64)]) -> Result<Self, Error> {
-        let What::Quantities(quantities) = &self.what else {
+        let CaseKind::Quantities(quantities) = &self.what else {
             return Err(Error::input(
                 "contact laws are compared on cases in physical quantities",
                 "state lever and sample by their quantities",
@@ -64,7 +64,7 @@ impl Case {
             }
         }
         Ok(Self {
-            what: What::Quantities(Box::new(quantities.mapped(true).possible()?)),
+            what: CaseKind::Quantities(Box::new(quantities.mapped(true).validated()?)),
             ..self.clone()
         })
     }

@@ -99,8 +99,8 @@ pub(crate) fn with_marks(
     panel
 }
 
-/// Branches against the parameter, a colour a period, with their bifurcations; beside
-/// them the bifurcation curves in two parameters, if they were traced.
+/// Branches against the parameter, one colour for each period, with their bifurcations; in a second
+/// panel the bifurcation curves in two parameters, if they were traced.
 pub fn branch_figure(
     report: &BranchReport,
     shown: Shown,

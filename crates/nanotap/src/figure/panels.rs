@@ -9,7 +9,7 @@ use serde::Deserialize;
 
 use crate::study::simulate::Classification;
 
-/// Strobe points beyond which they are drawn as small dots.
+/// ModelMap points beyond which they are drawn as small dots.
 const FEW_STROBES: usize = 200;
 
 /// What axes of motions are called, and their units.

@@ -45,11 +45,11 @@ use rayon::prelude::*;
 pub use motion::{Motion, Point};
 
 use crate::case::{Case, CaseError, Key};
-use crate::model::strobe::{Strobe, together};
+use crate::model::model_map::{ModelMap, together};
 use crate::model::{Model, MotionError, Tangent};
 
 /// Largest number of values that [`Map::iterate`] returns.
-pub const MOST_NUMBERS: usize = 200_000_000;
+pub const MAX_NUMBERS: usize = 200_000_000;
 
 /// Drive periods between two checks for cancellation.
 pub(crate) const UNINTERRUPTED: usize = 1024;
@@ -114,7 +114,7 @@ pub struct Map {
     case: Arc<Case>,
     model: Arc<Model>,
     /// A work space to be cloned.
-    strobe: Strobe,
+    strobe: ModelMap,
 }
 
 /// The linearised map at a state.
@@ -140,7 +140,7 @@ impl Map {
         }
         let model = case.model()?;
         Ok(Self {
-            strobe: Strobe::new(&model),
+            strobe: ModelMap::new(&model),
             model: Arc::new(model),
             case: Arc::new(case.clone()),
         })
@@ -168,7 +168,7 @@ impl Map {
 
     /// The map with a separate work space, for repeated use and for the algorithms of
     /// `nanotap_dynamics`.
-    pub fn strobe(&self) -> Strobe {
+    pub fn strobe(&self) -> ModelMap {
         self.strobe.clone()
     }
 
@@ -201,7 +201,7 @@ impl Map {
             return advance(&mut self.strobe(), states, periods, control);
         }
         let together = together(&self.strobe, rows);
-        let some = |strobe: &mut Strobe, (number, states): (usize, &mut [f64])| {
+        let some = |strobe: &mut ModelMap, (number, states): (usize, &mut [f64])| {
             advance_all(strobe, states, periods, control)
                 .map_err(|error| error.after(number * together))
         };
@@ -217,7 +217,7 @@ impl Map {
     /// The states `z, Pᵉ(z), P²ᵉ(z), …` for `e = every`: `count` states, row by row (`count × n`).
     ///
     /// # Errors
-    /// If the state has the wrong length, the flow fails, there would be more than [`MOST_NUMBERS`]
+    /// If the state has the wrong length, the flow fails, there would be more than [`MAX_NUMBERS`]
     /// values, or the computation is cancelled.
     pub fn iterate(
         &self,
@@ -227,7 +227,7 @@ impl Map {
         control: &Control<'_>,
     ) -> Result<Vec<f64>, MapError> {
         self.fits(state, 1)?;
-        let most = MOST_NUMBERS / self.dimension();
+        let most = MAX_NUMBERS / self.dimension();
         if count > most {
             return Err(MapError::TooMany {
                 states: count,
@@ -302,7 +302,7 @@ impl Map {
     ) -> Result<Linearised, MapError> {
         self.fits(state, 1)?;
         let n = self.dimension();
-        let mut strobe = Strobe::with_tangents(&self.model, tangents.to_vec());
+        let mut strobe = ModelMap::with_tangents(&self.model, tangents.to_vec());
         let mut at = Linearised {
             state: state.to_vec(),
             jacobian: DMatrix::identity(n, n),
@@ -363,7 +363,7 @@ impl Map {
 
 /// Advances `state` by `periods` drive periods, with regular checks for cancellation.
 fn advance(
-    strobe: &mut Strobe,
+    strobe: &mut ModelMap,
     state: &mut [f64],
     periods: usize,
     control: &Control<'_>,
@@ -375,7 +375,7 @@ fn advance(
 
 /// Advances many states in sequence.
 fn advance_all(
-    strobe: &mut Strobe,
+    strobe: &mut ModelMap,
     states: &mut [f64],
     periods: usize,
     control: &Control<'_>,

@@ -8,7 +8,7 @@ use nanotap_flow::{Flow, FlowError, Output};
 use super::{MapError, of_state};
 use crate::model::Model;
 use crate::model::recording::{Instant, Recording};
-use crate::observe::{ContactEvent, Contacts, Kept, Set, watch};
+use crate::observe::{ContactEvent, Contacts, ObservableSet, RecordOptions, record};
 
 /// Maximum number of drive periods of a [`Motion`].
 pub const MAX_PERIODS: f64 = 100_000.0;
@@ -90,12 +90,13 @@ impl Motion {
             }
             // Whole periods, evaluated up to the end of the span.
             let periods = ((length / period).ceil() as usize).max(1);
-            let options = Kept {
+            let options = RecordOptions {
                 recorded: periods,
                 events: true,
-                ..Kept::default()
+                ..RecordOptions::default()
             };
-            let recorded = watch(model, state, periods, Set::NONE, options).map_err(of_state(0))?;
+            let recorded =
+                record(model, state, periods, ObservableSet::NONE, options).map_err(of_state(0))?;
             let mut events = recorded.events;
             events.retain(|event| event.tau <= length);
             return Ok(motion(recorded.recording, events, 0, length));
@@ -116,7 +117,7 @@ impl Motion {
             flow.run_until(rest, &mut (&mut recorder, &mut contacts))
                 .map_err(failed)?;
         }
-        let recording = Recording::Exact(recorder.finish(Arc::clone(&model.system)));
+        let recording = Recording::PiecewiseLinear(recorder.finish(Arc::clone(&model.system)));
         Ok(motion(recording, contacts.events(), regime, end))
     }
 

@@ -25,9 +25,9 @@ use crate::model::beam_equations::{Beam, BeamTangent};
 use crate::model::cantilever::Cantilever;
 use crate::model::galerkin::Galerkin;
 use crate::model::grazed::grazed;
+use crate::model::model_map::EngineMap;
 use crate::model::parameter::Parameter;
 use crate::model::sample_law::SampleLaw;
-use crate::model::strobe::EngineMap;
 use crate::model::{Model, ModelError, MotionError};
 
 /// Forces a step.

@@ -65,7 +65,7 @@ pub struct Instant {
 #[derive(Clone, Debug)]
 pub enum Recording {
     /// Of a piecewise-linear model, in closed form.
-    Exact(Trajectory),
+    PiecewiseLinear(Trajectory),
     /// Under a nonlinear force.
     Nonlinear(Arc<NonlinearRecording>),
 }
@@ -75,7 +75,7 @@ impl Deref for Recording {
 
     fn deref(&self) -> &Self::Target {
         match self {
-            Self::Exact(trajectory) => trajectory,
+            Self::PiecewiseLinear(trajectory) => trajectory,
             Self::Nonlinear(recording) => &**recording,
         }
     }
@@ -121,7 +121,7 @@ impl Model {
                 flow.run_period(&mut recorder)?;
             }
             let system = Arc::clone(&self.system);
-            Ok(Recording::Exact(recorder.finish(system)))
+            Ok(Recording::PiecewiseLinear(recorder.finish(system)))
         }))
     }
 
@@ -171,7 +171,7 @@ impl Recording {
     /// The closed form, of a piecewise-linear model.
     pub const fn exact(&self) -> Option<&Trajectory> {
         match self {
-            Self::Exact(trajectory) => Some(trajectory),
+            Self::PiecewiseLinear(trajectory) => Some(trajectory),
             Self::Nonlinear(_) => None,
         }
     }
@@ -179,7 +179,7 @@ impl Recording {
     /// An output that is the same in flight and in contact.
     pub fn curve(&self, output: &Output) -> Curve {
         match self {
-            Self::Exact(trajectory) => Curve::Exact(trajectory.signal(output)),
+            Self::PiecewiseLinear(trajectory) => Curve::PiecewiseLinear(trajectory.signal(output)),
             Self::Nonlinear(recording) => recording.curve(output, 0.0),
         }
     }
@@ -187,7 +187,9 @@ impl Recording {
     /// The force of the sample on the tip.
     pub fn force(&self, model: &Model) -> Curve {
         match self {
-            Self::Exact(trajectory) => Curve::Exact(trajectory.signal_by_regime(&model.force)),
+            Self::PiecewiseLinear(trajectory) => {
+                Curve::PiecewiseLinear(trajectory.signal_by_regime(&model.force))
+            }
             Self::Nonlinear(recording) => recording.curve(&model.tip.scaled(0.0), 1.0),
         }
     }
@@ -406,7 +408,7 @@ pub(crate) fn read(
 #[derive(Clone, Debug)]
 pub enum Curve {
     /// In closed form.
-    Exact(PiecewiseSignal),
+    PiecewiseLinear(PiecewiseSignal),
     /// Under a nonlinear force.
     Nonlinear(Arc<NonlinearRecording>, nanotap_volterra::Output),
 }
@@ -431,7 +433,7 @@ impl Curve {
             length,
         };
         match self {
-            Self::Exact(signal) => {
+            Self::PiecewiseLinear(signal) => {
                 let all = signal.pieces.iter().map(|p| (p.start, p.length));
                 all.enumerate().map(piece).collect()
             }
@@ -445,7 +447,7 @@ impl Curve {
     /// The value `s` after the beginning of a piece, at its very ends too.
     pub fn on(&self, piece: &CurvePiece, s: f64) -> f64 {
         match self {
-            Self::Exact(signal) => signal
+            Self::PiecewiseLinear(signal) => signal
                 .pieces
                 .get(piece.index)
                 .map_or(f64::NAN, |p| p.signal.at(s)),
@@ -466,7 +468,7 @@ impl Curve {
     /// The fastest rate at which it may turn on a piece.
     pub fn fastest(&self, piece: &CurvePiece) -> f64 {
         match self {
-            Self::Exact(signal) => signal
+            Self::PiecewiseLinear(signal) => signal
                 .pieces
                 .get(piece.index)
                 .map_or(0.0, |p| p.signal.fastest()),
@@ -477,7 +479,7 @@ impl Curve {
     /// The value at time `t` (of the nearest piece outside), `None` if empty.
     pub fn at(&self, t: f64) -> Option<f64> {
         match self {
-            Self::Exact(signal) => signal.at(t),
+            Self::PiecewiseLinear(signal) => signal.at(t),
             Self::Nonlinear(recording, output) => {
                 let sample = recording.sample_at(t)?;
                 Some(recording.read(output, &sample))
@@ -488,7 +490,7 @@ impl Curve {
     /// When it is least and when it is greatest, with the values; `None` if empty.
     pub fn range(&self) -> Option<(Extremum, Extremum)> {
         match self {
-            Self::Exact(signal) => signal.range(),
+            Self::PiecewiseLinear(signal) => signal.range(),
             Self::Nonlinear(recording, output) => {
                 let ends = recording.periods.iter().enumerate().map(|(k, period)| {
                     period
@@ -512,7 +514,7 @@ impl Curve {
     /// Length of time covered.
     pub fn duration(&self) -> f64 {
         match self {
-            Self::Exact(signal) => signal.duration(),
+            Self::PiecewiseLinear(signal) => signal.duration(),
             Self::Nonlinear(recording, _) => recording.end(),
         }
     }
@@ -520,7 +522,7 @@ impl Curve {
     /// The time mean (0 if empty).
     pub fn mean(&self) -> f64 {
         match self {
-            Self::Exact(signal) => signal.mean(),
+            Self::PiecewiseLinear(signal) => signal.mean(),
             Self::Nonlinear(recording, output) => {
                 let sum = recording.integral(|s| recording.read(output, s));
                 sum / recording.end().max(f64::MIN_POSITIVE)
@@ -534,7 +536,7 @@ impl Curve {
         let (mut signals, mut outputs, mut nonlinear) = (Vec::new(), Vec::new(), None);
         for curve in curves {
             match curve {
-                Self::Exact(signal) => signals.push(signal),
+                Self::PiecewiseLinear(signal) => signals.push(signal),
                 Self::Nonlinear(recording, output) => {
                     outputs.push(output);
                     nonlinear = Some(recording);
@@ -551,7 +553,7 @@ impl Curve {
     /// component at `ω` is `Re(c e^{iωt})`.
     pub fn fourier(&self, omega: f64) -> Complex {
         match self {
-            Self::Exact(signal) => signal.fourier(omega),
+            Self::PiecewiseLinear(signal) => signal.fourier(omega),
             Self::Nonlinear(recording, output) => recording.fouriers(&[output], &[omega])[0][0],
         }
     }
@@ -559,7 +561,7 @@ impl Curve {
     /// `∫ g h dt` with another curve of the same recording.
     pub fn product_integral(&self, other: &Self) -> f64 {
         match (self, other) {
-            (Self::Exact(a), Self::Exact(b)) => a.product_integral(b),
+            (Self::PiecewiseLinear(a), Self::PiecewiseLinear(b)) => a.product_integral(b),
             (Self::Nonlinear(recording, a), Self::Nonlinear(_, b)) => {
                 recording.integral(|s| recording.read(a, s) * recording.read(b, s))
             }

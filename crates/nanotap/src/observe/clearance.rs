@@ -48,7 +48,7 @@ const CLAMP: f64 = 1e-6;
 /// Slope below which a beam is level.
 const LEVEL: f64 = 1e-13;
 /// Largest number of Newton steps to the time of a least height.
-const MOST_STEPS: usize = 12;
+const MAX_STEPS: usize = 12;
 /// Length of the last Newton step, in drive periods.
 const SAME_MOMENT: f64 = 1e-9;
 /// Accuracy to which a least height found by Newton agrees with a search over all time.
@@ -171,13 +171,13 @@ impl RecordedBeam<'_> {
     /// The least height at one position near the time `from`, in drive periods: Newton's method on
     /// its rate. Only for exact motions.
     fn least_near(&self, xi: f64, from: f64) -> Option<Clearance> {
-        let Recording::Exact(trajectory) = self.recording else {
+        let Recording::PiecewiseLinear(trajectory) = self.recording else {
             return None;
         };
         let height = self.beam.height(xi);
         let mut time = from * self.model.period();
         let mut piece = trajectory.piece_at(&height, time)?;
-        for _ in 0..MOST_STEPS {
+        for _ in 0..MAX_STEPS {
             let jet = piece.signal.jet(time - piece.start);
             if jet.curvature <= 0.0 {
                 return None;
@@ -263,7 +263,7 @@ fn valleys(heights: &[f64]) -> Vec<Valley> {
 
 /// Largest number of periods whose least height is computed exactly, those with the lowest bounds
 /// first. Motions with more such periods repeat.
-const MOST_PERIODS: usize = 64;
+const MAX_PERIODS: usize = 64;
 /// Two periods are the same if their modal coordinates at the start differ by less than this,
 /// relative to the largest.
 const SAME: f64 = 1e-10;
@@ -393,7 +393,7 @@ impl ClearanceSearch {
                 start,
             });
         }
-        if self.candidates.len() >= 4 * MOST_PERIODS {
+        if self.candidates.len() >= 4 * MAX_PERIODS {
             self.candidates = self.lowest();
         }
         self.higher = 0.0;
@@ -414,7 +414,7 @@ impl ClearanceSearch {
                     let bound = known.bound;
                     *known = Candidate { bound, ..candidate };
                 }
-            } else if kept.len() < MOST_PERIODS {
+            } else if kept.len() < MAX_PERIODS {
                 kept.push(candidate);
             }
         }
@@ -438,7 +438,7 @@ impl ClearanceSearch {
             let beam = RecordedBeam {
                 model,
                 beam,
-                recording: &Recording::Exact(period),
+                recording: &Recording::PiecewiseLinear(period),
             };
             let heights = least_heights(model, beam.beam, &state)?;
             let Some(here) = beam.lowest(&heights) else {

@@ -63,15 +63,6 @@ impl<'a> Contacts<'a> {
     pub fn events(self) -> Vec<ContactEvent> {
         self.events
     }
-
-    fn gap_rate(&self, view: &SwitchView<'_>) -> f64 {
-        let drive = self.model.system.drive();
-        let rate = &self.rates[view.switch.from];
-        let phasors = (0..rate.tones.len()).map(|k| drive.phasor(k, view.phase));
-        let modes = rate.modal.iter().copied().zip(view.modal.iter().copied());
-        let terms = modes.chain(rate.tones.iter().copied().zip(phasors));
-        rate.constant + terms.map(|(w, q)| (w * q).re).sum::<f64>()
-    }
 }
 
 impl Observer for Contacts<'_> {
@@ -86,7 +77,9 @@ impl Observer for Contacts<'_> {
             };
             (kind, view.rate)
         } else if contact[from] && !contact[to] {
-            (ContactEventKind::ContactEnd, self.gap_rate(view))
+            let drive = view.system.drive();
+            let rate = self.rates[from].at(drive, view.modal, view.phase);
+            (ContactEventKind::ContactEnd, rate)
         } else {
             return;
         };

@@ -31,8 +31,8 @@ use super::table::{OBSERVABLES, Observable, ObservableSet, Observables};
 use super::value::Value;
 use super::varied_motion::{Change, Varied, gather};
 use crate::case::{Case, CaseError, Key};
+use crate::model::model_map::ModelMap;
 use crate::model::nonlinear::{self, Nonlinear};
-use crate::model::strobe::Strobe;
 use crate::model::{Model, ModelTangent, MotionError, Tangent, TangentKind};
 
 /// Why an orbit has no derivative.
@@ -369,7 +369,7 @@ fn orbit_derivative(
     period: usize,
 ) -> Result<Vec<f64>, DerivativeError> {
     let n = state.len();
-    let mut map = Strobe::with_tangents(model, vec![tangent]);
+    let mut map = ModelMap::with_tangents(model, vec![tangent]);
     let mut x = state.to_vec();
     let (mut one, mut by) = (DMatrix::zeros(n, n), DMatrix::zeros(n, 1));
     let (mut all, mut change) = (DMatrix::identity(n, n), DMatrix::zeros(n, 1));

@@ -37,15 +37,22 @@ impl EnergyBalance {
         stored: f64::NAN,
         residual: f64::NAN,
     };
+}
 
-    /// Converts to a unit whose size is `unit`.
-    pub(super) fn in_units(self, unit: f64) -> Self {
-        Self {
-            drive_work: self.drive_work * unit,
-            beam_damping: self.beam_damping * unit,
-            sample_damping: self.sample_damping * unit,
-            stored: self.stored * unit,
-            residual: self.residual,
+impl<D: Copy> EnergyBalance<D> {
+    /// Combines every energy with that of another balance.
+    pub(super) fn with<E: Copy, F>(
+        self,
+        other: EnergyBalance<E>,
+        residual: F,
+        energy: impl Fn(D, E) -> F,
+    ) -> EnergyBalance<F> {
+        EnergyBalance {
+            drive_work: energy(self.drive_work, other.drive_work),
+            beam_damping: energy(self.beam_damping, other.beam_damping),
+            sample_damping: energy(self.sample_damping, other.sample_damping),
+            stored: energy(self.stored, other.stored),
+            residual,
         }
     }
 }

@@ -213,7 +213,7 @@ impl Measurement<'_> {
             lows,
             highs,
             events: self.contacts.map_or_else(Vec::new, Contacts::events),
-            recording: Recording::Exact(self.recorder.finish(Arc::clone(&model.system))),
+            recording: Recording::PiecewiseLinear(self.recorder.finish(Arc::clone(&model.system))),
         })
     }
 }

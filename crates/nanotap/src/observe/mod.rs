@@ -33,11 +33,7 @@ pub use energy::EnergyBalance;
 pub(crate) use harmonics::lag;
 pub use harmonics::{Harmonic, Spectrum};
 pub use physical_motion::{PhysicalHarmonic, PhysicalMotion, Setting};
-pub use record::{
-    RecordOptions as Kept, RecordOptions, Recorded, Recorded as Watched, Recorder,
-    Recorder as Watcher, measure, record, record as watch,
-};
-pub use table::ObservableSet as Set;
+pub use record::{RecordOptions, Recorded, Recorder, measure, record};
 pub use table::{OBSERVABLES, Observable, ObservableSet, Observables};
 pub use validity::OutOfRange;
 pub use value::Value;

@@ -32,13 +32,11 @@ impl Value {
             (Self::Range(change), Self::Range(value)) => {
                 Self::Range([0, 1].map(|k| change[k] * factor + value[k] * by))
             }
-            (Self::Energies(change), Self::Energies(value)) => Self::Energies(EnergyBalance {
-                drive_work: change.drive_work * factor + value.drive_work * by,
-                beam_damping: change.beam_damping * factor + value.beam_damping * by,
-                sample_damping: change.sample_damping * factor + value.sample_damping * by,
-                stored: change.stored * factor + value.stored * by,
-                residual: 0.0,
-            }),
+            (Self::Energies(change), Self::Energies(value)) => {
+                let energies =
+                    change.with(value, 0.0, |change, value| change * factor + value * by);
+                Self::Energies(energies)
+            }
             _ => Self::Absent,
         }
     }
@@ -125,7 +123,8 @@ impl Measurable for EnergyBalance {
     }
 
     fn scaled(self, unit: Option<f64>) -> Self {
-        unit.map_or(Self::UNKNOWN, |unit| self.in_units(unit))
+        let in_unit = |unit| self.with(self, self.residual, |energy, _| energy * unit);
+        unit.map_or(Self::UNKNOWN, in_unit)
     }
 }
 
@@ -171,13 +170,7 @@ impl Varying for [Dual; 2] {
 
 impl Varying for EnergyBalance<Dual> {
     fn change(self) -> Value {
-        let energies = EnergyBalance {
-            drive_work: self.drive_work.derivative(),
-            beam_damping: self.beam_damping.derivative(),
-            sample_damping: self.sample_damping.derivative(),
-            stored: self.stored.derivative(),
-            residual: 0.0,
-        };
+        let energies = self.with(self, 0.0, |energy, _| energy.derivative());
         if energies.drive_work.is_finite() {
             Value::Energies(energies)
         } else {

@@ -13,9 +13,9 @@ use crate::Error;
 use crate::case::Case;
 use crate::case::physical::Physical;
 use crate::model::Model;
-use crate::model::strobe::Strobe;
+use crate::model::model_map::ModelMap;
 use crate::observe::time_series::state_names;
-use crate::observe::{Observables, PhysicalMotion, Set, measure};
+use crate::observe::{ObservableSet, Observables, PhysicalMotion, measure};
 use crate::study::Study;
 use crate::study::approach::states_near;
 use crate::study::averaged_orbits::averaged_orbits;
@@ -298,7 +298,7 @@ pub fn attractors(
     let averaged = averaged_orbits(model).into_iter();
     let averaged = averaged.map(|orbit| (orbit.period, orbit.states[0].clone()));
     let set = set.with_seeds(averaged.chain(options.seeds.iter().cloned()));
-    let map = Strobe::new(model);
+    let map = ModelMap::new(model);
     // Motions that were found are measured, also of work that was cancelled.
     let model = &model.with_grace();
     let budgets = budgets(model, options, &start_box);
@@ -445,7 +445,7 @@ fn one(
     fraction: Fraction,
 ) -> Result<AttractorReport, Error> {
     let non_periodic = || -> Result<Option<NonPeriodic>, Error> {
-        let observables = measure(model, state, OBSERVED_PERIODS, Set::ALL)?;
+        let observables = measure(model, state, OBSERVED_PERIODS, ObservableSet::ALL)?;
         Ok(Some(NonPeriodic {
             period: None,
             state: state.to_vec(),
@@ -510,7 +510,7 @@ const SEARCHED_STARTS: usize = 64;
 
 fn unstable_orbits(
     model: &Model,
-    map: &Strobe,
+    map: &ModelMap,
     searched: &[Vec<f64>],
     options: &AttractorsOptions,
     control: &Control<'_>,

@@ -9,7 +9,7 @@
 use nanotap_dynamics::{PeriodicOrbit, Scheduling as _, ShootingOptions, close_orbit};
 
 use crate::model::Model;
-use crate::model::strobe::Strobe;
+use crate::model::model_map::ModelMap;
 
 /// Residual of an orbit of the approximate map, as a part of its scale.
 const COARSE_RESIDUAL: f64 = 1e-4;
@@ -22,7 +22,7 @@ pub fn averaged_orbits(model: &Model) -> Vec<PeriodicOrbit> {
     let Some(nonlinear) = &model.nonlinear else {
         return Vec::new();
     };
-    let mut exact = Strobe::new(model);
+    let mut exact = ModelMap::new(model);
     let states = nonlinear.averaged_states();
     let guesses = match exact.coarse() {
         Some(coarse) => coarse_states(coarse, &states),
@@ -40,7 +40,7 @@ pub fn averaged_orbits(model: &Model) -> Vec<PeriodicOrbit> {
 }
 
 /// The states of orbits of the approximate map from these guesses.
-fn coarse_states(mut coarse: Strobe, guesses: &[Vec<f64>]) -> Vec<Vec<f64>> {
+fn coarse_states(mut coarse: ModelMap, guesses: &[Vec<f64>]) -> Vec<Vec<f64>> {
     let options = ShootingOptions {
         residual_tolerance: COARSE_RESIDUAL,
         explains_stalls: false,

@@ -26,7 +26,7 @@ use crate::dataset::{
     attributes, chunk_files, work,
 };
 use crate::model::Model;
-use crate::model::strobe::{Strobe, together};
+use crate::model::model_map::{ModelMap, together};
 use crate::observe::time_series::state_names;
 use crate::study::attractors::MOST_STARTS;
 use crate::study::limits::{MOST_PERIOD, MOST_PERIODS};
@@ -44,7 +44,7 @@ const CHUNKS: usize = 64;
 /// for, and how many of its points are classified at a time.
 const COARSE: usize = 64;
 const STRANGERS: usize = 64;
-/// Strobe points by which an attractor is shown.
+/// ModelMap points by which an attractor is shown.
 const SHOWN: usize = 512;
 /// Labels of points that go to no attractor.
 pub(crate) const UNSETTLED: i32 = -1;
@@ -203,7 +203,7 @@ impl Basin {
             }
             None => starts_in(&slice, model.dimension(), options, control)?,
         };
-        let map = Strobe::new(&model);
+        let map = ModelMap::new(&model);
         let how = CensusOptions {
             classify: options.classify(),
             ..CensusOptions::default()
@@ -276,14 +276,14 @@ impl Basin {
     }
 
     /// The map, whose motions end once `control` cancels the work.
-    fn map(&self, control: &Control<'_>) -> Strobe {
-        Strobe::new(&self.model.clone().cancelled_by(&control.flag()))
+    fn map(&self, control: &Control<'_>) -> ModelMap {
+        ModelMap::new(&self.model.clone().cancelled_by(&control.flag()))
     }
 
     /// The labels of one row of the slice; `None` when it was stopped.
     fn row(
         &self,
-        map: &Strobe,
+        map: &ModelMap,
         block: &Block,
         item: usize,
         control: &Control<'_>,
@@ -348,7 +348,7 @@ fn columns(rows: &[Vec<Label>]) -> Vec<Values> {
 }
 
 /// States among a coarse grid of the slice that come to none of the attractors.
-fn strangers(map: &Strobe, slice: &Slice, basins: &Basins) -> Vec<Vec<f64>> {
+fn strangers(map: &ModelMap, slice: &Slice, basins: &Basins) -> Vec<Vec<f64>> {
     let (x, y) = slice.axes();
     let some = |count: usize| {
         let many = COARSE.min(count);
@@ -390,7 +390,7 @@ fn starts_in(
 }
 
 impl Known {
-    fn of(attractor: &Attractor, map: &mut Strobe) -> Self {
+    fn of(attractor: &Attractor, map: &mut ModelMap) -> Self {
         let spectrum = |s: &nanotap_dynamics::LyapunovSpectrum| Some(s.largest().0);
         match &attractor.kind {
             AttractorKind::Periodic(orbit) => Self {
@@ -424,8 +424,8 @@ impl Known {
     }
 }
 
-/// Strobe states along a motion.
-fn stretch(map: &mut Strobe, start: &[f64]) -> Vec<Vec<f64>> {
+/// ModelMap states along a motion.
+fn stretch(map: &mut ModelMap, start: &[f64]) -> Vec<Vec<f64>> {
     let mut state = start.to_vec();
     let mut states = Vec::new();
     while states.len() < SHOWN && map.advance(&mut state).is_ok() {

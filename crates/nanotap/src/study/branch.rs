@@ -13,9 +13,9 @@ use serde::Serialize;
 
 use crate::case::{Case, Key, ParameterUnit, PlaneFamily};
 use crate::model::Model;
+use crate::model::model_map::ModelMap;
 use crate::model::recording::Recording;
-use crate::model::strobe::Strobe;
-use crate::observe::{Observables, PhysicalMotion, Set, measure};
+use crate::observe::{ObservableSet, Observables, PhysicalMotion, measure};
 use crate::study::Study;
 use crate::study::limits::{MOST_DOUBLINGS, MOST_PERIOD, MOST_SEED_STARTS};
 use crate::study::orbit::{OrbitOptions, orbit, pairs};
@@ -444,7 +444,7 @@ fn first_orbit(case: &Case, range: Range, options: &BranchOptions) -> Result<Per
     let found = orbit(&model, &options).map_err(failed)?;
     // Newton again, from where it is, for the orbit itself.
     nanotap_dynamics::close_orbit_from_points(
-        &mut Strobe::new(&model),
+        &mut ModelMap::new(&model),
         &found.states.concat(),
         found.period,
         &ShootingOptions::default(),
@@ -469,7 +469,7 @@ fn census_seeds(
         .map(|t| range.from * (1.0 - t) + range.to * t)
         .collect();
     // Where there is no model there is no map, and no starts are needed.
-    let starts = |k: usize, _: &Strobe| {
+    let starts = |k: usize, _: &ModelMap| {
         let model = range.model(case, values[k]).ok();
         let drawn = model.and_then(|model| default_starts(&model, options.seed).ok());
         drawn.unwrap_or_else(|| StartSet::given(Vec::new()))
@@ -512,7 +512,12 @@ fn census_seeds(
     Ok(found)
 }
 
-fn described(case: &Case, range: Range, observables: Set, diagram: &Diagram) -> BranchReport {
+fn described(
+    case: &Case,
+    range: Range,
+    observables: ObservableSet,
+    diagram: &Diagram,
+) -> BranchReport {
     // Branches that were followed are measured, also of work that was cancelled.
     let case = &case.with_grace();
     let key = range.key;
@@ -651,7 +656,7 @@ fn summary(branch: &Branch, parent: Option<usize>, depth: usize, end: String) ->
 struct Measured<'a> {
     case: &'a Case,
     range: Range,
-    observables: Set,
+    observables: ObservableSet,
 }
 
 impl Measured<'_> {
@@ -874,7 +879,7 @@ options! {
         pub max_step: f64 = 0.01,
         /// Observables of every orbit.
         #[serde(skip)]
-        pub observables: Set = Set::COMMON,
+        pub observables: ObservableSet = ObservableSet::COMMON,
         /// Whether doubled branches end at their first orbit that is not stable.
         #[serde(skip)]
         pub stable_doublings: bool = false,
@@ -970,12 +975,12 @@ mod tests {
         let seeds = [(3.0, first_orbit(&case, range, &options).unwrap())];
         let how = range.diagram(&options);
         let mut diagram = assemble_diagram(&family, &seeds, &how, &Control::default());
-        let whole = described(&case, range, Set::COMMON, &diagram);
+        let whole = described(&case, range, ObservableSet::COMMON, &diagram);
         assert!(whole.failures.is_empty() && whole.points.len() > 2);
         let branch = &mut diagram.branches[0].branch;
         branch.points[1].orbit.states[0][0] = f64::NAN;
         let parameter = branch.points[1].parameter;
-        let rest = described(&case, range, Set::COMMON, &diagram);
+        let rest = described(&case, range, ObservableSet::COMMON, &diagram);
         assert_eq!(rest.points.len(), whole.points.len() - 1);
         assert_eq!(rest.failures.len(), 1);
         assert_eq!(rest.failures[0].parameter.to_bits(), parameter.to_bits());

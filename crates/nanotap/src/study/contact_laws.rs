@@ -17,10 +17,10 @@ use crate::case::Key;
 use crate::model::Model;
 use crate::model::cantilever::Cantilever;
 use crate::model::contact::ContactLaw;
+use crate::model::model_map::ModelMap;
 use crate::model::parameter::Parameter;
 use crate::model::recording::Curve;
 use crate::model::sample_law::SampleLaw;
-use crate::model::strobe::Strobe;
 use crate::observe::Observables;
 use crate::study::branch::{BranchOptions, BranchReport, Range, branches_through};
 use crate::study::limits::MOST_PERIOD;
@@ -205,7 +205,7 @@ fn motion(
     let model = Model::cantilever(&case)?;
     let model = model.cancelled_by(&control.flag());
     let rest = vec![0.0; model.dimension()];
-    let mut map = Strobe::new(&model);
+    let mut map = ModelMap::new(&model);
     let named = Named::of(&classify(&mut map, &rest, &ClassifyOptions::default()).kind);
     let options = OrbitOptions {
         period: Some(period),
@@ -238,7 +238,7 @@ fn motion(
 /// The branch of an orbit in the drive frequency.
 fn followed(
     case: &Cantilever,
-    map: &mut Strobe,
+    map: &mut ModelMap,
     found: &OrbitReport,
     (from, to): (f64, f64),
     control: &Control<'_>,

@@ -10,7 +10,7 @@ pub use nanotap_dynamics::LyapunovOptions as SpectrumOptions;
 use crate::Error;
 use crate::case::Case;
 use crate::control::Control;
-use crate::model::strobe::Strobe;
+use crate::model::model_map::ModelMap;
 use crate::model::{Model, MotionError};
 use crate::observe::begins_contact;
 use crate::study::Study;
@@ -89,7 +89,7 @@ pub fn lyapunov(
     check_periods(options.periods)?;
     check_states(model, options.points, "points")?;
     let model = &model.clone().cancelled_by(&control.flag());
-    let mut map = Strobe::new(model);
+    let mut map = ModelMap::new(model);
     let defaults = SpectrumOptions::default();
     // The tangent vectors align themselves during the last periods of the transient.
     let alignment = defaults.alignment.min(options.transient);

@@ -15,12 +15,13 @@ use serde::Serialize;
 
 use crate::Error;
 use crate::case::Case;
+use crate::model::model_map::ModelMap;
 use crate::model::recording::{NonlinearRecording, Recording};
-use crate::model::strobe::Strobe;
 use crate::model::{MemoryReset, Model};
 use crate::observe::PhysicalMotion;
 use crate::observe::{
-    ContactEvent, Derivative, Kept, Observables, OutOfRange, Set, Spectrum, watch,
+    ContactEvent, Derivative, ObservableSet, Observables, OutOfRange, RecordOptions, Spectrum,
+    record,
 };
 use crate::study::Study;
 use crate::study::in_si::InSi;
@@ -121,14 +122,14 @@ pub fn orbit(model: &Model, options: &OrbitOptions) -> Result<OrbitReport, Error
     }
     check_size(model.dimension(), options.period.unwrap_or(1))?;
     let start = starting_state(model, options.state.as_deref())?;
-    let mut map = Strobe::new(model);
+    let mut map = ModelMap::new(model);
     let found = match (options.period, &options.state) {
         (Some(period), Some(_)) => {
             close_orbit(&mut map, &start, period, &ShootingOptions::default())?
         }
         (period, _) => settled(model, &mut map, &start, period)?,
     };
-    let observables = options.observables.unwrap_or(Set::ALL);
+    let observables = options.observables.unwrap_or(ObservableSet::ALL);
     report_on(model, &found, options.harmonics, observables)
 }
 
@@ -144,7 +145,7 @@ pub(in crate::study) fn no_period() -> Error {
 /// anywhere.
 fn settled(
     model: &Model,
-    map: &mut Strobe,
+    map: &mut ModelMap,
     start: &[f64],
     period: Option<usize>,
 ) -> Result<PeriodicOrbit, Error> {
@@ -174,7 +175,7 @@ const SEARCHED_PERIODS: usize = 256;
 
 /// An orbit of just this period, the least unstable one that Newton finds from starts all
 /// over the default box; failing that, what it finds from where the run ended.
-fn searched(model: &Model, map: &mut Strobe, period: usize) -> Result<PeriodicOrbit, Error> {
+fn searched(model: &Model, map: &mut ModelMap, period: usize) -> Result<PeriodicOrbit, Error> {
     let count = SEARCHED_STARTS / if map.is_costly() { 4 } else { 1 };
     let starts = default_box(model)
         .map(|b| b.starts(1, count))
@@ -207,7 +208,11 @@ const RECURRENCE_PERIODS: usize = 2000;
 const RECURRENCE_TRIES: usize = 12;
 
 /// Closes an orbit of the given period from the nearest returns of a motion that does not repeat.
-fn near_recurrence(map: &mut Strobe, state: &[f64], period: usize) -> Result<PeriodicOrbit, Error> {
+fn near_recurrence(
+    map: &mut ModelMap,
+    state: &[f64],
+    period: usize,
+) -> Result<PeriodicOrbit, Error> {
     let shooting = ShootingOptions::default();
     let mut states = vec![state.to_vec()];
     for k in 0..RECURRENCE_PERIODS + period {
@@ -248,25 +253,25 @@ pub fn report(
     orbit: &PeriodicOrbit,
     harmonics: usize,
 ) -> Result<OrbitReport, Error> {
-    report_on(model, orbit, harmonics, Set::ALL)
+    report_on(model, orbit, harmonics, ObservableSet::ALL)
 }
 
 fn report_on(
     model: &Model,
     orbit: &PeriodicOrbit,
     harmonics: usize,
-    observables: Set,
+    observables: ObservableSet,
 ) -> Result<OrbitReport, Error> {
     let start = orbit.states.first().cloned().unwrap_or_default();
-    let kept = Kept {
+    let kept = RecordOptions {
         recorded: orbit.period,
         events: true,
-        ..Kept::default()
+        ..RecordOptions::default()
     };
     let observed = OutOfRange::observed_with(model, observables);
-    let seen = watch(model, &start, orbit.period, observed, kept)?;
+    let seen = record(model, &start, orbit.period, observed, kept)?;
     let determinant_defect = match &seen.recording {
-        Recording::Exact(trajectory) => determinant_defect(model, orbit, trajectory),
+        Recording::PiecewiseLinear(trajectory) => determinant_defect(model, orbit, trajectory),
         Recording::Nonlinear(recording) => nonlinear_defect(orbit, recording),
     };
     let agrees = determinant_defect <= allowed_defect(orbit);
@@ -454,7 +459,7 @@ options! {
         pub harmonics: usize = 20,
         /// Observables to measure; default: all, including the clearance of the beam
         #[schemars(extend("x-value" = "NAME,…"))]
-        pub observables: Option<Set> = None,
+        pub observables: Option<ObservableSet> = None,
         /// Samples per drive period in the time series
         #[schemars(range(min = 1, max = MOST_SAMPLES), extend("x-value" = "S"))]
         pub resolution: usize = 200,
@@ -487,7 +492,7 @@ impl Study for OrbitStudy {
             .map(|name| case.key(name))
             .collect::<Result<Vec<_>, _>>()?;
         let model = case.model()?;
-        let observables = options.observables.unwrap_or(Set::ALL);
+        let observables = options.observables.unwrap_or(ObservableSet::ALL);
         let mut found = orbit(&model, options)?;
         for key in keys {
             let at = (found.state.as_slice(), found.period);

@@ -26,9 +26,9 @@ use super::approach::{MAX_MULTIPLIER, SETPOINT_PERIODS, no_drive};
 use crate::case::Case;
 use crate::case::document::CaseDocument;
 use crate::case::physical::{Kind, Remark};
-use crate::model::strobe::Strobe;
+use crate::model::model_map::ModelMap;
 use crate::observe::table::shown_phase;
-use crate::observe::{Observables, OutOfRange, PhysicalMotion, Set, measure};
+use crate::observe::{ObservableSet, Observables, OutOfRange, PhysicalMotion, measure};
 use crate::{Error, ErrorKind};
 
 /// A distance at which an orbit has the setpoint amplitude.
@@ -281,7 +281,8 @@ struct Sample<'a> {
 fn amplitude(sweep: &DistanceSweep<'_>, gap: f64, orbit: &PeriodicOrbit) -> f64 {
     let start = orbit.states.first().map_or(&[][..], Vec::as_slice);
     let model = sweep.model(gap).ok();
-    let seen = model.and_then(|m| measure(&m, start, orbit.period, Set::FIRST_HARMONIC).ok());
+    let seen =
+        model.and_then(|m| measure(&m, start, orbit.period, ObservableSet::FIRST_HARMONIC).ok());
     seen.map_or(f64::NAN, |seen| seen.first_harmonic)
 }
 
@@ -452,7 +453,7 @@ impl Search<'_> {
         let view = self.case.physical()?;
         let model = self.case.with(self.case.gap_key(), gap).model().ok()?;
         let state = orbit.states.first()?.clone();
-        let observables = measure(&model, &state, orbit.period, Set::COMMON).ok()?;
+        let observables = measure(&model, &state, orbit.period, ObservableSet::COMMON).ok()?;
         Some(SetpointState {
             period: orbit.period,
             spectral_radius: orbit.spectral_radius(),
@@ -521,14 +522,14 @@ impl Search<'_> {
     ) -> Option<(f64, PeriodicOrbit, Observables)> {
         let gap = a.gap + t * (b.gap - a.gap);
         let model = self.case.with(self.case.gap_key(), gap).model().ok()?;
-        let mut map = Strobe::new(&model);
+        let mut map = ModelMap::new(&model);
         let [from, to] = [a, b].map(|sample| sample.orbit.states.concat());
         let points: Vec<f64> = from.iter().zip(&to).map(|(x, y)| x + t * (y - x)).collect();
         let period = a.orbit.period;
         let options = ShootingOptions::default();
         let orbit = close_orbit_from_points(&mut map, &points, period, &options).ok()?;
         let start = orbit.states.first()?;
-        let observables = measure(&model, start, orbit.period, Set::COMMON).ok()?;
+        let observables = measure(&model, start, orbit.period, ObservableSet::COMMON).ok()?;
         (orbit.period == period).then_some((gap, orbit, observables))
     }
 }

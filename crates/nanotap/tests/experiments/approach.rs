@@ -4,7 +4,7 @@ use nanotap::case::Case;
 use nanotap::case::file::Source;
 use nanotap::control::Control;
 use nanotap::model::cantilever::Cantilever;
-use nanotap::model::strobe::Strobe;
+use nanotap::model::model_map::ModelMap;
 use nanotap::study::approach::{
     ApproachOptions, ApproachPoint, ApproachReport, Way, approach, states_near,
 };
@@ -149,9 +149,9 @@ fn a_coarse_curve_agrees_with_a_slow_run() {
             let share = k as f64 / steps;
             let gap = at * (1.0 - share) + p.gap * share;
             model = case.with(case.gap_key(), gap).model().unwrap();
-            Strobe::new(&model).advance_by(&mut here, 120).unwrap();
+            ModelMap::new(&model).advance_by(&mut here, 120).unwrap();
         }
-        let mut map = Strobe::new(&model);
+        let mut map = ModelMap::new(&model);
         map.advance_by(&mut here, 4000).unwrap();
         let run = SimulateOptions {
             state: Some(here.clone()),

@@ -3,8 +3,8 @@
 use nanotap::case::Case;
 use nanotap::case::file::Source;
 use nanotap::control::Control;
-use nanotap::model::strobe::Strobe;
-use nanotap::observe::{Set, measure};
+use nanotap::model::model_map::ModelMap;
+use nanotap::observe::{ObservableSet, measure};
 use nanotap::study::approach::{ApproachOptions, Way, approach};
 use nanotap::study::fit::{Entry, FitOptions, FitReport, FittedParameter, Table, fit, residuals};
 use nanotap::study::orbit::{OrbitOptions, orbit};
@@ -396,7 +396,7 @@ fn a_resonance_curve_is_fitted_with_both_branches() {
         let model = there.model().unwrap();
         // Each motion starts from the one at the previous frequency, as in a slow sweep.
         let end = classify(
-            &mut Strobe::new(&model),
+            &mut ModelMap::new(&model),
             &state,
             &ClassifyOptions::default(),
         );
@@ -404,7 +404,7 @@ fn a_resonance_curve_is_fitted_with_both_branches() {
             panic!("{frequency}: {:?}", end.kind)
         };
         state.clone_from(&found.states[0]);
-        let seen = measure(&model, &state, found.period, Set::ALL).unwrap();
+        let seen = measure(&model, &state, found.period, ObservableSet::ALL).unwrap();
         let seen = seen.in_si(&there.physical().unwrap().scales);
         let row = [
             Entry::Number(1e-3 * frequency),

@@ -6,7 +6,7 @@
 use nanotap::case::Case;
 use nanotap::case::file::Source;
 use nanotap::model::Model;
-use nanotap::model::strobe::Strobe;
+use nanotap::model::model_map::ModelMap;
 use nanotap::study::averaged_orbits::{averaged_distances, averaged_orbits};
 use nanotap_dynamics::{Scheduling as _, StroboscopicMap};
 use std::path::Path;
@@ -74,7 +74,7 @@ fn averaging_finds_every_period_1_orbit() {
 #[test]
 fn the_approximate_map_preserves_orbits() {
     for (name, model, expected) in cases() {
-        let mut exact = Strobe::new(&model);
+        let mut exact = ModelMap::new(&model);
         let mut coarse = exact.coarse().unwrap();
         assert!(coarse.coarse().is_none());
         for expected in expected["orbits"].as_array().unwrap() {

@@ -3,7 +3,7 @@
 use nanotap::case::{Case, Key};
 use nanotap::control::Control;
 use nanotap::dataset::{Share, Store, Work};
-use nanotap::observe::{Derivative, Observables, Set, Value, measure};
+use nanotap::observe::{Derivative, ObservableSet, Observables, Value, measure};
 use nanotap::study::orbit::{OrbitOptions, orbit};
 use nanotap::study::setpoint::solve_setpoint;
 use nanotap::study::value::Axes;
@@ -105,7 +105,7 @@ fn observed(case: &Case, start: &[f64]) -> (Vec<f64>, Observables) {
         ..OrbitOptions::default()
     };
     let found = orbit(&model, &options).unwrap();
-    let seen = measure(&model, &found.state, 1, Set::ALL).unwrap();
+    let seen = measure(&model, &found.state, 1, ObservableSet::ALL).unwrap();
     (found.state, seen)
 }
 
@@ -177,7 +177,7 @@ fn derivatives_of_observables() {
         for key in keys {
             let model = case.model().unwrap();
             let at = (state.as_slice(), 1);
-            let exact = Derivative::of(&case, &model, key, at, &seen, Set::ALL).unwrap();
+            let exact = Derivative::of(&case, &model, key, at, &seen, ObservableSet::ALL).unwrap();
             let value = case.get(key);
             // A resonance is narrow.
             let part = if key == Key::DriveFrequency {
@@ -226,7 +226,7 @@ fn derivatives_over_several_repetitions() {
     for key in [Key::SampleModulus, Key::DriveFrequency] {
         let of = |periods| {
             let at = (state.as_slice(), periods);
-            Derivative::of(&case, &model, key, at, &seen, Set::COMMON).unwrap()
+            Derivative::of(&case, &model, key, at, &seen, ObservableSet::COMMON).unwrap()
         };
         let (one, three) = (of(1), of(3));
         let mut compared = 0;

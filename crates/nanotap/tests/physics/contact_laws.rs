@@ -5,7 +5,7 @@ use nanotap::model::Model;
 use nanotap::model::cantilever::Cantilever;
 use nanotap::model::contact::ContactLaw;
 use nanotap::model::parameter::Parameter;
-use nanotap::observe::{Set, measure};
+use nanotap::observe::{ObservableSet, measure};
 use nanotap::study::orbit::{OrbitOptions, orbit};
 use nanotap_flow::Trajectory;
 use proptest::prelude::*;
@@ -60,7 +60,7 @@ fn every_law_agrees_with_located_runge_kutta() {
                     independent.beam
                 );
             }
-            let seen = measure(&model, &state, 5, Set::ALL).unwrap();
+            let seen = measure(&model, &state, 5, ObservableSet::ALL).unwrap();
             let contacts = (seen.contacts_per_period * 5.0).round() as usize;
             assert_eq!(contacts, independent.contacts, "{law} {omega}");
             let lost = seen.energy_balance.sample_damping;
@@ -168,7 +168,7 @@ proptest! {
             state[2 * modes] = memory;
         }
         let run = Trajectory::record(&model.system, &state, 8).unwrap();
-        let seen = measure(&model, &state, 8, Set::ALL).unwrap();
+        let seen = measure(&model, &state, 8, ObservableSet::ALL).unwrap();
         prop_assert!(seen.energy_balance.sample_damping >= 0.0);
         if ![ContactLaw::SpringDamper, ContactLaw::MovingSurface].contains(&law) {
             let scale = seen.peak_force.max(stiffness * (a.abs() + memory.abs())) + 1e-3;

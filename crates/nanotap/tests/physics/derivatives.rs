@@ -5,13 +5,13 @@ use nalgebra::DMatrix;
 use nanotap::case::{Case, Key};
 use nanotap::model::Model;
 use nanotap::model::cantilever::Cantilever;
+use nanotap::model::model_map::ModelMap;
 use nanotap::model::oscillator::{Oscillator, Stop};
-use nanotap::model::strobe::Strobe;
 use nanotap_dynamics::StroboscopicMap;
 
 pub(crate) fn advance(subject: &Case, state: &[f64]) -> Vec<f64> {
     let mut x = state.to_vec();
-    Strobe::new(&subject.model().unwrap())
+    ModelMap::new(&subject.model().unwrap())
         .advance(&mut x)
         .unwrap();
     x
@@ -41,7 +41,7 @@ pub(crate) fn worst_over(subject: &Case, state: &[f64], step: f64) -> Option<f64
         .collect();
     let n = state.len();
     let (mut jacobian, mut derivatives) = (DMatrix::zeros(n, n), DMatrix::zeros(n, keys.len()));
-    Strobe::with_tangents(&model, tangents)
+    ModelMap::with_tangents(&model, tangents)
         .advance_with_derivatives(&mut state.to_vec(), &mut jacobian, &mut derivatives)
         .unwrap();
     let switches = counted(subject, state).1;

@@ -7,7 +7,7 @@ use nanotap::model::cantilever::Cantilever;
 use nanotap::model::contact::ContactLaw;
 use nanotap::model::drive_form::Actuation;
 use nanotap::model::parameter::Parameter;
-use nanotap::observe::{Set, Spectrum, measure};
+use nanotap::observe::{ObservableSet, Spectrum, measure};
 use nanotap::study::orbit::{OrbitOptions, orbit};
 use nanotap_arithmetic::ComplexFunctions as _;
 use nanotap_flow::{Complex, Flow};
@@ -124,7 +124,7 @@ fn every_drive_has_its_derivatives_and_balances_its_energy() {
             let model = subject.model().unwrap();
             let mut state = vec![0.0; model.dimension()];
             state[0] = 0.1;
-            let seen = measure(&model, &state, 3, Set::ALL).unwrap();
+            let seen = measure(&model, &state, 3, ObservableSet::ALL).unwrap();
             assert!(
                 seen.energy_balance.residual.abs() < 1e-11,
                 "{actuation} {law}"

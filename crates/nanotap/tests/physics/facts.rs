@@ -3,7 +3,7 @@
 
 use nanotap::model::Model;
 use nanotap::model::cantilever::{Cantilever, CosineTerm};
-use nanotap::observe::{Set, measure};
+use nanotap::observe::{ObservableSet, measure};
 use nanotap::study::orbit::{OrbitOptions, OrbitReport, orbit};
 use nanotap_flow::Trajectory;
 use proptest::prelude::*;
@@ -198,7 +198,7 @@ proptest! {
         let model = Model::cantilever(&case).unwrap();
         let start = vec![0.0; 2 * modes];
         let run = Trajectory::record(&model.system, &start, 12).unwrap();
-        let seen = measure(&model, &start, 12, Set::ALL).unwrap();
+        let seen = measure(&model, &start, 12, ObservableSet::ALL).unwrap();
         prop_assert!(seen.energy_balance.residual.abs() < 1e-11, "{:?}", seen.energy_balance);
 
         let doubled = Model::cantilever(&Cantilever { alpha2: 2.0 * case.alpha2, ..case.clone() }).unwrap();
@@ -237,7 +237,7 @@ fn clearance_of_a_long_run_is_the_least_of_its_periods() {
         let model = Model::cantilever(&case).unwrap();
         let seen = |state: &[f64], periods: usize| {
             let run = Trajectory::record(&model.system, state, periods).unwrap();
-            let seen = measure(&model, state, periods, Set::ALL).unwrap();
+            let seen = measure(&model, state, periods, ObservableSet::ALL).unwrap();
             (
                 seen.beam_clearance.unwrap(),
                 run.state_at(run.end()).unwrap(),
@@ -258,7 +258,7 @@ fn clearance_of_a_long_run_is_the_least_of_its_periods() {
 /// The clearance of one period from `state`, and the least height of `places` places over the whole
 /// period.
 fn clearance_and_least_height(model: &Model, state: &[f64], places: usize) -> (f64, f64) {
-    let seen = measure(model, state, 1, Set::ALL).unwrap();
+    let seen = measure(model, state, 1, ObservableSet::ALL).unwrap();
     let run = Trajectory::record(&model.system, state, 1).unwrap();
     let beam = model.beam.as_ref().unwrap();
     let least = (0..=places)

@@ -5,7 +5,7 @@ use nalgebra::Complex;
 use nanotap::case::{Case, Key};
 use nanotap::control::Control;
 use nanotap::model::oscillator::{Oscillator, Stop};
-use nanotap::observe::{Set, measure};
+use nanotap::observe::{ObservableSet, measure};
 use nanotap::study::branch::{BranchOptions, BranchReport, branch};
 use nanotap::study::orbit::{OrbitOptions, OrbitReport, orbit};
 use nanotap::study::value::Interval;
@@ -153,7 +153,7 @@ fn sticking_ends_when_the_force_changes_sign() {
         (releases[0] - quarter).abs() < 1e-10,
         "{releases:?} {quarter}"
     );
-    let seen = measure(&model, &[0.0, 0.0], 3, Set::ALL).unwrap();
+    let seen = measure(&model, &[0.0, 0.0], 3, ObservableSet::ALL).unwrap();
     assert!(seen.tip_max <= 1e-12);
     assert!(
         seen.energy_balance.residual.abs() < 1e-9,
@@ -208,10 +208,10 @@ fn stiff_soft_stop_tends_to_the_rigid_one() {
 /// impacts at drive phase 0.
 #[test]
 fn runs_that_impact_at_phase_zero_continue() {
-    use nanotap::model::strobe::Strobe;
+    use nanotap::model::model_map::ModelMap;
     use nanotap_dynamics::StroboscopicMap;
     let model = rigid(1.26, 0.8).model().unwrap();
-    let mut map = Strobe::new(&model);
+    let mut map = ModelMap::new(&model);
     for state in [
         [0.0, -0.5],
         [0.0, 0.5],

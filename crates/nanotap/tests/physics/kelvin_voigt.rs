@@ -3,8 +3,8 @@
 use nanotap::model::Model;
 use nanotap::model::cantilever::Cantilever;
 use nanotap::model::contact::ContactLaw;
+use nanotap::model::model_map::ModelMap;
 use nanotap::model::parameter::Parameter;
-use nanotap::model::strobe::Strobe;
 use nanotap::observe::begins_contact;
 use nanotap_dynamics::StroboscopicMap as _;
 use nanotap_flow::{Flow, Trajectory};
@@ -142,7 +142,7 @@ fn separation_is_not_a_grazing() {
     for k in 0..40 {
         let omega = 19.5 + 0.02 * f64::from(k);
         let model = Model::cantilever(&on(ContactLaw::KelvinVoigt, omega)).unwrap();
-        let mut map = Strobe::new(&model);
+        let mut map = ModelMap::new(&model);
         let mut state = vec![0.0; model.dimension()];
         for _ in 0..40 {
             map.advance(&mut state).unwrap();

@@ -6,8 +6,8 @@ use nanotap::control::Control;
 use nanotap::map::{Map, MapError};
 use nanotap::model::Model;
 use nanotap::model::cantilever::Cantilever;
+use nanotap::model::model_map::ModelMap;
 use nanotap::model::oscillator::{Oscillator, Stop};
-use nanotap::model::strobe::Strobe;
 use nanotap_dynamics::{Scheduling as _, StroboscopicMap};
 
 fn regular() -> Map {
@@ -88,7 +88,7 @@ fn strobe_states_of_many_motions_agree_with_single_ones() {
         (hertz.model().unwrap(), false),
     ];
     for (model, side_by_side) in models {
-        let mut map = Strobe::new(&model);
+        let mut map = ModelMap::new(&model);
         assert_eq!(map.batch_size() > 1, side_by_side);
         let d = map.dimension();
         let numbers = 0..u32::try_from(10 * d).unwrap();

@@ -6,9 +6,9 @@ use nanotap::control::Control;
 use nanotap::model::Model;
 use nanotap::model::cantilever::Cantilever;
 use nanotap::model::contact::ContactLaw;
+use nanotap::model::model_map::ModelMap;
 use nanotap::model::oscillator::{Oscillator, Stop};
 use nanotap::model::parameter::Parameter;
-use nanotap::model::strobe::Strobe;
 use nanotap::study::attractors::{AttractorsOptions, attractors};
 use nanotap::study::branch::{BranchOptions, branch};
 use nanotap::study::lyapunov::{LyapunovOptions, Section, lyapunov, section};
@@ -154,7 +154,7 @@ fn every_start_goes_to_the_motion_of_a_long_run() {
     let lever = bistable.model().unwrap();
     for (model, count, long) in [(paper, 128, 1500), (lever, 64, 3000)] {
         let starts = default_box(&model).unwrap().starts(1, count);
-        let map = Strobe::new(&model);
+        let map = ModelMap::new(&model);
         let found = census(
             &map,
             &starts,
@@ -162,7 +162,7 @@ fn every_start_goes_to_the_motion_of_a_long_run() {
             &Control::default(),
         );
         assert_eq!(found.attractors.len(), 2);
-        let destination = |map: &Strobe, start: &[f64], tolerance: f64| {
+        let destination = |map: &ModelMap, start: &[f64], tolerance: f64| {
             let (mut map, mut state) = (map.clone(), start.to_vec());
             for _ in 0..long {
                 map.advance(&mut state).unwrap();

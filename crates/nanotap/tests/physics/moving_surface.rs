@@ -8,8 +8,8 @@ use nanotap::model::Model;
 use nanotap::model::cantilever::Cantilever;
 use nanotap::model::contact::ContactLaw;
 use nanotap::model::galerkin::Galerkin;
+use nanotap::model::model_map::ModelMap;
 use nanotap::model::parameter::Parameter;
-use nanotap::model::strobe::Strobe;
 use nanotap::study::branch::{BranchOptions, BranchReport, branch};
 use nanotap::study::orbit::{OrbitOptions, orbit};
 use nanotap_dynamics::{Control, StroboscopicMap};
@@ -196,7 +196,7 @@ impl Taylor {
 /// state of the independent integration: errors grow where motions diverge.
 fn agrees_with_taylor_series(case: &Cantilever, start: [f64; 3]) -> Result<(), TestCaseError> {
     let modes = case.modes;
-    let mut map = Strobe::new(&Model::cantilever(case).unwrap());
+    let mut map = ModelMap::new(&Model::cantilever(case).unwrap());
     let independent = Taylor::new(case);
     let mut state = vec![0.0; 2 * modes + 1];
     [state[0], state[modes], state[2 * modes]] = start;
@@ -339,7 +339,7 @@ proptest! {
             Ok(model) => {
                 prop_assert!(stiffness > 0.0 && damping >= 1e-15 && adhesion >= 0.0);
                 let mut state = vec![0.1, 0.0, v, 0.0, s];
-                if Strobe::new(&model).advance(&mut state).is_ok() {
+                if ModelMap::new(&model).advance(&mut state).is_ok() {
                     prop_assert!(state.iter().all(|x| x.is_finite()), "{state:?}");
                 }
             }
@@ -409,7 +409,7 @@ fn orbits_keep_their_volumes_and_energies() {
             "{:e}",
             found.determinant_defect
         );
-        let mut map = Strobe::new(&model);
+        let mut map = ModelMap::new(&model);
         let mut jacobian = DMatrix::zeros(7, 7);
         let mut state = found.state.clone();
         let reported = map.advance_with_jacobian_and_determinant(&mut state, &mut jacobian);

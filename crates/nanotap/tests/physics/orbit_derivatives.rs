@@ -5,9 +5,9 @@ use nanotap::case::{Case, Key};
 use nanotap::model::cantilever::Cantilever;
 use nanotap::model::contact::ContactLaw;
 use nanotap::model::drive_form::Actuation;
+use nanotap::model::model_map::ModelMap;
 use nanotap::model::oscillator::{Oscillator, Stop};
-use nanotap::model::strobe::Strobe;
-use nanotap::observe::{Derivative, Observable, Observables, Set, Value, measure};
+use nanotap::observe::{Derivative, Observable, ObservableSet, Observables, Value, measure};
 use nanotap::study::orbit::{OrbitOptions, orbit};
 use nanotap_dynamics::{ShootingOptions, close_orbit};
 
@@ -26,10 +26,10 @@ fn numbers(value: Value) -> Vec<f64> {
 /// The orbit near `start`: its state and its observables.
 fn observed(case: &Case, start: &[f64], period: usize) -> (Vec<f64>, Observables) {
     let model = case.model().unwrap();
-    let mut map = Strobe::new(&model);
+    let mut map = ModelMap::new(&model);
     let found = close_orbit(&mut map, start, period, &ShootingOptions::default()).unwrap();
     assert_eq!(found.period, period);
-    let seen = measure(&model, &found.states[0], period, Set::ALL).unwrap();
+    let seen = measure(&model, &found.states[0], period, ObservableSet::ALL).unwrap();
     (found.states[0].clone(), seen)
 }
 
@@ -39,7 +39,7 @@ fn compare(case: &Case, start: &[f64], period: usize, key: Key, step: f64) {
     let (state, seen) = observed(case, start, period);
     let model = case.model().unwrap();
     let at = (state.as_slice(), period);
-    let exact = Derivative::of(case, &model, key, at, &seen, Set::ALL).unwrap();
+    let exact = Derivative::of(case, &model, key, at, &seen, ObservableSet::ALL).unwrap();
     let value = case.get(key);
     let size = if value == 0.0 { 0.02 } else { value.abs() };
     let h = step * size;

@@ -7,7 +7,7 @@ use nanotap::model::Model;
 use nanotap::model::cantilever::Cantilever;
 use nanotap::model::contact::ContactLaw;
 use nanotap::model::parameter::Parameter;
-use nanotap::observe::{Set, measure};
+use nanotap::observe::{ObservableSet, measure};
 use nanotap::study::orbit::{OrbitOptions, orbit};
 use nanotap_flow::Trajectory;
 
@@ -120,6 +120,6 @@ fn the_free_surface_recovers_with_its_retardation_time() {
         flights += 1;
     }
     assert!(flights > 1);
-    let seen = measure(&model, &after(&case, 30), 12, Set::ALL).unwrap();
+    let seen = measure(&model, &after(&case, 30), 12, ObservableSet::ALL).unwrap();
     assert!(seen.least_force > -1e-12 && seen.peak_force > 0.1);
 }

@@ -5,7 +5,7 @@ use nanotap::case::Case;
 use nanotap::dataset::{Share, Store, Values, Work};
 use nanotap::figure::basin::figure;
 use nanotap::model::cantilever::Cantilever;
-use nanotap::model::strobe::Strobe;
+use nanotap::model::model_map::ModelMap;
 use nanotap::study::Computation as _;
 use nanotap::study::basin::{Basin, BasinOptions, SliceRange, shares};
 use nanotap_dynamics::{CancelFlag, ClassifyOptions, Control, MotionKind, classify};
@@ -84,7 +84,7 @@ fn labels_agree_with_plain_runs() {
         "{found:?}"
     );
 
-    let mut map = Strobe::new(&bistable().model().unwrap());
+    let mut map = ModelMap::new(&bistable().model().unwrap());
     let (mut checked, mut wrong) = (0, 0);
     for chunk in 0..store.chunks() {
         let block = store.schema().grid.block(chunk);

@@ -28,7 +28,7 @@ pub(crate) use reader::{Described, modes, parse_with_scan, word};
 use toml::de::{DeTable, DeValue};
 
 use super::force_table::{ForceTable, file_named};
-use super::{Case, Kind, Value, What};
+use super::{Case, CaseKind, Kind, Value};
 use crate::case::key::Key;
 use crate::model::cantilever::{Cantilever, CosineTerm};
 use crate::model::contact::ContactLaw;
@@ -73,8 +73,8 @@ impl Case {
     pub fn to_toml(&self) -> String {
         use std::fmt::Write as _;
         let quantities = match &self.what {
-            What::Cantilever(cantilever) => return to_toml(cantilever),
-            What::Oscillator(oscillator) => {
+            CaseKind::Cantilever(cantilever) => return to_toml(cantilever),
+            CaseKind::Oscillator(oscillator) => {
                 let mut text = format!("[model]\nkind = \"{}\"\n", self.model_kind().name());
                 for (key, value) in self
                     .keys()
@@ -85,7 +85,7 @@ impl Case {
                 }
                 return text;
             }
-            What::Quantities(quantities) => quantities,
+            CaseKind::Quantities(quantities) => quantities,
         };
         let mut text = String::new();
         let mut section = None;

@@ -181,7 +181,7 @@ impl Physical {
     /// voltage, not the lever's answer to it), the second tone its place among the harmonics
     /// of the first, the sample its place, and the unit of length g₀ stays so that all values have
     /// the same unit.
-    pub(crate) fn held(&self, stated: &Stated) -> Stated {
+    pub(crate) fn implied_constants(&self, stated: &Stated) -> Stated {
         let mut held = stated.clone();
         held.set(Key::GapBeam, self.scales.length);
         held.set(Key::GapTip, self.parameters.get(Parameter::Alpha5));

@@ -22,7 +22,7 @@ use nanotap_dynamics::{
 
 use crate::case::{Case, CaseError, Family};
 use crate::model::Model;
-use crate::model::strobe::Strobe;
+use crate::model::model_map::ModelMap;
 use crate::study::branch::kind_name;
 use crate::study::short_run::short_run;
 use crate::study::simulate::{Classification, Named};
@@ -268,7 +268,7 @@ impl<'a> DistanceSweep<'a> {
         if let Some(response) = response.filter(|x| x.iter().all(|v| v.is_finite())) {
             let shared = start.len().min(response.len());
             start[..shared].copy_from_slice(&response[..shared]);
-            let mut map = Strobe::new(&model);
+            let mut map = ModelMap::new(&model);
             let closed = close_orbit(&mut map, &start, 1, &ShootingOptions::default());
             if let Ok(orbit) = closed
                 && orbit.is_stable()
@@ -302,7 +302,7 @@ impl<'a> DistanceSweep<'a> {
             ..self.classify.clone()
         };
         match self.model(gap) {
-            Ok(model) => named(&mut Strobe::new(&model), start, &options),
+            Ok(model) => named(&mut ModelMap::new(&model), start, &options),
             Err(error) => Met::undecided(error.to_string(), start),
         }
     }
@@ -314,7 +314,7 @@ impl<'a> DistanceSweep<'a> {
             Ok(model) => model,
             Err(error) => return Met::undecided(error.to_string(), start),
         };
-        let mut map = Strobe::new(&model);
+        let mut map = ModelMap::new(&model);
         let options = ClassifyOptions {
             max_transient: GRID_TRANSIENT,
             long_period: self.classify.max_period,
@@ -445,7 +445,7 @@ impl<'a> DistanceSweep<'a> {
                 .fold(0.0, |m: f64, (x, y)| m.max((x - y).abs()));
             let model = self.model(gap).ok()?;
             let options = ShootingOptions::default();
-            let mut map = Strobe::new(&model);
+            let mut map = ModelMap::new(&model);
             let closed = close_orbit_from_points(&mut map, &between, stretch.period, &options);
             if let Ok(orbit) = closed
                 && orbit.period == stretch.period
@@ -774,7 +774,7 @@ impl<'a> DistanceSweep<'a> {
 }
 
 /// What a run of a map goes to.
-fn named(map: &mut Strobe, start: &[f64], options: &ClassifyOptions) -> Met {
+fn named(map: &mut ModelMap, start: &[f64], options: &ClassifyOptions) -> Met {
     let classified = classify(map, start, options);
     let named = Named::of(&classified.kind);
     Met {

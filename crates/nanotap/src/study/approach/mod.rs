@@ -30,7 +30,7 @@ use crate::Error;
 use crate::case::physical::Kind;
 use crate::case::{Case, ParameterUnit};
 use crate::model::Model;
-use crate::observe::{Clearance, Observables, PhysicalMotion, Set, measure};
+use crate::observe::{Clearance, ObservableSet, Observables, PhysicalMotion, measure};
 use crate::study::branch::{BranchOptions, BranchReport};
 use crate::study::frequency_modulation::{
     FrequencyModulationOptions, Modulated, ModulatedInSi, ModulationReport, frequency_modulation,
@@ -363,10 +363,12 @@ impl Curve<'_> {
         let seen = match (&met.orbit, met.classification) {
             (Some(orbit), _) => {
                 let start = orbit.states.first().map_or(&[][..], Vec::as_slice);
-                measure(model, start, orbit.period, Set::COMMON).map(Some)
+                measure(model, start, orbit.period, ObservableSet::COMMON).map(Some)
             }
             (None, Classification::Undecided | Classification::Unbounded) => Ok(None),
-            (None, _) => measure(model, &met.state, RECORDED_PERIODS, Set::COMMON).map(Some),
+            (None, _) => {
+                measure(model, &met.state, RECORDED_PERIODS, ObservableSet::COMMON).map(Some)
+            }
         };
         let (classification, observables, reason) = match seen {
             Ok(Some(seen)) => (met.classification, Some(seen), None),

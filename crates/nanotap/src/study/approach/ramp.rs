@@ -8,7 +8,7 @@ use super::{ApproachPoint, Curve, Way};
 use crate::Error;
 use crate::case::MovingGap;
 use crate::model::{Model, MotionError};
-use crate::observe::{Set, measure};
+use crate::observe::{ObservableSet, measure};
 
 /// Most drive periods there and back.
 const MAX_PERIODS: usize = 2_000_000;
@@ -94,7 +94,7 @@ fn row(
     model: &Model,
     state: &[f64],
 ) -> Result<ApproachPoint, MotionError> {
-    let seen = measure(model, state, 1, Set::COMMON)?;
+    let seen = measure(model, state, 1, ObservableSet::COMMON)?;
     Ok(ApproachPoint::new(
         curve.case,
         (way, gap),

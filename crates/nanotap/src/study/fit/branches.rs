@@ -19,7 +19,7 @@ use nanotap_dynamics::{
 
 use crate::case::Case;
 use crate::model::Model;
-use crate::model::strobe::Strobe;
+use crate::model::model_map::ModelMap;
 
 /// An orbit at a row.
 #[derive(Clone, Debug)]
@@ -80,7 +80,7 @@ impl RowCases<'_> {
     pub(super) fn continued_from(&self, before: &Rows) -> Option<Rows> {
         let row = |(place, candidates): (&Vec<f64>, &Vec<Candidate>)| {
             let model = (self.at)(place)?.model().ok()?;
-            let mut map = Strobe::new(&model);
+            let mut map = ModelMap::new(&model);
             let one = |candidate: &Candidate| {
                 let orbit = newton_continuation(&mut map, &candidate.orbit)?;
                 let near = orbit.is_near(&candidate.orbit, MAX_CONTINUATION_DISTANCE);
@@ -242,7 +242,7 @@ impl RowCases<'_> {
     ) -> Option<PeriodicOrbit> {
         let closed = (self.at)(to).and_then(|case| {
             let model = case.model().ok()?;
-            newton_continuation(&mut Strobe::new(&model), orbit)
+            newton_continuation(&mut ModelMap::new(&model), orbit)
         });
         // Beyond a fold Newton may find an orbit of another branch.
         let near = |found: &PeriodicOrbit| found.is_near(orbit, MAX_CONTINUATION_DISTANCE);
@@ -284,7 +284,7 @@ pub(super) fn settle(
         birkhoff_periods: 0,
         ..ClassifyOptions::default()
     };
-    let end = classify(&mut Strobe::new(model), state.unwrap_or(&rest), &options);
+    let end = classify(&mut ModelMap::new(model), state.unwrap_or(&rest), &options);
     match end.kind {
         MotionKind::Periodic(orbit) | MotionKind::TransientChaos { orbit, .. } => Some(orbit),
         _ => None,
@@ -293,7 +293,7 @@ pub(super) fn settle(
 
 /// The orbit of this map that Newton finds from another orbit of the same period.
 pub(super) fn newton_continuation(
-    map: &mut Strobe,
+    map: &mut ModelMap,
     orbit: &PeriodicOrbit,
 ) -> Option<PeriodicOrbit> {
     if orbit.dimension() != map.dimension() {

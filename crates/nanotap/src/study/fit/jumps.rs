@@ -166,7 +166,7 @@ impl Fold {
 mod tests {
     use super::*;
     use crate::case::file::Source;
-    use crate::model::strobe::Strobe;
+    use crate::model::model_map::ModelMap;
     use nanotap_dynamics::{ClassifyOptions, MotionKind, classify};
 
     fn lever(overrides: &[&str]) -> Case {
@@ -188,7 +188,11 @@ mod tests {
         let case = case.with(Key::GapTip, at);
         let model = case.model().unwrap();
         let rest = vec![0.0; model.dimension()];
-        let end = classify(&mut Strobe::new(&model), &rest, &ClassifyOptions::default());
+        let end = classify(
+            &mut ModelMap::new(&model),
+            &rest,
+            &ClassifyOptions::default(),
+        );
         let MotionKind::Periodic(orbit) = end.kind else {
             panic!("{end:?}")
         };

@@ -10,7 +10,7 @@ use super::{
 };
 use crate::case::{Case, Key};
 use crate::model::cantilever::Cantilever;
-use crate::observe::{Set, measure};
+use crate::observe::{ObservableSet, measure};
 use crate::study::FreeMotion;
 use crate::study::approach::{
     ApproachPoint, ApproachReport, Distances, Way, beam_clearance, hysteresis,
@@ -314,7 +314,12 @@ impl Curve<'_> {
         orbit: HeldOrbit,
         amplitude: f64,
     ) -> Result<ApproachPoint, Error> {
-        let observables = measure(&orbit.model, &orbit.orbit.states[0], 1, Set::COMMON)?;
+        let observables = measure(
+            &orbit.model,
+            &orbit.orbit.states[0],
+            1,
+            ObservableSet::COMMON,
+        )?;
         let modulation = self.modulated(&orbit, amplitude, gap);
         let kind = Classification::Periodic;
         let (seen, orbit) = (Some(&observables), Some(orbit.orbit));

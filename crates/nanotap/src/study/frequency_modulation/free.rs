@@ -11,8 +11,8 @@ use crate::model::Model;
 use crate::model::cantilever::Cantilever;
 use crate::model::contact::ContactLaw;
 use crate::model::drive_form::Actuation;
-use crate::model::strobe::Strobe;
-use crate::observe::{Set, measure};
+use crate::model::model_map::ModelMap;
+use crate::observe::{ObservableSet, measure};
 use crate::study::FreeMotion;
 
 /// The free lever at the amplitude and phase that are held; in the model's units.
@@ -103,7 +103,12 @@ impl FreeOscillation {
                 state,
             },
         )?;
-        let seen = measure(&closed.model, &closed.orbit.states[0], 1, Set::ALL)?;
+        let seen = measure(
+            &closed.model,
+            &closed.orbit.states[0],
+            1,
+            ObservableSet::ALL,
+        )?;
         let swing = seen.tip_motion.unwrap_or(held.amplitude);
         let lag = seen.tip_motion_phase.unwrap_or(held.phase);
         let mut state = closed.orbit.states[0].clone();
@@ -268,7 +273,7 @@ fn stiffness(
 /// The steady motion of a linear system, at drive phase 0.
 fn steady_state(model: &Model) -> Result<Vec<f64>, Error> {
     let n = model.dimension();
-    let mut map = Strobe::new(model);
+    let mut map = ModelMap::new(model);
     let mut at = vec![0.0; n];
     let mut jacobian = DMatrix::zeros(n, n);
     nanotap_dynamics::StroboscopicMap::advance_with_jacobian(&mut map, &mut at, &mut jacobian)?;

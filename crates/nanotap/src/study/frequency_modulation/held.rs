@@ -16,8 +16,8 @@ use nanotap_dynamics::{Multipliers, PeriodicOrbit, StroboscopicMap as _};
 use crate::Error;
 use crate::case::{Case, Key};
 use crate::model::Model;
-use crate::model::strobe::Strobe;
-use crate::observe::{Set, first_harmonic_changes, measure};
+use crate::model::model_map::ModelMap;
+use crate::observe::{ObservableSet, first_harmonic_changes, measure};
 
 /// Setpoint of the loop.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -222,7 +222,7 @@ impl Held {
             .map(|key| case.tangent(&model, *key))
             .collect::<Result<Vec<_>, _>>()?;
         let n = model.dimension();
-        let mut map = Strobe::with_tangents(&model, tangents);
+        let mut map = ModelMap::with_tangents(&model, tangents);
         let mut driven = driven;
         let mut end = driven.state.clone();
         let (mut jacobian, mut by) = (DMatrix::zeros(n, n), DMatrix::zeros(n, keys.len()));
@@ -236,7 +236,7 @@ impl Held {
             end.copy_from_slice(&driven.state);
             map.advance_with_derivatives(&mut end, &mut jacobian, &mut by)?;
         }
-        let seen = measure(&model, &driven.state, 1, Set::FIRST_HARMONIC)?;
+        let seen = measure(&model, &driven.state, 1, ObservableSet::FIRST_HARMONIC)?;
         let sizes = self.sizes(&model, driven.frequency);
         let mut residual = DVector::zeros(n + 2);
         for k in 0..n {
@@ -377,7 +377,7 @@ impl At {
             stability: multipliers.stability(),
             multipliers: multipliers.values,
             log_determinant: multipliers.log_determinant,
-            discrete: Strobe::new(&self.model).discrete_entries(),
+            discrete: ModelMap::new(&self.model).discrete_entries(),
             states: vec![self.driven.state],
         };
         Ok(HeldOrbit {

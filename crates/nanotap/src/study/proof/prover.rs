@@ -56,7 +56,7 @@ impl Prover {
     /// [`NotProved`] says why that was not possible.
     pub fn theorem(&self, orbit: &Recording, period: usize) -> Result<Theorem, NotProved> {
         let system = self.system.as_ref().map_err(Clone::clone)?;
-        let Recording::Exact(trajectory) = orbit else {
+        let Recording::PiecewiseLinear(trajectory) = orbit else {
             return Err(EnclosureError::NotPiecewiseLinear.into());
         };
         Ok(prove(system, &candidate(trajectory, period))?)

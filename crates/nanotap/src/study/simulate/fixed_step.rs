@@ -17,7 +17,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::Error;
-use crate::model::strobe::Strobe;
+use crate::model::model_map::ModelMap;
 use crate::model::{FlowError, Model};
 use crate::study::simulate::{
     Classification, Grid, Named, SimulateOptions, check_periods, check_states, is_none,
@@ -172,7 +172,7 @@ pub fn fixed_step_run(model: &Model, options: &SimulateOptions) -> Result<FixedS
     let mut strobes = Vec::from(strobes);
     let (apparent_period, closure) = apparent_period(&strobes);
     let last = strobes.last().cloned().unwrap_or_default();
-    let named = Named::of(&classify(&mut Strobe::new(model), &last, &options.classify()).kind);
+    let named = Named::of(&classify(&mut ModelMap::new(model), &last, &options.classify()).kind);
     Ok(FixedStepRun {
         method: "rk4",
         steps,

@@ -14,11 +14,11 @@ use serde::{Deserialize, Serialize};
 use crate::Error;
 use crate::case::Case;
 use crate::control::Control;
+use crate::model::model_map::ModelMap;
 use crate::model::recording::Recording;
-use crate::model::strobe::Strobe;
 use crate::model::{Model, MotionError};
 use crate::observe::PhysicalMotion;
-use crate::observe::{ContactEvent, Kept, Observables, OutOfRange, Set, watch};
+use crate::observe::{ContactEvent, ObservableSet, Observables, OutOfRange, RecordOptions, record};
 use crate::study::Study;
 use crate::study::in_si::InSi;
 use crate::study::limits::{MOST_PERIOD, MOST_PERIODS, MOST_SAMPLES, MOST_STATE_NUMBERS};
@@ -128,7 +128,7 @@ pub fn simulate(model: &Model, options: &SimulateOptions) -> Result<Simulation, 
     check_periods(options.periods)?;
     check_states(model, options.strobe.min(options.periods), "strobe")?;
     let how = options.classify();
-    let mut map = Strobe::new(model);
+    let mut map = ModelMap::new(model);
     let transient = if let Some(transient) = options.transient {
         map.advance_by(&mut state, transient)?;
         transient
@@ -136,14 +136,15 @@ pub fn simulate(model: &Model, options: &SimulateOptions) -> Result<Simulation, 
         measured_transient(&mut map, &mut state, &how)
     };
     let (periods_per_second, evaluations_per_period) = speed(model, &state, options.periods)?;
-    let kept = Kept {
+    let kept = RecordOptions {
         recorded: SHOWN,
         states: options.strobe,
         events: true,
         each_period: false,
     };
-    let observed = OutOfRange::observed_with(model, options.observables.unwrap_or(Set::ALL));
-    let mut record = watch(model, &state, options.periods, observed, kept)?;
+    let observed =
+        OutOfRange::observed_with(model, options.observables.unwrap_or(ObservableSet::ALL));
+    let mut record = record(model, &state, options.periods, observed, kept)?;
     let events_left_out = record.events.len().saturating_sub(options.events);
     record.events.truncate(options.events);
     let named = Named::of(&classify(&mut map, &state, &how).kind);
@@ -253,7 +254,7 @@ const BEHIND_STOP: f64 = 1e-9;
 /// Runs until the motion has been named. If it goes to a periodic orbit, the state becomes
 /// the orbit's own and the rest of the decay, which the multipliers tell, counts as waited
 /// for: near a multiplier of modulus one it takes longer than anyone would run.
-fn measured_transient(map: &mut Strobe, state: &mut [f64], options: &ClassifyOptions) -> usize {
+fn measured_transient(map: &mut ModelMap, state: &mut [f64], options: &ClassifyOptions) -> usize {
     let classified = classify(map, state, options);
     state.copy_from_slice(&classified.state);
     let (MotionKind::Periodic(orbit) | MotionKind::TransientChaos { orbit, .. }) = &classified.kind
@@ -276,7 +277,7 @@ fn measured_transient(map: &mut Strobe, state: &mut [f64], options: &ClassifyOpt
 /// periods: a long run is not made longer by them.
 fn speed(model: &Model, state: &[f64], periods: usize) -> Result<(f64, f64), MotionError> {
     let periods = periods.min(SHOWN);
-    let mut map = Strobe::new(model);
+    let mut map = ModelMap::new(model);
     let mut state = state.to_vec();
     let clock = Instant::now();
     map.advance_by(&mut state, periods)?;
@@ -439,7 +440,7 @@ options! {
         pub max_period: usize = ClassifyOptions::default().max_period,
         /// Observables to measure; default: all, including the clearance of the beam
         #[schemars(extend("x-value" = "NAME,…"))]
-        pub observables: Option<Set> = None,
+        pub observables: Option<ObservableSet> = None,
         /// Samples per drive period in the time series
         #[schemars(range(min = 1, max = MOST_SAMPLES), extend("x-value" = "S"))]
         pub resolution: usize = 200,

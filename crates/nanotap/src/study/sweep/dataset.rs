@@ -12,7 +12,7 @@ use crate::case::Case;
 use crate::case::physical::Kind as QuantityKind;
 use crate::dataset::schema::Kind;
 use crate::dataset::{Axis, Coordinate, Grid, Schema, Values, Variable, attributes};
-use crate::observe::{Dimension, Observable, Set};
+use crate::observe::{Dimension, Observable, ObservableSet};
 use crate::study::simulate::Classification;
 
 /// Chunks that a large sweep is cut into at least: enough for a job array, few enough
@@ -139,7 +139,7 @@ fn variables(options: &SweepOptions, states: usize, si: bool) -> Vec<Variable> {
         ),
     ];
     variables.extend(
-        Set::COMMON
+        ObservableSet::COMMON
             .iter()
             .map(|o| real(o.name, o.words, unit(o.dimension))),
     );

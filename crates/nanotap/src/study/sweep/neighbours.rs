@@ -25,8 +25,8 @@ use super::run::is_on;
 use super::{Runs, Starts};
 use crate::case::{Case, CaseError, Key};
 use crate::dataset::{Store, StoreError, WorkError};
-use crate::model::strobe::Strobe;
-use crate::observe::{Set, measure};
+use crate::model::model_map::ModelMap;
+use crate::observe::{ObservableSet, measure};
 use crate::study::approach::{states_at, states_near};
 use crate::study::short_run::short_run;
 
@@ -88,7 +88,7 @@ impl Runs {
             })
         };
         let model_at = |k: usize| case_at(k).model();
-        let map_at = |k: usize| model_at(k).map(|m| Strobe::new(&m));
+        let map_at = |k: usize| model_at(k).map(|m| ModelMap::new(&m));
         let neighbours = grid_neighbours(&shape);
         let states = self.orbit_states(store, strobe, count)?;
         let quasistatic = match self.starts {
@@ -128,7 +128,8 @@ impl Runs {
                 let case = case_at(k);
                 let turn = if period == 0 { UNREPEATED } else { period };
                 let Ok(model) = case.model() else { continue };
-                let Ok(seen) = measure(&model, &attractor.state, turn, Set::COMMON) else {
+                let Ok(seen) = measure(&model, &attractor.state, turn, ObservableSet::COMMON)
+                else {
                     continue;
                 };
                 let seen = case
@@ -264,7 +265,7 @@ const LINES: usize = 16;
 const UNREPEATED: usize = 64;
 
 /// The stable orbits among the states that runs ended in, each once.
-fn closed(mut map: Strobe, states: &[OrbitState]) -> Vec<PeriodicOrbit> {
+fn closed(mut map: ModelMap, states: &[OrbitState]) -> Vec<PeriodicOrbit> {
     let mut orbits: Vec<PeriodicOrbit> = Vec::new();
     for (period, state) in states {
         let known = orbits.iter().filter(|o| o.period == *period);

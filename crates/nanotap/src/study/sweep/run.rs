@@ -10,10 +10,10 @@ use crate::case::Case;
 use crate::case::physical::Scales;
 use crate::dataset::Block;
 use crate::map::UNINTERRUPTED;
-use crate::model::strobe::Strobe;
+use crate::model::model_map::ModelMap;
 use crate::model::{Model, MotionError};
 use crate::observe::time_series::with_modes;
-use crate::observe::{Kept, Observables, Set, Watched, Watcher};
+use crate::observe::{ObservableSet, Observables, RecordOptions, Recorded, Recorder};
 use crate::study::short_run::short_run;
 use crate::study::simulate::{Classification, Named};
 use crate::study::start_box::{box_with, default_starts};
@@ -214,13 +214,13 @@ impl Runs {
 struct Runner<'a> {
     options: &'a SweepOptions,
     classify: ClassifyOptions,
-    map: Strobe,
+    map: ModelMap,
     /// Stable orbits that starts went to.
     known: Vec<PeriodicOrbit>,
     /// Exponents of chaotic motions that starts went to.
     chaos: Vec<LyapunovSpectrum>,
     /// What every motion is measured with.
-    watcher: Result<Watcher<'a>, MotionError>,
+    recorder: Result<Recorder<'a>, MotionError>,
     /// Units to tell observables in, where physical quantities vary.
     scales: Option<Scales>,
 }
@@ -231,10 +231,10 @@ impl<'a> Runner<'a> {
             scales: case.physical().map(|view| view.scales),
             options,
             classify: short_run(options.max_period),
-            map: Strobe::new(model),
+            map: ModelMap::new(model),
             known: Vec::new(),
             chaos: Vec::new(),
-            watcher: Watcher::new(model, Set::COMMON),
+            recorder: Recorder::new(model, ObservableSet::COMMON),
         }
     }
 
@@ -347,9 +347,14 @@ impl<'a> Runner<'a> {
         classified
     }
 
-    fn watch(&self, from: &[f64], periods: usize, kept: Kept) -> Result<Watched, MotionError> {
-        let watcher = self.watcher.as_ref().map_err(Clone::clone)?;
-        watcher.record(from, periods, kept)
+    fn watch(
+        &self,
+        from: &[f64],
+        periods: usize,
+        kept: RecordOptions,
+    ) -> Result<Recorded, MotionError> {
+        let recorder = self.recorder.as_ref().map_err(Clone::clone)?;
+        recorder.record(from, periods, kept)
     }
 
     /// Records the motion from `from`; with `period`, one turn of that orbit stands for
@@ -362,12 +367,12 @@ impl<'a> Runner<'a> {
     ) -> (Outcome, Option<Vec<f64>>) {
         let periods = self.options.periods;
         let turn = period.unwrap_or(periods);
-        let kept = Kept {
+        let kept = RecordOptions {
             states: turn,
             each_period: true,
-            ..Kept::default()
+            ..RecordOptions::default()
         };
-        let Watched {
+        let Recorded {
             observables,
             states,
             lows,

@@ -11,8 +11,8 @@ use rayon::prelude::*;
 
 use crate::case::{Case, Key};
 use crate::model::Model;
-use crate::model::strobe::Strobe;
-use crate::observe::{Derivative, Observables, Set, measure};
+use crate::model::model_map::ModelMap;
+use crate::observe::{Derivative, ObservableSet, Observables, measure};
 
 use crate::study::fit::branches::{
     Candidate, RowCases, Rows, newton_continuation, path, release_branch_ends,
@@ -117,10 +117,10 @@ impl Problem<'_> {
     }
 
     /// The requested observables.
-    fn set(&self) -> Set {
+    fn set(&self) -> ObservableSet {
         let columns = self.data.columns.iter();
         let observed = columns.filter_map(|column| column.quantity.observable());
-        observed.fold(Set::NONE, Set::with)
+        observed.fold(ObservableSet::NONE, ObservableSet::with)
     }
 
     /// The cases of the curves for given parameters.
@@ -658,7 +658,7 @@ impl LeastSquares for Problem<'_> {
                     }
                 }
                 let model = case.model().ok()?;
-                let orbit = newton_continuation(&mut Strobe::new(&model), &guess)?;
+                let orbit = newton_continuation(&mut ModelMap::new(&model), &guess)?;
                 self.seen(Arc::new((case, model)), before_point.branch, orbit)
             };
             follow().unwrap_or_else(lost)

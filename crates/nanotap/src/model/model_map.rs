@@ -11,7 +11,6 @@ use nanotap_flow::flow::{Observer, SegmentView, SwitchView};
 use nanotap_flow::jacobian::Jacobian;
 use nanotap_flow::search::sign_changes;
 use nanotap_flow::sensitivity::SystemTangent;
-use nanotap_flow::signal::Signal;
 use nanotap_flow::system::{Switch, Transition};
 use nanotap_flow::{Ensemble, Flow, FlowError, Output, System};
 
@@ -117,7 +116,7 @@ impl ModelMap {
         let (mut exact, mut nonlinear) = (Vec::new(), Vec::new());
         for tangent in tangents {
             match tangent.0 {
-                TangentKind::Exact(tangent) => exact.push(tangent),
+                TangentKind::PiecewiseLinear(tangent) => exact.push(tangent),
                 TangentKind::Nonlinear(variation) => nonlinear.push(variation),
             }
         }
@@ -265,9 +264,6 @@ const LONGEST_TOUCH: f64 = 0.1;
 
 /// The maximum number of states that are advanced in a batch.
 const MAX_BATCH: usize = 64;
-
-/// The map under its former name.
-pub use ModelMap as Strobe;
 
 /// How many of `count` states a thread of the present pool is best given at a time.
 pub(crate) fn together(map: &ModelMap, count: usize) -> usize {
@@ -541,16 +537,7 @@ const PARTING: f64 = 1e-6;
 impl Observer for GapExtrema<'_> {
     fn segment(&mut self, segment: &SegmentView<'_>) {
         let system: &System = segment.system;
-        let regime = segment.regime();
-        let gap = regime.project(self.gap);
-        let signal = Signal::of(
-            regime,
-            system.drive(),
-            &gap,
-            segment.modal,
-            segment.phase,
-            segment.length,
-        );
+        let signal = segment.signal(&segment.regime().project(self.gap));
         let rate = signal.differentiated(segment.length);
         let period = system.drive().period();
         for s in sign_changes(&rate, segment.length) {
@@ -577,19 +564,12 @@ impl Observer for GapExtrema<'_> {
         if !(switch.switch.breaks_grazing() || from == to) {
             return;
         }
-        let system = switch.system;
-        let (regime, period) = (
-            &system.regimes()[switch.switch.from],
-            system.drive().period(),
-        );
-        let rate_of =
-            |output: &Output| output.rate(regime.matrix(), regime.forcing(), system.drive());
+        let (system, regime) = (switch.system, switch.from());
+        let (drive, period) = (system.drive(), system.drive().period());
+        let rate_of = |output: &Output| output.rate(regime.matrix(), regime.forcing(), drive);
         let at = |output: &Output| {
             let own = regime.project(output);
-            let modal = own.modal.iter().zip(switch.modal).map(|(w, q)| (w * q).re);
-            let tones = own.tones.iter().enumerate();
-            let forced = tones.map(|(k, z)| (z * system.drive().phasor(k, switch.phase)).re);
-            own.constant + modal.chain(forced).sum::<f64>()
+            own.at(drive, switch.modal, switch.phase)
         };
         let rate = rate_of(self.gap);
         let (speed, turn) = (at(&rate), at(&rate_of(&rate)));

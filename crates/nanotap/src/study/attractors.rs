@@ -20,7 +20,7 @@ use crate::study::Study;
 use crate::study::approach::states_near;
 use crate::study::averaged_orbits::averaged_orbits;
 use crate::study::in_si::InSi;
-use crate::study::limits::MOST_PERIOD;
+use crate::study::limits::MAX_PERIOD;
 use crate::study::orbit::{OrbitReport, report};
 use crate::study::proof::Prover;
 use crate::study::request::options;
@@ -249,7 +249,7 @@ pub struct TransientChaosReport {
 }
 
 /// Most starts of a census: 480 MB of states at N = 3.
-pub const MOST_STARTS: usize = 1_000_000;
+pub const MAX_STARTS: usize = 1_000_000;
 /// Starts in a box that was given without their number.
 const STARTS_IN_A_BOX: usize = 256;
 /// Share of drawn starts that may lead to motions not found at which no more are drawn under a nonlinear
@@ -282,9 +282,9 @@ pub fn attractors(
                 "give 1 or more {starts}",
             ));
         }
-        Some(starts) if starts > MOST_STARTS => {
+        Some(starts) if starts > MAX_STARTS => {
             return Err(Error::input(
-                format!("{starts} starts are too many; {MOST_STARTS} at most"),
+                format!("{starts} starts are too many; {MAX_STARTS} at most"),
                 "give fewer {starts}",
             ));
         }
@@ -337,7 +337,7 @@ fn budgets(model: &Model, options: &AttractorsOptions, start_box: &StartBox) -> 
     CensusOptions {
         classify: bounded(options, start_box),
         unseen,
-        max_starts: ((times * default.max_starts as f64) as usize).min(MOST_STARTS),
+        max_starts: ((times * default.max_starts as f64) as usize).min(MAX_STARTS),
         max_periods: (times * periods as f64) as usize,
         ..default
     }
@@ -538,7 +538,7 @@ options! {
         /// amplitudes, from the resonant response down to below the gap, until the share that may
         /// lead to undiscovered motions is below {unseen}, or 5000 initial states or 2,000,000
         /// drive periods (600,000 under a nonlinear law) are reached
-        #[schemars(range(min = 1, max = MOST_STARTS), extend("x-value" = "S"))]
+        #[schemars(range(min = 1, max = MAX_STARTS), extend("x-value" = "S"))]
         pub starts: Option<usize> = None,
         /// Share of initial states that may lead to undiscovered motions, with 95 % confidence, at
         /// which sampling ends. Default: 0.01 under a nonlinear law and 0.002 under a
@@ -555,10 +555,10 @@ options! {
         #[schemars(extend("x-value" = "COORDINATE=LOW:HIGH"))]
         pub sides: Intervals = Intervals::default(),
         /// Longest period of orbits, in drive periods
-        #[schemars(range(min = 1, max = MOST_PERIOD), extend("x-value" = "N"))]
+        #[schemars(range(min = 1, max = MAX_PERIOD), extend("x-value" = "N"))]
         pub max_period: usize = ClassifyOptions::default().max_period,
         /// Also list unstable orbits up to this period
-        #[schemars(range(min = 0, max = MOST_PERIOD), extend("x-value" = "N", "x-bare" = "4"))]
+        #[schemars(range(min = 0, max = MAX_PERIOD), extend("x-value" = "N", "x-bare" = "4"))]
         pub unstable: usize = 0,
         /// Prove existence, local uniqueness and stability of each orbit by interval arithmetic
         pub prove: bool = false,

@@ -17,7 +17,7 @@ use crate::model::model_map::ModelMap;
 use crate::model::recording::Recording;
 use crate::observe::{ObservableSet, Observables, PhysicalMotion, measure};
 use crate::study::Study;
-use crate::study::limits::{MOST_DOUBLINGS, MOST_PERIOD, MOST_SEED_STARTS};
+use crate::study::limits::{MAX_DOUBLINGS, MAX_PERIOD, MAX_SEED_STARTS};
 use crate::study::orbit::{OrbitOptions, orbit, pairs};
 use crate::study::request::options;
 use crate::study::start_box::default_starts;
@@ -851,13 +851,13 @@ options! {
         #[schemars(extend("x-value" = "VALUE", "x-required" = true))]
         pub to: Amount = Amount::default(),
         /// Period of the orbit at the start; default: that of the motion to which a run converges
-        #[schemars(range(min = 1, max = MOST_PERIOD), extend("x-value" = "N"))]
+        #[schemars(range(min = 1, max = MAX_PERIOD), extend("x-value" = "N"))]
         pub period: Option<usize> = None,
         /// State near the orbit at the start: a1,…,aN,v1,…,vN
         #[schemars(extend("x-value" = "A1,…"))]
         pub state: Option<Vec<f64>> = None,
         /// Also follow doubled branches at flips, up to this number of doublings
-        #[schemars(range(min = 0, max = MOST_DOUBLINGS), extend("x-value" = "DEPTH", "x-bare" = "1"))]
+        #[schemars(range(min = 0, max = MAX_DOUBLINGS), extend("x-value" = "DEPTH", "x-bare" = "1"))]
         pub switch: Option<usize> = None,
         /// Find the branches of all attractors: stable orbits from a census at several values,
         /// followed in both directions and through two doublings (or {switch})
@@ -866,7 +866,7 @@ options! {
         #[schemars(range(min = 2, max = 10_000), extend("x-value" = "K"))]
         pub values: usize = 65,
         /// For {diagram}: initial states at each value
-        #[schemars(range(min = 1, max = MOST_SEED_STARTS), extend("x-value" = "S"))]
+        #[schemars(range(min = 1, max = MAX_SEED_STARTS), extend("x-value" = "S"))]
         pub starts: usize = 16,
         /// For {diagram}: seed of the initial states
         #[schemars(extend("x-value" = "K"))]

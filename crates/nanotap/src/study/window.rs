@@ -18,8 +18,8 @@ use serde::Serialize;
 use crate::Error;
 use crate::case::Case;
 use crate::dataset::{Store, StoreError};
-use crate::study::attractors::MOST_STARTS;
-use crate::study::limits::MOST_PERIOD;
+use crate::study::attractors::MAX_STARTS;
+use crate::study::limits::MAX_PERIOD;
 use crate::study::request::options;
 use crate::study::simulate::Classification;
 use crate::study::sweep::{FromNeighbour, Starts, Sweep, SweepOptions, class_of, from_neighbours};
@@ -255,13 +255,13 @@ options! {
         #[schemars(extend("x-value" = "KEY=VALUES", "x-required" = true))]
         pub over: Axes = Axes::default(),
         /// Initial states at each point: rest, the linear responses, and samples at all amplitudes
-        #[schemars(range(min = 1, max = MOST_STARTS), extend("x-value" = "S"))]
+        #[schemars(range(min = 1, max = MAX_STARTS), extend("x-value" = "S"))]
         pub starts: usize = 16,
         /// Seed of the initial states
         #[schemars(extend("x-value" = "K"))]
         pub seed: u64 = 1,
         /// Longest period of orbits, in drive periods
-        #[schemars(range(min = 1, max = MOST_PERIOD), extend("x-value" = "N"))]
+        #[schemars(range(min = 1, max = MAX_PERIOD), extend("x-value" = "N"))]
         pub max_period: usize = 32,
     }
 }

@@ -35,7 +35,7 @@ use crate::study::branch::{BranchOptions, BranchReport};
 use crate::study::frequency_modulation::{
     FrequencyModulationOptions, Modulated, ModulatedInSi, ModulationReport, frequency_modulation,
 };
-use crate::study::limits::{MOST_DISTANCES, MOST_DOUBLINGS, MOST_PERIOD};
+use crate::study::limits::{MAX_DISTANCES, MAX_DOUBLINGS, MAX_PERIOD};
 use crate::study::request::options;
 use crate::study::simulate::Classification;
 use crate::study::value::{Amount, value};
@@ -491,16 +491,16 @@ options! {
         #[schemars(extend("x-value" = "DISTANCE"))]
         pub to: Option<Amount> = None,
         /// Number of distances in each direction
-        #[schemars(range(min = 2, max = MOST_DISTANCES), extend("x-value" = "P"))]
+        #[schemars(range(min = 2, max = MAX_DISTANCES), extend("x-value" = "P"))]
         pub points: usize = 80,
         /// Also continue coexisting branches, stable and unstable
         #[schemars(extend("x-no" = "Only follow the motion: continue no branches"))]
         pub branches: bool = true,
         /// Number of period doublings to follow, as far as their orbits are stable
-        #[schemars(range(min = 0, max = MOST_DOUBLINGS), extend("x-value" = "DEPTH"))]
+        #[schemars(range(min = 0, max = MAX_DOUBLINGS), extend("x-value" = "DEPTH"))]
         pub switch: usize = 1,
         /// Longest period of orbits, in drive periods
-        #[schemars(range(min = 1, max = MOST_PERIOD), extend("x-value" = "N"))]
+        #[schemars(range(min = 1, max = MAX_PERIOD), extend("x-value" = "N"))]
         pub max_period: usize = 32,
         /// Speed of approach and retract, in units of the case ("500 nm/s") or as alpha5 per unit
         /// of time: the distance changes each drive period; default: quasi-static

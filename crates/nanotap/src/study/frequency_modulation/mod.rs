@@ -40,7 +40,7 @@ use crate::case::physical::{Kind, Physical};
 use crate::model::parameter::Parameter;
 use crate::study::Study;
 use crate::study::approach::{ApproachPoint, ApproachReport, Way};
-use crate::study::limits::MOST_DISTANCES;
+use crate::study::limits::MAX_DISTANCES;
 use crate::study::request::options;
 use crate::study::value::Amount;
 
@@ -305,7 +305,7 @@ options! {
         #[schemars(extend("x-value" = "DISTANCE"))]
         pub to: Option<Amount> = None,
         /// Number of distances in each direction
-        #[schemars(range(min = 2, max = MOST_DISTANCES), extend("x-value" = "P"))]
+        #[schemars(range(min = 2, max = MAX_DISTANCES), extend("x-value" = "P"))]
         pub points: usize = 80,
         /// Phase lag to keep, in degrees
         #[schemars(range(min = 0, max = 180), extend("x-value" = "DEGREES"))]

@@ -21,7 +21,7 @@ use crate::observe::PhysicalMotion;
 use crate::observe::{ContactEvent, ObservableSet, Observables, OutOfRange, RecordOptions, record};
 use crate::study::Study;
 use crate::study::in_si::InSi;
-use crate::study::limits::{MOST_PERIOD, MOST_PERIODS, MOST_SAMPLES, MOST_STATE_NUMBERS};
+use crate::study::limits::{MAX_PERIOD, MAX_PERIODS, MAX_SAMPLES, MAX_STATE_NUMBERS};
 use crate::study::request::options;
 use crate::study::value::Steps;
 use fixed_step::{FixedStepRun, fixed_step_run};
@@ -190,7 +190,7 @@ pub(in crate::study) fn check_states(
     option: &'static str,
 ) -> Result<(), Error> {
     let dimension = model.dimension();
-    let limit = MOST_STATE_NUMBERS / dimension;
+    let limit = MAX_STATE_NUMBERS / dimension;
     if states > limit {
         return Err(Error::input(
             format!("{states} states of {dimension} numbers are too many to keep; {limit} at most"),
@@ -421,28 +421,28 @@ options! {
     /// Options of one run.
     pub struct SimulateOptions {
         /// Number of recorded drive periods
-        #[schemars(range(min = 1, max = MOST_RECORDED), extend("x-value" = "P"))]
+        #[schemars(range(min = 1, max = MAX_RECORDED), extend("x-value" = "P"))]
         pub periods: usize = 50,
         /// Drive periods of the discarded transient; default: until the motion has settled; 0: none
-        #[schemars(range(min = 0, max = MOST_PERIODS), extend("x-value" = "T"))]
+        #[schemars(range(min = 0, max = MAX_PERIODS), extend("x-value" = "T"))]
         pub transient: Option<usize> = None,
         /// Initial state at drive phase 0: a1,…,aN,v1,…,vN (oscillator: x,v); default: rest
         #[schemars(extend("x-value" = "A1,…"))]
         pub state: Option<Vec<f64>> = None,
         /// Number of last states at drive phase 0 to keep
-        #[schemars(range(min = 0, max = MOST_LISTED), extend("x-value" = "K"))]
+        #[schemars(range(min = 0, max = MAX_LISTED), extend("x-value" = "K"))]
         pub strobe: usize = 1,
         /// Maximum number of listed contacts and releases
-        #[schemars(range(min = 0, max = MOST_LISTED), extend("x-value" = "K"))]
+        #[schemars(range(min = 0, max = MAX_LISTED), extend("x-value" = "K"))]
         pub events: usize = LISTED_EVENTS,
         /// Longest period of orbits, in drive periods
-        #[schemars(range(min = 1, max = MOST_PERIOD), extend("x-value" = "N"))]
+        #[schemars(range(min = 1, max = MAX_PERIOD), extend("x-value" = "N"))]
         pub max_period: usize = ClassifyOptions::default().max_period,
         /// Observables to measure; default: all, including the clearance of the beam
         #[schemars(extend("x-value" = "NAME,…"))]
         pub observables: Option<ObservableSet> = None,
         /// Samples per drive period in the time series
-        #[schemars(range(min = 1, max = MOST_SAMPLES), extend("x-value" = "S"))]
+        #[schemars(range(min = 1, max = MAX_SAMPLES), extend("x-value" = "S"))]
         pub resolution: usize = 200,
         /// Method of computation
         pub method: Method = Method::default(),
@@ -455,9 +455,9 @@ options! {
 }
 
 /// Most drive periods recorded: their events fill some hundred megabytes.
-pub const MOST_RECORDED: usize = 2_000_000;
+pub const MAX_RECORDED: usize = 2_000_000;
 /// Most events, and states at drive phase 0, that are listed.
-const MOST_LISTED: usize = 1_000_000;
+const MAX_LISTED: usize = 1_000_000;
 
 impl SimulateOptions {
     /// Budgets for naming the motion.

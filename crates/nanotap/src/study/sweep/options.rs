@@ -6,8 +6,8 @@ use super::{Follow, Over, Starts, Summary, Sweep};
 use crate::Error;
 use crate::case::Case;
 use crate::dataset::{Store, StoreError};
-use crate::study::attractors::MOST_STARTS;
-use crate::study::limits::{MOST_PERIOD, MOST_PERIODS};
+use crate::study::attractors::MAX_STARTS;
+use crate::study::limits::{MAX_PERIOD, MAX_PERIODS};
 use crate::study::request::options;
 use crate::study::value::{Axes, Intervals};
 use crate::study::{DatasetPlan, DatasetStudy};
@@ -21,7 +21,7 @@ options! {
         #[schemars(extend("x-value" = "KEY=VALUES", "x-required" = true))]
         pub over: Axes = Axes::default(),
         /// Quasi-random initial states at each value, spread over a box; default: rest alone
-        #[schemars(range(min = 1, max = MOST_STARTS), extend("x-value" = "S"))]
+        #[schemars(range(min = 1, max = MAX_STARTS), extend("x-value" = "S"))]
         pub starts: Option<usize> = None,
         /// Seed of the initial states
         #[schemars(extend("x-value" = "K"))]
@@ -39,16 +39,16 @@ options! {
         #[schemars(extend("x-value" = "WAY"))]
         pub follow: Follow = Follow::Off,
         /// Number of recorded drive periods
-        #[schemars(range(min = 1, max = MOST_PERIODS), extend("x-value" = "P"))]
+        #[schemars(range(min = 1, max = MAX_PERIODS), extend("x-value" = "P"))]
         pub periods: usize = 100,
         /// Number of last periods whose final states are kept; default: all recorded ones
-        #[schemars(range(min = 0, max = MOST_PERIODS), extend("x-value" = "K"))]
+        #[schemars(range(min = 0, max = MAX_PERIODS), extend("x-value" = "K"))]
         pub strobe: Option<usize> = None,
         /// Drive periods of the discarded transient; default: until the motion has settled
-        #[schemars(range(min = 0, max = MOST_PERIODS), extend("x-value" = "T"))]
+        #[schemars(range(min = 0, max = MAX_PERIODS), extend("x-value" = "T"))]
         pub transient: Option<usize> = None,
         /// Longest period of orbits, in drive periods
-        #[schemars(range(min = 1, max = MOST_PERIOD), extend("x-value" = "N"))]
+        #[schemars(range(min = 1, max = MAX_PERIOD), extend("x-value" = "N"))]
         pub max_period: usize = 64,
     }
 }

@@ -796,11 +796,9 @@ fn named(map: &mut ModelMap, start: &[f64], options: &ClassifyOptions) -> Met {
 /// Why nothing is known beyond an end.
 const NO_ORBIT: &str = "the branch that ends here has no orbit to start from";
 
-/// Part of an orbit's size within which two stable orbits at one distance are one.
-const SAME_ORBIT: f64 = 1e-9;
-
+/// Whether two orbits at one distance are the same.
 pub(in crate::study) fn is_same(a: &PeriodicOrbit, b: &PeriodicOrbit) -> bool {
-    a.is_same_as(b) || a.distance_to(b).1 <= SAME_ORBIT * a.scale()
+    a.is_same_as(b)
 }
 
 /// Whether a motion goes over into another at an end without a jump.

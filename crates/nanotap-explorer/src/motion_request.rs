@@ -9,7 +9,7 @@ use crate::figures::Views;
 use crate::preset::CaseSpec;
 
 /// Largest number of modes of a motion that follows a slider.
-const MOST_MODES: usize = 20;
+const MAX_MODES: usize = 20;
 
 /// A motion as requested by the page.
 #[derive(Clone, Debug, Deserialize)]
@@ -71,11 +71,11 @@ impl Start {
 /// The model of a case that is small enough to follow a slider.
 pub(crate) fn model_of(case: &Case) -> Result<Model, ApiError> {
     if let Some(cantilever) = case.cantilever()
-        && cantilever.modes > MOST_MODES
+        && cantilever.modes > MAX_MODES
     {
         return Err(ApiError::input(
             format!("modes = {} are too many for the explorer", cantilever.modes),
-            format!("{MOST_MODES} at most; the terminal takes more"),
+            format!("{MAX_MODES} at most; the terminal takes more"),
         ));
     }
     case.model().map_err(ApiError::of)

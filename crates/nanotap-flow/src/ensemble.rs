@@ -30,7 +30,7 @@ use std::collections::VecDeque;
 use std::sync::Arc;
 
 /// Evaluations of the guard near a switch before it is left to one motion alone.
-const MOST_EVALUATIONS: usize = 3;
+const MAX_EVALUATIONS: usize = 3;
 
 /// The work space of many motions of a [`System`]. Cloning shares the system.
 #[derive(Clone, Debug)]
@@ -652,7 +652,7 @@ impl Pack {
             }
         }
         let mut rest = [0.0; LANES];
-        for evaluation in 0..MOST_EVALUATIONS {
+        for evaluation in 0..MAX_EVALUATIONS {
             let from = W::load(&at);
             let near = Near::<W> {
                 cubic: self.evaluate::<W>(kernel, from),

@@ -368,11 +368,11 @@ impl System {
         for (r, regime) in system.regimes.iter().enumerate() {
             let rates = regime.basis().eigenvalues.iter();
             let turns = rates.map(|z| z.im.abs()).fold(0.0, f64::max) * system.drive.period();
-            if turns > MOST_TURNS * std::f64::consts::TAU {
+            if turns > MAX_TURNS * std::f64::consts::TAU {
                 return Err(FlowError::TooFast {
                     regime: r,
                     oscillations: turns / std::f64::consts::TAU,
-                    limit: MOST_TURNS,
+                    limit: MAX_TURNS,
                 });
             }
         }
@@ -920,7 +920,7 @@ fn packed_rates(regime: &Regime, drive: &Drive) -> Vec<ComplexVector> {
 const NEGLIGIBLE: f64 = 1e-13;
 
 /// Oscillations of a mode in one drive period that are followed.
-const MOST_TURNS: f64 = 1e7;
+const MAX_TURNS: f64 = 1e7;
 
 /// Derivatives of a guard that are looked at where it starts at zero.
 const FLATTEST: usize = 6;

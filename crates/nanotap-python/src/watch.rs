@@ -178,7 +178,7 @@ type Job = Box<dyn FnOnce() -> Box<dyn FnOnce()> + Send>;
 /// many a motion.
 fn elsewhere(job: Job) -> io::Result<()> {
     static IDLE: Mutex<OfThisProcess<Vec<Sender<Job>>>> = Mutex::new(OfThisProcess(None));
-    const MOST_IDLE: usize = 8;
+    const MAX_IDLE: usize = 8;
     let idle = lock(&IDLE).get_or_make(|| Ok(Vec::new()))?.pop();
     let mut job = match idle {
         Some(thread) => match thread.send(job) {
@@ -196,7 +196,7 @@ fn elsewhere(job: Job) -> io::Result<()> {
             let stays = lock(&IDLE)
                 .get_or_make(|| Ok(Vec::new()))
                 .is_ok_and(|idle| {
-                    let stays = idle.len() < MOST_IDLE;
+                    let stays = idle.len() < MAX_IDLE;
                     idle.extend(stays.then(|| sender.clone()));
                     stays
                 });

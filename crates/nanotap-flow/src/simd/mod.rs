@@ -151,7 +151,7 @@ pub(crate) trait Wide: Lanes {
 
 /// Work that is compiled once for each arithmetic.
 pub(crate) trait Work {
-    /// What comes of it.
+    /// The result.
     type Output;
     /// Does it.
     fn run<S: Simd>(self) -> Self::Output;
@@ -159,7 +159,7 @@ pub(crate) trait Work {
 
 /// The same for eight motions side by side.
 pub(crate) trait WideWork {
-    /// What comes of it.
+    /// The result.
     type Output;
     /// Does it.
     fn run<W: Wide>(self) -> Self::Output;

@@ -87,34 +87,32 @@ def simulate(
     case : Case
         The case.
     periods : int
-        Drive periods recorded (1 to 2000000).
+        Number of recorded drive periods (1 to 2000000).
     transient : int | None
-        Drive periods discarded first; without it, as many as the motion is measured
-        to need; 0: from the start (0 to 100000000).
+        Drive periods of the discarded transient; default: until the motion has
+        settled; 0: none (0 to 100000000).
     state : Any
-        State at the start, drive phase 0: a1,…,aN,v1,…,vN (oscillator: x,v);
-        without it, rest.
+        Initial state at drive phase 0: a1,…,aN,v1,…,vN (oscillator: x,v); default:
+        rest.
     strobe : int
-        How many of the last states at drive phase 0 to keep (0 to 1000000).
+        Number of last states at drive phase 0 to keep (0 to 1000000).
     events : int
-        How many contacts and releases to list at most, the first ones (0 to
-        1000000).
+        Maximum number of listed contacts and releases (0 to 1000000).
     max_period : int
-        Longest period looked for (1 to 10000).
+        Longest period of orbits, in drive periods (1 to 10000).
     observables : Sequence[str] | None
-        Observables to measure; without it, every one that there is, the beam's
-        clearance included.
+        Observables to measure; default: all, including the clearance of the beam.
     resolution : int
-        Samples a drive period in the time series (1 to 1000000).
+        Samples per drive period in the time series (1 to 1000000).
     method : Literal["exact", "rk4"]
-        How the motion is computed; `exact`: The exact flow: no time step, no
-        contact missed; `rk4`: The paper's method, to compare: Runge–Kutta steps
-        that switch on their grid.
+        Method of computation; `exact`: The exact flow: no time step, no contact
+        missed; `rk4`: The paper's method, to compare: Runge–Kutta steps that switch
+        on their grid.
     steps : int | Sequence[int]
-        Of rk4: steps a drive period, in free flight and (after a comma) in contact
-        (1 to 10000000).
+        For rk4: steps per drive period, in free flight and (after a comma) in
+        contact (1 to 10000000).
     switching : Literal["step", "stage"]
-        Of rk4: where within a step the regime is looked at; `step`: Once a step;
+        For rk4: where within a step the regime is checked; `step`: Once a step;
         `stage`: At every stage of a step.
     series : int | None
         Number of periods of the time series, from the start of the recording;
@@ -197,22 +195,21 @@ def orbit(
     case : Case
         The case.
     period : int | None
-        Its period in drive periods; without it, that of the motion to which a run
+        Period in drive periods; default: that of the motion to which a run
         converges (1 to 10000).
     state : Any
-        State to look near, at drive phase 0: a1,…,aN,v1,…,vN (oscillator: x,v).
+        State near the orbit, at drive phase 0: a1,…,aN,v1,…,vN (oscillator: x,v).
     harmonics : int
-        Harmonics of the drive frequency to report (0 to 100000).
+        Number of reported harmonics of the drive frequency (0 to 100000).
     observables : Sequence[str] | None
-        Observables to measure; without it, every one that there is, the beam's
-        clearance included.
+        Observables to measure; default: all, including the clearance of the beam.
     resolution : int
-        Samples a drive period in the time series (1 to 1000000).
+        Samples per drive period in the time series (1 to 1000000).
     derivatives : Sequence[str] | None
-        Keys of the case by which to differentiate the orbit and all that is
-        observed of it; what stays is what stays in a sweep.
+        Keys of the case for derivatives of the orbit and its observables; the same
+        quantities stay constant as in a sweep.
     prove : bool
-        Prove in interval arithmetic that it exists, is alone, and is stable or not.
+        Prove existence, local uniqueness and stability by interval arithmetic.
     threads : int | None
         Number of threads for arrays; default: one per core.
     progress : Progress
@@ -257,30 +254,29 @@ def attractors(
     case : Case
         The case.
     starts : int | None
-        Starts, spread evenly over one box of states. Without it, starts of every
-        size, from the resonant response down to below the gap, go on until the
-        share of starts that may lead to motions not found is below `unseen`, or
-        5000 starts or 2,000,000 drive periods (600,000 under a nonlinear law) are
-        done (1 to 1000000).
+        Number of initial states, spread evenly over one box. Default: initial
+        states at all amplitudes, from the resonant response down to below the gap,
+        until the share that may lead to undiscovered motions is below `unseen`, or
+        5000 initial states or 2,000,000 drive periods (600,000 under a nonlinear
+        law) are reached (1 to 1000000).
     unseen : float | None
-        Share of starts that may lead to motions not found, with 95 % confidence, at
-        which no more are drawn. Without it, 0.01 under a nonlinear law and 0.002
-        under a piecewise-linear one; a smaller one raises the limits of `starts`
-        and drive periods in proportion.
+        Share of initial states that may lead to undiscovered motions, with 95 %
+        confidence, at which sampling ends. Default: 0.01 under a nonlinear law and
+        0.002 under a piecewise-linear one; a smaller value raises the limits of
+        `starts` and drive periods in proportion.
     seed : int
-        Seed of the starts: the same seed gives the same answer on any number of
-        threads.
+        Seed of the initial states; results do not depend on the number of threads.
     box : Box
-        Sides of one box of starts, as in a1=-1:1 or v2=-4:4; the others are derived
-        from the linear response to the drive. 256 starts if `starts` says no
-        number.
+        Sides of one box of initial states, as in a1=-1:1 or v2=-4:4; other sides
+        follow from the linear response to the drive. 256 initial states unless
+        `starts` is given.
     max_period : int
-        Longest period looked for (1 to 10000).
+        Longest period of orbits, in drive periods (1 to 10000).
     unstable : int
         Also list unstable orbits up to this period (0 to 10000).
     prove : bool
-        Prove in interval arithmetic that each orbit exists, is alone, and is stable
-        or not.
+        Prove existence, local uniqueness and stability of each orbit by interval
+        arithmetic.
     threads : int | None
         Number of threads; default: one per core.
     progress : Progress
@@ -327,35 +323,36 @@ def branch(
     case : Case
         The case.
     parameter : str
-        The parameter, as the case file calls it (omega, alpha4, gap …); of a
-        physical case also a quantity of it (drive.frequency, gap.tip,
-        sample.stiffness …).
+        Parameter, by its name in the case file (omega, alpha4, gap …); for a
+        physical case also a quantity (drive.frequency, gap.tip, sample.stiffness
+        …).
     from_ : float | str
-        Its value at the start; of a physical case also with a unit, as in "70 kHz".
+        Value of the parameter at the start; for a physical case also with a unit,
+        as in "70 kHz".
     to : float | str
-        The other end of its range.
+        Value of the parameter at the other end of the range.
     period : int | None
-        Period of the orbit at the start; without it, that of the motion to which a
-        run converges (1 to 10000).
+        Period of the orbit at the start; default: that of the motion to which a run
+        converges (1 to 10000).
     state : Any
-        State near which the orbit at the start is looked for: a1,…,aN,v1,…,vN.
+        State near the orbit at the start: a1,…,aN,v1,…,vN.
     switch : int | None
-        Also follow the doubled branches at flips, so many doublings deep (0 to 12).
+        Also follow doubled branches at flips, up to this number of doublings (0 to
+        12).
     diagram : bool
-        Assemble the whole picture: every stable orbit of a census at several
-        values, followed both ways and through two doublings (or as `switch` says).
+        Find the branches of all attractors: stable orbits from a census at several
+        values, followed in both directions and through two doublings (or `switch`).
     values : int
-        Of the `diagram`: values of the parameter at which a census is taken (2 to
-        10000).
+        For `diagram`: number of parameter values with a census (2 to 10000).
     starts : int
-        Of the `diagram`: starts at each (1 to 100000).
+        For `diagram`: initial states at each value (1 to 100000).
     seed : int
-        Of the `diagram`: seed of the starts.
+        For `diagram`: seed of the initial states.
     second : Mapping[str, tuple[float | str, float | str]] | str | None
-        A second parameter and its range, as in alpha4=5:40: the bifurcation curves
-        are traced in both.
+        Second parameter and its range, as in alpha4=5:40, for bifurcation curves in
+        both.
     max_step : float
-        Longest step, as a part of the range.
+        Longest step, as a fraction of the range.
     threads : int | None
         Number of threads; default: one per core.
     progress : Progress
@@ -405,35 +402,35 @@ def approach(
     case : Case
         The case.
     from_ : float | str | None
-        Distance at which to begin, in units of the case ("30 nm") or as alpha5;
-        without it, 1.25 times what the free tip swings towards the sample.
+        First distance, in units of the case ("30 nm") or as alpha5; default: 1.25
+        times the free swing of the tip towards the sample.
     to : float | str | None
-        Distance at which to turn back; without it, 0.
+        Last distance of the approach; default: 0.
     points : int
-        Distances each way (2 to 20000).
+        Number of distances in each direction (2 to 20000).
     branches : bool
-        Also continue the branches that coexist, stable and unstable.
+        Also continue coexisting branches, stable and unstable.
     switch : int
-        Doublings of branches to follow, as far as their orbits are stable (0 to
-        12).
+        Number of period doublings to follow, as far as their orbits are stable (0
+        to 12).
     max_period : int
-        Longest period looked for (1 to 10000).
+        Longest period of orbits, in drive periods (1 to 10000).
     speed : float | str | None
-        Speed of the approach and of the retraction, in units of the case ("500
-        nm/s") or as alpha5 a unit of time: the distance changes each drive period
-        and the lever does not settle; without it, both are so slow that it always
-        does.
+        Speed of approach and retract, in units of the case ("500 nm/s") or as
+        alpha5 per unit of time: the distance changes each drive period; default:
+        quasi-static.
     fm : bool
-        Frequency modulation: hold amplitude (the case's free amplitude) and phase
-        by frequency and strength of the drive, and tell the frequency shift.
+        Frequency modulation: keep the amplitude (the free amplitude of the case)
+        and phase constant by frequency and strength of the drive, and report the
+        frequency shift.
     phase : float
-        Phase behind the drive that frequency modulation holds, in degrees.
+        Phase lag kept by frequency modulation, in degrees.
     shift : float | str | None
-        Frequency shift of frequency modulation whose distances are to be found, in
-        units of the case ("-50 Hz") or as omega.
+        Frequency shift whose distances to find under frequency modulation, in units
+        of the case ("-50 Hz") or as omega.
     closest : float | str | None
-        Least distance of the oscillation that frequency modulation keeps, in units
-        of the case ("1 nm") or as alpha5: the amplitude then changes with the
+        Least distance of the oscillation kept by frequency modulation, in units of
+        the case ("1 nm") or as alpha5: the amplitude then changes with the
         distance.
     threads : int | None
         Number of threads; default: one per core.
@@ -481,14 +478,14 @@ def fm(
     case : Case
         The case.
     from_ : float | str | None
-        Distance at which to begin, in units of the case ("30 nm") or as alpha5;
-        without it, 1.25 times the free amplitude towards the sample.
+        First distance, in units of the case ("30 nm") or as alpha5; default: 1.25
+        times the free amplitude towards the sample.
     to : float | str | None
-        Distance at which to turn back; without it, 0.
+        Last distance of the approach; default: 0.
     points : int
-        Distances each way (2 to 20000).
+        Number of distances in each direction (2 to 20000).
     phase : float
-        Phase behind the drive to hold, in degrees.
+        Phase lag to keep, in degrees.
     shift : float | str | None
         Frequency shift whose distances to find, in units of the case ("-50 Hz") or
         as omega.
@@ -614,36 +611,35 @@ def sweep(
     case : Case
         The case.
     over : str | Sequence[str] | Mapping[str, Any]
-        A parameter and its values, as in omega=2:4:400 (first, last, how many), or
-        alpha4=1:1000:50:log in equal ratios, or any that ascend, omega=2,2.5,4;
-        modes too; of a physical case also drive.frequency=60kHz:80kHz:200; once or
+        Parameter and its values, as in omega=2:4:400 (first, last, count),
+        alpha4=1:1000:50:log in equal ratios, or ascending values omega=2,2.5,4;
+        modes too; for a physical case also drive.frequency=60kHz:80kHz:200; once or
         twice.
     starts : int | None
-        Quasi-random starts at each value, spread over a box of states; without it,
-        one start from rest (1 to 1000000).
+        Quasi-random initial states at each value, spread over a box; default: rest
+        alone (1 to 1000000).
     seed : int
-        Seed of the starts.
+        Seed of the initial states.
     box : Box
-        Sides of the box, as in a1=-1:1 or v2=-4:4; the others are derived from the
+        Sides of the box, as in a1=-1:1 or v2=-4:4; other sides follow from the
         linear response to the drive.
     state : Any
         Start from this state at drive phase 0: a1,…,aN,v1,…,vN (oscillator: x,v).
     follow : Literal["off", "up", "down", "both"]
-        Start each value from the last state of the one before, along the first
-        parameter: up, down or both. A whole line is then one piece of work, lost
-        when interrupted; `off`: Every value starts anew.; `up`: From the least
-        value to the greatest.; `down`: From the greatest value to the least.;
-        `both`: Both..
+        Start each value from the last state of the previous one, along the first
+        parameter: up, down or both. An interrupted line is lost; `off`: Every value
+        starts anew.; `up`: From the least value to the greatest.; `down`: From the
+        greatest value to the least.; `both`: Both..
     periods : int
-        Drive periods recorded (1 to 100000000).
+        Number of recorded drive periods (1 to 100000000).
     strobe : int | None
-        States kept, at the end of each of the last periods; without it, of every
-        recorded one (0 to 100000000).
+        Number of last periods whose final states are kept; default: all recorded
+        ones (0 to 100000000).
     transient : int | None
-        Drive periods discarded first; without it, as many as the motion is measured
-        to need (0 to 100000000).
+        Drive periods of the discarded transient; default: until the motion has
+        settled (0 to 100000000).
     max_period : int
-        Longest period looked for (1 to 10000).
+        Longest period of orbits, in drive periods (1 to 10000).
     out : Path | None
         The dataset, a folder with the extension .zarr; an existing one is resumed.
         Without it, everything is in memory.
@@ -693,16 +689,16 @@ def window(
     case : Case
         The case.
     over : str | Sequence[str] | Mapping[str, Any]
-        A parameter and its values, as in gap.tip=5nm:25nm:41,
-        drive.free_amplitude=10nm:60nm:26, omega=2:4:81, or any that ascend,
-        omega=2,2.5,4; twice, the first is the horizontal axis.
+        Parameter and its values, as in gap.tip=5nm:25nm:41,
+        drive.free_amplitude=10nm:60nm:26, omega=2:4:81, or ascending values
+        omega=2,2.5,4; twice, first the horizontal axis.
     starts : int
-        Starts of the census at each point: rest, the linear responses, and draws of
-        every size (1 to 1000000).
+        Initial states at each point: rest, the linear responses, and samples at all
+        amplitudes (1 to 1000000).
     seed : int
-        Seed of the starts.
+        Seed of the initial states.
     max_period : int
-        Longest period looked for (1 to 10000).
+        Longest period of orbits, in drive periods (1 to 10000).
     out : Path | None
         The dataset, a folder with the extension .zarr; an existing one is resumed.
         Without it, everything is in memory.
@@ -754,23 +750,23 @@ def basin(
     case : Case
         The case.
     x : str | Mapping[str, Any]
-        The horizontal axis, as in a1=-1:1:200: entry of the state, first value,
-        last value, how many (a1…aN, v1…vN; oscillator: x, v).
+        Horizontal axis, as in a1=-1:1:200: entry of the state (a1…aN, v1…vN;
+        oscillator: x, v), first value, last value, count.
     y : str | Mapping[str, Any]
-        The vertical axis.
+        Vertical axis, in the same form.
     state : Any
-        The other entries of the state, in full: a1,…,aN,v1,…,vN; without it, 0.
+        State with the other entries: a1,…,aN,v1,…,vN; default: 0.
     attractors : Iterable[Any] | None
-        States on the attractors, or what a census found; without it, a census in
-        the slice finds them.
+        States on the attractors, or the result of a census; default: a census in
+        the slice.
     starts : int
-        Starts of the census (1 to 1000000).
+        Initial states of the census (1 to 1000000).
     seed : int
         Seed of the census.
     periods : int
-        Drive periods after which a point is called unsettled (1 to 100000000).
+        Drive periods after which a point counts as unsettled (1 to 100000000).
     max_period : int
-        Longest period looked for (1 to 10000).
+        Longest period of orbits, in drive periods (1 to 10000).
     out : Path | None
         The dataset, a folder with the extension .zarr; an existing one is resumed.
         Without it, everything is in memory.
@@ -816,19 +812,19 @@ def lyapunov(
     case : Case
         The case.
     periods : int
-        Drive periods averaged over (1 to 100000000).
+        Drive periods of the average (1 to 100000000).
     transient : int
-        Drive periods discarded first (0 to 100000000).
+        Drive periods of the discarded transient (0 to 100000000).
     state : Any
-        State at the start, drive phase 0: a1,…,aN,v1,…,vN (oscillator: x,v);
-        without it, rest.
+        Initial state at drive phase 0: a1,…,aN,v1,…,vN (oscillator: x,v); default:
+        rest.
     section : Literal["phase", "contact"]
-        Where the section is taken; `phase`: Once a drive period, at one phase;
-        `contact`: At the beginning of every contact.
+        Poincaré section; `phase`: Once a drive period, at one phase; `contact`: At
+        the beginning of every contact.
     phase : float
         Drive phase of the section in degrees.
     points : int
-        Points of the section (0 to 2000000).
+        Number of points of the section (0 to 2000000).
 
     Returns
     -------
@@ -860,11 +856,10 @@ def convergence(
     largest : int
         Largest number of modes (2 to 50).
     tolerance : float
-        Difference of the tip deflection, as a part of the amplitude, that is small
-        enough.
+        Tolerance of the tip deflection, as a fraction of the amplitude.
     period : int | None
-        Period of the orbit to compare; without it, the motion to which a run from
-        rest converges (1 to 10000).
+        Period of the orbit to compare; default: the motion to which a run from rest
+        converges (1 to 10000).
 
     Returns
     -------
@@ -897,9 +892,9 @@ def contact_laws(
     case : Case
         The case.
     period : int
-        Period of the orbits compared (1 to 10000).
+        Period of the compared orbits (1 to 10000).
     arm : float | None
-        Stiffness of the relaxing arm; without it, the case's, or twice alpha4.
+        Stiffness of the relaxing arm; default: that of the case, or twice alpha4.
     from_ : float | str | None
         Lowest drive frequency to which the orbits are followed.
     to : float | str | None

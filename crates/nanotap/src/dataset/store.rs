@@ -633,10 +633,10 @@ pub(super) fn mismatch(path: &Path, there: &str, here: &str) -> StoreError {
 
 /// Largest number of entries of an array and of characters of a text: larger ones were not written
 /// by nanotap and would fill the memory.
-const MOST_ENTRIES: u64 = 1 << 32;
+const MAX_ENTRIES: u64 = 1 << 32;
 const LONGEST_WORD: usize = 1 << 16;
 /// Largest number of chunks: each one is checked when a store is opened.
-const MOST_CHUNKS: usize = 10_000_000;
+const MAX_CHUNKS: usize = 10_000_000;
 
 /// True if `name` is a valid name of an array: a folder inside the store.
 fn is_name(name: &str) -> bool {
@@ -650,7 +650,7 @@ fn entries(sizes: impl IntoIterator<Item = usize>) -> Option<usize> {
     let product = sizes
         .into_iter()
         .try_fold(1_u64, |product, size| product.checked_mul(size as u64))?;
-    (product <= MOST_ENTRIES).then_some(product as usize)
+    (product <= MAX_ENTRIES).then_some(product as usize)
 }
 
 /// The schema that consolidated metadata describe; `None` if nanotap did not write them.
@@ -704,7 +704,7 @@ fn schema_of(path: &Path, documents: &Value) -> Result<Option<Schema>, StoreErro
     }
     let chunks = entries(schema.grid.axes.iter().map(Axis::chunks));
     if entries(schema.grid.axes.iter().map(|axis| axis.length)).is_none()
-        || chunks.is_none_or(|chunks| chunks > MOST_CHUNKS)
+        || chunks.is_none_or(|chunks| chunks > MAX_CHUNKS)
     {
         return Err(too_large("chunk_layout"));
     }

@@ -18,7 +18,7 @@ use crate::study::simulate::Classification;
 use crate::study::sweep::{FromNeighbour, class_of, from_neighbours};
 
 /// Categories of a map, and periods of a diagram, that get a colour of their own.
-const MOST_CATEGORIES: usize = 12;
+const MAX_CATEGORIES: usize = 12;
 /// What is beyond them.
 const OTHERS: Colour = Colour::rgb(222, 222, 222);
 
@@ -158,7 +158,7 @@ impl SweepTable {
         }
         let mut frequent: Vec<Motion> = counts.keys().copied().collect();
         frequent.sort_by_key(|motion| std::cmp::Reverse(counts[motion]));
-        frequent.truncate(MOST_CATEGORIES);
+        frequent.truncate(MAX_CATEGORIES);
         // None of what is too rare to be named.
         let mut clouds: BTreeMap<CloudOf<'_>, Vec<(f64, f64)>> = BTreeMap::new();
         for cell in 0..cells {
@@ -264,7 +264,7 @@ impl SweepTable {
         frequent.sort();
         let mut named: Vec<&BTreeSet<Option<Motion>>> = frequent
             .iter()
-            .take(MOST_CATEGORIES)
+            .take(MAX_CATEGORIES)
             .map(|(_, motions)| *motions)
             .collect();
         named.sort();

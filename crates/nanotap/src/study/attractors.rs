@@ -20,7 +20,7 @@ use crate::study::Study;
 use crate::study::approach::states_near;
 use crate::study::averaged_orbits::averaged_orbits;
 use crate::study::in_si::InSi;
-use crate::study::limits::MOST_PERIOD;
+use crate::study::limits::MAX_PERIOD;
 use crate::study::orbit::{OrbitReport, report};
 use crate::study::proof::Prover;
 use crate::study::request::options;
@@ -249,7 +249,7 @@ pub struct TransientChaosReport {
 }
 
 /// Most starts of a census: 480 MB of states at N = 3.
-pub const MOST_STARTS: usize = 1_000_000;
+pub const MAX_STARTS: usize = 1_000_000;
 /// Starts in a box that was given without their number.
 const STARTS_IN_A_BOX: usize = 256;
 /// Share of drawn starts that may lead to motions not found at which no more are drawn under a nonlinear
@@ -282,9 +282,9 @@ pub fn attractors(
                 "give 1 or more {starts}",
             ));
         }
-        Some(starts) if starts > MOST_STARTS => {
+        Some(starts) if starts > MAX_STARTS => {
             return Err(Error::input(
-                format!("{starts} starts are too many; {MOST_STARTS} at most"),
+                format!("{starts} starts are too many; {MAX_STARTS} at most"),
                 "give fewer {starts}",
             ));
         }
@@ -337,7 +337,7 @@ fn budgets(model: &Model, options: &AttractorsOptions, start_box: &StartBox) -> 
     CensusOptions {
         classify: bounded(options, start_box),
         unseen,
-        max_starts: ((times * default.max_starts as f64) as usize).min(MOST_STARTS),
+        max_starts: ((times * default.max_starts as f64) as usize).min(MAX_STARTS),
         max_periods: (times * periods as f64) as usize,
         ..default
     }
@@ -534,32 +534,33 @@ fn unstable_orbits(
 options! {
     /// Options of a census.
     pub struct AttractorsOptions {
-        /// Starts, spread evenly over one box of states. Without it, starts of every size, from the
-        /// resonant response down to below the gap, go on until the share of starts that may lead to
-        /// motions not found is below {unseen}, or 5000 starts or 2,000,000 drive periods (600,000 under a
-        /// nonlinear law) are done
-        #[schemars(range(min = 1, max = MOST_STARTS), extend("x-value" = "S"))]
+        /// Number of initial states, spread evenly over one box. Default: initial states at all
+        /// amplitudes, from the resonant response down to below the gap, until the share that may
+        /// lead to undiscovered motions is below {unseen}, or 5000 initial states or 2,000,000
+        /// drive periods (600,000 under a nonlinear law) are reached
+        #[schemars(range(min = 1, max = MAX_STARTS), extend("x-value" = "S"))]
         pub starts: Option<usize> = None,
-        /// Share of starts that may lead to motions not found, with 95 % confidence, at which no more are
-        /// drawn. Without it, 0.01 under a nonlinear law and 0.002 under a piecewise-linear one; a smaller
-        /// one raises the limits of {starts} and drive periods in proportion
+        /// Share of initial states that may lead to undiscovered motions, with 95 % confidence, at
+        /// which sampling ends. Default: 0.01 under a nonlinear law and 0.002 under a
+        /// piecewise-linear one; a smaller value raises the limits of {starts} and drive periods in
+        /// proportion
         #[schemars(range(min = 1e-5, max = 0.5), extend("x-value" = "PART"))]
         pub unseen: Option<f64> = None,
-        /// Seed of the starts: the same seed gives the same answer on any number of threads
+        /// Seed of the initial states; results do not depend on the number of threads
         #[schemars(extend("x-value" = "K"))]
         pub seed: u64 = 1,
-        /// Sides of one box of starts, as in a1=-1:1 or v2=-4:4; the others are derived from the linear
-        /// response to the drive. 256 starts if {starts} says no number
+        /// Sides of one box of initial states, as in a1=-1:1 or v2=-4:4; other sides follow from
+        /// the linear response to the drive. 256 initial states unless {starts} is given
         #[serde(rename = "box")]
         #[schemars(extend("x-value" = "COORDINATE=LOW:HIGH"))]
         pub sides: Intervals = Intervals::default(),
-        /// Longest period looked for
-        #[schemars(range(min = 1, max = MOST_PERIOD), extend("x-value" = "N"))]
+        /// Longest period of orbits, in drive periods
+        #[schemars(range(min = 1, max = MAX_PERIOD), extend("x-value" = "N"))]
         pub max_period: usize = ClassifyOptions::default().max_period,
         /// Also list unstable orbits up to this period
-        #[schemars(range(min = 0, max = MOST_PERIOD), extend("x-value" = "N", "x-bare" = "4"))]
+        #[schemars(range(min = 0, max = MAX_PERIOD), extend("x-value" = "N", "x-bare" = "4"))]
         pub unstable: usize = 0,
-        /// Prove in interval arithmetic that each orbit exists, is alone, and is stable or not
+        /// Prove existence, local uniqueness and stability of each orbit by interval arithmetic
         pub prove: bool = false,
         /// Periods in drive periods and states at drive phase 0 of orbits that are known near the model, in
         /// addition to those from averaging: Newton closes them before any start is drawn.

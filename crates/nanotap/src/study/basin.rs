@@ -28,15 +28,15 @@ use crate::dataset::{
 use crate::model::Model;
 use crate::model::model_map::{ModelMap, together};
 use crate::observe::time_series::state_names;
-use crate::study::attractors::MOST_STARTS;
-use crate::study::limits::{MOST_PERIOD, MOST_PERIODS};
+use crate::study::attractors::MAX_STARTS;
+use crate::study::limits::{MAX_PERIOD, MAX_PERIODS};
 use crate::study::request::options;
 use crate::study::simulate::{Classification, starting_state};
 use crate::study::{Computation, DatasetPlan, DatasetStudy};
 
 /// Most points along an axis, and of a slice.
 const MOST: usize = 1_000_000;
-const MOST_POINTS: usize = 4_000_000_000;
+const MAX_POINTS: usize = 4_000_000_000;
 /// Points that a chunk should not exceed, and chunks that a large slice is cut into.
 const CHUNK_POINTS: usize = 1 << 20;
 const CHUNKS: usize = 64;
@@ -170,19 +170,19 @@ impl Basin {
                 return Err(axes(format!("{what}; at least 1 is needed")));
             }
         }
-        if options.starts > MOST_STARTS {
+        if options.starts > MAX_STARTS {
             return Err(Error::input(
                 format!(
-                    "{} starts are too many; {MOST_STARTS} at most",
+                    "{} starts are too many; {MAX_STARTS} at most",
                     options.starts
                 ),
                 "give fewer {starts}",
             ));
         }
         let [x, y] = &options.axes()?;
-        if x.count.saturating_mul(y.count) > MOST_POINTS {
+        if x.count.saturating_mul(y.count) > MAX_POINTS {
             return Err(axes(format!(
-                "`{}`: {} by {} points; {MOST_POINTS} at most",
+                "`{}`: {} by {} points; {MAX_POINTS} at most",
                 x.name, x.count, y.count
             )));
         }
@@ -617,31 +617,30 @@ pub(crate) fn entries(store: &Store) -> Vec<String> {
 options! {
     /// Options of basins of attraction.
     pub struct BasinOptions {
-        /// The horizontal axis, as in a1=-1:1:200: entry of the state, first value, last value, how
-        /// many (a1…aN, v1…vN; oscillator: x, v)
+        /// Horizontal axis, as in a1=-1:1:200: entry of the state (a1…aN, v1…vN; oscillator: x, v),
+        /// first value, last value, count
         #[schemars(extend("x-value" = "ENTRY=FROM:TO:COUNT", "x-required" = true))]
         pub x: String = String::new(),
-        /// The vertical axis
+        /// Vertical axis, in the same form
         #[schemars(extend("x-value" = "ENTRY=FROM:TO:COUNT", "x-required" = true))]
         pub y: String = String::new(),
-        /// The other entries of the state, in full: a1,…,aN,v1,…,vN; without it, 0
+        /// State with the other entries: a1,…,aN,v1,…,vN; default: 0
         #[schemars(extend("x-value" = "A1,…"))]
         pub state: Option<Vec<f64>> = None,
-        /// States on the attractors, or what a census found; without it, a census in the slice
-        /// finds them
+        /// States on the attractors, or the result of a census; default: a census in the slice
         #[schemars(extend("x-own" = true))]
         pub attractors: Option<Vec<Vec<f64>>> = None,
-        /// Starts of the census
-        #[schemars(range(min = 1, max = MOST_STARTS), extend("x-value" = "S"))]
+        /// Initial states of the census
+        #[schemars(range(min = 1, max = MAX_STARTS), extend("x-value" = "S"))]
         pub starts: usize = 64,
         /// Seed of the census
         #[schemars(extend("x-value" = "K"))]
         pub seed: u64 = 1,
-        /// Drive periods after which a point is called unsettled
-        #[schemars(range(min = 1, max = MOST_PERIODS), extend("x-value" = "P"))]
+        /// Drive periods after which a point counts as unsettled
+        #[schemars(range(min = 1, max = MAX_PERIODS), extend("x-value" = "P"))]
         pub periods: usize = 1000,
-        /// Longest period looked for
-        #[schemars(range(min = 1, max = MOST_PERIOD), extend("x-value" = "N"))]
+        /// Longest period of orbits, in drive periods
+        #[schemars(range(min = 1, max = MAX_PERIOD), extend("x-value" = "N"))]
         pub max_period: usize = 64,
     }
 }

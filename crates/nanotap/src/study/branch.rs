@@ -17,7 +17,7 @@ use crate::model::model_map::ModelMap;
 use crate::model::recording::Recording;
 use crate::observe::{ObservableSet, Observables, PhysicalMotion, measure};
 use crate::study::Study;
-use crate::study::limits::{MOST_DOUBLINGS, MOST_PERIOD, MOST_SEED_STARTS};
+use crate::study::limits::{MAX_DOUBLINGS, MAX_PERIOD, MAX_SEED_STARTS};
 use crate::study::orbit::{OrbitOptions, orbit, pairs};
 use crate::study::request::options;
 use crate::study::start_box::default_starts;
@@ -839,42 +839,42 @@ fn crossings(curve: &CurveReport, second: f64) -> impl Iterator<Item = f64> {
 options! {
     /// Options of branches.
     pub struct BranchOptions {
-        /// The parameter, as the case file calls it (omega, alpha4, gap …); of a physical case also
-        /// a quantity of it (drive.frequency, gap.tip, sample.stiffness …)
+        /// Parameter, by its name in the case file (omega, alpha4, gap …); for a physical case also
+        /// a quantity (drive.frequency, gap.tip, sample.stiffness …)
         #[schemars(extend("x-value" = "KEY", "x-required" = true))]
         pub parameter: String = String::new(),
-        /// Its value at the start; of a physical case also with a unit, as in "70 kHz"
+        /// Value of the parameter at the start; for a physical case also with a unit, as in "70
+        /// kHz"
         #[schemars(extend("x-value" = "VALUE", "x-required" = true))]
         pub from: Amount = Amount::default(),
-        /// The other end of its range
+        /// Value of the parameter at the other end of the range
         #[schemars(extend("x-value" = "VALUE", "x-required" = true))]
         pub to: Amount = Amount::default(),
-        /// Period of the orbit at the start; without it, that of the motion to which a run converges
-        #[schemars(range(min = 1, max = MOST_PERIOD), extend("x-value" = "N"))]
+        /// Period of the orbit at the start; default: that of the motion to which a run converges
+        #[schemars(range(min = 1, max = MAX_PERIOD), extend("x-value" = "N"))]
         pub period: Option<usize> = None,
-        /// State near which the orbit at the start is looked for: a1,…,aN,v1,…,vN
+        /// State near the orbit at the start: a1,…,aN,v1,…,vN
         #[schemars(extend("x-value" = "A1,…"))]
         pub state: Option<Vec<f64>> = None,
-        /// Also follow the doubled branches at flips, so many doublings deep
-        #[schemars(range(min = 0, max = MOST_DOUBLINGS), extend("x-value" = "DEPTH", "x-bare" = "1"))]
+        /// Also follow doubled branches at flips, up to this number of doublings
+        #[schemars(range(min = 0, max = MAX_DOUBLINGS), extend("x-value" = "DEPTH", "x-bare" = "1"))]
         pub switch: Option<usize> = None,
-        /// Assemble the whole picture: every stable orbit of a census at several values, followed
-        /// both ways and through two doublings (or as {switch} says)
+        /// Find the branches of all attractors: stable orbits from a census at several values,
+        /// followed in both directions and through two doublings (or {switch})
         pub diagram: bool = false,
-        /// Of the {diagram}: values of the parameter at which a census is taken
+        /// For {diagram}: number of parameter values with a census
         #[schemars(range(min = 2, max = 10_000), extend("x-value" = "K"))]
         pub values: usize = 65,
-        /// Of the {diagram}: starts at each
-        #[schemars(range(min = 1, max = MOST_SEED_STARTS), extend("x-value" = "S"))]
+        /// For {diagram}: initial states at each value
+        #[schemars(range(min = 1, max = MAX_SEED_STARTS), extend("x-value" = "S"))]
         pub starts: usize = 16,
-        /// Of the {diagram}: seed of the starts
+        /// For {diagram}: seed of the initial states
         #[schemars(extend("x-value" = "K"))]
         pub seed: u64 = 1,
-        /// A second parameter and its range, as in alpha4=5:40: the bifurcation curves are traced in
-        /// both
+        /// Second parameter and its range, as in alpha4=5:40, for bifurcation curves in both
         #[schemars(extend("x-value" = "KEY=LOW:HIGH"))]
         pub second: Option<Interval> = None,
-        /// Longest step, as a part of the range
+        /// Longest step, as a fraction of the range
         #[schemars(range(min = 0.0, max = 1.0), extend("x-value" = "PART"))]
         pub max_step: f64 = 0.01,
         /// Observables of every orbit.

@@ -23,7 +23,7 @@ use crate::model::recording::Curve;
 use crate::model::sample_law::SampleLaw;
 use crate::observe::Observables;
 use crate::study::branch::{BranchOptions, BranchReport, Range, branches_through};
-use crate::study::limits::MOST_PERIOD;
+use crate::study::limits::MAX_PERIOD;
 use crate::study::orbit::{OrbitOptions, OrbitReport, no_period, orbit, spectral_radius};
 use crate::study::request::options;
 use crate::study::simulate::{Classification, Named};
@@ -291,10 +291,10 @@ fn force_loop(height: &Curve, force: &Curve) -> Vec<[f64; 2]> {
 options! {
     /// Options of the comparison of contact laws.
     pub struct ContactLawsOptions {
-        /// Period of the orbits compared
-        #[schemars(range(min = 1, max = MOST_PERIOD), extend("x-value" = "N"))]
+        /// Period of the compared orbits
+        #[schemars(range(min = 1, max = MAX_PERIOD), extend("x-value" = "N"))]
         pub period: usize = 1,
-        /// Stiffness of the relaxing arm; without it, the case's, or twice alpha4
+        /// Stiffness of the relaxing arm; default: that of the case, or twice alpha4
         #[schemars(extend("x-value" = "K"))]
         pub arm: Option<f64> = None,
         /// Lowest drive frequency to which the orbits are followed

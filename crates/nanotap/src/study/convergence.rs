@@ -10,7 +10,7 @@ use crate::model::beam::MAX_MODES;
 use crate::model::cantilever::Cantilever;
 use crate::model::{Model, ModelError};
 use crate::observe::time_series::with_modes;
-use crate::study::limits::MOST_PERIOD;
+use crate::study::limits::MAX_PERIOD;
 use crate::study::mode_share::ReadingsReport;
 use crate::study::orbit::{OrbitOptions, OrbitReport, orbit, spectral_radius};
 use crate::study::request::options;
@@ -233,11 +233,11 @@ options! {
         /// Largest number of modes
         #[schemars(range(min = 2, max = MAX_MODES), extend("x-value" = "K"))]
         pub largest: usize = 10,
-        /// Difference of the tip deflection, as a part of the amplitude, that is small enough
+        /// Tolerance of the tip deflection, as a fraction of the amplitude
         #[schemars(range(min = f64::MIN_POSITIVE), extend("x-value" = "D"))]
         pub tolerance: f64 = 0.01,
-        /// Period of the orbit to compare; without it, the motion to which a run from rest converges
-        #[schemars(range(min = 1, max = MOST_PERIOD), extend("x-value" = "N"))]
+        /// Period of the orbit to compare; default: the motion to which a run from rest converges
+        #[schemars(range(min = 1, max = MAX_PERIOD), extend("x-value" = "N"))]
         pub period: Option<usize> = None,
     }
 }

@@ -14,7 +14,7 @@ use crate::model::model_map::ModelMap;
 use crate::model::{Model, MotionError};
 use crate::observe::begins_contact;
 use crate::study::Study;
-use crate::study::limits::MOST_PERIODS;
+use crate::study::limits::MAX_PERIODS;
 use crate::study::request::options;
 use crate::study::simulate::{Classification, Named, check_periods, check_states, starting_state};
 
@@ -199,27 +199,27 @@ pub enum SectionKind {
 }
 
 /// Most points of a section: 300 MB with three modes.
-pub const MOST_SECTION_POINTS: usize = 2_000_000;
+pub const MAX_SECTION_POINTS: usize = 2_000_000;
 
 options! {
     /// Options of the Lyapunov spectrum.
     pub struct LyapunovOptions {
-        /// Drive periods averaged over
-        #[schemars(range(min = 1, max = MOST_PERIODS), extend("x-value" = "P"))]
+        /// Drive periods of the average
+        #[schemars(range(min = 1, max = MAX_PERIODS), extend("x-value" = "P"))]
         pub periods: usize = 20_000,
-        /// Drive periods discarded first
-        #[schemars(range(min = 0, max = MOST_PERIODS), extend("x-value" = "T"))]
+        /// Drive periods of the discarded transient
+        #[schemars(range(min = 0, max = MAX_PERIODS), extend("x-value" = "T"))]
         pub transient: usize = 1000,
-        /// State at the start, drive phase 0: a1,…,aN,v1,…,vN (oscillator: x,v); without it, rest
+        /// Initial state at drive phase 0: a1,…,aN,v1,…,vN (oscillator: x,v); default: rest
         #[schemars(extend("x-value" = "A1,…"))]
         pub state: Option<Vec<f64>> = None,
-        /// Where the section is taken
+        /// Poincaré section
         pub section: SectionKind = SectionKind::default(),
         /// Drive phase of the section in degrees
         #[schemars(extend("x-value" = "DEGREES"))]
         pub phase: f64 = 0.0,
-        /// Points of the section
-        #[schemars(range(min = 0, max = MOST_SECTION_POINTS), extend("x-value" = "K"))]
+        /// Number of points of the section
+        #[schemars(range(min = 0, max = MAX_SECTION_POINTS), extend("x-value" = "K"))]
         pub points: usize = 5000,
     }
 }

@@ -13,7 +13,7 @@ use crate::model::cantilever::{Cantilever, CantileverError};
 use crate::model::exact_beam;
 use crate::model::galerkin::{Galerkin, Regime};
 use crate::model::spectrum::{self, Spectrum, TipLoad};
-use crate::study::limits::MOST_POINTS;
+use crate::study::limits::MAX_POINTS;
 use crate::study::request::options;
 use crate::study::{Study, cantilever};
 
@@ -106,7 +106,7 @@ options! {
     /// Options of the mode table.
     pub struct ModesOptions {
         /// Points along the beam in the table of mode shapes
-        #[schemars(range(min = 2, max = MOST_POINTS), extend("x-value" = "P"))]
+        #[schemars(range(min = 2, max = MAX_POINTS), extend("x-value" = "P"))]
         pub points: usize = 201,
     }
 }

@@ -25,7 +25,7 @@ use crate::observe::{
 };
 use crate::study::Study;
 use crate::study::in_si::InSi;
-use crate::study::limits::{MOST_PERIOD, MOST_SAMPLES};
+use crate::study::limits::{MAX_PERIOD, MAX_SAMPLES};
 use crate::study::proof::{ProofReport, Prover};
 use crate::study::request::options;
 use crate::study::simulate::{Named, starting_state};
@@ -101,7 +101,7 @@ pub fn spectral_radius(multipliers: &[[f64; 2]]) -> f64 {
 }
 
 /// Most harmonics of the drive frequency that are reported.
-pub const MOST_HARMONICS: usize = 100_000;
+pub const MAX_HARMONICS: usize = 100_000;
 
 /// Finds a periodic orbit of `model`.
 ///
@@ -111,10 +111,10 @@ pub fn orbit(model: &Model, options: &OrbitOptions) -> Result<OrbitReport, Error
     if options.period == Some(0) {
         return Err(no_period());
     }
-    if options.harmonics > MOST_HARMONICS {
+    if options.harmonics > MAX_HARMONICS {
         return Err(Error::input(
             format!(
-                "{} harmonics are too many; {MOST_HARMONICS} at most",
+                "{} harmonics are too many; {MAX_HARMONICS} at most",
                 options.harmonics
             ),
             "give fewer {harmonics}",
@@ -448,26 +448,26 @@ fn log_determinant(model: &Model, trajectory: &Trajectory) -> f64 {
 options! {
     /// Options of a periodic orbit.
     pub struct OrbitOptions {
-        /// Its period in drive periods; without it, that of the motion to which a run converges
-        #[schemars(range(min = 1, max = MOST_PERIOD), extend("x-value" = "N"))]
+        /// Period in drive periods; default: that of the motion to which a run converges
+        #[schemars(range(min = 1, max = MAX_PERIOD), extend("x-value" = "N"))]
         pub period: Option<usize> = None,
-        /// State to look near, at drive phase 0: a1,…,aN,v1,…,vN (oscillator: x,v)
+        /// State near the orbit, at drive phase 0: a1,…,aN,v1,…,vN (oscillator: x,v)
         #[schemars(extend("x-value" = "A1,…"))]
         pub state: Option<Vec<f64>> = None,
-        /// Harmonics of the drive frequency to report
-        #[schemars(range(min = 0, max = MOST_HARMONICS), extend("x-value" = "H"))]
+        /// Number of reported harmonics of the drive frequency
+        #[schemars(range(min = 0, max = MAX_HARMONICS), extend("x-value" = "H"))]
         pub harmonics: usize = 20,
-        /// Observables to measure; without it, every one that there is, the beam's clearance included
+        /// Observables to measure; default: all, including the clearance of the beam
         #[schemars(extend("x-value" = "NAME,…"))]
         pub observables: Option<ObservableSet> = None,
-        /// Samples a drive period in the time series
-        #[schemars(range(min = 1, max = MOST_SAMPLES), extend("x-value" = "S"))]
+        /// Samples per drive period in the time series
+        #[schemars(range(min = 1, max = MAX_SAMPLES), extend("x-value" = "S"))]
         pub resolution: usize = 200,
-        /// Keys of the case by which to differentiate the orbit and all that is observed of it;
-        /// what stays is what stays in a sweep
+        /// Keys of the case for derivatives of the orbit and its observables; the same quantities
+        /// stay constant as in a sweep
         #[schemars(extend("x-value" = "KEY,…"))]
         pub derivatives: Vec<String> = Vec::new(),
-        /// Prove in interval arithmetic that it exists, is alone, and is stable or not
+        /// Prove existence, local uniqueness and stability by interval arithmetic
         pub prove: bool = false,
     }
 }

@@ -1,7 +1,7 @@
 //! How many threads work on a study. The result is the same for any number.
 
 use crate::Error;
-use crate::study::limits::MOST_THREADS;
+use crate::study::limits::MAX_THREADS;
 
 /// The number of threads, if it is available; `None`: one per core.
 ///
@@ -9,10 +9,10 @@ use crate::study::limits::MOST_THREADS;
 /// When there are none, or more than any machine has.
 pub fn checked(threads: Option<usize>) -> Result<Option<usize>, Error> {
     match threads {
-        Some(number) if !(1..=MOST_THREADS).contains(&number) => Err(Error::option(
+        Some(number) if !(1..=MAX_THREADS).contains(&number) => Err(Error::option(
             "threads",
             format!("{number} cannot work"),
-            format!("give a whole number from 1 to {MOST_THREADS}"),
+            format!("give a whole number from 1 to {MAX_THREADS}"),
         )),
         other => Ok(other),
     }

@@ -15,7 +15,7 @@ use crate::case::quantity::Kind;
 use crate::case::{Case, Key};
 
 /// Most fixed steps a drive period.
-const MOST_STEPS: u64 = 10_000_000;
+const MAX_STEPS: u64 = 10_000_000;
 
 /// Declares the JSON schema of a value, written where it is used.
 macro_rules! inline_schema {
@@ -350,14 +350,14 @@ impl<'de> Deserialize<'de> for Steps {
         let value = Value::deserialize(deserializer)?;
         let wrong = || {
             D::Error::custom(format!(
-                "{value} are no steps a drive period: one number from 1 to {MOST_STEPS}, or those in \
+                "{value} are no steps a drive period: one number from 1 to {MAX_STEPS}, or those in \
                  free flight and in contact, as in 200,400"
             ))
         };
         let step = |value: &Value| {
             let steps = value
                 .as_u64()
-                .filter(|steps| (1..=MOST_STEPS).contains(steps));
+                .filter(|steps| (1..=MAX_STEPS).contains(steps));
             steps.map(|steps| steps as u32).ok_or_else(wrong)
         };
         match &value {
@@ -374,8 +374,8 @@ impl<'de> Deserialize<'de> for Steps {
 inline_schema!(Steps, {
     "type": ["integer", "array"],
     "minimum": 1,
-    "maximum": MOST_STEPS,
-    "items": {"type": "integer", "minimum": 1, "maximum": MOST_STEPS},
+    "maximum": MAX_STEPS,
+    "items": {"type": "integer", "minimum": 1, "maximum": MAX_STEPS},
 });
 
 #[cfg(test)]

@@ -18,8 +18,8 @@ use serde::Serialize;
 use crate::Error;
 use crate::case::Case;
 use crate::dataset::{Store, StoreError};
-use crate::study::attractors::MOST_STARTS;
-use crate::study::limits::MOST_PERIOD;
+use crate::study::attractors::MAX_STARTS;
+use crate::study::limits::MAX_PERIOD;
 use crate::study::request::options;
 use crate::study::simulate::Classification;
 use crate::study::sweep::{FromNeighbour, Starts, Sweep, SweepOptions, class_of, from_neighbours};
@@ -250,18 +250,18 @@ fn condition(motions: &[Seen]) -> Condition {
 options! {
     /// Options of an operating window.
     pub struct WindowOptions {
-        /// A parameter and its values, as in gap.tip=5nm:25nm:41, drive.free_amplitude=10nm:60nm:26,
-        /// omega=2:4:81, or any that ascend, omega=2,2.5,4; twice, the first is the horizontal axis
+        /// Parameter and its values, as in gap.tip=5nm:25nm:41, drive.free_amplitude=10nm:60nm:26,
+        /// omega=2:4:81, or ascending values omega=2,2.5,4; twice, first the horizontal axis
         #[schemars(extend("x-value" = "KEY=VALUES", "x-required" = true))]
         pub over: Axes = Axes::default(),
-        /// Starts of the census at each point: rest, the linear responses, and draws of every size
-        #[schemars(range(min = 1, max = MOST_STARTS), extend("x-value" = "S"))]
+        /// Initial states at each point: rest, the linear responses, and samples at all amplitudes
+        #[schemars(range(min = 1, max = MAX_STARTS), extend("x-value" = "S"))]
         pub starts: usize = 16,
-        /// Seed of the starts
+        /// Seed of the initial states
         #[schemars(extend("x-value" = "K"))]
         pub seed: u64 = 1,
-        /// Longest period looked for
-        #[schemars(range(min = 1, max = MOST_PERIOD), extend("x-value" = "N"))]
+        /// Longest period of orbits, in drive periods
+        #[schemars(range(min = 1, max = MAX_PERIOD), extend("x-value" = "N"))]
         pub max_period: usize = 32,
     }
 }

@@ -67,9 +67,8 @@ const LEAST_DAMPING: f64 = 1e-15;
 fn objection(own: &[f64], k: usize) -> Option<&'static str> {
     if k < 2 && own[k] == 0.0 {
         return Some(
-            "must be above 0 with contact = \"moving-surface\": the surface has a spring and a \
-             damper of its own, and without one it is a \"kelvin-voigt\" or \"spring-damper\" \
-             sample",
+            "must be above 0 with contact = \"moving-surface\": the surface has its own \
+             spring and damper; without one of them, use \"kelvin-voigt\" or \"spring-damper\"",
         );
     }
     let too_fast = k == 1 && own[1] < LEAST_DAMPING * own[0].max(1.0);

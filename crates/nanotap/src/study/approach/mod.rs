@@ -35,7 +35,7 @@ use crate::study::branch::{BranchOptions, BranchReport};
 use crate::study::frequency_modulation::{
     FrequencyModulationOptions, Modulated, ModulatedInSi, ModulationReport, frequency_modulation,
 };
-use crate::study::limits::{MOST_DISTANCES, MOST_DOUBLINGS, MOST_PERIOD};
+use crate::study::limits::{MAX_DISTANCES, MAX_DOUBLINGS, MAX_PERIOD};
 use crate::study::request::options;
 use crate::study::simulate::Classification;
 use crate::study::value::{Amount, value};
@@ -483,42 +483,41 @@ fn difference(a: &ApproachPoint, b: &ApproachPoint, free_amplitude: f64) -> Opti
 options! {
     /// Options of an approach curve.
     pub struct ApproachOptions {
-        /// Distance at which to begin, in units of the case ("30 nm") or as alpha5; without it, 1.25
-        /// times what the free tip swings towards the sample
+        /// First distance, in units of the case ("30 nm") or as alpha5; default: 1.25 times the
+        /// free swing of the tip towards the sample
         #[schemars(extend("x-value" = "DISTANCE"))]
         pub from: Option<Amount> = None,
-        /// Distance at which to turn back; without it, 0
+        /// Last distance of the approach; default: 0
         #[schemars(extend("x-value" = "DISTANCE"))]
         pub to: Option<Amount> = None,
-        /// Distances each way
-        #[schemars(range(min = 2, max = MOST_DISTANCES), extend("x-value" = "P"))]
+        /// Number of distances in each direction
+        #[schemars(range(min = 2, max = MAX_DISTANCES), extend("x-value" = "P"))]
         pub points: usize = 80,
-        /// Also continue the branches that coexist, stable and unstable
+        /// Also continue coexisting branches, stable and unstable
         #[schemars(extend("x-no" = "Only follow the motion: continue no branches"))]
         pub branches: bool = true,
-        /// Doublings of branches to follow, as far as their orbits are stable
-        #[schemars(range(min = 0, max = MOST_DOUBLINGS), extend("x-value" = "DEPTH"))]
+        /// Number of period doublings to follow, as far as their orbits are stable
+        #[schemars(range(min = 0, max = MAX_DOUBLINGS), extend("x-value" = "DEPTH"))]
         pub switch: usize = 1,
-        /// Longest period looked for
-        #[schemars(range(min = 1, max = MOST_PERIOD), extend("x-value" = "N"))]
+        /// Longest period of orbits, in drive periods
+        #[schemars(range(min = 1, max = MAX_PERIOD), extend("x-value" = "N"))]
         pub max_period: usize = 32,
-        /// Speed of the approach and of the retraction, in units of the case ("500 nm/s") or as alpha5
-        /// a unit of time: the distance changes each drive period and the lever does not settle;
-        /// without it, both are so slow that it always does
+        /// Speed of approach and retract, in units of the case ("500 nm/s") or as alpha5 per unit
+        /// of time: the distance changes each drive period; default: quasi-static
         #[schemars(extend("x-value" = "SPEED"))]
         pub speed: Option<Amount> = None,
-        /// Frequency modulation: hold amplitude (the case's free amplitude) and phase by frequency and
-        /// strength of the drive, and tell the frequency shift
+        /// Frequency modulation: keep the amplitude (the free amplitude of the case) and phase
+        /// constant by frequency and strength of the drive, and report the frequency shift
         pub fm: bool = false,
-        /// Phase behind the drive that frequency modulation holds, in degrees
+        /// Phase lag kept by frequency modulation, in degrees
         #[schemars(range(min = 0, max = 180), extend("x-value" = "DEGREES"))]
         pub phase: f64 = 90.0,
-        /// Frequency shift of frequency modulation whose distances are to be found, in units of the
-        /// case ("-50 Hz") or as omega
+        /// Frequency shift whose distances to find under frequency modulation, in units of the case
+        /// ("-50 Hz") or as omega
         #[schemars(extend("x-value" = "SHIFT"))]
         pub shift: Option<Amount> = None,
-        /// Least distance of the oscillation that frequency modulation keeps, in units of the case
-        /// ("1 nm") or as alpha5: the amplitude then changes with the distance
+        /// Least distance of the oscillation kept by frequency modulation, in units of the case ("1
+        /// nm") or as alpha5: the amplitude then changes with the distance
         #[schemars(extend("x-value" = "DISTANCE"))]
         pub closest: Option<Amount> = None,
     }

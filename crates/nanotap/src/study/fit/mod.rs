@@ -35,7 +35,7 @@ mod statistics;
 
 use nanotap_dynamics::Control;
 
-pub use crate::case::table::{Entry, MOST_ROWS, Table};
+pub use crate::case::table::{Entry, MAX_ROWS, Table};
 pub use data::{Column, Curve, Data, Row, SweptKey};
 pub use quantity::Quantity;
 pub use report::{

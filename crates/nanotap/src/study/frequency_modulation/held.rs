@@ -84,7 +84,7 @@ const SHORTEST: f64 = 1.0 / 64.0;
 const CLOSED: f64 = 1e-9;
 /// How often entries of a state that are whole numbers, as whether a neck is there, are taken from
 /// the map at one place: where they do not come to rest, the residual says so.
-const MOST_SETTINGS: usize = 3;
+const MAX_SETTINGS: usize = 3;
 /// A step may change frequency and strength by this part of themselves.
 const FARTHEST: [f64; 2] = [0.1, 0.9];
 
@@ -228,7 +228,7 @@ impl Held {
         let (mut jacobian, mut by) = (DMatrix::zeros(n, n), DMatrix::zeros(n, keys.len()));
         map.advance_with_derivatives(&mut end, &mut jacobian, &mut by)?;
         let whole = n - map.discrete_entries();
-        for _ in 0..MOST_SETTINGS {
+        for _ in 0..MAX_SETTINGS {
             if end[whole..] == driven.state[whole..] {
                 break;
             }

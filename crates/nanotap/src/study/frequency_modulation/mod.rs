@@ -40,7 +40,7 @@ use crate::case::physical::{Kind, Physical};
 use crate::model::parameter::Parameter;
 use crate::study::Study;
 use crate::study::approach::{ApproachPoint, ApproachReport, Way};
-use crate::study::limits::MOST_DISTANCES;
+use crate::study::limits::MAX_DISTANCES;
 use crate::study::request::options;
 use crate::study::value::Amount;
 
@@ -297,17 +297,17 @@ pub struct Ended {
 options! {
     /// Options of a curve under frequency modulation.
     pub struct FrequencyModulationOptions {
-        /// Distance at which to begin, in units of the case ("30 nm") or as alpha5; without it, 1.25
-        /// times the free amplitude towards the sample
+        /// First distance, in units of the case ("30 nm") or as alpha5; default: 1.25 times the
+        /// free amplitude towards the sample
         #[schemars(extend("x-value" = "DISTANCE"))]
         pub from: Option<Amount> = None,
-        /// Distance at which to turn back; without it, 0
+        /// Last distance of the approach; default: 0
         #[schemars(extend("x-value" = "DISTANCE"))]
         pub to: Option<Amount> = None,
-        /// Distances each way
-        #[schemars(range(min = 2, max = MOST_DISTANCES), extend("x-value" = "P"))]
+        /// Number of distances in each direction
+        #[schemars(range(min = 2, max = MAX_DISTANCES), extend("x-value" = "P"))]
         pub points: usize = 80,
-        /// Phase behind the drive to hold, in degrees
+        /// Phase lag to keep, in degrees
         #[schemars(range(min = 0, max = 180), extend("x-value" = "DEGREES"))]
         pub phase: f64 = 90.0,
         /// Frequency shift whose distances to find, in units of the case ("-50 Hz") or as omega

@@ -550,7 +550,7 @@ fn materials(
     Ok((cases, segments))
 }
 
-/// A key of `[sample]` with its value, as set beside a case file.
+/// A key of `[sample]` with its value, as set in addition to a case file.
 fn word((key, value): (&String, &Value)) -> String {
     let text = match value {
         Value::String(text) => format!("{text:?}"),

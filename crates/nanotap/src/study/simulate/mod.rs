@@ -21,7 +21,7 @@ use crate::observe::PhysicalMotion;
 use crate::observe::{ContactEvent, ObservableSet, Observables, OutOfRange, RecordOptions, record};
 use crate::study::Study;
 use crate::study::in_si::InSi;
-use crate::study::limits::{MOST_PERIOD, MOST_PERIODS, MOST_SAMPLES, MOST_STATE_NUMBERS};
+use crate::study::limits::{MAX_PERIOD, MAX_PERIODS, MAX_SAMPLES, MAX_STATE_NUMBERS};
 use crate::study::request::options;
 use crate::study::value::Steps;
 use fixed_step::{FixedStepRun, fixed_step_run};
@@ -190,7 +190,7 @@ pub(in crate::study) fn check_states(
     option: &'static str,
 ) -> Result<(), Error> {
     let dimension = model.dimension();
-    let limit = MOST_STATE_NUMBERS / dimension;
+    let limit = MAX_STATE_NUMBERS / dimension;
     if states > limit {
         return Err(Error::input(
             format!("{states} states of {dimension} numbers are too many to keep; {limit} at most"),
@@ -420,45 +420,44 @@ pub enum Grid {
 options! {
     /// Options of one run.
     pub struct SimulateOptions {
-        /// Drive periods recorded
-        #[schemars(range(min = 1, max = MOST_RECORDED), extend("x-value" = "P"))]
+        /// Number of recorded drive periods
+        #[schemars(range(min = 1, max = MAX_RECORDED), extend("x-value" = "P"))]
         pub periods: usize = 50,
-        /// Drive periods discarded first; without it, as many as the motion is measured to need; 0:
-        /// from the start
-        #[schemars(range(min = 0, max = MOST_PERIODS), extend("x-value" = "T"))]
+        /// Drive periods of the discarded transient; default: until the motion has settled; 0: none
+        #[schemars(range(min = 0, max = MAX_PERIODS), extend("x-value" = "T"))]
         pub transient: Option<usize> = None,
-        /// State at the start, drive phase 0: a1,…,aN,v1,…,vN (oscillator: x,v); without it, rest
+        /// Initial state at drive phase 0: a1,…,aN,v1,…,vN (oscillator: x,v); default: rest
         #[schemars(extend("x-value" = "A1,…"))]
         pub state: Option<Vec<f64>> = None,
-        /// How many of the last states at drive phase 0 to keep
-        #[schemars(range(min = 0, max = MOST_LISTED), extend("x-value" = "K"))]
+        /// Number of last states at drive phase 0 to keep
+        #[schemars(range(min = 0, max = MAX_LISTED), extend("x-value" = "K"))]
         pub strobe: usize = 1,
-        /// How many contacts and releases to list at most, the first ones
-        #[schemars(range(min = 0, max = MOST_LISTED), extend("x-value" = "K"))]
+        /// Maximum number of listed contacts and releases
+        #[schemars(range(min = 0, max = MAX_LISTED), extend("x-value" = "K"))]
         pub events: usize = LISTED_EVENTS,
-        /// Longest period looked for
-        #[schemars(range(min = 1, max = MOST_PERIOD), extend("x-value" = "N"))]
+        /// Longest period of orbits, in drive periods
+        #[schemars(range(min = 1, max = MAX_PERIOD), extend("x-value" = "N"))]
         pub max_period: usize = ClassifyOptions::default().max_period,
-        /// Observables to measure; without it, every one that there is, the beam's clearance included
+        /// Observables to measure; default: all, including the clearance of the beam
         #[schemars(extend("x-value" = "NAME,…"))]
         pub observables: Option<ObservableSet> = None,
-        /// Samples a drive period in the time series
-        #[schemars(range(min = 1, max = MOST_SAMPLES), extend("x-value" = "S"))]
+        /// Samples per drive period in the time series
+        #[schemars(range(min = 1, max = MAX_SAMPLES), extend("x-value" = "S"))]
         pub resolution: usize = 200,
-        /// How the motion is computed
+        /// Method of computation
         pub method: Method = Method::default(),
-        /// Of rk4: steps a drive period, in free flight and (after a comma) in contact
+        /// For rk4: steps per drive period, in free flight and (after a comma) in contact
         #[schemars(extend("x-value" = "FREE,CONTACT"))]
         pub steps: Steps = Steps::default(),
-        /// Of rk4: where within a step the regime is looked at
+        /// For rk4: where within a step the regime is checked
         pub switching: Grid = Grid::default(),
     }
 }
 
 /// Most drive periods recorded: their events fill some hundred megabytes.
-pub const MOST_RECORDED: usize = 2_000_000;
+pub const MAX_RECORDED: usize = 2_000_000;
 /// Most events, and states at drive phase 0, that are listed.
-const MOST_LISTED: usize = 1_000_000;
+const MAX_LISTED: usize = 1_000_000;
 
 impl SimulateOptions {
     /// Budgets for naming the motion.

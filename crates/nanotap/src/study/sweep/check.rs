@@ -13,8 +13,8 @@ use crate::study::start_box::box_with;
 /// Most bytes that one chunk may take in memory.
 pub(super) const LARGEST_CHUNK: usize = 1 << 30;
 /// Most runs of a sweep, and most periods of a run.
-const MOST_RUNS: usize = 1_000_000_000;
-const MOST_PERIODS: usize = 100_000_000;
+const MAX_RUNS: usize = 1_000_000_000;
+const MAX_PERIODS: usize = 100_000_000;
 
 /// Checks options against the case.
 pub(super) fn check(
@@ -54,14 +54,14 @@ pub(super) fn check(
     let runs = over
         .iter()
         .fold(lanes, |runs, range| runs.saturating_mul(range.count));
-    if runs > MOST_RUNS {
+    if runs > MAX_RUNS {
         return Err(too_much(format!(
-            "{runs} runs are too many for one dataset; {MOST_RUNS} at most"
+            "{runs} runs are too many for one dataset; {MAX_RUNS} at most"
         )));
     }
-    if options.periods > MOST_PERIODS {
+    if options.periods > MAX_PERIODS {
         return Err(too_much(format!(
-            "{} periods to record are too many; {MOST_PERIODS} at most",
+            "{} periods to record are too many; {MAX_PERIODS} at most",
             options.periods
         )));
     }

@@ -19,7 +19,7 @@ use crate::study::simulate::Classification;
 /// for a file system.
 const CHUNKS: usize = 64;
 /// Most runs of a chunk: what a kill loses at most.
-const MOST_RUNS: usize = 4096;
+const MAX_RUNS: usize = 4096;
 /// Bytes that a chunk should not exceed.
 const CHUNK_BYTES: usize = 16 << 20;
 
@@ -92,7 +92,7 @@ fn cut(runs: &Runs, lanes: usize, bytes: usize) -> (usize, usize) {
     }
     let counts = runs.over.iter().map(|over| over.count);
     let runs = counts.product::<usize>() * lanes;
-    let most = (CHUNK_BYTES / bytes.max(1)).clamp(1, MOST_RUNS);
+    let most = (CHUNK_BYTES / bytes.max(1)).clamp(1, MAX_RUNS);
     let target = runs.div_ceil(CHUNKS).clamp(1, most);
     let starts = lanes.min(target);
     ((target / starts).max(1), starts)

@@ -6,8 +6,8 @@ use super::{Follow, Over, Starts, Summary, Sweep};
 use crate::Error;
 use crate::case::Case;
 use crate::dataset::{Store, StoreError};
-use crate::study::attractors::MOST_STARTS;
-use crate::study::limits::{MOST_PERIOD, MOST_PERIODS};
+use crate::study::attractors::MAX_STARTS;
+use crate::study::limits::{MAX_PERIOD, MAX_PERIODS};
 use crate::study::request::options;
 use crate::study::value::{Axes, Intervals};
 use crate::study::{DatasetPlan, DatasetStudy};
@@ -15,19 +15,18 @@ use crate::study::{DatasetPlan, DatasetStudy};
 options! {
     /// Options of a sweep.
     pub struct SweepOptions {
-        /// A parameter and its values, as in omega=2:4:400 (first, last, how many), or
-        /// alpha4=1:1000:50:log in equal ratios, or any that ascend, omega=2,2.5,4; modes too; of a physical case also
+        /// Parameter and its values, as in omega=2:4:400 (first, last, count), alpha4=1:1000:50:log
+        /// in equal ratios, or ascending values omega=2,2.5,4; modes too; for a physical case also
         /// drive.frequency=60kHz:80kHz:200; once or twice
         #[schemars(extend("x-value" = "KEY=VALUES", "x-required" = true))]
         pub over: Axes = Axes::default(),
-        /// Quasi-random starts at each value, spread over a box of states; without it, one start
-        /// from rest
-        #[schemars(range(min = 1, max = MOST_STARTS), extend("x-value" = "S"))]
+        /// Quasi-random initial states at each value, spread over a box; default: rest alone
+        #[schemars(range(min = 1, max = MAX_STARTS), extend("x-value" = "S"))]
         pub starts: Option<usize> = None,
-        /// Seed of the starts
+        /// Seed of the initial states
         #[schemars(extend("x-value" = "K"))]
         pub seed: u64 = 1,
-        /// Sides of the box, as in a1=-1:1 or v2=-4:4; the others are derived from the linear response
+        /// Sides of the box, as in a1=-1:1 or v2=-4:4; other sides follow from the linear response
         /// to the drive
         #[serde(rename = "box")]
         #[schemars(extend("x-value" = "COORDINATE=LOW:HIGH"))]
@@ -35,21 +34,21 @@ options! {
         /// Start from this state at drive phase 0: a1,…,aN,v1,…,vN (oscillator: x,v)
         #[schemars(extend("x-value" = "A1,…"))]
         pub state: Option<Vec<f64>> = None,
-        /// Start each value from the last state of the one before, along the first parameter: up,
-        /// down or both. A whole line is then one piece of work, lost when interrupted
+        /// Start each value from the last state of the previous one, along the first parameter: up,
+        /// down or both. An interrupted line is lost
         #[schemars(extend("x-value" = "WAY"))]
         pub follow: Follow = Follow::Off,
-        /// Drive periods recorded
-        #[schemars(range(min = 1, max = MOST_PERIODS), extend("x-value" = "P"))]
+        /// Number of recorded drive periods
+        #[schemars(range(min = 1, max = MAX_PERIODS), extend("x-value" = "P"))]
         pub periods: usize = 100,
-        /// States kept, at the end of each of the last periods; without it, of every recorded one
-        #[schemars(range(min = 0, max = MOST_PERIODS), extend("x-value" = "K"))]
+        /// Number of last periods whose final states are kept; default: all recorded ones
+        #[schemars(range(min = 0, max = MAX_PERIODS), extend("x-value" = "K"))]
         pub strobe: Option<usize> = None,
-        /// Drive periods discarded first; without it, as many as the motion is measured to need
-        #[schemars(range(min = 0, max = MOST_PERIODS), extend("x-value" = "T"))]
+        /// Drive periods of the discarded transient; default: until the motion has settled
+        #[schemars(range(min = 0, max = MAX_PERIODS), extend("x-value" = "T"))]
         pub transient: Option<usize> = None,
-        /// Longest period looked for
-        #[schemars(range(min = 1, max = MOST_PERIOD), extend("x-value" = "N"))]
+        /// Longest period of orbits, in drive periods
+        #[schemars(range(min = 1, max = MAX_PERIOD), extend("x-value" = "N"))]
         pub max_period: usize = 64,
     }
 }

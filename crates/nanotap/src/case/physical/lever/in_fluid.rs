@@ -10,7 +10,7 @@ use crate::case::quantity::Kind;
 use crate::model::parameter::{Numbers, Parameter};
 
 /// Largest number of iterations for the resonance in the fluid; each gains about a digit.
-const MOST_ITERATIONS: usize = 60;
+const MAX_ITERATIONS: usize = 60;
 
 impl Fluid {
     /// The same lever of this width in the fluid. `lever` is that in vacuum; its stiffness and
@@ -25,7 +25,7 @@ impl Fluid {
         let unit = PI / 4.0 * self.density * width * width * length;
         let mut found = *lever;
         // The added mass falls slowly with the frequency, so that this contracts.
-        for _ in 0..MOST_ITERATIONS {
+        for _ in 0..MAX_ITERATIONS {
             let last = found.f0;
             let gamma = self.on_lever(width, last)?;
             found.beam_mass = lever.beam_mass + unit * gamma.re;
@@ -58,7 +58,7 @@ impl Fluid {
         let mut found = Numbers::ZERO;
         for k in 1..count.min(3) {
             let (mut frequency, _) = lever.mode(k, lever.beam_mass)?;
-            for _ in 0..MOST_ITERATIONS {
+            for _ in 0..MAX_ITERATIONS {
                 let Ok(gamma) = self.on_lever(width, frequency) else {
                     return Ok(found);
                 };

@@ -18,6 +18,7 @@ pub mod modes;
 pub mod orbit;
 pub mod proof;
 pub mod recipe;
+pub mod reconstruct;
 pub mod registry;
 pub mod request;
 pub mod setpoint;

@@ -163,6 +163,7 @@ pub static STUDIES: &[StudyEntry] = &[
     StudyEntry::of::<super::branch::BranchStudy>(),
     StudyEntry::of::<super::approach::ApproachStudy>(),
     StudyEntry::of::<super::fit::FitStudy>(),
+    StudyEntry::of::<super::reconstruct::ReconstructStudy>(),
     StudyEntry::dataset::<super::sweep::SweepStudy>(),
     StudyEntry::dataset::<super::window::WindowStudy>(),
     StudyEntry::dataset::<super::basin::BasinStudy>(),

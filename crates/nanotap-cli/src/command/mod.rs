@@ -16,6 +16,7 @@ mod merge;
 mod modes;
 mod orbit;
 mod paper;
+mod reconstruct;
 mod schema;
 mod simulate;
 mod study;
@@ -113,6 +114,8 @@ pub(crate) enum Own {
     Approach(approach::Arguments),
     /// Parameters of lever and sample from measured curves
     Fit(fit::Arguments),
+    /// Force and dissipation against distance from a measured curve
+    Reconstruct(reconstruct::Arguments),
     /// How the motion changes with one or two parameters, from any number of starts
     Sweep(sweep::Arguments),
     /// The operating window over two parameters: where only one motion exists
@@ -155,6 +158,7 @@ pub(crate) fn run(command: &Command, output: &Output) -> Result<(), Failure> {
         Own::Branch(arguments) => branch::run(arguments, output),
         Own::Approach(arguments) => approach::run(arguments, output),
         Own::Fit(arguments) => fit::run(arguments, output),
+        Own::Reconstruct(arguments) => reconstruct::run(arguments, output),
         Own::Sweep(arguments) => sweep::run(arguments, output),
         Own::Window(arguments) => window::run(arguments, output),
         Own::Basin(arguments) => basin::run(arguments, output),

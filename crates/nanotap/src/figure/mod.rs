@@ -10,6 +10,7 @@ pub mod fit;
 pub mod modes;
 pub mod motion;
 pub mod panels;
+pub mod reconstruct;
 pub mod shown;
 pub mod sweep;
 pub mod window;

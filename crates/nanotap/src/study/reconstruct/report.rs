@@ -1,8 +1,12 @@
 //! What a reconstruction found.
 
+use std::fmt::Write as _;
+
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use crate::case::physical::quantity::JOULES_PER_ELECTRONVOLT;
+use crate::number::shortest;
 use crate::study::approach::Way;
 
 /// Force and dissipation from a measured curve. Values are in SI of a physical case, else in the
@@ -147,4 +151,44 @@ pub struct PlainCurve {
     pub distance: Vec<f64>,
     /// Force.
     pub force: Vec<f64>,
+}
+
+impl ReconstructReport {
+    /// How many nodes of the table lie where rows came near enough to feel the sample: the
+    /// force beyond is small.
+    pub fn resolved_nodes(&self) -> usize {
+        let steps = self.table.distance.windows(2).map(|w| w[1] - w[0]);
+        let first = steps.clone().next().unwrap_or(0.0);
+        let even = steps.take_while(|step| *step <= 1.001 * first).count();
+        (even + 1).min(self.table.distance.len())
+    }
+
+    /// The table as CSV, which `sample.law = "table"` reads.
+    pub fn csv(&self) -> String {
+        let (length, force, energy) = if self.physical {
+            ((1e9, " (nm)"), (1e9, " (nN)"), (1.0 / JOULES_PER_ELECTRONVOLT, " (eV)"))
+        } else {
+            ((1.0, ""), (1.0, ""), (1.0, ""))
+        };
+        let damping = if self.physical { " (N s/m)" } else { "" };
+        let mut csv = format!(
+            "distance{0},force{1},force error{1},dissipation{2},dissipation error{2},\
+             damping{3},damping error{3}\n",
+            length.1, force.1, energy.1, damping
+        );
+        let table = &self.table;
+        for k in 0..table.distance.len() {
+            let cells = [
+                length.0 * table.distance[k],
+                force.0 * table.force[k],
+                force.0 * table.force_error[k],
+                energy.0 * table.dissipation[k],
+                energy.0 * table.dissipation_error[k],
+                table.damping[k],
+                table.damping_error[k],
+            ];
+            let _ = writeln!(csv, "{}", cells.map(shortest).join(","));
+        }
+        csv
+    }
 }

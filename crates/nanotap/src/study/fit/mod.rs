@@ -21,6 +21,7 @@
 
 mod branches;
 mod data;
+pub(crate) mod instrument;
 mod jumps;
 mod laws;
 mod parameters;

@@ -63,6 +63,24 @@ pub(super) struct Inverted {
     pub(super) rows: Vec<InvertedRow>,
 }
 
+impl Inverted {
+    /// The resolved distances, from and to.
+    pub(super) fn range(&self) -> [f64; 2] {
+        let even = super::report::even_nodes(&self.nodes.0);
+        [self.nodes.0[1], self.nodes.0[even - 1]]
+    }
+
+    /// The force at a distance, with its standard error.
+    pub(super) fn force_at(&self, x: f64) -> [f64; 2] {
+        let (at, upper) = self.nodes.place(x);
+        let mut weights = vec![0.0; self.nodes.0.len()];
+        weights[at] = 1.0 - upper;
+        weights[at + 1] = upper;
+        weights.truncate(self.nodes.unknowns());
+        self.force.sum(&weights)
+    }
+}
+
 /// What force and damping say of a row.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct InvertedRow {

@@ -31,6 +31,7 @@ use crate::case::Case;
 use crate::case::physical::Kind as Quantity;
 use crate::case::table::Table;
 use crate::study::approach::Way;
+use crate::study::fit::instrument::{prepared, wrapped};
 use crate::study::fit::Data;
 use crate::study::frequency_modulation::average::sader_jarvis;
 use crate::study::registry::Study;
@@ -39,7 +40,7 @@ use crate::study::value::Amount;
 use inversion::{Inversion, Inverted, Measured};
 use lever::{Lever, Method};
 use nodes::Kernel;
-use rows::{Excitation, Kind, Readings, floors, wrapped};
+use rows::{Excitation, Kind, Readings, floors};
 
 /// Fewest rows that feel the sample; fewer than [`FEW_ROWS`] are warned of.
 const MIN_ROWS: usize = 8;
@@ -48,6 +49,10 @@ const FEW_ROWS: usize = 25;
 const WIDEST: [f64; 2] = [30e-12, 1.0 / 600.0];
 /// Part of the free amplitude, or of the largest shift, that tells whether a row feels the sample.
 const FELT: f64 = 0.05;
+/// Fewest rows that feel the sample in a direction that is inverted alone.
+const ROWS_OF_A_WAY: usize = 15;
+/// A mean squared residual above this is reported.
+const WORST_CHI2: f64 = 4.0;
 /// Most rows of the inversion.
 const MAX_ROWS: usize = 2000;
 
@@ -62,6 +67,9 @@ pub struct ReconstructOptions {
     /// Columns of the data that count; without it, all
     #[schemars(extend("x-value" = "NAME,…"))]
     pub columns: Vec<String>,
+    /// Conversions of columns, as in Amp="58 nm/V", Phase=90-x, Zsnsr=-x or Ch3=amplitude
+    #[schemars(extend("x-value" = "NAME=RULE"))]
+    pub convert: Vec<String>,
     /// Free amplitude, as in "20 nm"; without it, that of the rows far from the sample
     #[schemars(extend("x-value" = "AMPLITUDE"))]
     pub free_amplitude: Option<Amount>,
@@ -87,6 +95,7 @@ impl Default for ReconstructOptions {
         Self {
             data: Vec::new(),
             columns: Vec::new(),
+            convert: Vec::new(),
             free_amplitude: None,
             free_phase: None,
             amplitude_error: None,
@@ -147,17 +156,23 @@ pub fn reconstruct(
     if options.data.is_empty() {
         return Err(Error::option("data", "there are no data", "give a table"));
     }
-    let data = Data::read(case, &options.data, &options.columns)?;
-    let prepared = Prepared::of(case, &data, options)?;
+    let (tables, remarks) = prepared(case, &options.data, &options.convert)?;
+    let data = Data::read(case, &tables, &options.columns)?;
+    let prepared = Prepared::of(case, &data, options, remarks)?;
     let inverted = prepared.invert(None, control)?;
-    prepared.report(case, &inverted, control)
+    let ways = prepared.ways(control)?;
+    Ok(prepared.report(case, &inverted, ways))
 }
 
 impl Prepared {
-    fn of(case: &Case, data: &Data, options: &ReconstructOptions) -> Result<Self, Error> {
+    fn of(
+        case: &Case,
+        data: &Data,
+        options: &ReconstructOptions,
+        mut remarks: Vec<String>,
+    ) -> Result<Self, Error> {
         let readings = Readings::of(data)?;
         let lever = Lever::of(case)?;
-        let mut remarks = Vec::new();
         if readings.incomplete > 0 {
             remarks.push(format!(
                 "rows without all values, left out: {}",
@@ -329,6 +344,52 @@ impl Prepared {
         .run(control)
     }
 
+    /// Approach and retract alone, if both have enough rows and their forces differ by more than
+    /// three standard errors.
+    fn ways(&self, control: &Control<'_>) -> Result<Vec<WayCurve>, Error> {
+        let both = [Way::Approach, Way::Retract];
+        let felt = |way: Way| {
+            let rows = self.measured.iter().zip(&self.readings.rows);
+            rows.filter(|(m, row)| m.informative && row.way == Some(way)).count()
+        };
+        if both.iter().any(|way| felt(*way) < ROWS_OF_A_WAY) {
+            return Ok(Vec::new());
+        }
+        let silent = Control {
+            progress: None,
+            ..*control
+        };
+        let mut alone = Vec::new();
+        for way in both {
+            alone.push(self.invert(Some(way), &silent)?);
+        }
+        let (first, second) = (&alone[0], &alone[1]);
+        let (low, high) = [first, second]
+            .map(Inverted::range)
+            .into_iter()
+            .fold((f64::NEG_INFINITY, f64::INFINITY), |(low, high), range| {
+                (low.max(range[0]), high.min(range[1]))
+            });
+        let nodes = first.nodes.0.iter().filter(|x| (low..=high).contains(*x));
+        let apart = nodes.filter(|x| {
+            let [[a, b], [c, d]] = [first, second].map(|one| one.force_at(**x));
+            (a - c).abs() > 3.0 * (b * b + d * d).sqrt()
+        });
+        if apart.count() < 3 {
+            return Ok(Vec::new());
+        }
+        let curves = both.into_iter().zip(&alone).map(|(way, inverted)| {
+            let table = self.curve(inverted);
+            let minimum = minimum(&table);
+            WayCurve {
+                way,
+                table,
+                minimum,
+            }
+        });
+        Ok(curves.collect())
+    }
+
     /// Force and dissipation from the closest approach outwards.
     fn curve(&self, inverted: &Inverted) -> ForceCurve {
         let nodes = &inverted.nodes;
@@ -362,10 +423,18 @@ impl Prepared {
         &self,
         case: &Case,
         inverted: &Inverted,
-        _control: &Control<'_>,
-    ) -> Result<ReconstructReport, Error> {
+        ways: Vec<WayCurve>,
+    ) -> ReconstructReport {
         let table = self.curve(inverted);
         let mut remarks = self.remarks.clone();
+        if !ways.is_empty() {
+            remarks.push(
+                "the forces of approach and retract differ by more than three standard errors: the sample \
+                 or the instrument changed, or the force depends on the past. Both are reported; the common \
+                 force is their compromise"
+                    .to_owned(),
+            );
+        }
         let felt = self.measured.iter().filter(|row| row.informative).count();
         if felt < FEW_ROWS {
             remarks.push(format!(
@@ -375,6 +444,22 @@ impl Prepared {
         let closest = inverted.rows.iter().map(|row| row.closest);
         let closest = closest.fold(f64::INFINITY, f64::min);
         let minimum = minimum(&table);
+        let inflections = inflections(&table, closest, inverted.rows[0].amplitude);
+        for inflection in &inflections {
+            remarks.push(format!(
+                "near the distance {:.3e} the force has an inflection at which this amplitude does not \
+                 determine it (the test of Sader and others, 2018, gives {:.2}, below -1): measure with a \
+                 smaller or larger amplitude",
+                inflection.distance, inflection.factor
+            ));
+        }
+        if self.has_damping && inverted.force.chi2 > WORST_CHI2 {
+            remarks.push(format!(
+                "the residuals are {:.1} times the standard errors: the rows contradict each other, or \
+                 their errors are larger; the force's standard errors are widened by as much",
+                inverted.force.chi2.sqrt()
+            ));
+        }
         let has_damping = damped(&table);
         let rows = self.readings.rows.iter().zip(&inverted.rows);
         let rows = rows.map(|(row, inverted)| ReconstructedRow {
@@ -409,7 +494,7 @@ impl Prepared {
             }
             Method::Amplitude { .. } => None,
         };
-        Ok(ReconstructReport {
+        ReconstructReport {
             method: match self.method {
                 Method::Amplitude { .. } => ReconstructMethod::AmplitudeModulation,
                 Method::Frequency { .. } => ReconstructMethod::FrequencyModulation,
@@ -426,12 +511,57 @@ impl Prepared {
             freedom: inverted.force.freedom,
             chi2: inverted.force.chi2,
             rows,
-            ways: Vec::new(),
-            inflections: Vec::new(),
+            ways,
+            inflections,
             sader_jarvis,
             remarks,
-        })
+        }
     }
+}
+
+/// Inflection points of the force at which an oscillation of `amplitude` does not determine it: the
+/// test of J. E. Sader, B. D. Hughes, F. Huber and F. J. Giessibl, Nat. Nanotechnol. 13, 1088 (2018).
+/// Inflections that the standard errors allow to be absent are left out.
+fn inflections(table: &ForceCurve, closest: f64, amplitude: f64) -> Vec<Inflection> {
+    let resolved = report::even_nodes(&table.distance);
+    let stride = (resolved / 40).max(1);
+    let points: Vec<[f64; 3]> = (0..resolved)
+        .step_by(stride)
+        .map(|k| [table.distance[k], table.force[k], table.force_error[k]])
+        .collect();
+    let curvatures: Vec<[f64; 4]> = points
+        .windows(3)
+        .map(|w| {
+            let step = w[1][0] - w[0][0];
+            let curvature = (w[2][1] - 2.0 * w[1][1] + w[0][1]) / (step * step);
+            let error = 6f64.sqrt() * w[1][2] / (step * step);
+            [w[1][0], curvature, error, (w[2][1] - w[0][1]) / (2.0 * step)]
+        })
+        .collect();
+    let mut found = Vec::new();
+    for pair in curvatures.windows(2) {
+        let ([x, low, low_error, slope], [y, high, high_error, other]) = (pair[0], pair[1]);
+        if low * high >= 0.0 || low.abs() < low_error || high.abs() < high_error {
+            continue;
+        }
+        let part = low / (low - high);
+        let distance = x + part * (y - x);
+        let slope = slope + part * (other - slope);
+        let depth = distance - closest;
+        let ratio = (high - low) / (y - x) / slope;
+        let factor = 0.25 * depth * depth * ratio;
+        if factor < -1.0 {
+            let amplitudes = [(-1.0 / ratio).sqrt(), 0.5 * depth];
+            if (amplitudes[0]..amplitudes[1]).contains(&amplitude) {
+                found.push(Inflection {
+                    distance,
+                    factor,
+                    amplitudes,
+                });
+            }
+        }
+    }
+    found
 }
 
 /// The most attractive force, where it is larger than its standard error.

@@ -157,10 +157,7 @@ impl ReconstructReport {
     /// How many nodes of the table lie where rows came near enough to feel the sample: the
     /// force beyond is small.
     pub fn resolved_nodes(&self) -> usize {
-        let steps = self.table.distance.windows(2).map(|w| w[1] - w[0]);
-        let first = steps.clone().next().unwrap_or(0.0);
-        let even = steps.take_while(|step| *step <= 1.001 * first).count();
-        (even + 1).min(self.table.distance.len())
+        even_nodes(&self.table.distance)
     }
 
     /// The table as CSV, which `sample.law = "table"` reads.
@@ -191,4 +188,12 @@ impl ReconstructReport {
         }
         csv
     }
+}
+
+/// How many distances from the first on are evenly spaced.
+pub(super) fn even_nodes(distance: &[f64]) -> usize {
+    let steps = distance.windows(2).map(|w| w[1] - w[0]);
+    let first = steps.clone().next().unwrap_or(0.0);
+    let even = steps.take_while(|step| *step <= 1.001 * first).count();
+    (even + 1).min(distance.len())
 }

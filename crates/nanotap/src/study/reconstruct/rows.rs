@@ -4,6 +4,7 @@
 use crate::Error;
 use crate::observe::table::shown_phase;
 use crate::study::approach::Way;
+use crate::study::fit::instrument::{median, wrapped};
 use crate::study::fit::{Data, Row};
 
 /// Least number of rows of the free level.
@@ -309,22 +310,6 @@ fn mean(rows: &[Reading]) -> Reading {
         errors: [error(0), error(1)],
         ..first
     }
-}
-
-/// The middle of some values.
-pub(super) fn median(mut values: Vec<f64>) -> f64 {
-    values.sort_by(f64::total_cmp);
-    let middle = values.len() / 2;
-    match values.len() {
-        0 => f64::NAN,
-        n if n % 2 == 1 => values[middle],
-        _ => 0.5 * (values[middle - 1] + values[middle]),
-    }
-}
-
-/// An angle in degrees in [−180, 180).
-pub(super) fn wrapped(degrees: f64) -> f64 {
-    (degrees + 180.0).rem_euclid(360.0) - 180.0
 }
 
 /// Least standard errors of amplitude and phase, or of shift and energy, whose largest values

@@ -157,3 +157,43 @@ fn noise_leaves_the_force_within_a_few_percent() {
         assert!(all.iter().all(|one| one[2].abs() < 1e-10));
     }
 }
+
+#[test]
+#[ignore = "experiment"]
+fn experiment() {
+    let reference = &references()[0];
+    let case = lever(reference);
+    for step in [1, 4] {
+        for variant in 0..3 {
+            let mut all = Vec::new();
+            let mut covered = [0; 2];
+            for seed in 1..=24 {
+                let table = rows(reference, step, [0.02, 0.1], seed);
+                let mut options = ReconstructOptions::default();
+                if variant > 0 {
+                    options.free_amplitude = Some("20 nm".into());
+                    options.free_phase = Some(90.0);
+                }
+                if variant > 1 {
+                    options.amplitude_error = Some("0.02 nm".into());
+                    options.phase_error = Some(0.1);
+                }
+                let report = reconstructed(&case, table, options);
+                let truth = &reference["truth"];
+                for (x, f) in numbers(&truth["distance_m"]).iter().zip(numbers(&truth["force_N"])) {
+                    let k = report.table.distance.partition_point(|node| node <= x).clamp(1, report.table.distance.len() - 1);
+                    let error = report.table.force_error[k];
+                    covered[1] += 1;
+                    covered[0] += usize::from((value_at(&report, *x) - f).abs() < 2.0 * error);
+                }
+                all.push(deviations(reference, &report));
+            }
+            let square = |index: usize| {
+                let squares = all.iter().map(|one| one[index] * one[index]);
+                (squares.sum::<f64>() / all.len() as f64).sqrt()
+            };
+            let mean = all.iter().map(|one| one[1]).sum::<f64>() / all.len() as f64;
+            println!("step {step} variant {variant}: {:?} mean of minimum {mean} covered {covered:?}", [0, 1, 2].map(square));
+        }
+    }
+}

@@ -179,7 +179,7 @@ impl Readings {
             let of = |far: bool| -> Vec<f64> {
                 let differences = self.segments().flat_map(|segment| {
                     let rows = segment.iter();
-                    let rows = rows.filter(|row| !far || row.values[0] > 0.97 * free);
+                    let rows = rows.filter(|row| !far || self.kind != Kind::Amplitude || row.values[0] > 0.97 * free);
                     let values: Vec<f64> = rows.map(|row| row.values[index]).collect();
                     let third = |w: &[f64]| {
                         let step = |k: usize| {
@@ -196,12 +196,16 @@ impl Readings {
                 });
                 differences.filter(|value| value.is_finite()).collect()
             };
-            let far = of(self.kind == Kind::Amplitude);
-            let all = if far.len() >= MIN_SCATTER { far } else { of(false) };
-            (all.len() >= MIN_SCATTER).then(|| {
-                let deviations: Vec<f64> = all.iter().map(|value| value.abs()).collect();
-                1.4826 * median(deviations) / 20f64.sqrt()
-            })
+            let estimate = |far: bool| {
+                let deviations: Vec<f64> = of(far).iter().map(|value| value.abs()).collect();
+                let enough = deviations.len() >= MIN_SCATTER;
+                enough.then(|| 1.4826 * median(deviations) / 20f64.sqrt())
+            };
+            // Few far rows are uncertain, and all rows may be too far apart.
+            match (estimate(true), estimate(false)) {
+                (Some(far), Some(all)) if far < 0.6 * all => Some(far),
+                (far, all) => all.or(far),
+            }
         })
     }
 

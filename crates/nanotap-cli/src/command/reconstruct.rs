@@ -59,7 +59,10 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     for path in std::iter::once(&arguments.data).chain(&arguments.also) {
         if path.extension().is_some_and(|ending| ending == "toml") {
             return Err(Failure::input(
-                format!("{}: expected measured data, got a case file", path.display()),
+                format!(
+                    "{}: expected measured data, got a case file",
+                    path.display()
+                ),
                 "name the data first, then the case: nanotap reconstruct DATA CASE",
             ));
         }

@@ -1,6 +1,8 @@
 //! Reconstructed force and dissipation against distance.
 
-use nanotap_figures::{Axis, Colour, DOUBLE_COLUMN, Dash, Figure, Legend, Line, Markers, Panel, Rule};
+use nanotap_figures::{
+    Axis, Colour, DOUBLE_COLUMN, Dash, Figure, Legend, Line, Markers, Panel, Rule,
+};
 
 use crate::case::physical::Kind;
 use crate::case::physical::quantity::JOULES_PER_ELECTRONVOLT;
@@ -32,7 +34,9 @@ fn unit(report: &ReconstructReport, kind: Kind, size: f64) -> (f64, String) {
 }
 
 fn largest<'a>(values: impl IntoIterator<Item = &'a f64>) -> f64 {
-    values.into_iter().fold(0.0, |size: f64, value| size.max(value.abs()))
+    values
+        .into_iter()
+        .fold(0.0, |size: f64, value| size.max(value.abs()))
 }
 
 /// Axis of the distance, its factor, and the distances shown.
@@ -42,12 +46,20 @@ fn distance(report: &ReconstructReport) -> (Axis, f64, [f64; 2]) {
     let (low, high) = (nodes[0], nodes[nodes.len() - 1]);
     let range = [low, high + 0.15 * (high - low)];
     let axis = Axis::linear(format!("tip–sample distance $d${unit}"));
-    (axis.range(factor * range[0], factor * range[1]), factor, range)
+    (
+        axis.range(factor * range[0], factor * range[1]),
+        factor,
+        range,
+    )
 }
 
 /// Vertical bars of two standard errors.
 fn bars(curve: &ForceCurve, range: [f64; 2], along: f64, factor: f64) -> Vec<(f64, f64)> {
-    let rows = curve.distance.iter().zip(&curve.force).zip(&curve.force_error);
+    let rows = curve
+        .distance
+        .iter()
+        .zip(&curve.force)
+        .zip(&curve.force_error);
     let shown = rows.filter(|((x, _), _)| (range[0]..=range[1]).contains(*x));
     shown
         .flat_map(|((x, force), error)| {
@@ -71,7 +83,11 @@ fn force_panel(report: &ReconstructReport) -> Panel {
     panel = panel.with(bars.width(0.6).label("two standard errors"));
     let line = |x: &[f64], y: &[f64]| {
         let points = x.iter().zip(y).filter(|(x, _)| inside(**x));
-        Line::new(points.map(|(x, y)| (along * x, factor * y)).collect::<Vec<_>>())
+        Line::new(
+            points
+                .map(|(x, y)| (along * x, factor * y))
+                .collect::<Vec<_>>(),
+        )
     };
     if let Some(plain) = &report.sader_jarvis {
         let formula = line(&plain.distance, &plain.force).colour(Colour::VERMILLION);
@@ -82,7 +98,11 @@ fn force_panel(report: &ReconstructReport) -> Panel {
         let alone = line(&way.table.distance, &way.table.force).colour(colour);
         panel = panel.with(alone.width(0.6).label(format!("{} alone", way.way.name())));
     }
-    panel.with(line(&curve.distance, &curve.force).colour(Colour::BLACK).label("force"))
+    panel.with(
+        line(&curve.distance, &curve.force)
+            .colour(Colour::BLACK)
+            .label("force"),
+    )
 }
 
 const fn way_colour(way: Option<Way>) -> Colour {
@@ -111,15 +131,25 @@ fn dissipation_panel(report: &ReconstructReport) -> Panel {
         }
         let bars = rows.iter().flat_map(|row| {
             let half = STANDARD_ERRORS * row.dissipation_error;
-            let end = |side: f64| (along * row.closest, factor * (row.dissipation + side * half));
+            let end = |side: f64| {
+                (
+                    along * row.closest,
+                    factor * (row.dissipation + side * half),
+                )
+            };
             [end(-1.0), end(1.0), (f64::NAN, f64::NAN)]
         });
         let bars: Vec<_> = bars.collect();
-        let points = rows.iter().map(|row| (along * row.closest, factor * row.dissipation));
+        let points = rows
+            .iter()
+            .map(|row| (along * row.closest, factor * row.dissipation));
         let points: Vec<_> = points.collect();
         panel = panel.with(Line::new(bars).colour(Colour::GREY).width(0.6));
         let label = way.map_or("rows", Way::name);
-        let markers = Markers::new(points).colour(way_colour(way)).open().size(1.0);
+        let markers = Markers::new(points)
+            .colour(way_colour(way))
+            .open()
+            .size(1.0);
         panel = panel.with(markers.label(label));
     }
     panel

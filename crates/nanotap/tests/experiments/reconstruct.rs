@@ -2,8 +2,11 @@
 
 use nanotap::case::Case;
 use nanotap::case::file::Source;
-use nanotap::control::Control;
+use nanotap::control::{CancelFlag, Control};
+use nanotap::study::approach::{ApproachOptions, Way, approach};
 use nanotap::study::fit::{Entry, Table};
+use nanotap::study::frequency_modulation::Modulated;
+use nanotap::study::orbit::{OrbitOptions, orbit};
 use nanotap::study::reconstruct::{ReconstructOptions, ReconstructReport, reconstruct};
 use serde_json::Value;
 
@@ -81,7 +84,10 @@ fn value_at(report: &ReconstructReport, x: f64) -> f64 {
 fn deviations(reference: &Value, report: &ReconstructReport) -> [f64; 3] {
     let truth = &reference["truth"];
     let (at, force) = (numbers(&truth["distance_m"]), numbers(&truth["force_N"]));
-    let squares = at.iter().zip(&force).map(|(x, f)| (value_at(report, *x) - f).powi(2));
+    let squares = at
+        .iter()
+        .zip(&force)
+        .map(|(x, f)| (value_at(report, *x) - f).powi(2));
     let rms = (squares.sum::<f64>() / at.len() as f64).sqrt();
     let of = |name: &str| truth[name].as_f64().unwrap();
     let least = report.minimum.map_or(0.0, |minimum| minimum.force);
@@ -107,21 +113,36 @@ fn references_are_met_within_their_tolerance() {
         let number = |value: &Value| value.as_f64().unwrap();
         let given = |value: f64| (value > 0.0).then_some(value);
         let options = ReconstructOptions {
-            free_amplitude: Some(format!("{} m", lever_of["free_amplitude_m"]).as_str().into()),
+            free_amplitude: Some(
+                format!("{} m", lever_of["free_amplitude_m"])
+                    .as_str()
+                    .into(),
+            ),
             free_phase: Some(number(&lever_of["free_phase_deg"])),
             amplitude_error: given(number(&noise["A_m"]))
                 .map(|error| format!("{error} m").as_str().into()),
             phase_error: given(number(&noise["phase_deg"])),
             ..ReconstructOptions::default()
         };
-        let report = reconstructed(&lever(&reference), rows(&reference, 1, [0.0; 2], 0), options);
+        let report = reconstructed(
+            &lever(&reference),
+            rows(&reference, 1, [0.0; 2], 0),
+            options,
+        );
         let [rms, least, closest] = deviations(&reference, &report);
-        let dissipated = report.rows.iter().map(|row| row.dissipation).fold(0.0, f64::max);
+        let dissipated = report
+            .rows
+            .iter()
+            .map(|row| row.dissipation)
+            .fold(0.0, f64::max);
         let truth = number(&reference["truth"]["max_dissipation_J"]);
         println!(
             "{}: rms {rms:.4}, minimum {least:.4}, closest {closest:.2e} m, E_dis {dissipated:.3e} of {truth:.3e} J, \
              chi2 {:.2}, freedom {:.1}, nodes {}",
-            reference["name"], report.chi2, report.freedom, report.table.distance.len()
+            reference["name"],
+            report.chi2,
+            report.freedom,
+            report.table.distance.len()
         );
         let tolerance = |name: &str| reference["tolerance"][name].as_f64();
         assert!(rms < tolerance("rms_over_scale").unwrap());
@@ -144,7 +165,16 @@ fn noise_leaves_the_force_within_a_few_percent() {
         for seed in 1..=8 {
             let table = rows(reference, step, [0.02, 0.1], seed);
             let report = reconstructed(&case, table, ReconstructOptions::default());
-            println!("{step} {seed}: {:?} errors {:?} free {} {} {} chi2 {} df {}", deviations(reference, &report), report.errors, report.free_amplitude, report.free_phase, report.free_rows, report.chi2, report.freedom);
+            println!(
+                "{step} {seed}: {:?} errors {:?} free {} {} {} chi2 {} df {}",
+                deviations(reference, &report),
+                report.errors,
+                report.free_amplitude,
+                report.free_phase,
+                report.free_rows,
+                report.chi2,
+                report.freedom
+            );
             all.push(deviations(reference, &report));
         }
         let square = |index: usize| {
@@ -180,8 +210,15 @@ fn experiment() {
                 }
                 let report = reconstructed(&case, table, options);
                 let truth = &reference["truth"];
-                for (x, f) in numbers(&truth["distance_m"]).iter().zip(numbers(&truth["force_N"])) {
-                    let k = report.table.distance.partition_point(|node| node <= x).clamp(1, report.table.distance.len() - 1);
+                for (x, f) in numbers(&truth["distance_m"])
+                    .iter()
+                    .zip(numbers(&truth["force_N"]))
+                {
+                    let k = report
+                        .table
+                        .distance
+                        .partition_point(|node| node <= x)
+                        .clamp(1, report.table.distance.len() - 1);
                     let error = report.table.force_error[k];
                     covered[1] += 1;
                     covered[0] += usize::from((value_at(&report, *x) - f).abs() < 2.0 * error);
@@ -193,7 +230,192 @@ fn experiment() {
                 (squares.sum::<f64>() / all.len() as f64).sqrt()
             };
             let mean = all.iter().map(|one| one[1]).sum::<f64>() / all.len() as f64;
-            println!("step {step} variant {variant}: {:?} mean of minimum {mean} covered {covered:?}", [0, 1, 2].map(square));
+            println!(
+                "step {step} variant {variant}: {:?} mean of minimum {mean} covered {covered:?}",
+                [0, 1, 2].map(square)
+            );
         }
     }
+}
+
+/// A table of numbers, without lines.
+fn table(columns: &[(&str, Vec<f64>)]) -> Table {
+    let entries = |values: &[f64]| values.iter().copied().map(Entry::Number).collect();
+    Table {
+        name: "curve.csv".into(),
+        columns: columns
+            .iter()
+            .map(|(name, values)| ((*name).to_owned(), entries(values)))
+            .collect(),
+        lines: Vec::new(),
+    }
+}
+
+#[test]
+fn frequency_shifts_give_the_force_of_the_law() {
+    let words = [
+        "modes=1",
+        "cantilever.k=0.87 N/m",
+        "cantilever.f0=100 kHz",
+        "cantilever.Q=200",
+        "tip.radius=5 nm",
+        "tip.modulus=160 GPa",
+        "tip.poisson=0.3",
+        "sample.law=dmt",
+        "sample.modulus=1 GPa",
+        "sample.poisson=0.3",
+        "sample.hamaker=3e-20 J",
+        "sample.intermolecular_distance=0.169 nm",
+        "drive.actuation=tip",
+        "drive.frequency=100 kHz",
+        "drive.free_amplitude=10 nm",
+        "gap.tip=12 nm",
+    ];
+    let case = Case::parse(None, &words.map(str::to_owned)).unwrap();
+    let scales = case.physical().unwrap().scales;
+    let options = ApproachOptions {
+        from: Some(16e-9 / scales.length),
+        to: Some(9e-9 / scales.length),
+        points: 80,
+        phase: Some(90.0),
+        branches: false,
+        ..ApproachOptions::default()
+    };
+    let curve = approach(&case, &options, &Control::default()).unwrap();
+    let points = curve.table.iter().filter(|p| p.way == Way::Approach);
+    let points: Vec<_> = points
+        .map(|p| (p.zc.unwrap(), p.modulation.unwrap()))
+        .collect();
+    let column = |of: &dyn Fn(&(f64, Modulated)) -> f64| points.iter().map(of).collect();
+    let data = table(&[
+        ("distance (nm)", column(&|p| 1e9 * p.0)),
+        ("relative_shift", column(&|p| p.1.relative_shift)),
+        ("drive_ratio", column(&|p| p.1.drive_ratio)),
+    ]);
+    let report = reconstructed(&case, data, ReconstructOptions::default());
+    let (mut squares, mut largest) = (0.0, 0.0_f64);
+    for (_, found) in &points {
+        let truth = found.static_force.unwrap() * scales.force;
+        squares += (value_at(&report, found.closest * scales.length) - truth).powi(2);
+        largest = largest.max(truth.abs());
+    }
+    let rms = (squares / points.len() as f64).sqrt();
+    assert!(rms < 0.03 * largest, "{rms:e} of {largest:e}");
+    assert_eq!(report.sader_jarvis.unwrap().force.len(), points.len());
+    assert!(report.inflections.is_empty());
+}
+
+#[test]
+fn the_table_is_a_law_that_gives_the_curve_back() {
+    let reference = &references()[2];
+    let case = lever(reference);
+    let report = reconstructed(
+        &case,
+        rows(reference, 1, [0.0; 2], 0),
+        ReconstructOptions::default(),
+    );
+    let lever = &reference["lever"];
+    let of = |name: &str| lever[name].as_f64().unwrap();
+    let words = [
+        "modes=1".to_owned(),
+        format!("cantilever.k={} N/m", of("k_static_N_per_m")),
+        format!("cantilever.f0={} Hz", of("f0_Hz")),
+        format!("cantilever.Q={}", of("Q")),
+        "drive.actuation=base".to_owned(),
+        "drive.frequency_ratio=1".to_owned(),
+        format!("drive.free_amplitude={} m", of("free_amplitude_m")),
+        "sample.law=table".to_owned(),
+        format!("sample.table={}", report.csv()),
+        "gap.tip=6 nm".to_owned(),
+    ];
+    let again = Case::parse(None, &words).unwrap();
+    let found = orbit(&again.model().unwrap(), &OrbitOptions::default()).unwrap();
+    assert!(found.stable && found.observables.peak_force > 0.0);
+}
+
+#[test]
+fn an_instruments_columns_are_understood() {
+    let reference = &references()[0];
+    let raw = &reference["rows"];
+    let of = |name: &str, offset: f64, factor: f64| -> Vec<f64> {
+        let values = numbers(&raw[name]).into_iter();
+        values.map(|value| offset + factor * value).collect()
+    };
+    let data = table(&[
+        ("Zsnsr (nm)", of("distance_m", 1500.0, -1e9)),
+        ("Amp (V)", of("amplitude_m", 0.0, 1e9 / 58.0)),
+        ("Phase (deg)", of("phase_deg", 93.7, -1.0)),
+    ]);
+    let options = ReconstructOptions {
+        convert: vec!["Amp=58 nm/V".into()],
+        ..ReconstructOptions::default()
+    };
+    let report = reconstructed(&lever(reference), data, options);
+    let least = report.minimum.unwrap().force;
+    let truth = reference["truth"]["force_min_N"].as_f64().unwrap();
+    assert!((least / truth - 1.0).abs() < 0.05, "{least:e}");
+    assert!(report.closest.abs() < 4e-9, "{:e}", report.closest);
+    let retract = report
+        .rows
+        .iter()
+        .filter(|row| row.way == Some(Way::Retract));
+    assert_eq!(2 * retract.count(), report.rows.len());
+    for words in ["other way", "backwards", "row 88", "was added"] {
+        assert!(
+            report.remarks.iter().any(|remark| remark.contains(words)),
+            "{words}"
+        );
+    }
+}
+
+#[test]
+fn what_cannot_be_reconstructed_is_refused() {
+    let reference = &references()[0];
+    let case = lever(reference);
+    let good = rows(reference, 1, [0.0; 2], 0);
+    let refused = |data: Vec<Table>, options: ReconstructOptions, words: &str| {
+        let options = ReconstructOptions { data, ..options };
+        let error = reconstruct(&case, &options, &Control::default()).unwrap_err();
+        assert!(error.to_string().contains(words), "{error}");
+    };
+    let plain = ReconstructOptions::default;
+    refused(Vec::new(), plain(), "no data");
+    refused(
+        vec![rows(reference, 30, [0.0; 2], 0)],
+        plain(),
+        "feel the sample",
+    );
+    let mut none = good.clone();
+    none.columns.truncate(3);
+    refused(vec![none], plain(), "phase");
+    let mut negative = good.clone();
+    negative.columns[2].1[4] = Entry::Number(-1.0);
+    refused(vec![negative], plain(), "line 5");
+    let mut text = good.clone();
+    text.columns[2].1[6] = Entry::Text("off".into());
+    refused(vec![text], plain(), "row 7");
+    let convert = |rule: &str| ReconstructOptions {
+        convert: vec![rule.into()],
+        ..plain()
+    };
+    refused(
+        vec![good.clone()],
+        convert("Amp=58 nm/V"),
+        "no column is called `Amp`",
+    );
+    refused(vec![good.clone()], convert("amplitude=58 nm/V"), "is in nm");
+    refused(vec![good.clone()], convert("phase=x^2"), "not a conversion");
+    let few = ReconstructOptions { rows: 3, ..plain() };
+    refused(vec![good.clone()], few, "out of range");
+    let stop = CancelFlag::new();
+    stop.cancel();
+    let control = Control {
+        cancel: Some(&stop),
+        progress: None,
+    };
+    let options = ReconstructOptions {
+        data: vec![good],
+        ..plain()
+    };
+    assert!(reconstruct(&case, &options, &control).is_err());
 }

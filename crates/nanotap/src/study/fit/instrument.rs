@@ -52,11 +52,14 @@ pub(crate) fn prepared(
     conversions: &[String],
 ) -> Result<(Vec<Table>, Vec<String>), Error> {
     let mut tables = tables.to_vec();
+    let mut foreign = vec![false; tables.len()];
     for text in conversions {
         let conversion = Conversion::parse(text)?;
         let mut used = false;
-        for table in &mut tables {
-            used |= conversion.apply(table)?;
+        for (table, foreign) in tables.iter_mut().zip(&mut foreign) {
+            let applied = conversion.apply(table)?;
+            *foreign |= applied;
+            used |= applied;
         }
         if !used {
             let names: Vec<String> = tables
@@ -72,9 +75,9 @@ pub(crate) fn prepared(
         }
     }
     let mut remarks = Vec::new();
-    for table in &mut tables {
-        rename(table, &mut remarks);
-        guess(case, table, &mut remarks);
+    for (table, foreign) in tables.iter_mut().zip(foreign) {
+        let renamed = rename(table, &mut remarks);
+        guess(case, table, renamed || foreign, &mut remarks);
     }
     Ok((tables, remarks))
 }
@@ -129,7 +132,9 @@ impl Conversion {
                 ..plain
             });
         }
-        if rule.chars().all(|c| c.is_alphanumeric() || c == '_' || c == '.')
+        if rule
+            .chars()
+            .all(|c| c.is_alphanumeric() || c == '_' || c == '.')
             && rule.starts_with(|c: char| c.is_alphabetic())
         {
             return Ok(Self {
@@ -236,8 +241,9 @@ fn linear(rule: &str) -> Option<(f64, f64)> {
     Some((factor, offset.unwrap_or(0.0)))
 }
 
-/// Gives instruments' columns the names that are known here.
-fn rename(table: &mut Table, remarks: &mut Vec<String>) {
+/// Gives instruments' columns the names that are known here, and says whether there are any.
+fn rename(table: &mut Table, remarks: &mut Vec<String>) -> bool {
+    let before = remarks.len();
     let known = |table: &Table, name: &str| {
         let mut headers = table.columns.iter().map(|(written, _)| Header::of(written));
         headers.any(|header| header.name.to_lowercase() == name)
@@ -249,10 +255,14 @@ fn rename(table: &mut Table, remarks: &mut Vec<String>) {
             continue;
         };
         if !known(table, name) {
-            remarks.push(format!("{}: `{}` is taken as {name}", table.name, header.name));
+            remarks.push(format!(
+                "{}: `{}` is taken as {name}",
+                table.name, header.name
+            ));
             table.columns[place].0 = written(name, &header.unit);
         }
     }
+    remarks.len() > before
 }
 
 /// The columns of amplitude curves that guesses change.
@@ -275,8 +285,9 @@ fn places(table: &Table) -> Option<Places> {
     })
 }
 
-/// Directions, and the zero and sign of the phase.
-fn guess(case: &Case, table: &mut Table, remarks: &mut Vec<String>) {
+/// Directions, and of a `foreign` table, whose columns had other names or were converted, the
+/// zeros of distance and phase and the sign of the phase.
+fn guess(case: &Case, table: &mut Table, foreign: bool, remarks: &mut Vec<String>) {
     let Some(places) = places(table) else { return };
     let numbers = |place: usize| -> Option<Vec<f64>> {
         let entries = table.columns[place].1.iter();
@@ -318,7 +329,8 @@ fn guess(case: &Case, table: &mut Table, remarks: &mut Vec<String>) {
     }
     let lag = free_lag(case);
     let free = free_rows(&distance, &amplitude);
-    if let Some(own) = free.phase(&phase)
+    if foreign
+        && let Some(own) = free.phase(&phase)
         && let Some(lag) = lag
         && wrapped(own - lag).abs() > OWN_PHASE
     {
@@ -334,7 +346,7 @@ fn guess(case: &Case, table: &mut Table, remarks: &mut Vec<String>) {
              sample only attracts"
         ));
     }
-    if let Some(line) = tapping_line(&distance, &amplitude) {
+    if foreign && let Some(line) = tapping_line(&distance, &amplitude) {
         let offset = free.amplitude - line.knee(free.amplitude);
         if offset.abs() > 2.0 * free.amplitude {
             distance.iter_mut().for_each(|z| *z += offset);
@@ -352,9 +364,10 @@ fn guess(case: &Case, table: &mut Table, remarks: &mut Vec<String>) {
     ] {
         table.columns[place].1 = values.iter().copied().map(Entry::Number).collect();
     }
-    let has_direction = table.columns.iter().any(|(written, _)| {
-        matches!(Header::of(written).name.as_str(), "direction" | "way")
-    });
+    let has_direction = table
+        .columns
+        .iter()
+        .any(|(written, _)| matches!(Header::of(written).name.as_str(), "direction" | "way"));
     if !has_direction && let Some(turn) = turning_point(&distance) {
         let direction = |from: usize, to: usize| {
             let falls = distance[to - 1] < distance[from];
@@ -469,7 +482,8 @@ fn tapping_line(distance: &[f64], amplitude: &[f64]) -> Option<Line> {
     for _ in 0..6 {
         let sum = |of: &dyn Fn(f64, f64) -> f64| -> f64 {
             let both = rows.iter().zip(&weights);
-            both.map(|((z, a), weight)| weight * of(z - centre, *a)).sum()
+            both.map(|((z, a), weight)| weight * of(z - centre, *a))
+                .sum()
         };
         let (n, x, y) = (sum(&|_, _| 1.0), sum(&|z, _| z), sum(&|_, a| a));
         let (xx, xy) = (sum(&|z, _| z * z), sum(&|z, a| z * a));
@@ -538,7 +552,9 @@ mod tests {
         ] {
             assert_eq!(linear(rule), Some((factor, offset)), "{rule}");
         }
-        for rule in ["x+x", "3", "x-", "x^2", "2x", "", "--x", "x/0", "nm/V", "0*x"] {
+        for rule in [
+            "x+x", "3", "x-", "x^2", "2x", "", "--x", "x/0", "nm/V", "0*x",
+        ] {
             assert_eq!(linear(rule), None, "{rule}");
         }
         let amplitude = Conversion::parse("Amp=58 nm/V").unwrap();

@@ -39,8 +39,8 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 pub use crate::case::table::{Entry, MOST_ROWS, Table};
-pub use data::{Column, Curve, Data, Row, Swept};
 pub(crate) use data::is_distance;
+pub use data::{Column, Curve, Data, Row, Swept};
 pub use quantity::Quantity;
 pub use report::{
     ComparedLaw, CurveCase, FitReport, FittedColumn, FittedJump, FittedParameter, FittedRow,

@@ -150,7 +150,10 @@ impl Estimate {
 }
 
 fn spread(by: [f64; 2], errors: [f64; 2]) -> f64 {
-    let squares = by.iter().zip(errors).map(|(by, error)| (by * error).powi(2));
+    let squares = by
+        .iter()
+        .zip(errors)
+        .map(|(by, error)| (by * error).powi(2));
     squares.sum::<f64>().sqrt()
 }
 
@@ -267,7 +270,10 @@ impl Inversion<'_> {
     fn nodes(&self, rows: &[Estimate]) -> Nodes {
         let closest = || rows.iter().map(|row| row.closest);
         let low = closest().fold(f64::INFINITY, f64::min);
-        let felt = rows.iter().zip(self.rows).filter(|(_, row)| row.informative);
+        let felt = rows
+            .iter()
+            .zip(self.rows)
+            .filter(|(_, row)| row.informative);
         let fine = felt.map(|(row, _)| row.closest).fold(low, f64::max);
         let far = rows.iter().zip(self.rows).map(|(estimate, row)| {
             let at_rest = row.distance - estimate.at.amplitude;
@@ -304,9 +310,7 @@ impl Inversion<'_> {
         let values: Vec<f64> = rows
             .iter()
             .zip(weights)
-            .map(|(estimate, weights)| {
-                estimate.at.work - dot(&weights.work, &force.coefficients)
-            })
+            .map(|(estimate, weights)| estimate.at.work - dot(&weights.work, &force.coefficients))
             .collect();
         let matrix = matrix(weights, |weights| &weights.work_damping);
         Smooth::of(&matrix, &values, &errors, &nodes.roughness())

@@ -133,7 +133,9 @@ impl Lever {
             actuation: Actuation::Tip,
             ..self.cantilever.clone()
         };
-        let unit = self.scales.map_or(1.0, |scales| scales.length / scales.force);
+        let unit = self
+            .scales
+            .map_or(1.0, |scales| scales.length / scales.force);
         let gain = |n: usize| {
             // The response at rest is a limit.
             let multiple = if n == 0 { 1e-9 } else { n as f64 };
@@ -155,7 +157,9 @@ impl Lever {
         let gains = self.gains(self.cantilever.omega)?;
         let method = Method::Amplitude {
             free: from_polar(amplitude, -self.free_phase.to_radians()),
-            base: self.base.map_or(0.0, |response| amplitude / response.modulus()),
+            base: self
+                .base
+                .map_or(0.0, |response| amplitude / response.modulus()),
             gain: gains[1],
         };
         Ok((method, gains))

@@ -31,8 +31,8 @@ use crate::case::Case;
 use crate::case::physical::Kind as Quantity;
 use crate::case::table::Table;
 use crate::study::approach::Way;
-use crate::study::fit::instrument::{prepared, wrapped};
 use crate::study::fit::Data;
+use crate::study::fit::instrument::{prepared, wrapped};
 use crate::study::frequency_modulation::average::sader_jarvis;
 use crate::study::registry::Study;
 use crate::study::value::Amount;
@@ -180,7 +180,10 @@ impl Prepared {
             ));
         }
         if data.left_out > 0 {
-            remarks.push(format!("rows of neither direction, left out: {}", data.left_out));
+            remarks.push(format!(
+                "rows of neither direction, left out: {}",
+                data.left_out
+            ));
         }
         match readings.kind {
             Kind::Amplitude => Self::amplitude(case, readings, &lever, options, remarks),
@@ -288,7 +291,10 @@ impl Prepared {
                 "give rows in which the sample is felt",
             ));
         }
-        let least = floors(readings.kind, [largest[0], largest[1].max(1e-3 * free.loss)]);
+        let least = floors(
+            readings.kind,
+            [largest[0], largest[1].max(1e-3 * free.loss)],
+        );
         let errors = errors([None; 2], readings.scatter(0.0), least, ["", ""])?;
         let readings = averaged(readings, options.rows, errors, &mut remarks)?;
         let Method::Frequency { amplitude, .. } = method else {
@@ -350,7 +356,8 @@ impl Prepared {
         let both = [Way::Approach, Way::Retract];
         let felt = |way: Way| {
             let rows = self.measured.iter().zip(&self.readings.rows);
-            rows.filter(|(m, row)| m.informative && row.way == Some(way)).count()
+            rows.filter(|(m, row)| m.informative && row.way == Some(way))
+                .count()
         };
         if both.iter().any(|way| felt(*way) < ROWS_OF_A_WAY) {
             return Ok(Vec::new());
@@ -405,7 +412,8 @@ impl Prepared {
             })
             .collect();
         let count = nodes.0.len();
-        let coefficient = |of: &smooth::Smooth, k: usize| of.coefficients.get(k).copied().unwrap_or(0.0);
+        let coefficient =
+            |of: &smooth::Smooth, k: usize| of.coefficients.get(k).copied().unwrap_or(0.0);
         let error = |of: &smooth::Smooth, k: usize| if k + 1 < count { of.error(k) } else { 0.0 };
         let unit = 1.0 / self.angular_frequency;
         ForceCurve {
@@ -419,12 +427,7 @@ impl Prepared {
         }
     }
 
-    fn report(
-        &self,
-        case: &Case,
-        inverted: &Inverted,
-        ways: Vec<WayCurve>,
-    ) -> ReconstructReport {
+    fn report(&self, case: &Case, inverted: &Inverted, ways: Vec<WayCurve>) -> ReconstructReport {
         let table = self.curve(inverted);
         let mut remarks = self.remarks.clone();
         if !ways.is_empty() {
@@ -535,7 +538,12 @@ fn inflections(table: &ForceCurve, closest: f64, amplitude: f64) -> Vec<Inflecti
             let step = w[1][0] - w[0][0];
             let curvature = (w[2][1] - 2.0 * w[1][1] + w[0][1]) / (step * step);
             let error = 6f64.sqrt() * w[1][2] / (step * step);
-            [w[1][0], curvature, error, (w[2][1] - w[0][1]) / (2.0 * step)]
+            [
+                w[1][0],
+                curvature,
+                error,
+                (w[2][1] - w[0][1]) / (2.0 * step),
+            ]
         })
         .collect();
     let mut found = Vec::new();
@@ -566,7 +574,8 @@ fn inflections(table: &ForceCurve, closest: f64, amplitude: f64) -> Vec<Inflecti
 
 /// The most attractive force, where it is larger than its standard error.
 fn minimum(table: &ForceCurve) -> Option<ForceMinimum> {
-    let least = (0..table.force.len()).min_by(|a, b| table.force[*a].total_cmp(&table.force[*b]))?;
+    let least =
+        (0..table.force.len()).min_by(|a, b| table.force[*a].total_cmp(&table.force[*b]))?;
     let (force, force_error) = (table.force[least], table.force_error[least]);
     (force < -force_error).then(|| ForceMinimum {
         force,
@@ -578,7 +587,8 @@ fn minimum(table: &ForceCurve) -> Option<ForceMinimum> {
 /// Whether the dissipation is above three standard errors somewhere.
 fn damped(table: &ForceCurve) -> bool {
     let both = table.dissipation.iter().zip(&table.dissipation_error);
-    both.into_iter().any(|(value, error)| *error > 0.0 && *value > 3.0 * error)
+    both.into_iter()
+        .any(|(value, error)| *error > 0.0 && *value > 3.0 * error)
 }
 
 /// Averages of long curves.
@@ -624,7 +634,10 @@ fn length_of(case: &Case, amount: &Amount) -> Result<f64, Error> {
     if value > 0.0 && value.is_finite() {
         Ok(value)
     } else {
-        Err(Error::input(format!("{amount} is not positive"), "give a length above zero"))
+        Err(Error::input(
+            format!("{amount} is not positive"),
+            "give a length above zero",
+        ))
     }
 }
 

@@ -119,7 +119,11 @@ impl Known<'_> {
                 *sum = *sum * *gain * (2.0 / PHASES as f64);
                 forces[n] = Complex::new(0.0, (n + 2) as f64) * *sum;
             }
-            let weight = if step < 2 { relaxation.min(0.5) } else { relaxation };
+            let weight = if step < 2 {
+                relaxation.min(0.5)
+            } else {
+                relaxation
+            };
             for k in 0..PHASES {
                 let higher = &harmonics.higher[k * width..(k + 1) * width];
                 let (mut shift, mut speed) = (0.0, 0.0);
@@ -174,10 +178,11 @@ impl Motion {
                 weights[at + 1] += upper * factor;
             }
         }
-        let [cosine, cosine_damping, work, work_damping, mean, dissipated] = weights.map(|mut w| {
-            w.truncate(nodes.unknowns());
-            w
-        });
+        let [cosine, cosine_damping, work, work_damping, mean, dissipated] =
+            weights.map(|mut w| {
+                w.truncate(nodes.unknowns());
+                w
+            });
         Weights {
             cosine,
             cosine_damping,

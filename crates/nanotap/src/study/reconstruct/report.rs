@@ -163,7 +163,11 @@ impl ReconstructReport {
     /// The table as CSV, which `sample.law = "table"` reads.
     pub fn csv(&self) -> String {
         let (length, force, energy) = if self.physical {
-            ((1e9, " (nm)"), (1e9, " (nN)"), (1.0 / JOULES_PER_ELECTRONVOLT, " (eV)"))
+            (
+                (1e9, " (nm)"),
+                (1e9, " (nN)"),
+                (1.0 / JOULES_PER_ELECTRONVOLT, " (eV)"),
+            )
         } else {
             ((1.0, ""), (1.0, ""), (1.0, ""))
         };

@@ -97,7 +97,11 @@ impl Readings {
                 (kind, [absolute.or(relative), excitation.map(|(k, _)| k)])
             }
         };
-        if !data.swept.first().is_some_and(|swept| crate::study::fit::is_distance(swept.key)) {
+        if !data
+            .swept
+            .first()
+            .is_some_and(|swept| crate::study::fit::is_distance(swept.key))
+        {
             return Err(missing("distance"));
         }
         let mut readings = Self {
@@ -130,7 +134,10 @@ impl Readings {
         let first = values[0].unwrap_or_default();
         if self.kind == Kind::Amplitude && first <= 0.0 {
             return Err(Error::input(
-                format!("{name}, line {}: the amplitude {first} is not positive", row.line),
+                format!(
+                    "{name}, line {}: the amplitude {first} is not positive",
+                    row.line
+                ),
                 "check the amplitude's offset and conversion, or leave the row away",
             ));
         }
@@ -148,7 +155,8 @@ impl Readings {
 
     /// Rows of one curve and direction, in the order of measurement.
     fn segments(&self) -> impl Iterator<Item = &[Reading]> {
-        self.rows.chunk_by(|a, b| a.curve == b.curve && a.way == b.way)
+        self.rows
+            .chunk_by(|a, b| a.curve == b.curve && a.way == b.way)
     }
 
     /// The level far from the sample: median amplitude and phase, and how many rows have it.
@@ -164,7 +172,11 @@ impl Readings {
         }
         let reference = free[0].values[1];
         let amplitude = median(free.iter().map(|row| row.values[0]).collect());
-        let turn = median(free.iter().map(|row| wrapped(row.values[1] - reference)).collect());
+        let turn = median(
+            free.iter()
+                .map(|row| wrapped(row.values[1] - reference))
+                .collect(),
+        );
         Some(FreeLevel {
             amplitude,
             phase: shown_phase(reference + turn),
@@ -179,7 +191,9 @@ impl Readings {
             let of = |far: bool| -> Vec<f64> {
                 let differences = self.segments().flat_map(|segment| {
                     let rows = segment.iter();
-                    let rows = rows.filter(|row| !far || self.kind != Kind::Amplitude || row.values[0] > 0.97 * free);
+                    let rows = rows.filter(|row| {
+                        !far || self.kind != Kind::Amplitude || row.values[0] > 0.97 * free
+                    });
                     let values: Vec<f64> = rows.map(|row| row.values[index]).collect();
                     let third = |w: &[f64]| {
                         let step = |k: usize| {
@@ -243,7 +257,8 @@ impl Readings {
                 let along = (b.distance - a.distance) / ranges[2];
                 let step = (part(0).powi(2) + part(1).powi(2) + along * along).sqrt();
                 path.push(path[k - 1] + step);
-                let jump = |index: usize| (b.values[index] - a.values[index]).abs() > 10.0 * errors[index];
+                let jump =
+                    |index: usize| (b.values[index] - a.values[index]).abs() > 10.0 * errors[index];
                 breaks.push(jump(0) || jump(1));
             }
             let whole = path.last().copied().unwrap_or(0.0).max(f64::MIN_POSITIVE);

@@ -61,7 +61,8 @@ impl Smooth {
         for (mut row, error) in scaled.row_iter_mut().zip(errors) {
             row /= *error;
         }
-        let values = DVector::from_iterator(values.len(), values.iter().zip(errors).map(|(v, e)| v / e));
+        let values =
+            DVector::from_iterator(values.len(), values.iter().zip(errors).map(|(v, e)| v / e));
         let (normal, penalty) = (scaled.tr_mul(&scaled), roughness.tr_mul(roughness));
         let equations = Equations {
             projected: scaled.tr_mul(&values),
@@ -74,7 +75,10 @@ impl Smooth {
         };
         let (decade, _) = equations.best(DECADES, TRIALS[0]);
         let step = (DECADES[1] - DECADES[0]) / (TRIALS[0] - 1) as f64;
-        let near = [(decade - step).max(DECADES[0]), (decade + step).min(DECADES[1])];
+        let near = [
+            (decade - step).max(DECADES[0]),
+            (decade + step).min(DECADES[1]),
+        ];
         let (_, trial) = equations.best(near, TRIALS[1]);
         let trial = trial.ok_or_else(|| Error::numerics("the force has no smooth solution"))?;
         let residuals = equations.residuals(&trial.coefficients);
@@ -124,7 +128,9 @@ impl Equations<'_> {
         let mut best: (f64, Option<Trial>) = (ends[0], None);
         for k in 0..count {
             let decade = ends[0] + k as f64 * step;
-            let Some(trial) = self.at(decade) else { continue };
+            let Some(trial) = self.at(decade) else {
+                continue;
+            };
             if best.1.as_ref().is_none_or(|known| trial.cost < known.cost) {
                 best = (decade, Some(trial));
             }

@@ -148,6 +148,15 @@ PYTHON: dict[str, tuple[tuple[tuple[str, str, str, str], ...], str, str]] = {
             "`best_case()`, the case of the best fit."
         ),
     ),
+    "reconstruct": (
+        (THREADS, PROGRESS),
+        "Reconstruction",
+        (
+            "`table` (distance, force, force_error, dissipation, dissipation_error, damping, "
+            "damping_error), `minimum`, `closest`, the `rows`; `curve()`, the table as a "
+            "DataFrame, and `law_table()`, the text for `sample.table`."
+        ),
+    ),
     "lyapunov": (
         (),
         "Lyapunov",
@@ -181,7 +190,7 @@ from . import _arguments, _datasets, _motions, _studies
 from ._arguments import Box, Progress, Varied
 from ._case import Case, Path, Value
 from ._record import Record
-from ._results import Attractors, Convergence, Fit, Lyapunov, Modes, Orbit
+from ._results import Attractors, Convergence, Fit, Lyapunov, Modes, Orbit, Reconstruction
 
 if TYPE_CHECKING:
     import xarray as xr

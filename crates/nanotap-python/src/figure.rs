@@ -9,9 +9,11 @@ use nanotap::figure::fit::fit_figure;
 use nanotap::figure::modes::shapes_figure;
 use nanotap::figure::motion::difference_panel;
 use nanotap::figure::panels::{AttractorCurves, MotionCurves, OrbitCurves, SectionCurves};
+use nanotap::figure::reconstruct::reconstruct_figure;
 use nanotap::figure::sweep::SweepTable;
 use nanotap::model::beam::Modes;
 use nanotap::study::fit::FitReport;
+use nanotap::study::reconstruct::ReconstructReport;
 use nanotap_figures::Figure;
 use numpy::PyReadonlyArray1;
 use pyo3::prelude::*;
@@ -97,6 +99,7 @@ pub(crate) fn describe(
             "branch" => Some(read::<BranchCurves>(facts)?.figure()),
             "approach" => Some(read::<ApproachCurves>(facts)?.figure()),
             "fit" => Some(fit_figure(&read::<FitReport>(facts)?)),
+            "reconstruct" => Some(reconstruct_figure(&read::<ReconstructReport>(facts)?)),
             "motion" => Some(read::<MotionCurves>(facts)?.figure()),
             "orbit" => Some(read::<OrbitCurves>(facts)?.figure()),
             "attractors" => Some(read::<AttractorCurves>(facts)?.figure()),

@@ -16,6 +16,7 @@ mod merge;
 mod modes;
 mod orbit;
 mod paper;
+mod reconstruct;
 mod scan;
 mod schema;
 mod simulate;
@@ -116,6 +117,8 @@ pub(crate) enum Own {
     Scan(scan::Arguments),
     /// Fit parameters of lever and sample to measured curves
     Fit(fit::Arguments),
+    /// Reconstruct force and dissipation against distance from a measured curve
+    Reconstruct(reconstruct::Arguments),
     /// Sweep one or two parameters, from any number of initial states
     Sweep(sweep::Arguments),
     /// Map the operating window over two parameters: where only one motion exists
@@ -159,6 +162,7 @@ pub(crate) fn run(command: &Command, output: &Output) -> Result<(), Failure> {
         Own::Approach(arguments) => approach::run(arguments, output),
         Own::Scan(arguments) => scan::run(arguments, output),
         Own::Fit(arguments) => fit::run(arguments, output),
+        Own::Reconstruct(arguments) => reconstruct::run(arguments, output),
         Own::Sweep(arguments) => sweep::run(arguments, output),
         Own::Window(arguments) => window::run(arguments, output),
         Own::Basin(arguments) => basin::run(arguments, output),

@@ -80,6 +80,7 @@ fn long_work(study: &str) -> Option<Vec<&'static str>> {
             "--free",
             "sample.modulus,cantilever.Q",
         ],
+        "reconstruct" => vec!["curve.csv", "soft.toml", "--rows", "2000"],
         "sweep" => vec!["case.toml", "--over", "omega=2.5:2.9:40000"],
         "window" => vec![
             "case.toml",

@@ -2,7 +2,7 @@
 
 A `Case` describes cantilever, sample and drive. There is a function for every command of the
 terminal: `modes`, `simulate`, `orbit`, `attractors`, `sweep`, `basin`, `branch`, `approach`,
-`fm`, `fit`, `window`, `lyapunov`, `convergence`, `contact_laws`, `paper`,
+`fm`, `scan`, `fit`, `reconstruct`, `window`, `lyapunov`, `convergence`, `contact_laws`, `paper`,
 `merge`. Results are xarray Datasets, objects and lists of objects, with the names of the terminal's
 JSON. A `Map` is the exact stroboscopic map, for your own algorithms.
 
@@ -31,6 +31,7 @@ from ._results import (
     Modes,
     Orbit,
     Paper,
+    Reconstruction,
 )
 from ._si import in_si
 from ._signatures import *
@@ -53,6 +54,7 @@ __all__ = [
     "Orbit",
     "Paper",
     "PeriodicOrbit",
+    "Reconstruction",
     "Record",
     "__version__",
     "catalogue",

@@ -1,5 +1,6 @@
 """Results: objects with the names of the terminal's JSON."""
 
+import json
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -78,6 +79,29 @@ class Fit(Record):
 
     def __reduce__(self) -> tuple[Any, ...]:
         return Fit, (self.to_dict(),)
+
+
+class Reconstruction(Record):
+    """A reconstructed force, with the names of the terminal's JSON."""
+
+    __slots__ = ()
+
+    def curve(self) -> "pd.DataFrame":
+        """Force, dissipation and damping with their standard errors, by distance."""
+        import pandas as pd
+
+        return pd.DataFrame(dict(self["table"])).set_index("distance")
+
+    def law_table(self) -> str:
+        """The force as text for the key `sample.table` of a case with `law = "table"`."""
+        units = [" (m)", " (N)"] if self["physical"] else ["", ""]
+        rows = [[f"gap{units[0]}", f"force{units[1]}"]]
+        table = self["table"]
+        pairs = zip(table["distance"], table["force"], strict=True)
+        return json.dumps([*rows, *map(list, pairs)])
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return Reconstruction, (self.to_dict(),)
 
 
 def _of_curve(parameter: Mapping[str, Any]) -> str:

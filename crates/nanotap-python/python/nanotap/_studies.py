@@ -14,7 +14,14 @@ from ._interrupt import Interrupted
 from ._motions import _cased, _document, words
 from ._progress import bar
 from ._record import Record
-from ._results import Attractors, Convergence, Fit, Lyapunov, Paper
+from ._results import (
+    Attractors,
+    Convergence,
+    Fit,
+    Lyapunov,
+    Paper,
+    Reconstruction,
+)
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -279,6 +286,23 @@ def fit(
     asked = {**options, **lists, "data": _arguments.tables(options["data"])}
     document, interrupted = _run("fit", case, asked, threads, progress)
     return _finished(Fit(document), interrupted)
+
+
+def reconstruct(
+    case: Case, options: Mapping[str, Any], threads: int | None, progress: Progress
+) -> Reconstruction:
+    """Force and dissipation against distance from measured curves."""
+    if options["data"] is None:
+        message = "data: measured curves are needed"
+        raise TypeError(message)
+    lists = {
+        name: _arguments.names(name, options[name])
+        for name in ("columns", "convert")
+        if options[name] is not None
+    }
+    asked = {**options, **lists, "data": _arguments.tables(options["data"])}
+    document, interrupted = _run("reconstruct", case, asked, threads, progress)
+    return _finished(Reconstruction(document), interrupted)
 
 
 def paper(

@@ -15,7 +15,15 @@ import numpy as np
 from . import _nanotap, _signatures
 from ._case import Case
 from ._figure import STYLE, Picture, draw, page
-from ._results import Attractors, Convergence, Fit, Lyapunov, Modes, Orbit
+from ._results import (
+    Attractors,
+    Convergence,
+    Fit,
+    Lyapunov,
+    Modes,
+    Orbit,
+    Reconstruction,
+)
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -37,6 +45,7 @@ __all__ = [
     "orbit",
     "orbits",
     "page",
+    "reconstruct",
     "run",
     "section",
     "show",
@@ -569,6 +578,11 @@ def fit(found: Fit, **where: Unpack[Where]) -> "Figure":
     return _drawn("fit", found.to_dict(), where)
 
 
+def reconstruct(found: Reconstruction, **where: Unpack[Where]) -> "Figure":
+    """Reconstructed force and dissipation against distance."""
+    return _drawn("reconstruct", found.to_dict(), where)
+
+
 def modes(found: Modes, **where: Unpack[Where]) -> "Figure":
     """The mode shapes of the bare beam."""
     return _drawn("modes", {"modes": found.modes}, where)
@@ -605,6 +619,7 @@ _FIGURES: dict[type, Callable[..., "Figure"]] = {
     Modes: modes,
     Convergence: convergence,
     Fit: fit,
+    Reconstruction: reconstruct,
 }
 # The first of these that a Dataset has determines its type.
 _FIGURES_BY_VARIABLE: dict[str, Callable[..., "Figure"]] = {

@@ -12,6 +12,8 @@ pub mod fit;
 pub mod modes;
 pub mod motion;
 pub mod panels;
+#[cfg(feature = "fit")]
+pub mod reconstruct;
 pub mod scan;
 pub mod shown;
 #[cfg(feature = "dataset")]

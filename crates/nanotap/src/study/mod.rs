@@ -20,6 +20,8 @@ pub mod mode_share;
 pub mod modes;
 pub mod orbit;
 pub mod proof;
+#[cfg(feature = "fit")]
+pub mod reconstruct;
 pub mod registry;
 pub mod request;
 pub mod scan;
@@ -66,6 +68,8 @@ pub static STUDIES: &[StudyEntry] = &[
     StudyEntry::of::<frequency_modulation::FrequencyModulationStudy>(),
     #[cfg(feature = "fit")]
     StudyEntry::of::<fit::FitStudy>(),
+    #[cfg(feature = "fit")]
+    StudyEntry::of::<reconstruct::ReconstructStudy>(),
     #[cfg(feature = "dataset")]
     StudyEntry::dataset::<sweep::SweepStudy>(),
     #[cfg(feature = "dataset")]

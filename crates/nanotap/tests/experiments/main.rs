@@ -12,5 +12,6 @@ mod fit;
 mod identities;
 mod modes_that_matter;
 mod physical_quantities;
+mod reconstruct;
 mod requests;
 mod setpoint;

@@ -406,7 +406,7 @@ impl Data {
 }
 
 /// True if a key is the distance between tip and sample.
-pub(super) fn is_distance(key: Key) -> bool {
+pub(crate) fn is_distance(key: Key) -> bool {
     matches!(key, Key::GapTip | Key::Alpha5 | Key::OscillatorGap)
 }
 

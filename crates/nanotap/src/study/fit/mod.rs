@@ -21,6 +21,7 @@
 
 mod branches;
 mod data;
+pub(crate) mod instrument;
 mod jumps;
 mod laws;
 mod parameters;
@@ -36,6 +37,7 @@ mod statistics;
 use nanotap_dynamics::Control;
 
 pub use crate::case::table::{Entry, MAX_ROWS, Table};
+pub(crate) use data::is_distance;
 pub use data::{Column, Curve, Data, Row, SweptKey};
 pub use quantity::Quantity;
 pub use report::{

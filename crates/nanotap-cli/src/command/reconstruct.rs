@@ -1,0 +1,162 @@
+//! `nanotap reconstruct`: force and dissipation from measured curves, without a contact law.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use nanotap::case::physical::Kind;
+use nanotap::case::quantity::format_electronvolts;
+use nanotap::figure::reconstruct::reconstruct_figure;
+use nanotap::study::fit::Table as Data;
+use nanotap::study::reconstruct::{
+    ReconstructMethod, ReconstructOptions, ReconstructReport, ReconstructStudy,
+};
+
+use crate::arguments::{CaseArguments, OutArgument, PlotArgument};
+use crate::failure::Failure;
+use crate::given_case::GivenCase;
+use crate::output::Output;
+use crate::request::Request;
+use crate::table::{Align, Table};
+use crate::threads::ThreadsArgument;
+use crate::{motion, number, progress, style};
+
+/// Rows of the printed force curve.
+const SHOWN: usize = 15;
+
+/// Force and dissipation against distance from a measured curve.
+#[derive(Args, Debug)]
+pub(crate) struct Arguments {
+    /// The measured curve (CSV), its columns named as in `distance (nm)`, `amplitude (nm)`,
+    /// `phase (deg)`, or `frequency_shift (Hz)`
+    #[arg(value_name = "DATA")]
+    data: PathBuf,
+
+    #[command(flatten)]
+    case: CaseArguments,
+
+    /// A further measured curve of the same sample; may be repeated
+    #[arg(long, value_name = "DATA")]
+    also: Vec<PathBuf>,
+
+    #[command(flatten)]
+    request: Request<ReconstructOptions>,
+
+    #[command(flatten)]
+    threads: ThreadsArgument,
+
+    #[command(flatten)]
+    out: OutArgument,
+
+    #[command(flatten)]
+    plot: PlotArgument,
+}
+
+pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure> {
+    let mut options = arguments.request.read()?;
+    arguments.out.check()?;
+    arguments.plot.check()?;
+    for path in std::iter::once(&arguments.data).chain(&arguments.also) {
+        if path.extension().is_some_and(|ending| ending == "toml") {
+            return Err(Failure::input(
+                format!(
+                    "{}: expected measured data, got a case file",
+                    path.display()
+                ),
+                "name the data first, then the case: nanotap reconstruct DATA CASE",
+            ));
+        }
+        options.data.push(Data::read(path)?);
+    }
+    let case = GivenCase::for_study(&arguments.case, true, output)?;
+    let report = progress::study::<ReconstructStudy>(&case, &options, &arguments.threads)?;
+    arguments.out.write(|| report.csv())?;
+    arguments.plot.draw(|| reconstruct_figure(&report))?;
+    for remark in &report.remarks {
+        output.warning(remark);
+    }
+    output.study(&case, &report, |report| text(&case, report))
+}
+
+fn text(case: &GivenCase, report: &ReconstructReport) -> String {
+    let shown = |kind: Kind, value: f64, digits: usize| {
+        if report.physical {
+            kind.format_digits(value, digits)
+        } else {
+            number::significant(value, digits)
+        }
+    };
+    let energy = |value: f64| {
+        if report.physical {
+            format_electronvolts(value)
+        } else {
+            number::significant(value, 4)
+        }
+    };
+    let method = match report.method {
+        ReconstructMethod::AmplitudeModulation => "amplitude and phase",
+        ReconstructMethod::FrequencyModulation => "frequency shift",
+    };
+    let heading = format!(
+        "{}: force from {method} of {}",
+        case.title(),
+        number::counted(report.rows.len(), "row", "rows")
+    );
+    let mut table = Table::new([
+        ("distance", Align::Point),
+        ("force", Align::Point),
+        ("standard error", Align::Point),
+        ("dissipation", Align::Point),
+        ("standard error", Align::Point),
+    ]);
+    let curve = &report.table;
+    let end = report.resolved_nodes();
+    for k in (0..end).step_by(end.div_ceil(SHOWN).max(1)) {
+        let mut cells = vec![
+            shown(Kind::Length, curve.distance[k], 4),
+            shown(Kind::Force, curve.force[k], 4),
+            shown(Kind::Force, curve.force_error[k], 2),
+        ];
+        if report.has_damping {
+            cells.push(energy(curve.dissipation[k]));
+            cells.push(energy(curve.dissipation_error[k]));
+        }
+        cells.resize(5, String::new());
+        table.row(cells);
+    }
+    let mut text = format!("{}\n\n{}\n", style::bold(&heading), table.render());
+    let mut say = |words: String| text.push_str(&motion::paragraph(&words));
+    if let Some(minimum) = &report.minimum {
+        say(format!(
+            "minimum of the force: {} ± {} at {}",
+            shown(Kind::Force, minimum.force, 4),
+            shown(Kind::Force, minimum.force_error, 2),
+            shown(Kind::Length, minimum.distance, 4)
+        ));
+    }
+    say(format!(
+        "closest approach: {}; largest dissipation: {}",
+        shown(Kind::Length, report.closest, 4),
+        if report.has_damping {
+            let largest = report.rows.iter().map(|row| row.dissipation);
+            energy(largest.fold(0.0, f64::max))
+        } else {
+            "not determined".to_owned()
+        }
+    ));
+    let source = match (report.method, report.free_rows) {
+        (ReconstructMethod::FrequencyModulation, _) => "held".to_owned(),
+        (_, 0) => "given".to_owned(),
+        (_, rows) => format!("from {}", number::counted(rows, "row", "rows")),
+    };
+    say(format!(
+        "free amplitude {}, phase {}° ({source})",
+        shown(Kind::Length, report.free_amplitude, 5),
+        number::significant(report.free_phase, 5)
+    ));
+    say(format!(
+        "mean squared residual {} in standard errors; effective parameters {}",
+        number::significant(report.chi2, 3),
+        number::significant(report.freedom, 3)
+    ));
+    text
+}

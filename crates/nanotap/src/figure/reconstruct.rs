@@ -1,0 +1,156 @@
+//! Reconstructed force and dissipation against distance.
+
+use nanotap_figures::{
+    Axis, Colour, DOUBLE_COLUMN, Dash, Figure, Legend, Line, Markers, Panel, Rule,
+};
+
+use crate::case::physical::Kind;
+use crate::case::physical::quantity::JOULES_PER_ELECTRONVOLT;
+use crate::case::units::prefixed;
+use crate::study::approach::Way;
+use crate::study::reconstruct::{ForceCurve, ReconstructReport};
+
+/// Width of a bar's caps, as a part of the range.
+const STANDARD_ERRORS: f64 = 2.0;
+
+/// Force with bars of two standard errors, and the dissipated energy of each row against its
+/// closest approach.
+pub fn reconstruct_figure(report: &ReconstructReport) -> Figure {
+    Figure::new(1, 2)
+        .width(DOUBLE_COLUMN)
+        .height(72.0)
+        .with(force_panel(report))
+        .with(dissipation_panel(report))
+}
+
+/// Factor and unit in brackets for values up to `size`.
+fn unit(report: &ReconstructReport, kind: Kind, size: f64) -> (f64, String) {
+    if report.physical {
+        let (factor, unit) = prefixed(kind, 1.0, size);
+        (factor, format!(" ({unit})"))
+    } else {
+        (1.0, String::new())
+    }
+}
+
+fn largest<'a>(values: impl IntoIterator<Item = &'a f64>) -> f64 {
+    values
+        .into_iter()
+        .fold(0.0, |size: f64, value| size.max(value.abs()))
+}
+
+/// Axis of the distance, its factor, and the distances shown.
+fn distance(report: &ReconstructReport) -> (Axis, f64, [f64; 2]) {
+    let nodes = &report.table.distance[..report.resolved_nodes()];
+    let (factor, unit) = unit(report, Kind::Length, largest(nodes));
+    let (low, high) = (nodes[0], nodes[nodes.len() - 1]);
+    let range = [low, high + 0.15 * (high - low)];
+    let axis = Axis::linear(format!("tip–sample distance $d${unit}"));
+    (
+        axis.range(factor * range[0], factor * range[1]),
+        factor,
+        range,
+    )
+}
+
+/// Vertical bars of two standard errors.
+fn bars(curve: &ForceCurve, range: [f64; 2], along: f64, factor: f64) -> Vec<(f64, f64)> {
+    let rows = curve
+        .distance
+        .iter()
+        .zip(&curve.force)
+        .zip(&curve.force_error);
+    let shown = rows.filter(|((x, _), _)| (range[0]..=range[1]).contains(*x));
+    shown
+        .flat_map(|((x, force), error)| {
+            let half = STANDARD_ERRORS * error;
+            let end = |side: f64| (along * x, factor * (force + side * half));
+            [end(-1.0), end(1.0), (f64::NAN, f64::NAN)]
+        })
+        .collect()
+}
+
+fn force_panel(report: &ReconstructReport) -> Panel {
+    let (axis, along, range) = distance(report);
+    let inside = |x: f64| (range[0]..=range[1]).contains(&x);
+    let curve = &report.table;
+    let shown = &curve.force[..report.resolved_nodes()];
+    let (factor, unit) = unit(report, Kind::Force, largest(shown));
+    let mut panel = Panel::new(axis, Axis::linear(format!("force on the tip{unit}")))
+        .legend(Legend::Above)
+        .with(Rule::horizontal(0.0));
+    let bars = Line::new(bars(curve, range, along, factor)).colour(Colour::GREY);
+    panel = panel.with(bars.width(0.6).label("two standard errors"));
+    let line = |x: &[f64], y: &[f64]| {
+        let points = x.iter().zip(y).filter(|(x, _)| inside(**x));
+        Line::new(
+            points
+                .map(|(x, y)| (along * x, factor * y))
+                .collect::<Vec<_>>(),
+        )
+    };
+    if let Some(plain) = &report.sader_jarvis {
+        let formula = line(&plain.distance, &plain.force).colour(Colour::VERMILLION);
+        panel = panel.with(formula.dash(Dash::Dashed).label("Sader, Jarvis"));
+    }
+    for way in &report.ways {
+        let colour = way_colour(Some(way.way));
+        let alone = line(&way.table.distance, &way.table.force).colour(colour);
+        panel = panel.with(alone.width(0.6).label(format!("{} alone", way.way.name())));
+    }
+    panel.with(
+        line(&curve.distance, &curve.force)
+            .colour(Colour::BLACK)
+            .label("force"),
+    )
+}
+
+const fn way_colour(way: Option<Way>) -> Colour {
+    match way {
+        Some(Way::Retract) => Colour::VERMILLION,
+        _ => Colour::BLUE,
+    }
+}
+
+fn dissipation_panel(report: &ReconstructReport) -> Panel {
+    let (axis, along, range) = distance(report);
+    let (factor, unit) = if report.physical {
+        (1.0 / JOULES_PER_ELECTRONVOLT, " (eV)")
+    } else {
+        (1.0, "")
+    };
+    let mut panel = Panel::new(axis, Axis::linear(format!("dissipation $E_{{dis}}${unit}")))
+        .legend(Legend::Above)
+        .with(Rule::horizontal(0.0));
+    for way in [Some(Way::Approach), Some(Way::Retract), None] {
+        let rows = report.rows.iter().filter(|row| row.way == way);
+        let rows = rows.filter(|row| (range[0]..=range[1]).contains(&row.closest));
+        let rows: Vec<_> = rows.collect();
+        if rows.is_empty() {
+            continue;
+        }
+        let bars = rows.iter().flat_map(|row| {
+            let half = STANDARD_ERRORS * row.dissipation_error;
+            let end = |side: f64| {
+                (
+                    along * row.closest,
+                    factor * (row.dissipation + side * half),
+                )
+            };
+            [end(-1.0), end(1.0), (f64::NAN, f64::NAN)]
+        });
+        let bars: Vec<_> = bars.collect();
+        let points = rows
+            .iter()
+            .map(|row| (along * row.closest, factor * row.dissipation));
+        let points: Vec<_> = points.collect();
+        panel = panel.with(Line::new(bars).colour(Colour::GREY).width(0.6));
+        let label = way.map_or("rows", Way::name);
+        let markers = Markers::new(points)
+            .colour(way_colour(way))
+            .open()
+            .size(1.0);
+        panel = panel.with(markers.label(label));
+    }
+    panel
+}

@@ -1,0 +1,569 @@
+//! Tables as instruments write them: names and units of their columns, the direction of the
+//! distance, approach and retract in one column, and zero and sign of the phase.
+//!
+//! Conversions are stated (`Amp=58 nm/V`, `Phase=90-x`) or guessed; every guess is reported. A
+//! table whose columns follow nanotap's own conventions stays as it is.
+
+use nanotap_arithmetic::ComplexFunctions as _;
+
+use crate::Error;
+use crate::case::Case;
+use crate::case::physical::free_response::free_response;
+use crate::case::table::{Entry, Header, Table};
+
+/// Names of instruments' columns, in lower case without blanks, and what they are called here.
+const NAMES: [(&str, &str); 21] = [
+    ("amp", "amplitude"),
+    ("amp1", "amplitude"),
+    ("amplitude1", "amplitude"),
+    ("lockinamplitude", "amplitude"),
+    ("lock-inamplitude", "amplitude"),
+    ("phase1", "phase"),
+    ("phas1", "phase"),
+    ("lockinphase", "phase"),
+    ("lock-inphase", "phase"),
+    ("zsnsr", "distance"),
+    ("zsensor", "distance"),
+    ("z", "distance"),
+    ("zpiezo", "distance"),
+    ("piezo", "distance"),
+    ("height", "distance"),
+    ("heightsensor", "distance"),
+    ("measuredheight", "distance"),
+    ("height(measured)", "distance"),
+    ("df", "frequency_shift"),
+    ("freqshift", "frequency_shift"),
+    ("frequencyshift", "frequency_shift"),
+];
+
+/// The free phase is the instrument's own where it is this far from the lever's, in degrees.
+const OWN_PHASE: f64 = 15.0;
+/// Fewest rows from which anything is guessed.
+const MIN_ROWS: usize = 12;
+
+/// `tables` with the conversions, each of the form `NAME=RULE`, and then the guesses, which are
+/// described.
+///
+/// # Errors
+/// When a conversion is not understood, or no table has its column.
+pub(crate) fn prepared(
+    case: &Case,
+    tables: &[Table],
+    conversions: &[String],
+) -> Result<(Vec<Table>, Vec<String>), Error> {
+    let mut tables = tables.to_vec();
+    let mut foreign = vec![false; tables.len()];
+    for text in conversions {
+        let conversion = Conversion::parse(text)?;
+        let mut used = false;
+        for (table, foreign) in tables.iter_mut().zip(&mut foreign) {
+            let applied = conversion.apply(table)?;
+            *foreign |= applied;
+            used |= applied;
+        }
+        if !used {
+            let names: Vec<String> = tables
+                .iter()
+                .flat_map(|table| &table.columns)
+                .map(|(written, _)| Header::of(written).name)
+                .collect();
+            return Err(Error::option(
+                "convert",
+                format!("no column is called `{}`", conversion.name),
+                format!("the columns are {}", names.join(", ")),
+            ));
+        }
+    }
+    let mut remarks = Vec::new();
+    for (table, foreign) in tables.iter_mut().zip(foreign) {
+        let renamed = rename(table, &mut remarks);
+        guess(case, table, renamed || foreign, &mut remarks);
+    }
+    Ok((tables, remarks))
+}
+
+/// What is done to a column.
+#[derive(Clone, Debug, PartialEq)]
+struct Conversion {
+    /// Name of the column.
+    name: String,
+    /// Value = `offset` + `factor` · x.
+    factor: f64,
+    offset: f64,
+    /// Units from and to, where the rule states them.
+    units: Option<[String; 2]>,
+    /// Another name.
+    renamed: Option<String>,
+}
+
+const RULES: &str = "write NAME=RULE with a rule as in 58 nm/V, 90-x, -x, 1.02*x or amplitude";
+
+impl Conversion {
+    fn parse(text: &str) -> Result<Self, Error> {
+        let wrong = |what: String| Error::option("convert", what, RULES);
+        let (name, rule) = text
+            .split_once('=')
+            .ok_or_else(|| wrong(format!("`{text}` has no `=`")))?;
+        let (name, rule) = (Header::of(name).name, rule.trim());
+        if name.is_empty() || rule.is_empty() {
+            return Err(wrong(format!("`{text}` has an empty side")));
+        }
+        let plain = Self {
+            name,
+            factor: 1.0,
+            offset: 0.0,
+            units: None,
+            renamed: None,
+        };
+        if let Some((factor, offset)) = linear(rule) {
+            return Ok(Self {
+                factor,
+                offset,
+                ..plain
+            });
+        }
+        if let Some((number, rest)) = leading_number(rule)
+            && let Some((to, from)) = rest.trim().split_once('/')
+            && number != 0.0
+        {
+            return Ok(Self {
+                factor: number,
+                units: Some([from.trim().to_owned(), to.trim().to_owned()]),
+                ..plain
+            });
+        }
+        if rule
+            .chars()
+            .all(|c| c.is_alphanumeric() || c == '_' || c == '.')
+            && rule.starts_with(|c: char| c.is_alphabetic())
+        {
+            return Ok(Self {
+                renamed: Some(rule.to_owned()),
+                ..plain
+            });
+        }
+        Err(wrong(format!("`{rule}` is not a conversion")))
+    }
+
+    /// Converts the column of `table` that has the name, if one does.
+    fn apply(&self, table: &mut Table) -> Result<bool, Error> {
+        let is = |(written, _): &(String, Vec<Entry>)| {
+            *written == self.name || Header::of(written).name == self.name
+        };
+        let Some(place) = table.columns.iter().position(is) else {
+            return Ok(false);
+        };
+        let header = Header::of(&table.columns[place].0);
+        let unit = match &self.units {
+            Some([from, to]) if header.unit.is_empty() || header.unit == *from => to.clone(),
+            Some([from, _]) => {
+                return Err(Error::option(
+                    "convert",
+                    format!(
+                        "{}: the column is in {}, the rule converts {from}",
+                        table.place(None, place),
+                        header.unit
+                    ),
+                    format!("write the factor per {}", header.unit),
+                ));
+            }
+            None => header.unit,
+        };
+        let name = self.renamed.as_ref().unwrap_or(&header.name);
+        let column = &mut table.columns[place];
+        column.0 = written(name, &unit);
+        for entry in &mut column.1 {
+            if let Entry::Number(x) = entry {
+                *x = self.offset + self.factor * *x;
+            }
+        }
+        Ok(true)
+    }
+}
+
+fn written(name: &str, unit: &str) -> String {
+    if unit.is_empty() {
+        name.to_owned()
+    } else {
+        format!("{name} ({unit})")
+    }
+}
+
+/// The number that a text begins with, and the rest.
+fn leading_number(text: &str) -> Option<(f64, &str)> {
+    let ends = text.char_indices().map(|(at, _)| at).chain([text.len()]);
+    let numbers = ends.filter_map(|end| Some((text[..end].parse::<f64>().ok()?, &text[end..])));
+    numbers.filter(|(number, _)| number.is_finite()).last()
+}
+
+/// Factor and offset of a rule that is linear in x: a sum of two terms, one of them in x.
+fn linear(rule: &str) -> Option<(f64, f64)> {
+    let rule: String = rule.chars().filter(|c| !c.is_whitespace()).collect();
+    let (mut factor, mut offset) = (None, None);
+    let mut rest = rule.as_str();
+    while !rest.is_empty() {
+        let (sign, unsigned) = match rest.strip_prefix('-') {
+            Some(unsigned) => (-1.0, unsigned),
+            None => (1.0, rest.strip_prefix('+').unwrap_or(rest)),
+        };
+        if let Some(after) = unsigned.strip_prefix('x') {
+            let (number, after) = match after.strip_prefix('/') {
+                Some(divisor) => {
+                    let (divisor, after) = leading_number(divisor)?;
+                    (1.0 / divisor, after)
+                }
+                None => match after.strip_prefix('*') {
+                    Some(times) => leading_number(times)?,
+                    None => (1.0, after),
+                },
+            };
+            (factor.is_none() && number.is_finite()).then_some(())?;
+            factor = Some(sign * number);
+            rest = after;
+        } else {
+            let (number, after) = leading_number(unsigned)?;
+            match after.strip_prefix("*x") {
+                Some(after) => {
+                    factor.is_none().then_some(())?;
+                    factor = Some(sign * number);
+                    rest = after;
+                }
+                None => {
+                    offset.is_none().then_some(())?;
+                    offset = Some(sign * number);
+                    rest = after;
+                }
+            }
+        }
+        (rest.is_empty() || rest.starts_with(['+', '-'])).then_some(())?;
+    }
+    let factor = factor.filter(|factor| *factor != 0.0)?;
+    Some((factor, offset.unwrap_or(0.0)))
+}
+
+/// Gives instruments' columns the names that are known here, and says whether there are any.
+fn rename(table: &mut Table, remarks: &mut Vec<String>) -> bool {
+    let before = remarks.len();
+    let known = |table: &Table, name: &str| {
+        let mut headers = table.columns.iter().map(|(written, _)| Header::of(written));
+        headers.any(|header| header.name.to_lowercase() == name)
+    };
+    for place in 0..table.columns.len() {
+        let header = Header::of(&table.columns[place].0);
+        let plain = header.name.to_lowercase().replace([' ', '_'], "");
+        let Some((_, name)) = NAMES.iter().find(|(own, _)| *own == plain) else {
+            continue;
+        };
+        if !known(table, name) {
+            remarks.push(format!(
+                "{}: `{}` is taken as {name}",
+                table.name, header.name
+            ));
+            table.columns[place].0 = written(name, &header.unit);
+        }
+    }
+    remarks.len() > before
+}
+
+/// The columns of amplitude curves that guesses change.
+struct Places {
+    distance: usize,
+    amplitude: usize,
+    phase: usize,
+}
+
+fn places(table: &Table) -> Option<Places> {
+    let place = |names: &[&str]| {
+        let name = |written: &str| Header::of(written).name.to_lowercase();
+        let is = |(written, _): &(String, Vec<Entry>)| names.contains(&name(written).as_str());
+        table.columns.iter().position(is)
+    };
+    Some(Places {
+        distance: place(&["distance", "zc", "gap"])?,
+        amplitude: place(&["amplitude", "first_harmonic", "a"])?,
+        phase: place(&["phase"])?,
+    })
+}
+
+/// Directions, and of a `foreign` table, whose columns had other names or were converted, the
+/// zeros of distance and phase and the sign of the phase.
+fn guess(case: &Case, table: &mut Table, foreign: bool, remarks: &mut Vec<String>) {
+    let Some(places) = places(table) else { return };
+    let numbers = |place: usize| -> Option<Vec<f64>> {
+        let entries = table.columns[place].1.iter();
+        entries
+            .map(|entry| match entry {
+                Entry::Number(x) if x.is_finite() => Some(*x),
+                _ => None,
+            })
+            .collect()
+    };
+    let all = [places.distance, places.amplitude, places.phase].map(numbers);
+    let [Some(mut distance), Some(mut amplitude), Some(mut phase)] = all else {
+        return;
+    };
+    if distance.len() < MIN_ROWS {
+        return;
+    }
+    let mut notes: Vec<String> = Vec::new();
+    if is_reversed(&distance, &amplitude) {
+        distance.iter_mut().for_each(|z| *z = -*z);
+        notes.push("the distance is counted the other way: the amplitude grows with it".to_owned());
+    }
+    let header = Header::of(&table.columns[places.amplitude].0);
+    if header.unit == "V" || header.unit == "mV" {
+        let length = Header::of(&table.columns[places.distance].0).unit;
+        match tapping_line(&distance, &amplitude) {
+            Some(line) if line.is_reliable => {
+                amplitude.iter_mut().for_each(|a| *a /= line.slope);
+                table.columns[places.amplitude].0 = written(&header.name, &length);
+                notes.push(format!(
+                    "the amplitude's sensitivity is taken from the slope in contact, {:.4} {length}/{}: \
+                     a few percent wrong, and more on a soft sample; state it with {{convert}}",
+                    1.0 / line.slope,
+                    header.unit
+                ));
+            }
+            _ => return,
+        }
+    }
+    let lag = free_lag(case);
+    let free = free_rows(&distance, &amplitude);
+    if foreign
+        && let Some(own) = free.phase(&phase)
+        && let Some(lag) = lag
+        && wrapped(own - lag).abs() > OWN_PHASE
+    {
+        let deep = deep_deviation(&amplitude, free.amplitude, &phase, own);
+        let sign = if deep > 0.0 { -1.0 } else { 1.0 };
+        for value in &mut phase {
+            *value = lag + sign * wrapped(*value - own);
+        }
+        let counted = if sign > 0.0 { "from" } else { "backwards from" };
+        notes.push(format!(
+            "the phase is counted {counted} its value far from the sample, {own:.1}°, where the lever lags by \
+             {lag:.1}°: near the sample it falls, as over a repulsive sample; state it with {{convert}} if the \
+             sample only attracts"
+        ));
+    }
+    if foreign && let Some(line) = tapping_line(&distance, &amplitude) {
+        let offset = free.amplitude - line.knee(free.amplitude);
+        if offset.abs() > 2.0 * free.amplitude {
+            distance.iter_mut().for_each(|z| *z += offset);
+            let unit = Header::of(&table.columns[places.distance].0).unit;
+            notes.push(format!(
+                "the distance is counted from where the amplitude begins to fall: {offset:.5} {unit} was \
+                 added, which is good to a nanometre or two"
+            ));
+        }
+    }
+    for (place, values) in [
+        (places.distance, &distance),
+        (places.amplitude, &amplitude),
+        (places.phase, &phase),
+    ] {
+        table.columns[place].1 = values.iter().copied().map(Entry::Number).collect();
+    }
+    let has_direction = table
+        .columns
+        .iter()
+        .any(|(written, _)| matches!(Header::of(written).name.as_str(), "direction" | "way"));
+    if !has_direction && let Some(turn) = turning_point(&distance) {
+        let direction = |from: usize, to: usize| {
+            let falls = distance[to - 1] < distance[from];
+            Entry::Text(if falls { "approach" } else { "retract" }.to_owned())
+        };
+        let (first, second) = (direction(0, turn), direction(turn, distance.len()));
+        let column = (0..distance.len()).map(|k| if k < turn { &first } else { &second });
+        let column = column.cloned().collect();
+        table.columns.push(("direction".to_owned(), column));
+        notes.push(format!("approach and retract part at row {turn}"));
+    }
+    let place = |note: String| format!("{}: {note}", table.name);
+    remarks.extend(notes.into_iter().map(place));
+}
+
+/// The lever's free phase in degrees.
+fn free_lag(case: &Case) -> Option<f64> {
+    let cantilever = case.cantilever()?;
+    let response = free_response(cantilever).ok()?;
+    Some(-response.argument().to_degrees())
+}
+
+/// Whether the amplitude is larger where the distance is smaller.
+fn is_reversed(distance: &[f64], amplitude: &[f64]) -> bool {
+    let sorted = by_distance(distance);
+    let end = (distance.len() / 12).max(5).min(distance.len() / 2);
+    let level = |rows: &[usize]| median(rows.iter().map(|k| amplitude[*k]).collect());
+    level(&sorted[..end]) > level(&sorted[sorted.len() - end..])
+}
+
+/// Rows by increasing distance.
+fn by_distance(distance: &[f64]) -> Vec<usize> {
+    let mut sorted: Vec<usize> = (0..distance.len()).collect();
+    sorted.sort_by(|a, b| distance[*a].total_cmp(&distance[*b]));
+    sorted
+}
+
+/// The farthest rows, whose amplitude is free.
+struct Free {
+    amplitude: f64,
+    rows: Vec<usize>,
+}
+
+impl Free {
+    /// Median phase of the free rows in degrees.
+    fn phase(&self, phase: &[f64]) -> Option<f64> {
+        let reference = phase[*self.rows.first()?];
+        let turns = self.rows.iter().map(|k| wrapped(phase[*k] - reference));
+        Some(reference + median(turns.collect()))
+    }
+}
+
+fn free_rows(distance: &[f64], amplitude: &[f64]) -> Free {
+    let mut sorted = by_distance(distance);
+    sorted.reverse();
+    let end = (sorted.len() / 20).max(3);
+    let level = median(sorted[..end].iter().map(|k| amplitude[*k]).collect());
+    let leaves = |k: &usize| (amplitude[*k] / level - 1.0).abs() > 0.02;
+    let free = sorted.iter().position(leaves).unwrap_or(sorted.len());
+    sorted.truncate((free * 4 / 5).max(3));
+    Free {
+        amplitude: level,
+        rows: sorted,
+    }
+}
+
+/// How far the phase of deep rows lies from the free phase `own`, in degrees.
+fn deep_deviation(amplitude: &[f64], free: f64, phase: &[f64], own: f64) -> f64 {
+    let in_range = |low: f64, high: f64| -> Vec<f64> {
+        let rows = amplitude.iter().zip(phase);
+        let deep = rows.filter(|(a, _)| (low..high).contains(*a));
+        deep.map(|(_, phase)| wrapped(phase - own)).collect()
+    };
+    let deep = in_range(0.2 * free, 0.8 * free);
+    if deep.len() >= 8 {
+        return median(deep);
+    }
+    let least = amplitude.iter().copied().fold(f64::INFINITY, f64::min);
+    let rest = in_range(0.0, 0.5 * (free + least));
+    if rest.is_empty() { 0.0 } else { median(rest) }
+}
+
+/// The line of the amplitude against the distance while tapping.
+struct Line {
+    slope: f64,
+    offset: f64,
+    is_reliable: bool,
+}
+
+impl Line {
+    /// Where the line reaches the free amplitude.
+    fn knee(&self, free: f64) -> f64 {
+        (free - self.offset) / self.slope
+    }
+}
+
+/// A robust line through the rows between 0.35 and 0.85 of the free amplitude.
+fn tapping_line(distance: &[f64], amplitude: &[f64]) -> Option<Line> {
+    let free = free_rows(distance, amplitude).amplitude;
+    let rows: Vec<(f64, f64)> = distance
+        .iter()
+        .zip(amplitude)
+        .filter(|(_, a)| (0.35 * free..0.85 * free).contains(*a))
+        .map(|(z, a)| (*z, *a))
+        .collect();
+    if rows.len() < 4 {
+        return None;
+    }
+    let centre = median(rows.iter().map(|(z, _)| *z).collect());
+    let mut weights = vec![1.0; rows.len()];
+    let (mut slope, mut level) = (0.0, 0.0);
+    for _ in 0..6 {
+        let sum = |of: &dyn Fn(f64, f64) -> f64| -> f64 {
+            let both = rows.iter().zip(&weights);
+            both.map(|((z, a), weight)| weight * of(z - centre, *a))
+                .sum()
+        };
+        let (n, x, y) = (sum(&|_, _| 1.0), sum(&|z, _| z), sum(&|_, a| a));
+        let (xx, xy) = (sum(&|z, _| z * z), sum(&|z, a| z * a));
+        slope = (n * xy - x * y) / (n * xx - x * x);
+        level = (y - slope * x) / n;
+        let residuals: Vec<f64> = rows
+            .iter()
+            .map(|(z, a)| (a - level - slope * (z - centre)).abs())
+            .collect();
+        let scale = 1.5 * 1.4826 * median(residuals.clone());
+        weights = residuals
+            .iter()
+            .map(|residual| 1.0 / residual.max(scale).max(1e-9 * free))
+            .collect();
+    }
+    let least = amplitude.iter().copied().fold(f64::INFINITY, f64::min);
+    (slope > 0.0 && slope.is_finite()).then(|| Line {
+        slope,
+        offset: level - slope * centre,
+        is_reliable: rows.len() >= 8 && least < 0.65 * free,
+    })
+}
+
+/// The first row after the turning point of a distance that goes to the sample and back.
+fn turning_point(distance: &[f64]) -> Option<usize> {
+    let count = distance.len();
+    let ends = 0.5 * (distance[0] + distance[count - 1]);
+    let near = |k: usize| {
+        let window = &distance[k.saturating_sub(2)..(k + 3).min(count)];
+        (window.iter().sum::<f64>() / window.len() as f64 - ends).abs()
+    };
+    let turn = (0..count).max_by(|a, b| near(*a).total_cmp(&near(*b)))?;
+    let inside = turn * 10 >= count && turn * 10 <= 9 * count;
+    inside.then_some(turn + 1)
+}
+
+/// The middle of some values.
+pub(crate) fn median(mut values: Vec<f64>) -> f64 {
+    values.sort_by(f64::total_cmp);
+    let middle = values.len() / 2;
+    match values.len() {
+        0 => f64::NAN,
+        n if n % 2 == 1 => values[middle],
+        _ => 0.5 * (values[middle - 1] + values[middle]),
+    }
+}
+
+/// An angle in degrees in [−180, 180).
+pub(crate) fn wrapped(degrees: f64) -> f64 {
+    (degrees + 180.0).rem_euclid(360.0) - 180.0
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rules_are_linear_or_a_factor_with_units_or_a_name() {
+        for (rule, factor, offset) in [
+            ("90-x", -1.0, 90.0),
+            ("-x", -1.0, 0.0),
+            ("x + 3", 1.0, 3.0),
+            ("1.5*x-2e1", 1.5, -20.0),
+            ("x/4", 0.25, 0.0),
+            ("x*1e-3+1", 1e-3, 1.0),
+        ] {
+            assert_eq!(linear(rule), Some((factor, offset)), "{rule}");
+        }
+        for rule in [
+            "x+x", "3", "x-", "x^2", "2x", "", "--x", "x/0", "nm/V", "0*x",
+        ] {
+            assert_eq!(linear(rule), None, "{rule}");
+        }
+        let amplitude = Conversion::parse("Amp=58 nm/V").unwrap();
+        assert_eq!(amplitude.factor, 58.0);
+        assert_eq!(amplitude.units, Some(["V".to_owned(), "nm".to_owned()]));
+        let named = Conversion::parse("Ch3=amplitude").unwrap();
+        assert_eq!(named.renamed.as_deref(), Some("amplitude"));
+        for wrong in ["Amp", "=x", "Amp=", "Amp=58 nm", "Amp=?"] {
+            assert!(Conversion::parse(wrong).is_err(), "{wrong}");
+        }
+    }
+}

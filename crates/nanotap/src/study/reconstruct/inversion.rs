@@ -1,0 +1,394 @@
+//! Force and damping from the first harmonics of many oscillations.
+//!
+//! Both are piecewise linear in the distance. A first pass takes the motion as sinusoidal, where
+//! the averages of a linear piece have a closed form. Further passes take the tip's motion in
+//! the force and damping of the pass before, with its higher harmonics, and solve for both in
+//! turn. Each row's measured values are moved towards what the force says, by their share of the
+//! residual (orthogonal distance regression), since an error of the amplitude moves the
+//! distance too.
+//!
+//! Fails where the force is much steeper than the lever is stiff: the fixed point of the motion
+//! does not converge.
+
+use nalgebra::DMatrix;
+use nanotap_flow::Complex;
+use rayon::prelude::*;
+
+use super::lever::{FirstHarmonic, Method};
+use super::motion::{Harmonics, Known, Motion, Weights};
+use super::nodes::{Kernel, Nodes};
+use super::smooth::Smooth;
+use crate::Error;
+use crate::control::Control;
+
+/// Passes, the harmonic one first.
+pub(super) const PASSES: usize = 8;
+/// Passes after which nodes stay and motions are averaged with those before.
+const SETTLING: usize = 3;
+/// Part of the way that a row's values move in a pass.
+const MOVE: f64 = 0.6;
+
+/// A measured row.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Measured {
+    /// Distance at rest.
+    pub(super) distance: f64,
+    /// What the method measures.
+    pub(super) values: [f64; 2],
+    /// Standard errors.
+    pub(super) errors: [f64; 2],
+    /// Whether the sample is felt, so that the force there is to be resolved.
+    pub(super) informative: bool,
+}
+
+/// Rows, and how they were measured.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Inversion<'a> {
+    pub(super) rows: &'a [Measured],
+    pub(super) method: &'a Method,
+    /// Displacement of the tip a unit of force, of the harmonics 0, 1, ….
+    pub(super) gains: &'a [Complex],
+    /// Whether the second value was measured.
+    pub(super) has_damping: bool,
+    /// Upper limit of the spacing of the nodes.
+    pub(super) widest: f64,
+}
+
+/// Force and damping, and what they say of each row.
+#[derive(Clone, Debug)]
+pub(super) struct Inverted {
+    pub(super) nodes: Nodes,
+    pub(super) force: Smooth,
+    pub(super) damping: Smooth,
+    pub(super) rows: Vec<InvertedRow>,
+}
+
+impl Inverted {
+    /// The resolved distances, from and to.
+    pub(super) fn range(&self) -> [f64; 2] {
+        let even = super::report::even_nodes(&self.nodes.0);
+        [self.nodes.0[1], self.nodes.0[even - 1]]
+    }
+
+    /// The force at a distance, with its standard error.
+    pub(super) fn force_at(&self, x: f64) -> [f64; 2] {
+        let (at, upper) = self.nodes.place(x);
+        let mut weights = vec![0.0; self.nodes.0.len()];
+        weights[at] = 1.0 - upper;
+        weights[at + 1] = upper;
+        weights.truncate(self.nodes.unknowns());
+        self.force.sum(&weights)
+    }
+}
+
+/// What force and damping say of a row.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct InvertedRow {
+    /// Closest approach.
+    pub(super) closest: f64,
+    /// Amplitude of the tip.
+    pub(super) amplitude: f64,
+    /// Dissipated energy a period, with its standard error.
+    pub(super) dissipated: [f64; 2],
+    /// Residual of the conservative part in standard errors.
+    pub(super) residual: f64,
+}
+
+/// A row at its estimated values.
+#[derive(Clone, Copy, Debug)]
+struct Estimate {
+    values: [f64; 2],
+    at: FirstHarmonic,
+    /// Derivatives of conservative part, work and amplitude by both values.
+    conservative_by: [f64; 2],
+    work_by: [f64; 2],
+    amplitude_by: [f64; 2],
+    /// Mean deflection.
+    mean: f64,
+    /// Derivative of the conservative part by the distance, in the known force.
+    slope: f64,
+    closest: f64,
+}
+
+impl Estimate {
+    fn of(method: &Method, row: &Measured) -> Self {
+        let mut estimate = Self {
+            values: row.values,
+            at: method.first_harmonic(row.values),
+            conservative_by: [0.0; 2],
+            work_by: [0.0; 2],
+            amplitude_by: [0.0; 2],
+            mean: 0.0,
+            slope: 0.0,
+            closest: 0.0,
+        };
+        estimate.update(method, row);
+        estimate
+    }
+
+    fn update(&mut self, method: &Method, row: &Measured) {
+        self.at = method.first_harmonic(self.values);
+        for index in 0..2 {
+            let step = 1e-2 * row.errors[index];
+            let beside = |side: f64| {
+                let mut values = self.values;
+                values[index] += side * step;
+                method.first_harmonic(values)
+            };
+            let (low, high) = (beside(-1.0), beside(1.0));
+            let slope = |of: fn(&FirstHarmonic) -> f64| (of(&high) - of(&low)) / (2.0 * step);
+            self.conservative_by[index] = slope(|h| h.conservative);
+            self.work_by[index] = slope(|h| h.work);
+            self.amplitude_by[index] = slope(|h| h.amplitude);
+        }
+    }
+
+    /// Derivatives of the residual by both values: they change the distance too.
+    fn by(&self) -> [f64; 2] {
+        [0, 1].map(|k| self.conservative_by[k] + self.slope * self.amplitude_by[k])
+    }
+}
+
+fn spread(by: [f64; 2], errors: [f64; 2]) -> f64 {
+    let squares = by
+        .iter()
+        .zip(errors)
+        .map(|(by, error)| (by * error).powi(2));
+    squares.sum::<f64>().sqrt()
+}
+
+impl Inversion<'_> {
+    /// Solves for force and damping.
+    ///
+    /// # Errors
+    /// When no smooth force describes the rows, or the work is cancelled.
+    pub(super) fn run(&self, control: &Control<'_>) -> Result<Inverted, Error> {
+        let harmonics = Harmonics::new();
+        let mut rows: Vec<Estimate> = self
+            .rows
+            .iter()
+            .map(|row| Estimate::of(self.method, row))
+            .collect();
+        let mut nodes = Nodes(Vec::new());
+        let (mut force, mut damping) = (Smooth::zero(0), Smooth::zero(0));
+        let mut motions: Vec<Motion> = Vec::new();
+        let mut weights: Vec<Weights> = Vec::new();
+        let mut residuals = Vec::new();
+        for pass in 0..PASSES {
+            if control.is_cancelled() {
+                return Err(Error::stopped());
+            }
+            for (estimate, row) in rows.iter_mut().zip(self.rows) {
+                estimate.update(self.method, row);
+            }
+            let harmonic = pass == 0;
+            if harmonic {
+                for (estimate, row) in rows.iter_mut().zip(self.rows) {
+                    estimate.closest = row.distance - estimate.at.amplitude;
+                }
+            } else {
+                let known = Known {
+                    nodes: &nodes,
+                    force: &force.coefficients,
+                    damping: &damping.coefficients,
+                    gains: self.gains,
+                };
+                let moved = rows.par_iter().zip(self.rows).map(|(estimate, row)| {
+                    let centre = row.distance + estimate.mean;
+                    known.motion(&harmonics, centre, estimate.at.amplitude)
+                });
+                let mut moved: Vec<Motion> = moved.collect();
+                if pass >= SETTLING {
+                    for (motion, before) in moved.iter_mut().zip(&motions) {
+                        motion.half_way(before);
+                    }
+                }
+                motions = moved;
+                for (estimate, motion) in rows.iter_mut().zip(&motions) {
+                    estimate.closest = motion.closest();
+                }
+            }
+            if pass <= SETTLING {
+                nodes = self.nodes(&rows);
+            }
+            weights = if harmonic {
+                let of = |estimate: &Estimate| sinusoidal(&nodes, estimate);
+                rows.iter().map(of).collect()
+            } else {
+                let both = rows.par_iter().zip(&motions);
+                let of = |(estimate, motion): (&Estimate, &Motion)| {
+                    motion.weights(&harmonics, &nodes, estimate.at.amplitude)
+                };
+                both.map(of).collect()
+            };
+            if damping.coefficients.len() != nodes.unknowns() {
+                damping = Smooth::zero(nodes.unknowns());
+            }
+            let observed = self.observed(&rows);
+            force = solve_force(&observed, &weights, &nodes, &damping)?;
+            if self.has_damping {
+                damping = self.solve_damping(&rows, &weights, &nodes, &force)?;
+            }
+            let unexplained = |(row, weights): (&[f64; 2], &Weights)| {
+                let conservative = dot(&weights.cosine, &force.coefficients);
+                let damped = dot(&weights.cosine_damping, &damping.coefficients);
+                [row[0] - conservative - damped, row[1]]
+            };
+            residuals = observed.iter().zip(&weights).map(unexplained).collect();
+            self.advance(pass, &mut rows, &weights, &residuals, &force, |k, row| {
+                if harmonic {
+                    let half = 0.5 * nodes.spacing();
+                    let at = |x: f64| {
+                        let average = nodes.average(Kernel::Cosine, x, row.at.amplitude);
+                        dot(&average, &force.coefficients)
+                    };
+                    (at(row.closest + half) - at(row.closest - half)) / (2.0 * half)
+                } else {
+                    motions[k].shift_slope(&harmonics, &nodes, &force.coefficients)
+                }
+            });
+            if let Some(progress) = control.progress {
+                progress(pass + 1, PASSES);
+            }
+        }
+        let rows = rows.iter().zip(&weights).zip(&residuals);
+        let rows = rows.map(|((estimate, weights), [residual, error])| InvertedRow {
+            closest: estimate.closest,
+            amplitude: estimate.at.amplitude,
+            dissipated: damping.sum(&weights.dissipated),
+            residual: residual / error,
+        });
+        Ok(Inverted {
+            rows: rows.collect(),
+            nodes,
+            force,
+            damping,
+        })
+    }
+
+    /// Nodes for the range of the closest approaches.
+    fn nodes(&self, rows: &[Estimate]) -> Nodes {
+        let closest = || rows.iter().map(|row| row.closest);
+        let low = closest().fold(f64::INFINITY, f64::min);
+        let felt = rows
+            .iter()
+            .zip(self.rows)
+            .filter(|(_, row)| row.informative);
+        let fine = felt.map(|(row, _)| row.closest).fold(low, f64::max);
+        let far = rows.iter().zip(self.rows).map(|(estimate, row)| {
+            let at_rest = row.distance - estimate.at.amplitude;
+            at_rest.max(estimate.closest)
+        });
+        Nodes::new(low, fine, far.fold(fine, f64::max), self.widest)
+    }
+
+    /// Each row's conservative part at its measured values, with its standard error.
+    fn observed(&self, rows: &[Estimate]) -> Vec<[f64; 2]> {
+        let both = rows.iter().zip(self.rows);
+        both.map(|(estimate, row)| {
+            let by = estimate.by();
+            let back = [0, 1].map(|k| by[k] * (row.values[k] - estimate.values[k]));
+            let conservative = estimate.at.conservative + back[0] + back[1];
+            [conservative, spread(by, row.errors)]
+        })
+        .collect()
+    }
+
+    /// The damping.
+    fn solve_damping(
+        &self,
+        rows: &[Estimate],
+        weights: &[Weights],
+        nodes: &Nodes,
+        force: &Smooth,
+    ) -> Result<Smooth, Error> {
+        let errors: Vec<f64> = rows
+            .iter()
+            .zip(self.rows)
+            .map(|(estimate, row)| spread(estimate.work_by, row.errors))
+            .collect();
+        let values: Vec<f64> = rows
+            .iter()
+            .zip(weights)
+            .map(|(estimate, weights)| estimate.at.work - dot(&weights.work, &force.coefficients))
+            .collect();
+        let matrix = matrix(weights, |weights| &weights.work_damping);
+        Smooth::of(&matrix, &values, &errors, &nodes.roughness())
+    }
+
+    /// Mean deflections, slopes and values of the rows for the next pass.
+    fn advance(
+        &self,
+        pass: usize,
+        rows: &mut [Estimate],
+        weights: &[Weights],
+        residuals: &[[f64; 2]],
+        force: &Smooth,
+        slope: impl Fn(usize, &Estimate) -> f64,
+    ) {
+        let compliance = self.gains[0].re;
+        for (k, (estimate, row)) in rows.iter_mut().zip(self.rows).enumerate() {
+            let [residual, error] = residuals[k];
+            if pass + 1 < PASSES {
+                let by = estimate.by();
+                for index in 0..2 {
+                    let share = row.errors[index].powi(2) * by[index] / error.powi(2);
+                    let there = row.values[index] - share * residual;
+                    estimate.values[index] += MOVE * (there - estimate.values[index]);
+                }
+            }
+            estimate.slope = slope(k, estimate);
+            let mean = compliance * dot(&weights[k].mean, &force.coefficients);
+            let part = if pass < 2 { 1.0 } else { 0.5 };
+            estimate.mean += part * (mean - estimate.mean);
+        }
+    }
+}
+
+/// What a row measures of a sinusoidal motion.
+fn sinusoidal(nodes: &Nodes, row: &Estimate) -> Weights {
+    let (closest, amplitude) = (row.closest, row.at.amplitude);
+    let zeros = vec![0.0; nodes.unknowns()];
+    let scaled = |kernel, factor: f64| -> Vec<f64> {
+        let weights = nodes.average(kernel, closest, amplitude);
+        weights.iter().map(|weight| factor * weight).collect()
+    };
+    let damped = scaled(
+        Kernel::Damping,
+        std::f64::consts::PI * amplitude * amplitude,
+    );
+    Weights {
+        cosine: scaled(Kernel::Cosine, 1.0),
+        cosine_damping: zeros.clone(),
+        work: zeros,
+        dissipated: damped.clone(),
+        work_damping: damped,
+        mean: scaled(Kernel::Mean, 0.5),
+    }
+}
+
+/// The force of the conservative parts that the known damping leaves.
+fn solve_force(
+    observed: &[[f64; 2]],
+    weights: &[Weights],
+    nodes: &Nodes,
+    damping: &Smooth,
+) -> Result<Smooth, Error> {
+    let rows = observed.iter().zip(weights);
+    let left = |([value, _], weights): (&[f64; 2], &Weights)| {
+        value - dot(&weights.cosine_damping, &damping.coefficients)
+    };
+    let values: Vec<f64> = rows.map(left).collect();
+    let errors: Vec<f64> = observed.iter().map(|row| row[1]).collect();
+    let matrix = matrix(weights, |weights| &weights.cosine);
+    Smooth::of(&matrix, &values, &errors, &nodes.roughness())
+}
+
+fn dot(weights: &[f64], coefficients: &[f64]) -> f64 {
+    weights.iter().zip(coefficients).map(|(w, c)| w * c).sum()
+}
+
+fn matrix(weights: &[Weights], of: impl Fn(&Weights) -> &[f64]) -> DMatrix<f64> {
+    let width = weights.first().map_or(0, |row| of(row).len());
+    DMatrix::from_fn(weights.len(), width, |i, j| of(&weights[i])[j])
+}

@@ -1,0 +1,421 @@
+//! Reconstructed forces against the laws that made the curves.
+
+use nanotap::case::Case;
+use nanotap::case::file::Source;
+use nanotap::control::{CancelFlag, Control};
+use nanotap::study::approach::{ApproachOptions, Way, approach};
+use nanotap::study::fit::{Entry, Table};
+use nanotap::study::frequency_modulation::Modulated;
+use nanotap::study::orbit::{OrbitOptions, orbit};
+use nanotap::study::reconstruct::{ReconstructOptions, ReconstructReport, reconstruct};
+use serde_json::Value;
+
+use crate::fit::Noise;
+
+/// Curves of `../shared`'s prototype, with the laws' own forces.
+fn references() -> Vec<Value> {
+    serde_json::from_str(include_str!("../reference/inverse.json")).unwrap()
+}
+
+fn numbers(value: &Value) -> Vec<f64> {
+    let list = value.as_array().unwrap().iter();
+    list.map(|number| number.as_f64().unwrap()).collect()
+}
+
+/// The lever of a reference; its sample does not matter.
+fn lever(reference: &Value) -> Case {
+    let lever = &reference["lever"];
+    let of = |name: &str| lever[name].as_f64().unwrap();
+    let text = format!(
+        "[model]\nmodes = 1\n[cantilever]\nk = \"{} N/m\"\nf0 = \"{} Hz\"\nQ = {}\n[sample]\n\
+         stiffness = \"1 N/m\"\n[drive]\nactuation = \"{}\"\nfrequency_ratio = {}\n\
+         free_amplitude = \"{} m\"\n[gap]\ntip = \"10 nm\"\n",
+        of("k_static_N_per_m"),
+        of("f0_Hz"),
+        of("Q"),
+        lever["actuation"].as_str().unwrap(),
+        of("frequency_ratio"),
+        of("free_amplitude_m"),
+    );
+    let source = Source {
+        name: "lever.toml".into(),
+        text,
+    };
+    Case::parse(Some(source), &[]).unwrap()
+}
+
+/// Every `step`th row of a reference, with noise in nm and degrees.
+fn rows(reference: &Value, step: usize, noise: [f64; 2], seed: u64) -> Table {
+    let rows = &reference["rows"];
+    let mut random = Noise(seed);
+    let mut column = |name: &str, factor: f64, noise: f64| -> Vec<Entry> {
+        let values = numbers(&rows[name]).into_iter();
+        let noisy = values.map(|value| factor * value + noise * random.normal());
+        noisy.map(Entry::Number).collect()
+    };
+    let words = rows["direction"].as_array().unwrap().iter();
+    let words = words.map(|word| Entry::Text(word.as_str().unwrap().to_owned()));
+    let columns = [
+        ("direction", words.collect()),
+        ("distance (nm)", column("distance_m", 1e9, 0.0)),
+        ("amplitude (nm)", column("amplitude_m", 1e9, noise[0])),
+        ("phase (deg)", column("phase_deg", 1.0, noise[1])),
+    ];
+    let thinned = |values: Vec<Entry>| values.into_iter().step_by(step).collect();
+    Table {
+        name: "curve.csv".into(),
+        columns: columns
+            .into_iter()
+            .map(|(name, values): (&str, Vec<Entry>)| (name.to_owned(), thinned(values)))
+            .collect(),
+        lines: Vec::new(),
+    }
+}
+
+fn value_at(report: &ReconstructReport, x: f64) -> f64 {
+    let (at, force) = (&report.table.distance, &report.table.force);
+    let k = at.partition_point(|node| *node <= x).clamp(1, at.len() - 1);
+    let weight = (x - at[k - 1]) / (at[k] - at[k - 1]);
+    force[k - 1] + weight * (force[k] - force[k - 1])
+}
+
+/// Root mean square error relative to the law's largest force, relative error of the minimum, and
+/// error of the closest approach in m.
+fn deviations(reference: &Value, report: &ReconstructReport) -> [f64; 3] {
+    let truth = &reference["truth"];
+    let (at, force) = (numbers(&truth["distance_m"]), numbers(&truth["force_N"]));
+    let squares = at
+        .iter()
+        .zip(&force)
+        .map(|(x, f)| (value_at(report, *x) - f).powi(2));
+    let rms = (squares.sum::<f64>() / at.len() as f64).sqrt();
+    let of = |name: &str| truth[name].as_f64().unwrap();
+    let least = report.minimum.map_or(0.0, |minimum| minimum.force);
+    [
+        rms / of("force_scale_N"),
+        least / of("force_min_N") - 1.0,
+        report.closest - of("closest_approach_m"),
+    ]
+}
+
+fn reconstructed(case: &Case, data: Table, options: ReconstructOptions) -> ReconstructReport {
+    let options = ReconstructOptions {
+        data: vec![data],
+        ..options
+    };
+    reconstruct(case, &options, &Control::default()).unwrap()
+}
+
+#[test]
+fn references_are_met_within_their_tolerance() {
+    for reference in references() {
+        let (lever_of, noise) = (&reference["lever"], &reference["noise"]);
+        let number = |value: &Value| value.as_f64().unwrap();
+        let given = |value: f64| (value > 0.0).then_some(value);
+        let options = ReconstructOptions {
+            free_amplitude: Some(
+                format!("{} m", lever_of["free_amplitude_m"])
+                    .as_str()
+                    .into(),
+            ),
+            free_phase: Some(number(&lever_of["free_phase_deg"])),
+            amplitude_error: given(number(&noise["A_m"]))
+                .map(|error| format!("{error} m").as_str().into()),
+            phase_error: given(number(&noise["phase_deg"])),
+            ..ReconstructOptions::default()
+        };
+        let report = reconstructed(
+            &lever(&reference),
+            rows(&reference, 1, [0.0; 2], 0),
+            options,
+        );
+        let [rms, least, closest] = deviations(&reference, &report);
+        let dissipated = report
+            .rows
+            .iter()
+            .map(|row| row.dissipation)
+            .fold(0.0, f64::max);
+        let truth = number(&reference["truth"]["max_dissipation_J"]);
+        println!(
+            "{}: rms {rms:.4}, minimum {least:.4}, closest {closest:.2e} m, E_dis {dissipated:.3e} of {truth:.3e} J, \
+             chi2 {:.2}, freedom {:.1}, nodes {}",
+            reference["name"],
+            report.chi2,
+            report.freedom,
+            report.table.distance.len()
+        );
+        let tolerance = |name: &str| reference["tolerance"][name].as_f64();
+        assert!(rms < tolerance("rms_over_scale").unwrap());
+        assert!(closest.abs() < tolerance("closest_approach_m").unwrap());
+        if let Some(limit) = tolerance("force_min_relative") {
+            assert!(least.abs() < limit);
+        }
+        if let Some(limit) = tolerance("max_dissipation_relative") {
+            assert!((dissipated / truth - 1.0).abs() < limit);
+        }
+    }
+}
+
+#[test]
+fn noise_leaves_the_force_within_a_few_percent() {
+    let reference = &references()[0];
+    let case = lever(reference);
+    for (step, rms_limit, least_limit) in [(1, 0.02, 0.06), (4, 0.05, 0.09)] {
+        let mut all = Vec::new();
+        for seed in 1..=8 {
+            let table = rows(reference, step, [0.02, 0.1], seed);
+            let report = reconstructed(&case, table, ReconstructOptions::default());
+            println!(
+                "{step} {seed}: {:?} errors {:?} free {} {} {} chi2 {} df {}",
+                deviations(reference, &report),
+                report.errors,
+                report.free_amplitude,
+                report.free_phase,
+                report.free_rows,
+                report.chi2,
+                report.freedom
+            );
+            all.push(deviations(reference, &report));
+        }
+        let square = |index: usize| {
+            let squares = all.iter().map(|one| one[index] * one[index]);
+            (squares.sum::<f64>() / all.len() as f64).sqrt()
+        };
+        println!("{step}: {:?}", [0, 1, 2].map(square));
+        assert!(square(0) < rms_limit);
+        assert!(square(1) < least_limit);
+        assert!(all.iter().all(|one| one[2].abs() < 1e-10));
+    }
+}
+
+#[test]
+#[ignore = "experiment"]
+fn experiment() {
+    let reference = &references()[0];
+    let case = lever(reference);
+    for step in [1, 4] {
+        for variant in 0..3 {
+            let mut all = Vec::new();
+            let mut covered = [0; 2];
+            for seed in 1..=24 {
+                let table = rows(reference, step, [0.02, 0.1], seed);
+                let mut options = ReconstructOptions::default();
+                if variant > 0 {
+                    options.free_amplitude = Some("20 nm".into());
+                    options.free_phase = Some(90.0);
+                }
+                if variant > 1 {
+                    options.amplitude_error = Some("0.02 nm".into());
+                    options.phase_error = Some(0.1);
+                }
+                let report = reconstructed(&case, table, options);
+                let truth = &reference["truth"];
+                for (x, f) in numbers(&truth["distance_m"])
+                    .iter()
+                    .zip(numbers(&truth["force_N"]))
+                {
+                    let k = report
+                        .table
+                        .distance
+                        .partition_point(|node| node <= x)
+                        .clamp(1, report.table.distance.len() - 1);
+                    let error = report.table.force_error[k];
+                    covered[1] += 1;
+                    covered[0] += usize::from((value_at(&report, *x) - f).abs() < 2.0 * error);
+                }
+                all.push(deviations(reference, &report));
+            }
+            let square = |index: usize| {
+                let squares = all.iter().map(|one| one[index] * one[index]);
+                (squares.sum::<f64>() / all.len() as f64).sqrt()
+            };
+            let mean = all.iter().map(|one| one[1]).sum::<f64>() / all.len() as f64;
+            println!(
+                "step {step} variant {variant}: {:?} mean of minimum {mean} covered {covered:?}",
+                [0, 1, 2].map(square)
+            );
+        }
+    }
+}
+
+/// A table of numbers, without lines.
+fn table(columns: &[(&str, Vec<f64>)]) -> Table {
+    let entries = |values: &[f64]| values.iter().copied().map(Entry::Number).collect();
+    Table {
+        name: "curve.csv".into(),
+        columns: columns
+            .iter()
+            .map(|(name, values)| ((*name).to_owned(), entries(values)))
+            .collect(),
+        lines: Vec::new(),
+    }
+}
+
+#[test]
+fn frequency_shifts_give_the_force_of_the_law() {
+    let words = [
+        "modes=1",
+        "cantilever.k=0.87 N/m",
+        "cantilever.f0=100 kHz",
+        "cantilever.Q=200",
+        "tip.radius=5 nm",
+        "tip.modulus=160 GPa",
+        "tip.poisson=0.3",
+        "sample.law=dmt",
+        "sample.modulus=1 GPa",
+        "sample.poisson=0.3",
+        "sample.hamaker=3e-20 J",
+        "sample.intermolecular_distance=0.169 nm",
+        "drive.actuation=tip",
+        "drive.frequency=100 kHz",
+        "drive.free_amplitude=10 nm",
+        "gap.tip=12 nm",
+    ];
+    let case = Case::parse(None, &words.map(str::to_owned)).unwrap();
+    let scales = case.physical().unwrap().scales;
+    let options = ApproachOptions {
+        from: Some((16e-9 / scales.length).into()),
+        to: Some((9e-9 / scales.length).into()),
+        points: 80,
+        fm: true,
+        branches: false,
+        ..ApproachOptions::default()
+    };
+    let curve = approach(&case, &options, &Control::default()).unwrap();
+    let points = curve.table.iter().filter(|p| p.way == Way::Approach);
+    let points: Vec<_> = points
+        .map(|p| (p.zc.unwrap(), p.modulation.unwrap()))
+        .collect();
+    let column = |of: &dyn Fn(&(f64, Modulated)) -> f64| points.iter().map(of).collect();
+    let data = table(&[
+        ("distance (nm)", column(&|p| 1e9 * p.0)),
+        ("relative_shift", column(&|p| p.1.relative_shift)),
+        ("drive_ratio", column(&|p| p.1.drive_ratio)),
+    ]);
+    let report = reconstructed(&case, data, ReconstructOptions::default());
+    let (mut squares, mut largest) = (0.0, 0.0_f64);
+    for (_, found) in &points {
+        let truth = found.static_force.unwrap() * scales.force;
+        squares += (value_at(&report, found.closest * scales.length) - truth).powi(2);
+        largest = largest.max(truth.abs());
+    }
+    let rms = (squares / points.len() as f64).sqrt();
+    assert!(rms < 0.03 * largest, "{rms:e} of {largest:e}");
+    assert_eq!(report.sader_jarvis.unwrap().force.len(), points.len());
+    assert!(report.inflections.is_empty());
+}
+
+#[test]
+fn the_table_is_a_law_that_gives_the_curve_back() {
+    let reference = &references()[2];
+    let case = lever(reference);
+    let report = reconstructed(
+        &case,
+        rows(reference, 1, [0.0; 2], 0),
+        ReconstructOptions::default(),
+    );
+    let lever = &reference["lever"];
+    let of = |name: &str| lever[name].as_f64().unwrap();
+    let words = [
+        "modes=1".to_owned(),
+        format!("cantilever.k={} N/m", of("k_static_N_per_m")),
+        format!("cantilever.f0={} Hz", of("f0_Hz")),
+        format!("cantilever.Q={}", of("Q")),
+        "drive.actuation=base".to_owned(),
+        "drive.frequency_ratio=1".to_owned(),
+        format!("drive.free_amplitude={} m", of("free_amplitude_m")),
+        "sample.law=table".to_owned(),
+        format!("sample.table={}", report.csv()),
+        "gap.tip=6 nm".to_owned(),
+    ];
+    let again = Case::parse(None, &words).unwrap();
+    let found = orbit(&again.model().unwrap(), &OrbitOptions::default()).unwrap();
+    assert!(found.stable && found.observables.peak_force > 0.0);
+}
+
+#[test]
+fn an_instruments_columns_are_understood() {
+    let reference = &references()[0];
+    let raw = &reference["rows"];
+    let of = |name: &str, offset: f64, factor: f64| -> Vec<f64> {
+        let values = numbers(&raw[name]).into_iter();
+        values.map(|value| offset + factor * value).collect()
+    };
+    let data = table(&[
+        ("Zsnsr (nm)", of("distance_m", 1500.0, -1e9)),
+        ("Amp (V)", of("amplitude_m", 0.0, 1e9 / 58.0)),
+        ("Phase (deg)", of("phase_deg", 93.7, -1.0)),
+    ]);
+    let options = ReconstructOptions {
+        convert: vec!["Amp=58 nm/V".into()],
+        ..ReconstructOptions::default()
+    };
+    let report = reconstructed(&lever(reference), data, options);
+    let least = report.minimum.unwrap().force;
+    let truth = reference["truth"]["force_min_N"].as_f64().unwrap();
+    assert!((least / truth - 1.0).abs() < 0.05, "{least:e}");
+    assert!(report.closest.abs() < 4e-9, "{:e}", report.closest);
+    let retract = report
+        .rows
+        .iter()
+        .filter(|row| row.way == Some(Way::Retract));
+    assert_eq!(2 * retract.count(), report.rows.len());
+    for words in ["other way", "backwards", "row 88", "was added"] {
+        assert!(
+            report.remarks.iter().any(|remark| remark.contains(words)),
+            "{words}"
+        );
+    }
+}
+
+#[test]
+fn what_cannot_be_reconstructed_is_refused() {
+    let reference = &references()[0];
+    let case = lever(reference);
+    let good = rows(reference, 1, [0.0; 2], 0);
+    let refused = |data: Vec<Table>, options: ReconstructOptions, words: &str| {
+        let options = ReconstructOptions { data, ..options };
+        let error = reconstruct(&case, &options, &Control::default()).unwrap_err();
+        assert!(error.to_string().contains(words), "{error}");
+    };
+    let plain = ReconstructOptions::default;
+    refused(Vec::new(), plain(), "no data");
+    refused(
+        vec![rows(reference, 30, [0.0; 2], 0)],
+        plain(),
+        "feel the sample",
+    );
+    let mut none = good.clone();
+    none.columns.truncate(3);
+    refused(vec![none], plain(), "phase");
+    let mut negative = good.clone();
+    negative.columns[2].1[4] = Entry::Number(-1.0);
+    refused(vec![negative], plain(), "line 5");
+    let mut text = good.clone();
+    text.columns[2].1[6] = Entry::Text("off".into());
+    refused(vec![text], plain(), "row 7");
+    let convert = |rule: &str| ReconstructOptions {
+        convert: vec![rule.into()],
+        ..plain()
+    };
+    refused(
+        vec![good.clone()],
+        convert("Amp=58 nm/V"),
+        "no column is called `Amp`",
+    );
+    refused(vec![good.clone()], convert("amplitude=58 nm/V"), "is in nm");
+    refused(vec![good.clone()], convert("phase=x^2"), "not a conversion");
+    let few = ReconstructOptions { rows: 3, ..plain() };
+    refused(vec![good.clone()], few, "out of range");
+    let stop = CancelFlag::new();
+    stop.cancel();
+    let control = Control {
+        cancel: Some(&stop),
+        progress: None,
+    };
+    let options = ReconstructOptions {
+        data: vec![good],
+        ..plain()
+    };
+    assert!(reconstruct(&case, &options, &control).is_err());
+}

@@ -44,6 +44,12 @@ pub trait StroboscopicMap: Clone + Send + Sync {
         false
     }
 
+    /// Work done so far, in steps of an approximate flow; 0 where a period is in closed form. A clone
+    /// goes on from the same number. Budgets of work are measured by it.
+    fn cost(&self) -> u64 {
+        0
+    }
+
     /// A cheaper, approximate map of the same state, for following transients; `None` where this
     /// map is cheap itself. Nothing is reported from it.
     fn coarse(&self) -> Option<Self> {

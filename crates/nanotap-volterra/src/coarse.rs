@@ -45,6 +45,8 @@ const RESOLVED: f64 = 1.5;
 const UNRESOLVED: f64 = 1e-4;
 /// The most steps tried in one oscillation of the fastest tone.
 const MAX_STEPS: u64 = 20_000;
+/// Steps counted towards a budget, and steps between looks at the flag that cancels the work.
+const POLL: u64 = 64;
 /// Switches at one instant after which the law is reported to switch endlessly.
 const MAX_SWITCHES_AT_ONCE: usize = 64;
 /// A law of more branches that knows its branch from gap and rate is evaluated without
@@ -726,6 +728,11 @@ impl Coarse {
         self.work.statistics
     }
 
+    /// Steps tried in the runs so far.
+    pub fn cost(&self) -> u64 {
+        self.work.statistics.steps + self.work.statistics.refused
+    }
+
     /// Replaces `state` at drive phase 0 by the state so many periods later and returns the
     /// branch of the law there. The motion begins on `branch` where gap and rate allow it,
     /// otherwise on the branch that the law takes when nothing is known of the past.
@@ -886,8 +893,12 @@ impl Work {
         let mut fresh = true;
         let mut tried = 0;
         while end - self.now.time > 1e-13 * end {
-            if tried % 256 == 0 && tables.system.cancel().is_cancelled() {
-                return Err(VolterraError::Cancelled);
+            if tried % POLL == 0 {
+                let cancel = tables.system.cancel();
+                cancel.spend(POLL);
+                if cancel.is_cancelled() {
+                    return Err(VolterraError::Cancelled);
+                }
             }
             tried += 1;
             if tried > tables.max_steps {

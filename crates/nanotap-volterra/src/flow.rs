@@ -13,6 +13,8 @@ use std::sync::Arc;
 
 /// Switches at one instant after which the law is reported to switch endlessly.
 const MOST_SWITCHES_AT_ONCE: usize = 64;
+/// What a step costs, in steps of the approximate flow.
+const STEP_COST: u64 = 32;
 /// The first step of a run: a quarter of the longest.
 const FIRST_INDEX: usize = 4;
 /// A guard that is not certainly positive must be resolved to this fraction of its size.
@@ -185,6 +187,12 @@ impl Flow {
         self.solver.statistics
     }
 
+    /// Cost of the runs so far, in steps of the approximate flow.
+    pub fn cost(&self) -> u64 {
+        let statistics = self.solver.statistics;
+        STEP_COST * (statistics.steps + statistics.refused)
+    }
+
     /// The time reached.
     pub fn time(&self) -> f64 {
         self.time
@@ -284,6 +292,7 @@ impl Flow {
                 self.commit_pending(&system, end, observer);
                 return Ok(());
             }
+            system.cancel().spend(STEP_COST);
             if system.cancel().is_cancelled() {
                 return Err(VolterraError::Cancelled);
             }

@@ -8,7 +8,7 @@ use rayon::Scope;
 
 use crate::continuation::bifurcation::{Bifurcation, Tests, between};
 use crate::continuation::solver::{BranchSolver, Node};
-use crate::control::Control;
+use crate::control::{CancelFlag, Control};
 use crate::map::MapFamily;
 use crate::orbit::side_by_side::is_alone;
 
@@ -21,6 +21,11 @@ pub(crate) struct Locating<'s, 'scope> {
 }
 
 impl<'scope> Locating<'_, 'scope> {
+    /// Whether the work is counted, and so must not run beside that of the branch.
+    fn has_budget(&self) -> bool {
+        self.control.cancel.is_some_and(CancelFlag::has_budget)
+    }
+
     /// The bifurcations between two neighbouring nodes, or none, where another thread is to find
     /// them.
     pub(crate) fn between<'a: 'scope, F: MapFamily + 'scope>(
@@ -31,7 +36,7 @@ impl<'scope> Locating<'_, 'scope> {
         step: f64,
         after_point: usize,
     ) -> Vec<Bifurcation> {
-        if is_alone() || !Tests::any_changes(tests, solver.n) {
+        if is_alone() || self.has_budget() || !Tests::any_changes(tests, solver.n) {
             return between(solver, nodes, tests, step, after_point);
         }
         let mut solver = solver.another();

@@ -658,6 +658,11 @@ impl NonlinearStrobe {
         self.flow.statistics().evaluations
     }
 
+    /// See [`StroboscopicMap::cost`](nanotap_dynamics::StroboscopicMap::cost).
+    pub(crate) fn cost(&self) -> u64 {
+        self.flow.cost()
+    }
+
     /// See [`Nonlinear::log_determinant_everywhere`].
     pub(crate) fn log_determinant(&self) -> Option<f64> {
         self.nonlinear.log_determinant_everywhere()
@@ -727,6 +732,11 @@ impl CoarseStrobe {
     /// Evaluations of the law so far.
     pub(crate) fn evaluations(&self) -> u64 {
         self.coarse.statistics().evaluations
+    }
+
+    /// See [`StroboscopicMap::cost`](nanotap_dynamics::StroboscopicMap::cost).
+    pub(crate) fn cost(&self) -> u64 {
+        self.coarse.cost()
     }
 }
 

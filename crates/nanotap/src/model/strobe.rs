@@ -138,6 +138,14 @@ impl StroboscopicMap for Strobe {
         Some(Self(Engine::Coarse(Box::new(coarse))))
     }
 
+    fn cost(&self) -> u64 {
+        match &self.0 {
+            Engine::Exact(_) => 0,
+            Engine::Nonlinear(map) => map.cost(),
+            Engine::Coarse(map) => map.cost(),
+        }
+    }
+
     /// Under a nonlinear force.
     fn is_costly(&self) -> bool {
         matches!(self.0, Engine::Nonlinear(_))

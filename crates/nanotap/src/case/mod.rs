@@ -174,11 +174,16 @@ impl Case {
     /// control that cannot, the same.
     #[must_use]
     pub fn cancelled_by(&self, control: &Control<'_>) -> Self {
-        let mut case = self.clone();
-        if let Some(cancel) = control.cancel {
-            case.cancel = cancel.clone();
+        self.with_flag(control.cancel.unwrap_or(&self.cancel))
+    }
+
+    /// The same, whose models' motions end with an error once `flag` is set or its budget spent.
+    #[must_use]
+    pub(crate) fn with_flag(&self, flag: &CancelFlag) -> Self {
+        Self {
+            cancel: flag.clone(),
+            ..self.clone()
         }
-        case
     }
 
     /// The same, whose models' motions may go on for a moment after the work was cancelled: for

@@ -48,6 +48,8 @@ pub struct BranchOptions {
     pub max_step: f64,
     /// Points after which a branch is cut.
     pub max_points: usize,
+    /// Whether grazings are located.
+    pub grazings: bool,
     /// Branches after which no more are followed.
     pub max_branches: usize,
     /// A branch is left where a disturbance grows by more than this in the orbit's period.
@@ -96,6 +98,7 @@ impl BranchOptions {
             second: None,
             max_step: continuation.max_step,
             max_points: 20_000,
+            grazings: true,
             max_branches: 64,
             max_multiplier: continuation.max_multiplier,
             observables: Set::COMMON,
@@ -108,6 +111,7 @@ impl BranchOptions {
             max_step: self.max_step,
             initial_step: over.initial_step.min(self.max_step),
             max_points: self.max_points,
+            grazings: self.grazings,
             max_multiplier: self.max_multiplier,
             ..over
         }

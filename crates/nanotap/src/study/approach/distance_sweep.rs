@@ -8,13 +8,16 @@
 //! motion that does not close is followed on a grid of distances that depends on the case alone,
 //! until an orbit is found there, whose branch is then continued back to its beginning as well.
 //!
+//! Under a nonlinear law the work is counted in steps of the approximate flow, and ends at a budget
+//! ([`SWEEP_STEPS`]): what was followed by then is kept, with the reason why it goes no further.
+//!
 //! Fails: what a motion that does not close meets within a step of the grid is not seen, and
 //! where it ends by a jump the place is known to a step of the grid.
 
 use std::fmt;
 
 use nanotap_dynamics::{
-    Bifurcation, BifurcationKind, Branch, BranchEnd, BranchPoint, ClassifyOptions,
+    Bifurcation, BifurcationKind, Branch, BranchEnd, BranchPoint, CancelFlag, ClassifyOptions,
     ContinuationOptions, Control, Direction, LyapunovOptions, MotionKind, PeriodicOrbit,
     ShootingOptions, StroboscopicMap as _, UndecidedReason, classify, close_orbit,
     close_orbit_from_points, continue_orbit, switch_at_flip,
@@ -23,6 +26,7 @@ use nanotap_dynamics::{
 use crate::case::{Case, CaseError, Family};
 use crate::model::Model;
 use crate::model::strobe::Strobe;
+use crate::number::shortest;
 use crate::study::branch::kind_name;
 use crate::study::simulate::{Classification, Named};
 use crate::study::sweep::SweepOptions;
@@ -57,6 +61,9 @@ const ROW_TRANSIENT: usize = 128;
 const DECAY_TIMES: f64 = 30.0;
 const MAX_TRANSIENT: usize = 1 << 15;
 
+/// Steps of the approximate flow after which a motion is not followed further along the distance.
+pub(in crate::study) const SWEEP_STEPS: u64 = 24_000_000;
+
 /// Why a piece of a way ends.
 #[derive(Clone, Debug)]
 pub(in crate::study) enum End {
@@ -73,6 +80,8 @@ pub(in crate::study) enum End {
     Closes,
     /// The branch could not be followed further.
     Lost(String),
+    /// The budget of steps was spent.
+    Budget(u64),
 }
 
 impl fmt::Display for End {
@@ -83,8 +92,18 @@ impl fmt::Display for End {
             Self::Meeting { period } => write!(f, "meets period {period}"),
             Self::Closes => f.write_str("becomes periodic"),
             Self::Lost(reason) => f.write_str(reason),
+            Self::Budget(steps) => f.write_str(&budget_text(*steps)),
         }
     }
+}
+
+/// In words that a budget of steps was spent.
+pub(in crate::study) fn budget_text(steps: u64) -> String {
+    let millions = steps as f64 / 1e6;
+    format!(
+        "the lever was followed up to the budget of {} million steps",
+        shortest(millions)
+    )
 }
 
 /// A stretch of a branch on which all orbits are stable, by ascending distance.
@@ -193,25 +212,33 @@ pub(in crate::study) enum Place {
 
 /// Motions followed along the distance.
 pub(in crate::study) struct DistanceSweep<'a> {
-    case: &'a Case,
+    /// With the flag of the present budget.
+    case: Case,
     family: Family,
     /// The least and the greatest distance.
     range: (f64, f64),
     /// The unit in which small differences of distances are measured.
     scale: f64,
     classify: ClassifyOptions,
-    control: Control<'a>,
+    control: &'a Control<'a>,
+    /// What cancels the work: the caller, or the budget of a case under a nonlinear law.
+    flag: CancelFlag,
+    budget: Option<u64>,
+    /// Steps and points of the stretches that were continued.
+    continued: (u64, usize),
+    /// Whether a motion that does not close is followed no further.
+    pub(in crate::study) stops_on_grid: bool,
     pub(in crate::study) stretches: Vec<Stretch>,
 }
 
 impl<'a> DistanceSweep<'a> {
     /// Of a case between two distances. `reach` is how far the free tip swings.
     pub(in crate::study) fn new(
-        case: &'a Case,
+        case: &Case,
         (near, far): (f64, f64),
         reach: f64,
         max_period: usize,
-        control: &Control<'a>,
+        control: &'a Control<'a>,
     ) -> Result<Self, CaseError> {
         let swings = reach > 0.0 && reach.is_finite();
         let far = if swings { far.max(BEYOND * reach) } else { far };
@@ -227,8 +254,8 @@ impl<'a> DistanceSweep<'a> {
         });
         let decays = (DECAY_TIMES / rate).min(MAX_TRANSIENT as f64);
         let decays = if decays.is_nan() { 0 } else { decays as usize };
-        Ok(Self {
-            case,
+        let mut sweep = Self {
+            case: case.clone(),
             family: case.family(case.gap_key()),
             range: (near, far),
             scale: if swings { reach } else { far - near },
@@ -242,12 +269,50 @@ impl<'a> DistanceSweep<'a> {
                 birkhoff_periods: 1024,
                 ..sweep.classify()
             },
-            control: Control {
-                progress: None,
-                ..*control
-            },
+            control,
+            flag: CancelFlag::default(),
+            budget: None,
+            continued: (0, 0),
+            stops_on_grid: false,
             stretches: Vec::new(),
-        })
+        };
+        sweep.allow(model.nonlinear.is_some().then_some(SWEEP_STEPS));
+        Ok(sweep)
+    }
+
+    /// Allows so many steps from here on, of a case under a nonlinear law; none of another is
+    /// counted.
+    pub(in crate::study) fn allow_steps(&mut self, steps: u64) {
+        self.allow(self.budget.map(|_| steps));
+    }
+
+    fn allow(&mut self, budget: Option<u64>) {
+        let flag = self.control.cancel.unwrap_or(self.case.cancel()).clone();
+        self.flag = budget.map_or_else(|| flag.clone(), |steps| flag.with_budget(steps));
+        self.budget = budget;
+        self.case = self.case.with_flag(&self.flag);
+        self.family = self.case.family(self.case.gap_key());
+    }
+
+    /// What cancels the work: the caller, or the budget.
+    pub(in crate::study) fn limited(&self) -> Control<'_> {
+        Control {
+            cancel: Some(&self.flag),
+            progress: None,
+        }
+    }
+
+    /// The budget, if it is spent.
+    pub(in crate::study) fn spent_budget(&self) -> Option<u64> {
+        self.budget.filter(|_| self.flag.is_spent())
+    }
+
+    /// Points of branches for which so many steps suffice, by the average so far; no end of them
+    /// where steps are not counted.
+    pub(in crate::study) fn points_in(&self, steps: u64) -> usize {
+        let (taken, points) = self.continued;
+        let points = steps.saturating_mul(points as u64).checked_div(taken);
+        points.map_or(usize::MAX, |points| points as usize)
     }
 
     /// The greatest distance: that of the free motion, or beyond.
@@ -358,7 +423,11 @@ impl<'a> DistanceSweep<'a> {
                 && (self.orbit_at(k, gap)).is_some_and(|own| is_same(&own, &orbit))
         });
         let stretch = known.unwrap_or_else(|| {
-            self.stretches.push(self.continued(gap, orbit));
+            let before = self.flag.spent();
+            let stretch = self.continued(gap, orbit);
+            self.continued.0 += self.flag.spent() - before;
+            self.continued.1 += stretch.points.len();
+            self.stretches.push(stretch);
             self.stretches.len() - 1
         });
         Place::On { stretch, gap }
@@ -381,6 +450,8 @@ impl<'a> DistanceSweep<'a> {
         let (near, far) = self.range;
         ContinuationOptions {
             until_unstable: true,
+            // Those of piecewise-linear systems take little time and end branches.
+            grazings: self.budget.is_none(),
             max_points: MAX_POINTS,
             parameter_scale: Some(self.scale),
             ..ContinuationOptions::over(near, far)
@@ -394,10 +465,16 @@ impl<'a> DistanceSweep<'a> {
         direction: Direction,
     ) -> (Vec<BranchPoint>, (f64, End)) {
         let options = self.options();
-        match continue_orbit(&self.family, gap, orbit, direction, &options, &self.control) {
-            Ok(branch) => stable_part(branch),
-            Err(error) => (Vec::new(), (gap, End::Lost(error.to_string()))),
+        let control = self.limited();
+        let (points, mut end) =
+            match continue_orbit(&self.family, gap, orbit, direction, &options, &control) {
+                Ok(branch) => stable_part(branch),
+                Err(error) => (Vec::new(), (gap, End::Lost(error.to_string()))),
+            };
+        if let Some(steps) = self.spent_budget() {
+            end.1 = End::Budget(steps);
         }
+        (points, end)
     }
 
     /// The stretch of stable orbits through one.
@@ -483,7 +560,7 @@ impl<'a> DistanceSweep<'a> {
         };
         let (at, orbit) = (nearest.parameter, &nearest.orbit);
         let branch =
-            continue_orbit(&self.family, at, orbit, direction, &options, &self.control).ok()?;
+            continue_orbit(&self.family, at, orbit, direction, &options, &self.limited()).ok()?;
         let last = branch.points.into_iter().next_back()?;
         let arrived = matches!(branch.end, BranchEnd::RangeEnd) && last.orbit.is_stable();
         arrived.then_some(last.orbit)
@@ -524,10 +601,14 @@ impl<'a> DistanceSweep<'a> {
     ) -> (Vec<Piece>, Place) {
         let mut pieces: Vec<Piece> = Vec::new();
         loop {
-            let (mut piece, next) = self.piece(place.clone(), to);
+            let (mut piece, mut next) = self.piece(place.clone(), to);
             // A jump takes no distance.
             piece.from = pieces.last().map_or(piece.from, |last| last.to);
-            let done = enough(self, &piece) || self.control.is_cancelled();
+            if let Some(steps) = self.spent_budget() {
+                (piece.end, piece.jumps) = (End::Budget(steps), false);
+                next.get_or_insert(place.clone());
+            }
+            let done = enough(self, &piece) || self.flag.is_cancelled();
             pieces.push(piece);
             match next {
                 Some(next) if !done && pieces.len() < MAX_PIECES => place = next,
@@ -683,7 +764,7 @@ impl<'a> DistanceSweep<'a> {
         if known.is_some() {
             return known;
         }
-        let branch = switch_at_flip(&self.family, flip, &self.options(), &self.control).ok()?;
+        let branch = switch_at_flip(&self.family, flip, &self.options(), &self.limited()).ok()?;
         let (mut points, end) = stable_part(branch);
         let side = sign(direction);
         let first = points.first()?;
@@ -730,7 +811,12 @@ impl<'a> DistanceSweep<'a> {
         let mut found = vec![(from, met)];
         let mut onwards = None;
         while let Some((gap, before)) = found.last().cloned() {
-            if (gap - to) * side >= 0.0 || self.control.is_cancelled() {
+            if (gap - to) * side >= 0.0 {
+                break;
+            }
+            if self.stops_on_grid || self.flag.is_cancelled() {
+                piece.to = gap;
+                onwards = Some(Place::Off { gap, met: before });
                 break;
             }
             // The next multiple of a step, beyond rounding.
@@ -816,7 +902,7 @@ const fn is_continuous(end: &End) -> bool {
                 | BifurcationKind::Crossing
         ),
         End::Meeting { .. } => true,
-        End::Range | End::Closes | End::Lost(_) => false,
+        End::Range | End::Closes | End::Lost(_) | End::Budget(_) => false,
     }
 }
 

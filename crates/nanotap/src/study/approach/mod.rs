@@ -313,6 +313,9 @@ pub struct ApproachReport {
     pub branches: Option<BranchReport>,
     /// Whether the work was stopped before it was done.
     pub cancelled: bool,
+    /// Budgets of steps that were spent, with what is missing for that.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub limits: Vec<String>,
     /// Of a physical case: what a distance is to be multiplied with for SI.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub parameter_unit: Option<ParameterUnit>,
@@ -354,6 +357,7 @@ pub fn approach(
         coexisting: found.coexisting,
         branches: found.branches,
         cancelled: control.is_cancelled(),
+        limits: found.limits,
         parameter_unit: case.parameter_unit(key),
         modulation: None,
     })

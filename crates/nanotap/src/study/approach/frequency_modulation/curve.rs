@@ -158,6 +158,7 @@ pub fn modulated_approach(
         coexisting: Vec::new(),
         branches: None,
         cancelled: control.is_cancelled(),
+        limits: Vec::new(),
         parameter_unit: case.parameter_unit(case.gap_key()),
         modulation: Some(ModulationReport {
             amplitude: free.amplitude,

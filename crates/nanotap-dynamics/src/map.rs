@@ -50,6 +50,11 @@ pub trait StroboscopicMap: Clone + Send + Sync {
         0
     }
 
+    /// Adds the cost of work that a clone did for this map.
+    fn add_cost(&mut self, cost: u64) {
+        let _ = cost;
+    }
+
     /// A cheaper, approximate map of the same state, for following transients; `None` where this
     /// map is cheap itself. Nothing is reported from it.
     fn coarse(&self) -> Option<Self> {

@@ -193,6 +193,11 @@ impl Flow {
         STEP_COST * (statistics.steps + statistics.refused)
     }
 
+    /// Adds the cost of work that a clone did.
+    pub fn add_cost(&mut self, cost: u64) {
+        self.solver.statistics.steps += cost / STEP_COST;
+    }
+
     /// The time reached.
     pub fn time(&self) -> f64 {
         self.time

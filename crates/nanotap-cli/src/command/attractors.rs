@@ -238,6 +238,12 @@ fn unseen_paragraphs(found: &Attractors, unseen: &UnseenReport) -> String {
                 " The census ended at its limit of {limit} starts, before the requested {} %.",
                 percent(unseen.target)
             ),
+            EndReport::MaxSteps { limit } => format!(
+                " The census ended at its limit of {} million steps of the approximate flow (one of the exact flow \
+                 counts as 32), before the requested {} %.",
+                limit / 1_000_000,
+                percent(unseen.target)
+            ),
             EndReport::MaxPeriods { limit } => format!(
                 " The census ended at its limit of {limit} drive periods, before the requested {} %.",
                 percent(unseen.target)

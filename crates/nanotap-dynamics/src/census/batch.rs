@@ -31,8 +31,9 @@ pub(super) struct Batch<'a, M> {
 }
 
 impl<M: StroboscopicMap> Batch<'_, M> {
-    /// Where each start goes; `None` for those that were under way when the work was stopped.
-    pub(super) fn followed(&self) -> Vec<Option<RunEnd>> {
+    /// Where each start goes, with what that cost; `None` for those that were under way when the work
+    /// was stopped.
+    pub(super) fn followed(&self) -> Vec<Option<(RunEnd, u64)>> {
         let (sender, ended) = channel();
         let taken = AtomicUsize::new(0);
         rayon::scope(|scope| {
@@ -45,9 +46,9 @@ impl<M: StroboscopicMap> Batch<'_, M> {
                 scope.spawn(move |scope| turn.follow(scope));
             }
         });
-        let mut ends: Vec<Option<RunEnd>> = self.starts.iter().map(|_| None).collect();
-        for (place, end) in ended.try_iter() {
-            ends[place] = Some(end);
+        let mut ends: Vec<Option<(RunEnd, u64)>> = self.starts.iter().map(|_| None).collect();
+        for (place, end, cost) in ended.try_iter() {
+            ends[place] = Some((end, cost));
         }
         ends
     }
@@ -59,7 +60,7 @@ struct Turn<'s, 'a, M> {
     batch: &'s Batch<'a, M>,
     /// Starts that some thread has taken.
     taken: &'s AtomicUsize,
-    sender: Sender<(usize, RunEnd)>,
+    sender: Sender<(usize, RunEnd, u64)>,
 }
 
 impl<'s, 'a: 's, M: StroboscopicMap> Turn<'s, 'a, M> {
@@ -81,12 +82,14 @@ impl<'s, 'a: 's, M: StroboscopicMap> Turn<'s, 'a, M> {
             let parts = SHARES * rayon::current_num_threads();
             let places = || (self.left() / parts).clamp(LEAST_TOGETHER, most);
             let followed = |place, followed| match followed {
-                Followed::Ended(end) => self.tell(place, end),
+                // Maps that take several motions at a time are in closed form and cost nothing.
+                Followed::Ended(end) => self.send(place, end, 0),
                 Followed::Unmeasured(run) => {
                     let other = self.clone();
                     scope.spawn(move |_| {
                         if !cancelled() {
-                            other.tell(place, run.measured(&mut other.batch.map.clone()));
+                            let end = run.measured(&mut other.batch.map.clone());
+                            other.send(place, end, 0);
                         }
                     });
                 }
@@ -102,7 +105,9 @@ impl<'s, 'a: 's, M: StroboscopicMap> Turn<'s, 'a, M> {
             );
         } else {
             while let (false, Some((place, start))) = (cancelled(), self.next()) {
-                self.tell(place, follow_start(&mut map, start, known, options));
+                let before = map.cost();
+                let end = follow_start(&mut map, start, known, options);
+                self.send(place, end, map.cost() - before);
             }
         }
     }
@@ -117,7 +122,7 @@ impl<'s, 'a: 's, M: StroboscopicMap> Turn<'s, 'a, M> {
         self.batch.starts.len().saturating_sub(taken)
     }
 
-    fn tell(&self, place: usize, end: RunEnd) {
+    fn send(&self, place: usize, end: RunEnd, cost: u64) {
         // The map may have ended a run that was under way.
         if self.batch.control.is_cancelled() {
             return;
@@ -125,6 +130,6 @@ impl<'s, 'a: 's, M: StroboscopicMap> Turn<'s, 'a, M> {
         let (done, all) = self.batch.progress;
         self.batch.control.report(done, all);
         // What receives it outlives whoever sends.
-        let _ = self.sender.send((place, end));
+        let _ = self.sender.send((place, end, cost));
     }
 }

@@ -101,6 +101,9 @@ pub struct CensusOptions {
     pub max_starts: usize,
     /// Periods of all starts together after which no further batch is begun.
     pub max_periods: usize,
+    /// Steps of time integration of all the work after which no further batch is begun, as the map
+    /// counts them ([`StroboscopicMap::cost`]). [`ClassifyOptions::max_steps`] limits a start.
+    pub max_steps: u64,
 }
 
 impl Default for CensusOptions {
@@ -111,6 +114,7 @@ impl Default for CensusOptions {
             unseen: 0.002,
             max_starts: 5000,
             max_periods: 2_000_000,
+            max_steps: 48_000_000,
         }
     }
 }
@@ -165,6 +169,8 @@ pub enum CensusEnd {
     MaxStarts,
     /// The starts took [`CensusOptions::max_periods`].
     MaxPeriods,
+    /// The work took [`CensusOptions::max_steps`].
+    MaxSteps,
 }
 
 /// What happened to the starts of one size.
@@ -318,6 +324,8 @@ struct Work<'a, M> {
     patience: usize,
     /// Periods run so far.
     periods: usize,
+    /// Cost of the starts and trapping regions so far.
+    cost: u64,
     /// Starts decided since the last new motion, of those that count in the fractions.
     row: usize,
 }
@@ -349,6 +357,7 @@ impl<'a, M: StroboscopicMap> Work<'a, M> {
             searched: 0,
             patience: 0,
             periods: 0,
+            cost: 0,
             row: 0,
         };
         if work.motions.is_coarse {
@@ -396,7 +405,16 @@ impl<'a, M: StroboscopicMap> Work<'a, M> {
         }
         self.is_bound_met()
             || self.outcomes.len() > self.starts.given_count()
-                && self.periods >= self.options.max_periods
+                && (self.periods >= self.options.max_periods || self.is_budget_spent())
+    }
+
+    fn is_budget_spent(&self) -> bool {
+        self.total_cost() >= self.options.max_steps
+    }
+
+    /// Cost of all the work so far.
+    fn total_cost(&self) -> u64 {
+        self.cost + self.motions.cost()
     }
 
     fn is_bound_met(&self) -> bool {
@@ -411,6 +429,8 @@ impl<'a, M: StroboscopicMap> Work<'a, M> {
             CensusEnd::BoundMet
         } else if self.outcomes.len() >= self.last {
             CensusEnd::MaxStarts
+        } else if self.is_budget_spent() {
+            CensusEnd::MaxSteps
         } else {
             CensusEnd::MaxPeriods
         }
@@ -428,7 +448,10 @@ impl<'a, M: StroboscopicMap> Work<'a, M> {
             let budget = periods * self.outcomes.len() as f64 / self.periods.max(1) as f64;
             size = size.min(bound).min(budget.ceil() as usize);
         }
-        size.div_ceil(BATCH).max(1) * BATCH
+        let size = size.div_ceil(BATCH).max(1) * BATCH;
+        let steps = self.options.max_steps.saturating_sub(self.total_cost());
+        let affordable = steps.saturating_mul(self.outcomes.len() as u64) / self.cost.max(1);
+        size.min((affordable as usize).max(FIRST_PILOTS))
     }
 
     /// Follows the next `size` starts; returns those that were classified.
@@ -447,12 +470,16 @@ impl<'a, M: StroboscopicMap> Work<'a, M> {
         let arrivals = self.run(&starts);
         let known: Vec<usize> = self.neighbourhoods.iter().map(|(i, _)| *i).collect();
         let mut classified = Vec::new();
-        for (k, arrival) in range.zip(arrivals) {
+        for ((k, arrival), start) in range.zip(arrivals).zip(&starts) {
             let before = self.motions.count();
+            let arrival = arrival.map(|(arrival, cost)| {
+                self.cost += cost;
+                arrival
+            });
             if matches!(arrival, Some(RunEnd::Classified(_))) {
                 classified.push(k);
             }
-            let outcome = self.outcome(arrival, &known);
+            let outcome = self.outcome(arrival, &known, start);
             self.periods += assemble::periods_of(&outcome);
             let counts = self.starts.len().is_some()
                 || matches!(self.starts.origin(k), Some(StartOrigin::Drawn(_)));
@@ -514,7 +541,7 @@ impl<'a, M: StroboscopicMap> Work<'a, M> {
         }
     }
 
-    fn run(&self, starts: &[Vec<f64>]) -> Vec<Option<RunEnd>> {
+    fn run(&self, starts: &[Vec<f64>]) -> Vec<Option<(RunEnd, u64)>> {
         let balls = self.balls();
         let batch = Batch {
             map: &self.motions.followed,
@@ -527,11 +554,12 @@ impl<'a, M: StroboscopicMap> Work<'a, M> {
         batch.followed()
     }
 
-    fn outcome(&mut self, arrival: Option<RunEnd>, known: &[usize]) -> Outcome {
+    /// What a start has come to that arrived there.
+    fn outcome(&mut self, arrival: Option<RunEnd>, known: &[usize], start: &[f64]) -> Outcome {
         match arrival {
             None => Outcome::Undecided(UndecidedReason::Cancelled),
             Some(RunEnd::Entered { index, periods }) => self.motions.arrival(known[index], periods),
-            Some(RunEnd::Classified(classified)) => self.motions.outcome(*classified),
+            Some(RunEnd::Classified(classified)) => self.motions.outcome(*classified, start),
         }
     }
 
@@ -547,7 +575,7 @@ impl<'a, M: StroboscopicMap> Work<'a, M> {
                 }
             }
         }
-        let new: Vec<(usize, Neighbourhood)> = (self.searched..orbits.len())
+        let found: Vec<(Option<Neighbourhood>, u64)> = (self.searched..orbits.len())
             .into_par_iter()
             .with_max_len(1)
             .map_init(
@@ -557,24 +585,27 @@ impl<'a, M: StroboscopicMap> Work<'a, M> {
                     let others = orbits.iter().map(|(orbit, _)| orbit);
                     let others = others.enumerate().filter(|(k, _)| *k != own);
                     let others = others.map(|(_, other)| other).chain(&motions.unstable);
+                    let before = map.cost();
                     let found = if self.control.is_cancelled() {
-                        return None;
+                        return (None, 0);
                     } else if motions.is_coarse {
                         Neighbourhood::over_block(map, orbit, others)
                     } else {
                         Neighbourhood::around(map, orbit)
                     };
-                    Some((own, found.ok().flatten()?))
+                    (found.ok().flatten(), map.cost() - before)
                 },
             )
-            .collect::<Vec<_>>()
-            .into_iter()
-            .flatten()
             .collect();
+        let first = self.searched;
         self.searched = orbits.len();
-        let found = !new.is_empty();
-        self.neighbourhoods.extend(new);
-        found
+        let known = self.neighbourhoods.len();
+        for (k, (neighbourhood, cost)) in found.into_iter().enumerate() {
+            self.cost += cost;
+            let found = neighbourhood.map(|neighbourhood| (first + k, neighbourhood));
+            self.neighbourhoods.extend(found);
+        }
+        self.neighbourhoods.len() > known
     }
 
     /// How long the starts that were `classified` really took, now that their goal is
@@ -673,7 +704,9 @@ impl<'a, M: StroboscopicMap> Work<'a, M> {
         let together = WATCHED_TOGETHER / chaotic.max(1);
         let mut budget = self.options.max_periods;
         if self.motions.is_coarse {
-            budget = budget.min(WATCHED_TOGETHER);
+            let steps = self.options.max_steps.saturating_sub(self.total_cost());
+            let affordable = steps.saturating_mul(self.periods as u64) / self.cost.max(1);
+            budget = budget.min(WATCHED_TOGETHER).min(affordable as usize);
         }
         if self.motions.is_coarse && together > enough {
             for round in (0..WATCH_ROUNDS).rev() {
@@ -735,7 +768,8 @@ impl<'a, M: StroboscopicMap> Work<'a, M> {
                 }
                 Err(arrival) => {
                     let (spectrum, observed) = (chaos.spectrum.clone(), chaos.observed);
-                    let mut outcome = self.outcome(Some(arrival), &known);
+                    let start = at.clone();
+                    let mut outcome = self.outcome(Some(arrival), &known, &start);
                     if let Outcome::Orbit { periods, .. } = &mut outcome {
                         *periods += observed;
                         self.motions.transient_spectrum.get_or_insert(spectrum);

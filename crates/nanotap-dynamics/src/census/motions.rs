@@ -21,12 +21,18 @@ const MAX_EXACT_RUNS: usize = 8;
 /// States of a motion that does not close from which it is classified exactly, until one shows what
 /// it is.
 const MAX_TRIES: usize = 4;
+/// Starts on which the coarse map fails that are followed on the map itself, at most.
+const MAX_RETRIES: usize = 64;
+/// The same where that fails too.
+const MAX_FAILED_RETRIES: usize = 4;
 /// Periods for which exponents are measured on the map itself at most.
 const MAX_EXACT_PERIODS: usize = 4000;
 
 pub(super) struct Motions<'a, M> {
     /// The map itself.
     exact: M,
+    /// Its cost at first.
+    first_cost: u64,
     /// The map that starts are followed on: the same, or its coarse one.
     pub(super) followed: M,
     pub(super) is_coarse: bool,
@@ -44,6 +50,9 @@ pub(super) struct Motions<'a, M> {
     /// Orbits of the map itself that were looked for on the followed one.
     paired: usize,
     exact_runs: usize,
+    /// Starts on which the coarse map failed that were followed on the map itself.
+    retries: usize,
+    failed_retries: usize,
     /// Spectra of chaotic motions and tori of the followed map, one of each.
     pub(super) spectra: Vec<LyapunovSpectrum>,
     /// What each of these is.
@@ -83,6 +92,7 @@ impl<'a, M: StroboscopicMap> Motions<'a, M> {
         Self {
             budgets,
             exact: map.clone(),
+            first_cost: map.cost(),
             is_coarse: coarse.is_some(),
             followed: coarse.unwrap_or_else(|| map.clone()),
             options,
@@ -92,10 +102,17 @@ impl<'a, M: StroboscopicMap> Motions<'a, M> {
             followed_orbits: Vec::new(),
             paired: 0,
             exact_runs: 0,
+            retries: 0,
+            failed_retries: 0,
             spectra: Vec::new(),
             irregular: Vec::new(),
             transient_spectrum: None,
         }
+    }
+
+    /// Cost of what was closed and classified on the map itself.
+    pub(super) fn cost(&self) -> u64 {
+        self.exact.cost() - self.first_cost
     }
 
     /// Motions found so far.
@@ -118,8 +135,25 @@ impl<'a, M: StroboscopicMap> Motions<'a, M> {
         self.pair_orbits();
     }
 
-    /// What a start came to that was followed to its end.
-    pub(super) fn outcome(&mut self, found: Classified) -> Outcome {
+    /// What a start came to that was followed to its end: on the map itself, where the coarse one
+    /// failed.
+    pub(super) fn outcome(&mut self, mut found: Classified, start: &[f64]) -> Outcome {
+        let retries = self.retries < MAX_RETRIES && self.failed_retries < MAX_FAILED_RETRIES;
+        if self.is_coarse && is_map_failure(&found.kind) && retries {
+            self.retries += 1;
+            let exact = self.classify_exactly(start, 0);
+            if is_map_failure(&exact.kind) {
+                self.failed_retries += 1;
+            } else {
+                found.met.into_iter().for_each(|orbit| {
+                    self.follow_orbit(orbit);
+                });
+                let outcome = self.exact_outcome(exact);
+                self.pair_orbits();
+                return outcome;
+            }
+            found.kind = exact.kind;
+        }
         if !self.is_coarse {
             let outcome = self.exact_outcome(found);
             self.pair_orbits();
@@ -229,7 +263,6 @@ impl<'a, M: StroboscopicMap> Motions<'a, M> {
             cancel: self.cancel,
             ..Known::default()
         };
-        self.exact_runs += 1;
         let mut found = classify_on(&mut self.exact, state, known, &self.budgets);
         found.periods += periods;
         if let MotionKind::Chaotic(chaos) = &mut found.kind {
@@ -251,6 +284,7 @@ impl<'a, M: StroboscopicMap> Motions<'a, M> {
             }
             Outcome::Orbit { index, periods: 0 }
         } else if self.exact_runs < MAX_EXACT_RUNS {
+            self.exact_runs += 1;
             let found = self.classify_exactly(&orbit.states[0], 0);
             self.exact_outcome(found)
         } else {
@@ -310,6 +344,7 @@ impl<'a, M: StroboscopicMap> Motions<'a, M> {
         let may_try = self.irregular[known].tries < MAX_TRIES && self.exact_runs < MAX_EXACT_RUNS;
         if self.irregular[known].kind.is_none() && may_try {
             self.irregular[known].tries += 1;
+            self.exact_runs += 1;
             let found = self.classify_exactly(&state, periods);
             self.irregular[known].kind = match &found.kind {
                 MotionKind::Chaotic(Chaos { spectrum, .. })
@@ -330,4 +365,15 @@ impl<'a, M: StroboscopicMap> Motions<'a, M> {
             None => Outcome::Undecided(UndecidedReason::NotConfirmed),
         }
     }
+}
+
+/// Whether a motion is undecided because its map failed.
+const fn is_map_failure(kind: &MotionKind) -> bool {
+    matches!(
+        kind,
+        MotionKind::Undecided {
+            reason: UndecidedReason::Map { .. },
+            ..
+        }
+    )
 }

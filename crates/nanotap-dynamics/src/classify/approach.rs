@@ -40,15 +40,20 @@ const PHASES: usize = 8;
 ///
 /// Four stretches are one decay time long, or 2048 returns; a torus around the orbit that beats
 /// more slowly than that, and happens to shrink meanwhile with a free way ahead, would be mistaken.
+/// Where the map comes to its `largest_cost` the run is not seen to approach.
 pub(crate) fn approaches<M: StroboscopicMap>(
     map: &mut M,
     state: &[f64],
     orbit: &PeriodicOrbit,
+    largest_cost: u64,
 ) -> Result<bool, MapFailure> {
     let Some(mut approach) = Approach::new(map, state, orbit)? else {
         return Ok(false);
     };
     for _ in 0..approach.longest_watch {
+        if map.cost() > largest_cost {
+            break;
+        }
         match approach.one_decay_time(map)? {
             Progress::Arrived => return Ok(true),
             Progress::Gone => return Ok(false),
@@ -302,7 +307,7 @@ pub(super) mod tests {
         let mut map = Line(factor);
         let rest = close_orbit(&mut map, &[0.0], 1, &ShootingOptions::default()).unwrap();
         assert_eq!(rest.spectral_radius(), factor(0.0));
-        approaches(&mut map, &[1.0], &rest).unwrap()
+        approaches(&mut map, &[1.0], &rest, u64::MAX).unwrap()
     }
 
     /// Beyond 1/2 the distance falls by another factor than at rest: at three fifths of the rate

@@ -72,6 +72,9 @@ pub struct ClassifyOptions {
     pub birkhoff_periods: usize,
     /// Digits to which the two stretches must agree for a torus.
     pub torus_digits: f64,
+    /// Steps of time integration after which a run is left undecided, as the map counts them
+    /// ([`StroboscopicMap::cost`]).
+    pub max_steps: u64,
 }
 
 impl Default for ClassifyOptions {
@@ -89,6 +92,7 @@ impl Default for ClassifyOptions {
             lyapunov: LyapunovOptions::default(),
             birkhoff_periods: 8192,
             torus_digits: 7.0,
+            max_steps: 24_000_000,
         }
     }
 }

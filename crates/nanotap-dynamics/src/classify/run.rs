@@ -146,6 +146,7 @@ pub(super) enum Stop {
     Entered(usize),
     Unbounded,
     Cancelled,
+    Budget,
     Failed(MapFailure),
 }
 
@@ -160,6 +161,8 @@ pub(super) struct Run<'a> {
     pub(super) state: Vec<f64>,
     scratch: Vec<f64>,
     pub(super) periods: usize,
+    /// Cost of the map when the first period was over.
+    first_cost: Option<u64>,
     /// The latest strobe states, oldest first, at least the last twice the longest
     /// period.
     recent: Vec<f64>,
@@ -244,6 +247,7 @@ impl<'a> Run<'a> {
             state: start.to_vec(),
             scratch: start.to_vec(),
             periods: 0,
+            first_cost: None,
             recent: start.to_vec(),
             keep,
             target: options.first_look.max(known.patience).max(1),
@@ -283,6 +287,10 @@ impl<'a> Run<'a> {
             Stop::Entered(index) => RunEnd::Entered { index, periods },
             Stop::Unbounded => self.classified(MotionKind::Unbounded),
             Stop::Cancelled => self.classified(undecided(UndecidedReason::Cancelled, None)),
+            Stop::Budget => {
+                let steps = self.options.max_steps;
+                self.classified(undecided(UndecidedReason::Budget { periods, steps }, None))
+            }
             Stop::Failed(failure) => {
                 let reason = UndecidedReason::Map { periods, failure };
                 self.classified(undecided(reason, None))
@@ -405,6 +413,10 @@ impl<'a> Run<'a> {
         if self.known.cancel.is_some_and(CancelFlag::is_cancelled) {
             return Err(Stop::Cancelled);
         }
+        let cost = map.cost();
+        if cost > self.largest_cost(cost) {
+            return Err(Stop::Budget);
+        }
         if self.periods < self.next_entry {
             return Ok(());
         }
@@ -417,6 +429,20 @@ impl<'a> Run<'a> {
             }
         }
         Ok(())
+    }
+
+    /// Cost of the map at which the budget is spent.
+    fn largest_cost(&mut self, cost: u64) -> u64 {
+        let first = *self.first_cost.get_or_insert(cost);
+        first.saturating_add(self.options.max_steps)
+    }
+
+    /// Whether the budget suffices for Newton's method on an orbit of this period.
+    fn affords(&self, cost: u64, period: usize) -> bool {
+        let spent = cost - self.first_cost.unwrap_or(cost);
+        let a_period = spent / self.periods.max(1) as u64;
+        let needed = a_period.saturating_mul((self.closing.max_iterations * period) as u64);
+        spent.saturating_add(needed) <= self.options.max_steps
     }
 
     /// From where Newton is to close the motion.
@@ -459,6 +485,9 @@ impl<'a> Run<'a> {
         guesses: &mut Guesses,
     ) -> Option<Closed> {
         for (period, points) in guesses.left.by_ref() {
+            if !self.affords(map.cost(), period) {
+                continue;
+            }
             let Ok(orbit) = close_orbit_from_points(map, &points, period, &self.closing) else {
                 continue;
             };
@@ -492,7 +521,8 @@ impl<'a> Run<'a> {
                 return Ok(Some(undecided(reason, None)));
             }
         };
-        if approaches(map, &self.state, &orbit)? {
+        let largest_cost = self.largest_cost(map.cost());
+        if approaches(map, &self.state, &orbit, largest_cost)? {
             return Ok(Some(MotionKind::Periodic(orbit)));
         }
         if !self.met.iter().any(|m| m.is_same_as(&orbit)) {

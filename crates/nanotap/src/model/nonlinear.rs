@@ -663,6 +663,11 @@ impl NonlinearStrobe {
         self.flow.cost()
     }
 
+    /// See [`StroboscopicMap::add_cost`](nanotap_dynamics::StroboscopicMap::add_cost).
+    pub(crate) fn add_cost(&mut self, cost: u64) {
+        self.flow.add_cost(cost);
+    }
+
     /// See [`Nonlinear::log_determinant_everywhere`].
     pub(crate) fn log_determinant(&self) -> Option<f64> {
         self.nonlinear.log_determinant_everywhere()

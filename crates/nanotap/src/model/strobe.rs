@@ -146,6 +146,13 @@ impl StroboscopicMap for Strobe {
         }
     }
 
+    fn add_cost(&mut self, cost: u64) {
+        // Only periods of the exact flow are shared out.
+        if let Engine::Nonlinear(map) = &mut self.0 {
+            map.add_cost(cost);
+        }
+    }
+
     /// Under a nonlinear force.
     fn is_costly(&self) -> bool {
         matches!(self.0, Engine::Nonlinear(_))

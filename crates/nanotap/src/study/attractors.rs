@@ -185,6 +185,11 @@ pub enum EndReport {
         /// How many that is.
         limit: usize,
     },
+    /// The work took as many steps of the approximate flow as a census takes at most.
+    MaxSteps {
+        /// How many that is; a step of the exact flow counts as 32.
+        limit: u64,
+    },
     /// The work was stopped.
     Cancelled,
 }
@@ -334,6 +339,8 @@ pub const NONLINEAR_UNSEEN: f64 = 0.01;
 const NONLINEAR_PERIODS: usize = 600_000;
 /// Drive periods over which a motion that does not repeat is observed.
 pub const OBSERVED_PERIODS: usize = 512;
+/// Steps of the approximate flow after which a start is left undecided.
+const MAX_START_STEPS: u64 = 6_000_000;
 /// A state this many times larger than the box has left every bound.
 const OUT_OF_BOUNDS: f64 = 1e6;
 
@@ -410,6 +417,7 @@ fn budgets(model: &Model, options: &AttractorsOptions, start_box: &StartBox) -> 
         unseen,
         max_starts: ((times * default.max_starts as f64) as usize).min(MOST_STARTS),
         max_periods: (times * periods as f64) as usize,
+        max_steps: (times * default.max_steps as f64) as u64,
     }
 }
 
@@ -427,6 +435,7 @@ fn bounded(classify: &ClassifyOptions, start_box: &StartBox) -> ClassifyOptions 
     };
     ClassifyOptions {
         bound,
+        max_steps: MAX_START_STEPS,
         ..classify.clone()
     }
 }
@@ -486,6 +495,9 @@ fn described(
             },
             CensusEnd::MaxPeriods => EndReport::MaxPeriods {
                 limit: budgets.max_periods,
+            },
+            CensusEnd::MaxSteps => EndReport::MaxSteps {
+                limit: budgets.max_steps,
             },
         },
         followed_at: found.followed_coarsely.then_some(coarse::TOLERANCE),

@@ -10,6 +10,8 @@ const TOGETHER: f64 = 0.03;
 /// An extremum of a switching function this small, as a part of the largest, counts as
 /// a touch.
 const TOUCH: f64 = 1e-3;
+/// The same as a part of the orbit's size: of a rigid stop the impact alone may have an extremum.
+const TOUCH_OF_ORBIT: f64 = 1e-6;
 
 /// Why a curve of bifurcations ends.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -93,10 +95,9 @@ impl CurveEnd {
         reason: String,
     ) -> Self {
         let largest = tangencies.iter().fold(0.0f64, |m, t| m.max(t.value.abs()));
-        let touches = tangencies
-            .iter()
-            .filter(|t| t.value.abs() <= TOUCH * largest)
-            .count();
+        let touch = (TOUCH * largest).max(TOUCH_OF_ORBIT * orbit.scale());
+        let touches = tangencies.iter().filter(|t| t.value.abs() <= touch);
+        let touches = touches.count();
         let on_a_grazing = matches!(kind, BifurcationKind::Grazing { .. });
         if touches > usize::from(on_a_grazing) {
             return Self::Grazing { first, second };

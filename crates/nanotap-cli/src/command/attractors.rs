@@ -138,7 +138,7 @@ fn text(case: &GivenCase, found: &Attractors) -> String {
         );
         text.push_str(&motion::paragraph(&format!(
             "mean lifetime {:.0} drive periods (95 %: {:.0} … {:.0}) from {} escapes ({}); {} still wander \
-             ({} % of the starts); exponents {}",
+             ({} % of the starts); {}",
             chaos.lifetime,
             chaos.lifetime_interval[0],
             chaos.lifetime_interval[1],
@@ -146,7 +146,12 @@ fn text(case: &GivenCase, found: &Attractors) -> String {
             to.join(", "),
             number::counted(chaos.unescaped.count, "start", "starts"),
             number::significant(100.0 * chaos.unescaped.fraction, 3),
-            motion::exponents(&chaos.lyapunov, Some(&chaos.lyapunov_errors)),
+            if chaos.lyapunov.is_empty() {
+                "exponents were not measured on the exact flow".to_owned()
+            } else {
+                let errors = Some(chaos.lyapunov_errors.as_slice());
+                format!("exponents {}", motion::exponents(&chaos.lyapunov, errors))
+            },
         )));
     }
     if found.unbounded.count > 0 {

@@ -20,7 +20,7 @@ pub(crate) fn assemble(
     starts: &StartSet,
     orbits: Vec<PeriodicOrbit>,
     after: f64,
-    transient_spectrum: Option<LyapunovSpectrum>,
+    (mut has_transient_chaos, mut transient_spectrum): (bool, Option<LyapunovSpectrum>),
     row: usize,
 ) -> Census {
     let total = outcomes.len();
@@ -37,7 +37,6 @@ pub(crate) fn assemble(
     let mut undecided = Vec::new();
     let mut unbounded = Vec::new();
     let mut unescaped = Vec::new();
-    let mut unescaped_spectrum = transient_spectrum;
     for (k, outcome) in outcomes.iter().enumerate() {
         match outcome {
             Outcome::Orbit { index, .. } => groups[*index].members.push(k),
@@ -57,7 +56,8 @@ pub(crate) fn assemble(
             Outcome::Chaos(chaos, _) if !chaos_lasts => {
                 unescaped.push(k);
                 if unescaped.len() == 1 {
-                    unescaped_spectrum = Some(chaos.spectrum.clone());
+                    has_transient_chaos = true;
+                    transient_spectrum = Some(chaos.spectrum.clone());
                 }
             }
             Outcome::Chaos(chaos, state) => {
@@ -120,10 +120,9 @@ pub(crate) fn assemble(
             *outcome_of_start = StartOutcome::Unbounded;
         }
     }
-    let transient_chaos = unescaped_spectrum
-        .filter(|_| escapes.escaped.len() + unescaped.len() > 0)
-        .map(|spectrum| TransientChaos {
-            spectrum,
+    let transient_chaos = (has_transient_chaos && escapes.escaped.len() + unescaped.len() > 0)
+        .then(|| TransientChaos {
+            spectrum: transient_spectrum,
             lifetime: escapes.lifetime(),
             unescaped: counts.of(&unescaped),
             destinations: destinations(&escapes.escaped, &outcomes_by_start, order.len()),

@@ -235,8 +235,9 @@ impl AttractorKind {
 /// Chaos that ends.
 #[derive(Clone, Debug)]
 pub struct TransientChaos {
-    /// Exponents while it lasts, of the first start seen on it.
-    pub spectrum: LyapunovSpectrum,
+    /// Exponents while it lasts, of the first start seen on it; `None` if they were measured on the
+    /// map's [coarse](StroboscopicMap::coarse) one only.
+    pub spectrum: Option<LyapunovSpectrum>,
     /// Mean lifetime in periods, by maximum likelihood with the wanderers censored.
     pub lifetime: Lifetime,
     /// Starts still on transient chaos at the end.
@@ -772,6 +773,7 @@ impl<'a, M: StroboscopicMap> Work<'a, M> {
                     let mut outcome = self.outcome(Some(arrival), &known, &start);
                     if let Outcome::Orbit { periods, .. } = &mut outcome {
                         *periods += observed;
+                        self.motions.has_transient_chaos = true;
                         self.motions.transient_spectrum.get_or_insert(spectrum);
                         *after = after.min(observed as f64);
                     }
@@ -798,7 +800,7 @@ impl<'a, M: StroboscopicMap> Work<'a, M> {
             self.starts,
             motions.orbits,
             after,
-            motions.transient_spectrum,
+            (motions.has_transient_chaos, motions.transient_spectrum),
             self.row,
         );
         Census {

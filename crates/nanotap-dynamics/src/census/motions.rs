@@ -57,7 +57,9 @@ pub(super) struct Motions<'a, M> {
     pub(super) spectra: Vec<LyapunovSpectrum>,
     /// What each of these is.
     irregular: Vec<Irregular>,
-    /// Spectrum of chaos from which a start escaped.
+    /// Whether a start escaped from chaos.
+    pub(super) has_transient_chaos: bool,
+    /// Spectrum of that chaos on the map itself.
     pub(super) transient_spectrum: Option<LyapunovSpectrum>,
 }
 
@@ -68,9 +70,27 @@ struct Irregular {
     kind: Option<IrregularKind>,
 }
 
+#[derive(Clone)]
 enum IrregularKind {
-    Chaos(LyapunovSpectrum),
+    Chaos(Chaos),
     Torus(Torus),
+}
+
+impl IrregularKind {
+    const fn spectrum(&self) -> &LyapunovSpectrum {
+        match self {
+            Self::Chaos(chaos) => &chaos.spectrum,
+            Self::Torus(torus) => &torus.spectrum,
+        }
+    }
+
+    /// The outcome of a start that is on it, in a state.
+    fn outcome(self, state: Vec<f64>) -> Outcome {
+        match self {
+            Self::Chaos(chaos) => Outcome::Chaos(chaos, state),
+            Self::Torus(torus) => Outcome::Torus(torus, state),
+        }
+    }
 }
 
 impl<'a, M: StroboscopicMap> Motions<'a, M> {
@@ -106,6 +126,7 @@ impl<'a, M: StroboscopicMap> Motions<'a, M> {
             failed_retries: 0,
             spectra: Vec::new(),
             irregular: Vec::new(),
+            has_transient_chaos: false,
             transient_spectrum: None,
         }
     }
@@ -135,30 +156,27 @@ impl<'a, M: StroboscopicMap> Motions<'a, M> {
         self.pair_orbits();
     }
 
-    /// What a start came to that was followed to its end: on the map itself, where the coarse one
+    /// The outcome of a start that was followed to its end: on the map itself, where the coarse one
     /// failed.
     pub(super) fn outcome(&mut self, mut found: Classified, start: &[f64]) -> Outcome {
-        let retries = self.retries < MAX_RETRIES && self.failed_retries < MAX_FAILED_RETRIES;
-        if self.is_coarse && is_map_failure(&found.kind) && retries {
+        let mut is_exact = !self.is_coarse;
+        let may_retry = self.retries < MAX_RETRIES && self.failed_retries < MAX_FAILED_RETRIES;
+        if !is_exact && is_map_failure(&found.kind) && may_retry {
             self.retries += 1;
             let exact = self.classify_exactly(start, 0);
-            if is_map_failure(&exact.kind) {
-                self.failed_retries += 1;
-            } else {
-                found.met.into_iter().for_each(|orbit| {
-                    self.follow_orbit(orbit);
-                });
-                let outcome = self.exact_outcome(exact);
-                self.pair_orbits();
-                return outcome;
+            self.failed_retries += usize::from(is_map_failure(&exact.kind));
+            for orbit in std::mem::replace(&mut found, exact).met {
+                self.follow_orbit(orbit);
             }
-            found.kind = exact.kind;
+            is_exact = true;
         }
-        if !self.is_coarse {
-            let outcome = self.exact_outcome(found);
-            self.pair_orbits();
-            return outcome;
-        }
+        let outcome = self.outcome_on(found, is_exact);
+        self.pair_orbits();
+        outcome
+    }
+
+    /// The outcome of a start that came to a motion of the map itself, or of the coarse one.
+    fn outcome_on(&mut self, found: Classified, is_exact: bool) -> Outcome {
         let Classified {
             kind,
             periods,
@@ -166,29 +184,39 @@ impl<'a, M: StroboscopicMap> Motions<'a, M> {
             met,
         } = found;
         let outcome = match kind {
-            MotionKind::Periodic(orbit) => {
-                let index = self.follow_orbit(orbit);
-                self.arrival(index, periods)
-            }
+            MotionKind::Periodic(orbit) => self.orbit_outcome(orbit, periods, is_exact),
             MotionKind::TransientChaos {
                 orbit, spectrum, ..
             } => {
-                self.transient_spectrum.get_or_insert(spectrum);
-                let index = self.follow_orbit(orbit);
-                self.arrival(index, periods)
+                self.has_transient_chaos = true;
+                if is_exact {
+                    self.transient_spectrum.get_or_insert(spectrum);
+                }
+                self.orbit_outcome(orbit, periods, is_exact)
             }
             MotionKind::QuasiPeriodic(torus) => {
-                self.irregular_outcome(&torus.spectrum, state, periods)
+                self.irregular_outcome(IrregularKind::Torus(torus), state, periods, is_exact)
             }
-            MotionKind::Chaotic(chaos) => self.irregular_outcome(&chaos.spectrum, state, periods),
+            MotionKind::Chaotic(chaos) => {
+                self.irregular_outcome(IrregularKind::Chaos(chaos), state, periods, is_exact)
+            }
             MotionKind::Unbounded => Outcome::Unbounded,
             MotionKind::Undecided { reason, .. } => Outcome::Undecided(reason),
         };
         for orbit in met {
-            self.follow_orbit(orbit);
+            self.orbit_outcome(orbit, 0, is_exact);
         }
-        self.pair_orbits();
         outcome
+    }
+
+    /// The outcome of a start that came to an orbit.
+    fn orbit_outcome(&mut self, orbit: PeriodicOrbit, periods: usize, is_exact: bool) -> Outcome {
+        if is_exact {
+            let index = merge(&mut self.orbits, orbit);
+            return Outcome::Orbit { index, periods };
+        }
+        let index = self.follow_orbit(orbit);
+        self.arrival(index, periods)
     }
 
     /// What a start has come to that arrived at an orbit of the followed map.
@@ -202,51 +230,6 @@ impl<'a, M: StroboscopicMap> Motions<'a, M> {
         }
     }
 
-    /// What a motion of the map itself is to the census.
-    fn exact_outcome(&mut self, found: Classified) -> Outcome {
-        let Classified {
-            kind,
-            periods,
-            state,
-            met,
-        } = found;
-        let outcome = match kind {
-            MotionKind::Periodic(orbit) => Outcome::Orbit {
-                index: merge(&mut self.orbits, orbit),
-                periods,
-            },
-            MotionKind::TransientChaos {
-                orbit, spectrum, ..
-            } => {
-                self.transient_spectrum.get_or_insert(spectrum);
-                Outcome::Orbit {
-                    index: merge(&mut self.orbits, orbit),
-                    periods,
-                }
-            }
-            MotionKind::QuasiPeriodic(torus) => {
-                let known = self.spectrum_index(&torus.spectrum);
-                self.irregular[known]
-                    .kind
-                    .get_or_insert_with(|| IrregularKind::Torus(torus.clone()));
-                Outcome::Torus(torus, state)
-            }
-            MotionKind::Chaotic(chaos) => {
-                let known = self.spectrum_index(&chaos.spectrum);
-                self.irregular[known]
-                    .kind
-                    .get_or_insert_with(|| IrregularKind::Chaos(chaos.spectrum.clone()));
-                Outcome::Chaos(chaos, state)
-            }
-            MotionKind::Unbounded => Outcome::Unbounded,
-            MotionKind::Undecided { reason, .. } => Outcome::Undecided(reason),
-        };
-        for orbit in met {
-            merge(&mut self.orbits, orbit);
-        }
-        outcome
-    }
-
     /// Classifies the motion from a state on the map itself, as the end of a start that has run for
     /// so many periods.
     fn classify_exactly(&mut self, state: &[f64], periods: usize) -> Classified {
@@ -254,7 +237,7 @@ impl<'a, M: StroboscopicMap> Motions<'a, M> {
             .irregular
             .iter()
             .filter_map(|known| match &known.kind {
-                Some(IrregularKind::Chaos(spectrum)) => Some(spectrum.clone()),
+                Some(IrregularKind::Chaos(chaos)) => Some(chaos.spectrum.clone()),
                 _ => None,
             })
             .collect();
@@ -286,7 +269,7 @@ impl<'a, M: StroboscopicMap> Motions<'a, M> {
         } else if self.exact_runs < MAX_EXACT_RUNS {
             self.exact_runs += 1;
             let found = self.classify_exactly(&orbit.states[0], 0);
-            self.exact_outcome(found)
+            self.outcome_on(found, true)
         } else {
             Outcome::Undecided(UndecidedReason::NotConfirmed)
         };
@@ -333,35 +316,43 @@ impl<'a, M: StroboscopicMap> Motions<'a, M> {
         })
     }
 
-    /// What a start has come to whose motion on the coarse map does not close.
+    /// The outcome of a start whose motion does not close.
     fn irregular_outcome(
         &mut self,
-        spectrum: &LyapunovSpectrum,
+        found: IrregularKind,
         state: Vec<f64>,
         periods: usize,
+        is_exact: bool,
     ) -> Outcome {
-        let known = self.spectrum_index(spectrum);
+        let known = self.spectrum_index(found.spectrum());
+        if is_exact {
+            self.irregular[known]
+                .kind
+                .get_or_insert_with(|| found.clone());
+            return found.outcome(state);
+        }
         let may_try = self.irregular[known].tries < MAX_TRIES && self.exact_runs < MAX_EXACT_RUNS;
         if self.irregular[known].kind.is_none() && may_try {
             self.irregular[known].tries += 1;
             self.exact_runs += 1;
             let found = self.classify_exactly(&state, periods);
             self.irregular[known].kind = match &found.kind {
-                MotionKind::Chaotic(Chaos { spectrum, .. })
-                | MotionKind::TransientChaos { spectrum, .. } => {
-                    Some(IrregularKind::Chaos(spectrum.clone()))
+                MotionKind::Chaotic(chaos) => Some(IrregularKind::Chaos(chaos.clone())),
+                MotionKind::TransientChaos { spectrum, .. } => {
+                    let chaos = Chaos::of(spectrum.clone(), periods, self.options);
+                    Some(IrregularKind::Chaos(chaos))
                 }
                 MotionKind::QuasiPeriodic(torus) => Some(IrregularKind::Torus(torus.clone())),
                 _ => None,
             };
-            return self.exact_outcome(found);
+            return self.outcome_on(found, true);
         }
         match &self.irregular[known].kind {
-            Some(IrregularKind::Chaos(spectrum)) => {
-                let chaos = Chaos::of(spectrum.clone(), periods, self.options);
+            Some(IrregularKind::Chaos(chaos)) => {
+                let chaos = Chaos::of(chaos.spectrum.clone(), periods, self.options);
                 Outcome::Chaos(chaos, state)
             }
-            Some(IrregularKind::Torus(torus)) => Outcome::Torus(torus.clone(), state),
+            Some(torus) => torus.clone().outcome(state),
             None => Outcome::Undecided(UndecidedReason::NotConfirmed),
         }
     }

@@ -311,7 +311,8 @@ pub struct UndecidedStart {
 /// Chaos that ends.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct TransientChaosReport {
-    /// Lyapunov exponents per drive period while it lasts.
+    /// Lyapunov exponents per drive period while it lasts; empty where the exact flow was not followed
+    /// on it.
     pub lyapunov: Vec<f64>,
     /// One standard error of each.
     pub lyapunov_errors: Vec<f64>,
@@ -458,8 +459,8 @@ fn described(
         .transient_chaos
         .as_ref()
         .map(|t| TransientChaosReport {
-            lyapunov: t.spectrum.exponents.clone(),
-            lyapunov_errors: t.spectrum.errors.clone(),
+            lyapunov: t.spectrum.iter().flat_map(|s| s.exponents.clone()).collect(),
+            lyapunov_errors: t.spectrum.iter().flat_map(|s| s.errors.clone()).collect(),
             lifetime: t.lifetime.mean,
             lifetime_interval: [t.lifetime.low, t.lifetime.high],
             escapes: t.lifetime.escapes,

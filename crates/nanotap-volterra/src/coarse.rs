@@ -261,12 +261,13 @@ impl Level {
             let [s0, s1, _] = moments(block, 0.5 * h, &half, source);
             let [m0, m1, _] = moments(block, h, &square(&half), source);
             // Of the straight line through the two forces.
-            let combined = |h: f64, [a, b]: [f64; 2], [c, d]: [f64; 2], m0: [f64; 2], m1: [f64; 2]| {
-                [
-                    [0, 1].map(|i| h * (a * m0[i] + b * m1[i])),
-                    [0, 1].map(|i| h * (c * m0[i] + d * m1[i])),
-                ]
-            };
+            let combined =
+                |h: f64, [a, b]: [f64; 2], [c, d]: [f64; 2], m0: [f64; 2], m1: [f64; 2]| {
+                    [
+                        [0, 1].map(|i| h * (a * m0[i] + b * m1[i])),
+                        [0, 1].map(|i| h * (c * m0[i] + d * m1[i])),
+                    ]
+                };
             let end = combined(h, [0.0, 1.5], [1.0, -1.5], m0, m1);
             let places = [
                 combined(h / 3.0, [1.0, 0.5], [0.0, -0.5], t0, t1),
@@ -462,7 +463,10 @@ impl Tables {
                 .abs(),
             period,
             levels,
-            converged: 0.02 * TOLERANCE * frequency * system.drive().offset.abs().max(SWING * swing),
+            converged: 0.02
+                * TOLERANCE
+                * frequency
+                * system.drive().offset.abs().max(SWING * swing),
             table: GapTable::new(system),
             readout,
             rate_readout,
@@ -596,11 +600,11 @@ impl Tables {
             let from = from.phasors[k];
             let middle = turned(from, level.turns[k]);
             let end = turned(middle, level.turns[k]);
-            for (place, [c, s]) in places.iter_mut().zip([
-                turned(from, level.third_turns[k]),
-                middle,
-                end,
-            ]) {
+            for (place, [c, s]) in
+                places
+                    .iter_mut()
+                    .zip([turned(from, level.third_turns[k]), middle, end])
+            {
                 place[0] += z.re * c - z.im * s;
                 place[1] -= tone.frequency * (z.re * s + z.im * c);
             }
@@ -636,9 +640,8 @@ impl Tables {
             ];
             let slopes = [third, end].map(|[gap, rate]| self.slopes(branch, gap, rate));
             // One minus the derivative of the forces by the forces.
-            let matrix = [0, 1].map(|i| {
-                [0, 1].map(|j| f64::from(i == j) - dot(slopes[i], weights[2 * i][j]))
-            });
+            let matrix = [0, 1]
+                .map(|i| [0, 1].map(|j| f64::from(i == j) - dot(slopes[i], weights[2 * i][j])));
             let Some(step) = solve(&matrix, residuals) else {
                 return f64::INFINITY;
             };
@@ -798,8 +801,8 @@ impl Tables {
     /// [`carry`](Self::carry) over an implicit step with these slopes at its two forces.
     fn carry_implicitly(&self, level: &Level, slopes: [[f64; 2]; 2], columns: &mut [[f64; 2]]) {
         let weights = &level.implicit.weights;
-        let matrix = [0, 1]
-            .map(|i| [0, 1].map(|j| f64::from(i == j) - dot(slopes[i], weights[2 * i][j])));
+        let matrix =
+            [0, 1].map(|i| [0, 1].map(|j| f64::from(i == j) - dot(slopes[i], weights[2 * i][j])));
         for column in columns.chunks_exact_mut(level.blocks.len()) {
             let (mut third, mut end) = ([0.0; 2], [0.0; 2]);
             for (k, y) in column.iter_mut().enumerate() {

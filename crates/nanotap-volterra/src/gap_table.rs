@@ -129,11 +129,13 @@ impl Curve {
                 0.0
             };
             let [found, expected] = [self.at(gap, rate), Some(force(gap, rate))];
-            let near = |k: usize| self.values[k].abs() + rate * self.by_rate.get(k).map_or(0.0, |v| v.abs());
+            let near = |k: usize| {
+                self.values[k].abs() + rate * self.by_rate.get(k).map_or(0.0, |v| v.abs())
+            };
             let local = near(k).max(near(k + 1));
-            found.zip(expected).is_some_and(|(a, b)| {
-                (a - b).abs() <= ACCURACY * local.max(1e-6 * sizes[0])
-            })
+            found
+                .zip(expected)
+                .is_some_and(|(a, b)| (a - b).abs() <= ACCURACY * local.max(1e-6 * sizes[0]))
         })
     }
 

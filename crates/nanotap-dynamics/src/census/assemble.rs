@@ -3,7 +3,7 @@
 use crate::census::escapes::Escapes;
 use crate::census::{
     Attractor, AttractorKind, Census, CensusEnd, Fraction, Lifetime, Outcome, SizeCount,
-    StartOrigin, StartOutcome, StartSet, TransientChaos, Unseen,
+    StartOrigin, StartOutcome, StartSet, TransientChaos, UndiscoveredFraction,
 };
 use crate::lyapunov::LyapunovSpectrum;
 use crate::orbit::PeriodicOrbit;
@@ -21,7 +21,7 @@ pub(crate) fn assemble(
     orbits: Vec<PeriodicOrbit>,
     after: f64,
     (mut has_transient_chaos, mut transient_spectrum): (bool, Option<LyapunovSpectrum>),
-    row: usize,
+    starts_since_discovery: usize,
 ) -> Census {
     let total = outcomes.len();
     let mut groups: Vec<Group> = orbits
@@ -128,7 +128,8 @@ pub(crate) fn assemble(
             destinations: destinations(&escapes.escaped, &outcomes_by_start, order.len()),
         });
     let by_size = counts.by_size(&outcomes_by_start, order.len());
-    let unseen = (!by_size.is_empty()).then(|| Unseen::new(order.len(), row));
+    let unseen = (!by_size.is_empty())
+        .then(|| UndiscoveredFraction::new(order.len(), starts_since_discovery));
     let mut slots: Vec<Option<Group>> = groups.into_iter().map(Some).collect();
     let attractors = order
         .iter()

@@ -9,21 +9,23 @@ use std::sync::mpsc::{Sender, channel};
 
 use rayon::Scope;
 
-use crate::classify::{ClassifyOptions, Followed, Known, RunEnd, follow_start, follow_starts};
+use crate::classify::{
+    ClassifyOptions, Followed, KnownMotions, RunEnd, follow_start, follow_starts,
+};
 use crate::control::Control;
 use crate::map::StroboscopicMap;
 
 /// Starts that are worth following side by side.
-const LEAST_TOGETHER: usize = 8;
+const MIN_BATCH: usize = 8;
 /// Parts of a thread's share of what is left of which it follows one at a time: with fewer, others
 /// have nothing left to do while it follows its last.
-const SHARES: usize = 2;
+const PARTS_PER_THREAD: usize = 2;
 
 /// Starts to be followed, and with what in mind.
 pub(super) struct Batch<'a, M> {
     pub(super) map: &'a M,
     pub(super) starts: &'a [Vec<f64>],
-    pub(super) known: Known<'a>,
+    pub(super) known: KnownMotions<'a>,
     pub(super) options: &'a ClassifyOptions,
     pub(super) control: &'a Control<'a>,
     /// Starts followed by the whole census, and how many these are at most.
@@ -77,10 +79,10 @@ impl<'s, 'a: 's, M: StroboscopicMap> Turn<'s, 'a, M> {
         let mut map = map.clone();
         let cancelled = || control.is_cancelled();
         // Of few starts most places side by side would be empty.
-        if map.side_by_side() > 1 && starts.len() >= LEAST_TOGETHER {
-            let most = map.side_by_side().max(LEAST_TOGETHER);
-            let parts = SHARES * rayon::current_num_threads();
-            let places = || (self.left() / parts).clamp(LEAST_TOGETHER, most);
+        if map.side_by_side() > 1 && starts.len() >= MIN_BATCH {
+            let most = map.side_by_side().max(MIN_BATCH);
+            let parts = PARTS_PER_THREAD * rayon::current_num_threads();
+            let places = || (self.left() / parts).clamp(MIN_BATCH, most);
             let followed = |place, followed| match followed {
                 // Maps that take several motions at a time are in closed form and cost nothing.
                 Followed::Ended(end) => self.send(place, end, 0),

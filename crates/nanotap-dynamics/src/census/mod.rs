@@ -14,7 +14,7 @@
 //!    chaos that is known is recognised, without exponents of its own, by parting from a
 //!    neighbour and by the means of its strobe states and their squares.
 //! 4. Starts that can be drawn without end ([`StartSet`]) go on until the share of
-//!    them that may lead to motions not yet found is bounded ([`Unseen`]) as the
+//!    them that may lead to motions not yet found is bounded ([`UndiscoveredFraction`]) as the
 //!    options ask, or the budget is spent. Stable orbits that Newton closed on the way
 //!    are attractors too, with a fraction of zero if no start goes there.
 //! 5. Motions that do not close are merged when their exponents and the means of their
@@ -40,7 +40,7 @@ mod escapes;
 mod motions;
 mod start_box;
 mod start_set;
-mod unseen;
+mod undiscovered;
 
 use std::sync::atomic::AtomicUsize;
 
@@ -50,7 +50,8 @@ use crate::census::batch::Batch;
 use crate::census::escapes::Escapes;
 use crate::census::motions::Motions;
 use crate::classify::{
-    Chaos, ClassifyOptions, Known, RECOGNISABLE, RunEnd, Torus, UndecidedReason, first_entry, watch,
+    Chaos, ClassifyOptions, KnownMotions, RECOGNISABLE, RunEnd, Torus, UndecidedReason,
+    first_entry, watch,
 };
 use crate::control::Control;
 use crate::lyapunov::LyapunovSpectrum;
@@ -61,7 +62,7 @@ use crate::orbit::PeriodicOrbit;
 pub use confidence::{Fraction, Lifetime};
 pub use start_box::{StartBox, StartBoxError};
 pub use start_set::{StartOrigin, StartSet};
-pub use unseen::Unseen;
+pub use undiscovered::UndiscoveredFraction;
 
 /// Pilots that are followed before anything is known at all.
 const FIRST_PILOTS: usize = 4;
@@ -71,11 +72,11 @@ const BATCH: usize = 128;
 const DRAWN_AT_ONCE: usize = 16;
 /// Periods for which a start that enters no neighbourhood is left to itself at least,
 /// once attractors are known.
-const LEAST_PATIENCE: usize = 64;
+const MIN_WAIT_PERIODS: usize = 64;
 /// Part of the expected entry for which it is, where periods are cheap.
-const COARSE_PATIENCE: f64 = 1.3;
+const COARSE_WAIT_FACTOR: f64 = 1.3;
 /// Periods for which it is at most, where periods are cheap.
-const MAX_COARSE_PATIENCE: usize = 2048;
+const MAX_COARSE_WAIT_PERIODS: usize = 2048;
 /// Periods for which chaotic starts together are watched at most, where periods are cheap, and the
 /// rounds in which they are: each takes as long as all before it.
 const WATCHED_TOGETHER: usize = 400_000;
@@ -146,7 +147,7 @@ pub struct Census {
     pub by_size: Vec<SizeCount>,
     /// How much of the set of starts may lead to motions not found; `None` if no start
     /// was drawn.
-    pub unseen: Option<Unseen>,
+    pub unseen: Option<UndiscoveredFraction>,
     /// Unstable orbits near seeds.
     pub unstable: Vec<PeriodicOrbit>,
     /// Whether starts were followed on the map's [coarse](StroboscopicMap::coarse) one: what counts
@@ -322,13 +323,13 @@ struct Work<'a, M> {
     /// Orbits whose neighbourhood was looked for.
     searched: usize,
     /// Periods after which most starts are in a neighbourhood, or on chaos that is recognised.
-    patience: usize,
+    max_wait_periods: usize,
     /// Periods run so far.
     periods: usize,
     /// Cost of the starts and trapping regions so far.
     cost: u64,
     /// Starts decided since the last new motion, of those that count in the fractions.
-    row: usize,
+    starts_since_discovery: usize,
 }
 
 impl<'a, M: StroboscopicMap> Work<'a, M> {
@@ -356,17 +357,17 @@ impl<'a, M: StroboscopicMap> Work<'a, M> {
             ends: Vec::new(),
             neighbourhoods: Vec::new(),
             searched: 0,
-            patience: 0,
+            max_wait_periods: 0,
             periods: 0,
             cost: 0,
-            row: 0,
+            starts_since_discovery: 0,
         };
         if work.motions.is_coarse {
             work.followed_options = options.classify.on_coarse_map();
         }
         work.motions.close_seeds(starts.seeds());
         if work.motions.count() > 0 {
-            work.know_neighbourhoods(&[]);
+            work.update_trapping_regions(&[]);
         }
         let count = if work.motions.is_coarse && !work.neighbourhoods.is_empty() {
             options.pilots.min(COARSE_PILOTS)
@@ -376,7 +377,7 @@ impl<'a, M: StroboscopicMap> Work<'a, M> {
         // Chaos that the first of the pilots are on need not be measured again by the others.
         let mut pilots = work.follow(count.clamp(1, FIRST_PILOTS));
         pilots.extend(work.follow(count.saturating_sub(FIRST_PILOTS)));
-        work.know_neighbourhoods(&pilots);
+        work.update_trapping_regions(&pilots);
         work
     }
 
@@ -384,7 +385,7 @@ impl<'a, M: StroboscopicMap> Work<'a, M> {
     fn finish(mut self) -> Census {
         while self.outcomes.len() < self.last && !self.is_enough() {
             let classified = self.follow(self.next_batch());
-            self.know_neighbourhoods(&classified);
+            self.update_trapping_regions(&classified);
         }
         let mut after = Escapes::after(self.relaxation());
         self.watch_chaos(&mut after);
@@ -419,7 +420,8 @@ impl<'a, M: StroboscopicMap> Work<'a, M> {
     }
 
     fn is_bound_met(&self) -> bool {
-        Unseen::new(self.motions.count(), self.row).share <= self.options.unseen
+        UndiscoveredFraction::new(self.motions.count(), self.starts_since_discovery).share
+            <= self.options.unseen
     }
 
     /// Why no further start was followed.
@@ -441,10 +443,11 @@ impl<'a, M: StroboscopicMap> Work<'a, M> {
     /// other at the end of a batch. Of those that are drawn, no more than bound and budget ask for if
     /// nothing new comes.
     fn next_batch(&self) -> usize {
-        let mut size = self.row;
+        let mut size = self.starts_since_discovery;
         if self.starts.len().is_none() {
             let bound =
-                Unseen::row_for(self.motions.count(), self.options.unseen).saturating_sub(self.row);
+                UndiscoveredFraction::starts_needed(self.motions.count(), self.options.unseen)
+                    .saturating_sub(self.starts_since_discovery);
             let periods = self.options.max_periods.saturating_sub(self.periods) as f64;
             let budget = periods * self.outcomes.len() as f64 / self.periods.max(1) as f64;
             size = size.min(bound).min(budget.ceil() as usize);
@@ -485,9 +488,9 @@ impl<'a, M: StroboscopicMap> Work<'a, M> {
             let counts = self.starts.len().is_some()
                 || matches!(self.starts.origin(k), Some(StartOrigin::Drawn(_)));
             if self.motions.count() > before {
-                self.row = 0;
+                self.starts_since_discovery = 0;
             } else if counts && !matches!(outcome, Outcome::Undecided(_)) {
-                self.row += 1;
+                self.starts_since_discovery += 1;
             }
             self.outcomes.push(outcome);
         }
@@ -496,29 +499,29 @@ impl<'a, M: StroboscopicMap> Work<'a, M> {
 
     /// Finds neighbourhoods of the orbits that are new, checks all by the starts that were
     /// `classified` without them, and says how long a start is left to itself from now on.
-    fn know_neighbourhoods(&mut self, classified: &[usize]) {
+    fn update_trapping_regions(&mut self, classified: &[usize]) {
         // A run beside the same neighbourhoods as before would end as it did.
         if self.find_neighbourhoods() {
             self.check_neighbourhoods(classified);
         }
         let sides = self.sides();
-        let balls = self.neighbourhoods.iter();
-        let entries = balls.map(|(_, ball)| ball.expected_entry(&sides));
+        let trapping_regions = self.neighbourhoods.iter();
+        let entries = trapping_regions.map(|(_, region)| region.expected_entry(&sides));
         let entry = entries.fold(0.0, f64::max);
-        let longest = self.options.classify.max_transient.max(LEAST_PATIENCE);
-        self.patience = if self.motions.is_coarse {
-            let patience = (COARSE_PATIENCE * entry) as usize + LEAST_PATIENCE;
-            patience.min(longest.max(MAX_COARSE_PATIENCE))
+        let longest = self.options.classify.max_transient.max(MIN_WAIT_PERIODS);
+        self.max_wait_periods = if self.motions.is_coarse {
+            let max_wait_periods = (COARSE_WAIT_FACTOR * entry) as usize + MIN_WAIT_PERIODS;
+            max_wait_periods.min(longest.max(MAX_COARSE_WAIT_PERIODS))
         } else {
-            (entry as usize).clamp(LEAST_PATIENCE, longest)
+            (entry as usize).clamp(MIN_WAIT_PERIODS, longest)
         };
         let chaotic = |outcome: &&Outcome| matches!(outcome, Outcome::Chaos(..));
         if 2 * self.outcomes.iter().filter(chaotic).count() > self.outcomes.len() {
-            self.patience = self.patience.max(RECOGNISABLE);
+            self.max_wait_periods = self.max_wait_periods.max(RECOGNISABLE);
         }
         if self.motions.is_coarse {
             let transient = self.options.classify.max_transient;
-            self.followed_options.max_transient = transient.max(2 * self.patience);
+            self.followed_options.max_transient = transient.max(2 * self.max_wait_periods);
         }
     }
 
@@ -527,27 +530,27 @@ impl<'a, M: StroboscopicMap> Work<'a, M> {
         self.ends.iter().map(|[low, high]| high - low).collect()
     }
 
-    fn balls(&self) -> Vec<Neighbourhood> {
-        let balls = self.neighbourhoods.iter();
-        balls.map(|(_, ball)| ball.clone()).collect()
+    fn trapping_regions(&self) -> Vec<Neighbourhood> {
+        let trapping_regions = self.neighbourhoods.iter();
+        trapping_regions.map(|(_, region)| region.clone()).collect()
     }
 
     /// What a run knows from the start, with these neighbourhoods.
-    fn known<'k>(&'k self, balls: &'k [Neighbourhood]) -> Known<'k> {
-        Known {
-            balls,
+    fn known<'k>(&'k self, trapping_regions: &'k [Neighbourhood]) -> KnownMotions<'k> {
+        KnownMotions {
+            trapping_regions,
             chaos: &self.motions.spectra,
-            patience: self.patience,
+            max_wait_periods: self.max_wait_periods,
             cancel: self.control.cancel,
         }
     }
 
     fn run(&self, starts: &[Vec<f64>]) -> Vec<Option<(RunEnd, u64)>> {
-        let balls = self.balls();
+        let trapping_regions = self.trapping_regions();
         let batch = Batch {
             map: &self.motions.followed,
             starts,
-            known: self.known(&balls),
+            known: self.known(&trapping_regions),
             options: &self.followed_options,
             control: self.control,
             progress: (&self.done, self.last),
@@ -570,9 +573,9 @@ impl<'a, M: StroboscopicMap> Work<'a, M> {
         let motions = &self.motions;
         let orbits = &motions.followed_orbits;
         for (orbit, _) in &orbits[self.searched..] {
-            for (own, ball) in &mut self.neighbourhoods {
+            for (own, region) in &mut self.neighbourhoods {
                 if motions.is_coarse && !orbits[*own].0.is_same_as(orbit) {
-                    ball.keep_clear_of(orbit);
+                    region.keep_clear_of(orbit);
                 }
             }
         }
@@ -627,7 +630,7 @@ impl<'a, M: StroboscopicMap> Work<'a, M> {
                 _ => false,
             })
             .collect();
-        let balls = self.balls();
+        let trapping_regions = self.trapping_regions();
         let entries: Vec<Option<(usize, usize)>> = checked
             .par_iter()
             .with_max_len(1)
@@ -639,10 +642,10 @@ impl<'a, M: StroboscopicMap> Work<'a, M> {
                     }
                     let periods = assemble::periods_of(&self.outcomes[k]);
                     let start = self.starts.start(k)?;
-                    let known = Known {
-                        balls: &balls,
+                    let known = KnownMotions {
+                        trapping_regions: &trapping_regions,
                         cancel: self.control.cancel,
-                        ..Known::default()
+                        ..KnownMotions::default()
                     };
                     first_entry(map, &start, known, periods, &self.followed_options)
                 },
@@ -655,15 +658,15 @@ impl<'a, M: StroboscopicMap> Work<'a, M> {
             .map(|(own, _)| self.leads_to(*own))
             .collect();
         for (k, entry) in checked.into_iter().zip(entries) {
-            let (Outcome::Orbit { index, periods }, Some((ball, after))) =
+            let (Outcome::Orbit { index, periods }, Some((region, after))) =
                 (&mut self.outcomes[k], entry)
             else {
                 continue;
             };
-            if leads[ball] == Some(*index) {
+            if leads[region] == Some(*index) {
                 *periods = after;
             } else {
-                discarded.push(ball);
+                discarded.push(region);
             }
         }
         let mut position = 0;
@@ -734,8 +737,8 @@ impl<'a, M: StroboscopicMap> Work<'a, M> {
                 _ => false,
             })
             .collect();
-        let balls = self.balls();
-        let known = self.known(&balls);
+        let trapping_regions = self.trapping_regions();
+        let known = self.known(&trapping_regions);
         let ends: Vec<Result<Vec<f64>, RunEnd>> = watched
             .par_iter()
             .with_max_len(1)
@@ -788,7 +791,7 @@ impl<'a, M: StroboscopicMap> Work<'a, M> {
         let sides = self.sides();
         self.neighbourhoods
             .iter()
-            .map(|(_, ball)| ball.relaxation(&sides))
+            .map(|(_, region)| region.relaxation(&sides))
             .fold(0.0, f64::max)
     }
 
@@ -801,7 +804,7 @@ impl<'a, M: StroboscopicMap> Work<'a, M> {
             motions.orbits,
             after,
             (motions.has_transient_chaos, motions.transient_spectrum),
-            self.row,
+            self.starts_since_discovery,
         );
         Census {
             unstable: motions.unstable,

@@ -7,8 +7,8 @@
 
 use crate::census::Outcome;
 use crate::classify::{
-    Chaos, Classified, ClassifyOptions, Known, MotionKind, Torus, UndecidedReason, classify_on,
-    close_exactly,
+    Chaos, Classified, ClassifyOptions, KnownMotions, MotionKind, Torus, UndecidedReason,
+    classify_on, close_exactly,
 };
 use crate::control::CancelFlag;
 use crate::lyapunov::{LyapunovOptions, LyapunovSpectrum};
@@ -241,10 +241,10 @@ impl<'a, M: StroboscopicMap> Motions<'a, M> {
                 _ => None,
             })
             .collect();
-        let known = Known {
+        let known = KnownMotions {
             chaos: &chaos,
             cancel: self.cancel,
-            ..Known::default()
+            ..KnownMotions::default()
         };
         let mut found = classify_on(&mut self.exact, state, known, &self.budgets);
         found.periods += periods;

@@ -10,7 +10,7 @@
 //! does from states within the coarse map's error of a basin's boundary.
 
 use crate::classify::{
-    Classified, ClassifyOptions, Known, MotionKind, UndecidedReason, classify_on,
+    Classified, ClassifyOptions, KnownMotions, MotionKind, UndecidedReason, classify_on,
 };
 use crate::map::StroboscopicMap;
 use crate::orbit::{PeriodicOrbit, close_orbit_from_points};
@@ -37,7 +37,7 @@ pub(crate) fn confirm<M: StroboscopicMap>(
     map: &mut M,
     mut found: Classified,
     start: &[f64],
-    known: Known<'_>,
+    known: KnownMotions<'_>,
     options: &ClassifyOptions,
 ) -> Classified {
     let met: Vec<_> = std::mem::take(&mut found.met)

@@ -28,10 +28,10 @@
 //! slow for the budget, is left undecided.
 
 mod approach;
+mod batch_classify;
 mod birkhoff;
 mod candidates;
 mod confirm;
-mod pack;
 mod run;
 mod undecided;
 
@@ -39,12 +39,12 @@ use crate::lyapunov::{LyapunovOptions, LyapunovSpectrum};
 use crate::map::StroboscopicMap;
 use crate::orbit::{PeriodicOrbit, ShootingOptions};
 
+pub(crate) use batch_classify::{Followed, follow_starts};
 pub use birkhoff::birkhoff_digits;
 pub use candidates::{Candidate, candidate_periods};
 pub(crate) use confirm::close_exactly;
 use confirm::confirm;
-pub(crate) use pack::{Followed, follow_starts};
-pub(crate) use run::{Known, RECOGNISABLE, RunEnd, first_entry, follow_start, watch};
+pub(crate) use run::{KnownMotions, RECOGNISABLE, RunEnd, first_entry, follow_start, watch};
 pub use undecided::UndecidedReason;
 
 /// Budgets of [`classify`].
@@ -231,9 +231,9 @@ pub fn classify_beside<M: StroboscopicMap>(
     chaos: &[LyapunovSpectrum],
     options: &ClassifyOptions,
 ) -> Classified {
-    let known = Known {
+    let known = KnownMotions {
         chaos,
-        ..Known::default()
+        ..KnownMotions::default()
     };
     let Some(mut coarse) = map.coarse() else {
         return classify_on(map, start, known, options);
@@ -246,7 +246,7 @@ pub fn classify_beside<M: StroboscopicMap>(
 pub(crate) fn classify_on<M: StroboscopicMap>(
     map: &mut M,
     start: &[f64],
-    known: Known<'_>,
+    known: KnownMotions<'_>,
     options: &ClassifyOptions,
 ) -> Classified {
     let mut end = ended(follow_start(map, start, known, options), start);

@@ -459,7 +459,11 @@ fn described(
         .transient_chaos
         .as_ref()
         .map(|t| TransientChaosReport {
-            lyapunov: t.spectrum.iter().flat_map(|s| s.exponents.clone()).collect(),
+            lyapunov: t
+                .spectrum
+                .iter()
+                .flat_map(|s| s.exponents.clone())
+                .collect(),
             lyapunov_errors: t.spectrum.iter().flat_map(|s| s.errors.clone()).collect(),
             lifetime: t.lifetime.mean,
             lifetime_interval: [t.lifetime.low, t.lifetime.high],

@@ -431,10 +431,11 @@ impl Search<'_> {
                     })
                 };
                 let crossed = before.as_ref().map(|last| {
-                    self.crossing(sweep, last, &here).map(|found| SetpointSolution {
-                        reached: true,
-                        ..found
-                    })
+                    self.crossing(sweep, last, &here)
+                        .map(|found| SetpointSolution {
+                            reached: true,
+                            ..found
+                        })
                 });
                 self.found = match (crossed, self.before) {
                     (Some(Some(found)), _) => Some(Ok(found)),

@@ -559,8 +559,15 @@ impl<'a> DistanceSweep<'a> {
             Direction::Decreasing
         };
         let (at, orbit) = (nearest.parameter, &nearest.orbit);
-        let branch =
-            continue_orbit(&self.family, at, orbit, direction, &options, &self.limited()).ok()?;
+        let branch = continue_orbit(
+            &self.family,
+            at,
+            orbit,
+            direction,
+            &options,
+            &self.limited(),
+        )
+        .ok()?;
         let last = branch.points.into_iter().next_back()?;
         let arrived = matches!(branch.end, BranchEnd::RangeEnd) && last.orbit.is_stable();
         arrived.then_some(last.orbit)

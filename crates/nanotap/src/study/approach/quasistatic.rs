@@ -5,9 +5,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use nanotap_dynamics::{Control, PeriodicOrbit};
 use rayon::prelude::*;
 
-use super::distance_sweep::{
-    DistanceSweep, End, Met, Motion, Piece, Place, budget_text, is_same,
-};
+use super::distance_sweep::{DistanceSweep, End, Met, Motion, Piece, Place, budget_text, is_same};
 use super::ramp::ramp;
 use super::{
     ApproachError, ApproachPoint, Curve, Hysteresis, StateJump, Way, branching, difference,
@@ -118,7 +116,9 @@ pub(super) fn found(
         Some(_) => Vec::new(),
     };
     let hysteresis = written.hysteresis(free.amplitude)?;
-    let not_measured = sweep.spent_budget().map(|steps| written.not_measured(steps));
+    let not_measured = sweep
+        .spent_budget()
+        .map(|steps| written.not_measured(steps));
     let (branches, cut) = branches(curve, &mut sweep, range, control)?;
     let limits = [not_followed, not_measured, cut].into_iter().flatten();
     Ok(Found {

@@ -5,25 +5,25 @@
 //! it came through, one by one. Where it ends before the last of them, the others are not looked at.
 //! What comes of a start depends on no other.
 
-use crate::classify::run::{AfterLook, LONGEST_PARTING, Resembled, Run, Stop, refused};
-use crate::classify::{ClassifyOptions, Known, RunEnd};
+use crate::classify::run::{AfterLook, ChaosMatch, MAX_DIVERGENCE_PERIODS, Run, Stop, refused};
+use crate::classify::{ClassifyOptions, KnownMotions, RunEnd};
 use crate::failure::{MapFailure, finite};
 use crate::map::StroboscopicMap;
 
 /// Periods that are passed before a run is asked where it has come to.
-const UNSEEN: usize = 32;
+const PERIODS_AT_ONCE: usize = 32;
 
 /// One start under way.
 struct Member<'a> {
     number: usize,
     run: Run<'a>,
-    /// The neighbour that shows whether it is on the chaos that it resembles.
-    beside: Option<Beside>,
+    /// The neighbour that shows whether it is on the chaos that it matching_chaos.
+    beside: Option<Neighbour>,
 }
 
 /// A neighbour of a run.
-struct Beside {
-    chaos: Resembled,
+struct Neighbour {
+    chaos: ChaosMatch,
     neighbour: Vec<f64>,
     /// Periods passed.
     periods: usize,
@@ -60,7 +60,7 @@ pub(crate) fn follow_starts<'a, M: StroboscopicMap>(
     map: &mut M,
     places: impl Fn() -> usize,
     mut next: impl FnMut() -> Option<(usize, &'a [f64])>,
-    known: Known<'a>,
+    known: KnownMotions<'a>,
     options: &'a ClassifyOptions,
     cancelled: impl Fn() -> bool,
     mut followed: impl FnMut(usize, Followed<'a>),
@@ -95,7 +95,7 @@ pub(crate) fn follow_starts<'a, M: StroboscopicMap>(
             let own = passed.next().unwrap_or_default();
             let neighbour = member.beside.as_ref().and_then(|_| passed.next());
             let how = match member.go_on(map, own, &neighbour.unwrap_or_default()) {
-                Ok(AfterLook::GoOn | AfterLook::Perhaps(_)) => {
+                Ok(AfterLook::GoOn | AfterLook::MaybeChaos(_)) => {
                     left.push(member);
                     continue;
                 }
@@ -121,9 +121,9 @@ fn pass<M: StroboscopicMap>(map: &mut M, members: &[Member<'_>]) -> Vec<Passed> 
         states.extend_from_slice(&run.state);
         if let Some(beside) = beside {
             states.extend_from_slice(&beside.neighbour);
-            periods.extend([UNSEEN.min(LONGEST_PARTING - beside.periods); 2]);
+            periods.extend([PERIODS_AT_ONCE.min(MAX_DIVERGENCE_PERIODS - beside.periods); 2]);
         } else {
-            periods.push(UNSEEN.min(run.next_look() - run.periods));
+            periods.push(PERIODS_AT_ONCE.min(run.next_look() - run.periods));
         }
     }
     let mut passed = vec![Vec::new(); periods.len()];
@@ -159,8 +159,8 @@ impl Member<'_> {
         };
         loop {
             after = match after {
-                AfterLook::Perhaps(chaos) => {
-                    self.beside = Some(Beside {
+                AfterLook::MaybeChaos(chaos) => {
+                    self.beside = Some(Neighbour {
                         neighbour: chaos.neighbour(&self.run.state),
                         chaos,
                         periods: 0,
@@ -179,7 +179,7 @@ impl Member<'_> {
     fn go_on_beside<M: StroboscopicMap>(
         &mut self,
         map: &mut M,
-        mut beside: Beside,
+        mut beside: Neighbour,
         own: Passed,
         neighbour: &Passed,
     ) -> Result<Option<AfterLook>, Stop> {
@@ -190,7 +190,7 @@ impl Member<'_> {
             let Some(neighbour) = neighbours.next().filter(|x| finite(x).is_ok()) else {
                 return Ok(Some(self.run.go_on()));
             };
-            if beside.chaos.has_parted(state, neighbour) {
+            if beside.chaos.has_diverged(state, neighbour) {
                 let kind = self.run.chaotic(beside.chaos.spectrum);
                 return Ok(Some(AfterLook::Known(kind)));
             }
@@ -198,7 +198,7 @@ impl Member<'_> {
             beside.neighbour.copy_from_slice(neighbour);
         }
         own.failure.map_or(Ok(()), Err)?;
-        if beside.periods >= LONGEST_PARTING {
+        if beside.periods >= MAX_DIVERGENCE_PERIODS {
             return Ok(Some(self.run.go_on()));
         }
         self.beside = Some(beside);
@@ -234,7 +234,7 @@ mod tests {
     }
 
     /// One after the other, `map` gives the same bits, however many are followed at a time.
-    fn assert_same_as_alone<M: StroboscopicMap>(map: &M, known: Known<'_>) -> Vec<RunEnd> {
+    fn assert_same_as_alone<M: StroboscopicMap>(map: &M, known: KnownMotions<'_>) -> Vec<RunEnd> {
         let options = ClassifyOptions::default();
         let alone: Vec<RunEnd> = STARTS
             .iter()
@@ -277,11 +277,11 @@ mod tests {
     #[test]
     fn starts_side_by_side_come_to_what_each_comes_to_alone() {
         for r in [3.2, 3.449, 3.8285, 3.9, 4.5] {
-            assert_same_as_alone(&Logistic(r), Known::default());
+            assert_same_as_alone(&Logistic(r), KnownMotions::default());
         }
     }
 
-    /// Patience as a census has it, and neighbourhoods on the way.
+    /// Waiting as a census has it, and neighbourhoods on the way.
     #[test]
     fn neighbourhoods_are_entered_after_as_many_periods() {
         let mut map = Logistic(3.2);
@@ -289,11 +289,11 @@ mod tests {
         let MotionKind::Periodic(orbit) = found.kind else {
             panic!("3.2 x (1 − x) has an orbit of period 2")
         };
-        let ball = Neighbourhood::around(&mut map, &orbit).unwrap().unwrap();
-        let known = Known {
-            balls: &[ball],
-            patience: 100,
-            ..Known::default()
+        let region = Neighbourhood::around(&mut map, &orbit).unwrap().unwrap();
+        let known = KnownMotions {
+            trapping_regions: &[region],
+            max_wait_periods: 100,
+            ..KnownMotions::default()
         };
         let ends = assert_same_as_alone(&map, known);
         assert!(matches!(
@@ -305,15 +305,15 @@ mod tests {
         ));
     }
 
-    /// A start that resembles chaos is on it if a neighbour parts. On an orbit of period 3 none does,
+    /// A start that matching_chaos chaos is on it if a neighbour parts. On an orbit of period 3 none does,
     /// though its means are said to be those of chaos.
     #[test]
     fn known_chaos_is_recognised_beside_a_neighbour() {
         let own = [chaos(3.9)];
-        let known = Known {
+        let known = KnownMotions {
             chaos: &own,
-            patience: 300,
-            ..Known::default()
+            max_wait_periods: 300,
+            ..KnownMotions::default()
         };
         let ends = assert_same_as_alone(&Logistic(3.9), known);
         let RunEnd::Classified(end) = &ends[0] else {
@@ -335,7 +335,7 @@ mod tests {
         let mut other = chaos(3.9);
         other.strobe.errors.fill(1.0);
         let others = [other];
-        let known = Known {
+        let known = KnownMotions {
             chaos: &others,
             ..known
         };
@@ -379,12 +379,12 @@ mod tests {
 
     #[test]
     fn a_failure_comes_after_as_many_periods() {
-        assert_same_as_alone(&Fails(Logistic(3.9)), Known::default());
+        assert_same_as_alone(&Fails(Logistic(3.9)), KnownMotions::default());
         let own = [chaos(3.9)];
-        let known = Known {
+        let known = KnownMotions {
             chaos: &own,
-            patience: 300,
-            ..Known::default()
+            max_wait_periods: 300,
+            ..KnownMotions::default()
         };
         assert_same_as_alone(&Fails(Logistic(3.9)), known);
     }
@@ -404,7 +404,7 @@ mod tests {
             &mut Logistic(3.9),
             || STARTS.len(),
             || next.next(),
-            Known::default(),
+            KnownMotions::default(),
             &options,
             cancelled,
             |number, _| ended.push(number),

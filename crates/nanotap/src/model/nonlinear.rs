@@ -13,7 +13,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use nalgebra::{DMatrix, DVector, RowDVector};
 use nanotap_flow::{Output, Regime};
-use nanotap_volterra::averaging::{about_rest, distances, motions};
+use nanotap_volterra::averaging::{about_rest, motions};
 use nanotap_volterra::{
     Coarse, Drive, Flow, Guard, Kernel, Modes, Options, Parameter as Change, Remark, System, Tone,
     ToneChange, Trajectory, VolterraError,
@@ -171,16 +171,6 @@ impl Nonlinear {
         motions
             .chain(rests.iter().filter_map(about))
             .map(|motion| self.state(motion.state, motion.branch))
-            .collect()
-    }
-
-    /// Guesses of the distances at which the gap swings with this amplitude, the farthest first,
-    /// by averaging: the constant part of the gap, as [`Model::height`] has it, and the state at
-    /// drive phase 0.
-    pub(crate) fn averaged_distances(&self, amplitude: f64) -> Vec<(f64, Vec<f64>)> {
-        let motions = distances(&self.system, amplitude).into_iter();
-        motions
-            .map(|motion| (motion.offset, self.state(motion.state, motion.branch)))
             .collect()
     }
 

@@ -234,12 +234,7 @@ impl<'a> Averaging<'a> {
         self.finish(modal.as_slice(), branch?, amplitude)
     }
 
-    fn finish(
-        &self,
-        modal: &[f64],
-        branch: usize,
-        amplitude: f64,
-    ) -> Option<AveragedMotion> {
+    fn finish(&self, modal: &[f64], branch: usize, amplitude: f64) -> Option<AveragedMotion> {
         let mut state = vec![0.0; modal.len()];
         self.system.to_state(0.0, modal, &mut state);
         let finite = state.iter().all(|x| x.is_finite());

@@ -339,7 +339,7 @@ impl Level {
     }
 }
 
-/// What a [`Level`] is made of besides the system.
+/// What a [`Level`] is made from, in addition to the system.
 struct Readouts<'a> {
     readout: &'a [[f64; 2]],
     rate_readout: &'a [[f64; 2]],

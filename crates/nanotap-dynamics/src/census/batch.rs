@@ -1,8 +1,8 @@
 //! A batch of starts, which threads take one by one.
 //!
 //! Each thread follows some of them side by side, fewer towards the end, so that none is left with many.
-//! A run that does not close is measured by whoever has nothing else to do. What comes of a start does
-//! not depend on who follows it, nor beside which others.
+//! A run that does not close is measured by any thread that is free. The outcome of a start does not
+//! depend on the thread that follows it, nor on the others of its group.
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::mpsc::{Sender, channel};
@@ -131,7 +131,7 @@ impl<'s, 'a: 's, M: StroboscopicMap> Turn<'s, 'a, M> {
         }
         let (done, all) = self.batch.progress;
         self.batch.control.report(done, all);
-        // What receives it outlives whoever sends.
+        // The receiver outlives every sender.
         let _ = self.sender.send((place, end, cost));
     }
 }

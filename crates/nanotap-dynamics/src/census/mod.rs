@@ -11,7 +11,7 @@
 //!    destination enters is discarded.
 //! 3. The other starts follow in batches (`batch.rs`). Each is run until it enters a neighbourhood,
 //!    or is classified like a pilot; what a batch finds is known to the next. A start on
-//!    chaos that is known is recognised, without exponents of its own, by parting from a
+//!    chaos that is known is recognised, without measuring its exponents, by diverging from a
 //!    neighbour and by the means of its strobe states and their squares.
 //! 4. Starts that can be drawn without end ([`StartSet`]) go on until the share of
 //!    them that may lead to motions not yet found is bounded ([`UndiscoveredFraction`]) as the
@@ -29,8 +29,8 @@
 //!
 //! Fails: attractors whose basins are a smaller part of the set of starts than
 //! [`Census::unseen`] says are missed; two different chaotic attractors with equal
-//! means and mean squares would be merged; an attractor and a chaotic transient beside it
-//! are told apart only by the hazard of escape falling with time, as documented at
+//! means and mean squares would be merged; an attractor and a chaotic transient near it
+//! are distinguished only by the hazard of escape falling with time, as documented at
 //! [`Census::transient_chaos`].
 
 mod assemble;
@@ -132,7 +132,7 @@ pub struct Census {
     /// escape and others have not yet, the others are on transient chaos, unless all
     /// escapes fell in the first quarter of the time watched and that would happen
     /// with probability below 1 % at a constant rate: then there is an attractor,
-    /// with a chaotic transient beside it.
+    /// with a chaotic transient near it.
     pub transient_chaos: Option<TransientChaos>,
     /// Starts that left every bound.
     pub unbounded: Fraction,
@@ -500,7 +500,7 @@ impl<'a, M: StroboscopicMap> Work<'a, M> {
     /// Finds neighbourhoods of the orbits that are new, checks all by the starts that were
     /// `classified` without them, and says how long a start is left to itself from now on.
     fn update_trapping_regions(&mut self, classified: &[usize]) {
-        // A run beside the same neighbourhoods as before would end as it did.
+        // With the same trapping regions as before a run would end as it did.
         if self.find_neighbourhoods() {
             self.check_neighbourhoods(classified);
         }
@@ -685,9 +685,9 @@ impl<'a, M: StroboscopicMap> Work<'a, M> {
     }
 
     /// Follows chaotic starts for several times the periods `after` which escapes are
-    /// counted: beside a weakly stable orbit, chaos that was watched for less than a
+    /// counted: near a weakly stable orbit, chaos that was watched for less than a
     /// linear transient takes is no evidence of an attractor. Where no stable orbit is known there
-    /// is none to be beside. Where starts escaped, the others are watched for as long as a start
+    /// is none to be near. Where starts escaped, the others are watched for as long as a start
     /// may be in transit at all. Where one of them escapes,
     /// escapes count from when it was known to be chaotic.
     fn watch_chaos(&mut self, after: &mut f64) {
@@ -697,12 +697,12 @@ impl<'a, M: StroboscopicMap> Work<'a, M> {
         } else {
             0
         };
-        let beside = if self.motions.orbits.is_empty() {
+        let near_orbit = if self.motions.orbits.is_empty() {
             0.0
         } else {
             WATCHED_TRANSIENTS * *after
         };
-        let enough = least.max(beside as usize);
+        let enough = least.max(near_orbit as usize);
         let chaotic = |outcome: &&Outcome| matches!(outcome, Outcome::Chaos(..));
         let chaotic = self.outcomes.iter().filter(chaotic).count();
         let together = WATCHED_TOGETHER / chaotic.max(1);

@@ -3,14 +3,14 @@
 //! Each run comes to what [`follow_start`](super::follow_start) makes of its start, but for rounding:
 //! the map passes some periods of all of them together, and each run then takes in the states that
 //! it came through, one by one. Where it ends before the last of them, the others are not looked at.
-//! What comes of a start depends on no other.
+//! The outcome of a start does not depend on the others.
 
 use crate::classify::run::{AfterLook, ChaosMatch, MAX_DIVERGENCE_PERIODS, Run, Stop, refused};
 use crate::classify::{ClassifyOptions, KnownMotions, RunEnd};
 use crate::failure::{MapFailure, finite};
 use crate::map::StroboscopicMap;
 
-/// Periods that are passed before a run is asked where it has come to.
+/// Periods that are passed before a run takes in its states.
 const PERIODS_AT_ONCE: usize = 32;
 
 /// One start under way.
@@ -18,7 +18,7 @@ struct Member<'a> {
     number: usize,
     run: Run<'a>,
     /// The neighbour that shows whether it is on the chaos that it matching_chaos.
-    beside: Option<Neighbour>,
+    companion: Option<Neighbour>,
 }
 
 /// A neighbour of a run.
@@ -79,7 +79,7 @@ pub(crate) fn follow_starts<'a, M: StroboscopicMap>(
                 None => members.push(Member {
                     number,
                     run: Run::new(start, known, options),
-                    beside: None,
+                    companion: None,
                 }),
             }
         }
@@ -93,7 +93,7 @@ pub(crate) fn follow_starts<'a, M: StroboscopicMap>(
                 return;
             }
             let own = passed.next().unwrap_or_default();
-            let neighbour = member.beside.as_ref().and_then(|_| passed.next());
+            let neighbour = member.companion.as_ref().and_then(|_| passed.next());
             let how = match member.go_on(map, own, &neighbour.unwrap_or_default()) {
                 Ok(AfterLook::GoOn | AfterLook::MaybeChaos(_)) => {
                     left.push(member);
@@ -117,11 +117,11 @@ pub(crate) fn follow_starts<'a, M: StroboscopicMap>(
 /// Passes some periods of every run, and of its neighbour after it where it has one.
 fn pass<M: StroboscopicMap>(map: &mut M, members: &[Member<'_>]) -> Vec<Passed> {
     let (mut states, mut periods) = (Vec::new(), Vec::new());
-    for Member { run, beside, .. } in members {
+    for Member { run, companion, .. } in members {
         states.extend_from_slice(&run.state);
-        if let Some(beside) = beside {
-            states.extend_from_slice(&beside.neighbour);
-            periods.extend([PERIODS_AT_ONCE.min(MAX_DIVERGENCE_PERIODS - beside.periods); 2]);
+        if let Some(companion) = companion {
+            states.extend_from_slice(&companion.neighbour);
+            periods.extend([PERIODS_AT_ONCE.min(MAX_DIVERGENCE_PERIODS - companion.periods); 2]);
         } else {
             periods.push(PERIODS_AT_ONCE.min(run.next_look() - run.periods));
         }
@@ -144,7 +144,7 @@ impl Member<'_> {
         own: Passed,
         neighbour: &Passed,
     ) -> Result<AfterLook, Stop> {
-        let mut after = match self.beside.take() {
+        let mut after = match self.companion.take() {
             None => {
                 for state in own.states.chunks_exact(map.dimension()) {
                     self.run.step_to(map, state)?;
@@ -152,7 +152,7 @@ impl Member<'_> {
                 own.failure.map_or(Ok(()), Err)?;
                 AfterLook::GoOn
             }
-            Some(beside) => match self.go_on_beside(map, beside, own, neighbour)? {
+            Some(companion) => match self.go_on_with(map, companion, own, neighbour)? {
                 Some(after) => after,
                 None => return Ok(AfterLook::GoOn),
             },
@@ -160,7 +160,7 @@ impl Member<'_> {
         loop {
             after = match after {
                 AfterLook::MaybeChaos(chaos) => {
-                    self.beside = Some(Neighbour {
+                    self.companion = Some(Neighbour {
                         neighbour: chaos.neighbour(&self.run.state),
                         chaos,
                         periods: 0,
@@ -175,11 +175,11 @@ impl Member<'_> {
         }
     }
 
-    /// The same beside a neighbour; nothing follows as long as it may still part.
-    fn go_on_beside<M: StroboscopicMap>(
+    /// The same with a neighbour; `None` as long as the two may still diverge.
+    fn go_on_with<M: StroboscopicMap>(
         &mut self,
         map: &mut M,
-        mut beside: Neighbour,
+        mut companion: Neighbour,
         own: Passed,
         neighbour: &Passed,
     ) -> Result<Option<AfterLook>, Stop> {
@@ -190,18 +190,18 @@ impl Member<'_> {
             let Some(neighbour) = neighbours.next().filter(|x| finite(x).is_ok()) else {
                 return Ok(Some(self.run.go_on()));
             };
-            if beside.chaos.has_diverged(state, neighbour) {
-                let kind = self.run.chaotic(beside.chaos.spectrum);
+            if companion.chaos.has_diverged(state, neighbour) {
+                let kind = self.run.chaotic(companion.chaos.spectrum);
                 return Ok(Some(AfterLook::Known(kind)));
             }
-            beside.periods += 1;
-            beside.neighbour.copy_from_slice(neighbour);
+            companion.periods += 1;
+            companion.neighbour.copy_from_slice(neighbour);
         }
         own.failure.map_or(Ok(()), Err)?;
-        if beside.periods >= MAX_DIVERGENCE_PERIODS {
+        if companion.periods >= MAX_DIVERGENCE_PERIODS {
             return Ok(Some(self.run.go_on()));
         }
-        self.beside = Some(beside);
+        self.companion = Some(companion);
         Ok(None)
     }
 }
@@ -233,7 +233,7 @@ mod tests {
         format!("{end:?}")
     }
 
-    /// One after the other, `map` gives the same bits, however many are followed at a time.
+    /// In sequence, `map` gives the same bits, however many are followed at a time.
     fn assert_same_as_alone<M: StroboscopicMap>(map: &M, known: KnownMotions<'_>) -> Vec<RunEnd> {
         let options = ClassifyOptions::default();
         let alone: Vec<RunEnd> = STARTS
@@ -306,7 +306,7 @@ mod tests {
     }
 
     /// A start that matching_chaos chaos is on it if a neighbour parts. On an orbit of period 3 none does,
-    /// though its means are said to be those of chaos.
+    /// though its means are given as those of chaos.
     #[test]
     fn known_chaos_is_recognised_beside_a_neighbour() {
         let own = [chaos(3.9)];
@@ -389,7 +389,7 @@ mod tests {
         assert_same_as_alone(&Fails(Logistic(3.9)), known);
     }
 
-    /// What had ended by then is told.
+    /// What had ended by then is reported.
     #[test]
     fn work_that_is_stopped_tells_what_it_knows() {
         let options = ClassifyOptions::default();

@@ -1,7 +1,7 @@
 //! What a motion that was followed on a coarse map is on the map itself.
 //!
 //! A coarse map is near the map in every period, but its motions may differ: an orbit may have
-//! another period beside a flip, or be missing beside a fold. So an orbit counts only if Newton
+//! another period near a flip, or be missing near a fold. So an orbit counts only if Newton
 //! closes it on the map, from the coarse orbit's points and near them, and its multipliers there say
 //! stable. In any other case the run goes on exactly from where the coarse one ended, within the
 //! budgets of [`ClassifyOptions`], and has the name that it gets there.

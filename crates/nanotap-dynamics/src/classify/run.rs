@@ -192,7 +192,7 @@ impl Guesses {
     }
 }
 
-/// An orbit that Newton closed beside a run.
+/// An orbit that Newton closed near a run.
 pub(super) enum Closed {
     /// Its multipliers say that it attracts.
     Attracting(PeriodicOrbit),

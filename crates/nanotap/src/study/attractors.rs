@@ -31,7 +31,7 @@ use crate::study::value::Intervals;
 /// How to look for attractors.
 #[derive(Clone, Debug, PartialEq)]
 pub struct AttractorsOptions {
-    /// Starts drawn evenly from the box; `None`: starts of every size, besides rest and the
+    /// Starts drawn evenly from the box; `None`: starts of every size, in addition to rest and the
     /// linear responses, until the share of starts that may lead to motions not found is small
     /// (the box is not used then).
     pub starts: Option<usize>,
@@ -76,12 +76,12 @@ impl Default for AttractorsOptions {
 #[derive(Clone, Debug, thiserror::Error)]
 pub enum AttractorsError {
     /// Nothing to start from.
-    #[error("at least one start is needed, 0 were asked for")]
+    #[error("at least one start is needed, 0 were requested")]
     NoStarts,
     /// More than fit in memory.
     #[error("{starts} starts are too many; {MOST_STARTS} at most")]
     TooManyStarts {
-        /// How many were asked for.
+        /// The number requested.
         starts: usize,
     },
     /// The box makes no sense.
@@ -631,7 +631,7 @@ fn unstable_orbits(
         .collect()
 }
 
-/// What a census is asked for.
+/// Options of a census.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct AttractorsRequest {

@@ -252,7 +252,7 @@ pub fn solve_setpoint(case: &Case, control: &Control<'_>) -> Result<SetpointRepo
         return Err(SetpointError::Budget {
             ratio,
             spent: budget_text(steps),
-            at: search.told(pieces.last().map_or(range.1, |piece| piece.to)),
+            at: search.distance_text(pieces.last().map_or(range.1, |piece| piece.to)),
         });
     }
     let reached = search.found.take().unwrap_or_else(|| {
@@ -369,7 +369,7 @@ fn amplitude(sweep: &DistanceSweep<'_>, gap: f64, orbit: &PeriodicOrbit) -> f64 
 
 impl Search<'_> {
     /// The distance in words.
-    fn told(&self, gap: f64) -> String {
+    fn distance_text(&self, gap: f64) -> String {
         self.case.physical().map_or_else(
             || gap.to_string(),
             |view| Kind::Length.format(gap * view.scales.length),
@@ -381,14 +381,14 @@ impl Search<'_> {
         let stretch = match &piece.motion {
             Motion::Periodic(stretch) => *stretch,
             Motion::OnGrid(_) => {
-                let met = sweep.motion_at(piece, piece.entered);
-                let what = match met.orbit {
+                let motion = sweep.motion_at(piece, piece.entered);
+                let what = match motion.orbit {
                     Some(_) => "of a long period",
-                    None => met.classification.name(),
+                    None => motion.classification.name(),
                 };
                 self.found = Some(Err(SetpointError::NotPeriodic {
                     what,
-                    at: self.told(piece.from),
+                    at: self.distance_text(piece.from),
                     ratio: self.ratio,
                 }));
                 return true;
@@ -426,8 +426,8 @@ impl Search<'_> {
                         ratio: self.ratio,
                         before: above / self.free.amplitude,
                         after: amplitude / self.free.amplitude,
-                        from: self.told(from),
-                        to: self.told(*gap),
+                        from: self.distance_text(from),
+                        to: self.distance_text(*gap),
                     })
                 };
                 let crossed = before.as_ref().map(|last| {

@@ -127,7 +127,7 @@ impl Stretch {
 
 /// A motion as it was found.
 #[derive(Clone, Debug)]
-pub(in crate::study) struct Met {
+pub(in crate::study) struct FoundMotion {
     pub(in crate::study) classification: Classification,
     pub(in crate::study) evidence: String,
     pub(in crate::study) orbit: Option<PeriodicOrbit>,
@@ -135,18 +135,18 @@ pub(in crate::study) struct Met {
     /// Whether the motion from the start could not be computed.
     failed: bool,
     /// Whether it was only looked for an orbit.
-    glimpsed: bool,
+    only_searched: bool,
 }
 
-impl Met {
-    pub(in crate::study) fn on(orbit: PeriodicOrbit) -> Self {
+impl FoundMotion {
+    pub(in crate::study) fn periodic(orbit: PeriodicOrbit) -> Self {
         Self {
             classification: Classification::Periodic,
             evidence: String::new(),
             state: orbit.states.first().cloned().unwrap_or_default(),
             orbit: Some(orbit),
             failed: false,
-            glimpsed: false,
+            only_searched: false,
         }
     }
 
@@ -157,12 +157,12 @@ impl Met {
             orbit: None,
             state: state.to_vec(),
             failed: true,
-            glimpsed: false,
+            only_searched: false,
         }
     }
 
     /// Where the motion at the next distance starts: rest, where this one ran off.
-    fn onwards(&self) -> Vec<f64> {
+    fn next_start(&self) -> Vec<f64> {
         match self.classification {
             Classification::Unbounded => vec![0.0; self.state.len()],
             _ => self.state.clone(),
@@ -177,7 +177,7 @@ pub(in crate::study) enum Motion {
     Periodic(usize),
     /// A motion without a branch that is followed, as it was found at distances in the order of
     /// the way: none that closes, or one of a long period.
-    OnGrid(Vec<(f64, Met)>),
+    OnGrid(Vec<(f64, FoundMotion)>),
 }
 
 /// A piece of a way.
@@ -207,7 +207,7 @@ impl Piece {
 #[derive(Clone, Debug)]
 pub(in crate::study) enum Place {
     On { stretch: usize, gap: f64 },
-    Off { gap: f64, met: Met },
+    Off { gap: f64, motion: FoundMotion },
 }
 
 /// Motions followed along the distance.
@@ -351,36 +351,36 @@ impl<'a> DistanceSweep<'a> {
 
     /// Where a run from a state at a distance goes.
     fn arrive(&mut self, gap: f64, start: &[f64]) -> Place {
-        let met = self.met(gap, start, self.classify.max_transient);
-        self.place(gap, met)
+        let motion = self.run_from(gap, start, self.classify.max_transient);
+        self.place(gap, motion)
     }
 
     /// The place of a motion: on its branch, where that is followed.
-    fn place(&mut self, gap: f64, met: Met) -> Place {
-        match met.orbit {
+    fn place(&mut self, gap: f64, motion: FoundMotion) -> Place {
+        match motion.orbit {
             Some(orbit) if orbit.period <= LONGEST_BRANCH => self.on(gap, orbit),
-            _ => Place::Off { gap, met },
+            _ => Place::Off { gap, motion },
         }
     }
 
     /// What a run from a state at a distance goes to.
-    fn met(&self, gap: f64, start: &[f64], max_transient: usize) -> Met {
+    fn run_from(&self, gap: f64, start: &[f64], max_transient: usize) -> FoundMotion {
         let options = ClassifyOptions {
             max_transient,
             ..self.classify.clone()
         };
         match self.model(gap) {
             Ok(model) => named(&mut Strobe::new(&model), start, &options),
-            Err(error) => Met::undecided(error.to_string(), start),
+            Err(error) => FoundMotion::undecided(error.to_string(), start),
         }
     }
 
-    /// As [`met`](Self::met), on the approximate map where there is one, and no further than to
+    /// As [`run_from`](Self::run_from), on the approximate map where there is one, and no further than to
     /// see whether an orbit closes.
-    fn glimpse(&self, gap: f64, start: &[f64]) -> Met {
+    fn search_orbit(&self, gap: f64, start: &[f64]) -> FoundMotion {
         let model = match self.model(gap) {
             Ok(model) => model,
-            Err(error) => return Met::undecided(error.to_string(), start),
+            Err(error) => return FoundMotion::undecided(error.to_string(), start),
         };
         let mut map = Strobe::new(&model);
         let options = ClassifyOptions {
@@ -395,22 +395,22 @@ impl<'a> DistanceSweep<'a> {
             birkhoff_periods: 1,
             ..self.classify.clone()
         };
-        let mut met = named(
+        let mut motion = named(
             &mut map.coarse().unwrap_or_else(|| map.clone()),
             start,
             &options,
         );
-        if let Some(near) = met.orbit.take() {
+        if let Some(near) = motion.orbit.take() {
             let (points, period) = (near.states.concat(), near.period);
             let closed =
                 close_orbit_from_points(&mut map, &points, period, &ShootingOptions::default());
-            met.orbit = closed.ok().filter(|orbit| {
+            motion.orbit = closed.ok().filter(|orbit| {
                 orbit.is_stable() && orbit.distance_to(&near).1 <= CONTINUOUS * near.scale()
             });
         }
-        Met {
-            glimpsed: true,
-            ..met
+        FoundMotion {
+            only_searched: true,
+            ..motion
         }
     }
 
@@ -442,7 +442,7 @@ impl<'a> DistanceSweep<'a> {
                     .and_then(|o| o.states.first().cloned())
                     .unwrap_or_default()
             }
-            Place::Off { met, .. } => met.state.clone(),
+            Place::Off { motion, .. } => motion.state.clone(),
         }
     }
 
@@ -513,8 +513,8 @@ impl<'a> DistanceSweep<'a> {
         }
         let points = &stretch.points;
         let above = points.partition_point(|p| p.parameter < gap);
-        let beside = [above.checked_sub(1), Some(above)];
-        let [below, above] = beside.map(|k| k.and_then(|k| points.get(k)));
+        let neighbours = [above.checked_sub(1), Some(above)];
+        let [below, above] = neighbours.map(|k| k.and_then(|k| points.get(k)));
         if let (Some(a), Some(b)) = (below, above) {
             let t = (gap - a.parameter) / (b.parameter - a.parameter);
             let [from, to] = [a, b].map(|p| p.orbit.states.concat());
@@ -574,11 +574,11 @@ impl<'a> DistanceSweep<'a> {
     }
 
     /// The motion of a piece at a distance.
-    pub(in crate::study) fn motion_at(&self, piece: &Piece, gap: f64) -> Met {
-        let beside = match &piece.motion {
+    pub(in crate::study) fn motion_at(&self, piece: &Piece, gap: f64) -> FoundMotion {
+        let nearby = match &piece.motion {
             Motion::Periodic(stretch) => {
                 if let Some(orbit) = self.orbit_at(*stretch, gap) {
-                    return Met::on(orbit);
+                    return FoundMotion::periodic(orbit);
                 }
                 let nearest = self.stretches[*stretch].points.iter().min_by(|a, b| {
                     let apart = |p: &BranchPoint| (p.parameter - gap).abs();
@@ -587,16 +587,16 @@ impl<'a> DistanceSweep<'a> {
                 nearest.and_then(|p| p.orbit.states.first().cloned())
             }
             Motion::OnGrid(found) => {
-                let here = |(at, met): &&(f64, Met)| *at == gap && !met.glimpsed;
-                if let Some((_, met)) = found.iter().find(here) {
-                    return met.clone();
+                let here = |(at, motion): &&(f64, FoundMotion)| *at == gap && !motion.only_searched;
+                if let Some((_, motion)) = found.iter().find(here) {
+                    return motion.clone();
                 }
                 let passed = |at: f64| (at - piece.from).abs() <= (gap - piece.from).abs();
                 let last = found.iter().rfind(|(at, _)| passed(*at)).or(found.first());
-                last.map(|(_, met)| met.onwards())
+                last.map(|(_, motion)| motion.next_start())
             }
         };
-        self.met(gap, &beside.unwrap_or_default(), ROW_TRANSIENT)
+        self.run_from(gap, &nearby.unwrap_or_default(), ROW_TRANSIENT)
     }
 
     /// The pieces of the way from a place to a distance, until one is `enough`.
@@ -625,7 +625,7 @@ impl<'a> DistanceSweep<'a> {
                     let end = match last {
                         Some((Motion::Periodic(stretch), gap)) => Place::On { stretch, gap },
                         Some((Motion::OnGrid(mut found), gap)) => match found.pop() {
-                            Some((_, met)) => Place::Off { gap, met },
+                            Some((_, motion)) => Place::Off { gap, motion },
                             None => place,
                         },
                         None => place,
@@ -664,16 +664,17 @@ impl<'a> DistanceSweep<'a> {
                 let stuck = (at - gap).abs() <= 1e-9 * self.scale;
                 let next = match next {
                     Place::On { stretch: same, gap } if same == stretch && stuck => {
-                        let met = self
-                            .orbit_at(same, gap)
-                            .map_or_else(|| Met::undecided(end.to_string(), &[]), Met::on);
-                        Place::Off { gap, met }
+                        let motion = self.orbit_at(same, gap).map_or_else(
+                            || FoundMotion::undecided(end.to_string(), &[]),
+                            FoundMotion::periodic,
+                        );
+                        Place::Off { gap, motion }
                     }
                     next => next,
                 };
                 (piece(at, end, jumps), Some(next))
             }
-            Place::Off { gap, met } => self.on_grid(gap, met, to),
+            Place::Off { gap, motion } => self.on_grid(gap, motion, to),
         }
     }
 
@@ -704,12 +705,12 @@ impl<'a> DistanceSweep<'a> {
                 (Some(found.orbit), unstable, tries)
             }
             End::Meeting { period } => {
-                let met = (0..self.stretches.len()).find(|&k| {
+                let motion = (0..self.stretches.len()).find(|&k| {
                     let other = &self.stretches[k];
                     let near = |(gap, _): &(f64, End)| (gap - at).abs() <= SAME_PLACE * scale;
                     other.period == period && other.ends.iter().any(near)
                 });
-                if let Some(stretch) = met {
+                if let Some(stretch) = motion {
                     return (Place::On { stretch, gap: at }, false);
                 }
                 (last, None, &[BEYOND_END][..])
@@ -717,25 +718,25 @@ impl<'a> DistanceSweep<'a> {
             _ => (last, None, &[BEYOND_END][..]),
         };
         let Some(orbit) = orbit else {
-            let met = Met::undecided(NO_ORBIT.to_owned(), &[]);
-            return (Place::Off { gap: at, met }, true);
+            let motion = FoundMotion::undecided(NO_ORBIT.to_owned(), &[]);
+            return (Place::Off { gap: at, motion }, true);
         };
         let mut next = None;
         for &(step, push) in tries {
             let gap = at + side * step * scale;
             let gap = if (gap - to) * side > 0.0 { to } else { gap };
             let place = self.arrive(gap, &pushed(&orbit, unstable.as_deref(), push));
-            let settled = !matches!(&place, Place::Off { met, .. }
-                if met.classification == Classification::Undecided);
+            let settled = !matches!(&place, Place::Off { motion, .. }
+                if motion.classification == Classification::Undecided);
             next = Some(place);
             if settled {
                 break;
             }
         }
-        let met = || Met::undecided(NO_ORBIT.to_owned(), &[]);
+        let motion = || FoundMotion::undecided(NO_ORBIT.to_owned(), &[]);
         let next = next.unwrap_or_else(|| Place::Off {
             gap: at,
-            met: met(),
+            motion: motion(),
         });
         let jumps = !self.goes_on(&orbit, &next);
         (next, jumps)
@@ -747,9 +748,9 @@ impl<'a> DistanceSweep<'a> {
         match place {
             Place::On { stretch, gap } => (self.orbit_at(*stretch, *gap))
                 .is_some_and(|next| next.states.iter().all(|state| near(state))),
-            Place::Off { met, .. } => match &met.orbit {
+            Place::Off { motion, .. } => match &motion.orbit {
                 Some(next) => next.states.iter().all(|state| near(state)),
-                None => near(&met.state),
+                None => near(&motion.state),
             },
         }
     }
@@ -803,7 +804,7 @@ impl<'a> DistanceSweep<'a> {
 
     /// A motion without a branch that is followed, from grid distance to grid distance until it
     /// has one.
-    fn on_grid(&mut self, from: f64, met: Met, to: f64) -> (Piece, Option<Place>) {
+    fn on_grid(&mut self, from: f64, motion: FoundMotion, to: f64) -> (Piece, Option<Place>) {
         let side = sign(direction(from, to));
         let step = self.scale / GRID;
         let mut piece = Piece {
@@ -815,7 +816,7 @@ impl<'a> DistanceSweep<'a> {
             jumps: false,
             uncertainty: 0.0,
         };
-        let mut found = vec![(from, met)];
+        let mut found = vec![(from, motion)];
         let mut onwards = None;
         while let Some((gap, before)) = found.last().cloned() {
             if (gap - to) * side >= 0.0 {
@@ -823,7 +824,10 @@ impl<'a> DistanceSweep<'a> {
             }
             if self.stops_on_grid || self.flag.is_cancelled() {
                 piece.to = gap;
-                onwards = Some(Place::Off { gap, met: before });
+                onwards = Some(Place::Off {
+                    gap,
+                    motion: before,
+                });
                 break;
             }
             // The next multiple of a step, beyond rounding.
@@ -831,17 +835,17 @@ impl<'a> DistanceSweep<'a> {
             if (next - to) * side > 0.0 {
                 next = to;
             }
-            let start = before.onwards();
-            let mut met = self.glimpse(next, &start);
+            let start = before.next_start();
+            let mut motion = self.search_orbit(next, &start);
             for _ in 0..HALVINGS {
-                if !met.failed {
+                if !motion.failed {
                     break;
                 }
                 next = 0.5 * (gap + next);
-                met = self.glimpse(next, &start);
+                motion = self.search_orbit(next, &start);
             }
-            let Place::On { stretch, .. } = self.place(next, met.clone()) else {
-                found.push((next, met));
+            let Place::On { stretch, .. } = self.place(next, motion.clone()) else {
+                found.push((next, motion));
                 continue;
             };
             let direction = direction(from, to);
@@ -870,10 +874,10 @@ impl<'a> DistanceSweep<'a> {
 }
 
 /// What a run of a map goes to.
-fn named(map: &mut Strobe, start: &[f64], options: &ClassifyOptions) -> Met {
+fn named(map: &mut Strobe, start: &[f64], options: &ClassifyOptions) -> FoundMotion {
     let classified = classify(map, start, options);
     let named = Named::of(&classified.kind);
-    Met {
+    FoundMotion {
         classification: named.classification,
         evidence: named.evidence,
         orbit: named.orbit,
@@ -884,7 +888,7 @@ fn named(map: &mut Strobe, start: &[f64], options: &ClassifyOptions) -> Met {
                 ..
             }
         ),
-        glimpsed: false,
+        only_searched: false,
         state: classified.state,
     }
 }

@@ -42,7 +42,7 @@ use crate::study::kind::Study;
 use crate::study::limits::{MOST_DISTANCES, MOST_DOUBLINGS, MOST_PERIOD};
 use crate::study::simulate::Classification;
 use crate::study::value::Amount;
-use distance_sweep::Met;
+use distance_sweep::FoundMotion;
 use frequency_modulation::{
     HeldError, Modulated, ModulatedInSi, ModulationReport, modulated_approach,
 };
@@ -402,7 +402,7 @@ pub(in crate::study) fn distances(
         return Err(ApproachError::Closest { closest, to });
     }
     let last = (options.points - 1) as f64;
-    // Amplitudes at a kept least distance stand in equal ratios.
+    // Amplitudes at a kept least distance are in equal ratios.
     let between = |share: f64| match options.closest {
         Some(closest) if share > 0.0 && share < 1.0 => {
             let ratio = (to - closest) / (from - closest);
@@ -424,18 +424,18 @@ struct Curve<'a> {
 
 impl Curve<'_> {
     /// A motion as a line of the table.
-    fn observed(&self, way: Way, gap: f64, model: &Model, met: Met) -> ApproachPoint {
-        let seen = match (&met.orbit, met.classification) {
+    fn observed(&self, way: Way, gap: f64, model: &Model, motion: FoundMotion) -> ApproachPoint {
+        let seen = match (&motion.orbit, motion.classification) {
             (Some(orbit), _) => {
                 let start = orbit.states.first().map_or(&[][..], Vec::as_slice);
                 measure(model, start, orbit.period, Set::COMMON).map(Some)
             }
             (None, Classification::Undecided | Classification::Unbounded) => Ok(None),
-            (None, _) => measure(model, &met.state, self.options.periods, Set::COMMON).map(Some),
+            (None, _) => measure(model, &motion.state, self.options.periods, Set::COMMON).map(Some),
         };
         let (classification, observables, reason) = match seen {
-            Ok(Some(seen)) => (met.classification, Some(seen), None),
-            Ok(None) => (met.classification, None, Some(met.evidence)),
+            Ok(Some(seen)) => (motion.classification, Some(seen), None),
+            Ok(None) => (motion.classification, None, Some(motion.evidence)),
             Err(error) => (Classification::Undecided, None, Some(error.to_string())),
         };
         let view = self.case.physical();
@@ -444,8 +444,8 @@ impl Curve<'_> {
             gap,
             zc: view.map(|view| gap * view.scales.length),
             classification,
-            period: met.orbit.as_ref().map(|orbit| orbit.period),
-            spectral_radius: met.orbit.as_ref().map(PeriodicOrbit::spectral_radius),
+            period: motion.orbit.as_ref().map(|orbit| orbit.period),
+            spectral_radius: motion.orbit.as_ref().map(PeriodicOrbit::spectral_radius),
             physical: observables
                 .as_ref()
                 .zip(view)
@@ -454,7 +454,7 @@ impl Curve<'_> {
             reason,
             modulation: None,
             modulation_si: None,
-            orbit: met.orbit,
+            orbit: motion.orbit,
         }
     }
 }
@@ -551,7 +551,7 @@ fn difference(a: &ApproachPoint, b: &ApproachPoint, free_amplitude: f64) -> Opti
     differ.then_some(amplitudes)
 }
 
-/// What an approach curve is asked for.
+/// Options of an approach curve.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct ApproachRequest {

@@ -5,7 +5,9 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use nanotap_dynamics::{Control, PeriodicOrbit};
 use rayon::prelude::*;
 
-use super::distance_sweep::{DistanceSweep, End, Met, Motion, Piece, Place, budget_text, is_same};
+use super::distance_sweep::{
+    DistanceSweep, End, FoundMotion, Motion, Piece, Place, budget_text, is_same,
+};
 use super::ramp::ramp;
 use super::{
     ApproachError, ApproachPoint, Curve, Hysteresis, StateJump, Way, branching, difference,
@@ -206,9 +208,9 @@ const COMPARED: usize = 9;
 const COMPARED_ON_GRID: usize = 3;
 
 impl Written<'_> {
-    fn row(&self, way: Way, gap: f64, met: Met) -> Result<ApproachPoint, CaseError> {
+    fn row(&self, way: Way, gap: f64, motion: FoundMotion) -> Result<ApproachPoint, CaseError> {
         let model = self.sweep.model(gap)?;
-        Ok(self.curve.observed(way, gap, &model, met))
+        Ok(self.curve.observed(way, gap, &model, motion))
     }
 
     /// The rows at the written distances, there and back: up to the first that was not reached,
@@ -224,8 +226,8 @@ impl Written<'_> {
                 None => rows.extend(measured),
                 Some(steps) => {
                     let unmeasured = |way: Way, gap: f64| {
-                        let met = Met::undecided(self.not_measured(steps), &[]);
-                        self.row(way, gap, met).map(Some)
+                        let motion = FoundMotion::undecided(self.not_measured(steps), &[]);
+                        self.row(way, gap, motion).map(Some)
                     };
                     for &gap in distances {
                         rows.push((
@@ -268,13 +270,13 @@ impl Written<'_> {
                 let on = |pieces: &[Piece]| pieces.iter().find(|p| p.holds(gap)).cloned();
                 let of = |way: Way, piece: Option<Piece>| match piece {
                     Some(piece) if !control.is_cancelled() => {
-                        let met = self.sweep.motion_at(&piece, gap);
-                        self.row(way, gap, met).map(Some)
+                        let motion = self.sweep.motion_at(&piece, gap);
+                        self.row(way, gap, motion).map(Some)
                     }
                     _ if control.is_cancelled() => Ok(None),
                     _ => {
-                        let met = Met::undecided(self.not_followed.to_owned(), &[]);
-                        self.row(way, gap, met).map(Some)
+                        let motion = FoundMotion::undecided(self.not_followed.to_owned(), &[]);
+                        self.row(way, gap, motion).map(Some)
                     }
                 };
                 let [there, back] = self.ways.each().map(|(_, pieces)| on(pieces));
@@ -325,7 +327,7 @@ impl Written<'_> {
                 }
                 let found = found.into_iter();
                 found
-                    .map(|orbit| self.row(Way::Neither, gap, Met::on(orbit)))
+                    .map(|orbit| self.row(Way::Neither, gap, FoundMotion::periodic(orbit)))
                     .collect()
             })
             .collect();

@@ -85,6 +85,8 @@ const WATCH_ROUNDS: u32 = 4;
 const ENOUGH_ESCAPES: usize = 16;
 /// Pilots where orbits are known from seeds and periods are cheap.
 const COARSE_PILOTS: usize = 8;
+/// Part of the census's steps, as a divisor, that the search for one trapping region may take.
+const REGION_STEPS: u64 = 4;
 /// Chaos is watched for so many times the periods after which escapes are counted.
 const WATCHED_TRANSIENTS: f64 = 8.0;
 
@@ -593,7 +595,8 @@ impl<'a, M: StroboscopicMap> Work<'a, M> {
                     let found = if self.control.is_cancelled() {
                         return (None, 0);
                     } else if motions.is_coarse {
-                        Neighbourhood::over_block(map, orbit, others)
+                        let steps = self.options.max_steps / REGION_STEPS;
+                        Neighbourhood::over_block(map, orbit, others, steps)
                     } else {
                         Neighbourhood::around(map, orbit)
                     };

@@ -1210,6 +1210,13 @@ impl Work {
                     self.statistics.refused += 1;
                     continue;
                 }
+                if error.is_infinite() {
+                    return Err(VolterraError::Uncertified {
+                        time: self.now.time,
+                        gap: self.now.gap,
+                        reason: Refusal::Unresolved,
+                    });
+                }
                 if fall.is_none() {
                     if !self.columns.is_empty() {
                         let to = steep.then_some(self.next.gap);

@@ -638,12 +638,14 @@ pub struct AttractorsRequest {
     /// Starts, spread evenly over one box of states. Without it, starts of every size, from the
     /// resonant response down to below the gap, go on until the share of starts that may lead to
     /// motions not found is below {unseen}, or 5000 starts or 2,000,000 drive periods (600,000 under a
-    /// nonlinear law) are done
+    /// nonlinear law) are done. Under a nonlinear law a start also ends after 6 million steps of the
+    /// approximate flow and all starts together after 48 million, where a step of the exact flow
+    /// counts as 32
     #[schemars(range(min = 1, max = MOST_STARTS), extend("x-value" = "S"))]
     pub starts: Option<usize>,
     /// Share of starts that may lead to motions not found, with 95 % confidence, at which no more are
     /// drawn. Without it, 0.01 under a nonlinear law and 0.002 under a piecewise-linear one; a smaller
-    /// one raises the limits of {starts} and drive periods in proportion
+    /// one raises the limits of {starts}, drive periods and steps in proportion
     #[schemars(range(min = 1e-5, max = 0.5), extend("x-value" = "PART"))]
     pub unseen: Option<f64>,
     /// Seed of the starts: the same seed gives the same answer on any number of threads

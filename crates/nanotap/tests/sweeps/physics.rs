@@ -427,13 +427,13 @@ fn impossible_sweeps_are_refused_before_anything_is_computed() {
 #[test]
 fn a_sweep_passes_from_rest_on_a_stop_to_impacts() {
     let oscillator = |gap: f64| Oscillator {
+        mass: 1.0,
         stiffness: 1.0,
         damping: 0.1,
         forcing: 0.6,
         omega: 1.3,
         gap,
         stop: Stop::Rigid { restitution: 0.8 },
-        ..Oscillator::default()
     };
     let swept = Swept::of(&Case::from(oscillator(-1.0)), &["gap=-1:0.5:4"], |options| {
         options.periods = 400;

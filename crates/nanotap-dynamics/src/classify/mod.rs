@@ -103,7 +103,8 @@ const COARSE_RESIDUAL: f64 = 1e-5;
 
 impl ClassifyOptions {
     /// The same budgets on a coarse map.
-    pub(crate) fn on_coarse_map(&self) -> Self {
+    #[must_use]
+    pub fn on_coarse_map(&self) -> Self {
         let residual = self.shooting.residual_tolerance.max(COARSE_RESIDUAL);
         Self {
             shooting: ShootingOptions {

@@ -599,7 +599,8 @@ mod tests {
             ..orbit.clone()
         };
         let apart = other.states[0][0];
-        let smaller = Neighbourhood::over_block(&mut map, &orbit, std::iter::once(&other), u64::MAX);
+        let smaller =
+            Neighbourhood::over_block(&mut map, &orbit, std::iter::once(&other), u64::MAX);
         let smaller = smaller.unwrap().unwrap();
         assert!(smaller.extents()[0] < 0.75 * apart && !smaller.contains(&other.states[0]));
         let mut cut = block;

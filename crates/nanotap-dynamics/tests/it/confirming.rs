@@ -361,7 +361,12 @@ fn a_start_on_which_the_coarse_map_fails_is_followed_on_the_map_itself() {
             .map(|k| vec![0.05 * f64::from(k - 20) + 0.025])
             .collect(),
     );
-    let found = census_of(&map, &starts, &CensusOptions::default(), &Control::default());
+    let found = census_of(
+        &map,
+        &starts,
+        &CensusOptions::default(),
+        &Control::default(),
+    );
     assert!(found.followed_coarsely);
     assert!(found.undecided.is_empty(), "{:?}", found.undecided);
     let counts: Vec<usize> = found.attractors.iter().map(|a| a.fraction.count).collect();

@@ -435,9 +435,13 @@ fn a_sweep_passes_from_rest_on_a_stop_to_impacts() {
         gap,
         stop: Stop::Rigid { restitution: 0.8 },
     };
-    let swept = Swept::of(&Case::from(oscillator(-1.0)), &["gap=-1:0.5:4"], |options| {
-        options.periods = 400;
-    });
+    let swept = Swept::of(
+        &Case::from(oscillator(-1.0)),
+        &["gap=-1:0.5:4"],
+        |options| {
+            options.periods = 400;
+        },
+    );
     let amplitudes = swept.column("first_harmonic");
     for (k, found) in amplitudes.into_iter().enumerate() {
         let gap = -1.0 + 0.5 * k as f64;

@@ -349,9 +349,20 @@ impl<'a> DistanceSweep<'a> {
         Ok(self.arrive(gap, &start))
     }
 
-    /// Where a run from a state at a distance goes.
+    /// Where a run from a state at a distance goes. Under a nonlinear law a motion that does not close
+    /// on the approximate map is classified exactly only where it is reported.
     fn arrive(&mut self, gap: f64, start: &[f64]) -> Place {
-        let motion = self.run_from(gap, start, self.classify.max_transient);
+        let searched = self.budget.map(|_| {
+            let options = self.classify.clone();
+            self.search_orbit(gap, start, &options)
+        });
+        let is_confirmed = |motion: &FoundMotion| {
+            let is_periodic = motion.classification == Classification::Periodic;
+            !motion.failed && is_periodic == motion.orbit.is_some()
+        };
+        let motion = searched
+            .filter(is_confirmed)
+            .unwrap_or_else(|| self.run_from(gap, start, self.classify.max_transient));
         self.place(gap, motion)
     }
 
@@ -375,15 +386,9 @@ impl<'a> DistanceSweep<'a> {
         }
     }
 
-    /// As [`run_from`](Self::run_from), on the approximate map where there is one, and no further than to
-    /// see whether an orbit closes.
-    fn search_orbit(&self, gap: f64, start: &[f64]) -> FoundMotion {
-        let model = match self.model(gap) {
-            Ok(model) => model,
-            Err(error) => return FoundMotion::undecided(error.to_string(), start),
-        };
-        let mut map = Strobe::new(&model);
-        let options = ClassifyOptions {
+    /// Options that only show whether an orbit closes.
+    fn search_options(&self) -> ClassifyOptions {
+        ClassifyOptions {
             max_transient: GRID_TRANSIENT,
             long_period: self.classify.max_period,
             lyapunov: LyapunovOptions {
@@ -394,12 +399,21 @@ impl<'a> DistanceSweep<'a> {
             },
             birkhoff_periods: 1,
             ..self.classify.clone()
+        }
+    }
+
+    /// As [`run_from`](Self::run_from), on the approximate map where there is one; an orbit is that of
+    /// the exact map.
+    fn search_orbit(&self, gap: f64, start: &[f64], options: &ClassifyOptions) -> FoundMotion {
+        let model = match self.model(gap) {
+            Ok(model) => model,
+            Err(error) => return FoundMotion::undecided(error.to_string(), start),
         };
-        let mut motion = named(
-            &mut map.coarse().unwrap_or_else(|| map.clone()),
-            start,
-            &options,
-        );
+        let mut map = Strobe::new(&model);
+        let mut motion = match map.coarse() {
+            Some(mut coarse) => named(&mut coarse, start, &options.on_coarse_map()),
+            None => named(&mut map.clone(), start, options),
+        };
         if let Some(near) = motion.orbit.take() {
             let (points, period) = (near.states.concat(), near.period);
             let closed =
@@ -836,13 +850,14 @@ impl<'a> DistanceSweep<'a> {
                 next = to;
             }
             let start = before.next_start();
-            let mut motion = self.search_orbit(next, &start);
+            let options = self.search_options();
+            let mut motion = self.search_orbit(next, &start, &options);
             for _ in 0..HALVINGS {
                 if !motion.failed {
                     break;
                 }
                 next = 0.5 * (gap + next);
-                motion = self.search_orbit(next, &start);
+                motion = self.search_orbit(next, &start, &options);
             }
             let Place::On { stretch, .. } = self.place(next, motion.clone()) else {
                 found.push((next, motion));

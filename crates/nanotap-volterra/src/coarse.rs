@@ -1146,7 +1146,7 @@ impl Work {
         while end - self.now.time > 1e-13 * end {
             if tried % POLL == 0 {
                 let cancel = tables.system.cancel();
-                cancel.spend(POLL);
+                cancel.spend(POLL.min(tried));
                 if cancel.is_cancelled() {
                     return Err(VolterraError::Cancelled);
                 }
@@ -1253,6 +1253,7 @@ impl Work {
                 });
             }
         }
+        tables.system.cancel().spend((tried + POLL - 1) % POLL + 1);
         let y = self.now.modal.iter().flatten();
         if y.chain([&self.now.force]).any(|y| !y.is_finite()) {
             return Err(VolterraError::Diverged { time: end });

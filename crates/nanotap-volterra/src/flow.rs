@@ -14,7 +14,7 @@ use std::sync::Arc;
 /// Switches at one instant after which the law is reported to switch endlessly.
 const MOST_SWITCHES_AT_ONCE: usize = 64;
 /// What a step costs, in steps of the approximate flow.
-const STEP_COST: u64 = 32;
+const STEP_COST: u64 = 100;
 /// The first step of a run: a quarter of the longest.
 const FIRST_INDEX: usize = 4;
 /// A guard that is not certainly positive must be resolved to this fraction of its size.

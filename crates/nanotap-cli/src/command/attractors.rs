@@ -245,7 +245,7 @@ fn unseen_paragraphs(found: &Attractors, unseen: &UnseenReport) -> String {
             ),
             EndReport::MaxSteps { limit } => format!(
                 " The census ended at its limit of {} million steps of the approximate flow (one of the exact flow \
-                 counts as 32), before the requested {} %.",
+                 counts as 100), before the requested {} %.",
                 limit / 1_000_000,
                 percent(unseen.target)
             ),

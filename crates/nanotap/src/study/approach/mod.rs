@@ -562,9 +562,9 @@ pub struct ApproachRequest {
     /// Distance at which to turn back; without it, 0
     #[schemars(extend("x-value" = "DISTANCE"))]
     pub to: Option<Amount>,
-    /// Distances each way. Under a nonlinear law the lever is followed for 24 million steps of the
+    /// Distances each way. Under a nonlinear law the lever is followed for 60 million steps of the
     /// approximate flow at most, and as many are taken for the rows, where a step of the exact flow
-    /// counts as 32
+    /// counts as 100
     #[schemars(range(min = 2, max = MOST_DISTANCES), extend("x-value" = "P"))]
     pub points: usize,
     /// Also continue the branches that coexist, stable and unstable

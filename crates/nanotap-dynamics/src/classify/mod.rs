@@ -92,7 +92,7 @@ impl Default for ClassifyOptions {
             lyapunov: LyapunovOptions::default(),
             birkhoff_periods: 8192,
             torus_digits: 7.0,
-            max_steps: 60_000_000,
+            max_steps: 40_000_000,
         }
     }
 }

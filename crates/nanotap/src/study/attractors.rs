@@ -341,7 +341,7 @@ const NONLINEAR_PERIODS: usize = 600_000;
 /// Drive periods over which a motion that does not repeat is observed.
 pub const OBSERVED_PERIODS: usize = 512;
 /// Steps of the approximate flow after which a start is left undecided.
-const MAX_START_STEPS: u64 = 15_000_000;
+const MAX_START_STEPS: u64 = 10_000_000;
 /// A state this many times larger than the box has left every bound.
 const OUT_OF_BOUNDS: f64 = 1e6;
 
@@ -638,8 +638,8 @@ pub struct AttractorsRequest {
     /// Starts, spread evenly over one box of states. Without it, starts of every size, from the
     /// resonant response down to below the gap, go on until the share of starts that may lead to
     /// motions not found is below {unseen}, or 5000 starts or 2,000,000 drive periods (600,000 under a
-    /// nonlinear law) are done. Under a nonlinear law a start also ends after 15 million steps of the
-    /// approximate flow and all starts together after 120 million, where a step of the exact flow
+    /// nonlinear law) are done. Under a nonlinear law a start also ends after 10 million steps of the
+    /// approximate flow and all starts together after 50 million, where a step of the exact flow
     /// counts as 100
     #[schemars(range(min = 1, max = MOST_STARTS), extend("x-value" = "S"))]
     pub starts: Option<usize>,

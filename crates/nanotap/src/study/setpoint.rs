@@ -331,7 +331,7 @@ impl SolvedCase {
 
 /// Steps of the approximate flow after which other states at the setpoint are looked for no longer,
 /// and which their branches may take.
-const OTHERS_STEPS: u64 = 30_000_000;
+const OTHERS_STEPS: u64 = 20_000_000;
 /// Points to which each of these branches may always be followed.
 const MIN_POINTS: usize = 16;
 

@@ -62,7 +62,7 @@ const DECAY_TIMES: f64 = 30.0;
 const MAX_TRANSIENT: usize = 1 << 15;
 
 /// Steps of the approximate flow after which a motion is not followed further along the distance.
-pub(in crate::study) const SWEEP_STEPS: u64 = 60_000_000;
+pub(in crate::study) const SWEEP_STEPS: u64 = 40_000_000;
 
 /// Why a piece of a way ends.
 #[derive(Clone, Debug)]

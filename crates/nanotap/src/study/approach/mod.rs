@@ -562,7 +562,7 @@ pub struct ApproachRequest {
     /// Distance at which to turn back; without it, 0
     #[schemars(extend("x-value" = "DISTANCE"))]
     pub to: Option<Amount>,
-    /// Distances each way. Under a nonlinear law the lever is followed for 60 million steps of the
+    /// Distances each way. Under a nonlinear law the lever is followed for 40 million steps of the
     /// approximate flow at most, and as many are taken for the rows, where a step of the exact flow
     /// counts as 100
     #[schemars(range(min = 2, max = MOST_DISTANCES), extend("x-value" = "P"))]

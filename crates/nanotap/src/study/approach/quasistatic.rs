@@ -29,15 +29,15 @@ pub(super) struct Found {
 }
 
 /// Steps of the approximate flow after which no more rows are measured, and which branches may take.
-const ROW_STEPS: u64 = 60_000_000;
-const BRANCH_STEPS: u64 = 30_000_000;
+const ROW_STEPS: u64 = 40_000_000;
+const BRANCH_STEPS: u64 = 20_000_000;
 /// Points that the branches through a curve have all together, mostly; where steps suffice for fewer,
 /// grazings are not located.
 const USUAL_POINTS: usize = 1000;
 /// Points to which each branch may always be followed.
 const MIN_POINTS: usize = 16;
 /// Steps after which no more states are looked for from which a census starts.
-const SEED_STEPS: u64 = 30_000_000;
+const SEED_STEPS: u64 = 20_000_000;
 /// Rows that are measured before it is seen whether the budget is spent.
 const ROWS_AT_ONCE: usize = 16;
 

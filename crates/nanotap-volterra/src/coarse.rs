@@ -55,6 +55,8 @@ const MAX_LOCATED_BRANCHES: usize = 8;
 /// Decay of a disturbance over a step by the force's damping, as an exponent, above which the step is
 /// implicit.
 const STIFF: f64 = 1.0;
+/// Part of the allowed error to which the forces of an implicit step are iterated.
+const CONVERGED: f64 = 0.02;
 /// Iterations for the forces of an implicit step.
 const MAX_ITERATIONS: usize = 10;
 /// Steps of the bracketed search for a switch.
@@ -463,7 +465,7 @@ impl Tables {
                 .abs(),
             period,
             levels,
-            converged: 0.02
+            converged: CONVERGED
                 * TOLERANCE
                 * frequency
                 * system.drive().offset.abs().max(SWING * swing),
@@ -630,7 +632,9 @@ impl Tables {
         };
         let unit = level.length * self.mobility;
         let branch = from.branch;
-        let mut forces = [from.force; 2];
+        // A force that would change the rate by more than the motion's own size does not last.
+        let lasts = CONVERGED * TOLERANCE * unit * from.force.abs() <= self.converged;
+        let mut forces = [if lasts { from.force } else { 0.0 }; 2];
         let mut change = f64::INFINITY;
         for _ in 0..MAX_ITERATIONS {
             let [third, end] = [at(0, forces), at(2, forces)];

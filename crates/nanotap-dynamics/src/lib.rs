@@ -47,8 +47,8 @@ pub use attractor_continuation::{
 pub use basin::{BasinError, BasinOptions, Basins, Label, Slice, SliceAxis};
 pub use census::{
     Attractor, AttractorKind, Census, CensusEnd, CensusOptions, Fraction, Lifetime, SizeCount,
-    StartBox, StartBoxError, StartOrigin, StartOutcome, StartSet, TransientChaos, Unseen, census,
-    census_of,
+    StartBox, StartBoxError, StartOrigin, StartOutcome, StartSet, TransientChaos,
+    UndiscoveredFraction, census, census_of,
 };
 pub use classify::{
     Candidate, Chaos, Classified, ClassifyOptions, MotionKind, Torus, UndecidedReason,

@@ -27,6 +27,17 @@ pub trait Scheduling: Sized {
         false
     }
 
+    /// Work done so far, in steps of an approximate flow; 0 where a period is in closed form. A clone
+    /// goes on from the same number. Budgets of work are measured by it.
+    fn cost(&self) -> u64 {
+        0
+    }
+
+    /// Adds the cost of work that a clone did for this map.
+    fn add_cost(&mut self, cost: u64) {
+        let _ = cost;
+    }
+
     /// A cheaper, approximate map of the same state, for following transients; `None` where this
     /// map is cheap itself. Nothing is reported from it.
     fn coarse(&self) -> Option<Self> {

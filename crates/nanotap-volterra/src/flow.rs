@@ -13,6 +13,8 @@ use std::sync::Arc;
 
 /// Switches at one instant after which the law is reported to switch endlessly.
 const MOST_SWITCHES_AT_ONCE: usize = 64;
+/// What a step costs, in steps of the approximate flow.
+const STEP_COST: u64 = 100;
 /// The first step of a run: a quarter of the longest.
 const FIRST_INDEX: usize = 4;
 /// A guard that is not certainly positive must be resolved to this fraction of its size.
@@ -191,6 +193,17 @@ impl Flow {
         self.solver.statistics
     }
 
+    /// Cost of the runs so far, in steps of the approximate flow.
+    pub fn cost(&self) -> u64 {
+        let statistics = self.solver.statistics;
+        STEP_COST * (statistics.steps + statistics.refused)
+    }
+
+    /// Adds the cost of work that a clone did.
+    pub fn add_cost(&mut self, cost: u64) {
+        self.solver.statistics.steps += cost / STEP_COST;
+    }
+
     /// The time reached.
     pub fn time(&self) -> f64 {
         self.time
@@ -290,6 +303,7 @@ impl Flow {
                 self.commit_pending(&system, end, observer);
                 return Ok(());
             }
+            system.cancel().spend(STEP_COST);
             if system.cancel().is_cancelled() {
                 return Err(VolterraError::Cancelled);
             }

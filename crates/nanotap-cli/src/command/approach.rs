@@ -61,6 +61,9 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     if report.cancelled {
         output.warning("stopped before it was done");
     }
+    for limit in &report.limits {
+        output.warning(limit);
+    }
     if report.beam_clearance.is_some_and(|height| height <= 0.0) {
         output.warning(
             "at the nearest distance another part of the beam than the tip would pass through the \

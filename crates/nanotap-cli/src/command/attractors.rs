@@ -134,7 +134,7 @@ fn text(case: &GivenCase, found: &Attractors) -> String {
         );
         text.push_str(&motion::paragraph(&format!(
             "mean lifetime {:.0} drive periods (95 %: {:.0} … {:.0}) from {} escapes ({}); {} still wander \
-             ({} % of the starts); exponents {}",
+             ({} % of the starts); {}",
             chaos.lifetime,
             chaos.lifetime_interval[0],
             chaos.lifetime_interval[1],
@@ -142,7 +142,12 @@ fn text(case: &GivenCase, found: &Attractors) -> String {
             to.join(", "),
             number::counted(chaos.unescaped.count, "start", "starts"),
             number::significant(100.0 * chaos.unescaped.fraction, 3),
-            motion::exponents(&chaos.lyapunov, Some(&chaos.lyapunov_errors)),
+            if chaos.lyapunov.is_empty() {
+                "exponents were not measured on the exact flow".to_owned()
+            } else {
+                let errors = Some(chaos.lyapunov_errors.as_slice());
+                format!("exponents {}", motion::exponents(&chaos.lyapunov, errors))
+            },
         )));
     }
     if found.unbounded.count > 0 {
@@ -232,6 +237,12 @@ fn unseen_paragraphs(found: &Attractors, unseen: &UnseenReport) -> String {
             EndReport::AllStarts | EndReport::BoundMet | EndReport::Cancelled => String::new(),
             EndReport::MaxStarts { limit } => format!(
                 " The census ended at its limit of {limit} starts, before the requested {} %.",
+                percent(unseen.target)
+            ),
+            EndReport::MaxSteps { limit } => format!(
+                " The census ended at its limit of {} million steps of the approximate flow (one of the exact flow \
+                 counts as 100), before the requested {} %.",
+                limit / 1_000_000,
                 percent(unseen.target)
             ),
             EndReport::MaxPeriods { limit } => format!(

@@ -10,6 +10,8 @@ const COINCIDENCE: f64 = 0.03;
 /// Largest extremum of a switching function, as a fraction of the largest one, that counts as a
 /// grazing.
 const GRAZING_VALUE: f64 = 1e-3;
+/// The same as a fraction of the orbit's size: at a rigid stop the impact may be the only extremum.
+const GRAZING_OF_ORBIT: f64 = 1e-6;
 
 /// Why a curve of bifurcations ends.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -93,10 +95,9 @@ impl CurveEnd {
         reason: String,
     ) -> Self {
         let largest = tangencies.iter().fold(0.0f64, |m, t| m.max(t.value.abs()));
-        let touches = tangencies
-            .iter()
-            .filter(|t| t.value.abs() <= GRAZING_VALUE * largest)
-            .count();
+        let touch = (GRAZING_VALUE * largest).max(GRAZING_OF_ORBIT * orbit.scale());
+        let touches = tangencies.iter().filter(|t| t.value.abs() <= touch);
+        let touches = touches.count();
         let on_a_grazing = matches!(kind, BifurcationKind::Grazing { .. });
         if touches > usize::from(on_a_grazing) {
             return Self::Grazing { first, second };

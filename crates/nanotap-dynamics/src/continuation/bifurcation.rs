@@ -80,7 +80,11 @@ pub(crate) struct Tests {
 }
 
 impl Tests {
-    pub(crate) fn new<F: MapFamily>(solver: &mut BranchSolver<'_, F>, node: &Node) -> Option<Self> {
+    pub(crate) fn new<F: MapFamily>(
+        solver: &mut BranchSolver<'_, F>,
+        node: &Node,
+        grazings: bool,
+    ) -> Option<Self> {
         let multipliers = Multipliers::of_product(&node.jacobians).ok()?.values;
         let crossing = plus_one(&multipliers);
         Some(Self {
@@ -89,7 +93,11 @@ impl Tests {
             crossing: if node.slope == 0.0 { 0.0 } else { crossing },
             flip: minus_one(&multipliers),
             neimark_sacker: pair_on_circle(&multipliers).0,
-            tangencies: solver.tangencies(node).ok()?,
+            tangencies: if grazings {
+                solver.tangencies(node).ok()?
+            } else {
+                Vec::new()
+            },
         })
     }
 
@@ -439,7 +447,7 @@ fn grazings<F: MapFamily>(
         let Ok(node) = solver.along_cubic(stretch.from, middle, stretch.ends) else {
             return;
         };
-        let Some(tests) = Tests::new(solver, &node) else {
+        let Some(tests) = Tests::new(solver, &node, true) else {
             return;
         };
         let halves = [

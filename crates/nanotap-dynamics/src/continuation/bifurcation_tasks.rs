@@ -9,7 +9,7 @@ use rayon::Scope;
 
 use crate::continuation::bifurcation::{Bifurcation, Tests, between};
 use crate::continuation::solver::{BranchSolver, Node};
-use crate::control::Control;
+use crate::control::{CancelFlag, Control};
 use crate::map::MapFamily;
 use crate::orbit::parallel::is_single_threaded;
 
@@ -22,6 +22,11 @@ pub(crate) struct BifurcationTasks<'s, 'scope> {
 }
 
 impl<'scope> BifurcationTasks<'_, 'scope> {
+    /// True if steps are counted, so that no task may run in parallel with the branch.
+    fn has_budget(&self) -> bool {
+        self.control.cancel.is_some_and(CancelFlag::has_budget)
+    }
+
     /// Returns the bifurcations between two neighbouring nodes, or an empty list if a spawned task
     /// will find them.
     pub(crate) fn between<'a: 'scope, F: MapFamily + 'scope>(
@@ -32,7 +37,7 @@ impl<'scope> BifurcationTasks<'_, 'scope> {
         step: f64,
         after_point: usize,
     ) -> Vec<Bifurcation> {
-        if is_single_threaded() || !Tests::any_changes(tests, solver.n) {
+        if is_single_threaded() || self.has_budget() || !Tests::any_changes(tests, solver.n) {
             return between(solver, nodes, tests, step, after_point);
         }
         let mut solver = solver.another();

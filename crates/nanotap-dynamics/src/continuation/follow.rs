@@ -115,7 +115,7 @@ fn step_by_step<'scope, 'a: 'scope, F: MapFamily + 'scope>(
 ) -> Result<Branch, ContinuationError> {
     let control = tasks.control;
     let least = solver.size(&first.points);
-    let mut tests = tests_at(solver, &first)?;
+    let mut tests = tests_at(solver, &first, options.grazings)?;
     let mut arclength = 0.0;
     let mut branch = Branch {
         period: solver.n,
@@ -156,6 +156,9 @@ fn step_by_step<'scope, 'a: 'scope, F: MapFamily + 'scope>(
             Err(why) => {
                 step *= 0.5;
                 if step < options.min_step {
+                    if !options.grazings {
+                        add_last_tangencies(solver, &mut branch);
+                    }
                     branch.end = dead_end(solver, &mut branch, &node, &why);
                     break;
                 }
@@ -183,7 +186,7 @@ fn step_by_step<'scope, 'a: 'scope, F: MapFamily + 'scope>(
         if let Some((at, end)) = closed {
             (taken, next) = (at, end);
         }
-        let Some(next_tests) = Tests::new(solver, &next) else {
+        let Some(mut next_tests) = Tests::new(solver, &next, options.grazings) else {
             step *= 0.5;
             if step < options.min_step {
                 branch.end = BranchEnd::StepTooSmall {
@@ -207,7 +210,7 @@ fn step_by_step<'scope, 'a: 'scope, F: MapFamily + 'scope>(
                 parameter = meeting(solver, &node, &near, m).unwrap_or(parameter);
             }
             if let Ok(near) = solver.along(&node, 0.99 * at)
-                && let Some(near_tests) = Tests::new(solver, &near)
+                && let Some(near_tests) = Tests::new(solver, &near, options.grazings)
             {
                 let found = between(
                     solver,
@@ -227,17 +230,22 @@ fn step_by_step<'scope, 'a: 'scope, F: MapFamily + 'scope>(
             };
             break;
         }
+        arclength += taken;
+        let reached = point(solver, &next, &next_tests, arclength)?;
+        let multiplier = reached.orbit.spectral_radius();
+        let turns = node.slope * next.slope < 0.0;
+        let unstable = turns || !reached.orbit.is_stable();
+        if options.until_unstable && unstable && !options.grazings {
+            for (tests, node) in [(&mut tests, &node), (&mut next_tests, &next)] {
+                tests.tangencies = solver.tangencies(node).unwrap_or_default();
+            }
+        }
         let (nodes, changes) = ([&node, &next], [&tests, &next_tests]);
         let found = tasks.between(solver, nodes, changes, taken, index);
         if control.is_cancelled() {
             break;
         }
         branch.add_bifurcations(found, options.range);
-        arclength += taken;
-        let reached = point(solver, &next, &next_tests, arclength)?;
-        let multiplier = reached.orbit.spectral_radius();
-        let turns = node.slope * next.slope < 0.0;
-        let unstable = turns || !reached.orbit.is_stable();
         branch.points.push(reached);
         if options.until_unstable && unstable {
             branch.end = BranchEnd::Unstable {
@@ -274,6 +282,17 @@ fn step_by_step<'scope, 'a: 'scope, F: MapFamily + 'scope>(
     Ok(branch)
 }
 
+/// Points before a dead end whose tangencies show whether it is a grazing.
+const LAST_POINTS: usize = 12;
+
+fn add_last_tangencies<F: MapFamily>(solver: &mut BranchSolver<'_, F>, branch: &mut Branch) {
+    for point in branch.points.iter_mut().rev().take(LAST_POINTS) {
+        let states = point.orbit.states.concat();
+        let found = solver.tangencies_at(point.parameter, &states);
+        point.tangencies = found.unwrap_or_default();
+    }
+}
+
 impl Branch {
     /// Adds bifurcations between two points, restricted to the parameter range.
     fn add_bifurcations(&mut self, found: Vec<Bifurcation>, (low, high): (f64, f64)) {
@@ -285,8 +304,9 @@ impl Branch {
 fn tests_at<F: MapFamily>(
     solver: &mut BranchSolver<'_, F>,
     node: &Node,
+    grazings: bool,
 ) -> Result<Tests, ContinuationError> {
-    Tests::new(solver, node).ok_or(ContinuationError::NoStart {
+    Tests::new(solver, node, grazings).ok_or(ContinuationError::NoStart {
         parameter: node.parameter,
         reason: "its multipliers or tangencies could not be computed".into(),
     })

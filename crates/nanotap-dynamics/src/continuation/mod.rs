@@ -63,6 +63,9 @@ pub struct ContinuationOptions {
     pub residual_tolerance: f64,
     /// Whether the branch ends at its first orbit that is not stable.
     pub until_unstable: bool,
+    /// Whether grazings are located all along the branch; otherwise only before the orbit at which
+    /// [`until_unstable`](Self::until_unstable) ends it.
+    pub grazings: bool,
     /// Largest multiplier: beyond it the branch ends as [`BranchEnd::Repelling`].
     pub max_multiplier: f64,
 }
@@ -82,6 +85,7 @@ impl ContinuationOptions {
             parameter_scale: None,
             residual_tolerance: 1e-10,
             until_unstable: false,
+            grazings: true,
             max_multiplier: f64::INFINITY,
         }
     }

@@ -414,9 +414,18 @@ impl<'a, F: MapFamily> BranchSolver<'a, F> {
 
     /// All tangencies of an orbit, in order of time.
     pub(crate) fn tangencies(&mut self, node: &Node) -> Result<Vec<OrbitTangency>, MapFailure> {
+        self.tangencies_at(node.parameter, &node.points)
+    }
+
+    /// Every tangency of the orbit through these points, in order of time.
+    pub(crate) fn tangencies_at(
+        &mut self,
+        parameter: f64,
+        points: &[f64],
+    ) -> Result<Vec<OrbitTangency>, MapFailure> {
         let (family, touches) = (self.family, self.passes_touches);
-        let map = Self::map_at(family, &mut self.map, node.parameter, touches)?;
-        let points = node.points.chunks_exact(self.d);
+        let map = Self::map_at(family, &mut self.map, parameter, touches)?;
+        let points = points.chunks_exact(self.d);
         let mut periods: Vec<_> = points.map(|point| (point.to_vec(), Vec::new())).collect();
         for_each_period(map, &mut periods, &|map, (state, found)| {
             advance_with_tangencies(map, state, found)

@@ -30,6 +30,8 @@ const SHRINK: f64 = 0.75;
 const MAX_TRIALS: usize = 80;
 /// Required contraction of the distance by a block of returns.
 const BLOCK_RATE: f64 = 0.75;
+/// Decay time in drive periods above which a block is shorter than it.
+const MAX_BLOCK: f64 = 2048.0;
 /// First trial radius of a block, as a fraction of the orbit's scale.
 const FIRST_RADIUS: f64 = 1e-3;
 /// Ratios of successive trial radii while a block contracts, largest first.
@@ -88,8 +90,10 @@ impl Neighbourhood {
     }
 
     /// The largest ball in which a block of returns, one decay time long, contracts by
-    /// [`BLOCK_RATE`] at sample points, and which keeps clear of the `others`; `None` if the orbit
-    /// is not stable or no radius passes.
+    /// [`BLOCK_RATE`] at sample points, and that reaches over none of the `others`; `None` if the
+    /// orbit is not stable or none passes. A block of many periods is a quarter as long and contracts
+    /// by the fourth root. No larger ball is tried once the search has cost so many `steps`
+    /// ([`StroboscopicMap::cost`]).
     ///
     /// # Errors
     /// If the map fails on the orbit.
@@ -97,13 +101,21 @@ impl Neighbourhood {
         map: &mut M,
         orbit: &PeriodicOrbit,
         others: impl Iterator<Item = &'a PeriodicOrbit>,
+        steps: u64,
     ) -> Result<Option<Self>, MapFailure> {
         let Some(mut ball) = Self::empty(map, orbit)? else {
             return Ok(None);
         };
-        let returns = (1.0 / (ball.decay * orbit.period as f64)).ceil().max(1.0);
+        let decay_time = 1.0 / ball.decay;
+        let (block, rate) = if decay_time > MAX_BLOCK {
+            (0.25 * decay_time, BLOCK_RATE.sqrt().sqrt())
+        } else {
+            (decay_time, BLOCK_RATE)
+        };
+        let returns = (block / orbit.period as f64).ceil().max(1.0);
         ball.period = orbit.period.saturating_mul(returns as usize);
-        ball.rate = BLOCK_RATE;
+        ball.rate = rate;
+        let largest_cost = map.cost().saturating_add(steps);
         ball.retry = ball.period;
         let size = orbit.scale().max(1e3 * orbit.error);
         let mut largest = ball.norm.radius(size);
@@ -111,14 +123,16 @@ impl Neighbourhood {
             largest = largest.min(MAX_REACH * ball.distance_to(other));
         }
         let mut radius = ball.norm.radius(FIRST_RADIUS * size).min(largest);
-        while !ball.block_contracts(map, radius) {
+        while !ball.block_contracts(map, radius, largest_cost) {
             radius *= 0.25;
-            if radius < 8.0 * ball.floor {
+            if radius < 8.0 * ball.floor || map.cost() > largest_cost {
                 return Ok(None);
             }
         }
         for growth in GROWTH {
-            while growth * radius <= largest && ball.block_contracts(map, growth * radius) {
+            while growth * radius <= largest
+                && ball.block_contracts(map, growth * radius, largest_cost)
+            {
                 radius *= growth;
             }
         }
@@ -244,12 +258,19 @@ impl Neighbourhood {
         })
     }
 
-    /// True if a block of returns contracts from all samples at one radius.
-    fn block_contracts<M: StroboscopicMap>(&self, map: &mut M, radius: f64) -> bool {
+    /// Whether a block of returns comes nearer from all samples at one radius; not where that takes the
+    /// map to its largest cost.
+    fn block_contracts<M: StroboscopicMap>(
+        &self,
+        map: &mut M,
+        radius: f64,
+        largest_cost: u64,
+    ) -> bool {
         (0..2 * self.center.len() + DIRECTIONS).all(|sample| {
             let mut point = self.point(sample, radius);
             let before = self.norm.distance(&point, &self.center);
-            advance_by(map, &mut point, self.period).is_ok()
+            map.cost() <= largest_cost
+                && advance_by(map, &mut point, self.period).is_ok()
                 && self.norm.distance(&point, &self.center) <= self.rate * before + self.floor
         })
     }
@@ -560,7 +581,7 @@ mod tests {
         };
         let single = Neighbourhood::around(&mut map, &orbit).unwrap().unwrap();
         let none = || std::iter::empty::<&PeriodicOrbit>();
-        let block = Neighbourhood::over_block(&mut map, &orbit, none())
+        let block = Neighbourhood::over_block(&mut map, &orbit, none(), u64::MAX)
             .unwrap()
             .unwrap();
         assert_eq!(block.period(), 50);
@@ -584,7 +605,8 @@ mod tests {
             ..orbit.clone()
         };
         let apart = other.states[0][0];
-        let smaller = Neighbourhood::over_block(&mut map, &orbit, std::iter::once(&other));
+        let smaller =
+            Neighbourhood::over_block(&mut map, &orbit, std::iter::once(&other), u64::MAX);
         let smaller = smaller.unwrap().unwrap();
         assert!(smaller.extents()[0] < 0.75 * apart && !smaller.contains(&other.states[0]));
         let mut cut = block;

@@ -40,10 +40,12 @@ fn in_chunks<M: StroboscopicMap, T: Send>(
     }
     let (first, second) = items.split_at_mut(items.len() / 2);
     let mut other = map.clone();
+    let before = other.cost();
     let (first, second) = rayon::join(
         || in_chunks(map, first, longest, one),
         || in_chunks(&mut other, second, longest, one),
     );
+    map.add_cost(other.cost() - before);
     first.and(second)
 }
 

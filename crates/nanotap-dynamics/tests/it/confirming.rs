@@ -6,7 +6,8 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use nanotap_dynamics::{
     AttractorKind, CancelFlag, Census, CensusEnd, CensusOptions, ClassifyOptions, Control, DMatrix,
-    MotionKind, PeriodicOrbit, StartBox, StartSet, StroboscopicMap, census_of, classify,
+    MotionKind, PeriodicOrbit, StartBox, StartSet, StroboscopicMap, UndecidedReason, census_of,
+    classify,
 };
 
 use crate::systems::{Cubic, Formula, Logistic, Nested, System};
@@ -217,4 +218,164 @@ fn a_cancelled_census_of_chaos_ends_soon() {
     assert!(found.cancelled);
     let after = map.periods().iter().sum::<usize>() - at.load(Ordering::Relaxed);
     assert!(after < 20_000, "{after}");
+}
+
+/// A map whose periods cost 100 steps each.
+#[derive(Clone)]
+struct Counted {
+    map: System<Logistic>,
+    cost: u64,
+}
+
+impl nanotap_dynamics::Scheduling for Counted {
+    fn cost(&self) -> u64 {
+        self.cost
+    }
+}
+
+impl StroboscopicMap for Counted {
+    type Error = Infallible;
+
+    fn dimension(&self) -> usize {
+        1
+    }
+
+    fn period(&self) -> f64 {
+        1.0
+    }
+
+    fn advance(&mut self, state: &mut [f64]) -> Result<(), Infallible> {
+        self.cost += 100;
+        self.map.advance(state)
+    }
+
+    fn advance_with_jacobian(
+        &mut self,
+        state: &mut [f64],
+        jacobian: &mut DMatrix<f64>,
+    ) -> Result<(), Infallible> {
+        self.cost += 100;
+        self.map.advance_with_jacobian(state, jacobian)
+    }
+}
+
+/// Chaos at 3.9 takes thousands of periods to measure: a run of 20,000 steps at most is left
+/// undecided after 200 periods.
+#[test]
+fn a_run_ends_at_its_budget_of_steps() {
+    let mut map = Counted {
+        map: System(Logistic(3.9)),
+        cost: 7,
+    };
+    let options = ClassifyOptions {
+        max_steps: 20_000,
+        ..ClassifyOptions::default()
+    };
+    let found = classify(&mut map, &[0.3], &options);
+    let MotionKind::Undecided { reason, .. } = found.kind else {
+        panic!("{:?}", found.kind)
+    };
+    let UndecidedReason::Budget { periods, steps } = reason else {
+        panic!("{reason}")
+    };
+    assert_eq!(steps, 20_000);
+    assert!((20..=202).contains(&periods), "{periods}");
+}
+
+/// The census ends at its budget, whatever the number of threads, and says so.
+#[test]
+fn a_census_ends_at_its_budget_of_steps() {
+    let map = Counted {
+        map: System(Logistic(3.9)),
+        cost: 0,
+    };
+    let options = CensusOptions {
+        max_steps: 400_000,
+        classify: ClassifyOptions {
+            max_steps: 10_000,
+            ..ClassifyOptions::default()
+        },
+        ..CensusOptions::default()
+    };
+    let taken = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads);
+        let census = || census_of(&map, &drawn(0.1, 0.9), &options, &Control::default());
+        pool.build().unwrap().install(census)
+    };
+    let found = taken(1);
+    assert_eq!(found.end, CensusEnd::MaxSteps);
+    let starts = found.outcomes_by_start.len();
+    assert!((32..80).contains(&starts), "{starts}");
+    assert_eq!(found.undecided.len(), starts);
+    assert!(found.undecided[0].1.to_string().contains("10000 steps"));
+    assert_eq!(taken(3).outcomes_by_start, found.outcomes_by_start);
+}
+
+/// x ↦ r x − x³, whose coarse map fails beyond 0.8.
+#[derive(Clone)]
+struct FailsBeyond {
+    map: System<Cubic>,
+    is_coarse: bool,
+}
+
+impl nanotap_dynamics::Scheduling for FailsBeyond {
+    fn coarse(&self) -> Option<Self> {
+        (!self.is_coarse).then(|| Self {
+            is_coarse: true,
+            ..self.clone()
+        })
+    }
+}
+
+impl StroboscopicMap for FailsBeyond {
+    type Error = std::io::Error;
+
+    fn dimension(&self) -> usize {
+        1
+    }
+
+    fn period(&self) -> f64 {
+        1.0
+    }
+
+    fn advance(&mut self, state: &mut [f64]) -> Result<(), Self::Error> {
+        if self.is_coarse && state[0].abs() > 0.8 {
+            return Err(std::io::Error::other("too far"));
+        }
+        let Ok(()) = self.map.advance(state);
+        Ok(())
+    }
+
+    fn advance_with_jacobian(
+        &mut self,
+        state: &mut [f64],
+        jacobian: &mut DMatrix<f64>,
+    ) -> Result<(), Self::Error> {
+        let Ok(()) = self.map.advance_with_jacobian(state, jacobian);
+        Ok(())
+    }
+}
+
+/// The fixed points are at ±√0.3 = ±0.548.
+#[test]
+fn a_start_on_which_the_coarse_map_fails_is_followed_on_the_map_itself() {
+    let map = FailsBeyond {
+        map: System(Cubic(1.3)),
+        is_coarse: false,
+    };
+    let starts = StartSet::given(
+        (0..40)
+            .map(|k| vec![0.05 * f64::from(k - 20) + 0.025])
+            .collect(),
+    );
+    let found = census_of(
+        &map,
+        &starts,
+        &CensusOptions::default(),
+        &Control::default(),
+    );
+    assert!(found.followed_coarsely);
+    assert!(found.undecided.is_empty(), "{:?}", found.undecided);
+    let counts: Vec<usize> = found.attractors.iter().map(|a| a.fraction.count).collect();
+    assert_eq!(counts, [20, 20]);
 }

@@ -239,7 +239,7 @@ fn transient_chaos_has_its_exact_lifetime() {
         transient.destinations,
         vec![(0, transient.lifetime.escapes)]
     );
-    assert!((transient.spectrum.largest().0 - 2.002f64.ln()).abs() < 1e-12);
+    assert!((transient.spectrum.unwrap().largest().0 - 2.002f64.ln()).abs() < 1e-12);
 }
 
 /// A slow focus is one periodic attractor, not transient chaos.

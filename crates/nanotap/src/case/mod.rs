@@ -188,11 +188,16 @@ impl Case {
     /// The same case, whose motions end with an error once `control` cancels the computation.
     #[must_use]
     pub fn cancelled_by(&self, control: &Control<'_>) -> Self {
-        let mut case = self.clone();
-        if let Some(cancel) = control.cancel {
-            case.cancel = cancel.clone();
+        self.with_flag(control.cancel.unwrap_or(&self.cancel))
+    }
+
+    /// The same, whose models' motions end with an error once `flag` is set or its budget spent.
+    #[must_use]
+    pub(crate) fn with_flag(&self, flag: &CancelFlag) -> Self {
+        Self {
+            cancel: flag.clone(),
+            ..self.clone()
         }
-        case
     }
 
     /// The same case, whose motions may continue for a moment after a cancellation: for reports of

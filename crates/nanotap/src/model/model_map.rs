@@ -37,6 +37,14 @@ pub(crate) trait EngineMap: Debug + Send + Sync {
     fn is_costly(&self) -> bool {
         false
     }
+    /// [`Scheduling::cost`].
+    fn cost(&self) -> u64 {
+        0
+    }
+    /// [`Scheduling::add_cost`].
+    fn add_cost(&mut self, cost: u64) {
+        let _ = cost;
+    }
     /// [`Scheduling::coarse`].
     fn coarse(&self) -> Option<Box<dyn EngineMap>> {
         None
@@ -163,6 +171,14 @@ impl ModelMap {
 }
 
 impl Scheduling for ModelMap {
+    fn cost(&self) -> u64 {
+        self.0.cost()
+    }
+
+    fn add_cost(&mut self, cost: u64) {
+        self.0.add_cost(cost);
+    }
+
     fn is_costly(&self) -> bool {
         self.0.is_costly()
     }

@@ -14,7 +14,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use nalgebra::{DMatrix, DVector, RowDVector};
 use nanotap_dynamics::Tangency;
 use nanotap_flow::{Output, Regime};
-use nanotap_volterra::averaging::{about_rest, distances, motions};
+use nanotap_volterra::averaging::{about_rest, motions};
 use nanotap_volterra::{
     Coarse, Drive, Flow, Guard, Kernel, Modes, Options, Parameter as Change, Remark, System, Tone,
     ToneChange, Trajectory, VolterraError,
@@ -178,16 +178,6 @@ impl Nonlinear {
         motions
             .chain(rests.iter().filter_map(about))
             .map(|motion| self.state(motion.state, motion.branch))
-            .collect()
-    }
-
-    /// Guesses of the distances at which the gap swings with this amplitude, the farthest first,
-    /// by averaging: the constant part of the gap, as [`Model::height`] has it, and the state at
-    /// drive phase 0.
-    pub(crate) fn averaged_distances(&self, amplitude: f64) -> Vec<(f64, Vec<f64>)> {
-        let motions = distances(&self.system, amplitude).into_iter();
-        motions
-            .map(|motion| (motion.offset, self.state(motion.state, motion.branch)))
             .collect()
     }
 
@@ -672,6 +662,14 @@ impl EngineMap for NonlinearMap {
         self.flow.statistics().evaluations
     }
 
+    fn cost(&self) -> u64 {
+        self.flow.cost()
+    }
+
+    fn add_cost(&mut self, cost: u64) {
+        self.flow.add_cost(cost);
+    }
+
     fn discrete_entries(&self) -> usize {
         self.nonlinear.discrete_entries()
     }
@@ -766,6 +764,10 @@ impl EngineMap for CoarseMap {
 
     fn evaluations(&self) -> u64 {
         self.coarse.statistics().evaluations
+    }
+
+    fn cost(&self) -> u64 {
+        self.coarse.cost()
     }
 
     fn discrete_entries(&self) -> usize {

@@ -110,6 +110,11 @@ pub enum EndReport {
         /// The limit.
         limit: usize,
     },
+    /// The work took as many steps of the approximate flow as a census takes at most.
+    MaxSteps {
+        /// How many that is; a step of the exact flow counts as 100.
+        limit: u64,
+    },
     /// The work was stopped.
     Cancelled,
 }
@@ -231,7 +236,8 @@ pub struct UndecidedStart {
 /// Transient chaos.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct TransientChaosReport {
-    /// Lyapunov exponents per drive period while it lasts.
+    /// Lyapunov exponents per drive period while it lasts; empty where the exact flow was not followed
+    /// on it.
     pub lyapunov: Vec<f64>,
     /// Standard error of each.
     pub lyapunov_errors: Vec<f64>,
@@ -261,6 +267,8 @@ const NONLINEAR_PERIODS: usize = 600_000;
 const HARMONICS: usize = 20;
 /// Drive periods over which a motion that does not repeat is observed.
 pub const OBSERVED_PERIODS: usize = 512;
+/// Steps of the approximate flow after which a start is left undecided.
+const MAX_START_STEPS: u64 = 10_000_000;
 /// A state this many times larger than the box has left every bound.
 const OUT_OF_BOUNDS: f64 = 1e6;
 
@@ -339,6 +347,7 @@ fn budgets(model: &Model, options: &AttractorsOptions, start_box: &StartBox) -> 
         unseen,
         max_starts: ((times * default.max_starts as f64) as usize).min(MAX_STARTS),
         max_periods: (times * periods as f64) as usize,
+        max_steps: (times * default.max_steps as f64) as u64,
         ..default
     }
 }
@@ -358,6 +367,7 @@ fn bounded(options: &AttractorsOptions, start_box: &StartBox) -> ClassifyOptions
     };
     ClassifyOptions {
         bound,
+        max_steps: MAX_START_STEPS,
         max_period: options.max_period,
         ..classify
     }
@@ -381,8 +391,12 @@ fn described(
         .transient_chaos
         .as_ref()
         .map(|t| TransientChaosReport {
-            lyapunov: t.spectrum.exponents.clone(),
-            lyapunov_errors: t.spectrum.errors.clone(),
+            lyapunov: t
+                .spectrum
+                .iter()
+                .flat_map(|s| s.exponents.clone())
+                .collect(),
+            lyapunov_errors: t.spectrum.iter().flat_map(|s| s.errors.clone()).collect(),
             lifetime: t.lifetime.mean,
             lifetime_interval: [t.lifetime.low, t.lifetime.high],
             escapes: t.lifetime.escapes,
@@ -418,6 +432,9 @@ fn described(
             },
             CensusEnd::MaxPeriods => EndReport::MaxPeriods {
                 limit: budgets.max_periods,
+            },
+            CensusEnd::MaxSteps => EndReport::MaxSteps {
+                limit: budgets.max_steps,
             },
         },
         followed_at: found.followed_coarsely.then_some(coarse::TOLERANCE),
@@ -537,13 +554,15 @@ options! {
         /// Number of initial states, spread evenly over one box. Default: initial states at all
         /// amplitudes, from the resonant response down to below the gap, until the share that may
         /// lead to undiscovered motions is below {unseen}, or 5000 initial states or 2,000,000
-        /// drive periods (600,000 under a nonlinear law) are reached
+        /// drive periods (600,000 under a nonlinear law) are reached. Under a nonlinear law an initial
+        /// state is followed for at most 10 million steps of the approximate flow, and all together
+        /// for 50 million; a step of the exact flow counts as 100
         #[schemars(range(min = 1, max = MAX_STARTS), extend("x-value" = "S"))]
         pub starts: Option<usize> = None,
         /// Share of initial states that may lead to undiscovered motions, with 95 % confidence, at
         /// which sampling ends. Default: 0.01 under a nonlinear law and 0.002 under a
-        /// piecewise-linear one; a smaller value raises the limits of {starts} and drive periods in
-        /// proportion
+        /// piecewise-linear one; a smaller value raises the limits of {starts}, drive periods and
+        /// steps in proportion
         #[schemars(range(min = 1e-5, max = 0.5), extend("x-value" = "PART"))]
         pub unseen: Option<f64> = None,
         /// Seed of the initial states; results do not depend on the number of threads

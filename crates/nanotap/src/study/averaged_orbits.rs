@@ -58,11 +58,3 @@ fn coarse_states(mut coarse: ModelMap, guesses: &[Vec<f64>]) -> Vec<Vec<f64>> {
     let states = orbits.into_iter().flat_map(|orbit| orbit.states);
     states.collect()
 }
-
-/// Guesses of the distances at which the gap swings with this amplitude, the farthest first: the
-/// distance ([`Model::height`] at rest) and the state at drive phase 0, for Newton's method. Empty
-/// for a model without a nonlinear force.
-pub fn averaged_distances(model: &Model, amplitude: f64) -> Vec<(f64, Vec<f64>)> {
-    let nonlinear = model.nonlinear.as_ref();
-    nonlinear.map_or_else(Vec::new, |own| own.averaged_distances(amplitude))
-}

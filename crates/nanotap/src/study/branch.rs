@@ -67,7 +67,8 @@ impl Range {
         ContinuationOptions {
             max_step: options.max_step,
             initial_step: over.initial_step.min(options.max_step),
-            max_points: MAX_POINTS,
+            max_points: options.max_points,
+            grazings: options.grazings,
             max_multiplier: options.max_multiplier,
             ..over
         }
@@ -886,6 +887,12 @@ options! {
         /// A branch is left where a disturbance grows by more than this in the orbit's period.
         #[serde(skip)]
         pub max_multiplier: f64 = ContinuationOptions::over(0.0, 1.0).max_multiplier,
+        /// Points after which a branch is cut.
+        #[serde(skip)]
+        pub max_points: usize = MAX_POINTS,
+        /// Whether grazings are located.
+        #[serde(skip)]
+        pub grazings: bool = true,
     }
 }
 

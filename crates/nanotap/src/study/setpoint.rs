@@ -21,7 +21,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use super::FreeMotion;
-use super::approach::distance_sweep::{DistanceSweep, Motion, Piece, is_same};
+use super::approach::distance_sweep::{DistanceSweep, Motion, Piece, budget_text, is_same};
 use super::approach::{MAX_MULTIPLIER, SETPOINT_PERIODS, no_drive};
 use crate::case::Case;
 use crate::case::document::CaseDocument;
@@ -84,6 +84,9 @@ pub struct SetpointReport {
     pub chosen: usize,
     /// Other stable orbits at the distance that the approach reaches.
     pub other_states: Vec<SetpointState>,
+    /// Why other states may be missing, if the search for them ended at its budget.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub budget: Option<String>,
 }
 
 impl SetpointReport {
@@ -132,8 +135,12 @@ impl SetpointReport {
                 also.join(", or at ")
             )
         };
+        let budget = self.budget.as_ref();
+        let cut = budget.map_or_else(String::new, |reason| {
+            format!("; other states may be missing: {reason}")
+        });
         Remark::note(format!(
-            "the setpoint A = {} (A/A0 = {}) is reached on approach at gap.tip = {}{more}{bistable}",
+            "the setpoint A = {} (A/A0 = {}) is reached on approach at gap.tip = {}{more}{bistable}{cut}",
             Kind::Length.format(self.amplitude),
             Kind::Number.format(self.ratio),
             Kind::Length.format(self.zc()),
@@ -171,9 +178,20 @@ pub fn solve_setpoint(case: &Case, control: &Control<'_>) -> Result<SetpointRepo
     let range = (0.0, FARTHER * free.reach);
     let mut sweep = DistanceSweep::new(case, range, free.reach, SETPOINT_PERIODS, control)?;
     let place = sweep.free()?;
-    let (_, place) = sweep.way(place, 0.0, |sweep, piece| search.ends_in(sweep, piece));
+    // A motion that does not close ends the search.
+    sweep.stops_on_grid = true;
+    let (pieces, place) = sweep.way(place, 0.0, |sweep, piece| search.ends_in(sweep, piece));
+    sweep.stops_on_grid = false;
     if control.is_cancelled() {
         return Err(cancelled());
+    }
+    if let Some(steps) = sweep.spent_budget() {
+        return Err(Error::numerics(format!(
+            "the setpoint A/A0 = {ratio} was not reached: {}, to gap.tip = {}; give gap.tip, or raise \
+             drive.setpoint",
+            budget_text(steps),
+            search.shown(pieces.last().map_or(range.1, |piece| piece.to))
+        )));
     }
     let reached = search.found.take().unwrap_or_else(|| {
         Err(Error::numerics(format!(
@@ -183,8 +201,11 @@ pub fn solve_setpoint(case: &Case, control: &Control<'_>) -> Result<SetpointRepo
         )))
     })?;
     // What a lever shows at this distance that comes from near.
+    sweep.allow_steps(OTHERS_STEPS);
     let (_, place) = sweep.way(place, 0.0, |_, _| false);
     sweep.way(place, reached.gap, |_, _| false);
+    let budget = sweep.spent_budget().map(budget_text);
+    sweep.allow_steps(u64::MAX);
     let (mut solutions, other_states) = search.others(&sweep, &reached, control);
     if control.is_cancelled() {
         return Err(cancelled());
@@ -198,6 +219,7 @@ pub fn solve_setpoint(case: &Case, control: &Control<'_>) -> Result<SetpointRepo
         solutions,
         chosen,
         other_states,
+        budget,
     })
 }
 
@@ -253,6 +275,12 @@ impl SolvedCase {
     }
 }
 
+/// Steps of the approximate flow after which other states at the setpoint are looked for no longer,
+/// and which their branches may take.
+const OTHERS_STEPS: u64 = 20_000_000;
+/// Points to which each of these branches may always be followed.
+const MIN_POINTS: usize = 16;
+
 /// How much farther than the free tip swings the way begins.
 const FARTHER: f64 = 2.0;
 
@@ -300,10 +328,10 @@ impl Search<'_> {
         let stretch = match &piece.motion {
             Motion::Periodic(stretch) => *stretch,
             Motion::OnGrid(_) => {
-                let met = sweep.motion_at(piece, piece.entered);
-                let what = match met.orbit {
+                let motion = sweep.motion_at(piece, piece.entered);
+                let what = match motion.orbit {
                     Some(_) => "of a long period",
-                    None => met.classification.name(),
+                    None => motion.classification.name(),
                 };
                 self.found = Some(Err(Error::numerics(format!(
                     "on approach the motion is {what} at gap.tip = {}, before the setpoint A/A0 = \
@@ -355,10 +383,11 @@ impl Search<'_> {
                     )))
                 };
                 let crossed = before.as_ref().map(|last| {
-                    self.crossing(last, &here).map(|found| SetpointSolution {
-                        reached: true,
-                        ..found
-                    })
+                    self.crossing(sweep, last, &here)
+                        .map(|found| SetpointSolution {
+                            reached: true,
+                            ..found
+                        })
                 });
                 self.found = match (crossed, self.before) {
                     (Some(Some(found)), _) => Some(Ok(found)),
@@ -402,10 +431,14 @@ impl Search<'_> {
         let states = others
             .filter_map(|(gap, orbit)| self.state(*gap, orbit))
             .collect();
+        let over = ContinuationOptions::over(0.0, sweep.farthest());
+        let max_points = sweep.points_in(OTHERS_STEPS) / seeds.len().max(1);
         let options = DiagramOptions {
             continuation: ContinuationOptions {
+                max_points: max_points.max(MIN_POINTS).min(over.max_points),
+                grazings: false,
                 max_multiplier: MAX_MULTIPLIER,
-                ..ContinuationOptions::over(0.0, sweep.farthest())
+                ..over
             },
             doublings: 0,
             stable_doublings: false,
@@ -431,7 +464,7 @@ impl Search<'_> {
                     amplitude: both[k],
                 });
                 if (a.amplitude > self.target) != (b.amplitude > self.target)
-                    && let Some(solution) = self.crossing(&a, &b)
+                    && let Some(solution) = self.crossing(sweep, &a, &b)
                 {
                     let near = 1e-9 * self.free.reach.max(solution.gap.abs());
                     let known = |s: &SetpointSolution| {
@@ -469,7 +502,12 @@ const STEPS: usize = 60;
 
 impl Search<'_> {
     /// The orbit between two of a branch that has the target amplitude.
-    fn crossing(&self, a: &Sample<'_>, b: &Sample<'_>) -> Option<SetpointSolution> {
+    fn crossing(
+        &self,
+        sweep: &DistanceSweep<'_>,
+        a: &Sample<'_>,
+        b: &Sample<'_>,
+    ) -> Option<SetpointSolution> {
         let view = self.case.physical()?;
         let target = self.target;
         let (mut low, mut high) = ((0.0, a.amplitude), (1.0, b.amplitude));
@@ -483,7 +521,7 @@ impl Search<'_> {
             } else {
                 0.5 * (low.0 + high.0)
             };
-            let (gap, orbit, observables) = self.orbit_between(a, b, t)?;
+            let (gap, orbit, observables) = orbit_between(sweep, a, b, t)?;
             let value = observables.first_harmonic;
             closed = Some((gap, orbit, observables));
             if (value - target).abs() <= 1e-12 * target.abs() || high.0 - low.0 < 1e-14 {
@@ -512,24 +550,24 @@ impl Search<'_> {
             observables,
         })
     }
+}
 
-    /// The orbit at a share `t` of the way from one orbit of a branch to the next.
-    fn orbit_between(
-        &self,
-        a: &Sample<'_>,
-        b: &Sample<'_>,
-        t: f64,
-    ) -> Option<(f64, PeriodicOrbit, Observables)> {
-        let gap = a.gap + t * (b.gap - a.gap);
-        let model = self.case.with(self.case.gap_key(), gap).model().ok()?;
-        let mut map = ModelMap::new(&model);
-        let [from, to] = [a, b].map(|sample| sample.orbit.states.concat());
-        let points: Vec<f64> = from.iter().zip(&to).map(|(x, y)| x + t * (y - x)).collect();
-        let period = a.orbit.period;
-        let options = ShootingOptions::default();
-        let orbit = close_orbit_from_points(&mut map, &points, period, &options).ok()?;
-        let start = orbit.states.first()?;
-        let observables = measure(&model, start, orbit.period, ObservableSet::COMMON).ok()?;
-        (orbit.period == period).then_some((gap, orbit, observables))
-    }
+/// The orbit at a share `t` of the way from one orbit of a branch to the next.
+fn orbit_between(
+    sweep: &DistanceSweep<'_>,
+    a: &Sample<'_>,
+    b: &Sample<'_>,
+    t: f64,
+) -> Option<(f64, PeriodicOrbit, Observables)> {
+    let gap = a.gap + t * (b.gap - a.gap);
+    let model = sweep.model(gap).ok()?;
+    let mut map = ModelMap::new(&model);
+    let [from, to] = [a, b].map(|sample| sample.orbit.states.concat());
+    let points: Vec<f64> = from.iter().zip(&to).map(|(x, y)| x + t * (y - x)).collect();
+    let period = a.orbit.period;
+    let options = ShootingOptions::default();
+    let orbit = close_orbit_from_points(&mut map, &points, period, &options).ok()?;
+    let start = orbit.states.first()?;
+    let observables = measure(&model, start, orbit.period, ObservableSet::COMMON).ok()?;
+    (orbit.period == period).then_some((gap, orbit, observables))
 }

@@ -380,3 +380,34 @@ fn invalid_sweeps_are_refused_before_any_computation() {
     let many = refused(omega(), &|o| o.starts = Some(usize::MAX));
     assert!(many.contains("too many"), "{many}");
 }
+
+/// Pressed onto a rigid stop by more than the drive takes off, k·|gap| > F, a mass rests on it, and
+/// else it bounces: at each gap of a sweep as alone, at gaps below and above zero.
+#[test]
+fn a_sweep_passes_from_rest_on_a_stop_to_impacts() {
+    let oscillator = |gap: f64| Oscillator {
+        mass: 1.0,
+        stiffness: 1.0,
+        damping: 0.1,
+        forcing: 0.6,
+        omega: 1.3,
+        gap,
+        stop: Stop::Rigid { restitution: 0.8 },
+    };
+    let swept = Swept::of(
+        &Case::from(oscillator(-1.0)),
+        &["gap=-1:0.5:4"],
+        |options| {
+            options.periods = 400;
+        },
+    );
+    let amplitudes = swept.column("first_harmonic");
+    for (k, found) in amplitudes.into_iter().enumerate() {
+        let gap = -1.0 + 0.5 * k as f64;
+        let case = Case::from(oscillator(gap));
+        let alone = nanotap::study::orbit::orbit(&case.model().unwrap(), &OrbitOptions::default());
+        let alone = alone.unwrap().observables.first_harmonic;
+        assert!((found - alone).abs() < 1e-9, "{gap}: {found} {alone}");
+        assert_eq!(found == 0.0, gap <= -0.6, "{gap}");
+    }
+}

@@ -40,7 +40,7 @@ use crate::study::request::options;
 use crate::study::simulate::Classification;
 use crate::study::value::{Amount, value};
 use crate::study::{FreeMotion, Study};
-use distance_sweep::Met;
+use distance_sweep::FoundMotion;
 pub use quasistatic::{states_at, states_near};
 
 /// Where the default curve begins, in units of the tip's free reach: far enough to see the
@@ -206,6 +206,9 @@ pub struct ApproachReport {
     pub branches: Option<BranchReport>,
     /// Whether the work was stopped before it was done.
     pub cancelled: bool,
+    /// Budgets of steps that were spent, with what is missing for that reason.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub limits: Vec<String>,
     /// For a physical case, the factor from distances to m.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub parameter_unit: Option<ParameterUnit>,
@@ -261,6 +264,7 @@ pub fn approach(
         coexisting: found.coexisting,
         branches: found.branches,
         cancelled: control.is_cancelled(),
+        limits: found.limits,
         parameter_unit: case.parameter_unit(key),
         modulation: None,
     })
@@ -359,20 +363,24 @@ const RECORDED_PERIODS: usize = 256;
 
 impl Curve<'_> {
     /// A motion as a line of the table.
-    fn observed(&self, way: Way, gap: f64, model: &Model, met: Met) -> ApproachPoint {
-        let seen = match (&met.orbit, met.classification) {
+    fn observed(&self, way: Way, gap: f64, model: &Model, motion: FoundMotion) -> ApproachPoint {
+        let seen = match (&motion.orbit, motion.classification) {
             (Some(orbit), _) => {
                 let start = orbit.states.first().map_or(&[][..], Vec::as_slice);
                 measure(model, start, orbit.period, ObservableSet::COMMON).map(Some)
             }
             (None, Classification::Undecided | Classification::Unbounded) => Ok(None),
-            (None, _) => {
-                measure(model, &met.state, RECORDED_PERIODS, ObservableSet::COMMON).map(Some)
-            }
+            (None, _) => measure(
+                model,
+                &motion.state,
+                RECORDED_PERIODS,
+                ObservableSet::COMMON,
+            )
+            .map(Some),
         };
         let (classification, observables, reason) = match seen {
-            Ok(Some(seen)) => (met.classification, Some(seen), None),
-            Ok(None) => (met.classification, None, Some(met.evidence)),
+            Ok(Some(seen)) => (motion.classification, Some(seen), None),
+            Ok(None) => (motion.classification, None, Some(motion.evidence)),
             Err(error) => (Classification::Undecided, None, Some(error.to_string())),
         };
         ApproachPoint {
@@ -382,7 +390,7 @@ impl Curve<'_> {
                 (way, gap),
                 classification,
                 observables.as_ref(),
-                met.orbit,
+                motion.orbit,
             )
         }
     }
@@ -490,7 +498,9 @@ options! {
         /// Last distance of the approach; default: 0
         #[schemars(extend("x-value" = "DISTANCE"))]
         pub to: Option<Amount> = None,
-        /// Number of distances in each direction
+        /// Number of distances in each direction. Under a nonlinear law the lever is followed for at
+        /// most 40 million steps of the approximate flow, and as many are taken for the rows; a step
+        /// of the exact flow counts as 100
         #[schemars(range(min = 2, max = MAX_DISTANCES), extend("x-value" = "P"))]
         pub points: usize = 80,
         /// Also continue coexisting branches, stable and unstable

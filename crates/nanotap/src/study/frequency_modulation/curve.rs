@@ -180,6 +180,7 @@ fn curve(
         coexisting: Vec::new(),
         branches: None,
         cancelled: control.is_cancelled(),
+        limits: Vec::new(),
         parameter_unit: case.parameter_unit(case.gap_key()),
         modulation: Some(ModulationReport {
             amplitude: free.amplitude,

@@ -3,27 +3,27 @@
 //! Each run comes to what [`follow_start`](super::follow_start) makes of its start, but for rounding:
 //! the map passes some periods of all of them together, and each run then takes in the states that
 //! it came through, one by one. Where it ends before the last of them, the others are not looked at.
-//! What comes of a start depends on no other.
+//! The outcome of a start does not depend on the others.
 
-use crate::classify::run::{AfterLook, LONGEST_PARTING, Resembled, Run, Stop, refused};
-use crate::classify::{ClassifyOptions, Known, RunEnd};
+use crate::classify::run::{AfterLook, ChaosMatch, MAX_DIVERGENCE_PERIODS, Run, Stop, refused};
+use crate::classify::{ClassifyOptions, KnownMotions, RunEnd};
 use crate::failure::{MapFailure, finite};
 use crate::map::StroboscopicMap;
 
-/// Periods that are passed before a run is asked where it has come to.
-const UNSEEN: usize = 32;
+/// Periods that are passed before a run takes in its states.
+const PERIODS_AT_ONCE: usize = 32;
 
 /// One start under way.
 struct Member<'a> {
     number: usize,
     run: Run<'a>,
-    /// The neighbour that shows whether it is on the chaos that it resembles.
-    beside: Option<Beside>,
+    /// The neighbour that shows whether it is on the chaos that it matching_chaos.
+    companion: Option<Neighbour>,
 }
 
 /// A neighbour of a run.
-struct Beside {
-    chaos: Resembled,
+struct Neighbour {
+    chaos: ChaosMatch,
     neighbour: Vec<f64>,
     /// Periods passed.
     periods: usize,
@@ -60,7 +60,7 @@ pub(crate) fn follow_starts<'a, M: StroboscopicMap>(
     map: &mut M,
     places: impl Fn() -> usize,
     mut next: impl FnMut() -> Option<(usize, &'a [f64])>,
-    known: Known<'a>,
+    known: KnownMotions<'a>,
     options: &'a ClassifyOptions,
     cancelled: impl Fn() -> bool,
     mut followed: impl FnMut(usize, Followed<'a>),
@@ -79,7 +79,7 @@ pub(crate) fn follow_starts<'a, M: StroboscopicMap>(
                 None => members.push(Member {
                     number,
                     run: Run::new(start, known, options),
-                    beside: None,
+                    companion: None,
                 }),
             }
         }
@@ -93,9 +93,9 @@ pub(crate) fn follow_starts<'a, M: StroboscopicMap>(
                 return;
             }
             let own = passed.next().unwrap_or_default();
-            let neighbour = member.beside.as_ref().and_then(|_| passed.next());
+            let neighbour = member.companion.as_ref().and_then(|_| passed.next());
             let how = match member.go_on(map, own, &neighbour.unwrap_or_default()) {
-                Ok(AfterLook::GoOn | AfterLook::Perhaps(_)) => {
+                Ok(AfterLook::GoOn | AfterLook::MaybeChaos(_)) => {
                     left.push(member);
                     continue;
                 }
@@ -117,13 +117,13 @@ pub(crate) fn follow_starts<'a, M: StroboscopicMap>(
 /// Passes some periods of every run, and of its neighbour after it where it has one.
 fn pass<M: StroboscopicMap>(map: &mut M, members: &[Member<'_>]) -> Vec<Passed> {
     let (mut states, mut periods) = (Vec::new(), Vec::new());
-    for Member { run, beside, .. } in members {
+    for Member { run, companion, .. } in members {
         states.extend_from_slice(&run.state);
-        if let Some(beside) = beside {
-            states.extend_from_slice(&beside.neighbour);
-            periods.extend([UNSEEN.min(LONGEST_PARTING - beside.periods); 2]);
+        if let Some(companion) = companion {
+            states.extend_from_slice(&companion.neighbour);
+            periods.extend([PERIODS_AT_ONCE.min(MAX_DIVERGENCE_PERIODS - companion.periods); 2]);
         } else {
-            periods.push(UNSEEN.min(run.next_look() - run.periods));
+            periods.push(PERIODS_AT_ONCE.min(run.next_look() - run.periods));
         }
     }
     let mut passed = vec![Vec::new(); periods.len()];
@@ -144,7 +144,7 @@ impl Member<'_> {
         own: Passed,
         neighbour: &Passed,
     ) -> Result<AfterLook, Stop> {
-        let mut after = match self.beside.take() {
+        let mut after = match self.companion.take() {
             None => {
                 for state in own.states.chunks_exact(map.dimension()) {
                     self.run.step_to(map, state)?;
@@ -152,15 +152,15 @@ impl Member<'_> {
                 own.failure.map_or(Ok(()), Err)?;
                 AfterLook::GoOn
             }
-            Some(beside) => match self.go_on_beside(map, beside, own, neighbour)? {
+            Some(companion) => match self.go_on_with(map, companion, own, neighbour)? {
                 Some(after) => after,
                 None => return Ok(AfterLook::GoOn),
             },
         };
         loop {
             after = match after {
-                AfterLook::Perhaps(chaos) => {
-                    self.beside = Some(Beside {
+                AfterLook::MaybeChaos(chaos) => {
+                    self.companion = Some(Neighbour {
                         neighbour: chaos.neighbour(&self.run.state),
                         chaos,
                         periods: 0,
@@ -175,11 +175,11 @@ impl Member<'_> {
         }
     }
 
-    /// The same beside a neighbour; nothing follows as long as it may still part.
-    fn go_on_beside<M: StroboscopicMap>(
+    /// The same with a neighbour; `None` as long as the two may still diverge.
+    fn go_on_with<M: StroboscopicMap>(
         &mut self,
         map: &mut M,
-        mut beside: Beside,
+        mut companion: Neighbour,
         own: Passed,
         neighbour: &Passed,
     ) -> Result<Option<AfterLook>, Stop> {
@@ -190,18 +190,18 @@ impl Member<'_> {
             let Some(neighbour) = neighbours.next().filter(|x| finite(x).is_ok()) else {
                 return Ok(Some(self.run.go_on()));
             };
-            if beside.chaos.has_parted(state, neighbour) {
-                let kind = self.run.chaotic(beside.chaos.spectrum);
+            if companion.chaos.has_diverged(state, neighbour) {
+                let kind = self.run.chaotic(companion.chaos.spectrum);
                 return Ok(Some(AfterLook::Known(kind)));
             }
-            beside.periods += 1;
-            beside.neighbour.copy_from_slice(neighbour);
+            companion.periods += 1;
+            companion.neighbour.copy_from_slice(neighbour);
         }
         own.failure.map_or(Ok(()), Err)?;
-        if beside.periods >= LONGEST_PARTING {
+        if companion.periods >= MAX_DIVERGENCE_PERIODS {
             return Ok(Some(self.run.go_on()));
         }
-        self.beside = Some(beside);
+        self.companion = Some(companion);
         Ok(None)
     }
 }
@@ -233,8 +233,8 @@ mod tests {
         format!("{end:?}")
     }
 
-    /// One after the other, `map` gives the same bits, however many are followed at a time.
-    fn assert_same_as_alone<M: StroboscopicMap>(map: &M, known: Known<'_>) -> Vec<RunEnd> {
+    /// In sequence, `map` gives the same bits, however many are followed at a time.
+    fn assert_same_as_alone<M: StroboscopicMap>(map: &M, known: KnownMotions<'_>) -> Vec<RunEnd> {
         let options = ClassifyOptions::default();
         let alone: Vec<RunEnd> = STARTS
             .iter()
@@ -277,11 +277,11 @@ mod tests {
     #[test]
     fn starts_side_by_side_come_to_what_each_comes_to_alone() {
         for r in [3.2, 3.449, 3.8285, 3.9, 4.5] {
-            assert_same_as_alone(&Logistic(r), Known::default());
+            assert_same_as_alone(&Logistic(r), KnownMotions::default());
         }
     }
 
-    /// Patience as a census has it, and neighbourhoods on the way.
+    /// Waiting as a census has it, and neighbourhoods on the way.
     #[test]
     fn neighbourhoods_are_entered_after_as_many_periods() {
         let mut map = Logistic(3.2);
@@ -289,11 +289,11 @@ mod tests {
         let MotionKind::Periodic(orbit) = found.kind else {
             panic!("3.2 x (1 − x) has an orbit of period 2")
         };
-        let ball = Neighbourhood::around(&mut map, &orbit).unwrap().unwrap();
-        let known = Known {
-            balls: &[ball],
-            patience: 100,
-            ..Known::default()
+        let region = Neighbourhood::around(&mut map, &orbit).unwrap().unwrap();
+        let known = KnownMotions {
+            trapping_regions: &[region],
+            max_wait_periods: 100,
+            ..KnownMotions::default()
         };
         let ends = assert_same_as_alone(&map, known);
         assert!(matches!(
@@ -305,15 +305,15 @@ mod tests {
         ));
     }
 
-    /// A start that resembles chaos is on it if a neighbour parts. On an orbit of period 3 none does,
-    /// though its means are said to be those of chaos.
+    /// A start that matching_chaos chaos is on it if a neighbour parts. On an orbit of period 3 none does,
+    /// though its means are given as those of chaos.
     #[test]
     fn known_chaos_is_recognised_beside_a_neighbour() {
         let own = [chaos(3.9)];
-        let known = Known {
+        let known = KnownMotions {
             chaos: &own,
-            patience: 300,
-            ..Known::default()
+            max_wait_periods: 300,
+            ..KnownMotions::default()
         };
         let ends = assert_same_as_alone(&Logistic(3.9), known);
         let RunEnd::Classified(end) = &ends[0] else {
@@ -335,7 +335,7 @@ mod tests {
         let mut other = chaos(3.9);
         other.strobe.errors.fill(1.0);
         let others = [other];
-        let known = Known {
+        let known = KnownMotions {
             chaos: &others,
             ..known
         };
@@ -381,17 +381,17 @@ mod tests {
 
     #[test]
     fn a_failure_comes_after_as_many_periods() {
-        assert_same_as_alone(&Fails(Logistic(3.9)), Known::default());
+        assert_same_as_alone(&Fails(Logistic(3.9)), KnownMotions::default());
         let own = [chaos(3.9)];
-        let known = Known {
+        let known = KnownMotions {
             chaos: &own,
-            patience: 300,
-            ..Known::default()
+            max_wait_periods: 300,
+            ..KnownMotions::default()
         };
         assert_same_as_alone(&Fails(Logistic(3.9)), known);
     }
 
-    /// What had ended by then is told.
+    /// What had ended by then is reported.
     #[test]
     fn work_that_is_stopped_tells_what_it_knows() {
         let options = ClassifyOptions::default();
@@ -406,7 +406,7 @@ mod tests {
             &mut Logistic(3.9),
             || STARTS.len(),
             || next.next(),
-            Known::default(),
+            KnownMotions::default(),
             &options,
             cancelled,
             |number, _| ended.push(number),

@@ -21,7 +21,7 @@ const ERROR: f64 = 0.05;
 
 /// How much of the set of starts may lead to motions that were not found.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Unseen {
+pub struct UndiscoveredFraction {
     /// Motions found.
     pub motions: usize,
     /// Drawn starts decided since the last of them was found.
@@ -30,7 +30,7 @@ pub struct Unseen {
     pub share: f64,
 }
 
-impl Unseen {
+impl UndiscoveredFraction {
     pub(crate) fn new(motions: usize, starts: usize) -> Self {
         let share = if starts == 0 {
             1.0
@@ -45,7 +45,7 @@ impl Unseen {
     }
 
     /// Starts in a row after which the share is bounded by this one.
-    pub(crate) fn row_for(motions: usize, share: f64) -> usize {
+    pub(crate) fn starts_needed(motions: usize, share: f64) -> usize {
         (log_error(motions) / nanotap_arithmetic::ln_1p(-share)).ceil() as usize
     }
 }
@@ -63,25 +63,27 @@ mod tests {
 
     #[test]
     fn the_bound_falls_like_one_over_the_starts() {
-        assert_eq!(Unseen::new(1, 0).share, 1.0);
+        assert_eq!(UndiscoveredFraction::new(1, 0).share, 1.0);
         // ln 40 = 3.689.
-        let one = Unseen::new(1, 10_000).share;
+        let one = UndiscoveredFraction::new(1, 10_000).share;
         assert!((one * 10_000.0 - 3.689).abs() < 2e-3);
-        assert!(Unseen::new(5, 1000).share > Unseen::new(4, 1000).share);
+        assert!(
+            UndiscoveredFraction::new(5, 1000).share > UndiscoveredFraction::new(4, 1000).share
+        );
     }
 
     #[test]
     fn the_row_for_a_share_is_the_shortest_that_bounds_it() {
         for motions in [0, 1, 2, 7, 100] {
             for share in [0.5, 0.01, 0.002, 1e-6] {
-                let row = Unseen::row_for(motions, share);
-                assert!(Unseen::new(motions, row).share <= share);
-                assert!(Unseen::new(motions, row - 1).share > share);
+                let row = UndiscoveredFraction::starts_needed(motions, share);
+                assert!(UndiscoveredFraction::new(motions, row).share <= share);
+                assert!(UndiscoveredFraction::new(motions, row - 1).share > share);
             }
         }
         // Nothing bounds a share to none, and any row to all.
-        assert_eq!(Unseen::row_for(1, 0.0), usize::MAX);
-        assert_eq!(Unseen::row_for(1, 1.0), 0);
+        assert_eq!(UndiscoveredFraction::starts_needed(1, 0.0), usize::MAX);
+        assert_eq!(UndiscoveredFraction::starts_needed(1, 1.0), 0);
     }
 
     /// A thousand censuses of ten motions with shares 1/2, 1/4 … 1/512, 1/512, each
@@ -107,11 +109,11 @@ mod tests {
                     found += 1;
                     row = 0;
                 }
-                if Unseen::new(found, row).share < 0.02 {
+                if UndiscoveredFraction::new(found, row).share < 0.02 {
                     break;
                 }
             }
-            wrong += usize::from(share(&seen) > Unseen::new(found, row).share);
+            wrong += usize::from(share(&seen) > UndiscoveredFraction::new(found, row).share);
         }
         assert!(wrong <= 50, "{wrong}");
     }

@@ -647,11 +647,14 @@ impl LinearSums {
             if before.1 > 0.0 && here.1 < 0.0 {
                 let (mut low, mut high) = (end - width, end);
                 let (mut at_low, mut at_high) = (before.1, here.1);
-                // Secant steps, kept inside; the force is stationary at its peak.
-                for _ in 0..4 {
+                // Secant steps, kept inside.
+                for _ in 0..20 {
                     let at = low + (high - low) * at_low / (at_low - at_high);
                     let (force, rate) = self.force_at(at, constant);
                     self.sums.peak = self.sums.peak.max(force);
+                    if rate.abs() * (high - low) <= 1e-15 * force.abs() {
+                        break;
+                    }
                     if rate > 0.0 {
                         (low, at_low) = (at, rate);
                         at_high *= 0.5;

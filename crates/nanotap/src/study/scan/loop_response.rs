@@ -49,10 +49,19 @@ pub(super) fn loop_report(
     if plan.mode == Mode::ConstantHeight || plan.gains.delay > MAX_DELAY {
         return Ok(None);
     }
-    let (mut lever, mut state) = settled.exact_lever()?;
-    let Some(motion) = steady_motion(&mut lever, &mut state, gap, plan.setpoint) else {
+    let (mut lever, state) = settled.exact_lever()?;
+    // From where the scan is, and for a loop that hunts from the free motion at the start.
+    let starts = [
+        (state, gap),
+        (lever.free_start(), plan.z0 / plan.length_unit),
+    ];
+    let mut found = starts
+        .into_iter()
+        .filter_map(|(state, gap)| steady_motion(&mut lever, state, gap, plan.setpoint));
+    let Some(motion) = found.next() else {
         return Ok(None);
     };
+    drop(found);
     let n = lever.continuous_dimension();
     let map = motion.derivative.view((0, 0), (n, n)).into_owned();
     let moduli = |matrix: &DMatrix<f64>| {
@@ -101,7 +110,7 @@ pub(super) fn loop_report(
 /// Newton's method on state and gap for `P(x, g) = x` and the setpoint amplitude.
 fn steady_motion(
     lever: &mut Lever,
-    state: &mut Vec<f64>,
+    mut state: Vec<f64>,
     start: f64,
     setpoint: f64,
 ) -> Option<SteadyMotion> {
@@ -112,7 +121,7 @@ fn steady_motion(
     let mut before = f64::INFINITY;
     // Near the steady motion at this distance first.
     for _ in 0..MAX_SETTLING {
-        let signals = lever.advance(state, gap).ok()?;
+        let signals = lever.advance(&mut state, gap).ok()?;
         let amplitude = signals.deflection.modulus();
         if (amplitude - before).abs() < 1e-6 * free {
             break;
@@ -120,7 +129,7 @@ fn steady_motion(
         before = amplitude;
     }
     for _ in 0..MAX_ITERATIONS {
-        let derivative = lever.linearised(state, gap, free).ok()?;
+        let derivative = lever.linearised(&state, gap, free).ok()?;
         let mut end = state.clone();
         let signals = lever.advance(&mut end, gap).ok()?;
         let amplitude = signals.deflection.modulus();
@@ -160,7 +169,7 @@ fn steady_motion(
         }
         if damping < 1.0 {
             for _ in 0..200 {
-                lever.advance(state, gap).ok()?;
+                lever.advance(&mut state, gap).ok()?;
             }
         }
     }

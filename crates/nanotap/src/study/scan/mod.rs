@@ -190,6 +190,13 @@ fn warnings(
             ));
         }
     }
+    if feedback.is_none() && plan.mode == Mode::ConstantAmplitude {
+        warnings.push(
+            "no steady motion with the setpoint amplitude was found: the stability of the feedback \
+             loop is not known"
+                .into(),
+        );
+    }
     if recorded.at_range > 0 {
         let remedy = feedback.map_or_else(String::new, stable);
         warnings.push(format!(

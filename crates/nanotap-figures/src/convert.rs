@@ -3,7 +3,7 @@
 //! Letters are shapes in the SVG, so neither needs a font.
 
 use pdf_writer::{Content, Finish as _, Name, Pdf, Rect as Box, Ref, TextStr};
-use resvg::tiny_skia::{Color, Pixmap, Transform};
+use resvg::tiny_skia::{Color, Pixmap, PremultipliedColorU8, Transform};
 use resvg::usvg::{ImageRendering, Options, Tree};
 
 use crate::MADE_BY;
@@ -143,7 +143,7 @@ fn pixels(scene: &Scene, ground: Color, dpi: f64) -> Result<Pixmap, String> {
 }
 
 fn colours(page: &Pixmap) -> Vec<Colour> {
-    let pixels = page.pixels().iter().map(|pixel| pixel.demultiply());
+    let pixels = page.pixels().iter().map(PremultipliedColorU8::demultiply);
     pixels
         .map(|c| Colour {
             r: c.red(),

@@ -17,14 +17,14 @@ const PERIODS_AT_ONCE: usize = 32;
 struct Member<'a> {
     number: usize,
     run: Run<'a>,
-    /// The neighbour that shows whether it is on the chaos that it matching_chaos.
+    /// The neighbour that shows whether it is on the chaos that it matches.
     companion: Option<Neighbour>,
 }
 
 /// A neighbour of a run.
 struct Neighbour {
     chaos: ChaosMatch,
-    neighbour: Vec<f64>,
+    state: Vec<f64>,
     /// Periods passed.
     periods: usize,
 }
@@ -120,7 +120,7 @@ fn pass<M: StroboscopicMap>(map: &mut M, members: &[Member<'_>]) -> Vec<Passed> 
     for Member { run, companion, .. } in members {
         states.extend_from_slice(&run.state);
         if let Some(companion) = companion {
-            states.extend_from_slice(&companion.neighbour);
+            states.extend_from_slice(&companion.state);
             periods.extend([PERIODS_AT_ONCE.min(MAX_DIVERGENCE_PERIODS - companion.periods); 2]);
         } else {
             periods.push(PERIODS_AT_ONCE.min(run.next_look() - run.periods));
@@ -161,7 +161,7 @@ impl Member<'_> {
             after = match after {
                 AfterLook::MaybeChaos(chaos) => {
                     self.companion = Some(Neighbour {
-                        neighbour: chaos.neighbour(&self.run.state),
+                        state: chaos.neighbour(&self.run.state),
                         chaos,
                         periods: 0,
                     });
@@ -195,7 +195,7 @@ impl Member<'_> {
                 return Ok(Some(AfterLook::Known(kind)));
             }
             companion.periods += 1;
-            companion.neighbour.copy_from_slice(neighbour);
+            companion.state.copy_from_slice(neighbour);
         }
         own.failure.map_or(Ok(()), Err)?;
         if companion.periods >= MAX_DIVERGENCE_PERIODS {
@@ -305,10 +305,10 @@ mod tests {
         ));
     }
 
-    /// A start that matching_chaos chaos is on it if a neighbour parts. On an orbit of period 3 none does,
+    /// A start that resembles chaos is on it if a neighbour parts. On an orbit of period 3 none does,
     /// though its means are given as those of chaos.
     #[test]
-    fn known_chaos_is_recognised_beside_a_neighbour() {
+    fn known_chaos_is_recognised_next_to_a_neighbour() {
         let own = [chaos(3.9)];
         let known = KnownMotions {
             chaos: &own,

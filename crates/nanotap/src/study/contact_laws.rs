@@ -6,7 +6,9 @@
 //! where the case has them. The periodic orbit of one period on each law is compared, stable or
 //! not, and its branch in the drive frequency.
 
-use nanotap_dynamics::{ClassifyOptions, Control, ShootingOptions, classify, close_orbit};
+use nanotap_dynamics::{
+    ClassifyOptions, ContinuationOptions, Control, ShootingOptions, classify, close_orbit,
+};
 use schemars::JsonSchema;
 use serde::Serialize;
 use serde_json::{Map, Value};
@@ -255,7 +257,10 @@ fn followed(
         &case,
         range,
         &[(case.omega(), seed)],
-        &BranchOptions::default(),
+        &BranchOptions {
+            max_step: ContinuationOptions::over(from, to).max_step,
+            ..BranchOptions::default()
+        },
         control,
     )
 }

@@ -22,7 +22,7 @@ pub(in crate::study) mod distance_sweep;
 pub(in crate::study) mod quasistatic;
 mod ramp;
 
-use nanotap_dynamics::{Control, PeriodicOrbit};
+use nanotap_dynamics::{ContinuationOptions, Control, PeriodicOrbit};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -402,6 +402,7 @@ fn branching(options: &ApproachOptions) -> BranchOptions {
         switch: Some(options.switch),
         stable_doublings: true,
         max_multiplier: MAX_MULTIPLIER,
+        max_step: ContinuationOptions::over(0.0, 1.0).max_step,
         ..BranchOptions::default()
     }
 }

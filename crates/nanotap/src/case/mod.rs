@@ -76,6 +76,7 @@ pub struct Case {
 }
 
 /// Kind of a case, with its data.
+#[expect(clippy::large_enum_variant, reason = "cases are few")]
 #[derive(Clone, Debug, PartialEq)]
 enum CaseKind {
     Cantilever(Cantilever),

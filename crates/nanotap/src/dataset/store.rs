@@ -507,8 +507,8 @@ fn refuse_links(path: &Path) -> Result<(), StoreError> {
             return Err(StoreError::Occupied {
                 path: path.into(),
                 what: format!(
-                    "a folder with the symbolic link {:?} in it",
-                    entry.file_name()
+                    "a folder with the symbolic link {} in it",
+                    entry.file_name().display()
                 ),
             });
         }

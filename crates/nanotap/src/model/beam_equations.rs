@@ -537,7 +537,7 @@ impl BeamTangent {
 
     /// The derivative of a linear form.
     pub(crate) fn combined(&self, beam: &Beam<'_>, form: &LinearForm) -> Output {
-        beam.with_numbers(form, |dual| dual.derivative())
+        beam.with_numbers(form, Dual::derivative)
             .plus(form.height.value, &self.height)
             .plus(form.rate.value, &self.height_rate)
     }

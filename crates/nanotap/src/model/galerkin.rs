@@ -303,7 +303,7 @@ impl Coefficients {
 
     /// The derivatives of [`of`](Self::of).
     fn derivative(case: &Cantilever, parameter: Parameter) -> Self {
-        Self::numbers(case, Some(parameter), |dual| dual.derivative())
+        Self::numbers(case, Some(parameter), Dual::derivative)
     }
 
     fn numbers(case: &Cantilever, parameter: Option<Parameter>, number: fn(Dual) -> f64) -> Self {

@@ -254,13 +254,13 @@ impl Model {
         let galerkin = Galerkin::new(case)?;
         let drive = drive_of(case)?;
         let Some(law) = &case.law else {
-            return Self::on(&case.contact_law(None), galerkin, drive, None);
+            return Self::on(&case.contact_law(None), galerkin, &drive, None);
         };
         let bare = Beam::new(&galerkin, &drive, 0)?;
         let free = bare.regime(Regime::Free, &contact::no_sample(0).flight, true)?;
         let nonlinear = Nonlinear::new(law, &bare, &free, &drive)?;
         let flight = contact::no_sample(nonlinear.discrete_entries());
-        Self::on(&flight, galerkin, drive, Some(nonlinear))
+        Self::on(&flight, galerkin, &drive, Some(nonlinear))
     }
 
     /// The beam on a piecewise-linear sample, or in flight alone with the flow under a `nonlinear`
@@ -268,10 +268,10 @@ impl Model {
     fn on(
         law: &Law,
         galerkin: Galerkin,
-        drive: Drive,
+        drive: &Drive,
         nonlinear: Option<Nonlinear>,
     ) -> Result<Self, ModelError> {
-        let beam = Beam::new(&galerkin, &drive, law.internal)?;
+        let beam = Beam::new(&galerkin, drive, law.internal)?;
         let mut regimes = vec![beam.regime(Regime::Free, &law.flight, true)?];
         let mut transitions = vec![Vec::new()];
         if nonlinear.is_none() {

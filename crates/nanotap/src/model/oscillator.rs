@@ -331,7 +331,7 @@ impl Oscillator {
         };
         for (r, regime) in tangent.regimes.iter_mut().enumerate().take(moving) {
             let numbers = self.coefficients(r == 1, Some(parameter));
-            *regime = equations(0.0, numbers.map(|of| of.derivative()));
+            *regime = equations(0.0, numbers.map(Dual::derivative));
         }
         match (parameter, self.stop) {
             (P::Omega, _) => tangent.log_period = -1.0 / self.omega,
@@ -351,7 +351,7 @@ impl Oscillator {
         if moving == 1 {
             // The release guard −g̈ = (F cos ωt − k x − c ẋ)/m moves with the parameters.
             let numbers = self.coefficients(false, Some(parameter));
-            let [k, c, force, _] = numbers.map(|of| of.derivative());
+            let [k, c, force, _] = numbers.map(Dual::derivative);
             tangent.guards[1][0] =
                 Output::linear(RowDVector::from_row_slice(&[-k, -c]), 1).with_tone(0, 0.0, force);
         }

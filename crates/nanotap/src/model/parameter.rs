@@ -145,8 +145,8 @@ impl ParameterEntry {
     ) -> Self {
         Self {
             unit,
-            quantity,
             formula,
+            quantity,
             ..self
         }
     }

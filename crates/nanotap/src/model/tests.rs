@@ -105,7 +105,7 @@ fn a_law_with_two_internal_variables_is_one_entry() {
             own: &own,
         });
         let galerkin = Galerkin::new(&case).unwrap();
-        Model::on(&law, galerkin, drive_of(&case).unwrap(), None).unwrap()
+        Model::on(&law, galerkin, &drive_of(&case).unwrap(), None).unwrap()
     };
     let solid = crate::model::contact::ContactLaw::StandardLinearSolid;
     let single = Model::cantilever(&case.clone().on(solid, &[40.0, 0.05])).unwrap();

@@ -20,7 +20,7 @@ use crate::model::{Model, MotionError, nonlinear};
 /// The measurement of motions of a model under a nonlinear force.
 pub(super) struct Nonlinear<'a> {
     model: &'a Model,
-    nonlinear: &'a Arc<nonlinear::Nonlinear>,
+    engine: &'a Arc<nonlinear::Nonlinear>,
     required: Requirements,
     functionals: Vec<accumulate::Functional>,
     /// The required signals.
@@ -43,7 +43,7 @@ impl<'a> Nonlinear<'a> {
             outputs: required.signals.iter().map(output).collect(),
             functionals: required.numbered(model),
             model,
-            nonlinear,
+            engine: nonlinear,
             required,
         }
     }
@@ -52,11 +52,11 @@ impl<'a> Nonlinear<'a> {
 impl Engine for Nonlinear<'_> {
     fn start(&self, state: &[f64], _: RecordOptions) -> Result<Box<dyn Run + '_>, MotionError> {
         let clearance = self.required.clearance;
-        let clearance = clearance.then(|| SampledClearance::new(self.model, self.nonlinear));
+        let clearance = clearance.then(|| SampledClearance::new(self.model, self.engine));
         let start = (stored_by_lever(self.model, state), f64::NAN);
         Ok(Box::new(NonlinearRun {
             of: self,
-            flow: Flow::new(Arc::clone(&self.nonlinear.system)),
+            flow: Flow::new(Arc::clone(&self.engine.system)),
             state: state.to_vec(),
             values: self.functionals.iter().map(|f| f.initial()).collect(),
             periods: 0,
@@ -93,7 +93,7 @@ struct NonlinearRun<'a> {
 
 impl Run for NonlinearRun<'_> {
     fn period(&mut self, record: bool) -> Result<(), MotionError> {
-        let nonlinear = self.of.nonlinear;
+        let nonlinear = self.of.engine;
         nonlinear.start(&mut self.flow, &self.state)?;
         let period = self.flow.record_until(nonlinear.period)?;
         nonlinear.end(&self.flow, &mut self.state);
@@ -131,7 +131,7 @@ impl Run for NonlinearRun<'_> {
 
     fn finish(self: Box<Self>) -> Result<Measurements, MotionError> {
         let run = *self;
-        let (model, nonlinear) = (run.of.model, run.of.nonlinear);
+        let (model, nonlinear) = (run.of.model, run.of.engine);
         let [before, after] = run.energies;
         let by_sample = after.1 - before.1;
         let functionals = run.of.required.functionals.iter().copied();
@@ -164,7 +164,7 @@ impl Run for NonlinearRun<'_> {
 impl NonlinearRun<'_> {
     /// Adds a period to the integrals.
     fn integrate(&mut self, nodes: &[Node]) {
-        let (nonlinear, functionals) = (self.of.nonlinear, &self.of.functionals);
+        let (nonlinear, functionals) = (self.of.engine, &self.of.functionals);
         let offset = self.periods as f64 * nonlinear.period;
         let mut sums: Vec<Complex> = vec![Complex::default(); functionals.len()];
         let outputs = &self.of.outputs;
@@ -198,8 +198,8 @@ impl NonlinearRun<'_> {
             };
         }
         let signals = self.of.required.signals.iter().zip(ranges);
-        let tip = signals.filter(|(signal, _)| **signal == Signal::Tip);
-        if let Some([low, high]) = tip.filter_map(|(_, range)| range).next() {
+        let mut tip = signals.filter(|(signal, _)| **signal == Signal::Tip);
+        if let Some([low, high]) = tip.find_map(|(_, range)| range) {
             self.lows.push(low);
             self.highs.push(high);
         }
@@ -207,7 +207,7 @@ impl NonlinearRun<'_> {
 
     /// Lists the beginnings and ends of contacts.
     fn take_switches(&mut self, period: &Trajectory) {
-        let nonlinear = self.of.nonlinear;
+        let nonlinear = self.of.engine;
         for switch in period.switches() {
             let kind = match (nonlinear.contact[switch.from], nonlinear.contact[switch.to]) {
                 (false, true) => {

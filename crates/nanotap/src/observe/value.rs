@@ -159,7 +159,7 @@ impl Varying for Dual {
 
 impl Varying for [Dual; 2] {
     fn change(self) -> Value {
-        let ends = self.map(|end| end.derivative());
+        let ends = self.map(Dual::derivative);
         if ends.iter().all(|end| end.is_finite()) {
             Value::Range(ends)
         } else {

@@ -185,7 +185,7 @@ fn orbits_have_the_requested_amplitude_and_phase() {
             let options = FrequencyModulationOptions {
                 points: 6,
                 to: Some((10e-9 / case.physical().unwrap().scales.length).into()),
-                phase: phase,
+                phase,
                 ..FrequencyModulationOptions::default()
             };
             let report = frequency_modulation(&case, &options, &Control::default()).unwrap();
@@ -400,7 +400,7 @@ fn the_first_order_takes_a_driven_base_into_account() {
                 from: Some((12.0 * unit).into()),
                 to: Some((11.5 * unit).into()),
                 points: 2,
-                phase: phase,
+                phase,
                 ..FrequencyModulationOptions::default()
             };
             let report = frequency_modulation(&case, &options, &Control::default()).unwrap();

@@ -17,6 +17,7 @@ use crate::model::oscillator::{Oscillator, OscillatorParameter, Stop};
 use crate::model::parameter::Parameter;
 
 /// The content of a case file and its overrides.
+#[expect(clippy::large_enum_variant, reason = "cases are few")]
 #[derive(Debug)]
 pub(crate) enum Described {
     /// A dimensionless cantilever, every number checked.

@@ -268,14 +268,13 @@ pub const fn kind_of(unit: Unit, actuation: Actuation) -> Kind {
     match unit {
         Unit::Number => Kind::Number,
         Unit::Mass => Kind::Mass,
-        Unit::Length => Kind::Length,
         Unit::Time => Kind::Time,
         Unit::Frequency => Kind::Frequency,
         Unit::Stiffness => Kind::Stiffness,
         Unit::Damping => Kind::Damping,
         Unit::Force => Kind::Force,
-        Unit::Drive if matches!(actuation, Actuation::Base) => Kind::Length,
-        Unit::Drive => Kind::Force,
+        Unit::Drive if !matches!(actuation, Actuation::Base) => Kind::Force,
+        Unit::Length | Unit::Drive => Kind::Length,
         Unit::Degrees => Kind::Angle,
     }
 }

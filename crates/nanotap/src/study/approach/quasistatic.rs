@@ -117,9 +117,7 @@ pub(super) fn found(
         Some(_) => Vec::new(),
     };
     let hysteresis = written.hysteresis(free.amplitude)?;
-    let not_measured = sweep
-        .spent_budget()
-        .map(|steps| written.not_measured(steps));
+    let not_measured = sweep.spent_budget().map(Written::not_measured);
     let (branches, cut) = branches(curve, &mut sweep, range, control)?;
     let limits = [not_followed, not_measured, cut].into_iter().flatten();
     Ok(Found {
@@ -196,6 +194,9 @@ fn branches(
     Ok((any.then(|| branches.report(&quiet)), cut.filter(|_| any)))
 }
 
+/// A row of the approach and one of the retraction, as far as they were reached.
+type RowPair = (Option<ApproachPoint>, Option<ApproachPoint>);
+
 /// A followed curve and the distances at which it is written.
 struct Written<'a> {
     curve: &'a Curve<'a>,
@@ -230,7 +231,7 @@ impl Written<'_> {
                 None => rows.extend(measured),
                 Some(steps) => {
                     let unmeasured = |way: Way, gap: f64| {
-                        let motion = FoundMotion::undecided(self.not_measured(steps), &[]);
+                        let motion = FoundMotion::undecided(Self::not_measured(steps), &[]);
                         self.row(way, gap, motion).map(Some)
                     };
                     for &gap in distances {
@@ -248,7 +249,7 @@ impl Written<'_> {
     }
 
     /// In words that the budget for the rows was spent.
-    fn not_measured(&self, steps: u64) -> String {
+    fn not_measured(steps: u64) -> String {
         let millions = steps / 1_000_000;
         format!("the rows were measured up to the budget of {millions} million steps")
     }
@@ -260,7 +261,7 @@ impl Written<'_> {
         distances: &[f64],
         done: &AtomicUsize,
         control: &Control<'_>,
-    ) -> Result<Vec<(Option<ApproachPoint>, Option<ApproachPoint>)>, CaseError> {
+    ) -> Result<Vec<RowPair>, CaseError> {
         let count = self.distances.len();
         let report = || {
             if let Some(progress) = control.progress {

@@ -66,7 +66,7 @@ pub(super) fn loop_report(
     let map = motion.derivative.view((0, 0), (n, n)).into_owned();
     let moduli = |matrix: &DMatrix<f64>| {
         let all = eigenvalues(matrix)?.into_iter();
-        Some(all.map(|z| z.modulus()).fold(0.0, f64::max))
+        Some(all.map(Complex::modulus).fold(0.0, f64::max))
     };
     let Some(radius) = moduli(&map) else {
         return Ok(None);

@@ -337,7 +337,7 @@ fn found_distance(case: &Case, setpoint: f64, control: &Control<'_>) -> Result<f
     ];
     let case = case.restated(&words)?;
     let (found, _) = at_setpoint(case.cancelled_by(control), control)
-        .map_err(|error| Error::from(error).context("z0 is not given"))?;
+        .map_err(|error| error.context("z0 is not given"))?;
     Ok(found.get(Key::GapTip))
 }
 
@@ -535,15 +535,13 @@ fn materials(
             ));
         }
         let same = known.iter().position(|keys| **keys == material.keys);
-        let index = match same {
-            Some(index) => index + 1,
-            None => {
-                let words: Vec<String> = material.keys.iter().map(word).collect();
-                let restated = case.restated(&words).map_err(Error::from)?;
-                cases.push(restated);
-                known.push(&material.keys);
-                cases.len() - 1
-            }
+        let index = if let Some(index) = same {
+            index + 1
+        } else {
+            let words: Vec<String> = material.keys.iter().map(word).collect();
+            cases.push(case.restated(&words)?);
+            known.push(&material.keys);
+            cases.len() - 1
         };
         segments.push((from, to, index));
     }

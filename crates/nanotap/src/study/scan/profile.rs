@@ -356,10 +356,7 @@ impl Samples {
                 return refuse(k + 1, what, "sort the rows by position, each once");
             }
             if slope.abs() > STEEPEST {
-                let what = format!(
-                    "the height changes {:.0} times as much as the position",
-                    slope
-                );
+                let what = format!("the height changes {slope:.0} times as much as the position");
                 return refuse(
                     k + 1,
                     what,

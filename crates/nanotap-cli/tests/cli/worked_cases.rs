@@ -181,7 +181,7 @@ follows! {
     the_moving_surface: "moving-surface.md", 7 commands, 26 numbers;
     the_period_doubling: "period-doubling.md", 2 commands, 6 numbers;
     the_samples: "samples.md", 5 commands, 30 numbers;
-    the_scan: "scan.md", 4 commands, 20 numbers;
+    the_scan: "scan.md", 4 commands, 19 numbers;
     the_force_table: "table.md", 2 commands, 6 numbers;
     the_stiff_lever: "stiff-lever.md", 2 commands, 4 numbers;
     the_tip_mass: "tip-mass.md", 3 commands, 6 numbers;

@@ -1,6 +1,11 @@
 //! The study `scan` against an independent program, whose numbers are in `tests/scan/*.json`
 //! (80-bit arithmetic; lengths nm, forces nN, energies aJ, angles degrees).
 
+#![allow(
+    clippy::format_push_string,
+    reason = "case files are written piece by piece"
+)]
+
 use nanotap::case::Case;
 use nanotap::case::file::Source;
 use nanotap::control::Control;

@@ -9,7 +9,7 @@ from . import _arguments, _datasets, _motions, _studies
 from ._arguments import Box, Progress, Varied
 from ._case import Case, Path, Value
 from ._record import Record
-from ._results import Attractors, Convergence, Fit, Lyapunov, Modes, Orbit
+from ._results import Attractors, Convergence, Fit, Lyapunov, Modes, Orbit, Reconstruction
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -27,6 +27,8 @@ __all__ = [
     "lyapunov",
     "modes",
     "orbit",
+    "reconstruct",
+    "scan",
     "simulate",
     "sweep",
     "window",
@@ -258,12 +260,14 @@ def attractors(
         states at all amplitudes, from the resonant response down to below the gap,
         until the share that may lead to undiscovered motions is below `unseen`, or
         5000 initial states or 2,000,000 drive periods (600,000 under a nonlinear
-        law) are reached (1 to 1000000).
+        law) are reached. Under a nonlinear law an initial state is followed for at
+        most 10 million steps of the approximate flow, and all together for 50
+        million; a step of the exact flow counts as 100 (1 to 1000000).
     unseen : float | None
         Share of initial states that may lead to undiscovered motions, with 95 %
         confidence, at which sampling ends. Default: 0.01 under a nonlinear law and
         0.002 under a piecewise-linear one; a smaller value raises the limits of
-        `starts` and drive periods in proportion.
+        `starts`, drive periods and steps in proportion.
     seed : int
         Seed of the initial states; results do not depend on the number of threads.
     box : Box
@@ -407,7 +411,9 @@ def approach(
     to : float | str | None
         Last distance of the approach; default: 0.
     points : int
-        Number of distances in each direction (2 to 20000).
+        Number of distances in each direction. Under a nonlinear law the lever is
+        followed for at most 40 million steps of the approximate flow, and as many
+        are taken for the rows; a step of the exact flow counts as 100 (2 to 20000).
     branches : bool
         Also continue coexisting branches, stable and unstable.
     switch : int
@@ -584,6 +590,73 @@ def fit(
     """
     options = _arguments.options("fit", locals())
     return _studies.fit(case, options, threads, progress)
+
+def reconstruct(
+    case: Case,
+    *,
+    data: Any = None,
+    columns: Sequence[str] | None = None,
+    convert: Sequence[str] | None = None,
+    free_amplitude: float | str | None = None,
+    free_phase: float | None = None,
+    amplitude_error: float | str | None = None,
+    phase_error: float | None = None,
+    phase: float = 90.0,
+    rows: int = 240,
+    threads: int | None = None,
+    progress: Progress = None,
+) -> Reconstruction:
+    """Force and dissipation against distance from a measured curve.
+
+    Parameters
+    ----------
+    case : Case
+        The case.
+    data : Any
+        Measured curves: tables whose columns are named as in `distance (nm)`,
+        `amplitude (nm)`, `phase (deg)`, or `frequency_shift (Hz)`.
+    columns : Sequence[str] | None
+        Columns of the data that count; without it, all.
+    convert : Sequence[str] | None
+        Conversions of columns, as in Amp="58 nm/V", Phase=90-x, Zsnsr=-x or
+        Ch3=amplitude.
+    free_amplitude : float | str | None
+        Free amplitude, as in "20 nm"; without it, that of the rows far from the
+        sample.
+    free_phase : float | None
+        Free phase as measured, degrees; without it, that of the rows far from the
+        sample.
+    amplitude_error : float | str | None
+        Standard error of an amplitude, as in "0.02 nm"; without it, from the
+        scatter of the rows.
+    phase_error : float | None
+        Standard error of a phase, degrees; without it, from the scatter of the
+        rows.
+    phase : float
+        Phase that was held under frequency modulation, degrees.
+    rows : int
+        Longer curves are averaged to about this many rows (20 to 2000).
+    threads : int | None
+        Number of threads; default: one per core.
+    progress : Progress
+        Whether to show a bar, or a function that is called with the finished and
+        the total count.
+
+    Returns
+    -------
+    `table` (distance, force, force_error, dissipation, dissipation_error, damping,
+    damping_error), `minimum`, `closest`, the `rows`; `curve()`, the table as a
+    DataFrame, and `law_table()`, the text for `sample.table`.
+
+    Raises
+    ------
+    ValueError
+        An argument is invalid; the message names it.
+    RuntimeError
+        The computation failed.
+    """
+    options = _arguments.options("reconstruct", locals())
+    return _studies.reconstruct(case, options, threads, progress)
 
 def sweep(
     case: Case,
@@ -918,3 +991,132 @@ def contact_laws(
     """
     options = _arguments.options("contact-laws", locals())
     return _studies.document("contact-laws", case, options, threads, progress)
+
+def scan(
+    case: Case,
+    *,
+    method: Literal["exact", "fast", "quasi-static"] | None = None,
+    list: Any = None,
+    size: float | str | None = None,
+    size_y: float | str | None = None,
+    lines: int | None = None,
+    pixels: int | None = None,
+    settle: int | None = None,
+    periods: int | None = None,
+    line_rate: float | str | None = None,
+    speed: float | str | None = None,
+    retrace: bool | None = None,
+    line_settle: int | None = None,
+    mode: Literal["constant-amplitude", "constant-height"] | None = None,
+    setpoint: float | str | None = None,
+    integral_gain: float | str | None = None,
+    integral_bandwidth: float | str | None = None,
+    proportional_gain: float | None = None,
+    z0: float | str | None = None,
+    lock_in: Any = None,
+    z_scanner: Any = None,
+    delay: int | None = None,
+    slew_rate: float | str | None = None,
+    z_range: Any = None,
+    dynamic_threshold: float | None = None,
+    dynamic_gain: float | None = None,
+    surface: Any = None,
+    profile: Any = None,
+    image: str | None = None,
+    image_height: float | str | None = None,
+    dilate: float | str | None = None,
+    material: Any = None,
+    threads: int | None = None,
+    progress: Progress = None,
+) -> Record:
+    """Scan of a line or an image under feedback, drive period by period.
+
+    Parameters
+    ----------
+    case : Case
+        The case.
+    method : Literal["exact", "fast", "quasi-static"] | None
+        How the drive periods are computed.
+    list : Any
+        Drive periods to list, counted from the start of settling.
+    size : float | str | None
+        Length of a line.
+    size_y : float | str | None
+        Extent across the lines; without it, as long as a line.
+    lines : int | None
+        Lines (1 to 65536).
+    pixels : int | None
+        Pixels of a line (1 to 65536).
+    settle : int | None
+        Drive periods before the first line (0 to 10000000).
+    periods : int | None
+        Drive periods of a line in one direction (2 to 10000000).
+    line_rate : float | str | None
+        Lines a second, trace and retrace together, in place of `periods`.
+    speed : float | str | None
+        Speed of the tip along the line, in place of `periods`.
+    retrace : bool | None
+        Scan every line back, too.
+    line_settle : int | None
+        Drive periods that each line settles before it: lines are then independent
+        and run at the same time on all cores (0 to 10000000).
+    mode : Literal["constant-amplitude", "constant-height"] | None
+        What the feedback does.
+    setpoint : float | str | None
+        Amplitude that the feedback holds: a part of the free amplitude, or a
+        length.
+    integral_gain : float | str | None
+        Integral gain in 1/s: the crossover frequency times 2π where the amplitude
+        falls as the distance does.
+    integral_bandwidth : float | str | None
+        The same as a frequency.
+    proportional_gain : float | None
+        Proportional gain.
+    z0 : float | str | None
+        Height at the start; without it, where the amplitude of a lever that comes
+        from far has fallen to the setpoint.
+    lock_in : Any
+        Lock-in amplifier.
+    z_scanner : Any
+        Resonance of the z scanner.
+    delay : int | None
+        Drive periods by which the controller is late (0 to 10000).
+    slew_rate : float | str | None
+        Largest speed of the z command.
+    z_range : Any
+        Lowest and highest z command.
+    dynamic_threshold : float | None
+        Amplitude above which the error is amplified, a part of the free amplitude.
+    dynamic_gain : float | None
+        Gain on the amplitude above the threshold.
+    surface : Any
+        Features of the surface; their heights add up.
+    profile : Any
+        Measured heights of the line: a CSV file named relative to the case file.
+    image : str | None
+        Greyscale image of the heights, a PNG file named relative to the case file.
+    image_height : float | str | None
+        Height of white in the image.
+    dilate : float | str | None
+        Widen the sampled heights by a sphere of this radius, the tip.
+    material : Any
+        Stretches of the line with another sample.
+    threads : int | None
+        Number of threads; default: one per core.
+    progress : Progress
+        Whether to show a bar, or a function that is called with the finished and
+        the total count.
+
+    Returns
+    -------
+    The document, with the names of the terminal's JSON.
+
+    Raises
+    ------
+    ValueError
+        An argument is invalid; the message names it.
+    RuntimeError
+        The computation failed.
+    """
+    options = _arguments.options("scan", locals())
+    return _studies.document("scan", case, options, threads, progress)

@@ -58,7 +58,12 @@ REFUSED = [
     ("sweep", {"over": "omgea=2:3:4"}, ValueError, "did you mean `omega`"),
     ("sweep", {"over": "omega"}, ValueError, "omega"),
     ("sweep", {"over": 3}, TypeError, "over"),
-    ("sweep", {"over": {"omega": (2, 3)}}, ValueError, "first value, last value and count"),
+    (
+        "sweep",
+        {"over": {"omega": (2, 3)}},
+        ValueError,
+        "first value, last value and count",
+    ),
     ("sweep", {"over": {"omega": (2, NAN, 4)}}, ValueError, "."),
     ("sweep", {"over": {"omega": (2, 3, 0)}}, ValueError, "."),
     ("sweep", {"over": {"omega": (2, 3, 2**62)}}, ValueError, "."),

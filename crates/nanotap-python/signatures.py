@@ -23,8 +23,18 @@ PROGRESS = (
     "Whether to show a bar, or a function that is called with the finished and the total count.",
 )
 ARRAYS = (
-    ("threads", "int | None", "None", "Number of threads for arrays; default: one per core."),
-    ("progress", "Progress", "None", "Progress of arrays: whether to show a bar, or a function as in other studies."),
+    (
+        "threads",
+        "int | None",
+        "None",
+        "Number of threads for arrays; default: one per core.",
+    ),
+    (
+        "progress",
+        "Progress",
+        "None",
+        "Progress of arrays: whether to show a bar, or a function as in other studies.",
+    ),
 )
 SERIES = (
     "series",

@@ -124,7 +124,9 @@ def axis(name: str, values: Any) -> str:
     """An axis as the terminal writes it: `omega=2:4:400`, `alpha4=1:1000:50:log`, `omega=2,2.5,4`."""
     if isinstance(values, tuple):
         if len(values) not in (3, 4):
-            message = f"{name}: expected first value, last value and count, as in (2, 4, 400)"
+            message = (
+                f"{name}: expected first value, last value and count, as in (2, 4, 400)"
+            )
             raise ValueError(message)
         first, last, number_of, *spacing = values
         words = [

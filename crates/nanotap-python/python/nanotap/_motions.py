@@ -38,7 +38,9 @@ def modes(case: Case, options: Mapping[str, Any]) -> Modes:
         name="phi",
         attrs={"long_name": "mode shape of the bare beam", "units": "1"},
     )
-    table.xi.attrs.update(long_name="position along the beam, clamp 0 to tip 1", units="L")
+    table.xi.attrs.update(
+        long_name="position along the beam, clamp 0 to tip 1", units="L"
+    )
     return Modes.of(_document(document), shapes=table)
 
 
@@ -291,7 +293,9 @@ def _over(
     arrays = {key: _as_array(key, value) for key, value in varied.items()}
     if states is not None:
         if "start" in arrays:
-            message = "start: this name is reserved for the dimension of the initial states"
+            message = (
+                "start: this name is reserved for the dimension of the initial states"
+            )
             raise ValueError(message)
         starts = np.arange(len(states))
         arrays["start"] = xr.DataArray(starts, dims="start", coords={"start": starts})

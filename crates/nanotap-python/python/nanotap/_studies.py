@@ -54,9 +54,7 @@ def attractors(
     document, interrupted = _run("attractors", case, options, threads, progress)
     found = Attractors(case, document)
     if interrupted:
-        message = (
-            "stopped before all starts were finished: the fractions refer to the finished ones"
-        )
+        message = "stopped before all starts were finished: the fractions refer to the finished ones"
         raise Interrupted(message, found)
     return found
 

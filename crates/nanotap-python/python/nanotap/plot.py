@@ -253,7 +253,9 @@ def _over_one(
 
     if show not in ds or ds[show].dtype.kind not in "iuf":
         known = (str(n) for n, v in ds.data_vars.items() if v.dtype.kind in "iuf")
-        message = f"show: `{show}` is not a numeric variable; available: {', '.join(known)}"
+        message = (
+            f"show: `{show}` is not a numeric variable; available: {', '.join(known)}"
+        )
         raise ValueError(message)
     shown = ds[show]
     x, branch, shown = xr.broadcast(ds[name], branch, shown)
@@ -321,7 +323,9 @@ def sweep(
     if show is not None:
         names = [str(d) for d in ds.classification.dims if d != "start"]
         if len(names) != 1:
-            message = "show: the figure needs one parameter; select values of the others"
+            message = (
+                "show: the figure needs one parameter; select values of the others"
+            )
             raise ValueError(message)
         starts = ds.start if "start" in ds.dims else ds[names[0]] * 0
         return _over_one(ds, names[0], show, starts, where)

@@ -1,6 +1,6 @@
 //! Which attractors there are, and what part of a set of starts goes to each.
 //!
-//! Where the map has a [coarse](StroboscopicMap::coarse) one, starts are followed on that, and each
+//! Where the map has a [coarse](crate::Scheduling::coarse) one, starts are followed on that, and each
 //! motion that they come to is confirmed on the map itself (`motions.rs`).
 //!
 //! 0. Orbits near seeds are closed ([`StartSet::with_seeds`]).
@@ -105,7 +105,7 @@ pub struct CensusOptions {
     /// Periods of all starts together after which no further batch is begun.
     pub max_periods: usize,
     /// Steps of time integration of all the work after which no further batch is begun, as the map
-    /// counts them ([`StroboscopicMap::cost`]). [`ClassifyOptions::max_steps`] limits a start.
+    /// counts them ([`Scheduling::cost`](crate::Scheduling::cost)). [`ClassifyOptions::max_steps`] limits a start.
     pub max_steps: u64,
 }
 
@@ -152,7 +152,7 @@ pub struct Census {
     pub unseen: Option<UndiscoveredFraction>,
     /// Unstable orbits near seeds.
     pub unstable: Vec<PeriodicOrbit>,
-    /// Whether starts were followed on the map's [coarse](StroboscopicMap::coarse) one: what counts
+    /// Whether starts were followed on the map's [coarse](crate::Scheduling::coarse) one: what counts
     /// and fractions are of. Orbits and spectra are the map's own.
     pub followed_coarsely: bool,
     /// Why no further start was followed.
@@ -239,7 +239,7 @@ impl AttractorKind {
 #[derive(Clone, Debug)]
 pub struct TransientChaos {
     /// Exponents while it lasts, of the first start seen on it; `None` if they were measured on the
-    /// map's [coarse](StroboscopicMap::coarse) one only.
+    /// map's [coarse](crate::Scheduling::coarse) one only.
     pub spectrum: Option<LyapunovSpectrum>,
     /// Mean lifetime in periods, by maximum likelihood with the wanderers censored.
     pub lifetime: Lifetime,

@@ -1,6 +1,6 @@
 //! The motions that a census has found, and what those of a coarse map are on the map itself.
 //!
-//! Starts may be followed on a [coarse](StroboscopicMap::coarse) map. Each motion that they come to is
+//! Starts may be followed on a [coarse](Scheduling::coarse) map. Each motion that they come to is
 //! then confirmed once: Newton closes its orbit on the map itself, from the coarse orbit's points;
 //! where that fails, and of chaos and tori, the motion is classified on the map itself from a state
 //! that the coarse one came to. All starts that come to the same motion share the result.

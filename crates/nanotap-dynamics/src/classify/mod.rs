@@ -73,7 +73,7 @@ pub struct ClassifyOptions {
     /// Digits to which the two stretches must agree for a torus.
     pub torus_digits: f64,
     /// Steps of time integration after which a run is left undecided, as the map counts them
-    /// ([`StroboscopicMap::cost`]).
+    /// ([`Scheduling::cost`](crate::Scheduling::cost)).
     pub max_steps: u64,
 }
 
@@ -213,7 +213,7 @@ impl Chaos {
 }
 
 /// Follows the motion from `start` until it can be named, within the budgets. Where the map has a
-/// [coarse](StroboscopicMap::coarse) one, the transient is followed on that, and the map itself
+/// [coarse](crate::Scheduling::coarse) one, the transient is followed on that, and the map itself
 /// confirms what it comes to.
 pub fn classify<M: StroboscopicMap>(
     map: &mut M,

@@ -93,7 +93,7 @@ impl Neighbourhood {
     /// [`BLOCK_RATE`] at sample points, and that reaches over none of the `others`; `None` if the
     /// orbit is not stable or none passes. A block of many periods is a quarter as long and contracts
     /// by the fourth root. No larger ball is tried once the search has cost so many `steps`
-    /// ([`StroboscopicMap::cost`]).
+    /// ([`Scheduling::cost`]).
     ///
     /// # Errors
     /// If the map fails on the orbit.

@@ -110,7 +110,7 @@ impl PeriodicOrbit {
         best
     }
 
-    /// Whether the two are one orbit: see [`SameMotion`](crate::SameMotion).
+    /// Whether the two are one orbit: see [`SameMotion`].
     pub fn is_same_as(&self, other: &Self) -> bool {
         SameMotion::orbits(self, other)
     }

@@ -1,8 +1,8 @@
 //! Conservative force and dissipation from a measured curve, without a contact law.
 //!
 //! Amplitude and phase, or frequency shift and excitation, give the first harmonic of the force at
-//! each distance ([`lever`]). Force and damping are the smooth functions of the distance whose
-//! averages over the oscillations are these harmonics ([`inversion`]): piecewise linear, with a
+//! each distance (module `lever`). Force and damping are the smooth functions of the distance whose
+//! averages over the oscillations are these harmonics (module `inversion`): piecewise linear, with a
 //! penalty on their roughness whose weight follows from the evidence. Rows of both branches and
 //! directions go into one system of equations; none is differentiated or joined across a jump.
 //!

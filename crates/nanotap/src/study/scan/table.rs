@@ -3,6 +3,7 @@
 use std::fmt::Write as _;
 
 use super::report::{Channels, ScanReport};
+#[cfg(feature = "dataset")]
 use crate::dataset::gsf::Field;
 use crate::number::shortest;
 
@@ -96,6 +97,7 @@ impl ScanReport {
     }
 
     /// A channel of the trace as a field for programs for AFM data.
+    #[cfg(feature = "dataset")]
     pub fn field(&self, channel: &Channel) -> Field {
         let rows = (channel.values)(&self.trace);
         Field {

@@ -395,7 +395,7 @@ fn wrong_scans_are_refused() {
         (&["scan.periods=1000000000"], "out of range"),
         (&["scan.lines=60000", "scan.pixels=60000"], "too many"),
         (&["scan.list=[100000]"], "numbered from 0"),
-        (&["scan.profile=x.csv"], "names no other files"),
+        (&["scan.profile=x.csv"], "cannot name other files"),
         (&["scan.profile=[0, 1e-9, nan]"], "scan"),
         (&["scan.integral_gain="], "integral_gain"),
         (&["scan.z_range=[2e-8, 1e-8]"], "empty"),

@@ -53,7 +53,7 @@ fn no_file_is_needed_if_all_keys_are_set() {
     );
     folder
         .run(&arguments[..8])
-        .refused(&["it lacks", "alpha4, alpha6, omega", "--set alpha4=20"]);
+        .refused(&["missing", "alpha4, alpha6, omega", "--set alpha4=20"]);
     folder
         .run(&["case"])
         .refused(&["no case was given", "name a case file"]);
@@ -195,7 +195,7 @@ fn files_other_than_case_files_are_refused() {
     folder.run(&["case", "."]).refused(&[".: is a folder"]);
     folder
         .run(&["case", "empty.toml"])
-        .refused(&["empty.toml", "lacks alpha1, alpha2", "omega"]);
+        .refused(&["empty.toml", "missing alpha1, alpha2", "omega"]);
     folder
         .run(&["case", "binary.toml"])
         .refused(&["binary.toml: not text: byte 4"]);

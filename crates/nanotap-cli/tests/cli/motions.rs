@@ -382,7 +382,7 @@ fn results_of_fixed_steps_are_labelled() {
     ];
     let outcome = folder.run(&[&arguments[..], &["--json"]].concat());
     assert!(
-        outcome.stderr.contains("the paper's own method"),
+        outcome.stderr.contains("the paper's method"),
         "{}",
         outcome.stderr
     );

@@ -290,7 +290,7 @@ fn invalid_sweep_requests_are_refused() {
     };
     refused(&[], &["--over"]);
     for (over, word) in [
-        ("omega", "no `=`"),
+        ("omega", "missing `=`"),
         ("omega=2:4", "are needed"),
         ("omega=2:4:400:log:5", "too many"),
         ("omega=2:4:400:cubic", "`log`"),

@@ -45,7 +45,7 @@ fn keys_that_a_law_does_not_use_are_refused() {
         "sample.indentation=1 nm",
     ]);
     assert!(
-        said.contains("sample.indentation") && said.contains("no part of"),
+        said.contains("sample.indentation") && said.contains("is not a parameter of"),
         "{said}"
     );
     let said = refused(&["sample.stiffness=1 N/m", "sample.hamaker=1e-20 J"]);

@@ -239,7 +239,7 @@ fn tables_that_are_not_functions_are_refused_with_their_place() {
             "sample.modulus=1 GPa",
             "tip.radius=5 nm"
         ])
-        .contains("no part of")
+        .contains("not a parameter of")
     );
     assert!(said(&["sample.law=table", "sample.table=[1, 2]"]).contains("an array"));
     assert!(said(&["sample.law=table", "sample.table=3"]).contains("not opened"));

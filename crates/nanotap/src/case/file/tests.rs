@@ -113,7 +113,7 @@ fn without_a_file_all_that_is_missing_is_told_at_once() {
     assert_eq!(error.problems.len(), 1);
     let words = error.to_string();
     assert!(
-        words.contains("lacks alpha2, alpha3, alpha4, alpha6;"),
+        words.contains("missing: alpha2, alpha3, alpha4, alpha6;"),
         "{words}"
     );
     let nothing = Case::parse(None, &[]).unwrap_err().to_string();
@@ -265,7 +265,7 @@ fn every_refusal_says_place_key_value_and_remedy() {
         let refused = refusal(&text, &[]);
         assert!(refused.contains(words), "{to}: {refused}");
     }
-    assert!(refusal("", &[]).contains("c.toml: an empty case: it lacks alpha1"));
+    assert!(refusal("", &[]).contains("c.toml: empty case: missing alpha1"));
 }
 
 #[test]

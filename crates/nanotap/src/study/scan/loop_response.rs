@@ -246,7 +246,11 @@ impl<'a> LinearLoop<'a> {
         let scanner = n + 2 * order;
         let command = state[scanner + 3];
         let z = match self.scanner {
-            None => command,
+            // A scanner without a resonance has no rate: kept, it would be a multiplier of 1.
+            None => {
+                next[scanner + 1] = 0.0;
+                command
+            }
             Some([[a, b], [c, d]]) => {
                 let (x, v) = (state[scanner] - command, state[scanner + 1]);
                 next[scanner + 1] = c * x + d * v;

@@ -413,7 +413,10 @@ mod tests {
     #[test]
     fn profiles_are_read_with_their_units() {
         let plain = parse("0\n1e-9\n2e-9\n3e-9\n").unwrap();
-        assert_eq!(plain.at, [1.25e-7, 3.75e-7, 6.25e-7, 8.75e-7]);
+        assert_eq!(plain.at.len(), 4);
+        for (at, expected) in plain.at.iter().zip([1.25e-7, 3.75e-7, 6.25e-7, 8.75e-7]) {
+            assert!((at - expected).abs() < 1e-21, "{at}");
+        }
         let named = parse("x (nm),height (nm)\n0,0\n100,5\n").unwrap();
         assert!((named.at(5e-8) - 2.5e-9).abs() < 1e-22);
         assert_eq!(named.at(1.0), named.heights[1]);

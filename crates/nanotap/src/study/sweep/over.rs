@@ -247,7 +247,7 @@ mod tests {
     #[test]
     fn what_is_no_range_is_refused_with_what_would_be_right() {
         for (given, words) in [
-            ("omega", "no `=`"),
+            ("omega", "missing `=`"),
             ("omega=", "are needed"),
             ("omega=2", "are needed"),
             ("omega=2:4", "are needed"),

@@ -144,6 +144,7 @@ fn every_document_has_a_test() {
             "observables.md",
             "orbits.md",
             "period-doubling.md",
+            "reconstruct.md",
             "samples.md",
             "scan.md",
             "stiff-lever.md",
@@ -181,6 +182,7 @@ follows! {
     the_moving_surface: "moving-surface.md", 7 commands, 26 numbers;
     the_period_doubling: "period-doubling.md", 2 commands, 6 numbers;
     the_samples: "samples.md", 5 commands, 30 numbers;
+    the_reconstruction: "reconstruct.md", 1 commands, 0 numbers;
     the_scan: "scan.md", 4 commands, 19 numbers;
     the_force_table: "table.md", 2 commands, 6 numbers;
     the_stiff_lever: "stiff-lever.md", 2 commands, 4 numbers;

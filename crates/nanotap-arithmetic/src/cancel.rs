@@ -1,22 +1,22 @@
-//! A flag that ends work, from outside or at a budget.
+//! A flag that cancels long computations, from outside or at a budget of steps.
 
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, OnceLock};
 use std::time::{Duration, Instant};
 
-/// How long work with a [grace period](CancelFlag::with_grace) may go on.
+/// Time that a computation with a [grace period](CancelFlag::with_grace) may continue.
 const GRACE: Duration = Duration::from_millis(300);
 
-/// A flag that ends work from outside or when a budget is spent. Clones share both. The default can
-/// never be set.
+/// A flag that cancels a computation, from outside or when a budget is spent. Clones share both. The
+/// default can never be set.
 ///
-/// Systems carry it and poll it on every stretch of a motion, so that a loop over motions ends
-/// early, with errors, even where it does not poll the flag itself. It is no part of what a system
-/// is: two flags always compare equal.
+/// Systems carry the flag and poll it on every segment of a motion, so that a loop over motions
+/// ends early, with errors, even if it does not poll the flag itself. The flag is not part of a
+/// system's identity: two flags always compare equal.
 #[derive(Clone, Debug, Default)]
 pub struct CancelFlag {
     flag: Option<Arc<AtomicBool>>,
-    /// When this flag was first polled after it was set, where it has a grace period.
+    /// Time of the first poll after the flag was set, if there is a grace period.
     grace: Option<Arc<OnceLock<Instant>>>,
     budget: Option<Arc<Budget>>,
 }
@@ -30,7 +30,7 @@ struct Budget {
 }
 
 impl CancelFlag {
-    /// A flag that is not set and can be.
+    /// Creates a flag that is not set.
     pub fn new() -> Self {
         Self {
             flag: Some(Arc::default()),
@@ -39,8 +39,8 @@ impl CancelFlag {
         }
     }
 
-    /// The same flag, seen as set only 0.3 s after it was first polled as set: for work that brings
-    /// finished results into a report.
+    /// The same flag, which appears set only 0.3 s after the first poll that found it set: for code
+    /// that turns finished results into a report.
     #[must_use]
     pub fn with_grace(&self) -> Self {
         Self {
@@ -90,14 +90,14 @@ impl CancelFlag {
         self.budget.is_some()
     }
 
-    /// Sets the flag: work that polls it ends soon.
+    /// Sets the flag: computations that poll it end soon.
     pub fn cancel(&self) {
         if let Some(flag) = &self.flag {
             flag.store(true, Ordering::SeqCst);
         }
     }
 
-    /// Whether the flag is set or the budget is spent.
+    /// True if the flag is set or the budget is spent.
     #[inline]
     pub fn is_cancelled(&self) -> bool {
         match &self.flag {
@@ -106,7 +106,7 @@ impl CancelFlag {
         }
     }
 
-    /// Whether the grace period is over, if there is one.
+    /// True if there is no grace period or it is over.
     #[cold]
     fn is_late(&self) -> bool {
         self.grace

@@ -1,7 +1,5 @@
 //! How an error is shown at the terminal: its options as flags, its places in the case file drawn.
 
-use std::process::ExitCode;
-
 use annotate_snippets::{AnnotationKind, Group, Level, Renderer, Snippet};
 use nanotap::ErrorKind;
 use nanotap::error::{ErrorPlace, ErrorProblem, SourceText};
@@ -12,7 +10,7 @@ pub(crate) use nanotap::Error as Failure;
 
 /// Says on standard error what went wrong; returns the exit code: 130 once Ctrl-C stopped the
 /// program, 2 for bad input, else 1.
-pub(crate) fn report(mut error: Failure) -> ExitCode {
+pub(crate) fn report(mut error: Failure) -> u8 {
     let code = match error.kind {
         _ if progress::is_stopped() => progress::INTERRUPTED,
         ErrorKind::BadInput => 2,
@@ -23,7 +21,7 @@ pub(crate) fn report(mut error: Failure) -> ExitCode {
         error = Failure::stopped();
     }
     let error = error.written(flag);
-    // A snippet of the case file, or a key that was set beside it, is drawn with its help.
+    // A snippet of the case file, or a key of --set, is drawn with its help.
     let of_case = |problem: &ErrorProblem| {
         matches!(problem.place, ErrorPlace::Span(_) | ErrorPlace::Override(_))
     };
@@ -32,8 +30,8 @@ pub(crate) fn report(mut error: Failure) -> ExitCode {
     } else {
         error.problems.iter().map(plain).collect()
     };
-    anstream::eprint!("{text}");
-    ExitCode::from(code)
+    anstream::eprint!("{}", style::safe(&text));
+    code
 }
 
 /// The flag of an option.
@@ -57,7 +55,7 @@ fn plain(problem: &ErrorProblem) -> String {
     }
 }
 
-/// All problems of a case, each with the line of the file that it stands in.
+/// All problems of a case, each with its line of the file.
 fn drawn(error: &Failure) -> String {
     let renderer = Renderer::styled();
     let drawn: Vec<String> = error

@@ -9,10 +9,12 @@ use std::sync::{LazyLock, Mutex, MutexGuard, PoisonError};
 use std::thread;
 use std::time::{Duration, Instant};
 
+use nanotap::case::Case;
 use nanotap::control::{CancelFlag, Control};
-use nanotap::study::kind::Study;
+use nanotap::study::Study;
 
 use crate::failure::Failure;
+use crate::threads::ThreadsArgument;
 
 /// The exit code of a program that Ctrl-C or SIGTERM ended.
 pub(crate) const INTERRUPTED: u8 = 130;
@@ -102,11 +104,19 @@ pub(crate) fn end() {
     line.ended = true;
 }
 
-/// Runs a study as [`watched`] does.
-pub(crate) fn study<S: Study, R>(
-    work: impl FnOnce(&Control<'_>) -> Result<R, Failure>,
-) -> Result<R, Failure> {
-    watched(S::NAME, S::COUNTED, S::PARTIAL, work)
+/// Runs a study on so many threads, as [`watched`] does.
+pub(crate) fn study<S: Study>(
+    case: &Case,
+    options: &S::Options,
+    threads: &ThreadsArgument,
+) -> Result<S::Report, Failure>
+where
+    S::Options: Sync,
+    S::Report: Send,
+{
+    watched(S::NAME, S::COUNTED, S::PARTIAL, |control| {
+        threads.install(|| S::run(case, options, control))
+    })?
 }
 
 /// Does `work` with a control that counts on the line and stops at Ctrl-C. `what` is what it does,
@@ -128,7 +138,7 @@ pub(crate) fn watched<R>(
     };
     line().work = Some(counted(0, 0));
     let report = |done: usize, total: usize| {
-        // Whoever cannot have the line at once leaves it to the next.
+        // A thread that does not get the line at once skips this report.
         if let Ok(mut line) = LINE.try_lock() {
             line.work = Some(counted(done, total));
         }

@@ -6,7 +6,7 @@ use nanotap::study::threads::{checked, install};
 use crate::failure::Failure;
 
 /// How many threads work.
-#[derive(Args, Clone, Debug)]
+#[derive(Args, Clone, Debug, Default)]
 pub(crate) struct ThreadsArgument {
     /// Threads; without it, one a core. The result is the same for any number
     #[arg(long, value_name = "T")]
@@ -14,7 +14,7 @@ pub(crate) struct ThreadsArgument {
 }
 
 impl ThreadsArgument {
-    /// How many; 0 if nobody said.
+    /// How many; 0: one a core.
     pub(crate) fn number(&self) -> Result<usize, Failure> {
         Ok(checked(self.threads)?.unwrap_or(0))
     }

@@ -129,12 +129,13 @@ pub(crate) fn spots(
                 bottom: top + grid.heights[r] / all_heights * height,
             };
             if !(rect.width() >= SMALLEST && rect.height() >= SMALLEST) {
-                return Err(FigureError::NoRoom {
-                    row: r + 1,
-                    column: c + 1,
-                    width_mm: rect.width().max(0.0),
-                    height_mm: rect.height().max(0.0),
-                });
+                return Err(FigureError::Invalid(format!(
+                    "the panel in row {}, column {} has {:.1} mm × {:.1} mm left for its data: make the figure larger, its labels shorter, or its panels fewer",
+                    r + 1,
+                    c + 1,
+                    rect.width().max(0.0),
+                    rect.height().max(0.0)
+                )));
             }
             around[index] = Sides {
                 top: row[r].top,

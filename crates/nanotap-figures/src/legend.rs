@@ -49,18 +49,19 @@ fn swatch_width(entry: &Entry, style: &Style) -> f64 {
     }
 }
 
+fn widest_swatch(entries: &[Entry], style: &Style) -> f64 {
+    let widths = entries.iter().map(|e| swatch_width(e, style));
+    widths.fold(0.0, f64::max)
+}
+
 /// Width and height of the legend as a column, with its margins, mm.
 pub(crate) fn column_size(entries: &[Entry], style: &Style) -> (f64, f64) {
-    let sample = entries
-        .iter()
-        .map(|e| swatch_width(e, style))
-        .fold(0.0, f64::max);
     let words = entries
         .iter()
         .map(|e| Words::set(&e.label, style.legend, false).width)
         .fold(0.0, f64::max);
     (
-        sample + words + 3.0 * style.pad,
+        widest_swatch(entries, style) + words + 3.0 * style.pad,
         entries.len() as f64 * style.line() + style.pad,
     )
 }
@@ -174,22 +175,7 @@ impl Occupancy {
                     }
                 }
                 Layer::Rule(rule) => {
-                    let ends = if rule.upright {
-                        frame.across(rule.at).map(|x| {
-                            (
-                                Point::new(x, frame.rect.top),
-                                Point::new(x, frame.rect.bottom),
-                            )
-                        })
-                    } else {
-                        frame.upright(rule.at).map(|y| {
-                            (
-                                Point::new(frame.rect.left, y),
-                                Point::new(frame.rect.right, y),
-                            )
-                        })
-                    };
-                    if let Some((a, b)) = ends {
+                    if let Some((a, b)) = frame.rule(rule) {
                         seen.mark_line(a, b);
                     }
                 }
@@ -296,10 +282,7 @@ pub(crate) fn draw(
 }
 
 fn draw_column(scene: &mut Scene, entries: &[Entry], left: f64, top: f64, style: &Style) {
-    let sample = entries
-        .iter()
-        .map(|e| swatch_width(e, style))
-        .fold(0.0, f64::max);
+    let sample = widest_swatch(entries, style);
     for (number, entry) in entries.iter().enumerate() {
         let middle = top + style.pad / 2.0 + (number as f64 + 0.5) * style.line();
         draw_entry(scene, entry, left, sample, middle, style);

@@ -120,6 +120,12 @@ impl Regime {
         }
     }
 
+    /// Calls `visit` with every entry of the constant parts of forcing and response.
+    pub(crate) fn each_constant(&mut self, visit: &mut dyn FnMut(&mut f64)) {
+        let constants = [&mut self.forcing.constant, &mut self.response.constant];
+        constants.into_iter().flatten().for_each(visit);
+    }
+
     /// What an output is in this regime's modal coordinates.
     pub fn project(&self, output: &Output) -> ModalOutput {
         let dot = |column: &[Complex]| -> Complex {

@@ -408,6 +408,33 @@ impl System {
         }
     }
 
+    /// Calls `visit` with every constant of forcings, guards and resets and what was prepared from
+    /// them, in the same order for all systems of one structure. Between two systems that differ in
+    /// constant forces and thresholds only, these numbers vary linearly and nothing else does.
+    pub fn each_constant(&mut self, visit: &mut dyn FnMut(&mut f64)) {
+        for regime in &mut self.regimes {
+            regime.each_constant(visit);
+        }
+        for transition in self.transitions.iter_mut().flatten() {
+            visit(&mut transition.guard.constant);
+            let inelastic = transition.sticking.as_mut().map(|s| &mut s.reset);
+            for reset in transition.reset.iter_mut().chain(inelastic) {
+                reset.offset.constant.iter_mut().for_each(&mut *visit);
+            }
+        }
+        for prepared in self.switches.iter_mut().flatten() {
+            visit(&mut prepared.guard.constant);
+            visit(&mut prepared.kernel.constant);
+            if let Some(acceleration) = &mut prepared.acceleration {
+                visit(&mut acceleration.constant);
+            }
+            prepared.switch.packed.each_constant(visit);
+            if let Some(sticking) = &mut prepared.sticking {
+                sticking.packed.each_constant(visit);
+            }
+        }
+    }
+
     /// Dimension of the state.
     pub fn dimension(&self) -> usize {
         self.dimension

@@ -17,13 +17,10 @@ const START: (f64, f64) = (0.1, 0.2);
 
 /// The limit of the damped steady state without damping, and its model.
 pub(super) fn response(undamped: &Cantilever) -> Result<(Model, OrbitReport), PaperError> {
-    let failed = |why: String| PaperError::Failed {
-        what: format!(
-            "the periodic response at Ω = {}, N = {}",
-            undamped.omega, undamped.modes
-        ),
-        why,
-    };
+    let what = format!(
+        "the periodic response at Ω = {}, N = {}",
+        undamped.omega, undamped.modes
+    );
     let damped = |factor: f64| {
         Model::cantilever(
             &undamped
@@ -38,7 +35,9 @@ pub(super) fn response(undamped: &Cantilever) -> Result<(Model, OrbitReport), Pa
     let (MotionKind::Periodic(mut orbit) | MotionKind::TransientChaos { mut orbit, .. }) =
         classified.kind
     else {
-        return Err(failed("the damped motion is not periodic".into()));
+        return Err(PaperError::failed(what)(
+            "the damped motion is not periodic",
+        ));
     };
     let factors = (1..=HALVINGS).map(|k| 0.5f64.powi(k)).chain([0.0]);
     let mut model = model;
@@ -51,9 +50,9 @@ pub(super) fn response(undamped: &Cantilever) -> Result<(Model, OrbitReport), Pa
             orbit.period,
             &ShootingOptions::default(),
         )
-        .map_err(|error| failed(error.to_string()))?;
+        .map_err(PaperError::failed(&what))?;
     }
-    let report = report(&model, &orbit, 20).map_err(|error| failed(error.to_string()))?;
+    let report = report(&model, &orbit, 20).map_err(PaperError::failed(what))?;
     Ok((model, report))
 }
 

@@ -1,4 +1,4 @@
-//! Work on a thread of its own, watched: progress is told, signals are heard, panics are
+//! Work on a separate thread, watched: progress is reported, signals are heard, panics are
 //! caught, and the interpreter is free meanwhile.
 
 use std::io;
@@ -76,14 +76,14 @@ pub(crate) fn watched_alone<R: Send + 'static>(
         };
         let result = catch_unwind(AssertUnwindSafe(|| work(&control)));
         Box::new(move || {
-            // Nobody may be waiting any more.
+            // The receiver may be gone.
             let _ = sender.send(result);
         })
     }))
     .map_err(|error| PyRuntimeError::new_err(format!("cannot start a thread: {error}")))?;
     py.detach(move || {
         let mut stopped: Option<(Instant, PyErr)> = None;
-        let mut told = (0, 0);
+        let mut reported = (0, 0);
         loop {
             let done = match soon(&receiver).map_or_else(|| receiver.recv_timeout(INTERVAL), Ok) {
                 Ok(done) => Some(done),
@@ -96,8 +96,8 @@ pub(crate) fn watched_alone<R: Send + 'static>(
                 counts[0].load(Ordering::Relaxed),
                 counts[1].load(Ordering::Relaxed),
             );
-            if stopped.is_none() && (done.is_none() || seen != told) {
-                told = seen;
+            if stopped.is_none() && (done.is_none() || seen != reported) {
+                reported = seen;
                 if let Err(error) = Python::attach(|py| look(py, progress.as_ref(), seen)) {
                     cancel.cancel();
                     stopped = Some((Instant::now(), error));

@@ -182,6 +182,12 @@ impl Flow {
         &self.system
     }
 
+    /// The system, to change its offset; a copy where others share it. Start the motion anew
+    /// afterwards.
+    pub fn system_mut(&mut self) -> &mut System {
+        Arc::make_mut(&mut self.system)
+    }
+
     /// What the runs so far have cost.
     pub fn statistics(&self) -> Statistics {
         self.solver.statistics

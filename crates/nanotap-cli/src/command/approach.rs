@@ -6,15 +6,13 @@ use std::path::PathBuf;
 
 use clap::Args;
 use nanotap::case::physical::Kind;
-use nanotap::case::physical::quantity::format_electronvolts;
 use nanotap::case::units::Units;
 use nanotap::figure::approach::approach_figure;
 use nanotap::number::shortest;
 use nanotap::observe::table::shown_phase;
 use nanotap::observe::{Observables, Set, columns};
-use nanotap::study::approach::{ApproachPoint, ApproachReport, ApproachRequest, ApproachStudy};
+use nanotap::study::approach::{ApproachOptions, ApproachPoint, ApproachReport, ApproachStudy};
 use nanotap::study::frequency_modulation::{COLUMNS, ModulatedColumn, ModulationReport};
-use nanotap::study::registry::Study as _;
 use nanotap::study::simulate::Classification;
 use serde::Serialize;
 
@@ -35,7 +33,7 @@ pub(crate) struct Arguments {
     case: CaseArguments,
 
     #[command(flatten)]
-    request: Request<ApproachRequest>,
+    request: Request<ApproachOptions>,
 
     #[command(flatten)]
     threads: ThreadsArgument,
@@ -58,12 +56,8 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     let request = arguments.request.read()?;
     arguments.out.check()?;
     arguments.plot.check()?;
-    let case = GivenCase::with_any_distance(&arguments.case, output)?;
-    let report = progress::study::<ApproachStudy, _>(|control| {
-        arguments
-            .threads
-            .install(|| ApproachStudy::run(&case, &request, control))
-    })??;
+    let case = GivenCase::for_study(&arguments.case, true, output)?;
+    let report = progress::study::<ApproachStudy>(&case, &request, &arguments.threads)?;
     if report.cancelled {
         output.warning("stopped before it was done");
     }
@@ -157,7 +151,7 @@ fn step_of(report: &ApproachReport) -> usize {
 fn thinned(table: &Table, step: usize, report: &ApproachReport) -> String {
     let all = report.table.len();
     let left_out = if step > 1 {
-        format!("  every {step}th of {all} (--out writes all)\n")
+        format!("  one in {step} of {all} distances (--out writes all)\n")
     } else {
         String::new()
     };
@@ -166,12 +160,7 @@ fn thinned(table: &Table, step: usize, report: &ApproachReport) -> String {
 
 fn text(case: &GivenCase, report: &ApproachReport) -> String {
     let units = case.units();
-    let shown = |kind: Kind, value: f64| {
-        units.si(kind).map_or_else(
-            || number::significant(value, 5),
-            |unit| kind.format(unit * value),
-        )
-    };
+    let shown = |kind: Kind, value: f64| number::quantity(&units, kind, value, [5, 4]);
     let heading = format!(
         "{}: {}, distances from {} to {} and back",
         case.title(),
@@ -252,7 +241,7 @@ fn text(case: &GivenCase, report: &ApproachReport) -> String {
     }
     if !report.returned && !report.cancelled {
         text.push_str(&motion::paragraph(
-            "the way back does not end in the motion with which the way there began: begin farther \
+            "the retraction does not end in the motion in which the approach began: begin farther \
              away, with --from",
         ));
     }
@@ -421,7 +410,7 @@ fn modulated(
     }
     if modulation.setpoints.as_ref().is_some_and(Vec::is_empty) {
         text.push_str(&motion::paragraph(
-            "no distance of the curve has the frequency shift that was asked for",
+            "no distance of the curve has the requested frequency shift",
         ));
     }
     for jump in &modulation.jumps {
@@ -452,8 +441,5 @@ fn modulated(
 }
 
 fn energy(value: f64, units: &Units) -> String {
-    units.si(Kind::Energy).map_or_else(
-        || number::significant(value, 4),
-        |unit| format_electronvolts(unit * value),
-    )
+    number::quantity(units, Kind::Energy, value, [4, 4])
 }

@@ -79,8 +79,8 @@ impl<'s, 'a: 's, M: StroboscopicMap> Turn<'s, 'a, M> {
         let mut map = map.clone();
         let cancelled = || control.is_cancelled();
         // Of few starts most places side by side would be empty.
-        if map.side_by_side() > 1 && starts.len() >= MIN_BATCH {
-            let most = map.side_by_side().max(MIN_BATCH);
+        if map.batch_size() > 1 && starts.len() >= MIN_BATCH {
+            let most = map.batch_size().max(MIN_BATCH);
             let parts = PARTS_PER_THREAD * rayon::current_num_threads();
             let places = || (self.left() / parts).clamp(MIN_BATCH, most);
             let followed = |place, followed| match followed {

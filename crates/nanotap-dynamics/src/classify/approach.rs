@@ -4,7 +4,7 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::failure::{MapFailure, advance};
 use crate::map::StroboscopicMap;
-use crate::neighbourhood::{AdaptedNorm, Return};
+use crate::neighbourhood::{AdaptedNorm, ReturnMap};
 use crate::orbit::PeriodicOrbit;
 use crate::vector::distance;
 
@@ -107,7 +107,7 @@ impl<'a> Approach<'a> {
     ) -> Result<Option<Self>, MapFailure> {
         let (d, n) = (state.len(), orbit.period);
         let center = &orbit.states[0];
-        let mut work = Return::new(d);
+        let mut work = ReturnMap::new(d);
         let monodromy = work.jacobian(map, center, n)?.clone();
         let Some(adapted) = AdaptedNorm::new(&monodromy, orbit.spectral_radius()) else {
             return Ok(None);
@@ -271,6 +271,8 @@ pub(super) mod tests {
     /// x → f(|x|) x on a line, with f'(0) f(0) = 0.999 for the orbit at rest.
     #[derive(Clone)]
     pub(in crate::classify) struct Line(pub(in crate::classify) fn(f64) -> f64);
+
+    impl crate::Scheduling for Line {}
 
     impl StroboscopicMap for Line {
         type Error = Infallible;

@@ -346,6 +346,8 @@ mod tests {
     #[derive(Clone)]
     struct Fails(Logistic);
 
+    impl crate::Scheduling for Fails {}
+
     impl StroboscopicMap for Fails {
         type Error = std::fmt::Error;
 

@@ -579,7 +579,7 @@ impl<'a> Run<'a> {
         let settled = (self.periods - self.periods / 4).min(self.recent.len() / self.d);
         let means = StrobeMeans::of(&self.recent[self.recent.len() - settled * self.d..], self.d);
         let deviations = means.deviations();
-        let telling = means.is_telling();
+        let telling = means.is_comparable();
         let found = known.find(|k| telling && k.strobe.agree_with(&means));
         found.map(|spectrum| ChaosMatch {
             spectrum: spectrum.clone(),
@@ -665,7 +665,7 @@ impl<'a> Run<'a> {
                 {
                     return Ok(self.chaotic(spectrum));
                 }
-            } else if is_known && spectrum.is_telling() {
+            } else if is_known && spectrum.is_comparable() {
                 // Perhaps on a torus that is known.
                 let kind = self.neither_periodic_nor_chaotic(map, spectrum.clone())?;
                 if !matches!(kind, MotionKind::Undecided { .. }) {
@@ -824,6 +824,8 @@ pub(super) mod tests {
 
     #[derive(Clone)]
     pub(in crate::classify) struct Logistic(pub(in crate::classify) f64);
+
+    impl crate::Scheduling for Logistic {}
 
     impl StroboscopicMap for Logistic {
         type Error = std::convert::Infallible;

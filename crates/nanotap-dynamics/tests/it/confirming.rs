@@ -1,4 +1,4 @@
-//! Motions that are followed on a coarse map and confirmed on the map itself.
+//! Motions that are followed on an approximate map and confirmed on the exact one.
 
 use std::convert::Infallible;
 use std::sync::Arc;
@@ -12,7 +12,7 @@ use nanotap_dynamics::{
 
 use crate::systems::{Cubic, Formula, Logistic, Nested, System};
 
-/// A map with another as its coarse one, and the periods that were advanced on each.
+/// A map with another one as its approximation, and the numbers of periods advanced on each.
 #[derive(Clone)]
 struct Pair<F> {
     map: System<F>,
@@ -44,6 +44,17 @@ impl<F> Pair<F> {
     }
 }
 
+impl<F: Formula> nanotap_dynamics::Scheduling for Pair<F> {
+    fn coarse(&self) -> Option<Self> {
+        let coarse = self.coarse.clone()?;
+        Some(Self {
+            map: System(coarse),
+            coarse: None,
+            ..self.clone()
+        })
+    }
+}
+
 impl<F: Formula> StroboscopicMap for Pair<F> {
     type Error = Infallible;
 
@@ -53,15 +64,6 @@ impl<F: Formula> StroboscopicMap for Pair<F> {
 
     fn period(&self) -> f64 {
         self.map.period()
-    }
-
-    fn coarse(&self) -> Option<Self> {
-        let coarse = self.coarse.clone()?;
-        Some(Self {
-            map: System(coarse),
-            coarse: None,
-            ..self.clone()
-        })
     }
 
     fn advance(&mut self, state: &mut [f64]) -> Result<(), Infallible> {
@@ -99,9 +101,9 @@ fn orbits(census: &Census) -> Vec<&PeriodicOrbit> {
     orbits.collect()
 }
 
-/// The fixed points of r x − x³ are ±√(r − 1), and half of the starts go to each.
+/// The fixed points of r x − x³ are ±√(r − 1), and half of the starts lead to each.
 #[test]
-fn orbits_are_those_of_the_map_itself() {
+fn orbits_are_those_of_the_exact_map() {
     let map = Pair::new(Cubic(1.6), Cubic(1.601));
     let found = taken(&map, &drawn(-1.0, 1.0));
     assert!(found.followed_coarsely);
@@ -116,9 +118,10 @@ fn orbits_are_those_of_the_map_itself() {
     assert!(exact < 100 && coarse > 10 * exact, "{exact} {coarse}");
 }
 
-/// r x (1 − x) doubles its period at r = 3: on one side of it the coarse map, on the other the map.
+/// r x (1 − x) doubles its period at r = 3: the approximate map is on one side, the exact one on
+/// the other.
 #[test]
-fn another_period_is_that_of_the_map_itself() {
+fn the_period_is_that_of_the_exact_map() {
     for (exact, coarse, period) in [(3.02, 2.98, 2), (2.98, 3.02, 1)] {
         let mut map = Pair::new(Logistic(exact), Logistic(coarse));
         let named = classify(&mut map, &[0.3], &ClassifyOptions::default());
@@ -135,7 +138,7 @@ fn another_period_is_that_of_the_map_itself() {
 
 /// At 3.83 there is a stable period 3, at 3.9 there is none: it is not reported.
 #[test]
-fn a_motion_of_the_coarse_map_alone_is_not_reported() {
+fn a_motion_of_the_approximate_map_only_is_not_reported() {
     let mut map = Pair::new(Logistic(3.9), Logistic(3.83));
     let named = classify(&mut map, &[0.3], &ClassifyOptions::default());
     assert!(matches!(named.kind, MotionKind::Chaotic(_)), "{named:?}");
@@ -145,9 +148,9 @@ fn a_motion_of_the_coarse_map_alone_is_not_reported() {
     assert!(matches!(kind, AttractorKind::Chaotic { .. }), "{kind:?}");
 }
 
-/// The exponent at r = 4 is ln 2; the coarse map's at 3.9 is 0.5.
+/// The exponent at r = 4 is ln 2; that of the approximate map at 3.9 is 0.5.
 #[test]
-fn exponents_are_those_of_the_map_itself() {
+fn exponents_are_those_of_the_exact_map() {
     let map = Pair::new(Logistic(4.0), Logistic(3.999));
     let found = taken(&map, &drawn(0.1, 0.9));
     assert_eq!(found.attractors.len(), 1);
@@ -160,10 +163,10 @@ fn exponents_are_those_of_the_map_itself() {
     assert!(coarse > 20 * exact, "{exact} {coarse}");
 }
 
-/// At 3.8285, beside the window of period 3 (from 1 + √8 = 3.828427), the orbit attracts after chaos
-/// that the coarse map at 3.82 does not leave.
+/// At 3.8285, near the window of period 3 (from 1 + √8 = 3.828427), the orbit is reached after
+/// chaos that the approximate map at 3.82 does not leave.
 #[test]
-fn chaos_that_only_the_map_itself_leaves_is_no_attractor() {
+fn chaos_that_only_the_exact_map_leaves_is_not_an_attractor() {
     let mut map = Pair::new(Logistic(3.84), Logistic(3.82));
     let named = classify(&mut map, &[0.3], &ClassifyOptions::default());
     let MotionKind::Periodic(orbit) = &named.kind else {
@@ -175,10 +178,10 @@ fn chaos_that_only_the_map_itself_leaves_is_no_attractor() {
     assert!(kinds.all(|kind| matches!(kind, AttractorKind::Periodic(orbit) if orbit.period == 3)));
 }
 
-/// A motion with a basin of 1e-9 of the starts, from a seed near it; the unstable orbit at 0 that parts
-/// two basins is known too.
+/// A motion with a basin of 1e-9 of the starts, from a seed near it; the unstable orbit at 0, on
+/// the boundary of two basins, is known too.
 #[test]
-fn seeds_are_attractors_without_starts() {
+fn orbits_from_seeds_are_attractors_without_starts() {
     let nested = Nested { r: 1.5, s: 1e-9 };
     let map = Pair::new(nested.clone(), nested);
     let start = drawn(-3.0, 3.0);
@@ -195,7 +198,7 @@ fn seeds_are_attractors_without_starts() {
     assert_eq!(taken(&map, &start).attractors.len(), 2);
 }
 
-/// After the signal each thread follows its motion for a period or so, and looks at it once.
+/// After the signal each thread advances its motion for about one period and examines it once.
 #[test]
 fn a_cancelled_census_of_chaos_ends_soon() {
     let map = Pair::new(Logistic(3.9), Logistic(3.9001));

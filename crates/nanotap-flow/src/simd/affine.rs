@@ -40,6 +40,13 @@ impl AffineMap {
         }
     }
 
+    /// Calls `visit` with every part of the constant `c`.
+    pub(crate) fn each_constant(&mut self, visit: &mut dyn FnMut(&mut f64)) {
+        let linear = self.columns.len() - self.vectors;
+        let parts = self.columns[linear..].iter_mut().flatten().flatten();
+        parts.for_each(visit);
+    }
+
     /// Writes the image of `z` to `out`.
     #[inline(always)]
     pub(crate) fn apply<S: Simd>(&self, z: &[ComplexVector], out: &mut Vec<ComplexVector>) {

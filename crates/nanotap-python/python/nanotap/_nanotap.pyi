@@ -1,4 +1,4 @@
-"""The compiled part; see the package for what each is for."""
+"""The compiled part, used by the modules of the package."""
 
 import os
 from collections.abc import Callable
@@ -13,6 +13,8 @@ _Floats: TypeAlias = npt.NDArray[np.float64]
 _Progress: TypeAlias = Callable[[int, int], object] | None
 _Table: TypeAlias = tuple[list[str], _Floats]
 _Path: TypeAlias = str | os.PathLike[str]
+
+def run_command_line(arguments: list[str]) -> int: ...
 
 class CaseCore:
     def __new__(

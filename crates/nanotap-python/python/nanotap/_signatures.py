@@ -5,7 +5,7 @@
 from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Literal, overload
 
-from . import _datasets, _motions, _studies
+from . import _arguments, _datasets, _motions, _studies
 from ._arguments import Box, Progress, Varied
 from ._case import Case, Path, Value
 from ._record import Record
@@ -23,6 +23,7 @@ __all__ = [
     "contact_laws",
     "convergence",
     "fit",
+    "fm",
     "lyapunov",
     "modes",
     "orbit",
@@ -41,7 +42,7 @@ def modes(
     Parameters
     ----------
     case : Case
-        What is studied.
+        The case.
     points : int
         Points along the beam in the table of mode shapes (2 to 1000000).
 
@@ -53,13 +54,11 @@ def modes(
     Raises
     ------
     ValueError
-        Something that was asked for is not right.
+        An argument is invalid; the message names it.
     RuntimeError
-        The computation did not succeed.
+        The computation failed.
     """
-    options = {
-        "points": points,
-    }
+    options = _arguments.options("modes", locals())
     return _motions.modes(case, options)
 
 def simulate(
@@ -81,12 +80,12 @@ def simulate(
     progress: Progress = None,
     **parameters: Varied,
 ) -> "xr.Dataset":
-    """One run: its steady state, or how it gets there.
+    """Simulate a motion: its steady state or its transient.
 
     Parameters
     ----------
     case : Case
-        What is studied.
+        The case.
     periods : int
         Drive periods recorded (1 to 2000000).
     transient : int | None
@@ -139,23 +138,11 @@ def simulate(
     Raises
     ------
     ValueError
-        Something that was asked for is not right.
+        An argument is invalid; the message names it.
     RuntimeError
-        The computation did not succeed.
+        The computation failed.
     """
-    options = {
-        "periods": periods,
-        "transient": transient,
-        "state": state,
-        "strobe": strobe,
-        "events": events,
-        "max_period": max_period,
-        "observables": observables,
-        "resolution": resolution,
-        "method": method,
-        "steps": steps,
-        "switching": switching,
-    }
+    options = _arguments.options("simulate", locals())
     return _motions.simulate(case, options, series, threads, progress, parameters)
 
 @overload
@@ -202,12 +189,12 @@ def orbit(
     progress: Progress = None,
     **parameters: Varied,
 ) -> "Orbit | xr.Dataset":
-    """A periodic orbit by Newton, stable or not.
+    """Compute a periodic orbit by Newton's method, stable or not.
 
     Parameters
     ----------
     case : Case
-        What is studied.
+        The case.
     period : int | None
         Its period in drive periods; without it, that of the motion to which a run
         converges (1 to 10000).
@@ -241,19 +228,11 @@ def orbit(
     Raises
     ------
     ValueError
-        Something that was asked for is not right.
+        An argument is invalid; the message names it.
     RuntimeError
-        The computation did not succeed.
+        The computation failed.
     """
-    options = {
-        "period": period,
-        "state": state,
-        "harmonics": harmonics,
-        "observables": observables,
-        "resolution": resolution,
-        "derivatives": derivatives,
-        "prove": prove,
-    }
+    options = _arguments.options("orbit", locals())
     return _motions.orbit(case, options, threads, progress, parameters)
 
 def attractors(
@@ -269,12 +248,12 @@ def attractors(
     threads: int | None = None,
     progress: Progress = None,
 ) -> Attractors:
-    """Every motion that coexists: a census from many seeded starts.
+    """Find coexisting attractors by sampling initial states.
 
     Parameters
     ----------
     case : Case
-        What is studied.
+        The case.
     starts : int | None
         Starts, spread evenly over one box of states. Without it, starts of every
         size, from the resonant response down to below the gap, go on until the
@@ -313,19 +292,11 @@ def attractors(
     Raises
     ------
     ValueError
-        Something that was asked for is not right.
+        An argument is invalid; the message names it.
     RuntimeError
-        The computation did not succeed.
+        The computation failed.
     """
-    options = {
-        "starts": starts,
-        "unseen": unseen,
-        "seed": seed,
-        "box": box,
-        "max_period": max_period,
-        "unstable": unstable,
-        "prove": prove,
-    }
+    options = _arguments.options("attractors", locals())
     return _studies.attractors(case, options, threads, progress)
 
 def branch(
@@ -352,7 +323,7 @@ def branch(
     Parameters
     ----------
     case : Case
-        What is studied.
+        The case.
     parameter : str
         The parameter, as the case file calls it (omega, alpha4, gap …); of a
         physical case also a quantity of it (drive.frequency, gap.tip,
@@ -400,24 +371,11 @@ def branch(
     Raises
     ------
     ValueError
-        Something that was asked for is not right.
+        An argument is invalid; the message names it.
     RuntimeError
-        The computation did not succeed.
+        The computation failed.
     """
-    options = {
-        "parameter": parameter,
-        "from": from_,
-        "to": to,
-        "period": period,
-        "state": state,
-        "switch": switch,
-        "diagram": diagram,
-        "values": values,
-        "starts": starts,
-        "seed": seed,
-        "second": second,
-        "max_step": max_step,
-    }
+    options = _arguments.options("branch", locals())
     return _studies.branch(case, options, threads, progress)
 
 def approach(
@@ -443,7 +401,7 @@ def approach(
     Parameters
     ----------
     case : Case
-        What is studied.
+        The case.
     from_ : float | str | None
         Distance at which to begin, in units of the case ("30 nm") or as alpha5;
         without it, 1.25 times what the free tip swings towards the sample.
@@ -494,24 +452,66 @@ def approach(
     Raises
     ------
     ValueError
-        Something that was asked for is not right.
+        An argument is invalid; the message names it.
     RuntimeError
-        The computation did not succeed.
+        The computation failed.
     """
-    options = {
-        "from": from_,
-        "to": to,
-        "points": points,
-        "branches": branches,
-        "switch": switch,
-        "max_period": max_period,
-        "speed": speed,
-        "fm": fm,
-        "phase": phase,
-        "shift": shift,
-        "closest": closest,
-    }
+    options = _arguments.options("approach", locals())
     return _studies.approach(case, options, threads, progress)
+
+def fm(
+    case: Case,
+    *,
+    from_: float | str | None = None,
+    to: float | str | None = None,
+    points: int = 80,
+    phase: float = 90.0,
+    shift: float | str | None = None,
+    closest: float | str | None = None,
+    threads: int | None = None,
+    progress: Progress = None,
+) -> Record:
+    """Frequency shift and excitation against the distance to the sample, with amplitude
+    and phase held.
+
+    Parameters
+    ----------
+    case : Case
+        What is studied.
+    from_ : float | str | None
+        Distance at which to begin, in units of the case ("30 nm") or as alpha5;
+        without it, 1.25 times the free amplitude towards the sample.
+    to : float | str | None
+        Distance at which to turn back; without it, 0.
+    points : int
+        Distances each way (2 to 20000).
+    phase : float
+        Phase behind the drive to hold, in degrees.
+    shift : float | str | None
+        Frequency shift whose distances to find, in units of the case ("-50 Hz") or
+        as omega.
+    closest : float | str | None
+        Least distance of the oscillation to keep, in units of the case ("1 nm") or
+        as alpha5: the amplitude then changes with the distance.
+    threads : int | None
+        Threads; without it, one a core.
+    progress : Progress
+        Whether to show a bar, or a function that is called with what is done and
+        the total.
+
+    Returns
+    -------
+    What the terminal's JSON has, by its names.
+
+    Raises
+    ------
+    ValueError
+        An argument is not valid.
+    RuntimeError
+        The computation failed.
+    """
+    options = _arguments.options("fm", locals())
+    return _studies.document("fm", case, options, threads, progress)
 
 def fit(
     case: Case,
@@ -536,7 +536,7 @@ def fit(
     Parameters
     ----------
     case : Case
-        What is studied.
+        The case.
     data : Any
         Measured curves: tables whose columns are named as in `distance (nm)`,
         `amplitude (nm)`, `phase (deg)`.
@@ -580,24 +580,11 @@ def fit(
     Raises
     ------
     ValueError
-        Something that was asked for is not right.
+        An argument is invalid; the message names it.
     RuntimeError
-        The computation did not succeed.
+        The computation failed.
     """
-    options = {
-        "data": data,
-        "free": free,
-        "per_curve": per_curve,
-        "bounds": bounds,
-        "columns": columns,
-        "laws": laws,
-        "starts": starts,
-        "seed": seed,
-        "max_period": max_period,
-        "jumps": jumps,
-        "phase": phase,
-        "profile": profile,
-    }
+    options = _arguments.options("fit", locals())
     return _studies.fit(case, options, threads, progress)
 
 def sweep(
@@ -624,7 +611,7 @@ def sweep(
     Parameters
     ----------
     case : Case
-        What is studied.
+        The case.
     over : str | Sequence[str] | Mapping[str, Any]
         A parameter and its values, as in omega=2:4:400 (first, last, how many), or
         alpha4=1:1000:50:log in equal ratios, or any that ascend, omega=2,2.5,4;
@@ -678,22 +665,11 @@ def sweep(
     Raises
     ------
     ValueError
-        Something that was asked for is not right.
+        An argument is invalid; the message names it.
     RuntimeError
-        The computation did not succeed.
+        The computation failed.
     """
-    options = {
-        "over": over,
-        "starts": starts,
-        "seed": seed,
-        "box": box,
-        "state": state,
-        "follow": follow,
-        "periods": periods,
-        "strobe": strobe,
-        "transient": transient,
-        "max_period": max_period,
-    }
+    options = _arguments.options("sweep", locals())
     return _datasets.sweep(case, options, out, chunk, threads, client, progress)
 
 def window(
@@ -714,7 +690,7 @@ def window(
     Parameters
     ----------
     case : Case
-        What is studied.
+        The case.
     over : str | Sequence[str] | Mapping[str, Any]
         A parameter and its values, as in gap.tip=5nm:25nm:41,
         drive.free_amplitude=10nm:60nm:26, omega=2:4:81, or any that ascend,
@@ -746,16 +722,11 @@ def window(
     Raises
     ------
     ValueError
-        Something that was asked for is not right.
+        An argument is invalid; the message names it.
     RuntimeError
-        The computation did not succeed.
+        The computation failed.
     """
-    options = {
-        "over": over,
-        "starts": starts,
-        "seed": seed,
-        "max_period": max_period,
-    }
+    options = _arguments.options("window", locals())
     return _datasets.window(case, options, out, threads, client, progress)
 
 def basin(
@@ -780,7 +751,7 @@ def basin(
     Parameters
     ----------
     case : Case
-        What is studied.
+        The case.
     x : str | Mapping[str, Any]
         The horizontal axis, as in a1=-1:1:200: entry of the state, first value,
         last value, how many (a1…aN, v1…vN; oscillator: x, v).
@@ -820,20 +791,11 @@ def basin(
     Raises
     ------
     ValueError
-        Something that was asked for is not right.
+        An argument is invalid; the message names it.
     RuntimeError
-        The computation did not succeed.
+        The computation failed.
     """
-    options = {
-        "x": x,
-        "y": y,
-        "state": state,
-        "attractors": attractors,
-        "starts": starts,
-        "seed": seed,
-        "periods": periods,
-        "max_period": max_period,
-    }
+    options = _arguments.options("basin", locals())
     return _datasets.basin(case, options, out, chunk, threads, client, progress)
 
 def lyapunov(
@@ -851,7 +813,7 @@ def lyapunov(
     Parameters
     ----------
     case : Case
-        What is studied.
+        The case.
     periods : int
         Drive periods averaged over (1 to 100000000).
     transient : int
@@ -874,18 +836,11 @@ def lyapunov(
     Raises
     ------
     ValueError
-        Something that was asked for is not right.
+        An argument is invalid; the message names it.
     RuntimeError
-        The computation did not succeed.
+        The computation failed.
     """
-    options = {
-        "periods": periods,
-        "transient": transient,
-        "state": state,
-        "section": section,
-        "phase": phase,
-        "points": points,
-    }
+    options = _arguments.options("lyapunov", locals())
     return _studies.lyapunov(case, options)
 
 def convergence(
@@ -895,12 +850,12 @@ def convergence(
     tolerance: float = 0.01,
     period: int | None = None,
 ) -> Convergence:
-    """The same motion with N = 1 … K modes: how many are enough.
+    """Compare the motion with 1 to K modes: how many are enough.
 
     Parameters
     ----------
     case : Case
-        What is studied.
+        The case.
     largest : int
         Largest number of modes (2 to 50).
     tolerance : float
@@ -917,15 +872,11 @@ def convergence(
     Raises
     ------
     ValueError
-        Something that was asked for is not right.
+        An argument is invalid; the message names it.
     RuntimeError
-        The computation did not succeed.
+        The computation failed.
     """
-    options = {
-        "largest": largest,
-        "tolerance": tolerance,
-        "period": period,
-    }
+    options = _arguments.options("convergence", locals())
     return _studies.convergence(case, options)
 
 def contact_laws(
@@ -938,17 +889,16 @@ def contact_laws(
     threads: int | None = None,
     progress: Progress = None,
 ) -> Record:
-    """The same lever and drive on every contact law: what difference the sample makes.
+    """Compare contact laws under the same lever and drive.
 
     Parameters
     ----------
     case : Case
-        What is studied.
+        The case.
     period : int
         Period of the orbits compared (1 to 10000).
     arm : float | None
-        Stiffness of the standard linear solid's arm; without it, the case's, or
-        twice alpha4.
+        Stiffness of the relaxing arm; without it, the case's, or twice alpha4.
     from_ : float | str | None
         Lowest drive frequency to which the orbits are followed.
     to : float | str | None
@@ -966,14 +916,9 @@ def contact_laws(
     Raises
     ------
     ValueError
-        Something that was asked for is not right.
+        An argument is invalid; the message names it.
     RuntimeError
-        The computation did not succeed.
+        The computation failed.
     """
-    options = {
-        "period": period,
-        "arm": arm,
-        "from": from_,
-        "to": to,
-    }
+    options = _arguments.options("contact-laws", locals())
     return _studies.document("contact-laws", case, options, threads, progress)

@@ -48,7 +48,7 @@ def attractors(
     found = Attractors(case, document)
     if interrupted:
         message = (
-            "stopped before all starts were done: the fractions are of what was done"
+            "stopped before all starts were finished: the fractions refer to the finished ones"
         )
         raise Interrupted(message, found)
     return found
@@ -57,7 +57,7 @@ def attractors(
 def _finished(found: Found, interrupted: bool) -> Found:
     """The result of a study; raises `Interrupted` if it was stopped."""
     if interrupted:
-        message = "stopped before it was done"
+        message = "stopped before it was finished"
         raise Interrupted(message, found)
     return found
 
@@ -269,7 +269,7 @@ def fit(
 ) -> Fit:
     """The parameters that describe measured curves best."""
     if options["data"] is None:
-        message = "data: measured curves are needed"
+        message = "data: expected measured curves"
         raise TypeError(message)
     lists = {
         name: _arguments.names(name, options[name])
@@ -313,6 +313,6 @@ def paper(
         )
     report = Paper.of(json.loads(text))
     if interrupted:
-        message = f"stopped; the report in {report.out} is of what was computed"
+        message = f"stopped; the report in {report.out} contains the finished sections"
         raise Interrupted(message, report)
     return report

@@ -74,7 +74,7 @@ impl TwoParameterFamily for PlaneFamily {
     }
 }
 
-/// The map at these values of the free parameters, with its derivatives to them.
+/// The map at these values of the free parameters, with its derivatives.
 fn strobe_at(case: &Case, values: &[(Key, f64)]) -> Result<Strobe, CaseError> {
     let case = values
         .iter()

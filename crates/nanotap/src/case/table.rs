@@ -15,7 +15,7 @@ pub const MOST_ROWS: usize = 100_000;
 /// Most bytes of a file.
 const MOST_BYTES: u64 = 256 << 20;
 
-/// What stands in one place of a table.
+/// An entry of a table.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(untagged)]
 pub enum Entry {

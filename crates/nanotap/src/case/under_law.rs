@@ -25,7 +25,7 @@ impl LawName {
         self.0.text()
     }
 
-    /// Whether a key can be stated beside this law.
+    /// True if a key can be stated with this law.
     pub(crate) fn takes(&self, key: Key) -> bool {
         if !keys_of_contacts().any(|of_some| of_some == key) {
             return true;
@@ -64,9 +64,8 @@ impl Case {
             }
         }
         Ok(Self {
-            title: self.title.clone(),
             what: What::Quantities(Box::new(quantities.mapped(true).possible()?)),
-            cancel: self.cancel.clone(),
+            ..self.clone()
         })
     }
 }

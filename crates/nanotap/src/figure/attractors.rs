@@ -15,7 +15,7 @@ use crate::study::lyapunov::{LyapunovReport, Section};
 const WANDERING_PERIODS: usize = 48;
 /// Strobe points of such a motion.
 const STROBE_POINTS: usize = 3000;
-/// Attractors drawn at most: more cannot be told apart.
+/// Attractors drawn at most: more cannot be distinguished.
 const MOST: usize = 8;
 
 /// Phase portraits and strobe points of every attractor, each in its own colour, and the

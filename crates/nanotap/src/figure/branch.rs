@@ -175,7 +175,7 @@ pub fn branch_figure(
 }
 
 /// What size of a quantity matters: of the dissipation the work of the greatest force over the
-/// amplitude, beside which rounding is nothing; of others it is not known.
+/// amplitude, compared with which rounding is negligible; of others it is not known.
 pub(crate) fn natural_of(shown: Shown, largest: impl Fn(Shown) -> f64) -> Option<f64> {
     if shown != Shown::named("dissipation")? {
         return None;

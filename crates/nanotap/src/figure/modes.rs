@@ -7,7 +7,7 @@ use crate::model::beam::Modes;
 /// The mode shapes φ_j(ξ) of the bare beam, the paper's Fig. 2e.
 pub fn shapes_figure(beam: &Modes) -> Figure {
     const POINTS: usize = 401;
-    // Beyond these the lines cannot be told apart.
+    // More lines cannot be distinguished.
     const MOST_NAMED: usize = 8;
     let mut panel = Panel::new(
         Axis::linear("position along the beam $ξ = x/L$").range(0.0, 1.0),

@@ -157,9 +157,9 @@ pub(crate) fn contact_intervals(
     let period = model.period();
     let mut intervals: Vec<(f64, f64)> = Vec::new();
     for s in recording
-        .stretches(model)
+        .pieces()
         .iter()
-        .filter(|s| s.contact && s.start < periods * period)
+        .filter(|s| model.touches(s.regime) && s.start < periods * period)
     {
         let (from, to) = (
             s.start / period,
@@ -229,7 +229,7 @@ pub fn orbit_figure(model: &Model, orbit: &OrbitReport, units: &Units) -> Figure
 
 /// The same motion with every number of modes, and how far each is from the best.
 pub fn convergence_figure(convergence: &Convergence, units: &Units) -> Figure {
-    /// Lines beyond these cannot be told apart; the first and the last matter.
+    /// More lines cannot be distinguished; the first and the last matter.
     const MOST_LINES: usize = 5;
     let count = convergence.modes.len();
     let chosen: Vec<usize> = if count <= MOST_LINES {

@@ -1,11 +1,12 @@
-//! The stroboscopic map of a model: the joint between the engines, the exact flow and that
+//! The stroboscopic map of a model: the interface between the engines, the exact flow and that
 //! under a nonlinear force, and the analysis of motions.
 
+use std::fmt::Debug;
 use std::sync::Arc;
 
 use nalgebra::DMatrix;
-use nanotap_dynamics::map::{one_after_another, one_after_another_through};
-use nanotap_dynamics::{StroboscopicMap, Tangency};
+use nanotap_dynamics::map::{in_sequence, in_sequence_through};
+use nanotap_dynamics::{Scheduling, StroboscopicMap, Tangency};
 use nanotap_flow::flow::{Observer, SegmentView, SwitchView};
 use nanotap_flow::jacobian::Jacobian;
 use nanotap_flow::search::sign_changes;
@@ -14,25 +15,106 @@ use nanotap_flow::signal::Signal;
 use nanotap_flow::system::{Switch, Transition};
 use nanotap_flow::{Ensemble, Flow, FlowError, Output, System};
 
-use crate::model::nonlinear::{CoarseStrobe, NonlinearStrobe};
+use crate::model::nonlinear::NonlinearMap;
 use crate::model::{Model, MotionError, Tangent, TangentKind};
 
-/// The map from the state at drive phase 0 to the state one drive period later.
-#[derive(Clone, Debug)]
-pub struct Strobe(Engine);
-
-#[expect(
-    clippy::large_enum_variant,
-    reason = "the exact map is the one whose period takes no more time than following a pointer"
-)]
-#[derive(Clone, Debug)]
-enum Engine {
-    Exact(ExactStrobe),
-    Nonlinear(Box<NonlinearStrobe>),
-    Coarse(Box<CoarseStrobe>),
+/// The stroboscopic map as an engine computes it.
+pub(crate) trait EngineMap: Debug + Send + Sync {
+    /// A clone, whose work space is separate.
+    fn boxed(&self) -> Box<dyn EngineMap>;
+    /// Dimension of the state.
+    fn dimension(&self) -> usize;
+    /// The drive period.
+    fn period(&self) -> f64;
+    /// [`ModelMap::move_gap`].
+    fn move_gap(&mut self, gap: f64, visit: &mut dyn FnMut(&mut f64)) -> Result<(), MotionError>;
+    /// Evaluations so far: of the gap in searches for switches, or of a nonlinear force.
+    fn evaluations(&self) -> u64;
+    /// [`StroboscopicMap::discrete_entries`].
+    fn discrete_entries(&self) -> usize {
+        0
+    }
+    /// [`Scheduling::is_costly`].
+    fn is_costly(&self) -> bool {
+        false
+    }
+    /// [`Scheduling::cost`].
+    fn cost(&self) -> u64 {
+        0
+    }
+    /// [`Scheduling::add_cost`].
+    fn add_cost(&mut self, cost: u64) {
+        let _ = cost;
+    }
+    /// [`Scheduling::coarse`].
+    fn coarse(&self) -> Option<Box<dyn EngineMap>> {
+        None
+    }
+    /// [`Scheduling::batch_size`].
+    fn batch_size(&self) -> usize {
+        1
+    }
+    /// The work space of a batch; `None` where states are advanced in sequence.
+    fn ensemble(&mut self) -> Option<&mut Ensemble> {
+        None
+    }
+    /// [`StroboscopicMap::advance`].
+    fn advance(&mut self, state: &mut [f64]) -> Result<(), MotionError> {
+        self.advance_by(state, 1)
+    }
+    /// [`StroboscopicMap::advance_by`].
+    fn advance_by(&mut self, state: &mut [f64], periods: usize) -> Result<(), MotionError>;
+    /// [`StroboscopicMap::advance_with_jacobian`].
+    fn advance_with_jacobian(
+        &mut self,
+        state: &mut [f64],
+        jacobian: &mut DMatrix<f64>,
+    ) -> Result<(), MotionError>;
+    /// [`ModelMap::advance_with_derivatives`].
+    fn advance_with_derivatives(
+        &mut self,
+        state: &mut [f64],
+        jacobian: &mut DMatrix<f64>,
+        derivatives: &mut DMatrix<f64>,
+    ) -> Result<(), MotionError> {
+        *derivatives = DMatrix::zeros(state.len(), 0);
+        self.advance_with_jacobian(state, jacobian)
+    }
+    /// [`StroboscopicMap::advance_with_jacobian_and_determinant`].
+    fn advance_with_determinant(
+        &mut self,
+        state: &mut [f64],
+        jacobian: &mut DMatrix<f64>,
+    ) -> Result<Option<f64>, MotionError> {
+        self.advance_with_jacobian(state, jacobian)?;
+        Ok(Some(self.log_determinant_bound()).filter(|log| log.is_finite()))
+    }
+    /// [`StroboscopicMap::log_determinant_bound`].
+    fn log_determinant_bound(&self) -> f64;
+    /// [`StroboscopicMap::pass_touches`].
+    fn pass_touches(&mut self) {}
+    /// [`StroboscopicMap::advance_with_tangencies`].
+    fn advance_with_tangencies(
+        &mut self,
+        state: &mut [f64],
+        tangencies: &mut Vec<Tangency>,
+    ) -> Result<(), MotionError> {
+        let _ = tangencies;
+        self.advance(state)
+    }
 }
 
-impl Strobe {
+/// The map from the state at drive phase 0 to the state one drive period later.
+#[derive(Debug)]
+pub struct ModelMap(Box<dyn EngineMap>);
+
+impl Clone for ModelMap {
+    fn clone(&self) -> Self {
+        Self(self.0.boxed())
+    }
+}
+
+impl ModelMap {
     /// The map of `model`.
     pub fn new(model: &Model) -> Self {
         Self::with_tangents(model, Vec::new())
@@ -40,40 +122,36 @@ impl Strobe {
 
     /// The map of `model`, which also knows how it changes with some parameters.
     pub fn with_tangents(model: &Model, tangents: Vec<Tangent>) -> Self {
+        let (mut exact, mut nonlinear) = (Vec::new(), Vec::new());
+        for tangent in tangents {
+            match tangent.0 {
+                TangentKind::Exact(tangent) => exact.push(tangent),
+                TangentKind::Nonlinear(variation) => nonlinear.push(variation),
+            }
+        }
         Self(match &model.nonlinear {
-            None => {
-                let exact = tangents.into_iter().filter_map(|tangent| match tangent.0 {
-                    TangentKind::Exact(tangent) => Some(tangent),
-                    TangentKind::Nonlinear(_) => None,
-                });
-                Engine::Exact(ExactStrobe::new(model, exact.collect()))
-            }
-            Some(nonlinear) => {
-                let variations = tangents.into_iter().filter_map(|tangent| match tangent.0 {
-                    TangentKind::Nonlinear(variation) => Some(variation),
-                    TangentKind::Exact(_) => None,
-                });
-                let map = NonlinearStrobe::new(nonlinear, variations.collect());
-                Engine::Nonlinear(Box::new(map))
-            }
+            None => Box::new(ExactMap::new(model, exact)),
+            Some(engine) => Box::new(NonlinearMap::new(engine, nonlinear)),
         })
     }
 
-    /// What takes many motions of it at a time; `None` where they go one after the other.
-    fn ensemble(&mut self) -> Option<&mut Ensemble> {
-        match &mut self.0 {
-            Engine::Exact(map) => map.ensemble(),
-            Engine::Nonlinear(_) | Engine::Coarse(_) => None,
-        }
+    /// Changes the gap: of a piecewise-linear model by `visit`, which sets the constants of its
+    /// system in turn and then that of its gap, of one under a nonlinear force to `gap`. The next
+    /// motion starts anew.
+    ///
+    /// # Errors
+    /// When the gap is not finite.
+    pub(crate) fn move_gap(
+        &mut self,
+        gap: f64,
+        visit: &mut dyn FnMut(&mut f64),
+    ) -> Result<(), MotionError> {
+        self.0.move_gap(gap, visit)
     }
 
     /// Evaluations so far: of the gap in searches for switches, or of a nonlinear force.
     pub fn evaluations(&self) -> u64 {
-        match &self.0 {
-            Engine::Exact(map) => map.flow.statistics().evaluations,
-            Engine::Nonlinear(map) => map.evaluations(),
-            Engine::Coarse(map) => map.evaluations(),
-        }
+        self.0.evaluations()
     }
 
     /// Replaces `state` by `P(state)`, `jacobian` by `∂P/∂state` and `derivatives`
@@ -88,99 +166,30 @@ impl Strobe {
         jacobian: &mut DMatrix<f64>,
         derivatives: &mut DMatrix<f64>,
     ) -> Result<(), MotionError> {
-        match &mut self.0 {
-            Engine::Exact(map) => Ok(map.advance_with_derivatives(state, jacobian, derivatives)?),
-            Engine::Nonlinear(map) => {
-                map.advance_with_derivatives(state, jacobian, Some(derivatives))
-            }
-            Engine::Coarse(map) => {
-                *derivatives = DMatrix::zeros(state.len(), 0);
-                map.advance_with_jacobian(state, jacobian)
-            }
-        }
+        self.0
+            .advance_with_derivatives(state, jacobian, derivatives)
     }
 }
 
-impl StroboscopicMap for Strobe {
-    type Error = MotionError;
-
-    fn dimension(&self) -> usize {
-        match &self.0 {
-            Engine::Exact(map) => map.flow.system().dimension(),
-            Engine::Nonlinear(map) => map.nonlinear().dimension(),
-            Engine::Coarse(map) => map.nonlinear().dimension(),
-        }
-    }
-
-    fn period(&self) -> f64 {
-        match &self.0 {
-            Engine::Exact(map) => map.flow.system().drive().period(),
-            Engine::Nonlinear(map) => map.nonlinear().period,
-            Engine::Coarse(map) => map.nonlinear().period,
-        }
-    }
-
-    fn discrete_entries(&self) -> usize {
-        match &self.0 {
-            Engine::Exact(_) => 0,
-            Engine::Nonlinear(map) => map.nonlinear().discrete_entries(),
-            Engine::Coarse(map) => map.nonlinear().discrete_entries(),
-        }
-    }
-
-    /// Of the exact flow under a nonlinear force, by the Runge–Kutta method of
-    /// [`nanotap_volterra::coarse`].
-    fn coarse(&self) -> Option<Self> {
-        let Engine::Nonlinear(map) = &self.0 else {
-            return None;
-        };
-        let coarse = CoarseStrobe::new(map.nonlinear())?;
-        Some(Self(Engine::Coarse(Box::new(coarse))))
-    }
-
+impl Scheduling for ModelMap {
     fn cost(&self) -> u64 {
-        match &self.0 {
-            Engine::Exact(_) => 0,
-            Engine::Nonlinear(map) => map.cost(),
-            Engine::Coarse(map) => map.cost(),
-        }
+        self.0.cost()
     }
 
     fn add_cost(&mut self, cost: u64) {
-        // Only periods of the exact flow are shared out.
-        if let Engine::Nonlinear(map) = &mut self.0 {
-            map.add_cost(cost);
-        }
+        self.0.add_cost(cost);
     }
 
-    /// Under a nonlinear force.
     fn is_costly(&self) -> bool {
-        matches!(self.0, Engine::Nonlinear(_))
+        self.0.is_costly()
     }
 
-    /// Many where the model is piecewise linear with one contact: eight at a time, and others to
-    /// fill the places of those that have come to a switch.
-    fn side_by_side(&self) -> usize {
-        match &self.0 {
-            Engine::Exact(map) if Ensemble::fits(map.flow.system()) => TOGETHER,
-            _ => 1,
-        }
+    fn coarse(&self) -> Option<Self> {
+        self.0.coarse().map(Self)
     }
 
-    fn advance(&mut self, state: &mut [f64]) -> Result<(), MotionError> {
-        match &mut self.0 {
-            Engine::Exact(map) => Ok(map.advance(state)?),
-            Engine::Nonlinear(map) => map.advance(state),
-            Engine::Coarse(map) => map.advance_by(state, 1),
-        }
-    }
-
-    fn advance_by(&mut self, state: &mut [f64], periods: usize) -> Result<(), MotionError> {
-        match &mut self.0 {
-            Engine::Exact(map) => Ok(map.advance_by(state, periods)?),
-            Engine::Nonlinear(map) => (0..periods).try_for_each(|_| map.advance(state)),
-            Engine::Coarse(map) => map.advance_by(state, periods),
-        }
+    fn batch_size(&self) -> usize {
+        self.0.batch_size()
     }
 
     fn advance_each(
@@ -188,8 +197,8 @@ impl StroboscopicMap for Strobe {
         states: &mut [f64],
         periods: &[usize],
     ) -> Vec<Result<(), MotionError>> {
-        let Some(ensemble) = self.ensemble() else {
-            return one_after_another(self, states, periods);
+        let Some(ensemble) = self.0.ensemble() else {
+            return in_sequence(self, states, periods);
         };
         let advanced = ensemble.advance(states, periods).into_iter();
         advanced.map(|result| Ok(result?)).collect()
@@ -201,11 +210,35 @@ impl StroboscopicMap for Strobe {
         periods: &[usize],
         passed: &mut [Vec<f64>],
     ) -> Vec<Result<(), MotionError>> {
-        let Some(ensemble) = self.ensemble() else {
-            return one_after_another_through(self, states, periods, passed);
+        let Some(ensemble) = self.0.ensemble() else {
+            return in_sequence_through(self, states, periods, passed);
         };
         let advanced = ensemble.advance_through(states, periods, passed);
         advanced.into_iter().map(|result| Ok(result?)).collect()
+    }
+}
+
+impl StroboscopicMap for ModelMap {
+    type Error = MotionError;
+
+    fn dimension(&self) -> usize {
+        self.0.dimension()
+    }
+
+    fn period(&self) -> f64 {
+        self.0.period()
+    }
+
+    fn discrete_entries(&self) -> usize {
+        self.0.discrete_entries()
+    }
+
+    fn advance(&mut self, state: &mut [f64]) -> Result<(), MotionError> {
+        self.0.advance(state)
+    }
+
+    fn advance_by(&mut self, state: &mut [f64], periods: usize) -> Result<(), MotionError> {
+        self.0.advance_by(state, periods)
     }
 
     fn advance_with_jacobian(
@@ -213,11 +246,7 @@ impl StroboscopicMap for Strobe {
         state: &mut [f64],
         jacobian: &mut DMatrix<f64>,
     ) -> Result<(), MotionError> {
-        match &mut self.0 {
-            Engine::Exact(map) => Ok(map.advance_with_jacobian(state, jacobian)?),
-            Engine::Nonlinear(map) => map.advance_with_derivatives(state, jacobian, None),
-            Engine::Coarse(map) => map.advance_with_jacobian(state, jacobian),
-        }
+        self.0.advance_with_jacobian(state, jacobian)
     }
 
     /// From the trace of the equations and the time in each regime, and from switches at which
@@ -227,38 +256,15 @@ impl StroboscopicMap for Strobe {
         state: &mut [f64],
         jacobian: &mut DMatrix<f64>,
     ) -> Result<Option<f64>, MotionError> {
-        match &mut self.0 {
-            Engine::Exact(map) => {
-                let determinant = map.advance_with_jacobian_and_determinant(state, jacobian)?;
-                Ok(Some(determinant).filter(|log| !log.is_nan()))
-            }
-            Engine::Nonlinear(map) => {
-                map.advance_with_derivatives(state, jacobian, None)?;
-                Ok(map.log_determinant())
-            }
-            Engine::Coarse(map) => {
-                map.advance_with_jacobian(state, jacobian)?;
-                Ok(map.nonlinear().log_determinant_everywhere())
-            }
-        }
+        self.0.advance_with_determinant(state, jacobian)
     }
 
     fn log_determinant_bound(&self) -> f64 {
-        match &self.0 {
-            Engine::Exact(map) => map.log_determinant_bound(),
-            Engine::Nonlinear(map) => map.log_determinant().unwrap_or(f64::INFINITY),
-            Engine::Coarse(map) => {
-                let known = map.nonlinear().log_determinant_everywhere();
-                known.unwrap_or(f64::INFINITY)
-            }
-        }
+        self.0.log_determinant_bound()
     }
 
     fn pass_touches(&mut self) {
-        if let Engine::Exact(map) = &mut self.0 {
-            let period = map.flow.system().drive().period();
-            map.flow.pass_touches(LONGEST_TOUCH * period);
-        }
+        self.0.pass_touches();
     }
 
     fn advance_with_tangencies(
@@ -266,42 +272,33 @@ impl StroboscopicMap for Strobe {
         state: &mut [f64],
         tangencies: &mut Vec<Tangency>,
     ) -> Result<(), MotionError> {
-        match &mut self.0 {
-            Engine::Exact(map) => Ok(map.advance_with_tangencies(state, tangencies)?),
-            Engine::Nonlinear(map) => {
-                let period = map.nonlinear().period;
-                let extrema = map.advance_with_extrema(state)?.into_iter();
-                tangencies.extend(extrema.map(|(time, value)| Tangency {
-                    phase: time / period,
-                    value,
-                }));
-                Ok(())
-            }
-            Engine::Coarse(map) => map.advance_by(state, 1),
-        }
+        self.0.advance_with_tangencies(state, tangencies)
     }
 }
 
 /// The longest touch of a rigid stop that is passed through near a grazing, in drive periods.
 const LONGEST_TOUCH: f64 = 0.1;
 
-/// The most states that are advanced together.
-const TOGETHER: usize = 64;
+/// The maximum number of states that are advanced in a batch.
+const MAX_BATCH: usize = 64;
+
+/// The map under its former name.
+pub use ModelMap as Strobe;
 
 /// How many of `count` states a thread of the present pool is best given at a time.
-pub(crate) fn together(map: &Strobe, count: usize) -> usize {
+pub(crate) fn together(map: &ModelMap, count: usize) -> usize {
     count
         .div_ceil(rayon::current_num_threads())
-        .clamp(1, map.side_by_side())
+        .clamp(1, map.batch_size())
 }
 
 /// The exact map of a piecewise-linear model.
 #[derive(Clone, Debug)]
-struct ExactStrobe {
+struct ExactMap {
     flow: Flow,
-    /// Many motions at a time, once that is asked for.
+    /// A batch of motions, set up when first used.
     ensemble: Option<Box<Ensemble>>,
-    /// The state that the flow was last left in: whoever goes on from it need not start anew.
+    /// The state that the flow was last left in, from which it can go on without a new start.
     last: Vec<f64>,
     /// Work space of a Jacobian.
     carried: Jacobian,
@@ -314,7 +311,7 @@ struct ExactStrobe {
     tangents: Arc<[SystemTangent]>,
 }
 
-impl ExactStrobe {
+impl ExactMap {
     fn new(model: &Model, tangents: Vec<SystemTangent>) -> Self {
         Self {
             flow: Flow::new(Arc::clone(&model.system)),
@@ -322,31 +319,10 @@ impl ExactStrobe {
             last: Vec::new(),
             carried: Jacobian::default(),
             gap: Arc::new(model.gap.clone()),
-            parts_at_rest: model.forgetting.is_some(),
+            parts_at_rest: model.memory_reset.is_some(),
             is_rigid: model.rigid_stop.is_some(),
             tangents: tangents.into(),
         }
-    }
-
-    fn ensemble(&mut self) -> Option<&mut Ensemble> {
-        let system = self.flow.system();
-        if self.ensemble.is_none() && Ensemble::fits(system) {
-            self.ensemble = Some(Box::new(Ensemble::new(Arc::clone(system))));
-        }
-        self.ensemble.as_deref_mut()
-    }
-
-    fn advance_with_derivatives(
-        &mut self,
-        state: &mut [f64],
-        jacobian: &mut DMatrix<f64>,
-        derivatives: &mut DMatrix<f64>,
-    ) -> Result<(), FlowError> {
-        self.begin(state)?;
-        self.flow
-            .run_period_with_sensitivities(&self.tangents, jacobian, derivatives)?;
-        self.end(state);
-        Ok(())
     }
 
     /// Puts the flow at `state`, unless that is where it is.
@@ -381,15 +357,62 @@ impl ExactStrobe {
         self.flow.state(state);
         self.last.extend_from_slice(state);
     }
+}
 
-    fn advance(&mut self, state: &mut [f64]) -> Result<(), FlowError> {
+impl EngineMap for ExactMap {
+    fn boxed(&self) -> Box<dyn EngineMap> {
+        Box::new(self.clone())
+    }
+
+    fn dimension(&self) -> usize {
+        self.flow.system().dimension()
+    }
+
+    fn period(&self) -> f64 {
+        self.flow.system().drive().period()
+    }
+
+    fn move_gap(&mut self, gap: f64, visit: &mut dyn FnMut(&mut f64)) -> Result<(), MotionError> {
+        if !gap.is_finite() {
+            return Err(FlowError::NotFinite { what: "the gap" }.into());
+        }
+        self.last.clear();
+        self.ensemble = None;
+        self.flow.system_mut().each_constant(visit);
+        visit(&mut Arc::make_mut(&mut self.gap).constant);
+        Ok(())
+    }
+
+    fn evaluations(&self) -> u64 {
+        self.flow.statistics().evaluations
+    }
+
+    /// Many where the model is piecewise linear with one contact: eight at a time, and others to
+    /// fill the places of those that have come to a switch.
+    fn batch_size(&self) -> usize {
+        if Ensemble::fits(self.flow.system()) {
+            MAX_BATCH
+        } else {
+            1
+        }
+    }
+
+    fn ensemble(&mut self) -> Option<&mut Ensemble> {
+        let system = self.flow.system();
+        if self.ensemble.is_none() && Ensemble::fits(system) {
+            self.ensemble = Some(Box::new(Ensemble::new(Arc::clone(system))));
+        }
+        self.ensemble.as_deref_mut()
+    }
+
+    fn advance(&mut self, state: &mut [f64]) -> Result<(), MotionError> {
         self.begin(state)?;
         self.flow.run_period(&mut ())?;
         self.end(state);
         Ok(())
     }
 
-    fn advance_by(&mut self, state: &mut [f64], periods: usize) -> Result<(), FlowError> {
+    fn advance_by(&mut self, state: &mut [f64], periods: usize) -> Result<(), MotionError> {
         self.begin(state)?;
         self.flow.run_periods(periods)?;
         self.end(state);
@@ -400,26 +423,37 @@ impl ExactStrobe {
         &mut self,
         state: &mut [f64],
         jacobian: &mut DMatrix<f64>,
-    ) -> Result<(), FlowError> {
+    ) -> Result<(), MotionError> {
         self.begin(state)?;
         self.run_with_jacobian(&mut (), jacobian)?;
         self.end(state);
         Ok(())
     }
 
-    /// The determinant is from the trace of the equations and the time in each regime, and from
-    /// the switches; not a number where one of them does not tell it.
-    fn advance_with_jacobian_and_determinant(
+    fn advance_with_derivatives(
         &mut self,
         state: &mut [f64],
         jacobian: &mut DMatrix<f64>,
-    ) -> Result<f64, FlowError> {
+        derivatives: &mut DMatrix<f64>,
+    ) -> Result<(), MotionError> {
+        self.begin(state)?;
+        self.flow
+            .run_period_with_sensitivities(&self.tangents, jacobian, derivatives)?;
+        self.end(state);
+        Ok(())
+    }
+
+    fn advance_with_determinant(
+        &mut self,
+        state: &mut [f64],
+        jacobian: &mut DMatrix<f64>,
+    ) -> Result<Option<f64>, MotionError> {
         self.begin(state)?;
         let sticks = self.flow.system().sticks(self.flow.regime());
         let mut sum = LogDeterminant(if sticks { f64::NAN } else { 0.0 });
         self.run_with_jacobian(&mut sum, jacobian)?;
         self.end(state);
-        Ok(sum.0)
+        Ok(Some(sum.0).filter(|log| !log.is_nan()))
     }
 
     fn log_determinant_bound(&self) -> f64 {
@@ -452,11 +486,15 @@ impl ExactStrobe {
         fastest * system.drive().period()
     }
 
+    fn pass_touches(&mut self) {
+        self.flow.pass_touches(LONGEST_TOUCH * self.period());
+    }
+
     fn advance_with_tangencies(
         &mut self,
         state: &mut [f64],
         tangencies: &mut Vec<Tangency>,
-    ) -> Result<(), FlowError> {
+    ) -> Result<(), MotionError> {
         self.begin(state)?;
         let mut collector = GapExtrema {
             gap: &self.gap,

@@ -4,11 +4,11 @@
 use nanotap_arithmetic::ComplexFunctions as _;
 use nanotap_dynamics::{
     AttractorKind, Census, CensusEnd, CensusOptions, ClassifyOptions, Control, Fraction,
-    OrbitSearch, PeriodicOrbit, StartBox, StartBoxError, StartSet, census_of, find_orbits,
+    OrbitSearch, PeriodicOrbit, StartBox, StartSet, census_of, find_orbits,
 };
 use nanotap_volterra::coarse;
 use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 
 use crate::Error;
 use crate::case::Case;
@@ -17,91 +17,17 @@ use crate::model::Model;
 use crate::model::strobe::Strobe;
 use crate::observe::time_series::state_names;
 use crate::observe::{Observables, PhysicalMotion, Set, measure};
+use crate::study::Study;
 use crate::study::approach::states_near;
 use crate::study::averaged_orbits::averaged_orbits;
 use crate::study::in_si::InSi;
-use crate::study::kind::Study;
 use crate::study::limits::MOST_PERIOD;
-use crate::study::orbit::{OrbitError, OrbitReport, report};
+use crate::study::orbit::{OrbitReport, report};
 use crate::study::proof::Prover;
-use crate::study::simulate::{Classification, SimulateError, largest_exponent};
-use crate::study::start_box::{box_with, default_box, default_starts};
+use crate::study::request::options;
+use crate::study::simulate::{Classification, largest_exponent, orbit_evidence, torus_evidence};
+use crate::study::start_box::{box_with, default_starts};
 use crate::study::value::Intervals;
-
-/// How to look for attractors.
-#[derive(Clone, Debug, PartialEq)]
-pub struct AttractorsOptions {
-    /// Starts drawn evenly from the box; `None`: starts of every size, in addition to rest and the
-    /// linear responses, until the share of starts that may lead to motions not found is small
-    /// (the box is not used then).
-    pub starts: Option<usize>,
-    /// Seed of the starts.
-    pub seed: u64,
-    /// Where a given number of starts lies; `None`: [`default_box`].
-    pub start_box: Option<StartBox>,
-    /// Budgets of each start.
-    pub classify: ClassifyOptions,
-    /// Starts settled before any attractor is known.
-    pub pilots: usize,
-    /// Share of drawn starts that may lead to motions not found, with 95 % confidence, at which no more
-    /// are drawn; `None`: [`NONLINEAR_UNSEEN`] under a nonlinear law, else [`CensusOptions`]'s.
-    pub unseen: Option<f64>,
-    /// Periods in drive periods and states at drive phase 0 of orbits that are known near the model, in
-    /// addition to those from averaging: Newton closes them before any start is drawn.
-    pub seeds: Vec<(usize, Vec<f64>)>,
-    /// Longest period of unstable orbits to list; 0: none.
-    pub unstable: usize,
-    /// Harmonics reported of each orbit.
-    pub harmonics: usize,
-}
-
-impl Default for AttractorsOptions {
-    fn default() -> Self {
-        let census = CensusOptions::default();
-        Self {
-            starts: None,
-            seed: 1,
-            start_box: None,
-            classify: census.classify,
-            pilots: census.pilots,
-            unseen: None,
-            seeds: Vec::new(),
-            unstable: 0,
-            harmonics: 20,
-        }
-    }
-}
-
-/// Why there was no census.
-#[derive(Clone, Debug, thiserror::Error)]
-pub enum AttractorsError {
-    /// Nothing to start from.
-    #[error("at least one start is needed, 0 were requested")]
-    NoStarts,
-    /// More than fit in memory.
-    #[error("{starts} starts are too many; {MOST_STARTS} at most")]
-    TooManyStarts {
-        /// The number requested.
-        starts: usize,
-    },
-    /// The box makes no sense.
-    #[error(transparent)]
-    Box(#[from] StartBoxError),
-    /// The box has another dimension than the model.
-    #[error("the box has {found} sides where {expected} are needed")]
-    Dimension {
-        /// Its sides.
-        found: usize,
-        /// The dimension of the model.
-        expected: usize,
-    },
-    /// An attractor could not be followed once more.
-    #[error(transparent)]
-    Motion(#[from] SimulateError),
-    /// An orbit could not be followed once more.
-    #[error(transparent)]
-    Orbit(#[from] OrbitError),
-}
 
 /// What a census found.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
@@ -338,6 +264,8 @@ const STARTS_IN_A_BOX: usize = 256;
 pub const NONLINEAR_UNSEEN: f64 = 0.01;
 /// Drive periods of all starts together after which no more are drawn under a nonlinear law.
 const NONLINEAR_PERIODS: usize = 600_000;
+/// Harmonics reported of each orbit.
+const HARMONICS: usize = 20;
 /// Drive periods over which a motion that does not repeat is observed.
 pub const OBSERVED_PERIODS: usize = 512;
 /// Steps of the approximate flow after which a start is left undecided.
@@ -348,28 +276,31 @@ const OUT_OF_BOUNDS: f64 = 1e6;
 /// Takes the census.
 ///
 /// # Errors
-/// [`AttractorsError`] when the options make no sense.
+/// When the options are not valid for the model, or an attractor cannot be measured.
 pub fn attractors(
     model: &Model,
     options: &AttractorsOptions,
     control: &Control<'_>,
-) -> Result<Attractors, AttractorsError> {
-    match options.starts {
-        Some(0) => return Err(AttractorsError::NoStarts),
+) -> Result<Attractors, Error> {
+    let in_box = !options.sides.0.is_empty();
+    let starts = options.starts.or(in_box.then_some(STARTS_IN_A_BOX));
+    match starts {
+        Some(0) => {
+            return Err(Error::input(
+                "expected at least one start, got 0",
+                "give 1 or more {starts}",
+            ));
+        }
         Some(starts) if starts > MOST_STARTS => {
-            return Err(AttractorsError::TooManyStarts { starts });
+            return Err(Error::input(
+                format!("{starts} starts are too many; {MOST_STARTS} at most"),
+                "give fewer {starts}",
+            ));
         }
         _ => {}
     }
-    let start_box = options
-        .start_box
-        .clone()
-        .map_or_else(|| default_box(model), Ok)?;
-    if start_box.dimension() != model.dimension() {
-        let (found, expected) = (start_box.dimension(), model.dimension());
-        return Err(AttractorsError::Dimension { found, expected });
-    }
-    let set = match options.starts {
+    let start_box = box_with(model, &options.sides.numbers()?)?;
+    let set = match starts {
         Some(count) => StartSet::given(start_box.starts_until(options.seed, count, control)),
         None => default_starts(model, options.seed)?,
     };
@@ -413,17 +344,18 @@ fn budgets(model: &Model, options: &AttractorsOptions, start_box: &StartBox) -> 
     let unseen = options.unseen.unwrap_or(usual);
     let times = (usual / unseen).max(1.0);
     CensusOptions {
-        pilots: options.pilots,
-        classify: bounded(&options.classify, start_box),
+        classify: bounded(options, start_box),
         unseen,
         max_starts: ((times * default.max_starts as f64) as usize).min(MOST_STARTS),
         max_periods: (times * periods as f64) as usize,
         max_steps: (times * default.max_steps as f64) as u64,
+        ..default
     }
 }
 
 /// The budgets of each start with a bound on the states that fits the box.
-fn bounded(classify: &ClassifyOptions, start_box: &StartBox) -> ClassifyOptions {
+fn bounded(options: &AttractorsOptions, start_box: &StartBox) -> ClassifyOptions {
+    let classify = ClassifyOptions::default();
     let widest = start_box
         .lower()
         .iter()
@@ -437,7 +369,8 @@ fn bounded(classify: &ClassifyOptions, start_box: &StartBox) -> ClassifyOptions 
     ClassifyOptions {
         bound,
         max_steps: MAX_START_STEPS,
-        ..classify.clone()
+        max_period: options.max_period,
+        ..classify
     }
 }
 
@@ -448,12 +381,12 @@ fn described(
     (options, budgets): (&AttractorsOptions, &CensusOptions),
     sides: Vec<Side>,
     unstable: Option<Vec<InSi<OrbitReport>>>,
-) -> Result<Attractors, AttractorsError> {
+) -> Result<Attractors, Error> {
     let starts = found.outcomes_by_start.len();
     let attractors = found
         .attractors
         .iter()
-        .map(|a| one(model, &a.kind, &a.state, a.fraction, options.harmonics))
+        .map(|a| one(model, &a.kind, &a.state, a.fraction))
         .collect::<Result<_, _>>()?;
     let transient_chaos = found
         .transient_chaos
@@ -528,11 +461,9 @@ fn one(
     kind: &AttractorKind,
     state: &[f64],
     fraction: Fraction,
-    harmonics: usize,
-) -> Result<AttractorReport, AttractorsError> {
-    let non_periodic = || -> Result<Option<NonPeriodic>, AttractorsError> {
-        let observables =
-            measure(model, state, OBSERVED_PERIODS, Set::ALL).map_err(SimulateError::from)?;
+) -> Result<AttractorReport, Error> {
+    let non_periodic = || -> Result<Option<NonPeriodic>, Error> {
+        let observables = measure(model, state, OBSERVED_PERIODS, Set::ALL)?;
         Ok(Some(NonPeriodic {
             period: None,
             state: state.to_vec(),
@@ -541,29 +472,16 @@ fn one(
     };
     let (classification, spectrum, evidence, orbit, non_periodic) = match kind {
         AttractorKind::Periodic(orbit) => {
-            let evidence = format!(
-                "Newton closed a period-{} orbit (residual {:.1e}); largest |multiplier| {:.6}",
-                orbit.period,
-                orbit.residual,
-                orbit.spectral_radius()
-            );
+            let evidence = orbit_evidence(orbit);
             (Classification::Periodic, None, evidence, Some(orbit), None)
         }
-        AttractorKind::QuasiPeriodic(torus) => {
-            let evidence = format!(
-                "{}; Birkhoff averages agree to {:.1} digits; nearest return {:.1e}",
-                largest_exponent(&torus.spectrum),
-                torus.birkhoff_digits,
-                torus.nearest_return
-            );
-            (
-                Classification::QuasiPeriodic,
-                Some(&torus.spectrum),
-                evidence,
-                None,
-                non_periodic()?,
-            )
-        }
+        AttractorKind::QuasiPeriodic(torus) => (
+            Classification::QuasiPeriodic,
+            Some(&torus.spectrum),
+            torus_evidence(torus),
+            None,
+            non_periodic()?,
+        ),
         AttractorKind::Chaotic { spectrum, lifetime } => {
             let evidence = format!(
                 "{}; none of {} starts escaped in {:.0} periods together (mean lifetime above {:.0} at 95 %)",
@@ -590,7 +508,7 @@ fn one(
         ),
         lyapunov_errors: spectrum.map(|s| s.errors.clone()),
         evidence,
-        orbit: orbit.map(|o| report(model, o, harmonics)).transpose()?,
+        orbit: orbit.map(|o| report(model, o, HARMONICS)).transpose()?,
         non_periodic,
         physical: None,
     })
@@ -614,7 +532,7 @@ fn unstable_orbits(
     searched: &[Vec<f64>],
     options: &AttractorsOptions,
     control: &Control<'_>,
-) -> Result<Vec<InSi<OrbitReport>>, AttractorsError> {
+) -> Result<Vec<InSi<OrbitReport>>, Error> {
     let search = OrbitSearch {
         max_period: options.unstable,
         ..OrbitSearch::default()
@@ -624,84 +542,49 @@ fn unstable_orbits(
         .filter(|orbit| !orbit.is_stable())
         .map(|orbit| {
             Ok(InSi {
-                motion: report(model, orbit, options.harmonics)?,
+                motion: report(model, orbit, HARMONICS)?,
                 physical: None,
             })
         })
         .collect()
 }
 
-/// Options of a census.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct AttractorsRequest {
-    /// Starts, spread evenly over one box of states. Without it, starts of every size, from the
-    /// resonant response down to below the gap, go on until the share of starts that may lead to
-    /// motions not found is below {unseen}, or 5000 starts or 2,000,000 drive periods (600,000 under a
-    /// nonlinear law) are done. Under a nonlinear law a start also ends after 10 million steps of the
-    /// approximate flow and all starts together after 50 million, where a step of the exact flow
-    /// counts as 100
-    #[schemars(range(min = 1, max = MOST_STARTS), extend("x-value" = "S"))]
-    pub starts: Option<usize>,
-    /// Share of starts that may lead to motions not found, with 95 % confidence, at which no more are
-    /// drawn. Without it, 0.01 under a nonlinear law and 0.002 under a piecewise-linear one; a smaller
-    /// one raises the limits of {starts}, drive periods and steps in proportion
-    #[schemars(range(min = 1e-5, max = 0.5), extend("x-value" = "PART"))]
-    pub unseen: Option<f64>,
-    /// Seed of the starts: the same seed gives the same answer on any number of threads
-    #[schemars(extend("x-value" = "K"))]
-    pub seed: u64,
-    /// Sides of one box of starts, as in a1=-1:1 or v2=-4:4; the others are derived from the linear
-    /// response to the drive. 256 starts if {starts} says no number
-    #[serde(rename = "box")]
-    #[schemars(extend("x-value" = "COORDINATE=LOW:HIGH"))]
-    pub sides: Intervals,
-    /// Longest period looked for
-    #[schemars(range(min = 1, max = MOST_PERIOD), extend("x-value" = "N"))]
-    pub max_period: usize,
-    /// Also list unstable orbits up to this period
-    #[schemars(range(min = 0, max = MOST_PERIOD), extend("x-value" = "N", "x-bare" = "4"))]
-    pub unstable: usize,
-    /// Prove in interval arithmetic that each orbit exists, is alone, and is stable or not
-    pub prove: bool,
-}
-
-impl Default for AttractorsRequest {
-    fn default() -> Self {
-        let options = AttractorsOptions::default();
-        Self {
-            starts: options.starts,
-            unseen: options.unseen,
-            seed: options.seed,
-            sides: Intervals::default(),
-            max_period: options.classify.max_period,
-            unstable: options.unstable,
-            prove: false,
-        }
-    }
-}
-
-impl AttractorsRequest {
-    /// How to look for the attractors of `model`.
-    ///
-    /// # Errors
-    /// When a side of the box is none.
-    pub fn options(&self, model: &Model) -> Result<AttractorsOptions, Error> {
-        let default = AttractorsOptions::default();
-        Ok(AttractorsOptions {
-            starts: self
-                .starts
-                .or((!self.sides.0.is_empty()).then_some(STARTS_IN_A_BOX)),
-            seed: self.seed,
-            unseen: self.unseen,
-            start_box: Some(box_with(model, &self.sides.numbers()?)?),
-            classify: ClassifyOptions {
-                max_period: self.max_period,
-                ..default.classify.clone()
-            },
-            unstable: self.unstable,
-            ..default
-        })
+options! {
+    /// Options of a census.
+    pub struct AttractorsOptions {
+        /// Starts, spread evenly over one box of states. Without it, starts of every size, from the
+        /// resonant response down to below the gap, go on until the share of starts that may lead to
+        /// motions not found is below {unseen}, or 5000 starts or 2,000,000 drive periods (600,000 under a
+        /// nonlinear law) are done. Under a nonlinear law a start also ends after 10 million steps of
+        /// the approximate flow and all starts together after 80 million, where a step of the exact
+        /// flow counts as 100
+        #[schemars(range(min = 1, max = MOST_STARTS), extend("x-value" = "S"))]
+        pub starts: Option<usize> = None,
+        /// Share of starts that may lead to motions not found, with 95 % confidence, at which no more are
+        /// drawn. Without it, 0.01 under a nonlinear law and 0.002 under a piecewise-linear one; a smaller
+        /// one raises the limits of {starts}, drive periods and steps in proportion
+        #[schemars(range(min = 1e-5, max = 0.5), extend("x-value" = "PART"))]
+        pub unseen: Option<f64> = None,
+        /// Seed of the starts: the same seed gives the same answer on any number of threads
+        #[schemars(extend("x-value" = "K"))]
+        pub seed: u64 = 1,
+        /// Sides of one box of starts, as in a1=-1:1 or v2=-4:4; the others are derived from the linear
+        /// response to the drive. 256 starts if {starts} says no number
+        #[serde(rename = "box")]
+        #[schemars(extend("x-value" = "COORDINATE=LOW:HIGH"))]
+        pub sides: Intervals = Intervals::default(),
+        /// Longest period looked for
+        #[schemars(range(min = 1, max = MOST_PERIOD), extend("x-value" = "N"))]
+        pub max_period: usize = ClassifyOptions::default().max_period,
+        /// Also list unstable orbits up to this period
+        #[schemars(range(min = 0, max = MOST_PERIOD), extend("x-value" = "N", "x-bare" = "4"))]
+        pub unstable: usize = 0,
+        /// Prove in interval arithmetic that each orbit exists, is alone, and is stable or not
+        pub prove: bool = false,
+        /// Periods in drive periods and states at drive phase 0 of orbits that are known near the model, in
+        /// addition to those from averaging: Newton closes them before any start is drawn.
+        #[serde(skip)]
+        pub seeds: Vec<(usize, Vec<f64>)> = Vec::new(),
     }
 }
 
@@ -711,22 +594,21 @@ pub struct AttractorsStudy;
 
 impl Study for AttractorsStudy {
     const NAME: &'static str = "attractors";
-    const ABOUT: &'static str = "Every motion that coexists: a census from many seeded starts";
+    const ABOUT: &'static str = "Find coexisting attractors by sampling initial states";
     const COUNTED: &'static str = "starts";
     const PARTIAL: bool = true;
-    type Request = AttractorsRequest;
+    type Options = AttractorsOptions;
     type Report = Attractors;
 
     fn compute(
         case: &Case,
-        request: &AttractorsRequest,
+        options: &AttractorsOptions,
         control: &Control<'_>,
     ) -> Result<Attractors, Error> {
         let model = case.model()?;
-        let options = request.options(&model)?;
         // A piecewise-linear census takes less time than the approach.
         let known = match model.nonlinear {
-            Some(_) => states_near(case, options.classify.max_period, control)?,
+            Some(_) => states_near(case, options.max_period, control)?,
             None => Vec::new(),
         };
         let seeds = known.into_iter().filter_map(|orbit| {
@@ -735,31 +617,15 @@ impl Study for AttractorsStudy {
         });
         let options = AttractorsOptions {
             seeds: seeds.collect(),
-            ..options
+            ..options.clone()
         };
         let mut found = attractors(&model, &options, control)?;
-        if request.prove {
+        if options.prove {
             found.prove(case);
         }
         Ok(match case.physical() {
             Some(resolved) => found.in_si(resolved),
             None => found,
         })
-    }
-}
-
-impl From<AttractorsError> for crate::Error {
-    fn from(error: AttractorsError) -> Self {
-        match error {
-            AttractorsError::NoStarts => Self::input(error.to_string(), "give 1 or more {starts}"),
-            AttractorsError::TooManyStarts { .. } => {
-                Self::input(error.to_string(), "give fewer {starts}")
-            }
-            AttractorsError::Box(_) | AttractorsError::Dimension { .. } => {
-                Self::input(error.to_string(), "change it with {box}")
-            }
-            AttractorsError::Motion(error) => error.into(),
-            AttractorsError::Orbit(error) => error.into(),
-        }
     }
 }

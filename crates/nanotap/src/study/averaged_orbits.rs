@@ -6,7 +6,7 @@
 //!
 //! Fails by omission: subharmonic motions, and motions with strong harmonics of the gap.
 
-use nanotap_dynamics::{PeriodicOrbit, ShootingOptions, StroboscopicMap, close_orbit};
+use nanotap_dynamics::{PeriodicOrbit, Scheduling as _, ShootingOptions, close_orbit};
 
 use crate::model::Model;
 use crate::model::strobe::Strobe;
@@ -49,9 +49,7 @@ fn coarse_states(mut coarse: Strobe, guesses: &[Vec<f64>]) -> Vec<Vec<f64>> {
     let mut orbits: Vec<PeriodicOrbit> = Vec::new();
     for guess in guesses {
         if let Ok(orbit) = close_orbit(&mut coarse, guess, 1, &options) {
-            let near = |known: &PeriodicOrbit| {
-                known.distance_to(&orbit).1 <= COARSE_DISTANCE * orbit.scale()
-            };
+            let near = |known: &PeriodicOrbit| known.is_near(&orbit, COARSE_DISTANCE);
             if !orbits.iter().any(near) {
                 orbits.push(orbit);
             }

@@ -2,7 +2,7 @@
 
 use nanotap_dynamics::Control;
 use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 
 use crate::Error;
 use crate::case::Case;
@@ -10,11 +10,12 @@ use crate::model::beam::MAX_MODES;
 use crate::model::cantilever::Cantilever;
 use crate::model::{Model, ModelError};
 use crate::observe::time_series::with_modes;
-use crate::study::kind::{Study, cantilever};
 use crate::study::limits::MOST_PERIOD;
 use crate::study::mode_share::ReadingsReport;
 use crate::study::orbit::{OrbitOptions, OrbitReport, orbit, spectral_radius};
+use crate::study::request::options;
 use crate::study::simulate::Classification;
+use crate::study::{Study, cantilever};
 
 /// A motion at each number of modes.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
@@ -77,11 +78,10 @@ const COMPARED_POINTS: usize = 400;
 /// When the case makes no sense.
 pub fn convergence(
     case: &Cantilever,
-    largest: usize,
-    tolerance: f64,
-    options: &OrbitOptions,
+    options: &ConvergenceOptions,
     control: &Control<'_>,
 ) -> Result<Convergence, ModelError> {
+    let (largest, tolerance) = (options.largest, options.tolerance);
     let mut orbits: Vec<Option<OrbitReport>> = Vec::new();
     let mut motions = Vec::new();
     let models: Vec<Model> = (1..=largest)
@@ -92,8 +92,9 @@ pub fn convergence(
         .collect::<Result<_, _>>()?;
     for (modes, model) in (1..).zip(&models) {
         let guess = OrbitOptions {
+            period: options.period,
             state: carried(orbits.last(), modes),
-            ..options.clone()
+            ..OrbitOptions::default()
         };
         let found = orbit(model, &guess).or_else(|_| {
             orbit(
@@ -104,7 +105,7 @@ pub fn convergence(
                 },
             )
         });
-        motions.push(motion(modes, found.as_ref().map_err(ToString::to_string)));
+        motions.push(motion(modes, found.as_ref().map_err(Error::message)));
         orbits.push(found.ok());
     }
     let difference = differences(&orbits, &models);
@@ -125,7 +126,7 @@ pub fn convergence(
 }
 
 /// The state of the motion with one mode less, the new mode at rest: a guess near which
-/// the same motion is looked for. Only where a period was asked for or found.
+/// the same motion is looked for. Only where a period was given or found.
 fn carried(previous: Option<&Option<OrbitReport>>, modes: usize) -> Option<Vec<f64>> {
     let previous = previous?.as_ref()?;
     let memory = previous.state.len() - 2 * (modes - 1);
@@ -227,56 +228,39 @@ fn verdict(
     }
 }
 
-/// What the study of convergence is asked for.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct ConvergenceRequest {
-    /// Largest number of modes
-    #[schemars(range(min = 2, max = MAX_MODES), extend("x-value" = "K"))]
-    pub largest: usize,
-    /// Difference of the tip deflection, as a part of the amplitude, that is small enough
-    #[schemars(range(min = f64::MIN_POSITIVE), extend("x-value" = "D"))]
-    pub tolerance: f64,
-    /// Period of the orbit to compare; without it, the motion to which a run from rest converges
-    #[schemars(range(min = 1, max = MOST_PERIOD), extend("x-value" = "N"))]
-    pub period: Option<usize>,
-}
-
-impl Default for ConvergenceRequest {
-    fn default() -> Self {
-        Self {
-            largest: 10,
-            tolerance: 0.01,
-            period: None,
-        }
+options! {
+    /// Options of a convergence study.
+    pub struct ConvergenceOptions {
+        /// Largest number of modes
+        #[schemars(range(min = 2, max = MAX_MODES), extend("x-value" = "K"))]
+        pub largest: usize = 10,
+        /// Difference of the tip deflection, as a part of the amplitude, that is small enough
+        #[schemars(range(min = f64::MIN_POSITIVE), extend("x-value" = "D"))]
+        pub tolerance: f64 = 0.01,
+        /// Period of the orbit to compare; without it, the motion to which a run from rest converges
+        #[schemars(range(min = 1, max = MOST_PERIOD), extend("x-value" = "N"))]
+        pub period: Option<usize> = None,
     }
 }
 
-/// How many modes are enough.
+/// Number of modes that is enough.
 #[derive(Clone, Copy, Debug)]
 pub struct ConvergenceStudy;
 
 impl Study for ConvergenceStudy {
     const NAME: &'static str = "convergence";
-    const ABOUT: &'static str = "The same motion with N = 1 … K modes: how many are enough";
-    type Request = ConvergenceRequest;
+    const ABOUT: &'static str = "Compare the motion with 1 to K modes: how many are enough";
+    type Options = ConvergenceOptions;
     type Report = Convergence;
 
     fn compute(
         case: &Case,
-        request: &ConvergenceRequest,
+        options: &ConvergenceOptions,
         control: &Control<'_>,
     ) -> Result<Convergence, Error> {
-        let options = OrbitOptions {
-            period: request.period,
-            ..OrbitOptions::default()
-        };
-        let (largest, tolerance) = (request.largest, request.tolerance);
         Ok(convergence(
             cantilever(case, Self::NAME)?,
-            largest,
-            tolerance,
-            &options,
+            options,
             control,
         )?)
     }

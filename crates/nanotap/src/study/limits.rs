@@ -1,7 +1,6 @@
-//! Most of everything that can be asked for: beyond these a study would run for days or fill
-//! the memory, and whoever asks for more has almost always mistyped.
+//! Upper limits on options: beyond these a study would run for days or fill the memory.
 
-pub use crate::observe::time_series::MOST_ROWS;
+pub use crate::observe::time_series::MAX_ROWS as MOST_ROWS;
 
 /// Longest period of an orbit, in drive periods.
 pub const MOST_PERIOD: usize = 10_000;

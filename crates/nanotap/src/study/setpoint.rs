@@ -22,81 +22,14 @@ use serde::Serialize;
 
 use super::FreeMotion;
 use super::approach::distance_sweep::{DistanceSweep, Motion, Piece, budget_text, is_same};
-use super::approach::{ApproachError, MAX_MULTIPLIER, SETPOINT_PERIODS};
+use super::approach::{MAX_MULTIPLIER, SETPOINT_PERIODS, no_drive};
+use crate::case::Case;
 use crate::case::document::CaseDocument;
 use crate::case::physical::{Kind, Remark};
-use crate::case::{Case, CaseError};
 use crate::model::strobe::Strobe;
 use crate::observe::table::shown_phase;
 use crate::observe::{Observables, OutOfRange, PhysicalMotion, Set, measure};
-
-/// Why no distance was chosen.
-#[derive(Clone, Debug, thiserror::Error)]
-pub enum SetpointError {
-    /// The case has no setpoint.
-    #[error("the case has no setpoint: give drive.setpoint, as in setpoint = 0.8")]
-    None,
-    /// There is no curve.
-    #[error(transparent)]
-    Approach(#[from] ApproachError),
-    /// The amplitude never falls so far.
-    #[error(
-        "the setpoint A/A0 = {ratio} is not reached on the way to the sample's own position \
-         (gap.tip = 0), where A/A0 is {least:.3}; raise drive.setpoint, or give gap.tip"
-    )]
-    NotReached {
-        /// The setpoint.
-        ratio: f64,
-        /// The least amplitude on the way, over A₀.
-        least: f64,
-    },
-    /// The amplitude jumps past the setpoint.
-    #[error(
-        "on approach the amplitude jumps past the setpoint A/A0 = {ratio}: from {before:.3} to \
-         {after:.3} of A0 between gap.tip = {from} and {to}; change drive.setpoint, or give gap.tip"
-    )]
-    Jump {
-        /// The setpoint.
-        ratio: f64,
-        /// Amplitude before the jump, over A₀.
-        before: f64,
-        /// Amplitude after it.
-        after: f64,
-        /// Distance before it.
-        from: String,
-        /// Distance after it.
-        to: String,
-    },
-    /// The motion has no one amplitude there.
-    #[error(
-        "on approach the motion is {what} at gap.tip = {at}, before the setpoint A/A0 = {ratio} \
-         is reached: it has no amplitude to hold; change drive.setpoint, or give gap.tip"
-    )]
-    NotPeriodic {
-        /// What it is.
-        what: &'static str,
-        /// Where.
-        at: String,
-        /// The setpoint.
-        ratio: f64,
-    },
-    /// The budget was spent first.
-    #[error(
-        "the setpoint A/A0 = {ratio} was not reached: {spent}, to gap.tip = {at}; give gap.tip, or \
-         raise drive.setpoint"
-    )]
-    Budget {
-        /// The setpoint.
-        ratio: f64,
-        /// The budget in words.
-        spent: String,
-        /// How far the lever was followed.
-        at: String,
-    },
-    /// The work was stopped.
-    #[error("stopped before the setpoint was solved for")]
-    Cancelled,
-}
+use crate::{Error, ErrorKind};
 
 /// One distance at which an orbit has the setpoint amplitude.
 #[derive(Clone, Debug, Serialize)]
@@ -218,13 +151,19 @@ impl SetpointReport {
 /// Solves the setpoint of a physical case for the distance.
 ///
 /// # Errors
-/// [`SetpointError`] when there is none to solve, or none is reached on approach.
-pub fn solve_setpoint(case: &Case, control: &Control<'_>) -> Result<SetpointReport, SetpointError> {
-    let view = case.physical().ok_or(SetpointError::None)?;
-    let ratio = view.setpoint.ok_or(SetpointError::None)?;
-    let free = FreeMotion::of(&case.model().map_err(ApproachError::Model)?);
+/// When there is none to solve, or none is reached on approach.
+pub fn solve_setpoint(case: &Case, control: &Control<'_>) -> Result<SetpointReport, Error> {
+    let none = || {
+        Error::input(
+            "the case has no setpoint: give drive.setpoint, as in setpoint = 0.8",
+            "give drive.setpoint",
+        )
+    };
+    let view = case.physical().ok_or_else(none)?;
+    let ratio = view.setpoint.ok_or_else(none)?;
+    let free = FreeMotion::of(&case.model()?);
     if !(free.reach > 0.0 && free.reach.is_finite()) {
-        return Err(ApproachError::NoDrive.into());
+        return Err(no_drive());
     }
     let target = ratio * free.amplitude;
     let mut search = Search {
@@ -236,30 +175,30 @@ pub fn solve_setpoint(case: &Case, control: &Control<'_>) -> Result<SetpointRepo
         least: f64::INFINITY,
         found: None,
     };
-    let failed = |error: CaseError| SetpointError::Approach(error.into());
     let range = (0.0, FARTHER * free.reach);
-    let mut sweep =
-        DistanceSweep::new(case, range, free.reach, SETPOINT_PERIODS, control).map_err(failed)?;
-    let place = sweep.free().map_err(failed)?;
+    let mut sweep = DistanceSweep::new(case, range, free.reach, SETPOINT_PERIODS, control)?;
+    let place = sweep.free()?;
     // A motion that does not close ends the search.
     sweep.stops_on_grid = true;
     let (pieces, place) = sweep.way(place, 0.0, |sweep, piece| search.ends_in(sweep, piece));
     sweep.stops_on_grid = false;
     if control.is_cancelled() {
-        return Err(SetpointError::Cancelled);
+        return Err(cancelled());
     }
     if let Some(steps) = sweep.spent_budget() {
-        return Err(SetpointError::Budget {
-            ratio,
-            spent: budget_text(steps),
-            at: search.distance_text(pieces.last().map_or(range.1, |piece| piece.to)),
-        });
+        return Err(Error::numerics(format!(
+            "the setpoint A/A0 = {ratio} was not reached: {}, to gap.tip = {}; give gap.tip, or raise \
+             drive.setpoint",
+            budget_text(steps),
+            search.shown(pieces.last().map_or(range.1, |piece| piece.to))
+        )));
     }
     let reached = search.found.take().unwrap_or_else(|| {
-        Err(SetpointError::NotReached {
-            ratio,
-            least: search.least / free.amplitude,
-        })
+        Err(Error::numerics(format!(
+            "the setpoint A/A0 = {ratio} is not reached on the way to the sample's own position \
+             (gap.tip = 0), where A/A0 is {:.3}; raise drive.setpoint, or give gap.tip",
+            search.least / free.amplitude
+        )))
     })?;
     // What a lever shows at this distance that comes from near.
     sweep.allow_steps(OTHERS_STEPS);
@@ -269,7 +208,7 @@ pub fn solve_setpoint(case: &Case, control: &Control<'_>) -> Result<SetpointRepo
     sweep.allow_steps(u64::MAX);
     let (mut solutions, other_states) = search.others(&sweep, &reached, control);
     if control.is_cancelled() {
-        return Err(SetpointError::Cancelled);
+        return Err(cancelled());
     }
     solutions.push(reached);
     solutions.sort_by(|a, b| b.gap.total_cmp(&a.gap));
@@ -292,15 +231,22 @@ pub fn solve_setpoint(case: &Case, control: &Control<'_>) -> Result<SetpointRepo
 pub fn at_setpoint(
     case: Case,
     control: &Control<'_>,
-) -> Result<(Case, Option<SetpointReport>), SetpointError> {
+) -> Result<(Case, Option<SetpointReport>), Error> {
     if !case.leaves_distance_to_setpoint() {
         return Ok((case, None));
     }
     let report = solve_setpoint(&case.cancelled_by(control), control)?;
     let state = report.solutions.get(report.chosen).map(|s| s.state.clone());
-    let there = case.at_distance(report.zc(), report.remark(), state.unwrap_or_default());
-    let there = there.map_err(|error| ApproachError::Model(Box::new(error).into()))?;
+    let there = case.at_distance(report.zc(), report.remark(), state.unwrap_or_default())?;
     Ok((there, Some(report)))
+}
+
+/// The error of a search that was cancelled.
+fn cancelled() -> Error {
+    Error::new(
+        ErrorKind::Stopped,
+        "stopped before the setpoint was solved for",
+    )
 }
 
 /// A case as a document, with how its setpoint was solved for the distance.
@@ -348,7 +294,7 @@ struct Search<'a> {
     /// The distance and the amplitude last passed.
     before: Option<(f64, f64)>,
     least: f64,
-    found: Option<Result<SetpointSolution, SetpointError>>,
+    found: Option<Result<SetpointSolution, Error>>,
 }
 
 /// An orbit of a branch and its amplitude.
@@ -369,7 +315,7 @@ fn amplitude(sweep: &DistanceSweep<'_>, gap: f64, orbit: &PeriodicOrbit) -> f64 
 
 impl Search<'_> {
     /// The distance in words.
-    fn distance_text(&self, gap: f64) -> String {
+    fn shown(&self, gap: f64) -> String {
         self.case.physical().map_or_else(
             || gap.to_string(),
             |view| Kind::Length.format(gap * view.scales.length),
@@ -386,11 +332,13 @@ impl Search<'_> {
                     Some(_) => "of a long period",
                     None => motion.classification.name(),
                 };
-                self.found = Some(Err(SetpointError::NotPeriodic {
-                    what,
-                    at: self.distance_text(piece.from),
-                    ratio: self.ratio,
-                }));
+                self.found = Some(Err(Error::numerics(format!(
+                    "on approach the motion is {what} at gap.tip = {}, before the setpoint A/A0 = \
+                     {} is reached: it has no amplitude to hold; change drive.setpoint, or give \
+                     gap.tip",
+                    self.shown(piece.from),
+                    self.ratio
+                ))));
                 return true;
             }
         };
@@ -422,13 +370,16 @@ impl Search<'_> {
             self.least = self.least.min(amplitude);
             if amplitude <= self.target {
                 let jumped = |(from, above): (f64, f64)| {
-                    Err(SetpointError::Jump {
-                        ratio: self.ratio,
-                        before: above / self.free.amplitude,
-                        after: amplitude / self.free.amplitude,
-                        from: self.distance_text(from),
-                        to: self.distance_text(*gap),
-                    })
+                    Err(Error::numerics(format!(
+                        "on approach the amplitude jumps past the setpoint A/A0 = {}: from {:.3} \
+                         to {:.3} of A0 between gap.tip = {} and {}; change drive.setpoint, or \
+                         give gap.tip",
+                        self.ratio,
+                        above / self.free.amplitude,
+                        amplitude / self.free.amplitude,
+                        self.shown(from),
+                        self.shown(*gap)
+                    )))
                 };
                 let crossed = before.as_ref().map(|last| {
                     self.crossing(sweep, last, &here)
@@ -618,15 +569,4 @@ fn orbit_between(
     let start = orbit.states.first()?;
     let observables = measure(&model, start, orbit.period, Set::COMMON).ok()?;
     (orbit.period == period).then_some((gap, orbit, observables))
-}
-
-impl From<SetpointError> for crate::Error {
-    fn from(error: SetpointError) -> Self {
-        match error {
-            SetpointError::Approach(error) => error.into(),
-            SetpointError::Cancelled => Self::new(crate::ErrorKind::Stopped, error.to_string()),
-            SetpointError::None => Self::input(error.to_string(), "give drive.setpoint"),
-            other => Self::numerics(other.to_string()),
-        }
-    }
 }

@@ -1,14 +1,14 @@
 //! Orbits from averaging, and the approximate map, on reference cases.
 //!
-//! `tests/reference/census` has cases and the orbits to expect, each closed by the exact flow,
-//! from a census with an independent program.
+//! `tests/reference/census` contains cases and their orbits, closed by the exact flow, from a
+//! census with an independent program.
 
 use nanotap::case::Case;
 use nanotap::case::file::Source;
 use nanotap::model::Model;
 use nanotap::model::strobe::Strobe;
 use nanotap::study::averaged_orbits::averaged_orbits;
-use nanotap_dynamics::StroboscopicMap;
+use nanotap_dynamics::{Scheduling as _, StroboscopicMap};
 use std::path::Path;
 
 /// The cases of the folder with their expected orbits.
@@ -70,9 +70,9 @@ fn averaging_finds_every_period_1_orbit() {
     }
 }
 
-/// The approximate map returns to each orbit within its error.
+/// Starting on an orbit, the approximate map stays on it within its error.
 #[test]
-fn the_coarse_map_keeps_orbits() {
+fn the_approximate_map_preserves_orbits() {
     for (name, model, expected) in cases() {
         let mut exact = Strobe::new(&model);
         let mut coarse = exact.coarse().unwrap();

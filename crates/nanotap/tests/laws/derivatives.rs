@@ -1,5 +1,5 @@
-//! Derivatives of the map under nonlinear laws, by state and by quantities of the case, against
-//! fourth-order central differences.
+//! Derivatives of the map under nonlinear laws with respect to the state and to quantities of the
+//! case, compared with fourth-order central differences.
 
 use nalgebra::DMatrix;
 use nanotap::case::{Case, Key};
@@ -8,7 +8,7 @@ use nanotap_dynamics::StroboscopicMap;
 
 use crate::common::{DMT, air};
 
-/// Largest difference over the largest entry of the column.
+/// Largest difference relative to the largest entry of the column.
 pub(crate) fn worst(case: &Case, keys: &[Key], state: &[f64]) -> f64 {
     let model = case.model().unwrap();
     let tangents = keys.iter().map(|k| case.tangent(&model, *k).unwrap());

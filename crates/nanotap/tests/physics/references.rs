@@ -73,7 +73,7 @@ fn errors(name: &str) -> (f64, f64) {
     (worst_state, worst_time)
 }
 
-/// Chaotic: errors grow by 240 in 20 periods. Asked for: 1e-9 and 1e-11.
+/// Chaotic: errors grow by 240 in 20 periods. Required: 1e-9 and 1e-11.
 #[test]
 fn chaotic_run_at_omega_2_6() {
     let (state, time) = errors("W1_Om2.6_N3");
@@ -91,7 +91,7 @@ fn undamped_runs_of_eq_24() {
     }
 }
 
-/// Regular motion for 200 periods and 400 switches at Ω = 3.5. Asked for: 1e-10.
+/// Regular motion for 200 periods and 400 switches at Ω = 3.5. Required: 1e-10.
 #[test]
 fn regular_run_of_200_periods() {
     let reference = reference("regular_Om3.5_long200");

@@ -19,7 +19,7 @@ use std::fmt;
 use nanotap_dynamics::{
     Bifurcation, BifurcationKind, Branch, BranchEnd, BranchPoint, CancelFlag, ClassifyOptions,
     ContinuationOptions, Control, Direction, LyapunovOptions, MotionKind, PeriodicOrbit,
-    ShootingOptions, StroboscopicMap as _, UndecidedReason, classify, close_orbit,
+    Scheduling as _, ShootingOptions, UndecidedReason, classify, close_orbit,
     close_orbit_from_points, continue_orbit, switch_at_flip,
 };
 
@@ -28,8 +28,8 @@ use crate::model::Model;
 use crate::model::strobe::Strobe;
 use crate::number::shortest;
 use crate::study::branch::kind_name;
+use crate::study::short_run::short_run;
 use crate::study::simulate::{Classification, Named};
-use crate::study::sweep::SweepOptions;
 
 use super::BEYOND;
 
@@ -242,10 +242,7 @@ impl<'a> DistanceSweep<'a> {
     ) -> Result<Self, CaseError> {
         let swings = reach > 0.0 && reach.is_finite();
         let far = if swings { far.max(BEYOND * reach) } else { far };
-        let sweep = SweepOptions {
-            max_period,
-            ..SweepOptions::new(Vec::new())
-        };
+        let short = short_run(max_period);
         let model = case.with(case.gap_key(), far).model()?;
         // The slowest decay of the free lever, by its trace.
         let rate = model.system.regimes().first().map_or(0.0, |free| {
@@ -264,10 +261,10 @@ impl<'a> DistanceSweep<'a> {
                 max_transient: decays.max(2048).next_power_of_two(),
                 lyapunov: LyapunovOptions {
                     max_periods: 1000,
-                    ..sweep.classify().lyapunov
+                    ..short.lyapunov
                 },
                 birkhoff_periods: 1024,
-                ..sweep.classify()
+                ..short
             },
             control,
             flag: CancelFlag::default(),

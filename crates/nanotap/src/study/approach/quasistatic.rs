@@ -9,12 +9,11 @@ use super::distance_sweep::{
     DistanceSweep, End, FoundMotion, Motion, Piece, Place, budget_text, is_same,
 };
 use super::ramp::ramp;
-use super::{
-    ApproachError, ApproachPoint, Curve, Hysteresis, StateJump, Way, branching, difference,
-};
+use super::{ApproachPoint, Curve, Hysteresis, StateJump, Way, branching, difference};
+use crate::Error;
 use crate::case::{Case, CaseError};
 use crate::study::FreeMotion;
-use crate::study::branch::{BranchReport, BranchesThrough};
+use crate::study::branch::{BranchReport, BranchesThrough, Range};
 use crate::study::simulate::Classification;
 
 /// What is reported of a curve.
@@ -81,12 +80,12 @@ pub(super) fn found(
     free: &FreeMotion,
     distances: &[f64],
     control: &Control<'_>,
-) -> Result<Found, ApproachError> {
+) -> Result<Found, Error> {
     let (case, options) = (curve.case, curve.options);
     let (from, to) = (distances[0], distances[distances.len() - 1]);
     let range = (to, from);
     let mut sweep = DistanceSweep::new(case, range, free.reach, options.max_period, control)?;
-    let (ways, first) = if options.speed.is_none() {
+    let (ways, first) = if curve.speed.is_none() {
         Ways::of(&mut sweep, from, to)?
     } else {
         let mut place = sweep.free()?;
@@ -109,11 +108,11 @@ pub(super) fn found(
         not_followed: not_followed.as_deref().unwrap_or(NOT_FOLLOWED),
     };
     let jumps = written.jumps()?;
-    let table = match options.speed {
+    let table = match curve.speed {
         Some(speed) => ramp(curve, speed, distances, &sweep.state(&first), control)?,
         None => written.table(control)?,
     };
-    let coexisting = match options.speed {
+    let coexisting = match curve.speed {
         None => written.coexisting(&table)?,
         Some(_) => Vec::new(),
     };
@@ -139,7 +138,7 @@ fn branches(
     sweep: &mut DistanceSweep<'_>,
     (near, far): (f64, f64),
     control: &Control<'_>,
-) -> Result<(Option<BranchReport>, Option<String>), ApproachError> {
+) -> Result<(Option<BranchReport>, Option<String>), Error> {
     if !curve.options.branches {
         return Ok((None, None));
     }
@@ -149,7 +148,7 @@ fn branches(
         progress: None,
         ..*control
     };
-    let mut how = branching(curve.case.gap_key(), (far, near), curve.options);
+    let mut how = branching(curve.options);
     let cut = points < USUAL_POINTS;
     if cut {
         // Two ways from each seed.
@@ -164,7 +163,12 @@ fn branches(
              orbit takes too many steps for more"
         )
     });
-    let mut branches = BranchesThrough::new(curve.case, &how)?;
+    let range = Range {
+        key: curve.case.gap_key(),
+        from: far,
+        to: near,
+    };
+    let mut branches = BranchesThrough::new(curve.case, range, &how)?;
     // A doubled branch is followed from its flip, as deep as the options say.
     let is_doubled = |k: &usize| {
         let ends = sweep.stretches[*k].ends.iter();

@@ -556,7 +556,7 @@ options! {
         /// lead to undiscovered motions is below {unseen}, or 5000 initial states or 2,000,000
         /// drive periods (600,000 under a nonlinear law) are reached. Under a nonlinear law an initial
         /// state is followed for at most 10 million steps of the approximate flow, and all together
-        /// for 60 million; a step of the exact flow counts as 100
+        /// for 80 million; a step of the exact flow counts as 100
         #[schemars(range(min = 1, max = MAX_STARTS), extend("x-value" = "S"))]
         pub starts: Option<usize> = None,
         /// Share of initial states that may lead to undiscovered motions, with 95 % confidence, at

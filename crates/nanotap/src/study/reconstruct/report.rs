@@ -166,7 +166,7 @@ impl ReconstructReport {
         let last = felt.enumerate().filter(|(_, (force, error))| {
             force.abs() > 0.03 * largest && force.abs() > 2.0 * **error
         });
-        let last = last.map(|(k, _)| k + 2).last().unwrap_or(0);
+        let last = last.map(|(k, _)| k + 2).next_back().unwrap_or(0);
         last.max(even).min(table.distance.len())
     }
 

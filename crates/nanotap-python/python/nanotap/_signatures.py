@@ -261,7 +261,7 @@ def attractors(
         until the share that may lead to undiscovered motions is below `unseen`, or
         5000 initial states or 2,000,000 drive periods (600,000 under a nonlinear
         law) are reached. Under a nonlinear law an initial state is followed for at
-        most 10 million steps of the approximate flow, and all together for 50
+        most 10 million steps of the approximate flow, and all together for 80
         million; a step of the exact flow counts as 100 (1 to 1000000).
     unseen : float | None
         Share of initial states that may lead to undiscovered motions, with 95 %

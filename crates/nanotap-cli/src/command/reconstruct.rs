@@ -114,7 +114,7 @@ fn text(case: &GivenCase, report: &ReconstructReport) -> String {
         ("standard error", Align::Point),
     ]);
     let curve = &report.table;
-    let end = report.resolved_nodes();
+    let end = report.shown_rows();
     for k in (0..end).step_by(end.div_ceil(SHOWN).max(1)) {
         let mut cells = vec![
             shown(Kind::Length, curve.distance[k], 4),

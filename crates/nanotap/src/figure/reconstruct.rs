@@ -10,7 +10,7 @@ use crate::case::units::prefixed;
 use crate::study::approach::Way;
 use crate::study::reconstruct::{ForceCurve, ReconstructReport};
 
-/// Width of a bar's caps, as a part of the range.
+/// Half length of a bar in standard errors.
 const STANDARD_ERRORS: f64 = 2.0;
 
 /// Force with bars of two standard errors, and the dissipated energy of each row against its
@@ -41,7 +41,7 @@ fn largest<'a>(values: impl IntoIterator<Item = &'a f64>) -> f64 {
 
 /// Axis of the distance, its factor, and the distances shown.
 fn distance(report: &ReconstructReport) -> (Axis, f64, [f64; 2]) {
-    let nodes = &report.table.distance[..report.resolved_nodes()];
+    let nodes = &report.table.distance[..report.shown_rows()];
     let (factor, unit) = unit(report, Kind::Length, largest(nodes));
     let (low, high) = (nodes[0], nodes[nodes.len() - 1]);
     let range = [low, high + 0.15 * (high - low)];
@@ -74,7 +74,7 @@ fn force_panel(report: &ReconstructReport) -> Panel {
     let (axis, along, range) = distance(report);
     let inside = |x: f64| (range[0]..=range[1]).contains(&x);
     let curve = &report.table;
-    let shown = &curve.force[..report.resolved_nodes()];
+    let shown = &curve.force[..report.shown_rows()];
     let (factor, unit) = unit(report, Kind::Force, largest(shown));
     let mut panel = Panel::new(axis, Axis::linear(format!("force on the tip{unit}")))
         .legend(Legend::Above)

@@ -12,7 +12,7 @@ use serde_json::Value;
 
 use crate::fit::Noise;
 
-/// Curves of `../shared`'s prototype, with the laws' own forces.
+/// Curves that another program made, with the laws' own forces.
 fn references() -> Vec<Value> {
     serde_json::from_str(include_str!("../reference/inverse.json")).unwrap()
 }
@@ -136,14 +136,6 @@ fn references_are_met_within_their_tolerance() {
             .map(|row| row.dissipation)
             .fold(0.0, f64::max);
         let truth = number(&reference["truth"]["max_dissipation_J"]);
-        println!(
-            "{}: rms {rms:.4}, minimum {least:.4}, closest {closest:.2e} m, E_dis {dissipated:.3e} of {truth:.3e} J, \
-             chi2 {:.2}, freedom {:.1}, nodes {}",
-            reference["name"],
-            report.chi2,
-            report.freedom,
-            report.table.distance.len()
-        );
         let tolerance = |name: &str| reference["tolerance"][name].as_f64();
         assert!(rms < tolerance("rms_over_scale").unwrap());
         assert!(closest.abs() < tolerance("closest_approach_m").unwrap());
@@ -165,76 +157,16 @@ fn noise_leaves_the_force_within_a_few_percent() {
         for seed in 1..=8 {
             let table = rows(reference, step, [0.02, 0.1], seed);
             let report = reconstructed(&case, table, ReconstructOptions::default());
-            println!(
-                "{step} {seed}: {:?} errors {:?} free {} {} {} chi2 {} df {}",
-                deviations(reference, &report),
-                report.errors,
-                report.free_amplitude,
-                report.free_phase,
-                report.free_rows,
-                report.chi2,
-                report.freedom
-            );
             all.push(deviations(reference, &report));
         }
         let square = |index: usize| {
             let squares = all.iter().map(|one| one[index] * one[index]);
             (squares.sum::<f64>() / all.len() as f64).sqrt()
         };
-        println!("{step}: {:?}", [0, 1, 2].map(square));
-        assert!(square(0) < rms_limit);
-        assert!(square(1) < least_limit);
+        let deviation = [0, 1, 2].map(square);
+        assert!(deviation[0] < rms_limit, "{step}: {deviation:?}");
+        assert!(deviation[1] < least_limit, "{step}: {deviation:?}");
         assert!(all.iter().all(|one| one[2].abs() < 1e-10));
-    }
-}
-
-#[test]
-#[ignore = "experiment"]
-fn experiment() {
-    let reference = &references()[0];
-    let case = lever(reference);
-    for step in [1, 4] {
-        for variant in 0..3 {
-            let mut all = Vec::new();
-            let mut covered = [0; 2];
-            for seed in 1..=24 {
-                let table = rows(reference, step, [0.02, 0.1], seed);
-                let mut options = ReconstructOptions::default();
-                if variant > 0 {
-                    options.free_amplitude = Some("20 nm".into());
-                    options.free_phase = Some(90.0);
-                }
-                if variant > 1 {
-                    options.amplitude_error = Some("0.02 nm".into());
-                    options.phase_error = Some(0.1);
-                }
-                let report = reconstructed(&case, table, options);
-                let truth = &reference["truth"];
-                for (x, f) in numbers(&truth["distance_m"])
-                    .iter()
-                    .zip(numbers(&truth["force_N"]))
-                {
-                    let k = report
-                        .table
-                        .distance
-                        .partition_point(|node| node <= x)
-                        .clamp(1, report.table.distance.len() - 1);
-                    let error = report.table.force_error[k];
-                    covered[1] += 1;
-                    covered[0] += usize::from((value_at(&report, *x) - f).abs() < 2.0 * error);
-                }
-                all.push(deviations(reference, &report));
-            }
-            let square = |index: usize| {
-                let squares = all.iter().map(|one| one[index] * one[index]);
-                (squares.sum::<f64>() / all.len() as f64).sqrt()
-            };
-            let mean = all.iter().map(|one| one[1]).sum::<f64>() / all.len() as f64;
-            println!(
-                "step {step} variant {variant}: {:?} mean of minimum {mean} covered {covered:?}",
-                [0, 1, 2].map(square)
-            );
-        }
     }
 }
 
@@ -359,8 +291,8 @@ fn an_instruments_columns_are_understood() {
         .rows
         .iter()
         .filter(|row| row.way == Some(Way::Retract));
-    assert_eq!(2 * retract.count(), report.rows.len());
-    for words in ["other way", "backwards", "row 88", "was added"] {
+    assert!(retract.count().abs_diff(report.rows.len() / 2) <= 2);
+    for words in ["other way", "backwards", "retract part", "was added"] {
         assert!(
             report.remarks.iter().any(|remark| remark.contains(words)),
             "{words}"

@@ -308,7 +308,9 @@ fn guess(case: &Case, table: &mut Table, foreign: bool, remarks: &mut Vec<String
     let mut notes: Vec<String> = Vec::new();
     if is_reversed(&distance, &amplitude) {
         distance.iter_mut().for_each(|z| *z = -*z);
-        notes.push("the distance is counted the other way: the amplitude grows with it".to_owned());
+        notes.push(
+            "the distance is counted the other way, so that the amplitude grows with it".to_owned(),
+        );
     }
     let header = Header::of(&table.columns[places.amplitude].0);
     if header.unit == "V" || header.unit == "mV" {
@@ -319,7 +321,7 @@ fn guess(case: &Case, table: &mut Table, foreign: bool, remarks: &mut Vec<String
                 table.columns[places.amplitude].0 = written(&header.name, &length);
                 notes.push(format!(
                     "the amplitude's sensitivity is taken from the slope in contact, {:.4} {length}/{}: \
-                     a few percent wrong, and more on a soft sample; state it with {{convert}}",
+                     a few percent wrong, and more on a soft sample; state it with the option `convert`",
                     1.0 / line.slope,
                     header.unit
                 ));
@@ -342,7 +344,7 @@ fn guess(case: &Case, table: &mut Table, foreign: bool, remarks: &mut Vec<String
         let counted = if sign > 0.0 { "from" } else { "backwards from" };
         notes.push(format!(
             "the phase is counted {counted} its value far from the sample, {own:.1}°, where the lever lags by \
-             {lag:.1}°: near the sample it falls, as over a repulsive sample; state it with {{convert}} if the \
+             {lag:.1}°: near the sample it falls, as over a repulsive sample; state it with the option `convert` if the \
              sample only attracts"
         ));
     }
@@ -515,7 +517,8 @@ fn turning_point(distance: &[f64]) -> Option<usize> {
         let window = &distance[k.saturating_sub(2)..(k + 3).min(count)];
         (window.iter().sum::<f64>() / window.len() as f64 - ends).abs()
     };
-    let turn = (0..count).max_by(|a, b| near(*a).total_cmp(&near(*b)))?;
+    // The first of equally far rows.
+    let turn = (0..count).min_by(|a, b| near(*b).total_cmp(&near(*a)))?;
     let inside = turn * 10 >= count && turn * 10 <= 9 * count;
     inside.then_some(turn + 1)
 }

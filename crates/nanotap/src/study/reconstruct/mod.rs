@@ -611,7 +611,7 @@ fn averaged(
     }
     let readings = readings.averaged(rows, errors);
     remarks.push(format!(
-        "{count} rows were averaged to {}; {{rows}} sets how many",
+        "{count} rows were averaged to {}; the option `rows` sets how many",
         readings.rows.len()
     ));
     Ok(readings)

@@ -154,10 +154,20 @@ pub struct PlainCurve {
 }
 
 impl ReconstructReport {
-    /// How many nodes of the table lie where rows came near enough to feel the sample: the
-    /// force beyond is small.
-    pub fn resolved_nodes(&self) -> usize {
-        even_nodes(&self.table.distance)
+    /// How many rows of the table are worth showing: up to where the force has fallen to 3 % of
+    /// its largest value or to its standard error.
+    pub fn shown_rows(&self) -> usize {
+        let table = &self.table;
+        let even = even_nodes(&table.distance);
+        let largest = table.force[..even]
+            .iter()
+            .fold(0.0, |m: f64, f| m.max(f.abs()));
+        let felt = table.force.iter().zip(&table.force_error);
+        let last = felt.enumerate().filter(|(_, (force, error))| {
+            force.abs() > 0.03 * largest && force.abs() > 2.0 * **error
+        });
+        let last = last.map(|(k, _)| k + 2).last().unwrap_or(0);
+        last.max(even).min(table.distance.len())
     }
 
     /// The table as CSV, which `sample.law = "table"` reads.

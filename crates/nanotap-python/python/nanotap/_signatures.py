@@ -9,7 +9,7 @@ from . import _datasets, _motions, _studies
 from ._arguments import Box, Progress, Varied
 from ._case import Case, Path, Value
 from ._record import Record
-from ._results import Attractors, Convergence, Fit, Lyapunov, Modes, Orbit
+from ._results import Attractors, Convergence, Fit, Lyapunov, Modes, Orbit, Reconstruction
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -26,6 +26,7 @@ __all__ = [
     "lyapunov",
     "modes",
     "orbit",
+    "reconstruct",
     "simulate",
     "sweep",
     "window",
@@ -599,6 +600,83 @@ def fit(
         "profile": profile,
     }
     return _studies.fit(case, options, threads, progress)
+
+def reconstruct(
+    case: Case,
+    *,
+    data: Any = None,
+    columns: Sequence[str] | None = None,
+    convert: Sequence[str] | None = None,
+    free_amplitude: float | str | None = None,
+    free_phase: float | None = None,
+    amplitude_error: float | str | None = None,
+    phase_error: float | None = None,
+    phase: float = 90.0,
+    rows: int = 240,
+    threads: int | None = None,
+    progress: Progress = None,
+) -> Reconstruction:
+    """Force and dissipation against distance from a measured curve.
+
+    Parameters
+    ----------
+    case : Case
+        What is studied.
+    data : Any
+        Measured curves: tables whose columns are named as in `distance (nm)`,
+        `amplitude (nm)`, `phase (deg)`, or `frequency_shift (Hz)`.
+    columns : Sequence[str] | None
+        Columns of the data that count; without it, all.
+    convert : Sequence[str] | None
+        Conversions of columns, as in Amp="58 nm/V", Phase=90-x, Zsnsr=-x or
+        Ch3=amplitude.
+    free_amplitude : float | str | None
+        Free amplitude, as in "20 nm"; without it, that of the rows far from the
+        sample.
+    free_phase : float | None
+        Free phase as measured, degrees; without it, that of the rows far from the
+        sample.
+    amplitude_error : float | str | None
+        Standard error of an amplitude, as in "0.02 nm"; without it, from the
+        scatter of the rows.
+    phase_error : float | None
+        Standard error of a phase, degrees; without it, from the scatter of the
+        rows.
+    phase : float
+        Phase that was held under frequency modulation, degrees.
+    rows : int
+        Longer curves are averaged to about this many rows (20 to 2000).
+    threads : int | None
+        Threads; without it, one a core.
+    progress : Progress
+        Whether to show a bar, or a function that is called with what is done and
+        the total.
+
+    Returns
+    -------
+    `table` (distance, force, force_error, dissipation, dissipation_error, damping,
+    damping_error), `minimum`, `closest`, the `rows`; `curve()`, the table as a
+    DataFrame, and `law_table()`, the text for `sample.table`.
+
+    Raises
+    ------
+    ValueError
+        Something that was asked for is not right.
+    RuntimeError
+        The computation did not succeed.
+    """
+    options = {
+        "data": data,
+        "columns": columns,
+        "convert": convert,
+        "free_amplitude": free_amplitude,
+        "free_phase": free_phase,
+        "amplitude_error": amplitude_error,
+        "phase_error": phase_error,
+        "phase": phase,
+        "rows": rows,
+    }
+    return _studies.reconstruct(case, options, threads, progress)
 
 def sweep(
     case: Case,

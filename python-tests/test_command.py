@@ -13,7 +13,9 @@ COMMAND = Path(sysconfig.get_path("scripts")) / "nanotap"
 
 
 def run(*arguments: str, program: tuple[str, ...] = (str(COMMAND),)):
-    return subprocess.run([*program, *arguments], capture_output=True, text=True)
+    return subprocess.run(
+        [*program, *arguments], check=False, capture_output=True, text=True
+    )
 
 
 def test_the_command_is_the_program_of_this_version():

@@ -680,7 +680,7 @@ def test_a_click_on_a_basin_starts_a_run_there(page: Any, address: str) -> None:
     ("shows", "legend"),
     [
         ("kinds of motion", "period 1"),
-        ("greatest force", ""),
+        ("peak force", ""),
         ("number of motions", "one"),
     ],
 )
@@ -697,7 +697,7 @@ def test_a_map_of_two_parameters_and_a_click_on_it(
     )
     assert legend in said
     if not legend:
-        assert "greatest force on the tip" in said
+        assert "peak force on the tip" in said
     page.mouse.click(*spot(page, "study-figure", 0, 0.6, 0.5))
     until(page, lambda: "set.alpha4=" in page.url and "set.omega=" in page.url)
     alpha4, omega = (
@@ -792,7 +792,7 @@ def test_the_keyboard_reaches_everything(page: Any, address: str) -> None:
 
 def test_few_fixed_steps_show_what_is_not_there(page: Any, address: str) -> None:
     opened(page, address, "preset=paper&steps=80")
-    assert "80 steps a period show" in page.inner_text("#spurious")
+    assert "80 steps per period" in page.inner_text("#spurious")
     assert page.locator("#fixed svg").count() == 1
 
 

@@ -316,7 +316,7 @@ def test_rows_of_states_are_runs_of_their_own(regular):
         assert float(one.tip_max) == float(many.tip_max[k])
     both = nanotap.orbit(regular, state=states, omega=[2.9, 3.0])
     assert both.tip_max.dims == ("omega", "start")
-    with pytest.raises(ValueError, match="rows of them"):
+    with pytest.raises(ValueError, match="one per row"):
         nanotap.simulate(regular, state=np.zeros((2, 2, 6)))
 
 
@@ -330,7 +330,7 @@ def test_an_orbit_of_a_physical_case_is_seen_in_si():
     period = float(series.tau[-1]) / orbit.period
     assert period == pytest.approx(1 / case.physical.drive_frequency, rel=1e-9)
     assert float(series.tip.max()) <= orbit.physical.tip_max * (1 + 1e-9)
-    assert "greatest tip deflection" in orbit._repr_html_()
+    assert "largest tip deflection" in orbit._repr_html_()
     assert "cantilever.lever" in case._repr_html_() and "PPP-FM" in case._repr_html_()
     again = pickle.loads(pickle.dumps(orbit))
     assert again.series.equals(orbit.series)

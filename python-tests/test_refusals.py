@@ -13,7 +13,7 @@ REFUSED = [
     ("simulate", {"periods": 0}, ValueError, "periods: 0 is out of range"),
     ("simulate", {"periods": -1}, ValueError, "periods: -1 is out of range"),
     ("simulate", {"periods": 2**64}, ValueError, "out of range"),
-    ("simulate", {"periods": 2.0}, TypeError, "periods: a whole number is needed"),
+    ("simulate", {"periods": 2.0}, TypeError, "periods: expected a whole number"),
     ("simulate", {"periods": True}, TypeError, "periods"),
     ("simulate", {"periods": None}, TypeError, "periods"),
     (
@@ -23,8 +23,8 @@ REFUSED = [
         "the state has 2 numbers where 6 are needed",
     ),
     ("simulate", {"state": [NAN] * 6}, ValueError, "state: `nan`"),
-    ("simulate", {"state": [[[0] * 6]]}, ValueError, "one state, or rows of them"),
-    ("simulate", {"state": ["a"] * 6}, TypeError, "state: real numbers are needed"),
+    ("simulate", {"state": [[[0] * 6]]}, ValueError, "one state, or one per row"),
+    ("simulate", {"state": ["a"] * 6}, TypeError, "state: expected real numbers"),
     ("simulate", {"state": [1j] * 6}, TypeError, "state"),
     ("simulate", {"state": [[1], [2, 3]]}, ValueError, "state"),
     ("simulate", {"max_period": 0}, ValueError, "max_period"),
@@ -58,7 +58,12 @@ REFUSED = [
     ("sweep", {"over": "omgea=2:3:4"}, ValueError, "did you mean `omega`"),
     ("sweep", {"over": "omega"}, ValueError, "omega"),
     ("sweep", {"over": 3}, TypeError, "over"),
-    ("sweep", {"over": {"omega": (2, 3)}}, ValueError, "first, last and how many"),
+    (
+        "sweep",
+        {"over": {"omega": (2, 3)}},
+        ValueError,
+        "first value, last value and count",
+    ),
     ("sweep", {"over": {"omega": (2, NAN, 4)}}, ValueError, "."),
     ("sweep", {"over": {"omega": (2, 3, 0)}}, ValueError, "."),
     ("sweep", {"over": {"omega": (2, 3, 2**62)}}, ValueError, "."),
@@ -90,7 +95,7 @@ REFUSED = [
         "sweep",
         {"over": {"omega": (2, 3, 4)}, "out": "x.csv"},
         ValueError,
-        "end the name in .zarr",
+        "use .zarr",
     ),
     ("basin", {"x": "a1=-1:1:4", "y": "a1=-1:1:4"}, ValueError, "."),
     ("basin", {"x": "a9=-1:1:4", "y": "v1=-1:1:4"}, ValueError, "a9"),
@@ -180,7 +185,7 @@ def test_what_is_no_case_is_a_type_error(name):
         "basin": {"x": "a1=-1:1:4", "y": "v1=-1:1:4"},
         "branch": {"parameter": "omega", "from_": 2, "to": 3},
     }
-    with pytest.raises(TypeError, match="a nanotap.Case is needed"):
+    with pytest.raises(TypeError, match="expected a nanotap.Case"):
         getattr(nanotap, name)({"omega": 3}, **needed.get(name, {}))
 
 

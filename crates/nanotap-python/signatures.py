@@ -2,8 +2,8 @@
 
     python crates/nanotap-python/signatures.py target/release/nanotap [--check]
 
-Names, defaults, documentation and ranges are the library's; only what is Python's own (extra
-arguments, what comes back) stands here.
+Names, defaults, documentation and ranges come from the library; only extra arguments and return
+values of Python are stated here.
 """
 
 import json
@@ -15,22 +15,32 @@ from typing import Any
 
 TARGET = Path(__file__).parent / "python" / "nanotap" / "_signatures.py"
 
-THREADS = ("threads", "int | None", "None", "Threads; without it, one a core.")
+THREADS = ("threads", "int | None", "None", "Number of threads; default: one per core.")
 PROGRESS = (
     "progress",
     "Progress",
     "None",
-    "Whether to show a bar, or a function that is called with what is done and the total.",
+    "Whether to show a bar, or a function that is called with the finished and the total count.",
 )
 ARRAYS = (
-    ("threads", "int | None", "None", "Of arrays: threads; without it, one a core."),
-    ("progress", "Progress", "None", "Of arrays: as everywhere, a bar or a function."),
+    (
+        "threads",
+        "int | None",
+        "None",
+        "Number of threads for arrays; default: one per core.",
+    ),
+    (
+        "progress",
+        "Progress",
+        "None",
+        "Progress of arrays: whether to show a bar, or a function as in other studies.",
+    ),
 )
 SERIES = (
     "series",
     "int | None",
     "None",
-    "Periods of the time series, from the start of the recording; without it, all up to 100.",
+    "Number of periods of the time series, from the start of the recording; default: all, up to 100.",
 )
 
 DATASET = (
@@ -39,27 +49,27 @@ DATASET = (
         "Path | None",
         "None",
         (
-            "The dataset, a folder ending in .zarr; where it is there already, the work goes on "
-            "where it stopped. Without it, everything is in memory."
+            "The dataset, a folder with the extension .zarr; an existing one is resumed. "
+            "Without it, everything is in memory."
         ),
     ),
     (
         "chunk",
         "str",
         '"1/1"',
-        'One of n shares only, as in "2/8"; `merge` puts the shares together.',
+        'Only one of n shares, as in "2/8"; `merge` merges the shares.',
     ),
     THREADS,
     (
         "client",
         '"Client | None"',
         "None",
-        "A Dask client, on whose workers the chunks are computed: the same bytes.",
+        "A Dask client on whose workers the chunks are computed, with the same bytes.",
     ),
     PROGRESS,
 )
 
-# What Python adds to a study: further arguments, the type of the result and what it holds.
+# Additions of Python to a study: further arguments, the type of the result and its contents.
 PYTHON: dict[str, tuple[tuple[tuple[str, str, str, str], ...], str, str]] = {
     "modes": (
         (),
@@ -73,17 +83,17 @@ PYTHON: dict[str, tuple[tuple[tuple[str, str, str, str], ...], str, str]] = {
         (SERIES, *ARRAYS),
         "xr.Dataset",
         (
-            "What was observed, by the names of the terminal's JSON: `classification`, `period`, "
+            "The observables, with the names of the terminal's JSON: `classification`, `period`, "
             "`tip_max` …; `strobe` over `strobe_period` and `state`; `events` (their times) with "
             "`event_kind`; and the time series `tip`, `gap`, `force` … over `tau`. Over arrays, "
-            "what is a number in each run, and `failure` where there is none."
+            "the numeric observables of each run, and `failure` for a run that failed."
         ),
     ),
     "orbit": (
         ARRAYS,
         "Orbit | xr.Dataset",
         (
-            "The orbit, or over arrays a Dataset of what is observed of each, with `failure` where "
+            "The orbit; over arrays, a Dataset of the observables of each, with `failure` where "
             "there is none."
         ),
     ),
@@ -99,21 +109,20 @@ PYTHON: dict[str, tuple[tuple[tuple[str, str, str, str], ...], str, str]] = {
             "The orbits over `point` (`branch`, the parameter by its name, `stable`, `tip_max`, "
             "`states` …) and the bifurcations over `bifurcation` (`bifurcation_kind`, "
             "`bifurcation_parameter`, `bifurcation_states` …); curves in two parameters over "
-            "`locus_point`. The attributes say of each branch why it ends, and what could not be "
-            "followed."
+            "`locus_point`. The attributes state why each branch ends, and list failures."
         ),
     ),
     "approach": (
         (THREADS, PROGRESS),
         "xr.Dataset",
         (
-            "What is observed over `way` (approach, retract) and the distance (by the name of its "
+            "The observables over `way` (approach, retract) and the distance (with the name of its "
             "parameter, with `zc` in metres for a physical case): `first_harmonic`, `phase`, "
             "`peak_force`, `dissipation` … and in SI `physical_A`, `physical_F_max`, "
-            "`physical_E_dis` …; the branches over `branch_point`; where the lever jumps in the "
+            "`physical_E_dis` …; the branches over `branch_point`; the jumps in the "
             "attribute `jumps`. With `fm=True` also "
             "`relative_shift`, `drive_ratio`, `sader_jarvis_force` … and in SI "
-            "`physical_frequency_shift` …, with what is held in the attribute `modulation`."
+            "`physical_frequency_shift` …, with the settings of the loop in the attribute `modulation`."
         ),
     ),
     "sweep": (
@@ -121,7 +130,7 @@ PYTHON: dict[str, tuple[tuple[tuple[str, str, str, str], ...], str, str]] = {
         "xr.Dataset",
         (
             "The dataset, as `open` opens it: lazily from `out`. After Ctrl-C, the `result` of the "
-            "exception is the dataset with what is finished, and the same call goes on in `out`."
+            "exception is the finished part of the dataset, and the same call resumes in `out`."
         ),
     ),
     "window": (
@@ -129,8 +138,7 @@ PYTHON: dict[str, tuple[tuple[tuple[str, str, str, str], ...], str, str]] = {
         "xr.Dataset",
         (
             "The sweep with `condition` over both parameters: no-contact, one-period-1, "
-            "second-state, subharmonic, irregular or undecided; `share` says how much of each "
-            "there is."
+            "second-state, subharmonic, irregular or undecided; `share` is the fraction of each."
         ),
     ),
     "basin": (
@@ -171,11 +179,11 @@ PYTHON: dict[str, tuple[tuple[tuple[str, str, str, str], ...], str, str]] = {
     ),
 }
 
-# A study of which Python adds nothing: its document by the names of the terminal's JSON.
+# A study without additions: its document, with the names of the terminal's JSON.
 DOCUMENT = (
     (THREADS, PROGRESS),
     "Record",
-    "What the terminal's JSON has, by its names.",
+    "The document, with the names of the terminal's JSON.",
 )
 
 # Studies that run over arrays of parameters.
@@ -188,7 +196,7 @@ HEAD = '''"""The function of every study. Written by signatures.py; do not edit 
 from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Literal, overload
 
-from . import _datasets, _motions, _studies
+from . import _arguments, _datasets, _motions, _studies
 from ._arguments import Box, Progress, Varied
 from ._case import Case, Path, Value
 from ._record import Record
@@ -233,7 +241,7 @@ def python_name(study: str) -> str:
 
 
 def argument_name(option: str) -> str:
-    """The keyword argument of an option: `from` is Python's own word."""
+    """The keyword argument of an option: `from` is a keyword of Python."""
     return "from_" if option == "from" else option
 
 
@@ -241,7 +249,7 @@ def function(name: str, about: str, schema: dict[str, Any]) -> str:
     options = schema["properties"]
     required = set(schema.get("required", ()))
     extra, result, returns = PYTHON.get(name, DOCUMENT)
-    arguments, documents, passed = [], [], []
+    arguments, documents = [], []
     for option, declared in options.items():
         argument = argument_name(option)
         default = None if option in required else python_default(declared)
@@ -250,7 +258,6 @@ def function(name: str, about: str, schema: dict[str, Any]) -> str:
             f"    {argument}: {kind}" + (f" = {default}" if default else "") + ","
         )
         documents.append((argument, kind, documentation(declared)))
-        passed.append(f'        "{option}": {argument},')
     for argument, kind, default, text in extra:
         arguments.append(f"    {argument}: {kind} = {default},")
         documents.append((argument, kind, text))
@@ -262,8 +269,8 @@ def function(name: str, about: str, schema: dict[str, Any]) -> str:
                 "**parameters",
                 "Varied",
                 (
-                    "Keys of the case to change. Arrays (one-dimensional, or xarray's DataArrays) "
-                    "make a Dataset over them, each a dimension."
+                    "Keys of the case to change. Arrays (one-dimensional, or xarray DataArrays) "
+                    "give a Dataset with one dimension per array."
                 ),
             )
         )
@@ -287,9 +294,7 @@ def function(name: str, about: str, schema: dict[str, Any]) -> str:
     body = "\n".join(
         [
             docstring(about, documents, returns),
-            "    options = {",
-            *passed,
-            "    }",
+            f'    options = _arguments.options("{name}", locals())',
             call,
         ]
     )
@@ -311,7 +316,7 @@ def kinds(declared: dict[str, Any]) -> list[str]:
 
 
 def words(declared: dict[str, Any]) -> list[str]:
-    """The words among which one chooses."""
+    """The names of a choice."""
     found = list(declared.get("enum", []))
     if "const" in declared:
         found.append(declared["const"])
@@ -331,6 +336,8 @@ def annotation(option: str, declared: dict[str, Any], default: str | None) -> st
         return "str | Sequence[str] | Mapping[str, Any]"
     elif "object" not in known and declared.get("items") == {"type": "string"}:
         return "Sequence[str] | None"
+    elif declared.get("x-own") and "object" in known:
+        return "Any"
     elif option in {"x", "y"}:
         return "str | Mapping[str, Any]"
     elif option == "attractors":
@@ -392,7 +399,7 @@ def docstring(about: str, documents: list[tuple[str, str, str]], returns: str) -
         "    Parameters",
         "    ----------",
         "    case : Case",
-        "        What is studied.",
+        "        The case.",
     ]
     for argument, kind, text in documents:
         lines += [f"    {argument} : {kind}", indented(text)]
@@ -407,9 +414,9 @@ def docstring(about: str, documents: list[tuple[str, str, str]], returns: str) -
         "    Raises",
         "    ------",
         "    ValueError",
-        "        Something that was asked for is not right.",
+        "        An argument is invalid; the message names it.",
         "    RuntimeError",
-        "        The computation did not succeed.",
+        "        The computation failed.",
     ]
     first = textwrap.fill(f"{about}.", 84, subsequent_indent="    ")
     return f'    """{first}\n\n' + "\n".join(lines) + '\n    """'

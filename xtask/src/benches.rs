@@ -4,6 +4,7 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 use crate::process::shown_and_kept;
+use crate::tally::Tally;
 use crate::tools::Workspace;
 
 /// The crates with benches, and headings for their tables.
@@ -22,7 +23,7 @@ const MEMORY: &str = "/dev/shm";
 ///
 /// # Errors
 /// If a bench does not build or fails, or the page cannot be written.
-pub(crate) fn run(workspace: &Workspace) -> Result<(), String> {
+pub(crate) fn run(workspace: &Workspace) -> Result<Tally, String> {
     let mut page = String::from(HEAD);
     for (name, about) in CRATES {
         let mut command = workspace.cargo(&["bench", "--quiet", "--package", name]);
@@ -43,7 +44,7 @@ pub(crate) fn run(workspace: &Workspace) -> Result<(), String> {
         .and_then(|()| std::fs::write(&path, page))
         .map_err(|error| format!("cannot write {}: {error}", path.display()))?;
     println!("\nwritten: docs/benches.md");
-    Ok(())
+    Ok(Tally::check(true))
 }
 
 const HEAD: &str = "\
@@ -193,7 +194,7 @@ speed                    fastest       │ slowest       │ median        │ m
     }
 
     #[test]
-    fn a_run_without_results_is_no_success() {
+    fn a_run_without_results_is_a_failure() {
         assert!(!succeeds_with_results(&[], true));
         assert!(!succeeds_with_results(&lines(), false));
     }

@@ -2,7 +2,8 @@
 
 use std::fs;
 
-use crate::process::succeeds;
+use crate::process::must;
+use crate::tally::Tally;
 use crate::tools::Workspace;
 
 /// Version of mdBook, which is built from source into `.tools` if it is missing there.
@@ -12,7 +13,7 @@ const MDBOOK: &str = "0.5.4";
 ///
 /// # Errors
 /// If a tool is missing or fails; the message names it.
-pub(crate) fn run(workspace: &Workspace, options: &[String]) -> Result<(), String> {
+pub(crate) fn run(workspace: &Workspace, options: &[String]) -> Result<Tally, String> {
     let mut mdbook = workspace.cargo_tool("mdbook", MDBOOK, &["--features", "search"])?;
     let folder = workspace.target().join("book");
     let sources = folder.join("src");
@@ -29,10 +30,8 @@ pub(crate) fn run(workspace: &Workspace, options: &[String]) -> Result<(), Strin
     let mut lay_out = workspace.cargo(&["run", "--release", "--package", "nanotap-book", "--"]);
     lay_out.arg(&workspace.root).arg(&sources).args(options);
     for command in [&mut lay_out, mdbook.arg("build").arg(&folder)] {
-        if !succeeds(&workspace.root, command)? {
-            return Err("the site could not be built".into());
-        }
+        must(&workspace.root, command, "the site could not be built")?;
     }
     println!("{}", folder.join("site").join("index.html").display());
-    Ok(())
+    Ok(Tally::check(true))
 }

@@ -17,94 +17,56 @@ mod wheel;
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
-use steps::{BESIDE, STEPS, Step};
+use steps::{OTHER_TASKS, STEPS, Step};
 use tally::Tally;
 use tools::Workspace;
 
 fn main() -> ExitCode {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     match select(&arguments) {
-        Ok(Selection::Help) => {
-            print!("{}", usage());
-            ExitCode::SUCCESS
-        }
-        Ok(Selection::Run(steps)) => run(&steps),
-        Ok(Selection::Bench) => finished(benches::run(&Workspace::find())),
-        Ok(Selection::Book(options)) => finished(book::run(&Workspace::find(), &options)),
-        Ok(Selection::Peers(options)) => finished(peers::run(&Workspace::find(), &options)),
+        Ok((steps, options)) => run(&steps, options),
         Err(message) => {
-            eprintln!("error: {message}\n");
-            eprint!("{}", usage());
+            eprintln!("error: {message}\n\n{}", usage());
             ExitCode::from(2)
         }
     }
 }
 
-/// Exit code of a task that is not a check.
-fn finished(outcome: Result<(), String>) -> ExitCode {
-    match outcome {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(reason) => {
-            eprintln!("error: {reason}");
-            ExitCode::FAILURE
-        }
-    }
-}
-
-/// The tasks requested on the command line.
-enum Selection {
-    Help,
-    Run(Vec<&'static Step>),
-    /// The benches.
-    Bench,
-    /// The site of the documents, with its options.
-    Book(Vec<String>),
-    /// The comparison with other solvers, with its options.
-    Peers(Vec<String>),
-}
-
-fn select(arguments: &[String]) -> Result<Selection, String> {
+/// The tasks requested on the command line, none for help, and the options of the last one.
+fn select(arguments: &[String]) -> Result<(Vec<&'static Step>, &[String]), String> {
     if arguments.is_empty() {
         return Err("name at least one task".into());
     }
-    match (arguments[0].as_str(), &arguments[1..]) {
-        ("bench", []) => return Ok(Selection::Bench),
-        ("book", options) => return Ok(Selection::Book(options.to_vec())),
-        ("peers", options) => return Ok(Selection::Peers(options.to_vec())),
-        _ => {}
-    }
     let mut selected = Vec::new();
-    for argument in arguments {
+    for (index, argument) in arguments.iter().enumerate() {
         match argument.as_str() {
-            "help" | "-h" | "--help" => return Ok(Selection::Help),
+            "help" | "-h" | "--help" => return Ok((Vec::new(), &[])),
             "test" => selected.extend(STEPS),
-            name => selected.push(
-                STEPS
-                    .iter()
-                    .chain(BESIDE)
+            name => {
+                let mut all = STEPS.iter().chain(OTHER_TASKS);
+                let step = all
                     .find(|step| step.name == name)
-                    .ok_or_else(|| format!("no task is called `{name}`"))?,
-            ),
+                    .ok_or_else(|| format!("no task is called `{name}`"))?;
+                selected.push(step);
+                if step.takes_options {
+                    return Ok((selected, &arguments[index + 1..]));
+                }
+            }
         }
     }
-    Ok(Selection::Run(selected))
+    Ok((selected, &[]))
 }
 
 fn usage() -> String {
-    use std::fmt::Write as _;
-    let mut text =
-        String::from("usage: cargo xtask <task>...\n\n  test         all of these checks:\n");
-    for step in STEPS {
-        let _ = writeln!(text, "  {:<11}  {}", step.name, step.about);
-    }
-    text.push_str("\n  other tasks:\n");
-    for step in BESIDE {
-        let _ = writeln!(text, "  {:<11}  {}", step.name, step.about);
-    }
-    text += "  bench        run every bench and write docs/benches.md\n";
-    text += "  book         build the documents as a site in target/book/site (--quick: a quick report on the paper)\n";
-    text += "  peers        compare nanotap with general solvers and write docs/peers.md (--quick, --help)\n";
-    text
+    let lines = |steps: &[Step]| -> String {
+        let line = |step: &Step| format!("  {:<11}  {}\n", step.name, step.about);
+        steps.iter().map(line).collect()
+    };
+    format!(
+        "usage: cargo xtask <task>...\n\n  test         all of these checks:\n{}\n  other tasks:\n{}",
+        lines(STEPS),
+        lines(OTHER_TASKS)
+    )
 }
 
 /// One step's outcome, for the summary.
@@ -116,18 +78,22 @@ struct Line {
     time: Duration,
 }
 
-fn run(steps: &[&'static Step]) -> ExitCode {
+fn run(steps: &[&'static Step], options: &[String]) -> ExitCode {
+    if steps.is_empty() {
+        print!("{}", usage());
+        return ExitCode::SUCCESS;
+    }
     let workspace = Workspace::find();
     let lines: Vec<Line> = steps
         .iter()
         .map(|step| {
             println!("\n── {} · {}", step.name, step.about);
             let start = Instant::now();
-            let (tally, trouble) = match (step.run)(&workspace) {
+            let (tally, trouble) = match (step.run)(&workspace, options) {
                 Ok(tally) => (tally, None),
                 Err(reason) => {
                     eprintln!("error: {reason}");
-                    (Tally::failed_check(), Some(reason))
+                    (Tally::check(false), Some(reason))
                 }
             };
             Line {

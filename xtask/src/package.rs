@@ -5,7 +5,7 @@ use std::env;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use crate::process::{output, succeeds};
+use crate::process::{check, output, succeeds};
 use crate::tally::Tally;
 use crate::tools::{Environment, Workspace};
 use crate::wheel::with_extension;
@@ -32,7 +32,7 @@ pub(crate) fn crates(workspace: &Workspace) -> Result<Tally, String> {
     // The build tests compilation, not speed; uncommitted changes are packed too.
     command.args(["--allow-dirty", "--config", "profile.dev.opt-level=0"]);
     command.args(["--config", "profile.dev.debug=0"]);
-    Ok(Tally::check(succeeds(&workspace.root, &mut command)?))
+    check(&workspace.root, &mut command)
 }
 
 /// Cargo assumes that a version never changes: files unpacked and compiled from an earlier state of
@@ -82,14 +82,7 @@ pub(crate) fn python(workspace: &Workspace) -> Result<Tally, String> {
         return Err(format!("no archive in {}", folder.display()));
     };
     let environment = Environment::empty(&workspace.root, folder.join("environment"))?;
-    let mut install = environment.program("python");
-    install.args([
-        "-m",
-        "pip",
-        "install",
-        "--quiet",
-        "--disable-pip-version-check",
-    ]);
+    let mut install = environment.pip();
     // In a separate folder: all files of an archive have the same time, and cargo would take build
     // outputs of the checkout for current.
     install
@@ -102,10 +95,13 @@ pub(crate) fn python(workspace: &Workspace) -> Result<Tally, String> {
     }
     let mut trial = environment.program("python");
     // Outside of the checkout, whose own package would be found first.
-    let said = output(&folder, trial.args(["-c", TRIAL]));
+    let printed = output(&folder, trial.args(["-c", TRIAL]));
     println!(
         "{}",
-        said.as_deref().unwrap_or("the package does not run").trim()
+        printed
+            .as_deref()
+            .unwrap_or("the package does not run")
+            .trim()
     );
-    Ok(Tally::check(said.is_some()))
+    Ok(Tally::check(printed.is_some()))
 }

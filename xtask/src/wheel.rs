@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use crate::process::succeeds;
+use crate::process::must;
 use crate::tools::{Environment, Workspace};
 
 /// Builds the wheel and leaves it as the only one in `target/wheels`.
@@ -24,9 +24,11 @@ pub(crate) fn build(workspace: &Workspace) -> Result<PathBuf, String> {
     command
         .args(["--interpreter", "python3", "--out"])
         .arg(&folder);
-    if !succeeds(&workspace.root, &mut command)? {
-        return Err("the wheel could not be built".into());
-    }
+    must(
+        &workspace.root,
+        &mut command,
+        "the wheel could not be built",
+    )?;
     match with_extension(&folder, "whl").as_slice() {
         [wheel] => Ok(wheel.clone()),
         found => Err(format!(
@@ -62,20 +64,12 @@ pub(crate) fn installed(workspace: &Workspace) -> Result<Environment, String> {
         workspace.root.join("target").join("python-tests"),
         &list,
     )?;
-    let mut command = environment.program("python");
-    command
-        .args([
-            "-m",
-            "pip",
-            "install",
-            "--quiet",
-            "--disable-pip-version-check",
-        ])
-        .args(["--force-reinstall", "--no-deps"])
-        .arg(&wheel);
-    if succeeds(&workspace.root, &mut command)? {
-        Ok(environment)
-    } else {
-        Err("the wheel could not be installed".into())
-    }
+    let mut command = environment.pip();
+    command.args(["--force-reinstall", "--no-deps"]).arg(&wheel);
+    must(
+        &workspace.root,
+        &mut command,
+        "the wheel could not be installed",
+    )?;
+    Ok(environment)
 }

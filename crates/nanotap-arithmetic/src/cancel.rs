@@ -1,60 +1,112 @@
-//! A flag that ends work.
+//! A flag that cancels long computations, from outside or at a budget of steps.
 
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, OnceLock};
 use std::time::{Duration, Instant};
 
-/// How long work with a [grace period](CancelFlag::with_grace) may go on.
+/// Time that a computation with a [grace period](CancelFlag::with_grace) may continue.
 const GRACE: Duration = Duration::from_millis(300);
 
-/// A flag that ends work from outside. Clones share the flag. The default can never be set.
+/// A flag that cancels a computation, from outside or when a budget is spent. Clones share both. The
+/// default can never be set.
 ///
-/// Systems carry it and poll it on every stretch of a motion, so that a loop over motions ends
-/// early, with errors, even where it does not poll the flag itself. It is no part of what a system
-/// is: two flags always compare equal.
+/// Systems carry the flag and poll it on every segment of a motion, so that a loop over motions
+/// ends early, with errors, even if it does not poll the flag itself. The flag is not part of a
+/// system's identity: two flags always compare equal.
 #[derive(Clone, Debug, Default)]
 pub struct CancelFlag {
     flag: Option<Arc<AtomicBool>>,
-    /// When this flag was first polled after it was set, where it has a grace period.
+    /// Time of the first poll after the flag was set, if there is a grace period.
     grace: Option<Arc<OnceLock<Instant>>>,
+    budget: Option<Arc<Budget>>,
+}
+
+/// Steps that work may take. Whether the work in a parallel section exceeds them does not depend on
+/// the order of its threads; which of its items fails does.
+#[derive(Debug)]
+struct Budget {
+    limit: u64,
+    spent: AtomicU64,
 }
 
 impl CancelFlag {
-    /// A flag that is not set and can be.
+    /// Creates a flag that is not set.
     pub fn new() -> Self {
         Self {
             flag: Some(Arc::default()),
             grace: None,
+            budget: None,
         }
     }
 
-    /// The same flag, seen as set only 0.3 s after it was first polled as set: for work that brings
-    /// finished results into a report.
+    /// The same flag, which appears set only 0.3 s after the first poll that found it set: for code
+    /// that turns finished results into a report.
     #[must_use]
     pub fn with_grace(&self) -> Self {
         Self {
             flag: self.flag.clone(),
             grace: Some(Arc::default()),
+            budget: self.budget.clone(),
         }
     }
 
-    /// Sets the flag: work that polls it ends soon.
+    /// The same flag, seen as set also once so many steps are spent. It replaces the budget that the
+    /// flag had.
+    #[must_use]
+    pub fn with_budget(&self, steps: u64) -> Self {
+        Self {
+            budget: Some(Arc::new(Budget {
+                limit: steps,
+                spent: AtomicU64::new(0),
+            })),
+            ..self.clone()
+        }
+    }
+
+    /// Counts steps of time integration towards the budget, if there is one.
+    #[inline]
+    pub fn spend(&self, steps: u64) {
+        if let Some(budget) = &self.budget {
+            budget.spent.fetch_add(steps, Ordering::Relaxed);
+        }
+    }
+
+    /// Steps spent of the budget; 0 without one.
+    pub fn spent(&self) -> u64 {
+        let budget = self.budget.as_ref();
+        budget.map_or(0, |budget| budget.spent.load(Ordering::Relaxed))
+    }
+
+    /// Whether the budget is spent.
+    #[inline]
+    pub fn is_spent(&self) -> bool {
+        let budget = self.budget.as_ref();
+        budget.is_some_and(|budget| budget.spent.load(Ordering::Relaxed) > budget.limit)
+    }
+
+    /// Whether there is a budget. Work that is shared out without waiting for it would then be counted
+    /// in an order that depends on threads.
+    pub fn has_budget(&self) -> bool {
+        self.budget.is_some()
+    }
+
+    /// Sets the flag: computations that poll it end soon.
     pub fn cancel(&self) {
         if let Some(flag) = &self.flag {
             flag.store(true, Ordering::SeqCst);
         }
     }
 
-    /// Whether the flag is set.
+    /// True if the flag is set or the budget is spent.
     #[inline]
     pub fn is_cancelled(&self) -> bool {
         match &self.flag {
             Some(flag) if flag.load(Ordering::Relaxed) => self.is_late(),
-            _ => false,
+            _ => self.is_spent(),
         }
     }
 
-    /// Whether the grace period is over, if there is one.
+    /// True if there is no grace period or it is over.
     #[cold]
     fn is_late(&self) -> bool {
         self.grace
@@ -82,6 +134,17 @@ mod tests {
         assert!(clone.is_cancelled() && !graced.is_cancelled());
         std::thread::sleep(GRACE + Duration::from_millis(5));
         assert!(graced.is_cancelled());
+    }
+
+    #[test]
+    fn a_budget_ends_work_and_clones_share_it() {
+        let flag = CancelFlag::new();
+        let limited = flag.with_budget(10);
+        limited.clone().spend(10);
+        assert!(!limited.is_cancelled());
+        limited.spend(1);
+        assert!(limited.is_cancelled() && limited.is_spent() && limited.spent() == 11);
+        assert!(!flag.is_cancelled() && !limited.with_budget(10).is_cancelled());
     }
 
     #[test]

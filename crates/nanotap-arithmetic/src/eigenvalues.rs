@@ -2,22 +2,21 @@
 
 use nalgebra::{Complex, DMatrix, Schur};
 
-/// Iteration steps allowed per row; two or three are usual.
-const STEPS: usize = 400;
+/// Largest number of iteration steps per row; two or three are usual.
+const MAX_STEPS: usize = 400;
 
 /// The eigenvalues of a finite square matrix; `None` if the iteration does not converge.
 ///
 /// The double shifts of the QR iteration come from the last two rows. For about one random 3 × 3
-/// matrix in a million they reproduce the same matrix for ever, as Francis noted for orthogonal
-/// ones; other programs then use an exceptional shift. Here the iteration is repeated with the
-/// transposed matrix and with a reflected one, which have the same eigenvalues and another last
-/// row.
+/// matrix in a million the step reproduces the same matrix, as Francis noted for orthogonal ones;
+/// other programs then use an exceptional shift. Here the iteration is repeated with the transposed
+/// matrix and with a reflected one, which have the same eigenvalues and a different last row.
 #[must_use]
 pub fn eigenvalues(matrix: &DMatrix<f64>) -> Option<Vec<Complex<f64>>> {
     if matrix.is_empty() {
         return Some(Vec::new());
     }
-    let steps = STEPS * matrix.nrows();
+    let steps = MAX_STEPS * matrix.nrows();
     let of = |matrix: DMatrix<f64>| {
         let schur = Schur::try_new(matrix, f64::EPSILON, steps)?;
         Some(schur.complex_eigenvalues().as_slice().to_vec())
@@ -42,11 +41,11 @@ mod tests {
     use crate::ComplexFunctions as _;
     use nalgebra::linalg::balancing::balance_parlett_reinsch;
 
-    /// Matrices of random tests on which the iteration cycled after balancing: the product of three
-    /// Jacobians, and a contraction. The values found must be the roots of the characteristic
-    /// polynomial, all of them.
+    /// Matrices from random tests on which the iteration cycled after balancing: the product of
+    /// three Jacobians, and a contraction. The computed values must be all the roots of the
+    /// characteristic polynomial.
     #[test]
-    fn a_circle_of_the_iteration_is_left() {
+    fn matrices_on_which_the_iteration_cycles() {
         let jacobians = [
             [
                 -0.36717797319384765,
@@ -113,7 +112,7 @@ mod tests {
         }
     }
 
-    /// Every one makes `A − λ` singular, and their sum and product are trace and determinant.
+    /// Every value makes `A − λ` singular; their sum and product are trace and determinant.
     fn are_the_eigenvalues(matrix: &DMatrix<f64>, values: &[Complex<f64>]) {
         let n = matrix.nrows();
         let size = matrix.norm();

@@ -7,12 +7,14 @@
 //!
 //! [`VERSION`] is part of every dataset: results of another arithmetic are not mixed with it.
 //!
-//! [`CancelFlag`] is here too, since every crate that computes for long polls it.
+//! [`CancelFlag`] is here because every crate with long computations polls it.
 
 mod cancel;
+mod dual;
 mod eigenvalues;
 
 pub use cancel::CancelFlag;
+pub use dual::{Dual, Scalar};
 pub use eigenvalues::eigenvalues;
 
 use nalgebra::{Complex, DMatrix};
@@ -146,8 +148,8 @@ pub fn hypot(x: f64, y: f64) -> f64 {
     libm::hypot(x, y)
 }
 
-/// Functions of complex numbers. Their names differ from those of num-complex, whose functions are
-/// the platform's wherever a crate in the same build requires them.
+/// Functions of complex numbers. Their names differ from those of num-complex, which call the
+/// platform's functions as soon as any crate in the build requests them.
 pub trait ComplexFunctions {
     /// `|z|`.
     fn modulus(self) -> f64;

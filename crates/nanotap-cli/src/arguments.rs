@@ -12,16 +12,16 @@ use crate::file;
 /// The case that a command works on.
 #[derive(Args, Clone, Debug)]
 pub(crate) struct CaseArguments {
-    /// The case file (TOML); without one, --set must say all that has no default
+    /// Case file (TOML); without one, set every required key with --set
     #[arg(value_name = "CASE")]
     pub(crate) file: Option<PathBuf>,
 
-    /// Set a key of the case, as in omega=20 or sample.stiffness="20 N/m", or take it away, as in
+    /// Set a key of the case, as in omega=20 or sample.stiffness="20 N/m", or remove it, as in
     /// sample.modulus=; may be repeated
     #[arg(long, value_name = "KEY=VALUE", allow_hyphen_values = true)]
     pub(crate) set: Vec<String>,
 
-    /// Levers and materials beside the built-in ones (TOML); may be repeated
+    /// Additional levers and materials (TOML); may be repeated
     #[arg(long, value_name = "FILE")]
     pub(crate) catalogue: Vec<PathBuf>,
 }
@@ -29,7 +29,7 @@ pub(crate) struct CaseArguments {
 /// Where data go.
 #[derive(Args, Clone, Debug)]
 pub(crate) struct OutArgument {
-    /// Write the data to this file; its ending decides the format
+    /// Write the data to this file; the extension selects the format
     #[arg(long, value_name = "PATH")]
     pub(crate) out: Option<PathBuf>,
 }
@@ -51,7 +51,7 @@ impl OutArgument {
 /// Where a picture goes.
 #[derive(Args, Clone, Debug)]
 pub(crate) struct PlotArgument {
-    /// Draw the result into this file (.svg, .png or .pdf)
+    /// Draw the result to this file (.svg, .png or .pdf)
     #[arg(long, value_name = "PATH")]
     pub(crate) plot: Option<PathBuf>,
 }

@@ -1,14 +1,17 @@
-//! Datasets at the terminal: where they go, work on them, what is said of failures.
+//! Datasets at the terminal: destination, computation, report.
 
 use std::path::{Path, PathBuf};
 
 use std::time::Instant;
 
 use clap::Args;
-use nanotap::dataset::{Schema, Share, Store, StoreError, Work, WorkError, table};
+use nanotap::case::Case;
+use nanotap::dataset::{Share, Store, StoreError, Work, WorkError, table};
+use nanotap::study::{Computation, DatasetStudy};
 use nanotap_figures::Figure;
 use serde::Serialize;
 
+use crate::arguments::PlotArgument;
 use crate::failure::Failure;
 use crate::file;
 use crate::output::Output;
@@ -18,13 +21,13 @@ use crate::{number, progress, style};
 /// Where a dataset goes, and which part of it is computed here.
 #[derive(Args, Clone, Debug)]
 pub(crate) struct DatasetArguments {
-    /// The dataset: a folder ending in .zarr, which xarray.open_zarr opens; with an ending of
-    /// .csv, a table with a line a start, beside the folder of that name. Without it, a name
-    /// is derived. Where it is there already, the work goes on where it stopped
+    /// The dataset: a folder with extension .zarr, which xarray.open_zarr opens; with .csv, also a
+    /// table with a row per start, next to the folder. Default: a name derived from the case. An
+    /// unfinished dataset is continued
     #[arg(long, value_name = "PATH")]
     pub(crate) out: Option<PathBuf>,
 
-    /// Compute one of n shares only, as in 2/8; `nanotap merge` puts the shares together
+    /// Compute only one of n shares, as in 2/8; `nanotap merge` merges the shares
     #[arg(long, value_name = "I/N", default_value_t = Share::WHOLE, hide_default_value = true)]
     pub(crate) chunk: Share,
 
@@ -41,8 +44,8 @@ pub(crate) struct Destination {
 }
 
 impl DatasetArguments {
-    /// Where the dataset goes: where it was asked to, or to `derived`.zarr. Pictures and
-    /// tables need every chunk, which a share does not have.
+    /// Where the dataset goes: as given, or to `derived`.zarr. Pictures and tables need every chunk,
+    /// which a share does not have.
     pub(crate) fn destination(
         &self,
         derived: &str,
@@ -77,17 +80,57 @@ impl DatasetArguments {
         Ok(destination)
     }
 
-    /// Makes the store, or opens it to go on, and does `compute` on it.
-    pub(crate) fn compute(
+    /// Plans the dataset of a study, computes it into a new store or one to go on with, and sums it
+    /// up; `derived` names the store unless the arguments do, `noun` is what progress counts.
+    #[expect(clippy::too_many_arguments, reason = "what three commands share")]
+    pub(crate) fn run<S: DatasetStudy>(
+        &self,
+        case: &Case,
+        options: &S::Options,
+        derived: &str,
+        noun: &'static str,
+        seed: u64,
+        plot: &PlotArgument,
+        figure: impl FnOnce(&Store) -> Result<Figure, StoreError>,
+        output: &Output,
+    ) -> Result<DatasetReport<S::Report>, Failure>
+    where
+        S::Options: Sync,
+    {
+        let begun = Instant::now();
+        let destination = self.destination(derived, plot.plot.as_deref())?;
+        plot.check()?;
+        let plan = progress::watched(S::NAME, "starts of the census", false, |control| {
+            self.threads.install(|| S::plan(case, options, control))
+        })??;
+        let store = self.compute(&destination.store, &*plan, [S::NAME, noun], output)?;
+        let missing = store.missing();
+        let summary = (missing == 0).then(|| S::report(&store)).transpose()?;
+        if let Some(path) = &destination.table {
+            write_table(&store, path)?;
+        }
+        if let Some(path) = &plot.plot {
+            file::draw(path, &figure(&store)?)?;
+        }
+        Ok(DatasetReport {
+            path: destination.store,
+            chunks: store.chunks(),
+            finished: store.chunks() - missing,
+            summary,
+            seed,
+            seconds: begun.elapsed().as_secs_f64(),
+        })
+    }
+
+    fn compute(
         &self,
         path: &Path,
-        schema: &Schema,
+        plan: &dyn Computation,
         [what, noun]: [&'static str; 2],
         output: &Output,
-        compute: impl FnOnce(&Store, &Work<'_>) -> Result<(), WorkError>,
     ) -> Result<Store, Failure> {
         let threads = self.threads.number()?;
-        let store = Store::create_or_resume(path, schema.clone())?;
+        let store = Store::create_or_resume(path, plan.schema().clone())?;
         let finished = store.chunks() - store.missing();
         if finished > 0 {
             output.note(&format!(
@@ -102,7 +145,7 @@ impl DatasetArguments {
                 threads,
                 control: *control,
             };
-            compute(&store, &work)
+            plan.compute(&store, &work)
         });
         match done {
             Ok(()) => Ok(store),
@@ -136,34 +179,6 @@ pub(crate) struct DatasetReport<S> {
 }
 
 impl<S> DatasetReport<S> {
-    /// Sums up a dataset, writes its table and draws it, as far as these were asked for.
-    pub(crate) fn of(
-        store: &Store,
-        destination: Destination,
-        plot: Option<&Path>,
-        begun: Instant,
-        seed: u64,
-        summary: impl FnOnce(&Store) -> Result<S, StoreError>,
-        figure: impl FnOnce(&Store) -> Result<Figure, StoreError>,
-    ) -> Result<Self, Failure> {
-        let missing = store.missing();
-        let summary = (missing == 0).then(|| summary(store)).transpose()?;
-        if let Some(path) = &destination.table {
-            write_table(store, path)?;
-        }
-        if let Some(path) = plot {
-            file::draw(path, &figure(store)?)?;
-        }
-        Ok(Self {
-            path: destination.store,
-            chunks: store.chunks(),
-            finished: store.chunks() - missing,
-            summary,
-            seed,
-            seconds: begun.elapsed().as_secs_f64(),
-        })
-    }
-
     /// The text: `summed` of the summary, or how far the work is, and where the dataset lies.
     pub(crate) fn text(&self, heading: &str, summed: impl FnOnce(&S) -> String) -> String {
         let body = self.summary.as_ref().map_or_else(
@@ -184,8 +199,7 @@ impl<S> DatasetReport<S> {
     }
 }
 
-/// The name of a dataset without its ending, when nobody says one: of the case file and
-/// what is varied.
+/// The default name of a dataset without its ending: of the case file and what is varied.
 pub(crate) fn derived_name(case: Option<&Path>, what: &[&str]) -> String {
     let stem = case
         .and_then(Path::file_stem)

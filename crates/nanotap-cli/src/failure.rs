@@ -21,7 +21,7 @@ pub(crate) fn report(mut error: Failure) -> u8 {
         error = Failure::stopped();
     }
     let error = error.written(flag);
-    // A snippet of the case file, or a key that was set beside it, is drawn with its help.
+    // A snippet of the case file, or a key of --set, is drawn with its help.
     let of_case = |problem: &ErrorProblem| {
         matches!(problem.place, ErrorPlace::Span(_) | ErrorPlace::Override(_))
     };
@@ -30,7 +30,7 @@ pub(crate) fn report(mut error: Failure) -> u8 {
     } else {
         error.problems.iter().map(plain).collect()
     };
-    anstream::eprint!("{text}");
+    anstream::eprint!("{}", style::safe(&text));
     code
 }
 
@@ -55,7 +55,7 @@ fn plain(problem: &ErrorProblem) -> String {
     }
 }
 
-/// All problems of a case, each with the line of the file that it stands in.
+/// All problems of a case, each with its line of the file.
 fn drawn(error: &Failure) -> String {
     let renderer = Renderer::styled();
     let drawn: Vec<String> = error

@@ -22,8 +22,9 @@ static FORCE: AtomicBool = AtomicBool::new(false);
 /// What this command was asked to write.
 static CLAIMED: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
 
-/// How the tables begin that commands write, and what stands in those of datasets.
-const TABLES: [&str; 12] = [
+/// Beginnings of the tables that commands write, and columns of those of datasets.
+const TABLES: [&str; 13] = [
+    "line,direction,",
     "tau,tip,tip_rate",
     "order,tip,tip_lag_degrees",
     "attractor,classification,",
@@ -45,7 +46,7 @@ pub(crate) fn force() {
 }
 
 /// The ending of `path`, in lower case, among those that can be written there, if the file may
-/// be written: nobody else's, and asked for once.
+/// be written: a file of nanotap or none, and requested once.
 pub(crate) fn claim<'a>(path: &Path, endings: &[&'a str]) -> Result<&'a str, Failure> {
     let ending = ending(path, endings)?;
     let place = fs::canonicalize(path).unwrap_or_else(|_| path.to_path_buf());
@@ -53,11 +54,14 @@ pub(crate) fn claim<'a>(path: &Path, endings: &[&'a str]) -> Result<&'a str, Fai
     if !claimed.insert(place) {
         return Err(Failure::input(
             format!("{}: two outputs cannot go to one file", path.display()),
-            "give each a name of its own",
+            "give each output a different name",
         ));
     }
     if path.is_dir() {
         return Err(refused(path, "it is a folder"));
+    }
+    if path.exists() && !path.is_file() {
+        return Err(refused(path, "it is not a regular file"));
     }
     if !FORCE.load(Ordering::Relaxed) && path.is_file() {
         let there = fs::read(path).map_err(|error| refused(path, error))?;
@@ -199,11 +203,8 @@ pub(crate) fn ending<'a>(path: &Path, endings: &[&'a str]) -> Result<&'a str, Fa
         .ok_or_else(|| {
             let list: Vec<String> = endings.iter().map(|ending| format!(".{ending}")).collect();
             Failure::input(
-                format!(
-                    "{}: the ending says no format that is written here",
-                    path.display()
-                ),
-                format!("end the name in {}", alternatives(&list)),
+                format!("{}: unsupported file extension", path.display()),
+                format!("use {}", alternatives(&list)),
             )
         })
 }

@@ -1,4 +1,4 @@
-//! The case of a command at the terminal: remarks are said, wrong names and values become
+//! The case of a command at the terminal: remarks are printed, wrong names and values become
 //! failures with advice.
 
 use std::ops::Deref;
@@ -31,31 +31,34 @@ pub(crate) fn at_setpoint(case: Case) -> Result<(Case, Option<SetpointReport>), 
     if !case.leaves_distance_to_setpoint() {
         return Ok((case, None));
     }
-    Ok(progress::watched(
-        "setpoint",
-        "distances",
-        false,
-        |control| setpoint::at_setpoint(case, control),
-    )?)
+    progress::watched("setpoint", "distances", false, |control| {
+        setpoint::at_setpoint(case, control)
+    })
 }
 
 impl GivenCase {
-    /// The case of the arguments. What puts a physical case in doubt is said, and what of its file
-    /// does not count; its other notes are `nanotap case`'s.
-    pub(crate) fn of(arguments: &CaseArguments, output: &Output) -> Result<Self, Failure> {
-        let (case, setpoint) = at_setpoint(case_of(arguments)?)?;
+    /// The case of the arguments, for a study that takes a case at any distance or at its setpoint.
+    /// Warnings about a physical case are printed, and keys of its file that do not count; other
+    /// notes are `nanotap case`'s.
+    pub(crate) fn for_study(
+        arguments: &CaseArguments,
+        any_distance: bool,
+        output: &Output,
+    ) -> Result<Self, Failure> {
+        let case = case_of(arguments)?;
+        if any_distance {
+            return Ok(Self::warned(case, output));
+        }
+        let (case, setpoint) = at_setpoint(case)?;
         if let Some(setpoint) = &setpoint {
             output.note(&setpoint.remark().text);
         }
         Ok(Self::warned(case, output))
     }
 
-    /// The same, but a setpoint is not solved for: for experiments that vary the distance.
-    pub(crate) fn with_any_distance(
-        arguments: &CaseArguments,
-        output: &Output,
-    ) -> Result<Self, Failure> {
-        Ok(Self::warned(case_of(arguments)?, output))
+    /// The case of the arguments at its setpoint.
+    pub(crate) fn of(arguments: &CaseArguments, output: &Output) -> Result<Self, Failure> {
+        Self::for_study(arguments, false, output)
     }
 
     fn warned(case: Case, output: &Output) -> Self {
@@ -70,11 +73,11 @@ impl GivenCase {
         Self(case)
     }
 
-    /// Says what stays while these keys vary, as the words that make one of the points again.
-    pub(crate) fn say_held(&self, keys: &[Key], output: &Output) {
+    /// Prints the keys that stay constant while these keys vary, as the words that reproduce a point.
+    pub(crate) fn note_constants(&self, keys: &[Key], output: &Output) {
         let mut words: Vec<String> = Vec::new();
         for key in keys {
-            for (held, value) in self.held(*key) {
+            for (held, value) in self.implied_constants(*key) {
                 let word = format!("--set {held}=\"{}\"", held.kind().format_exact(value));
                 if !keys.contains(&held) && !words.contains(&word) {
                     words.push(word);
@@ -130,7 +133,7 @@ impl GivenCase {
 /// What the case is called in a heading: its file, or that it was typed.
 fn title(arguments: &CaseArguments) -> String {
     arguments.file.as_ref().map_or_else(
-        || "the case that was typed".to_owned(),
+        || "case from --set".to_owned(),
         |file| file.display().to_string(),
     )
 }

@@ -1,4 +1,4 @@
-//! The nanotap terminal program.
+//! The `nanotap` command-line program.
 
 use std::process::ExitCode;
 

@@ -1,4 +1,4 @@
-//! What is said of a motion: observables, energy, spectrum, multipliers. Shared by every
+//! The text of a motion: observables, energy, spectrum, multipliers. Shared by every
 //! command that shows motions.
 
 use std::fmt::Write as _;
@@ -9,7 +9,7 @@ use nanotap::case::units::Units;
 use nanotap::model::Model;
 use nanotap::observe::table::shown_phase;
 use nanotap::observe::{
-    Derivative, Harmonic, Observables, OutOfRange, PhysicalMotion, Set, Spectrum, Value,
+    Derivative, Harmonic, ObservableSet, Observables, OutOfRange, PhysicalMotion, Spectrum, Value,
     time_series,
 };
 use nanotap::study::proof::ProofReport;
@@ -37,14 +37,19 @@ pub(crate) fn lag(phase: f64, tone: &str, digits: usize) -> String {
 }
 
 /// What was observed: tip, gap, contact, force and energy; of a choice of observables a row each.
-pub(crate) fn observed(o: &Observables, chosen: Option<Set>, units: &Units, beam: bool) -> String {
+pub(crate) fn observed(
+    o: &Observables,
+    chosen: Option<ObservableSet>,
+    units: &Units,
+    beam: bool,
+) -> String {
     match chosen {
         Some(chosen) => choice(o, chosen, units),
         None => format!("{}\n{}", observables(o, units, beam), energy(o, units)),
     }
 }
 
-fn choice(o: &Observables, chosen: Set, units: &Units) -> String {
+fn choice(o: &Observables, chosen: ObservableSet, units: &Units) -> String {
     let mut table = Table::new([
         ("", Align::Left),
         ("", Align::Left),
@@ -83,12 +88,6 @@ fn choice(o: &Observables, chosen: Set, units: &Units) -> String {
 
 /// Tip, gap, contact and force.
 fn observables(o: &Observables, units: &Units, beam: bool) -> String {
-    let mut table = Table::new([
-        ("", Align::Left),
-        ("", Align::Left),
-        ("", Align::Left),
-        ("", Align::Left),
-    ]);
     let si = |kind: Kind, value: f64| {
         units
             .si(kind)
@@ -106,94 +105,82 @@ fn observables(o: &Observables, units: &Units, beam: bool) -> String {
             number::significant(high, 6)
         )
     };
+    let mut table = Table::new([("", Align::Left); 4]);
+    let row = |name: &str, value: f64, digits, kind, note: &str| {
+        let number = number::significant(value, digits);
+        [name.to_owned(), number, si(kind, value), note.to_owned()]
+    };
+    let length = |name, value, note: &str| row(name, value, 6, Kind::Length, note);
+    let words = |name: &str, what: &str, note: &str| {
+        [
+            name.to_owned(),
+            what.to_owned(),
+            String::new(),
+            note.to_owned(),
+        ]
+    };
+    let between = |name: &str, [low, high]: [f64; 2], note: String| {
+        let in_si = si_range(Kind::Length, low, high);
+        [name.to_owned(), range(low, high), in_si, note]
+    };
     let tip = if beam {
         "tip deflection W"
     } else {
         "displacement x"
     };
-    table.row([
-        tip,
-        &range(o.tip_min, o.tip_max),
-        &si_range(Kind::Length, o.tip_min, o.tip_max),
-        &format!("mean {}", number::significant(o.mean_deflection, 4)),
-    ]);
-    table.row([
-        "amplitude",
-        &number::significant(o.amplitude, 6),
-        &si(Kind::Length, o.amplitude),
-        "half of peak to peak",
-    ]);
-    table.row([
+    let mean = format!("mean {}", number::significant(o.mean_deflection, 4));
+    table.row(between(tip, [o.tip_min, o.tip_max], mean));
+    table.row(length("amplitude", o.amplitude, "half of peak to peak"));
+    let behind = lag(o.phase, "the drive", 4);
+    table.row(length(
         "at the drive's frequency",
-        &number::significant(o.first_harmonic, 6),
-        &si(Kind::Length, o.first_harmonic),
-        &lag(o.phase, "the drive", 4),
-    ]);
+        o.first_harmonic,
+        &behind,
+    ));
     if let Some((amplitude, phase)) = o.tone2_response.zip(o.tone2_lag) {
-        table.row([
-            "at the second tone",
-            &number::significant(amplitude, 6),
-            &si(Kind::Length, amplitude),
-            &lag(phase, "that tone", 4),
-        ]);
+        let behind = lag(phase, "that tone", 4);
+        table.row(length("at the second tone", amplitude, &behind));
     }
     if let Some((amplitude, phase)) = o.tip_motion.zip(o.tip_motion_phase) {
-        table.row([
-            "the tip itself moves",
-            &number::significant(amplitude, 6),
-            &si(Kind::Length, amplitude),
-            &format!("{}, deflection and base", lag(phase, "the base", 4)),
-        ]);
+        let behind = format!("{}, deflection and base", lag(phase, "the base", 4));
+        table.row(length("the tip itself moves", amplitude, &behind));
     }
-    table.row([
-        "gap",
-        &range(o.gap_range[0], o.gap_range[1]),
-        &si_range(Kind::Length, o.gap_range[0], o.gap_range[1]),
-        "",
-    ]);
+    table.row(between("gap", o.gap_range, String::new()));
     if o.contacts_per_period > 0.0 || o.contact_fraction > 0.0 {
         let grazing = match o.grazing_contacts.unwrap_or(0) {
             0 => String::new(),
             n => format!(", {n} of them grazing"),
         };
+        let count = number::significant(o.contacts_per_period, 3);
+        let count = format!("{count} a period{grazing}");
         // A rigid stop is touched for an instant.
-        let (name, share) = if o.contact_fraction > 0.0 {
-            let percent = number::significant(100.0 * o.contact_fraction, 4);
-            ("contact", format!("{percent} % of the time"))
-        } else {
-            ("impacts", String::new())
-        };
-        table.row([
-            name,
-            &share,
-            "",
-            &format!(
-                "{} a period{grazing}",
-                number::significant(o.contacts_per_period, 3)
-            ),
-        ]);
-        table.row([
-            "speed of approach",
-            &number::significant(o.impact_speed, 5),
-            &si(Kind::Velocity, o.impact_speed),
-            "greatest at which a contact begins",
-        ]);
         if o.contact_fraction > 0.0 {
+            let percent = number::significant(100.0 * o.contact_fraction, 4);
+            table.row(words(
+                "contact",
+                &format!("{percent} % of the time"),
+                &count,
+            ));
+        } else {
+            table.row(words("impacts", "", &count));
+        }
+        let greatest = "largest at which a contact begins";
+        let speed = o.impact_speed;
+        table.row(row("impact speed", speed, 5, Kind::Velocity, greatest));
+        if o.contact_fraction > 0.0 {
+            let force = format!("up to {}", number::significant(o.peak_force, 6));
+            let mean = format!("mean {}", number::significant(o.mean_force, 4));
             table.row([
                 "force on the tip",
-                &format!("up to {}", number::significant(o.peak_force, 6)),
+                &force,
                 &si(Kind::Force, o.peak_force),
-                &format!("mean {}", number::significant(o.mean_force, 4)),
+                &mean,
             ]);
-            table.row([
-                "indentation",
-                &number::significant(o.indentation, 5),
-                &si(Kind::Length, o.indentation),
-                "greatest depth below the resting surface",
-            ]);
+            let depth = "largest depth below the surface at rest";
+            table.row(row("indentation", o.indentation, 5, Kind::Length, depth));
         }
     } else {
-        table.row(["contact", "none", "", ""]);
+        table.row(words("contact", "none", ""));
     }
     // An attraction acts without contact too.
     if o.least_force < 0.0 {
@@ -201,16 +188,17 @@ fn observables(o: &Observables, units: &Units, beam: bool) -> String {
             "pull of the sample",
             &format!("up to {}", number::significant(-o.least_force, 6)),
             &si(Kind::Force, -o.least_force),
-            "greatest force on the tip towards the sample",
+            "largest force on the tip towards the sample",
         ]);
     }
     if o.peak_force > 0.0 || o.least_force < 0.0 {
+        let electronvolts = |unit| format_electronvolts(unit * o.virial);
         table.row([
             "virial ⟨F·W⟩",
             &number::significant(o.virial, 5),
             &units
                 .si(Kind::Energy)
-                .map_or_else(String::new, |u| format_electronvolts(u * o.virial)),
+                .map_or_else(String::new, electronvolts),
             "mean of force times deflection",
         ]);
     }
@@ -220,26 +208,16 @@ fn observables(o: &Observables, units: &Units, beam: bool) -> String {
         } else {
             format!("at ξ = {}", number::significant(xi, 3))
         };
-        table.row([
-            "beam clearance",
-            &number::significant(height, 5),
-            &si(Kind::Length, height),
-            &format!("least height of the beam, {place}"),
-        ]);
+        let least = format!("smallest height of the beam, {place}");
+        table.row(row("beam clearance", height, 5, Kind::Length, &least));
     }
     if let Some([low, high]) = o.slope_range {
-        table.row(["slope at the tip", &range(low, high), "", ""]);
+        table.row(words("slope at the tip", &range(low, high), ""));
     }
     if let Some((amplitude, phase)) = o.optical_amplitude.zip(o.optical_phase) {
-        table.row([
-            "an optical lever reads",
-            &number::significant(amplitude, 6),
-            &si(Kind::Length, amplitude),
-            &format!(
-                "{}, calibrated by a static force",
-                lag(phase, "the drive", 4)
-            ),
-        ]);
+        let behind = lag(phase, "the drive", 4);
+        let behind = format!("{behind}, calibrated by a static force");
+        table.row(length("an optical lever reads", amplitude, &behind));
     }
     table.render()
 }

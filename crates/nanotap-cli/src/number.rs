@@ -1,5 +1,8 @@
 //! Numbers as a person reads them, and as a table holds them.
 
+use nanotap::case::physical::Kind;
+use nanotap::case::quantity::format_electronvolts;
+use nanotap::case::units::Units;
 use nanotap::number::shortest;
 
 /// `value` with `digits` significant digits: `0.1447`, `20.34`, `3.113e-8`.
@@ -35,7 +38,16 @@ pub(crate) fn significant(value: f64, digits: usize) -> String {
     }
 }
 
-/// A number that somebody chose, as short as it can be without changing it:
+/// A number of the model with so many digits; where the case has SI, the quantity with so many.
+pub(crate) fn quantity(units: &Units, kind: Kind, value: f64, [model, si]: [usize; 2]) -> String {
+    match (units.si(kind), kind) {
+        (None, _) => significant(value, model),
+        (Some(unit), Kind::Energy) => format_electronvolts(unit * value),
+        (Some(unit), _) => kind.format_digits(unit * value, si),
+    }
+}
+
+/// A number that was given, as short as it can be without changing it:
 /// `0.1`, `20`, `1e-9`.
 pub(crate) fn chosen(value: f64) -> String {
     let size = value.abs();

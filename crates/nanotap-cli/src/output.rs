@@ -29,7 +29,7 @@ impl Output {
         self.quiet
     }
 
-    /// Prints a result: as the one JSON document where that was asked for, else the
+    /// Prints a result: with --json as the one JSON document, else the
     /// text that `text` makes.
     pub(crate) fn result<R: Serialize>(
         &self,
@@ -67,7 +67,7 @@ impl Output {
     pub(crate) fn note(&self, text: &str) {
         if !self.quiet {
             progress::clear();
-            anstream::eprintln!("{}", style::note(&page::remark(text)));
+            anstream::eprintln!("{}", style::safe(&style::note(&page::remark(text))));
         }
     }
 
@@ -78,15 +78,15 @@ impl Output {
     )]
     pub(crate) fn warning(&self, text: &str) {
         progress::clear();
-        anstream::eprintln!("{}", style::warning(&page::remark(text)));
+        anstream::eprintln!("{}", style::safe(&style::warning(&page::remark(text))));
     }
 }
 
-/// Prints `text` on standard output, without its colours where nobody sees them.
+/// Prints `text` on standard output, without colours where it is not a terminal.
 pub(crate) fn print(text: &str) -> Result<(), Failure> {
     progress::end();
     let mut stream = anstream::stdout().lock();
-    let written = stream.write_all(text.as_bytes());
+    let written = stream.write_all(style::safe(text).as_bytes());
     printed(written.and_then(|()| stream.flush()))
 }
 
@@ -102,7 +102,7 @@ fn print_json<R: Serialize>(result: &R) -> Result<(), Failure> {
 /// What came of writing to standard output.
 fn printed(written: std::io::Result<()>) -> Result<(), Failure> {
     match written {
-        // Whoever reads has seen enough (`| head`).
+        // The reader has closed the pipe (`| head`).
         Err(error) if error.kind() == ErrorKind::BrokenPipe => Ok(()),
         Err(error) => Err(Failure::numerics(format!(
             "cannot write to standard output: {error}"

@@ -40,7 +40,7 @@ pub(crate) fn paragraph(words: &str) -> String {
         .fold(String::new(), |text, line| text + "  " + line + "\n")
 }
 
-/// A remark that follows a word of its own, broken as the terminal is wide; further lines are
+/// A remark that follows its label, broken as the terminal is wide; further lines are
 /// indented by two.
 pub(crate) fn remark(text: &str) -> String {
     if width() == usize::MAX {

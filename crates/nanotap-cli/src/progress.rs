@@ -1,38 +1,39 @@
-//! Long work at the terminal: what it does and how far it is, and Ctrl-C that stops it and keeps
-//! what is done.
+//! Progress of long work on standard error, and Ctrl-C, which stops it and keeps finished results.
 //!
-//! On a terminal one line is written over itself; where standard error is redirected, a new line
-//! is written after 2 s and then at growing intervals.
+//! On a terminal one line is overwritten; where standard error is redirected, a new line is written
+//! after 2 s and then at growing intervals.
 
 use std::io::{IsTerminal as _, Write as _};
 use std::sync::{LazyLock, Mutex, MutexGuard, PoisonError};
 use std::thread;
 use std::time::{Duration, Instant};
 
+use nanotap::case::Case;
 use nanotap::control::{CancelFlag, Control};
-use nanotap::study::kind::Study;
+use nanotap::study::Study;
 
 use crate::failure::Failure;
+use crate::threads::ThreadsArgument;
 
-/// The exit code of a program that Ctrl-C or SIGTERM ended.
+/// Exit code after Ctrl-C or SIGTERM.
 pub(crate) const INTERRUPTED: u8 = 130;
 
 /// Set by the first Ctrl-C or SIGTERM.
 static STOP: LazyLock<CancelFlag> = LazyLock::new(CancelFlag::new);
 /// On a terminal, work shorter than this reports nothing.
-const PATIENCE: Duration = Duration::from_millis(700);
+const DELAY: Duration = Duration::from_millis(700);
 /// Time between two writes of the line on a terminal.
 const INTERVAL: Duration = Duration::from_millis(200);
 /// Time to the first line where standard error is redirected; from then on it doubles.
 const FIRST_LINE: Duration = Duration::from_secs(2);
 /// Longest time between two such lines.
 const LONGEST_INTERVAL: Duration = Duration::from_secs(300);
-/// How long work without anything to keep may take to stop.
+/// Longest time in which cancelled work without results to keep must end.
 const STOPPING: Duration = Duration::from_millis(900);
-/// The same of work that keeps what is finished.
+/// Longest time in which cancelled work that keeps finished results must end.
 const KEEPING: Duration = Duration::from_secs(5);
 
-/// The progress line; a program has one.
+/// The progress line.
 static LINE: Mutex<Line> = Mutex::new(Line {
     work: None,
     saving: false,
@@ -43,74 +44,78 @@ static LINE: Mutex<Line> = Mutex::new(Line {
 /// The line on standard error.
 struct Line {
     work: Option<Counted>,
-    /// Whether results of work that was stopped are being written.
+    /// Whether results of cancelled work are being written.
     saving: bool,
     /// Whether it is on the terminal now.
     written: bool,
-    /// Whether the program is done, or nothing is to be said.
+    /// Whether the program is done, or reports nothing.
     ended: bool,
 }
 
-/// Work that counts what it has done.
+/// Work with a count of finished items.
 #[derive(Clone, Copy)]
 struct Counted {
-    /// What it does.
+    /// Name of the work.
     what: &'static str,
-    /// What is counted, in the plural.
+    /// Name of the items, in the plural.
     noun: &'static str,
-    /// Whether what is finished is kept when it is stopped.
+    /// Whether finished results are kept when it is cancelled.
     keeps: bool,
     begun: Instant,
     done: usize,
     total: usize,
 }
 
-/// From now on standard error says that the program works, and how far it is, until [`end`].
+/// Starts to report on standard error what the program does and how much is done, until [`end`].
 pub(crate) fn begin() {
     line().ended = false;
     let begun = Instant::now();
-    if std::io::stderr().is_terminal() {
-        thread::spawn(move || {
-            thread::sleep(PATIENCE);
-            while line().rewrite(begun) {
-                thread::sleep(INTERVAL);
+    let terminal = std::io::stderr().is_terminal();
+    thread::spawn(move || {
+        let mut interval = if terminal { DELAY } else { FIRST_LINE };
+        loop {
+            thread::sleep(interval);
+            if !line().write(begun, terminal) {
+                return;
             }
-        });
-    } else {
-        thread::spawn(move || {
-            let mut interval = FIRST_LINE;
-            loop {
-                thread::sleep(interval);
-                if !line().append(begun) {
-                    return;
-                }
-                interval = LONGEST_INTERVAL.min(2 * interval);
-            }
-        });
-    }
+            interval = if terminal {
+                INTERVAL
+            } else {
+                LONGEST_INTERVAL.min(2 * interval)
+            };
+        }
+    });
 }
 
-/// Takes the line away; it may come back.
+/// Erases the line; it may be written again.
 pub(crate) fn clear() {
     line().clear();
 }
 
-/// Takes the line away for good: the result follows.
+/// Erases the line and ends the reports: the result follows.
 pub(crate) fn end() {
     let mut line = line();
     line.clear();
     line.ended = true;
 }
 
-/// Runs a study as [`watched`] does.
-pub(crate) fn study<S: Study, R>(
-    work: impl FnOnce(&Control<'_>) -> Result<R, Failure>,
-) -> Result<R, Failure> {
-    watched(S::NAME, S::COUNTED, S::PARTIAL, work)
+/// Runs a study on so many threads, as [`watched`] does.
+pub(crate) fn study<S: Study>(
+    case: &Case,
+    options: &S::Options,
+    threads: &ThreadsArgument,
+) -> Result<S::Report, Failure>
+where
+    S::Options: Sync,
+    S::Report: Send,
+{
+    watched(S::NAME, S::COUNTED, S::PARTIAL, |control| {
+        threads.install(|| S::run(case, options, control))
+    })?
 }
 
-/// Does `work` with a control that counts on the line and stops at Ctrl-C. `what` is what it does,
-/// `noun` what is counted; `keeps` says whether work that was stopped leaves what is finished.
+/// Runs `work` with a control that reports its count on the line and is cancelled by Ctrl-C. `what`
+/// names the work, `noun` the counted items; `keeps`: cancelled work leaves its finished results.
 pub(crate) fn watched<R>(
     what: &'static str,
     noun: &'static str,
@@ -128,7 +133,7 @@ pub(crate) fn watched<R>(
     };
     line().work = Some(counted(0, 0));
     let report = |done: usize, total: usize| {
-        // Whoever cannot have the line at once leaves it to the next.
+        // A thread that does not get the line at once skips this report.
         if let Ok(mut line) = LINE.try_lock() {
             line.work = Some(counted(done, total));
         }
@@ -145,7 +150,7 @@ pub(crate) fn watched<R>(
     result
 }
 
-/// A control that stops at Ctrl-C.
+/// A control that Ctrl-C cancels.
 pub(crate) fn control() -> Control<'static> {
     Control {
         cancel: Some(&STOP),
@@ -163,7 +168,7 @@ fn line() -> MutexGuard<'static, Line> {
     LINE.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// From now on Ctrl-C and SIGTERM stop the work, and a second one ends the program at once.
+/// Makes Ctrl-C and SIGTERM cancel the work, and a second one end the program at once.
 pub(crate) fn listen() -> Result<(), Failure> {
     LazyLock::force(&STOP);
     ctrlc::set_handler(|| {
@@ -198,24 +203,21 @@ fn end_late() {
 }
 
 impl Line {
-    /// Writes the line anew on a terminal; whether to go on.
-    fn rewrite(&mut self, begun: Instant) -> bool {
+    /// Overwrites the line on a terminal, or appends one; returns whether to go on.
+    fn write(&mut self, begun: Instant, terminal: bool) -> bool {
         if self.ended {
             return false;
         }
+        let words = self.words(begun);
         let mut stream = std::io::stderr().lock();
-        let _ = write!(stream, "\r\x1b[K{}", self.words(begun));
+        let _ = if terminal {
+            write!(stream, "\r\x1b[K{words}")
+        } else {
+            writeln!(stream, "{words}")
+        };
         let _ = stream.flush();
-        self.written = true;
+        self.written = terminal;
         true
-    }
-
-    /// Writes a separate line; returns whether to go on.
-    fn append(&self, begun: Instant) -> bool {
-        if !self.ended {
-            let _ = writeln!(std::io::stderr(), "{}", self.words(begun));
-        }
-        !self.ended
     }
 
     fn words(&self, begun: Instant) -> String {
@@ -232,7 +234,7 @@ impl Line {
     }
 }
 
-/// What the line says after `elapsed` of the whole and so long of the counted work.
+/// Text of the line after `elapsed` of the whole program and the given time of the counted work.
 fn words(work: Option<(Counted, Duration)>, elapsed: Duration, stopping: bool) -> String {
     let so_far = format!("{} so far", duration(elapsed.as_secs_f64()));
     let words = match work {

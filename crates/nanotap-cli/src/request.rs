@@ -1,4 +1,4 @@
-//! The flags of a study, made of the declaration of its request.
+//! The flags of a study, from the declaration of its options.
 
 use std::marker::PhantomData;
 
@@ -137,7 +137,7 @@ fn help(property: Property<'_>) -> String {
     });
     let default = match property.default() {
         Some(Value::Bool(_)) | None => String::new(),
-        // Off unless asked for.
+        // Off by default.
         Some(Value::Number(zero)) if !bare.is_empty() && zero.as_f64() == Some(0.0) => {
             String::new()
         }

@@ -22,7 +22,7 @@ pub(crate) fn write(
     units: &Units,
 ) -> Result<(), Failure> {
     let mut csv = time_series::columns(model).join(",");
-    // The columns beside which the model's own stand, by their index.
+    // The columns that also exist in the model's units, by index.
     let si: Vec<(usize, f64)> = [
         ("time_s", 0, Kind::Time),
         ("tip_m", 1, Kind::Length),

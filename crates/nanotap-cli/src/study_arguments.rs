@@ -1,7 +1,7 @@
 //! What most studies take: a case, a request, and where table and picture go.
 
 use clap::Args;
-use nanotap::study::kind::Study;
+use nanotap::study::Study;
 
 use crate::arguments::{CaseArguments, OutArgument, PlotArgument};
 use crate::failure::Failure;
@@ -16,7 +16,7 @@ pub(crate) struct StudyArguments<S: Study> {
     pub(crate) case: CaseArguments,
 
     #[command(flatten)]
-    pub(crate) request: Request<S::Request>,
+    pub(crate) request: Request<S::Options>,
 
     #[command(flatten)]
     pub(crate) out: OutArgument,
@@ -25,11 +25,12 @@ pub(crate) struct StudyArguments<S: Study> {
 }
 
 impl<S: Study> StudyArguments<S> {
-    /// What is asked for of which case, once it is known that table and picture can be written.
-    pub(crate) fn read(&self, output: &Output) -> Result<(S::Request, GivenCase), Failure> {
-        let request = self.request.read()?;
+    /// The options and the case, once it is known that table and picture can be written.
+    pub(crate) fn read(&self, output: &Output) -> Result<(S::Options, GivenCase), Failure> {
+        let options = self.request.read()?;
         self.out.check()?;
         self.plot.check()?;
-        Ok((request, GivenCase::of(&self.case, output)?))
+        let case = GivenCase::for_study(&self.case, S::ANY_DISTANCE, output)?;
+        Ok((options, case))
     }
 }

@@ -48,3 +48,43 @@ pub(crate) fn help(text: &str) -> String {
         styled(AnsiColor::Cyan.on_default().bold(), "help:")
     )
 }
+
+/// Replaces control characters of `text`, which may come from file names and data, but keeps line
+/// breaks, tabs and the colours of this module.
+pub(crate) fn safe(text: &str) -> String {
+    let mut safe = String::with_capacity(text.len());
+    let mut rest = text;
+    while let Some(at) = rest.find(|c: char| c.is_control() && c != '\n' && c != '\t') {
+        let (before, found) = rest.split_at(at);
+        safe.push_str(before);
+        let colour = found.strip_prefix("\u{1b}[").and_then(|code| {
+            let end = code.find(|c: char| !c.is_ascii_digit() && c != ';')?;
+            code[end..].starts_with('m').then_some(end + 3)
+        });
+        let length = colour.unwrap_or_else(|| found.chars().next().map_or(0, char::len_utf8));
+        safe.push_str(if colour.is_some() {
+            &found[..length]
+        } else {
+            "\u{fffd}"
+        });
+        rest = &found[length..];
+    }
+    safe + rest
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn control_characters_are_replaced_and_colours_kept() {
+        assert_eq!(safe("a\tb\n°"), "a\tb\n°");
+        assert_eq!(safe(&error("x")), error("x"));
+        assert_eq!(
+            safe("\u{1b}[2Jevil\u{7}\u{9b}5m"),
+            "\u{fffd}[2Jevil\u{fffd}\u{fffd}5m"
+        );
+        assert_eq!(safe("\u{1b}"), "\u{fffd}");
+        assert_eq!(safe("\u{1b}[1;31"), "\u{fffd}[1;31");
+    }
+}

@@ -56,7 +56,7 @@ impl Table {
     }
 
     /// The table in lines of at most `width`: where it is wider, words are broken over several
-    /// lines, and if that is not enough, the columns stand in blocks beneath each other, each
+    /// lines, and if that is not enough, the columns are in blocks beneath each other, each
     /// beginning with the first column.
     fn fitted(&self, width: usize) -> String {
         let headed = self.columns.iter().any(|(name, _)| !name.is_empty());
@@ -126,7 +126,7 @@ impl Table {
             .fold(NARROWEST, usize::max)
     }
 
-    /// The columns of each block that fits; every block has at least one beside the first.
+    /// The columns of each block that fits; every block has at least one in addition to the first.
     fn blocks(&self, widths: &[usize], width: usize) -> Vec<Range<usize>> {
         let mut blocks = Vec::new();
         let mut begin = 0;

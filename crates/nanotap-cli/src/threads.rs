@@ -6,15 +6,15 @@ use nanotap::study::threads::{checked, install};
 use crate::failure::Failure;
 
 /// How many threads work.
-#[derive(Args, Clone, Debug)]
+#[derive(Args, Clone, Debug, Default)]
 pub(crate) struct ThreadsArgument {
-    /// Threads; without it, one a core. The result is the same for any number
+    /// Number of threads; default: one per core. The result is the same for any number
     #[arg(long, value_name = "T")]
     threads: Option<usize>,
 }
 
 impl ThreadsArgument {
-    /// How many; 0 if nobody said.
+    /// Number of threads; 0: one per core.
     pub(crate) fn number(&self) -> Result<usize, Failure> {
         Ok(checked(self.threads)?.unwrap_or(0))
     }

@@ -1,20 +1,20 @@
-//! Stopping long work from outside and hearing how far it is.
+//! Cancellation and progress reports of long computations.
 //!
-//! A loop polls [`Control::is_cancelled`] between its items and keeps the finished ones. Within an
-//! item the map itself ends with an error once the flag is set, if the system behind it carries the
-//! flag; what an item came to meanwhile is then worth nothing, so a loop polls after each item too.
+//! A loop polls [`Control::is_cancelled`] between its items and keeps the finished ones. If the
+//! system carries the flag, the map fails as soon as the flag is set; the item being computed is
+//! then invalid, so a loop polls after each item too.
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 pub use nanotap_arithmetic::CancelFlag;
 
-/// What a caller hands to long work. The default neither cancels nor reports.
+/// Cancellation flag and progress callback of a long computation. The default has neither.
 #[derive(Clone, Copy, Default)]
 pub struct Control<'a> {
-    /// Work stops soon after this is set; what is done is returned.
+    /// The computation stops soon after this flag is set and returns what is finished.
     pub cancel: Option<&'a CancelFlag>,
-    /// Called with the number of finished items and their total, from any thread,
-    /// in no particular order.
+    /// Called with the number of finished items and their total, from any thread, in no particular
+    /// order.
     pub progress: Option<&'a (dyn Fn(usize, usize) + Sync)>,
 }
 
@@ -28,12 +28,12 @@ impl std::fmt::Debug for Control<'_> {
 }
 
 impl Control<'_> {
-    /// True once the caller wants the work to stop.
+    /// True if the caller has cancelled the computation.
     pub fn is_cancelled(&self) -> bool {
         self.cancel.is_some_and(CancelFlag::is_cancelled)
     }
 
-    /// The flag that cancels the work, for the systems that it runs.
+    /// The cancellation flag, for the systems that are run.
     pub fn flag(&self) -> CancelFlag {
         self.cancel.cloned().unwrap_or_default()
     }

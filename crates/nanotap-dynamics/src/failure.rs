@@ -1,4 +1,4 @@
-//! Why one period of a map could not be used.
+//! Failures of the stroboscopic map.
 
 use std::error::Error;
 use std::sync::Arc;
@@ -10,7 +10,7 @@ use crate::map::{StroboscopicMap, Tangency};
 /// Why one period could not be advanced.
 #[derive(Clone, Debug, thiserror::Error)]
 pub enum MapFailure {
-    /// The map itself refused.
+    /// The map returned an error.
     #[error("the map failed: {0}")]
     Refused(Arc<dyn Error + Send + Sync>),
     /// The map returned an infinity or a NaN.
@@ -24,7 +24,7 @@ impl MapFailure {
     }
 }
 
-/// Advances one period and refuses a result that is not finite.
+/// Advances one period; fails if the result is not finite.
 #[inline]
 pub(crate) fn advance<M: StroboscopicMap>(
     map: &mut M,
@@ -45,7 +45,7 @@ pub(crate) fn advance_by<M: StroboscopicMap>(
     finite(state)
 }
 
-/// As [`advance`], of many states, each over periods of its own without looking in between.
+/// As [`advance`], for many states with different numbers of periods.
 pub(crate) fn advance_each<M: StroboscopicMap>(
     map: &mut M,
     states: &mut [f64],
@@ -75,7 +75,7 @@ pub(crate) fn advance_with_jacobian<M: StroboscopicMap>(
     finite(jacobian.as_slice())
 }
 
-/// As [`advance_with_jacobian`], with log|det DP| where it is known by other means.
+/// As [`advance_with_jacobian`], and log|det DP| if the system computes it independently.
 #[inline]
 pub(crate) fn advance_with_jacobian_and_determinant<M: StroboscopicMap>(
     map: &mut M,

@@ -1,47 +1,41 @@
-//! The one interface between a system and its analysis: the stroboscopic map
-//! `P`, which takes the state at drive phase 0 to the state one drive period later.
+//! The interface between a system and its analysis: the stroboscopic map `P`, which takes the state
+//! at drive phase 0 to the state one drive period later.
 
 use nalgebra::DMatrix;
 
 /// A local extremum of a switching function along one drive period.
 ///
-/// A motion grazes when one of these values passes through zero: a contact is
-/// born or dies there, and the map is only once differentiable.
+/// A motion grazes when one of these values crosses zero: a contact appears or vanishes there, and
+/// the map is only once differentiable.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Tangency {
     /// Drive phase of the extremum as a fraction of the period, in `[0, 1)`.
     pub phase: f64,
-    /// Value of the switching function there: its sign tells touched from missed.
+    /// Value of the switching function: its sign tells contact from a near miss.
     pub value: f64,
 }
 
-/// The stroboscopic map of a periodically forced system.
-///
-/// An implementor owns whatever work space it needs, hence `&mut self`; a
-/// parallel analysis clones the map once per task, so a clone must be cheap
-/// (shared, immutable data behind an `Arc`). The same state must give the same
-/// bits on every clone and every call.
-pub trait StroboscopicMap: Clone + Send + Sync {
-    /// Why a period could not be computed.
-    type Error: std::error::Error + Send + Sync + 'static;
+/// Success, or the error of a map.
+pub type Advanced<M> = Result<(), <M as StroboscopicMap>::Error>;
 
-    /// Dimension of the state.
-    fn dimension(&self) -> usize;
+/// How the evaluations of a map are best arranged: in batches, on several threads, or on a cheaper map.
+/// The defaults suit a map that is cheap and takes one state at a time: `impl Scheduling for MyMap {}`.
+pub trait Scheduling: Sized {
+    /// Whether a period takes so much longer than to wake a thread that the periods of an orbit are
+    /// worth computing in parallel.
+    fn is_costly(&self) -> bool {
+        false
+    }
 
-    /// Length of one drive period.
-    fn period(&self) -> f64;
-
-    /// How many of the last entries of the state are whole numbers that the map sets, such as
-    /// whether a neck of adhesion is there. They change by leaps from orbit to orbit along a
-    /// branch; Newton's method takes them from the map.
-    fn discrete_entries(&self) -> usize {
+    /// Work done so far, in steps of an approximate flow; 0 where a period is in closed form. A clone
+    /// goes on from the same number. Budgets of work are measured by it.
+    fn cost(&self) -> u64 {
         0
     }
 
-    /// Whether a period takes so much longer than to wake a thread that the periods of an orbit are
-    /// worth computing side by side.
-    fn is_costly(&self) -> bool {
-        false
+    /// Adds the cost of work that a clone did for this map.
+    fn add_cost(&mut self, cost: u64) {
+        let _ = cost;
     }
 
     /// A cheaper, approximate map of the same state, for following transients; `None` where this
@@ -50,10 +44,59 @@ pub trait StroboscopicMap: Clone + Send + Sync {
         None
     }
 
-    /// How many motions at a time are best given to [`advance_each`](Self::advance_each): one where
-    /// they go one after the other.
-    fn side_by_side(&self) -> usize {
+    /// Number of states in a batch of [`advance_each`](Self::advance_each); 1 where it takes them in
+    /// sequence.
+    fn batch_size(&self) -> usize {
         1
+    }
+
+    /// Replaces each of `states` (row by row, of length `dimension`) by `Pᵏ` of it, with `k` from
+    /// `periods`, whose length is the number of states. A batch may be faster than
+    /// [`advance_by`](StroboscopicMap::advance_by) of each; the result of one state does not depend on the
+    /// others, and differs from that by rounding only. A state that cannot be followed is of no
+    /// use afterwards.
+    fn advance_each(&mut self, states: &mut [f64], periods: &[usize]) -> Vec<Advanced<Self>>
+    where
+        Self: StroboscopicMap,
+    {
+        in_sequence(self, states, periods)
+    }
+
+    /// As [`advance_each`](Self::advance_each), and puts the states at the ends of all periods of each
+    /// state, row by row, into its entry of `passed`, as far as it can be followed.
+    fn advance_each_through(
+        &mut self,
+        states: &mut [f64],
+        periods: &[usize],
+        passed: &mut [Vec<f64>],
+    ) -> Vec<Advanced<Self>>
+    where
+        Self: StroboscopicMap,
+    {
+        in_sequence_through(self, states, periods, passed)
+    }
+}
+
+/// The stroboscopic map of a periodically forced system.
+///
+/// An implementation owns its work space, hence `&mut self`. A parallel analysis clones the map
+/// once per task, so a clone must be cheap (shared, immutable data in an `Arc`). The same state
+/// must give the same bits on every clone and in every call.
+pub trait StroboscopicMap: Scheduling + Clone + Send + Sync {
+    /// Why a period could not be computed.
+    type Error: std::error::Error + Send + Sync + 'static;
+
+    /// Dimension of the state.
+    fn dimension(&self) -> usize;
+
+    /// Length of one drive period, in the system's unit of time.
+    fn period(&self) -> f64;
+
+    /// How many of the last entries of the state are whole numbers that the map sets, such as
+    /// whether a neck of adhesion is there. They change by leaps from orbit to orbit along a
+    /// branch; Newton's method takes them from the map.
+    fn discrete_entries(&self) -> usize {
+        0
     }
 
     /// Replaces `state` (length `dimension`) by `P(state)`.
@@ -69,30 +112,6 @@ pub trait StroboscopicMap: Clone + Send + Sync {
     /// When a period cannot be computed.
     fn advance_by(&mut self, state: &mut [f64], periods: usize) -> Result<(), Self::Error> {
         (0..periods).try_for_each(|_| self.advance(state))
-    }
-
-    /// Replaces each of `states` (of length `dimension`, one after the other) by `Pᵏ` of it, with `k`
-    /// from `periods`, which says how many there are. A flow that takes several at a time may be faster
-    /// than [`advance_by`](Self::advance_by) of each; what comes of one does not depend on the
-    /// others, and differs from that by rounding only. A
-    /// state that cannot be followed is of no use afterwards.
-    fn advance_each(
-        &mut self,
-        states: &mut [f64],
-        periods: &[usize],
-    ) -> Vec<Result<(), Self::Error>> {
-        one_after_another(self, states, periods)
-    }
-
-    /// As [`advance_each`](Self::advance_each), and puts the states at the ends of all periods, those
-    /// of one state one after the other, into its place in `passed`, as far as it can be followed.
-    fn advance_each_through(
-        &mut self,
-        states: &mut [f64],
-        periods: &[usize],
-        passed: &mut [Vec<f64>],
-    ) -> Vec<Result<(), Self::Error>> {
-        one_after_another_through(self, states, periods, passed)
     }
 
     /// Replaces `state` by `P(state)` and `jacobian` (`dimension × dimension`)
@@ -129,14 +148,14 @@ pub trait StroboscopicMap: Clone + Send + Sync {
         f64::INFINITY
     }
 
-    /// From here on motions pass through a rigid stop that they hardly touch. Past its grazing an
-    /// orbit then goes on smoothly, as it would without the touch, so that the grazing can be
-    /// located and followed. A map without rigid stops stays as it is.
+    /// From now on motions pass through a rigid stop that they hardly touch. Beyond its grazing an
+    /// orbit then continues smoothly, as if without contact, so that the grazing can be located and
+    /// followed. A map without rigid stops does nothing.
     fn pass_touches(&mut self) {}
 
-    /// Appends every local extremum of the switching functions over the period
-    /// that starts at `state`, in order of phase, and replaces `state` by
-    /// `P(state)`. A smooth system leaves `tangencies` as it is.
+    /// Appends all local extrema of the switching functions over the period that starts at `state`,
+    /// in order of phase, and replaces `state` by `P(state)`. A smooth system leaves `tangencies`
+    /// unchanged.
     ///
     /// # Errors
     /// When the period cannot be computed from this state.
@@ -150,24 +169,24 @@ pub trait StroboscopicMap: Clone + Send + Sync {
     }
 }
 
-/// [`StroboscopicMap::advance_each`] of a map that takes one at a time.
-pub fn one_after_another<M: StroboscopicMap>(
+/// [`Scheduling::advance_each`], one state at a time.
+pub fn in_sequence<M: StroboscopicMap>(
     map: &mut M,
     states: &mut [f64],
     periods: &[usize],
-) -> Vec<Result<(), M::Error>> {
+) -> Vec<Advanced<M>> {
     let each = states.chunks_exact_mut(map.dimension()).zip(periods);
     each.map(|(state, &periods)| map.advance_by(state, periods))
         .collect()
 }
 
-/// [`StroboscopicMap::advance_each_through`] of a map that takes one at a time.
-pub fn one_after_another_through<M: StroboscopicMap>(
+/// [`Scheduling::advance_each_through`], one state at a time.
+pub fn in_sequence_through<M: StroboscopicMap>(
     map: &mut M,
     states: &mut [f64],
     periods: &[usize],
     passed: &mut [Vec<f64>],
-) -> Vec<Result<(), M::Error>> {
+) -> Vec<Advanced<M>> {
     let each = states.chunks_exact_mut(map.dimension()).zip(periods);
     each.zip(passed)
         .map(|((state, &periods), passed)| {
@@ -181,7 +200,7 @@ pub fn one_after_another_through<M: StroboscopicMap>(
         .collect()
 }
 
-/// A one-parameter family of stroboscopic maps, for continuation.
+/// A one-parameter family of stroboscopic maps, for continuation in one parameter.
 pub trait MapFamily: Sync {
     /// The map at one parameter value.
     type Map: StroboscopicMap;
@@ -189,9 +208,9 @@ pub trait MapFamily: Sync {
     type Error: std::error::Error + Send + Sync + 'static;
 
     /// The map at `parameter`.
-    ///
+    /// The map at this parameter value.
     /// # Errors
-    /// When the parameter value makes no sense for the system.
+    /// If the system does not exist at this parameter value.
     fn at(&self, parameter: f64) -> Result<Self::Map, Self::Error>;
 
     /// Replaces `state` by `P(state; parameter)`, `jacobian` by `∂P/∂state` and
@@ -209,7 +228,7 @@ pub trait MapFamily: Sync {
     ) -> Result<(), <Self::Map as StroboscopicMap>::Error>;
 }
 
-/// A two-parameter family of stroboscopic maps.
+/// A two-parameter family of stroboscopic maps, for continuation of bifurcations.
 pub trait TwoParameterFamily: Sync {
     /// The map at one pair of values.
     type Map: StroboscopicMap;

@@ -1,4 +1,4 @@
-//! The few vector operations that every analysis needs, on plain slices.
+//! Vector operations on slices.
 
 /// Largest modulus of an entry, 0 for an empty slice.
 pub(crate) fn norm(a: &[f64]) -> f64 {
@@ -27,8 +27,8 @@ pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(x, y)| x * y).sum()
 }
 
-/// A well-mixed 64-bit value from another (splitmix64 finaliser, Steele, Lea and
-/// Flood 2014): the only source of pseudo-randomness in this crate.
+/// A well-mixed 64-bit value from another one (splitmix64 finaliser, Steele, Lea and Flood 2014):
+/// the only source of pseudo-random numbers in this crate.
 pub(crate) fn mix(mut z: u64) -> u64 {
     z = z.wrapping_add(0x9e37_79b9_7f4a_7c15);
     z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
@@ -45,7 +45,7 @@ pub(crate) fn unit(z: u64) -> f64 {
 mod tests {
     use super::*;
 
-    /// The first numbers of splitmix64 from 0 and 1234567, as its authors' C code gives them
+    /// The first numbers of splitmix64 from 0 and 1234567, according to its authors' C code
     /// (<https://prng.di.unimi.it/splitmix64.c>).
     #[test]
     fn mixing_is_splitmix64() {

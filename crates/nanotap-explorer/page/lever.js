@@ -65,11 +65,11 @@ function draw() {
   pen.beginPath();
   film.beam[k].forEach((v, j) => pen.lineTo(x(j / (film.beam[k].length - 1)), y(v)));
   pen.stroke();
-  // The tip: its apex meets the sample.
+  // The tip.
   pen.fillStyle = pen.strokeStyle;
   pen.beginPath(); pen.moveTo(right - 7 * ratio, y(tip)); pen.lineTo(right + 7 * ratio, y(tip)); pen.lineTo(right, y(film.apex[k])); pen.closePath(); pen.fill();
   pen.fillStyle = colour("--ink"); pen.font = `${12 * ratio}px system-ui`;
-  pen.fillText(`height of the picture: ${film.scale}; along the lever not to scale`, left, 16 * ratio);
+  pen.fillText(`height: ${film.scale}; length of the lever not to scale`, left, 16 * ratio);
   pen.fillText(touching ? "contact" : "", right - 24 * ratio, height - 6 * ratio);
   clock.textContent = `drive period ${Math.floor(time % film.periods) + 1} of ${film.periods}, phase ${(360 * (time % 1)).toFixed(0)}°`;
   frames.drawn += 1;

@@ -9,10 +9,10 @@ import * as figure from "./figure.js";
 import * as study from "./study.js";
 
 const $ = (id) => document.getElementById(id);
-const PATIENCE = 300;          // milliseconds before the page shows that it waits
-const OFF = "0: off. Few steps show motions that the equations do not have.";
+const BUSY_DELAY = 300;        // milliseconds before the page shows that it computes
+const OFF = "0: off. Too few steps give motions that the equations do not have.";
 let about = null;
-let wanted = false;           // a change made while a motion was being computed
+let outdated = false;         // a value changed while a motion was being computed
 let underway = false;
 let shown = "";               // the case whose controls are shown
 const redrawn = [];            // called when figures were redrawn
@@ -25,17 +25,17 @@ export function say(error) {
 }
 
 /** Requests the motion for the present values. While one is being computed the next one waits, so that a
- *  dragged slider shows as many motions as there is time for and ends with the last. */
+ *  dragged slider shows as many motions as can be computed, and finally the last one. */
 export async function refresh() {
-  if (underway) { wanted = true; return; }
+  if (underway) { outdated = true; return; }
   underway = true;
   document.body.dataset.busy = "yes";
-  const patience = setTimeout(() => { $("busy").textContent = "computing …"; }, PATIENCE);
+  const busyTimer = setTimeout(() => { $("busy").textContent = "computing …"; }, BUSY_DELAY);
   let next = request();
   while (next) {
     const { motion, error } = await next;
     // The server computes the next motion while this one is drawn.
-    next = wanted ? request() : null;
+    next = outdated ? request() : null;
     if (motion) {
       say(null);
       show(motion);
@@ -44,11 +44,11 @@ export async function refresh() {
       // With another number of modes the state has another length: the motion is then computed from
       // rest.
       state.start = "";
-      wanted = true;
+      outdated = true;
     } else if (!superseded(error)) say(error);
-    if (!next && wanted) next = request();
+    if (!next && outdated) next = request();
   }
-  clearTimeout(patience);
+  clearTimeout(busyTimer);
   $("busy").textContent = "";
   document.body.dataset.busy = "no";
   underway = false;
@@ -56,7 +56,7 @@ export async function refresh() {
 
 /** The motion for the present values, or the reason why there is none. */
 function request() {
-  wanted = false;
+  outdated = false;
   const wish = { case: theCase(), start: state.start, steps: state.steps, views: motionViews() };
   return ask("motion", "/api/motion", wish).then((motion) => ({ motion }), (error) => ({ error }));
 }
@@ -113,7 +113,7 @@ function table(rows) {
 async function census() {
   const list = $("attractors");
   list.replaceChildren();
-  $("bound").textContent = "looking …";
+  $("bound").textContent = "searching …";
   try {
     const found = await ask("census", "/api/attractors", { case: theCase(), unstable: $("unstable").checked });
     $("bound").textContent = found.bound;

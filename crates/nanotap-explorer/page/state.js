@@ -4,7 +4,7 @@ const empty = () => ({
   preset: "",                 // the case from which the values start
   set: {},                    // keys of the case that differ from it: key -> text
   start: "",                  // state at drive phase 0 from which the motion is computed
-  follow: "",                 // "yes": a turned knob goes on from the motion that is shown
+  follow: "",                 // "yes": a changed parameter continues from the displayed motion
   tab: "diagram",
   steps: 0,                   // Runge-Kutta steps per period of the motion for comparison; 0: none
   study: {},                  // fields of the study's form: name -> text

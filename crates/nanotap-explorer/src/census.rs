@@ -5,16 +5,16 @@ use std::sync::Arc;
 use axum::Json;
 use axum::extract::State;
 use nanotap::control::Control;
-use nanotap::study::attractors::{Attractors, AttractorsRequest, AttractorsStudy};
+use nanotap::study::attractors::{Attractors, AttractorsOptions, AttractorsStudy};
 use nanotap::study::orbit::OrbitReport;
 use nanotap::study::registry::Study as _;
 use serde::Deserialize;
 use serde_json::{Value, json};
 
 use crate::App;
-use crate::answer::Refusal;
-use crate::asked::{Start, model_of};
-use crate::preset::Wanted;
+use crate::api_error::ApiError;
+use crate::motion_request::{Start, model_of};
+use crate::preset::CaseSpec;
 
 /// Longest period of the unstable orbits that are searched for.
 const UNSTABLE: usize = 4;
@@ -23,7 +23,7 @@ const UNSTABLE: usize = 4;
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct Census {
-    case: Wanted,
+    case: CaseSpec,
     #[serde(default)]
     unstable: bool,
 }
@@ -31,7 +31,7 @@ pub(crate) struct Census {
 pub(crate) async fn attractors(
     State(app): State<Arc<App>>,
     Json(census): Json<Census>,
-) -> Result<Json<Value>, Refusal> {
+) -> Result<Json<Value>, ApiError> {
     let shared = Arc::clone(&app);
     app.workers
         .run_long(move |control| listed(&shared, &census, control))
@@ -39,12 +39,12 @@ pub(crate) async fn attractors(
         .map(Json)
 }
 
-fn listed(app: &App, census: &Census, control: &Control<'_>) -> Result<Value, Refusal> {
+fn listed(app: &App, census: &Census, control: &Control<'_>) -> Result<Value, ApiError> {
     let case = census.case.case(app, control)?;
     model_of(&case)?;
-    let request = AttractorsRequest {
+    let request = AttractorsOptions {
         unstable: if census.unstable { UNSTABLE } else { 0 },
-        ..AttractorsRequest::default()
+        ..AttractorsOptions::default()
     };
     let found = AttractorsStudy::run(&case, &request, control)?;
     let stable = found.attractors.iter().filter_map(|one| {

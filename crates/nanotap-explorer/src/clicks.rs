@@ -13,7 +13,7 @@ use nanotap::study::sweep::Over;
 use nanotap_figures::{Colour, Dash, Figure, Line, Panel};
 use serde_json::{Value, json};
 
-use crate::asked::Start;
+use crate::motion_request::Start;
 
 /// An axis of a figure on which a click sets a key.
 #[derive(Clone, Copy)]

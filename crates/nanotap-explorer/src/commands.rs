@@ -5,25 +5,28 @@ use std::fmt::Write as _;
 use serde_json::{Map, Value};
 
 use crate::App;
-use crate::answer::Refusal;
-use crate::asked::{Asked, Start};
-use crate::preset::Wanted;
+use crate::api_error::ApiError;
+use crate::motion_request::{MotionRequest, Start};
+use crate::preset::CaseSpec;
 
 /// File name of the saved case.
 const CASE_FILE: &str = "case.toml";
 
 /// The path of the case file in commands: the given file if nothing was changed, otherwise the
 /// saved one.
-fn case_path(app: &App, case: &Wanted) -> Result<String, Refusal> {
+fn case_path(app: &App, case: &CaseSpec) -> Result<String, ApiError> {
     let preset = case.preset(app)?;
     let unchanged = !preset.path.is_empty() && case.words(preset).is_empty();
     Ok(if unchanged { &preset.path } else { CASE_FILE }.to_owned())
 }
 
 /// The command for the same motion.
-pub(crate) fn command(app: &App, asked: &Asked, study: &str) -> Result<String, Refusal> {
-    let mut line = format!("nanotap {study} {}", quoted(&case_path(app, &asked.case)?));
-    let start = Start::parse(&asked.start)?;
+pub(crate) fn command(app: &App, request: &MotionRequest, study: &str) -> Result<String, ApiError> {
+    let mut line = format!(
+        "nanotap {study} {}",
+        quoted(&case_path(app, &request.case)?)
+    );
+    let start = Start::parse(&request.start)?;
     if let Some(period) = start.period {
         let _ = write!(line, " --period {period}");
     }
@@ -36,10 +39,10 @@ pub(crate) fn command(app: &App, asked: &Asked, study: &str) -> Result<String, R
 /// The command of a study with its options.
 pub(crate) fn study_command(
     app: &App,
-    case: &Wanted,
+    case: &CaseSpec,
     name: &str,
     request: &Map<String, Value>,
-) -> Result<String, Refusal> {
+) -> Result<String, ApiError> {
     let mut line = format!("nanotap {name} {}", quoted(&case_path(app, case)?));
     for (option, value) in request {
         let flag = option.replace('_', "-");
@@ -83,9 +86,9 @@ fn quoted(word: &str) -> String {
 }
 
 /// The lines of Python for the same motion.
-pub(crate) fn python(app: &App, asked: &Asked, study: &str) -> Result<String, Refusal> {
-    let path = case_path(app, &asked.case)?;
-    let start = Start::parse(&asked.start)?;
+pub(crate) fn python(app: &App, request: &MotionRequest, study: &str) -> Result<String, ApiError> {
+    let path = case_path(app, &request.case)?;
+    let start = Start::parse(&request.start)?;
     let mut options = String::new();
     if let Some(period) = start.period {
         let _ = write!(options, ", period={period}");
@@ -102,9 +105,9 @@ pub(crate) fn python(app: &App, asked: &Asked, study: &str) -> Result<String, Re
 /// The lines of Python for the same studies.
 pub(crate) fn study_python(
     app: &App,
-    case: &Wanted,
+    case: &CaseSpec,
     studies: &[(&str, &Map<String, Value>)],
-) -> Result<String, Refusal> {
+) -> Result<String, ApiError> {
     let path = case_path(app, case)?;
     let mut text = format!("import nanotap\n\ncase = nanotap.Case.from_file({path:?})\n");
     for (name, request) in studies {

@@ -12,10 +12,10 @@ use nanotap::observe::time_series;
 use serde::Deserialize;
 
 use crate::App;
-use crate::answer::Refusal;
-use crate::asked::{Asked, Start, model_of};
+use crate::api_error::ApiError;
 use crate::figures::{picture, viewed};
 use crate::motion::Motion;
+use crate::motion_request::{MotionRequest, Start, model_of};
 
 /// Samples per drive period in the time series, as at the terminal.
 const RESOLUTION: usize = 200;
@@ -25,7 +25,7 @@ const RESOLUTION: usize = 200;
 #[serde(deny_unknown_fields)]
 pub(crate) struct Wish {
     #[serde(flatten)]
-    asked: Asked,
+    asked: MotionRequest,
     /// Name of one of the motion's figures.
     #[serde(default)]
     figure: String,
@@ -35,7 +35,7 @@ pub(crate) struct Wish {
 pub(crate) async fn export(
     State(app): State<Arc<App>>,
     Json(wish): Json<Wish>,
-) -> Result<Response, Refusal> {
+) -> Result<Response, ApiError> {
     let shared = Arc::clone(&app);
     let (kind, bytes) = app
         .workers
@@ -48,7 +48,7 @@ fn exported(
     app: &App,
     wish: &Wish,
     control: &Control<'_>,
-) -> Result<(&'static str, Vec<u8>), Refusal> {
+) -> Result<(&'static str, Vec<u8>), ApiError> {
     let asked = &wish.asked;
     if wish.format == "toml" {
         let case = asked.case.any_distance(app)?;
@@ -77,7 +77,7 @@ fn exported(
 }
 
 /// The time series of one repetition, in the model's units.
-fn csv(model: &Model, motion: &Motion) -> Result<String, Refusal> {
+fn csv(model: &Model, motion: &Motion) -> Result<String, ApiError> {
     let mut text = time_series::columns(model).join(",");
     text.push('\n');
     time_series::sample(model, motion.state(), motion.periods(), RESOLUTION, |row| {
@@ -85,6 +85,6 @@ fn csv(model: &Model, motion: &Motion) -> Result<String, Refusal> {
         text.push_str(&cells.join(","));
         text.push('\n');
     })
-    .map_err(Refusal::of)?;
+    .map_err(ApiError::of)?;
     Ok(text)
 }

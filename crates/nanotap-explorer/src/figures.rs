@@ -13,7 +13,7 @@ use serde::Deserialize;
 use serde_json::{Value, json};
 
 use crate::App;
-use crate::answer::Refusal;
+use crate::api_error::ApiError;
 
 /// Number of figures of studies that are stored for redrawing.
 const KEPT: usize = 8;
@@ -49,24 +49,24 @@ pub(crate) fn viewed(mut figure: Figure, views: &[View]) -> Figure {
 }
 
 /// A figure in the form that the page reads.
-pub(crate) fn drawn(figure: &Figure) -> Result<Value, Refusal> {
-    let (svg, map) = figure.to_svg_with_map().map_err(Refusal::of)?;
+pub(crate) fn drawn(figure: &Figure) -> Result<Value, ApiError> {
+    let (svg, map) = figure.to_svg_with_map().map_err(ApiError::of)?;
     Ok(json!({ "svg": svg, "map": map }))
 }
 
 /// A figure in a format, given by its file extension.
-pub(crate) fn picture(figure: &Figure, format: &str) -> Result<(&'static str, Vec<u8>), Refusal> {
+pub(crate) fn picture(figure: &Figure, format: &str) -> Result<(&'static str, Vec<u8>), ApiError> {
     Ok(match format {
         "svg" => (
             "image/svg+xml",
-            figure.to_svg().map_err(Refusal::of)?.into_bytes(),
+            figure.to_svg().map_err(ApiError::of)?.into_bytes(),
         ),
-        "png" => ("image/png", figure.to_png(DPI).map_err(Refusal::of)?),
-        "pdf" => ("application/pdf", figure.to_pdf().map_err(Refusal::of)?),
+        "png" => ("image/png", figure.to_png(DPI).map_err(ApiError::of)?),
+        "pdf" => ("application/pdf", figure.to_pdf().map_err(ApiError::of)?),
         "csv" => ("text/csv", csv(figure).into_bytes()),
         other => {
-            return Err(Refusal::input(
-                format!("there is no format `{other}`"),
+            return Err(ApiError::input(
+                format!("unknown format `{other}`"),
                 "there are svg, png, pdf and csv",
             ));
         }
@@ -183,11 +183,14 @@ impl Shelf {
         number
     }
 
-    fn get(&self, number: u64) -> Result<Arc<Figure>, Refusal> {
+    fn get(&self, number: u64) -> Result<Arc<Figure>, ApiError> {
         let kept = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         let found = kept.figures.iter().find(|(own, _)| *own == number);
         found.map(|(_, figure)| Arc::clone(figure)).ok_or_else(|| {
-            Refusal::input("this figure is no longer kept", "compute the study again")
+            ApiError::input(
+                "this figure is no longer available",
+                "compute the study again",
+            )
         })
     }
 }
@@ -207,7 +210,7 @@ pub(crate) struct Wish {
 pub(crate) async fn figure(
     State(app): State<Arc<App>>,
     Json(wish): Json<Wish>,
-) -> Result<Response, Refusal> {
+) -> Result<Response, ApiError> {
     let figure = app.figures.get(wish.number)?;
     app.workers
         .run(move |_| {

@@ -7,7 +7,7 @@ use nanotap::model::beam::Modes;
 use nanotap::observe::time_series;
 use serde::Serialize;
 
-use crate::answer::Refusal;
+use crate::api_error::ApiError;
 
 /// Instants per drive period.
 const INSTANTS: usize = 90;
@@ -47,7 +47,7 @@ pub(crate) fn film(
     model: &Model,
     start: &[f64],
     periods: usize,
-) -> Result<Film, Refusal> {
+) -> Result<Film, ApiError> {
     let is_beam = model.beam.is_some();
     let modes = if is_beam {
         (model.dimension() - model.memory) / 2
@@ -85,7 +85,7 @@ pub(crate) fn film(
         surface.push(dent);
         contact.push(u8::from(touching));
     })
-    .map_err(Refusal::of)?;
+    .map_err(ApiError::of)?;
     // The last instant equals the first one.
     beam.truncate(periods * INSTANTS);
     let tip = TIP * (high - low).max(f64::MIN_POSITIVE);
@@ -114,11 +114,11 @@ pub(crate) fn film(
 }
 
 /// φ_1 … φ_N at points along the beam; empty for an oscillator.
-fn shapes(modes: usize) -> Result<Vec<Vec<f64>>, Refusal> {
+fn shapes(modes: usize) -> Result<Vec<Vec<f64>>, ApiError> {
     if modes == 0 {
         return Ok(vec![Vec::new(); ALONG]);
     }
-    let beam = Modes::new(modes).map_err(|error| Refusal::failed(error.to_string()))?;
+    let beam = Modes::new(modes).map_err(|error| ApiError::failed(error.to_string()))?;
     Ok((0..ALONG)
         .map(|k| {
             beam.shapes(k as f64 / (ALONG - 1) as f64)

@@ -71,9 +71,9 @@ pub(crate) fn keys(case: &Case) -> impl Iterator<Item = Key> {
         let takes = key.entry().models.contains(&kind) && *key != Key::Kind;
         // A table has no control.
         let curve = key.entry().takes == Takes::Table;
-        let beside = [Key::Modes, Key::CosineTerm].contains(key);
+        let in_addition = [Key::Modes, Key::CosineTerm].contains(key);
         if physical {
-            key.is_physical() && !curve || beside
+            key.is_physical() && !curve || in_addition
         } else {
             takes
         }
@@ -162,7 +162,7 @@ fn choices(key: Key) -> Option<Vec<Choice>> {
     };
     let linear = ContactLaw::ALL.iter().map(|law| Choice {
         word: law.name().to_owned(),
-        meaning: format!("{}: F = {}", law.meaning(), formula(*law)),
+        meaning: format!("{}: F = {}", law.meaning(), law.entry().formula),
     });
     Some(match key.entry().takes {
         Takes::Word(_) if key == Key::Contact => linear.collect(),
@@ -187,20 +187,6 @@ fn choices(key: Key) -> Option<Vec<Choice>> {
         Takes::MaterialName => plain(catalogue.materials().map(|m| m.name.clone()).collect()),
         _ => return None,
     })
-}
-
-/// The force of a linear contact on the tip.
-const fn formula(law: ContactLaw) -> &'static str {
-    match law {
-        ContactLaw::SpringDamper => "−(K1 h + C1 dh/dt) at heights h < 0, none above",
-        ContactLaw::KelvinVoigt => "−(K1 h + C1 dh/dt) while this pushes, then none",
-        ContactLaw::StandardLinearSolid => {
-            "−K1 h + Fm, Fm + τm dFm/dt = −km τm dh/dt, while this pushes, then none"
-        }
-        ContactLaw::MovingSurface => {
-            "−Fad − K1 (h − s) − C1 d(h − s)/dt at heights h < s, none above; ηs ds/dt + ks s = −F"
-        }
-    }
 }
 
 /// From an eighth of a positive value to eight times the value; otherwise both signs, or from zero.

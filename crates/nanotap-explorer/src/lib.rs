@@ -14,8 +14,7 @@
     )
 )]
 
-mod answer;
-mod asked;
+mod api_error;
 mod assets;
 mod census;
 mod clicks;
@@ -28,6 +27,7 @@ mod guard;
 mod knobs;
 mod maps;
 mod motion;
+mod motion_request;
 mod preset;
 mod scratch;
 mod study;

@@ -1,7 +1,7 @@
 //! Maps over two parameters: the motions, the peak force on the sample, or the number of coexisting
 //! motions.
 
-use nanotap::dataset::{Store, StoreError, Values};
+use nanotap::dataset::{Store, StoreError};
 use nanotap::figure::sweep::figure as sweep_figure;
 use nanotap::study::sweep::from_neighbours;
 use nanotap_figures::{Axis, CategoryMap, Colour, Figure, Heatmap, Layer, Legend};
@@ -39,7 +39,7 @@ impl Shows {
     pub(crate) const fn words(self) -> &'static str {
         match self {
             Self::Motions => "kinds of motion",
-            Self::Force => "greatest force",
+            Self::Force => "peak force",
             Self::States => "number of motions",
         }
     }
@@ -72,50 +72,15 @@ pub(crate) fn figure(store: &Store, shows: Shows) -> Result<Figure, StoreError> 
     Ok(figure)
 }
 
-/// Calls a function for each motion with the index of its place on the map and its values of the
-/// variables.
-fn each(
-    store: &Store,
-    variables: &[&str],
-    mut take: impl FnMut(usize, &[f64]),
-) -> Result<(), StoreError> {
-    let schema = store.schema();
-    let width = schema.grid.axes[1].length;
-    let columns: Vec<usize> = variables
-        .iter()
-        .filter_map(|name| schema.index_of(name))
-        .collect();
-    for chunk in 0..store.chunks() {
-        let block = schema.grid.block(chunk);
-        let read: Vec<Vec<f64>> = columns
-            .iter()
-            .map(|column| Ok(numbers(store.read_chunk(&block, *column)?)))
-            .collect::<Result<_, StoreError>>()?;
-        for (cell, entry) in block.entries().enumerate() {
-            let row: Vec<f64> = read.iter().filter_map(|r| r.get(cell).copied()).collect();
-            take(entry[0] * width + entry[1], &row);
-        }
-    }
-    Ok(())
-}
-
-fn numbers(values: Values) -> Vec<f64> {
-    match values {
-        Values::Real(values) => values,
-        Values::Code(values) => values.into_iter().map(f64::from).collect(),
-        Values::Whole(values) => values.into_iter().map(f64::from).collect(),
-        Values::Text(_) => Vec::new(),
-    }
-}
-
 fn force(store: &Store, grid: &CategoryMap) -> Result<Heatmap, StoreError> {
     let mut greatest = vec![f64::NAN; grid.columns * grid.rows];
-    each(store, &["peak_force"], |at, row| {
-        if let (Some(most), [force]) = (greatest.get_mut(at), row) {
-            *most = most.max(*force);
+    let schema = store.schema();
+    let width = schema.grid.axes[1].length;
+    store.each(["peak_force"], |entry, [force]| {
+        if let Some(most) = greatest.get_mut(entry[0] * width + entry[1]) {
+            *most = most.max(force);
         }
     })?;
-    let schema = store.schema();
     let variable = schema.index_of("peak_force").map(|k| &schema.variables[k]);
     let units = variable.and_then(|v| v.attributes.get("units").and_then(Value::as_str));
     let size = greatest.iter().fold(0.0, |m: f64, v| m.max(v.abs()));
@@ -125,7 +90,7 @@ fn force(store: &Store, grid: &CategoryMap) -> Result<Heatmap, StoreError> {
         (1.0, String::new())
     };
     let values: Vec<f64> = greatest.iter().map(|force| factor * force).collect();
-    let scale = Axis::linear("greatest force on the tip").unit(unit);
+    let scale = Axis::linear("peak force on the tip").unit(unit);
     Ok(Heatmap::new(
         grid.columns,
         grid.rows,
@@ -155,17 +120,16 @@ fn states(store: &Store, grid: &CategoryMap) -> Result<CategoryMap, StoreError> 
     };
     let names = ["classification", "period", "first_harmonic"];
     let mut periodic = None;
-    each(store, &names, |at, row| {
-        if let [code, period, amplitude] = *row {
-            let (code, period) = (code as u8, period as i32);
-            if code == 0 {
-                return;
-            }
-            if period > 0 {
-                periodic = Some(code);
-            }
-            meet(at, (code, period, amplitude));
+    let width = store.schema().grid.axes[1].length;
+    store.each(names, |entry, [code, period, amplitude]| {
+        let (code, period) = (code as u8, period as i32);
+        if code == 0 {
+            return;
         }
+        if period > 0 {
+            periodic = Some(code);
+        }
+        meet(entry[0] * width + entry[1], (code, period, amplitude));
     })?;
     for orbit in from_neighbours(store)? {
         let at = orbit.at[1] * grid.columns + orbit.at[0];

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use axum::Json;
 use axum::extract::State;
+use nanotap::ErrorKind;
 use nanotap::case::Case;
 use nanotap::case::quantity::Kind;
 use nanotap::control::Control;
@@ -12,19 +13,19 @@ use nanotap::figure::motion::{fixed_step_figure, orbit_figure, simulation_figure
 use nanotap::model::Model;
 use nanotap::observe::table::shown_phase;
 use nanotap::observe::{Dimension, OBSERVABLES, Observables};
-use nanotap::study::orbit::{OrbitError, OrbitReport, OrbitRequest, orbit, spectral_radius};
+use nanotap::study::orbit::{OrbitOptions, OrbitReport, orbit, spectral_radius};
 use nanotap::study::registry::Study as _;
 use nanotap::study::simulate::{
-    Method, SimulateReport, SimulateRequest, SimulateStudy, Simulation, simulate,
+    Method, SimulateOptions, SimulateReport, SimulateStudy, Simulation, simulate,
 };
 use nanotap::study::value::Steps;
 use nanotap_figures::Figure;
 use serde_json::{Value, json};
 
-use crate::answer::Refusal;
-use crate::asked::{Asked, Start, model_of};
+use crate::api_error::ApiError;
 use crate::figures::{Views, drawn, viewed};
 use crate::film::film;
+use crate::motion_request::{MotionRequest, Start, model_of};
 use crate::{App, commands, forms, knobs};
 
 /// Largest number of drive periods in the film and the figures of a motion without a period.
@@ -40,23 +41,23 @@ pub(crate) enum Motion {
 }
 
 impl Motion {
-    pub(crate) fn find(model: &Model, start: &Start) -> Result<Self, Refusal> {
-        let request = OrbitRequest {
+    pub(crate) fn find(model: &Model, start: &Start) -> Result<Self, ApiError> {
+        let request = OrbitOptions {
             period: start.period,
             state: start.state.clone(),
-            ..OrbitRequest::default()
+            ..OrbitOptions::default()
         };
-        match orbit(model, &request.options()) {
+        match orbit(model, &request) {
             Ok(found) => Ok(Self::Orbit(Box::new(found))),
-            Err(OrbitError::NotPeriodic { .. }) => {
-                let request = SimulateRequest {
+            Err(error) if start.period.is_none() && error.kind == ErrorKind::Numerics => {
+                let request = SimulateOptions {
                     state: start.state.clone(),
-                    ..SimulateRequest::default()
+                    ..SimulateOptions::default()
                 };
-                let run = simulate(model, &request.options()).map_err(Refusal::of)?;
+                let run = simulate(model, &request).map_err(ApiError::of)?;
                 Ok(Self::Run(Box::new(run)))
             }
-            Err(error) => Err(Refusal::of(error)),
+            Err(error) => Err(ApiError::of(error)),
         }
     }
 
@@ -124,22 +125,22 @@ impl Motion {
 
 pub(crate) async fn motion(
     State(app): State<Arc<App>>,
-    Json(asked): Json<Asked>,
-) -> Result<Json<Value>, Refusal> {
+    Json(request): Json<MotionRequest>,
+) -> Result<Json<Value>, ApiError> {
     let shared = Arc::clone(&app);
     app.workers
-        .run(move |control| answer(&shared, &asked, control))
+        .run(move |control| answer(&shared, &request, control))
         .await
         .map(Json)
 }
 
-fn answer(app: &App, asked: &Asked, control: &Control<'_>) -> Result<Value, Refusal> {
+fn answer(app: &App, request: &MotionRequest, control: &Control<'_>) -> Result<Value, ApiError> {
     let (case, base) = (
-        asked.case.case(app, control)?,
-        asked.case.base(app, control)?,
+        request.case.case(app, control)?,
+        request.case.base(app, control)?,
     );
     let model = model_of(&case)?;
-    let start = Start::parse(&asked.start)?;
+    let start = Start::parse(&request.start)?;
     let motion = Motion::find(&model, &start)?;
     let remarks: Vec<String> = case.remarks().into_iter().map(|r| r.text).collect();
     Ok(json!({
@@ -149,18 +150,18 @@ fn answer(app: &App, asked: &Asked, control: &Control<'_>) -> Result<Value, Refu
         "keys": knobs::of(&case, &base),
         "observables": rows(&case, motion.observables()),
         "start": Start::text(None, motion.state()),
-        "figure": unlettered(motion.figure(&model, &case), &asked.views, "portrait")?,
-        "contact": unlettered(motion.contact_figure(&model, &case), &asked.views, "contact")?,
+        "figure": unlettered(motion.figure(&model, &case), &request.views, "portrait")?,
+        "contact": unlettered(motion.contact_figure(&model, &case), &request.views, "contact")?,
         "film": film(&case, &model, motion.state(), motion.periods())?,
-        "fixed_step": fixed_step(&case, &model, asked.steps, start.state, control)?,
+        "fixed_step": fixed_step(&case, &model, request.steps, start.state, control)?,
         "forms": forms::forms(&case, &base, &model),
-        "command": commands::command(app, asked, motion.study())?,
-        "python": commands::python(app, asked, motion.study())?,
+        "command": commands::command(app, request, motion.study())?,
+        "python": commands::python(app, request, motion.study())?,
     }))
 }
 
 /// The figure without panel letters, which are for publications; the page has headings.
-fn unlettered(figure: Figure, views: &Views, name: &str) -> Result<Value, Refusal> {
+fn unlettered(figure: Figure, views: &Views, name: &str) -> Result<Value, ApiError> {
     let figure = figure.letters(false);
     match views.get(name) {
         Some(views) => drawn(&viewed(figure, views)),
@@ -208,16 +209,16 @@ fn fixed_step(
     steps: u32,
     state: Option<Vec<f64>>,
     control: &Control<'_>,
-) -> Result<Option<Value>, Refusal> {
+) -> Result<Option<Value>, ApiError> {
     if steps == 0 {
         return Ok(None);
     }
-    let request = SimulateRequest {
+    let request = SimulateOptions {
         method: Method::Rk4,
         steps: Steps([steps, steps]),
         periods: FIXED_PERIODS,
         state,
-        ..SimulateRequest::default()
+        ..SimulateOptions::default()
     };
     let run = match SimulateStudy::run(case, &request, control) {
         Ok(SimulateReport::FixedStep(run)) => run,
@@ -231,7 +232,7 @@ fn fixed_step(
     );
     Ok(Some(json!({
         "words": format!(
-            "{steps} steps a period show {shown}. The exact flow goes from there to: {}",
+            "{steps} steps per period show {shown}. The exact flow goes from there to: {}",
             run.exact.evidence
         ),
         "figure": drawn(&fixed_step_figure(model, &run, &case.units()))?,

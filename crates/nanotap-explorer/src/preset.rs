@@ -13,7 +13,7 @@ use serde::Deserialize;
 use serde_json::{Value, json};
 
 use crate::App;
-use crate::answer::Refusal;
+use crate::api_error::ApiError;
 
 /// A case to start from.
 #[derive(Clone, Debug)]
@@ -150,21 +150,21 @@ pub(crate) fn all(path: Option<&Path>, set: &[String]) -> Result<Vec<Preset>, na
 /// A case as requested by the page.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(crate) struct Wanted {
+pub(crate) struct CaseSpec {
     preset: String,
     #[serde(default)]
     set: Vec<String>,
 }
 
-impl Wanted {
-    pub(crate) fn preset<'a>(&self, app: &'a App) -> Result<&'a Preset, Refusal> {
+impl CaseSpec {
+    pub(crate) fn preset<'a>(&self, app: &'a App) -> Result<&'a Preset, ApiError> {
         app.presets
             .iter()
             .find(|preset| preset.name == self.preset)
             .ok_or_else(|| {
                 let known: Vec<&str> = app.presets.iter().map(|p| p.name.as_str()).collect();
-                Refusal::input(
-                    format!("there is no case called `{}`", self.preset),
+                ApiError::input(
+                    format!("no case called `{}`", self.preset),
                     format!("there are {}", known.join(", ")),
                 )
             })
@@ -184,9 +184,9 @@ impl Wanted {
     }
 
     /// The case, checked as at the terminal, without solving for the distance of a setpoint.
-    pub(crate) fn any_distance(&self, app: &App) -> Result<Case, Refusal> {
+    pub(crate) fn any_distance(&self, app: &App) -> Result<Case, ApiError> {
         let preset = self.preset(app)?;
-        let case = Case::parse(Some(preset.source()), &self.words(preset)).map_err(Refusal::of)?;
+        let case = Case::parse(Some(preset.source()), &self.words(preset)).map_err(ApiError::of)?;
         let changes: Vec<String> = self.set.iter().map(|word| changed(word)).collect();
         Ok(if changes.is_empty() {
             case.called(&preset.words)
@@ -196,17 +196,17 @@ impl Wanted {
     }
 
     /// The case at its setpoint; its motions end once `control` cancels the work.
-    pub(crate) fn case(&self, app: &App, control: &Control<'_>) -> Result<Case, Refusal> {
+    pub(crate) fn case(&self, app: &App, control: &Control<'_>) -> Result<Case, ApiError> {
         Ok(self.at_setpoint(app, control)?.cancelled_by(control))
     }
 
-    fn at_setpoint(&self, app: &App, control: &Control<'_>) -> Result<Case, Refusal> {
+    fn at_setpoint(&self, app: &App, control: &Control<'_>) -> Result<Case, ApiError> {
         let solved = at_setpoint(self.any_distance(app)?, control);
-        Ok(solved.map_err(Refusal::of)?.0)
+        Ok(solved.map_err(ApiError::of)?.0)
     }
 
     /// The case of the preset, without changes; its motions end once `control` cancels the work.
-    pub(crate) fn base(&self, app: &App, control: &Control<'_>) -> Result<Case, Refusal> {
+    pub(crate) fn base(&self, app: &App, control: &Control<'_>) -> Result<Case, ApiError> {
         let solved = &self.preset(app)?.solved;
         if let Some(case) = solved.get() {
             return Ok(case.cancelled_by(control));

@@ -13,10 +13,11 @@ use nanotap::figure::approach::approach_figure;
 use nanotap::figure::basin::figure as basin_figure;
 use nanotap::figure::branch::{Shown, case_figure};
 use nanotap::figure::sweep::{figure as sweep_figure, response as response_figure};
+use nanotap::model::Model;
 use nanotap::observe::time_series::state_names;
-use nanotap::study::approach::{ApproachRequest, ApproachStudy};
-use nanotap::study::branch::{BranchReport, BranchRequest, BranchStudy};
-use nanotap::study::registry::{Study as _, study as study_named};
+use nanotap::study::approach::ApproachStudy;
+use nanotap::study::branch::{BranchReport, BranchStudy};
+use nanotap::study::registry::{Study, study as study_named};
 use nanotap::study::request::read;
 use nanotap::study::sweep::Over;
 use nanotap_figures::Figure;
@@ -24,13 +25,13 @@ use serde::Deserialize;
 use serde_json::{Map, Value, json};
 
 use crate::App;
-use crate::answer::Refusal;
-use crate::asked::{Start, model_of};
+use crate::api_error::ApiError;
 use crate::clicks::{self, Axis, Height};
 use crate::commands::{study_command, study_python};
 use crate::figures::drawn;
 use crate::maps::{self, Shows};
-use crate::preset::Wanted;
+use crate::motion_request::{Start, model_of};
+use crate::preset::CaseSpec;
 use crate::scratch::Scratch;
 
 /// Numbers of values of the parameter in the stages of a diagram.
@@ -55,8 +56,8 @@ const RECORDED: usize = 32;
 /// A study as requested by the page: its fields by name.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(crate) struct Asked {
-    case: Wanted,
+pub(crate) struct StudyRequest {
+    case: CaseSpec,
     #[serde(default)]
     start: String,
     tab: Tab,
@@ -75,12 +76,15 @@ enum Tab {
     Map,
 }
 
-pub(crate) async fn study(State(app): State<Arc<App>>, Json(asked): Json<Asked>) -> Response {
+pub(crate) async fn study(
+    State(app): State<Arc<App>>,
+    Json(request): Json<StudyRequest>,
+) -> Response {
     let shared = Arc::clone(&app);
     app.workers.stream(move |control, hand_over| {
         Studied {
             app: &shared,
-            asked: &asked,
+            request: &request,
             control,
             hand_over,
         }
@@ -91,7 +95,7 @@ pub(crate) async fn study(State(app): State<Arc<App>>, Json(asked): Json<Asked>)
 /// A running study.
 struct Studied<'a> {
     app: &'a App,
-    asked: &'a Asked,
+    request: &'a StudyRequest,
     control: &'a Control<'a>,
     hand_over: &'a dyn Fn(Value),
 }
@@ -102,15 +106,15 @@ struct Stage<'a> {
     clicks: &'a Value,
     words: String,
     /// Names and requests of the studies in its figure.
-    studies: &'a [Asking<'a>],
+    studies: &'a [Computed<'a>],
 }
 
-/// The name of a study, and its request.
-type Asking<'a> = (&'a str, &'a Map<String, Value>);
+/// The name of a study, and its options.
+type Computed<'a> = (&'a str, &'a Map<String, Value>);
 
 impl Studied<'_> {
-    fn run(&self) -> Result<(), Refusal> {
-        match self.asked.tab {
+    fn run(&self) -> Result<(), ApiError> {
+        match self.request.tab {
             Tab::Diagram => self.sweep(&DIAGRAM, STARTS.0, false),
             Tab::Resonance => self.sweep(&DIAGRAM[..2], 0, true),
             Tab::Map => self.map(),
@@ -120,26 +124,26 @@ impl Studied<'_> {
         }
     }
 
-    fn field(&self, name: &str) -> Result<&str, Refusal> {
-        let given = self.asked.options.get(name).and_then(Value::as_str);
+    fn field(&self, name: &str) -> Result<&str, ApiError> {
+        let given = self.request.options.get(name).and_then(Value::as_str);
         let given = given.map(str::trim).filter(|text| !text.is_empty());
         given.ok_or_else(|| {
-            Refusal::input(format!("the field `{name}` is empty"), "give it a value")
+            ApiError::input(format!("the field `{name}` is empty"), "give it a value")
         })
     }
 
     /// `key=from:to:count` in the terminal's form, and the parsed range.
-    fn over(&self, case: &Case, which: &str, count: usize) -> Result<(String, Over), Refusal> {
+    fn over(&self, case: &Case, which: &str, count: usize) -> Result<(String, Over), ApiError> {
         let [key, from, to] =
             ["key", "from", "to"].map(|part| self.field(&format!("{part}{which}")));
         let text = format!("{}={}:{}:{count}", key?, from?, to?).replace(' ', "");
-        let over = Over::parse(&text, case).map_err(Refusal::of)?;
+        let over = Over::parse(&text, case).map_err(ApiError::of)?;
         Ok((text, over))
     }
 
-    fn hand(&self, stage: &Stage<'_>) -> Result<(), Refusal> {
-        let case = &self.asked.case;
-        let command = |(name, request): &Asking<'_>| study_command(self.app, case, name, request);
+    fn hand(&self, stage: &Stage<'_>) -> Result<(), ApiError> {
+        let case = &self.request.case;
+        let command = |(name, request): &Computed<'_>| study_command(self.app, case, name, request);
         let commands = stage.studies.iter().map(command);
         let commands: Vec<String> = commands.collect::<Result<_, _>>()?;
         (self.hand_over)(json!({
@@ -159,15 +163,15 @@ impl Studied<'_> {
         case: &Case,
         name: &str,
         request: &Map<String, Value>,
-        use_it: impl FnOnce(&Store) -> Result<T, Refusal>,
-    ) -> Result<T, Refusal> {
-        let entry = study_named(name)
-            .ok_or_else(|| Refusal::failed(format!("there is no study `{name}`")))?;
-        let recipe = entry.recipe(case, Value::Object(request.clone()), self.control)?;
+        use_it: impl FnOnce(&Store) -> Result<T, ApiError>,
+    ) -> Result<T, ApiError> {
+        let entry =
+            study_named(name).ok_or_else(|| ApiError::failed(format!("unknown study `{name}`")))?;
+        let plan = entry.plan(case, Value::Object(request.clone()), self.control)?;
         let scratch = Scratch::within(&self.app.scratch)?;
         let store =
-            Store::create_or_resume(&scratch.path().join("data.zarr"), recipe.schema().clone())
-                .map_err(Refusal::of)?;
+            Store::create_or_resume(&scratch.path().join("data.zarr"), plan.schema().clone())
+                .map_err(ApiError::of)?;
         let work = Work {
             share: Share::WHOLE,
             threads: 0,
@@ -176,36 +180,58 @@ impl Studied<'_> {
                 progress: None,
             },
         };
-        recipe.compute(&store, &work).map_err(Refusal::of)?;
+        plan.compute(&store, &work).map_err(ApiError::of)?;
         use_it(&store)
     }
 
+    /// Computes the stages one by one until the work is cancelled; `stage` gets its count and the
+    /// finest one.
+    fn stages(
+        &self,
+        counts: &[usize],
+        mut stage: impl FnMut(usize, usize) -> Result<(), ApiError>,
+    ) -> Result<(), ApiError> {
+        let finest = counts.last().copied().unwrap_or_default();
+        for &count in counts {
+            stage(count, finest)?;
+            if self.control.is_cancelled() {
+                break;
+            }
+        }
+        Ok(())
+    }
+
+    /// The case at its setpoint, if it is small enough for the explorer, and its model.
+    fn case(&self) -> Result<(Case, Model), ApiError> {
+        let case = self.request.case.case(self.app, self.control)?;
+        let model = model_of(&case)?;
+        Ok((case, model))
+    }
+
     /// A diagram or a resonance curve, then the branches over it.
-    fn sweep(&self, stages: &[usize], starts: usize, response: bool) -> Result<(), Refusal> {
-        let case = self.asked.case.case(self.app, self.control)?;
-        model_of(&case)?;
+    fn sweep(&self, counts: &[usize], starts: usize, response: bool) -> Result<(), ApiError> {
+        let (case, _) = self.case()?;
         let (draw, names): (fn(&Store) -> _, &[&str]) = if response {
             (response_figure, &["first_harmonic", "phase"])
         } else {
             (sweep_figure, &["tip_max"])
         };
-        for (stage, &count) in stages.iter().enumerate() {
+        self.stages(counts, |count, finest| {
             let (text, over) = self.over(&case, "", count)?;
-            let mut request = object(json!({ "over": [text], "periods": RECORDED, "strobe": 1 }));
+            let mut options = object(json!({ "over": [text], "periods": RECORDED, "strobe": 1 }));
             if response {
-                request.insert("follow".into(), "both".into());
+                options.insert("follow".into(), "both".into());
             } else {
-                request.insert("starts".into(), starts.into());
+                options.insert("starts".into(), starts.into());
             }
             let x = Axis::of(&over);
-            let (mut figure, mut near) = self.dataset(&case, "sweep", &request, |store| {
-                let figure = draw(store).map_err(Refusal::of)?;
+            let (mut figure, mut near) = self.dataset(&case, "sweep", &options, |store| {
+                let figure = draw(store).map_err(ApiError::of)?;
                 let heights = Height::of(&figure, names);
-                let near = clicks::in_sweep(store, x, &heights, response).map_err(Refusal::of)?;
+                let near = clicks::in_sweep(store, x, &heights, response).map_err(ApiError::of)?;
                 Ok((figure, near))
             })?;
-            let last = stage + 1 == stages.len();
-            let hand = |figure: &Figure, near: &[Value], words, studies: &[Asking<'_>]| {
+            let hand = |figure: &Figure, near: &[Value], words, studies: &[Computed<'_>]| {
                 self.hand(&Stage {
                     figure: figure.clone(),
                     clicks: &json!({ "set": { "x": x.json() }, "near": near }),
@@ -213,64 +239,46 @@ impl Studied<'_> {
                     studies,
                 })
             };
-            let words = progress(count, stages[stages.len() - 1], "values");
-            let swept = ("sweep", &request);
-            if !last {
-                hand(&figure, &near, words, &[swept])?;
-                if self.stopped(stage, stages.len()) {
-                    break;
-                }
-                continue;
+            let swept = ("sweep", &options);
+            if count < finest {
+                return hand(&figure, &near, progress(count, finest, "values"), &[swept]);
             }
-            hand(
-                &figure,
-                &near,
-                format!("{count} values; following branches …"),
-                &[swept],
-            )?;
-            if self.cancelled() {
-                break;
+            let words = format!("{count} values; following branches …");
+            hand(&figure, &near, words, &[swept])?;
+            if self.control.is_cancelled() {
+                return Ok(());
             }
             let (report, followed) = self.followed(&case, &over, OVERLAID)?;
             let heights = Height::of(&figure, names);
             clicks::drawn_over(&mut figure, &report, x, &heights, &case.units());
             near.extend(clicks::on_branches(&report, x, &heights, &case.units()));
-            let words = format!(
-                "{count} values and {} orbits on branches",
-                report.points.len()
-            );
-            hand(&figure, &near, words, &[swept, ("branch", &followed)])?;
-        }
-        Ok(())
+            let orbits = report.points.len();
+            let words = format!("{count} values and {orbits} orbits on branches");
+            hand(&figure, &near, words, &[swept, ("branch", &followed)])
+        })
     }
 
     /// The motions over two parameters.
-    fn map(&self) -> Result<(), Refusal> {
-        let case = self.asked.case.case(self.app, self.control)?;
-        model_of(&case)?;
+    fn map(&self) -> Result<(), ApiError> {
+        let (case, _) = self.case()?;
         let shows = self.field("show").ok().and_then(Shows::named);
-        for (stage, &count) in MAP.iter().enumerate() {
+        self.stages(&MAP, |count, finest| {
             let over = [self.over(&case, "1", count)?, self.over(&case, "2", count)?];
             let texts: Vec<&String> = over.iter().map(|(text, _)| text).collect();
-            let request = object(
+            let options = object(
                 json!({ "over": texts, "periods": RECORDED, "strobe": 1, "starts": STARTS.1 }),
             );
             let [x, y] = [&over[0].1, &over[1].1].map(|over| Axis::of(over).json());
-            let figure = self.dataset(&case, "sweep", &request, |store| {
-                maps::figure(store, shows.unwrap_or_default()).map_err(Refusal::of)
+            let figure = self.dataset(&case, "sweep", &options, |store| {
+                maps::figure(store, shows.unwrap_or_default()).map_err(ApiError::of)
             })?;
-            let finest = MAP[MAP.len() - 1];
             self.hand(&Stage {
                 figure,
                 clicks: &json!({ "set": { "x": x, "y": y } }),
                 words: progress(count.pow(2), finest.pow(2), "values"),
-                studies: &[("sweep", &request)],
-            })?;
-            if self.stopped(stage, MAP.len()) {
-                break;
-            }
-        }
-        Ok(())
+                studies: &[("sweep", &options)],
+            })
+        })
     }
 
     /// The branches over a parameter through the attractors of censuses at `values` of its values.
@@ -279,32 +287,32 @@ impl Studied<'_> {
         case: &Case,
         over: &Over,
         values: usize,
-    ) -> Result<(BranchReport, Map<String, Value>), Refusal> {
-        let request = object(json!({
+    ) -> Result<(BranchReport, Map<String, Value>), ApiError> {
+        let options = object(json!({
             "parameter": over.key.path(),
             "from": self.field("from")?,
             "to": self.field("to")?,
             "diagram": true,
             "values": values,
         }));
-        let asked: BranchRequest = read(Value::Object(request.clone()))?;
-        Ok((BranchStudy::run(case, &asked, self.control)?, request))
+        Ok((self.report::<BranchStudy>(case, &options)?, options))
     }
 
-    fn stopped(&self, stage: usize, stages: usize) -> bool {
-        self.cancelled() || stage + 1 == stages
+    /// The report of a study.
+    fn report<S: Study>(
+        &self,
+        case: &Case,
+        options: &Map<String, Value>,
+    ) -> Result<S::Report, ApiError> {
+        let options: S::Options = read(Value::Object(options.clone()))?;
+        Ok(S::run(case, &options, self.control)?)
     }
 
-    fn cancelled(&self) -> bool {
-        self.control.is_cancelled()
-    }
-
-    fn branches(&self) -> Result<(), Refusal> {
-        let case = self.asked.case.case(self.app, self.control)?;
-        model_of(&case)?;
+    fn branches(&self) -> Result<(), ApiError> {
+        let (case, _) = self.case()?;
         let (_, over) = self.over(&case, "", 2)?;
-        for (stage, &values) in BRANCHES.iter().enumerate() {
-            let (report, request) = self.followed(&case, &over, values)?;
+        self.stages(&BRANCHES, |values, finest| {
+            let (report, options) = self.followed(&case, &over, values)?;
             let axis = Axis::of(&over);
             let figure = case_figure(&case, &report, None);
             let shown = Shown::usual(&case).observable().map_or("", |o| o.name);
@@ -313,27 +321,23 @@ impl Studied<'_> {
             self.hand(&Stage {
                 figure,
                 clicks: &json!({ "set": { "x": axis.json() }, "near": near }),
-                words: progress(values, BRANCHES[BRANCHES.len() - 1], "censuses"),
-                studies: &[("branch", &request)],
-            })?;
-            if self.stopped(stage, BRANCHES.len()) {
-                break;
-            }
-        }
-        Ok(())
+                words: progress(values, finest, "censuses"),
+                studies: &[("branch", &options)],
+            })
+        })
     }
 
-    fn approach(&self) -> Result<(), Refusal> {
-        let case = self.asked.case.any_distance(self.app)?;
-        for (stage, &points) in APPROACH.iter().enumerate() {
-            let mut request = object(json!({ "points": points, "branches": stage > 0 }));
+    fn approach(&self) -> Result<(), ApiError> {
+        let case = self.request.case.any_distance(self.app)?;
+        self.stages(&APPROACH, |points, finest| {
+            let branches = points == finest;
+            let mut options = object(json!({ "points": points, "branches": branches }));
             for end in ["from", "to"] {
                 if let Ok(text) = self.field(end) {
-                    request.insert(end.into(), text.into());
+                    options.insert(end.into(), text.into());
                 }
             }
-            let asked: ApproachRequest = read(Value::Object(request.clone()))?;
-            let report = ApproachStudy::run(&case, &asked, self.control)?;
+            let report = self.report::<ApproachStudy>(&case, &options)?;
             let units = case.units();
             let (factor, _) = units.axis(Kind::Length, report.from.abs().max(report.to.abs()));
             let axis = match units.si(Kind::Length) {
@@ -352,35 +356,28 @@ impl Studied<'_> {
             self.hand(&Stage {
                 figure,
                 clicks: &json!({ "set": { "x": axis.json() }, "near": near }),
-                words: progress(points, APPROACH[APPROACH.len() - 1], "distances each way"),
-                studies: &[("approach", &request)],
-            })?;
-            if self.stopped(stage, APPROACH.len()) {
-                break;
-            }
-        }
-        Ok(())
+                words: progress(points, finest, "distances each way"),
+                studies: &[("approach", &options)],
+            })
+        })
     }
 
-    fn basin(&self) -> Result<(), Refusal> {
-        let case = self.asked.case.case(self.app, self.control)?;
-        let model = model_of(&case)?;
+    fn basin(&self) -> Result<(), ApiError> {
+        let (case, model) = self.case()?;
         let names = state_names(&model);
-        let origin = Start::parse(&self.asked.start)?.state;
-        for (stage, &count) in BASIN.iter().enumerate() {
-            let side = |which: &str| -> Result<(String, String), Refusal> {
-                let [entry, from, to] =
-                    ["entry", "from", "to"].map(|part| self.field(&format!("{part}{which}")));
-                let entry = entry?;
-                Ok((
-                    entry.to_owned(),
-                    format!("{entry}={}:{}:{count}", from?, to?),
-                ))
-            };
-            let ((x, x_range), (y, y_range)) = (side("x")?, side("y")?);
-            let mut request = object(json!({ "x": x_range, "y": y_range }));
+        let origin = Start::parse(&self.request.start)?.state;
+        let side = |which: &str, count| -> Result<(String, String), ApiError> {
+            let [entry, from, to] =
+                ["entry", "from", "to"].map(|part| self.field(&format!("{part}{which}")));
+            let entry = entry?.to_owned();
+            let range = format!("{entry}={}:{}:{count}", from?, to?);
+            Ok((entry, range))
+        };
+        self.stages(&BASIN, |count, finest| {
+            let ((x, x_range), (y, y_range)) = (side("x", count)?, side("y", count)?);
+            let mut options = object(json!({ "x": x_range, "y": y_range }));
             if let Some(state) = &origin {
-                request.insert("state".into(), json!(state));
+                options.insert("state".into(), json!(state));
             }
             // A click starts a run there: the state of the slice with two entries replaced.
             let start: Vec<Value> = names
@@ -392,25 +389,21 @@ impl Studied<'_> {
                     _ => json!(origin.as_ref().and_then(|s| s.get(k)).unwrap_or(&0.0)),
                 })
                 .collect();
-            let figure = self.dataset(&case, "basin", &request, |store| {
-                basin_figure(store).map_err(Refusal::of)
+            let figure = self.dataset(&case, "basin", &options, |store| {
+                basin_figure(store).map_err(ApiError::of)
             })?;
             self.hand(&Stage {
                 figure,
                 clicks: &json!({ "start": start }),
-                words: progress(count, BASIN[BASIN.len() - 1], "points each way"),
-                studies: &[("basin", &request)],
-            })?;
-            if self.stopped(stage, BASIN.len()) {
-                break;
-            }
-        }
-        Ok(())
+                words: progress(count, finest, "points each way"),
+                studies: &[("basin", &options)],
+            })
+        })
     }
 }
 
 fn progress(done: usize, finest: usize, counted: &str) -> String {
-    let more = if done < finest { ", going on …" } else { "" };
+    let more = if done < finest { " so far" } else { "" };
     format!("{done} {counted}{more}")
 }
 

@@ -12,7 +12,7 @@ use serde_json::Value;
 use tokio::sync::{Semaphore, mpsc};
 use tokio_stream::wrappers::ReceiverStream;
 
-use crate::answer::Refusal;
+use crate::api_error::ApiError;
 
 /// Number of motions computed at once.
 const MOTIONS: usize = 2;
@@ -58,23 +58,23 @@ impl Workers {
     /// Runs `work` that follows a slider, and waits for its result.
     pub(crate) async fn run<T: Send + 'static>(
         &self,
-        work: impl FnOnce(&Control<'_>) -> Result<T, Refusal> + Send + 'static,
-    ) -> Result<T, Refusal> {
+        work: impl FnOnce(&Control<'_>) -> Result<T, ApiError> + Send + 'static,
+    ) -> Result<T, ApiError> {
         Self::run_in(&self.motions, work).await
     }
 
     /// Runs `work` that may take long, within the limit of the studies.
     pub(crate) async fn run_long<T: Send + 'static>(
         &self,
-        work: impl FnOnce(&Control<'_>) -> Result<T, Refusal> + Send + 'static,
-    ) -> Result<T, Refusal> {
+        work: impl FnOnce(&Control<'_>) -> Result<T, ApiError> + Send + 'static,
+    ) -> Result<T, ApiError> {
         Self::run_in(&self.studies, work).await
     }
 
     async fn run_in<T: Send + 'static>(
         places: &Arc<Semaphore>,
-        work: impl FnOnce(&Control<'_>) -> Result<T, Refusal> + Send + 'static,
-    ) -> Result<T, Refusal> {
+        work: impl FnOnce(&Control<'_>) -> Result<T, ApiError> + Send + 'static,
+    ) -> Result<T, ApiError> {
         let place = Arc::clone(places).acquire_owned().await;
         let stop = CancelFlag::new();
         let _guard = StopOnDrop(stop.clone());
@@ -84,7 +84,7 @@ impl Workers {
         });
         match tokio::time::timeout(LONGEST, task).await {
             Ok(Ok(done)) => done,
-            Ok(Err(_)) => Err(Refusal::failed("the computation broke off")),
+            Ok(Err(_)) => Err(ApiError::failed("internal error; please report")),
             Err(_) => Err(too_long()),
         }
     }
@@ -92,7 +92,7 @@ impl Workers {
     /// Runs `work` and sends its results as lines of JSON as they come.
     pub(crate) fn stream(
         &self,
-        work: impl FnOnce(&Control<'_>, &dyn Fn(Value)) -> Result<(), Refusal> + Send + 'static,
+        work: impl FnOnce(&Control<'_>, &dyn Fn(Value)) -> Result<(), ApiError> + Send + 'static,
     ) -> Response {
         let places = Arc::clone(&self.studies);
         let (sender, receiver) = mpsc::channel::<Result<String, std::convert::Infallible>>(WAITING);
@@ -133,6 +133,6 @@ impl Workers {
     }
 }
 
-fn too_long() -> Refusal {
-    Refusal::failed(format!("stopped after {} s", LONGEST.as_secs()))
+fn too_long() -> ApiError {
+    ApiError::failed(format!("stopped after {} s", LONGEST.as_secs()))
 }

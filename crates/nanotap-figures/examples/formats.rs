@@ -162,7 +162,7 @@ fn scatter() -> Figure {
     )
 }
 
-/// A heatmap, categories, bars, notes.
+/// A heatmap, categories, bars and notes.
 fn maps() -> Figure {
     let grid = (0..120 * 80).map(|i| (f64::from(i % 120) / 20.0).sin() * f64::from(i / 120));
     let cells = (0..200 * 200).map(|i| {
@@ -201,7 +201,7 @@ fn maps() -> Figure {
         )
 }
 
-/// A line of 100,000 corners that fills its panel.
+/// A line of 100,000 points that fills its panel.
 fn trajectory() -> Figure {
     let line = (0..100_000).map(|i| {
         let t = f64::from(i) / 50.0;

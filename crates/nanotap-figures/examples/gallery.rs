@@ -41,7 +41,7 @@ fn figures() -> Vec<(&'static str, Figure)> {
         ("convergence", convergence()),
         ("four-panels", four_panels()),
         ("stacked", stacked()),
-        ("awkward", awkward()),
+        ("extreme_input", extreme_input()),
     ]
 }
 
@@ -384,7 +384,7 @@ fn stacked() -> Figure {
 }
 
 /// Input that breaks plotting programs.
-fn awkward() -> Figure {
+fn extreme_input() -> Figure {
     Figure::new(2, 3)
         .width(DOUBLE_COLUMN)
         .height(100.0)

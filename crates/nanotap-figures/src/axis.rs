@@ -136,12 +136,10 @@ impl Axis {
             return Ok(());
         };
         let refuse = |reason| {
-            Err(FigureError::Range {
-                axis: self.label.clone(),
-                from,
-                to,
-                reason,
-            })
+            Err(FigureError::Invalid(format!(
+                "the axis \"{}\" cannot run from {from} to {to}: {reason}",
+                self.label
+            )))
         };
         if !(from.is_finite() && to.is_finite() && from.abs() <= LARGEST && to.abs() <= LARGEST) {
             refuse("both ends must be finite and below 1e300 in size")
@@ -172,60 +170,63 @@ fn indistinct(low: f64, high: f64) -> bool {
     high - low <= 1e-11 * low.abs().max(high.abs()) || high - low < 1e-290
 }
 
+/// The smallest interval with all values that were added.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Hull {
+    low: f64,
+    high: f64,
+}
+
+impl Hull {
+    const EMPTY: Hull = Hull {
+        low: f64::INFINITY,
+        high: f64::NEG_INFINITY,
+    };
+
+    pub(crate) fn add(&mut self, value: f64) {
+        self.join(Hull {
+            low: value,
+            high: value,
+        });
+    }
+
+    fn join(&mut self, other: Hull) {
+        self.low = self.low.min(other.low);
+        self.high = self.high.max(other.high);
+    }
+}
+
 /// Extent of the data along an axis.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Extent {
-    /// Extent of data that need a margin.
-    soft: (f64, f64),
-    /// Extent of items that may touch the end of the axis: the feet of bars.
-    hard: (f64, f64),
-    /// Extent of maps: they fill the panel, and nothing beyond them is shown.
-    whole: (f64, f64),
+    /// Data that need a margin.
+    pub(crate) data: Hull,
+    /// Items that may touch the end of the axis: the feet of bars.
+    pub(crate) feet: Hull,
+    /// Maps: they fill the panel, and nothing beyond them is shown.
+    pub(crate) maps: Hull,
 }
 
 impl Extent {
     pub(crate) const EMPTY: Extent = Extent {
-        soft: (f64::INFINITY, f64::NEG_INFINITY),
-        hard: (f64::INFINITY, f64::NEG_INFINITY),
-        whole: (f64::INFINITY, f64::NEG_INFINITY),
+        data: Hull::EMPTY,
+        feet: Hull::EMPTY,
+        maps: Hull::EMPTY,
     };
 
-    pub(crate) fn add(&mut self, value: f64) {
-        self.soft = (self.soft.0.min(value), self.soft.1.max(value));
-    }
-
-    pub(crate) fn add_edge(&mut self, value: f64) {
-        self.hard = (self.hard.0.min(value), self.hard.1.max(value));
-    }
-
-    pub(crate) fn add_map(&mut self, value: f64) {
-        self.whole = (self.whole.0.min(value), self.whole.1.max(value));
-    }
-
     pub(crate) fn join(&mut self, other: Extent) {
-        for value in [other.soft.0, other.soft.1] {
-            if value.is_finite() {
-                self.add(value);
-            }
-        }
-        for value in [other.hard.0, other.hard.1] {
-            if value.is_finite() {
-                self.add_edge(value);
-            }
-        }
-        for value in [other.whole.0, other.whole.1] {
-            if value.is_finite() {
-                self.add_map(value);
-            }
-        }
+        self.data.join(other.data);
+        self.feet.join(other.feet);
+        self.maps.join(other.maps);
     }
 
     fn range(self, log: bool, padding: f64, natural: f64) -> (f64, f64) {
-        if self.whole.0 < self.whole.1 {
-            return self.whole;
+        if self.maps.low < self.maps.high {
+            return (self.maps.low, self.maps.high);
         }
-        let low = self.soft.0.min(self.hard.0);
-        let high = self.soft.1.max(self.hard.1);
+        let mut all = self.data;
+        all.join(self.feet);
+        let Hull { low, high } = all;
         if low > high {
             return if log { (1.0, 10.0) } else { (0.0, 1.0) };
         }
@@ -240,8 +241,8 @@ impl Extent {
                 (false, false) => (low - 0.05 * size, high + 0.05 * size),
             };
         }
-        let below = if low < self.hard.0 { padding } else { 0.0 };
-        let above = if high > self.hard.1 { padding } else { 0.0 };
+        let below = if low < self.feet.low { padding } else { 0.0 };
+        let above = if high > self.feet.high { padding } else { 0.0 };
         if log {
             let ratio = (libm::log10(high) - libm::log10(low)).max(0.0);
             (
@@ -277,12 +278,12 @@ impl View {
         share.is_finite().then(|| share.clamp(-1e6, 1e6))
     }
 
-    pub(crate) fn ticks(self, most: usize) -> Ticks {
+    pub(crate) fn ticks(self, max_count: usize) -> Ticks {
         let (low, high) = (self.from.min(self.to), self.from.max(self.to));
         if self.log {
-            ticks::logarithmic(low, high, most)
+            ticks::logarithmic(low, high, max_count)
         } else {
-            ticks::linear(low, high, most)
+            ticks::linear(low, high, max_count)
         }
     }
 }
@@ -296,7 +297,7 @@ mod tests {
         values
             .iter()
             .filter(|v| axis.holds(**v))
-            .for_each(|v| extent.add(*v));
+            .for_each(|v| extent.data.add(*v));
         axis.view(extent)
     }
 
@@ -340,9 +341,9 @@ mod tests {
             }
         );
         let mut extent = Extent::EMPTY;
-        extent.add_edge(0.0);
-        extent.add_edge(2.0);
-        extent.add(1.0);
+        extent.feet.add(0.0);
+        extent.feet.add(2.0);
+        extent.data.add(1.0);
         assert_eq!(
             Axis::linear("x").view(extent),
             View {
@@ -351,8 +352,8 @@ mod tests {
                 log: false
             }
         );
-        extent.add_map(5.0);
-        extent.add_map(6.0);
+        extent.maps.add(5.0);
+        extent.maps.add(6.0);
         assert_eq!(
             Axis::linear("x").view(extent),
             View {

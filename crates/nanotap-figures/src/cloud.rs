@@ -15,9 +15,6 @@ pub(crate) struct Cloud {
 
 /// Up to this number of dots, vector formats contain each one.
 const VECTOR_LIMIT: usize = 3000;
-/// Dots are placed to this fraction of a pixel. Where pixels are too small to be seen they are
-/// placed to whole pixels, because equal dots compress better.
-const PARTS: usize = 4;
 
 impl Cloud {
     /// The dots as a path of round line ends, if there are few enough.
@@ -55,27 +52,32 @@ impl Cloud {
         let columns = ((bounds.right * scale).floor() as isize + reach - left + 1) as usize;
         let rows = ((bounds.bottom * scale).floor() as isize + reach - top + 1) as usize;
 
-        let parts = if dpi < EMBEDDED_DPI { PARTS } else { 1 };
-        let stamps = Stamps::new(radius, reach, parts);
-        let opacity = self.colour.opacity();
-        let opaque = self.colour.a == 255;
+        let opacity = Some(self.colour.opacity()).filter(|opacity| *opacity < 1.0);
+        // A dot smaller than a pixel is spread over the pixels around it.
+        let strength = if radius < 0.5 {
+            3.0 * radius * radius / (radius + 0.5).powi(3)
+        } else {
+            1.0
+        };
         let mut coverage = vec![0f32; columns * rows];
         for p in &self.points {
             let (x, y) = (p.x * scale - left as f64, p.y * scale - top as f64);
             let (column, row) = (x.floor(), y.floor());
-            let stamp = stamps.at(x - column, y - row);
-            let side = stamps.side;
-            let first =
-                (row as usize - reach as usize) * columns + column as usize - reach as usize;
-            for (line, weights) in stamp.chunks(side).enumerate() {
-                let start = first + line * columns;
-                for (cell, &weight) in coverage[start..start + side].iter_mut().zip(weights) {
-                    *cell = if opaque {
-                        cell.max(weight)
-                    } else {
-                        *cell + (1.0 - *cell) * weight * opacity as f32
-                    };
-                }
+            // Equal dots compress better. Pixels of this size are too small to be seen.
+            let centre = if dpi < EMBEDDED_DPI {
+                Point::new(x - column, y - row)
+            } else {
+                Point::new(0.5, 0.5)
+            };
+            for (down, across) in square(reach) {
+                let distance = centre.distance(Point::new(across as f64 + 0.5, down as f64 + 0.5));
+                let weight = strength * (radius + 0.5 - distance).clamp(0.0, 1.0);
+                let place = (row as isize + down) * columns as isize + column as isize + across;
+                let cell = &mut coverage[place as usize];
+                *cell = match opacity {
+                    None => cell.max(weight as f32),
+                    Some(opacity) => *cell + (1.0 - *cell) * (weight * opacity) as f32,
+                };
             }
         }
         let pixels = coverage
@@ -113,55 +115,9 @@ impl Cloud {
     }
 }
 
-/// The pixels of a dot, for each sub-pixel position of its centre.
-struct Stamps {
-    side: usize,
-    parts: usize,
-    weights: Vec<Vec<f32>>,
-}
-
-impl Stamps {
-    fn new(radius: f64, reach: isize, parts: usize) -> Stamps {
-        let side = (2 * reach + 1) as usize;
-        let part = |k: usize| (k as f64 + 0.5) / parts as f64;
-        let mut weights = Vec::with_capacity(parts * parts);
-        for row in 0..parts {
-            for column in 0..parts {
-                let centre = Point::new(reach as f64 + part(column), reach as f64 + part(row));
-                weights.push(
-                    (0..side * side)
-                        .map(|i| disc_share(centre, radius, (i % side) as f64, (i / side) as f64))
-                        .collect(),
-                );
-            }
-        }
-        Stamps {
-            side,
-            parts,
-            weights,
-        }
-    }
-
-    fn at(&self, x: f64, y: f64) -> &[f32] {
-        let part = |v: f64| ((v * self.parts as f64) as usize).min(self.parts - 1);
-        &self.weights[part(y) * self.parts + part(x)]
-    }
-}
-
-/// Fraction of the pixel with the corner (`column`, `row`) that the disc covers, from 8 × 8
-/// samples.
-fn disc_share(centre: Point, radius: f64, column: f64, row: f64) -> f32 {
-    const SAMPLES: usize = 8;
-    let inside = (0..SAMPLES * SAMPLES)
-        .filter(|i| {
-            let sample = Point::new(
-                column + ((i % SAMPLES) as f64 + 0.5) / SAMPLES as f64,
-                row + ((i / SAMPLES) as f64 + 0.5) / SAMPLES as f64,
-            );
-            sample.distance(centre) <= radius
-        })
-        .count();
-    inside as f32 / (SAMPLES * SAMPLES) as f32
+/// Rows and columns of the pixels up to `reach` from the one in the middle.
+fn square(reach: isize) -> impl Iterator<Item = (isize, isize)> {
+    (-reach..=reach).flat_map(move |row| (-reach..=reach).map(move |column| (row, column)))
 }
 
 #[cfg(test)]

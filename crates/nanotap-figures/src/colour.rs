@@ -105,7 +105,7 @@ impl FromStr for Colour {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Colour, String> {
-        let refuse = || format!("\"{text}\" is no colour: write it as #rrggbb or #rrggbbaa");
+        let refuse = || format!("expected a colour as #rrggbb or #rrggbbaa, got \"{text}\"");
         let digits = text.strip_prefix('#').ok_or_else(refuse)?;
         if !digits.bytes().all(|b| b.is_ascii_hexdigit()) {
             return Err(refuse());

@@ -1,5 +1,6 @@
 //! Panels drawn onto the page.
 
+use crate::axis::Axis;
 use crate::cloud::Cloud;
 use crate::colour::Colour;
 use crate::layer::{CategoryMap, Heatmap, Layer, Line, Markers, Points};
@@ -11,7 +12,7 @@ use crate::polyline;
 use crate::prepared::{ColourBar, Frame, Prepared};
 use crate::raster::Raster;
 use crate::scene::{Item, Scene};
-use crate::shape::{Point, Rect, Segment, Stroke};
+use crate::shape::{Point, Rect, Stroke};
 use crate::style::{EDGE, INK, Style};
 use crate::symbol::{disc, marker, strokes};
 use crate::text::{Across, MM_PER_POINT, Upright, Words};
@@ -84,18 +85,8 @@ fn layer(
                 dash: rule.dash.lengths(width),
                 ..Stroke::solid(width, colour)
             };
-            let rect = frame.rect;
-            let ends = if rule.upright {
-                frame
-                    .across(rule.at)
-                    .map(|x| (Point::new(x, rect.bottom), Point::new(x, rect.top)))
-            } else {
-                frame
-                    .upright(rule.at)
-                    .map(|y| (Point::new(rect.left, y), Point::new(rect.right, y)))
-            };
-            if let Some((from, to)) = ends
-                && rect.contains(from)
+            if let Some((from, to)) = frame.rule(rule)
+                && frame.rect.contains(from)
             {
                 scene.line(from, to, stroke);
             }
@@ -109,9 +100,7 @@ fn layer(
                         .flat_map(Rect::outline),
                 );
             }
-            if !outline.is_empty() {
-                scene.fill(outline, colour, Some(frame.rect));
-            }
+            scene.fill(outline, colour, Some(frame.rect));
         }),
         Layer::Heatmap(map) => {
             if let Some(bar) = bar {
@@ -134,10 +123,8 @@ fn layer(
                 .collect();
             let lines: Vec<(Point, Point)> =
                 tops.iter().map(|p| (Point::new(p.x, foot), *p)).collect();
-            if !lines.is_empty() {
-                let stroke = Stroke::solid(0.8 * MM_PER_POINT, colour);
-                scene.stroke(strokes(&lines), stroke, Some(frame.rect));
-            }
+            let stroke = Stroke::solid(0.8 * MM_PER_POINT, colour);
+            scene.stroke(strokes(&lines), stroke, Some(frame.rect));
             for top in tops.into_iter().filter(|p| frame.rect.contains(*p)) {
                 scene.fill(disc(top, 0.65), colour, None);
             }
@@ -171,9 +158,6 @@ fn draw_line(scene: &mut Scene, frame: &Frame, line: &Line, colour: Colour) {
     let width = line.width * MM_PER_POINT;
     let points = line.points.iter().map(|p| frame.place(*p));
     let parts = polyline::visible(points, frame.rect.grown(BEYOND));
-    if parts.is_empty() {
-        return;
-    }
     let dash = line.dash.lengths(width);
     let stroke = Stroke {
         // Round ends make points between gaps visible; dashes need cut ends to keep their lengths.
@@ -326,113 +310,117 @@ fn axes(scene: &mut Scene, prepared: &Prepared, spot: &Spot, style: &Style) {
     let rect = spot.rect;
     scene.stroke(rect.outline(), Stroke::solid(style.axis, INK), None);
     scene.group("axis-x", &prepared.panel.x.label, |scene| {
-        let mut beside = 0.0;
-        if prepared.panel.x.marked() {
-            let marks = Marks::new(&prepared.panel.x, prepared.x, rect.width(), false, style);
-            let at = |share: f64| rect.left + share * rect.width();
-            let mut lines = mark_lines(&marks, style, |share, length| {
-                let x = at(share);
-                (
-                    Point::new(x, rect.bottom),
-                    Point::new(x, rect.bottom + length),
-                )
-            });
-            if !lines.is_empty() {
-                scene.stroke(
-                    std::mem::take(&mut lines),
-                    Stroke::solid(style.axis, INK),
-                    None,
-                );
-            }
-            if prepared.words_below {
-                let top = rect.bottom + style.mark + style.pad;
-                for (share, words) in marks.major {
-                    // Powers of ten are taller than plain numbers; their baselines agree all the
-                    // same.
-                    let base = Point::new(at(share), top + 1.1 * words.cap_height());
-                    scene.words(words.place(base, Across::Centre, Upright::Baseline, INK));
-                }
-                if let Some(note) = marks.note {
-                    beside = note.width + style.gap;
-                    let base =
-                        rect.bottom + spot.sides.bottom_marks + style.pad + note.cap_height();
-                    scene.words(note.place(
-                        Point::new(rect.right, base),
-                        Across::Right,
-                        Upright::Baseline,
-                        INK,
-                    ));
-                }
-            }
-        }
-        if prepared.words_below {
-            let words = Words::set(&prepared.panel.x.words(), style.label, false);
-            let base =
-                rect.bottom + spot.sides.bottom_marks + spot.sides.bottom_label - words.descent();
-            let room = if layout::shares_row(prepared, rect.width(), style) {
-                rect.right - beside
-            } else {
-                rect.right
-            };
-            let centre = f64::midpoint(rect.left, rect.right).min(room - words.width / 2.0);
-            scene.words(words.place(
-                Point::new(centre, base),
-                Across::Centre,
-                Upright::Baseline,
-                INK,
-            ));
-        }
+        horizontal_axis(scene, prepared, spot, style);
     });
     scene.group("axis-y", &prepared.panel.y.label, |scene| {
-        if prepared.panel.y.marked() {
-            let marks = Marks::new(&prepared.panel.y, prepared.y, rect.height(), true, style);
-            let at = |share: f64| rect.bottom - share * rect.height();
-            let lines = mark_lines(&marks, style, |share, length| {
-                let y = at(share);
-                (Point::new(rect.left, y), Point::new(rect.left - length, y))
-            });
-            if !lines.is_empty() {
-                scene.stroke(lines, Stroke::solid(style.axis, INK), None);
-            }
-            for (share, words) in marks.major {
-                let end = Point::new(rect.left - style.mark - style.pad, at(share));
-                scene.words(words.place(end, Across::Right, Upright::Middle, INK));
-            }
-            if let Some(note) = marks.note {
-                let corner = Point::new(rect.left, rect.top - style.pad);
-                scene.words(note.place(corner, Across::Left, Upright::Baseline, INK));
-            }
-        }
-        let words = Words::set(&prepared.panel.y.words(), style.label, false);
-        let base = rect.left - spot.sides.left_marks - style.pad - words.descent();
-        let centre = f64::midpoint(rect.top, rect.bottom);
-        scene.words(words.place_upwards(
-            Point::new(base, centre),
-            Across::Centre,
-            Upright::Baseline,
-            INK,
-        ));
+        let axis = &prepared.panel.y;
+        let marks = axis
+            .marked()
+            .then(|| Marks::new(axis, prepared.y, rect.height(), true, style));
+        let outer = rect.left - spot.sides.left_marks - style.pad;
+        vertical_axis(scene, (axis, marks), rect, (false, outer), style);
     });
 }
 
+/// The ticks below a panel, their labels and the axis label.
+fn horizontal_axis(scene: &mut Scene, prepared: &Prepared, spot: &Spot, style: &Style) {
+    let rect = spot.rect;
+    let mut note_width = 0.0;
+    if prepared.panel.x.marked() {
+        let marks = Marks::new(&prepared.panel.x, prepared.x, rect.width(), false, style);
+        let at = |share: f64| rect.left + share * rect.width();
+        ticks(scene, &marks, style, |share, length| {
+            let x = at(share);
+            (
+                Point::new(x, rect.bottom),
+                Point::new(x, rect.bottom + length),
+            )
+        });
+        if prepared.words_below {
+            let top = rect.bottom + style.mark + style.pad;
+            for (share, words) in marks.major {
+                // Powers of ten are taller than plain numbers; their baselines agree all the same.
+                let base = Point::new(at(share), top + 1.1 * words.cap_height());
+                scene.words(words.place(base, Across::Centre, Upright::Baseline, INK));
+            }
+            if let Some(note) = marks.note {
+                note_width = note.width + style.gap;
+                let base = rect.bottom + spot.sides.bottom_marks + style.pad + note.cap_height();
+                let end = Point::new(rect.right, base);
+                scene.words(note.place(end, Across::Right, Upright::Baseline, INK));
+            }
+        }
+    }
+    if prepared.words_below {
+        let words = Words::set(&prepared.panel.x.words(), style.label, false);
+        let base =
+            rect.bottom + spot.sides.bottom_marks + spot.sides.bottom_label - words.descent();
+        let end = if layout::shares_row(prepared, rect.width(), style) {
+            rect.right - note_width
+        } else {
+            rect.right
+        };
+        let centre = f64::midpoint(rect.left, rect.right).min(end - words.width / 2.0);
+        let at = Point::new(centre, base);
+        scene.words(words.place(at, Across::Centre, Upright::Baseline, INK));
+    }
+}
+
+/// The ticks at the left or (`right`) the right edge of `rect`, their labels and the axis label,
+/// whose descenders end at `outer`.
+fn vertical_axis(
+    scene: &mut Scene,
+    (axis, marks): (&Axis, Option<Marks>),
+    rect: Rect,
+    (right, outer): (bool, f64),
+    style: &Style,
+) {
+    if let Some(marks) = marks {
+        let (edge, outwards, across) = if right {
+            (rect.right, 1.0, Across::Left)
+        } else {
+            (rect.left, -1.0, Across::Right)
+        };
+        let at = |share: f64, length: f64| {
+            Point::new(
+                edge + outwards * length,
+                rect.bottom - share * rect.height(),
+            )
+        };
+        ticks(scene, &marks, style, |share, length| {
+            (at(share, 0.0), at(share, length))
+        });
+        for (share, words) in marks.major {
+            let end = at(share, style.mark + style.pad);
+            scene.words(words.place(end, across, Upright::Middle, INK));
+        }
+        if let Some(note) = marks.note {
+            let corner = Point::new(rect.left, rect.top - style.pad);
+            scene.words(note.place(corner, Across::Left, Upright::Baseline, INK));
+        }
+    }
+    let words = Words::set(&axis.words(), style.label, false);
+    let base = Point::new(
+        outer - words.descent(),
+        f64::midpoint(rect.top, rect.bottom),
+    );
+    scene.words(words.place_upwards(base, Across::Centre, Upright::Baseline, INK));
+}
+
 /// The tick lines of an axis; `line` gives their ends for a position on the axis and a length.
-fn mark_lines(
+fn ticks(
+    scene: &mut Scene,
     marks: &Marks,
     style: &Style,
     line: impl Fn(f64, f64) -> (Point, Point),
-) -> Vec<Segment> {
-    let mut lines: Vec<(Point, Point)> = marks
-        .major
-        .iter()
-        .map(|(share, _)| line(*share, style.mark))
+) {
+    let major = marks.major.iter().map(|(share, _)| (share, style.mark));
+    let minor = marks.minor.iter().map(|share| (share, style.minor_mark));
+    let lines: Vec<(Point, Point)> = major
+        .chain(minor)
+        .map(|(share, length)| line(*share, length))
         .collect();
-    lines.extend(
-        marks
-            .minor
-            .iter()
-            .map(|share| line(*share, style.minor_mark)),
-    );
-    strokes(&lines)
+    scene.stroke(strokes(&lines), Stroke::solid(style.axis, INK), None);
 }
 
 /// Draws a colour bar right of `edge`; returns the new edge.
@@ -458,39 +446,8 @@ fn colour_bar(scene: &mut Scene, bar: &ColourBar, panel: Rect, edge: f64, style:
             pixels,
         }));
         scene.stroke(rect.outline(), Stroke::solid(style.axis, INK), None);
-        let at = |share: f64| rect.bottom - share * rect.height();
-        let lines = mark_lines(&marks, style, |share, length| {
-            let y = at(share);
-            (
-                Point::new(rect.right, y),
-                Point::new(rect.right + length, y),
-            )
-        });
-        if !lines.is_empty() {
-            scene.stroke(lines, Stroke::solid(style.axis, INK), None);
-        }
-        let left = rect.right + style.mark + style.pad;
-        for (share, words) in marks.major {
-            scene.words(words.place(
-                Point::new(left, at(share)),
-                Across::Left,
-                Upright::Middle,
-                INK,
-            ));
-        }
-        if let Some(note) = marks.note {
-            let corner = Point::new(rect.left, rect.top - style.pad);
-            scene.words(note.place(corner, Across::Left, Upright::Baseline, INK));
-        }
-        let words = Words::set(&bar.axis.words(), style.label, false);
-        let base = edge + whole - words.descent();
-        let centre = f64::midpoint(rect.top, rect.bottom);
-        scene.words(words.place_upwards(
-            Point::new(base, centre),
-            Across::Centre,
-            Upright::Baseline,
-            INK,
-        ));
+        let outer = (true, edge + whole);
+        vertical_axis(scene, (bar.axis, Some(marks)), rect, outer, style);
     });
     edge + whole
 }

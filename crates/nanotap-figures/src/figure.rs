@@ -140,24 +140,26 @@ impl Figure {
     pub(crate) fn check(&self) -> Result<(), FigureError> {
         let cells = self.rows.saturating_mul(self.cols);
         if !(1..=400).contains(&cells) || self.panels.len() > cells {
-            return Err(FigureError::Grid {
-                rows: self.rows,
-                cols: self.cols,
-                panels: self.panels.len(),
-            });
+            return Err(FigureError::Invalid(format!(
+                "{} panels do not fit a grid of {} × {}: it must have 1 to 400 cells, one for each panel",
+                self.panels.len(),
+                self.rows,
+                self.cols
+            )));
         }
         let sensible = |length: f64| (10.0..=2000.0).contains(&length);
         if !sensible(self.width) || !sensible(self.full_height()) {
-            return Err(FigureError::Size {
-                width_mm: self.width,
-                height_mm: self.full_height(),
-            });
+            return Err(FigureError::Invalid(format!(
+                "a figure of {} mm × {} mm cannot be drawn: both sides must lie between 10 mm and 2000 mm",
+                self.width,
+                self.full_height()
+            )));
         }
         if !(0.2..=10.0).contains(&self.text_scale) {
-            return Err(FigureError::Length {
-                what: "a text scale (0.2 to 10)",
-                given: self.text_scale,
-            });
+            return Err(FigureError::length(
+                "a text scale (0.2 to 10)",
+                self.text_scale,
+            ));
         }
         for (what, given, expected) in [
             ("widths", &self.column_widths, self.cols),
@@ -165,11 +167,9 @@ impl Figure {
         ] {
             let right = given.len() == expected && given.iter().all(|s| s.is_finite() && *s > 0.0);
             if !(given.is_empty() || right) {
-                return Err(FigureError::Ratios {
-                    what,
-                    given: given.clone(),
-                    expected,
-                });
+                return Err(FigureError::Invalid(format!(
+                    "{given:?} cannot be the relative {what} of {expected} cells: give one positive number for each"
+                )));
             }
         }
         self.panels.iter().try_for_each(Panel::check)

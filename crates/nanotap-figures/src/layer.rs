@@ -230,7 +230,7 @@ impl Rule {
 #[must_use]
 pub struct Band {
     /// Start and end of each interval; an end that is not a number is the panel's edge.
-    #[serde(with = "numbers::intervals")]
+    #[serde(deserialize_with = "numbers::intervals")]
     pub intervals: Vec<(f64, f64)>,
     /// Whether the intervals are those of the horizontal axis.
     pub along_x: bool,
@@ -351,7 +351,7 @@ pub struct Heatmap {
     /// Number of cells along y.
     pub rows: usize,
     /// Values, row by row; the row of the smallest y comes first.
-    #[serde(with = "numbers::gaps")]
+    #[serde(deserialize_with = "numbers::gaps")]
     pub values: Vec<f64>,
     /// Outer edges of the grid along x.
     pub x: (f64, f64),

@@ -129,12 +129,13 @@ pub(crate) fn spots(
                 bottom: top + grid.heights[r] / all_heights * height,
             };
             if !(rect.width() >= SMALLEST && rect.height() >= SMALLEST) {
-                return Err(FigureError::NoRoom {
-                    row: r + 1,
-                    column: c + 1,
-                    width_mm: rect.width().max(0.0),
-                    height_mm: rect.height().max(0.0),
-                });
+                return Err(FigureError::Invalid(format!(
+                    "the panel in row {}, column {} has {:.1} mm × {:.1} mm left for its data: make the figure larger, its labels shorter, or its panels fewer",
+                    r + 1,
+                    c + 1,
+                    rect.width().max(0.0),
+                    rect.height().max(0.0)
+                )));
             }
             around[index] = Sides {
                 top: row[r].top,
@@ -251,8 +252,8 @@ pub(crate) fn title_height(panel: &Prepared, style: &Style) -> f64 {
 pub(crate) fn shares_row(panel: &Prepared, width: f64, style: &Style) -> bool {
     let marks = Marks::new(&panel.panel.x, panel.x, width, false, style);
     let label = Words::set(&panel.panel.x.words(), style.label, false);
-    let beside = |note: Words| label.width + style.gap + note.width <= width;
-    label.width > 0.0 && marks.note.is_none_or(beside)
+    let fits = |note: Words| label.width + style.gap + note.width <= width;
+    label.width > 0.0 && marks.note.is_none_or(fits)
 }
 
 /// Distance of a colour bar from the item to its left, and its width, mm.

@@ -49,18 +49,19 @@ fn swatch_width(entry: &Entry, style: &Style) -> f64 {
     }
 }
 
+fn widest_swatch(entries: &[Entry], style: &Style) -> f64 {
+    let widths = entries.iter().map(|e| swatch_width(e, style));
+    widths.fold(0.0, f64::max)
+}
+
 /// Width and height of the legend as a column, with its margins, mm.
 pub(crate) fn column_size(entries: &[Entry], style: &Style) -> (f64, f64) {
-    let sample = entries
-        .iter()
-        .map(|e| swatch_width(e, style))
-        .fold(0.0, f64::max);
     let words = entries
         .iter()
         .map(|e| Words::set(&e.label, style.legend, false).width)
         .fold(0.0, f64::max);
     (
-        sample + words + 3.0 * style.pad,
+        widest_swatch(entries, style) + words + 3.0 * style.pad,
         entries.len() as f64 * style.line() + style.pad,
     )
 }
@@ -174,22 +175,7 @@ impl Occupancy {
                     }
                 }
                 Layer::Rule(rule) => {
-                    let ends = if rule.upright {
-                        frame.across(rule.at).map(|x| {
-                            (
-                                Point::new(x, frame.rect.top),
-                                Point::new(x, frame.rect.bottom),
-                            )
-                        })
-                    } else {
-                        frame.upright(rule.at).map(|y| {
-                            (
-                                Point::new(frame.rect.left, y),
-                                Point::new(frame.rect.right, y),
-                            )
-                        })
-                    };
-                    if let Some((a, b)) = ends {
+                    if let Some((a, b)) = frame.rule(rule) {
                         seen.mark_line(a, b);
                     }
                 }
@@ -247,7 +233,7 @@ impl Occupancy {
     fn any(&self, area: Rect) -> bool {
         let (left, top) = self.cell(Point::new(area.left, area.top));
         let (right, bottom) = self.cell(Point::new(area.right, area.bottom));
-        let clamp = |v: f64, most: usize| (v.max(0.0) as usize).min(most - 1);
+        let clamp = |v: f64, count: usize| (v.max(0.0) as usize).min(count - 1);
         (clamp(top, Self::ROWS)..=clamp(bottom, Self::ROWS)).any(|row| {
             (clamp(left, Self::COLUMNS)..=clamp(right, Self::COLUMNS))
                 .any(|column| self.cells[row * Self::COLUMNS + column])
@@ -256,14 +242,14 @@ impl Occupancy {
 }
 
 /// Draws the legend of a panel in `rect`; `above` is the bottom of the rows above the panel, and
-/// `beside` the left edge of the column to the right of it.
+/// `right` the left edge of the column to the right of it.
 pub(crate) fn draw(
     scene: &mut Scene,
     prepared: &Prepared,
     stand: Stand,
     rect: Rect,
     above: f64,
-    beside: f64,
+    right: f64,
     style: &Style,
 ) {
     let entries = &prepared.entries;
@@ -277,7 +263,7 @@ pub(crate) fn draw(
             });
         }
         Stand::Right => scene.group("legend", "", |scene| {
-            draw_column(scene, entries, beside, rect.top, style);
+            draw_column(scene, entries, right, rect.top, style);
         }),
         Stand::Above => scene.group("legend", "", |scene| {
             let rows = rows(entries, rect.width(), style);
@@ -296,10 +282,7 @@ pub(crate) fn draw(
 }
 
 fn draw_column(scene: &mut Scene, entries: &[Entry], left: f64, top: f64, style: &Style) {
-    let sample = entries
-        .iter()
-        .map(|e| swatch_width(e, style))
-        .fold(0.0, f64::max);
+    let sample = widest_swatch(entries, style);
     for (number, entry) in entries.iter().enumerate() {
         let middle = top + style.pad / 2.0 + (number as f64 + 0.5) * style.line();
         draw_entry(scene, entry, left, sample, middle, style);

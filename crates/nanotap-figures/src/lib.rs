@@ -36,6 +36,7 @@
 mod axis;
 mod cloud;
 mod colour;
+mod convert;
 mod draw;
 mod error;
 mod figure;
@@ -49,8 +50,6 @@ mod note;
 mod numbers;
 mod page;
 mod panel;
-mod pdf;
-mod pixels;
 mod polyline;
 mod prepared;
 mod raster;

@@ -33,10 +33,10 @@ impl Marks {
         }
         // These spacings give four to six ticks on a usual panel.
         let spacing = if upright { 8.0 } else { 11.0 };
-        let most = ((length / spacing) as usize + 1).clamp(2, 8);
+        let max_count = ((length / spacing) as usize + 1).clamp(2, 8);
         let mut marks = Marks::default();
-        for most in (2..=most).rev() {
-            let ticks = view.ticks(most);
+        for max_count in (2..=max_count).rev() {
+            let ticks = view.ticks(max_count);
             marks = Marks {
                 major: ticks
                     .positions

@@ -5,6 +5,7 @@ use std::fs;
 use std::hash::{BuildHasher as _, RandomState};
 use std::path::{Path, PathBuf};
 
+use crate::convert;
 use crate::draw;
 use crate::error::FigureError;
 use crate::figure::Figure;
@@ -15,13 +16,13 @@ use crate::resolve;
 use crate::scene::Scene;
 use crate::shape::{Point, Rect};
 use crate::style::{EDGE, INK, Style};
+use crate::svg::{self, Target};
 use crate::text::{Across, Upright, Words};
-use crate::{pdf, pixels, svg};
 
 /// Resolution of PNG files, dots per inch.
 pub const DPI: f64 = 300.0;
 /// Largest number of pixels of a picture.
-const MOST_PIXELS: f64 = 2e8;
+const MAX_PIXELS: f64 = 2e8;
 
 impl Figure {
     /// Writes the figure in the format given by the path's extension: `.svg`, `.png` (300 dots per
@@ -62,7 +63,7 @@ impl Figure {
     /// # Errors
     /// If the figure cannot be drawn.
     pub fn to_svg(&self) -> Result<String, FigureError> {
-        Ok(svg::write(&self.scene()?.0))
+        Ok(svg::write(&self.scene()?.0, Target::Svg))
     }
 
     /// The figure as SVG, with the positions of its panels and axes. A page needs them to find the
@@ -72,7 +73,7 @@ impl Figure {
     /// If the figure cannot be drawn.
     pub fn to_svg_with_map(&self) -> Result<(String, Vec<PanelMap>), FigureError> {
         let (scene, map) = self.scene()?;
-        Ok((svg::write(&scene), map))
+        Ok((svg::write(&scene, Target::Svg), map))
     }
 
     /// The figure as JSON, with everything resolved that does not depend on its size: the range of
@@ -102,10 +103,10 @@ impl Figure {
     pub fn to_png(&self, dpi: f64) -> Result<Vec<u8>, FigureError> {
         let (scene, _) = self.scene()?;
         let count = scene.width * scene.height * (dpi / 25.4).powi(2);
-        if !(10.0..=2400.0).contains(&dpi) || count > MOST_PIXELS {
+        if !(10.0..=2400.0).contains(&dpi) || count > MAX_PIXELS {
             return Err(FigureError::Resolution { dpi });
         }
-        pixels::write(&scene, dpi).ok_or(FigureError::Resolution { dpi })
+        convert::png(&scene, dpi).map_err(|reason| FigureError::Conversion { reason })
     }
 
     /// The figure as PDF of one page, to be included in a paper.
@@ -113,7 +114,7 @@ impl Figure {
     /// # Errors
     /// If the figure cannot be drawn.
     pub fn to_pdf(&self) -> Result<Vec<u8>, FigureError> {
-        Ok(pdf::write(&self.scene()?.0))
+        convert::pdf(&self.scene()?.0).map_err(|reason| FigureError::Conversion { reason })
     }
 
     fn scene(&self) -> Result<(Scene, Vec<PanelMap>), FigureError> {

@@ -112,7 +112,9 @@ impl Panel {
                 cells(l.columns, l.rows, l.cells.len())?;
                 let named = l.categories.len();
                 match l.cells.iter().flatten().find(|c| **c >= named) {
-                    Some(&category) => Err(FigureError::Category { category, named }),
+                    Some(category) => Err(FigureError::Invalid(format!(
+                        "a cell belongs to category {category}, but only {named} categories are named"
+                    ))),
                     None => self.check_edges(l.x, l.y),
                 }
             }
@@ -131,7 +133,7 @@ fn length(what: &'static str, given: f64) -> Result<(), FigureError> {
     if given.is_finite() && given > 0.0 {
         Ok(())
     } else {
-        Err(FigureError::Length { what, given })
+        Err(FigureError::length(what, given))
     }
 }
 
@@ -139,10 +141,8 @@ fn cells(columns: usize, rows: usize, given: usize) -> Result<(), FigureError> {
     if columns.checked_mul(rows) == Some(given) && given > 0 {
         Ok(())
     } else {
-        Err(FigureError::Cells {
-            columns,
-            rows,
-            given,
-        })
+        Err(FigureError::Invalid(format!(
+            "a heatmap of {columns} columns and {rows} rows cannot be filled with {given} values: give one value for each cell, and at least one"
+        )))
     }
 }

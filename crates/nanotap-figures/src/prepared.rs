@@ -2,7 +2,7 @@
 
 use crate::axis::{Axis, Extent, Scale, View};
 use crate::colour::{self, Colour};
-use crate::layer::{Dash, Layer, Shape};
+use crate::layer::{Dash, Layer, Rule, Shape};
 use crate::panel::Panel;
 use crate::resolve;
 use crate::shape::{Point, Rect};
@@ -64,6 +64,18 @@ impl Frame {
         self.y
             .share(y)
             .map(|share| self.rect.bottom - share * self.rect.height())
+    }
+
+    /// The ends of a rule, from the left or the bottom.
+    pub(crate) fn rule(&self, rule: &Rule) -> Option<(Point, Point)> {
+        let rect = self.rect;
+        if rule.upright {
+            let x = self.across(rule.at)?;
+            Some((Point::new(x, rect.bottom), Point::new(x, rect.top)))
+        } else {
+            let y = self.upright(rule.at)?;
+            Some((Point::new(rect.left, y), Point::new(rect.right, y)))
+        }
     }
 
     pub(crate) fn place(&self, (x, y): (f64, f64)) -> Option<Point> {

@@ -48,7 +48,7 @@ pub(crate) fn figure(given: &Figure) -> Figure {
                 Layer::Heatmap(map) => {
                     let mut extent = Extent::EMPTY;
                     for &value in map.values.iter().filter(|v| map.scale.holds(**v)) {
-                        extent.add_edge(value);
+                        extent.feet.add(value);
                     }
                     fix(&mut map.scale, extent);
                 }
@@ -83,13 +83,13 @@ pub(crate) fn extents(panel: &Panel) -> (Extent, Extent, bool) {
         for &(px, py) in layer.points() {
             if panel.x.holds(px) && panel.y.holds(py) {
                 own = true;
-                x.add(px);
-                y.add(py);
+                x.data.add(px);
+                y.data.add(py);
                 if let Layer::Bars(bars) = layer {
                     [px - bars.width / 2.0, px + bars.width / 2.0]
                         .into_iter()
                         .filter(|edge| panel.x.holds(*edge))
-                        .for_each(|edge| x.add(edge));
+                        .for_each(|edge| x.data.add(edge));
                 }
             }
         }
@@ -100,7 +100,7 @@ pub(crate) fn extents(panel: &Panel) -> (Extent, Extent, bool) {
                     _ => 0.0,
                 };
                 if panel.y.holds(foot) {
-                    y.add_edge(foot);
+                    y.feet.add(foot);
                 }
             }
             Layer::Heatmap(map) => {
@@ -118,7 +118,7 @@ pub(crate) fn extents(panel: &Panel) -> (Extent, Extent, bool) {
                     (&panel.y, &mut y)
                 };
                 if axis.holds(rule.at) {
-                    extent.add(rule.at);
+                    extent.data.add(rule.at);
                 }
             }
             _ => {}
@@ -130,8 +130,8 @@ pub(crate) fn extents(panel: &Panel) -> (Extent, Extent, bool) {
 
 fn add_area(x: &mut Extent, y: &mut Extent, across: (f64, f64), upright: (f64, f64)) {
     for (extent, edges) in [(x, across), (y, upright)] {
-        extent.add_map(edges.0);
-        extent.add_map(edges.1);
+        extent.maps.add(edges.0);
+        extent.maps.add(edges.1);
     }
 }
 

@@ -45,21 +45,27 @@ impl Scene {
     }
 
     pub(crate) fn fill(&mut self, segments: Vec<Segment>, colour: Colour, clip: Option<Rect>) {
-        self.items.push(Item::Path(Path {
+        self.path(Path {
             segments,
             fill: Some(colour),
             stroke: None,
             clip,
-        }));
+        });
     }
 
     pub(crate) fn stroke(&mut self, segments: Vec<Segment>, stroke: Stroke, clip: Option<Rect>) {
-        self.items.push(Item::Path(Path {
+        self.path(Path {
             segments,
             fill: None,
             stroke: Some(stroke),
             clip,
-        }));
+        });
+    }
+
+    fn path(&mut self, path: Path) {
+        if !path.segments.is_empty() {
+            self.items.push(Item::Path(path));
+        }
     }
 
     pub(crate) fn line(&mut self, from: Point, to: Point, stroke: Stroke) {

@@ -77,9 +77,9 @@ fn multiples(low: f64, high: f64, step: Decimal) -> (i64, i64) {
     )
 }
 
-/// The step 1, 2, 2.5 or 5 times a power of ten that is the smallest with at most `most` marks.
-fn nice_step(low: f64, high: f64, most: usize) -> Decimal {
-    let mut exponent = libm::log10((high - low) / most as f64).floor() as i32 - 1;
+/// The step 1, 2, 2.5 or 5 times a power of ten that is the smallest with at most `max_count` marks.
+fn nice_step(low: f64, high: f64, max_count: usize) -> Decimal {
+    let mut exponent = libm::log10((high - low) / max_count as f64).floor() as i32 - 1;
     // The loop ends: the steps grow tenfold every round.
     loop {
         for (digits, lower) in [(1, 0), (2, 0), (25, 1), (5, 0)] {
@@ -88,7 +88,7 @@ fn nice_step(low: f64, high: f64, most: usize) -> Decimal {
                 exponent: exponent - lower,
             };
             let (first, last) = multiples(low, high, step);
-            if last.saturating_sub(first) < most as i64 {
+            if last.saturating_sub(first) < max_count as i64 {
                 return step;
             }
         }
@@ -96,17 +96,17 @@ fn nice_step(low: f64, high: f64, most: usize) -> Decimal {
     }
 }
 
-/// Ticks of a linear axis from `low` to `high` (finite, `low < high`), at most `most`, at steps of
+/// Ticks of a linear axis from `low` to `high` (finite, `low < high`), at most `max_count`, at steps of
 /// 1, 2, 2.5 or 5 times a power of ten.
 ///
 /// Labels longer than six digits are shortened by a common factor, a common offset, or both, given
 /// in [`Ticks::note`].
-pub fn linear(low: f64, high: f64, most: usize) -> Ticks {
+pub fn linear(low: f64, high: f64, max_count: usize) -> Ticks {
     let span = high - low;
     if !span.is_finite() || span <= 0.0 {
         return Ticks::default();
     }
-    let step = nice_step(low, high, most.max(2));
+    let step = nice_step(low, high, max_count.max(2));
     let width = step.value();
     let (first, last) = multiples(low, high, step);
     let marks: Vec<Decimal> = (first..=last)
@@ -201,9 +201,9 @@ fn power_text(number: Decimal) -> String {
     }
 }
 
-/// Ticks of a logarithmic axis from `low` to `high` (finite, `0 < low < high`), at most `most`
+/// Ticks of a logarithmic axis from `low` to `high` (finite, `0 < low < high`), at most `max_count`
 /// labelled ones: decades, or fractions of a decade if the axis spans no more than about one.
-pub fn logarithmic(low: f64, high: f64, most: usize) -> Ticks {
+pub fn logarithmic(low: f64, high: f64, max_count: usize) -> Ticks {
     if !(low > 0.0 && high > low && high.is_finite()) {
         return Ticks::default();
     }
@@ -216,9 +216,9 @@ pub fn logarithmic(low: f64, high: f64, most: usize) -> Ticks {
         .collect();
     let decades = (last - first + 1).max(0) as usize;
     if decades < 2 {
-        return part_of_decade(low, high, most, &fine, within);
+        return part_of_decade(low, high, max_count, &fine, within);
     }
-    let stride = decades.div_ceil(most.max(2)) as i32;
+    let stride = decades.div_ceil(max_count.max(2)) as i32;
     // Ticks are at multiples of the stride, so that two figures of the same quantity agree.
     let labelled: Vec<i32> = (first..=last)
         .filter(|e| e.rem_euclid(stride) == 0)
@@ -251,7 +251,7 @@ pub fn logarithmic(low: f64, high: f64, most: usize) -> Ticks {
 fn part_of_decade(
     low: f64,
     high: f64,
-    most: usize,
+    max_count: usize,
     fine: &[Decimal],
     within: impl Fn(f64) -> bool,
 ) -> Ticks {
@@ -273,7 +273,7 @@ fn part_of_decade(
                 .copied()
                 .collect::<Vec<_>>()
         })
-        .find(|marks| marks.len() <= most.max(2));
+        .find(|marks| marks.len() <= max_count.max(2));
     match chosen {
         Some(marks) if marks.len() >= 2 => Ticks {
             positions: marks.iter().map(|m| m.value().clamp(low, high)).collect(),
@@ -286,7 +286,7 @@ fn part_of_decade(
             note: None,
         },
         // Over less than a factor of about two the axis is almost linear.
-        _ => linear(low, high, most),
+        _ => linear(low, high, max_count),
     }
 }
 
@@ -374,15 +374,15 @@ mod tests {
     proptest! {
         #[test]
         fn linear_marks_are_even_inside_and_few(
-            centre in -1e6..1e6f64, exponent in -9..9i32, most in 2usize..12
+            centre in -1e6..1e6f64, exponent in -9..9i32, max_count in 2usize..12
         ) {
             let span = 10f64.powi(exponent).max(centre.abs() * 1e-9);
             let (low, high) = (centre, centre + span);
-            let ticks = linear(low, high, most);
-            prop_assert!(!ticks.positions.is_empty() && ticks.positions.len() <= most);
+            let ticks = linear(low, high, max_count);
+            prop_assert!(!ticks.positions.is_empty() && ticks.positions.len() <= max_count);
             // With space for four ticks there are at least two; otherwise the axis would have no
             // scale.
-            prop_assert!(most < 4 || ticks.positions.len() >= 2, "{:?}", ticks);
+            prop_assert!(max_count < 4 || ticks.positions.len() >= 2, "{:?}", ticks);
             prop_assert!(ticks.positions.iter().all(|p| (low..=high).contains(p)));
             let gaps: Vec<f64> = ticks.positions.windows(2).map(|w| w[1] - w[0]).collect();
             for gap in &gaps {
@@ -392,10 +392,10 @@ mod tests {
 
         #[test]
         fn labels_say_where_the_marks_are(
-            centre in -1e6..1e6f64, exponent in -9..9i32, most in 2usize..12
+            centre in -1e6..1e6f64, exponent in -9..9i32, max_count in 2usize..12
         ) {
             let span = 10f64.powi(exponent).max(centre.abs() * 1e-9);
-            let ticks = linear(centre, centre + span, most);
+            let ticks = linear(centre, centre + span, max_count);
             let note = ticks.note.clone().unwrap_or_default();
             let (factor, offset) = match note.split_once([' ']) {
                 _ if note.is_empty() => (1.0, 0.0),
@@ -420,11 +420,11 @@ mod tests {
 
         #[test]
         fn logarithmic_marks_are_inside_and_few(
-            low in -300.0..280.0f64, decades in 0.01..20.0f64, most in 2usize..12
+            low in -300.0..280.0f64, decades in 0.01..20.0f64, max_count in 2usize..12
         ) {
             let (low, high) = (10f64.powf(low), 10f64.powf(low + decades));
-            let ticks = logarithmic(low, high, most);
-            prop_assert!(!ticks.positions.is_empty() && ticks.positions.len() <= most.max(2));
+            let ticks = logarithmic(low, high, max_count);
+            prop_assert!(!ticks.positions.is_empty() && ticks.positions.len() <= max_count.max(2));
             prop_assert!(ticks.positions.iter().chain(&ticks.minor).all(|p| (low..=high).contains(p)));
             prop_assert!(ticks.positions.windows(2).all(|w| w[1] > w[0]));
         }

@@ -138,7 +138,7 @@ fn every_word_is_in_the_svg() {
 }
 
 #[test]
-fn svg_letters_need_no_fonts_and_every_reference_is_defined_once() {
+fn svg_text_needs_no_fonts_and_references_are_defined_once() {
     let svg = everything().to_svg().unwrap();
     assert!(!svg.contains("<text") && !svg.contains("font-family"));
     let mut found = 0;
@@ -192,7 +192,7 @@ fn nan_and_infinity_leave_gaps() {
 }
 
 #[test]
-fn long_lines_are_short_on_disk() {
+fn long_lines_give_small_files() {
     let svg = Figure::single(plain(Line::new(wave(1_000_000))))
         .to_svg()
         .unwrap();
@@ -214,7 +214,7 @@ fn long_lines_are_short_on_disk() {
 }
 
 #[test]
-fn very_many_bands_are_all_drawn() {
+fn all_of_very_many_bands_are_drawn() {
     let bands = (0..7000).map(|i| (f64::from(i), f64::from(i) + 0.5));
     let axis = |to: f64| Axis::linear("").range(0.0, to);
     let panel = Panel::new(axis(7000.0), axis(1.0))
@@ -232,7 +232,7 @@ fn very_many_bands_are_all_drawn() {
 }
 
 #[test]
-fn a_hundred_thousand_points_stay_small() {
+fn a_hundred_thousand_points_give_a_small_file() {
     let mut points = Vec::with_capacity(100_000);
     for column in 0..1000 {
         let r = 3.5 + 0.5 * f64::from(column) / 1000.0;
@@ -257,7 +257,7 @@ fn a_hundred_thousand_points_stay_small() {
 }
 
 #[test]
-fn scattered_points_stay_small_too() {
+fn scattered_points_give_a_small_file() {
     // Data without structure do not compress: the hardest case.
     let mut random = pseudo_random(7);
     let points: Vec<(f64, f64)> = (0..100_000).map(|_| (random(), random())).collect();
@@ -270,7 +270,7 @@ fn scattered_points_stay_small_too() {
 }
 
 #[test]
-fn pngs_have_the_size_asked_for_and_show_the_data() {
+fn pngs_have_the_requested_size_and_show_the_data() {
     let figure = Figure::single(plain(Line::new(wave(500))))
         .width(86.0)
         .height(60.0);
@@ -320,7 +320,7 @@ fn a_heatmap_puts_each_cell_in_its_place() {
 }
 
 #[test]
-fn cells_without_a_number_stay_white_and_the_rest_takes_the_scale() {
+fn cells_without_a_number_are_white() {
     let values = [0.0, f64::NAN, 1.0];
     let map = Heatmap::new(3, 1, values, (0.0, 3.0), (0.0, 1.0), Axis::linear("z"));
     let panel = Panel::new(Axis::linear(""), Axis::linear("")).with(map);
@@ -366,7 +366,7 @@ fn pdfs_have_one_page_of_the_figure_s_size() {
 }
 
 #[test]
-fn panels_without_data_say_so() {
+fn panels_without_data_are_labelled() {
     let lines = [
         Figure::single(Panel::new(Axis::linear("x"), Axis::log("y"))),
         Figure::single(plain(Line::new([]))),
@@ -477,7 +477,7 @@ fn json_describes_the_whole_figure() {
 }
 
 #[test]
-fn the_map_says_where_each_value_is_drawn() {
+fn the_map_gives_the_position_of_each_value() {
     let log = Panel::new(
         Axis::linear("a").unit("nm").range(2.0, 4.0),
         Axis::log("b").range(1.0, 1e4),
@@ -537,7 +537,7 @@ fn rounding_is_not_magnified() {
 }
 
 #[test]
-fn files_appear_whole_or_not_at_all() {
+fn files_are_written_completely_or_not_at_all() {
     let folder = std::env::temp_dir().join(format!("nanotap-figures-{}", std::process::id()));
     std::fs::create_dir_all(&folder).unwrap();
     let figure = Figure::single(plain(Line::new(wave(50))));
@@ -570,7 +570,7 @@ fn files_appear_whole_or_not_at_all() {
 }
 
 #[test]
-fn impossible_figures_are_refused_with_a_reason() {
+fn invalid_figures_are_refused_with_a_reason() {
     let line = || plain(Line::new(wave(10)));
     let grid = |values: usize| {
         let cells = vec![0.0; values];

@@ -1,9 +1,9 @@
-//! The floor of the exact flow: what its exponentials and rotations alone cost.
+//! Lower bound of the exact flow: the cost of its exponentials and rotations alone.
 //!
-//! One evaluation of a gap at a new time needs `e^{λ_k s}` of every term: N modes and the
-//! tone, four to a vector. `chained` feeds each evaluation's time from the one before, as a
-//! search for a crossing must; `unchained` evaluates at times known beforehand, which is
-//! the most that several motions side by side could reach. `cargo bench -p nanotap-flow`.
+//! One evaluation of a gap at a new time needs `e^{λ_k s}` of every term: N modes and the tone,
+//! four to a vector. In `chained` the time of each evaluation depends on the previous value, as in
+//! the search for a crossing. In `unchained` the times are known in advance, which is the limit for
+//! several motions at once. `cargo bench -p nanotap-flow`.
 
 #![allow(
     clippy::disallowed_methods,
@@ -13,7 +13,7 @@
 use divan::counter::ItemsCount;
 use divan::{Bencher, black_box};
 
-// The engine's own arithmetic, which the crate keeps to itself.
+// The crate's private arithmetic.
 #[allow(dead_code, unused_imports, clippy::inline_always)]
 #[path = "../src/simd/mod.rs"]
 mod simd;
@@ -22,20 +22,20 @@ use simd::{ComplexVector, Simd, Vector, WIDTH, Work};
 
 /// Numbers of modes N.
 const MODES: [usize; 6] = [1, 2, 3, 5, 10, 20];
-/// Evaluations a run.
+/// Number of evaluations in a run.
 const EVALUATIONS: usize = 1000;
 
 fn main() {
     divan::main();
 }
 
-/// Each evaluation waits for the one before. Items are evaluations.
+/// Each evaluation waits for the previous one. Items are evaluations.
 #[divan::bench(args = MODES)]
 fn chained(bencher: Bencher<'_, '_>, modes: usize) {
     time(bencher, modes, true);
 }
 
-/// Evaluations that need not wait for each other.
+/// Independent evaluations.
 #[divan::bench(args = MODES)]
 fn unchained(bencher: Bencher<'_, '_>, modes: usize) {
     time(bencher, modes, false);
@@ -55,7 +55,7 @@ struct Terms {
     weight: ComplexVector,
 }
 
-/// Terms of about the beam's frequencies, the tone last, weights of one.
+/// Terms with frequencies like those of a beam, the tone last, and weights of one.
 fn terms(modes: usize) -> Vec<Terms> {
     let mut vectors = Vec::new();
     for vector in 0..(modes + 1).div_ceil(WIDTH) {

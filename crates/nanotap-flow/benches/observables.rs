@@ -1,4 +1,4 @@
-//! What exact observables cost beside the motion itself: `cargo bench -p nanotap-flow --bench
+//! Cost of exact observables in addition to the motion: `cargo bench -p nanotap-flow --bench
 //! observables`. Items are drive periods.
 //!
 //! The system is a cantilever of N modes that taps a springy sample: α1 = α2 = α3 = 0.1,
@@ -15,11 +15,11 @@ use std::sync::Arc;
 use divan::Bencher;
 use divan::counter::ItemsCount;
 use nalgebra::{DMatrix, DVector, RowDVector};
-use nanotap_flow::accumulate::{Accumulator, Request};
+use nanotap_flow::accumulate::{Accumulator, Functional, Request};
 use nanotap_flow::{Drive, Flow, HarmonicVector, Output, Regime, System, Transition};
 
 const MODES: [usize; 6] = [1, 2, 3, 5, 10, 20];
-/// Periods a run.
+/// Drive periods in a run.
 const PERIODS: usize = 200;
 const OMEGA: f64 = 2.6;
 const STIFFNESS: f64 = 20.0;
@@ -36,7 +36,7 @@ struct Cantilever {
     rate: Output,
 }
 
-/// Roots of cos β cosh β = −1, the modes' integrals 2σ/β, and what they are for high modes.
+/// Roots of cos β cosh β = −1, the modes' integrals 2σ/β, and their limits for high modes.
 fn mode(j: usize) -> (f64, f64) {
     let known = [
         (1.875_104, 0.782_992),
@@ -122,7 +122,7 @@ fn bare(bencher: Bencher<'_, '_>, modes: usize) {
         });
 }
 
-/// Which observables.
+/// Selection of observables.
 #[derive(Clone, Copy, Debug)]
 enum Set {
     Times,
@@ -147,32 +147,32 @@ fn request(cantilever: &Cantilever, set: Set) -> Request {
     let rate = request.output(&cantilever.rate);
     let asked = |one: fn(Set) -> bool| one(set) || matches!(set, Set::Typical);
     if asked(|s| matches!(s, Set::TipExtrema)) {
-        request.least(tip);
-        request.greatest(tip);
+        request.add(Functional::Least(tip));
+        request.add(Functional::Greatest(tip));
     }
     if asked(|s| matches!(s, Set::GapLeast)) {
-        request.least(gap);
+        request.add(Functional::Least(gap));
     }
     if asked(|s| matches!(s, Set::ForceExtrema)) {
-        request.least(force);
-        request.greatest(force);
+        request.add(Functional::Least(force));
+        request.add(Functional::Greatest(force));
     }
     if asked(|s| matches!(s, Set::MeanAndHarmonic)) {
-        request.integral(tip);
-        request.integral(force);
-        request.fourier(tip, OMEGA);
+        request.add(Functional::Integral(tip));
+        request.add(Functional::Integral(force));
+        request.add(Functional::Fourier(tip, OMEGA));
     }
     if asked(|s| matches!(s, Set::Dissipation)) {
-        request.product(force, rate);
+        request.add(Functional::Product(force, rate));
     }
     if matches!(set, Set::MeanSquare) {
-        request.product(tip, tip);
+        request.add(Functional::Product(tip, tip));
     }
     request
 }
 
-/// N = 3, with one kind of observable after the other, and with the typical set: extrema of
-/// tip and force, least gap, means, first harmonic, dissipation, contacts.
+/// N = 3, with one kind of observable at a time, and with the typical set: extrema of tip and
+/// force, least gap, means, first harmonic, dissipation, contacts.
 #[divan::bench(args = [
     Set::Times, Set::TipExtrema, Set::GapLeast, Set::ForceExtrema, Set::MeanAndHarmonic,
     Set::Dissipation, Set::MeanSquare, Set::Typical,
@@ -181,7 +181,7 @@ fn with(bencher: Bencher<'_, '_>, set: Set) {
     accumulated(bencher, 3, set);
 }
 
-/// The typical set, extrema of every period on its own.
+/// The typical set, with the extrema of each period.
 #[divan::bench(args = MODES)]
 fn typical(bencher: Bencher<'_, '_>, modes: usize) {
     accumulated(bencher, modes, Set::Typical);

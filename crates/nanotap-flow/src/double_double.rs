@@ -1,5 +1,5 @@
 //! Twice double precision, for one question only: on which side of zero a
-//! signal's extremum lies when it cannot be told from rounding.
+//! signal's extremum lies when it cannot be distinguished from rounding.
 //!
 //! Error-free sums and products after Dekker and Knuth.
 

@@ -9,7 +9,7 @@
 //! What eight share is the common case: a stretch that a table certifies, ended by a switch that a
 //! few evaluations settle. A lane in which it is not so (a grazing touch, a shallow dip, an end within
 //! the interval of a switch) goes on alone for this stretch, as [`Flow`](crate::Flow) does. What comes
-//! of a motion does not depend on those beside it.
+//! of a motion does not depend on the others in the batch.
 
 use crate::motion::{BRIEF, Motion, count_period};
 use crate::regime::Kernel;
@@ -30,7 +30,7 @@ use std::collections::VecDeque;
 use std::sync::Arc;
 
 /// Evaluations of the guard near a switch before it is left to one motion alone.
-const MOST_EVALUATIONS: usize = 3;
+const MAX_EVALUATIONS: usize = 3;
 
 /// The work space of many motions of a [`System`]. Cloning shares the system.
 #[derive(Clone, Debug)]
@@ -45,14 +45,14 @@ pub struct Ensemble {
     waiting: Vec<VecDeque<usize>>,
     pack: Pack,
     stretches: Stretches,
-    /// States at the ends of periods, if they are asked for.
+    /// States at the ends of periods, if they are requested.
     strobe: Option<Strobe>,
 }
 
 /// The states of all members at the ends of their periods.
 #[derive(Clone, Debug)]
 struct Strobe {
-    /// Of each member those that came, one after the other.
+    /// Those of each member, in sequence.
     passed: Vec<Vec<f64>>,
     /// Of each regime its forced response at phase 0.
     responses: Vec<Vec<f64>>,
@@ -135,7 +135,7 @@ impl Ensemble {
     }
 
     /// Whether motions of `system` can go side by side: one guard leads out of each regime, tabulated,
-    /// and nothing is known of it but that it starts at zero. Others go one after the other.
+    /// and nothing is known of it but that it starts at zero. Others are run in sequence.
     pub fn fits(system: &System) -> bool {
         let simple = |regime: usize| {
             let ([prepared], [transition]) = (
@@ -157,7 +157,7 @@ impl Ensemble {
         self.stretches
     }
 
-    /// Replaces each of the states (of length `n`, one after the other), which are at phase 0, by
+    /// Replaces each of the states (row by row, of length `n`), which are at phase 0, by
     /// that so many drive periods later. Of a motion that cannot be followed the state is left as it
     /// was and the reason returned. `periods` says how many states there are.
     ///
@@ -429,7 +429,7 @@ impl Ensemble {
         let (mut ahead, mut some) = (Octet::default(), false);
         for (lane, &member) in members.iter().enumerate() {
             let phase = self.members[member].phase;
-            // Of a stretch that is passed alone nobody knows where it ends.
+            // The end of a stretch that is passed alone is not known.
             if known & (1 << lane) == 0 || phase + ends[lane] >= period {
                 (ahead[lane], some) = (period - phase, true);
             }
@@ -515,7 +515,7 @@ impl Member {
         count_period(&mut self.phase, &mut self.left, period);
     }
 
-    /// Goes on to the next switch as a motion does that has nobody beside it.
+    /// Goes on to the next switch as a motion outside a batch does.
     #[inline(always)]
     fn go_on_alone<S: Simd>(&mut self, system: &System, alone: &mut Motion) {
         self.hand_to(system, alone);
@@ -652,7 +652,7 @@ impl Pack {
             }
         }
         let mut rest = [0.0; LANES];
-        for evaluation in 0..MOST_EVALUATIONS {
+        for evaluation in 0..MAX_EVALUATIONS {
             let from = W::load(&at);
             let near = Near::<W> {
                 cubic: self.evaluate::<W>(kernel, from),

@@ -52,7 +52,7 @@ pub enum FlowError {
         /// Digits lost.
         digits: u32,
     },
-    /// A mode is too fast beside the drive to be followed over a period.
+    /// A mode is too fast, compared with the drive, to be followed over a period.
     #[error(
         "regime {regime}: its fastest mode oscillates {oscillations:.3e} times in one drive \
          period, and at most {limit:.0e} are followed; raise the drive's frequency"

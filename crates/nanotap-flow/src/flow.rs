@@ -29,6 +29,12 @@ impl Flow {
         &self.system
     }
 
+    /// The system, to change its constants; a copy where others share it. Start the motion anew
+    /// afterwards.
+    pub fn system_mut(&mut self) -> &mut System {
+        Arc::make_mut(&mut self.system)
+    }
+
     /// Passes through rigid stops where the motion would come back within a time `longest` of
     /// itself. Past a grazing the flow then goes on smoothly, as it would without the stop.
     pub fn pass_touches(&mut self, longest: f64) {

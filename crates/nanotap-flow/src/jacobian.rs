@@ -6,7 +6,7 @@ use crate::simd::linear::{LinearMap, scale};
 use crate::simd::{ComplexVector, WIDTH, layout};
 use crate::system::System;
 use crate::{Complex, Flow, FlowError};
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DMatrix;
 
 /// Carries `∂q/∂x₀` along a flow, in modal coordinates: a column for each
 /// component of the initial state. The default is empty: [`Jacobian::begin`] starts it.
@@ -61,18 +61,8 @@ impl Jacobian {
 
     /// A switch whose saltation depends on the state.
     fn saltate(&mut self, view: &SwitchView<'_>) {
-        let regime = &view.system.regimes()[view.switch.from];
-        let mut x = DVector::zeros(view.system.dimension());
-        let modal = view.modal.iter().copied();
-        regime.to_state(view.system.drive(), modal, view.phase, x.as_mut_slice());
-        let saltation = view.system.saltation(
-            view.switch.from,
-            view.transition,
-            view.stuck,
-            &x,
-            view.phase,
-        );
-        let (from, to) = (regime, &view.system.regimes()[view.switch.to]);
+        let saltation = view.saltation(&view.state());
+        let (from, to) = (view.from(), &view.system.regimes()[view.switch.to]);
         let tangent = to.prepared().stacked_left() * (saltation * from.prepared().stacked_right());
         LinearMap::of(&tangent).apply(&self.columns, &mut self.next);
     }

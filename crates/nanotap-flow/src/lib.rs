@@ -14,7 +14,7 @@
 //!   change of basis; [`flow`] runs it, [`Ensemble`] many motions side by side, [`trajectory`] records it;
 //! - [`accumulate`]: exact observables of a motion while it runs, at the price of the motion;
 //! - [`jacobian`] and [`sensitivity`]: derivatives with respect to the state and
-//!   to any parameter; [`variation`]: of what is read off the motion;
+//!   to any parameter; [`variation`]: of functionals of the motion;
 //! - [`fixed_step`]: the Runge–Kutta method that switches on its grid, kept to
 //!   show what it does wrong.
 //!
@@ -39,6 +39,7 @@ pub mod error;
 pub mod extrema;
 pub mod fixed_step;
 pub mod flow;
+mod functional;
 pub mod harmonic;
 pub mod integral;
 pub mod jacobian;

@@ -1,6 +1,6 @@
 //! The inner loop: a motion from switch to switch in modal coordinates.
 //!
-//! A motion does not hold its system. Whoever runs it lends the system, so that threads which
+//! A motion does not hold its system. The caller lends the system, so that threads which
 //! share one need not count references to it every period.
 
 use crate::observer::{Observer, SegmentView, SwitchView};

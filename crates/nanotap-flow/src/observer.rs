@@ -1,9 +1,12 @@
 //! What can be seen of a flow while it runs: stretches within a regime, switches, ends of periods.
 
+use nalgebra::{DMatrix, DVector};
+
 use crate::Complex;
-use crate::regime::Regime;
+use crate::regime::{ModalOutput, Regime};
+use crate::signal::Signal;
 use crate::simd::ComplexVector;
-use crate::system::{Switch, System};
+use crate::system::{Reset, Switch, System, Transition};
 
 /// A stretch within one regime and one drive period.
 #[derive(Clone, Copy, Debug)]
@@ -31,6 +34,13 @@ impl SegmentView<'_> {
     pub fn regime(&self) -> &Regime {
         &self.system.regimes()[self.regime]
     }
+
+    /// An output over the stretch.
+    pub fn signal(&self, output: &ModalOutput) -> Signal {
+        let drive = self.system.drive();
+        let (regime, modal) = (self.regime(), self.modal);
+        Signal::of(regime, drive, output, modal, self.phase, self.length)
+    }
 }
 
 /// A switch from one regime to another.
@@ -54,9 +64,48 @@ pub struct SwitchView<'a> {
     pub modal: &'a [Complex],
 }
 
-/// Something that watches a flow: a recorder, a Jacobian, a sensitivity.
+impl SwitchView<'_> {
+    /// The regime that it leaves.
+    pub fn from(&self) -> &Regime {
+        &self.system.regimes()[self.switch.from]
+    }
+
+    /// The transition taken.
+    pub fn transition(&self) -> &Transition {
+        &self.system.transitions()[self.switch.from][self.transition]
+    }
+
+    /// The jump of the state; none if it is continuous.
+    pub fn reset(&self) -> Option<&Reset> {
+        let transition = self.transition();
+        if self.stuck {
+            transition.sticking.as_ref().map(|sticking| &sticking.reset)
+        } else {
+            transition.reset.as_ref()
+        }
+    }
+
+    /// The state before it.
+    pub fn state(&self) -> DVector<f64> {
+        let mut x = DVector::zeros(self.system.dimension());
+        let modal = self.modal.iter().copied();
+        let drive = self.system.drive();
+        self.from()
+            .to_state(drive, modal, self.phase, x.as_mut_slice());
+        x
+    }
+
+    /// The saltation matrix at the state `x` before it.
+    pub fn saltation(&self, x: &DVector<f64>) -> DMatrix<f64> {
+        let (from, transition) = (self.switch.from, self.transition);
+        self.system
+            .saltation(from, transition, self.stuck, x, self.phase)
+    }
+}
+
+/// An observer of a flow: a recorder, a Jacobian, a sensitivity.
 pub trait Observer {
-    /// Whether it watches nothing, so that nothing need be prepared for it.
+    /// Whether it observes nothing, so that nothing need be prepared for it.
     const IDLE: bool = false;
     /// A stretch within one regime was completed.
     fn segment(&mut self, segment: &SegmentView<'_>) {

@@ -53,7 +53,7 @@ impl PreparedBasis {
         &self.stacked_right
     }
 
-    /// The columns of `L`, one after the other.
+    /// The columns of `L`, in sequence.
     pub(crate) fn packed_left(&self) -> &[ComplexVector] {
         &self.packed_left
     }

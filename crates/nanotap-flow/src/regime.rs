@@ -120,6 +120,12 @@ impl Regime {
         }
     }
 
+    /// Calls `visit` with every entry of the constant parts of forcing and response.
+    pub(crate) fn each_constant(&mut self, visit: &mut dyn FnMut(&mut f64)) {
+        let constants = [&mut self.forcing.constant, &mut self.response.constant];
+        constants.into_iter().flatten().for_each(visit);
+    }
+
     /// What an output is in this regime's modal coordinates.
     pub fn project(&self, output: &Output) -> ModalOutput {
         let dot = |column: &[Complex]| -> Complex {
@@ -149,6 +155,16 @@ pub struct ModalOutput {
     pub tones: Vec<Complex>,
     /// The constant.
     pub constant: f64,
+}
+
+impl ModalOutput {
+    /// Its value at modal coordinates `q` and time `t`.
+    pub fn at(&self, drive: &Drive, q: &[Complex], t: f64) -> f64 {
+        let phasors = (0..self.tones.len()).map(|k| drive.phasor(k, t));
+        let modes = self.modal.iter().copied().zip(q.iter().copied());
+        let terms = modes.chain(self.tones.iter().copied().zip(phasors));
+        self.constant + terms.map(|(w, q)| (w * q).re).sum::<f64>()
+    }
 }
 
 /// A [`ModalOutput`] of a regime without clusters, packed for the inner loop: modal
@@ -283,7 +299,7 @@ fn forced_response(
     };
     let mut tones = Vec::with_capacity(forcing.tones.len());
     for (tone, &omega) in forcing.tones.iter().zip(drive.frequencies()) {
-        // A pair stands for itself and its conjugate: Re(R y), with R's factor 2, covers
+        // A pair represents itself and its conjugate: Re(R y), with R's factor 2, covers
         // both for a real right-hand side only. Re(F e^{iωt}) is half the sum of F e^{iωt}
         // and F̄ e^{−iωt}, and the response to the second is the conjugate of that to
         // the first with all eigenvalues: (R y₊ + conj(R y₋)) / 2.

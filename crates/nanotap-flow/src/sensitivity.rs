@@ -363,28 +363,9 @@ impl Observer for Sensitivity<'_> {
     }
 
     fn switch(&mut self, view: &SwitchView<'_>) {
-        let system = view.system;
-        let from = &system.regimes()[view.switch.from];
-        let mut x = DVector::zeros(system.dimension());
-        from.to_state(
-            system.drive(),
-            view.modal.iter().copied(),
-            view.phase,
-            x.as_mut_slice(),
-        );
-        let saltation = system.saltation(
-            view.switch.from,
-            view.transition,
-            view.stuck,
-            &x,
-            view.phase,
-        );
-        let transition = &system.transitions()[view.switch.from][view.transition];
-        let reset = if view.stuck {
-            transition.sticking.as_ref().map(|s| &s.reset)
-        } else {
-            transition.reset.as_ref()
-        };
+        let (system, from, transition) = (view.system, view.from(), view.transition());
+        let x = view.state();
+        let (saltation, reset) = (view.saltation(&x), view.reset());
         let n = system.dimension();
         let jump = reset.map_or_else(|| DMatrix::identity(n, n), |r| r.matrix.clone());
         let mut before = DVector::zeros(n);
@@ -456,7 +437,7 @@ impl<'a> Propagator<'a> {
         later
     }
 
-    /// The sensitivity to the first parameter, which was `s` beside `q` at `phase`; `number`
+    /// The sensitivity to the first parameter, which was `s` where the coordinates were `q` at `phase`; `number`
     /// is the regime's.
     pub(crate) fn sensitivity(
         &self,

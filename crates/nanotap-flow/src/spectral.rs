@@ -20,7 +20,7 @@ use nanotap_arithmetic::ComplexFunctions as _;
 pub struct Cluster {
     /// First coordinate.
     pub start: usize,
-    /// What couples the coordinates beside the common eigenvalue `μ`.
+    /// The coupling of the coordinates in addition to the common eigenvalue `μ`.
     pub coupling: DMatrix<Complex>,
     /// `N^p / p!` for `p = 1, 2, …`, as many as double precision can see over the horizon.
     powers: Vec<DMatrix<Complex>>,
@@ -38,7 +38,7 @@ impl Cluster {
     }
 }
 
-/// Modal coordinates `q = L x`, `x = Re(R q)` with `q̇_k = λ_k q_k` (beside what
+/// Modal coordinates `q = L x`, `x = Re(R q)` with `q̇_k = λ_k q_k` (apart from what
 /// clusters couple). One complex coordinate stands for each conjugate pair, one
 /// (with zero imaginary part) for each real eigenvalue.
 #[derive(Clone, Debug, PartialEq)]

@@ -368,11 +368,11 @@ impl System {
         for (r, regime) in system.regimes.iter().enumerate() {
             let rates = regime.basis().eigenvalues.iter();
             let turns = rates.map(|z| z.im.abs()).fold(0.0, f64::max) * system.drive.period();
-            if turns > MOST_TURNS * std::f64::consts::TAU {
+            if turns > MAX_TURNS * std::f64::consts::TAU {
                 return Err(FlowError::TooFast {
                     regime: r,
                     oscillations: turns / std::f64::consts::TAU,
-                    limit: MOST_TURNS,
+                    limit: MAX_TURNS,
                 });
             }
         }
@@ -405,6 +405,33 @@ impl System {
             Err(FlowError::Cancelled)
         } else {
             Ok(())
+        }
+    }
+
+    /// Calls `visit` with every constant of forcings, guards and resets and what was prepared from
+    /// them, in the same order for all systems of one structure. Between two systems that differ in
+    /// constant forces and thresholds only, these numbers vary linearly and nothing else does.
+    pub fn each_constant(&mut self, visit: &mut dyn FnMut(&mut f64)) {
+        for regime in &mut self.regimes {
+            regime.each_constant(visit);
+        }
+        for transition in self.transitions.iter_mut().flatten() {
+            visit(&mut transition.guard.constant);
+            let inelastic = transition.sticking.as_mut().map(|s| &mut s.reset);
+            for reset in transition.reset.iter_mut().chain(inelastic) {
+                reset.offset.constant.iter_mut().for_each(&mut *visit);
+            }
+        }
+        for prepared in self.switches.iter_mut().flatten() {
+            visit(&mut prepared.guard.constant);
+            visit(&mut prepared.kernel.constant);
+            if let Some(acceleration) = &mut prepared.acceleration {
+                visit(&mut acceleration.constant);
+            }
+            prepared.switch.packed.each_constant(visit);
+            if let Some(sticking) = &mut prepared.sticking {
+                sticking.packed.each_constant(visit);
+            }
         }
     }
 
@@ -889,11 +916,11 @@ fn packed_rates(regime: &Regime, drive: &Drive) -> Vec<ComplexVector> {
     layout::list(&rates)
 }
 
-/// What counts as rounding beside the numbers that a difference is made of.
+/// Relative size up to which a difference counts as rounding.
 const NEGLIGIBLE: f64 = 1e-13;
 
 /// Oscillations of a mode in one drive period that are followed.
-const MOST_TURNS: f64 = 1e7;
+const MAX_TURNS: f64 = 1e7;
 
 /// Derivatives of a guard that are looked at where it starts at zero.
 const FLATTEST: usize = 6;

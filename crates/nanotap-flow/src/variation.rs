@@ -16,14 +16,14 @@
 //! integrated by Gauss–Legendre quadrature whose panels follow from the fastest exponential,
 //! so that the error is that of rounding: nothing here is a difference.
 
-use nanotap_arithmetic::ComplexFunctions as _;
+use nanotap_arithmetic::{ComplexFunctions as _, Dual};
 use std::sync::LazyLock;
 
+use crate::functional::Functional;
 use crate::observer::{Observer, SegmentView, SwitchView};
 use crate::regime::ModalOutput;
 use crate::search::sign_changes;
 use crate::sensitivity::{Propagator, Sensitivity, SystemTangent};
-use crate::signal::Signal;
 use crate::{Complex, Drive, Output, Regime, System};
 
 /// An output and its derivative with respect to the parameter at constant state and drive
@@ -81,30 +81,6 @@ impl VariedOutput {
     }
 }
 
-/// A number and its derivative.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Varied<T> {
-    /// The number.
-    pub value: T,
-    /// Its derivative.
-    pub change: T,
-}
-
-/// What is wanted of the outputs, by their places in a list.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Wanted {
-    /// `∫ g dt`.
-    pub integrals: Vec<usize>,
-    /// `∫ g h dt`.
-    pub products: Vec<(usize, usize)>,
-    /// `∫ g e^{−iωt} dt`, of an output and a frequency.
-    pub fouriers: Vec<(usize, f64)>,
-    /// The least (`−1`) or greatest (`1`) value.
-    pub extrema: Vec<(usize, f64)>,
-    /// The greatest speed of the guard at switches between two regimes.
-    pub speeds: Vec<(usize, usize)>,
-}
-
 /// Carries the derivatives along a flow.
 #[derive(Debug)]
 pub struct Variation<'a> {
@@ -115,29 +91,31 @@ pub struct Variation<'a> {
     /// An entry a regime, and in it one an output.
     modal: Vec<Vec<[ModalOutput; 2]>>,
     guards: Vec<Vec<Guard>>,
-    wanted: Wanted,
-    /// `∫ g dt`, and so on, as they were wanted.
-    pub integrals: Vec<Varied<f64>>,
-    /// Of products.
-    pub products: Vec<Varied<f64>>,
-    /// Fourier integrals.
-    pub fouriers: Vec<Varied<Complex>>,
-    /// Extrema; infinite of a motion of no length.
-    pub extrema: Vec<Varied<f64>>,
-    /// Speeds; zero where there was no such switch.
-    pub speeds: Vec<Varied<f64>>,
-    /// Sums of the speeds at these switches.
-    pub summed_speeds: Vec<Varied<f64>>,
-    /// Sums of the squares of the speeds at these switches.
-    pub squared_speeds: Vec<Varied<f64>>,
+    functionals: Vec<Functional>,
+    /// The functionals' values with their derivatives, by number; extrema of a motion of no length
+    /// are infinite.
+    pub values: Vec<nalgebra::Complex<Dual>>,
+    /// Pairs of regimes, and the speeds of the guard at switches between them.
+    pub speeds: Vec<((usize, usize), Speeds)>,
     /// How long the motion lasted.
-    pub duration: Varied<f64>,
+    pub duration: Dual,
     /// An extremum at the end of the last stretch moves with the switch there, if there is
     /// one: which, and its rate.
     at_end: Vec<(usize, f64)>,
     /// By how much the start of the stretch moved, where it began with a switch.
     moved: Option<f64>,
     periods: f64,
+}
+
+/// Speeds of a guard at switches, with their derivatives; zero where there was none.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Speeds {
+    /// The greatest.
+    pub greatest: Dual,
+    /// Their sum.
+    pub sum: Dual,
+    /// The sum of their squares.
+    pub squares: Dual,
 }
 
 /// A guard, its rate, and the rate of that, with their derivatives.
@@ -159,7 +137,8 @@ impl<'a> Variation<'a> {
         regime: usize,
         start: &[f64],
         outputs: Vec<VariedOutput>,
-        wanted: Wanted,
+        functionals: Vec<Functional>,
+        speeds: impl Iterator<Item = (usize, usize)>,
     ) -> Self {
         let mut sensitivity = Sensitivity::new(system, std::slice::from_ref(tangent), regime);
         sensitivity.begin(&system.regimes()[regime], 0, start);
@@ -194,26 +173,17 @@ impl<'a> Variation<'a> {
                 transitions.iter().enumerate().map(guard).collect()
             })
             .collect();
-        let extreme = |&(_, sign): &(usize, f64)| Varied {
-            value: -sign * f64::INFINITY,
-            change: 0.0,
-        };
         Self {
             system,
             tangent,
             sensitivity,
             modal,
             guards,
-            integrals: vec![Varied::default(); wanted.integrals.len()],
-            products: vec![Varied::default(); wanted.products.len()],
-            fouriers: vec![Varied::default(); wanted.fouriers.len()],
-            extrema: wanted.extrema.iter().map(extreme).collect(),
-            speeds: vec![Varied::default(); wanted.speeds.len()],
-            summed_speeds: vec![Varied::default(); wanted.speeds.len()],
-            squared_speeds: vec![Varied::default(); wanted.speeds.len()],
-            duration: Varied::default(),
+            values: functionals.iter().map(|f| f.initial()).collect(),
+            speeds: speeds.map(|pair| (pair, Speeds::default())).collect(),
+            duration: Dual::default(),
             outputs,
-            wanted,
+            functionals,
             at_end: Vec::new(),
             moved: None,
             periods: 0.0,
@@ -226,27 +196,11 @@ impl<'a> Variation<'a> {
         self.sensitivity.to_state(regime, 0, derivative);
     }
 
-    /// Adds what outputs of these values and derivatives contribute with a weight.
-    fn gather(&mut self, weight: f64, time: f64, at: &[Varied<f64>]) {
-        let add = |sum: &mut Varied<f64>, value: f64, change: f64| {
-            sum.value += weight * value;
-            sum.change += weight * change;
-        };
-        for (sum, &g) in self.integrals.iter_mut().zip(&self.wanted.integrals) {
-            add(sum, at[g].value, at[g].change);
-        }
-        for (sum, &(g, h)) in self.products.iter_mut().zip(&self.wanted.products) {
-            let (g, h) = (at[g], at[h]);
-            add(
-                sum,
-                g.value * h.value,
-                g.change * h.value + g.value * h.change,
-            );
-        }
-        for (sum, &(g, omega)) in self.fouriers.iter_mut().zip(&self.wanted.fouriers) {
-            let turn = Complex::new(0.0, -omega * time).exponential() * weight;
-            sum.value += turn * at[g].value;
-            sum.change += turn * at[g].change;
+    /// Adds a node of this weight, where outputs have these values, at a time within the period.
+    fn add_node(&mut self, weight: Dual, time: f64, values: &[Dual]) {
+        let time = self.periods * self.system.drive().period() + time;
+        for (sum, functional) in self.values.iter_mut().zip(&self.functionals) {
+            functional.add_node(sum, weight, values, |omega| Dual::constant(omega * time));
         }
     }
 
@@ -255,39 +209,31 @@ impl<'a> Variation<'a> {
         let (r, drive) = (segment.regime, segment.system.drive());
         let regime = segment.regime();
         self.at_end.clear();
-        for index in 0..self.wanted.extrema.len() {
-            let (output, sign) = self.wanted.extrema[index];
+        for index in 0..self.functionals.len() {
+            let Some((output, sign)) = self.functionals[index].extremum() else {
+                continue;
+            };
             let [value, _] = &self.modal[r][output];
-            let signal = Signal::of(
-                regime,
-                drive,
-                value,
-                segment.modal,
-                segment.phase,
-                segment.length,
-            );
+            let signal = segment.signal(value);
             let rate = signal.differentiated(segment.length);
             let inside = sign_changes(&rate, segment.length);
             let places = std::iter::once(0.0).chain(inside).chain([segment.length]);
             for place in places {
                 let found = signal.at(place);
-                if sign * (found - self.extrema[index].value) <= 0.0 {
+                if sign * (found - self.values[index].re.value) <= 0.0 {
                     continue;
                 }
                 let slope = rate.at(place);
                 let q = Propagator::new(regime, drive, place).modal(segment.modal);
                 let s = self.sensitivity.after(segment, place);
                 let time = segment.phase + place;
-                let change = varied(&self.modal[r][output], &q, &s, drive, time).change;
+                let change = varied(&self.modal[r][output], &q, &s, drive, time).derivative();
                 let moved = if place == 0.0 {
                     self.moved.map_or(0.0, |by| by * slope)
                 } else {
                     0.0
                 };
-                self.extrema[index] = Varied {
-                    value: found,
-                    change: change + moved,
-                };
+                self.values[index].re = Dual::new(found, change + moved);
                 self.at_end.retain(|(known, _)| *known != index);
                 if place == segment.length {
                     self.at_end.push((index, slope));
@@ -304,19 +250,9 @@ fn varied(
     s: &[Complex],
     drive: &Drive,
     time: f64,
-) -> Varied<f64> {
+) -> Dual {
     let along: f64 = value.modal.iter().zip(s).map(|(w, s)| (w * s).re).sum();
-    Varied {
-        value: value_of(value, q, drive, time),
-        change: along + value_of(change, q, drive, time),
-    }
-}
-
-fn value_of(output: &ModalOutput, q: &[Complex], drive: &Drive, time: f64) -> f64 {
-    let modes: f64 = output.modal.iter().zip(q).map(|(w, q)| (w * q).re).sum();
-    let tones = output.tones.iter().enumerate();
-    let tones: f64 = tones.map(|(k, z)| (z * drive.phasor(k, time)).re).sum();
-    output.constant + modes + tones
+    Dual::new(value.at(drive, q, time), along + change.at(drive, q, time))
 }
 
 impl Observer for Variation<'_> {
@@ -326,12 +262,12 @@ impl Observer for Variation<'_> {
         }
         let (regime, drive) = (segment.regime(), segment.system.drive());
         self.look_for_extrema(segment);
-        // Products have twice the rate, Fourier integrals the frequency beside it.
+        // Products have twice the rate, Fourier integrals the frequency in addition.
         let modes = regime.basis().eigenvalues.iter().map(|l| l.modulus());
         let tones = drive.frequencies().iter().copied();
         let fastest = 2.0 * modes.chain(tones).fold(0.0, f64::max);
-        let turned = self.wanted.fouriers.iter().map(|(_, omega)| omega.abs());
-        let rate = fastest + turned.fold(0.0, f64::max);
+        let omegas = self.functionals.iter().filter_map(|f| f.frequency());
+        let rate = fastest + omegas.map(f64::abs).fold(0.0, f64::max);
         let panels = (rate * segment.length / PANEL).ceil().max(1.0);
         let width = segment.length / panels;
         let rule = &*GAUSS;
@@ -342,7 +278,7 @@ impl Observer for Variation<'_> {
         let step = Propagator::new(regime, drive, width);
         let mut q = segment.modal.to_vec();
         let mut s = self.sensitivity.modal(0).to_vec();
-        let mut at = vec![Varied::default(); self.outputs.len()];
+        let mut at = vec![Dual::default(); self.outputs.len()];
         for panel in 0..panels as usize {
             let begin = segment.phase + panel as f64 * width;
             for (propagator, (place, weight)) in steps.iter().zip(rule) {
@@ -354,8 +290,7 @@ impl Observer for Variation<'_> {
                 for (at, output) in at.iter_mut().zip(&self.modal[segment.regime]) {
                     *at = varied(output, &q, &s, drive, time);
                 }
-                let time = self.periods * drive.period() + time;
-                self.gather(weight * width, time, &at);
+                self.add_node(Dual::constant(weight * width), time, &at);
             }
             s = step.sensitivity(&self.sensitivity, segment.regime, begin, &q, &s);
             q = step.modal(&q);
@@ -369,7 +304,7 @@ impl Observer for Variation<'_> {
         let (from, drive) = (view.switch.from, view.system.drive());
         let guard = &self.guards[from][view.transition];
         let s = self.sensitivity.modal(0);
-        let moves = varied(&guard.value, view.modal, s, drive, view.phase).change;
+        let moves = varied(&guard.value, view.modal, s, drive, view.phase).derivative();
         // Where the guard only grazes, nothing that is read off the motion jumps.
         let by = if view.rate == 0.0 {
             0.0
@@ -377,62 +312,33 @@ impl Observer for Variation<'_> {
             -moves / view.rate
         };
         let rate = varied(&guard.rate, view.modal, s, drive, view.phase);
-        let curvature = value_of(&guard.curvature, view.modal, drive, view.phase);
-        let speed = Varied {
-            value: rate.value.abs(),
-            change: (rate.change + curvature * by) * rate.value.signum(),
-        };
-        for (k, pair) in self.wanted.speeds.iter().enumerate() {
-            if *pair != (from, view.switch.to) {
-                continue;
+        let curvature = guard.curvature.at(drive, view.modal, view.phase);
+        let speed = Dual::new(
+            rate.value.abs(),
+            (rate.derivative() + curvature * by) * rate.value.signum(),
+        );
+        let between = (from, view.switch.to);
+        for (_, speeds) in self.speeds.iter_mut().filter(|(pair, _)| *pair == between) {
+            if speed.value > speeds.greatest.value {
+                speeds.greatest = speed;
             }
-            if speed.value > self.speeds[k].value {
-                self.speeds[k] = speed;
-            }
-            let (sum, squares) = (&mut self.summed_speeds[k], &mut self.squared_speeds[k]);
-            sum.value += speed.value;
-            sum.change += speed.change;
-            squares.value += speed.value * speed.value;
-            squares.change += 2.0 * speed.value * speed.change;
+            speeds.sum = speeds.sum + speed;
+            speeds.squares = speeds.squares + speed * speed;
         }
         for (index, rate) in std::mem::take(&mut self.at_end) {
-            self.extrema[index].change += rate * by;
+            self.values[index].re.slopes[0] += rate * by;
         }
-        let mut x = vec![0.0; view.system.dimension()];
-        let modal = view.modal.iter().copied();
-        view.system.regimes()[from].to_state(drive, modal, view.phase, &mut x);
-        let transition = &view.system.transitions()[from][view.transition];
-        let reset = if view.stuck {
-            transition.sticking.as_ref().map(|sticking| &sticking.reset)
-        } else {
-            transition.reset.as_ref()
-        };
-        let after = reset.map_or_else(
+        let x = view.state();
+        let after = view.reset().map_or_else(
             || x.clone(),
-            |reset| {
-                let x = nalgebra::DVector::from_column_slice(&x);
-                let after = &reset.matrix * x + reset.offset.at(drive, view.phase);
-                after.as_slice().to_vec()
-            },
+            |reset| &reset.matrix * &x + reset.offset.at(drive, view.phase),
         );
         // The integrand before the switch in place of that after it, for as long as it moves.
-        let of = |regime: usize, x: &[f64]| -> Vec<Varied<f64>> {
-            let value = |o: &VariedOutput| o.value[regime].at(drive, x, view.phase);
-            let jump = |value| Varied { value, change: 0.0 };
-            self.outputs.iter().map(|o| jump(value(o))).collect()
-        };
-        let (before, after) = (of(from, &x), of(view.switch.to, &after));
-        let time = self.periods * drive.period() + view.phase;
-        for (sum, &g) in self.integrals.iter_mut().zip(&self.wanted.integrals) {
-            sum.change += (before[g].value - after[g].value) * by;
-        }
-        for (sum, &(g, h)) in self.products.iter_mut().zip(&self.wanted.products) {
-            let product = |at: &[Varied<f64>]| at[g].value * at[h].value;
-            sum.change += (product(&before) - product(&after)) * by;
-        }
-        for (sum, &(g, omega)) in self.fouriers.iter_mut().zip(&self.wanted.fouriers) {
-            let turn = Complex::new(0.0, -omega * time).exponential();
-            sum.change += turn * ((before[g].value - after[g].value) * by);
+        for (regime, x, by) in [(from, &x, by), (view.switch.to, &after, -by)] {
+            let value =
+                |o: &VariedOutput| o.value[regime].at(drive, x.as_slice(), view.phase).into();
+            let values: Vec<Dual> = self.outputs.iter().map(value).collect();
+            self.add_node(Dual::new(0.0, by), view.phase, &values);
         }
         self.sensitivity.switch(view);
         self.moved = Some(by);
@@ -450,13 +356,13 @@ impl Variation<'_> {
     /// period that changes stretches all integrals alike.
     pub fn finish(&mut self) {
         let by = self.tangent.log_period;
-        for sum in self.integrals.iter_mut().chain(&mut self.products) {
-            sum.change += by * sum.value;
+        let stretch = Dual::new(1.0, by);
+        for (sum, functional) in self.values.iter_mut().zip(&self.functionals) {
+            if functional.extremum().is_none() {
+                *sum = nalgebra::Complex::new(sum.re * stretch, sum.im * stretch);
+            }
         }
-        for sum in &mut self.fouriers {
-            sum.change += sum.value * by;
-        }
-        self.duration.change = by * self.duration.value;
+        self.duration = self.duration * stretch;
     }
 }
 

@@ -1,6 +1,6 @@
-//! What is accumulated while a motion runs is what its recorded trajectory gives, which is
-//! computed otherwise: on random systems of 1 to 12 oscillators of every damping, that meet a
-//! springy stop or hit a rigid one.
+//! Accumulated observables agree with those of the recorded trajectory, which are computed
+//! independently: random systems of 1 to 12 oscillators with any damping, with a soft or a rigid
+//! stop.
 
 #![allow(
     clippy::disallowed_methods,
@@ -11,7 +11,7 @@ use nanotap_arithmetic::ComplexFunctions as _;
 use std::sync::Arc;
 
 use nalgebra::{DMatrix, DVector, RowDVector};
-use nanotap_flow::accumulate::{Accumulator, Request};
+use nanotap_flow::accumulate::{Accumulator, Functional, Request};
 use nanotap_flow::trajectory::Recorder;
 use nanotap_flow::{Drive, Flow, HarmonicVector, Output, Regime, Reset, System, Transition};
 use proptest::prelude::*;
@@ -21,8 +21,8 @@ const OMEGA: f64 = 1.7;
 /// An oscillator: its frequency, damping ratio, displacement, velocity, and weight in the gap.
 type Oscillator = (f64, f64, f64, f64, f64);
 
-/// Oscillators that a drive pushes, whose weighted sum `w` with the gap `w + offset` meets a
-/// stop of stiffness `k` and damper `c`, or bounces off it with the restitution `e`.
+/// Driven oscillators whose weighted sum `w` meets a stop with the gap `w + offset`: a spring `k`
+/// and damper `c`, or a rigid stop with the coefficient of restitution `e`.
 #[derive(Clone, Debug)]
 struct Example {
     oscillators: Vec<Oscillator>,
@@ -71,7 +71,7 @@ impl Example {
         states.flatten().collect()
     }
 
-    /// `None` where eigenvalues are too close to tell apart in double precision.
+    /// `None` if eigenvalues are too close to be separated in double precision.
     fn system(&self) -> Option<Arc<System>> {
         let n = self.dimension();
         let drive = Drive::single(OMEGA).unwrap();
@@ -156,7 +156,7 @@ fn example() -> impl Strategy<Value = Example> {
         })
 }
 
-/// Periods that are looked at.
+/// Number of periods compared.
 const PERIODS: usize = 3;
 
 fn compare(example: &Example) -> Result<(), TestCaseError> {
@@ -177,18 +177,24 @@ fn compare(example: &Example) -> Result<(), TestCaseError> {
         request.output(&other),
         request.output_by_regime(&force),
     ];
-    let extrema = channels.map(|c| (request.least(c), request.greatest(c)));
-    let integrals = channels.map(|c| request.integral(c));
-    let fouriers = channels.map(|c| frequencies.map(|omega| request.fourier(c, omega)));
+    let extrema = channels.map(|c| {
+        (
+            request.add(Functional::Least(c)),
+            request.add(Functional::Greatest(c)),
+        )
+    });
+    let integrals = channels.map(|c| request.add(Functional::Integral(c)));
+    let fouriers =
+        channels.map(|c| frequencies.map(|omega| request.add(Functional::Fourier(c, omega))));
     let pairs = [(0, 0), (0, 1), (1, 2), (2, 2)];
-    let products = pairs.map(|(a, b)| request.product(channels[a], channels[b]));
+    let products = pairs.map(|(a, b)| request.add(Functional::Product(channels[a], channels[b])));
     let mut accumulator = Accumulator::new(&request.plan(&system).unwrap());
 
     let mut flow = Flow::new(Arc::clone(&system));
     flow.start(&example.start(), 0.0).unwrap();
     let mut recorder = Recorder::default();
     for _ in 0..PERIODS {
-        // Rigid stops may chatter, which is refused where there is no sticking.
+        // Rigid stops may chatter, which is an error in a system without sticking.
         if flow
             .run_period(&mut (&mut accumulator, &mut recorder))
             .is_err()
@@ -213,7 +219,7 @@ fn compare(example: &Example) -> Result<(), TestCaseError> {
         .iter()
         .map(|s| {
             let (low, high) = s.range().unwrap();
-            // Terms of a signal cancel each other; its rounding is that of the largest.
+            // Terms of a signal cancel; its rounding is that of the largest term.
             let terms = s.pieces.iter().map(|p| p.signal.noise() / f64::EPSILON);
             terms.fold(low.value.abs().max(high.value.abs()), f64::max)
         })
@@ -221,18 +227,18 @@ fn compare(example: &Example) -> Result<(), TestCaseError> {
     for (i, signal) in signals.iter().enumerate() {
         let (low, high) = signal.range().unwrap();
         for (key, expected) in [(extrema[i].0, low.value), (extrema[i].1, high.value)] {
-            let found = accumulator.extremum(key);
+            let found = accumulator.values()[key].re;
             prop_assert!(
                 (found - expected).abs() <= 1e-12 * sizes[i],
                 "{i}: {found} {expected}"
             );
         }
-        let (found, expected) = (accumulator.integral(integrals[i]), signal.integral());
+        let (found, expected) = (accumulator.values()[integrals[i]].re, signal.integral());
         let known = 1e-12 * sizes[i] * duration;
         prop_assert!((found - expected).abs() <= known, "{i}: {found} {expected}");
         prop_assert!((signal.mean() - found / duration).abs() <= 1e-12 * sizes[i]);
         for (key, omega) in fouriers[i].iter().zip(frequencies) {
-            let found = accumulator.fourier(*key);
+            let found = accumulator.values()[*key];
             let expected = signal.fourier(omega) * (0.5 * duration);
             prop_assert!(
                 (found - expected).modulus() <= known,
@@ -241,7 +247,7 @@ fn compare(example: &Example) -> Result<(), TestCaseError> {
         }
     }
     for (key, (a, b)) in products.iter().zip(pairs) {
-        let found = accumulator.product(*key);
+        let found = accumulator.values()[*key].re;
         let expected = signals[a].product_integral(&signals[b]);
         let known = 1e-12 * sizes[a] * sizes[b] * duration;
         prop_assert!(
@@ -264,15 +270,15 @@ proptest! {
     #![proptest_config(ProptestConfig { cases: 100, max_shrink_iters: 50, ..ProptestConfig::default() })]
 
     #[test]
-    fn what_is_accumulated_is_what_the_trajectory_gives(example in example()) {
+    fn accumulated_observables_agree_with_the_trajectory(example in example()) {
         compare(&example)?;
     }
 }
 
-/// Cleared in between, an accumulator gives the later periods alone, with the same phase of
-/// the drive; an extremum that is taken gives each period's own.
+/// After it is cleared, an accumulator gives the later periods only, with the same phase of the
+/// drive; extrema that are read per period are those of each period.
 #[test]
-fn clearing_begins_anew() {
+fn clearing_restarts_the_accumulation() {
     let example = Example {
         oscillators: vec![(1.0, 0.05, 0.2, 0.0, 1.0), (6.3, 0.02, 0.0, 0.1, -0.5)],
         offset: 0.1,
@@ -286,7 +292,10 @@ fn clearing_begins_anew() {
         request.output(&example.gap()),
         "one output, one channel"
     );
-    let (least, first) = (request.least(gap), request.fourier(gap, OMEGA));
+    let (least, first) = (
+        request.add(Functional::Least(gap)),
+        request.add(Functional::Fourier(gap, OMEGA)),
+    );
     let plan = request.plan(&system).unwrap();
     let mut flow = Flow::new(Arc::clone(&system));
     flow.start(&example.start(), 0.0).unwrap();
@@ -295,20 +304,20 @@ fn clearing_begins_anew() {
     let (mut lowest, mut sum) = (f64::INFINITY, nanotap_flow::Complex::new(0.0, 0.0));
     for _ in 0..5 {
         flow.run_period(&mut (&mut whole, &mut each)).unwrap();
-        lowest = lowest.min(each.take_extremum(least));
-        sum += each.fourier(first);
-        assert_eq!(each.extremum(least), f64::INFINITY);
+        lowest = lowest.min(each.take(least));
+        sum += each.values()[first];
+        assert_eq!(each.values()[least].re, f64::INFINITY);
         each.clear();
         assert_eq!(each.duration(), 0.0);
     }
-    assert_eq!(whole.extremum(least), lowest);
-    assert!((whole.fourier(first) - sum).modulus() < 1e-13);
+    assert_eq!(whole.values()[least].re, lowest);
+    assert!((whole.values()[first] - sum).modulus() < 1e-13);
     assert_eq!(whole.periods(), 5);
 }
 
-/// A stop that a motion of period one taps has the same Fourier coefficients in each period, in
-/// the hundred-thousandth as in the first: phases of multiples of the drive's frequency do not
-/// lose digits with time.
+/// A periodic motion that taps a stop has the same Fourier coefficients in each period, in the
+/// hundred-thousandth as in the first: the phases of harmonics of the drive do not lose digits with
+/// time.
 #[test]
 fn harmonics_stay_exact_over_many_periods() {
     let example = Example {
@@ -319,7 +328,7 @@ fn harmonics_stay_exact_over_many_periods() {
     let system = example.system().unwrap();
     let mut request = Request::new();
     let force = request.output_by_regime(&example.force());
-    let keys = [1, 2, 5].map(|n| request.fourier(force, f64::from(n) * OMEGA));
+    let keys = [1, 2, 5].map(|n| request.add(Functional::Fourier(force, f64::from(n) * OMEGA)));
     let mut accumulator = Accumulator::new(&request.plan(&system).unwrap());
     let mut flow = Flow::new(Arc::clone(&system));
     flow.start(&example.start(), 0.0).unwrap();
@@ -327,20 +336,20 @@ fn harmonics_stay_exact_over_many_periods() {
         flow.run_period(&mut ()).unwrap();
     }
     flow.run_period(&mut accumulator).unwrap();
-    let first = keys.map(|key| accumulator.fourier(key));
+    let first = keys.map(|key| accumulator.values()[key]);
     let many = 100_000;
     for _ in 1..many {
         flow.run_period(&mut accumulator).unwrap();
     }
     for (key, first) in keys.into_iter().zip(first) {
         assert!(first.modulus() > 1e-6, "the motion taps");
-        let mean = accumulator.fourier(key) / f64::from(many);
+        let mean = accumulator.values()[key] / f64::from(many);
         let error = (mean - first).modulus() / first.modulus();
         assert!(error < 1e-11, "{error:e}");
     }
 }
 
-/// What does not fit is refused.
+/// Outputs of the wrong size are refused.
 #[test]
 fn outputs_that_do_not_fit_are_refused() {
     let example = Example {
@@ -357,12 +366,12 @@ fn outputs_that_do_not_fit_are_refused() {
     assert!(request.plan(&system).is_err());
     let mut request = Request::new();
     let gap = request.output(&example.gap());
-    request.fourier(gap, f64::NAN);
+    request.add(Functional::Fourier(gap, f64::NAN));
     assert!(request.plan(&system).is_err());
 }
 
-/// A whole period's flight whose least gap comes just before its end: random cases found that it
-/// lay beyond the last tabulated point, as for a quarter of all ratios of period and step.
+/// A flight of a whole period whose least gap occurs just before its end: random cases found that
+/// it was beyond the last tabulated point, as for a quarter of all ratios of period and step.
 #[test]
 fn extrema_at_the_end_of_a_flight_are_seen() {
     let example = Example {
@@ -380,8 +389,8 @@ fn extrema_at_the_end_of_a_flight_are_seen() {
     compare(&example).unwrap();
 }
 
-/// Terms so fast beside the drive that a table ends before the flight does, and a beat that
-/// grows up to the last period's end.
+/// Terms so fast compared with the drive that a table ends before the flight, and a beat that grows
+/// up to the end of the last period.
 #[test]
 fn extrema_beyond_the_table_are_seen() {
     let mut oscillators = vec![
@@ -389,7 +398,7 @@ fn extrema_beyond_the_table_are_seen() {
         (400.28, 1e-5, -0.1, 0.0, 1.0),
         (4000.0, 0.001, 0.01, 0.0, 0.3),
     ];
-    // More terms than a guard's table follows: extrema have one of their own, with finer steps.
+    // More terms than a guard's table contains: extrema have a separate one with finer steps.
     oscillators.extend((0..8).map(|j| (500.0 + 20.0 * f64::from(j), 0.05, 1e-3, 0.0, 0.2)));
     let example = Example {
         oscillators,

@@ -1,4 +1,4 @@
-//! Motions side by side are those that go alone.
+//! Motions in an ensemble agree with single motions.
 
 #![allow(
     clippy::disallowed_methods,
@@ -12,9 +12,9 @@ use nanotap_flow::{Drive, Ensemble, Flow, FlowError, HarmonicVector, Output, Reg
 use nanotap_flow::{System, Transition};
 use proptest::prelude::*;
 
-/// Masses on springs of their own, (frequency, damping, weight) each, that one tip is the weighted
-/// sum of; the tip's gap to a surface moves with the drive, and the surface is a spring and a
-/// damper.
+/// Masses on separate springs, each (frequency, damping, weight), whose weighted sum is the
+/// position of a tip. The gap between tip and surface moves with the drive, and the surface is a
+/// spring and a damper.
 #[derive(Clone, Debug)]
 struct Tip {
     masses: Vec<(f64, f64, f64)>,
@@ -63,7 +63,7 @@ impl Tip {
         Arc::new(System::new(drive, regimes, transitions).unwrap())
     }
 
-    /// Three masses that hammer: some two contacts a period, as the paper's lever at Ω = 2.6.
+    /// Three masses: about two contacts per period, like the paper's lever at Ω = 2.6.
     fn lever() -> Self {
         Self {
             masses: vec![(3.0, 0.02, 1.8), (19.4, 0.003, -1.9), (56.0, 0.001, 2.0)],
@@ -76,7 +76,7 @@ impl Tip {
     }
 }
 
-/// States of `2n` numbers each, of the size that motions have.
+/// States of `2n` numbers each, of the size of typical motions.
 fn states(n: usize, count: usize) -> Vec<f64> {
     let number = |k: usize| 0.15 * ((k * k) as f64 * 0.37 + k as f64 * 1.3).sin();
     (0..2 * n * count).map(number).collect()
@@ -100,13 +100,13 @@ fn together(system: &Arc<System>, states: &[f64], periods: &[usize]) -> Vec<f64>
     all
 }
 
-/// By how much states may differ that are the same but for rounding: a billionth of their size, or
-/// more where chaos parts neighbours.
+/// Largest difference between states that are equal up to rounding: 1e-9 of their size, or more
+/// where neighbours diverge by chaos.
 fn rounding(system: &Arc<System>, states: &[f64], periods: &[usize]) -> f64 {
     let ends = alone(system, states, periods);
-    let beside: Vec<f64> = states.iter().map(|x| x * (1.0 + 1e-14)).collect();
-    let parted = alone(system, &beside, periods);
-    let apart = ends.iter().zip(&parted).map(|(a, b)| (a - b).abs());
+    let perturbed: Vec<f64> = states.iter().map(|x| x * (1.0 + 1e-14)).collect();
+    let separated = alone(system, &perturbed, periods);
+    let apart = ends.iter().zip(&separated).map(|(a, b)| (a - b).abs());
     let size = ends.iter().fold(1.0, |size: f64, x| size.max(x.abs()));
     1e-9 * size + 1e3 * apart.fold(0.0, f64::max)
 }
@@ -140,7 +140,7 @@ proptest! {
 
     /// A few periods of random systems.
     #[test]
-    fn motions_side_by_side_are_those_that_go_alone(
+    fn motions_in_an_ensemble_agree_with_single_motions(
         tip in tips(),
         periods in proptest::collection::vec(0..4_usize, 1..20),
     ) {
@@ -154,10 +154,10 @@ proptest! {
         }
     }
 
-    /// The states at the ends of all periods are those that a motion alone comes to after so many, and
-    /// the last one is where the motion ends.
+    /// The states at the ends of all periods are those of a single motion after as many periods,
+    /// and the last one is the final state.
     #[test]
-    fn motions_pass_through_the_states_of_every_period(tip in tips(), count in 1..20_usize) {
+    fn the_states_of_every_period_are_those_of_a_single_motion(tip in tips(), count in 1..20_usize) {
         let system = tip.system();
         let n = system.dimension();
         let starts = states(tip.masses.len(), count);
@@ -180,7 +180,7 @@ proptest! {
         }
     }
 
-    /// What comes of a motion depends on no other: not on who is beside it, not on the order.
+    /// A result does not depend on the other motions or on their order.
     #[test]
     fn neighbours_do_not_matter(tip in tips(), count in 1..20_usize) {
         let system = tip.system();
@@ -200,9 +200,10 @@ proptest! {
     }
 }
 
-/// Where the gap falls to zero but once a flight, hardly a stretch need be passed alone.
+/// If the gap reaches zero once per flight only, hardly any segment is computed for a single
+/// motion.
 #[test]
-fn nearly_all_stretches_are_passed_together() {
+fn nearly_all_segments_are_computed_together() {
     let tip = Tip {
         masses: vec![(3.0, 0.02, 1.8), (19.4, 0.01, -1.0), (56.0, 0.01, 0.5)],
         ..Tip::lever()
@@ -216,10 +217,11 @@ fn nearly_all_stretches_are_passed_together() {
     assert!(stretches.alone * 25 < stretches.together, "{stretches:?}");
 }
 
-/// More motions than lanes, and periods from none to many: each stops at its own end.
+/// More motions than lanes, with different numbers of periods, zero included: each stops at its own
+/// end.
 #[test]
-fn each_motion_has_periods_of_its_own() {
-    // Its motions come to rest on an orbit, so that a hundred periods leave rounding small.
+fn each_motion_has_its_own_number_of_periods() {
+    // The motions converge to an orbit, so that rounding stays small over a hundred periods.
     let tip = Tip {
         drive: 0.1,
         gap: 0.25,
@@ -236,9 +238,9 @@ fn each_motion_has_periods_of_its_own() {
     assert_eq!(found[..6], states[..6], "no period changes nothing");
 }
 
-/// What is no state is refused, and its neighbours go on.
+/// An invalid state is refused, and the others continue.
 #[test]
-fn one_bad_state_harms_no_other() {
+fn one_invalid_state_does_not_affect_the_others() {
     let system = Tip::lever().system();
     let mut states = states(3, 3);
     let good = states.clone();

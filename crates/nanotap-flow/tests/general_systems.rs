@@ -1,5 +1,5 @@
-//! Systems that are no microscope: several tones, several regimes, every kind of damping,
-//! and what is refused.
+//! Systems other than microscopes: several tones, several regimes, every kind of damping, and
+//! invalid input.
 
 #![allow(
     clippy::disallowed_methods,
@@ -77,10 +77,10 @@ fn two_tones_and_three_regimes_agree_with_fine_runge_kutta() {
     }
 }
 
-/// A step that passes a stop: looked at once a step, the stop is not felt within it, and the
-/// step is as between stops that are not there; looked at in every stage, it is felt.
+/// A step that crosses a stop. If contact is tested once per step, the stop has no effect within
+/// it, as if it did not exist; if it is tested in every stage, the stop acts.
 #[test]
-fn a_stop_is_felt_within_a_step_only_where_every_stage_looks() {
+fn a_stop_acts_within_a_step_only_if_every_stage_tests_contact() {
     let first_step = |stops: [f64; 2], switching: Switching| {
         let system = between_stops(0.1, stops);
         let mut steps = FixedStep::new(&system, &[0.49, 1.0], &[50; 3], switching).unwrap();
@@ -130,9 +130,9 @@ fn on_a_moving_stop() -> System {
     .unwrap()
 }
 
-/// The classical method, written down here a stage at a time, does the same steps and sees the same
-/// switches, taken whole or looking at the stop in every stage, with a stop that moves and steps
-/// that do not divide the time left of the period.
+/// The classical method, written here stage by stage, gives the same steps and switches, with
+/// contact tested once per step or in every stage, for a moving stop and for steps that do not
+/// divide the rest of the period.
 #[test]
 fn steps_are_the_four_stages_of_the_classical_method() {
     for switching in [Switching::EveryStep, Switching::EveryStage] {
@@ -141,7 +141,7 @@ fn steps_are_the_four_stages_of_the_classical_method() {
     }
 }
 
-/// How many switches twenty periods had.
+/// Number of switches in twenty periods.
 fn compare_steps(system: &System, counts: [u32; 2], switching: Switching) -> u32 {
     let start = [0.2, 0.3];
     let period = system.drive().period();
@@ -194,10 +194,9 @@ fn compare_steps(system: &System, counts: [u32; 2], switching: Switching) -> u32
     all
 }
 
-/// The same map whether the period is run in one piece or cut in many: a cut is nothing
-/// that happens.
+/// The same map whether the period is run in one piece or in several.
 #[test]
-fn a_run_may_be_cut_anywhere() {
+fn a_run_may_be_divided_anywhere() {
     let system = Arc::new(between_stops(0.1, [20.0, 11.0]));
     let period = system.drive().period();
     let run = |cuts: u32| {
@@ -219,8 +218,8 @@ fn a_run_may_be_cut_anywhere() {
     }
 }
 
-/// An undamped mode driven at its own frequency has no bounded response; beside it, or
-/// with any damping, there is one.
+/// An undamped mode driven at its own frequency has no bounded response; at a nearby frequency, or
+/// with any damping, it has one.
 #[test]
 fn undamped_resonance_is_refused_with_a_reason() {
     let build = |omega: f64, damping: f64| {
@@ -236,15 +235,15 @@ fn undamped_resonance_is_refused_with_a_reason() {
         "{refused:?}"
     );
     assert!(refused.unwrap_err().to_string().contains("add damping"));
-    let beside = build(2.0 + 1e-6, 0.0).unwrap();
+    let nearby = build(2.0 + 1e-6, 0.0).unwrap();
     // x = sin ωt / (4 − ω²)
     let omega = 2.0 + 1e-6;
     let expected = 1.0 / (4.0 - omega * omega);
-    assert!((beside.response().tones[0][0].im / -expected - 1.0).abs() < 1e-6);
+    assert!((nearby.response().tones[0][0].im / -expected - 1.0).abs() < 1e-6);
     assert!(build(2.0, 1e-9).is_ok());
 }
 
-/// Every way to misuse the constructors is an error that says what is wrong.
+/// Invalid arguments of the constructors are errors that state the problem.
 #[test]
 fn bad_input_is_refused() {
     assert!(matches!(

@@ -1,4 +1,4 @@
-//! Many periods run in one go are the same motion as one after the other.
+//! Many periods in one call give the same motion as single periods.
 
 #![allow(
     clippy::disallowed_methods,
@@ -11,8 +11,8 @@ use std::sync::Arc;
 use nalgebra::{DMatrix, DVector, RowDVector};
 use nanotap_flow::{Drive, Ensemble, Flow, HarmonicVector, Output, Regime, System, Transition};
 
-/// Two coupled masses, one of which hits springy stops on both sides: regimes with two transitions
-/// and with one.
+/// Two coupled masses, one of which hits soft stops on both sides: regimes with two transitions and
+/// with one.
 fn system() -> Arc<System> {
     let drive = Drive::new(TAU / 1.1, &[1]).unwrap();
     let regime = |index: usize, stiffness: f64, at: f64| {
@@ -72,9 +72,9 @@ fn start(i: usize) -> [f64; 4] {
     ]
 }
 
-/// Running on over the ends of periods is the same motion as stopping at each.
+/// A run over several periods is the same motion as runs of single periods.
 #[test]
-fn periods_may_be_run_in_one_go() {
+fn many_periods_in_one_call() {
     let system = system();
     for i in 0..6 {
         let (mut one_go, mut stopping) = (Flow::new(system.clone()), Flow::new(system.clone()));
@@ -95,10 +95,9 @@ fn periods_may_be_run_in_one_go() {
     }
 }
 
-/// Where two ways lead out of a regime, many motions go one after the other, and are the same to the
-/// last bit.
+/// If a regime has two exits, many motions are computed in sequence and agree to the last bit.
 #[test]
-fn what_does_not_fit_side_by_side_goes_alone() {
+fn systems_with_two_exits_are_computed_in_sequence() {
     let system = system();
     let starts: Vec<f64> = (0..6).flat_map(start).collect();
     let (mut together, mut alone) = (starts.clone(), starts);

@@ -1,5 +1,5 @@
-//! A body on a surface that recovers by itself (Kelvin and Voigt): contact ends when the
-//! force is zero, and gap and rate are then both zero by definition.
+//! A body on a viscoelastic surface (Kelvin and Voigt): contact ends when the force is zero, and
+//! gap and rate are then both zero by definition.
 
 #![allow(
     clippy::disallowed_methods,
@@ -13,7 +13,7 @@ use nalgebra::{DMatrix, DVector, RowDVector};
 use nanotap_flow::trajectory::Recorder;
 use nanotap_flow::{Drive, Flow, HarmonicVector, Onset, Output, Regime, Reset, System, Transition};
 
-/// ẍ + 0.1 ẋ + x = 2 sin ωt above a surface at rest at 0 of stiffness `k`, damper `c`.
+/// ẍ + 0.1 ẋ + x = 2 sin ωt above a surface with rest position 0, stiffness `k` and damper `c`.
 #[derive(Clone, Copy)]
 struct Body {
     omega: f64,
@@ -26,8 +26,8 @@ impl Body {
         -(self.k * x + self.c * v)
     }
 
-    /// State (x, ẋ, s): s is where the surface would be had nothing touched it since it was
-    /// last left. Regime 0 is flight.
+    /// State (x, ẋ, s): s is the position that the surface would have without contact since the
+    /// last separation. Regime 0 is flight.
     fn system(self) -> System {
         let drive = Drive::single(self.omega).unwrap();
         let (k, c, recovery) = (self.k, self.c, self.k / self.c);
@@ -64,8 +64,8 @@ impl Body {
         System::new(drive, regimes, transitions).unwrap()
     }
 
-    /// Runge–Kutta of fourth order with switches located by bisection of the step; returns
-    /// the state and how often the body touched.
+    /// Runge–Kutta of fourth order with switches located by bisection of the step; returns the
+    /// state and the number of contacts.
     fn stepped(self, start: [f64; 3], periods: u32, steps: u32) -> ([f64; 3], usize) {
         let h = TAU / self.omega / f64::from(steps);
         let mut touching = start[0] <= start[2] && self.force(start[0], start[1]) > 0.0;
@@ -123,8 +123,8 @@ impl Body {
                 }
                 touching = !touching;
                 if !touching {
-                    // Gap and rate are zero and the gap is about to open: one small step
-                    // on, where it has opened.
+                    // Gap and rate are zero and the gap is about to open: one small step later it
+                    // has opened.
                     let on = left.min(1e-4 * h);
                     y = step(false, t, y, on);
                     (t, left) = (t + on, left - on);
@@ -141,10 +141,10 @@ const BODY: Body = Body {
     c: 3.0,
 };
 
-/// The same motion as fine steps with located switches: nothing touches again at once,
-/// and no contact is missed.
+/// The same motion as fine steps with located switches: no contact begins again at once, and none
+/// is missed.
 #[test]
-fn parting_without_force_agrees_with_located_runge_kutta() {
+fn separation_at_zero_force_agrees_with_located_runge_kutta() {
     for c in [0.3, 3.0, 30.0] {
         let body = Body { c, ..BODY };
         let mut flow = Flow::new(Arc::new(body.system()));
@@ -165,7 +165,7 @@ fn parting_without_force_agrees_with_located_runge_kutta() {
             );
         }
         assert_eq!(run.events().iter().filter(|e| e.to == 1).count(), touched);
-        // The force never pulls, and no contact or flight is an instant only.
+        // The force never pulls, and contacts and flights have a finite duration.
         let force = Output::linear(RowDVector::from_row_slice(&[-body.k, -c, 0.0]), 1);
         let zero = force.scaled(0.0);
         let (least, most) = run.signal_by_regime(&[zero, force]).range().unwrap();
@@ -178,8 +178,8 @@ fn parting_without_force_agrees_with_located_runge_kutta() {
     }
 }
 
-/// A start in the surface that already moves out of it parts at once, at the rate that it
-/// has; one that presses stays.
+/// A start inside the surface that already moves outwards separates at once, at its rate; one that
+/// presses stays in contact.
 #[test]
 fn every_start_has_a_motion() {
     let system = Arc::new(BODY.system());
@@ -207,10 +207,10 @@ fn every_start_has_a_motion() {
     }
 }
 
-/// The Jacobian against differences of fourth order. The map is smooth through a grazing
-/// touch, since the damper's force begins at zero there.
+/// The Jacobian against differences of fourth order. The map is smooth at a grazing contact, since
+/// the damper's force begins at zero there.
 #[test]
-fn the_jacobian_holds_through_meeting_and_parting() {
+fn the_jacobian_through_contact_and_separation() {
     let system = Arc::new(BODY.system());
     let run = |start: [f64; 3]| {
         let mut flow = Flow::new(Arc::clone(&system));

@@ -1,5 +1,5 @@
-//! Starts at the surface, where gap, rate and more vanish together, and systems with time
-//! scales far apart.
+//! Starts at the surface, where gap, rate and higher derivatives vanish together, and systems with
+//! very different time scales.
 
 #![allow(
     clippy::disallowed_methods,
@@ -58,7 +58,8 @@ impl SoftStop {
         Ok(recorder.finish(Arc::clone(flow.system())))
     }
 
-    /// Where Runge and Kutta's fourth order comes to with this many steps a period.
+    /// The state after integration by the classical Runge–Kutta method with this many steps per
+    /// period.
     fn stepped(self, mut x: [f64; 2], periods: u32, steps: u32) -> [f64; 2] {
         let h = std::f64::consts::TAU / self.omega / f64::from(steps);
         let field = |t: f64, [x, v]: [f64; 2]| {
@@ -84,8 +85,8 @@ impl SoftStop {
     }
 }
 
-/// A case that once never came to an end: from rest at a stop that touches, gap, rate and
-/// acceleration vanish together, and the drive's first push, into the stop, decides.
+/// A case that once never ended: from rest at a stop in contact, gap, rate and acceleration vanish
+/// together, and the first push of the drive, into the stop, decides.
 const TOUCHING: SoftStop = SoftStop {
     stiffness: 1.0,
     damping: 3.285_167,
@@ -110,12 +111,12 @@ fn the_first_derivative_that_does_not_vanish_decides_the_regime() {
     }
 }
 
-/// A start with gap and rate zero, and the acceleration into the stop or away from it: no pair
-/// of events of no length.
+/// A start with gap and rate zero and acceleration into the stop or away from it: no pair of events
+/// at the same time.
 #[test]
-fn a_start_that_touches_without_rate_has_no_events_of_no_length() {
+fn a_start_in_contact_at_rest_has_no_simultaneous_events() {
     for (gap, first) in [(0.1, 0), (-0.1, 1)] {
-        // At rest at the stop the spring alone pulls: away from one at x > 0, into one at x < 0.
+        // At rest at the stop only the spring acts: away from a stop at x > 0, into one at x < 0.
         let system = SoftStop {
             gap,
             damping: 0.1,
@@ -131,7 +132,7 @@ fn a_start_that_touches_without_rate_has_no_events_of_no_length() {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(1500))]
 
-    /// 120 of such 1500 draws were once refused as chatter.
+    /// 120 of 1500 such samples were once refused as chatter.
     #[test]
     fn a_soft_stop_never_chatters(
         damping in 0.0..4.0_f64,
@@ -153,10 +154,10 @@ proptest! {
     }
 }
 
-/// A contact so viscous that its fast mode dies out at once takes no more memory than another,
-/// and moves as the limit of a stop that hardly gives way.
+/// A contact so viscous that its fast mode decays at once needs no more memory than another, and
+/// moves like a nearly rigid stop.
 #[test]
-fn time_scales_may_lie_far_apart() {
+fn time_scales_may_differ_widely() {
     let mut ends = Vec::new();
     for contact_damping in [1e6, 1e7, 1e8, 1e9] {
         let case = SoftStop {
@@ -171,7 +172,7 @@ fn time_scales_may_lie_far_apart() {
     for pair in ends.windows(2).skip(1) {
         assert!((pair[0][0] - pair[1][0]).abs() < 1e-5, "{ends:?}");
     }
-    // A mode that oscillates more often in a period than can be followed is refused.
+    // A mode with too many oscillations per period is refused.
     let slow = SoftStop {
         omega: 1e-29,
         damping: 0.0,

@@ -8,7 +8,7 @@ use nanotap::model::cantilever::Cantilever;
 use nanotap::model::parameter::Parameter;
 
 /// Largest number of modes of the census.
-const MOST_MODES: usize = 5;
+const MAX_MODES: usize = 5;
 
 /// The coexisting motions that the paper states for one case.
 struct Coexistence {
@@ -71,7 +71,7 @@ impl Coexistence {
 /// Every attractor in the cases of Figs. 6–17.
 pub(super) fn section(runs: &Runs<'_>, mut section: Section) -> Result<Section, PaperError> {
     let mut table = Table::new(
-        "Every attractor found, from seeded starts in a box that fits the case",
+        "Attractors found from pseudo-random initial states in a box that fits the case",
         [
             "Ω",
             "α₁",
@@ -81,7 +81,7 @@ pub(super) fn section(runs: &Runs<'_>, mut section: Section) -> Result<Section, 
             "W min",
             "W max",
             "amplitude",
-            "largest |μ|, or λ₁ a period",
+            "largest |μ|, or λ₁ per period",
         ],
     );
     for claim in &CLAIMS {
@@ -89,7 +89,7 @@ pub(super) fn section(runs: &Runs<'_>, mut section: Section) -> Result<Section, 
         let mut agreeing = Vec::new();
         let mut evidence = String::new();
         let mut again = String::new();
-        for modes in 1..=runs.either(MOST_MODES, 3) {
+        for modes in 1..=runs.either(MAX_MODES, 3) {
             let case = Cantilever::paper()
                 .with_modes(modes)
                 .with(Parameter::Omega, claim.omega)
@@ -107,7 +107,7 @@ pub(super) fn section(runs: &Runs<'_>, mut section: Section) -> Result<Section, 
         }
         let mut here = kinds.join("; ");
         if !agreeing.is_empty() {
-            here = format!("so it is with N = {}; {here}", agreeing.join(", "));
+            here = format!("agrees with N = {}; {here}", agreeing.join(", "));
         }
         section = section.check(
             Check::new(
@@ -122,9 +122,9 @@ pub(super) fn section(runs: &Runs<'_>, mut section: Section) -> Result<Section, 
     }
     Ok(section
         .text(
-            "Each start is followed until Newton closes the orbit that it goes to, with multipliers that say stable, \
-             or until its Lyapunov exponents have been measured; no tolerance on how nearly a run repeats decides. \
-             Orbits that are the same up to a shift by whole drive periods are one.",
+            "Each initial state is followed until Newton finds a stable orbit to which the motion converges, \
+             or until its Lyapunov exponents are known. The classification does not depend on a tolerance for repetition. \
+             Orbits that differ only by a shift of whole drive periods count once.",
         )
         .table(table))
 }

@@ -8,13 +8,13 @@ use nanotap_figures::{Figure, Panel};
 use super::PaperError;
 use super::check::{Check, Verdict, digits};
 use super::motion_view::{KEY, View, empty_portrait};
-use super::runs::{Counted, Runs, how_many};
+use super::runs::{Counted, Runs, how_many, stability};
 use super::section::{Picture, Section};
 use nanotap::model::cantilever::Cantilever;
 use nanotap::model::parameter::Parameter;
 
 /// Longest period of the orbits that are searched for.
-const LONGEST: usize = 4;
+const MAX_PERIOD: usize = 4;
 
 /// Both readings, with their censuses and orbits.
 struct Bare {
@@ -34,7 +34,7 @@ impl Reading {
             .with(Parameter::Alpha1, 0.0)
             .with(Parameter::Omega, omega);
         let counted = runs.count(&case)?;
-        let orbits = runs.orbits(&counted, LONGEST, 256)?;
+        let orbits = runs.orbits(&counted, MAX_PERIOD, 256)?;
         Ok(Self { counted, orbits })
     }
 
@@ -45,13 +45,13 @@ impl Reading {
             .collect()
     }
 
-    /// The motions of a period in words: "one attracts (W from … to …), one repels".
+    /// The motions of a period in words: "one stable (W from … to …), one unstable (…)".
     fn describe(&self, period: usize) -> Result<String, PaperError> {
         let mut parts = Vec::new();
         for (orbit, _) in self.counted.stable(period) {
             let o = self.counted.look(orbit)?.observables;
             parts.push(format!(
-                "one that attracts (W from {} to {})",
+                "one stable (W from {} to {})",
                 digits(o.tip_min, 4),
                 digits(o.tip_max, 5)
             ));
@@ -59,7 +59,7 @@ impl Reading {
         for orbit in self.unstable(period) {
             let o = self.counted.look(orbit)?.observables;
             parts.push(format!(
-                "one that repels (W from {} to {})",
+                "one unstable (W from {} to {})",
                 digits(o.tip_min, 4),
                 digits(o.tip_max, 5)
             ));
@@ -80,16 +80,15 @@ impl Reading {
 
     /// Time series and phase portrait of an orbit.
     fn panels(&self, orbit: &PeriodicOrbit, periods: usize) -> Result<[Panel; 2], PaperError> {
-        let stability = if orbit.is_stable() {
-            "stable"
-        } else {
-            "unstable"
-        };
         let omega = self.counted.case.omega;
         let view = View::new(&self.counted.model, &orbit.states[0], periods)?;
         let whole = View::new(&self.counted.model, &orbit.states[0], orbit.period)?;
         Ok([
-            view.time_panel(format!("Ω = {omega}: period {}, {stability}", orbit.period)),
+            view.time_panel(format!(
+                "Ω = {omega}: period {}, {}",
+                orbit.period,
+                stability(orbit)
+            )),
             whole.portrait_panel(
                 format!("largest |μ| = {}", digits(orbit.spectral_radius(), 4)),
                 0.8,
@@ -191,7 +190,7 @@ pub(super) fn fig15(runs: &Runs<'_>, section: Section) -> Result<Section, PaperE
         (false, true) => {
             "only at Ω = 2.6 does a subharmonic exist, as Figs. 16 and 17 need: the text looks right"
         }
-        _ => "the motions that exist do not tell which is meant",
+        _ => "the existing motions do not decide between the two",
     };
     Ok(section
         .text(
@@ -201,7 +200,7 @@ pub(super) fn fig15(runs: &Runs<'_>, section: Section) -> Result<Section, PaperE
         .picture(picture(
             "fig15",
             "Period-1 motions without a tip mass (Fig. 15)",
-            "(a, b) At Ω = 20, as the captions have it. (c, d) At Ω = 2.6, as the text has it.",
+            "(a, b) Ω = 20, as in the captions. (c, d) Ω = 2.6, as in the text.",
             &[
                 bare.fast.best(1).map(|o| (&bare.fast, o, 4)),
                 bare.slow.best(1).map(|o| (&bare.slow, o, 4)),
@@ -241,12 +240,9 @@ pub(super) fn fig16(runs: &Runs<'_>, section: Section) -> Result<Section, PaperE
         (None, None) => {
             let orbit = bare.fast.best(4).or_else(|| bare.fast.best(1));
             let Some(orbit) = orbit else {
-                return Err(PaperError::Failed {
-                    what: "Fig. 16".into(),
-                    why: "no orbit at Ω = 20".into(),
-                });
+                return Err(PaperError::failed("Fig. 16")("no orbit at Ω = 20"));
             };
-            let words = "No period-2 orbit was found, stable or not; the subharmonic that exists at Ω = 20 stands in its place.";
+            let words = "No period-2 orbit was found, stable or unstable; the figure shows the subharmonic that exists at Ω = 20.";
             (&bare.fast, orbit, orbit.period, words)
         }
     };
@@ -269,9 +265,9 @@ pub(super) fn fig16(runs: &Runs<'_>, section: Section) -> Result<Section, PaperE
                 "fig16-no-period-3",
                 "section 4: no period-3 motion was found for α₁ = 0 at Ω = 2.6",
                 if no_three {
-                    "none attracts here either"
+                    "none is stable here either"
                 } else {
-                    "one attracts"
+                    "one is stable"
                 },
                 Verdict::of(no_three),
             )
@@ -313,14 +309,14 @@ pub(super) fn fig17(runs: &Runs<'_>, section: Section) -> Result<Section, PaperE
             &format!(
                 "{} {}",
                 match stable.len() {
-                    0 => "No period-4 motion attracts.".to_owned(),
-                    1 => "(a, b) The one that attracts.".to_owned(),
-                    n => format!("{n} attract."),
+                    0 => "No period-4 motion is stable.".to_owned(),
+                    1 => "(a, b) The stable one.".to_owned(),
+                    n => format!("{n} are stable."),
                 },
                 if unstable.is_empty() {
                     ""
                 } else {
-                    "(c, d) The saddle beside it, which no run stays on."
+                    "(c, d) The unstable one (saddle)."
                 }
             ),
             &rows,

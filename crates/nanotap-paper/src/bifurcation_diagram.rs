@@ -60,7 +60,7 @@ pub(super) fn section(runs: &Runs<'_>, section: Section) -> Result<Section, Pape
     let two = FollowedBranch::from_rest(runs, &subject, (ENTRY_TWO, 2), CLOSE)?;
     let mut table = Table::new(
         format!(
-            "What attracts, N = 3, {starts} seeded starts a value of Ω; shorter stretches than five values left out"
+            "Attractors, N = 3, {starts} initial states per value of Ω; intervals of fewer than five values are omitted"
         ),
         ["Ω from", "to", "motions"],
     );
@@ -106,9 +106,9 @@ pub(super) fn section(runs: &Runs<'_>, section: Section) -> Result<Section, Pape
     ];
     let mut section = section
         .text(
-            "At each drive frequency several seeded starts are followed until their motion is named; each motion gives \
-             one point a drive period, the greatest tip deflection in it. The line is the period-1 branch, followed by \
-             arclength continuation through its bifurcations, whether it attracts or not.",
+            "At each drive frequency several initial states are followed until their motions are classified. Each motion gives \
+             one point per drive period: the largest tip deflection in that period. The line is the period-1 branch, stable \
+             and unstable, followed by arclength continuation through its bifurcations.",
         )
         .picture(picture(&wide, &close, [&one, &two], starts))
         .table(one.table("Bifurcations of the period-1 branch"))
@@ -141,14 +141,14 @@ fn subharmonics(wide: &[Column], [branch, doubled]: [&FollowedBranch; 2], again:
         "fig5-periods-1-2",
         "Fig. 5: period-1 and period-2 motions and their bifurcations",
         format!(
-            "period 1 attracts at Ω = {}; period 2 at Ω = {}",
+            "period 1 is stable at Ω = {}; period 2 at Ω = {}",
             where_seen(wide, |c| c.has(one)),
             where_seen(wide, |c| c.has(two))
         ),
         Verdict::of(holds),
     )
     .evidence(format!(
-        "the period-1 branch doubles its period at Ω = {}; the period-2 branch around Ω = 2.6 attracts at {}",
+        "the period-1 branch doubles its period at Ω = {}; the period-2 branch around Ω = 2.6 is stable at {}",
         numbers(&branch.flips()),
         in_words(&doubled.attracting())
     ))
@@ -171,11 +171,11 @@ fn nonperiodic_window(window: &[Column], close: &[Column], again: &str) -> Check
     Check::new(
         "fig5-window",
         "section 4: for 2.0 ≤ Ω ≤ 2.15 nonperiodic motions evolve from period 2",
-        format!("at {inside} of {} values of Ω there is one ({})", window.len(), kinds.join("; ")),
+        format!("nonperiodic at {inside} of {} values of Ω ({})", window.len(), kinds.join("; ")),
         Verdict::of(inside > 0),
     )
     .evidence(format!(
-        "what the statement describes exists at other frequencies: near Ω = 2.6 nonperiodic motion at {}, period 2 at {}",
+        "such motions exist at other frequencies: near Ω = 2.6 nonperiodic motion at {}, period 2 at {}",
         where_seen(close, nonperiodic),
         where_seen(close, |c| c.has(Kind::Periodic(2)))
     ))
@@ -218,7 +218,7 @@ fn further(wide: &[Column], beyond: &[Column], branch: &FollowedBranch, again: &
         if tori.is_empty() {
             "the period-1 branch has no Neimark–Sacker bifurcation above Ω = 2.15 in the range drawn".to_owned()
         } else {
-            format!("the period-1 branch gives birth to tori at Ω = {}", numbers(&tori))
+            format!("tori bifurcate from the period-1 branch at Ω = {}", numbers(&tori))
         },
         Verdict::of(!tori.is_empty() && seen),
     )
@@ -237,12 +237,12 @@ fn period_three(wide: &[Column], again: &str) -> Check {
         "fig5-period-3",
         "section 4: other subharmonics like period 3 exist, which Fig. 5 does not show",
         format!(
-            "period 3 attracts at Ω = {}",
+            "period 3 is stable at Ω = {}",
             where_seen(wide, |c| c.has(three))
         ),
         Verdict::of(wide.iter().any(|c| c.has(three))),
     )
-    .evidence("at Ω = 2.6 itself, where Fig. 7 has it, none does (see Fig. 7)")
+    .evidence("none is stable at Ω = 2.6, the frequency of Fig. 7 (see there)")
     .rerun(again)
 }
 
@@ -253,12 +253,12 @@ fn coexistence(wide: &[Column], again: &str) -> Check {
         "fig5-coexistence",
         "section 4: several period-n motions coexist at one driving frequency",
         format!(
-            "more than one motion attracts at Ω = {}",
+            "more than one motion is stable at Ω = {}",
             where_seen(wide, several)
         ),
         Verdict::of(wide.iter().any(several)),
     )
-    .evidence("from as many starts as were tried at each value; others may exist beside")
+    .evidence("found from a limited number of initial states per value; further motions may exist")
     .rerun(again)
 }
 
@@ -289,11 +289,11 @@ fn picture(
     let near = with_branch(near, branches[1], Colour::VERMILLION, CLOSE);
     Picture::new(
         "fig05",
-        "What attracts at each drive frequency, α₁ = 0.1 (Fig. 5)",
+        "Attractors at each drive frequency, α₁ = 0.1 (Fig. 5)",
         format!(
-            "Eq. (26), N = 3, {starts} seeded starts at each Ω; the ranges are chosen here. One point a drive period. \
-             Dashed: the period-1 branch and, in (b), the period-2 branch where they repel. Band in (a): \
-             2.0 ≤ Ω ≤ 2.15, where the paper has nonperiodic motions. (b) Colours as in (a); around Ω = 2.6 (upright line), the frequency of \
+            "Eq. (26), N = 3, {starts} initial states at each Ω; the paper does not state its ranges. One point per drive period. \
+             Dashed: the period-1 branch and, in (b), the period-2 branch where they are unstable. Band in (a): \
+             2.0 ≤ Ω ≤ 2.15, where the paper has nonperiodic motions. (b) Colours as in (a); around Ω = 2.6 (vertical line), the frequency of \
              Figs. 6 and 7."
         ),
         Figure::new(2, 1).with(whole).with(near),

@@ -12,7 +12,7 @@ use nanotap::model::parameter::Parameter;
 use nanotap::observe::Clearance;
 
 /// Drive periods over which a motion that does not repeat is observed.
-const WATCHED: usize = 400;
+const OBSERVED_PERIODS: usize = 400;
 
 struct Row {
     figure: &'static str,
@@ -58,7 +58,7 @@ pub(super) fn section(runs: &Runs<'_>, section: Section) -> Result<Section, Pape
             )?);
         }
         for chaos in counted.chaos() {
-            let watched = runs.either(WATCHED, 50);
+            let watched = runs.either(OBSERVED_PERIODS, 50);
             rows.extend(row(
                 figure,
                 "chaos".into(),
@@ -99,7 +99,7 @@ pub(super) fn section(runs: &Runs<'_>, section: Section) -> Result<Section, Pape
     }
     let touching: Vec<&Row> = rows.iter().filter(|r| r.clearance.touches()).collect();
     let here = if touching.is_empty() {
-        format!("so it is in all {} motions shown here", rows.len())
+        format!("true for all {} motions shown here", rows.len())
     } else {
         let list: Vec<String> = touching
             .iter()
@@ -114,7 +114,7 @@ pub(super) fn section(runs: &Runs<'_>, section: Section) -> Result<Section, Pape
                 )
             })
             .collect();
-        format!("not in {}", list.join(", "))
+        format!("not true for {}", list.join(", "))
     };
     let shown = touching.first().copied().or(rows.first());
     let again = shown.map_or_else(
@@ -133,9 +133,9 @@ pub(super) fn section(runs: &Runs<'_>, section: Section) -> Result<Section, Pape
     );
     Ok(section
         .text(
-            "Where the beam's height V(ξ, τ) = W(ξ, τ) + α₂ sin Ωτ + 1 vanishes anywhere, another part than the tip \
-             is in contact and the model no longer holds. With α₅ = 0 the tip is as long as g₀: where it sinks into \
-             the sample by its whole length, the end of the beam itself arrives.",
+            "Where the beam's height V(ξ, τ) = W(ξ, τ) + α₂ sin Ωτ + 1 becomes zero, a part other than the tip \
+             is in contact and the model is not valid. With α₅ = 0 the length of the tip is g₀: if the tip indents \
+             the sample by its whole length, the end of the beam touches the sample.",
         )
         .check(
             Check::new(
@@ -158,10 +158,8 @@ fn row(
     state: &[f64],
     periods: usize,
 ) -> Result<Option<Row>, PaperError> {
-    let clearance = Clearance::of(model, state, periods).map_err(|error| PaperError::Failed {
-        what: motion.clone(),
-        why: error.to_string(),
-    })?;
+    let clearance =
+        Clearance::of(model, state, periods).map_err(PaperError::failed(motion.clone()))?;
     Ok(clearance.map(|clearance| Row {
         figure,
         motion,

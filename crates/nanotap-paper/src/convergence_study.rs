@@ -15,15 +15,15 @@ use nanotap::model::cantilever::Cantilever;
 use nanotap::study::orbit::OrbitReport;
 
 /// Largest number of modes of the study.
-const MOST: usize = 20;
+const MAX_MODES: usize = 20;
 /// Modes in the paper's figure.
 const PAPER_MODES: usize = 4;
 /// Instants at which two motions are compared.
 const INSTANTS: usize = 1000;
 /// Drive periods of the run from rest.
-const RUN: usize = 30;
+const RUN_PERIODS: usize = 30;
 /// Difference visible in a figure of this size, relative to the amplitude.
-const VISIBLE: f64 = 0.05;
+const VISIBLE_DIFFERENCE: f64 = 0.05;
 
 struct Response {
     modes: usize,
@@ -33,7 +33,7 @@ struct Response {
 
 /// Fig. 4.
 pub(super) fn section(runs: &Runs<'_>, section: Section) -> Result<Section, PaperError> {
-    let most = runs.either(MOST, 8);
+    let most = runs.either(MAX_MODES, 8);
     let responses: Vec<Response> = (1..=most)
         .into_par_iter()
         .map(|modes| {
@@ -51,7 +51,7 @@ pub(super) fn section(runs: &Runs<'_>, section: Section) -> Result<Section, Pape
     };
     let mut table = Table::new(
         format!(
-            "The periodic response with N modes; differences of W are the largest over the period, in parts of the amplitude with N = {most}"
+            "The periodic response with N modes; largest differences of W over the period, relative to the amplitude with N = {most}"
         ),
         [
             "N",
@@ -99,10 +99,10 @@ pub(super) fn section(runs: &Runs<'_>, section: Section) -> Result<Section, Pape
         .map_or(most, |i| i + 1);
     Ok(section
         .text(
-            "Eq. (24) has no damping, so nothing settles: a run from rest keeps its free vibration for ever, and \
-             \"the steady-state motion\" has to be chosen. Here it is the periodic motion that the steady state of \
-             the damped case (Eq. 26) becomes when the damping is taken away, solved for by shooting. All its \
-             multipliers lie on the unit circle: it neither attracts nor repels.",
+            "Eq. (24) has no damping, so transients do not decay: a run from rest keeps its free vibration, and \
+             \"the steady-state motion\" has to be defined. Here it is the limit of the steady state of \
+             the damped case (Eq. 26) for vanishing damping, computed by shooting. All its \
+             multipliers lie on the unit circle: it is neither stable nor unstable.",
         )
         .picture(overlay(&responses, runs)?)
         .picture(convergence(&responses, &to, most))
@@ -111,7 +111,7 @@ pub(super) fn section(runs: &Runs<'_>, section: Section) -> Result<Section, Pape
             Check::new(
                 "fig4-steady-state",
                 "Fig. 4: the tip motion is the steady-state motion",
-                "without damping no motion attracts; the periodic response exists for every N",
+                "without damping there is no attractor; the periodic response exists for every N",
                 Verdict::Differs,
             )
             .evidence(format!(
@@ -126,7 +126,7 @@ pub(super) fn section(runs: &Runs<'_>, section: Section) -> Result<Section, Pape
                 "fig4-one-mode",
                 "Fig. 4: N = 1 differs significantly from N = 2, 3, 4",
                 format!("N = 1 and N = 2 differ by {:.0} % of the amplitude", 100.0 * single),
-                Verdict::of(single > VISIBLE),
+                Verdict::of(single > VISIBLE_DIFFERENCE),
             )
             .evidence(format!(
                 "W reaches {} with N = 1, {} with N = 2, {} with N = 3",
@@ -141,10 +141,10 @@ pub(super) fn section(runs: &Runs<'_>, section: Section) -> Result<Section, Pape
                 "fig4-convergence",
                 "Fig. 4: for N = 3, 4 there is very little difference",
                 format!("N = 3 and N = 4 differ by {:.1} % of the amplitude", 100.0 * last),
-                Verdict::of(last < VISIBLE),
+                Verdict::of(last < VISIBLE_DIFFERENCE),
             )
             .evidence(format!(
-                "N = {enough} is within 1 % of N = {most}; convergence goes on slowly, because a point mass and a \
+                "N = {enough} is within 1 % of N = {most}; further convergence is slow, because a point mass and a \
                  point force excite every mode"
             ))
             .rerun(rerun_orbit(&responses[3])),
@@ -189,7 +189,7 @@ fn overlay(responses: &[Response], runs: &Runs<'_>) -> Result<Picture, PaperErro
     let time = || Axis::linear("time $τ / T$ (drive periods)").tight();
     let tip = || Axis::linear("tip deflection $W$");
     let mut periodic = Panel::new(time(), tip())
-        .title("periodic response, solved for by shooting")
+        .title("periodic response, by shooting")
         .legend(Legend::Above);
     let mut from_rest = Panel::new(time(), tip())
         .title("run from rest")
@@ -215,15 +215,19 @@ fn overlay(responses: &[Response], runs: &Runs<'_>) -> Result<Picture, PaperErro
                 .label(format!("N = {}", r.modes))
         };
         periodic = periodic.with(style(view.tip_line()));
-        let rest = View::new(&model, &vec![0.0; model.dimension()], runs.either(RUN, 8))?;
+        let rest = View::new(
+            &model,
+            &vec![0.0; model.dimension()],
+            runs.either(RUN_PERIODS, 8),
+        )?;
         from_rest = from_rest.with(style(rest.tip_line()));
     }
     Ok(Picture::new(
         "fig04",
         "Tip motion at Ω = 4.1 with one to four modes, without damping (Fig. 4)",
-        "Eq. (24): α₁ = α₂ = 0.1, α₃ = α₅ = α₆ = 0, α₄ = 20. Without damping no motion attracts. (a) The periodic \
+        "Eq. (24): α₁ = α₂ = 0.1, α₃ = α₅ = α₆ = 0, α₄ = 20. Without damping there is no attractor. (a) The periodic \
          response, two periods: the limit of the damped steady state as damping vanishes; multipliers on the unit \
-         circle. (b) The run from rest, which keeps its free vibration; colours as in (a).",
+         circle. (b) A run from rest, which keeps its free vibration; colours as in (a).",
         Figure::new(2, 1).with(periodic).with(from_rest),
         120.0,
     ))
@@ -273,10 +277,10 @@ fn convergence(
     );
     Picture::new(
         "fig04-convergence",
-        "How Fig. 4 goes on: the periodic response with more modes",
+        "Fig. 4 continued: the periodic response with more modes",
         format!(
             "Largest difference of the tip deflection over the period between N modes and {most} (filled) or one mode \
-             less (open), in parts of the amplitude. Same case as Fig. 4."
+             fewer (open), relative to the amplitude. Same case as Fig. 4."
         ),
         Figure::single(panel),
         70.0,

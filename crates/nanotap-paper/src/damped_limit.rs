@@ -6,8 +6,8 @@ use nanotap_dynamics::{ClassifyOptions, MotionKind, ShootingOptions, classify, c
 use super::PaperError;
 use nanotap::model::Model;
 use nanotap::model::cantilever::Cantilever;
+use nanotap::model::model_map::ModelMap;
 use nanotap::model::parameter::Parameter;
-use nanotap::model::strobe::Strobe;
 use nanotap::study::orbit::{OrbitReport, report};
 
 /// Halvings of the damping before it is set to zero.
@@ -17,13 +17,10 @@ const START: (f64, f64) = (0.1, 0.2);
 
 /// The limit of the damped steady state without damping, and its model.
 pub(super) fn response(undamped: &Cantilever) -> Result<(Model, OrbitReport), PaperError> {
-    let failed = |why: String| PaperError::Failed {
-        what: format!(
-            "the periodic response at Ω = {}, N = {}",
-            undamped.omega, undamped.modes
-        ),
-        why,
-    };
+    let what = format!(
+        "the periodic response at Ω = {}, N = {}",
+        undamped.omega, undamped.modes
+    );
     let damped = |factor: f64| {
         Model::cantilever(
             &undamped
@@ -34,11 +31,17 @@ pub(super) fn response(undamped: &Cantilever) -> Result<(Model, OrbitReport), Pa
     };
     let model = damped(1.0)?;
     let rest = vec![0.0; model.dimension()];
-    let classified = classify(&mut Strobe::new(&model), &rest, &ClassifyOptions::default());
+    let classified = classify(
+        &mut ModelMap::new(&model),
+        &rest,
+        &ClassifyOptions::default(),
+    );
     let (MotionKind::Periodic(mut orbit) | MotionKind::TransientChaos { mut orbit, .. }) =
         classified.kind
     else {
-        return Err(failed("the damped motion is not periodic".into()));
+        return Err(PaperError::failed(what)(
+            "the damped motion is not periodic",
+        ));
     };
     let factors = (1..=HALVINGS).map(|k| 0.5f64.powi(k)).chain([0.0]);
     let mut model = model;
@@ -46,14 +49,14 @@ pub(super) fn response(undamped: &Cantilever) -> Result<(Model, OrbitReport), Pa
         model = damped(factor)?;
         let start = orbit.states[0].clone();
         orbit = close_orbit(
-            &mut Strobe::new(&model),
+            &mut ModelMap::new(&model),
             &start,
             orbit.period,
             &ShootingOptions::default(),
         )
-        .map_err(|error| failed(error.to_string()))?;
+        .map_err(PaperError::failed(&what))?;
     }
-    let report = report(&model, &orbit, 20).map_err(|error| failed(error.to_string()))?;
+    let report = report(&model, &orbit, 20).map_err(PaperError::failed(what))?;
     Ok((model, report))
 }
 

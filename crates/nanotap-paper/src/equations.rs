@@ -101,11 +101,11 @@ pub(super) fn cosine_term(runs: &Runs<'_>, section: Section) -> Result<Section, 
         ]);
     }
     let here = if same {
-        "−α₂ α₃ Ω ∫φ_i cos Ωτ, as the Galerkin projection of Eq. (6) gives it; with the printed form the same \
-         kinds of motion attract"
+        "−α₂ α₃ Ω ∫φ_i cos Ωτ, as the Galerkin projection of Eq. (6) gives it; with the printed form the attractors are of the same \
+         kinds"
     } else {
-        "−α₂ α₃ Ω ∫φ_i cos Ωτ, as the Galerkin projection of Eq. (6) gives it; with the printed form other kinds \
-         of motion attract"
+        "−α₂ α₃ Ω ∫φ_i cos Ωτ, as the Galerkin projection of Eq. (6) gives it; with the printed form the attractors are of other \
+         kinds"
     };
     let printed_case = Cantilever {
         cosine_term: CosineTerm::Printed,
@@ -115,7 +115,7 @@ pub(super) fn cosine_term(runs: &Runs<'_>, section: Section) -> Result<Section, 
         .text(
             "Eq. (6) damps the beam by its own velocity and by that of its base, α₂ Ω cos Ωτ. Eq. (14), its \
              projection on a mode, is printed without the Ω. Everything in this report uses the projection of \
-             Eq. (6); here the printed form stands beside it.",
+             Eq. (6); this section compares it with the printed form.",
         )
         .check(
             Check::new("eq14", "Eq. (14): … − α₂ α₃ ∫φ_i cos Ωτ", here, Verdict::Differs)
@@ -151,19 +151,15 @@ pub(super) fn bare_frequencies(_: &Runs<'_>, section: Section) -> Result<Section
 }
 
 /// Largest number of modes with which Eq. (25) is computed.
-const MOST_MODES: usize = 10;
+const MAX_MODES: usize = 10;
 /// Numbers of Eq. (25) with their decimals.
 const EQ25: [(f64, i32); 3] = [(7.79, 2), (20.33, 2), (55.81, 2)];
 
 /// Eq. (25).
 pub(super) fn contact_frequencies(_: &Runs<'_>, section: Section) -> Result<Section, PaperError> {
     let table_of = |modes: usize| {
-        ModeTable::new(&Cantilever::paper_eq24().with_modes(modes)).map_err(|error| {
-            PaperError::Failed {
-                what: "the frequencies in contact".into(),
-                why: error.to_string(),
-            }
-        })
+        ModeTable::new(&Cantilever::paper_eq24().with_modes(modes))
+            .map_err(PaperError::failed("the frequencies in contact"))
     };
     let mut table = Table::new(
         "Frequencies in contact at α₁ = 0.1, α₄ = 20; the paper prints 7.79, 20.33, 55.81",
@@ -171,7 +167,7 @@ pub(super) fn contact_frequencies(_: &Runs<'_>, section: Section) -> Result<Sect
     );
     let mut agreeing = Vec::new();
     let mut three = Vec::new();
-    for modes in 1..=MOST_MODES {
+    for modes in 1..=MAX_MODES {
         let contact = table_of(modes)?.contact;
         let agrees = modes >= 3 && agree(&contact, &EQ25);
         if agrees {
@@ -214,7 +210,7 @@ pub(super) fn contact_frequencies(_: &Runs<'_>, section: Section) -> Result<Sect
     let names: Vec<String> = agreeing.iter().map(ToString::to_string).collect();
     Ok(section
         .text(
-            "The Galerkin frequencies fall towards those of the beam as modes are added, so printed digits tell \
+            "The Galerkin frequencies fall towards those of the beam as modes are added, so the printed digits show \
              how many modes were used.",
         )
         .check(
@@ -222,13 +218,13 @@ pub(super) fn contact_frequencies(_: &Runs<'_>, section: Section) -> Result<Sect
                 "eq25",
                 "Eq. (25): ω₁ = 7.79, ω₂ = 20.33, ω₃ = 55.81",
                 if agreeing.is_empty() {
-                    format!("no N up to {MOST_MODES} gives all three")
+                    format!("no N up to {MAX_MODES} gives all three")
                 } else {
-                    format!("these digits are N = {}", names.join(", "))
+                    format!("these digits belong to N = {}", names.join(", "))
                 },
                 Verdict::of(!agreeing.is_empty()),
             )
-            .evidence(format!("N = 1 … {MOST_MODES} compared digit by digit (table)"))
+            .evidence(format!("N = 1 … {MAX_MODES} compared digit by digit (table)"))
             .in_print()
 .rerun(rerun::on_case("modes", &five, "")),
         )
@@ -263,7 +259,7 @@ pub(super) fn contact_frequencies(_: &Runs<'_>, section: Section) -> Result<Sect
                 Verdict::of(trend),
             )
             .evidence(format!(
-                "it is the tip mass that lowers them, not contact: free flight with α₁ = 0.1 has {}, each below its \
+                "the tip mass lowers them, not the contact: in free flight with α₁ = 0.1 they are {}, each below its \
                  value in contact",
                 list(with_tip, 4)
             ))
@@ -350,7 +346,7 @@ pub(super) fn samples(_: &Runs<'_>, section: Section) -> Result<Section, PaperEr
     Ok(section
         .text(
             "Section 4 gives the formula α₄ = 3K₁/K_c with K₁ = 2E*√(RΔ), Δ = R/9, so that α₄ = 2RE*/K_c: for one \
-             lever, α₄ of different samples must be as their E*. R/K_c is not given, so only the ratios can be \
+             lever, α₄ is proportional to E* of the sample. R/K_c is not given, so only the ratios can be \
              checked.",
         )
         .check(
@@ -360,7 +356,7 @@ pub(super) fn samples(_: &Runs<'_>, section: Section) -> Result<Section, PaperEr
                  graphite (5 GPa), tip of E₁ = 130 GPa, ν₁ = 0.27",
                 if rigid {
                     format!(
-                        "the four numbers are proportional to E₂ (α₄ = {} E₂/GPa): those of a rigid tip",
+                        "the four numbers are proportional to E₂ (α₄ = {} E₂/GPa), as for a rigid tip",
                         digits(1e9 * 0.5 * (low + high), 3)
                     )
                 } else {
@@ -399,20 +395,17 @@ pub(super) fn scaling(_: &Runs<'_>, section: Section) -> Result<Section, PaperEr
     use nanotap_dynamics::StroboscopicMap as _;
     let map_of = |alpha2: f64| -> Result<_, PaperError> {
         let case = Cantilever::paper().with(Parameter::Alpha2, alpha2);
-        Ok(nanotap::model::strobe::Strobe::new(
+        Ok(nanotap::model::model_map::ModelMap::new(
             &nanotap::model::Model::cantilever(&case)?,
         ))
     };
-    let failed = |error: nanotap::model::MotionError| PaperError::Failed {
-        what: "a run".into(),
-        why: error.to_string(),
-    };
+    let failed = PaperError::failed("a run");
     let factor = 3.0;
     let (mut small, mut large) = (map_of(0.1)?, map_of(0.1 * factor)?);
     let mut x = vec![0.1, 0.01, 0.001, 0.2, 0.02, 0.002];
     let mut y: Vec<f64> = x.iter().map(|v| factor * v).collect();
-    small.advance(&mut x).map_err(failed)?;
-    large.advance(&mut y).map_err(failed)?;
+    small.advance(&mut x).map_err(&failed)?;
+    large.advance(&mut y).map_err(&failed)?;
     let size = y.iter().fold(0.0, |m: f64, v| m.max(v.abs()));
     let difference = x
         .iter()
@@ -424,7 +417,7 @@ pub(super) fn scaling(_: &Runs<'_>, section: Section) -> Result<Section, PaperEr
         Check::new(
             "scaling",
             "section 3: the eigenfrequency of this intermittent contact system is amplitude-independent",
-            "with α₅ = 0 the whole motion is: three times the drive and the start give three times the motion",
+            "with α₅ = 0 the whole motion scales: three times the drive and the initial state give three times the motion",
             Verdict::of(difference < 1e-12),
         )
         .evidence(format!(

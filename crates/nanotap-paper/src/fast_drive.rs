@@ -21,7 +21,7 @@ use nanotap::model::{Model, ModelError};
 /// Colour of motions computed with fixed steps.
 const GRID: Colour = Colour::PURPLE;
 /// Number of drive periods of a nonperiodic motion that are drawn.
-const SHOWN: usize = 40;
+const SHOWN_PERIODS: usize = 40;
 
 /// The case of these figures, three modes, with its only attractor.
 struct Fast {
@@ -38,10 +38,8 @@ impl Fast {
             .first()
             .map(|(orbit, _)| (*orbit).clone());
         let Some(attractor) = attractor else {
-            return Err(PaperError::Failed {
-                what: "the census at Ω = 20".into(),
-                why: "no periodic attractor was found".into(),
-            });
+            let failed = PaperError::failed("the census at Ω = 20");
+            return Err(failed("no periodic attractor was found"));
         };
         Ok(Self {
             counted,
@@ -70,7 +68,7 @@ impl Fast {
             None => figure,
             Some(motion) => {
                 let model = Model::cantilever(&fast_case(motion.grid.modes))?;
-                let periods = motion.period.unwrap_or(SHOWN).max(4);
+                let periods = motion.period.unwrap_or(SHOWN_PERIODS).max(4);
                 let [time, portrait] = grid_panels(motion, &model, periods);
                 figure.with(time).with(portrait)
             }
@@ -133,7 +131,7 @@ fn grid_panels(motion: &GridMotion, model: &Model, periods: usize) -> [Panel; 2]
 fn below(motion: Option<&GridMotion>) -> String {
     motion.map_or_else(String::new, |m| {
         format!(
-            " (c, d) What fixed-step Runge–Kutta settles on ({}): {}, amplitude {}; the exact flow does not have it.",
+            " (c, d) The motion of fixed-step Runge–Kutta ({}): {}, amplitude {}; the exact flow does not have it.",
             m.grid.words(),
             m.words(),
             digits(m.amplitude, 4)
@@ -201,7 +199,7 @@ pub(super) fn fig8(runs: &Runs<'_>, section: Section) -> Result<Section, PaperEr
             Check::new(
                 "fig8",
                 "Fig. 8: a period-1 motion exists at Ω = 20, α₁ = 0.1",
-                format!("{} attracts", how_many(found, "period-1 motion")),
+                format!("{} is stable", how_many(found, "period-1 motion")),
                 Verdict::of(found >= 1),
             )
             .evidence(fast.evidence())
@@ -221,8 +219,8 @@ pub(super) fn fig8(runs: &Runs<'_>, section: Section) -> Result<Section, PaperEr
                 if matches { Verdict::Ambiguous } else { Verdict::Differs },
             )
             .evidence(format!(
-                "the paper itself finds a single mode insufficient; three \
-                 give {} times as much, because the second frequency is {} in flight and {} in contact",
+                "the paper itself finds a single mode insufficient; the amplitude with three modes \
+                 is {} times as large, because the second frequency is {} in flight and {} in contact",
                 digits(look.amplitude / one_mode, 2),
                 digits(second[0], 4),
                 digits(second[1], 4)
@@ -269,7 +267,7 @@ pub(super) fn fig9(runs: &Runs<'_>, section: Section) -> Result<Section, PaperEr
     let near = grid.filter(|m| rounds_to(m.amplitude, 0.148, 3));
     let amplitude = match near {
         Some(m) => format!(
-            "no attractor has it; fixed steps ({}) show {} of amplitude {}; the exact orbit of as many modes has {}",
+            "no attractor has it; fixed steps ({}) give {} of amplitude {}; the exact orbit with the same number of modes has {}",
             m.grid.words(),
             m.words(),
             digits(m.amplitude, 4),
@@ -291,7 +289,7 @@ pub(super) fn fig9(runs: &Runs<'_>, section: Section) -> Result<Section, PaperEr
             Check::new(
                 "fig9",
                 "Fig. 9: another period-1 motion, very near that of Fig. 8, coexists",
-                format!("{} attracts", how_many(found, "period-1 motion")),
+                format!("{} is stable", how_many(found, "period-1 motion")),
                 Verdict::of(found >= 2),
             )
             .evidence(fast.evidence())
@@ -300,8 +298,8 @@ pub(super) fn fig9(runs: &Runs<'_>, section: Section) -> Result<Section, PaperEr
         .check(
             Check::new("fig9-amplitude", "section 4: the amplitude in Fig. 9 is 0.148", amplitude, Verdict::Differs)
                 .evidence(format!(
-                "a small difference to Fig. 8 is no start of a bifurcation here: the multiplier of the one period-1 \
-                 orbit nearest to 1 is {} away from it",
+                "the small difference to Fig. 8 is not the beginning of a bifurcation: the multiplier of the only period-1 \
+                 orbit that is nearest to 1 is {} away from 1",
                 digits(from_one, 2)
             ))
                 .rerun(grid.map_or_else(|| rerun::section("fig9"), GridMotion::rerun)),
@@ -310,8 +308,6 @@ pub(super) fn fig9(runs: &Runs<'_>, section: Section) -> Result<Section, PaperEr
 
 /// A figure that reports one long period with its amplitude.
 struct LongPeriod {
-    name: &'static str,
-    id: &'static str,
     number: usize,
     period: usize,
     /// Number of motions of this period that the paper has up to this figure.
@@ -325,6 +321,7 @@ fn long_period(
     figure: &LongPeriod,
 ) -> Result<Section, PaperError> {
     let fast = Fast::new(runs)?;
+    let section_id = section.id;
     let (period, amplitude) = (figure.period, figure.amplitude);
     let grid = fast
         .scan
@@ -336,7 +333,7 @@ fn long_period(
     let look = fast.counted.look(&fast.attractor)?.observables;
     Ok(section
         .picture(Picture::new(
-            figure.name,
+            section_id,
             format!("Is there a period-{period} motion at Ω = 20, α₁ = 0.1? (Fig. {})", figure.number),
             format!(
                 "Eq. (26). (a, b) The only attractor of the exact flow, over {period} drive periods.{} {KEY}",
@@ -347,18 +344,18 @@ fn long_period(
         ))
         .check(
             Check::new(
-                figure.id,
+                section_id,
                 format!("Fig. {}: a period-{period} motion of amplitude {amplitude} exists at Ω = 20, α₁ = 0.1", figure.number),
                 format!(
-                    "no start comes to one; the only attractor has period {} and amplitude {} (N = 3)",
+                    "no initial state leads to one; the only attractor has period {} and amplitude {} (N = 3)",
                     fast.attractor.period,
                     digits(look.amplitude, 4)
                 ),
                 Verdict::of(found >= figure.claimed),
             )
             .evidence(format!(
-                "{}; Newton with period {period} from the starts closes {}, unstable ones included; fixed-step \
-                 Runge–Kutta shows {} of that period (amplitudes {}), none of which the exact flow keeps",
+                "{}; Newton with period {period} from the initial states finds {}, unstable ones included; fixed-step \
+                 Runge–Kutta gives {} of that period (amplitudes {}), none of which persists under the exact flow",
                 fast.evidence(),
                 how_many(unstable, "such orbit"),
                 how_many(spurious, "different motion"),
@@ -371,8 +368,6 @@ fn long_period(
 /// Fig. 10.
 pub(super) fn fig10(runs: &Runs<'_>, section: Section) -> Result<Section, PaperError> {
     let figure = LongPeriod {
-        name: "fig10",
-        id: "fig10",
         number: 10,
         period: 11,
         claimed: 1,
@@ -384,8 +379,6 @@ pub(super) fn fig10(runs: &Runs<'_>, section: Section) -> Result<Section, PaperE
 /// Fig. 11.
 pub(super) fn fig11(runs: &Runs<'_>, section: Section) -> Result<Section, PaperError> {
     let figure = LongPeriod {
-        name: "fig11",
-        id: "fig11",
         number: 11,
         period: 28,
         claimed: 1,
@@ -397,8 +390,6 @@ pub(super) fn fig11(runs: &Runs<'_>, section: Section) -> Result<Section, PaperE
 /// Fig. 12.
 pub(super) fn fig12(runs: &Runs<'_>, section: Section) -> Result<Section, PaperError> {
     let figure = LongPeriod {
-        name: "fig12",
-        id: "fig12",
         number: 12,
         period: 21,
         claimed: 1,
@@ -410,8 +401,6 @@ pub(super) fn fig12(runs: &Runs<'_>, section: Section) -> Result<Section, PaperE
 /// Fig. 13.
 pub(super) fn fig13(runs: &Runs<'_>, section: Section) -> Result<Section, PaperError> {
     let figure = LongPeriod {
-        name: "fig13",
-        id: "fig13",
         number: 13,
         period: 21,
         claimed: 2,
@@ -426,16 +415,16 @@ pub(super) fn fig14(runs: &Runs<'_>, section: Section) -> Result<Section, PaperE
     let grid = fast.scan.nearest(None, 1.3, 0);
     let rest = vec![0.0; fast.counted.model.dimension()];
     let nonperiodic = !fast.counted.chaos().is_empty();
-    let transient = View::new(&fast.counted.model, &rest, SHOWN)?;
+    let transient = View::new(&fast.counted.model, &rest, SHOWN_PERIODS)?;
     let radius = fast.attractor.spectral_radius();
     let fading = nanotap_arithmetic::ln(10f64) / -nanotap_arithmetic::ln(radius);
     let mut figure = Figure::new(if grid.is_some() { 2 } else { 1 }, 2)
         .column_widths([1.7, 1.0])
-        .with(transient.time_panel("exact flow, N = 3: on the way to period 1"))
+        .with(transient.time_panel("exact flow, N = 3: transient to period 1"))
         .with(transient.tangle_into(empty_portrait(""), Colour::BLUE));
     if let Some(motion) = grid {
         let model = Model::cantilever(&fast_case(motion.grid.modes))?;
-        let [time, portrait] = grid_panels(motion, &model, SHOWN);
+        let [time, portrait] = grid_panels(motion, &model, SHOWN_PERIODS);
         figure = figure.with(time).with(portrait);
     }
     Ok(section
@@ -443,8 +432,8 @@ pub(super) fn fig14(runs: &Runs<'_>, section: Section) -> Result<Section, PaperE
             "fig14",
             "Is there a nonperiodic motion at Ω = 20, α₁ = 0.1? (Fig. 14)",
             format!(
-                "Eq. (26). (a, b) The exact flow from rest: what looks irregular is the slow approach \
-                 to the period-1 orbit, whose disturbances need {fading:.0} drive periods to fall to a tenth.{} {KEY}",
+                "Eq. (26). (a, b) The exact flow from rest: the irregular motion is the slow transient \
+                 to the period-1 orbit, near which disturbances need {fading:.0} drive periods to decay to a tenth.{} {KEY}",
                 below(grid)
             ),
             figure,
@@ -455,8 +444,8 @@ pub(super) fn fig14(runs: &Runs<'_>, section: Section) -> Result<Section, PaperE
                 "fig14",
                 "Fig. 14: a nonperiodic motion of amplitude close to those of periods 11 and 28 exists at Ω = 20, α₁ = 0.1",
                 format!(
-                    "none attracts; transients are long: a disturbance of the period-1 orbit shrinks by a factor {} \
-                     a drive period only",
+                    "none is stable; transients are long: a disturbance of the period-1 orbit decays by a factor {} \
+                     per drive period",
                     digits(radius, 4)
                 ),
                 Verdict::of(nonperiodic),
@@ -465,7 +454,7 @@ pub(super) fn fig14(runs: &Runs<'_>, section: Section) -> Result<Section, PaperE
             .rerun(rerun::on_case(
                 "simulate",
                 &fast.counted.case,
-                &format!("--transient 0 --periods {SHOWN}"),
+                &format!("--transient 0 --periods {SHOWN_PERIODS}"),
             )),
         ))
 }

@@ -2,8 +2,8 @@
 //! sections need: its extrema, its bifurcations, and where it is stable.
 
 use nanotap_dynamics::{
-    Bifurcation, BifurcationKind, Branch, ClassifyOptions, ContinuationError, ContinuationOptions,
-    Direction, MotionKind as Settled, PeriodicOrbit, classify, continue_orbit,
+    Bifurcation, BifurcationKind, Branch, ClassifyOptions, ContinuationOptions, Direction,
+    MotionKind as Settled, PeriodicOrbit, classify, continue_orbit,
 };
 
 use super::PaperError;
@@ -11,7 +11,7 @@ use super::frequency_sweep::maxima;
 use super::runs::Runs;
 use super::section::Table;
 use nanotap::case::{Case, Key};
-use nanotap::model::strobe::Strobe;
+use nanotap::model::model_map::ModelMap;
 
 /// The key of the drive frequency.
 pub(super) const OMEGA: Key = Key::Omega;
@@ -43,7 +43,7 @@ impl FollowedBranch {
     ) -> Result<Self, PaperError> {
         let model = case.with(OMEGA, entry).model()?;
         let classified = classify(
-            &mut Strobe::new(&model),
+            &mut ModelMap::new(&model),
             &vec![0.0; model.dimension()],
             &ClassifyOptions::default(),
         );
@@ -55,7 +55,7 @@ impl FollowedBranch {
             }
             _ => Err(PaperError::Failed {
                 what: format!("the period-{period} branch"),
-                why: format!("a run from rest at Ω = {entry} does not settle on it"),
+                why: format!("a run from rest at Ω = {entry} does not converge to it"),
             }),
         }
     }
@@ -81,11 +81,11 @@ impl FollowedBranch {
                 || follow(Direction::Increasing),
             )
         });
-        let failed = |error: ContinuationError| PaperError::Failed {
-            what: format!("the period-{} branch from Ω = {entry}", orbit.period),
-            why: error.to_string(),
-        };
-        let (down, up) = (down.map_err(failed)?, up.map_err(failed)?);
+        let failed = PaperError::failed(format!(
+            "the period-{} branch from Ω = {entry}",
+            orbit.period
+        ));
+        let (down, up) = (down.map_err(&failed)?, up.map_err(&failed)?);
         let mut points = points_of(&down, case)?;
         points.reverse();
         // In reversed order a bifurcation precedes the point that it followed.
@@ -164,7 +164,7 @@ impl FollowedBranch {
 
     /// Table of its bifurcations, by Ω.
     pub(super) fn table(&self, caption: &str) -> Table {
-        let mut table = Table::new(caption, ["Ω", "what happens", "known to"]);
+        let mut table = Table::new(caption, ["Ω", "bifurcation", "uncertainty"]);
         let mut sorted: Vec<&Bifurcation> = self.bifurcations.iter().collect();
         sorted.sort_by(|a, b| a.parameter.total_cmp(&b.parameter));
         for b in sorted {
@@ -172,8 +172,8 @@ impl FollowedBranch {
                 BifurcationKind::Fold => "fold",
                 BifurcationKind::Crossing => "another branch crosses",
                 BifurcationKind::Flip => "flip (period doubling)",
-                BifurcationKind::NeimarkSacker { .. } => "Neimark–Sacker: a torus is born",
-                BifurcationKind::Grazing { .. } => "grazing: a contact is born or dies",
+                BifurcationKind::NeimarkSacker { .. } => "Neimark–Sacker: a torus bifurcates",
+                BifurcationKind::Grazing { .. } => "grazing: a contact appears or vanishes",
             };
             table.row([
                 format!("{:.10}", b.parameter),

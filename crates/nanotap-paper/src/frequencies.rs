@@ -105,10 +105,8 @@ pub(super) fn maps(_: &Runs<'_>, section: Section) -> Result<Section, PaperError
     }
     let spread = ranges.map(|(low, high)| high / low);
     let holds = spread[0] > spread[1];
-    let three = ModeTable::new(&Cantilever::paper()).map_err(|error| PaperError::Failed {
-        what: "the frequencies in contact".into(),
-        why: error.to_string(),
-    })?;
+    let three = ModeTable::new(&Cantilever::paper())
+        .map_err(PaperError::failed("the frequencies in contact"))?;
     let paper = at(0.1, 20.0)?;
     let [first, second] = panels;
     Ok(section

@@ -14,15 +14,15 @@ use super::PaperError;
 use super::runs::{Runs, SEED};
 use nanotap::case::{Case, Key};
 use nanotap::model::Model;
-use nanotap::model::strobe::Strobe;
+use nanotap::model::model_map::ModelMap;
 use nanotap::study::start_box::default_box;
 
 /// Drive periods for which maxima of a motion that does not repeat are drawn.
-const SHOWN: usize = 48;
+const SHOWN_PERIODS: usize = 48;
 /// Longest period that is searched for.
-const LONGEST: usize = 32;
+const MAX_PERIOD: usize = 32;
 /// Initial states of a column that are followed before its attractors are known.
-const PILOTS: usize = 2;
+const INITIAL_RUNS: usize = 2;
 
 /// Kind of a motion.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -50,7 +50,7 @@ impl Kind {
 
 /// A motion to which some initial states lead.
 #[derive(Clone, Debug)]
-pub(super) struct Seen {
+pub(super) struct FoundMotion {
     pub(super) kind: Kind,
     /// Largest value of the drawn quantity in each of its drive periods: the deflection W of the
     /// cantilever's tip, or the distance of an oscillator from its stop.
@@ -61,7 +61,7 @@ pub(super) struct Seen {
 #[derive(Clone, Debug)]
 pub(super) struct Column {
     pub(super) at: f64,
-    pub(super) motions: Vec<Seen>,
+    pub(super) motions: Vec<FoundMotion>,
 }
 
 impl Column {
@@ -115,7 +115,7 @@ pub(super) fn sweep(
 /// Budgets small enough for thousands of runs: exponents to a hundredth, tori to six digits.
 fn budgets() -> ClassifyOptions {
     ClassifyOptions {
-        max_period: LONGEST,
+        max_period: MAX_PERIOD,
         max_transient: 512,
         lyapunov: LyapunovOptions {
             alignment: 50,
@@ -132,55 +132,53 @@ fn budgets() -> ClassifyOptions {
 
 fn column(subject: &Case, at: f64, starts: usize) -> Result<Column, PaperError> {
     let model = subject.model()?;
-    let area = default_box(&model).map_err(|error| PaperError::Failed {
-        what: "the box of starts".into(),
-        why: error.to_string(),
-    })?;
+    let area = default_box(&model).map_err(PaperError::failed("the box of initial states"))?;
     let options = CensusOptions {
-        pilots: PILOTS,
+        pilots: INITIAL_RUNS,
         classify: budgets(),
         ..CensusOptions::default()
     };
     let starts = area.starts(SEED, starts);
-    let found = census(&Strobe::new(&model), &starts, &options, &Control::default());
-    let seen = |kind, state: &[f64], periods| -> Result<Seen, PaperError> {
+    let found = census(
+        &ModelMap::new(&model),
+        &starts,
+        &options,
+        &Control::default(),
+    );
+    let seen = |kind, state: &[f64], periods| -> Result<FoundMotion, PaperError> {
         let maxima = maxima(&model, state, periods)?;
-        Ok(Seen { kind, maxima })
+        Ok(FoundMotion { kind, maxima })
     };
-    let mut motions: Vec<Seen> = Vec::new();
+    let mut motions: Vec<FoundMotion> = Vec::new();
     for attractor in found.attractors {
         let state = &attractor.state;
         motions.push(match attractor.kind {
             AttractorKind::Periodic(orbit) => {
                 seen(Kind::Periodic(orbit.period), &orbit.states[0], orbit.period)
             }
-            AttractorKind::QuasiPeriodic(_) => seen(Kind::Torus, state, SHOWN),
-            AttractorKind::Chaotic { .. } => seen(Kind::Chaos, state, SHOWN),
+            AttractorKind::QuasiPeriodic(_) => seen(Kind::Torus, state, SHOWN_PERIODS),
+            AttractorKind::Chaotic { .. } => seen(Kind::Chaos, state, SHOWN_PERIODS),
         }?);
     }
     if let Some((start, _)) = found.undecided.first() {
         let mut state = starts[*start].clone();
-        let mut map = Strobe::new(&model);
+        let mut map = ModelMap::new(&model);
         for _ in 0..options.classify.max_transient {
-            map.advance(&mut state).map_err(|error| not_drawn(&error))?;
+            map.advance(&mut state).map_err(not_drawn)?;
         }
-        motions.push(seen(Kind::Undecided, &state, SHOWN)?);
+        motions.push(seen(Kind::Undecided, &state, SHOWN_PERIODS)?);
     }
     Ok(Column { at, motions })
 }
 
-fn not_drawn(error: &impl ToString) -> PaperError {
-    PaperError::Failed {
-        what: "a motion's maxima".into(),
-        why: error.to_string(),
-    }
+fn not_drawn<E: ToString>(error: E) -> PaperError {
+    PaperError::failed("a motion's maxima")(error)
 }
 
 /// Largest deflection of the tip away from the sample (for an oscillator: distance from its stop)
 /// in each of `periods` drive periods from `state`.
 pub(super) fn maxima(model: &Model, state: &[f64], periods: usize) -> Result<Vec<f64>, PaperError> {
-    let trajectory =
-        Trajectory::record(&model.system, state, periods).map_err(|error| not_drawn(&error))?;
+    let trajectory = Trajectory::record(&model.system, state, periods).map_err(not_drawn)?;
     let signal = trajectory.signal(if model.beam.is_some() {
         &model.tip
     } else {
@@ -201,7 +199,7 @@ pub(super) fn maxima(model: &Model, state: &[f64], periods: usize) -> Result<Vec
 }
 
 /// Labels and colours of the kinds.
-const LOOKS: [(&str, Colour); 8] = [
+const STYLES: [(&str, Colour); 8] = [
     ("period 1", Colour::BLUE),
     ("period 2", Colour::VERMILLION),
     ("period 3", Colour::GREEN),
@@ -212,7 +210,7 @@ const LOOKS: [(&str, Colour); 8] = [
     ("undecided", Colour::GREY),
 ];
 
-fn look(kind: Kind) -> usize {
+fn style_of(kind: Kind) -> usize {
     match kind {
         Kind::Periodic(n) => n.clamp(1, 5) - 1,
         Kind::Torus => 5,
@@ -223,11 +221,11 @@ fn look(kind: Kind) -> usize {
 
 /// Adds the maxima of all columns to a panel, coloured by kind.
 pub(super) fn draw(mut panel: Panel, columns: &[Column], diameter: f64) -> Panel {
-    for (k, (label, colour)) in LOOKS.iter().enumerate() {
+    for (k, (label, colour)) in STYLES.iter().enumerate() {
         let points: Vec<(f64, f64)> = columns
             .iter()
             .flat_map(|c| {
-                let motions = c.motions.iter().filter(|m| look(m.kind) == k);
+                let motions = c.motions.iter().filter(|m| style_of(m.kind) == k);
                 motions.flat_map(|m| m.maxima.iter().map(|w| (c.at, *w)))
             })
             .collect();
@@ -285,7 +283,7 @@ mod tests {
     fn column(at: f64, kinds: &[Kind]) -> Column {
         let motions = kinds
             .iter()
-            .map(|kind| Seen {
+            .map(|kind| FoundMotion {
                 kind: *kind,
                 maxima: vec![1.0],
             })
@@ -326,7 +324,7 @@ mod tests {
         )
         .unwrap();
         let classified = classify(
-            &mut Strobe::new(&model),
+            &mut ModelMap::new(&model),
             &[0.0; 6],
             &ClassifyOptions::default(),
         );

@@ -41,16 +41,16 @@ pub(super) fn page(report: &Report) -> Result<String, PaperError> {
 
 fn introduction(report: &Report) -> String {
     let hurry = if report.quick {
-        "<p><strong>Made with --quick: fewer starts and parameter values, wider bounds.</strong></p>\n"
+        "<p><strong>Made with --quick: fewer initial states and parameter values, wider bounds.</strong></p>\n"
     } else {
         ""
     };
     format!(
-        "<h1>“Multi-modal analysis on the intermittent contact dynamics of atomic force microscope”, computed again</h1>\n\
-         <p>J. Sound Vib. (2011). Every figure 2e–17 and every number in the text: what the paper says, what holds \
-         here, the verdict, the evidence, and a command line that computes it again. The motion between contacts is \
-         propagated in closed form and every contact is found with a guarantee, so that no time step takes part; a \
-         motion is called periodic only where Newton has closed its orbit. No parameter was adjusted to agree.</p>\n\
+        "<h1>“Multi-modal analysis on the intermittent contact dynamics of atomic force microscope”, reproduced</h1>\n\
+         <p>J. Sound Vib. (2011). Figures 2e–17 and all numbers in the text: the statement of the paper, the result of \
+         nanotap, the verdict, the evidence, and a command line that reproduces the result. The motion between contacts is \
+         computed in closed form, and no contact can be missed, so the results do not depend on a time step. A \
+         motion is called periodic only if Newton has found its orbit. No parameter was adjusted.</p>\n\
          <p><strong>{} statements: {}.</strong> Made by nanotap {}.</p>\n{hurry}",
         report.checks().count(),
         report.counts(),
@@ -92,10 +92,7 @@ fn part(section: &Section) -> Result<String, PaperError> {
         let svg = picture
             .bare()
             .to_svg()
-            .map_err(|source| PaperError::Figure {
-                name: picture.name.clone(),
-                source,
-            })?;
+            .map_err(PaperError::failed(picture.name.clone()))?;
         // An XML declaration is not allowed inside a page.
         let svg = svg.find("<svg").map_or(svg.as_str(), |start| &svg[start..]);
         let _ = writeln!(
@@ -131,7 +128,7 @@ fn statement(check: &Check) -> String {
 }
 
 /// Tables with more rows than this are collapsed.
-const FOLDED: usize = 24;
+const MAX_OPEN_ROWS: usize = 24;
 
 fn tabulated(table: &Table) -> String {
     let mut html = format!(
@@ -150,7 +147,7 @@ fn tabulated(table: &Table) -> String {
         html.push_str("</tr>\n");
     }
     html.push_str("</table>\n");
-    if table.rows.len() > FOLDED {
+    if table.rows.len() > MAX_OPEN_ROWS {
         format!(
             "<details><summary>{} ({} rows)</summary>\n{html}</details>\n",
             escaped(&table.caption),

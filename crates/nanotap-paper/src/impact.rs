@@ -16,9 +16,9 @@ use super::section::{Picture, Section, Table};
 use super::{PaperError, rerun};
 use nanotap::case::{Case, Key};
 use nanotap::model::Model;
+use nanotap::model::model_map::ModelMap;
 use nanotap::model::oscillator::{Oscillator, OscillatorParameter, Stop};
-use nanotap::model::strobe::Strobe;
-use nanotap::observe::{Set, measure};
+use nanotap::observe::{ObservableSet, measure};
 use nanotap::study::start_box::default_box;
 
 /// The coefficient of restitution.
@@ -81,7 +81,7 @@ pub(super) fn section(runs: &Runs<'_>, section: Section) -> Result<Section, Pape
     let (hard, soft_columns) = (columns(rigid())?, columns(soft(SOFT))?);
     let limit = Orbit::find(rigid())?;
     let flips = runs.controlled(|control| limit.flips(control))?;
-    let way = way_to_rigid(runs, &limit)?;
+    let way = soft_stop_series(runs, &limit)?;
     let fits = KNOWN_FLIPS
         .iter()
         .all(|known| flips.iter().any(|f| (f - known).abs() < 5e-8));
@@ -115,20 +115,20 @@ pub(super) fn section(runs: &Runs<'_>, section: Section) -> Result<Section, Pape
     let contact = Orbit::find(soft(SOFT))?.contact;
     Ok(section
         .text(
-            "The oscillators of the paper's Fig. 1, ẍ + x = cos ωt with a stop at x = 0: a rigid one that gives back 0.8 \
-             of the speed, and a spring and damper that would do the same in a free impact. The soft one has 20/3 of the \
-             oscillator's own stiffness, as α₄ = 20 has of the cantilever's.",
+            "The oscillators of the paper's Fig. 1, ẍ + x = cos ωt with a stop at x = 0: a rigid one with coefficient of restitution \
+             0.8, and a spring and damper with the same coefficient in a free impact. The stiffness of the soft stop is 20/3 \
+             times the oscillator's stiffness, as α₄ = 20 is for the cantilever.",
         )
         .picture(diagrams(&hard, &soft_columns, starts))
         .picture(limit_picture(&way, &flips))
-        .table(way_table(&way, &flips))
+        .table(series_table(&way, &flips))
         .check(
             Check::new(
                 "impact-flips",
                 "section 1: with K₁ → ∞ the vibro-impact system becomes an impact oscillator",
                 format!(
-                    "the rigid oscillator's period-1 branch flips at ω = {}; the soft one's flips go there as its stop \
-                     stiffens (κ = {}: {})",
+                    "the rigid oscillator's period-1 branch flips at ω = {}; the flips of the soft one converge to them as its stop \
+                     becomes stiffer (κ = {}: {})",
                     list(&flips),
                     last.map_or_else(String::new, |w| digits(w.stiffness, 1)),
                     last.map_or_else(String::new, |w| list(&w.flips))
@@ -136,8 +136,8 @@ pub(super) fn section(runs: &Runs<'_>, section: Section) -> Result<Section, Pape
                 Verdict::of(fits && last.is_some_and(|w| nearest(&w.flips, &flips) < 1e-2)),
             )
             .evidence(format!(
-                "the period-1 orbit at ω = {MEASURED_AT} differs from the rigid one's as κ^{} over the last decade: the length \
-                 of the contact, π/√κ, vanishes like that",
+                "the difference of the period-1 orbit at ω = {MEASURED_AT} from that of the rigid stop scales as κ^{} over the last \
+                 decade, like the duration of contact, π/√κ",
                 digits(slope, 2)
             ))
             .rerun(branch_rerun(&rigid())),
@@ -147,7 +147,7 @@ pub(super) fn section(runs: &Runs<'_>, section: Section) -> Result<Section, Pape
                 "impact-diagram",
                 "section 4: Fig. 5 is very different from the bifurcation diagram of an impact oscillator",
                 format!(
-                    "so it is for these oscillators: with κ = {} the period-1 branch flips at ω = {}, with the rigid stop at \
+                    "true for these oscillators: with κ = {} the period-1 branch flips at ω = {}, with the rigid stop at \
                      {}; chaos at {} and at {} of {count} frequencies",
                     digits(SOFT, 3),
                     list(&soft_flips),
@@ -158,7 +158,7 @@ pub(super) fn section(runs: &Runs<'_>, section: Section) -> Result<Section, Pape
                 Verdict::of(nearest(&soft_flips, &flips) > 0.05),
             )
             .evidence(format!(
-                "at ω = {ENTRY} the soft stop is touched for {:.0} % of the time, the rigid one for an instant",
+                "at ω = {ENTRY} the contact with the soft stop lasts {:.0} % of the time, that with the rigid one is instantaneous",
                 100.0 * contact
             ))
             .rerun(sweep_rerun(&soft(SOFT))),
@@ -204,13 +204,10 @@ struct Orbit {
 impl Orbit {
     /// The orbit to which runs lead.
     fn find(oscillator: Oscillator) -> Result<Self, PaperError> {
-        let failed = |why: String| PaperError::Failed {
-            what: format!("a period-1 orbit at ω = {ENTRY}"),
-            why,
-        };
+        let what = format!("a period-1 orbit at ω = {ENTRY}");
         let model = oscillator.model()?;
-        let mut map = Strobe::new(&model);
-        let area = default_box(&model).map_err(|error| failed(error.to_string()))?;
+        let mut map = ModelMap::new(&model);
+        let area = default_box(&model).map_err(PaperError::failed(&what))?;
         let found = area.starts(SEED, 32).into_iter().find_map(|start| {
             match classify(&mut map, &start, &ClassifyOptions::default()).kind {
                 Settled::Periodic(orbit) if orbit.period == 1 => Some(orbit),
@@ -220,7 +217,7 @@ impl Orbit {
         Self::look(
             oscillator,
             &model,
-            found.ok_or_else(|| failed("no start settles on one".into()))?,
+            found.ok_or_else(|| PaperError::failed(what)("no run converges to one"))?,
         )
     }
 
@@ -228,15 +225,12 @@ impl Orbit {
     fn near(oscillator: Oscillator, guess: &Self) -> Result<Self, PaperError> {
         let model = oscillator.model()?;
         let orbit = close_orbit(
-            &mut Strobe::new(&model),
+            &mut ModelMap::new(&model),
             &guess.closed.states[0],
             1,
             &ShootingOptions::default(),
         )
-        .map_err(|error| PaperError::Failed {
-            what: format!("the orbit of {oscillator:?}"),
-            why: error.to_string(),
-        })?;
+        .map_err(PaperError::failed(format!("the orbit of {oscillator:?}")))?;
         Self::look(oscillator, &model, orbit)
     }
 
@@ -245,12 +239,8 @@ impl Orbit {
         model: &Model,
         orbit: PeriodicOrbit,
     ) -> Result<Self, PaperError> {
-        let failed = |why: String| PaperError::Failed {
-            what: "the orbit's extrema".into(),
-            why,
-        };
-        let o = measure(model, &orbit.states[0], 1, Set::ALL)
-            .map_err(|error| failed(error.to_string()))?;
+        let o = measure(model, &orbit.states[0], 1, ObservableSet::ALL)
+            .map_err(PaperError::failed("the orbit's extrema"))?;
         Ok(Self {
             oscillator,
             closed: orbit,
@@ -266,10 +256,7 @@ impl Orbit {
         let mut flips = Vec::new();
         for direction in [Direction::Decreasing, Direction::Increasing] {
             let branch = continue_orbit(&family, ENTRY, &self.closed, direction, &options, control)
-                .map_err(|error| PaperError::Failed {
-                    what: "a period-1 branch".into(),
-                    why: error.to_string(),
-                })?;
+                .map_err(PaperError::failed("a period-1 branch"))?;
             // Beyond its first flip a branch may lead anywhere.
             flips.extend(
                 branch
@@ -285,7 +272,7 @@ impl Orbit {
 }
 
 /// One soft stop of the series.
-struct Waypoint {
+struct StopSeries {
     stiffness: f64,
     /// Relative distance of the reach of its period-1 orbit from that of the rigid stop.
     distance: f64,
@@ -308,7 +295,7 @@ fn softened(limit: &Orbit, omega: f64, stiffnesses: &[f64]) -> Result<Vec<Orbit>
 }
 
 /// All stops of the series, softest first.
-fn way_to_rigid(runs: &Runs<'_>, limit: &Orbit) -> Result<Vec<Waypoint>, PaperError> {
+fn soft_stop_series(runs: &Runs<'_>, limit: &Orbit) -> Result<Vec<StopSeries>, PaperError> {
     let per_decade = runs.either(2, 1);
     let decades = nanotap_arithmetic::log10(STIFFNESSES.1 / STIFFNESSES.0).round() as usize;
     let stiffnesses: Vec<f64> = (0..=decades * per_decade)
@@ -318,13 +305,13 @@ fn way_to_rigid(runs: &Runs<'_>, limit: &Orbit) -> Result<Vec<Waypoint>, PaperEr
     let entries = softened(limit, ENTRY, &stiffnesses)?;
     let measured = softened(limit, MEASURED_AT, &stiffnesses)?;
     let reach = measured[0].reach;
-    let mut way: Vec<Waypoint> = runs.controlled(|control| {
+    let mut way: Vec<StopSeries> = runs.controlled(|control| {
         stiffnesses
             .par_iter()
             .zip(&entries[1..])
             .zip(&measured[1..])
             .map(|((stiffness, entry), measured)| {
-                Ok(Waypoint {
+                Ok(StopSeries {
                     stiffness: *stiffness,
                     distance: (measured.reach / reach - 1.0).abs(),
                     contact: measured.contact,
@@ -338,7 +325,7 @@ fn way_to_rigid(runs: &Runs<'_>, limit: &Orbit) -> Result<Vec<Waypoint>, PaperEr
 }
 
 /// The power of κ with which the distance falls over the last decade.
-fn convergence_rate(way: &[Waypoint]) -> f64 {
+fn convergence_rate(way: &[StopSeries]) -> f64 {
     let Some(last) = way.last() else {
         return f64::NAN;
     };
@@ -352,12 +339,12 @@ fn convergence_rate(way: &[Waypoint]) -> f64 {
     })
 }
 
-fn way_table(way: &[Waypoint], flips: &[f64]) -> Table {
+fn series_table(way: &[StopSeries], flips: &[f64]) -> Table {
     let mut table = Table::new(
-        "The period-1 orbit of one impact while the stop stiffens",
+        "The period-1 orbit with one impact for increasing stiffness of the stop",
         [
             "stiffness κ",
-            "reach, from the rigid one's",
+            "relative difference of the largest distance from the stop",
             "time in contact",
             "first flips of its branch (ω)",
         ],
@@ -377,7 +364,7 @@ fn way_table(way: &[Waypoint], flips: &[f64]) -> Table {
 fn diagrams(hard: &[Column], soft: &[Column], starts: usize) -> Picture {
     let panel = |title: &str, columns: &[Column], legend| {
         let axis = Axis::linear("drive frequency $ω$").range(RANGE.0, RANGE.1);
-        let empty = Panel::new(axis, Axis::log("reach from the stop"))
+        let empty = Panel::new(axis, Axis::log("largest distance from the stop"))
             .title(title)
             .legend(legend);
         draw(empty, columns, 0.5)
@@ -386,9 +373,9 @@ fn diagrams(hard: &[Column], soft: &[Column], starts: usize) -> Picture {
         "impact-oscillator",
         "The oscillators of Fig. 1: a rigid and a soft stop",
         format!(
-            "ẍ + x = cos ωt with a stop at x = 0; greatest distance from the stop in each drive period, {starts} seeded \
-             starts at each ω. (a) Rigid stop, restitution 0.8, chatter and sticking included (Fig. 1b). (b) Spring of 20/3 \
-             and damper that give back the same part of the speed (Fig. 1a)."
+            "ẍ + x = cos ωt with a stop at x = 0; largest distance from the stop in each drive period, {starts} \
+             initial states at each ω. (a) Rigid stop, restitution 0.8, with chatter and sticking (Fig. 1b). (b) Spring of stiffness 20/3 \
+             and damper with the same coefficient of restitution (Fig. 1a)."
         ),
         Figure::new(2, 1)
             .with(panel("rigid stop, r = 0.8", hard, Legend::Above))
@@ -397,7 +384,7 @@ fn diagrams(hard: &[Column], soft: &[Column], starts: usize) -> Picture {
     )
 }
 
-fn limit_picture(way: &[Waypoint], flips: &[f64]) -> Picture {
+fn limit_picture(way: &[StopSeries], flips: &[f64]) -> Picture {
     let stiffness = || Axis::log("stiffness of the stop $κ$");
     let distance: Vec<(f64, f64)> = way.iter().map(|w| (w.stiffness, w.distance)).collect();
     let contact: Vec<(f64, f64)> = way.iter().map(|w| (w.stiffness, w.contact)).collect();
@@ -405,13 +392,13 @@ fn limit_picture(way: &[Waypoint], flips: &[f64]) -> Picture {
         let at = |k: f64| (k, 3.0 * last.distance * (last.stiffness / k).sqrt());
         vec![at(1e4), at(last.stiffness)]
     });
-    let left = Panel::new(stiffness(), Axis::log("part"))
+    let left = Panel::new(stiffness(), Axis::log("fraction"))
         .legend(Legend::Above)
         .with(Line::new(distance.clone()).colour(Colour::BLUE).width(0.5))
         .with(
             Markers::new(distance)
                 .colour(Colour::BLUE)
-                .label("reach beside the rigid one's"),
+                .label("relative difference of the largest distance"),
         )
         .with(Line::new(contact.clone()).colour(Colour::GREEN).width(0.5))
         .with(
@@ -447,9 +434,9 @@ fn limit_picture(way: &[Waypoint], flips: &[f64]) -> Picture {
         "impact-limit",
         "From the soft stop to the rigid one",
         format!(
-            "The period-1 orbit of one impact at ω = {MEASURED_AT} and its branch, while the stop stiffens and gives back the \
-             same 0.8 of the speed in a free impact. (a) Distance from the rigid stop's orbit. (b) Where the branch first \
-             doubles its period; lines: rigid stop."
+            "The period-1 orbit with one impact at ω = {MEASURED_AT} and its branch, for increasing stiffness of the stop and the \
+             same coefficient of restitution 0.8 in a free impact. (a) Difference from the orbit of the rigid stop. (b) First \
+             flips of the branch; lines: rigid stop."
         ),
         Figure::new(1, 2).with(left).with(right),
         72.0,

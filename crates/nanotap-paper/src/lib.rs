@@ -41,7 +41,6 @@ use nanotap_dynamics::Control;
 
 use nanotap::case::CaseError;
 use nanotap::case::near_name::near_name;
-use nanotap::study::orbit::OrbitError;
 
 pub use check::{About, Check, Verdict};
 use runs::Runs;
@@ -61,7 +60,7 @@ pub struct Options {
 #[derive(Debug, thiserror::Error)]
 pub enum PaperError {
     /// An unknown section was requested.
-    #[error("no section `{given}`{hint}; there are {known}")]
+    #[error("no section `{given}`{hint}; the sections are {known}")]
     UnknownSection {
         /// The requested name.
         given: String,
@@ -71,34 +70,18 @@ pub enum PaperError {
         known: String,
     },
     /// The computation was cancelled.
-    #[error("stopped before the report was done")]
+    #[error("stopped before the report was finished")]
     Cancelled,
     /// A case is invalid.
     #[error(transparent)]
     Model(#[from] CaseError),
-    /// An orbit was not found.
-    #[error("{what}: {source}")]
-    Orbit {
-        /// Description of the orbit.
-        what: String,
-        /// Reason of the failure.
-        source: OrbitError,
-    },
-    /// A computation that should succeed failed.
+    /// A computation that should succeed failed, or a picture could not be drawn.
     #[error("{what}: {why}")]
     Failed {
         /// Description of the computation.
         what: String,
         /// Reason of the failure.
         why: String,
-    },
-    /// A picture could not be drawn.
-    #[error("{name}: {source}")]
-    Figure {
-        /// Name of the picture.
-        name: String,
-        /// Reason of the failure.
-        source: nanotap_figures::FigureError,
     },
     /// A file could not be written.
     #[error("cannot write {}: {source}", path.display())]
@@ -108,6 +91,17 @@ pub enum PaperError {
         /// Error of the operating system.
         source: std::io::Error,
     },
+}
+
+impl PaperError {
+    /// The conversion of an error of the computation or picture that `what` names.
+    fn failed<E: ToString>(what: impl Into<String>) -> impl Fn(E) -> PaperError {
+        let what = what.into();
+        move |error| PaperError::Failed {
+            what: what.clone(),
+            why: error.to_string(),
+        }
+    }
 }
 
 impl From<nanotap::model::ModelError> for PaperError {
@@ -199,7 +193,7 @@ const TOPICS: &[Topic] = &[
     },
     Topic {
         id: "scaling",
-        title: "Section 3: frequencies that do not depend on amplitude",
+        title: "Section 3: amplitude-independent frequencies",
         weight: 1,
         make: equations::scaling,
     },
@@ -211,7 +205,7 @@ const TOPICS: &[Topic] = &[
     },
     Topic {
         id: "fig2f",
-        title: "Fig. 2f: does another part of the beam touch?",
+        title: "Fig. 2f: contact of other parts of the beam",
         weight: 2,
         make: clearance::section,
     },
@@ -223,7 +217,7 @@ const TOPICS: &[Topic] = &[
     },
     Topic {
         id: "fig4",
-        title: "Fig. 4: how many modes are enough at Ω = 4.1",
+        title: "Fig. 4: number of modes needed at Ω = 4.1",
         weight: 2,
         make: convergence_study::section,
     },
@@ -313,13 +307,13 @@ const TOPICS: &[Topic] = &[
     },
     Topic {
         id: "attractors",
-        title: "Evidence: every motion that attracts, N = 1 … 5",
+        title: "Evidence: all attractors, N = 1 … 5",
         weight: 15,
         make: attractors::section,
     },
     Topic {
         id: "time-step",
-        title: "Evidence: what fixed time steps add",
+        title: "Evidence: artefacts of fixed time steps",
         weight: 1,
         make: time_step::section,
     },

@@ -7,8 +7,8 @@ use super::Report;
 /// The document.
 pub(super) fn document(report: &Report) -> String {
     let mut text = format!(
-        "# The paper computed again\n\n{} statements: {}. The page `report.html` beside this file shows the pictures \
-         and tables.\n\n| id | the paper | here | verdict | evidence | run it again |\n|---|---|---|---|---|---|\n",
+        "# The paper's statements, reproduced\n\n{} statements: {}. The page `report.html` in the same folder contains the figures \
+         and tables.\n\n| id | the paper | here | verdict | evidence | command |\n|---|---|---|---|---|---|\n",
         report.checks().count(),
         report.counts()
     );

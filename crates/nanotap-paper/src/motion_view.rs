@@ -10,7 +10,7 @@ use nanotap::model::Model;
 /// Number of points drawn per drive period.
 const POINTS_PER_PERIOD: f64 = 500.0;
 /// Minimum number of points per stretch of flight or contact.
-const FEWEST_POINTS: f64 = 6.0;
+const MIN_POINTS: f64 = 6.0;
 
 /// Colour of flight.
 pub(super) const FLIGHT: Colour = Colour::BLUE;
@@ -32,12 +32,8 @@ struct Stretch {
 impl<'a> View<'a> {
     /// `periods` drive periods of `model` from the state `start`.
     pub(super) fn new(model: &'a Model, start: &[f64], periods: usize) -> Result<Self, PaperError> {
-        let trajectory = Trajectory::record(&model.system, start, periods).map_err(|error| {
-            PaperError::Failed {
-                what: "a motion to draw".into(),
-                why: error.to_string(),
-            }
-        })?;
+        let trajectory = Trajectory::record(&model.system, start, periods)
+            .map_err(PaperError::failed("a motion to draw"))?;
         Ok(Self { model, trajectory })
     }
 
@@ -50,7 +46,7 @@ impl<'a> View<'a> {
         for (i, (segment, piece)) in self.trajectory.segments().iter().zip(&y.pieces).enumerate() {
             let contact = self.model.contact[segment.regime];
             let count = (POINTS_PER_PERIOD * piece.length / period)
-                .max(FEWEST_POINTS)
+                .max(MIN_POINTS)
                 .ceil();
             let points = (0..=count as usize).map(|k| {
                 let s = piece.length * k as f64 / count;

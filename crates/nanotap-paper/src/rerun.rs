@@ -89,7 +89,7 @@ mod tests {
         case.cosine_term = CosineTerm::Printed;
         case.contact = ContactLaw::KelvinVoigt;
         case.tone2_ratio = Some("25/4".parse().unwrap());
-        case.tone2_amplitude = 0.01;
+        case.further.set(Parameter::Tone2Amplitude, 0.01);
         let line = on_case("simulate", &case, "--periods 4");
         assert!(line.starts_with("nanotap simulate ") && line.ends_with(" --periods 4"));
         let read = Case::parse(None, &overrides(&line)).unwrap();

@@ -15,8 +15,8 @@ use super::{PaperError, rerun};
 use nanotap::case::Case;
 use nanotap::model::Model;
 use nanotap::model::cantilever::Cantilever;
-use nanotap::model::strobe::Strobe;
-use nanotap::observe::{Observables, Set, measure};
+use nanotap::model::model_map::ModelMap;
+use nanotap::observe::{ObservableSet, Observables, measure};
 use nanotap::study::orbit::{OrbitReport, report};
 use nanotap::study::proof::Prover;
 use nanotap::study::start_box::default_box;
@@ -26,7 +26,7 @@ pub(super) const SEED: u64 = 1;
 /// Number of harmonics of an orbit; only its extrema and contacts are used.
 const HARMONICS: usize = 1;
 /// Drive periods over which a motion that never repeats is observed.
-const WATCHED: usize = 400;
+const OBSERVED_PERIODS: usize = 400;
 
 /// Results that the sections share: every census and scan of grids is computed once.
 pub(super) struct Runs<'a> {
@@ -112,7 +112,7 @@ impl<'a> Runs<'a> {
             },
             ..CensusOptions::default()
         };
-        let map = Strobe::new(&model);
+        let map = ModelMap::new(&model);
         let census =
             self.controlled(|control| census(&map, &starts.starts(SEED, count), &options, control));
         if census.cancelled {
@@ -147,7 +147,7 @@ impl<'a> Runs<'a> {
         if let Some(known) = self.found.borrow().iter().find(same) {
             return Ok(Rc::clone(&known.orbits));
         }
-        let map = Strobe::new(&counted.model);
+        let map = ModelMap::new(&counted.model);
         let count = self.either(64, 12);
         let orbits: Rc<[PeriodicOrbit]> = self
             .controlled(|control| find_orbits(&map, &starts.starts(SEED, count), &search, control))
@@ -195,10 +195,7 @@ fn report_percent(control: &Control<'_>, reported: &AtomicUsize, part: f64) {
 
 /// The box of the initial states.
 fn start_box(model: &Model) -> Result<StartBox, PaperError> {
-    default_box(model).map_err(|error| PaperError::Failed {
-        what: "the box of starts".into(),
-        why: error.to_string(),
-    })
+    default_box(model).map_err(PaperError::failed("the box of initial states"))
 }
 
 /// Chaos from which no escape was observed.
@@ -257,21 +254,18 @@ impl Counted {
             .collect()
     }
 
-    /// Observables of a motion that does not repeat, over [`WATCHED`] periods from `state`.
+    /// Observables of a motion that does not repeat, over [`OBSERVED_PERIODS`] periods from `state`.
     pub(super) fn watch(&self, state: &[f64]) -> Result<Observables, PaperError> {
-        let failed = |why: String| PaperError::Failed {
-            what: "a run to observe".into(),
-            why,
-        };
-        measure(&self.model, state, WATCHED, Set::ALL).map_err(|e| failed(e.to_string()))
+        measure(&self.model, state, OBSERVED_PERIODS, ObservableSet::ALL)
+            .map_err(PaperError::failed("a run to observe"))
     }
 
     /// Observables of a closed orbit of this case.
     pub(super) fn look(&self, orbit: &PeriodicOrbit) -> Result<OrbitReport, PaperError> {
-        report(&self.model, orbit, HARMONICS).map_err(|source| PaperError::Orbit {
-            what: format!("a period-{} orbit", orbit.period),
-            source,
-        })
+        report(&self.model, orbit, HARMONICS).map_err(PaperError::failed(format!(
+            "a period-{} orbit",
+            orbit.period
+        )))
     }
 
     /// The result of a proof for an orbit, to be appended to its description; empty if nothing was
@@ -323,7 +317,7 @@ impl Counted {
                 AttractorKind::Chaotic { spectrum, lifetime } => {
                     let (exponent, error) = spectrum.largest();
                     format!(
-                        "chaos ({count} starts, λ₁ = {exponent:.3} ± {error:.3} a period; no escape seen, so \
+                        "chaos ({count} starts, λ₁ = {exponent:.3} ± {error:.3} per period; no escape observed, so \
                          its mean lifetime is above {:.0} periods at 95 %)",
                         lifetime.low
                     )
@@ -332,7 +326,7 @@ impl Counted {
         }
         if let Some(chaos) = &self.census.transient_chaos {
             parts.push(format!(
-                "transient chaos ({} starts still on it)",
+                "transient chaos ({} starts not yet escaped)",
                 chaos.unescaped.count
             ));
         }
@@ -345,7 +339,7 @@ impl Counted {
     /// Upper bound of the share of the box of attractors that were not found.
     pub(super) fn missed(&self) -> String {
         format!(
-            "an attractor that none of {} starts found has less than {:.1} % of the box (95 %)",
+            "the basin of an attractor that none of {} starts found is smaller than {:.1} % of the box (95 %)",
             self.starts,
             100.0 * Fraction::new(0, self.starts).high
         )
@@ -358,6 +352,15 @@ impl Counted {
             &self.case,
             &format!("--starts {} --seed {SEED}", self.starts),
         )
+    }
+}
+
+/// Whether an orbit is stable, in a word.
+pub(super) fn stability(orbit: &PeriodicOrbit) -> &'static str {
+    if orbit.is_stable() {
+        "stable"
+    } else {
+        "unstable"
     }
 }
 

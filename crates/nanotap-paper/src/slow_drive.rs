@@ -12,24 +12,24 @@ use super::check::{Check, Verdict, digits};
 use super::followed_branch::{FollowedBranch, OMEGA, in_words};
 use super::motion_view::{KEY, View, empty_portrait};
 use super::rerun;
-use super::runs::{Counted, Runs, SEED, how_many};
+use super::runs::{Counted, Runs, SEED, how_many, stability};
 use super::section::{Picture, Section, Table};
 use super::time_step::Grid;
 use nanotap::case::Case;
 use nanotap::model::Model;
 use nanotap::model::cantilever::Cantilever;
+use nanotap::model::model_map::ModelMap;
 use nanotap::model::parameter::Parameter;
-use nanotap::model::strobe::Strobe;
 use nanotap::study::start_box::default_box;
 
 /// Longest period of the unstable orbits that are searched for.
-const LONGEST: usize = 3;
+const MAX_PERIOD: usize = 3;
 /// Range of Ω over which the orbits are followed.
 const BRANCH_RANGE: (f64, f64) = (2.3, 3.6);
 /// Frequencies that are printed as Ω = 2.6.
-const PRINTED_ALIKE: (f64, f64) = (2.55, 2.65);
+const ROUNDS_TO_PRINTED: (f64, f64) = (2.55, 2.65);
 /// Numbers of drive periods of chaos that are drawn against time and in the phase portrait.
-const SHOWN: (usize, usize) = (16, 200);
+const SHOWN_PERIODS: (usize, usize) = (16, 200);
 
 /// The case of both figures with its census and its orbits, stable or not.
 struct Slow {
@@ -44,7 +44,7 @@ impl Slow {
 
     fn with_modes(runs: &Runs<'_>, modes: usize) -> Result<Self, PaperError> {
         let counted = runs.count(&Cantilever::paper().with_modes(modes))?;
-        let orbits = runs.orbits(&counted, LONGEST, runs.either(3000, 600))?;
+        let orbits = runs.orbits(&counted, MAX_PERIOD, runs.either(3000, 600))?;
         Ok(Self { counted, orbits })
     }
 
@@ -58,15 +58,11 @@ impl Slow {
         let mut parts = Vec::new();
         for orbit in &orbits {
             let o = self.counted.look(orbit)?.observables;
-            let stability = if orbit.is_stable() {
-                "stable"
-            } else {
-                "unstable"
-            };
             parts.push(format!(
-                "W from {} to {}, {stability}, μ = {}{}",
+                "W from {} to {}, {}, μ = {}{}",
                 digits(o.tip_min, 4),
                 digits(o.tip_max, 4),
+                stability(orbit),
                 multiplier(orbit),
                 self.counted.proved(orbit)
             ));
@@ -129,7 +125,7 @@ impl Slow {
     ) -> Result<Check, PaperError> {
         let found = self.counted.stable(period).len();
         let mut here = format!(
-            "{} attracts; {}",
+            "{} is stable; {}",
             how_many(found, &format!("period-{period} motion")),
             self.describe(period)?
         );
@@ -137,7 +133,7 @@ impl Slow {
         let attracting = self.attracting(runs, period)?;
         if !attracting.is_empty() {
             evidence = format!(
-                "{evidence}; the orbit attracts at Ω = {}",
+                "{evidence}; the orbit is stable at Ω = {}",
                 in_words(&attracting)
             );
         }
@@ -146,7 +142,7 @@ impl Slow {
         if verdict == Verdict::Differs && claimed == 1 && !alike.is_empty() {
             verdict = Verdict::Ambiguous;
             here = format!(
-                "{here}; among the frequencies that are printed as 2.6 it attracts at Ω = {}",
+                "{here}; within the rounding of 2.6 it is stable at Ω = {}",
                 in_words(&alike)
             );
         }
@@ -160,7 +156,7 @@ impl Slow {
 fn printed_alike(stretches: &[(f64, f64)]) -> Vec<(f64, f64)> {
     stretches
         .iter()
-        .map(|&(from, to)| (from.max(PRINTED_ALIKE.0), to.min(PRINTED_ALIKE.1)))
+        .map(|&(from, to)| (from.max(ROUNDS_TO_PRINTED.0), to.min(ROUNDS_TO_PRINTED.1)))
         .filter(|(from, to)| from < to)
         .collect()
 }
@@ -183,8 +179,8 @@ pub(super) fn fig6(runs: &Runs<'_>, section: Section) -> Result<Section, PaperEr
     let mut figure = Figure::new(2, 2).column_widths([1.7, 1.0]);
     let mut words = Vec::new();
     if let Some(chaos) = slow.counted.chaos().first() {
-        let series = View::new(model, chaos.state, SHOWN.0)?;
-        let tangle = View::new(model, chaos.state, runs.either(SHOWN.1, 60))?;
+        let series = View::new(model, chaos.state, SHOWN_PERIODS.0)?;
+        let tangle = View::new(model, chaos.state, runs.either(SHOWN_PERIODS.1, 60))?;
         let dots = View::new(model, chaos.state, runs.either(3000, 300))?.strobe_dots();
         let portrait = tangle
             .tangle_into(empty_portrait("chaos"), Colour::SKY)
@@ -192,7 +188,7 @@ pub(super) fn fig6(runs: &Runs<'_>, section: Section) -> Result<Section, PaperEr
         figure = figure
             .with(series.time_panel("the attractor: chaos"))
             .with(portrait);
-        words.push("(a, b) The one attractor that any start found: chaos; dots are states at drive phase 0.");
+        words.push("(a, b) The only attractor found: chaos; dots are states at drive phase 0.");
     } else if let Some((orbit, _)) = slow.counted.all_stable().first() {
         let view = View::new(model, &orbit.states[0], orbit.period)?;
         figure = figure
@@ -201,15 +197,10 @@ pub(super) fn fig6(runs: &Runs<'_>, section: Section) -> Result<Section, PaperEr
         words.push("(a, b) The attractor.");
     }
     if let Some(orbit) = slow.of_period(1).first() {
-        let stability = if orbit.is_stable() {
-            "stable"
-        } else {
-            "unstable"
-        };
         let series = View::new(model, &orbit.states[0], 2)?;
         let loop_view = View::new(model, &orbit.states[0], 1)?;
         figure = figure
-            .with(series.time_panel(format!("period 1, {stability}")))
+            .with(series.time_panel(format!("period 1, {}", stability(orbit))))
             .with(loop_view.portrait_panel(format!("μ = {}", multiplier(orbit)), 0.9));
         words.push("(c, d) The only period-1 orbit that Newton found.");
     }
@@ -241,17 +232,12 @@ pub(super) fn fig7(runs: &Runs<'_>, section: Section) -> Result<Section, PaperEr
         let Some(orbit) = slow.of_period(period).first().copied() else {
             continue;
         };
-        let stability = if orbit.is_stable() {
-            "stable"
-        } else {
-            "unstable"
-        };
         let view = View::new(model, &orbit.states[0], period)?;
         figure = figure
-            .with(view.time_panel(format!("period {period}, {stability}")))
+            .with(view.time_panel(format!("period {period}, {}", stability(orbit))))
             .with(view.portrait_panel(format!("μ = {}", multiplier(orbit)), 0.9));
         captions.push(format!(
-            "{letters} The period-{period} orbit, closed by Newton; no run stays on it."
+            "{letters} The unstable period-{period} orbit, found by Newton."
         ));
     }
     let mut no_three = String::new();
@@ -262,8 +248,8 @@ pub(super) fn fig7(runs: &Runs<'_>, section: Section) -> Result<Section, PaperEr
         figure = figure.with(returns.panel()).with(returns.pieces(model));
         no_three = returns.words();
         captions.push(format!(
-            "(c) How near any state of the chaotic motion comes back after n drive periods, {} periods watched: \
-             after an odd number never, because (d) the attractor has two pieces that are visited in turn. No \
+            "(c) The nearest return of the chaotic motion after n drive periods, observed over {} periods: \
+             there are none after an odd number, because (d) the attractor has two pieces that the motion visits in turn. No \
              period-3 orbit lies on it.",
             returns.watched
         ));
@@ -291,7 +277,7 @@ pub(super) fn fig7(runs: &Runs<'_>, section: Section) -> Result<Section, PaperEr
         let branch = slow.branch(runs, omega, &orbit)?;
         let (from, to) = branch.extent();
         three.evidence = format!(
-            "{}; a period-3 branch exists from Ω = {from:.4} to {to:.4} and attracts at {}",
+            "{}; a period-3 branch exists from Ω = {from:.4} to {to:.4} and is stable at {}",
             three.evidence,
             in_words(&branch.attracting())
         );
@@ -305,9 +291,9 @@ pub(super) fn fig7(runs: &Runs<'_>, section: Section) -> Result<Section, PaperEr
             128.0,
         ))
         .text(
-            "No one case has the two period-1 motions, the period 2 and the period 3 of Figs. 6 and 7. A tip that the \
-             sample presses a little at rest (a small negative α₅) has each of these kinds, at different gaps; fixed \
-             steps at Ω = 2.6 show several periods that the equations do not have.",
+            "No single case has all motions of Figs. 6 and 7: two of period 1, one of period 2 and one of period 3. If the tip \
+             slightly indents the sample at rest (a small negative α₅), each of these kinds exists, at different gaps. Fixed \
+             steps at Ω = 2.6 give several periods that the equations do not have.",
         )
         .table(doubled_by_modes(runs)?)
         .table(pressed_at_rest(runs)?)
@@ -320,10 +306,10 @@ pub(super) fn fig7(runs: &Runs<'_>, section: Section) -> Result<Section, PaperEr
 fn doubled_by_modes(runs: &Runs<'_>) -> Result<Table, PaperError> {
     let mut table = Table::new(
         format!(
-            "Where the period-2 orbit that exists at Ω = 2.6 attracts, for Ω from {} to {}",
+            "Frequencies at which the period-2 orbit of Ω = 2.6 is stable, for Ω from {} to {}",
             BRANCH_RANGE.0, BRANCH_RANGE.1
         ),
-        ["N", "μ at Ω = 2.6", "attracts at Ω ="],
+        ["N", "μ at Ω = 2.6", "stable at Ω ="],
     );
     for modes in 1..=runs.either(5, 2) {
         let slow = Slow::with_modes(runs, modes)?;
@@ -342,9 +328,9 @@ fn doubled_by_modes(runs: &Runs<'_>) -> Result<Table, PaperError> {
 /// The attractors at Ω = 2.6 if the tip indents the sample slightly at rest.
 fn pressed_at_rest(runs: &Runs<'_>) -> Result<Table, PaperError> {
     let mut table = Table::new(
-        "What attracts at Ω = 2.6, α₁ = 0.1, N = 3 with a small negative gap: the kinds of motion in Figs. 6 and 7, \
-         but not all at once",
-        ["α₅", "motions", "run it again"],
+        "Attractors at Ω = 2.6, α₁ = 0.1, N = 3 with a small negative gap: the kinds of motion in Figs. 6 and 7, \
+         but never all at once",
+        ["α₅", "motions", "command"],
     );
     for alpha5 in [-0.10, -0.05, -0.045] {
         let case = Cantilever::paper().with(Parameter::Alpha5, alpha5);
@@ -368,15 +354,15 @@ fn slow_grids(runs: &Runs<'_>) -> Result<Table, PaperError> {
     let starts = Runs::starts(&counted, runs.either(most, most / 4))?;
     let mut table = Table::new(
         format!(
-            "What fixed steps that switch on their grid settle on at Ω = 2.6, α₁ = 0.1, N = 2; the exact flow has: {}",
+            "Motions of fixed-step runs that switch on their grid at Ω = 2.6, α₁ = 0.1, N = 2; the exact flow has: {}",
             counted.kinds().join(", ")
         ),
         [
-            "steps a period",
+            "steps per period",
             "period",
             "amplitude",
             "starts",
-            "run it again",
+            "command",
         ],
     );
     for steps in steps {
@@ -398,11 +384,8 @@ fn slow_grids(runs: &Runs<'_>) -> Result<Table, PaperError> {
 fn period_three(subject: &Case) -> Result<Option<(f64, PeriodicOrbit)>, PaperError> {
     let omega = 3.15;
     let model = subject.with(OMEGA, omega).model()?;
-    let area = default_box(&model).map_err(|error| PaperError::Failed {
-        what: "the box of starts".into(),
-        why: error.to_string(),
-    })?;
-    let mut map = Strobe::new(&model);
+    let area = default_box(&model).map_err(PaperError::failed("the box of initial states"))?;
+    let mut map = ModelMap::new(&model);
     let found = area.starts(SEED, 32).into_iter().find_map(|start| {
         match classify(&mut map, &start, &ClassifyOptions::default()).kind {
             MotionKind::Periodic(orbit) if orbit.period == 3 => Some(orbit),
@@ -413,7 +396,7 @@ fn period_three(subject: &Case) -> Result<Option<(f64, PeriodicOrbit)>, PaperErr
 }
 
 /// Longest return that is examined.
-const LONGEST_RETURN: usize = 12;
+const MAX_RETURN: usize = 12;
 
 /// Distances of the nearest returns of a motion.
 struct Returns {
@@ -425,15 +408,12 @@ struct Returns {
 
 impl Returns {
     fn of(model: &Model, state: &[f64], watched: usize) -> Result<Self, PaperError> {
-        let failed = |error: nanotap::model::MotionError| PaperError::Failed {
-            what: "a run on the chaotic attractor".into(),
-            why: error.to_string(),
-        };
-        let mut map = Strobe::new(model);
+        let failed = PaperError::failed("a run on the chaotic attractor");
+        let mut map = ModelMap::new(model);
         let mut states = vec![state.to_vec()];
         for k in 0..watched {
             let mut next = states[k].clone();
-            map.advance(&mut next).map_err(failed)?;
+            map.advance(&mut next).map_err(&failed)?;
             states.push(next);
         }
         let norm = |x: &[f64]| x.iter().map(|v| v * v).sum::<f64>().sqrt();
@@ -445,7 +425,7 @@ impl Returns {
                 .sum::<f64>()
                 .sqrt()
         };
-        let nearest = (1..=LONGEST_RETURN)
+        let nearest = (1..=MAX_RETURN)
             .map(|n| {
                 states
                     .iter()
@@ -474,8 +454,8 @@ impl Returns {
 
     fn words(&self) -> String {
         format!(
-            "in {} periods on the attractor no state comes back after an odd number of periods nearer than {} of its \
-             size (even: {}), so it holds no orbit of period 3",
+            "in {} periods on the attractor the nearest return after an odd number of periods is {} of its \
+             size (even: {}), so it contains no orbit of period 3",
             self.watched,
             digits(self.best(1), 1),
             digits(self.best(0), 1)
@@ -495,8 +475,8 @@ impl Returns {
         };
         Panel::new(
             Axis::linear("drive periods $n$")
-                .range(0.0, LONGEST_RETURN as f64 + 1.0)
-                .marks((1..=LONGEST_RETURN).map(|n| (n as f64, n.to_string()))),
+                .range(0.0, MAX_RETURN as f64 + 1.0)
+                .marks((1..=MAX_RETURN).map(|n| (n as f64, n.to_string()))),
             Axis::log("nearest return / size of motion"),
         )
         .title("no near return after an odd number of periods")

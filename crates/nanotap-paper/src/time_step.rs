@@ -13,18 +13,18 @@ use super::section::{Picture, Section, Table};
 use super::{PaperError, rerun};
 use nanotap::model::Model;
 use nanotap::model::cantilever::Cantilever;
+use nanotap::model::model_map::ModelMap;
 use nanotap::model::parameter::Parameter;
-use nanotap::model::strobe::Strobe;
 
 /// Longest period that is searched for.
-pub(super) const LONGEST: usize = 64;
+pub(super) const MAX_PERIOD: usize = 64;
 /// A grid motion has period n if each of its last strobe states recurs after n periods to within
 /// this fraction of the motion's size.
 const CLOSURE: f64 = 1e-9;
 /// Two motions of the same period are identical if their extrema agree to this relative difference.
-const SAME: f64 = 1e-5;
+const EXTREMA_TOLERANCE: f64 = 1e-5;
 /// Periods that the paper reports at Ω = 20, α1 = 0.1.
-pub(super) const CLAIMED: [usize; 3] = [11, 21, 28];
+pub(super) const PAPER_PERIODS: [usize; 3] = [11, 21, 28];
 
 /// Parameters of a fixed-step run.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -42,13 +42,13 @@ pub(super) struct Grid {
 #[derive(Clone, Debug)]
 pub(super) struct GridMotion {
     pub(super) grid: Grid,
-    /// Apparent period; `None`: no period up to [`LONGEST`].
+    /// Apparent period; `None`: no period up to [`MAX_PERIOD`].
     pub(super) period: Option<usize>,
     pub(super) amplitude: f64,
     tip_range: (f64, f64),
     /// State at drive phase 0.
     pub(super) state: Vec<f64>,
-    /// Strobe states of one repetition (or of [`LONGEST`] drive periods).
+    /// ModelMap states of one repetition (or of [`MAX_PERIOD`] drive periods).
     strobes: Vec<Vec<f64>>,
     /// Number of initial states that lead to it.
     pub(super) count: usize,
@@ -246,7 +246,7 @@ impl Grid {
             let Some(motion) = self.classify(model, start) else {
                 continue;
             };
-            let near = |a: f64, b: f64| (a - b).abs() <= SAME * motion.amplitude;
+            let near = |a: f64, b: f64| (a - b).abs() <= EXTREMA_TOLERANCE * motion.amplitude;
             let same = |m: &&mut GridMotion| {
                 m.period == motion.period
                     && (m.period.is_none()
@@ -273,7 +273,7 @@ impl Grid {
         let tip = |phase: f64, x: &[f64]| model.tip.at(drive, x, phase);
         let mut range = (tip(0.0, &state), tip(0.0, &state));
         let mut strobes = vec![state.clone()];
-        for _ in 0..2 * LONGEST {
+        for _ in 0..2 * MAX_PERIOD {
             run.run_period(|phase, x| {
                 let w = tip(phase, x);
                 range = (range.0.min(w), range.1.max(w));
@@ -288,7 +288,7 @@ impl Grid {
             return None;
         }
         let period = apparent_period(&strobes, CLOSURE * scale);
-        strobes.truncate(period.unwrap_or(LONGEST));
+        strobes.truncate(period.unwrap_or(MAX_PERIOD));
         Some(GridMotion {
             grid: *self,
             period,
@@ -304,9 +304,9 @@ impl Grid {
     pub(super) fn short(&self) -> String {
         let [free, contact] = self.steps;
         if free == contact {
-            format!("N = {}, {free} a period", self.modes)
+            format!("N = {}, {free} per period", self.modes)
         } else {
-            format!("N = {}, {free}/{contact} a period", self.modes)
+            format!("N = {}, {free}/{contact} per period", self.modes)
         }
     }
 
@@ -314,9 +314,9 @@ impl Grid {
     pub(super) fn words(&self) -> String {
         let [free, contact] = self.steps;
         let steps = if free == contact {
-            format!("{free} steps a period")
+            format!("{free} steps per period")
         } else {
-            format!("{free} steps a period in flight, {contact} in contact")
+            format!("{free} steps per period in flight, {contact} in contact")
         };
         match self.switching {
             Switching::EveryStep => format!("N = {}, {steps}", self.modes),
@@ -343,7 +343,7 @@ impl GridMotion {
     /// Whether the exact flow leads to a period-1 orbit, and whether Newton's method finds an exact
     /// orbit of the same period from the strobe states.
     fn exactly(&self, model: &Model) -> (bool, bool) {
-        let mut map = Strobe::new(model);
+        let mut map = ModelMap::new(model);
         let classified = classify(&mut map, &self.state, &ClassifyOptions::default());
         let vanishes = matches!(&classified.kind, MotionKind::Periodic(orbit) if orbit.period == 1);
         let closes = self.period.is_some_and(|period| {
@@ -404,7 +404,7 @@ impl GridMotion {
     pub(super) fn words(&self) -> String {
         match self.period {
             Some(period) => format!("period {period}"),
-            None => format!("no period up to {LONGEST}"),
+            None => format!("no period up to {MAX_PERIOD}"),
         }
     }
 }
@@ -420,7 +420,7 @@ pub(super) fn section(runs: &Runs<'_>, section: Section) -> Result<Section, Pape
         .collect();
     periods.sort_unstable();
     periods.dedup();
-    let claimed: Vec<String> = CLAIMED
+    let claimed: Vec<String> = PAPER_PERIODS
         .iter()
         .map(|&n| {
             format!(
@@ -435,7 +435,7 @@ pub(super) fn section(runs: &Runs<'_>, section: Section) -> Result<Section, Pape
         })
         .collect();
     let mut table = Table::new(
-        "Motions that fixed steps settle on at Ω = 20, α₁ = 0.1; the exact flow has one, of period 1",
+        "Motions of fixed-step runs at Ω = 20, α₁ = 0.1; the exact flow has one, of period 1",
         [
             "N",
             "steps in flight",
@@ -458,7 +458,7 @@ pub(super) fn section(runs: &Runs<'_>, section: Section) -> Result<Section, Pape
                 "stage".to_owned()
             },
             m.period
-                .map_or_else(|| format!("none to {LONGEST}"), |n| n.to_string()),
+                .map_or_else(|| format!("none to {MAX_PERIOD}"), |n| n.to_string()),
             format!("{:.5}", m.amplitude),
             scan.exact_amplitude(m.grid.modes)
                 .map_or_else(String::new, |a| format!("{a:.5}")),
@@ -470,10 +470,10 @@ pub(super) fn section(runs: &Runs<'_>, section: Section) -> Result<Section, Pape
     Ok(section
         .text(
             "The paper integrates with fourth-order Runge–Kutta and fixed steps that differ between flight and \
-             contact; it says no numbers and warns of overshooting the contact. A switch noticed at the next grid \
-             point comes up to a step late. That delay makes the map of the method piecewise constant in its \
-             switching indices, and where the true orbit is only weakly stable it locks into subharmonics that \
-             the equations do not have, different ones at every step, several at once.",
+             contact; it does not state the steps, and warns of overshooting the contact. A switch that is detected at the next grid \
+             point occurs up to one step late. This delay makes the map of the method piecewise constant in its \
+             switching indices. Where the true orbit is only weakly stable, the method locks into subharmonics that \
+             the equations do not have: several at once, and different ones for every step.",
         )
         .picture(picture(&scan))
         .check(
@@ -481,18 +481,18 @@ pub(super) fn section(runs: &Runs<'_>, section: Section) -> Result<Section, Pape
                 "time-step",
                 "section 2: fixed-step Runge–Kutta, switching on the grid; Figs. 8–14 report periods 1, 11, 21, 28 at Ω = 20",
                 format!(
-                    "{} grids show {} motions that are not period 1 (periods {}); the exact flow takes {} of them to \
-                     its one period-1 orbit",
+                    "{} grids give {} motions that are not of period 1 (periods {}); under the exact flow {} of them converge to \
+                     the only period-1 orbit",
                     scan.grids,
                     scan.subharmonics,
                     listed.join(", "),
-                    if scan.vanished == scan.subharmonics { "every one".to_owned() } else { scan.vanished.to_string() }
+                    if scan.vanished == scan.subharmonics { "all".to_owned() } else { scan.vanished.to_string() }
                 ),
                 Verdict::of(scan.subharmonics == 0),
             )
             .evidence(format!(
-                "each repeats 64 times to {CLOSURE:.0e} of its size; Newton on the exact map finds an orbit of its own \
-                 period near {} of them; the periods that the paper reports appear as products of the step: {}",
+                "each repeats 64 times to {CLOSURE:.0e} of its size; Newton on the exact map finds an orbit of the same \
+                 period near {} of them; the periods that the paper reports appear as artefacts of the step: {}",
                 if scan.closed == 0 { "none".to_owned() } else { scan.closed.to_string() },
                 claimed.join(", ")
             ))
@@ -511,12 +511,12 @@ impl Scan {
 }
 
 fn picture(scan: &Scan) -> Picture {
-    let steps = || Axis::log("Runge–Kutta steps a drive period (in flight)");
+    let steps = || Axis::log("Runge–Kutta steps per drive period (in flight)");
     let of = |modes: usize| scan.motions.iter().filter(move |m| m.grid.modes == modes);
     let point = |m: &GridMotion, y: f64| (f64::from(m.grid.steps[0]), y);
     let class = |m: &GridMotion| match m.period {
         Some(1) => 0,
-        Some(n) if CLAIMED.contains(&n) => 2,
+        Some(n) if PAPER_PERIODS.contains(&n) => 2,
         Some(_) => 1,
         None => 3,
     };
@@ -541,14 +541,14 @@ fn picture(scan: &Scan) -> Picture {
                 )
             })
     };
-    let period = |m: &GridMotion| m.period.map_or(LONGEST as f64 + 3.0, |n| n as f64);
+    let period = |m: &GridMotion| m.period.map_or(MAX_PERIOD as f64 + 3.0, |n| n as f64);
     let mut periods = Panel::new(
         steps(),
-        Axis::linear("period (drive periods)").range(0.0, LONGEST as f64 + 6.0),
+        Axis::linear("period (drive periods)").range(0.0, MAX_PERIOD as f64 + 6.0),
     )
     .title("N = 1: periods found")
     .legend(Legend::Above);
-    for claimed in CLAIMED {
+    for claimed in PAPER_PERIODS {
         periods = periods.with(
             Rule::horizontal(claimed as f64)
                 .colour(Colour::VERMILLION)
@@ -566,12 +566,12 @@ fn picture(scan: &Scan) -> Picture {
     };
     Picture::new(
         "time-step",
-        "What fixed time steps make of the one period-1 orbit at Ω = 20, α₁ = 0.1",
+        "Motions of fixed-step runs near the only period-1 orbit at Ω = 20, α₁ = 0.1",
         format!(
-            "Each mark is a motion that fixed-step Runge–Kutta settles on from some start, switching on its grid as the \
-             paper does. (a) Periods; those that the paper reports, 11, 21 and 28, are ruled in orange-red; marks at the \
-             top have none up to {LONGEST}. (b)–(d) Amplitudes with 1, 2 and 3 modes. The exact flow has one \
-             attractor, of period 1 (line): every other mark is a product of the step."
+            "Each mark is a motion that fixed-step Runge–Kutta, switching on its grid as in the \
+             paper, reaches from some initial state. (a) Periods; orange-red lines: the periods 11, 21 and 28 of the paper; marks at the \
+             top: no period up to {MAX_PERIOD}. (b)–(d) Amplitudes with 1, 2 and 3 modes. The exact flow has one \
+             attractor, of period 1 (line): all other marks are artefacts of the step."
         ),
         Figure::new(2, 2)
             .with(layers(periods, 1, &period))

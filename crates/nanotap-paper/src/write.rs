@@ -76,10 +76,8 @@ impl Report {
             .flat_map(|picture| ["svg", "png"].map(|ending| draw(picture, folder, ending)))
             .collect::<Result<_, PaperError>>()?;
         let checks: Vec<&Check> = self.checks().collect();
-        let json = serde_json::to_string_pretty(&checks).map_err(|error| PaperError::Failed {
-            what: "checks.json".into(),
-            why: error.to_string(),
-        })?;
+        let json =
+            serde_json::to_string_pretty(&checks).map_err(PaperError::failed("checks.json"))?;
         Ok(Written {
             html: put(folder.join("report.html"), &html::page(self)?)?,
             markdown: put(folder.join("report.md"), &markdown::document(self))?,
@@ -94,10 +92,7 @@ fn draw(picture: &Picture, folder: &Path, ending: &str) -> Result<PathBuf, Paper
     picture
         .whole()
         .write(&path)
-        .map_err(|source| PaperError::Figure {
-            name: picture.name.clone(),
-            source,
-        })?;
+        .map_err(PaperError::failed(picture.name.clone()))?;
     Ok(path)
 }
 

@@ -150,7 +150,7 @@ fn enclosed_pair(
     value: Complex<f64>,
     vector: &DVector<Complex<f64>>,
 ) -> Option<(Rectangle, Vec<Rectangle>)> {
-    const ROUNDS: usize = 12;
+    const MAX_ROUNDS: usize = 12;
     let n = matrix.rows();
     let fixed = (0..n).max_by(|&a, &b| vector[a].norm_sqr().total_cmp(&vector[b].norm_sqr()))?;
     let lambda = Rectangle::point(value);
@@ -169,7 +169,7 @@ fn enclosed_pair(
     let left = &Matrix::identity(n) - &(&inverse * &jacobian);
     let real = value.im == 0.0;
     let mut unknown: Vec<Rectangle> = residual.iter().map(|&z| -z).collect();
-    for _ in 0..ROUNDS {
+    for _ in 0..MAX_ROUNDS {
         let wider: Vec<Rectangle> = unknown
             .iter()
             .map(|z| {
@@ -280,12 +280,12 @@ mod tests {
                     Complex::new(nanotap_arithmetic::sin(turn), im) * size
                 };
                 let coarse = value + off();
-                let mut beside = DVector::from_fn(3, |i, _| vector[i] + off());
-                beside[fixed] = Complex::new(1.0, 0.0);
-                if (0..3).any(|i| i != fixed && beside[i].norm_sqr() >= 1.0) {
+                let mut neighbour = DVector::from_fn(3, |i, _| vector[i] + off());
+                neighbour[fixed] = Complex::new(1.0, 0.0);
+                if (0..3).any(|i| i != fixed && neighbour[i].norm_sqr() >= 1.0) {
                     continue;
                 }
-                let Some((found, around)) = enclosed_pair(&intervals, coarse, &beside) else {
+                let Some((found, around)) = enclosed_pair(&intervals, coarse, &neighbour) else {
                     refused += 1;
                     continue;
                 };

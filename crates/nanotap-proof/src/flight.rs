@@ -21,7 +21,7 @@ pub(crate) struct Ends {
 }
 
 /// Largest number of pieces into which a flight is divided.
-const MOST_PIECES: usize = 100_000;
+const MAX_PIECES: usize = 100_000;
 /// Smallest length of a piece, relative to the flight.
 const SHORTEST: f64 = 1e-12;
 
@@ -64,7 +64,7 @@ pub(crate) fn stays_positive(
         }
         pieces += 1;
         let middle = 0.5 * (from + to);
-        let is_over = pieces > MOST_PIECES || to - from <= SHORTEST * whole;
+        let is_over = pieces > MAX_PIECES || to - from <= SHORTEST * whole;
         if is_over || system.check_cancel().is_err() {
             return Err(Undecided { at: middle });
         }

@@ -3,8 +3,8 @@
 //!
 //! IEEE arithmetic rounds to nearest, so the exact result lies between the neighbours of the
 //! computed one. After each operation the bounds are moved to these neighbours, unless a zero makes
-//! the result exact. No rounding mode is changed and no function of the platform is used, so that
-//! bounds are the same bits on every machine.
+//! the result exact. The rounding mode is never changed and no platform function is used, so the
+//! bounds have the same bits on every machine.
 
 use std::f64::consts::FRAC_2_PI;
 use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
@@ -17,10 +17,10 @@ pub struct Interval {
 }
 
 /// The largest number of quarter turns for which the reduction of an angle is exact.
-const MOST_QUARTERS: f64 = 1_048_576.0;
-/// π/2 in parts of 33 bits, whose products with numbers up to [`MOST_QUARTERS`] are exact, and a
+const MAX_QUARTER_TURNS: f64 = 1_048_576.0;
+/// π/2 in parts of 33 bits, whose products with numbers up to [`MAX_QUARTER_TURNS`] are exact, and a
 /// remainder (fdlibm, `e_rem_pio2.c`).
-const QUARTER: [f64; 3] = [
+const HALF_PI: [f64; 3] = [
     1.5707963267341256,
     6.077100506303966e-11,
     2.0222662487959506e-21,
@@ -30,7 +30,7 @@ const LN_2: [f64; 2] = [0.6931471803691238, 1.9082149292705877e-10];
 /// Bound of the remainder of the Taylor series below: for the cosine to the 20th power and the sine
 /// to the 21st, with arguments up to 0.8, at most 0.8²²/22! = 6.6e-24; for the exponential function
 /// to the 18th, with arguments up to 0.36, e^0.36·0.36¹⁹/19! = 4.4e-26.
-const LEFT_OUT: f64 = 1e-23;
+const REMAINDER_BOUND: f64 = 1e-23;
 
 impl Interval {
     /// Zero.
@@ -61,9 +61,9 @@ impl Interval {
         }
     }
 
-    /// All decimal numbers that are read as `x`: they round to `x` and lie between its neighbours.
-    /// Zero is exactly zero.
-    pub fn typed(x: f64) -> Self {
+    /// All decimal numbers whose nearest double is `x`: they lie between its neighbours. Zero is
+    /// exactly zero.
+    pub fn decimal(x: f64) -> Self {
         if x == 0.0 {
             return Self::ZERO;
         }
@@ -90,7 +90,7 @@ impl Interval {
         self.hi
     }
 
-    /// A number of the interval near its centre.
+    /// A double in the interval near its centre.
     pub fn middle(self) -> f64 {
         let middle = 0.5 * self.lo + 0.5 * self.hi;
         if middle.is_finite() {
@@ -151,10 +151,10 @@ impl Interval {
         Self::new(self.lo.min(other.lo), self.hi.max(other.hi))
     }
 
-    /// The intersection; `self` if it is empty, which cannot happen for true enclosures of one
+    /// The intersection; `self` if it is empty, which cannot happen for valid enclosures of one
     /// number.
     #[must_use]
-    pub fn meet(self, other: Self) -> Self {
+    pub fn intersection(self, other: Self) -> Self {
         let (lo, hi) = (self.lo.max(other.lo), self.hi.min(other.hi));
         if lo <= hi { Self { lo, hi } } else { self }
     }
@@ -215,8 +215,8 @@ impl Interval {
         let d = Self::around_zero(radius);
         let rest = Self::around_zero((Self::point(radius).square() * Self::point(0.5)).hi);
         (
-            (sin + cos * d + rest).meet(all),
-            (cos - sin * d + rest).meet(all),
+            (sin + cos * d + rest).intersection(all),
+            (cos - sin * d + rest).intersection(all),
         )
     }
 
@@ -240,7 +240,7 @@ fn up(x: f64) -> f64 {
 
 /// An enclosure of π/2.
 fn quarter_turn() -> Interval {
-    Interval::point(QUARTER[0]) + Interval::point(QUARTER[1]) + Interval::typed(QUARTER[2])
+    Interval::point(HALF_PI[0]) + Interval::point(HALF_PI[1]) + Interval::decimal(HALF_PI[2])
 }
 
 /// Sine and cosine of one number: the remainder after whole quarter turns is put into their Taylor
@@ -248,7 +248,7 @@ fn quarter_turn() -> Interval {
 fn sin_cos_of(x: f64) -> (Interval, Interval) {
     let all = Interval::new(-1.0, 1.0);
     let quarters = (x * FRAC_2_PI).round();
-    if !(quarters.abs() < MOST_QUARTERS) {
+    if !(quarters.abs() < MAX_QUARTER_TURNS) {
         return (all, all);
     }
     if x == 0.0 {
@@ -257,9 +257,9 @@ fn sin_cos_of(x: f64) -> (Interval, Interval) {
     let count = Interval::point(quarters);
     let exact = |part: f64| Interval::point(quarters * part);
     let rest = Interval::point(x)
-        - exact(QUARTER[0])
-        - exact(QUARTER[1])
-        - count * Interval::typed(QUARTER[2]);
+        - exact(HALF_PI[0])
+        - exact(HALF_PI[1])
+        - count * Interval::decimal(HALF_PI[2]);
     if rest.magnitude() > 0.8 {
         return (all, all);
     }
@@ -274,10 +274,10 @@ fn sin_cos_of(x: f64) -> (Interval, Interval) {
         }
         sum
     };
-    let left_out = Interval::around_zero(LEFT_OUT);
-    let cos = (series(0) + left_out).meet(all);
+    let left_out = Interval::around_zero(REMAINDER_BOUND);
+    let cos = (series(0) + left_out).intersection(all);
     // The sine keeps its relative accuracy: the remainder has the factor x too.
-    let sin = (rest * (series(1) + left_out)).meet(all);
+    let sin = (rest * (series(1) + left_out)).intersection(all);
     match quarters.rem_euclid(4.0) as u8 {
         0 => (sin, cos),
         1 => (cos, -sin),
@@ -288,20 +288,20 @@ fn sin_cos_of(x: f64) -> (Interval, Interval) {
 
 /// The exponential function of one number: x = k ln 2 + r, and the Taylor series of eʳ.
 fn exp_of(x: f64) -> Interval {
-    const LARGEST: f64 = 700.0;
+    const MAX_ARGUMENT: f64 = 700.0;
     if x == 0.0 {
         return Interval::ONE;
     }
-    if x > LARGEST {
-        return Interval::new(exp_of(LARGEST).lo, f64::INFINITY);
+    if x > MAX_ARGUMENT {
+        return Interval::new(exp_of(MAX_ARGUMENT).lo, f64::INFINITY);
     }
-    if x < -LARGEST {
-        return Interval::new(0.0, exp_of(-LARGEST).hi);
+    if x < -MAX_ARGUMENT {
+        return Interval::new(0.0, exp_of(-MAX_ARGUMENT).hi);
     }
     let twos = (x * std::f64::consts::LOG2_E).round();
     let rest = Interval::point(x)
         - Interval::point(twos * LN_2[0])
-        - Interval::point(twos) * Interval::typed(LN_2[1]);
+        - Interval::point(twos) * Interval::decimal(LN_2[1]);
     if rest.magnitude() > 0.36 {
         return Interval::new(0.0, f64::INFINITY);
     }
@@ -309,7 +309,7 @@ fn exp_of(x: f64) -> Interval {
     for power in (1..=18).rev() {
         sum = Interval::ONE + rest * sum / Interval::point(f64::from(power));
     }
-    let value = sum + Interval::around_zero(LEFT_OUT);
+    let value = sum + Interval::around_zero(REMAINDER_BOUND);
     // 2^k has its exponent's bits; |k| ≤ 1010 keeps it normal.
     let power = f64::from_bits(((twos as i64 + 1023) as u64) << 52);
     value * Interval::point(power)
@@ -355,7 +355,7 @@ impl Sub for Interval {
 }
 
 /// Bounds of products or quotients from all four pairs of bounds.
-fn spanned(all: [f64; 4]) -> Interval {
+fn hull_of(all: [f64; 4]) -> Interval {
     if all.iter().any(|x| x.is_nan()) {
         return Interval::ENTIRE;
     }
@@ -371,7 +371,7 @@ impl Mul for Interval {
         if (zero(self) && other.is_finite()) || (zero(other) && self.is_finite()) {
             return Self::ZERO;
         }
-        spanned([
+        hull_of([
             self.lo * other.lo,
             self.lo * other.hi,
             self.hi * other.lo,
@@ -390,7 +390,7 @@ impl Div for Interval {
         if self.lo == 0.0 && self.hi == 0.0 && other.is_finite() {
             return Self::ZERO;
         }
-        spanned([
+        hull_of([
             self.lo / other.lo,
             self.lo / other.hi,
             self.hi / other.lo,
@@ -461,9 +461,9 @@ mod tests {
     fn the_parts_of_a_quarter_turn_and_of_the_logarithm_of_two_are_their_digits() {
         // 3 = 11 in binary, and π/2 begins with 1.
         let quarter: Vec<bool> = [true, true].into_iter().chain(digits(&PI)).collect();
-        assert_eq!(QUARTER[0], part(&quarter, 0, 33, 0));
-        assert_eq!(QUARTER[1], part(&quarter, 33, 66, 0));
-        assert_eq!(QUARTER[2], part(&quarter, 66, 190, 0));
+        assert_eq!(HALF_PI[0], part(&quarter, 0, 33, 0));
+        assert_eq!(HALF_PI[1], part(&quarter, 33, 66, 0));
+        assert_eq!(HALF_PI[2], part(&quarter, 66, 190, 0));
         let two: Vec<bool> = digits(&LOGARITHM).collect();
         assert_eq!(LN_2[0], part(&two, 0, 32, -1));
         assert_eq!(LN_2[1], part(&two, 32, 160, -1));

@@ -9,7 +9,7 @@
 //! and its flow, [`orbit`] existence and uniqueness by Krawczyk's operator, and [`multipliers`]
 //! stability.
 
-// With NaN nothing may be proved: `!(a < b)` is true then, and `a >= b` is not.
+// With NaN nothing may be proved: `!(a < b)` is then true, while `a >= b` is not.
 #![allow(clippy::neg_cmp_op_on_partial_ord)]
 
 pub mod complex;
@@ -25,14 +25,14 @@ pub use complex::Rectangle;
 pub use interval::Interval;
 pub use matrix::Matrix;
 pub use multipliers::{Disc, Multipliers, Stability};
-pub use orbit::{Alone, Candidate, EnclosedSwitch, Switch, Theorem, prove};
+pub use orbit::{Candidate, EnclosedSwitch, Isolation, Switch, Theorem, prove};
 pub use system::{HarmonicVector, Output, RegimeParts, Reset, System, Transition};
 
 /// Why an orbit could not be proved. It may exist nevertheless.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ProofError {
     /// Eigenvalues of a regime coincide, as at critical damping.
-    #[error("two eigenvalues of regime {regime} are too near to each other to be told apart")]
+    #[error("two eigenvalues of regime {regime} are too close to be separated")]
     Eigenvalues {
         /// Index of the regime.
         regime: usize,
@@ -43,37 +43,41 @@ pub enum ProofError {
         /// Index of the regime.
         regime: usize,
     },
-    /// The test of existence does not contract: no orbit is near, it is not isolated (at a fold),
-    /// or it is too sensitive to rounding.
-    #[error("no orbit was isolated near the computed one: none is there, or a fold is near")]
+    /// The existence test does not contract: there is no orbit nearby, it is not isolated (at a
+    /// fold), or it is too sensitive to rounding.
+    #[error(
+        "no isolated orbit was found near the computed one: it may not exist, or a fold is near"
+    )]
     NoIsolatedOrbit,
     /// A guard could not be shown to keep its sign.
-    #[error("flight {flight} may graze {at} after its start: its sign could not be decided there")]
+    #[error(
+        "flight {flight} may graze at time {at} after its start: the sign of a guard is undecided"
+    )]
     Grazing {
         /// Index of the flight, from 0.
         flight: usize,
-        /// Time since the start of the flight.
+        /// Time since the start of the flight, in the system's unit.
         at: f64,
     },
-    /// The orbit may be several repetitions of a shorter one.
-    #[error("its period may be {period} already")]
+    /// The orbit may be a repetition of a shorter one.
+    #[error("its minimal period may be {period}")]
     ShorterPeriod {
         /// The shorter period, in drive periods.
         period: usize,
     },
     /// The number of equations exceeds the limit.
-    #[error("its switches make {unknowns} equations; at most {limit} are solved")]
+    #[error("its switches give {unknowns} equations; the limit is {limit}")]
     TooLarge {
         /// Number of equations.
         unknowns: usize,
         /// Largest number of equations.
         limit: usize,
     },
-    /// The work was cancelled from outside.
-    #[error("stopped from outside")]
+    /// The computation was cancelled.
+    #[error("cancelled")]
     Cancelled,
     /// The approximate orbit is not an orbit of this system.
-    #[error("what was given is no orbit: {what}")]
+    #[error("the candidate is not an orbit: {what}")]
     Candidate {
         /// Reason.
         what: &'static str,

@@ -58,7 +58,7 @@ impl Disc {
     }
 
     /// A disc that contains both.
-    fn joined(&self, other: &Self) -> Self {
+    fn union(&self, other: &Self) -> Self {
         let center = (self.center + other.center) * 0.5;
         let reach = |disc: &Self| {
             let way = (Rectangle::point(disc.center) - Rectangle::point(center)).modulus();
@@ -87,7 +87,7 @@ impl Multipliers {
         }
     }
 
-    /// From multipliers that are enclosed individually.
+    /// Creates discs from multipliers that are enclosed individually.
     pub(crate) fn of_each(values: &[Rectangle]) -> Self {
         let disc = |z: &Rectangle| {
             let center = z.middle();
@@ -97,11 +97,11 @@ impl Multipliers {
                 count: 1,
             }
         };
-        Self::apart(values.iter().map(disc).collect())
+        Self::merge_overlapping(values.iter().map(disc).collect())
     }
 
-    /// Joins discs until none overlap.
-    fn apart(mut discs: Vec<Disc>) -> Self {
+    /// Merges discs until no two overlap.
+    fn merge_overlapping(mut discs: Vec<Disc>) -> Self {
         if discs
             .iter()
             .any(|d| !(d.radius.is_finite() && d.center.re.is_finite()))
@@ -114,7 +114,7 @@ impl Multipliers {
                 .find(|&(j, i)| discs[j].overlaps(&discs[i]));
             let Some((j, i)) = pair else { break };
             let other = discs.swap_remove(i);
-            discs[j] = discs[j].joined(&other);
+            discs[j] = discs[j].union(&other);
         }
         discs.sort_by(|a, b| {
             let size = |d: &Disc| d.center.norm_sqr();
@@ -153,14 +153,14 @@ pub(crate) fn of_flow(regime: &Regime, period: Interval) -> Vec<Rectangle> {
 
 /// A column with less than this fraction of its length outside the span of the previous ones is
 /// replaced by an orthogonal one.
-const NEARLY_DEPENDENT: f64 = 1e-6;
+const MIN_INDEPENDENT_FRACTION: f64 = 1e-6;
 
 /// The multipliers of the product of `factors`, the last one leftmost; `weights` are the magnitudes
 /// of the entries of states.
 pub(crate) fn enclosed(factors: &[Matrix<Interval>], weights: &[f64]) -> Multipliers {
     product_in_frames(factors, weights)
         .map(|product| discs(&product).into_iter().map(around_real).collect())
-        .map(Multipliers::apart)
+        .map(Multipliers::merge_overlapping)
         .unwrap_or_default()
 }
 
@@ -220,7 +220,7 @@ fn normalised(columns: &DMatrix<Complex<f64>>) -> Option<DMatrix<Complex<f64>>> 
     let mut all = Vec::with_capacity(n);
     for j in 0..columns.ncols() {
         let column = columns.column(j).into_owned();
-        let beside = |v: &DVector<Complex<f64>>| {
+        let remainder = |v: &DVector<Complex<f64>>| {
             let mut rest = v.clone();
             for _ in 0..2 {
                 for q in &orthogonal {
@@ -231,14 +231,14 @@ fn normalised(columns: &DMatrix<Complex<f64>>) -> Option<DMatrix<Complex<f64>>> 
             rest
         };
         let length = column.norm();
-        let rest = beside(&column);
-        let (column, rest) = if rest.norm() > NEARLY_DEPENDENT * length {
+        let rest = remainder(&column);
+        let (column, rest) = if rest.norm() > MIN_INDEPENDENT_FRACTION * length {
             (column / Complex::new(length, 0.0), rest)
         } else {
             // The unit vector farthest from the span of the previous columns.
             let far = (0..n)
                 .map(|i| {
-                    beside(&DVector::from_fn(n, |k, _| {
+                    remainder(&DVector::from_fn(n, |k, _| {
                         Complex::new(f64::from(u8::from(k == i)), 0.0)
                     }))
                 })

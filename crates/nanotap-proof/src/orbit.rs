@@ -35,7 +35,7 @@ pub struct Candidate {
 /// A switch of an approximate orbit.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Switch {
-    /// Time from phase 0 of the first period.
+    /// Time from phase 0 of the first period, in the system's unit.
     pub time: f64,
     /// Index of the regime before the switch.
     pub from: usize,
@@ -56,7 +56,7 @@ pub struct Theorem {
     pub switches: Vec<EnclosedSwitch>,
     /// The neighbourhood in which there is no other orbit; `None` without switches, where no other
     /// orbit stays in the regime.
-    pub alone: Option<Alone>,
+    pub isolation: Option<Isolation>,
     /// Enclosures of its multipliers.
     pub multipliers: Multipliers,
 }
@@ -64,7 +64,7 @@ pub struct Theorem {
 /// A switch of a proved orbit.
 #[derive(Clone, Debug, PartialEq)]
 pub struct EnclosedSwitch {
-    /// Time from phase 0 of the first period.
+    /// Time from phase 0 of the first period, in the system's unit.
     pub time: Interval,
     /// Index of the regime before the switch.
     pub from: usize,
@@ -74,11 +74,11 @@ pub struct EnclosedSwitch {
     pub state: Vec<Interval>,
 }
 
-/// No other orbit with the same period and sequence of regimes has all its switches within these
-/// distances.
+/// Distances within which the orbit is unique: no other orbit with the same period and sequence of
+/// regimes has all its switches within them.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Alone {
-    /// Largest difference in the time of any switch.
+pub struct Isolation {
+    /// Largest difference in the time of any switch, in the system's unit.
     pub time: f64,
     /// Largest difference in each entry of the state after any switch.
     pub state: Vec<f64>,
@@ -107,46 +107,46 @@ struct Unknowns {
 }
 
 /// Largest number of equations; their matrix grows with the square.
-pub const MOST_UNKNOWNS: usize = 3000;
-/// Minimum weight of an entry of the state, as a fraction of its change over a radian of the drive.
-const MOVED: f64 = 0.1;
-/// Minimum weight, as a fraction of the largest entry.
-const LEAST: f64 = 1e-9;
+pub const MAX_UNKNOWNS: usize = 3000;
+/// Smallest weight of an entry of the state, as a fraction of its change over a radian of the
+/// drive.
+const MIN_CHANGE_WEIGHT: f64 = 0.1;
+/// Smallest weight, as a fraction of the largest entry.
+const MIN_WEIGHT: f64 = 1e-9;
 /// Newton steps in floating-point numbers before the test.
 const NEWTON_STEPS: usize = 4;
-/// Relative size of the first box that is tried; each following one is larger by the factor
-/// [`WIDER`].
+/// Relative size of the first box. Each following box is larger by the factor [`BOX_GROWTH`].
 const FIRST_BOX: f64 = 1e-14;
-const WIDER: f64 = 10.0;
-const LARGEST_BOX: f64 = 0.1;
+const BOX_GROWTH: f64 = 10.0;
+const MAX_BOX: f64 = 0.1;
 /// Number of further applications of the operator to the enclosure.
-const TIGHTENING: usize = 3;
+const REFINEMENTS: usize = 3;
 
-/// Proves that a periodic orbit exists near an approximate one, close enough to be unique.
+/// Proves that a periodic orbit exists near an approximate one, and that it is locally unique.
 ///
 /// # Errors
-/// [`ProofError`] says what could not be proved.
+/// [`ProofError`] with the property that could not be proved.
 pub fn prove(system: &System, candidate: &Candidate) -> Result<Theorem, ProofError> {
-    let proved = proved(system, candidate);
-    // What was cancelled did not fail for the reason that it ended with.
+    let proved = prove_candidate(system, candidate);
+    // A cancelled proof fails with the error of the cancellation.
     proved.or_else(|error| system.check_cancel().and(Err(error)))
 }
 
-fn proved(system: &System, candidate: &Candidate) -> Result<Theorem, ProofError> {
+fn prove_candidate(system: &System, candidate: &Candidate) -> Result<Theorem, ProofError> {
     if candidate.period == 0 {
         return Err(ProofError::Candidate {
             what: "its period is 0",
         });
     }
     if candidate.switches.is_empty() {
-        return without_switches(system, candidate);
+        return prove_without_switches(system, candidate);
     }
     let d = system.dimension;
     let count = candidate.switches.len() * (d + 1);
-    if count > MOST_UNKNOWNS {
+    if count > MAX_UNKNOWNS {
         return Err(ProofError::TooLarge {
             unknowns: count,
-            limit: MOST_UNKNOWNS,
+            limit: MAX_UNKNOWNS,
         });
     }
     let (equations, offsets) = Equations::of(system, candidate)?;
@@ -157,11 +157,11 @@ fn proved(system: &System, candidate: &Candidate) -> Result<Theorem, ProofError>
         center.push(switch.time - offset * period);
     }
     let weights = equations.weights(&center, period);
-    let (alone, enclosure) = equations.solved(&center, &weights)?;
+    let (isolation, enclosure) = equations.enclose_zero(&center, &weights)?;
     let enclosed = equations.unknowns(&enclosure);
     equations.check_flights(&enclosed)?;
     let states = equations.states_at_phase_zero(&enclosed, &offsets, candidate.period)?;
-    minimal(&states)?;
+    check_minimal_period(&states)?;
     let switches = candidate
         .switches
         .iter()
@@ -181,11 +181,11 @@ fn proved(system: &System, candidate: &Candidate) -> Result<Theorem, ProofError>
         period: candidate.period,
         states,
         switches,
-        alone: Some(Alone {
-            time: (Interval::point(alone) * Interval::point(weights[d])).lo(),
+        isolation: Some(Isolation {
+            time: (Interval::point(isolation) * Interval::point(weights[d])).lo(),
             state: weights[..d]
                 .iter()
-                .map(|&w| (Interval::point(alone) * Interval::point(w)).lo())
+                .map(|&w| (Interval::point(isolation) * Interval::point(w)).lo())
                 .collect(),
         }),
         multipliers: multipliers::enclosed(&equations.monodromy(&enclosed)?, &weights[..d]),
@@ -205,13 +205,13 @@ impl<'a> Equations<'a> {
                 .get(switch.from)
                 .and_then(|regime| regime.parts.transitions.get(switch.transition))
             else {
-                return wrong("it has a switch that the system has not");
+                return wrong("a switch uses a transition that the system does not have");
             };
             if switch.state.len() != system.dimension {
-                return wrong("a state has another length than the system's");
+                return wrong("a state does not have the dimension of the system");
             }
             if !(switch.time.is_finite() && switch.state.iter().all(|x| x.is_finite())) {
-                return wrong("not all its numbers are finite");
+                return wrong("a number is not finite");
             }
             targets.push(transition.target);
             offsets.push((switch.time / period).floor());
@@ -234,7 +234,9 @@ impl<'a> Equations<'a> {
             .collect::<Vec<_>>();
         for (s, leg) in legs.iter().enumerate() {
             if candidate.switches[(s + 1) % count].from != leg.regime {
-                return wrong("a flight does not start in the regime in which it ends");
+                return wrong(
+                    "the regime after a switch differs from the regime before the next switch",
+                );
             }
         }
         Ok((Self { system, legs }, offsets))
@@ -277,13 +279,13 @@ impl<'a> Equations<'a> {
             let phasors = self.system.phasors(Interval::point(block[d]));
             let field = self.system.regimes[leg.regime].field(&state, &phasors);
             for (i, w) in weights.iter_mut().enumerate() {
-                let moved = MOVED * radian * field[i].middle().abs();
+                let moved = MIN_CHANGE_WEIGHT * radian * field[i].middle().abs();
                 *w = w.max(block[i].abs()).max(moved);
             }
         }
         let largest = weights.iter().copied().fold(0.0, f64::max);
         for w in &mut weights {
-            *w = w.max(LEAST * largest);
+            *w = w.max(MIN_WEIGHT * largest);
         }
         weights.push(radian);
         weights
@@ -294,7 +296,7 @@ impl<'a> Equations<'a> {
         let mut all = Vec::with_capacity(self.size());
         for s in 0..self.legs.len() {
             let e = self.next(s);
-            let flown = self.flown(s, at);
+            let flown = self.fly(s, at);
             let exit = self.exit(s);
             let after = reset_state(exit, &flown.end, &flown.phasors);
             all.extend(at.states[e].iter().zip(after).map(|(&x, y)| x - y));
@@ -309,7 +311,7 @@ impl<'a> Equations<'a> {
     }
 
     /// One flight, for all unknowns in the box.
-    fn flown(&self, leg: usize, at: &Unknowns) -> Flown {
+    fn fly(&self, leg: usize, at: &Unknowns) -> FlightResult {
         let regime = &self.system.regimes[self.legs[leg].regime];
         let start = self.system.phasors(at.phases[leg]);
         let phasors = self.system.phasors(at.phases[self.next(leg)]);
@@ -318,7 +320,7 @@ impl<'a> Equations<'a> {
         for (q, &factor) in modal.iter_mut().zip(&factors) {
             *q = *q * factor;
         }
-        Flown {
+        FlightResult {
             end: regime.state(&modal, &phasors),
             propagator: regime.propagator(&factors),
             departure: regime.field(&at.states[leg], &start),
@@ -340,7 +342,7 @@ impl<'a> Equations<'a> {
         for s in 0..self.legs.len() {
             let e = self.next(s);
             let (rows, here, there) = (s * (d + 1), s * (d + 1), e * (d + 1));
-            let flown = self.flown(s, at);
+            let flown = self.fly(s, at);
             let regime = &self.system.regimes[self.legs[s].regime];
             let exit = self.exit(s);
             let jump = |m: Matrix<Interval>| match &exit.reset {
@@ -385,7 +387,11 @@ impl<'a> Equations<'a> {
     /// Newton steps in floating-point numbers, then boxes around the result. Returns the size of
     /// the largest box, relative to the weights, that contains no other zero, and the smallest
     /// enclosure found.
-    fn solved(&self, start: &[f64], weights: &[f64]) -> Result<(f64, Vec<Interval>), ProofError> {
+    fn enclose_zero(
+        &self,
+        start: &[f64],
+        weights: &[f64],
+    ) -> Result<(f64, Vec<Interval>), ProofError> {
         let size = self.size();
         let weight = |k: usize| weights[k % weights.len()];
         let points = |center: &[f64]| -> Vec<Interval> {
@@ -446,7 +452,7 @@ impl<'a> Equations<'a> {
         let least = offsets.iter().copied().fold(0.0, f64::max);
         let mut radius = FIRST_BOX.max(2.0 * least);
         let mut found: Option<(f64, Vec<f64>)> = None;
-        while radius < LARGEST_BOX {
+        while radius < MAX_BOX {
             let columns = self.jacobian(&self.unknowns(&boxed(&|_| radius)));
             // |1 − C J(X)| in units of the weights, row by row.
             let defects = |k: usize| -> Vec<f64> {
@@ -481,12 +487,12 @@ impl<'a> Equations<'a> {
                 if found.is_some() {
                     break;
                 }
-                radius *= WIDER;
+                radius *= BOX_GROWTH;
                 continue;
             }
             let mut radii = radii;
             if found.is_none() {
-                for _ in 0..TIGHTENING {
+                for _ in 0..REFINEMENTS {
                     radii = (0..size)
                         .map(|k| mapped(&rows[k], &|j| radii[j], k).min(radii[k]))
                         .collect();
@@ -496,19 +502,19 @@ impl<'a> Equations<'a> {
                 None => (radius, radii),
                 Some((_, tight)) => (radius, tight),
             });
-            radius *= WIDER;
+            radius *= BOX_GROWTH;
         }
-        let (alone, radii) = found.ok_or(ProofError::NoIsolatedOrbit)?;
+        let (isolation, radii) = found.ok_or(ProofError::NoIsolatedOrbit)?;
         // The theorem must be about the given orbit, not about another one to which Newton's method
         // converged.
-        let near = |(k, &x): (usize, &f64)| (start[k] - x).abs() <= alone * weight(k);
+        let near = |(k, &x): (usize, &f64)| (start[k] - x).abs() <= isolation * weight(k);
         if !center.iter().enumerate().all(near) {
             return Err(ProofError::NoIsolatedOrbit);
         }
         // From any point of the enclosure, not only from its centre.
         let widest = radii.iter().copied().fold(0.0, f64::max);
-        let alone = (Interval::point(alone) - Interval::point(widest)).lo();
-        Ok((alone.max(0.0), boxed(&|k| radii[k])))
+        let isolation = (Interval::point(isolation) - Interval::point(widest)).lo();
+        Ok((isolation.max(0.0), boxed(&|k| radii[k])))
     }
 
     /// Proves that no flight has a switch before its end.
@@ -592,7 +598,7 @@ impl<'a> Equations<'a> {
         (0..self.legs.len())
             .map(|s| {
                 let e = self.next(s);
-                let flown = self.flown(s, at);
+                let flown = self.fly(s, at);
                 let regime = &self.system.regimes[self.legs[s].regime];
                 let exit = self.exit(s);
                 let before = if exit.reset.is_some() {
@@ -628,7 +634,7 @@ impl<'a> Equations<'a> {
 }
 
 /// Result of a flight.
-struct Flown {
+struct FlightResult {
     /// The state at its end.
     end: Vec<Interval>,
     /// The derivative of the end by the state at its start, at fixed times.
@@ -645,7 +651,7 @@ fn reset_state(
     before: &[Interval],
     phasors: &[crate::Rectangle],
 ) -> Vec<Interval> {
-    jumped(exit, before, |offset| offset.at(phasors))
+    apply_reset(exit, before, |offset| offset.at(phasors))
 }
 
 /// How fast the state after a switch changes with its time: R f⁻ + ρ̇.
@@ -655,13 +661,13 @@ fn reset_rate(
     arrival: &[Interval],
     phasors: &[crate::Rectangle],
 ) -> Vec<Interval> {
-    jumped(exit, arrival, |offset| {
+    apply_reset(exit, arrival, |offset| {
         offset.rate(&system.frequencies, phasors)
     })
 }
 
 /// R x + o, including the contribution of the reset's offset; x itself if there is no reset.
-fn jumped(
+fn apply_reset(
     exit: &Transition,
     x: &[Interval],
     contributes: impl FnOnce(&HarmonicVector) -> Vec<Interval>,
@@ -677,8 +683,8 @@ fn jumped(
     }
 }
 
-/// Proves that no shorter part of the orbit closes: a shorter period divides its period.
-fn minimal(states: &[Vec<Interval>]) -> Result<(), ProofError> {
+/// Proves that the period is minimal: a shorter period would divide it.
+fn check_minimal_period(states: &[Vec<Interval>]) -> Result<(), ProofError> {
     let count = states.len();
     for shorter in (1..count).filter(|k| count.is_multiple_of(*k)) {
         let apart = states[0]
@@ -694,10 +700,10 @@ fn minimal(states: &[Vec<Interval>]) -> Result<(), ProofError> {
 
 /// Proves that an orbit that stays in one regime is its forced response, if that is the only
 /// periodic motion.
-fn without_switches(system: &System, candidate: &Candidate) -> Result<Theorem, ProofError> {
+fn prove_without_switches(system: &System, candidate: &Candidate) -> Result<Theorem, ProofError> {
     let Some(regime) = system.regimes.get(candidate.regime) else {
         return Err(ProofError::Candidate {
-            what: "it is in a regime that the system has not",
+            what: "its regime does not exist in the system",
         });
     };
     if candidate.period != 1 {
@@ -732,7 +738,7 @@ fn without_switches(system: &System, candidate: &Candidate) -> Result<Theorem, P
         period: 1,
         states: vec![regime.response.at(&phasors)],
         switches: Vec::new(),
-        alone: None,
+        isolation: None,
         multipliers: Multipliers::of_each(&multipliers),
     })
 }

@@ -169,14 +169,15 @@ impl System {
         })
     }
 
-    /// The same system, proofs about which end with [`ProofError::Cancelled`] once `cancel` is set.
+    /// The same system with a cancellation flag: proofs end with [`ProofError::Cancelled`] once it
+    /// is set.
     #[must_use]
     pub fn cancelled_by(mut self, cancel: CancelFlag) -> Self {
         self.cancel = cancel;
         self
     }
 
-    /// An error once proofs are to end.
+    /// Returns an error if the flag is set.
     pub(crate) fn check_cancel(&self) -> Result<(), ProofError> {
         if self.cancel.is_cancelled() {
             Err(ProofError::Cancelled)
@@ -255,12 +256,12 @@ impl Regime {
     /// Modal coordinates of the difference of a state from the forced response.
     pub(crate) fn modal(&self, state: &[Interval], phasors: &[Rectangle]) -> Vec<Rectangle> {
         let forced = self.response.at(phasors);
-        let beside: Vec<Rectangle> = state
+        let difference: Vec<Rectangle> = state
             .iter()
             .zip(forced)
             .map(|(&x, p)| Rectangle::real(x - p))
             .collect();
-        self.basis.left.apply(&beside)
+        self.basis.left.apply(&difference)
     }
 
     /// The factors e^{λ_k s}.

@@ -15,7 +15,7 @@ fn oscillator(omega: f64, gap: f64, damping: f64) -> System {
 
 fn driven(omega: f64, gap: f64, damping: f64, restitution: f64, force: f64) -> System {
     let (zero, one) = (Interval::ZERO, Interval::ONE);
-    let entries = [zero, one, -one, -Interval::typed(damping)];
+    let entries = [zero, one, -one, -Interval::decimal(damping)];
     let still = HarmonicVector {
         constant: vec![zero; 2],
         tones: vec![vec![Rectangle::ZERO; 2]],
@@ -23,14 +23,14 @@ fn driven(omega: f64, gap: f64, damping: f64, restitution: f64, force: f64) -> S
     let wall = Transition {
         guard: Output {
             row: vec![-one, zero],
-            constant: Interval::typed(gap),
+            constant: Interval::decimal(gap),
             tones: vec![Rectangle::ZERO],
         },
         target: 0,
         reset: Some(Reset {
             matrix: Matrix::from_fn(2, 2, |i, j| match (i, j) {
                 (0, 0) => one,
-                (1, 1) => -Interval::typed(restitution),
+                (1, 1) => -Interval::decimal(restitution),
                 _ => zero,
             }),
             offset: still.clone(),
@@ -38,11 +38,11 @@ fn driven(omega: f64, gap: f64, damping: f64, restitution: f64, force: f64) -> S
         starts_at_zero: vec![(0, 1)],
     };
     let forcing = HarmonicVector {
-        tones: vec![vec![Rectangle::ZERO, Interval::typed(force).into()]],
+        tones: vec![vec![Rectangle::ZERO, Interval::decimal(force).into()]],
         ..still
     };
     let matrix = Matrix::from_fn(2, 2, |i, j| entries[2 * i + j]);
-    let omega = Interval::typed(omega);
+    let omega = Interval::decimal(omega);
     let period = Interval::point(2.0) * Interval::pi() / omega;
     let parts = RegimeParts {
         matrix,
@@ -81,7 +81,7 @@ fn holds(interval: Interval, (near, rest): (f64, f64)) -> bool {
 }
 
 #[test]
-fn the_orbit_exists_is_held_and_is_stable() {
+fn the_orbit_exists_is_enclosed_and_is_stable() {
     let system = oscillator(2.2, 0.0, DAMPING);
     // With initial values of six digits.
     let theorem = prove(&system, &near(1.172154, -1.394112)).unwrap();
@@ -92,10 +92,10 @@ fn the_orbit_exists_is_held_and_is_stable() {
         assert!(holds(*entry, reference), "{entry:?} {reference:?}");
         assert!(entry.hi() - entry.lo() < 1e-12);
     }
-    let alone = theorem.alone.as_ref().unwrap();
-    assert!(alone.time > 1e-6);
+    let isolation = theorem.isolation.as_ref().unwrap();
+    assert!(isolation.time > 1e-6);
     // Every impact multiplies areas by r², and damping by e^{−cT} per period.
-    let decay = -(Interval::typed(DAMPING) * system.period());
+    let decay = -(Interval::decimal(DAMPING) * system.period());
     let area = RESTITUTION.powi(2) * decay.exp().middle();
     let discs = &theorem.multipliers.discs;
     assert_eq!(discs.iter().map(|d| d.count).sum::<usize>(), 2);
@@ -110,7 +110,7 @@ fn the_orbit_exists_is_held_and_is_stable() {
 
 /// Claims that are false are not proved.
 #[test]
-fn what_is_no_orbit_is_not_proved() {
+fn false_claims_are_not_proved() {
     let system = oscillator(2.2, 0.0, DAMPING);
     // Motions that do not close, far from the orbit and near it: Newton's method converges to
     // another motion.
@@ -175,7 +175,7 @@ fn what_is_no_orbit_is_not_proved() {
 /// Without drive, damping and loss every bounce lasts π, whatever its height. At ω = 2 all motions
 /// are periodic, so that none is isolated, and Newton's method stays where it starts.
 #[test]
-fn an_orbit_among_others_is_not_proved() {
+fn an_orbit_that_is_not_isolated_is_not_proved() {
     for speed in [-0.1, -1.0, -7.0] {
         let bounce = prove(&driven(2.0, 0.0, 0.0, 1.0, 0.0), &near(0.5, speed));
         assert_eq!(bounce, Err(ProofError::NoIsolatedOrbit));
@@ -200,7 +200,7 @@ fn an_orbit_among_others_is_not_proved() {
 /// A drive that differs in its last digits moves the orbit by more than the width of the
 /// enclosures, which are therefore disjoint.
 #[test]
-fn enclosures_of_neighbouring_systems_are_apart() {
+fn enclosures_of_neighbouring_systems_are_disjoint() {
     let [one, other] = [2.2, 2.2 * (1.0 + 1e-12)].map(|omega| {
         let theorem = prove(&oscillator(omega, 0.0, DAMPING), &near(TIME.0, SPEED.0));
         theorem.unwrap().switches[0].time
@@ -224,7 +224,7 @@ fn without_impacts_the_forced_response_is_the_orbit() {
         switches: Vec::new(),
     };
     let free = prove(&oscillator(omega, 1.001 * amplitude, DAMPING), &none).unwrap();
-    assert!(free.alone.is_none() && free.switches.is_empty());
+    assert!(free.isolation.is_none() && free.switches.is_empty());
     assert_eq!(free.multipliers.stability(), Stability::Stable);
     let at_start = amplitude * amplitude * (1.0 - omega * omega);
     assert!((free.states[0][0].middle() - at_start).abs() < 1e-14);
@@ -249,7 +249,7 @@ fn without_impacts_the_forced_response_is_the_orbit() {
 
 /// At critical damping there is one eigenvector where two are needed.
 #[test]
-fn critical_damping_is_beyond_reach_and_said_so() {
+fn critical_damping_is_refused_with_a_reason() {
     let (zero, one) = (Interval::ZERO, Interval::ONE);
     let entries = [zero, one, -one, Interval::point(-2.0)];
     let parts = RegimeParts {

@@ -172,7 +172,7 @@ fn width(interval: Interval) -> f64 {
 }
 
 #[test]
-fn functions_hold_their_values_to_80_digits_and_little_else() {
+fn enclosures_of_functions_contain_their_values_and_are_narrow() {
     for (x, sin, cos, exp) in FUNCTIONS {
         let (s, c) = Interval::point(x).sin_cos();
         assert!(holds(s, sin) && holds(c, cos), "sine or cosine of {x}");
@@ -205,7 +205,7 @@ fn a_bound_moved_inwards_by_its_width_loses_values() {
 
 /// Infinite bounds, zeros and NaN give intervals that make no false statement.
 #[test]
-fn nothing_is_promised_of_what_overflows() {
+fn overflowing_results_have_infinite_bounds() {
     let huge = Interval::point(f64::MAX);
     assert_eq!((huge + huge).hi(), f64::INFINITY);
     assert!((huge + huge).lo() <= f64::MAX);
@@ -221,16 +221,16 @@ fn nothing_is_promised_of_what_overflows() {
     assert!(width(s) >= 2.0);
 }
 
-/// Decimal numbers are read to the nearest double: the typed number lies between its neighbours.
+/// A decimal number is read as the nearest double: the exact number lies between its neighbours.
 #[test]
-fn what_was_typed_is_held() {
+fn decimal_numbers_are_enclosed() {
     // 0.1 = 0.1000000000000000055… − 5.55e-18.
     assert!(holds(
-        Interval::typed(0.1),
+        Interval::decimal(0.1),
         (0.1, -5.551_115_123_125_783e-18)
     ));
-    assert_eq!(Interval::typed(0.0), Interval::ZERO);
-    assert!(Interval::typed(20.0).contains(20.0));
+    assert_eq!(Interval::decimal(0.0), Interval::ZERO);
+    assert!(Interval::decimal(20.0).contains(20.0));
 }
 
 /// The sum as a rounded sum and its error, exactly (Knuth).
@@ -267,7 +267,7 @@ fn with_number() -> impl Strategy<Value = (Interval, f64)> {
 
 proptest! {
     #[test]
-    fn sums_and_products_hold_the_exact_ones((a, x) in with_number(), (b, y) in with_number()) {
+    fn sums_and_products_contain_the_exact_ones((a, x) in with_number(), (b, y) in with_number()) {
         prop_assert!(holds(a + b, two_sum(x, y)));
         prop_assert!(holds(a - b, two_sum(x, -y)));
         prop_assert!(holds(a * b, two_product(x, y)));
@@ -281,7 +281,7 @@ proptest! {
 
     /// q ≤ x/y if and only if q y ≤ x, for y > 0.
     #[test]
-    fn quotients_hold_the_exact_ones(x in number(), y in number()) {
+    fn quotients_contain_the_exact_ones(x in number(), y in number()) {
         prop_assume!(y != 0.0);
         let (x, y) = (x * y.signum(), y.abs());
         let quotient = Interval::point(x) / Interval::point(y);
@@ -291,7 +291,7 @@ proptest! {
     }
 
     #[test]
-    fn roots_hold_the_exact_ones(x in number()) {
+    fn roots_contain_the_exact_ones(x in number()) {
         let x = x.abs();
         let root = Interval::point(x).sqrt();
         prop_assert!(at_most_product(-x, -root.lo(), root.lo()));
@@ -301,7 +301,7 @@ proptest! {
     /// Wide intervals: the function of any number in an interval lies in the image (functions of
     /// single numbers are tested above).
     #[test]
-    fn functions_of_wide_intervals_hold_those_of_their_numbers(
+    fn functions_of_wide_intervals_contain_those_of_their_numbers(
         x in -40.0..40.0_f64, r in 0.0..3.0_f64, part in -1.0..1.0_f64,
     ) {
         let wide = Interval::new(x - r, x + r);

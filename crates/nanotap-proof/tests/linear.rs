@@ -112,7 +112,7 @@ fn eigenvalues_of_a_companion_matrix_are_the_polynomials_roots() {
 
 /// A double eigenvalue has no separate box, with one eigenvector or with two.
 #[test]
-fn eigenvalues_that_meet_are_refused() {
+fn double_eigenvalues_are_refused() {
     for corner in [0.0, 1.0] {
         let rows = [[2.0, corner], [0.0, 2.0]];
         let matrix = Matrix::from_fn(2, 2, |i, j| Interval::point(rows[i][j]));

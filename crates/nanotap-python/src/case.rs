@@ -15,8 +15,8 @@ use pyo3::prelude::*;
 use crate::failure::Failure;
 use crate::watch::watched;
 
-/// A checked case. It keeps what it was made of, text for text, so that it can be made
-/// again with changes, and elsewhere.
+/// A checked case. It keeps the texts that it was made of, so that it can be made again with
+/// changes, also in another process.
 #[pyclass(frozen, module = "nanotap._nanotap")]
 pub(crate) struct CaseCore {
     case: Arc<Case>,
@@ -86,7 +86,7 @@ impl CaseCore {
     }
 }
 
-/// The built-in catalogue and others beside it.
+/// The built-in catalogue and further ones.
 fn catalogue_of(others: &[(String, String)]) -> Result<Arc<Catalogue>, Failure> {
     let mut catalogue = Catalogue::shared();
     for (origin, text) in others {
@@ -95,7 +95,7 @@ fn catalogue_of(others: &[(String, String)]) -> Result<Arc<Catalogue>, Failure> 
     Ok(catalogue)
 }
 
-/// A case of which some keys vary.
+/// A case with keys that vary.
 pub(crate) struct Variants {
     source: Option<Source>,
     fixed: Vec<String>,
@@ -116,7 +116,7 @@ impl Variants {
 
 #[pymethods]
 impl CaseCore {
-    /// From the name and text of a case file, if there is one, `key=value` words beside it,
+    /// From the name and text of a case file, if there is one, `key=value` words for it,
     /// and names and texts of catalogues.
     #[new]
     fn new(
@@ -145,7 +145,7 @@ impl CaseCore {
         Ok(Self::make(Some(source), overrides, catalogues)?)
     }
 
-    /// What it was made of.
+    /// The texts that it was made of.
     #[getter]
     #[expect(
         clippy::type_complexity,
@@ -188,7 +188,7 @@ impl CaseCore {
         Ok(report.transpose().map_err(Failure::from)?)
     }
 
-    /// Of a physical case, every parameter beside its physical quantity, JSON.
+    /// Of a physical case, every parameter with its physical quantity, JSON.
     #[getter]
     fn mapping(&self) -> PyResult<String> {
         let rows: Vec<MappingDocument> = self
@@ -202,7 +202,7 @@ impl CaseCore {
         Ok(serde_json::to_string(&rows).map_err(Failure::from)?)
     }
 
-    /// Assumptions (`note`) and doubts (`warning`) about a physical case.
+    /// Assumptions (`note`) and warnings (`warning`) of a physical case.
     #[getter]
     fn remarks(&self) -> Vec<(&'static str, String)> {
         let remarks = self.case.remarks();
@@ -257,8 +257,7 @@ fn text_of(path: &Path) -> Result<String, Failure> {
         .map_err(|error| Failure::input(format!("{}: cannot be read: {error}", path.display())))
 }
 
-/// A key of a case file: its name, the other name that it goes by, and its SI unit, empty of what
-/// is no quantity.
+/// A key of a case file: its name, its second name, and its SI unit (empty without a unit).
 type KeyRow = (&'static str, &'static str, &'static str);
 
 /// The keys of a case file by table.

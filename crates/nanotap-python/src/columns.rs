@@ -93,7 +93,7 @@ fn gather(
     for (name, value) in report {
         let full = format!("{before}{name}");
         let entry = match value {
-            // Why a motion was named so is a text of its own.
+            // The evidence for a classification is a text.
             Value::String(_) if name == "evidence" => continue,
             Value::Object(energies) if name == "energy_balance" => {
                 if !before.is_empty() {
@@ -106,7 +106,7 @@ fn gather(
                 gather(inner, &format!("{full}_"), dimension, all);
                 continue;
             }
-            // What has a shape of its own belongs to single results.
+            // Values of another shape belong to single results.
             Value::Array(_) if !before.is_empty() => continue,
             Value::Array(numbers) => {
                 let numbers: Option<Vec<f64>> = numbers.iter().map(Value::as_f64).collect();

@@ -1,5 +1,5 @@
-//! Sweeps and basins: recipes whose chunks are computed here or elsewhere, and the stores
-//! that hold them.
+//! Sweeps and basins: plans whose chunks are computed here or elsewhere, and the stores that hold
+//! them.
 
 use std::fs::File;
 use std::io::{BufWriter, Write as _};
@@ -11,10 +11,10 @@ use nanotap::dataset::gsf::Field;
 use nanotap::dataset::{self, Share, Store, Work, WorkError, table};
 use nanotap::figure as figures;
 use nanotap::study::basin;
-use nanotap::study::sweep;
+use nanotap::study::registry;
+use nanotap::study::sweep::Summary;
 use nanotap::study::threads::{checked, install};
 use nanotap::study::window::Window;
-use nanotap::study::{self, registry};
 use nanotap_figures::Figure;
 use numpy::PyReadonlyArray1;
 use pyo3::prelude::*;
@@ -25,16 +25,16 @@ use crate::failure::Failure;
 use crate::study::json;
 use crate::watch::watched;
 
-/// A sweep or basin that was checked: its chunks are pure functions of it.
+/// A checked plan of a sweep or basin; its chunks are pure functions of it.
 #[pyclass(frozen, module = "nanotap._nanotap")]
 pub(crate) struct Recipe {
-    recipe: Arc<study::recipe::Recipe>,
+    recipe: Arc<registry::DatasetPlan>,
 }
 
 #[pymethods]
 impl Recipe {
-    /// What the study called `name` computes of a case. What must be known beforehand, as the
-    /// attractors of basins, is found now.
+    /// The plan of the study `name` for a case. What chunks need, such as the attractors of a
+    /// basin, is computed now.
     #[new]
     #[pyo3(signature = (name, case, request, *, threads=None, progress=None))]
     fn new(
@@ -46,12 +46,12 @@ impl Recipe {
         progress: Option<Py<PyAny>>,
     ) -> PyResult<Self> {
         let entry = registry::study(name)
-            .ok_or_else(|| Failure::input(format!("there is no study `{name}`")))?;
+            .ok_or_else(|| Failure::input(format!("unknown study `{name}`")))?;
         let request = json(request)?;
         let studied = case.studied(py)?;
         let done = watched(py, progress, move |control| {
             Ok(install(threads, || {
-                entry.recipe(&studied, request, control)
+                entry.plan(&studied, request, control)
             })??)
         })?;
         Ok(Self {
@@ -65,7 +65,7 @@ impl Recipe {
         self.recipe.schema().grid.chunks()
     }
 
-    /// Computes the chunks of a share that the store at `path` lacks; says whether Ctrl-C
+    /// Computes the missing chunks of a share in the store at `path`; returns whether Ctrl-C
     /// stopped it.
     #[pyo3(signature = (path, *, share, threads, progress))]
     fn compute(
@@ -96,7 +96,7 @@ impl Recipe {
         Ok(done.interrupted)
     }
 
-    /// The files of one chunk: the same bytes wherever it is computed.
+    /// The files of one chunk; the same bytes on every machine.
     fn chunk_files<'py>(
         &self,
         py: Python<'py>,
@@ -106,7 +106,7 @@ impl Recipe {
         let done = watched(py, None, move |control| {
             recipe
                 .chunk_files(chunk, control)
-                .ok_or_else(|| Failure::input(format!("there is no chunk {chunk}")))
+                .ok_or_else(|| Failure::input(format!("no chunk {chunk}")))
         })?;
         let files = done.result.iter().map(|file| PyBytes::new(py, file));
         Ok(files.collect())
@@ -131,12 +131,12 @@ impl Recipe {
 #[pyclass(frozen, module = "nanotap._nanotap")]
 pub(crate) struct Receiver {
     store: Store,
-    recipe: Arc<study::recipe::Recipe>,
+    recipe: Arc<registry::DatasetPlan>,
 }
 
 #[pymethods]
 impl Receiver {
-    /// The chunks that it lacks.
+    /// The missing chunks.
     #[getter]
     fn missing(&self) -> Vec<usize> {
         (0..self.store.chunks())
@@ -144,7 +144,7 @@ impl Receiver {
             .collect()
     }
 
-    /// Takes the files of a chunk.
+    /// Stores the files of a chunk.
     fn take(&self, chunk: usize, files: Vec<Vec<u8>>) -> PyResult<()> {
         Ok(self
             .store
@@ -152,8 +152,8 @@ impl Receiver {
             .map_err(Failure::from)?)
     }
 
-    /// Once every chunk is there: does what needs them all, and removes what killed work left
-    /// half-written.
+    /// Finishes a store with all chunks: does the work that needs them all, and removes partial
+    /// files of interrupted work.
     fn finish(&self) -> PyResult<()> {
         if self.store.missing() > 0 {
             return Ok(());
@@ -170,7 +170,7 @@ impl Receiver {
     }
 }
 
-/// Puts together what several machines computed: JSON.
+/// Merges partial datasets: JSON.
 #[pyfunction]
 pub(crate) fn merge(py: Python<'_>, sources: Vec<PathBuf>, out: PathBuf) -> PyResult<String> {
     let done = watched(py, None, move |_| {
@@ -187,7 +187,7 @@ fn opened(path: &Path) -> Result<(Store, String), Failure> {
     Ok((store, kind))
 }
 
-/// What the runs, or the points of the slice, of a finished dataset came to: JSON.
+/// The summary of a finished dataset: JSON.
 #[pyfunction]
 pub(crate) fn summary(path: PathBuf) -> PyResult<String> {
     let summary = || -> Result<String, Failure> {
@@ -195,13 +195,13 @@ pub(crate) fn summary(path: PathBuf) -> PyResult<String> {
         Ok(if kind == "basin" {
             serde_json::to_string(&basin::shares(&store)?)?
         } else {
-            serde_json::to_string(&sweep::summary(&store)?)?
+            serde_json::to_string(&Summary::of(&store)?)?
         })
     };
     Ok(summary()?)
 }
 
-/// What there is at each point of a finished sweep over two parameters: JSON.
+/// The window at each point of a finished sweep over two parameters: JSON.
 #[pyfunction]
 pub(crate) fn window(path: PathBuf) -> PyResult<String> {
     let window = || -> Result<String, Failure> {
@@ -211,7 +211,7 @@ pub(crate) fn window(path: PathBuf) -> PyResult<String> {
     Ok(window()?)
 }
 
-/// The terminal's picture of a finished dataset, as `svg`, `png` or `pdf`.
+/// The figure of a finished dataset, as `svg`, `png` or `pdf`.
 #[pyfunction]
 pub(crate) fn figure<'py>(
     py: Python<'py>,
@@ -238,7 +238,7 @@ fn drawn(figure: &Figure, format: &str) -> Result<Vec<u8>, Failure> {
         "pdf" => figure.to_pdf()?,
         other => {
             return Err(Failure::input(format!(
-                "`{other}` is no format that can be drawn; there are svg, png and pdf"
+                "unknown figure format `{other}`: expected svg, png or pdf"
             )));
         }
     })

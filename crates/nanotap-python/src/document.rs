@@ -1,4 +1,4 @@
-//! Documents as Python has them: dictionaries, lists, numbers and words.
+//! Documents as Python dictionaries, lists, numbers and strings.
 
 use nanotap::Error;
 use pyo3::IntoPyObjectExt as _;
@@ -9,19 +9,19 @@ use serde_json::Value;
 
 use crate::failure::Failure;
 
-/// A report as JSON values, before the interpreter is needed. What is no finite number is null.
+/// A report as JSON values, built without the interpreter. Non-finite numbers are null.
 ///
 /// # Errors
-/// When it cannot be said in JSON.
+/// When it cannot be written as JSON.
 pub(crate) fn document(report: &impl Serialize) -> Result<Value, Failure> {
     Ok(serde_json::to_value(report).map_err(Error::from)?)
 }
 
-/// What `json.loads` makes of the same document, without a text in between: to write a number
-/// and read it again takes several times as long as to hand it over.
+/// The same objects as `json.loads` of the document, built directly: writing and parsing numbers
+/// takes several times as long.
 ///
 /// # Errors
-/// When Python has no memory left.
+/// When Python is out of memory.
 pub(crate) fn python<'py>(py: Python<'py>, value: &Value) -> PyResult<Bound<'py, PyAny>> {
     match value {
         Value::Null => Ok(py.None().into_bound(py)),

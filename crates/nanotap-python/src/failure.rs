@@ -11,7 +11,7 @@ use pyo3::exceptions::{PyOSError, PyRuntimeError, PyValueError};
 pub(crate) struct Failure(pub(crate) Error);
 
 impl Failure {
-    /// Something asked for that is not right.
+    /// Bad input.
     pub(crate) fn input(words: impl Into<String>) -> Self {
         Self(Error::new(ErrorKind::BadInput, words))
     }

@@ -1,4 +1,4 @@
-//! Descriptions of figures, from what a result or dataset holds: JSON that matplotlib draws.
+//! Descriptions of figures, as JSON that matplotlib draws.
 
 use std::collections::HashMap;
 
@@ -63,7 +63,7 @@ struct Shapes {
     modes: usize,
 }
 
-/// The description of the figure of a study: what it holds as JSON, and its large columns.
+/// The description of the figure of a study, as JSON with its large columns apart.
 #[pyfunction]
 pub(crate) fn describe(
     study: &str,
@@ -121,9 +121,8 @@ pub(crate) fn describe(
             }
             _ => None,
         };
-        let figure = figure.ok_or_else(|| {
-            Failure::input(format!("there is no {study} to draw: columns are missing"))
-        })?;
+        let figure = figure
+            .ok_or_else(|| Failure::input(format!("cannot draw {study}: columns are missing")))?;
         Ok(figure.to_json()?)
     };
     Ok(described()?)

@@ -1,10 +1,9 @@
-//! The Python door: what crosses between Python and the library. No physics and no
-//! numerics here, and nothing that Python itself says better.
+//! The Python module: conversion between Python and the library, without physics or numerics.
 //!
-//! Results cross as the documents of the terminal's JSON and as numpy arrays; the package
-//! `nanotap` makes typed objects, xarray Datasets and pandas tables of them. Work runs on
-//! a thread of its own while the caller waits outside the interpreter lock
-//! ([`watch`]), so that Ctrl-C is heard and a panic becomes an exception.
+//! Results are passed as the JSON documents of the command line and as numpy arrays; the package
+//! `nanotap` turns them into typed objects, xarray Datasets and pandas tables. Work runs on a
+//! separate thread while the caller waits outside the interpreter lock ([`watch`]), so that Ctrl-C
+//! works and a panic becomes an exception.
 
 #![allow(
     clippy::needless_pass_by_value,
@@ -68,7 +67,8 @@ fn _nanotap(module: &Bound<'_, PyModule>) -> PyResult<()> {
     Ok(())
 }
 
-/// Runs the terminal program with `arguments`, whose first item is its name; returns the exit code.
+/// Runs the command line with `arguments`, whose first item is the program's name; returns the exit
+/// code.
 #[pyfunction]
 fn run_command_line(py: Python<'_>, arguments: Vec<std::ffi::OsString>) -> u8 {
     py.detach(|| nanotap_cli::run(arguments))

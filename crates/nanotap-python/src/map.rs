@@ -18,18 +18,18 @@ use crate::watch::watched;
 type Rows<'py> = Bound<'py, PyArray2<f64>>;
 type Matrices<'py> = Bound<'py, PyArray3<f64>>;
 
-/// Drive periods that run where they are asked for; longer work is watched, so that Ctrl-C
-/// stops it.
+/// Most drive periods that run on the calling thread; longer work is watched, so that Ctrl-C stops
+/// it.
 const AT_ONCE: usize = 4096;
 /// The same under a nonlinear force, whose periods take a thousand times longer.
 const NONLINEAR_AT_ONCE: usize = 16;
 
-/// The map of one case.
+/// The stroboscopic map of a case.
 #[pyclass(frozen, module = "nanotap._nanotap")]
 pub(crate) struct MapCore(Arc<Map>);
 
 impl MapCore {
-    /// Does `work` of so many drive periods while others use the interpreter.
+    /// Runs `work` of so many drive periods without the interpreter lock.
     fn done<R: Send + 'static>(
         &self,
         py: Python<'_>,

@@ -1,20 +1,20 @@
-//! Single motions: modes, runs, orbits, and what is observed of many cases at once.
+//! Single motions: modes, runs, orbits, and observables of many cases at once.
 
 use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use nanotap::case::Case;
 use nanotap::control::Control;
-use nanotap::map::MOST_NUMBERS;
+use nanotap::map::MAX_NUMBERS;
 use nanotap::model::Model;
 use nanotap::model::beam::Modes;
 use nanotap::observe::time_series::{self, state_names};
-use nanotap::study::modes::{ModesRequest, ModesStudy};
-use nanotap::study::orbit::{OrbitRequest, OrbitStudy};
+use nanotap::study::modes::{ModesOptions, ModesStudy};
+use nanotap::study::orbit::{OrbitOptions, OrbitStudy};
 use nanotap::study::registry::{Document, Study as _};
 use nanotap::study::request::read;
 use nanotap::study::setpoint::at_setpoint;
-use nanotap::study::simulate::{SimulateReport, SimulateRequest, SimulateStudy};
+use nanotap::study::simulate::{SimulateOptions, SimulateReport, SimulateStudy};
 use nanotap::study::threads::install;
 use nanotap::{Error, ErrorKind};
 use numpy::{PyArray1, PyArray2, PyArrayMethods};
@@ -46,7 +46,7 @@ pub(crate) fn modes<'py>(
     request: &str,
 ) -> PyResult<(String, Row<'py>, Rows<'py>)> {
     let studied = case.studied(py)?;
-    let request: ModesRequest = read(json(request)?).map_err(Failure::from)?;
+    let request: ModesOptions = read(json(request)?).map_err(Failure::from)?;
     let table = ModesStudy::run(&studied, &request, &Control::default()).map_err(Failure::from)?;
     let beam = Modes::new(table.modes).map_err(|error| Failure::input(error.to_string()))?;
     let points = request.points;
@@ -72,9 +72,9 @@ fn rows(
     let numbers = periods
         .saturating_mul(resolution)
         .saturating_mul(time_series::columns(model).len());
-    if numbers > MOST_NUMBERS {
+    if numbers > MAX_NUMBERS {
         let words =
-            format!("a time series of {numbers} numbers is too long; {MOST_NUMBERS} at most");
+            format!("a time series of {numbers} numbers is too long; {MAX_NUMBERS} at most");
         return Err(Failure(Error::input(
             words,
             "take fewer {periods} or a lower {resolution}",
@@ -87,8 +87,7 @@ fn rows(
     Ok(values)
 }
 
-/// One run: its document, and its time series or, of fixed steps, its curve. Of the time
-/// series `series_periods` are taken.
+/// A run: its document, and `series_periods` of its time series or, for fixed steps, its curve.
 #[pyfunction]
 pub(crate) fn simulate<'py>(
     py: Python<'py>,
@@ -97,7 +96,7 @@ pub(crate) fn simulate<'py>(
     series_periods: usize,
 ) -> PyResult<(Bound<'py, PyAny>, Table<'py>)> {
     let studied = case.studied(py)?;
-    let request: SimulateRequest = read(json(request)?).map_err(Failure::from)?;
+    let request: SimulateOptions = read(json(request)?).map_err(Failure::from)?;
     let done = watched_alone(py, None, move |control| {
         let report = SimulateStudy::run(&studied, &request, control)?;
         let (names, values) = match &report {
@@ -126,7 +125,7 @@ pub(crate) fn orbit<'py>(
     request: &str,
 ) -> PyResult<Bound<'py, PyAny>> {
     let studied = case.studied(py)?;
-    let request: OrbitRequest = read(json(request)?).map_err(Failure::from)?;
+    let request: OrbitOptions = read(json(request)?).map_err(Failure::from)?;
     // An orbit of a given period may have to be searched for from starts all over.
     let searched = request.period.is_some() && request.state.is_none();
     let work = move |control: &Control<'_>| {
@@ -174,7 +173,7 @@ fn report(
         }
         OrbitStudy::NAME => {
             // Single results alone show harmonics.
-            let request = OrbitRequest {
+            let request = OrbitOptions {
                 harmonics: 0,
                 ..read(request)?
             };
@@ -183,14 +182,14 @@ fn report(
             )?)?)
         }
         other => Err(Error::input(
-            format!("{other} is no study of single motions"),
+            format!("{other} is not a study of single motions"),
             format!("there are {} and {}", SimulateStudy::NAME, OrbitStudy::NAME),
         )),
     }
 }
 
-/// The columns of what was found, why there is nothing (empty where there is something), the
-/// names of entries along `state` and `energy`, and whether Ctrl-C stopped it.
+/// The columns of the results, the reason of each failure (empty on success), the names of the
+/// entries along `state` and `energy`, and whether Ctrl-C stopped the work.
 type Found = (
     Vec<Column>,
     Vec<String>,
@@ -293,7 +292,7 @@ pub(crate) fn observe(
     Ok((columns(py, &reports)?, reasons, labels, done.interrupted))
 }
 
-/// What the entries of results mean, and their units: JSON.
+/// Meaning and units of the entries of results, JSON.
 #[pyfunction]
 pub(crate) fn glossary() -> PyResult<String> {
     Ok(serde_json::to_string(&nanotap::observe::glossary::glossary()).map_err(Failure::from)?)

@@ -1,10 +1,10 @@
-//! What exists, and how it changes: census, branches, exponents, modes enough, the paper.
+//! Studies: attractors, branches, exponents, convergence, the paper.
 
 use std::path::PathBuf;
 
 use nanotap::Error;
 use nanotap::study::fit::Table;
-use nanotap::study::lyapunov::{LyapunovRequest, LyapunovStudy};
+use nanotap::study::lyapunov::{LyapunovOptions, LyapunovStudy};
 use nanotap::study::registry::{self, Document, Study as _};
 use nanotap::study::request::read;
 use nanotap::study::threads::install;
@@ -27,8 +27,8 @@ pub(crate) fn study(
     threads: Option<usize>,
     progress: Option<Py<PyAny>>,
 ) -> PyResult<(String, bool)> {
-    let entry = registry::study(name)
-        .ok_or_else(|| Failure::input(format!("there is no study `{name}`")))?;
+    let entry =
+        registry::study(name).ok_or_else(|| Failure::input(format!("unknown study `{name}`")))?;
     let request = json(request)?;
     // Solved for once a case, not once a study.
     let case = if entry.any_distance {
@@ -66,7 +66,7 @@ pub(crate) fn table(path: PathBuf) -> PyResult<String> {
 /// The JSON of a request.
 pub(crate) fn json(request: &str) -> Result<serde_json::Value, Failure> {
     serde_json::from_str(request)
-        .map_err(|error| Failure::input(format!("the request is no JSON: {error}")))
+        .map_err(|error| Failure::input(format!("the request is not JSON: {error}")))
 }
 
 /// Lyapunov exponents (JSON) and the points of a section: phase in drive periods, tip, its
@@ -78,7 +78,7 @@ pub(crate) fn lyapunov<'py>(
     request: &str,
 ) -> PyResult<(String, Bound<'py, PyArray2<f64>>)> {
     let studied = case.studied(py)?;
-    let request: LyapunovRequest = read(json(request)?).map_err(Failure::from)?;
+    let request: LyapunovOptions = read(json(request)?).map_err(Failure::from)?;
     let done = watched(py, None, move |control| {
         let report = LyapunovStudy::run(&studied, &request, control)?;
         let rows = report.section.iter().flat_map(|p| {
@@ -98,8 +98,8 @@ pub(crate) fn lyapunov<'py>(
     Ok((document, PyArray1::from_vec(py, values).reshape(shape)?))
 }
 
-/// The paper computed again, its report and pictures in the folder `out`: JSON, and whether
-/// Ctrl-C stopped it.
+/// Recomputes the paper, with report and figures in the folder `out`: JSON, and whether Ctrl-C
+/// stopped it.
 #[pyfunction]
 #[pyo3(signature = (*, out, only, quick, threads, progress))]
 pub(crate) fn paper(

@@ -1,4 +1,4 @@
-//! Work on a thread of its own, watched: progress is told, signals are heard, panics are
+//! Work on a separate thread, watched: progress is reported, signals are heard, panics are
 //! caught, and the interpreter is free meanwhile.
 
 use std::io;
@@ -76,14 +76,14 @@ pub(crate) fn watched_alone<R: Send + 'static>(
         };
         let result = catch_unwind(AssertUnwindSafe(|| work(&control)));
         Box::new(move || {
-            // Nobody may be waiting any more.
+            // The receiver may be gone.
             let _ = sender.send(result);
         })
     }))
     .map_err(|error| PyRuntimeError::new_err(format!("cannot start a thread: {error}")))?;
     py.detach(move || {
         let mut stopped: Option<(Instant, PyErr)> = None;
-        let mut told = (0, 0);
+        let mut reported = (0, 0);
         loop {
             let done = match soon(&receiver).map_or_else(|| receiver.recv_timeout(INTERVAL), Ok) {
                 Ok(done) => Some(done),
@@ -96,8 +96,8 @@ pub(crate) fn watched_alone<R: Send + 'static>(
                 counts[0].load(Ordering::Relaxed),
                 counts[1].load(Ordering::Relaxed),
             );
-            if stopped.is_none() && (done.is_none() || seen != told) {
-                told = seen;
+            if stopped.is_none() && (done.is_none() || seen != reported) {
+                reported = seen;
                 if let Err(error) = Python::attach(|py| look(py, progress.as_ref(), seen)) {
                     cancel.cancel();
                     stopped = Some((Instant::now(), error));
@@ -178,7 +178,7 @@ type Job = Box<dyn FnOnce() -> Box<dyn FnOnce()> + Send>;
 /// many a motion.
 fn elsewhere(job: Job) -> io::Result<()> {
     static IDLE: Mutex<OfThisProcess<Vec<Sender<Job>>>> = Mutex::new(OfThisProcess(None));
-    const MOST_IDLE: usize = 8;
+    const MAX_IDLE: usize = 8;
     let idle = lock(&IDLE).get_or_make(|| Ok(Vec::new()))?.pop();
     let mut job = match idle {
         Some(thread) => match thread.send(job) {
@@ -196,7 +196,7 @@ fn elsewhere(job: Job) -> io::Result<()> {
             let stays = lock(&IDLE)
                 .get_or_make(|| Ok(Vec::new()))
                 .is_ok_and(|idle| {
-                    let stays = idle.len() < MOST_IDLE;
+                    let stays = idle.len() < MAX_IDLE;
                     idle.extend(stays.then(|| sender.clone()));
                     stays
                 });

@@ -19,7 +19,7 @@ fn main() {
 fn flow(modes: usize, nodes: usize) -> (Flow, Vec<f64>) {
     let system = common::beam(common::dmt(), modes, 0.9, 200.0, 20.0, 18.0, nodes);
     let mut flow = Flow::new(Arc::new(system));
-    // Near the repulsive orbit, and settled for a while.
+    // Near the repulsive orbit, after a transient.
     let mut state = vec![0.0; 2 * modes];
     (state[0], state[modes]) = (7.0048, 17.1408);
     for _ in 0..50 {

@@ -1,10 +1,10 @@
-//! A lever over a DMT sample, from the command line that all peers of `peers/driver/law.py` have:
+//! A lever over a DMT sample, with the command line of all peers of `peers/driver/law.py`:
 //!
 //! ```text
 //! dmt_peer MODES TOLERANCE SECONDS
 //! ```
 //!
-//! It prints the states after some periods and how many periods a second it does, as JSON.
+//! It prints the states after some periods and the number of periods per second as JSON.
 
 #![allow(
     clippy::disallowed_methods,

@@ -8,7 +8,7 @@
 //! `d̄ = d₀ + c F̄`, `|A − H f| = |G|`, `e^{iφ} = G/(A − H f)`
 //!
 //! (Garcia and San Paulo, Phys. Rev. B 60, 4961, 1999, for one mode). The roots in `A` at a given
-//! distance `d₀` are the motions; those in `d₀` at a given `A` the distances of a setpoint.
+//! distance `d₀` are the motions.
 //! Higher harmonics of the force enter the state by the modes' response to them. Wrong where the
 //! gap has strong harmonics: whatever is found here is a guess.
 
@@ -26,8 +26,6 @@ const AMPLITUDES: usize = 400;
 const PHASES: usize = 240;
 /// Harmonics of the force in the state.
 const HARMONICS: usize = 12;
-/// Mean gaps at which the equation of a setpoint is evaluated.
-const MEAN_GAPS: usize = 600;
 /// Newton steps for the mean gap.
 const MAX_ITERATIONS: usize = 12;
 /// What may be left of the drive's amplitude at a root.
@@ -44,9 +42,6 @@ pub struct AveragedMotion {
     pub state: Vec<f64>,
     /// The branch of the law there.
     pub branch: usize,
-    /// The constant part of the gap, `d₀` less the drive's static deflection: the system's, or
-    /// that solved for.
-    pub offset: f64,
     /// Amplitude of the gap at the strongest tone.
     pub amplitude: f64,
 }
@@ -236,24 +231,16 @@ impl<'a> Averaging<'a> {
             modal += unit.map(|z| (z * harmonic * power).re);
             power *= shift;
         }
-        let offset = mean - self.compliance * average.mean - self.system.gap_constant;
-        self.finish(modal.as_slice(), branch?, offset, amplitude)
+        self.finish(modal.as_slice(), branch?, amplitude)
     }
 
-    fn finish(
-        &self,
-        modal: &[f64],
-        branch: usize,
-        offset: f64,
-        amplitude: f64,
-    ) -> Option<AveragedMotion> {
+    fn finish(&self, modal: &[f64], branch: usize, amplitude: f64) -> Option<AveragedMotion> {
         let mut state = vec![0.0; modal.len()];
         self.system.to_state(0.0, modal, &mut state);
         let finite = state.iter().all(|x| x.is_finite());
         finite.then_some(AveragedMotion {
             state,
             branch,
-            offset: self.system.drive().offset + offset,
             amplitude,
         })
     }
@@ -320,54 +307,6 @@ pub fn motions(system: &System, rests: &[f64]) -> Vec<AveragedMotion> {
     found
 }
 
-/// Distances at which a motion has this amplitude of the gap, the farthest first: the roots of
-/// the averaged equation in the mean gap. [`AveragedMotion::offset`] has the system's offset at
-/// each.
-pub fn distances(system: &System, amplitude: f64) -> Vec<AveragedMotion> {
-    let Some(averaging) = Averaging::new(system) else {
-        return Vec::new();
-    };
-    let residual = |mean: f64| averaging.residual(amplitude, &averaging.average(mean, amplitude));
-    // From where hardly any force is left to where the tip never leaves the sample.
-    let (far, near) = (6.0 * amplitude, -amplitude);
-    let contact = (0..system.law().branches())
-        .flat_map(|branch| system.exits(branch))
-        .filter_map(|exit| match exit.guard {
-            Guard::Falls(level) if level > 0.0 => Some(level),
-            _ => None,
-        })
-        .fold(0.0, f64::max);
-    let mut found = Vec::new();
-    let mut before: Option<(f64, f64)> = None;
-    for k in 0..=MEAN_GAPS {
-        // Denser about the amplitude, where the tip comes to the sample.
-        let u = 1.0 - 2.0 * k as f64 / MEAN_GAPS as f64;
-        let side = if u > 0.0 {
-            far - amplitude
-        } else {
-            amplitude - near
-        };
-        let mean = contact + amplitude + side * u * u * u;
-        let here = residual(mean);
-        if let Some((mean_before, at)) = before
-            && here * at < 0.0
-        {
-            let (mut far, mut near) = (mean_before, mean);
-            for _ in 0..BISECTIONS {
-                let middle = 0.5 * (far + near);
-                if residual(middle) * at > 0.0 {
-                    far = middle;
-                } else {
-                    near = middle;
-                }
-            }
-            found.extend(averaging.motion(0.5 * (far + near), amplitude));
-        }
-        before = here.is_finite().then_some((mean, here));
-    }
-    found
-}
-
 /// The linear response to the drive about a rest of the lever at `gap` on a branch of the law.
 pub fn about_rest(system: &System, branch: usize, gap: f64) -> Option<AveragedMotion> {
     let averaging = Averaging::new(system)?;
@@ -380,5 +319,5 @@ pub fn about_rest(system: &System, branch: usize, gap: f64) -> Option<AveragedMo
         let swing = drive / (1.0 - system.kernel().read(&unit) * slope);
         modal += unit.map(|z| (z * slope * swing).re);
     }
-    averaging.finish(modal.as_slice(), branch, 0.0, 0.0)
+    averaging.finish(modal.as_slice(), branch, 0.0)
 }

@@ -15,6 +15,7 @@
 
 use crate::VolterraError;
 use crate::error::Refusal;
+use crate::force_sums::{ForceSums, ParabolicStep};
 use crate::gap_table::GapTable;
 use crate::law::{Approach, Exit, Guard};
 use crate::modes::Block;
@@ -45,11 +46,20 @@ const RESOLVED: f64 = 1.5;
 const UNRESOLVED: f64 = 1e-4;
 /// The most steps tried in one oscillation of the fastest tone.
 const MAX_STEPS: u64 = 20_000;
+/// Steps counted towards a budget, and steps between looks at the flag that cancels the work.
+const POLL: u64 = 64;
 /// Switches at one instant after which the law is reported to switch endlessly.
 const MAX_SWITCHES_AT_ONCE: usize = 64;
 /// A law of more branches that knows its branch from gap and rate is evaluated without
 /// locating the switches between them.
 const MAX_LOCATED_BRANCHES: usize = 8;
+/// Decay of a disturbance over a step by the force's damping, as an exponent, above which the step is
+/// implicit.
+const STIFF: f64 = 1.0;
+/// Part of the allowed error to which the forces of an implicit step are iterated.
+const CONVERGED: f64 = 0.02;
+/// Iterations for the forces of an implicit step.
+const MAX_ITERATIONS: usize = 10;
 /// Steps of the bracketed search for a switch.
 const MAX_BISECTIONS: usize = 48;
 
@@ -72,6 +82,8 @@ struct Work {
     columns: Vec<[f64; 2]>,
     /// The size of the motion, in the unit of the gap.
     size: f64,
+    /// Integrals of the force, where requested, with the angular frequency of the harmonic.
+    sums: Option<(ForceSums, f64)>,
     statistics: Statistics,
 }
 
@@ -88,6 +100,8 @@ struct Tables {
     source: Vec<[f64; 2]>,
     /// Acceleration of the gap by a unit of force.
     mobility: f64,
+    /// Change of the gap's rate by the forces up to which they are iterated.
+    converged: f64,
     /// The forced response at phase 0 as a state.
     forced: Vec<f64>,
     /// Frequency that scales the allowed error.
@@ -100,6 +114,8 @@ struct Tables {
     by_gap_alone: Vec<bool>,
     /// Whether the branch is looked up at each evaluation.
     by_lookup: bool,
+    /// On which branches tip and sample touch.
+    touches: Vec<bool>,
     max_steps: u64,
 }
 
@@ -118,6 +134,8 @@ struct Motion {
     modal: Vec<[f64; 2]>,
     /// `(cos ωt, sin ωt)` of each tone.
     phasors: Vec<[f64; 2]>,
+    /// What is added to the gap of the tables' system.
+    shift: f64,
     gap: f64,
     rate: f64,
     force: f64,
@@ -129,6 +147,27 @@ struct Stages {
     gaps: [f64; 4],
     rates: [f64; 4],
     forces: [f64; 4],
+    /// Whether the second stage is at a third of the step, and its force unknown, as that of the
+    /// last.
+    implicit: bool,
+}
+
+/// A step in which the force is a straight line in time through its values at a third and at the end
+/// of the step, both unknown: the Radau IIA method of order 3 with exponentials of the modes. It
+/// remains stable where a damping acts that is much faster than the step.
+#[derive(Clone, Copy, Debug, Default)]
+struct ImplicitLevel {
+    /// Gap and rate at a third, in the middle and at the end from the two forces.
+    weights: [[[f64; 2]; 2]; 3],
+}
+
+/// The same of one block.
+#[derive(Clone, Copy, Debug, Default)]
+struct ImplicitBlock {
+    /// `e^{Bh/3}`.
+    third: [[f64; 2]; 2],
+    /// Coordinates at the end from the two forces.
+    weights: [[f64; 2]; 2],
 }
 
 /// Everything about a step that its length fixes.
@@ -145,8 +184,12 @@ struct Level {
     fourth: [f64; 2],
     /// Gap and rate at the end from the three weights of the forces.
     end: [[f64; 2]; 3],
-    /// The first block, of those sorted by rate, that the search for switches cannot resolve.
+    /// The blocks that the search for switches cannot resolve.
     unresolved: Vec<usize>,
+    implicit: ImplicitLevel,
+    implicit_blocks: Vec<ImplicitBlock>,
+    /// `(cos, sin)` of what each tone turns in a third of a step.
+    third_turns: Vec<[f64; 2]>,
 }
 
 #[derive(Clone, Copy, Debug, Default)]
@@ -160,6 +203,13 @@ struct BlockStep {
 
 fn product(m: &[[f64; 2]; 2], [x, y]: [f64; 2]) -> [f64; 2] {
     [m[0][0] * x + m[0][1] * y, m[1][0] * x + m[1][1] * y]
+}
+
+fn square([[a, b], [c, d]]: &[[f64; 2]; 2]) -> [[f64; 2]; 2] {
+    [
+        [a * a + b * c, a * b + b * d],
+        [c * a + d * c, c * b + d * d],
+    ]
 }
 
 fn dot([a, b]: [f64; 2], [x, y]: [f64; 2]) -> f64 {
@@ -206,6 +256,51 @@ fn moments(block: &Block, h: f64, exp: &[[f64; 2]; 2], b: [f64; 2]) -> [[f64; 2]
 }
 
 impl Level {
+    /// Fills what an implicit step of its length needs.
+    fn set_implicit(&mut self, system: &System, parts: &Readouts<'_>) {
+        let h = self.length;
+        self.implicit_blocks.clear();
+        self.third_turns.clear();
+        self.implicit = ImplicitLevel::default();
+        for (k, block) in system.kernel().modes().blocks().iter().enumerate() {
+            let source = parts.source[k];
+            let third = block.exp(h / 3.0);
+            let half = self.blocks[k].half;
+            let [t0, t1, _] = moments(block, h / 3.0, &third, source);
+            let [s0, s1, _] = moments(block, 0.5 * h, &half, source);
+            let [m0, m1, _] = moments(block, h, &square(&half), source);
+            // Of the straight line through the two forces.
+            let combined =
+                |h: f64, [a, b]: [f64; 2], [c, d]: [f64; 2], m0: [f64; 2], m1: [f64; 2]| {
+                    [
+                        [0, 1].map(|i| h * (a * m0[i] + b * m1[i])),
+                        [0, 1].map(|i| h * (c * m0[i] + d * m1[i])),
+                    ]
+                };
+            let end = combined(h, [0.0, 1.5], [1.0, -1.5], m0, m1);
+            let places = [
+                combined(h / 3.0, [1.0, 0.5], [0.0, -0.5], t0, t1),
+                combined(0.5 * h, [0.75, 0.75], [0.25, -0.75], s0, s1),
+                end,
+            ];
+            for (sums, forces) in self.implicit.weights.iter_mut().zip(places) {
+                for (sum, weights) in sums.iter_mut().zip(forces) {
+                    sum[0] += dot(parts.readout[k], weights);
+                    sum[1] += dot(parts.rate_readout[k], weights);
+                }
+            }
+            self.implicit_blocks.push(ImplicitBlock {
+                third,
+                weights: end,
+            });
+        }
+        let tones = system.drive().tones.iter();
+        self.third_turns.extend(tones.map(|tone| {
+            let (sin, cos) = nanotap_arithmetic::sin_cos(h * tone.frequency / 3.0);
+            [cos, sin]
+        }));
+    }
+
     /// Fills it for a step of length `h`.
     fn set(&mut self, system: &System, parts: &Readouts<'_>, h: f64) {
         let kernel = system.kernel();
@@ -216,11 +311,7 @@ impl Level {
         let (mut middle, mut fourth, mut end) = ([0.0; 2], [0.0; 2], [[0.0; 2]; 3]);
         for (k, block) in kernel.modes().blocks().iter().enumerate() {
             let half = block.exp(0.5 * h);
-            let full = [
-                product(&half, [half[0][0], half[1][0]]),
-                product(&half, [half[0][1], half[1][1]]),
-            ];
-            let full = [[full[0][0], full[1][0]], [full[0][1], full[1][1]]];
+            let full = square(&half);
             let source = parts.source[k];
             let [a, ..] = moments(block, 0.5 * h, &half, source);
             let [m0, m1, m2] = moments(block, h, &full, source);
@@ -257,7 +348,7 @@ impl Level {
     }
 }
 
-/// What a [`Level`] is made of besides the system.
+/// Components of a [`Level`] in addition to the system.
 struct Readouts<'a> {
     readout: &'a [[f64; 2]],
     rate_readout: &'a [[f64; 2]],
@@ -326,6 +417,9 @@ impl Tables {
             .map(|l| {
                 let mut level = Level::default();
                 level.set(system, &of, longest / (1_u64 << l) as f64);
+                if system.law().depends_on_rate() {
+                    level.set_implicit(system, &of);
+                }
                 level
             })
             .collect();
@@ -378,6 +472,10 @@ impl Tables {
                 .abs(),
             period,
             levels,
+            converged: CONVERGED
+                * TOLERANCE
+                * frequency
+                * system.drive().offset.abs().max(SWING * swing),
             table: GapTable::new(system),
             readout,
             rate_readout,
@@ -395,6 +493,7 @@ impl Tables {
                 .collect(),
             exits,
             by_lookup,
+            touches: (0..law.branches()).map(|b| law.touches(b)).collect(),
             max_steps: MAX_STEPS.saturating_mul(oscillations as u64),
             system: Arc::clone(system),
         })
@@ -455,7 +554,7 @@ impl Tables {
 
     /// Gap and rate at `motion`, from its coordinates and phasors.
     fn read(&self, motion: &mut Motion) {
-        let (mut gap, mut rate) = (self.system.gap_constant, 0.0);
+        let (mut gap, mut rate) = (self.system.gap_constant + motion.shift, 0.0);
         let tones = self.system.drive().tones.iter().zip(&self.system.gap_tones);
         for ((tone, z), [cos, sin]) in tones.zip(&motion.phasors) {
             gap += z.re * cos - z.im * sin;
@@ -468,10 +567,135 @@ impl Tables {
         (motion.gap, motion.rate) = (gap, rate);
     }
 
+    /// A step, explicit or not.
+    fn step_by(
+        &self,
+        implicit: bool,
+        level: &Level,
+        from: &Motion,
+        to: &mut Motion,
+        stages: &mut Stages,
+    ) -> f64 {
+        if implicit {
+            self.implicit_step(level, from, to, stages)
+        } else {
+            self.step(level, from, to, stages)
+        }
+    }
+
+    /// How much a disturbance of the rate would decay in a step by the damping of the force, as an
+    /// exponent.
+    fn stiffness(&self, level: &Level, from: &Motion) -> f64 {
+        let [_, by_rate] = self.slopes(from.branch, from.gap, from.rate);
+        -by_rate * self.mobility * level.length
+    }
+
+    /// As [`step`](Self::step), with the two forces of [`ImplicitLevel`] by Newton's method; infinite
+    /// where that does not converge.
+    fn implicit_step(
+        &self,
+        level: &Level,
+        from: &Motion,
+        to: &mut Motion,
+        stages: &mut Stages,
+    ) -> f64 {
+        let constant = self.system.gap_constant;
+        // Gap and rate at a third, in the middle and at the end without the force.
+        let mut places = [[constant, 0.0]; 3];
+        let tones = self.system.drive().tones.iter().zip(&self.system.gap_tones);
+        for (k, (tone, z)) in tones.enumerate() {
+            let turned = |[c, s]: [f64; 2], [turn_c, turn_s]: [f64; 2]| {
+                [c * turn_c - s * turn_s, c * turn_s + s * turn_c]
+            };
+            let from = from.phasors[k];
+            let middle = turned(from, level.turns[k]);
+            let end = turned(middle, level.turns[k]);
+            for (place, [c, s]) in
+                places
+                    .iter_mut()
+                    .zip([turned(from, level.third_turns[k]), middle, end])
+            {
+                place[0] += z.re * c - z.im * s;
+                place[1] -= tone.frequency * (z.re * s + z.im * c);
+            }
+            to.phasors[k] = end;
+        }
+        for (k, block) in level.blocks.iter().enumerate() {
+            let third = product(&level.implicit_blocks[k].third, from.modal[k]);
+            let half = product(&block.half, from.modal[k]);
+            let full = product(&block.half, half);
+            for (place, y) in places.iter_mut().zip([third, half, full]) {
+                place[0] += dot(self.readout[k], y);
+                place[1] += dot(self.rate_readout[k], y);
+            }
+            to.modal[k] = full;
+        }
+        let weights = &level.implicit.weights;
+        let at = |place: usize, forces: [f64; 2]| {
+            [0, 1].map(|i| {
+                places[place][i]
+                    + weights[place][0][i] * forces[0]
+                    + weights[place][1][i] * forces[1]
+            })
+        };
+        let unit = level.length * self.mobility;
+        let branch = from.branch;
+        // A force that would change the rate by more than the motion's own size does not last.
+        let lasts = CONVERGED * TOLERANCE * unit * from.force.abs() <= self.converged;
+        let mut forces = [if lasts { from.force } else { 0.0 }; 2];
+        let mut change = f64::INFINITY;
+        for _ in 0..MAX_ITERATIONS {
+            let [third, end] = [at(0, forces), at(2, forces)];
+            let residuals = [
+                self.force(branch, third[0], third[1]) - forces[0],
+                self.force(branch, end[0], end[1]) - forces[1],
+            ];
+            let slopes = [third, end].map(|[gap, rate]| self.slopes(branch, gap, rate));
+            // One minus the derivative of the forces by the forces.
+            let matrix = [0, 1]
+                .map(|i| [0, 1].map(|j| f64::from(i == j) - dot(slopes[i], weights[2 * i][j])));
+            let Some(step) = solve(&matrix, residuals) else {
+                return f64::INFINITY;
+            };
+            let before = change;
+            change = unit * step[0].abs().max(step[1].abs());
+            forces = [forces[0] + step[0], forces[1] + step[1]];
+            if change.is_nan() || change > 4.0 * before {
+                return f64::INFINITY;
+            }
+            if change <= self.converged {
+                break;
+            }
+        }
+        if change > self.converged {
+            return f64::INFINITY;
+        }
+        for (y, block) in to.modal.iter_mut().zip(&level.implicit_blocks) {
+            for i in 0..2 {
+                y[i] += block.weights[0][i] * forces[0] + block.weights[1][i] * forces[1];
+            }
+        }
+        let [third, middle, end] = [0, 1, 2].map(|place| at(place, forces));
+        (to.gap, to.rate) = (end[0], end[1]);
+        to.time = from.time + level.length;
+        to.branch = branch;
+        let mean = 0.75 * forces[0] + 0.25 * forces[1];
+        *stages = Stages {
+            gaps: [from.gap, third[0], middle[0], end[0]],
+            rates: [from.rate, third[1], middle[1], end[1]],
+            forces: [from.force, mean, mean, forces[1]],
+            implicit: true,
+        };
+        // What the line misses of the force at the start, as far as the damping leaves it.
+        let missed = from.force - 1.5 * forces[0] + 0.5 * forces[1];
+        let [_, by_rate] = self.slopes(branch, end[0], end[1]);
+        unit * missed.abs() / (6.0 * (1.0 + unit * by_rate.abs()))
+    }
+
     /// One step; returns the estimate of its error in the gap's rate.
     #[inline]
     fn step(&self, level: &Level, from: &Motion, to: &mut Motion, stages: &mut Stages) -> f64 {
-        let constant = self.system.gap_constant;
+        let constant = self.system.gap_constant + from.shift;
         let (mut mid, mut end) = ([constant, 0.0], [constant, 0.0]);
         let tones = self.system.drive().tones.iter().zip(&self.system.gap_tones);
         for (k, (tone, z)) in tones.enumerate() {
@@ -518,8 +742,56 @@ impl Tables {
             gaps: [from.gap, second[0], third[0], fourth[0]],
             rates: [from.rate, second[1], third[1], fourth[1]],
             forces: [k1, k2, k3, k4],
+            implicit: false,
         };
         level.length * self.mobility * ((k1 - k2 - k3 + k4).abs() + (k2 - k3).abs()) / 6.0
+    }
+
+    /// Whether tip and sample touch.
+    fn touch(&self, motion: &Motion) -> bool {
+        let law = self.system.law();
+        if self.by_lookup {
+            law.touches(law.branch_at(motion.gap, motion.rate))
+        } else {
+            self.touches[motion.branch]
+        }
+    }
+
+    /// Adds a completed step to the integrals of the force.
+    fn add_force(
+        &self,
+        sums: &mut ForceSums,
+        omega: f64,
+        length: f64,
+        from: &Motion,
+        to: &Motion,
+        stages: &Stages,
+    ) {
+        let [k1, k2, k3, k4] = stages.forces;
+        let [_, r2, r3, _] = stages.rates;
+        sums.add(
+            &ParabolicStep {
+                length,
+                forces: [k1, 0.5 * (k2 + k3), k4],
+                rates: [from.rate, 0.5 * (r2 + r3), to.rate],
+                phasor: from.phasors.first().copied().unwrap_or([1.0, 0.0]),
+                touches: self.touch(from),
+            },
+            omega,
+        );
+        if from.rate < 0.0 && to.rate > 0.0 {
+            // The force at the least gap, with the gap as a cubic between start and end.
+            let stretch = Stretch {
+                start: 0.0,
+                length,
+                values: [from.gap, to.gap],
+                slopes: [from.rate, to.rate],
+            };
+            if let Some(x) = stretch.minimum() {
+                let peak = self.force(from.branch, stretch.at(x), 0.0);
+                sums.peak = sums.peak.max(peak);
+            }
+        }
     }
 
     /// Carries derivatives of the modal coordinates along the step with these stages to
@@ -551,6 +823,10 @@ impl Tables {
                 }
             }
         }
+        if stages.implicit {
+            self.carry_implicitly(level, [slopes[1], slopes[3]], columns);
+            return;
+        }
         for column in columns.chunks_exact_mut(level.blocks.len()) {
             let (mut start, mut mid, mut end) = ([0.0; 2], [0.0; 2], [0.0; 2]);
             for (k, (y, block)) in column.iter_mut().zip(&level.blocks).enumerate() {
@@ -576,6 +852,33 @@ impl Tables {
                     y[i] += block.weights[0][i] * k1
                         + block.weights[1][i] * (k2 + k3)
                         + block.weights[2][i] * k4;
+                }
+            }
+        }
+    }
+
+    /// [`carry`](Self::carry) over an implicit step with these slopes at its two forces.
+    fn carry_implicitly(&self, level: &Level, slopes: [[f64; 2]; 2], columns: &mut [[f64; 2]]) {
+        let weights = &level.implicit.weights;
+        let matrix =
+            [0, 1].map(|i| [0, 1].map(|j| f64::from(i == j) - dot(slopes[i], weights[2 * i][j])));
+        for column in columns.chunks_exact_mut(level.blocks.len()) {
+            let (mut third, mut end) = ([0.0; 2], [0.0; 2]);
+            for (k, y) in column.iter_mut().enumerate() {
+                let readouts = [self.readout[k], self.rate_readout[k]];
+                let part = product(&level.implicit_blocks[k].third, *y);
+                let half = &level.blocks[k].half;
+                *y = product(half, product(half, *y));
+                for i in 0..2 {
+                    third[i] += dot(readouts[i], part);
+                    end[i] += dot(readouts[i], *y);
+                }
+            }
+            let free = [dot(slopes[0], third), dot(slopes[1], end)];
+            let forces = solve(&matrix, free).unwrap_or_default();
+            for (y, block) in column.iter_mut().zip(&level.implicit_blocks) {
+                for i in 0..2 {
+                    y[i] += block.weights[0][i] * forces[0] + block.weights[1][i] * forces[1];
                 }
             }
         }
@@ -624,6 +927,13 @@ impl Tables {
             .map(|&k| 2.0 * norm(self.readout[k]) * norm(motion.modal[k]))
             .sum()
     }
+}
+
+/// The solution of two linear equations, if there is one.
+fn solve([[a, b], [c, d]]: &[[f64; 2]; 2], [x, y]: [f64; 2]) -> Option<[f64; 2]> {
+    let determinant = a * d - b * c;
+    let solution = [(d * x - b * y) / determinant, (a * y - c * x) / determinant];
+    solution.iter().all(|v| v.is_finite()).then_some(solution)
 }
 
 /// A stretch of a step between two points where gap and rate are known.
@@ -705,6 +1015,7 @@ impl Coarse {
             branch: 0,
             modal: vec![[0.0; 2]; tables.source.len()],
             phasors: vec![[1.0, 0.0]; system.drive().tones.len()],
+            shift: 0.0,
             gap: 0.0,
             rate: 0.0,
             force: 0.0,
@@ -716,6 +1027,7 @@ impl Coarse {
             stages: Stages::default(),
             columns: Vec::new(),
             size: 1.0,
+            sums: None,
             statistics: Statistics::default(),
         };
         Ok(Self { tables, work })
@@ -724,6 +1036,11 @@ impl Coarse {
     /// What the runs so far have cost.
     pub fn statistics(&self) -> Statistics {
         self.work.statistics
+    }
+
+    /// Steps tried in the runs so far.
+    pub fn cost(&self) -> u64 {
+        self.work.statistics.steps + self.work.statistics.refused
     }
 
     /// Replaces `state` at drive phase 0 by the state so many periods later and returns the
@@ -746,6 +1063,30 @@ impl Coarse {
             work.period(tables)?;
         }
         Ok(work.end(tables, state))
+    }
+
+    /// As [`Coarse::run_periods`] over one period with `shift` added to the gap of the system; sums
+    /// the force, with its component at the angular frequency `omega`.
+    ///
+    /// # Errors
+    /// As [`Coarse::run_periods`].
+    pub fn run_with_force_sums(
+        &mut self,
+        state: &mut [f64],
+        branch: Option<usize>,
+        shift: f64,
+        omega: f64,
+    ) -> Result<(usize, ForceSums), VolterraError> {
+        let Self { tables, work } = self;
+        work.columns.clear();
+        (work.now.shift, work.next.shift) = (shift, shift);
+        work.sums = Some((ForceSums::default(), omega));
+        let result = work.begin(tables, state, branch);
+        let result = result.and_then(|()| work.period(tables));
+        (work.now.shift, work.next.shift) = (0.0, 0.0);
+        let (sums, _) = work.sums.take().unwrap_or_default();
+        result?;
+        Ok((work.end(tables, state), sums))
     }
 
     /// As [`Coarse::run_periods`] over one period, with the Jacobian (`n × n`) by the state, from
@@ -850,7 +1191,8 @@ impl Work {
         for (y, r) in now.modal.iter().zip(&tables.readout) {
             amplitude += (dot(*y, *y) * dot(*r, *r)).sqrt();
         }
-        let size = (SWING * amplitude).max(tables.system.drive().offset.abs());
+        let offset = tables.system.drive().offset + now.shift;
+        let size = (SWING * amplitude).max(offset.abs());
         self.size = if size > 0.0 { size } else { 1.0 };
     }
 
@@ -884,10 +1226,16 @@ impl Work {
         let mut steep = false;
         // After a switch the new branch may end at once.
         let mut fresh = true;
+        let mut implicit = false;
+        let rate_dependent = tables.system.law().depends_on_rate();
         let mut tried = 0;
         while end - self.now.time > 1e-13 * end {
-            if tried % 256 == 0 && tables.system.cancel().is_cancelled() {
-                return Err(VolterraError::Cancelled);
+            if tried % POLL == 0 {
+                let cancel = tables.system.cancel();
+                cancel.spend(POLL.min(tried));
+                if cancel.is_cancelled() {
+                    return Err(VolterraError::Cancelled);
+                }
             }
             tried += 1;
             if tried > tables.max_steps {
@@ -903,13 +1251,17 @@ impl Work {
                 let tabulated = tables.levels[l].length < rest;
                 if !tabulated {
                     self.part.set(&tables.system, &tables.readouts(), rest);
+                    if implicit {
+                        self.part.set_implicit(&tables.system, &tables.readouts());
+                    }
                 }
                 let level = if tabulated {
                     &tables.levels[l]
                 } else {
                     &self.part
                 };
-                let error = tables.step(level, &self.now, &mut self.next, &mut self.stages);
+                let error =
+                    tables.step_by(implicit, level, &self.now, &mut self.next, &mut self.stages);
                 self.statistics.evaluations += 3;
                 let mut refused = error > allowed || error.is_nan();
                 if !refused {
@@ -927,6 +1279,15 @@ impl Work {
                         Search::None => {}
                     }
                 }
+                // A damping that is fast for the step makes it implicit.
+                if rate_dependent && (refused || implicit) {
+                    let stiff = tables.stiffness(level, &self.now) > STIFF;
+                    if refused && stiff && !implicit {
+                        implicit = true;
+                        continue;
+                    }
+                    implicit = stiff;
+                }
                 if refused && l + 1 < LEVELS {
                     l += 1;
                     while !tabulated && l + 1 < LEVELS && tables.levels[l].length >= rest {
@@ -935,11 +1296,28 @@ impl Work {
                     self.statistics.refused += 1;
                     continue;
                 }
+                if error.is_infinite() {
+                    return Err(VolterraError::Uncertified {
+                        time: self.now.time,
+                        gap: self.now.gap,
+                        reason: Refusal::Unresolved,
+                    });
+                }
                 if fall.is_none() {
                     if !self.columns.is_empty() {
                         let to = steep.then_some(self.next.gap);
                         let branch = self.now.branch;
                         tables.carry(level, branch, &self.stages, to, &mut self.columns);
+                    }
+                    if let Some((sums, omega)) = &mut self.sums {
+                        tables.add_force(
+                            sums,
+                            *omega,
+                            level.length,
+                            &self.now,
+                            &self.next,
+                            &self.stages,
+                        );
                     }
                     std::mem::swap(&mut self.now, &mut self.next);
                     self.now.force = tables.force(self.now.branch, self.now.gap, self.now.rate);
@@ -953,7 +1331,7 @@ impl Work {
                 }
             }
             let Some(fall) = fall else { continue };
-            if !self.switch(tables, fall, steep)? {
+            if !self.switch(tables, fall, steep, implicit)? {
                 steep = false;
                 continue;
             }
@@ -971,6 +1349,7 @@ impl Work {
                 });
             }
         }
+        tables.system.cancel().spend((tried + POLL - 1) % POLL + 1);
         let y = self.now.modal.iter().flatten();
         if y.chain([&self.now.force]).any(|y| !y.is_finite()) {
             return Err(VolterraError::Diverged { time: end });
@@ -996,7 +1375,13 @@ impl Work {
     /// Goes to where the guard of `fall` has just fallen, on partial steps, and switches.
     /// Returns whether it has switched: where the guard does not fall after all, the motion
     /// only goes on to the end of the search.
-    fn switch(&mut self, tables: &Tables, fall: Fall, steep: bool) -> Result<bool, VolterraError> {
+    fn switch(
+        &mut self,
+        tables: &Tables,
+        fall: Fall,
+        steep: bool,
+        implicit: bool,
+    ) -> Result<bool, VolterraError> {
         let exit = fall.exit.exit;
         let beyond = exit_tolerance(tables, &fall.exit, &self.now, self.size);
         let mut fell = true;
@@ -1008,7 +1393,11 @@ impl Work {
             let mut time = fall.time;
             for count in 0..MAX_BISECTIONS {
                 self.part.set(&tables.system, &tables.readouts(), time);
-                tables.step(&self.part, &self.now, &mut self.next, &mut self.stages);
+                if implicit {
+                    self.part.set_implicit(&tables.system, &tables.readouts());
+                }
+                let (part, stages) = (&self.part, &mut self.stages);
+                tables.step_by(implicit, part, &self.now, &mut self.next, stages);
                 self.statistics.evaluations += 3;
                 let found = value(&self.next);
                 fell = found <= 0.5 * beyond;
@@ -1048,6 +1437,10 @@ impl Work {
                 let steep = steep || exit.before == Approach::Half;
                 let (to, branch) = (steep.then_some(self.next.gap), self.now.branch);
                 tables.carry(&self.part, branch, &self.stages, to, &mut self.columns);
+            }
+            if let Some((sums, omega)) = &mut self.sums {
+                let length = self.part.length;
+                tables.add_force(sums, *omega, length, &self.now, &self.next, &self.stages);
             }
             std::mem::swap(&mut self.now, &mut self.next);
             self.statistics.steps += 1;

@@ -13,6 +13,8 @@ use std::sync::Arc;
 
 /// Switches at one instant after which the law is reported to switch endlessly.
 const MOST_SWITCHES_AT_ONCE: usize = 64;
+/// What a step costs, in steps of the approximate flow.
+const STEP_COST: u64 = 100;
 /// The first step of a run: a quarter of the longest.
 const FIRST_INDEX: usize = 4;
 /// A guard that is not certainly positive must be resolved to this fraction of its size.
@@ -92,7 +94,7 @@ pub struct Flow {
 }
 
 impl Clone for Flow {
-    /// With a system of its own: threads that counted their use of one at every period would wait for
+    /// With a separate system: threads that counted references to one at every period would wait for
     /// each other.
     fn clone(&self) -> Self {
         Self {
@@ -180,9 +182,26 @@ impl Flow {
         &self.system
     }
 
+    /// The system, to change its offset; a copy where others share it. Start the motion anew
+    /// afterwards.
+    pub fn system_mut(&mut self) -> &mut System {
+        Arc::make_mut(&mut self.system)
+    }
+
     /// What the runs so far have cost.
     pub fn statistics(&self) -> Statistics {
         self.solver.statistics
+    }
+
+    /// Cost of the runs so far, in steps of the approximate flow.
+    pub fn cost(&self) -> u64 {
+        let statistics = self.solver.statistics;
+        STEP_COST * (statistics.steps + statistics.refused)
+    }
+
+    /// Adds the cost of work that a clone did.
+    pub fn add_cost(&mut self, cost: u64) {
+        self.solver.statistics.steps += cost / STEP_COST;
     }
 
     /// The time reached.
@@ -284,6 +303,7 @@ impl Flow {
                 self.commit_pending(&system, end, observer);
                 return Ok(());
             }
+            system.cancel().spend(STEP_COST);
             if system.cancel().is_cancelled() {
                 return Err(VolterraError::Cancelled);
             }

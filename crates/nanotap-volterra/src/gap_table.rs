@@ -1,18 +1,21 @@
-//! Forces tabulated in the gap, where a law is costly to evaluate and some 1e-9 of the force will
-//! do.
+//! Forces tabulated in the gap, where a law is costly to evaluate and some 1e-7 of the force is
+//! accurate enough.
 
-use crate::law::{Approach, Guard};
+use crate::law::{Approach, Exit, Guard};
 use crate::system::System;
 
 /// Intervals of a table.
 const INTERVALS: usize = 2048;
 /// Laws of more branches are not tabulated.
 const MAX_BRANCHES: usize = 64;
+/// Places at which a table is compared with the law, and their allowed relative difference.
+const CHECKS: usize = 64;
+const ACCURACY: f64 = 1e-6;
 /// How far a table reaches, as a part of the size of gaps and amplitudes.
 const REACH: f64 = 2.0;
 
 /// The force on one branch over `√|level − gap|`, in which it is analytic up to the level at
-/// which the branch ends.
+/// which the branch ends. A force that is affine in the gap's rate has a second table.
 #[derive(Clone, Debug)]
 struct Curve {
     level: f64,
@@ -26,7 +29,8 @@ struct Curve {
     by_rate: Vec<f64>,
 }
 
-/// The force of a law, tabulated on the branches where the law solves an equation for it.
+/// The force of a law, tabulated on the branches where the law solves an equation for it or has
+/// several terms.
 #[derive(Clone, Debug)]
 pub(crate) struct GapTable {
     curves: Vec<Option<Curve>>,
@@ -53,15 +57,19 @@ impl GapTable {
 }
 
 impl Curve {
-    /// Of a branch that ends where its slope is infinite.
+    /// Of a branch that ends where its slope is infinite, or at a gap under a law of several terms.
     fn new(system: &System, branch: usize, reach: f64) -> Option<Self> {
-        let mut exits = system.exits(branch).iter();
-        let (level, side) = exits.find_map(|exit| match exit.guard {
-            _ if exit.before != Approach::Half => None,
+        let law = system.law();
+        let end = |exit: &Exit| match exit.guard {
             Guard::Falls(level) => Some((level, 1.0)),
             Guard::Rises(level) => Some((level, -1.0)),
             Guard::Turns | Guard::Own(_) => None,
-        })?;
+        };
+        let exits = || system.exits(branch).iter();
+        let mut steep = exits().filter(|exit| exit.before == Approach::Half);
+        let (level, side) = steep
+            .find_map(end)
+            .or_else(|| exits().find_map(end).filter(|_| law.has_terms()))?;
         // No further than another end of the branch.
         let ends = system.exits(branch).iter();
         let reach = ends.fold(reach, |reach, exit| match exit.guard {
@@ -71,7 +79,6 @@ impl Curve {
             _ => reach,
         });
         let density = INTERVALS as f64 / reach.sqrt();
-        let law = system.law();
         let at = |k: usize, rate: f64| {
             let root = k as f64 / density;
             law.value(branch, level + side * root * root, rate)
@@ -104,7 +111,32 @@ impl Curve {
             },
         };
         let mut all = curve.values.iter().chain(&curve.by_rate);
-        all.all(|v| v.is_finite()).then_some(curve)
+        let finite = all.all(|v| v.is_finite());
+        (finite && curve.agrees_with(|gap, rate| law.value(branch, gap, rate))).then_some(curve)
+    }
+
+    /// Whether it is accurate between its points.
+    fn agrees_with(&self, force: impl Fn(f64, f64) -> f64) -> bool {
+        let size = |values: &[f64]| values.iter().fold(0.0, |m: f64, v| m.max(v.abs()));
+        let sizes = [size(&self.values), size(&self.by_rate)];
+        (1..CHECKS).all(|check| {
+            let k = check * INTERVALS / CHECKS;
+            let root = (k as f64 + 0.5) / self.density;
+            let gap = self.level + self.side * root * root;
+            let rate = if sizes[1] > 0.0 {
+                sizes[0] / sizes[1]
+            } else {
+                0.0
+            };
+            let [found, expected] = [self.at(gap, rate), Some(force(gap, rate))];
+            let near = |k: usize| {
+                self.values[k].abs() + rate * self.by_rate.get(k).map_or(0.0, |v| v.abs())
+            };
+            let local = near(k).max(near(k + 1));
+            found
+                .zip(expected)
+                .is_some_and(|(a, b)| (a - b).abs() <= ACCURACY * local.max(1e-6 * sizes[0]))
+        })
     }
 
     /// The cubics through the four nearest values; `None` outside the table.

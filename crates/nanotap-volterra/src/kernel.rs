@@ -650,8 +650,8 @@ impl Kernel {
         terms.map(|(r, z)| z * *r).sum()
     }
 
-    /// Takes the modal coordinates `y` from one place of a step to the next of a trajectory's
-    /// quadrature.
+    /// Takes motions in modal coordinates, a column each, from one place of a step to the next of a
+    /// trajectory's quadrature; the coefficients of their forces are empty where these vanish.
     pub(crate) fn between(
         &self,
         map: TimeMap,
@@ -665,40 +665,11 @@ impl Kernel {
         }
         let panel = Panel::new(&self.short, map, h, [from, to]);
         let time = panel.end - map.time(h, from);
-        let force = panel.weighted(coefficients);
-        let silent = force.iter().all(|force| *force == 0.0);
-        for block in self.modes.blocks() {
-            let y = &mut y[block.start..block.start + block.size];
-            let e = block.exp(time);
-            let mut value = applied(e, y);
-            if !silent {
-                let [even, odd] = panel.response(block, &force);
-                let [x, y] = block.turn(even, odd, self.source_of(block));
-                value[0] += x;
-                value[1] += y;
-            }
-            y.copy_from_slice(&value[..block.size]);
+        let columns = coefficients.chunks_exact(self.nodes);
+        let mut forces: Vec<_> = columns.map(|column| panel.weighted(column)).collect();
+        if forces.iter().flatten().all(|force| *force == 0.0) {
+            forces.clear();
         }
-    }
-
-    /// The same of many motions with their coefficients, a column each.
-    pub(crate) fn between_all(
-        &self,
-        map: TimeMap,
-        h: f64,
-        [from, to]: [f64; 2],
-        y: &mut [f64],
-        coefficients: &[f64],
-    ) {
-        if from == to {
-            return;
-        }
-        let panel = Panel::new(&self.short, map, h, [from, to]);
-        let time = panel.end - map.time(h, from);
-        let forces: Vec<[f64; SHORT_POINTS]> = coefficients
-            .chunks_exact(self.nodes)
-            .map(|column| panel.weighted(column))
-            .collect();
         for block in self.modes.blocks() {
             let e = block.exp(time);
             let (even, odd) = if forces.is_empty() {

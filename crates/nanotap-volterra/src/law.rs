@@ -103,6 +103,11 @@ pub trait ForceLaw: Debug + Send + Sync {
         self.force(branch, gap, rate).value
     }
 
+    /// Whether the force is a sum of several, so that a table in the gap takes less time.
+    fn has_terms(&self) -> bool {
+        false
+    }
+
     /// Whether the force depends on the gap's rate.
     fn depends_on_rate(&self) -> bool {
         true

@@ -106,7 +106,6 @@
 
 pub mod averaging;
 pub mod coarse;
-pub mod dual;
 pub mod error;
 pub mod flow;
 pub mod kernel;
@@ -119,6 +118,7 @@ pub mod trajectory;
 pub mod variation;
 
 mod bracket;
+mod force_sums;
 mod gap_table;
 mod linear;
 mod quadrature;
@@ -130,6 +130,7 @@ pub type Complex = nalgebra::Complex<f64>;
 pub use coarse::Coarse;
 pub use error::{Refusal, VolterraError};
 pub use flow::{Flow, Switch};
+pub use force_sums::ForceSums;
 pub use kernel::Kernel;
 pub use law::{Approach, Exit, Force, ForceLaw, Guard, Remark};
 pub use modes::Modes;

@@ -37,7 +37,7 @@ pub struct Drive {
 /// How well steps are resolved.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Options {
-    /// How much the error of one step may move the gap. Rounding sets a floor of its own.
+    /// How much the error of one step may move the gap. Rounding sets a separate floor.
     pub tolerance: f64,
     /// The largest number of steps of one run.
     pub max_steps: usize,
@@ -70,6 +70,8 @@ pub struct System {
     /// Complex amplitudes of the gap's forced part.
     pub(crate) gap_tones: Vec<Complex>,
     pub(crate) gap_constant: f64,
+    /// The same without the offset.
+    forced_gap: f64,
     /// Sizes of the drive's part in the gap and in its rate.
     pub(crate) gap_sizes: [f64; 2],
     /// Whether a step needs the gap's rate: the law or a guard does.
@@ -183,14 +185,10 @@ impl System {
                 .iter()
                 .flatten()
                 .any(|exit| matches!(exit.guard, Guard::Turns | Guard::Own(_)));
-        let gap_constant = drive.offset
-            + kernel
-                .readout
-                .iter()
-                .zip(response.constant.iter())
-                .map(|(r, y)| r * y)
-                .sum::<f64>();
+        let pairs = kernel.readout.iter().zip(response.constant.iter());
+        let forced_gap = pairs.map(|(r, y)| r * y).sum::<f64>();
         Ok(Self {
+            gap_constant: drive.offset + forced_gap,
             vanishes: (0..branches).map(|b| law.vanishes(b)).collect(),
             forced: response.to_state(&kernel),
             exits,
@@ -199,7 +197,7 @@ impl System {
             options,
             response,
             gap_tones,
-            gap_constant,
+            forced_gap,
             gap_sizes,
             needs_rate,
             phasors: Arc::new(std::array::from_fn(|_| {
@@ -227,13 +225,22 @@ impl System {
     /// # Errors
     /// When the offset is not finite.
     pub fn with_offset(&self, offset: f64) -> Result<Self, VolterraError> {
+        let mut system = self.clone();
+        system.set_offset(offset)?;
+        Ok(system)
+    }
+
+    /// Changes the offset of the gap; allocates nothing.
+    ///
+    /// # Errors
+    /// When the offset is not finite.
+    pub fn set_offset(&mut self, offset: f64) -> Result<(), VolterraError> {
         if !offset.is_finite() {
             return Err(not_finite("the offset of the gap", offset));
         }
-        let mut system = self.clone();
-        system.gap_constant += offset - self.drive.offset;
-        system.drive.offset = offset;
-        Ok(system)
+        self.gap_constant = offset + self.forced_gap;
+        self.drive.offset = offset;
+        Ok(())
     }
 
     /// Dimension of the state.

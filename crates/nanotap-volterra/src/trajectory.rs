@@ -11,7 +11,7 @@ use nalgebra::{DVector, RowDVector};
 use std::sync::Arc;
 
 /// Points of the Gauss–Legendre rule of one panel of an integral.
-pub(crate) const POINTS: usize = 24;
+const POINTS: usize = 24;
 /// How far the fastest mode may turn within a panel.
 const REACH: f64 = 6.0;
 /// By how much the phase of a factor may turn in a panel: Gauss's rule of [`POINTS`] points is
@@ -339,23 +339,12 @@ impl Trajectory {
 
     /// The same, dense enough for a factor that oscillates with the angular frequency `omega`.
     pub fn nodes_resolving(&self, omega: f64) -> Vec<Node> {
-        let (places, weights) = gauss_legendre(POINTS);
         let mut all = Vec::new();
         for (index, piece) in self.pieces.iter().enumerate() {
-            let panels = self.panels(piece, omega);
-            let width = piece.end / panels as f64;
-            let inner = (0..panels).flat_map(|panel| {
-                let nodes = places.iter().zip(&weights);
-                nodes.map(move |(x, w)| (width * (panel as f64 + x), w * width))
-            });
             let slope = piece.force_slope();
             let mut modal = piece.modal.clone();
             let mut last = 0.0;
-            for (u, weight) in [(0.0, 0.0)]
-                .into_iter()
-                .chain(inner)
-                .chain([(piece.end, 0.0)])
-            {
+            for (u, weight) in self.places(piece, omega) {
                 self.system.kernel().between(
                     piece.map,
                     piece.length,
@@ -419,16 +408,16 @@ impl Trajectory {
         self.integrate(1, |s, out| out[0] = s.force * s.rate)[0]
     }
 
-    /// The fraction of time spent where `inside` says.
+    /// The time spent on the branches that `inside` accepts.
+    pub fn time_on(&self, inside: impl Fn(usize) -> bool) -> f64 {
+        let stretches = self.stretches().filter(|s| inside(s.branch));
+        stretches.map(|s| s.length).sum()
+    }
+
+    /// The same as a fraction of the span.
     pub fn fraction(&self, inside: impl Fn(usize) -> bool) -> f64 {
         let (start, end) = self.span();
-        let time: f64 = self
-            .pieces
-            .iter()
-            .filter(|p| inside(p.branch))
-            .map(|p| p.end_time() - p.start)
-            .sum();
-        time / (end - start)
+        self.time_on(inside) / (end - start)
     }
 
     /// The local extrema of an output inside the span, in order.
@@ -521,7 +510,10 @@ impl Trajectory {
         }
     }
 
-    pub(crate) fn panels(&self, piece: &Piece, omega: f64) -> usize {
+    /// The places `u` of a quadrature of a piece, with their weights by `u`, and its ends with weight
+    /// 0, in order: dense enough for a factor that oscillates with the angular frequency `omega`.
+    pub(crate) fn places(&self, piece: &Piece, omega: f64) -> Vec<(f64, f64)> {
+        let (places, weights) = gauss_legendre(POINTS);
         let fastest = self
             .fastest()
             .max((self.fastest() + omega) * REACH / OSCILLATION);
@@ -529,7 +521,15 @@ impl Trajectory {
             .map
             .rate(piece.length, 0.0)
             .max(piece.map.rate(piece.length, piece.end));
-        ((fastest * steepest * piece.end / REACH).ceil() as usize).max(1)
+        let panels = ((fastest * steepest * piece.end / REACH).ceil() as usize).max(1);
+        let width = piece.end / panels as f64;
+        let mut all = vec![(0.0, 0.0)];
+        for panel in 0..panels {
+            let nodes = places.iter().zip(&weights);
+            all.extend(nodes.map(|(x, w)| (width * (panel as f64 + x), w * width)));
+        }
+        all.push((piece.end, 0.0));
+        all
     }
 }
 

@@ -8,9 +8,9 @@
 
 use crate::flow::Flow;
 use crate::kernel::TimeMap;
-use crate::quadrature::{derivative, gauss_legendre, series};
+use crate::quadrature::{derivative, series};
 use crate::tangent::{Forced, Parameter, StepChange, Tangents};
-use crate::trajectory::{Node, Output, POINTS, Piece, Trajectory};
+use crate::trajectory::{Node, Output, Trajectory};
 use crate::{Complex, VolterraError};
 use nalgebra::{DMatrix, RowDVector};
 
@@ -62,7 +62,7 @@ pub struct Reading<'a> {
     pub shifts: &'a [f64],
     /// Of every output.
     pub values: &'a [f64],
-    /// Of every output its changes, one after the other.
+    /// The changes of every output, output by output.
     pub changes: &'a [f64],
 }
 
@@ -91,7 +91,7 @@ struct Reader {
     changes: Vec<ChangeReader>,
 }
 
-/// Its change with one column, beside what the change of the motion does.
+/// Its change with one column, apart from that through the motion.
 struct ChangeReader {
     row: Vec<f64>,
     constant: f64,
@@ -249,74 +249,17 @@ impl Variation {
     /// Visits the nodes of a quadrature of the whole motion and the ends of its steps, in order of
     /// time, dense enough for a factor that oscillates with the angular frequency `omega`.
     pub fn visit(&self, outputs: &[VariedOutput], omega: f64, mut take: impl FnMut(&Reading<'_>)) {
-        let system = &self.motion.system;
-        let (kernel, tones) = (system.kernel(), &system.drive().tones);
         let readers: Vec<Reader> = outputs.iter().map(|output| self.reader(output)).collect();
-        let (places, weights) = gauss_legendre(POINTS);
-        let n = kernel.nodes;
-        let mut phasors = vec![Complex::default(); tones.len()];
         let mut values = vec![0.0; outputs.len()];
         let mut changes = vec![0.0; outputs.len() * self.count];
         let mut widening = vec![0.0; self.count];
-        // The motion, then its changes.
-        let (mut modal, mut coefficients) = (Vec::new(), Vec::new());
         for (index, (piece, of)) in self.motion.pieces.iter().zip(&self.pieces).enumerate() {
-            let panels = self.motion.panels(piece, omega);
-            let width = piece.end / panels as f64;
-            let inner = (0..panels).flat_map(|panel| {
-                let nodes = places.iter().zip(&weights);
-                nodes.map(move |(x, w)| (width * (panel as f64 + x), w * width))
-            });
-            modal.clear();
-            modal.extend_from_slice(&piece.modal);
-            modal.extend_from_slice(&of.modal);
-            coefficients.clear();
-            if !of.coefficients.is_empty() {
-                coefficients.extend_from_slice(&piece.coefficients);
-                coefficients.extend_from_slice(&of.coefficients);
-            }
-            let mut last = 0.0;
-            for (u, weight) in [(0.0, 0.0)]
-                .into_iter()
-                .chain(inner)
-                .chain([(piece.end, 0.0)])
-            {
-                kernel.between_all(
-                    piece.map,
-                    piece.length,
-                    [last, u],
-                    &mut modal,
-                    &coefficients,
-                );
-                last = u;
-                let time = piece.start + piece.map.time(piece.length, u);
-                for (phasor, tone) in phasors.iter_mut().zip(tones) {
-                    let (sin, cos) = nanotap_arithmetic::sin_cos(tone.frequency * time);
-                    *phasor = Complex::new(cos, sin);
-                }
-                let dimension = kernel.modes().dimension();
-                let (own, varied) = modal.split_at(dimension);
+            let mut place = self.start_of(index);
+            for (u, weight) in self.motion.places(piece, omega) {
+                self.move_to(&mut place, u);
                 for (o, reader) in readers.iter().enumerate() {
-                    let force = series(&piece.coefficients, u);
-                    values[o] = reader.value(own, &phasors, force);
-                    for (column, of_column) in varied.chunks_exact(dimension).enumerate() {
-                        let by_force = of.coefficients.get(column * n..(column + 1) * n);
-                        let change = Motion {
-                            modal: own,
-                            force,
-                            change: of_column,
-                            by_force: if reader.force == 0.0 {
-                                0.0
-                            } else {
-                                by_force.map_or(0.0, |c| series(c, u))
-                            },
-                            time,
-                            shift: of.shifts[column],
-                        };
-                        let turns = tones.iter().map(|tone| tone.frequency);
-                        changes[o * self.count + column] =
-                            reader.change(column, &change, &phasors, turns);
-                    }
+                    let changes = &mut changes[o * self.count..(o + 1) * self.count];
+                    values[o] = self.read(reader, &place, changes);
                 }
                 let edge = if weight == 0.0 { Some(u != 0.0) } else { None };
                 for (column, wider) in widening.iter_mut().enumerate() {
@@ -327,7 +270,7 @@ impl Variation {
                     };
                 }
                 take(&Reading {
-                    time,
+                    time: place.time,
                     weight: weight * piece.map.rate(piece.length, u),
                     widening: &widening,
                     shifts: &of.shifts,
@@ -336,6 +279,74 @@ impl Variation {
                 });
             }
         }
+    }
+
+    /// The start of a step.
+    fn start_of(&self, index: usize) -> Place {
+        let (piece, of) = (&self.motion.pieces[index], &self.pieces[index]);
+        let coefficients = if of.coefficients.is_empty() {
+            Vec::new()
+        } else {
+            [&*piece.coefficients, &*of.coefficients].concat()
+        };
+        Place {
+            index,
+            u: 0.0,
+            time: piece.start,
+            phasors: Vec::new(),
+            modal: [&*piece.modal, &*of.modal].concat(),
+            coefficients,
+        }
+    }
+
+    /// Moves on to another place of the same step.
+    fn move_to(&self, place: &mut Place, u: f64) {
+        let (system, piece) = (&self.motion.system, &self.motion.pieces[place.index]);
+        let range = [place.u, u];
+        let Place {
+            modal,
+            coefficients,
+            ..
+        } = place;
+        let kernel = system.kernel();
+        kernel.between(piece.map, piece.length, range, modal, coefficients);
+        place.u = u;
+        place.time = piece.start + piece.map.time(piece.length, u);
+        let tones = system.drive().tones.iter();
+        place.phasors.clear();
+        place.phasors.extend(tones.map(|tone| {
+            let (sin, cos) = nanotap_arithmetic::sin_cos(tone.frequency * place.time);
+            Complex::new(cos, sin)
+        }));
+    }
+
+    /// The value of an output at a place; writes its change with every column.
+    fn read(&self, reader: &Reader, place: &Place, changes: &mut [f64]) -> f64 {
+        let (piece, of) = (&self.motion.pieces[place.index], &self.pieces[place.index]);
+        let kernel = self.motion.system.kernel();
+        let n = kernel.nodes;
+        let (own, varied) = place.modal.split_at(kernel.modes().dimension());
+        let force = series(&piece.coefficients, place.u);
+        let columns = varied.chunks_exact(own.len()).zip(changes);
+        for (column, (of_column, change)) in columns.enumerate() {
+            let by_force = of.coefficients.get(column * n..(column + 1) * n);
+            let motion = Motion {
+                modal: own,
+                force,
+                change: of_column,
+                by_force: if reader.force == 0.0 {
+                    0.0
+                } else {
+                    by_force.map_or(0.0, |c| series(c, place.u))
+                },
+                time: place.time,
+                shift: of.shifts[column],
+            };
+            let tones = self.motion.system.drive().tones.iter();
+            let turns = tones.map(|tone| tone.frequency);
+            *change = reader.change(column, &motion, &place.phasors, turns);
+        }
+        reader.value(own, &place.phasors, force)
     }
 
     /// The least and the largest value of an output over the run, ends included, with their
@@ -375,74 +386,39 @@ impl Variation {
 
     /// The change with every column of an output where it is extreme, or at an end of a step.
     fn changes_at(&self, reader: &Reader, index: usize, u: f64) -> Vec<f64> {
-        let (Some(piece), Some(of)) = (self.motion.pieces.get(index), self.pieces.get(index))
-        else {
-            return vec![f64::NAN; self.count];
+        let mut changes = vec![f64::NAN; self.count];
+        let Some(piece) = self.motion.pieces.get(index) else {
+            return changes;
         };
-        let system = &self.motion.system;
-        let (kernel, tones) = (system.kernel(), &system.drive().tones);
-        let (n, dimension) = (kernel.nodes, kernel.modes().dimension());
-        let time = piece.start + piece.map.time(piece.length, u);
-        let phasors: Vec<Complex> = tones
-            .iter()
-            .map(|tone| {
-                let (sin, cos) = nanotap_arithmetic::sin_cos(tone.frequency * time);
-                Complex::new(cos, sin)
-            })
-            .collect();
-        let silent = vec![0.0; n];
-        let at = |start: &[f64], coefficients: &[f64]| {
-            let mut modal = vec![0.0; dimension];
-            kernel.partial(piece.map, piece.length, u, start, coefficients, &mut modal);
-            modal
-        };
-        let own = at(&piece.modal, &piece.coefficients);
-        let force = series(&piece.coefficients, u);
+        let mut place = self.start_of(index);
+        let nodes = self.motion.places(piece, 0.0).into_iter();
+        for (node, _) in nodes.take_while(|(node, _)| *node < u).chain([(u, 0.0)]) {
+            self.move_to(&mut place, node);
+        }
+        self.read(reader, &place, &mut changes);
         let edge = if u == 0.0 {
             Some(false)
         } else {
             (u >= piece.end).then_some(true)
         };
-        let one = |column: usize| {
-            let coefficients = of
-                .coefficients
-                .get(column * n..(column + 1) * n)
-                .unwrap_or(&silent);
-            let start = &of.modal[column * dimension..(column + 1) * dimension];
-            let change = Motion {
-                modal: &own,
-                force,
-                change: &at(start, coefficients),
-                by_force: series(coefficients, u),
-                time,
-                shift: of.shifts[column],
-            };
-            let turns = tones.iter().map(|tone| tone.frequency);
-            let change = reader.change(column, &change, &phasors, turns);
+        for (column, change) in changes.iter_mut().enumerate() {
             // Between its ends a step has the extremum where the output does not change in time.
             let moved = edge.map_or(0.0, |end| self.edge(index, end, column));
-            if moved == 0.0 {
-                change
-            } else {
-                change + moved * self.rate(reader, piece, u, &own, &phasors)
+            if moved != 0.0 {
+                *change += moved * self.rate(reader, &place);
             }
-        };
-        (0..self.count).map(one).collect()
+        }
+        changes
     }
 
     /// How fast an output changes in time at an end of a step.
-    fn rate(
-        &self,
-        reader: &Reader,
-        piece: &Piece,
-        u: f64,
-        modal: &[f64],
-        phasors: &[Complex],
-    ) -> f64 {
-        let system = &self.motion.system;
+    fn rate(&self, reader: &Reader, place: &Place) -> f64 {
+        let (system, piece) = (&self.motion.system, &self.motion.pieces[place.index]);
+        let (u, modal) = (place.u, &place.modal[..system.dimension()]);
         let slope = Tangents::slope(system, modal, series(&piece.coefficients, u));
         let mut rate: f64 = reader.row.iter().zip(&slope).map(|(r, s)| r * s).sum();
-        for ((tone, z), phasor) in system.drive().tones.iter().zip(&reader.tones).zip(phasors) {
+        let tones = system.drive().tones.iter().zip(&reader.tones);
+        for ((tone, z), phasor) in tones.zip(&place.phasors) {
             rate -= tone.frequency * (z * phasor).im;
         }
         if reader.force != 0.0 {
@@ -462,6 +438,19 @@ impl Variation {
         }
         rate
     }
+}
+
+/// A place on a step, with the motion and its changes there.
+struct Place {
+    index: usize,
+    u: f64,
+    time: f64,
+    /// `e^{iωt}` of the drive's tones.
+    phasors: Vec<Complex>,
+    /// Modal coordinates of the motion, then of its changes.
+    modal: Vec<f64>,
+    /// Coefficients of the force, then of its changes; empty where the force vanishes.
+    coefficients: Vec<f64>,
 }
 
 /// A motion and one change of it at an instant.

@@ -1,4 +1,4 @@
-//! The approximate flow against the exact one.
+//! The approximate flow compared with the exact one.
 
 mod common;
 
@@ -25,7 +25,7 @@ impl Random {
         2.0 * (self.0 >> 11) as f64 / (1_u64 << 53) as f64 - 1.0
     }
 
-    /// A state in which every mode may bring the tip to the sample.
+    /// A state in which every mode may bring the tip into contact.
     fn state(&mut self, modes: usize) -> Vec<f64> {
         let size = |i: usize| {
             let order = 1.0 + (i % modes) as f64;
@@ -44,8 +44,8 @@ fn exact(flow: &mut Flow, x: &[f64], period: f64) -> Result<(Vec<f64>, usize), V
     Ok((end, flow.branch()))
 }
 
-/// The largest difference of two states, velocities divided by the modes' frequencies `(2k+1)²`
-/// (a bound of the beam's), as a part of the amplitude.
+/// The largest difference of two states, velocities divided by the modes' frequencies `(2k+1)²` (a
+/// bound of the beam's), relative to the amplitude.
 fn difference(a: &[f64], b: &[f64]) -> f64 {
     let modes = a.len() / 2;
     let weight = |i: usize| {
@@ -67,7 +67,7 @@ fn compare(system: &Arc<System>, name: &str, period: f64, states: usize) -> [f64
     let mut differences = Vec::new();
     for _ in 0..states {
         let mut x = random.state(modes);
-        // The exact flow refuses what begins deep inside the wall of Lennard-Jones.
+        // The exact flow refuses starts deep inside the repulsive wall of Lennard-Jones.
         let Ok((end, branch)) = exact(&mut flow, &x, period) else {
             assert_eq!(name, "lennard-jones");
             continue;
@@ -148,8 +148,8 @@ fn two_tones_and_a_shaken_base_are_followed() {
     );
 }
 
-/// By exact sensitivities, or where those of many modes under smooth forces are too coarse, by
-/// differences of the exact flow.
+/// From exact sensitivities, or from differences of the exact flow where those of many modes under
+/// smooth forces are too coarse.
 #[test]
 fn the_jacobian_is_that_of_the_exact_flow() {
     let x = [-7.0, 0.02, -7.0, 0.1];
@@ -190,7 +190,7 @@ fn the_jacobian_is_that_of_the_exact_flow() {
     }
 }
 
-/// The repulsive orbit of the example of the crate, attracting with a multiplier of 0.984.
+/// The repulsive orbit of the crate's example, stable with a multiplier of 0.984.
 #[test]
 fn ten_thousand_periods_stay_on_a_stable_orbit() {
     let lever = Lever {
@@ -217,7 +217,7 @@ fn ten_thousand_periods_stay_on_a_stable_orbit() {
 }
 
 #[test]
-fn what_cannot_be_followed_is_refused() {
+fn invalid_starts_and_steps_are_refused() {
     let system = Arc::new(beam(dmt(), 1, 1.0, 20.0, AMPLITUDE, 8.0, 20));
     assert!(matches!(
         Coarse::new(&system, 0.0),

@@ -37,7 +37,7 @@ fn of_every_law() {
         let base = Arc::new(system(law(index, None), zc));
         let mut flow = Flow::new(base.clone());
         flow.start(&x, 0.0).unwrap();
-        // The first parameters are those of the law itself, a sum's second law comes after.
+        // The first parameters are those of the law itself; those of a sum's second law follow.
         let count = TABLE[index].entry.parameters.len();
         let mut parameters = vec![Parameter::offset()];
         parameters.extend((0..count).map(|k| Parameter::of_law(&base, k)));
@@ -73,7 +73,7 @@ fn of_every_law() {
         compare("offset", exact, moved(h), moved(-h), h);
         for k in 0..count {
             let parameter = TABLE[index].entry.parameters[k].name;
-            // In a sum the two contacts would part.
+            // In a sum the two contacts would separate at different times.
             if parameter == "contact_distance" && base.law().parameters().len() > count {
                 continue;
             }
@@ -86,8 +86,8 @@ fn of_every_law() {
     assert!(failed.is_empty(), "{}", failed.join("\n"));
 }
 
-/// Numbers read off a run, in one order.
-fn read_off(system: System, x: &[f64]) -> Vec<f64> {
+/// Values measured in a run, in a fixed order.
+fn measured_values(system: System, x: &[f64]) -> Vec<f64> {
     let mut flow = Flow::new(Arc::new(system));
     flow.start(x, 0.0).unwrap();
     let motion = flow.record_until(TAU).unwrap();
@@ -112,7 +112,7 @@ fn force_output(dimension: usize) -> Output {
     }
 }
 
-/// The rate of the gap: of the beam of [`system`], whose speeds stand behind its deflections.
+/// The rate of the gap of the beam of [`system`], whose velocities follow its deflections.
 fn rate_output(gap: &Output) -> Output {
     let half = gap.row.len() / 2;
     let mut rate = Output::component(2 * half, 0);
@@ -123,7 +123,7 @@ fn rate_output(gap: &Output) -> Output {
     rate
 }
 
-/// The same with their changes, a column each.
+/// The same with derivatives, one column each.
 fn varied(
     variation: &Variation,
     changes: &[VariedOutput; 3],
@@ -178,10 +178,10 @@ fn varied(
     sums
 }
 
-/// Integrals, Fourier coefficients, extrema, times and speeds at switches, against differences of
-/// fourth order.
+/// Integrals, Fourier coefficients, extrema, times and speeds at switches, compared with
+/// differences of fourth order.
 #[test]
-fn of_what_is_read_off_under_every_law() {
+fn of_measured_values_under_every_law() {
     let x = [6.5, 0.02, 3.0, 0.1];
     let zc = 5.0;
     let mut failed = Vec::new();
@@ -222,7 +222,7 @@ fn of_what_is_read_off_under_every_law() {
             VariedOutput::fixed(rate_output(&gap)),
         ];
         let exact = varied(&variation, &outputs, columns);
-        let values = read_off(system(law(index, None), zc), &x);
+        let values = measured_values(system(law(index, None), zc), &x);
         for (number, (value, _)) in exact.iter().enumerate() {
             if (value - values[number]).abs() > 1e-10 * values[number].abs().max(1.0) {
                 failed.push(format!(
@@ -236,16 +236,16 @@ fn of_what_is_read_off_under_every_law() {
                 0..4 => {
                     let mut x = x;
                     x[column] += h;
-                    read_off(system(law(index, None), zc), &x)
+                    measured_values(system(law(index, None), zc), &x)
                 }
-                4 => read_off(system(law(index, None), zc + h), &x),
-                _ => read_off(system(law(index, Some((column - 5, h))), zc), &x),
+                4 => measured_values(system(law(index, None), zc + h), &x),
+                _ => measured_values(system(law(index, Some((column - 5, h))), zc), &x),
             };
             let h = if column < 5 {
                 2e-4
             } else {
                 let parameter = TABLE[index].entry.parameters[column - 5].name;
-                // In a sum the two contacts would part.
+                // In a sum the two contacts would separate at different times.
                 if parameter == "contact_distance" && !own {
                     continue;
                 }

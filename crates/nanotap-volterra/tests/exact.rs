@@ -1,4 +1,4 @@
-//! A spring and a damper in contact, against the engine that solves them in closed form.
+//! A spring-damper contact, compared with the engine that solves it in closed form.
 
 #![allow(
     clippy::disallowed_methods,

@@ -1,4 +1,4 @@
-//! What holds on every closed orbit, whatever the law.
+//! Invariants of closed orbits under every law.
 
 #![allow(
     clippy::disallowed_methods,
@@ -32,8 +32,8 @@ fn energy_balance_determinant_and_mean_force() {
             for _ in 0..60 {
                 map.advance(&mut state).unwrap();
             }
-            // A law with a memory need not be detached at drive phase zero; nor need the
-            // motion have settled on period one: then there is nothing to balance here.
+            // A law with memory need not be out of contact at drive phase zero, and the motion need
+            // not have period one: then there is nothing to balance.
             let Ok(orbit) = close_orbit(&mut map, &state, 1, &ShootingOptions::default()) else {
                 continue;
             };
@@ -41,8 +41,8 @@ fn energy_balance_determinant_and_mean_force() {
             map.flow.start(&orbit.states[0], 0.0).unwrap();
             let motion = map.flow.record_until(TAU).unwrap();
             let linear = beam_modes(modes, Q);
-            // Work of the drive, loss of the modes, work of the law, force and deflection of
-            // the modes at rest.
+            // Work of the drive, loss of the modes, work of the law; mean force and static
+            // deflection of the modes.
             let sums = motion.integrate(4, |s, out| {
                 out.fill(0.0);
                 for (n, (stiffness, damping, sign)) in linear.iter().enumerate() {
@@ -143,7 +143,7 @@ fn a_stored_energy_is_the_force_s_potential() {
 }
 
 #[test]
-fn what_must_not_be_added_is_refused() {
+fn laws_that_cannot_be_added_are_refused() {
     let pair = |first: &str, second: &str| {
         let terms = [first, second].map(|name| {
             let law = laws::law(name).unwrap();

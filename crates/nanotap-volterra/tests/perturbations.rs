@@ -1,5 +1,5 @@
-//! Perturbations of every mode under a force that never ceases: the motion is smooth and takes long
-//! steps, a perturbation of a fast mode is not.
+//! Perturbations of every mode under a permanent force: the motion is smooth and takes long steps,
+//! but a perturbation of a fast mode is not smooth.
 //!
 //! Where all modes have one damping γ and one modal mass, a conservative force makes the flow
 //! conformally symplectic, `JᵀSJ = e^{−γt} S` (R. McLachlan and M. Perlmutter, J. Geom. Phys. 39,
@@ -63,7 +63,7 @@ fn hertz(modulus: f64) -> Arc<dyn ForceLaw> {
     laws::build("hertz", &values).unwrap()
 }
 
-/// The largest entry of `JᵀSJ e^{γt} − S`, every mode in the scale in which it turns a circle.
+/// The largest entry of `JᵀSJ e^{γt} − S`, each mode scaled so that it moves on a circle.
 fn symplectic_error(system: &Arc<System>, start: &[f64], q: f64) -> f64 {
     let n = system.dimension() / 2;
     let mut flow = Flow::new(Arc::clone(system));
@@ -82,10 +82,10 @@ fn symplectic_error(system: &Arc<System>, start: &[f64], q: f64) -> f64 {
     (scaled.transpose() * &form * &scaled * (TAU / q).exp() - form).amax()
 }
 
-/// The orbit of a lever that never leaves the sample: it is smooth, no fast mode swings freely.
+/// The orbit of a lever in permanent contact: it is smooth, and no fast mode oscillates freely.
 fn steady(modulus: f64, n: usize, q: f64) -> PeriodicOrbit {
     let mut map = Strobe::new(uniform(hertz(modulus), n, 0.3, q, -60.0), TAU);
-    // Where lever and sample balance: a unit of force bends every mode by ±1/(k κ).
+    // Static equilibrium of lever and sample: a unit force bends every mode by ±1/(k κ).
     let own = beam_modes(n, q);
     let compliance: f64 = own.iter().map(|mode| 1.0 / (0.3 * mode.0)).sum();
     let law = hertz(modulus);
@@ -106,7 +106,7 @@ fn steady(modulus: f64, n: usize, q: f64) -> PeriodicOrbit {
 }
 
 #[test]
-fn a_conservative_force_that_never_ceases_is_conformally_symplectic() {
+fn a_permanent_conservative_force_is_conformally_symplectic() {
     for n in [1, 2, 3, 5, 10, 20] {
         for q in [2.0, 200.0, 1e5] {
             for modulus in [1e-3, 1.0] {
@@ -115,7 +115,7 @@ fn a_conservative_force_that_never_ceases_is_conformally_symplectic() {
                 let system = Arc::new(uniform(hertz(modulus), n, 0.3, q, -60.0));
                 let error = symplectic_error(&system, &orbit.states[0], q);
                 assert!(error < 1e-11, "{what}: {error:e}");
-                // All multipliers have one modulus.
+                // All multipliers have the same modulus.
                 for multiplier in &orbit.multipliers {
                     let modulus = multiplier.modulus() * (0.5 * TAU / q).exp();
                     assert!(
@@ -129,7 +129,7 @@ fn a_conservative_force_that_never_ceases_is_conformally_symplectic() {
 }
 
 #[test]
-fn so_is_tapping() {
+fn tapping_is_conformally_symplectic() {
     for n in [1, 3, 10] {
         let system = Arc::new(uniform(dmt(), n, 0.9, 50.0, 8.0));
         let mut start = vec![0.0; 2 * n];
@@ -139,7 +139,8 @@ fn so_is_tapping() {
     }
 }
 
-/// Against central differences of the flow, in the fast modes and by the distance.
+/// Compared with central differences of the flow, in the fast modes and with respect to the
+/// distance.
 #[test]
 fn derivatives_in_fast_modes_are_those_of_the_flow() {
     let (n, q) = (10, 200.0);

@@ -1,5 +1,5 @@
-//! Random levers, laws, sums of laws and starts, one to ten modes: the flow against an independent
-//! integrator of order 16 with events, its Jacobian against central differences.
+//! Random levers, laws, sums of laws and starts with one to ten modes: the flow compared with an
+//! independent integrator of order 16 with events, its Jacobian with central differences.
 
 #![allow(
     clippy::disallowed_methods,
@@ -28,7 +28,7 @@ fn law(random: &mut Random, of: &'static TableLaw) -> (&'static Entry, Arc<dyn F
     let mut parameters: Vec<f64> = Vec::new();
     for parameter in of.entry.parameters {
         let near = value(parameter.name) * 1.5_f64.powf(random.next());
-        // More work to part than what joining gave.
+        // Separation takes more work than the attraction gave.
         let near = match parameter.name {
             "work_of_retraction" => near + 0.01,
             "gap_factor" | "force_factor" => 1.0 + 0.3 * random.next(),
@@ -54,7 +54,7 @@ fn law(random: &mut Random, of: &'static TableLaw) -> (&'static Entry, Arc<dyn F
     (of.entry, built.unwrap())
 }
 
-/// A law, with an elastic contact where it has none, and sometimes a dissipation.
+/// A law, with an elastic contact if it has none, and sometimes with dissipation.
 fn sum(random: &mut Random, of: &'static TableLaw) -> (String, Arc<dyn ForceLaw>) {
     let mut terms = vec![law(random, of)];
     if !of.entry.parts.contains(&Part::Elasticity) {
@@ -82,8 +82,8 @@ impl Case {
     fn new(random: &mut Random, of: &'static TableLaw, modes: usize) -> Self {
         let (name, law) = sum(random, of);
         let mut x = vec![0.0; 2 * modes];
-        // The tip comes down from outside and swings through the surface: a start inside a hard
-        // contact is thrown out too fast.
+        // The tip enters from outside and swings through the surface: a start inside a hard contact
+        // would be ejected too fast.
         let swing = 7.0 + 2.0 * random.next();
         let part = 0.3 + 0.6 * random.next();
         x[0] = swing * part;
@@ -125,7 +125,7 @@ impl Case {
         )))
     }
 
-    /// The state after a period, and the switches on the way.
+    /// The state after a period, and the number of switches.
     fn end(&self, x: &[f64]) -> (Vec<f64>, u64) {
         let mut flow = self.flow();
         flow.start(x, 0.0).unwrap();
@@ -135,7 +135,7 @@ impl Case {
         (out, flow.statistics().switches)
     }
 
-    /// Velocities of high modes are large: each counts by the size of its mode's frequency.
+    /// Velocities of high modes are large: each is scaled by its mode's frequency.
     fn scaled(&self, x: &[f64]) -> Vec<f64> {
         let rates = beam_modes(self.modes, self.q);
         let rate = |k: usize| match k.checked_sub(self.modes) {
@@ -162,8 +162,8 @@ impl Case {
         pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
     }
 
-    /// The largest error of the Jacobian over its largest entry, both by the sizes of the modes'
-    /// frequencies; `None` where a touch begins or ends within the differences.
+    /// The largest error of the Jacobian over its largest entry, both scaled by the modes'
+    /// frequencies; `None` if a contact begins or ends within the differences.
     fn jacobian_error(&self) -> Option<f64> {
         let n = self.x.len();
         let (mut jacobian, mut none) = (DMatrix::zeros(n, n), DMatrix::zeros(n, 0));
@@ -175,7 +175,7 @@ impl Case {
         let unit = self.scaled(&vec![1.0; n]);
         let mut columns = Vec::new();
         for c in 0..n {
-            // As far as a nanometre in this direction takes the gap.
+            // The displacement in this direction that moves the gap by a nanometre.
             let h = 2e-6 / unit[c];
             let moved = |h: f64| {
                 let mut x = self.x.clone();
@@ -213,7 +213,7 @@ fn check(count: usize, mut random: Random) {
     assert_eq!(all.last().unwrap().entry, polyline::TABLE.entry);
     let (mut worst, mut worst_jacobian, mut touched, mut jacobians) = (0.0_f64, 0.0_f64, 0, 0);
     for k in 0..count {
-        // 7 and 3 have no factor with the numbers of laws and modes: all pairs come by.
+        // 7 and 3 have no common factor with the numbers of laws and modes: all pairs occur.
         let case = Case::new(&mut random, all[7 * k % all.len()], 1 + 3 * k % 10);
         let what = format!("case {k}: {}, {} modes", case.name, case.modes);
         let error = case.error();
@@ -234,13 +234,13 @@ fn check(count: usize, mut random: Random) {
 }
 
 #[test]
-fn a_dozen_agree_with_an_independent_integrator() {
+fn a_dozen_cases_agree_with_an_independent_integrator() {
     check(12, Random(20_260_201));
 }
 
 /// Over every law and every number of modes.
 #[test]
 #[ignore = "minutes; run it with --run-ignored only"]
-fn two_hundred_agree_with_an_independent_integrator() {
+fn two_hundred_cases_agree_with_an_independent_integrator() {
     check(200, Random::of_a_long_run(20_260_202));
 }

@@ -1,7 +1,7 @@
 //! The reference orbits of one lever under the laws of contact mechanics.
 //!
-//! The numbers were computed by an independent prototype whose orbits closed to 1e-14 nm and
-//! whose transients agreed with DOP853 to 2e-11 nm.
+//! The numbers are from an independent prototype whose orbits closed to 1e-14 nm and whose
+//! transients agreed with DOP853 to 2e-11 nm.
 
 #![allow(
     clippy::disallowed_methods,
@@ -128,7 +128,7 @@ fn hertz_contact() {
             33.6454686,
             0.031830273,
             0.154164520,
-            // The prototype gave −0.811134, read off its samples: a little too shallow.
+            // The prototype gave −0.811134 from its samples, slightly too shallow.
             -0.811166,
             -1.45658069,
         ),
@@ -208,9 +208,9 @@ fn dmt_with_van_der_waals() {
 
 #[test]
 fn the_repulsive_branch_ends_in_a_fold() {
-    // At the fold one multiplier is 1, so that det(DP − 1) vanishes: a secant in zc on it,
-    // with the orbit followed. It is reached as a square root, so the orbits are taken a
-    // little before it and the square of the determinant is extrapolated to zero.
+    // At the fold one multiplier is 1, so that det(DP − 1) vanishes: a secant iteration in zc along
+    // the orbit. The determinant behaves like a square root there, so orbits slightly before the
+    // fold are used and its square is extrapolated to zero.
     let law = dmt();
     let base = air(20.0, 18.0).system(law, NODES);
     let mut guess = {
@@ -292,14 +292,14 @@ fn the_frequency_shift_of_van_der_waals_attraction() {
     flow.start(&[-10.0, 0.0], 0.0).unwrap();
     let motion = flow.record_until(7.0).unwrap();
     let extrema = motion.extrema(&motion.gap_output());
-    // Half an oscillation lasts from turning point to turning point.
+    // Half an oscillation is the time from turning point to turning point.
     let outer = extrema.iter().find(|e| e.value > 10.0).unwrap();
     let shift = std::f64::consts::PI / outer.time - 1.0;
     digits(shift, -8.661882e-5, 1e-11, "frequency shift");
 }
 
-/// Where the tip just touches, period after period, every step is certified: of random starts
-/// on the lever with two stable motions none may end undecided.
+/// The tip just touches, period after period, and every step is certified: none of the random
+/// starts on the lever with two stable motions may remain undecided.
 #[test]
 fn slight_touches_are_followed() {
     let mut seed = 1_u64;

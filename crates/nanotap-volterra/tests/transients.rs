@@ -1,4 +1,4 @@
-//! Transients of every law against an independent integrator of order 16 with events.
+//! Transients under every law, compared with an independent integrator of order 16 with events.
 
 #![allow(
     clippy::disallowed_methods,
@@ -19,7 +19,7 @@ use random::Random;
 use std::f64::consts::TAU;
 use std::sync::Arc;
 
-/// The error after `periods` of both, and the switches seen by each.
+/// The error after `periods` periods, and the numbers of switches of both.
 fn compare(
     law: &Arc<dyn ForceLaw>,
     modes: usize,
@@ -43,7 +43,7 @@ fn compare(
     };
     let mut theirs = x.to_vec();
     let switches = plain.run(&mut theirs, periods * TAU);
-    // Velocities of high modes are large: each by the size of its own mode's frequency.
+    // Velocities of high modes are large: each is scaled by its mode's frequency.
     let error = (0..modes)
         .map(|n| {
             let rate = plain.modes[n].0.sqrt();
@@ -75,8 +75,8 @@ fn of_random_starts_under_every_law() {
         for modes in [1, 2, 3] {
             for _ in 0..3 {
                 let x = start(&mut random, modes);
-                // From well outside: a start inside a hard contact is thrown out too fast
-                // to mean anything.
+                // From well outside: a start inside a hard contact would be ejected too fast to be
+                // meaningful.
                 let zc = 6.0 + 2.0 * random.next() + (-x[0]).max(0.0);
                 let (error, switches) = compare(&law, modes, &x, zc, 1.0);
                 let name = TABLE[index].entry.name;
@@ -104,7 +104,7 @@ fn of_ten_and_twenty_modes() {
         let law = table_law(index, None);
         for modes in [10, 20] {
             let mut x = start(&mut random, modes);
-            // Into contact and out again.
+            // Into contact and out of it.
             (x[0], x[modes]) = (7.0, 2.0);
             let (error, switches) = compare(&law, modes, &x, 5.0, 0.9);
             assert_eq!(switches[0], switches[1], "{name}, {modes} modes");
@@ -137,7 +137,8 @@ fn a_polyline_converges_to_its_law_with_the_square_of_the_spacing() {
     let exact = end(smooth.clone());
     let mut errors = Vec::new();
     for count in [100, 200, 400, 800] {
-        // Evenly in the root of the distance from a0 on either side, where the law is bent.
+        // Evenly spaced in the root of the distance from a0 on either side, where the law is
+        // curved.
         let (a0, inner, outer) = (0.2, 4.0, 40.0);
         let mut points = Vec::new();
         for k in -count..=count {

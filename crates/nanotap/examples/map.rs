@@ -1,15 +1,15 @@
-//! The map of a case in an algorithm of one's own: how the period-1 orbit that has lost its
-//! stability is reached by Newton, and kept by small moves of the sample.
+//! The map of a case in a user's algorithm: Newton finds an unstable period-1 orbit, and small
+//! displacements of the sample stabilise it.
 //!
 //! ```text
 //! cargo run --release --example map -p nanotap
 //! ```
 //!
-//! At Ω = 2.6 the paper's cantilever wanders chaotically about a period-1 orbit with one
-//! multiplier below −1. Near it the motion of one period is z* + A (z − z*) + b u, with
-//! A = ∂P/∂z and b = ∂P/∂α5 of a move u of the sample: the move that takes the unstable
-//! component away, u = −μ f·(z − z*)/(f·b) with f A = μ f, is worked out from the state at each
-//! strobe (Ott, Grebogi and Yorke, Phys. Rev. Lett. 64, 1196, 1990).
+//! At Ω = 2.6 the paper's cantilever moves chaotically around a period-1 orbit with one multiplier
+//! below −1. Near the orbit the map of one period is z* + A (z − z*) + b u, with A = ∂P/∂z and b =
+//! ∂P/∂α5 for a displacement u of the sample. The displacement that removes the unstable component,
+//! u = −μ f·(z − z*)/(f·b) with f A = μ f, is computed from the state at each strobe (Ott, Grebogi
+//! and Yorke, Phys. Rev. Lett. 64, 1196, 1990).
 
 #![allow(
     clippy::disallowed_methods,
@@ -21,9 +21,9 @@ use nanotap::Map;
 use nanotap::case::{Case, Key};
 use nanotap::control::Control;
 
-/// The largest move of the sample, in units of the beam's gap. The chaos comes no nearer than
-/// 0.024 to the orbit; such moves reach that far.
-const LARGEST_MOVE: f64 = 0.02;
+/// The largest displacement of the sample, in units of the beam's gap. The chaos comes no nearer
+/// than 0.024 to the orbit; such displacements reach that far.
+const MAX_DISPLACEMENT: f64 = 0.02;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let words = [
@@ -38,7 +38,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let map = Map::new(&case)?;
     let n = map.dimension();
 
-    // A long run, and the nearest return in it, from which Newton closes the orbit.
+    // A long run, and its nearest return, from which Newton closes the orbit.
     let run = map.iterate(&vec![0.0; n], 2000, 1, &Control::default())?;
     let states: Vec<DVector<f64>> = run.chunks(n).map(DVector::from_column_slice).collect();
     let nearest = states
@@ -65,13 +65,13 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     }
     let multiplier = at.jacobian.tr_mul(&f).dot(&f);
 
-    // The run goes on from its end; the sample moves once the motion comes near.
+    // The run continues; the sample is displaced once the motion is close to the orbit.
     let mut z = states.last().ok_or("nothing ran")?.clone();
     let mut caught = None;
     for k in 0..5000 {
         let away = &z - &fixed;
         let wanted = -multiplier * f.dot(&away) / f.dot(&b);
-        let moved = if wanted.abs() <= LARGEST_MOVE {
+        let moved = if wanted.abs() <= MAX_DISPLACEMENT {
             wanted
         } else {
             0.0

@@ -1,10 +1,11 @@
-//! nanotap on the works of `peers/README.md`, from the command line that all peers have:
+//! nanotap on the tasks of `peers/README.md`, with the command line of all peers:
 //!
 //! ```text
 //! peer first|long|sweep|basin [--threads K] [--seconds S]
 //! ```
 //!
-//! `cargo xtask peers` runs it beside the others. There is no setting: nothing is stepped.
+//! `cargo xtask peers` runs it with the other programs. There are no settings: the flow has no time
+//! steps.
 
 #![allow(
     clippy::disallowed_methods,
@@ -23,18 +24,18 @@ use nanotap_flow::{Ensemble, Flow, System};
 /// Modes, and the dimension of a state.
 const MODES: usize = 3;
 const DIMENSION: usize = 2 * MODES;
-/// The sweep: 400 values of Ω by 8 starts, 500 periods each, the last 100 kept.
+/// The sweep: 400 values of Ω with 8 starts, 500 periods each, the last 100 recorded.
 const SWEEP: (usize, usize) = (400, 8);
 const SWEEP_PERIODS: usize = 500;
 const SWEEP_KEPT: usize = 100;
-/// The basin: 200 by 200 starts, 300 periods each, the last state kept.
+/// The basin: 200 by 200 starts, 300 periods each, the last state recorded.
 const BASIN_SIDE: usize = 200;
 const BASIN_PERIODS: usize = 300;
 
 type State = [f64; DIMENSION];
 type Failure = Box<dyn std::error::Error>;
 
-/// What the command line asks for.
+/// Command-line options.
 struct Options {
     work: String,
     threads: usize,
@@ -77,8 +78,8 @@ fn model(omega: f64) -> Result<Model, Failure> {
     Ok(Model::cantilever(&case)?)
 }
 
-/// A motion of a system of its own: threads that share one count references to it and wait for
-/// each other.
+/// A motion with a separate system: threads that share one count references to it and wait for each
+/// other.
 fn motion(model: &Model) -> Flow {
     Flow::new(Arc::new(System::clone(&model.system)))
 }
@@ -90,7 +91,7 @@ fn state(flow: &Flow) -> State {
     state
 }
 
-/// The best time of many for what `run` does with motions from rest.
+/// The best time of several for `run` with motions from rest.
 fn best_from_rest(
     options: &Options,
     mut run: impl FnMut(&mut Flow) -> Result<(), Failure>,
@@ -162,7 +163,7 @@ fn sweep(options: &Options) -> Result<(), Failure> {
     Ok(())
 }
 
-/// The grid of starts, in packets of 64.
+/// The grid of starts, in batches of 64.
 fn basin(options: &Options) -> Result<(), Failure> {
     const PACKET: usize = 64;
     let model = model(Cantilever::paper().omega)?;
@@ -191,13 +192,13 @@ fn basin(options: &Options) -> Result<(), Failure> {
     Ok(())
 }
 
-/// What was done of a work.
+/// The part of a task that was done.
 struct Done {
     seconds: f64,
     items: usize,
 }
 
-/// Does items 0, 1, … of `count` until the time is up.
+/// Computes items 0, 1, … of `count` until the time is up.
 fn as_many_as_fit(
     options: &Options,
     count: usize,
@@ -224,7 +225,7 @@ fn as_many_as_fit(
             .map(|other| other.join().unwrap_or_else(|_| Err("a thread died".into())))
             .fold(mine, Result::and)
     })?;
-    // On one thread the processor's time, which a busy machine disturbs least.
+    // On one thread, the processor's time, which other programs disturb least.
     let seconds = match (processor, processor_seconds()) {
         (Some(start), Some(end)) if options.threads == 1 => end - start,
         _ => wall.elapsed().as_secs_f64(),

@@ -1,9 +1,8 @@
-//! Why something could not be done: one type for every front end.
+//! The error of every front end: kind, message, place, remedy.
 //!
-//! Inside the library each part has typed errors of its own; where they leave it they become an
-//! [`Error`] by one conversion each, which stands beside the typed error. An error has a
-//! [kind](ErrorKind), from which the terminal takes its exit code and Python its exception, and
-//! problems, each with its place and with what would be right.
+//! Studies return an [`Error`]. The model, the case and the dataset have typed errors, each with one
+//! conversion to an [`Error`] next to it. An error has a [kind](ErrorKind), from which the terminal
+//! takes its exit code and Python its exception, and problems, each with its place and a remedy.
 //!
 //! A message names an option of a study in braces: "look near a {state}". [`Error::written`]
 //! puts it as the reader types it, `--state` at the terminal and `state=` in Python.
@@ -14,39 +13,39 @@ use std::ops::Range;
 /// What kind of error it is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ErrorKind {
-    /// What was asked for is not right.
+    /// The input is not valid.
     BadInput,
-    /// It was right, and the computation did not succeed.
+    /// The input is valid, and the computation failed.
     Numerics,
-    /// The file system refused.
+    /// The file system failed.
     Files,
-    /// The work was stopped from outside.
+    /// The work was cancelled.
     Stopped,
 }
 
-/// A text that problems point into.
+/// A text to which problems point.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct SourceText {
-    /// What the reader calls it: the path as it was given.
+    /// Name for messages: the path as given.
     pub name: String,
     /// The whole text.
     pub text: String,
 }
 
-/// Where a problem lies.
+/// Place of a problem.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum ErrorPlace {
     /// Nowhere in particular, or all of the file.
     Whole,
     /// An option of a study.
     Option(String),
-    /// A `key=value` that was set beside the case file, as it was written.
+    /// A `key=value` of `--set`, as written.
     Override(String),
     /// These bytes of the file.
     Span(Range<usize>),
 }
 
-/// One thing that is wrong.
+/// A problem of a case.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ErrorProblem {
     /// Where.
@@ -55,11 +54,11 @@ pub struct ErrorProblem {
     pub message: String,
     /// A few words to stand under the place in the file; may be empty.
     pub label: String,
-    /// What would be right.
+    /// What to do.
     pub remedy: Option<String>,
 }
 
-/// Why something could not be done.
+/// An error: its kind, and one or more problems with place and remedy.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Error {
     /// What kind of error it is.
@@ -70,16 +69,28 @@ pub struct Error {
     pub problems: Vec<ErrorProblem>,
 }
 
-/// A text of any length as it may stand in a message: what was given is quoted there.
-fn cut(text: String) -> String {
-    const LONGEST: usize = 2000;
-    const ENDS: [usize; 2] = [1500, 300];
+/// A text for a message, which may quote input of any length: long words and long texts are shortened.
+pub(crate) fn cut(text: String) -> String {
+    const MAX_WORD: usize = 200;
+    const MAX_TEXT: usize = 2000;
+    let is_long = |word: &str| word.chars().count() > MAX_WORD;
+    let text = if text.split_whitespace().any(is_long) {
+        let words = text.split(' ').map(|word| shortened(word, MAX_WORD));
+        words.collect::<Vec<_>>().join(" ")
+    } else {
+        text
+    };
+    shortened(&text, MAX_TEXT)
+}
+
+/// The first four fifths and the end of a text that is longer than `max` characters.
+fn shortened(text: &str, max: usize) -> String {
     let count = text.chars().count();
-    if count <= LONGEST {
-        return text;
+    if count <= max {
+        return text.to_owned();
     }
-    let start = text.chars().take(ENDS[0]);
-    let end = text.chars().skip(count - ENDS[1]);
+    let start = text.chars().take(max * 4 / 5);
+    let end = text.chars().skip(count - max / 10);
     start.chain(" … ".chars()).chain(end).collect()
 }
 
@@ -98,29 +109,35 @@ impl Error {
         }
     }
 
-    /// Something asked for that is not right, and what would be.
+    /// Input that is not valid, and a remedy.
     pub fn input(message: impl Into<String>, remedy: impl Into<String>) -> Self {
         Self::new(ErrorKind::BadInput, message).remedy(remedy)
     }
 
-    /// An option of a study with a value that is not right, and what would be.
+    /// An option of a study whose value is not valid, and a remedy.
     pub fn option(name: &str, message: impl Into<String>, remedy: impl Into<String>) -> Self {
         Self::input(message, remedy).at(name)
     }
 
-    /// A computation that did not succeed.
+    /// A computation that failed.
     pub fn numerics(message: impl Into<String>) -> Self {
         Self::new(ErrorKind::Numerics, message)
     }
 
-    /// Work that was stopped from outside before it was done.
+    /// Work that was cancelled.
     pub fn stopped() -> Self {
         Self::new(ErrorKind::Stopped, "stopped before it was done")
     }
 
-    /// What the file system refused.
+    /// An error of the file system.
     pub fn files(message: impl Into<String>) -> Self {
         Self::new(ErrorKind::Files, message)
+    }
+
+    /// The first problem's message, without its place and remedy.
+    pub fn message(&self) -> String {
+        let message = self.problems.first().map_or("", |problem| &problem.message);
+        replaced(message, &str::to_owned)
     }
 
     /// The same, at an option of a study.
@@ -132,7 +149,7 @@ impl Error {
         self
     }
 
-    /// The same, with what would be right.
+    /// The same, with a remedy.
     #[must_use]
     pub fn remedy(mut self, remedy: impl Into<String>) -> Self {
         if let Some(problem) = self.problems.last_mut() {
@@ -232,16 +249,57 @@ impl From<nanotap_flow::FlowError> for Error {
     }
 }
 
+impl From<nanotap_volterra::VolterraError> for Error {
+    fn from(error: nanotap_volterra::VolterraError) -> Self {
+        match error {
+            nanotap_volterra::VolterraError::Cancelled => Self::stopped(),
+            error => Self::numerics(error.to_string()),
+        }
+    }
+}
+
+impl From<nanotap_dynamics::ShootingError> for Error {
+    fn from(error: nanotap_dynamics::ShootingError) -> Self {
+        match error {
+            nanotap_dynamics::ShootingError::TooLarge { .. } => {
+                Self::input(error.to_string(), "give a shorter {period} or fewer modes")
+            }
+            error => Self::numerics(error.to_string()),
+        }
+    }
+}
+
+/// Conversions of errors of computations whose input is valid.
+macro_rules! numerics {
+    ($($error:path),*) => {$(
+        impl From<$error> for Error {
+            fn from(error: $error) -> Self {
+                Self::numerics(error.to_string())
+            }
+        }
+    )*};
+}
+
+numerics!(
+    nanotap_dynamics::ContinuationError,
+    nanotap_dynamics::MultiplierError,
+    crate::model::spectrum::SpectrumError
+);
+
+impl From<nanotap_dynamics::StartBoxError> for Error {
+    fn from(error: nanotap_dynamics::StartBoxError) -> Self {
+        Self::input(error.to_string(), "change it with {box}")
+    }
+}
+
+#[cfg(feature = "figures")]
 impl From<nanotap_figures::FigureError> for Error {
     fn from(error: nanotap_figures::FigureError) -> Self {
         use nanotap_figures::FigureError;
         match error {
             FigureError::UnknownEnding { path } => Self::input(
-                format!(
-                    "{}: the ending says no format that can be drawn",
-                    path.display()
-                ),
-                "end the name in .svg, .png or .pdf",
+                format!("{}: unsupported file extension", path.display()),
+                "use .svg, .png or .pdf",
             ),
             error @ FigureError::Write { .. } => Self::files(error.to_string()),
             other => Self::numerics(other.to_string()),

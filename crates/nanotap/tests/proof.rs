@@ -1,5 +1,5 @@
-//! Periodic orbits as theorems: what is proved holds the orbit to 60 digits, and what is not
-//! true is not proved.
+//! Proofs of periodic orbits: theorems enclose the orbit to 60 digits, and false statements are not
+//! proved.
 
 use nanotap::case::Case;
 use nanotap::case::file::Source;
@@ -7,13 +7,13 @@ use nanotap::control::Control;
 use nanotap::model::Model;
 use nanotap::model::enclosed::{EnclosureError, enclosed};
 use nanotap::model::oscillator::{Oscillator, Stop};
-use nanotap::study::kind::Study as _;
-use nanotap::study::orbit::{OrbitOptions, OrbitReport, OrbitRequest, OrbitStudy, orbit};
+use nanotap::study::Study as _;
+use nanotap::study::orbit::{OrbitOptions, OrbitReport, OrbitStudy, orbit};
 use nanotap::study::proof::{ProofReport, Prover, candidate};
 use nanotap_flow::Trajectory;
 use nanotap_proof::{Interval, ProofError, Stability, prove};
 
-/// A number to twice double precision: the nearest double, and what is left.
+/// A number to twice double precision: the nearest double and the remainder.
 type Long = (f64, f64);
 
 /// An orbit of the paper's parameters.
@@ -28,8 +28,8 @@ struct Reference {
     multipliers: &'static [(f64, f64)],
 }
 
-/// mpmath 1.3, 60 digits: closed forms from eigenvectors, switches by Newton, the orbit by
-/// Newton with difference quotients of 1e-28, residual below 1e-59.
+/// mpmath 1.3, 60 digits: closed forms from eigenvectors, switches by Newton, the orbit by Newton
+/// with difference quotients of 1e-28, residual below 1e-59.
 const REFERENCES: [Reference; 4] = [
     Reference {
         modes: 1,
@@ -126,7 +126,7 @@ const REFERENCES: [Reference; 4] = [
     },
 ];
 
-/// The paper's parameters and what is said beside or in place of them.
+/// The paper's parameters with additional or different ones.
 fn case(more: &[&str]) -> Case {
     let paper = [
         "alpha1=0.1",
@@ -149,16 +149,16 @@ fn found(case: &Case, options: &OrbitOptions) -> (OrbitReport, ProofReport) {
     (orbit, proof)
 }
 
-/// At a drive frequency where the multiplier of modulus 1 − 6.7e-8 is within the margin that rounding
-/// is given, and yet proved to be inside the unit circle.
+/// At a drive frequency with a multiplier of modulus 1 − 6.7e-8: within the margin for rounding,
+/// and yet proved to be inside the unit circle.
 #[test]
-fn a_report_says_of_stability_what_is_proved() {
+fn a_report_states_the_proved_stability() {
     let case = case(&["modes=1", "omega=2.9422193073652134"]);
     let report = |prove: bool| {
-        let request = OrbitRequest {
+        let request = OrbitOptions {
             period: Some(1),
             prove,
-            ..OrbitRequest::default()
+            ..OrbitOptions::default()
         };
         let report = OrbitStudy::run(&case, &request, &Control::default());
         report.unwrap().motion
@@ -180,7 +180,7 @@ fn holds([low, high]: [f64; 2], (near, rest): Long) -> bool {
 }
 
 #[test]
-fn theorems_hold_the_orbits_to_60_digits() {
+fn theorems_enclose_the_orbits_to_60_digits() {
     for reference in &REFERENCES {
         let modes = format!("modes={}", reference.modes);
         let case = case(&[&modes, &format!("omega={}", reference.omega)]);
@@ -223,10 +223,10 @@ fn theorems_hold_the_orbits_to_60_digits() {
     }
 }
 
-/// The same orbit of a case that differs in the ninth digit of a damper is not the one of the
-/// reference, and the theorems say so.
+/// The orbit of a case that differs in the ninth digit of a damper is not the one of the reference,
+/// and the theorems show it.
 #[test]
-fn a_theorem_is_about_its_own_numbers() {
+fn a_theorem_depends_on_all_digits_of_the_case() {
     let reference = &REFERENCES[0];
     let other = case(&["modes=1", "omega=20", "alpha6=0.200000001"]);
     let theorem = found(&other, &OrbitOptions::default()).1.theorem.unwrap();
@@ -236,7 +236,7 @@ fn a_theorem_is_about_its_own_numbers() {
 
 /// Every piecewise-linear law, drive and number of modes.
 #[test]
-fn every_piecewise_linear_lever_is_within_reach() {
+fn every_piecewise_linear_lever_can_be_proved() {
     let levers: [&[&str]; 8] = [
         &["omega=20", "modes=2"],
         &["omega=20", "modes=12"],
@@ -277,7 +277,7 @@ fn every_piecewise_linear_lever_is_within_reach() {
     assert!(proof.proved, "{}", proof.statement);
 }
 
-/// A force that jumps has no place in the proofs, which say so.
+/// A discontinuous force is not covered by the proofs, which report this.
 #[test]
 fn a_moving_surface_is_not_proved() {
     let surface = [
@@ -297,7 +297,7 @@ fn a_moving_surface_is_not_proved() {
     );
 }
 
-/// An orbit of 30 drive periods amid chaos, with some 70 switches.
+/// An orbit of 30 drive periods in chaos, with some 70 switches.
 #[test]
 fn long_unstable_orbits_are_proved() {
     let case = case(&["omega=2.6", "modes=5"]);
@@ -314,10 +314,10 @@ fn long_unstable_orbits_are_proved() {
     }
 }
 
-/// The table of docs/proof.md: switches exactly and widths within a factor of two, or what is said to be
-/// some number within a tenth and within a factor of ten.
+/// The table of docs/proof.md: exact numbers of switches and widths within a factor of two; where
+/// the page says "some", within a tenth and a factor of ten.
 #[test]
-fn enclosures_are_as_narrow_as_the_page_says() {
+fn enclosures_are_as_narrow_as_documented() {
     let page = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/proof.md");
     let page = std::fs::read_to_string(page).unwrap();
     let mut rows = 0;
@@ -364,10 +364,10 @@ fn enclosures_are_as_narrow_as_the_page_says() {
     assert_eq!(rows, 6);
 }
 
-/// Undamped motion has its multipliers on the unit circle: the orbit exists, and stability is
-/// not decided.
+/// The multipliers of undamped motion are on the unit circle: the orbit exists, and stability is
+/// undecided.
 #[test]
-fn stability_on_the_unit_circle_is_left_open() {
+fn stability_on_the_unit_circle_is_undecided() {
     let case = case(&["alpha3=0", "alpha6=0", "omega=4.1", "modes=2"]);
     let options = OrbitOptions {
         period: Some(1),
@@ -378,9 +378,9 @@ fn stability_on_the_unit_circle_is_left_open() {
     assert_eq!(proof.theorem.unwrap().stability, "undecided");
 }
 
-/// A motion that does not repeat, given as if it did.
+/// A motion that does not repeat, given as an orbit.
 #[test]
-fn what_does_not_repeat_is_not_proved() {
+fn a_motion_that_does_not_repeat_is_not_proved() {
     let case = case(&["omega=2.6", "modes=2"]);
     let model = case.model().unwrap();
     let system = enclosed(case.cantilever().unwrap()).unwrap();
@@ -389,7 +389,7 @@ fn what_does_not_repeat_is_not_proved() {
         assert!(!run.events().is_empty());
         assert!(prove(&system, &candidate(&run, periods)).is_err());
     }
-    // One switch of an orbit left out, and one of another orbit's states.
+    // One switch of an orbit omitted, and one state of another orbit.
     let found = orbit(
         &model,
         &OrbitOptions {
@@ -411,9 +411,9 @@ fn what_does_not_repeat_is_not_proved() {
     assert_eq!(prove(&system, &moved), Err(ProofError::NoIsolatedOrbit));
 }
 
-/// What is beyond the method says why.
+/// Cases that the method does not cover are refused with the reason.
 #[test]
-fn what_is_beyond_reach_says_why() {
+fn cases_that_are_not_covered_are_refused_with_a_reason() {
     let read = |text: &str| {
         let source = Source {
             name: "case".to_owned(),
@@ -470,11 +470,11 @@ fn oscillators_with_a_stop_are_proved() {
     }
 }
 
-/// The plain model's numbers lie in the enclosed ones, which are narrow.
+/// The numbers of the ordinary model are inside the enclosed ones, which are narrow.
 #[test]
-fn equations_in_intervals_hold_the_plain_ones() {
+fn interval_equations_contain_the_ordinary_ones() {
     let near = |interval: Interval, x: f64, what: &str| {
-        // The plain number has its own rounding errors.
+        // The ordinary number has its own rounding error.
         let wider = interval + Interval::around_zero(4e-14 * x.abs());
         assert!(wider.contains(x), "{what}: {interval:?} {x:e}");
         let width = interval.hi() - interval.lo();

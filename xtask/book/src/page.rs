@@ -22,16 +22,17 @@ pub(crate) struct Page {
     pub(crate) anchors: Vec<String>,
     /// Links and pictures, in order.
     pub(crate) links: Vec<Link>,
-    formulas: Vec<(Range<usize>, String, bool)>,
-    /// Texts with a `$` that does not begin a formula.
-    strays: Vec<String>,
+    /// The MathML of each formula and the byte range that it replaces.
+    formulas: Vec<(Range<usize>, String)>,
+    /// Formulas that cannot be typeset and texts with an unmatched `$`, each with the reason.
+    pub(crate) unreadable: Vec<(String, String)>,
 }
 
 impl Page {
     pub(crate) fn read(text: String) -> Self {
         let options = Options::ENABLE_TABLES | Options::ENABLE_FOOTNOTES | Options::ENABLE_MATH;
         let (mut anchors, mut links) = (Vec::new(), Vec::new());
-        let (mut formulas, mut strays) = (Vec::new(), Vec::new());
+        let (mut formulas, mut unreadable) = (Vec::new(), Vec::new());
         let mut in_block = false;
         let mut heading: Option<String> = None;
         let mut times: HashMap<String, usize> = HashMap::new();
@@ -53,15 +54,20 @@ impl Page {
                 Event::Text(words)
                     if words.contains('$') && !in_block && !text[..range.start].ends_with('\\') =>
                 {
-                    strays.push(words.into_string());
+                    let reason = "Markdown sees no formula in it".to_owned();
+                    unreadable.push((words.into_string(), reason));
                 }
                 Event::Text(words) | Event::Code(words) => {
                     if let Some(heading) = &mut heading {
                         heading.push_str(&words);
                     }
                 }
-                Event::InlineMath(formula) => formulas.push((range, formula.into_string(), false)),
-                Event::DisplayMath(formula) => formulas.push((range, formula.into_string(), true)),
+                Event::InlineMath(ref formula) | Event::DisplayMath(ref formula) => {
+                    match typeset(formula, matches!(event, Event::DisplayMath(_))) {
+                        Ok(mathml) => formulas.push((range, mathml)),
+                        Err(error) => unreadable.push((formula.to_string(), error)),
+                    }
+                }
                 Event::Start(Tag::Link { dest_url, .. } | Tag::Image { dest_url, .. }) => {
                     links.push(Link {
                         target: dest_url.into_string(),
@@ -76,28 +82,13 @@ impl Page {
             anchors,
             links,
             formulas,
-            strays,
+            unreadable,
         }
-    }
-
-    /// Formulas that cannot be typeset, each with the reason.
-    pub(crate) fn unreadable(&self) -> impl Iterator<Item = (&str, String)> {
-        let refused = self.formulas.iter().filter_map(|(_, formula, displayed)| {
-            let error = typeset(formula, *displayed).err()?;
-            Some((formula.as_str(), error))
-        });
-        let strays = self.strays.iter();
-        refused.chain(strays.map(|text| (text.as_str(), "Markdown sees no formula in it".into())))
     }
 
     /// The page for mdBook: formulas in MathML, and link targets replaced by `moved`.
     pub(crate) fn written(&self, moved: impl Fn(&str) -> Option<String>) -> String {
-        let mut changes: Vec<(Range<usize>, String)> = Vec::new();
-        for (range, formula, displayed) in &self.formulas {
-            if let Ok(mathml) = typeset(formula, *displayed) {
-                changes.push((range.clone(), mathml));
-            }
-        }
+        let mut changes = self.formulas.clone();
         for link in &self.links {
             let Some(target) = moved(&link.target) else {
                 continue;
@@ -155,7 +146,11 @@ mod tests {
     #[test]
     fn what_cannot_be_typeset_is_told() {
         let page = Page::read("$a$ and $\\nosuchcommand$, \\$5\n\n$$\na\n+ b\n$$\n".to_owned());
-        let formulas: Vec<&str> = page.unreadable().map(|(formula, _)| formula).collect();
+        let formulas: Vec<&str> = page
+            .unreadable
+            .iter()
+            .map(|(formula, _)| formula.as_str())
+            .collect();
         // In Markdown a line that begins with a plus is a list item, and both `$` remain unmatched.
         assert_eq!(formulas[0], "\\nosuchcommand");
         assert!(

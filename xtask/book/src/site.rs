@@ -101,7 +101,7 @@ impl Site {
             if !listed.contains(name) {
                 troubles.push(wrong(name, "is not in docs/SUMMARY.md".into()));
             }
-            for (formula, error) in page.unreadable() {
+            for (formula, error) in &page.unreadable {
                 troubles.push(wrong(
                     name,
                     format!("${formula}$ cannot be typeset: {error}"),

@@ -6,15 +6,13 @@ use std::path::PathBuf;
 
 use clap::Args;
 use nanotap::case::physical::Kind;
-use nanotap::case::physical::quantity::format_electronvolts;
 use nanotap::case::units::Units;
 use nanotap::figure::approach::approach_figure;
 use nanotap::number::shortest;
 use nanotap::observe::table::shown_phase;
-use nanotap::observe::{Observables, Set, columns};
-use nanotap::study::approach::{ApproachPoint, ApproachReport, ApproachRequest, ApproachStudy};
+use nanotap::observe::{ObservableSet, Observables, columns};
+use nanotap::study::approach::{ApproachOptions, ApproachPoint, ApproachReport, ApproachStudy};
 use nanotap::study::frequency_modulation::{COLUMNS, ModulatedColumn, ModulationReport};
-use nanotap::study::registry::Study as _;
 use nanotap::study::simulate::Classification;
 use serde::Serialize;
 
@@ -35,7 +33,7 @@ pub(crate) struct Arguments {
     case: CaseArguments,
 
     #[command(flatten)]
-    request: Request<ApproachRequest>,
+    request: Request<ApproachOptions>,
 
     #[command(flatten)]
     threads: ThreadsArgument,
@@ -58,14 +56,13 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     let request = arguments.request.read()?;
     arguments.out.check()?;
     arguments.plot.check()?;
-    let case = GivenCase::with_any_distance(&arguments.case, output)?;
-    let report = progress::study::<ApproachStudy, _>(|control| {
-        arguments
-            .threads
-            .install(|| ApproachStudy::run(&case, &request, control))
-    })??;
+    let case = GivenCase::for_study(&arguments.case, true, output)?;
+    let report = progress::study::<ApproachStudy>(&case, &request, &arguments.threads)?;
     if report.cancelled {
         output.warning("stopped before it was done");
+    }
+    for limit in &report.limits {
+        output.warning(limit);
     }
     if report.beam_clearance.is_some_and(|height| height <= 0.0) {
         output.warning(
@@ -97,7 +94,7 @@ fn csv(report: &ApproachReport, units: &Units) -> String {
     ]
     .map(str::to_owned)
     .to_vec();
-    header.extend(columns::columns(Set::COMMON, physical));
+    header.extend(columns::columns(ObservableSet::COMMON, physical));
     if physical {
         header.push("zc (m)".to_owned());
     }
@@ -111,7 +108,11 @@ fn csv(report: &ApproachReport, units: &Units) -> String {
     for p in report.table.iter().chain(&report.coexisting) {
         let si = physical.then_some(p.physical.as_ref());
         let mut row = vec![p.spectral_radius];
-        row.extend(columns::cells(Set::COMMON, p.observables.as_ref(), si));
+        row.extend(columns::cells(
+            ObservableSet::COMMON,
+            p.observables.as_ref(),
+            si,
+        ));
         if physical {
             row.push(p.zc);
         }
@@ -154,7 +155,7 @@ fn step_of(report: &ApproachReport) -> usize {
 fn thinned(table: &Table, step: usize, report: &ApproachReport) -> String {
     let all = report.table.len();
     let left_out = if step > 1 {
-        format!("  every {step}th of {all} (--out writes all)\n")
+        format!("  one in {step} of {all} distances (--out writes all)\n")
     } else {
         String::new()
     };
@@ -163,12 +164,7 @@ fn thinned(table: &Table, step: usize, report: &ApproachReport) -> String {
 
 fn text(case: &GivenCase, report: &ApproachReport) -> String {
     let units = case.units();
-    let shown = |kind: Kind, value: f64| {
-        units.si(kind).map_or_else(
-            || number::significant(value, 5),
-            |unit| kind.format(unit * value),
-        )
-    };
+    let shown = |kind: Kind, value: f64| number::quantity(&units, kind, value, [5, 4]);
     let heading = format!(
         "{}: {}, distances from {} to {} and back",
         case.title(),
@@ -249,7 +245,7 @@ fn text(case: &GivenCase, report: &ApproachReport) -> String {
     }
     if !report.returned && !report.cancelled {
         text.push_str(&motion::paragraph(
-            "the way back does not end in the motion with which the way there began: begin farther \
+            "the retraction does not end in the motion in which the approach began: begin farther \
              away, with --from",
         ));
     }
@@ -418,7 +414,7 @@ fn modulated(
     }
     if modulation.setpoints.as_ref().is_some_and(Vec::is_empty) {
         text.push_str(&motion::paragraph(
-            "no distance of the curve has the frequency shift that was asked for",
+            "no distance of the curve has the requested frequency shift",
         ));
     }
     for jump in &modulation.jumps {
@@ -449,8 +445,5 @@ fn modulated(
 }
 
 fn energy(value: f64, units: &Units) -> String {
-    units.si(Kind::Energy).map_or_else(
-        || number::significant(value, 4),
-        |unit| format_electronvolts(unit * value),
-    )
+    number::quantity(units, Kind::Energy, value, [4, 4])
 }

@@ -1,8 +1,9 @@
-//! `nanotap attractors`: a census of every motion that coexists.
+//! `nanotap attractors`: coexisting attractors by sampling initial states.
 
 use std::fmt::Write as _;
 
 use clap::Args;
+use nanotap::case::physical::Kind;
 use nanotap::case::units::Units;
 use nanotap::figure::attractors::attractors_figure;
 use nanotap::model::Model;
@@ -12,7 +13,6 @@ use nanotap::study::attractors::{
 };
 use nanotap::study::orbit::spectral_radius;
 use nanotap::study::proof::ProofReport;
-use nanotap::study::registry::Study as _;
 
 use crate::failure::Failure;
 use crate::given_case::GivenCase;
@@ -22,7 +22,7 @@ use crate::table::{Align, Table};
 use crate::threads::ThreadsArgument;
 use crate::{motion, number, progress, style};
 
-/// Every motion that coexists: a census from many seeded starts.
+/// Find coexisting attractors by sampling initial states.
 #[derive(Args, Debug)]
 pub(crate) struct Arguments {
     #[command(flatten)]
@@ -34,11 +34,7 @@ pub(crate) struct Arguments {
 pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure> {
     let (request, case) = arguments.study.read(output)?;
     let model = case.model()?;
-    let found = progress::study::<AttractorsStudy, _>(|control| {
-        arguments
-            .threads
-            .install(|| AttractorsStudy::run(&case, &request, control))
-    })??;
+    let found = progress::study::<AttractorsStudy>(&case, &request, &arguments.threads)?;
     arguments.study.out.write(|| csv(&model, &found))?;
     arguments
         .study
@@ -134,11 +130,11 @@ fn text(case: &GivenCase, found: &Attractors) -> String {
         let _ = writeln!(
             text,
             "\n  {}",
-            style::bold("transient chaos: it is no attractor")
+            style::bold("transient chaos, not an attractor")
         );
         text.push_str(&motion::paragraph(&format!(
             "mean lifetime {:.0} drive periods (95 %: {:.0} … {:.0}) from {} escapes ({}); {} still wander \
-             ({} % of the starts); exponents {}",
+             ({} % of the starts); {}",
             chaos.lifetime,
             chaos.lifetime_interval[0],
             chaos.lifetime_interval[1],
@@ -146,7 +142,12 @@ fn text(case: &GivenCase, found: &Attractors) -> String {
             to.join(", "),
             number::counted(chaos.unescaped.count, "start", "starts"),
             number::significant(100.0 * chaos.unescaped.fraction, 3),
-            motion::exponents(&chaos.lyapunov, Some(&chaos.lyapunov_errors)),
+            if chaos.lyapunov.is_empty() {
+                "exponents were not measured on the exact flow".to_owned()
+            } else {
+                let errors = Some(chaos.lyapunov_errors.as_slice());
+                format!("exponents {}", motion::exponents(&chaos.lyapunov, errors))
+            },
         )));
     }
     if found.unbounded.count > 0 {
@@ -238,6 +239,12 @@ fn unseen_paragraphs(found: &Attractors, unseen: &UnseenReport) -> String {
                 " The census ended at its limit of {limit} starts, before the requested {} %.",
                 percent(unseen.target)
             ),
+            EndReport::MaxSteps { limit } => format!(
+                " The census ended at its limit of {} million steps of the approximate flow (one of the exact flow \
+                 counts as 100), before the requested {} %.",
+                limit / 1_000_000,
+                percent(unseen.target)
+            ),
             EndReport::MaxPeriods { limit } => format!(
                 " The census ended at its limit of {limit} drive periods, before the requested {} %.",
                 percent(unseen.target)
@@ -303,17 +310,8 @@ fn table(attractors: &[AttractorReport], units: &Units) -> String {
 }
 
 fn tip(low: f64, high: f64, units: &Units) -> String {
-    let kind = nanotap::case::physical::Kind::Length;
-    units.si(kind).map_or_else(
-        || {
-            format!(
-                "{} … {}",
-                number::significant(low, 5),
-                number::significant(high, 5)
-            )
-        },
-        |unit| format!("{} … {}", kind.format(unit * low), kind.format(unit * high)),
-    )
+    let [low, high] = [low, high].map(|v| number::quantity(units, Kind::Length, v, [5, 4]));
+    format!("{low} … {high}")
 }
 
 /// Starts without a verdict, those with one reason together.

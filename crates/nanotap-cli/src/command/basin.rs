@@ -1,34 +1,33 @@
 //! `nanotap basin`: basins of attraction on a slice of initial states.
 
 use std::path::{Path, PathBuf};
-use std::time::Instant;
 
 use clap::Args;
 use nanotap::figure::basin::figure;
-use nanotap::study::basin::{Basin, BasinOptions, BasinRequest, Shares, shares};
+use nanotap::study::DatasetStudy as _;
+use nanotap::study::basin::{BasinOptions, BasinStudy, Shares, SliceRange};
 
 use crate::arguments::{CaseArguments, PlotArgument};
 use crate::dataset::{DatasetArguments, DatasetReport, derived_name};
 use crate::failure::Failure;
 use crate::given_case::GivenCase;
+use crate::number;
 use crate::output::Output;
 use crate::request::Request;
 use crate::table::{Align, Table};
-use crate::{number, progress};
 
-/// Basins of attraction on a two-dimensional slice of initial states.
+/// Compute basins of attraction on a two-dimensional slice of initial states.
 #[derive(Args, Debug)]
 pub(crate) struct Arguments {
     #[command(flatten)]
     case: CaseArguments,
 
-    /// The attractors, from `nanotap attractors --json`; without it, a census in the slice
-    /// finds them
+    /// The attractors, from `nanotap attractors --json`; default: found by sampling the slice
     #[arg(long, value_name = "FILE", conflicts_with = "starts")]
     attractors: Option<PathBuf>,
 
     #[command(flatten)]
-    request: Request<BasinRequest>,
+    request: Request<BasinOptions>,
 
     #[command(flatten)]
     dataset: DatasetArguments,
@@ -37,34 +36,25 @@ pub(crate) struct Arguments {
 }
 
 pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure> {
-    let begun = Instant::now();
-    let mut request = arguments.request.read()?;
-    request.attractors = arguments.attractors.as_deref().map(states).transpose()?;
-    let options = request.options()?;
+    let mut options = arguments.request.read()?;
+    options.attractors = arguments.attractors.as_deref().map(states).transpose()?;
+    let axes = options.axes()?;
     let case = GivenCase::of(&arguments.case, output)?;
-    let dataset = &arguments.dataset;
     let name = derived_name(
         arguments.case.file.as_deref(),
-        &["basin", &options.x.name, &options.y.name],
+        &["basin", &axes[0].name, &axes[1].name],
     );
-    let destination = dataset.destination(&name, arguments.plot.plot.as_deref())?;
-    arguments.plot.check()?;
-    let basin = progress::watched("basin", "starts of the census", false, |control| {
-        dataset
-            .threads
-            .install(|| Basin::new(&case, &options, control))
-    })??;
-    let store = dataset.compute(
-        &destination.store,
-        basin.schema(),
-        ["basin", "rows"],
+    let done = arguments.dataset.run::<BasinStudy>(
+        &case,
+        &options,
+        &name,
+        BasinStudy::COUNTED,
+        options.seed,
+        &arguments.plot,
+        figure,
         output,
-        |store, work| basin.compute(store, work),
     )?;
-    let plot = arguments.plot.plot.as_deref();
-    let seed = request.seed;
-    let done = DatasetReport::of(&store, destination, plot, begun, seed, shares, figure)?;
-    output.study(&case, &done, |done| text(&case, &options, done))
+    output.study(&case, &done, |done| text(&case, &axes, done))
 }
 
 /// The states on the attractors that a file of `nanotap attractors --json` names.
@@ -77,7 +67,7 @@ fn states(path: &Path) -> Result<Vec<Vec<f64>>, Failure> {
     };
     let text = std::fs::read_to_string(path).map_err(|error| refuse(error.to_string()))?;
     let document: serde_json::Value =
-        serde_json::from_str(&text).map_err(|error| refuse(format!("it is no JSON: {error}")))?;
+        serde_json::from_str(&text).map_err(|error| refuse(format!("not JSON: {error}")))?;
     let list = document["attractors"]
         .as_array()
         .filter(|list| !list.is_empty())
@@ -98,15 +88,15 @@ fn states(path: &Path) -> Result<Vec<Vec<f64>>, Failure> {
         .collect()
 }
 
-fn text(case: &GivenCase, options: &BasinOptions, done: &DatasetReport<Shares>) -> String {
+fn text(case: &GivenCase, [x, y]: &[SliceRange; 2], done: &DatasetReport<Shares>) -> String {
     let heading = format!(
         "{}: {}, {} by {} starts over {} and {}",
         case.title(),
         case.summary(),
-        options.x.count,
-        options.y.count,
-        options.x.name,
-        options.y.name
+        x.count,
+        y.count,
+        x.name,
+        y.name
     );
     done.text(&heading, parts)
 }

@@ -7,8 +7,8 @@ use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use nanotap::case::physical::Kind;
 use nanotap::figure::branch::{Shown, case_figure};
 use nanotap::number::shortest;
-use nanotap::observe::{Set, columns, time_series};
-use nanotap::study::branch::{BranchReport, BranchRequest, BranchStudy, PointReport, followed};
+use nanotap::observe::{ObservableSet, columns, time_series};
+use nanotap::study::branch::{BranchOptions, BranchReport, BranchStudy, PointReport};
 use nanotap::study::orbit::spectral_radius;
 
 use crate::arguments::{CaseArguments, OutArgument, PlotArgument};
@@ -30,13 +30,13 @@ pub(crate) struct Arguments {
     case: CaseArguments,
 
     #[command(flatten)]
-    request: Request<BranchRequest>,
+    request: Request<BranchOptions>,
 
-    /// What --plot shows against the parameter
+    /// Observable that --plot shows against the parameter
     #[arg(long, value_name = "OBSERVABLE", value_parser = shown())]
     show: Option<Shown>,
 
-    /// List every point in the JSON document, however long it becomes
+    /// List every point in the JSON document, whatever its length
     #[arg(long)]
     all_points: bool,
 
@@ -52,24 +52,19 @@ pub(crate) struct Arguments {
 fn shown() -> impl TypedValueParser<Value = Shown> {
     let choices = Shown::choices().map(|(name, what)| PossibleValue::new(name).help(what));
     PossibleValuesParser::new(choices)
-        .try_map(|name| Shown::named(&name).ok_or_else(|| format!("nothing is called {name}")))
+        .try_map(|name| Shown::named(&name).ok_or_else(|| format!("unknown observable {name}")))
 }
 
 pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure> {
-    let request = arguments.request.read()?;
+    let mut options = arguments.request.read()?;
     arguments.out.check()?;
     arguments.plot.check()?;
     let case = GivenCase::of(&arguments.case, output)?;
-    let mut options = request.options(&case)?;
-    case.say_held(&[options.key], output);
+    case.note_constants(&[options.range(&case)?.key], output);
     if let Some(shown) = arguments.show.and_then(Shown::observable) {
         options.observables = options.observables.with(shown);
     }
-    let mut report = progress::study::<BranchStudy, _>(|control| {
-        arguments
-            .threads
-            .install(|| followed(&case, &options, control))
-    })??;
+    let mut report = progress::study::<BranchStudy>(&case, &options, &arguments.threads)?;
     if report.cancelled {
         output.warning("stopped before it was done");
     }
@@ -112,7 +107,7 @@ fn shorten(report: &mut BranchReport, output: &Output) {
 
 /// A row a point, branch by branch; `kind` is empty but for bifurcations, which follow the
 /// points of their branch.
-fn csv(report: &BranchReport, observed: Set, names: &[String]) -> String {
+fn csv(report: &BranchReport, observed: ObservableSet, names: &[String]) -> String {
     let physical = report.points.iter().any(|p| p.physical.is_some());
     let mut header: Vec<String> = [
         "branch",
@@ -182,19 +177,14 @@ pub(super) fn failures(report: &BranchReport, at: impl Fn(f64) -> String) -> Str
 }
 
 fn text(case: &GivenCase, report: &BranchReport) -> String {
-    let told = |key, value: f64, digits| {
+    let of_key = |key, value: f64, digits| {
         case.parameter_unit(key).map_or_else(
             || number::significant(value, digits),
             |unit| unit.kind.format_digits(unit.si * value, digits),
         )
     };
-    let shown = |value, digits| told(report.key, value, digits);
-    let length = |value: f64| {
-        case.units().si(Kind::Length).map_or_else(
-            || number::significant(value, 5),
-            |unit| Kind::Length.format_digits(unit * value, 5),
-        )
-    };
+    let shown = |value, digits| of_key(report.key, value, digits);
+    let length = |value: f64| number::quantity(&case.units(), Kind::Length, value, [5, 5]);
     let heading = format!(
         "{}: {} from {} to {}",
         case.title(),
@@ -289,7 +279,7 @@ fn text(case: &GivenCase, report: &BranchReport) -> String {
         let range = |key, values: &[f64]| {
             let low = values.iter().copied().fold(f64::INFINITY, f64::min);
             let high = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-            format!("{} … {}", told(key, low, 6), told(key, high, 6))
+            format!("{} … {}", of_key(key, low, 6), of_key(key, high, 6))
         };
         for curve in &loci.curves {
             table.row([

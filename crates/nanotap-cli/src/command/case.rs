@@ -1,4 +1,4 @@
-//! `nanotap case`: the case, checked and view.
+//! `nanotap case`: check a case and print it resolved.
 
 use clap::Args;
 use nanotap::ErrorKind;
@@ -12,8 +12,9 @@ use nanotap::model::beam::Modes;
 use nanotap::model::cantilever::{Cantilever, CosineTerm};
 use nanotap::model::nonlinear::Equilibrium;
 use nanotap::model::oscillator::{Oscillator, Stop};
+use nanotap::model::parameter::Parameter;
 use nanotap::observe::table::shown_phase;
-use nanotap::study::kind::cantilever as cantilever_of;
+use nanotap::study::cantilever as cantilever_of;
 use nanotap::study::modes::ModeTable;
 use nanotap::study::setpoint::{SetpointReport, SolvedCase};
 
@@ -24,7 +25,7 @@ use crate::output::Output;
 use crate::table::{Align, Table};
 use crate::{file, motion, number, style};
 
-/// Check a case and show it resolved.
+/// Check a case and print it resolved.
 #[derive(Args, Debug)]
 pub(crate) struct Arguments {
     #[command(flatten)]
@@ -46,7 +47,7 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
         if let Some(path) = &arguments.out.out {
             return Err(Failure::input(
                 format!("--out {}: an oscillator is not written out", path.display()),
-                "leave --out away, or take --json",
+                "omit --out, or use --json",
             ));
         }
         return output.result(&document, |_| oscillator(&case, given));
@@ -87,7 +88,7 @@ fn write_out(out: &OutArgument, case: &Cantilever) -> Result<(), Failure> {
                 "--out {}: a nonlinear force law has no dimensionless case file",
                 path.display()
             ),
-            "leave --out away, or take --json, which has the law in the model's units",
+            "omit --out, or use --json, which has the law in the model's units",
         ));
     }
     file::write_case(path, &case_file::to_toml(case))
@@ -181,7 +182,7 @@ fn physical(title: &str, view: &Physical) -> String {
         "quality factor of the first mode",
     ]);
     if let Some(quality) = ModeTable::new(case).ok().and_then(|table| table.quality) {
-        let measured = case.higher_modes.quality;
+        let measured = [Parameter::Mode2Quality, Parameter::Mode3Quality].map(|of| case.get(of));
         for (k, quality) in quality.iter().enumerate().skip(1).take(2) {
             let source = if measured[k - 1] > 0.0 && view.is_in_fluid() {
                 "in the fluid, at its own frequency"
@@ -325,12 +326,12 @@ fn force_rows(table: &mut Table, force: &SampleForce) {
             &format!("of gap and force, from {} to {}", gap(*first), gap(*last)),
         ]);
     }
-    let mut told = Vec::new();
+    let mut shown = Vec::new();
     for (parameter, key, value) in force.parameters() {
-        if told.contains(&key) {
+        if shown.contains(&key) {
             continue;
         }
-        told.push(key);
+        shown.push(key);
         let value = if value.is_infinite() {
             "rigid".to_owned()
         } else {

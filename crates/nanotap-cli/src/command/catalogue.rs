@@ -13,19 +13,19 @@ use crate::output::Output;
 use crate::table::{Align, Table};
 use crate::{given_case, number, page, style};
 
-/// The levers and materials that a case can name.
+/// List the levers and materials that a case can name.
 #[derive(Args, Debug)]
 pub(crate) struct Arguments {
-    /// Only these, by any of their names, with the sources of their numbers
+    /// List only these, by any of their names, with the sources of their numbers
     #[arg(value_name = "NAME")]
     names: Vec<String>,
 
-    /// Levers and materials beside the built-in ones (TOML); may be repeated
+    /// Additional levers and materials (TOML); may be repeated
     #[arg(long, value_name = "FILE")]
     catalogue: Vec<PathBuf>,
 }
 
-/// What was asked for, in SI.
+/// The requested entry, in SI.
 #[derive(Serialize)]
 struct Listed<'a> {
     levers: Vec<&'a Lever>,

@@ -2,29 +2,27 @@
 
 use std::fmt::Write as _;
 
+use nanotap::case::key::kind_of;
 use nanotap::case::physical::Kind;
-use nanotap::case::quantity::format_electronvolts;
 use nanotap::case::units::Units;
 use nanotap::figure::contact_laws::sample_figure;
 use nanotap::model::parameter::Parameter;
 use nanotap::study::contact_laws::{Comparison, ContactLawsStudy, SampleMotion};
-use nanotap::study::registry::Study as _;
 
 use crate::failure::Failure;
 use crate::given_case::GivenCase;
 use crate::output::Output;
 use crate::study_arguments::StudyArguments;
 use crate::table::{Align, Table};
+use crate::threads::ThreadsArgument;
 use crate::{motion, number, progress, style};
 
-/// The same lever and drive on every contact law: what difference the sample makes.
+/// Compare contact laws under the same lever and drive.
 pub(crate) type Arguments = StudyArguments<ContactLawsStudy>;
 
 pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure> {
     let (request, case) = arguments.read(output)?;
-    let result = progress::study::<ContactLawsStudy, _>(|control| {
-        ContactLawsStudy::run(&case, &request, control)
-    })?;
+    let result = progress::study::<ContactLawsStudy>(&case, &request, &ThreadsArgument::default())?;
     arguments.out.write(|| csv(&result, &case.units()))?;
     arguments
         .plot
@@ -56,12 +54,7 @@ fn csv(result: &Comparison, units: &Units) -> String {
 
 fn text(case: &GivenCase, result: &Comparison) -> String {
     let units = case.units();
-    let shown = |kind: Kind, value: f64| {
-        units.si(kind).map_or_else(
-            || number::significant(value, 5),
-            |unit| kind.format_digits(unit * value, 5),
-        )
-    };
+    let shown = |kind: Kind, value: f64| number::quantity(&units, kind, value, [5, 5]);
     let heading = format!(
         "{}: the period-{} orbit on each sample at {}",
         case.title(),
@@ -95,10 +88,7 @@ fn text(case: &GivenCase, result: &Comparison) -> String {
             cells.extend([
                 number::significant(orbit.spectral_radius, 5),
                 shown(Kind::Length, o.first_harmonic),
-                units.si(Kind::Energy).map_or_else(
-                    || number::significant(o.dissipation, 5),
-                    |unit| format_electronvolts(unit * o.dissipation),
-                ),
+                shown(Kind::Energy, o.dissipation),
                 shown(Kind::Force, o.peak_force),
                 shown(Kind::Force, least),
                 shown(Kind::Length, o.indentation),
@@ -111,26 +101,31 @@ fn text(case: &GivenCase, result: &Comparison) -> String {
     let mut text = format!("{}\n\n{}\n", style::bold(&heading), table.render());
     text.push_str(&followed(case, result));
     let linear = result.samples.iter().all(|s| s.case.law.is_none());
-    let undamped = |s: &SampleMotion| s.case.alpha6 == 0.0 && s.case.relaxation_time == 0.0;
+    let undamped =
+        |s: &SampleMotion| s.case.arm().map_or(s.case.alpha6, |[_, damper]| damper) == 0.0;
     if linear && result.samples.iter().all(undamped) {
         text.push_str(&motion::paragraph(
             "the sample has no damper, and without one the laws are the same spring",
         ));
-    } else if let Some(solid) = result.samples.last().filter(|_| linear) {
+    } else if let Some(solid) = result
+        .samples
+        .iter()
+        .find(|s| linear && s.case.arm().is_some())
+    {
         let of_parameter = |parameter: Parameter| {
             let value = solid.case.get(parameter);
             case.physical().map_or_else(
                 || number::significant(value, 5),
                 |view| {
                     let unit = view.scales.of(parameter, solid.case.actuation);
-                    let kind = match parameter {
-                        Parameter::RelaxationTime => Kind::Time,
-                        _ => Kind::Stiffness,
-                    };
+                    let kind = kind_of(parameter.entry().unit, solid.case.actuation);
                     kind.format_digits(unit * value, 5)
                 },
             )
         };
+        let own: Vec<String> = Parameter::of_law(solid.case.contact)
+            .map(of_parameter)
+            .collect();
         text.push_str(&motion::paragraph(&format!(
             "all have the spring {} and the damper of the case; the solid has it in series with an arm of \
              stiffness {}, so that its force relaxes in {}. E_dis is the energy that the sample takes in one \
@@ -139,8 +134,8 @@ fn text(case: &GivenCase, result: &Comparison) -> String {
                 None => format!("α₄ = {}", number::significant(solid.case.alpha4, 5)),
                 Some(_) => of_parameter(Parameter::Alpha4),
             },
-            of_parameter(Parameter::RelaxationStiffness),
-            of_parameter(Parameter::RelaxationTime),
+            own[0],
+            own[1],
         )));
     }
     for sample in &result.samples {

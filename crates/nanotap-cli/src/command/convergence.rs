@@ -3,27 +3,24 @@
 use std::fmt::Write as _;
 
 use nanotap::case::physical::Kind;
-use nanotap::case::physical::quantity::format_electronvolts;
 use nanotap::figure::motion::convergence_figure;
 use nanotap::observe::table::shown_phase;
 use nanotap::study::convergence::{Convergence, ConvergenceStudy};
-use nanotap::study::registry::Study as _;
 
 use crate::failure::Failure;
 use crate::given_case::GivenCase;
 use crate::output::Output;
 use crate::study_arguments::StudyArguments;
 use crate::table::{Align, Table};
+use crate::threads::ThreadsArgument;
 use crate::{motion, number, progress, style};
 
-/// The same motion with N = 1 … K modes: how many are enough.
+/// Compare the motion with 1 to K modes: how many are enough.
 pub(crate) type Arguments = StudyArguments<ConvergenceStudy>;
 
 pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure> {
     let (request, case) = arguments.read(output)?;
-    let result = progress::study::<ConvergenceStudy, _>(|control| {
-        ConvergenceStudy::run(&case, &request, control)
-    })?;
+    let result = progress::study::<ConvergenceStudy>(&case, &request, &ThreadsArgument::default())?;
     arguments.out.write(|| csv(&result))?;
     arguments
         .plot
@@ -73,11 +70,9 @@ fn text(case: &GivenCase, result: &Convergence) -> String {
     let digits =
         |value: Option<f64>, n| value.map_or_else(String::new, |v| number::significant(v, n));
     let length = |value: Option<f64>| {
-        let si = units.si(Kind::Length).zip(value);
-        si.map_or_else(
-            || digits(value, 6),
-            |(unit, value)| Kind::Length.format_digits(unit * value, 5),
-        )
+        value.map_or_else(String::new, |v| {
+            number::quantity(&units, Kind::Length, v, [6, 5])
+        })
     };
     for (motion, difference) in result.motions.iter().zip(&result.difference) {
         let what = match (motion.period, &motion.reason) {
@@ -116,18 +111,7 @@ fn text(case: &GivenCase, result: &Convergence) -> String {
 /// What an experimenter reads with each number of modes, and the part of each mode.
 fn readings(case: &GivenCase, result: &Convergence) -> String {
     let units = case.units();
-    let shown = |kind: Kind, value: f64| {
-        units.si(kind).map_or_else(
-            || number::significant(value, 5),
-            |unit| kind.format(unit * value),
-        )
-    };
-    let energy = |value: f64| {
-        units.si(Kind::Energy).map_or_else(
-            || number::significant(value, 5),
-            |unit| format_electronvolts(unit * value),
-        )
-    };
+    let shown = |kind: Kind, value: f64| number::quantity(&units, kind, value, [5, 4]);
     let report = &result.readings;
     let mut table = Table::new([
         ("modes", Align::Right),
@@ -146,7 +130,7 @@ fn readings(case: &GivenCase, result: &Convergence) -> String {
             Some(r) => row.extend([
                 shown(Kind::Length, r.first_harmonic),
                 number::significant(shown_phase(r.phase), 5),
-                energy(r.dissipation),
+                shown(Kind::Energy, r.dissipation),
                 shown(Kind::Force, r.peak_force),
             ]),
             None => row.extend(std::iter::repeat_n(String::new(), 4)),
@@ -159,7 +143,7 @@ fn readings(case: &GivenCase, result: &Convergence) -> String {
     }
     format!(
         "  {}\n{}\n  {}\n",
-        style::bold("what one reads, and the part of each mode with the most modes"),
+        style::bold("readings, and the share of each mode with the most modes"),
         table.render(),
         style::bold(&report.reading_verdict)
     )

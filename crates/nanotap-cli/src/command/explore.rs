@@ -10,13 +10,13 @@ use crate::failure::Failure;
 use crate::output::Output;
 use crate::progress;
 
-/// Turn the knobs of a case in a browser and see what the tip does
+/// Change parameters of a case in a browser and see the motion
 ///
-/// The page is served on this machine only, and only to the address that is printed first:
-/// it carries a token of this start. Ctrl-C ends it.
+/// The page is served on this machine only, at the printed address, which contains a token. Stop
+/// it with Ctrl-C.
 #[derive(Args, Debug)]
 pub(crate) struct Arguments {
-    /// The case file shown first; without one, the paper's case
+    /// Case file shown first; default: the paper's case
     #[arg(value_name = "CASE")]
     file: Option<PathBuf>,
 
@@ -28,7 +28,7 @@ pub(crate) struct Arguments {
     #[arg(long, value_name = "P", default_value_t = 0)]
     port: u16,
 
-    /// Print the address and open no browser
+    /// Print the address without opening a browser
     #[arg(long)]
     no_browser: bool,
 }
@@ -42,7 +42,7 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     // A page that is served has no end to wait for.
     progress::end();
     serve(&options, |address| {
-        // Whoever reads it from a pipe waits for this line.
+        // A reader of the pipe waits for this line.
         let mut out = std::io::stdout().lock();
         let _ = writeln!(out, "{address}");
         let _ = out.flush();

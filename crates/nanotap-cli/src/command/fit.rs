@@ -7,8 +7,7 @@ use clap::Args;
 use nanotap::case::Key;
 use nanotap::figure::fit::fit_figure;
 use nanotap::number::shortest;
-use nanotap::study::fit::{FitReport, FitRequest, FitStudy, FittedParameter, Table as Data};
-use nanotap::study::registry::Study as _;
+use nanotap::study::fit::{FitOptions, FitReport, FitStudy, FittedParameter, Table as Data};
 use serde::Serialize;
 
 use crate::arguments::{CaseArguments, PlotArgument};
@@ -20,7 +19,7 @@ use crate::table::{Align, Table};
 use crate::threads::ThreadsArgument;
 use crate::{file, motion, number, progress, style};
 
-/// Parameters of lever and sample from measured curves.
+/// Fit parameters of lever and sample to measured curves.
 #[derive(Args, Debug)]
 pub(crate) struct Arguments {
     /// The measured curve (CSV), its columns named as in `distance (nm)`, `amplitude (nm)`,
@@ -31,18 +30,18 @@ pub(crate) struct Arguments {
     #[command(flatten)]
     case: CaseArguments,
 
-    /// A further measured curve, fitted together with the first; may be repeated
+    /// Another measured curve, fitted together with the first; may be repeated
     #[arg(long, value_name = "DATA")]
     also: Vec<PathBuf>,
 
     #[command(flatten)]
-    request: Request<FitRequest>,
+    request: Request<FitOptions>,
 
     #[command(flatten)]
     threads: ThreadsArgument,
 
-    /// Write the case of the best fit (.toml), with --per-curve one a curve (NAME-CURVE.toml), or
-    /// the rows with model and residuals (.csv)
+    /// Write the case of the best fit (.toml), with --per-curve one per curve
+    /// (NAME-CURVE.toml), or the rows with model and residuals (.csv)
     #[arg(long, value_name = "PATH")]
     out: Option<PathBuf>,
 
@@ -71,21 +70,14 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     for path in std::iter::once(&arguments.data).chain(&arguments.also) {
         if path.extension().is_some_and(|ending| ending == "toml") {
             return Err(Failure::input(
-                format!(
-                    "{}: a case file stands where the data are named",
-                    path.display()
-                ),
+                format!("{}: expected a data file, got a case file", path.display()),
                 "name the data first, then the case: nanotap fit DATA CASE",
             ));
         }
         request.data.push(Data::read(path)?);
     }
-    let case = GivenCase::with_any_distance(&arguments.case, output)?;
-    let report = progress::study::<FitStudy, _>(|control| {
-        arguments
-            .threads
-            .install(|| FitStudy::run(&case, &request, control))
-    })??;
+    let case = GivenCase::for_study(&arguments.case, true, output)?;
+    let report = progress::study::<FitStudy>(&case, &request, &arguments.threads)?;
     if let (Some(path), Some(ending)) = (&arguments.out, ending) {
         match ending {
             "toml" if !report.case_files.is_empty() => {
@@ -117,7 +109,7 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     }
 }
 
-/// Where the case of one curve is written: `best-CURVE.toml` beside `best.toml`.
+/// Where the case of one curve is written: `best-CURVE.toml` next to `best.toml`.
 fn of_curve(path: &Path, curve: &str, index: usize) -> PathBuf {
     let name = Path::new(curve)
         .file_stem()

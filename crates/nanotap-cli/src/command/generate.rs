@@ -11,15 +11,15 @@ use crate::failure::Failure;
 use crate::file;
 use crate::output::Output;
 
-/// Shell completions and manual pages.
+/// Generate shell completions and manual pages.
 #[derive(Args, Debug)]
 pub(crate) struct Arguments {
     /// Completions for this shell, or the manual pages
     #[arg(value_enum)]
     what: What,
 
-    /// Folder for the manual pages, one for each command, made if it is not there; without it,
-    /// the first page goes to standard output
+    /// Folder for the manual pages, one per command, created if missing; without it, the main page
+    /// goes to standard output
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
 }
@@ -61,7 +61,7 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
                     "--out {}: completions go to standard output",
                     folder.display()
                 ),
-                "leave --out away and redirect the output where the shell looks for completions",
+                "omit --out and redirect the output where the shell looks for completions",
             ));
         }
     };

@@ -4,16 +4,16 @@ use nanotap::figure::attractors::section_figure;
 use nanotap::model::Model;
 use nanotap::observe::time_series;
 use nanotap::study::lyapunov::{LyapunovReport, LyapunovStudy};
-use nanotap::study::registry::Study as _;
 
 use crate::failure::Failure;
 use crate::given_case::GivenCase;
 use crate::output::Output;
 use crate::study_arguments::StudyArguments;
 use crate::table::{Align, Table};
+use crate::threads::ThreadsArgument;
 use crate::{motion, number, progress, style};
 
-/// Lyapunov spectrum with error bars, and a Poincaré section.
+/// Compute the Lyapunov spectrum with error bars, and a Poincaré section.
 pub(crate) type Arguments = StudyArguments<LyapunovStudy>;
 
 pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure> {
@@ -23,9 +23,7 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     if !wanted {
         request.points = 0;
     }
-    let report = progress::study::<LyapunovStudy, _>(|control| {
-        LyapunovStudy::run(&case, &request, control)
-    })?;
+    let report = progress::study::<LyapunovStudy>(&case, &request, &ThreadsArgument::default())?;
     if wanted && report.section.is_empty() {
         output.warning("the section is empty: the motion begins no contact");
     }

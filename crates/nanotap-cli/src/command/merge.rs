@@ -1,4 +1,4 @@
-//! `nanotap merge`: what several machines computed of one dataset, put together.
+//! `nanotap merge`: partial datasets merged into one.
 
 use std::path::PathBuf;
 
@@ -9,14 +9,14 @@ use crate::failure::Failure;
 use crate::output::Output;
 use crate::{file, number, style};
 
-/// Put together what several machines computed of one dataset with --chunk.
+/// Merge partial datasets, computed with --chunk.
 #[derive(Args, Debug)]
 pub(crate) struct Arguments {
-    /// The datasets, made by the same command with different --chunk
+    /// The partial datasets, computed by the same command with different --chunk
     #[arg(value_name = "DATASET", required = true)]
     sources: Vec<PathBuf>,
 
-    /// The merged dataset: byte for byte what one machine would have made
+    /// The merged dataset, byte for byte equal to one computed without --chunk
     #[arg(long, value_name = "PATH")]
     out: PathBuf,
 }

@@ -1,4 +1,4 @@
-//! What can be typed, as it was typed: the commands, one a file, which resolve their own arguments.
+//! The commands, one per file, with their arguments.
 
 mod approach;
 mod attractors;
@@ -17,6 +17,7 @@ mod modes;
 mod orbit;
 mod paper;
 mod reconstruct;
+mod scan;
 mod schema;
 mod simulate;
 mod study;
@@ -51,20 +52,20 @@ A case is a TOML file:
 Exit codes: 0 done, 1 failed, 2 bad input, 130 stopped by Ctrl-C or SIGTERM (what is finished
 is kept: reports of what was found so far, chunks of datasets).";
 
-/// What an AFM cantilever does when its tip taps a sample: every motion, its
-/// stability, and what an experimenter would measure in it.
+/// Dynamics of an AFM cantilever whose tip taps a sample: its motions, their stability, and the
+/// quantities that an experiment measures.
 #[derive(Debug, Parser)]
 #[command(name = "nanotap", version, long_version = long_version(), styles = STYLES, after_help = AFTER_HELP, max_term_width = 100)]
 pub(crate) struct Arguments {
-    /// Print one JSON document on standard output, and nothing else there
+    /// Print one JSON document on standard output, and nothing else
     #[arg(long, global = true)]
     pub(crate) json: bool,
 
-    /// Leave out notes and progress; what puts the result in doubt is said all the same
+    /// Suppress notes and progress; warnings are still printed
     #[arg(long, short, global = true)]
     pub(crate) quiet: bool,
 
-    /// Replace files that nanotap did not write, too
+    /// Also replace files that nanotap did not write
     #[arg(long, global = true)]
     pub(crate) force: bool,
 
@@ -72,14 +73,14 @@ pub(crate) struct Arguments {
     pub(crate) command: Command,
 }
 
-/// The version, and what the speed of this machine depends on.
+/// The version, and the vector instructions in use.
 fn long_version() -> String {
     let version = env!("CARGO_PKG_VERSION");
     let instructions = nanotap::model::vector_instructions();
     format!("{version}\nvector instructions: {instructions}")
 }
 
-/// Every command that there is.
+/// Every command.
 #[derive(Debug, Subcommand)]
 pub(crate) enum Command {
     #[command(flatten)]
@@ -89,57 +90,59 @@ pub(crate) enum Command {
 }
 
 impl Command {
-    /// Whether it hears Ctrl-C by itself.
+    /// Whether the command handles Ctrl-C itself.
     pub(crate) const fn listens_itself(&self) -> bool {
         matches!(self, Self::Own(Own::Explore(_)))
     }
 }
 
-/// The commands with a text of their own.
+/// The commands with a hand-written text.
 #[derive(Debug, Subcommand)]
 pub(crate) enum Own {
-    /// Check a case and show it resolved
+    /// Check a case and print it resolved
     Case(case::Arguments),
-    /// Mode shapes and frequencies, in free flight and in contact
+    /// Compute mode shapes and frequencies, in free flight and in contact
     Modes(modes::Arguments),
-    /// One run: its steady state, or how it gets there
+    /// Simulate a motion: its steady state or its transient
     Simulate(simulate::Arguments),
-    /// A periodic orbit by Newton, stable or not
+    /// Compute a periodic orbit by Newton's method, stable or not
     Orbit(orbit::Arguments),
-    /// Every motion that coexists: a census from many seeded starts
+    /// Find coexisting attractors by sampling initial states
     Attractors(attractors::Arguments),
-    /// Periodic orbits followed in a parameter, stable and unstable
+    /// Follow periodic orbits in a parameter, stable and unstable
     Branch(branch::Arguments),
-    /// Amplitude, phase, force and energy against the distance, both ways
+    /// Compute amplitude, phase, force and energy against the distance, both ways
     Approach(approach::Arguments),
-    /// Parameters of lever and sample from measured curves
+    /// Simulate a line or an image under feedback
+    Scan(scan::Arguments),
+    /// Fit parameters of lever and sample to measured curves
     Fit(fit::Arguments),
-    /// Force and dissipation against distance from a measured curve
+    /// Reconstruct force and dissipation against distance from a measured curve
     Reconstruct(reconstruct::Arguments),
-    /// How the motion changes with one or two parameters, from any number of starts
+    /// Sweep one or two parameters, from any number of initial states
     Sweep(sweep::Arguments),
-    /// The operating window over two parameters: where only one motion exists
+    /// Map the operating window over two parameters: where only one motion exists
     Window(window::Arguments),
-    /// Basins of attraction on a slice of initial states
+    /// Compute basins of attraction on a slice of initial states
     Basin(basin::Arguments),
-    /// Put together what several machines computed of one sweep or basin
+    /// Merge partial datasets of a sweep or basin
     Merge(merge::Arguments),
-    /// Lyapunov spectrum with error bars, and a Poincaré section
+    /// Compute the Lyapunov spectrum with error bars, and a Poincaré section
     Lyapunov(lyapunov::Arguments),
-    /// The same motion with N = 1 … K modes: how many are enough
+    /// Compare the motion with 1 to K modes: how many are enough
     Convergence(convergence::Arguments),
-    /// The same lever and drive on every contact law: what difference the sample makes
+    /// Compare contact laws under the same lever and drive
     #[command(alias = "samples")]
     ContactLaws(contact_laws::Arguments),
-    /// Turn the knobs of a case in a browser and see what the tip does
+    /// Change parameters of a case in a browser and see the motion
     Explore(explore::Arguments),
-    /// Every figure and number of the paper, with verdicts and evidence
+    /// Reproduce every figure and number of the paper, with verdicts and evidence
     Paper(paper::Arguments),
-    /// The levers and materials that a case can name
+    /// List the levers and materials that a case can name
     Catalogue(catalogue::Arguments),
-    /// Shell completions and manual pages
+    /// Generate shell completions and manual pages
     Generate(generate::Arguments),
-    /// The JSON schema of what a study is asked for
+    /// Print the JSON schema of a study's options and report, or of a case
     Schema(schema::Arguments),
 }
 
@@ -157,6 +160,7 @@ pub(crate) fn run(command: &Command, output: &Output) -> Result<(), Failure> {
         Own::Attractors(arguments) => attractors::run(arguments, output),
         Own::Branch(arguments) => branch::run(arguments, output),
         Own::Approach(arguments) => approach::run(arguments, output),
+        Own::Scan(arguments) => scan::run(arguments, output),
         Own::Fit(arguments) => fit::run(arguments, output),
         Own::Reconstruct(arguments) => reconstruct::run(arguments, output),
         Own::Sweep(arguments) => sweep::run(arguments, output),

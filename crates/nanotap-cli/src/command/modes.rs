@@ -6,22 +6,21 @@ use nanotap::figure::modes::shapes_figure;
 use nanotap::model::beam::Modes;
 use nanotap::model::parameter::Parameter;
 use nanotap::study::modes::{ModeTable, ModesStudy, damping_ratio};
-use nanotap::study::registry::Study as _;
 
 use crate::failure::Failure;
 use crate::given_case::GivenCase;
 use crate::output::Output;
 use crate::study_arguments::StudyArguments;
 use crate::table::{Align, Table};
+use crate::threads::ThreadsArgument;
 use crate::{motion, number, progress, style};
 
-/// Mode shapes and frequencies, in free flight and in contact.
+/// Compute mode shapes and frequencies, in free flight and in contact.
 pub(crate) type Arguments = StudyArguments<ModesStudy>;
 
 pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure> {
     let (request, case) = arguments.read(output)?;
-    let table =
-        progress::study::<ModesStudy, _>(|control| ModesStudy::run(&case, &request, control))?;
+    let table = progress::study::<ModesStudy>(&case, &request, &ThreadsArgument::default())?;
     let beam = Modes::new(table.modes).map_err(|error| Failure::numerics(error.to_string()))?;
     arguments.out.write(|| shapes(&beam, request.points))?;
     arguments.plot.draw(|| shapes_figure(&beam))?;
@@ -90,20 +89,20 @@ fn text(case: &GivenCase, table: &ModeTable) -> String {
         number::significant(100.0 * table.static_excess, 2)
     )));
     if let Some(quality) = table.quality.as_ref().filter(|q| q.len() > 1) {
-        let told = |(k, q): (usize, &f64)| format!("Q{} = {}", k + 1, number::significant(*q, 4));
-        let told: Vec<String> = quality.iter().take(3).enumerate().map(told).collect();
+        let value = |(k, q): (usize, &f64)| format!("Q{} = {}", k + 1, number::significant(*q, 4));
+        let values: Vec<String> = quality.iter().take(3).enumerate().map(value).collect();
         text.push_str(&motion::paragraph(&format!(
             "In free flight {}. Without numbers of their own higher modes are damped in proportion \
              to their mass, which gives them several times the Q of real levers in air: \
              cantilever.Q2, Q3, f2, f3 and k2 take what was measured.",
-            told.join(", ")
+            values.join(", ")
         )));
     }
     text
 }
 
 fn frequencies(galerkin: &[f64], exact: &[f64], eigenvalues: Option<&[[f64; 2]]>) -> String {
-    // Where each mode oscillates there is one eigenvalue a mode, and it stands in its row.
+    // Where each mode oscillates there is one eigenvalue a mode, shown in its row.
     let paired = eigenvalues.filter(|list| list.len() == galerkin.len());
     let mut table = Table::new([
         ("mode", Align::Right),
@@ -129,7 +128,7 @@ fn frequencies(galerkin: &[f64], exact: &[f64], eigenvalues: Option<&[[f64; 2]]>
     let mut text = table.render();
     match eigenvalues {
         None => {
-            text.push_str("  damped: eigenvalues too close to critical damping to tell apart\n");
+            text.push_str("  damped: eigenvalues too close to critical damping to distinguish\n");
         }
         Some(list) if paired.is_none() => {
             text.push_str("  overdamped: not every mode oscillates; the eigenvalues are\n");

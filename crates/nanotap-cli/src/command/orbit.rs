@@ -5,9 +5,8 @@ use std::fmt::Write as _;
 use clap::Args;
 use nanotap::figure::motion::orbit_figure;
 use nanotap::model::Model;
-use nanotap::observe::{PhysicalMotion, Set, time_series};
-use nanotap::study::orbit::{MAX_DETERMINANT_DEFECT, OrbitReport, OrbitRequest, OrbitStudy};
-use nanotap::study::registry::Study as _;
+use nanotap::observe::{ObservableSet, PhysicalMotion, time_series};
+use nanotap::study::orbit::{MAX_DETERMINANT_DEFECT, OrbitOptions, OrbitReport, OrbitStudy};
 
 use crate::arguments::{CaseArguments, OutArgument, PlotArgument};
 use crate::failure::Failure;
@@ -16,16 +15,17 @@ use crate::motion;
 use crate::output::Output;
 use crate::request::Request;
 use crate::table::{Align, Table};
+use crate::threads::ThreadsArgument;
 use crate::{file, number, progress, series, style};
 
-/// A periodic orbit by Newton, stable or not.
+/// Compute a periodic orbit by Newton's method, stable or not.
 #[derive(Args, Debug)]
 pub(crate) struct Arguments {
     #[command(flatten)]
     case: CaseArguments,
 
     #[command(flatten)]
-    request: Request<OrbitRequest>,
+    request: Request<OrbitOptions>,
 
     /// Write the harmonics to this file (.csv)
     #[arg(long, value_name = "PATH")]
@@ -44,16 +44,15 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     }
     let case = GivenCase::of(&arguments.case, output)?;
     let model = case.model()?;
-    let found =
-        progress::study::<OrbitStudy, _>(|control| OrbitStudy::run(&case, &request, control))?;
+    let found = progress::study::<OrbitStudy>(&case, &request, &ThreadsArgument::default())?;
     let found = &found;
     for key in request.derivatives.iter().flat_map(|name| case.key(name)) {
-        case.say_held(&[key], output);
+        case.note_constants(&[key], output);
     }
     let orbit = &found.motion;
     if let Some(asked) = request.period.filter(|n| *n != orbit.period) {
         output.note(&format!(
-            "an orbit of period {asked} was asked for; Newton closed one that repeats every {} already",
+            "requested an orbit of period {asked}; Newton converged to one that repeats every {}",
             number::counted(orbit.period, "period", "periods")
         ));
     }
@@ -112,7 +111,12 @@ fn harmonics_csv(orbit: &OrbitReport, physical: Option<&PhysicalMotion>) -> Stri
     csv
 }
 
-fn text(case: &GivenCase, model: &Model, orbit: &OrbitReport, chosen: Option<Set>) -> String {
+fn text(
+    case: &GivenCase,
+    model: &Model,
+    orbit: &OrbitReport,
+    chosen: Option<ObservableSet>,
+) -> String {
     let units = case.units();
     let heading = format!("{}: {}", case.title(), case.summary());
     let mut text = format!("{}\n\n", style::bold(&heading));
@@ -131,7 +135,7 @@ fn text(case: &GivenCase, model: &Model, orbit: &OrbitReport, chosen: Option<Set
             .to_owned()
     };
     text.push_str(&motion::paragraph(&format!(
-        "Newton closed it to {:.1e}; it is known to {:.1e}; {check}",
+        "Newton residual {:.1e}; error estimate {:.1e}; {check}",
         orbit.residual, orbit.error
     )));
     let _ = writeln!(text, "\n  {}", style::bold("state at drive phase 0"));

@@ -14,18 +14,18 @@ use crate::output::Output;
 use crate::threads::ThreadsArgument;
 use crate::{progress, style};
 
-/// Every figure and number of the paper, with verdicts and evidence
+/// Reproduce every figure and number of the paper, with verdicts and evidence
 #[derive(Args, Debug)]
 pub(crate) struct Arguments {
-    /// Folder for the report and its pictures; made if it is not there
+    /// Folder for the report and its figures; created if missing
     #[arg(long, value_name = "DIR", default_value = "nanotap-paper")]
     out: PathBuf,
 
-    /// Only these sections, such as fig4 eq25 time-step
+    /// Compute only these sections, such as fig4 eq25 time-step
     #[arg(long, value_name = "ID", num_args = 1.., value_delimiter = ',')]
     only: Vec<String>,
 
-    /// Fewer starts and parameter values: seconds instead of minutes, wider bounds
+    /// Use fewer starts and parameter values: seconds instead of minutes, wider bounds
     #[arg(long)]
     quick: bool,
 

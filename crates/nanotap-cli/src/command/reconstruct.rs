@@ -10,7 +10,6 @@ use nanotap::study::fit::Table as Data;
 use nanotap::study::reconstruct::{
     ReconstructMethod, ReconstructOptions, ReconstructReport, ReconstructStudy,
 };
-use nanotap::study::registry::Study as _;
 
 use crate::arguments::{CaseArguments, OutArgument, PlotArgument};
 use crate::failure::Failure;
@@ -68,12 +67,8 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
         }
         options.data.push(Data::read(path)?);
     }
-    let case = GivenCase::with_any_distance(&arguments.case, output)?;
-    let report = progress::study::<ReconstructStudy, _>(|control| {
-        arguments
-            .threads
-            .install(|| ReconstructStudy::run(&case, &options, control))
-    })??;
+    let case = GivenCase::for_study(&arguments.case, true, output)?;
+    let report = progress::study::<ReconstructStudy>(&case, &options, &arguments.threads)?;
     arguments.out.write(|| report.csv())?;
     arguments.plot.draw(|| reconstruct_figure(&report))?;
     for remark in &report.remarks {

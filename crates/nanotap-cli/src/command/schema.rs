@@ -1,5 +1,4 @@
-//! `nanotap schema`: what studies are asked for and report, and what a case states, as JSON
-//! schema.
+//! `nanotap schema`: the JSON schemas of options and reports of studies, and of a case.
 
 use clap::Args;
 use nanotap::case::schema;
@@ -9,10 +8,10 @@ use serde_json::{Map, Value, json};
 use crate::failure::Failure;
 use crate::output;
 
-/// What the schema of a case is called beside those of the studies.
+/// The name of the schema of a case.
 const CASE: &str = "case";
 
-/// The JSON schema of what a study is asked for and reports, or of a case.
+/// Print the JSON schema of a study's options and report, or of a case.
 #[derive(Args, Debug)]
 pub(crate) struct Arguments {
     /// A study, or `case` for the keys of a case; without it, all of them by name
@@ -31,7 +30,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         Some(name) => all.remove(name).ok_or_else(|| {
             let known: Vec<&str> = all.keys().map(String::as_str).collect();
             Failure::input(
-                format!("there is no study `{name}`"),
+                format!("unknown study `{name}`"),
                 format!("there are {}", known.join(", ")),
             )
         })?,

@@ -1,13 +1,13 @@
-//! `nanotap simulate`: one run.
+//! `nanotap simulate`: a single motion.
 
 use std::fmt::Write as _;
 
+use nanotap::case::physical::Kind;
 use nanotap::case::units::Units;
 use nanotap::figure::motion::{fixed_step_figure, simulation_figure};
 use nanotap::model::Model;
-use nanotap::observe::Set;
+use nanotap::observe::ObservableSet;
 use nanotap::study::fixed_step::FixedStepRun;
-use nanotap::study::registry::Study as _;
 use nanotap::study::simulate::{Classification, SimulateReport, SimulateStudy, Simulation};
 
 use crate::failure::Failure;
@@ -16,17 +16,16 @@ use crate::motion;
 use crate::output::Output;
 use crate::study_arguments::StudyArguments;
 use crate::table::{Align, Table};
+use crate::threads::ThreadsArgument;
 use crate::{number, progress, series, style};
 
-/// One run: its steady state, or how it gets there.
+/// Simulate a motion: its steady state or its transient.
 pub(crate) type Arguments = StudyArguments<SimulateStudy>;
 
 pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure> {
     let (request, case) = arguments.read(output)?;
     let model = case.model()?;
-    let report = progress::study::<SimulateStudy, _>(|control| {
-        SimulateStudy::run(&case, &request, control)
-    })?;
+    let report = progress::study::<SimulateStudy>(&case, &request, &ThreadsArgument::default())?;
     let units = case.units();
     match &report {
         SimulateReport::Exact(report) => {
@@ -47,7 +46,7 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
                 .plot
                 .draw(|| fixed_step_figure(&model, run, &units))?;
             output.note(
-                "rk4 is the paper's own method, kept to show what a time step does; nothing it says is certified",
+                "rk4 is the paper's method, kept to show the effect of a time step; its results are not certified",
             );
         }
     }
@@ -57,7 +56,12 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     })
 }
 
-fn text(case: &GivenCase, model: &Model, run: &Simulation, chosen: Option<Set>) -> String {
+fn text(
+    case: &GivenCase,
+    model: &Model,
+    run: &Simulation,
+    chosen: Option<ObservableSet>,
+) -> String {
     let units = case.units();
     let heading = format!("{}: {}", case.title(), case.summary());
     let mut text = format!("{}\n\n", style::bold(&heading));
@@ -69,13 +73,13 @@ fn text(case: &GivenCase, model: &Model, run: &Simulation, chosen: Option<Set>) 
     text.push_str(&motion::paragraph(&run.evidence));
     if run.classification == Classification::Undecided {
         text.push_str(&motion::paragraph(
-            "What follows is what was recorded; it need not be what remains in the end.",
+            "The following describes the recorded motion, which need not be the final one.",
         ));
     }
     // Far above rounding and what Newton leaves.
     if let Some(distance) = run.distance_to_orbit.filter(|d| *d > 1e-6) {
         text.push_str(&motion::paragraph(&format!(
-            "What follows is the way there, not yet the orbit: at its end the state is still {} % of the orbit's \
+            "The following describes the transient, not yet the orbit: at its end the state is still {} % of the orbit's \
              size away. Without --transient the orbit itself is shown.",
             number::significant(100.0 * distance, 2)
         )));
@@ -159,12 +163,8 @@ fn rk4_text(case: &GivenCase, run: &FixedStepRun) -> String {
             number::significant(run.tip_max, 6)
         ),
     ]);
-    if let Some(unit) = units.si(nanotap::case::physical::Kind::Length) {
-        let metres = nanotap::case::physical::Kind::Length;
-        table.row(["amplitude", &metres.format(unit * run.amplitude)]);
-    } else {
-        table.row(["amplitude", &number::significant(run.amplitude, 6)]);
-    }
+    let amplitude = number::quantity(&units, Kind::Length, run.amplitude, [6, 4]);
+    table.row(["amplitude", &amplitude]);
     table.row([
         "contact",
         &format!(
@@ -177,7 +177,7 @@ fn rk4_text(case: &GivenCase, run: &FixedStepRun) -> String {
         style::bold(&heading),
         table.render(),
         style::bold(&format!(
-            "the exact flow from where it ended: {}",
+            "exact flow from its final state: {}",
             motion::verdict(run.exact.classification, run.exact.period)
         )),
         motion::paragraph(&run.exact.evidence),

@@ -1,5 +1,5 @@
-//! A study that has no text of its own: every study of the registry is a command, with the flags
-//! of its request, and prints its document.
+//! Studies without a hand-written text: every study of the registry is a command, with the flags of
+//! its options, and prints its document.
 
 use clap::{ArgMatches, Args as _, Command, FromArgMatches, Subcommand};
 use nanotap::study::registry::{STUDIES, StudyEntry, study};
@@ -68,28 +68,34 @@ fn command_of(entry: &StudyEntry) -> Command {
 
 pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure> {
     let entry = arguments.entry;
-    let case = if entry.any_distance {
-        GivenCase::with_any_distance(&arguments.case, output)?
-    } else {
-        GivenCase::of(&arguments.case, output)?
-    };
+    let case = GivenCase::for_study(&arguments.case, entry.any_distance, output)?;
     let request = Value::Object(arguments.given.clone());
     let document = progress::watched(entry.name, entry.counted, entry.partial, |control| {
         entry.document(&case, request, control)
     })?;
     let document: Value = serde_json::from_str(&document)
         .map_err(|error| Failure::numerics(format!("no JSON of the result: {error}")))?;
+    if document["cancelled"] == true {
+        output.warning("stopped before it was done");
+    }
     output.result(&document, text)
 }
 
-/// A line a field; of the case its own command tells more.
+/// A line a field, without the case.
 fn text(document: &Value) -> String {
+    lines(document, "  ")
+}
+
+fn lines(document: &Value, indent: &str) -> String {
     let fields = document.as_object().into_iter().flatten();
+    let line = |(name, value): (&String, &Value)| match value {
+        Value::Object(_) => format!("{indent}{name}:\n{}", lines(value, &format!("{indent}  "))),
+        _ => format!("{indent}{name}: {}\n", shown(value)),
+    };
     fields
         .filter(|(name, _)| !["case", "version"].contains(&name.as_str()))
-        .fold(String::new(), |text, (name, value)| {
-            text + &format!("  {name}: {}\n", shown(value))
-        })
+        .map(line)
+        .collect()
 }
 
 fn shown(value: &Value) -> String {
@@ -123,10 +129,12 @@ mod tests {
     fn its_text_is_a_line_a_field() {
         let document = serde_json::json!({
             "case": {}, "version": "0", "verdict": "two modes", "modes": [1, 2], "path": vec![0; 9],
+            "unit": {"symbol": "m", "si": 1},
         });
         assert_eq!(
             text(&document),
-            "  verdict: two modes\n  modes: [1,2]\n  path: 9 entries, which --json shows\n"
+            "  verdict: two modes\n  modes: [1,2]\n  path: 9 entries, which --json shows\n  unit:\n    \
+             symbol: m\n    si: 1\n"
         );
     }
 }

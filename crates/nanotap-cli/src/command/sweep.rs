@@ -1,12 +1,10 @@
 //! `nanotap sweep`: how the motion changes with one or two parameters.
 
-use std::time::Instant;
-
 use clap::{Args, ValueEnum};
 use nanotap::case::Key;
 use nanotap::case::physical::Kind;
 use nanotap::figure::sweep::{figure, response};
-use nanotap::study::sweep::{Follow, Over, Summary, Sweep, SweepRequest, summary};
+use nanotap::study::sweep::{Follow, Over, Summary, SweepOptions, SweepStudy};
 
 use crate::arguments::{CaseArguments, PlotArgument};
 use crate::dataset::{DatasetArguments, DatasetReport, derived_name};
@@ -17,17 +15,17 @@ use crate::output::Output;
 use crate::request::Request;
 use crate::table::{Align, Table};
 
-/// How the motion changes with one or two parameters, from any number of starts.
+/// Sweep one or two parameters, from any number of initial states.
 #[derive(Args, Debug)]
 pub(crate) struct Arguments {
     #[command(flatten)]
     case: CaseArguments,
 
     #[command(flatten)]
-    request: Request<SweepRequest>,
+    request: Request<SweepOptions>,
 
-    /// What --plot shows; without it the response over drive.frequency or over two parameters of
-    /// a physical case, else the diagram
+    /// Kind of --plot; default: the response over drive.frequency or over two parameters of a
+    /// physical case, else the diagram
     #[arg(long, value_enum)]
     show: Option<Show>,
 
@@ -40,46 +38,34 @@ pub(crate) struct Arguments {
 /// What a picture shows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 enum Show {
-    /// Greatest deflection in each drive period: a bifurcation diagram; over two parameters a map
-    /// of what motions there are
+    /// Largest deflection in each drive period: a bifurcation diagram; over two parameters a map of
+    /// the motions
     Diagram,
     /// Amplitude and phase at the drive's frequency: a resonance curve; over two parameters also
-    /// maps of amplitude, phase, greatest force, dissipation and contact
+    /// maps of amplitude, phase, peak force, dissipation and contact
     Response,
 }
 
 pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure> {
-    let request = arguments.request.read()?;
-    let begun = Instant::now();
+    let options = arguments.request.read()?;
     let case = GivenCase::of(&arguments.case, output)?;
-    let sweep = request.sweep(&case)?;
-    let keys: Vec<Key> = sweep.options().over.iter().map(|o| o.key).collect();
-    case.say_held(&keys, output);
+    let over = options.over.parse(&case)?;
+    let keys: Vec<Key> = over.iter().map(|over| over.key).collect();
+    case.note_constants(&keys, output);
     let names: Vec<&str> = keys.iter().map(|key| key.path()).collect();
     let name = derived_name(
         arguments.case.file.as_deref(),
         &[&["sweep"], names.as_slice()].concat(),
     );
-    let dataset = &arguments.dataset;
-    let destination = dataset.destination(&name, arguments.plot.plot.as_deref())?;
-    arguments.plot.check()?;
-    let noun = if sweep.options().follow == Follow::Off {
+    let noun = if options.follow == Follow::Off {
         "values"
     } else {
         "lines"
     };
-    let store = dataset.compute(
-        &destination.store,
-        sweep.schema(),
-        ["sweep", noun],
-        output,
-        |store, work| sweep.compute(store, work),
-    )?;
     let shown = arguments.show.unwrap_or_else(|| {
         // A resonance curve is what one sees of the drive's frequency.
-        let key = sweep.options().over[0].key.path();
-        let two = sweep.options().over.len() == 2;
-        if key.starts_with("drive.frequency") || (two && case.physical().is_some()) {
+        let of_frequency = over[0].key.path().starts_with("drive.frequency");
+        if of_frequency || (over.len() == 2 && case.physical().is_some()) {
             Show::Response
         } else {
             Show::Diagram
@@ -89,16 +75,26 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
         Show::Diagram => figure,
         Show::Response => response,
     };
-    let plot = arguments.plot.plot.as_deref();
-    let seed = request.seed;
-    let done = DatasetReport::of(&store, destination, plot, begun, seed, summary, drawn)?;
-    output.study(&case, &done, |done| text(&case, &sweep, done))
+    let done = arguments.dataset.run::<SweepStudy>(
+        &case,
+        &options,
+        &name,
+        noun,
+        options.seed,
+        &arguments.plot,
+        drawn,
+        output,
+    )?;
+    output.study(&case, &done, |done| text(&case, &options, &over, done))
 }
 
-fn text(case: &GivenCase, sweep: &Sweep, done: &DatasetReport<Summary>) -> String {
-    let options = sweep.options();
-    let ranges: Vec<String> = options
-        .over
+fn text(
+    case: &GivenCase,
+    options: &SweepOptions,
+    over: &[Over],
+    done: &DatasetReport<Summary>,
+) -> String {
+    let ranges: Vec<String> = over
         .iter()
         .map(|over| {
             format!(
@@ -114,7 +110,7 @@ fn text(case: &GivenCase, sweep: &Sweep, done: &DatasetReport<Summary>) -> Strin
         "{}: {}, {}",
         case.title(),
         ranges.join(", "),
-        number::counted(sweep.runs(), "run", "runs")
+        number::counted(options.runs(over), "run", "runs")
     );
     done.text(&heading, counts)
 }

@@ -3,15 +3,14 @@
 //! "Window" is what people at the instrument call the range of setpoints and drives in which
 //! imaging is stable.
 
-use std::time::Instant;
-
 use clap::Args;
 use nanotap::case::Key;
 use nanotap::figure::window::figure;
-use nanotap::study::window::{Condition, Window, WindowRequest};
+use nanotap::study::DatasetStudy as _;
+use nanotap::study::window::{Condition, Window, WindowOptions, WindowStudy};
 
 use crate::arguments::{CaseArguments, PlotArgument};
-use crate::dataset::{DatasetArguments, DatasetReport, derived_name};
+use crate::dataset::{DatasetArguments, derived_name};
 use crate::failure::Failure;
 use crate::given_case::GivenCase;
 use crate::number;
@@ -27,7 +26,7 @@ pub(crate) struct Arguments {
     case: CaseArguments,
 
     #[command(flatten)]
-    request: Request<WindowRequest>,
+    request: Request<WindowOptions>,
 
     #[command(flatten)]
     dataset: DatasetArguments,
@@ -36,37 +35,34 @@ pub(crate) struct Arguments {
 }
 
 pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure> {
-    let request = arguments.request.read()?;
-    let begun = Instant::now();
-    let names = request.over.names();
+    let options = arguments.request.read()?;
+    let names = options.over.names();
     let case = GivenCase::of(&arguments.case, output)?;
-    let sweep = request.sweep(&case)?;
-    let keys: Vec<Key> = sweep.options().over.iter().map(|over| over.key).collect();
-    case.say_held(&keys, output);
+    let over = options.over.parse(&case)?;
+    let keys: Vec<Key> = over.iter().map(|over| over.key).collect();
+    case.note_constants(&keys, output);
     let name = derived_name(
         arguments.case.file.as_deref(),
         &[&["window"], names.as_slice()].concat(),
     );
-    let plot = arguments.plot.plot.as_deref();
-    let destination = arguments.dataset.destination(&name, plot)?;
-    arguments.plot.check()?;
-    let store = arguments.dataset.compute(
-        &destination.store,
-        sweep.schema(),
-        ["window", "values"],
+    let done = arguments.dataset.run::<WindowStudy>(
+        &case,
+        &options,
+        &name,
+        WindowStudy::COUNTED,
+        options.seed,
+        &arguments.plot,
+        figure,
         output,
-        |store, work| sweep.compute(store, work),
     )?;
-    let seed = request.seed;
-    let done = DatasetReport::of(&store, destination, plot, begun, seed, Window::kept, figure)?;
     output.study(&case, &done, |done| {
         let heading = format!(
             "{}: operating window over {} and {}, {} at each of {} points",
             case.title(),
             names[0],
             names[1],
-            number::counted(request.starts, "start", "starts"),
-            sweep.runs() / request.starts.max(1)
+            number::counted(options.starts, "start", "starts"),
+            over.iter().map(|over| over.count).product::<usize>()
         );
         done.text(&heading, shares)
     })

@@ -23,10 +23,10 @@ fn of_kind(json: &Value, kind: &str) -> Vec<f64> {
 const IMPACT: &str = "[model]\nkind = \"impact\"\nstiffness = 1\ndamping = 0\nforcing = 1\nomega = 2\n\
                       gap = 0\nrestitution = 0.8\n";
 
-/// Short steps are some 10⁴ points of 1.3 kB: every other one is listed, with both ends, and the
-/// CSV has all of them.
+/// With short steps there are some 10⁴ points of 1.3 kB: every other one is listed, with both ends,
+/// and the CSV file contains all of them.
 #[test]
-fn a_long_document_lists_points_evenly_and_says_how_many_it_leaves_out() {
+fn a_long_document_lists_points_evenly_and_counts_the_omitted_ones() {
     let folder = Folder::new();
     folder.write("case.toml", IMPACT);
     let arguments = [
@@ -66,7 +66,7 @@ fn a_long_document_lists_points_evenly_and_says_how_many_it_leaves_out() {
 }
 
 #[test]
-fn the_period_1_orbit_doubles_where_it_should() {
+fn the_period_1_orbit_doubles_at_the_reference_points() {
     let folder = Folder::with_paper_case();
     let arguments = [
         "branch",
@@ -110,7 +110,7 @@ fn the_period_1_orbit_doubles_where_it_should() {
     );
     for p in points {
         let inside = number(p, "parameter");
-        // Between the flips it is unstable, and nowhere else.
+        // It is unstable between the flips only.
         let unstable = inside < flips[0] && inside > flips[1];
         assert_eq!(p["stable"], !unstable, "{inside}");
         assert!(number(p, "tip_max") > number(p, "tip_min"));
@@ -156,7 +156,7 @@ fn the_doubled_branch_joins_both_flips() {
     // It begins at one flip of its parent and ends at the other.
     let end = branches[1]["end"].as_str().unwrap();
     assert!(
-        end.contains("meets one of period 1 at 2.505040698"),
+        end.contains("meets a branch of period 1 at 2.505040698"),
         "{end}"
     );
     let doubled: Vec<&Value> = json["points"]
@@ -170,7 +170,7 @@ fn the_doubled_branch_joins_both_flips() {
 }
 
 #[test]
-fn the_restitution_model_flips_where_it_should() {
+fn the_restitution_model_flips_at_the_reference_points() {
     let folder = Folder::new();
     folder.write("impact.toml", IMPACT);
     // Reference: gap 0, r = 0.8 flips at ω = 1.2606766 and 2.6533477.
@@ -196,11 +196,11 @@ fn the_restitution_model_flips_where_it_should() {
     }
 }
 
-/// COCO's hard-impact example: k = 1, c = 0.1, distance 1, r = 0.8. At ω = 1 the orbit
-/// without impact has the amplitude F/(c ω) and grazes at F = 0.1; at ω = 0.8 at
-/// √((1 − ω²)² + (c ω)²) = 0.368782.
+/// COCO's hard-impact example: k = 1, c = 0.1, distance 1, r = 0.8. At ω = 1 the orbit without
+/// impact has the amplitude F/(c ω) and grazes at F = 0.1; at ω = 0.8 it grazes at F = √((1 − ω²)²
+/// + (c ω)²) = 0.368782.
 #[test]
-fn a_rigid_stop_is_grazed_where_the_linear_response_reaches_it() {
+fn the_linear_response_grazes_a_rigid_stop() {
     let folder = Folder::new();
     for (omega, expected) in [("1", 0.1), ("0.8", 0.368_781_778_291_715_5)] {
         folder.write(
@@ -270,7 +270,7 @@ fn loci_and_diagrams_are_assembled() {
     };
     let second = list("second");
     assert!(second.iter().any(|a| *a <= 19.0) && second.iter().any(|a| *a >= 21.0));
-    // A point of the locus is a flip of the branch at its second value.
+    // A point of the curve is a flip of the branch at its second value.
     let (first, second) = (list("first")[0], second[0]);
     let set = format!("alpha4={second}");
     let again = folder
@@ -376,7 +376,7 @@ fn physical_cases_take_values_with_units() {
 }
 
 #[test]
-fn what_makes_no_sense_is_refused() {
+fn invalid_requests_are_refused() {
     let folder = Folder::with_paper_case();
     let refused = |arguments: &[&str], words: &[&str]| {
         let start = ["branch", "case.toml", "--set", "omega=3"];

@@ -1,4 +1,4 @@
-//! `nanotap case`: what it shows and what it refuses.
+//! `nanotap case`: output and error messages.
 
 use crate::util::{Folder, PAPER, case};
 use proptest::prelude::*;
@@ -33,7 +33,7 @@ fn overrides_and_readable_names_reach_the_result() {
 }
 
 #[test]
-fn no_file_is_needed_where_everything_is_set() {
+fn no_file_is_needed_if_all_keys_are_set() {
     let folder = Folder::new();
     let set = [
         "alpha1=0",
@@ -76,7 +76,7 @@ fn text_names_symbols_meanings_and_values() {
             outcome.stdout
         );
     }
-    // No terminal, no colour.
+    // Not a terminal: no colour.
     assert!(!outcome.stdout.contains('\u{1b}'));
     assert!(outcome.stdout.lines().all(|line| line == line.trim_end()));
 }
@@ -102,7 +102,7 @@ fn a_case_written_out_is_the_same_case() {
     );
     folder
         .run(&["case", "case.toml", "--out", "other.xyz"])
-        .refused(&["other.xyz", "end the name in .toml"]);
+        .refused(&["other.xyz", "use .toml"]);
     let nowhere = folder.run(&["case", "case.toml", "--out", "no/such/folder/x.toml"]);
     assert_eq!((nowhere.code, nowhere.stdout.as_str()), (1, ""));
     assert!(
@@ -115,7 +115,7 @@ fn a_case_written_out_is_the_same_case() {
 }
 
 #[test]
-fn a_wrong_case_is_shown_with_its_line() {
+fn an_error_in_a_case_is_shown_with_its_line() {
     let refused = case(PAPER.replace("omega = 2.6", "omgea = 2.6"), &[]);
     refused.refused(&[
         "case.toml:9:1",
@@ -125,7 +125,7 @@ fn a_wrong_case_is_shown_with_its_line() {
     ]);
     assert!(
         !refused.stderr.contains("lacks"),
-        "said once: {}",
+        "printed once: {}",
         refused.stderr
     );
     // Without a line to point at, the nearest key is offered below.
@@ -145,7 +145,7 @@ fn a_wrong_case_is_shown_with_its_line() {
 }
 
 #[test]
-fn every_bad_number_is_refused_with_key_and_value() {
+fn every_invalid_number_is_refused_with_key_and_value() {
     for (word, words) in [
         ("alpha1=-0.1", "`alpha1` = -0.1: must be 0 or more"),
         (
@@ -182,7 +182,7 @@ fn every_bad_number_is_refused_with_key_and_value() {
 }
 
 #[test]
-fn files_that_are_no_case_files_are_refused() {
+fn files_other_than_case_files_are_refused() {
     let folder = Folder::with_paper_case();
     folder.write("empty.toml", "");
     folder.write("binary.toml", [0x7f, b'E', b'L', b'F', 0xff, 0xfe, 0, 1]);
@@ -191,8 +191,8 @@ fn files_that_are_no_case_files_are_refused() {
     folder.write("prose.toml", "It was a dark and stormy night.\n");
     folder
         .run(&["case", "none.toml"])
-        .refused(&["none.toml: there is no such file"]);
-    folder.run(&["case", "."]).refused(&[".: this is a folder"]);
+        .refused(&["none.toml: no such file"]);
+    folder.run(&["case", "."]).refused(&[".: is a folder"]);
     folder
         .run(&["case", "empty.toml"])
         .refused(&["empty.toml", "lacks alpha1, alpha2", "omega"]);
@@ -214,8 +214,8 @@ fn files_that_are_no_case_files_are_refused() {
 }
 
 #[test]
-fn a_key_twice_by_one_name_or_two_is_refused() {
-    case(format!("{PAPER}omega = 2\n"), &[]).refused(&["case.toml:10:1", "stands here twice"]);
+fn a_key_that_is_stated_twice_is_refused() {
+    case(format!("{PAPER}omega = 2\n"), &[]).refused(&["case.toml:10:1", "duplicate key"]);
     case(format!("{PAPER}drive_frequency = 2\n"), &[])
         .refused(&["`omega` and `drive_frequency` are the same key", "keep one"]);
 }
@@ -254,23 +254,31 @@ fn control_characters_of_a_file_do_not_reach_the_terminal() {
     assert!(!outcome.stderr.contains('\u{1b}'), "{:?}", outcome.stderr);
 }
 
+/// A key of 100,000 letters is quoted by its beginning and end.
+#[test]
+fn long_words_are_shortened_in_messages() {
+    let outcome = case(PAPER, &["--set", &format!("{}=1", "x".repeat(100_000))]);
+    outcome.refused(&["xxx … xxx", "is not a key of [model]"]);
+    assert!(outcome.stderr.len() < 3000, "{}", outcome.stderr.len());
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(64))]
 
     #[test]
-    fn random_bytes_never_make_it_panic(bytes in prop::collection::vec(any::<u8>(), 0..300)) {
+    fn random_bytes_never_cause_a_panic(bytes in prop::collection::vec(any::<u8>(), 0..300)) {
         case(bytes, &[]).refused(&["error"]);
     }
 
     #[test]
-    fn random_changes_never_make_it_panic(
+    fn random_changes_never_cause_a_panic(
         at in 0..PAPER.len(),
         bytes in prop::collection::vec(any::<u8>(), 1..6),
     ) {
         let mut text = PAPER.as_bytes().to_vec();
         text.splice(at..(at + bytes.len()).min(text.len()), bytes);
         let outcome = case(text, &[]);
-        // A comment or another number may still be a case.
+        // A comment or another number may still be a valid case.
         prop_assert!(outcome.code == 0 || outcome.code == 2, "{}", outcome.stderr);
         prop_assert!(!outcome.stderr.contains("panicked"), "{}", outcome.stderr);
     }

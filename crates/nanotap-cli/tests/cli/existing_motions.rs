@@ -9,7 +9,7 @@ fn number(json: &serde_json::Value, key: &str) -> f64 {
 }
 
 #[test]
-fn coexisting_motions_are_all_found() {
+fn all_coexisting_motions_are_found() {
     let folder = Folder::with_paper_case();
     let arguments = [
         "attractors",
@@ -25,7 +25,7 @@ fn coexisting_motions_are_all_found() {
     let list = json["attractors"].as_array().unwrap();
     let periods: Vec<u64> = list.iter().map(|a| a["period"].as_u64().unwrap()).collect();
     // Reference: at Ω = 20, α1 = 0 a period-1 (W up to 0.7357) and a period-4 (W up to 3.0047).
-    // Plain runs of 3000 periods from 1000 starts of this box: 67 % go to the period-4 orbit.
+    // Plain runs of 3000 periods from 1000 starts in this box: 67 % go to the period-4 orbit.
     assert_eq!(periods, [4, 1]);
     assert!((number(&list[0], "tip_max") - 3.0047).abs() < 5e-5);
     assert!((number(&list[1], "tip_max") - 0.7357).abs() < 5e-5);
@@ -47,7 +47,7 @@ fn coexisting_motions_are_all_found() {
 }
 
 #[test]
-fn the_answer_is_the_same_on_any_number_of_threads() {
+fn the_result_does_not_depend_on_the_number_of_threads() {
     let folder = Folder::with_paper_case();
     let run = |threads: &str| {
         let arguments = [
@@ -71,7 +71,7 @@ fn the_answer_is_the_same_on_any_number_of_threads() {
 }
 
 #[test]
-fn chaos_is_an_attractor_with_its_evidence_and_unstable_orbits() {
+fn chaos_is_reported_with_evidence_and_unstable_orbits() {
     let folder = Folder::with_paper_case();
     let outcome = folder.run(&[
         "attractors",
@@ -121,9 +121,9 @@ fn chaos_is_an_attractor_with_its_evidence_and_unstable_orbits() {
     );
 }
 
-/// A motion of nanometres over a beam at ten micrometres: nothing may depend on the size.
+/// A motion of nanometres with a beam at ten micrometres: the results do not depend on the size.
 #[test]
-fn small_motions_are_told_apart_as_well_as_large_ones() {
+fn small_motions_are_distinguished_like_large_ones() {
     let folder = Folder::with_paper_case();
     let census = |alpha2: &str| {
         let arguments = [
@@ -183,7 +183,7 @@ fn an_oscillator_with_a_rigid_stop_is_counted_too() {
 }
 
 #[test]
-fn the_spectrum_is_right_and_sums_to_the_trace() {
+fn the_spectrum_is_correct_and_sums_to_the_trace() {
     let folder = Folder::with_paper_case();
     let outcome = folder.run(&[
         "lyapunov",
@@ -214,7 +214,7 @@ fn the_spectrum_is_right_and_sums_to_the_trace() {
             "{value} {expected}"
         );
     }
-    // The trace is taken along another shadow of the same chaos.
+    // The trace is computed along a different trajectory of the same chaos.
     assert!((number(&json, "sum") - number(&json, "sum_by_trace")).abs() < 0.01);
     assert_eq!(json["classification"], "chaotic");
     let section = folder.read("section.csv");
@@ -246,7 +246,7 @@ fn the_spectrum_is_right_and_sums_to_the_trace() {
 }
 
 #[test]
-fn what_makes_no_sense_is_refused() {
+fn invalid_requests_are_refused() {
     let folder = Folder::with_paper_case();
     let refused = |arguments: &[&str], words: &[&str]| {
         folder
@@ -276,7 +276,7 @@ fn what_makes_no_sense_is_refused() {
 
 /// Unstable orbits of a physical case are reported in SI too, with all observables.
 #[test]
-fn unstable_orbits_are_told_in_si() {
+fn unstable_orbits_are_reported_in_si() {
     let folder = Folder::new();
     let soft = include_str!("../../../../docs/cases/soft-sample.toml");
     folder.write("soft.toml", soft);
@@ -310,8 +310,8 @@ fn unstable_orbits_are_told_in_si() {
     assert_eq!(alone["stable"], false);
 }
 
-/// Two tones of 1 and 25/4 mix in a contact: f1 + f2 is shown, far above the first orders, which are
-/// quarters.
+/// Two tones with frequencies 1 and 25/4 mix in a contact: f1 + f2 is shown, although it is far
+/// above the first orders, which are quarters.
 #[test]
 fn the_sidebands_of_two_tones_are_shown() {
     let folder = Folder::new();

@@ -1,4 +1,4 @@
-//! Experiments at the terminal.
+//! Studies of measurements at the terminal.
 
 use crate::util::{Folder, case};
 
@@ -22,7 +22,7 @@ tip = \"15 nm\"
 ";
 
 #[test]
-fn an_approach_curve_goes_there_and_back() {
+fn an_approach_curve_has_approach_and_retract() {
     let folder = Folder::new();
     folder.write("lever.toml", STIFF);
     let json = folder
@@ -49,7 +49,8 @@ fn an_approach_curve_goes_there_and_back() {
     for (k, nm) in [(0, 25.0), (1, 24.0), (20, 5.0), (21, 5.0), (41, 25.0)] {
         assert!((zc(k) / (nm * 1e-9) - 1.0).abs() < 1e-9, "{}", zc(k));
     }
-    // 22 nm lies between the reach (20 nm) and the fold (23 nm): free there, tapping back.
+    // 22 nm is between the reach (20 nm) and the fold (23 nm): free on approach, tapping on
+    // retract.
     let (there, back) = (&table[3], &table[38]);
     assert_eq!(there["way"], "approach");
     assert_eq!(there["physical"]["F_max"].as_f64(), Some(0.0));
@@ -70,7 +71,7 @@ fn an_approach_curve_goes_there_and_back() {
 }
 
 #[test]
-fn senseless_approaches_are_refused() {
+fn invalid_approach_requests_are_refused() {
     let folder = Folder::new();
     folder.write("lever.toml", STIFF);
     let run = |arguments: &[&str]| folder.run(&[&["approach", "lever.toml"], arguments].concat());
@@ -81,7 +82,7 @@ fn senseless_approaches_are_refused() {
     case(STIFF, &["--set", "gap.tip=15 kHz"]).refused(&["gap.tip", "length"]);
 }
 
-/// The same lever without a distance: the setpoint decides.
+/// The same lever without a distance: the setpoint determines it.
 fn at_setpoint(setpoint: &str) -> String {
     STIFF.replace(
         "[gap]\ntip = \"15 nm\"\n",
@@ -110,7 +111,7 @@ fn a_setpoint_serves_every_command() {
     assert!((amplitude / 16e-9 - 1.0).abs() < 1e-9, "{amplitude}");
     let text = folder.run(&["case", "lever.toml"]).stdout;
     assert!(text.contains("stable, reached on approach"), "{text}");
-    // Too low to be reached: every command fails with the reason; the case is shown before that.
+    // Too low to be reached: every command fails with the reason, except that the case is shown.
     folder.write("low.toml", at_setpoint("1 pm"));
     let failed = folder.run(&["orbit", "low.toml"]);
     assert_eq!(failed.code, 1);
@@ -171,7 +172,7 @@ fn quantities_of_the_case_are_swept_in_their_units() {
     // In metres: nanometres of a 20 nm drive.
     assert!(rows.iter().all(|r| r[1] > 0.5e-9 && r[1] < 40e-9));
     assert!(folder.read("f.svg").contains("drive frequency (kHz)"));
-    // Twice the drive far away is twice the amplitude.
+    // Twice the drive at a large distance gives twice the amplitude.
     let json = sweep(
         "drive.amplitude=10pm:20pm:2",
         &["--set", "gap.tip=100 nm", "--out", "a.csv"],
@@ -237,7 +238,7 @@ fn branches_run_over_quantities_of_the_case() {
 }
 
 #[test]
-fn the_window_says_where_one_motion_exists() {
+fn the_window_reports_where_one_motion_exists() {
     let folder = Folder::new();
     folder.write("lever.toml", STIFF);
     let plain = [
@@ -254,8 +255,8 @@ fn the_window_says_where_one_motion_exists() {
     let json = folder
         .run(&[&plain, &["--plot", "w.svg"][..]].concat())
         .json();
-    // Near the sample: one tapping motion at the resonance, beside the free one above it.
-    // Far away nothing touches.
+    // Near the sample: one tapping motion at the resonance, in addition to the free one above it.
+    // At large distances there is no contact.
     assert_eq!(
         json["conditions"],
         serde_json::json!([
@@ -265,7 +266,7 @@ fn the_window_says_where_one_motion_exists() {
     );
     assert_eq!(json["shares"]["no-contact"].as_f64(), Some(0.5));
     assert!(folder.read("w.svg").contains("a second state"));
-    // It goes on where it stopped: everything is there already.
+    // It resumes where it stopped: all chunks exist.
     let again = folder.run(&plain);
     assert!(
         again.stderr.contains("chunks are there already"),
@@ -278,7 +279,7 @@ fn the_window_says_where_one_motion_exists() {
         .refused(&["1 parameters make no window", "twice"]);
 }
 
-/// What cannot be, and what the model would not hold for, is said with what would be right.
+/// Invalid levers and cases beyond the model's validity are reported with a remedy.
 #[test]
 fn impossible_levers_are_refused_and_touching_beams_warned_of() {
     let refused = |set: &str, words: &[&str]| {
@@ -300,7 +301,7 @@ fn impossible_levers_are_refused_and_touching_beams_warned_of() {
     refused("sample.poisson=0.7", &["not above 0.5"]);
     case(STIFF, &["--set", "sample.material=polystirene"])
         .refused(&["did you mean \"polystyrene\"?"]);
-    // A tip 5 nm high on a very soft sample sinks until the beam itself touches.
+    // A tip 5 nm high indents a very soft sample until the beam touches it.
     let soft = STIFF.replace(
         "material = \"polystyrene\"\nloss_tangent = 0.1",
         "stiffness = \"0.01 N/m\"",
@@ -316,10 +317,10 @@ fn impossible_levers_are_refused_and_touching_beams_warned_of() {
     );
 }
 
-/// Of Hertz's stiffness at an indentation only the product counts: neither value is printed as a
-/// result, that of the distance's offset is.
+/// Hertz's stiffness at an indentation depends on the product only: neither factor is printed as a
+/// result, but the offset of the distance is.
 #[test]
-fn values_that_data_leave_open_stand_in_brackets() {
+fn values_that_the_data_do_not_determine_are_in_brackets() {
     let folder = Folder::new();
     for (name, text) in [
         (

@@ -1,8 +1,8 @@
-//! What a command writes, and what it leaves alone.
+//! Files that commands write or must not overwrite.
 
 use crate::util::Folder;
 
-/// Each with the outputs that it can write.
+/// Commands with the outputs that they can write.
 const WRITERS: [&[&str]; 12] = [
     &["simulate", "--out", "a.csv", "--plot", "a.svg"],
     &[
@@ -56,7 +56,7 @@ const WRITERS: [&[&str]; 12] = [
     &["case", "--out", "m.toml"],
 ];
 
-fn typed<'a>(writer: &[&'a str]) -> Vec<&'a str> {
+fn arguments_of<'a>(writer: &[&'a str]) -> Vec<&'a str> {
     [
         &writer[..1],
         &["case.toml", "--set", "omega=3.6", "-q"],
@@ -65,21 +65,21 @@ fn typed<'a>(writer: &[&'a str]) -> Vec<&'a str> {
     .concat()
 }
 
-/// The same command twice: what it wrote it may replace, whatever the table.
+/// The same command run twice may replace its own output, whatever the table.
 #[test]
-fn what_was_written_here_is_replaced() {
+fn own_output_is_replaced() {
     let folder = Folder::with_paper_case();
     for writer in WRITERS {
         for _ in 0..2 {
-            let outcome = folder.run(&typed(writer));
+            let outcome = folder.run(&arguments_of(writer));
             assert_eq!(outcome.code, 0, "{writer:?}: {}", outcome.stderr);
         }
     }
 }
 
-/// A case with comments, somebody's table, a picture: none is lost.
+/// A case with comments, a foreign table, a picture: none is overwritten.
 #[test]
-fn what_somebody_else_wrote_is_replaced_only_by_force() {
+fn foreign_files_are_replaced_only_with_force() {
     let folder = Folder::with_paper_case();
     folder.write("m.toml", "# my own case\n[model]\nmodes = 3\n");
     folder.write(
@@ -108,7 +108,7 @@ fn what_somebody_else_wrote_is_replaced_only_by_force() {
         assert_eq!(folder.run(&arguments).code, 0);
     }
     assert!(folder.read("data.csv").starts_with("xi,"));
-    // A case that was written here and edited since is somebody's.
+    // A case that nanotap wrote and that has been edited since counts as foreign.
     assert_eq!(
         folder.run(&["case", "case.toml", "--out", "m.toml"]).code,
         0
@@ -120,9 +120,9 @@ fn what_somebody_else_wrote_is_replaced_only_by_force() {
     assert_eq!(folder.run(&["case", "m.toml"]).code, 0);
 }
 
-/// Commands that write many files look at all of them first.
+/// Commands that write many files check all of them first.
 #[test]
-fn what_somebody_else_wrote_in_a_folder_is_replaced_only_by_force() {
+fn foreign_files_in_a_folder_are_replaced_only_with_force() {
     let folder = Folder::with_paper_case();
     for (name, arguments) in [
         (
@@ -146,7 +146,7 @@ fn what_somebody_else_wrote_in_a_folder_is_replaced_only_by_force() {
         let files = std::fs::read_dir(folder.path().join(inside)).unwrap();
         assert_eq!(files.count(), 1, "{name}");
         assert_eq!(folder.read(name), "somebody's own");
-        // The second time the files are nanotap's own.
+        // The second time the files are nanotap's.
         for force in [&["--force"][..], &[]] {
             let outcome = folder.run(&[arguments, force].concat());
             assert_eq!(outcome.code, 0, "{}", outcome.stderr);
@@ -175,8 +175,8 @@ fn two_outputs_do_not_share_a_file() {
     assert_eq!(folder.names(), ["case.toml"]);
 }
 
-/// The same command twice at the same time on one dataset, and shares of it side by side: each
-/// comes to its end, and the bytes are those of one alone.
+/// The same command twice at the same time on one dataset, and shares of it in parallel: each
+/// finishes, and the bytes are those of a single run.
 #[test]
 fn two_processes_share_a_dataset() {
     let folder = Folder::with_paper_case();
@@ -220,7 +220,7 @@ fn two_processes_share_a_dataset() {
             let stderr = String::from_utf8_lossy(&output.stderr);
             assert!(output.status.success(), "round {round}: {stderr}");
         }
-        // What is summed up over all chunks, none of two shares could.
+        // The summary over all chunks, which neither share could compute.
         assert!(sweep(&out, "1/1").status().unwrap().success());
         assert!(
             alone == super::sweeps::bytes(&folder.path().join(out)),
@@ -229,10 +229,10 @@ fn two_processes_share_a_dataset() {
     }
 }
 
-/// Metadata that a power cut left empty or torn: `merge` reads them from the arrays, and the
-/// same command writes them anew.
+/// Metadata that a power failure left empty or incomplete: `merge` reads them from the arrays, and
+/// the same command writes them again.
 #[test]
-fn torn_metadata_are_rebuilt() {
+fn incomplete_metadata_are_rebuilt() {
     let folder = Folder::with_paper_case();
     let sweep = [
         "sweep",
@@ -253,7 +253,7 @@ fn torn_metadata_are_rebuilt() {
         assert_eq!(folder.run(&sweep).code, 0);
         assert_eq!(folder.read("s.zarr/.zmetadata"), whole);
     }
-    // What it was made of is torn as well: refused, with what to do.
+    // The source of the metadata is incomplete too: refused, with a remedy.
     folder.write("s.zarr/.zmetadata", "");
     folder.write("s.zarr/.zattrs", "{");
     let outcome = folder.run(&["merge", "s.zarr", "--out", "never.zarr"]);
@@ -263,9 +263,9 @@ fn torn_metadata_are_rebuilt() {
         .refused(&["empty or torn", "remove the folder"]);
 }
 
-/// A dataset of another's making cannot write elsewhere, nor ask for all the memory.
+/// A foreign dataset can neither write elsewhere nor request all memory.
 #[test]
-fn merge_refuses_names_and_sizes_that_no_dataset_has() {
+fn merge_refuses_invalid_names_and_sizes() {
     let folder = Folder::with_paper_case();
     let sweep = [
         "sweep",
@@ -282,18 +282,18 @@ fn merge_refuses_names_and_sizes_that_no_dataset_has() {
     for name in ["../outside", "/tmp/outside", "..", "a/b", ".hidden"] {
         folder.write("s.zarr/.zmetadata", whole.replace(variable, name));
         let outcome = folder.run(&["merge", "s.zarr", "--out", "never.zarr"]);
-        outcome.refused(&[name, "no name of a variable"]);
+        outcome.refused(&[name, "not a valid name of a variable"]);
         assert!(!folder.path().join("never.zarr").exists());
     }
     let long = whole.replace("[\\\"omega\\\",4,", "[\\\"omega\\\",4000000000000000000,");
     assert_ne!(long, whole);
     folder.write("s.zarr/.zmetadata", long);
     let outcome = folder.run(&["merge", "s.zarr", "--out", "never.zarr"]);
-    outcome.refused(&["sizes that no dataset has"]);
+    outcome.refused(&["the sizes of"]);
 }
 
-/// A chaotic sweep, computed with vector registers and without: every file the same, to the last
-/// bit. Where there are no such registers both are the second.
+/// A chaotic sweep, computed with and without vector registers: every file is the same to the last
+/// bit. Without such registers both runs use the same code.
 #[test]
 fn every_arithmetic_gives_the_same_bytes() {
     let folder = Folder::with_paper_case();
@@ -321,7 +321,7 @@ fn every_arithmetic_gives_the_same_bytes() {
     assert!(sweep("vectors.zarr", "") == sweep("plain.zarr", "plain"));
 }
 
-/// Chunks of another arithmetic are not gone on with, nor merged.
+/// Chunks of another arithmetic are neither continued nor merged.
 #[test]
 fn arithmetics_are_not_mixed() {
     let folder = Folder::with_paper_case();
@@ -341,7 +341,7 @@ fn arithmetics_are_not_mixed() {
         .replace("\"arithmetic\": \"", "\"arithmetic\": \"another-");
     folder.write("b.zarr/.zmetadata", other);
     let merge = folder.run(&["merge", "a.zarr", "b.zarr", "--out", "never.zarr"]);
-    merge.refused(&["made otherwise", "arithmetic", "another-"]);
+    merge.refused(&["belongs to another case", "arithmetic", "another-"]);
     let again = folder.run(&[&sweep[..], &["b.zarr"]].concat());
-    again.refused(&["made otherwise", "arithmetic", "another-"]);
+    again.refused(&["belongs to another case", "arithmetic", "another-"]);
 }

@@ -1,4 +1,5 @@
-//! Ctrl-C and SIGTERM end any work within a second, with exit code 130, and keep what is finished.
+//! Ctrl-C and SIGTERM end a computation within a second, with exit code 130, and keep what is
+//! finished.
 
 use std::process::Stdio;
 use std::time::{Duration, Instant};
@@ -7,8 +8,8 @@ use nanotap::study::registry::STUDIES;
 
 use crate::util::{Folder, Outcome};
 
-/// A lever whose single drive periods take minutes: its contact is damped so strongly that steps
-/// are 1e-5 of a period.
+/// A lever whose single drive periods take minutes: its contact damping is so strong that steps are
+/// 1e-5 of a period.
 const STIFF: &str = "\
 [model]
 modes = 2
@@ -33,7 +34,7 @@ free_amplitude = \"15.46 nm\"
 tip = \"12.2 nm\"
 ";
 
-/// A lever over mica, its distance left to the setpoint.
+/// A lever over mica whose distance follows from the setpoint.
 const SETPOINT: &str = "\
 [model]
 modes = 1
@@ -53,7 +54,8 @@ free_amplitude = \"10 nm\"
 setpoint = 0.9
 ";
 
-/// How a study is made to take far longer than the test waits; `None` of one that never does.
+/// Options that make a study take much longer than the test waits; `None` for a study that is
+/// always fast.
 fn long_work(study: &str) -> Option<Vec<&'static str>> {
     Some(match study {
         "modes" => return None,
@@ -71,7 +73,7 @@ fn long_work(study: &str) -> Option<Vec<&'static str>> {
             "--values",
             "10000",
         ],
-        "approach" => vec!["soft.toml", "--points", "20000"],
+        "approach" | "fm" => vec!["soft.toml", "--points", "20000"],
         "fit" => vec![
             "curve.csv",
             "soft.toml",
@@ -90,6 +92,7 @@ fn long_work(study: &str) -> Option<Vec<&'static str>> {
         "basin" => vec!["case.toml", "--x", "a1=-1:1:2000", "--y", "v1=-1:1:2000"],
         "lyapunov" => vec!["case.toml", "--periods", "100000000"],
         "orbit" | "convergence" | "contact-laws" => vec!["case.toml", "--period", "10000"],
+        "scan" => vec!["scan.toml"],
         other => panic!("say how long work of {other} is requested"),
     })
 }
@@ -98,13 +101,16 @@ fn folder() -> Folder {
     let folder = Folder::with_paper_case();
     folder.write("stiff.toml", STIFF);
     folder.write("setpoint.toml", SETPOINT);
+    let scan = include_str!("../../../../docs/cases/scan-step.toml");
+    let scan = scan.replace("periods = 5000 ", "periods = 5000000 ");
+    folder.write("scan.toml", scan);
     folder.write(
         "soft.toml",
         SETPOINT
             .replace("60 GPa", "50 MPa")
             .replace("setpoint = 0.9\n", "[gap]\ntip = \"8 nm\"\n"),
     );
-    // Rows that no lever made: the search goes on from start to start.
+    // Rows that do not belong to a lever: the search continues from start to start.
     let rows = (0..2000).map(|k| {
         let distance = 12.0 - 0.004 * f64::from(k);
         let wave = 0.2 * f64::from(k % 7);
@@ -119,8 +125,8 @@ fn folder() -> Folder {
     folder
 }
 
-/// Runs the program, sends it `signal` after a while, and says how long it took to end; `None`
-/// where it had ended before.
+/// Runs the program, sends it `signal` after a while, and returns how long it took to end; `None`
+/// if it had ended before.
 fn interrupted(folder: &Folder, arguments: &[&str], signal: &str) -> (Outcome, Option<Duration>) {
     let mut child = folder
         .command(arguments)
@@ -197,7 +203,7 @@ fn setpoints_fixed_steps_and_the_paper_stop_too() {
     }
 }
 
-/// A single period may take minutes, or be refused for that.
+/// A single period may take minutes, or be refused because of that.
 #[test]
 fn one_long_period_stops_too() {
     let folder = folder();
@@ -211,7 +217,7 @@ fn one_long_period_stops_too() {
 }
 
 #[test]
-fn a_report_of_work_that_was_stopped_says_so() {
+fn a_report_of_cancelled_work_is_marked() {
     let folder = folder();
     for study in ["attractors", "branch"] {
         let work = long_work(study).unwrap();
@@ -224,7 +230,7 @@ fn a_report_of_work_that_was_stopped_says_so() {
 }
 
 #[test]
-fn long_work_says_what_it_does_where_standard_error_is_a_file() {
+fn long_work_reports_progress_to_a_file() {
     let folder = folder();
     let long = ["simulate", "case.toml", "--transient", "100000000"];
     let run = |more: &[&str]| {

@@ -1,4 +1,4 @@
-//! The program from outside: exit codes, words, JSON and files.
+//! The program as a process: exit codes, messages, JSON and files.
 
 #![allow(
     clippy::disallowed_methods,

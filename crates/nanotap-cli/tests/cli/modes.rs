@@ -37,7 +37,7 @@ fn json_has_the_frequencies_of_the_paper_and_of_the_exact_beam() {
 }
 
 #[test]
-fn text_sets_galerkin_beside_exact() {
+fn text_compares_galerkin_with_the_exact_beam() {
     let folder = Folder::with_paper_case();
     let outcome = folder.run(&["modes", "case.toml"]);
     assert_eq!((outcome.code, outcome.stderr.as_str()), (0, ""));
@@ -99,10 +99,10 @@ fn shapes_are_written_and_drawn() {
     assert_eq!(folder.names(), ["case.toml", "shapes.csv", "shapes.svg"]);
     folder
         .run(&["modes", "case.toml", "--plot", "shapes.jpeg"])
-        .refused(&["shapes.jpeg", "end the name in .svg, .png or .pdf"]);
+        .refused(&["shapes.jpeg", "use .svg, .png or .pdf"]);
     folder
         .run(&["modes", "case.toml", "--out", "shapes"])
-        .refused(&["shapes: the ending says no format", ".csv"]);
+        .refused(&["shapes: unsupported file extension", ".csv"]);
 }
 
 #[test]

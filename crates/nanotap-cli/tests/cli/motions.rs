@@ -18,7 +18,7 @@ pub(crate) fn vector(json: &Value) -> Vec<f64> {
         .collect()
 }
 
-/// Every key of a document once: a reader may keep the first or the last of two.
+/// Every key occurs once in a document: a reader may keep the first or the last of two.
 fn assert_no_key_twice(text: &str) {
     let top: Vec<&str> = text
         .lines()
@@ -34,7 +34,7 @@ fn assert_no_key_twice(text: &str) {
 const IMPACT: &str = "[model]\nkind = \"impact\"\nstiffness = 1\ndamping = 0\nforcing = 1\nomega = 2.5\n\
                       gap = 0\nrestitution = 0.8\n";
 
-/// What the paper's case does at Ω = 3: shooting on the flow with 50-digit arithmetic.
+/// The state of the paper's case at Ω = 3: shooting on the flow with 50-digit arithmetic.
 const STATE_AT_3: [f64; 6] = [
     0.048_674_496_26,
     -4.170_932_009e-4,
@@ -45,7 +45,7 @@ const STATE_AT_3: [f64; 6] = [
 ];
 
 #[test]
-fn simulate_tells_the_contract_and_ends_on_the_orbit() {
+fn simulate_reports_all_fields_and_ends_on_the_orbit() {
     let folder = Folder::with_paper_case();
     let outcome = folder.run(&[
         "simulate",
@@ -86,10 +86,10 @@ fn simulate_tells_the_contract_and_ends_on_the_orbit() {
     }
 }
 
-/// Only what is named is measured, and it is what all together give; a name may be the one that
-/// experimenters use, and the terminal shows a row each.
+/// Only the named observables are measured, with the same values as all together. Experimenters'
+/// names are accepted, and the terminal shows one row for each.
 #[test]
-fn observables_are_those_that_are_named() {
+fn only_named_observables_are_measured() {
     let folder = Folder::with_paper_case();
     for study in ["simulate", "orbit"] {
         let run = |more: &[&str]| {
@@ -116,7 +116,7 @@ fn observables_are_those_that_are_named() {
     }
 }
 
-/// Keys in a list, as in several options.
+/// Keys in a list are the same as several options.
 #[test]
 fn derivatives_are_listed() {
     let folder = Folder::with_paper_case();
@@ -170,7 +170,7 @@ fn simulate_from_the_start_takes_states_and_periods_as_given() {
 }
 
 #[test]
-fn chaos_is_called_chaos_and_told_why() {
+fn chaos_is_reported_with_its_evidence() {
     let folder = Folder::with_paper_case();
     let outcome = folder.run(&["simulate", "case.toml"]);
     assert_eq!(outcome.code, 0, "{}", outcome.stderr);
@@ -190,7 +190,7 @@ fn chaos_is_called_chaos_and_told_why() {
 }
 
 #[test]
-fn time_series_have_the_columns_and_close() {
+fn time_series_have_all_columns_and_close() {
     let folder = Folder::with_paper_case();
     let outcome = folder.run(&[
         "orbit",
@@ -232,7 +232,7 @@ fn time_series_have_the_columns_and_close() {
     assert!(harmonics.starts_with("order,tip,tip_lag_degrees,force,force_lag_degrees,slope\n1,"));
     assert_eq!(harmonics.lines().count(), 21);
     assert!(folder.read("orbit.svg").contains("Re "));
-    // A whole run, longer than what is kept for figures.
+    // A whole run, longer than the part that is recorded for figures.
     let long = folder.run(&[
         "simulate",
         "case.toml",
@@ -250,7 +250,7 @@ fn time_series_have_the_columns_and_close() {
 }
 
 #[test]
-fn orbit_finds_the_unstable_one_inside_chaos() {
+fn orbit_finds_the_unstable_orbit_in_chaos() {
     let folder = Folder::with_paper_case();
     let json = folder
         .run(&["orbit", "case.toml", "--period", "1", "--json"])
@@ -259,7 +259,7 @@ fn orbit_finds_the_unstable_one_inside_chaos() {
         (json["period"].as_u64(), json["stable"].as_bool()),
         (Some(1), Some(false))
     );
-    // MODEL: the period-1 orbit exists at Ω = 2.6 and is unstable, μ = −1.392.
+    // Reference: the period-1 orbit exists at Ω = 2.6 and is unstable, μ = −1.392.
     let first = vector(&json["multipliers"][0]);
     assert!(
         (first[0] + 1.392).abs() < 1e-3 && first[1] == 0.0,
@@ -274,7 +274,7 @@ fn orbit_finds_the_unstable_one_inside_chaos() {
 }
 
 #[test]
-fn an_impact_oscillator_runs_through_the_same_door() {
+fn an_impact_oscillator_is_studied_by_the_same_commands() {
     let folder = Folder::new();
     folder.write("impact.toml", IMPACT);
     let json = folder
@@ -296,7 +296,7 @@ fn an_impact_oscillator_runs_through_the_same_door() {
 }
 
 #[test]
-fn a_physical_case_is_told_in_si() {
+fn a_physical_case_is_reported_in_si() {
     let folder = Folder::new();
     folder.write(
         "lever.toml",
@@ -314,7 +314,7 @@ fn a_physical_case_is_told_in_si() {
     ]);
     let json = outcome.json();
     let physical = &json["physical"];
-    // Driven to 20 nm, it is stopped by the sample 10 nm away.
+    // Driven to 20 nm, limited by the sample at 10 nm.
     let amplitude = number(physical, "amplitude");
     assert!(amplitude > 8e-9 && amplitude < 20e-9, "{amplitude}");
     assert!((number(physical, "frequency") / 75e3 - 1.0).abs() < 1e-9);
@@ -333,7 +333,7 @@ fn a_physical_case_is_told_in_si() {
 }
 
 #[test]
-fn convergence_says_how_many_modes_are_enough() {
+fn convergence_reports_how_many_modes_are_enough() {
     let folder = Folder::with_paper_case();
     let arguments = [
         "convergence",
@@ -366,7 +366,7 @@ fn convergence_says_how_many_modes_are_enough() {
 }
 
 #[test]
-fn fixed_steps_are_labelled_as_what_they_are() {
+fn results_of_fixed_steps_are_labelled() {
     let folder = Folder::with_paper_case();
     let arguments = [
         "simulate",
@@ -393,13 +393,13 @@ fn fixed_steps_are_labelled_as_what_they_are() {
     );
     assert!(json.get("period").is_none() && json.get("classification").is_none());
     assert_eq!(json["exact"]["period"], 1);
-    // Of first order in the step: near the exact W of the period-1 orbit, and not at it.
+    // First order in the step: near the exact W of the period-1 orbit, but not equal to it.
     let error = (number(&json, "tip_max") - 1.094_46).abs();
     assert!(error < 0.02, "{error}");
 }
 
 #[test]
-fn what_makes_no_sense_is_refused_with_a_remedy() {
+fn invalid_requests_are_refused_with_a_remedy() {
     let folder = Folder::with_paper_case();
     let refused = |arguments: &[&str], words: &[&str]| {
         folder
@@ -450,11 +450,11 @@ fn what_makes_no_sense_is_refused_with_a_remedy() {
     );
 }
 
-/// Values at the edge of what is allowed end in a verdict, and soon: a drive of the smallest
-/// number there is, whose motion drowns in its rounding, and a beam so damped that its fast
-/// eigenvalues coincide at −10⁹ (a bound that did not decay with them took 10⁹ steps a period).
+/// Extreme values give a result in a short time: the smallest possible drive, whose motion is lost
+/// in rounding, and a beam so damped that its fast eigenvalues coincide at −10⁹ (a bound that did
+/// not decay with them took 10⁹ steps per period).
 #[test]
-fn extreme_cases_come_to_an_end() {
+fn extreme_cases_finish() {
     let folder = Folder::with_paper_case();
     for extreme in ["alpha2=5e-324", "alpha3=1e9"] {
         let outcome = folder.run(&[

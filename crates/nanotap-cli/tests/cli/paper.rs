@@ -1,9 +1,9 @@
-//! `nanotap paper`: the report, its files, and what it refuses.
+//! `nanotap paper`: report, files and errors.
 
 use crate::util::Folder;
 
 #[test]
-fn a_quick_part_of_the_report_is_written_whole() {
+fn a_quick_part_of_the_report_is_written() {
     let folder = Folder::new();
     let run = folder.run(&[
         "paper", "--quick", "--json", "--out", "report", "--only", "eq25", "fig2e", "fig15",
@@ -26,7 +26,7 @@ fn a_quick_part_of_the_report_is_written_whole() {
     let html = read("report.html");
     assert!(
         html.contains("<svg") && html.contains("fig15"),
-        "pictures stand in the page"
+        "the page contains the figures"
     );
     assert!(read("report.md").contains("| eq25 |"));
     for picture in json["pictures"].as_array().unwrap() {
@@ -45,7 +45,7 @@ fn a_quick_part_of_the_report_is_written_whole() {
 }
 
 #[test]
-fn what_it_cannot_do_is_refused() {
+fn unknown_sections_and_folders_are_refused() {
     let folder = Folder::new();
     folder
         .run(&["paper", "--only", "fgi4"])

@@ -23,9 +23,9 @@ beam = \"10 um\"
 ";
 
 #[test]
-fn both_worlds_are_shown() {
+fn physical_and_dimensionless_values_are_shown() {
     let json = case(LEVER, &["--json"]).json();
-    // α4 = 3 K1/k, α2 = f/g0 and α5 = g1/g0, whatever else the lever is.
+    // α4 = 3 K1/k, α2 = f/g0 and α5 = g1/g0 for every lever.
     let near = |key: &str, expected: f64| {
         let value = json[key].as_f64().unwrap();
         assert!(
@@ -71,7 +71,7 @@ fn a_physical_case_written_out_is_its_dimensionless_self() {
 }
 
 #[test]
-fn wrong_quantities_are_pointed_at() {
+fn errors_in_quantities_show_their_place() {
     case(LEVER.replace("20 N/m", "20 kHz"), &[]).refused(&["case.toml:7:13", "20 kHz", "N/m"]);
     case(LEVER.replace("Q = 200", ""), &[]).refused(&["case.toml:1:", "cantilever.Q"]);
     case(LEVER, &["--set", "sample.stiffness=-3 N/m"])
@@ -91,10 +91,10 @@ fn modes_of_a_lever() {
     assert_eq!(json["free"].as_array().unwrap().len(), 4);
 }
 
-/// What stands under `physical` is what stands beside it, in SI: lengths times g0 = 10 µm,
-/// energies times g0² k/3 and in electronvolts, times by √(mL⁴/(EI)).
+/// Each value under `physical` is the dimensionless one in SI: lengths times g0 = 10 µm, energies
+/// times g0² k/3 and in electronvolts, times by √(mL⁴/(EI)).
 #[test]
-fn motions_of_a_lever_are_told_in_si() {
+fn motions_of_a_lever_are_reported_in_si() {
     let folder = Folder::new();
     folder.write("lever.toml", LEVER);
     let orbit = folder
@@ -143,10 +143,10 @@ fn motions_of_a_lever_are_told_in_si() {
     assert!((second["slope"].as_f64().unwrap() / slope - 1.0).abs() < 1e-9);
 }
 
-/// Over a sample so soft that the tip sinks in by more than its radius, Hertz's law is beyond what it
-/// was derived for: the terminal says by how much.
+/// On a very soft sample the indentation exceeds the radius of the tip, beyond the range of Hertz's
+/// law: the terminal prints by how much.
 #[test]
-fn a_motion_beyond_its_force_law_is_warned_of() {
+fn a_motion_beyond_the_range_of_its_law_has_a_warning() {
     let folder = Folder::new();
     folder.write("case.toml", SOFT);
     let said = folder.run(&["orbit", "case.toml", "--period", "1"]);

@@ -1,10 +1,10 @@
-//! Contact laws, ways of driving and second tones at the terminal.
+//! Contact laws, actuations and second tones at the terminal.
 
 use crate::util::Folder;
 
 const FAST: [&str; 2] = ["--set", "omega=20"];
 
-/// The difference that the law makes, as a table, as JSON, as data and as a picture.
+/// Comparison of the laws as a table, as JSON, as data and as a figure.
 #[test]
 fn samples_are_compared() {
     let folder = Folder::with_paper_case();
@@ -28,7 +28,7 @@ fn samples_are_compared() {
     let samples = json["samples"].as_array().unwrap();
     let number = |k: usize, key: &str| samples[k][key].as_f64().unwrap();
     assert_eq!(samples.len(), 3);
-    // The paper's damper pulls on the leaving tip; a surface that recovers does not.
+    // The paper's damper pulls on the receding tip; a viscoelastic surface does not.
     assert!(number(0, "least_force") < -0.1);
     assert!(number(1, "least_force") > -1e-10 && number(2, "least_force") > -1e-10);
     assert!(
@@ -57,9 +57,9 @@ fn samples_are_compared() {
         .refused(&["--period 0", "from 1 to"]);
 }
 
-/// Every analysis takes a sample with a memory, and says its state by name.
+/// All analyses accept a sample with memory and name its state.
 #[test]
-fn a_surface_with_a_memory_is_analysed_like_any_other() {
+fn a_surface_with_memory_is_analysed_like_any_other() {
     let folder = Folder::with_paper_case();
     let kelvin = ["--set", "contact=kelvin-voigt", "--set", "omega=20"];
     let on = |words: &[&str]| folder.run(&[words, &kelvin[..]].concat());
@@ -111,9 +111,9 @@ fn a_surface_with_a_memory_is_analysed_like_any_other() {
     on(&["simulate", "case.toml", "--state", "1,2"]).refused(&["the sample's memory"]);
 }
 
-/// Two tones at the tip: each with its own response, and a map of four periods.
+/// Two tones at the tip: each with its response, and a map over four periods.
 #[test]
-fn two_tones_are_driven_and_read() {
+fn two_tones_are_driven_and_measured() {
     let folder = Folder::with_paper_case();
     let words = [
         "orbit",
@@ -141,10 +141,10 @@ fn two_tones_are_driven_and_read() {
     assert!((case["period"].as_f64().unwrap() / period - 1.0).abs() < 1e-14);
 }
 
-/// A hundred times the Hamaker constant of dForce's example: 1 nm above the sample its attraction
-/// is stiffer than the lever of 0.87 N/m, up to the contact; 18 nm above it is not.
+/// A hundred times the Hamaker constant of dForce's example: 1 nm above the sample, the attraction
+/// is stiffer than the lever of 0.87 N/m up to the contact; 18 nm above it is not.
 #[test]
-fn a_lever_that_snaps_in_is_said_to() {
+fn snap_in_is_reported() {
     let folder = Folder::new();
     folder.write(
         "lever.toml",
@@ -166,10 +166,10 @@ fn a_lever_that_snaps_in_is_said_to() {
     assert!(!says("gap.tip=18 nm"));
 }
 
-/// dForce's example pressed in: at a distance of −60 nm the lever rests at d = −5.968 nm, where
-/// δ = a0 − d = 6.137 nm is above the radius of 5 nm.
+/// dForce's example pressed into the sample: at a distance of −60 nm the lever rests at d = −5.968
+/// nm, where δ = a0 − d = 6.137 nm exceeds the radius of 5 nm.
 #[test]
-fn a_lever_that_rests_too_deep_for_its_law_is_warned_of() {
+fn a_rest_position_beyond_the_range_of_the_law_has_a_warning() {
     let folder = Folder::new();
     folder.write(
         "lever.toml",
@@ -186,31 +186,31 @@ fn a_lever_that_rests_too_deep_for_its_law_is_warned_of() {
     assert!(!free.stderr.contains("δ/R"), "{}", free.stderr);
 }
 
-/// Adhesion stated as a force and as a Hamaker constant contradict each other: of a file with
-/// both none is taken; what is set beside the file counts, and that is said.
+/// Adhesion as a force and as a Hamaker constant contradict each other: a file with both is
+/// refused; a value given with `--set` replaces the one in the file, and a note says so.
 #[test]
-fn what_a_setting_takes_the_place_of_is_said() {
+fn replaced_keys_are_reported() {
     let folder = Folder::new();
     folder.write(
         "lever.toml",
         include_str!("../../../../docs/cases/dforce-dmt.toml"),
     );
     let set = ["lever.toml", "--set", "sample.adhesion_force=5 nN"];
-    let said = "note: sample.adhesion_force, set beside the file, takes the place of its \
+    let said = "note: sample.adhesion_force, set in addition to the file, replaces its \
                 sample.hamaker = \"3e-20 J\"";
     for command in ["case", "modes"] {
         let run = folder.run(&[&[command], &set[..]].concat());
         assert_eq!(run.code, 0, "{}", run.stderr);
         assert!(run.stderr.contains(said), "{}", run.stderr);
         let away = ["--set", "sample.hamaker="];
-        let told = folder.run(&[&[command], &set[..], &away[..]].concat());
-        assert!(!told.stderr.contains("place"), "{}", told.stderr);
+        let outcome = folder.run(&[&[command], &set[..], &away[..]].concat());
+        assert!(!outcome.stderr.contains("place"), "{}", outcome.stderr);
     }
 }
 
-/// A table that is not there ends with advice, in a file and beside it.
+/// A missing table is an error with a remedy, in a file and on the command line.
 #[test]
-fn a_table_that_is_not_there_is_asked_for() {
+fn a_missing_table_is_an_error() {
     let folder = Folder::new();
     let text = include_str!("../../../../docs/cases/dmt-table.toml");
     folder.write("lever.toml", text.replace("dmt-curve.csv", "nowhere.csv"));

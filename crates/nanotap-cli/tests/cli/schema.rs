@@ -1,4 +1,4 @@
-//! `nanotap schema`: what is declared is what is asked for and reported.
+//! `nanotap schema`: the declarations agree with options and reports.
 
 use serde_json::Value;
 
@@ -47,8 +47,8 @@ fn a_case_states_its_keys_with_dimension_and_range() {
 }
 
 #[test]
-fn what_has_no_schema_is_refused_with_what_has() {
+fn an_unknown_schema_is_refused_with_the_known_ones() {
     Folder::new()
         .run(&["schema", "orbits"])
-        .refused(&["no study `orbits`", "orbit", "case"]);
+        .refused(&["unknown study `orbits`", "orbit", "case"]);
 }

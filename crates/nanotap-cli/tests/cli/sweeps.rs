@@ -5,8 +5,7 @@ use std::path::{Path, PathBuf};
 
 use crate::util::Folder;
 
-/// Every file below a folder.
-/// The files of a folder, but for those that a killed program was writing.
+/// The files of a folder, except those that a killed program was writing.
 pub(crate) fn bytes(root: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
     let mut found = BTreeMap::new();
     let mut folders = vec![root.to_path_buf()];
@@ -38,14 +37,14 @@ fn small<'a>(more: &[&'a str]) -> Vec<&'a str> {
 }
 
 #[test]
-fn a_sweep_says_what_it_found_and_where() {
+fn a_sweep_reports_its_motions_and_their_values() {
     let folder = Folder::with_paper_case();
     let json = folder.run(&small(&["--json", "--starts", "2"])).json();
     assert_eq!(json["path"], "case-sweep-omega.zarr");
     assert_eq!(json["runs"], 80);
     assert_eq!(json["counts"]["periodic"], 80);
     assert_eq!(json["counts"]["chaotic"], 0);
-    // Period 1 doubles downwards at 2.91372 (the project's list): values 0 … 2 lie below.
+    // Period 1 doubles downwards at 2.91372 (reference list): values 0 … 2 are below.
     assert_eq!(
         (&json["periods"]["1"], &json["periods"]["2"]),
         (&74.into(), &6.into())
@@ -58,7 +57,7 @@ fn a_sweep_says_what_it_found_and_where() {
             .is_file()
     );
 
-    // The same command has nothing left to do, and says so.
+    // The same command has nothing left to compute and says so.
     let again = folder.run(&small(&["--starts", "2", "--plot", "s.svg"]));
     assert_eq!(again.code, 0, "{}", again.stderr);
     assert!(again.stderr.contains("there already"), "{}", again.stderr);
@@ -74,7 +73,7 @@ fn a_sweep_says_what_it_found_and_where() {
 }
 
 #[test]
-fn a_table_stands_beside_its_dataset() {
+fn a_table_is_written_next_to_its_dataset() {
     let folder = Folder::with_paper_case();
     let outcome = folder.run(&small(&["--follow", "both", "--out", "runs.csv"]));
     assert_eq!(outcome.code, 0, "{}", outcome.stderr);
@@ -93,10 +92,10 @@ fn a_table_stands_beside_its_dataset() {
     assert_eq!(folder.names(), ["case.toml", "runs.csv", "runs.zarr"]);
 }
 
-/// Killed without mercy at any moment, the same command goes on to the same bytes.
+/// Killed at any moment, the same command continues to the same bytes.
 #[cfg(unix)]
 #[test]
-fn a_killed_sweep_goes_on_to_the_same_bytes() {
+fn a_killed_sweep_resumes_to_the_same_bytes() {
     let folder = Folder::with_paper_case();
     let chaotic = |out| {
         [
@@ -118,7 +117,7 @@ fn a_killed_sweep_goes_on_to_the_same_bytes() {
             .code,
         0
     );
-    // Each time after some more chunks are finished, in the midst of the next ones.
+    // Each time after some more chunks are finished, while the next ones are being computed.
     let finished = || {
         let markers = folder.path().join("killed.zarr/.chunks");
         std::fs::read_dir(markers).map_or(0, Iterator::count)
@@ -146,11 +145,11 @@ fn a_killed_sweep_goes_on_to_the_same_bytes() {
     assert!(bytes(&whole) == bytes(&killed));
 }
 
-/// Ctrl-C leaves what is finished, says how to go on, and exits with 130; so does SIGTERM, by which
-/// clusters end what has run too long.
+/// Ctrl-C keeps what is finished, prints how to resume, and exits with 130; so does SIGTERM, with
+/// which clusters end jobs that exceed their time.
 #[cfg(unix)]
 #[test]
-fn an_interrupted_sweep_says_how_to_go_on() {
+fn an_interrupted_sweep_prints_how_to_resume() {
     for signal in ["-INT", "-TERM"] {
         interrupted_by(signal);
     }
@@ -233,7 +232,7 @@ fn shares_merge_to_the_bytes_of_one_machine() {
         ])
         .json();
     assert_eq!((&all["chunks"], &all["copied"]), (&40.into(), &20.into()));
-    // Nothing is left to compute but what the values show their neighbours.
+    // Only the continuation to neighbouring values is left to compute.
     assert_eq!(folder.run(&small(&["--out", "merged.zarr"])).code, 0);
     let of = |name: &str| bytes(&folder.path().join(name));
     assert!(of("whole.zarr") == of("merged.zarr"));
@@ -244,10 +243,10 @@ fn shares_merge_to_the_bytes_of_one_machine() {
         .refused(&["--chunk 1/2", "merge the shares"]);
     folder
         .run(&["merge", "nowhere.zarr", "--out", "m.zarr"])
-        .refused(&["nowhere.zarr", "not there"]);
+        .refused(&["nowhere.zarr", "does not exist"]);
     folder
         .run(&["merge", "a.zarr", "--out", "m.csv"])
-        .refused(&["end the name in .zarr"]);
+        .refused(&["use .zarr"]);
     folder
         .run(&["merge", "--out", "m.zarr"])
         .refused(&["DATASET"]);
@@ -266,7 +265,7 @@ fn a_dataset_of_another_case_is_not_touched() {
             "contact_stiffness=25",
         ]))
         .refused(&[
-            "s.zarr was made otherwise",
+            "s.zarr belongs to another case",
             "case.alpha4: 20.0 there, 25.0 here",
             "--out",
         ]);
@@ -282,7 +281,7 @@ fn a_dataset_of_another_case_is_not_touched() {
 }
 
 #[test]
-fn bad_requests_of_a_sweep_are_refused() {
+fn invalid_sweep_requests_are_refused() {
     let folder = Folder::with_paper_case();
     let refused = |more: &[&str], words: &[&str]| {
         folder
@@ -341,7 +340,7 @@ fn bad_requests_of_a_sweep_are_refused() {
 }
 
 #[test]
-fn basins_say_what_goes_where() {
+fn basins_report_their_attractors() {
     let folder = Folder::with_paper_case();
     let arguments = [
         "basin",
@@ -362,7 +361,7 @@ fn basins_say_what_goes_where() {
         .json();
     assert_eq!(json["path"], "case-basin-a1-v1.zarr");
     assert_eq!(json["points"], 224);
-    // At Ω = 20, α1 = 0 a period-1 and a period-4 coexist (the project's list).
+    // At Ω = 20, α1 = 0 a period-1 and a period-4 motion coexist (reference list).
     let attractors = json["attractors"].as_array().unwrap();
     let mut periods: Vec<u64> = attractors
         .iter()
@@ -413,7 +412,7 @@ fn basins_say_what_goes_where() {
 }
 
 #[test]
-fn bad_requests_of_a_basin_are_refused() {
+fn invalid_basin_requests_are_refused() {
     let folder = Folder::with_paper_case();
     let refused = |x: &str, y: &str, more: &[&str], words: &[&str]| {
         let arguments = [&["basin", "case.toml", "--x", x, "--y", y], more].concat();

@@ -1,4 +1,4 @@
-//! The program as a citizen of the terminal.
+//! Behaviour on a terminal.
 
 use std::process::Stdio;
 
@@ -24,7 +24,7 @@ fn help_and_version_go_to_standard_output() {
 }
 
 #[test]
-fn what_is_not_there_is_refused_with_the_nearest() {
+fn unknown_commands_are_refused_with_the_nearest() {
     let folder = Folder::with_paper_case();
     folder.run(&["caes"]).refused(&["'caes'", "'case'"]);
     folder
@@ -34,7 +34,7 @@ fn what_is_not_there_is_refused_with_the_nearest() {
 }
 
 #[test]
-fn a_reader_that_has_seen_enough_is_no_error() {
+fn a_closed_pipe_is_not_an_error() {
     let folder = Folder::with_paper_case();
     let mut child = folder
         .command(&["case", "case.toml"])
@@ -42,7 +42,7 @@ fn a_reader_that_has_seen_enough_is_no_error() {
         .stderr(Stdio::piped())
         .spawn()
         .unwrap();
-    // Nobody will read.
+    // Without a reader.
     drop(child.stdout.take());
     let output = child.wait_with_output().unwrap();
     assert_eq!(output.status.code(), Some(0));
@@ -50,7 +50,7 @@ fn a_reader_that_has_seen_enough_is_no_error() {
 }
 
 #[test]
-fn colour_is_there_when_forced_and_never_with_no_color() {
+fn colour_follows_the_environment() {
     let folder = Folder::with_paper_case();
     let coloured = folder
         .command(&["case", "case.toml"])
@@ -67,7 +67,7 @@ fn colour_is_there_when_forced_and_never_with_no_color() {
 }
 
 #[test]
-fn json_is_alone_on_standard_output_and_remarks_can_be_silenced() {
+fn standard_output_contains_json_only_and_notes_can_be_silenced() {
     let folder = Folder::with_paper_case();
     let arguments = [
         "case",
@@ -84,9 +84,9 @@ fn json_is_alone_on_standard_output_and_remarks_can_be_silenced() {
     assert_eq!(quiet.stdout, outcome.stdout);
 }
 
-/// A beam that would pass through the sample makes the motion none of the model's.
+/// A motion in which the beam would pass through the sample is not valid in the model.
 #[test]
-fn what_puts_the_result_in_doubt_is_said_even_when_quiet() {
+fn warnings_about_the_result_are_printed_even_when_quiet() {
     let folder = Folder::with_paper_case();
     let outcome = folder.run(&["orbit", "case.toml", "--set", "omega=20", "--quiet"]);
     assert_eq!(outcome.code, 0, "{}", outcome.stderr);
@@ -167,14 +167,17 @@ fn the_catalogue_lists_what_a_case_can_name() {
 }
 
 #[test]
-fn completions_and_manual_pages_know_every_command() {
+fn completions_and_manual_pages_contain_every_command() {
     let folder = Folder::with_paper_case();
     let help = folder.run(&["--help"]).stdout;
     let commands: Vec<&str> = help
         .lines()
         .skip_while(|line| *line != "Commands:")
         .skip(1)
-        .map_while(|line| line.split_whitespace().next())
+        .take_while(|line| !line.is_empty())
+        // A long description goes on in a line that is indented further.
+        .filter(|line| !line.starts_with("   "))
+        .filter_map(|line| line.split_whitespace().next())
         .filter(|command| *command != "help")
         .collect();
     assert!(
@@ -206,23 +209,23 @@ fn completions_and_manual_pages_know_every_command() {
         .refused(&["--out there", "standard output"]);
 }
 
-/// On a terminal a line says that the program works, and is gone when the result is there.
+/// On a terminal a line shows that the program works; it disappears with the result.
 #[cfg(unix)]
 #[test]
-fn long_work_says_that_it_goes_on() {
-    // A chaotic motion, of which nothing but the periods is counted: on a faster machine more of
-    // them, until the work is long enough to be spoken of.
+fn long_work_reports_progress() {
+    // A chaotic motion of which only the periods are counted: on a faster machine more of them,
+    // until the work is long enough for a progress report.
     let said = (0..10)
-        .map(|doubled| said_on_a_terminal(200_000 << doubled))
+        .map(|doubled| printed_on_a_terminal(200_000 << doubled))
         .find(|text| !text.is_empty())
         .expect("a hundred million periods take longer than any machine keeps silent");
     assert!(said.contains("lyapunov: 1 s so far"), "{said:?}");
     assert!(said.ends_with("\r\u{1b}[K"), "{said:?}");
 }
 
-/// What `lyapunov` over so many periods writes to a terminal.
+/// Output of `lyapunov` over this many periods on a terminal.
 #[cfg(unix)]
-fn said_on_a_terminal(periods: u32) -> String {
+fn printed_on_a_terminal(periods: u32) -> String {
     use std::io::Read as _;
 
     let folder = Folder::with_paper_case();
@@ -234,14 +237,14 @@ fn said_on_a_terminal(periods: u32) -> String {
         .spawn()
         .unwrap();
     let mut text = Vec::new();
-    // A terminal of which the program is gone ends in an error.
+    // Reading from a terminal whose program has ended gives an error.
     let _ = std::fs::File::from(terminal.master).read_to_end(&mut text);
     assert!(child.wait().unwrap().success());
     String::from_utf8_lossy(&text).into_owned()
 }
 
 #[test]
-fn refusals_name_what_was_typed() {
+fn errors_quote_the_input() {
     let folder = Folder::with_paper_case();
     folder
         .run(&["attractors", "case.toml", "--box", "v2=2:1"])
@@ -251,13 +254,13 @@ fn refusals_name_what_was_typed() {
         .refused(&["both axes", "`a1`"]);
     folder
         .run(&["merge", "case.toml", "--out", "whole.zarr"])
-        .refused(&["case.toml", "no folder", "nanotap sweep"]);
+        .refused(&["case.toml", "not a folder", "nanotap sweep"]);
 }
 
 #[test]
-fn numbers_and_nouns_agree() {
+fn singular_and_plural_agree() {
     let folder = Folder::with_paper_case();
-    // Nothing moves more than a hundredfold of itself: one mode will do.
+    // Values change by less than a factor of a hundred: one mode is enough.
     let convergence = folder.run(&[
         "convergence",
         "case.toml",

@@ -1,4 +1,4 @@
-//! Running the program in a folder of its own.
+//! Runs the program in a temporary folder.
 
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
@@ -18,7 +18,7 @@ alpha6 = 0.2
 omega = 2.6
 ";
 
-/// What a run of the program came to.
+/// Result of a run of the program.
 pub(crate) struct Outcome {
     pub(crate) code: i32,
     pub(crate) stdout: String,
@@ -26,15 +26,15 @@ pub(crate) struct Outcome {
 }
 
 impl Outcome {
-    /// The one JSON document on standard output.
+    /// The JSON document on standard output.
     pub(crate) fn json(&self) -> serde_json::Value {
         assert_eq!(self.code, 0, "{}", self.stderr);
         serde_json::from_str(&self.stdout)
             .unwrap_or_else(|error| panic!("{error} in {}", self.stdout))
     }
 
-    /// Asserts a refusal of bad input: code 2, nothing on standard output, these words
-    /// on standard error, and no trace of a panic.
+    /// Asserts a refusal of invalid input: code 2, nothing on standard output, these words on
+    /// standard error, and no panic.
     #[track_caller]
     pub(crate) fn refused(&self, words: &[&str]) {
         assert_eq!(self.code, 2, "{}{}", self.stdout, self.stderr);
@@ -95,7 +95,7 @@ impl Folder {
         names
     }
 
-    /// Runs the program here.
+    /// Runs the program in the folder.
     pub(crate) fn run(&self, arguments: &[&str]) -> Outcome {
         let output = self.command(arguments).output().unwrap();
         Outcome {

@@ -1,11 +1,9 @@
-//! The worked cases, tutorials and theory of the documentation: every command of `docs/cases/*.md`,
-//! `docs/tutorials/*.md` and `docs/theory/*.md` is run as it stands there, and every number is compared, so that they
-//! cannot rot.
+//! The worked cases, tutorials and theory of the documentation: every command in `docs/cases/*.md`,
+//! `docs/tutorials/*.md` and `docs/theory/*.md` is run as written, and every number is compared.
 //!
-//! A `console` block has the commands, each a line that begins with `$ nanotap`; the table that
-//! follows has what the last of them says in its JSON document: a JSON pointer, the value, and
-//! within what part (`1 %`) or distance (`0.5`) it holds; `exactly` compares texts and whole
-//! numbers.
+//! A `console` block contains commands, one per line that begins with `$ nanotap`. The following
+//! table contains values of the JSON document of the last command: a JSON pointer, the value, and
+//! its tolerance, relative (`1 %`) or absolute (`0.5`); `exactly` compares texts and whole numbers.
 
 use std::path::{Path, PathBuf};
 
@@ -13,7 +11,7 @@ use serde_json::Value;
 
 use crate::util::Folder;
 
-/// Every file of the documents that are followed.
+/// All documents that are checked.
 fn documents() -> Vec<PathBuf> {
     let docs = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs");
     let files = ["cases", "tutorials", "theory"]
@@ -34,7 +32,7 @@ fn with_cases() -> Folder {
     folder
 }
 
-/// The words of a command line; quotes hold words together.
+/// The words of a command line; quotes group words.
 fn words(line: &str) -> Vec<String> {
     let mut words = vec![String::new()];
     let mut quoted = false;
@@ -49,7 +47,7 @@ fn words(line: &str) -> Vec<String> {
     words
 }
 
-/// Whether `found` is what the document says.
+/// True if `found` agrees with the value in the document.
 fn holds(found: &Value, value: &str, within: &str) -> bool {
     if within == "exactly" {
         return match found {
@@ -67,7 +65,7 @@ fn holds(found: &Value, value: &str, within: &str) -> bool {
     (found - value).abs() <= limit
 }
 
-/// Runs one document; how many commands and numbers it has.
+/// Runs one document; returns the numbers of commands and values in it.
 fn follow(name: &str) -> (usize, usize) {
     let path = documents().into_iter().find(|path| path.ends_with(name));
     let text = std::fs::read_to_string(path.unwrap()).unwrap();
@@ -85,7 +83,7 @@ fn follow(name: &str) -> (usize, usize) {
             said = folder.run(&arguments).json();
             command.clone_into(&mut last);
             commands += 1;
-            // Pictures that are spoken of are drawn.
+            // Figures that the document mentions are drawn.
             if let Some(k) = arguments.iter().position(|a| *a == "--plot") {
                 assert!(folder.path().join(arguments[k + 1]).exists(), "{last}");
             }
@@ -110,9 +108,9 @@ fn follow(name: &str) -> (usize, usize) {
     (commands, numbers)
 }
 
-/// Every document is followed here: a new one needs its own line.
+/// Every document has a test here: a new one needs a line.
 #[test]
-fn no_document_is_left_out() {
+fn every_document_has_a_test() {
     let mut names: Vec<String> = documents()
         .into_iter()
         .filter(|path| path.extension().is_some_and(|e| e == "md"))
@@ -147,6 +145,7 @@ fn no_document_is_left_out() {
             "orbits.md",
             "period-doubling.md",
             "samples.md",
+            "scan.md",
             "stiff-lever.md",
             "table.md",
             "tip-mass.md",
@@ -154,7 +153,7 @@ fn no_document_is_left_out() {
     );
 }
 
-/// One test a document, so that they run side by side.
+/// One test per document, so that they run in parallel.
 macro_rules! follows {
     ($($test:ident: $name:literal, $commands:literal commands, $numbers:literal numbers;)*) => {
         $(#[test]
@@ -182,6 +181,7 @@ follows! {
     the_moving_surface: "moving-surface.md", 7 commands, 26 numbers;
     the_period_doubling: "period-doubling.md", 2 commands, 6 numbers;
     the_samples: "samples.md", 5 commands, 30 numbers;
+    the_scan: "scan.md", 4 commands, 19 numbers;
     the_force_table: "table.md", 2 commands, 6 numbers;
     the_stiff_lever: "stiff-lever.md", 2 commands, 4 numbers;
     the_tip_mass: "tip-mass.md", 3 commands, 6 numbers;

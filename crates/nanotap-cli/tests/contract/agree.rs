@@ -1,11 +1,11 @@
-//! Whether what the program does now keeps what is pinned.
+//! Compares the present results with the pinned ones.
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
 use crate::facts::Fact;
 
-/// The pinned facts of a command that no longer hold, a line each.
+/// The pinned facts of a command that no longer hold, one per line.
 pub(crate) fn differences(line: &str, pinned: &[Fact], actual: &[Fact]) -> String {
     let now: BTreeMap<&str, &str> = actual
         .iter()
@@ -29,8 +29,9 @@ pub(crate) fn differences(line: &str, pinned: &[Fact], actual: &[Fact]) -> Strin
     differences
 }
 
-/// Below what a number is rounding: in the model's units everything is of order one, but for a
-/// lever, whose unit of length is a thousand times what it moves; energies in SI are 1e-17.
+/// Threshold below which a number is rounding. In the model's units everything is of order one,
+/// except for a lever, whose unit of length is a thousand times its motion; energies in SI are
+/// 1e-17.
 fn near_zero(line: &str, name: &str) -> f64 {
     match () {
         () if !line.contains("lever") => 1e-11,
@@ -44,7 +45,7 @@ fn holds(fact: &Fact, value: &str, near_zero: f64) -> bool {
     let separators = |c: char| c.is_whitespace() || matches!(c, ',' | '[' | ']');
     let mut was = fact.value.split(separators);
     let mut now = value.split(separators);
-    // Documents, and those within attributes, begin with their types.
+    // Documents, and documents in attributes, begin with their types.
     if fact.name.starts_with("json ") || fact.name.contains('@') && fact.name.contains('/') {
         let (Some(types), Some(now)) = (was.next(), now.next()) else {
             return false;
@@ -52,7 +53,7 @@ fn holds(fact: &Fact, value: &str, near_zero: f64) -> bool {
         if !types_hold(types, now) {
             return false;
         }
-        // A value that was not there, or only sometimes, cannot be compared.
+        // A value that was missing, or sometimes missing, cannot be compared.
         if types.contains("null") {
             return true;
         }
@@ -66,7 +67,7 @@ fn holds(fact: &Fact, value: &str, near_zero: f64) -> bool {
     }
 }
 
-/// No type is new, where something else than `null` was known.
+/// True if no type is new, unless only `null` was known.
 fn types_hold(was: &str, now: &str) -> bool {
     was == "null"
         || now
@@ -88,7 +89,7 @@ fn same(was: &str, now: &str, near_zero: f64) -> bool {
 mod tests {
     use super::{Fact, differences};
 
-    /// Pins that each kind of loss is found: a test that cannot fail would pin nothing.
+    /// Checks that each kind of loss is found: a test that cannot fail would pin nothing.
     #[test]
     fn losses_are_found_and_additions_are_not() {
         let lost = |pinned: &str, actual: &str| {

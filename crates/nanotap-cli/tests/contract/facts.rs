@@ -1,4 +1,4 @@
-//! What is known of a command once it has run.
+//! Facts about the result of a command.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
@@ -21,7 +21,7 @@ impl Fact {
         }
     }
 
-    /// The fact that a line of a snapshot says.
+    /// Parses the fact in a line of a snapshot.
     pub(crate) fn read(line: &str) -> Self {
         let (name, value) = line.split_once(" = ").unwrap_or((line, ""));
         Self::new(name, value)
@@ -37,7 +37,7 @@ impl fmt::Display for Fact {
     }
 }
 
-/// What the program printed.
+/// Facts about the printed output.
 pub(crate) fn printed(line: &str, code: i32, stdout: &str, stderr: &str) -> Vec<Fact> {
     let mut facts = vec![Fact::new("exit", code.to_string())];
     if code != 0 {
@@ -57,7 +57,7 @@ pub(crate) fn printed(line: &str, code: i32, stdout: &str, stderr: &str) -> Vec<
     facts
 }
 
-/// The words of a message that name something: keys, options, numbers, places.
+/// Words of a message that name something: keys, options, numbers, places.
 fn names(message: &str) -> BTreeSet<String> {
     let edges = |c: char| {
         matches!(
@@ -67,7 +67,7 @@ fn names(message: &str) -> BTreeSet<String> {
     };
     message
         .lines()
-        // Of a line of the case file what stands in it, not its number.
+        // Of a line of the case file, its content, not its number.
         .map(|line| line.split_once(" |").map_or(line, |(_, quoted)| quoted))
         .flat_map(str::split_whitespace)
         .filter(|word| {
@@ -82,7 +82,7 @@ fn names(message: &str) -> BTreeSet<String> {
         .collect()
 }
 
-/// The options that a help offers, and the values among which one chooses.
+/// Options in a help text, and the values of choices.
 fn offered(help: &str) -> BTreeSet<String> {
     help.lines()
         .flat_map(|line| {
@@ -101,7 +101,7 @@ fn offered(help: &str) -> BTreeSet<String> {
         .collect()
 }
 
-/// Entries whose numbers depend on time, rounding, step control or chance.
+/// Entries whose numbers depend on time, rounding, step control or random numbers.
 const FLEETING: [&str; 17] = [
     "seconds",
     "periods_per_second",
@@ -119,15 +119,15 @@ const FLEETING: [&str; 17] = [
     "lyapunov",
     "steps",
     "start",
-    // Of a proof: how wide its enclosures are, and how far the test of uniqueness reached.
+    // Of a proof: widths of enclosures and the reach of the uniqueness test.
     "radius",
     "unique_within",
 ];
 
-/// Arrays whose entries but the first come from step control.
+/// Arrays whose entries after the first depend on step control.
 const STEPPED: [&str; 1] = ["points"];
 
-/// A document as facts, one for each path: the types there and the values of the first entries.
+/// A document as facts, one for each path: the types and the values of the first entries.
 fn flat(prefix: &str, document: &Value) -> Vec<Fact> {
     let mut entries = Entries::default();
     entries.take("", document, true);
@@ -150,7 +150,7 @@ fn flat(prefix: &str, document: &Value) -> Vec<Fact> {
 struct Entries(BTreeMap<String, (BTreeSet<&'static str>, Vec<String>)>);
 
 impl Entries {
-    /// Takes in `value`, which stands at `path`; its values too, where they are `kept`.
+    /// Adds `value` at `path`, with its values if they are `kept`.
     fn take(&mut self, path: &str, value: &Value, kept: bool) {
         let name = path
             .trim_end_matches("/*")
@@ -180,7 +180,7 @@ impl Entries {
                     self.take(&format!("{path}/{key}"), entry, kept);
                 }
             }
-            // Sentences may become better.
+            // Sentences may be improved.
             Value::String(text) if text.contains(' ') => {}
             Value::Null => {}
             other if kept => values.push(other.to_string()),
@@ -189,7 +189,7 @@ impl Entries {
     }
 }
 
-/// Every file below `root` that can be pinned, datasets as one, sorted.
+/// Every file below `root` that can be pinned, datasets as one file, sorted.
 pub(crate) fn files(root: &Path) -> BTreeSet<PathBuf> {
     let mut found = BTreeSet::new();
     let mut folders = vec![root.to_owned()];
@@ -206,7 +206,7 @@ pub(crate) fn files(root: &Path) -> BTreeSet<PathBuf> {
     found
 }
 
-/// What is known of a file that a command left.
+/// Facts about a file that a command wrote.
 pub(crate) fn file(root: &Path, path: &Path) -> Vec<Fact> {
     let name = path.strip_prefix(root).unwrap().display().to_string();
     let read = || std::fs::read_to_string(path).unwrap();
@@ -222,7 +222,7 @@ pub(crate) fn file(root: &Path, path: &Path) -> Vec<Fact> {
     }
 }
 
-/// The header and the first row, without what is fleeting.
+/// The header and the first row, without changing entries.
 fn csv(name: &str, text: &str) -> Vec<Fact> {
     let mut lines = text.lines();
     let header = lines.next().unwrap_or_default();
@@ -244,7 +244,7 @@ fn csv(name: &str, text: &str) -> Vec<Fact> {
     facts
 }
 
-/// The words in a figure; numbers at ticks are no words.
+/// The words in a figure, without the numbers at ticks.
 fn svg(name: &str, text: &str) -> Vec<Fact> {
     let mut words = BTreeSet::new();
     for piece in text.split("<text").skip(1) {
@@ -252,7 +252,7 @@ fn svg(name: &str, text: &str) -> Vec<Fact> {
             continue;
         };
         let inside = inside.split("</text>").next().unwrap_or_default();
-        // Subscripts and the like are spans within.
+        // Subscripts and the like are nested spans.
         let mut plain = String::new();
         for (index, span) in inside.split('<').enumerate() {
             plain.push_str(if index == 0 {
@@ -308,7 +308,7 @@ fn attribute(prefix: &str, name: &str, value: &Value) -> Vec<Fact> {
     match value.as_str().map(serde_json::from_str::<Value>) {
         _ if name == "_ARRAY_DIMENSIONS" => Vec::new(),
         _ if FLEETING.contains(&name) => vec![Fact::new(prefix, "")],
-        // A document within.
+        // A nested document.
         Some(Ok(document)) if document.is_object() || document.is_array() => {
             flat(prefix, &document)
         }

@@ -1,4 +1,4 @@
-//! Snapshot files: read, compared with what the program does now, renewed.
+//! Snapshot files: reading, comparison with the present results, renewal.
 
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -7,7 +7,7 @@ use std::process::{Command, Stdio};
 use crate::agree;
 use crate::facts::{self, Fact};
 
-/// A command with the facts that are pinned of it.
+/// A command with its pinned facts.
 struct Pinned {
     line: String,
     facts: Vec<Fact>,
@@ -62,7 +62,7 @@ fn folder(name: &str) -> PathBuf {
         .join(name)
 }
 
-/// What stands before the first command, and the commands.
+/// The text before the first command, and the commands.
 fn read(text: &str) -> (String, Vec<Pinned>) {
     let mut preface = String::new();
     let mut pinned: Vec<Pinned> = Vec::new();
@@ -98,10 +98,10 @@ impl Work {
         work
     }
 
-    /// Runs a command line here; what is known of it afterwards.
+    /// Runs a command line in the folder; returns the facts about its results.
     fn run(&self, line: &str) -> Vec<Fact> {
         let before = facts::files(&self.0);
-        // Another program of the same contract can be held against it.
+        // Another program with the same contract can be tested.
         let program = std::env::var_os("NANOTAP_PROGRAM")
             .unwrap_or_else(|| env!("CARGO_BIN_EXE_nanotap").into());
         let output = Command::new(program)
@@ -130,12 +130,12 @@ impl Drop for Work {
     }
 }
 
-/// A command line cut into words; double quotes hold words together.
+/// Splits a command line into words; double quotes group words.
 fn words(line: &str) -> Vec<String> {
     let mut words: Vec<String> = Vec::new();
     for (index, piece) in line.split('"').enumerate() {
         if index % 2 == 1 {
-            // Right behind `--set key=`, or a word of its own.
+            // Directly after `--set key=`, or a separate word.
             match words.last_mut() {
                 Some(last) if str::ends_with(last, '=') => last.push_str(piece),
                 _ => words.push(piece.to_owned()),

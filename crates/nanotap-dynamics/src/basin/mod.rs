@@ -1,15 +1,14 @@
 //! Basins of attraction on a two-dimensional slice of initial states.
 //!
-//! A start is labelled as soon as it is inside a neighbourhood that contracts to a
-//! known attractor ([`crate::neighbourhood`], which says what that proves) and its
-//! next return confirms it. Attractors without such a neighbourhood (chaotic ones,
-//! tori) cannot capture a start that way: a start that reaches none within the
-//! budget is compared with the boxes that hold the strobe points of those
-//! attractors, and labelled if its last states stay in exactly one of them.
+//! A start gets its label as soon as it is inside a neighbourhood that contracts to a known
+//! attractor ([`crate::neighbourhood`] explains what that proves) and its next return confirms the
+//! contraction. Chaotic attractors and tori have no such neighbourhood. A start that reaches no
+//! neighbourhood within the budget is compared with the boxes around the strobe points of those
+//! attractors. It gets a label if its last states all lie in exactly one box.
 //!
-//! Fails: that comparison is evidence, not proof (a transient may live inside the box
-//! of a chaotic attractor); an attractor not in the list leaves its basin unsettled;
-//! the label of a start within rounding of a basin boundary is a matter of chance.
+//! Fails: the comparison with boxes is evidence, not proof (a transient may stay inside the box of
+//! a chaotic attractor); starts that go to an attractor missing from the list stay unsettled; the
+//! label of a start within rounding of a basin boundary is arbitrary.
 
 use crate::census::{Attractor, AttractorKind};
 use crate::failure::{MapFailure, advance, advance_each};
@@ -17,21 +16,21 @@ use crate::map::StroboscopicMap;
 use crate::neighbourhood::Neighbourhood;
 use crate::vector::norm;
 
-/// One axis of a slice: a coordinate and the values it takes.
+/// One axis of a slice: a coordinate and its evenly spaced values.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SliceAxis {
-    /// Which coordinate of the state.
+    /// Index of the coordinate in the state.
     pub coordinate: usize,
     /// First value.
     pub from: f64,
     /// Last value.
     pub to: f64,
-    /// How many values, both ends included.
+    /// Number of values, both ends included.
     pub count: usize,
 }
 
 impl SliceAxis {
-    /// The `index`-th value.
+    /// The value with this index, counted from 0.
     pub fn value(&self, index: usize) -> f64 {
         if self.count <= 1 {
             return self.from;
@@ -41,7 +40,7 @@ impl SliceAxis {
     }
 }
 
-/// A grid of initial states: two coordinates vary, the others stay.
+/// A grid of initial states: two coordinates vary, the others are fixed.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Slice {
     origin: Vec<f64>,
@@ -52,33 +51,33 @@ pub struct Slice {
 /// Why a basin could not be computed.
 #[derive(Clone, Debug, thiserror::Error)]
 pub enum BasinError {
-    /// An axis that does not fit.
-    #[error("bad slice: {0}")]
+    /// The slice does not fit the map, or an axis is invalid.
+    #[error("invalid slice: {0}")]
     Slice(String),
-    /// The map cannot be followed on an attractor.
-    #[error("an attractor could not be followed")]
+    /// The map failed on an attractor.
+    #[error("the map failed on an attractor")]
     Map(#[from] MapFailure),
 }
 
 impl Slice {
-    /// The slice through `origin` (a full state) spanned by two axes. Points are
-    /// numbered row by row: index = iy · x.count + ix.
+    /// Creates the slice through `origin` (a full state) that two axes span. Points are numbered
+    /// row by row: index = iy · x.count + ix.
     ///
     /// # Errors
-    /// If an axis has no points, is not finite, or names a coordinate that the
-    /// origin lacks or that the other axis has.
+    /// If an axis has no points or non-finite ends, if its coordinate does not exist, if both axes
+    /// have the same coordinate, or if the origin is not finite.
     pub fn new(origin: Vec<f64>, x: SliceAxis, y: SliceAxis) -> Result<Self, BasinError> {
         for axis in [&x, &y] {
             if axis.coordinate >= origin.len() {
                 return Err(BasinError::Slice(format!(
-                    "coordinate {} of a state of {} (they count from 0)",
+                    "coordinate {} does not exist: the state has {} coordinates, counted from 0",
                     axis.coordinate,
                     origin.len()
                 )));
             }
             if axis.count == 0 || !axis.from.is_finite() || !axis.to.is_finite() {
                 return Err(BasinError::Slice(format!(
-                    "{} points from {} to {}: one point at least, between finite numbers",
+                    "an axis needs at least 1 point and finite ends, got {} points from {} to {}",
                     axis.count, axis.from, axis.to
                 )));
             }
@@ -95,17 +94,17 @@ impl Slice {
         Ok(Self { origin, x, y })
     }
 
-    /// Number of points.
+    /// Number of points of the grid.
     pub fn len(&self) -> usize {
         self.x.count * self.y.count
     }
 
-    /// Never true: an axis has one point at least.
+    /// Always false: an axis has at least one point.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
 
-    /// Writes the state at a point to `out`.
+    /// Writes the state of a grid point to `out` (length: dimension of the state).
     pub fn state(&self, index: usize, out: &mut [f64]) {
         out.copy_from_slice(&self.origin);
         out[self.x.coordinate] = self.x.value(index % self.x.count);
@@ -118,25 +117,25 @@ impl Slice {
     }
 }
 
-/// Where a start goes.
+/// Fate of a start.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Label {
-    /// To the attractor of this index.
+    /// It goes to the attractor with this index.
     Attractor(u32),
-    /// To none of them within the budget.
+    /// It reached no attractor within the budget.
     Unsettled,
-    /// It left every bound.
+    /// A state exceeded the bound.
     Unbounded,
-    /// The map could not be followed.
+    /// The map failed.
     Failed,
 }
 
-/// How long starts are followed.
+/// Limits of the runs.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BasinOptions {
-    /// Periods after which a start is called unsettled.
+    /// Drive periods after which a start is called unsettled.
     pub max_periods: usize,
-    /// A state with an entry above this is unbounded.
+    /// Largest entry of a bounded state, in units of the state.
     pub bound: f64,
 }
 
@@ -149,14 +148,14 @@ impl Default for BasinOptions {
     }
 }
 
-/// Last states of an unsettled start that must lie in an attractor's box.
-const LAST: usize = 64;
-/// Starts that are followed together: a flow may advance several at a time.
-const TOGETHER: usize = 64;
-/// Strobe points that the box of an attractor that is no orbit is drawn around.
-const CLOUD: usize = 4096;
+/// Number of last states of an unsettled start that must lie in an attractor's box.
+const LAST_STATES: usize = 64;
+/// Number of starts that are followed together: some flows advance several at a time.
+const BATCH_SIZE: usize = 64;
+/// Number of strobe points that define the box of a non-periodic attractor.
+const BOX_POINTS: usize = 4096;
 
-/// What the chunks of a basin share: ready to be cloned into any thread.
+/// Labels points of a slice; immutable, so that threads can share it.
 #[derive(Clone, Debug)]
 pub struct Basins {
     slice: Slice,
@@ -166,10 +165,11 @@ pub struct Basins {
 }
 
 impl Basins {
-    /// Prepares the attractors of a census (labels are their indices).
+    /// Prepares neighbourhoods or boxes for the attractors of a census. A label is the index of an
+    /// attractor.
     ///
     /// # Errors
-    /// If the slice does not fit the map or an attractor cannot be followed.
+    /// If the slice does not fit the map, or the map fails on an attractor.
     pub fn new<M: StroboscopicMap>(
         map: &M,
         slice: Slice,
@@ -179,7 +179,7 @@ impl Basins {
         let d = map.dimension();
         if slice.origin.len() != d {
             return Err(BasinError::Slice(format!(
-                "the origin has {} numbers, {d} are needed",
+                "the origin has length {}, expected {d}",
                 slice.origin.len()
             )));
         }
@@ -195,7 +195,7 @@ impl Basins {
             if let Some(ball) = ball {
                 balls.push((label, ball));
             } else {
-                let (low, high) = cloud(&mut map, &attractor.state)?;
+                let (low, high) = bounding_box(&mut map, &attractor.state)?;
                 boxes.push((label, low, high));
             }
         }
@@ -212,13 +212,13 @@ impl Basins {
         self.slice.len()
     }
 
-    /// Never true: a slice has one point at least.
+    /// Always false: a slice has at least one point.
     pub fn is_empty(&self) -> bool {
         self.slice.is_empty()
     }
 
-    /// Labels of the points of a range of indices (cut at the end of the slice). A
-    /// pure function: chunks may be computed anywhere, in any order.
+    /// Labels the points of a range of indices, cut at the end of the slice. The result does not
+    /// depend on how a slice is divided into ranges, nor on their order.
     pub fn chunk<M: StroboscopicMap>(
         &self,
         map: &mut M,
@@ -228,16 +228,17 @@ impl Basins {
         self.labels(map, &points)
     }
 
-    /// The same of any points. Many at a time may be faster than each alone, and come to the same.
+    /// Labels points given by their indices. Many points in one call may be faster; the labels are
+    /// the same.
     pub fn labels<M: StroboscopicMap>(&self, map: &mut M, points: &[usize]) -> Vec<Label> {
         let mut labels = vec![Label::Unsettled; points.len()];
-        for (points, labels) in points.chunks(TOGETHER).zip(labels.chunks_mut(TOGETHER)) {
+        for (points, labels) in points.chunks(BATCH_SIZE).zip(labels.chunks_mut(BATCH_SIZE)) {
             self.label(map, points, labels);
         }
         labels
     }
 
-    /// Labels some points, whose motions are followed together.
+    /// Labels one batch of points, whose motions are followed together.
     fn label<M: StroboscopicMap>(&self, map: &mut M, points: &[usize], labels: &mut [Label]) {
         let d = map.dimension();
         let mut scratch = vec![0.0; d];
@@ -245,28 +246,28 @@ impl Basins {
         for (state, &point) in states.chunks_exact_mut(d).zip(points) {
             self.slice.state(point, state);
         }
-        let mut runs: Vec<Run<'_>> = (0..points.len())
-            .map(|number| Run::new(number, self))
+        let mut runs: Vec<Trajectory<'_>> = (0..points.len())
+            .map(|number| Trajectory::new(number, self))
             .collect();
         let mut periods = Vec::with_capacity(points.len());
         while !runs.is_empty() {
-            let (mut going_on, mut left) = (Vec::with_capacity(states.len()), Vec::new());
+            let (mut continuing, mut remaining) = (Vec::with_capacity(states.len()), Vec::new());
             periods.clear();
             for (mut run, state) in runs.into_iter().zip(states.chunks_exact(d)) {
-                match self.look(map, &mut run, state, &mut scratch) {
-                    Ok(Look::Again(after)) => {
-                        going_on.extend_from_slice(state);
+                match self.check(map, &mut run, state, &mut scratch) {
+                    Ok(Check::After(after)) => {
+                        continuing.extend_from_slice(state);
                         periods.push(after);
                         run.period += after;
-                        left.push(run);
+                        remaining.push(run);
                     }
-                    Ok(Look::Settled(label)) => labels[run.number] = label,
+                    Ok(Check::Done(label)) => labels[run.number] = label,
                     Err(failure) => labels[run.number] = label_of(&failure),
                 }
             }
-            let advanced = advance_each(map, &mut going_on, &periods);
-            (runs, states) = (Vec::with_capacity(left.len()), Vec::new());
-            let each = left.into_iter().zip(going_on.chunks_exact(d));
+            let advanced = advance_each(map, &mut continuing, &periods);
+            (runs, states) = (Vec::with_capacity(remaining.len()), Vec::new());
+            let each = remaining.into_iter().zip(continuing.chunks_exact(d));
             for ((run, state), result) in each.zip(advanced) {
                 match result {
                     Ok(()) => {
@@ -279,25 +280,25 @@ impl Basins {
         }
     }
 
-    /// Looks where a run is: its label, or in how many periods to look again.
-    fn look<M: StroboscopicMap>(
+    /// Checks where a trajectory is: returns its label, or the periods to the next check.
+    fn check<M: StroboscopicMap>(
         &self,
         map: &mut M,
-        run: &mut Run<'_>,
+        run: &mut Trajectory<'_>,
         state: &[f64],
         scratch: &mut [f64],
-    ) -> Result<Look, MapFailure> {
+    ) -> Result<Check, MapFailure> {
         let (max_periods, period) = (self.options.max_periods, run.period);
         let size = norm(state);
         if size > self.options.bound {
-            return Ok(Look::Settled(Label::Unbounded));
+            return Ok(Check::Done(Label::Unbounded));
         }
         for (label, ball) in &self.balls {
             if ball.contains(state) && ball.holds(map, state, scratch)? {
-                return Ok(Look::Settled(Label::Attractor(*label)));
+                return Ok(Check::Done(Label::Attractor(*label)));
             }
         }
-        if period + LAST > max_periods {
+        if period + LAST_STATES > max_periods {
             for (flag, (_, low, high)) in run.inside.iter_mut().zip(&self.boxes) {
                 *flag &= state
                     .iter()
@@ -307,17 +308,18 @@ impl Basins {
         }
         if period == max_periods {
             let mut held = self.boxes.iter().zip(&run.inside).filter(|(_, f)| **f);
-            return Ok(Look::Settled(match (held.next(), held.next()) {
+            return Ok(Check::Done(match (held.next(), held.next()) {
                 (Some(((label, ..), _)), None) => Label::Attractor(*label),
                 _ => Label::Unsettled,
             }));
         }
-        // The last states are all looked at, and those of a motion that may run off.
-        let unwatched = (max_periods + 1).saturating_sub(period + LAST);
-        Ok(Look::Again(if size > SMALL * self.options.bound {
+        // Every one of the last states is checked, and so is every state of a motion that may
+        // escape.
+        let unchecked = (max_periods + 1).saturating_sub(period + LAST_STATES);
+        Ok(Check::After(if size > SMALL_STATE * self.options.bound {
             1
         } else {
-            run.wait.after(state).min(unwatched).max(1)
+            run.schedule.next_after(state).min(unchecked).max(1)
         }))
     }
 }
@@ -330,85 +332,85 @@ fn label_of(failure: &MapFailure) -> Label {
 }
 
 /// A start that is being followed.
-struct Run<'a> {
-    /// Whose label it is.
+struct Trajectory<'a> {
+    /// Index of its label.
     number: usize,
-    /// Periods so far.
+    /// Drive periods so far.
     period: usize,
-    /// Boxes that have held every one of the last states.
+    /// For each box: whether it contained all of the last states.
     inside: Vec<bool>,
-    wait: Wait<'a>,
+    schedule: CheckSchedule<'a>,
 }
 
-impl<'a> Run<'a> {
+impl<'a> Trajectory<'a> {
     fn new(number: usize, basins: &'a Basins) -> Self {
         Self {
             number,
             period: 0,
             inside: vec![true; basins.boxes.len()],
-            wait: Wait::new(&basins.balls),
+            schedule: CheckSchedule::new(&basins.balls),
         }
     }
 }
 
-/// What comes of a look at a run.
-enum Look {
-    Settled(Label),
-    /// It is to be looked at again after so many periods.
-    Again(usize),
+/// Result of a check.
+enum Check {
+    Done(Label),
+    /// Check again after this many periods.
+    After(usize),
 }
 
-/// How long a start need not be looked at: half of what it would take to the nearest ball at
-/// the ball's own rate. A start that is in a ball meanwhile stays there, so this decides nothing
-/// but when its label is found.
-struct Wait<'a> {
+/// Decides when a trajectory is checked next: after half of the time that it would take to reach
+/// the nearest ball at the ball's own rate. A trajectory that enters a ball in the meantime stays
+/// there, so only the time of its label depends on this.
+struct CheckSchedule<'a> {
     balls: &'a [(u32, Neighbourhood)],
-    /// Looks in a row that see every phase of every orbit.
+    /// Consecutive checks that cover every phase of every orbit.
     phases: usize,
-    looks: usize,
-    /// Periods to the nearest ball in any of these looks.
+    checks: usize,
+    /// Smallest number of periods to a ball in these checks.
     nearest: f64,
 }
 
-/// Periods that a start is not looked at, at most.
-const LONGEST_WAIT: f64 = 64.0;
-/// Size of a state, as a part of the bound, up to which it may be left alone.
-const SMALL: f64 = 1e-4;
+/// Longest time between checks, in periods.
+const MAX_CHECK_INTERVAL: f64 = 64.0;
+/// Largest state, as a fraction of the bound, for which checks may be skipped.
+const SMALL_STATE: f64 = 1e-4;
 
-impl<'a> Wait<'a> {
+impl<'a> CheckSchedule<'a> {
     fn new(balls: &'a [(u32, Neighbourhood)]) -> Self {
         Self {
             balls,
             phases: balls.iter().map(|(_, b)| b.period()).max().unwrap_or(1),
-            looks: 0,
+            checks: 0,
             nearest: f64::INFINITY,
         }
     }
 
-    /// Periods to the next look, after one at `state`.
-    fn after(&mut self, state: &[f64]) -> usize {
+    /// Periods to the next check after one at `state`.
+    fn next_after(&mut self, state: &[f64]) -> usize {
         for (_, ball) in self.balls {
             self.nearest = self.nearest.min(ball.periods_away(state));
         }
-        self.looks += 1;
-        if self.looks < self.phases {
+        self.checks += 1;
+        if self.checks < self.phases {
             return 1;
         }
-        let wait = (0.5 * self.nearest).min(LONGEST_WAIT);
-        self.looks = 0;
+        let interval = (0.5 * self.nearest).min(MAX_CHECK_INTERVAL);
+        self.checks = 0;
         self.nearest = f64::INFINITY;
-        wait as usize
+        interval as usize
     }
 }
 
-/// The box around a stretch of an attractor, widened by a twentieth.
-fn cloud<M: StroboscopicMap>(
+/// The bounding box of 4096 strobe points of an attractor, widened by 5 % on each side.
+fn bounding_box<M: StroboscopicMap>(
     map: &mut M,
     state: &[f64],
 ) -> Result<(Vec<f64>, Vec<f64>), MapFailure> {
     let mut x = state.to_vec();
     let (mut low, mut high) = (x.clone(), x.clone());
-    for _ in 0..CLOUD {
+    for _ in 0..BOX_POINTS {
         advance(map, &mut x)?;
         for (v, (l, h)) in x.iter().zip(low.iter_mut().zip(&mut high)) {
             *l = l.min(*v);

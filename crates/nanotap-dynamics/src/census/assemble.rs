@@ -3,7 +3,7 @@
 use crate::census::escapes::Escapes;
 use crate::census::{
     Attractor, AttractorKind, Census, CensusEnd, Fraction, Lifetime, Outcome, SizeCount,
-    StartOrigin, StartOutcome, StartSet, TransientChaos, Unseen,
+    StartOrigin, StartOutcome, StartSet, TransientChaos, UndiscoveredFraction,
 };
 use crate::lyapunov::LyapunovSpectrum;
 use crate::orbit::PeriodicOrbit;
@@ -20,8 +20,8 @@ pub(crate) fn assemble(
     starts: &StartSet,
     orbits: Vec<PeriodicOrbit>,
     after: f64,
-    transient_spectrum: Option<LyapunovSpectrum>,
-    row: usize,
+    (mut has_transient_chaos, mut transient_spectrum): (bool, Option<LyapunovSpectrum>),
+    starts_since_discovery: usize,
 ) -> Census {
     let total = outcomes.len();
     let mut groups: Vec<Group> = orbits
@@ -37,7 +37,6 @@ pub(crate) fn assemble(
     let mut undecided = Vec::new();
     let mut unbounded = Vec::new();
     let mut unescaped = Vec::new();
-    let mut unescaped_spectrum = transient_spectrum;
     for (k, outcome) in outcomes.iter().enumerate() {
         match outcome {
             Outcome::Orbit { index, .. } => groups[*index].members.push(k),
@@ -57,7 +56,8 @@ pub(crate) fn assemble(
             Outcome::Chaos(chaos, _) if !chaos_lasts => {
                 unescaped.push(k);
                 if unescaped.len() == 1 {
-                    unescaped_spectrum = Some(chaos.spectrum.clone());
+                    has_transient_chaos = true;
+                    transient_spectrum = Some(chaos.spectrum.clone());
                 }
             }
             Outcome::Chaos(chaos, state) => {
@@ -120,16 +120,16 @@ pub(crate) fn assemble(
             *outcome_of_start = StartOutcome::Unbounded;
         }
     }
-    let transient_chaos = unescaped_spectrum
-        .filter(|_| escapes.escaped.len() + unescaped.len() > 0)
-        .map(|spectrum| TransientChaos {
-            spectrum,
+    let transient_chaos = (has_transient_chaos && escapes.escaped.len() + unescaped.len() > 0)
+        .then(|| TransientChaos {
+            spectrum: transient_spectrum,
             lifetime: escapes.lifetime(),
             unescaped: counts.of(&unescaped),
             destinations: destinations(&escapes.escaped, &outcomes_by_start, order.len()),
         });
     let by_size = counts.by_size(&outcomes_by_start, order.len());
-    let unseen = (!by_size.is_empty()).then(|| Unseen::new(order.len(), row));
+    let unseen = (!by_size.is_empty())
+        .then(|| UndiscoveredFraction::new(order.len(), starts_since_discovery));
     let mut slots: Vec<Option<Group>> = groups.into_iter().map(Some).collect();
     let attractors = order
         .iter()

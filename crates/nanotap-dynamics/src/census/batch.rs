@@ -1,29 +1,31 @@
 //! A batch of starts, which threads take one by one.
 //!
 //! Each thread follows some of them side by side, fewer towards the end, so that none is left with many.
-//! A run that does not close is measured by whoever has nothing else to do. What comes of a start does
-//! not depend on who follows it, nor beside which others.
+//! A run that does not close is measured by any thread that is free. The outcome of a start does not
+//! depend on the thread that follows it, nor on the others of its group.
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::mpsc::{Sender, channel};
 
 use rayon::Scope;
 
-use crate::classify::{ClassifyOptions, Followed, Known, RunEnd, follow_start, follow_starts};
+use crate::classify::{
+    ClassifyOptions, Followed, KnownMotions, RunEnd, follow_start, follow_starts,
+};
 use crate::control::Control;
 use crate::map::StroboscopicMap;
 
 /// Starts that are worth following side by side.
-const LEAST_TOGETHER: usize = 8;
+const MIN_BATCH: usize = 8;
 /// Parts of a thread's share of what is left of which it follows one at a time: with fewer, others
 /// have nothing left to do while it follows its last.
-const SHARES: usize = 2;
+const PARTS_PER_THREAD: usize = 2;
 
 /// Starts to be followed, and with what in mind.
 pub(super) struct Batch<'a, M> {
     pub(super) map: &'a M,
     pub(super) starts: &'a [Vec<f64>],
-    pub(super) known: Known<'a>,
+    pub(super) known: KnownMotions<'a>,
     pub(super) options: &'a ClassifyOptions,
     pub(super) control: &'a Control<'a>,
     /// Starts followed by the whole census, and how many these are at most.
@@ -31,8 +33,9 @@ pub(super) struct Batch<'a, M> {
 }
 
 impl<M: StroboscopicMap> Batch<'_, M> {
-    /// Where each start goes; `None` for those that were under way when the work was stopped.
-    pub(super) fn followed(&self) -> Vec<Option<RunEnd>> {
+    /// Where each start goes, with what that cost; `None` for those that were under way when the work
+    /// was stopped.
+    pub(super) fn followed(&self) -> Vec<Option<(RunEnd, u64)>> {
         let (sender, ended) = channel();
         let taken = AtomicUsize::new(0);
         rayon::scope(|scope| {
@@ -45,9 +48,9 @@ impl<M: StroboscopicMap> Batch<'_, M> {
                 scope.spawn(move |scope| turn.follow(scope));
             }
         });
-        let mut ends: Vec<Option<RunEnd>> = self.starts.iter().map(|_| None).collect();
-        for (place, end) in ended.try_iter() {
-            ends[place] = Some(end);
+        let mut ends: Vec<Option<(RunEnd, u64)>> = self.starts.iter().map(|_| None).collect();
+        for (place, end, cost) in ended.try_iter() {
+            ends[place] = Some((end, cost));
         }
         ends
     }
@@ -59,7 +62,7 @@ struct Turn<'s, 'a, M> {
     batch: &'s Batch<'a, M>,
     /// Starts that some thread has taken.
     taken: &'s AtomicUsize,
-    sender: Sender<(usize, RunEnd)>,
+    sender: Sender<(usize, RunEnd, u64)>,
 }
 
 impl<'s, 'a: 's, M: StroboscopicMap> Turn<'s, 'a, M> {
@@ -76,17 +79,19 @@ impl<'s, 'a: 's, M: StroboscopicMap> Turn<'s, 'a, M> {
         let mut map = map.clone();
         let cancelled = || control.is_cancelled();
         // Of few starts most places side by side would be empty.
-        if map.side_by_side() > 1 && starts.len() >= LEAST_TOGETHER {
-            let most = map.side_by_side().max(LEAST_TOGETHER);
-            let parts = SHARES * rayon::current_num_threads();
-            let places = || (self.left() / parts).clamp(LEAST_TOGETHER, most);
+        if map.batch_size() > 1 && starts.len() >= MIN_BATCH {
+            let most = map.batch_size().max(MIN_BATCH);
+            let parts = PARTS_PER_THREAD * rayon::current_num_threads();
+            let places = || (self.left() / parts).clamp(MIN_BATCH, most);
             let followed = |place, followed| match followed {
-                Followed::Ended(end) => self.tell(place, end),
+                // Maps that take several motions at a time are in closed form and cost nothing.
+                Followed::Ended(end) => self.send(place, end, 0),
                 Followed::Unmeasured(run) => {
                     let other = self.clone();
                     scope.spawn(move |_| {
                         if !cancelled() {
-                            other.tell(place, run.measured(&mut other.batch.map.clone()));
+                            let end = run.measured(&mut other.batch.map.clone());
+                            other.send(place, end, 0);
                         }
                     });
                 }
@@ -102,7 +107,9 @@ impl<'s, 'a: 's, M: StroboscopicMap> Turn<'s, 'a, M> {
             );
         } else {
             while let (false, Some((place, start))) = (cancelled(), self.next()) {
-                self.tell(place, follow_start(&mut map, start, known, options));
+                let before = map.cost();
+                let end = follow_start(&mut map, start, known, options);
+                self.send(place, end, map.cost() - before);
             }
         }
     }
@@ -117,14 +124,14 @@ impl<'s, 'a: 's, M: StroboscopicMap> Turn<'s, 'a, M> {
         self.batch.starts.len().saturating_sub(taken)
     }
 
-    fn tell(&self, place: usize, end: RunEnd) {
+    fn send(&self, place: usize, end: RunEnd, cost: u64) {
         // The map may have ended a run that was under way.
         if self.batch.control.is_cancelled() {
             return;
         }
         let (done, all) = self.batch.progress;
         self.batch.control.report(done, all);
-        // What receives it outlives whoever sends.
-        let _ = self.sender.send((place, end));
+        // The receiver outlives every sender.
+        let _ = self.sender.send((place, end, cost));
     }
 }

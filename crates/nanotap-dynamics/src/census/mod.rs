@@ -11,10 +11,10 @@
 //!    destination enters is discarded.
 //! 3. The other starts follow in batches (`batch.rs`). Each is run until it enters a neighbourhood,
 //!    or is classified like a pilot; what a batch finds is known to the next. A start on
-//!    chaos that is known is recognised, without exponents of its own, by parting from a
+//!    chaos that is known is recognised, without measuring its exponents, by diverging from a
 //!    neighbour and by the means of its strobe states and their squares.
 //! 4. Starts that can be drawn without end ([`StartSet`]) go on until the share of
-//!    them that may lead to motions not yet found is bounded ([`Unseen`]) as the
+//!    them that may lead to motions not yet found is bounded ([`UndiscoveredFraction`]) as the
 //!    options ask, or the budget is spent. Stable orbits that Newton closed on the way
 //!    are attractors too, with a fraction of zero if no start goes there.
 //! 5. Motions that do not close are merged when their exponents and the means of their
@@ -29,8 +29,8 @@
 //!
 //! Fails: attractors whose basins are a smaller part of the set of starts than
 //! [`Census::unseen`] says are missed; two different chaotic attractors with equal
-//! means and mean squares would be merged; an attractor and a chaotic transient beside it
-//! are told apart only by the hazard of escape falling with time, as documented at
+//! means and mean squares would be merged; an attractor and a chaotic transient near it
+//! are distinguished only by the hazard of escape falling with time, as documented at
 //! [`Census::transient_chaos`].
 
 mod assemble;
@@ -40,7 +40,7 @@ mod escapes;
 mod motions;
 mod start_box;
 mod start_set;
-mod unseen;
+mod undiscovered;
 
 use std::sync::atomic::AtomicUsize;
 
@@ -50,7 +50,8 @@ use crate::census::batch::Batch;
 use crate::census::escapes::Escapes;
 use crate::census::motions::Motions;
 use crate::classify::{
-    Chaos, ClassifyOptions, Known, RECOGNISABLE, RunEnd, Torus, UndecidedReason, first_entry, watch,
+    Chaos, ClassifyOptions, KnownMotions, RECOGNISABLE, RunEnd, Torus, UndecidedReason,
+    first_entry, watch,
 };
 use crate::control::Control;
 use crate::lyapunov::LyapunovSpectrum;
@@ -61,7 +62,7 @@ use crate::orbit::PeriodicOrbit;
 pub use confidence::{Fraction, Lifetime};
 pub use start_box::{StartBox, StartBoxError};
 pub use start_set::{StartOrigin, StartSet};
-pub use unseen::Unseen;
+pub use undiscovered::UndiscoveredFraction;
 
 /// Pilots that are followed before anything is known at all.
 const FIRST_PILOTS: usize = 4;
@@ -71,11 +72,11 @@ const BATCH: usize = 128;
 const DRAWN_AT_ONCE: usize = 16;
 /// Periods for which a start that enters no neighbourhood is left to itself at least,
 /// once attractors are known.
-const LEAST_PATIENCE: usize = 64;
+const MIN_WAIT_PERIODS: usize = 64;
 /// Part of the expected entry for which it is, where periods are cheap.
-const COARSE_PATIENCE: f64 = 1.3;
+const COARSE_WAIT_FACTOR: f64 = 1.3;
 /// Periods for which it is at most, where periods are cheap.
-const MAX_COARSE_PATIENCE: usize = 2048;
+const MAX_COARSE_WAIT_PERIODS: usize = 2048;
 /// Periods for which chaotic starts together are watched at most, where periods are cheap, and the
 /// rounds in which they are: each takes as long as all before it.
 const WATCHED_TOGETHER: usize = 400_000;
@@ -84,6 +85,8 @@ const WATCH_ROUNDS: u32 = 4;
 const ENOUGH_ESCAPES: usize = 16;
 /// Pilots where orbits are known from seeds and periods are cheap.
 const COARSE_PILOTS: usize = 8;
+/// Part of the census's steps, as a divisor, that the search for one trapping region may take.
+const REGION_STEPS: u64 = 4;
 /// Chaos is watched for so many times the periods after which escapes are counted.
 const WATCHED_TRANSIENTS: f64 = 8.0;
 
@@ -101,6 +104,9 @@ pub struct CensusOptions {
     pub max_starts: usize,
     /// Periods of all starts together after which no further batch is begun.
     pub max_periods: usize,
+    /// Steps of time integration of all the work after which no further batch is begun, as the map
+    /// counts them ([`StroboscopicMap::cost`]). [`ClassifyOptions::max_steps`] limits a start.
+    pub max_steps: u64,
 }
 
 impl Default for CensusOptions {
@@ -111,6 +117,7 @@ impl Default for CensusOptions {
             unseen: 0.002,
             max_starts: 5000,
             max_periods: 2_000_000,
+            max_steps: 50_000_000,
         }
     }
 }
@@ -127,7 +134,7 @@ pub struct Census {
     /// escape and others have not yet, the others are on transient chaos, unless all
     /// escapes fell in the first quarter of the time watched and that would happen
     /// with probability below 1 % at a constant rate: then there is an attractor,
-    /// with a chaotic transient beside it.
+    /// with a chaotic transient near it.
     pub transient_chaos: Option<TransientChaos>,
     /// Starts that left every bound.
     pub unbounded: Fraction,
@@ -142,7 +149,7 @@ pub struct Census {
     pub by_size: Vec<SizeCount>,
     /// How much of the set of starts may lead to motions not found; `None` if no start
     /// was drawn.
-    pub unseen: Option<Unseen>,
+    pub unseen: Option<UndiscoveredFraction>,
     /// Unstable orbits near seeds.
     pub unstable: Vec<PeriodicOrbit>,
     /// Whether starts were followed on the map's [coarse](StroboscopicMap::coarse) one: what counts
@@ -165,6 +172,8 @@ pub enum CensusEnd {
     MaxStarts,
     /// The starts took [`CensusOptions::max_periods`].
     MaxPeriods,
+    /// The work took [`CensusOptions::max_steps`].
+    MaxSteps,
 }
 
 /// What happened to the starts of one size.
@@ -229,8 +238,9 @@ impl AttractorKind {
 /// Chaos that ends.
 #[derive(Clone, Debug)]
 pub struct TransientChaos {
-    /// Exponents while it lasts, of the first start seen on it.
-    pub spectrum: LyapunovSpectrum,
+    /// Exponents while it lasts, of the first start seen on it; `None` if they were measured on the
+    /// map's [coarse](StroboscopicMap::coarse) one only.
+    pub spectrum: Option<LyapunovSpectrum>,
     /// Mean lifetime in periods, by maximum likelihood with the wanderers censored.
     pub lifetime: Lifetime,
     /// Starts still on transient chaos at the end.
@@ -315,11 +325,13 @@ struct Work<'a, M> {
     /// Orbits whose neighbourhood was looked for.
     searched: usize,
     /// Periods after which most starts are in a neighbourhood, or on chaos that is recognised.
-    patience: usize,
+    max_wait_periods: usize,
     /// Periods run so far.
     periods: usize,
+    /// Cost of the starts and trapping regions so far.
+    cost: u64,
     /// Starts decided since the last new motion, of those that count in the fractions.
-    row: usize,
+    starts_since_discovery: usize,
 }
 
 impl<'a, M: StroboscopicMap> Work<'a, M> {
@@ -347,16 +359,17 @@ impl<'a, M: StroboscopicMap> Work<'a, M> {
             ends: Vec::new(),
             neighbourhoods: Vec::new(),
             searched: 0,
-            patience: 0,
+            max_wait_periods: 0,
             periods: 0,
-            row: 0,
+            cost: 0,
+            starts_since_discovery: 0,
         };
         if work.motions.is_coarse {
             work.followed_options = options.classify.on_coarse_map();
         }
         work.motions.close_seeds(starts.seeds());
         if work.motions.count() > 0 {
-            work.know_neighbourhoods(&[]);
+            work.update_trapping_regions(&[]);
         }
         let count = if work.motions.is_coarse && !work.neighbourhoods.is_empty() {
             options.pilots.min(COARSE_PILOTS)
@@ -366,7 +379,7 @@ impl<'a, M: StroboscopicMap> Work<'a, M> {
         // Chaos that the first of the pilots are on need not be measured again by the others.
         let mut pilots = work.follow(count.clamp(1, FIRST_PILOTS));
         pilots.extend(work.follow(count.saturating_sub(FIRST_PILOTS)));
-        work.know_neighbourhoods(&pilots);
+        work.update_trapping_regions(&pilots);
         work
     }
 
@@ -374,7 +387,7 @@ impl<'a, M: StroboscopicMap> Work<'a, M> {
     fn finish(mut self) -> Census {
         while self.outcomes.len() < self.last && !self.is_enough() {
             let classified = self.follow(self.next_batch());
-            self.know_neighbourhoods(&classified);
+            self.update_trapping_regions(&classified);
         }
         let mut after = Escapes::after(self.relaxation());
         self.watch_chaos(&mut after);
@@ -396,11 +409,21 @@ impl<'a, M: StroboscopicMap> Work<'a, M> {
         }
         self.is_bound_met()
             || self.outcomes.len() > self.starts.given_count()
-                && self.periods >= self.options.max_periods
+                && (self.periods >= self.options.max_periods || self.is_budget_spent())
+    }
+
+    fn is_budget_spent(&self) -> bool {
+        self.total_cost() >= self.options.max_steps
+    }
+
+    /// Cost of all the work so far.
+    fn total_cost(&self) -> u64 {
+        self.cost + self.motions.cost()
     }
 
     fn is_bound_met(&self) -> bool {
-        Unseen::new(self.motions.count(), self.row).share <= self.options.unseen
+        UndiscoveredFraction::new(self.motions.count(), self.starts_since_discovery).share
+            <= self.options.unseen
     }
 
     /// Why no further start was followed.
@@ -411,6 +434,8 @@ impl<'a, M: StroboscopicMap> Work<'a, M> {
             CensusEnd::BoundMet
         } else if self.outcomes.len() >= self.last {
             CensusEnd::MaxStarts
+        } else if self.is_budget_spent() {
+            CensusEnd::MaxSteps
         } else {
             CensusEnd::MaxPeriods
         }
@@ -420,15 +445,19 @@ impl<'a, M: StroboscopicMap> Work<'a, M> {
     /// other at the end of a batch. Of those that are drawn, no more than bound and budget ask for if
     /// nothing new comes.
     fn next_batch(&self) -> usize {
-        let mut size = self.row;
+        let mut size = self.starts_since_discovery;
         if self.starts.len().is_none() {
             let bound =
-                Unseen::row_for(self.motions.count(), self.options.unseen).saturating_sub(self.row);
+                UndiscoveredFraction::starts_needed(self.motions.count(), self.options.unseen)
+                    .saturating_sub(self.starts_since_discovery);
             let periods = self.options.max_periods.saturating_sub(self.periods) as f64;
             let budget = periods * self.outcomes.len() as f64 / self.periods.max(1) as f64;
             size = size.min(bound).min(budget.ceil() as usize);
         }
-        size.div_ceil(BATCH).max(1) * BATCH
+        let size = size.div_ceil(BATCH).max(1) * BATCH;
+        let steps = self.options.max_steps.saturating_sub(self.total_cost());
+        let affordable = steps.saturating_mul(self.outcomes.len() as u64) / self.cost.max(1);
+        size.min((affordable as usize).max(FIRST_PILOTS))
     }
 
     /// Follows the next `size` starts; returns those that were classified.
@@ -447,19 +476,23 @@ impl<'a, M: StroboscopicMap> Work<'a, M> {
         let arrivals = self.run(&starts);
         let known: Vec<usize> = self.neighbourhoods.iter().map(|(i, _)| *i).collect();
         let mut classified = Vec::new();
-        for (k, arrival) in range.zip(arrivals) {
+        for ((k, arrival), start) in range.zip(arrivals).zip(&starts) {
             let before = self.motions.count();
+            let arrival = arrival.map(|(arrival, cost)| {
+                self.cost += cost;
+                arrival
+            });
             if matches!(arrival, Some(RunEnd::Classified(_))) {
                 classified.push(k);
             }
-            let outcome = self.outcome(arrival, &known);
+            let outcome = self.outcome(arrival, &known, start);
             self.periods += assemble::periods_of(&outcome);
             let counts = self.starts.len().is_some()
                 || matches!(self.starts.origin(k), Some(StartOrigin::Drawn(_)));
             if self.motions.count() > before {
-                self.row = 0;
+                self.starts_since_discovery = 0;
             } else if counts && !matches!(outcome, Outcome::Undecided(_)) {
-                self.row += 1;
+                self.starts_since_discovery += 1;
             }
             self.outcomes.push(outcome);
         }
@@ -468,29 +501,29 @@ impl<'a, M: StroboscopicMap> Work<'a, M> {
 
     /// Finds neighbourhoods of the orbits that are new, checks all by the starts that were
     /// `classified` without them, and says how long a start is left to itself from now on.
-    fn know_neighbourhoods(&mut self, classified: &[usize]) {
-        // A run beside the same neighbourhoods as before would end as it did.
+    fn update_trapping_regions(&mut self, classified: &[usize]) {
+        // With the same trapping regions as before a run would end as it did.
         if self.find_neighbourhoods() {
             self.check_neighbourhoods(classified);
         }
         let sides = self.sides();
-        let balls = self.neighbourhoods.iter();
-        let entries = balls.map(|(_, ball)| ball.expected_entry(&sides));
+        let trapping_regions = self.neighbourhoods.iter();
+        let entries = trapping_regions.map(|(_, region)| region.expected_entry(&sides));
         let entry = entries.fold(0.0, f64::max);
-        let longest = self.options.classify.max_transient.max(LEAST_PATIENCE);
-        self.patience = if self.motions.is_coarse {
-            let patience = (COARSE_PATIENCE * entry) as usize + LEAST_PATIENCE;
-            patience.min(longest.max(MAX_COARSE_PATIENCE))
+        let longest = self.options.classify.max_transient.max(MIN_WAIT_PERIODS);
+        self.max_wait_periods = if self.motions.is_coarse {
+            let max_wait_periods = (COARSE_WAIT_FACTOR * entry) as usize + MIN_WAIT_PERIODS;
+            max_wait_periods.min(longest.max(MAX_COARSE_WAIT_PERIODS))
         } else {
-            (entry as usize).clamp(LEAST_PATIENCE, longest)
+            (entry as usize).clamp(MIN_WAIT_PERIODS, longest)
         };
         let chaotic = |outcome: &&Outcome| matches!(outcome, Outcome::Chaos(..));
         if 2 * self.outcomes.iter().filter(chaotic).count() > self.outcomes.len() {
-            self.patience = self.patience.max(RECOGNISABLE);
+            self.max_wait_periods = self.max_wait_periods.max(RECOGNISABLE);
         }
         if self.motions.is_coarse {
             let transient = self.options.classify.max_transient;
-            self.followed_options.max_transient = transient.max(2 * self.patience);
+            self.followed_options.max_transient = transient.max(2 * self.max_wait_periods);
         }
     }
 
@@ -499,27 +532,27 @@ impl<'a, M: StroboscopicMap> Work<'a, M> {
         self.ends.iter().map(|[low, high]| high - low).collect()
     }
 
-    fn balls(&self) -> Vec<Neighbourhood> {
-        let balls = self.neighbourhoods.iter();
-        balls.map(|(_, ball)| ball.clone()).collect()
+    fn trapping_regions(&self) -> Vec<Neighbourhood> {
+        let trapping_regions = self.neighbourhoods.iter();
+        trapping_regions.map(|(_, region)| region.clone()).collect()
     }
 
     /// What a run knows from the start, with these neighbourhoods.
-    fn known<'k>(&'k self, balls: &'k [Neighbourhood]) -> Known<'k> {
-        Known {
-            balls,
+    fn known<'k>(&'k self, trapping_regions: &'k [Neighbourhood]) -> KnownMotions<'k> {
+        KnownMotions {
+            trapping_regions,
             chaos: &self.motions.spectra,
-            patience: self.patience,
+            max_wait_periods: self.max_wait_periods,
             cancel: self.control.cancel,
         }
     }
 
-    fn run(&self, starts: &[Vec<f64>]) -> Vec<Option<RunEnd>> {
-        let balls = self.balls();
+    fn run(&self, starts: &[Vec<f64>]) -> Vec<Option<(RunEnd, u64)>> {
+        let trapping_regions = self.trapping_regions();
         let batch = Batch {
             map: &self.motions.followed,
             starts,
-            known: self.known(&balls),
+            known: self.known(&trapping_regions),
             options: &self.followed_options,
             control: self.control,
             progress: (&self.done, self.last),
@@ -527,11 +560,12 @@ impl<'a, M: StroboscopicMap> Work<'a, M> {
         batch.followed()
     }
 
-    fn outcome(&mut self, arrival: Option<RunEnd>, known: &[usize]) -> Outcome {
+    /// What a start has come to that arrived there.
+    fn outcome(&mut self, arrival: Option<RunEnd>, known: &[usize], start: &[f64]) -> Outcome {
         match arrival {
             None => Outcome::Undecided(UndecidedReason::Cancelled),
             Some(RunEnd::Entered { index, periods }) => self.motions.arrival(known[index], periods),
-            Some(RunEnd::Classified(classified)) => self.motions.outcome(*classified),
+            Some(RunEnd::Classified(classified)) => self.motions.outcome(*classified, start),
         }
     }
 
@@ -541,13 +575,13 @@ impl<'a, M: StroboscopicMap> Work<'a, M> {
         let motions = &self.motions;
         let orbits = &motions.followed_orbits;
         for (orbit, _) in &orbits[self.searched..] {
-            for (own, ball) in &mut self.neighbourhoods {
+            for (own, region) in &mut self.neighbourhoods {
                 if motions.is_coarse && !orbits[*own].0.is_same_as(orbit) {
-                    ball.keep_clear_of(orbit);
+                    region.keep_clear_of(orbit);
                 }
             }
         }
-        let new: Vec<(usize, Neighbourhood)> = (self.searched..orbits.len())
+        let found: Vec<(Option<Neighbourhood>, u64)> = (self.searched..orbits.len())
             .into_par_iter()
             .with_max_len(1)
             .map_init(
@@ -557,24 +591,28 @@ impl<'a, M: StroboscopicMap> Work<'a, M> {
                     let others = orbits.iter().map(|(orbit, _)| orbit);
                     let others = others.enumerate().filter(|(k, _)| *k != own);
                     let others = others.map(|(_, other)| other).chain(&motions.unstable);
+                    let before = map.cost();
                     let found = if self.control.is_cancelled() {
-                        return None;
+                        return (None, 0);
                     } else if motions.is_coarse {
-                        Neighbourhood::over_block(map, orbit, others)
+                        let steps = self.options.max_steps / REGION_STEPS;
+                        Neighbourhood::over_block(map, orbit, others, steps)
                     } else {
                         Neighbourhood::around(map, orbit)
                     };
-                    Some((own, found.ok().flatten()?))
+                    (found.ok().flatten(), map.cost() - before)
                 },
             )
-            .collect::<Vec<_>>()
-            .into_iter()
-            .flatten()
             .collect();
+        let first = self.searched;
         self.searched = orbits.len();
-        let found = !new.is_empty();
-        self.neighbourhoods.extend(new);
-        found
+        let known = self.neighbourhoods.len();
+        for (k, (neighbourhood, cost)) in found.into_iter().enumerate() {
+            self.cost += cost;
+            let found = neighbourhood.map(|neighbourhood| (first + k, neighbourhood));
+            self.neighbourhoods.extend(found);
+        }
+        self.neighbourhoods.len() > known
     }
 
     /// How long the starts that were `classified` really took, now that their goal is
@@ -595,7 +633,7 @@ impl<'a, M: StroboscopicMap> Work<'a, M> {
                 _ => false,
             })
             .collect();
-        let balls = self.balls();
+        let trapping_regions = self.trapping_regions();
         let entries: Vec<Option<(usize, usize)>> = checked
             .par_iter()
             .with_max_len(1)
@@ -607,10 +645,10 @@ impl<'a, M: StroboscopicMap> Work<'a, M> {
                     }
                     let periods = assemble::periods_of(&self.outcomes[k]);
                     let start = self.starts.start(k)?;
-                    let known = Known {
-                        balls: &balls,
+                    let known = KnownMotions {
+                        trapping_regions: &trapping_regions,
                         cancel: self.control.cancel,
-                        ..Known::default()
+                        ..KnownMotions::default()
                     };
                     first_entry(map, &start, known, periods, &self.followed_options)
                 },
@@ -623,15 +661,15 @@ impl<'a, M: StroboscopicMap> Work<'a, M> {
             .map(|(own, _)| self.leads_to(*own))
             .collect();
         for (k, entry) in checked.into_iter().zip(entries) {
-            let (Outcome::Orbit { index, periods }, Some((ball, after))) =
+            let (Outcome::Orbit { index, periods }, Some((region, after))) =
                 (&mut self.outcomes[k], entry)
             else {
                 continue;
             };
-            if leads[ball] == Some(*index) {
+            if leads[region] == Some(*index) {
                 *periods = after;
             } else {
-                discarded.push(ball);
+                discarded.push(region);
             }
         }
         let mut position = 0;
@@ -650,9 +688,9 @@ impl<'a, M: StroboscopicMap> Work<'a, M> {
     }
 
     /// Follows chaotic starts for several times the periods `after` which escapes are
-    /// counted: beside a weakly stable orbit, chaos that was watched for less than a
+    /// counted: near a weakly stable orbit, chaos that was watched for less than a
     /// linear transient takes is no evidence of an attractor. Where no stable orbit is known there
-    /// is none to be beside. Where starts escaped, the others are watched for as long as a start
+    /// is none to be near. Where starts escaped, the others are watched for as long as a start
     /// may be in transit at all. Where one of them escapes,
     /// escapes count from when it was known to be chaotic.
     fn watch_chaos(&mut self, after: &mut f64) {
@@ -662,18 +700,20 @@ impl<'a, M: StroboscopicMap> Work<'a, M> {
         } else {
             0
         };
-        let beside = if self.motions.orbits.is_empty() {
+        let near_orbit = if self.motions.orbits.is_empty() {
             0.0
         } else {
             WATCHED_TRANSIENTS * *after
         };
-        let enough = least.max(beside as usize);
+        let enough = least.max(near_orbit as usize);
         let chaotic = |outcome: &&Outcome| matches!(outcome, Outcome::Chaos(..));
         let chaotic = self.outcomes.iter().filter(chaotic).count();
         let together = WATCHED_TOGETHER / chaotic.max(1);
         let mut budget = self.options.max_periods;
         if self.motions.is_coarse {
-            budget = budget.min(WATCHED_TOGETHER);
+            let steps = self.options.max_steps.saturating_sub(self.total_cost());
+            let affordable = steps.saturating_mul(self.periods as u64) / self.cost.max(1);
+            budget = budget.min(WATCHED_TOGETHER).min(affordable as usize);
         }
         if self.motions.is_coarse && together > enough {
             for round in (0..WATCH_ROUNDS).rev() {
@@ -700,8 +740,8 @@ impl<'a, M: StroboscopicMap> Work<'a, M> {
                 _ => false,
             })
             .collect();
-        let balls = self.balls();
-        let known = self.known(&balls);
+        let trapping_regions = self.trapping_regions();
+        let known = self.known(&trapping_regions);
         let ends: Vec<Result<Vec<f64>, RunEnd>> = watched
             .par_iter()
             .with_max_len(1)
@@ -735,9 +775,11 @@ impl<'a, M: StroboscopicMap> Work<'a, M> {
                 }
                 Err(arrival) => {
                     let (spectrum, observed) = (chaos.spectrum.clone(), chaos.observed);
-                    let mut outcome = self.outcome(Some(arrival), &known);
+                    let start = at.clone();
+                    let mut outcome = self.outcome(Some(arrival), &known, &start);
                     if let Outcome::Orbit { periods, .. } = &mut outcome {
                         *periods += observed;
+                        self.motions.has_transient_chaos = true;
                         self.motions.transient_spectrum.get_or_insert(spectrum);
                         *after = after.min(observed as f64);
                     }
@@ -752,7 +794,7 @@ impl<'a, M: StroboscopicMap> Work<'a, M> {
         let sides = self.sides();
         self.neighbourhoods
             .iter()
-            .map(|(_, ball)| ball.relaxation(&sides))
+            .map(|(_, region)| region.relaxation(&sides))
             .fold(0.0, f64::max)
     }
 
@@ -764,8 +806,8 @@ impl<'a, M: StroboscopicMap> Work<'a, M> {
             self.starts,
             motions.orbits,
             after,
-            motions.transient_spectrum,
-            self.row,
+            (motions.has_transient_chaos, motions.transient_spectrum),
+            self.starts_since_discovery,
         );
         Census {
             unstable: motions.unstable,

@@ -7,8 +7,8 @@
 
 use crate::census::Outcome;
 use crate::classify::{
-    Chaos, Classified, ClassifyOptions, Known, MotionKind, Torus, UndecidedReason, classify_on,
-    close_exactly,
+    Chaos, Classified, ClassifyOptions, KnownMotions, MotionKind, Torus, UndecidedReason,
+    classify_on, close_exactly,
 };
 use crate::control::CancelFlag;
 use crate::lyapunov::{LyapunovOptions, LyapunovSpectrum};
@@ -21,12 +21,18 @@ const MAX_EXACT_RUNS: usize = 8;
 /// States of a motion that does not close from which it is classified exactly, until one shows what
 /// it is.
 const MAX_TRIES: usize = 4;
+/// Starts on which the coarse map fails that are followed on the map itself, at most.
+const MAX_RETRIES: usize = 64;
+/// The same where that fails too.
+const MAX_FAILED_RETRIES: usize = 4;
 /// Periods for which exponents are measured on the map itself at most.
 const MAX_EXACT_PERIODS: usize = 4000;
 
 pub(super) struct Motions<'a, M> {
     /// The map itself.
     exact: M,
+    /// Its cost at first.
+    first_cost: u64,
     /// The map that starts are followed on: the same, or its coarse one.
     pub(super) followed: M,
     pub(super) is_coarse: bool,
@@ -44,11 +50,16 @@ pub(super) struct Motions<'a, M> {
     /// Orbits of the map itself that were looked for on the followed one.
     paired: usize,
     exact_runs: usize,
+    /// Starts on which the coarse map failed that were followed on the map itself.
+    retries: usize,
+    failed_retries: usize,
     /// Spectra of chaotic motions and tori of the followed map, one of each.
     pub(super) spectra: Vec<LyapunovSpectrum>,
     /// What each of these is.
     irregular: Vec<Irregular>,
-    /// Spectrum of chaos from which a start escaped.
+    /// Whether a start escaped from chaos.
+    pub(super) has_transient_chaos: bool,
+    /// Spectrum of that chaos on the map itself.
     pub(super) transient_spectrum: Option<LyapunovSpectrum>,
 }
 
@@ -59,9 +70,27 @@ struct Irregular {
     kind: Option<IrregularKind>,
 }
 
+#[derive(Clone)]
 enum IrregularKind {
-    Chaos(LyapunovSpectrum),
+    Chaos(Chaos),
     Torus(Torus),
+}
+
+impl IrregularKind {
+    const fn spectrum(&self) -> &LyapunovSpectrum {
+        match self {
+            Self::Chaos(chaos) => &chaos.spectrum,
+            Self::Torus(torus) => &torus.spectrum,
+        }
+    }
+
+    /// The outcome of a start that is on it, in a state.
+    fn outcome(self, state: Vec<f64>) -> Outcome {
+        match self {
+            Self::Chaos(chaos) => Outcome::Chaos(chaos, state),
+            Self::Torus(torus) => Outcome::Torus(torus, state),
+        }
+    }
 }
 
 impl<'a, M: StroboscopicMap> Motions<'a, M> {
@@ -83,6 +112,7 @@ impl<'a, M: StroboscopicMap> Motions<'a, M> {
         Self {
             budgets,
             exact: map.clone(),
+            first_cost: map.cost(),
             is_coarse: coarse.is_some(),
             followed: coarse.unwrap_or_else(|| map.clone()),
             options,
@@ -92,10 +122,18 @@ impl<'a, M: StroboscopicMap> Motions<'a, M> {
             followed_orbits: Vec::new(),
             paired: 0,
             exact_runs: 0,
+            retries: 0,
+            failed_retries: 0,
             spectra: Vec::new(),
             irregular: Vec::new(),
+            has_transient_chaos: false,
             transient_spectrum: None,
         }
+    }
+
+    /// Cost of what was closed and classified on the map itself.
+    pub(super) fn cost(&self) -> u64 {
+        self.exact.cost() - self.first_cost
     }
 
     /// Motions found so far.
@@ -118,13 +156,27 @@ impl<'a, M: StroboscopicMap> Motions<'a, M> {
         self.pair_orbits();
     }
 
-    /// What a start came to that was followed to its end.
-    pub(super) fn outcome(&mut self, found: Classified) -> Outcome {
-        if !self.is_coarse {
-            let outcome = self.exact_outcome(found);
-            self.pair_orbits();
-            return outcome;
+    /// The outcome of a start that was followed to its end: on the map itself, where the coarse one
+    /// failed.
+    pub(super) fn outcome(&mut self, mut found: Classified, start: &[f64]) -> Outcome {
+        let mut is_exact = !self.is_coarse;
+        let may_retry = self.retries < MAX_RETRIES && self.failed_retries < MAX_FAILED_RETRIES;
+        if !is_exact && is_map_failure(&found.kind) && may_retry {
+            self.retries += 1;
+            let exact = self.classify_exactly(start, 0);
+            self.failed_retries += usize::from(is_map_failure(&exact.kind));
+            for orbit in std::mem::replace(&mut found, exact).met {
+                self.follow_orbit(orbit);
+            }
+            is_exact = true;
         }
+        let outcome = self.outcome_on(found, is_exact);
+        self.pair_orbits();
+        outcome
+    }
+
+    /// The outcome of a start that came to a motion of the map itself, or of the coarse one.
+    fn outcome_on(&mut self, found: Classified, is_exact: bool) -> Outcome {
         let Classified {
             kind,
             periods,
@@ -132,29 +184,39 @@ impl<'a, M: StroboscopicMap> Motions<'a, M> {
             met,
         } = found;
         let outcome = match kind {
-            MotionKind::Periodic(orbit) => {
-                let index = self.follow_orbit(orbit);
-                self.arrival(index, periods)
-            }
+            MotionKind::Periodic(orbit) => self.orbit_outcome(orbit, periods, is_exact),
             MotionKind::TransientChaos {
                 orbit, spectrum, ..
             } => {
-                self.transient_spectrum.get_or_insert(spectrum);
-                let index = self.follow_orbit(orbit);
-                self.arrival(index, periods)
+                self.has_transient_chaos = true;
+                if is_exact {
+                    self.transient_spectrum.get_or_insert(spectrum);
+                }
+                self.orbit_outcome(orbit, periods, is_exact)
             }
             MotionKind::QuasiPeriodic(torus) => {
-                self.irregular_outcome(&torus.spectrum, state, periods)
+                self.irregular_outcome(IrregularKind::Torus(torus), state, periods, is_exact)
             }
-            MotionKind::Chaotic(chaos) => self.irregular_outcome(&chaos.spectrum, state, periods),
+            MotionKind::Chaotic(chaos) => {
+                self.irregular_outcome(IrregularKind::Chaos(chaos), state, periods, is_exact)
+            }
             MotionKind::Unbounded => Outcome::Unbounded,
             MotionKind::Undecided { reason, .. } => Outcome::Undecided(reason),
         };
         for orbit in met {
-            self.follow_orbit(orbit);
+            self.orbit_outcome(orbit, 0, is_exact);
         }
-        self.pair_orbits();
         outcome
+    }
+
+    /// The outcome of a start that came to an orbit.
+    fn orbit_outcome(&mut self, orbit: PeriodicOrbit, periods: usize, is_exact: bool) -> Outcome {
+        if is_exact {
+            let index = merge(&mut self.orbits, orbit);
+            return Outcome::Orbit { index, periods };
+        }
+        let index = self.follow_orbit(orbit);
+        self.arrival(index, periods)
     }
 
     /// What a start has come to that arrived at an orbit of the followed map.
@@ -168,51 +230,6 @@ impl<'a, M: StroboscopicMap> Motions<'a, M> {
         }
     }
 
-    /// What a motion of the map itself is to the census.
-    fn exact_outcome(&mut self, found: Classified) -> Outcome {
-        let Classified {
-            kind,
-            periods,
-            state,
-            met,
-        } = found;
-        let outcome = match kind {
-            MotionKind::Periodic(orbit) => Outcome::Orbit {
-                index: merge(&mut self.orbits, orbit),
-                periods,
-            },
-            MotionKind::TransientChaos {
-                orbit, spectrum, ..
-            } => {
-                self.transient_spectrum.get_or_insert(spectrum);
-                Outcome::Orbit {
-                    index: merge(&mut self.orbits, orbit),
-                    periods,
-                }
-            }
-            MotionKind::QuasiPeriodic(torus) => {
-                let known = self.spectrum_index(&torus.spectrum);
-                self.irregular[known]
-                    .kind
-                    .get_or_insert_with(|| IrregularKind::Torus(torus.clone()));
-                Outcome::Torus(torus, state)
-            }
-            MotionKind::Chaotic(chaos) => {
-                let known = self.spectrum_index(&chaos.spectrum);
-                self.irregular[known]
-                    .kind
-                    .get_or_insert_with(|| IrregularKind::Chaos(chaos.spectrum.clone()));
-                Outcome::Chaos(chaos, state)
-            }
-            MotionKind::Unbounded => Outcome::Unbounded,
-            MotionKind::Undecided { reason, .. } => Outcome::Undecided(reason),
-        };
-        for orbit in met {
-            merge(&mut self.orbits, orbit);
-        }
-        outcome
-    }
-
     /// Classifies the motion from a state on the map itself, as the end of a start that has run for
     /// so many periods.
     fn classify_exactly(&mut self, state: &[f64], periods: usize) -> Classified {
@@ -220,16 +237,15 @@ impl<'a, M: StroboscopicMap> Motions<'a, M> {
             .irregular
             .iter()
             .filter_map(|known| match &known.kind {
-                Some(IrregularKind::Chaos(spectrum)) => Some(spectrum.clone()),
+                Some(IrregularKind::Chaos(chaos)) => Some(chaos.spectrum.clone()),
                 _ => None,
             })
             .collect();
-        let known = Known {
+        let known = KnownMotions {
             chaos: &chaos,
             cancel: self.cancel,
-            ..Known::default()
+            ..KnownMotions::default()
         };
-        self.exact_runs += 1;
         let mut found = classify_on(&mut self.exact, state, known, &self.budgets);
         found.periods += periods;
         if let MotionKind::Chaotic(chaos) = &mut found.kind {
@@ -251,8 +267,9 @@ impl<'a, M: StroboscopicMap> Motions<'a, M> {
             }
             Outcome::Orbit { index, periods: 0 }
         } else if self.exact_runs < MAX_EXACT_RUNS {
+            self.exact_runs += 1;
             let found = self.classify_exactly(&orbit.states[0], 0);
-            self.exact_outcome(found)
+            self.outcome_on(found, true)
         } else {
             Outcome::Undecided(UndecidedReason::NotConfirmed)
         };
@@ -299,35 +316,55 @@ impl<'a, M: StroboscopicMap> Motions<'a, M> {
         })
     }
 
-    /// What a start has come to whose motion on the coarse map does not close.
+    /// The outcome of a start whose motion does not close.
     fn irregular_outcome(
         &mut self,
-        spectrum: &LyapunovSpectrum,
+        found: IrregularKind,
         state: Vec<f64>,
         periods: usize,
+        is_exact: bool,
     ) -> Outcome {
-        let known = self.spectrum_index(spectrum);
+        let known = self.spectrum_index(found.spectrum());
+        if is_exact {
+            self.irregular[known]
+                .kind
+                .get_or_insert_with(|| found.clone());
+            return found.outcome(state);
+        }
         let may_try = self.irregular[known].tries < MAX_TRIES && self.exact_runs < MAX_EXACT_RUNS;
         if self.irregular[known].kind.is_none() && may_try {
             self.irregular[known].tries += 1;
+            self.exact_runs += 1;
             let found = self.classify_exactly(&state, periods);
             self.irregular[known].kind = match &found.kind {
-                MotionKind::Chaotic(Chaos { spectrum, .. })
-                | MotionKind::TransientChaos { spectrum, .. } => {
-                    Some(IrregularKind::Chaos(spectrum.clone()))
+                MotionKind::Chaotic(chaos) => Some(IrregularKind::Chaos(chaos.clone())),
+                MotionKind::TransientChaos { spectrum, .. } => {
+                    let chaos = Chaos::of(spectrum.clone(), periods, self.options);
+                    Some(IrregularKind::Chaos(chaos))
                 }
                 MotionKind::QuasiPeriodic(torus) => Some(IrregularKind::Torus(torus.clone())),
                 _ => None,
             };
-            return self.exact_outcome(found);
+            return self.outcome_on(found, true);
         }
         match &self.irregular[known].kind {
-            Some(IrregularKind::Chaos(spectrum)) => {
-                let chaos = Chaos::of(spectrum.clone(), periods, self.options);
+            Some(IrregularKind::Chaos(chaos)) => {
+                let chaos = Chaos::of(chaos.spectrum.clone(), periods, self.options);
                 Outcome::Chaos(chaos, state)
             }
-            Some(IrregularKind::Torus(torus)) => Outcome::Torus(torus.clone(), state),
+            Some(torus) => torus.clone().outcome(state),
             None => Outcome::Undecided(UndecidedReason::NotConfirmed),
         }
     }
+}
+
+/// Whether a motion is undecided because its map failed.
+const fn is_map_failure(kind: &MotionKind) -> bool {
+    matches!(
+        kind,
+        MotionKind::Undecided {
+            reason: UndecidedReason::Map { .. },
+            ..
+        }
+    )
 }

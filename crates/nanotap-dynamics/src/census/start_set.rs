@@ -216,7 +216,7 @@ mod tests {
         }
     }
 
-    /// States given before do not change what is drawn, and every size has draws of its own.
+    /// States given before do not change what is drawn, and every size has separate draws.
     #[test]
     fn given_states_leave_the_draws_as_they_are() {
         let drawn = StartSet::spread(&square(), &[0.0, 0.0], &[1.0, 1.0, 1.0], 0).unwrap();

@@ -1,10 +1,10 @@
-//! Whether a run really goes to an orbit that Newton closed beside it.
+//! Whether a run really goes to an orbit that Newton closed near it.
 
 use nalgebra::{DMatrix, DVector};
 
 use crate::failure::{MapFailure, advance};
 use crate::map::StroboscopicMap;
-use crate::neighbourhood::{AdaptedNorm, Return};
+use crate::neighbourhood::{AdaptedNorm, ReturnMap};
 use crate::orbit::PeriodicOrbit;
 use crate::vector::distance;
 
@@ -14,7 +14,7 @@ const LONGEST_STRETCH: f64 = 512.0;
 /// Part of its first distance, and of the orbit's size, at which a run has come to the orbit.
 const ARRIVED: f64 = 0.01;
 /// Part of the orbit's size at which the rest of the way is looked at.
-const BESIDE: f64 = 0.1;
+const NEARBY: f64 = 0.1;
 /// How many times longer than four such stretches a decay time is that is watched to its end.
 const SLOWEST: f64 = 10.0;
 /// Decay times that this takes, and more where the run comes from so many sizes away.
@@ -22,16 +22,16 @@ const LONGEST_WATCH: f64 = 5.0;
 const FARTHEST: f64 = 1e9;
 /// Places of the rest of the way at which the map is tried.
 const PLACES: usize = 16;
-/// Returns after which the slowest turns beside a flip or a strong resonance (of three or four
+/// Returns after which the slowest turns near a flip or a strong resonance (of three or four
 /// returns) have come round: on one side of such an orbit a single return may lead away.
 const DOZEN: usize = 12;
 /// Phases of the slowest turns at which it is tried, at every halving of the distance.
 const PHASES: usize = 8;
 
 /// True if the run from `state` approaches the stable `orbit` as its multipliers say: nearer by a
-/// factor 100 in the adapted norm, and to a hundredth of the orbit's size; or beside it, a tenth of
-/// its size away, for one decay time with the peaks of four stretches falling one after the other, at
-/// half the linear rate at least, and with a free way ahead. Peaks, because beside a flip or a
+/// factor 100 in the adapted norm, and to a hundredth of the orbit's size; or near it, a tenth of
+/// its size away, for one decay time with the peaks of four stretches falling in sequence, at
+/// half the linear rate at least, and with a free way ahead. Peaks, because near a flip or a
 /// Neimark–Sacker point the distance falls only on average over the turns. The way ahead is the
 /// linear decay from there and all phases of its slowest turns, where the map must contract, over one
 /// return or a dozen. Where it is not free, as where a beat will bring the tip to a sample that it does
@@ -40,15 +40,20 @@ const PHASES: usize = 8;
 ///
 /// Four stretches are one decay time long, or 2048 returns; a torus around the orbit that beats
 /// more slowly than that, and happens to shrink meanwhile with a free way ahead, would be mistaken.
+/// Where the map comes to its `largest_cost` the run is not seen to approach.
 pub(crate) fn approaches<M: StroboscopicMap>(
     map: &mut M,
     state: &[f64],
     orbit: &PeriodicOrbit,
+    largest_cost: u64,
 ) -> Result<bool, MapFailure> {
     let Some(mut approach) = Approach::new(map, state, orbit)? else {
         return Ok(false);
     };
     for _ in 0..approach.longest_watch {
+        if map.cost() > largest_cost {
+            break;
+        }
         match approach.one_decay_time(map)? {
             Progress::Arrived => return Ok(true),
             Progress::Gone => return Ok(false),
@@ -63,7 +68,7 @@ pub(crate) fn approaches<M: StroboscopicMap>(
 enum Progress {
     /// It is as small as it need be.
     Arrived,
-    /// It falls as the multipliers say, beside the orbit.
+    /// It falls as the multipliers say, near the orbit.
     Falls,
     /// It falls by less, or far away.
     Nearer,
@@ -86,8 +91,8 @@ struct Approach<'a> {
     first: f64,
     /// Distance at which it has arrived.
     near: f64,
-    /// Distance beside the orbit, where what is far from it no longer counts.
-    beside: f64,
+    /// Distance near the orbit, where what is far from it no longer counts.
+    nearby: f64,
     now: f64,
     /// Times four stretches that this takes.
     longest_watch: usize,
@@ -102,7 +107,7 @@ impl<'a> Approach<'a> {
     ) -> Result<Option<Self>, MapFailure> {
         let (d, n) = (state.len(), orbit.period);
         let center = &orbit.states[0];
-        let mut work = Return::new(d);
+        let mut work = ReturnMap::new(d);
         let monodromy = work.jacobian(map, center, n)?.clone();
         let Some(adapted) = AdaptedNorm::new(&monodromy, orbit.spectral_radius()) else {
             return Ok(None);
@@ -133,7 +138,7 @@ impl<'a> Approach<'a> {
             x,
             first,
             near: floor.max(ARRIVED * first / far),
-            beside: if size > floor { BESIDE * size } else { first },
+            nearby: if size > floor { NEARBY * size } else { first },
             now: first,
             longest_watch: (shortened * (LONGEST_WATCH + nanotap_arithmetic::ln(far))).ceil()
                 as usize,
@@ -173,7 +178,7 @@ impl<'a> Approach<'a> {
         let wanted = 1.5 * self.stretch() as f64 * self.rate;
         let falls = highest.windows(2).all(|w| w[1] < w[0])
             && nanotap_arithmetic::ln(highest[3] / highest[0]) <= wanted;
-        Ok(if falls && self.now <= self.beside {
+        Ok(if falls && self.now <= self.nearby {
             Progress::Falls
         } else if falls || highest[3] < highest[0] {
             Progress::Nearer
@@ -267,6 +272,8 @@ pub(super) mod tests {
     #[derive(Clone)]
     pub(in crate::classify) struct Line(pub(in crate::classify) fn(f64) -> f64);
 
+    impl crate::Scheduling for Line {}
+
     impl StroboscopicMap for Line {
         type Error = Infallible;
 
@@ -302,7 +309,7 @@ pub(super) mod tests {
         let mut map = Line(factor);
         let rest = close_orbit(&mut map, &[0.0], 1, &ShootingOptions::default()).unwrap();
         assert_eq!(rest.spectral_radius(), factor(0.0));
-        approaches(&mut map, &[1.0], &rest).unwrap()
+        approaches(&mut map, &[1.0], &rest, u64::MAX).unwrap()
     }
 
     /// Beyond 1/2 the distance falls by another factor than at rest: at three fifths of the rate

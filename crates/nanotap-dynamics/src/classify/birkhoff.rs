@@ -76,6 +76,8 @@ mod tests {
     #[derive(Clone)]
     struct Turn;
 
+    impl crate::Scheduling for Turn {}
+
     impl StroboscopicMap for Turn {
         type Error = std::convert::Infallible;
 

@@ -22,7 +22,7 @@ pub struct Candidate {
 /// `strobe` holds consecutive states row by row (`dimension` values each). Each
 /// period is judged on as many of the latest states as it is long, 4 at least. A
 /// period counts only if it more than halves the best closure of every shorter
-/// one, so multiples of a period are not listed beside it.
+/// one, so multiples of a period are not listed with it.
 pub fn candidate_periods(strobe: &[f64], dimension: usize, max_period: usize) -> Vec<Candidate> {
     if dimension == 0 {
         return Vec::new();

@@ -1,7 +1,7 @@
 //! What a motion that was followed on a coarse map is on the map itself.
 //!
 //! A coarse map is near the map in every period, but its motions may differ: an orbit may have
-//! another period beside a flip, or be missing beside a fold. So an orbit counts only if Newton
+//! another period near a flip, or be missing near a fold. So an orbit counts only if Newton
 //! closes it on the map, from the coarse orbit's points and near them, and its multipliers there say
 //! stable. In any other case the run goes on exactly from where the coarse one ended, within the
 //! budgets of [`ClassifyOptions`], and has the name that it gets there.
@@ -10,7 +10,7 @@
 //! does from states within the coarse map's error of a basin's boundary.
 
 use crate::classify::{
-    Classified, ClassifyOptions, Known, MotionKind, UndecidedReason, classify_on,
+    Classified, ClassifyOptions, KnownMotions, MotionKind, UndecidedReason, classify_on,
 };
 use crate::map::StroboscopicMap;
 use crate::orbit::{PeriodicOrbit, close_orbit_from_points};
@@ -37,7 +37,7 @@ pub(crate) fn confirm<M: StroboscopicMap>(
     map: &mut M,
     mut found: Classified,
     start: &[f64],
-    known: Known<'_>,
+    known: KnownMotions<'_>,
     options: &ClassifyOptions,
 ) -> Classified {
     let met: Vec<_> = std::mem::take(&mut found.met)

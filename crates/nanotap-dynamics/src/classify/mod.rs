@@ -28,10 +28,10 @@
 //! slow for the budget, is left undecided.
 
 mod approach;
+mod batch_classify;
 mod birkhoff;
 mod candidates;
 mod confirm;
-mod pack;
 mod run;
 mod undecided;
 
@@ -39,12 +39,12 @@ use crate::lyapunov::{LyapunovOptions, LyapunovSpectrum};
 use crate::map::StroboscopicMap;
 use crate::orbit::{PeriodicOrbit, ShootingOptions};
 
+pub(crate) use batch_classify::{Followed, follow_starts};
 pub use birkhoff::birkhoff_digits;
 pub use candidates::{Candidate, candidate_periods};
 pub(crate) use confirm::close_exactly;
 use confirm::confirm;
-pub(crate) use pack::{Followed, follow_starts};
-pub(crate) use run::{Known, RECOGNISABLE, RunEnd, first_entry, follow_start, watch};
+pub(crate) use run::{KnownMotions, RECOGNISABLE, RunEnd, first_entry, follow_start, watch};
 pub use undecided::UndecidedReason;
 
 /// Budgets of [`classify`].
@@ -72,6 +72,9 @@ pub struct ClassifyOptions {
     pub birkhoff_periods: usize,
     /// Digits to which the two stretches must agree for a torus.
     pub torus_digits: f64,
+    /// Steps of time integration after which a run is left undecided, as the map counts them
+    /// ([`StroboscopicMap::cost`]).
+    pub max_steps: u64,
 }
 
 impl Default for ClassifyOptions {
@@ -89,6 +92,7 @@ impl Default for ClassifyOptions {
             lyapunov: LyapunovOptions::default(),
             birkhoff_periods: 8192,
             torus_digits: 7.0,
+            max_steps: 40_000_000,
         }
     }
 }
@@ -99,7 +103,8 @@ const COARSE_RESIDUAL: f64 = 1e-5;
 
 impl ClassifyOptions {
     /// The same budgets on a coarse map.
-    pub(crate) fn on_coarse_map(&self) -> Self {
+    #[must_use]
+    pub fn on_coarse_map(&self) -> Self {
         let residual = self.shooting.residual_tolerance.max(COARSE_RESIDUAL);
         Self {
             shooting: ShootingOptions {
@@ -227,9 +232,9 @@ pub fn classify_beside<M: StroboscopicMap>(
     chaos: &[LyapunovSpectrum],
     options: &ClassifyOptions,
 ) -> Classified {
-    let known = Known {
+    let known = KnownMotions {
         chaos,
-        ..Known::default()
+        ..KnownMotions::default()
     };
     let Some(mut coarse) = map.coarse() else {
         return classify_on(map, start, known, options);
@@ -242,7 +247,7 @@ pub fn classify_beside<M: StroboscopicMap>(
 pub(crate) fn classify_on<M: StroboscopicMap>(
     map: &mut M,
     start: &[f64],
-    known: Known<'_>,
+    known: KnownMotions<'_>,
     options: &ClassifyOptions,
 ) -> Classified {
     let mut end = ended(follow_start(map, start, known, options), start);

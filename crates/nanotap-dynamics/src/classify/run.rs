@@ -22,7 +22,7 @@ const CLOSING_STEPS: usize = 10;
 const SHORTEST_STEP: f64 = 0.5;
 /// Growth over a near return beyond which it is no sign of a stable orbit: where a run does go
 /// to one, the linearised return comes to shrink.
-const HOPELESS_GROWTH: f64 = 100.0;
+const MAX_GUESS_GROWTH: f64 = 100.0;
 /// Closure, as a part of the motion's spread, up to which a period is worth trying.
 const WORTH_TRYING: f64 = 0.2;
 /// The same for periods beyond [`ClassifyOptions::max_period`], where Newton costs more.
@@ -39,20 +39,20 @@ const DETERMINED: f64 = 1e-8;
 /// Distance of a neighbour, in standard deviations of the motion.
 const NEIGHBOUR: f64 = 1e-9;
 /// How many times its distance grows on chaos.
-const PARTING: f64 = 1e5;
+const DIVERGENCE: f64 = 1e5;
 /// Periods in which it does.
-pub(super) const LONGEST_PARTING: usize = 512;
+pub(super) const MAX_DIVERGENCE_PERIODS: usize = 512;
 
 /// What is known already when a start sets out.
 #[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct Known<'a> {
+pub(crate) struct KnownMotions<'a> {
     /// Neighbourhoods of attracting orbits.
-    pub(crate) balls: &'a [Neighbourhood],
+    pub(crate) trapping_regions: &'a [Neighbourhood],
     /// Exponents and means of chaotic motions and tori.
     pub(crate) chaos: &'a [LyapunovSpectrum],
     /// Periods after which most runs are in one of the neighbourhoods, or on known chaos:
     /// before that, looking where a run goes costs more than waiting.
-    pub(crate) patience: usize,
+    pub(crate) max_wait_periods: usize,
     /// A run stops within a period after this becomes true.
     pub(crate) cancel: Option<&'a CancelFlag>,
 }
@@ -71,7 +71,7 @@ pub(crate) enum RunEnd {
 pub(crate) fn follow_start<M: StroboscopicMap>(
     map: &mut M,
     start: &[f64],
-    known: Known<'_>,
+    known: KnownMotions<'_>,
     options: &ClassifyOptions,
 ) -> RunEnd {
     if let Some(end) = refused(start, map.dimension()) {
@@ -102,7 +102,7 @@ pub(super) fn refused(start: &[f64], d: usize) -> Option<RunEnd> {
 pub(crate) fn first_entry<M: StroboscopicMap>(
     map: &mut M,
     start: &[f64],
-    known: Known<'_>,
+    known: KnownMotions<'_>,
     periods: usize,
     options: &ClassifyOptions,
 ) -> Option<(usize, usize)> {
@@ -117,7 +117,7 @@ pub(crate) fn first_entry<M: StroboscopicMap>(
 pub(crate) fn watch<M: StroboscopicMap>(
     map: &mut M,
     state: &[f64],
-    known: Known<'_>,
+    known: KnownMotions<'_>,
     periods: usize,
     options: &ClassifyOptions,
 ) -> Result<Vec<f64>, RunEnd> {
@@ -146,6 +146,7 @@ pub(super) enum Stop {
     Entered(usize),
     Unbounded,
     Cancelled,
+    Budget,
     Failed(MapFailure),
 }
 
@@ -160,6 +161,8 @@ pub(super) struct Run<'a> {
     pub(super) state: Vec<f64>,
     scratch: Vec<f64>,
     pub(super) periods: usize,
+    /// Cost of the map when the first period was over.
+    first_cost: Option<u64>,
     /// The latest strobe states, oldest first, at least the last twice the longest
     /// period.
     recent: Vec<f64>,
@@ -168,7 +171,7 @@ pub(super) struct Run<'a> {
     target: usize,
     /// Periods before which it is not looked for in a neighbourhood.
     next_entry: usize,
-    known: Known<'a>,
+    known: KnownMotions<'a>,
     options: &'a ClassifyOptions,
     closing: ShootingOptions,
     met: Vec<PeriodicOrbit>,
@@ -189,7 +192,7 @@ impl Guesses {
     }
 }
 
-/// An orbit that Newton closed beside a run.
+/// An orbit that Newton closed near a run.
 pub(super) enum Closed {
     /// Its multipliers say that it attracts.
     Attracting(PeriodicOrbit),
@@ -202,7 +205,7 @@ pub(super) enum AfterLook {
     /// It is this motion.
     Known(MotionKind),
     /// It may be on known chaos, which a neighbour decides.
-    Perhaps(Resembled),
+    MaybeChaos(ChaosMatch),
     /// It goes on to the next look.
     GoOn,
     /// It does not close: its exponents are measured.
@@ -210,13 +213,13 @@ pub(super) enum AfterLook {
 }
 
 /// Chaos whose means a run has.
-pub(super) struct Resembled {
+pub(super) struct ChaosMatch {
     pub(super) spectrum: LyapunovSpectrum,
     /// Standard deviations of the run's states.
     deviations: Vec<f64>,
 }
 
-impl Resembled {
+impl ChaosMatch {
     /// A neighbour of a state.
     pub(super) fn neighbour(&self, state: &[f64]) -> Vec<f64> {
         let apart = self.deviations.iter().map(|s| NEIGHBOUR * s);
@@ -227,32 +230,37 @@ impl Resembled {
             .collect()
     }
 
-    /// Whether a neighbour has come to be [`PARTING`] times as far away as it was, more than any
+    /// Whether a neighbour has come to be [`DIVERGENCE`] times as far away as it was, more than any
     /// linear transient explains.
-    pub(super) fn has_parted(&self, state: &[f64], neighbour: &[f64]) -> bool {
+    pub(super) fn has_diverged(&self, state: &[f64], neighbour: &[f64]) -> bool {
         let distances = neighbour.iter().zip(state).zip(&self.deviations);
         let apart = distances.fold(0.0f64, |far, ((a, b), s)| far.max((a - b).abs() / s));
-        apart > PARTING * NEIGHBOUR
+        apart > DIVERGENCE * NEIGHBOUR
     }
 }
 
 impl<'a> Run<'a> {
-    pub(super) fn new(start: &[f64], known: Known<'a>, options: &'a ClassifyOptions) -> Self {
+    pub(super) fn new(
+        start: &[f64],
+        known: KnownMotions<'a>,
+        options: &'a ClassifyOptions,
+    ) -> Self {
         let keep = (2 * longest(options)).max(options.first_look) * start.len();
         Self {
             d: start.len(),
             state: start.to_vec(),
             scratch: start.to_vec(),
             periods: 0,
+            first_cost: None,
             recent: start.to_vec(),
             keep,
-            target: options.first_look.max(known.patience).max(1),
+            target: options.first_look.max(known.max_wait_periods).max(1),
             next_entry: 0,
             known,
             options,
             closing: ShootingOptions {
                 max_iterations: options.shooting.max_iterations.min(CLOSING_STEPS),
-                max_growth: HOPELESS_GROWTH,
+                max_growth: MAX_GUESS_GROWTH,
                 min_damping: options.shooting.min_damping.max(SHORTEST_STEP),
                 explains_stalls: false,
                 ..options.shooting.clone()
@@ -283,6 +291,10 @@ impl<'a> Run<'a> {
             Stop::Entered(index) => RunEnd::Entered { index, periods },
             Stop::Unbounded => self.classified(MotionKind::Unbounded),
             Stop::Cancelled => self.classified(undecided(UndecidedReason::Cancelled, None)),
+            Stop::Budget => {
+                let steps = self.options.max_steps;
+                self.classified(undecided(UndecidedReason::Budget { periods, steps }, None))
+            }
             Stop::Failed(failure) => {
                 let reason = UndecidedReason::Map { periods, failure };
                 self.classified(undecided(reason, None))
@@ -319,8 +331,8 @@ impl<'a> Run<'a> {
         map: &mut M,
         mut after: AfterLook,
     ) -> Result<Option<MotionKind>, Stop> {
-        if let AfterLook::Perhaps(chaos) = after {
-            if self.parts_from_neighbour(map, &chaos)? {
+        if let AfterLook::MaybeChaos(chaos) = after {
+            if self.diverges_from_neighbour(map, &chaos)? {
                 return Ok(Some(self.chaotic(chaos.spectrum)));
             }
             after = self.go_on();
@@ -328,7 +340,7 @@ impl<'a> Run<'a> {
         match after {
             AfterLook::Known(kind) => Ok(Some(kind)),
             AfterLook::Measure => self.measure(map).map(Some),
-            AfterLook::GoOn | AfterLook::Perhaps(_) => Ok(None),
+            AfterLook::GoOn | AfterLook::MaybeChaos(_) => Ok(None),
         }
     }
 
@@ -353,9 +365,9 @@ impl<'a> Run<'a> {
             return Ok(AfterLook::Known(kind));
         }
         if self.periods >= RECOGNISABLE.min(self.options.max_transient)
-            && let Some(chaos) = self.resembles()
+            && let Some(chaos) = self.matching_chaos()
         {
-            return Ok(AfterLook::Perhaps(chaos));
+            return Ok(AfterLook::MaybeChaos(chaos));
         }
         Ok(self.go_on())
     }
@@ -405,18 +417,36 @@ impl<'a> Run<'a> {
         if self.known.cancel.is_some_and(CancelFlag::is_cancelled) {
             return Err(Stop::Cancelled);
         }
+        let cost = map.cost();
+        if cost > self.largest_cost(cost) {
+            return Err(Stop::Budget);
+        }
         if self.periods < self.next_entry {
             return Ok(());
         }
-        for (index, ball) in self.known.balls.iter().enumerate() {
-            if ball.contains(&self.state) {
-                if ball.holds(map, &self.state, &mut self.scratch)? {
+        for (index, region) in self.known.trapping_regions.iter().enumerate() {
+            if region.contains(&self.state) {
+                if region.holds(map, &self.state, &mut self.scratch)? {
                     return Err(Stop::Entered(index));
                 }
-                self.next_entry = self.periods + ball.retry();
+                self.next_entry = self.periods + region.retry();
             }
         }
         Ok(())
+    }
+
+    /// Cost of the map at which the budget is spent.
+    fn largest_cost(&mut self, cost: u64) -> u64 {
+        let first = *self.first_cost.get_or_insert(cost);
+        first.saturating_add(self.options.max_steps)
+    }
+
+    /// Whether the budget suffices for Newton's method on an orbit of this period.
+    fn affords(&self, cost: u64, period: usize) -> bool {
+        let spent = cost - self.first_cost.unwrap_or(cost);
+        let a_period = spent / self.periods.max(1) as u64;
+        let needed = a_period.saturating_mul((self.closing.max_iterations * period) as u64);
+        spent.saturating_add(needed) <= self.options.max_steps
     }
 
     /// From where Newton is to close the motion.
@@ -459,6 +489,9 @@ impl<'a> Run<'a> {
         guesses: &mut Guesses,
     ) -> Option<Closed> {
         for (period, points) in guesses.left.by_ref() {
+            if !self.affords(map.cost(), period) {
+                continue;
+            }
             let Ok(orbit) = close_orbit_from_points(map, &points, period, &self.closing) else {
                 continue;
             };
@@ -492,7 +525,8 @@ impl<'a> Run<'a> {
                 return Ok(Some(undecided(reason, None)));
             }
         };
-        if approaches(map, &self.state, &orbit)? {
+        let largest_cost = self.largest_cost(map.cost());
+        if approaches(map, &self.state, &orbit, largest_cost)? {
             return Ok(Some(MotionKind::Periodic(orbit)));
         }
         if !self.met.iter().any(|m| m.is_same_as(&orbit)) {
@@ -539,34 +573,34 @@ impl<'a> Run<'a> {
 
     /// The chaotic motion that is known already, if the strobe states after the first quarter have
     /// the means of it.
-    fn resembles(&self) -> Option<Resembled> {
+    fn matching_chaos(&self) -> Option<ChaosMatch> {
         let mut known = self.known.chaos.iter().filter(|k| is_chaotic(k)).peekable();
         known.peek()?;
         let settled = (self.periods - self.periods / 4).min(self.recent.len() / self.d);
         let means = StrobeMeans::of(&self.recent[self.recent.len() - settled * self.d..], self.d);
         let deviations = means.deviations();
-        let telling = means.is_telling();
+        let telling = means.is_comparable();
         let found = known.find(|k| telling && k.strobe.agree_with(&means));
-        found.map(|spectrum| Resembled {
+        found.map(|spectrum| ChaosMatch {
             spectrum: spectrum.clone(),
             deviations,
         })
     }
 
-    /// Whether a neighbour of the state parts from it within [`LONGEST_PARTING`] periods. The run
+    /// Whether a neighbour of the state parts from it within [`MAX_DIVERGENCE_PERIODS`] periods. The run
     /// goes on meanwhile.
-    fn parts_from_neighbour<M: StroboscopicMap>(
+    fn diverges_from_neighbour<M: StroboscopicMap>(
         &mut self,
         map: &mut M,
-        chaos: &Resembled,
+        chaos: &ChaosMatch,
     ) -> Result<bool, Stop> {
         let mut neighbour = chaos.neighbour(&self.state);
-        for _ in 0..LONGEST_PARTING {
+        for _ in 0..MAX_DIVERGENCE_PERIODS {
             self.step(map)?;
             if advance(map, &mut neighbour).is_err() {
                 return Ok(false);
             }
-            if chaos.has_parted(&self.state, &neighbour) {
+            if chaos.has_diverged(&self.state, &neighbour) {
                 return Ok(true);
             }
         }
@@ -631,7 +665,7 @@ impl<'a> Run<'a> {
                 {
                     return Ok(self.chaotic(spectrum));
                 }
-            } else if is_known && spectrum.is_telling() {
+            } else if is_known && spectrum.is_comparable() {
                 // Perhaps on a torus that is known.
                 let kind = self.neither_periodic_nor_chaotic(map, spectrum.clone())?;
                 if !matches!(kind, MotionKind::Undecided { .. }) {
@@ -791,6 +825,8 @@ pub(super) mod tests {
     #[derive(Clone)]
     pub(in crate::classify) struct Logistic(pub(in crate::classify) f64);
 
+    impl crate::Scheduling for Logistic {}
+
     impl StroboscopicMap for Logistic {
         type Error = std::convert::Infallible;
 
@@ -821,7 +857,15 @@ pub(super) mod tests {
     #[test]
     fn a_motion_that_is_watched_may_go_to_an_orbit_that_nobody_knows() {
         let options = ClassifyOptions::default();
-        let watched = |r: f64| watch(&mut Logistic(r), &[0.3], Known::default(), 200, &options);
+        let watched = |r: f64| {
+            watch(
+                &mut Logistic(r),
+                &[0.3],
+                KnownMotions::default(),
+                200,
+                &options,
+            )
+        };
         let Err(RunEnd::Classified(end)) = watched(3.2) else {
             panic!("the orbit was not noticed")
         };

@@ -93,6 +93,16 @@ pub enum UndecidedReason {
         "the approximate flow comes to a motion that the exact flow did not confirm from any state tried"
     )]
     NotConfirmed,
+    /// The budget of steps was spent.
+    #[error(
+        "the run was followed for {periods} periods, up to the budget of {steps} steps of the approximate flow"
+    )]
+    Budget {
+        /// Periods run.
+        periods: usize,
+        /// [`ClassifyOptions::max_steps`](crate::ClassifyOptions::max_steps).
+        steps: u64,
+    },
     /// The work was stopped before this start was done.
     #[error("stopped before it was done")]
     Cancelled,

@@ -1,23 +1,22 @@
-//! Bifurcations along a branch: what crosses zero, and where exactly.
+//! Detection and location of bifurcations along a branch.
 //!
 //! | kind | test function |
 //! |---|---|
 //! | fold | the parameter's component of the tangent |
-//! | crossing | Π(μ − 1), where no fold explains its sign |
+//! | crossing | Π(μ − 1), where no fold explains its sign change |
 //! | flip | Π(μ + 1) |
 //! | Neimark–Sacker | Π_{i<j}(μ_i μ_j − 1), where the pair is complex |
-//! | grazing | an extremum of a switching function, followed from point to point |
+//! | grazing | an extremum of a switching function, matched from point to point |
 //!
-//! Products are replaced by their sign times the smallest factor, which has the same
-//! zeros and does not over- or underflow. A sign change between neighbouring points
-//! is narrowed down along the arc, the orbit solved anew by Newton at every trial, to
-//! a bracket of 1e-12 of the parameter or rounding.
+//! Each product is replaced by its sign times the smallest factor: the zeros are the same, and it
+//! neither overflows nor underflows. A sign change between neighbouring points is located along the
+//! arc, with a Newton solution at every trial, to a bracket of 1e-12 of the parameter or rounding.
 //!
-//! Fails: two zeros of one function between neighbouring points cancel and are
-//! missed (shorter steps find them); an extremum is followed by the time at which it
-//! happens, so a grazing is missed if its time jumps by more than the distance to
-//! the next extremum within a 256th of a step; multipliers that nearly coincide on
-//! the circle are known to the square root of rounding only, and so is the point.
+//! Fails: two zeros of one function between neighbouring points cancel and are missed (shorter
+//! steps find them). Extrema are matched by their times, so a grazing is missed if its time changes
+//! by more than the distance to the next extremum within 1/256 of a step. Multipliers that nearly
+//! coincide on the unit circle, and therefore the bifurcation point, are accurate to the square
+//! root of rounding only.
 
 use nalgebra::Complex;
 use nanotap_arithmetic::ComplexFunctions as _;
@@ -28,47 +27,49 @@ use crate::orbit::PeriodicOrbit;
 use crate::orbit::multipliers::Multipliers;
 use crate::vector::dot;
 
-/// What happens at a bifurcation point.
+/// Kind of a bifurcation.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum BifurcationKind {
-    /// Two orbits meet and vanish (saddle-node): a multiplier +1, the branch turns.
+    /// Saddle-node bifurcation: two orbits meet and vanish, a multiplier is +1 and the branch
+    /// turns.
     Fold,
-    /// Another branch of the same period crosses (pitchfork, transcritical): a
-    /// multiplier +1, the branch goes on.
+    /// Pitchfork or transcritical bifurcation: another branch of the same period crosses, a
+    /// multiplier is +1 and the branch continues.
     Crossing,
     /// Period doubling: a multiplier −1.
     Flip,
-    /// A complex pair on the unit circle: a torus is born or dies.
+    /// Neimark–Sacker bifurcation: a complex pair crosses the unit circle and a torus appears or
+    /// vanishes.
     NeimarkSacker {
-        /// Angle of the pair, in (0, π).
+        /// Angle of the pair in radians, in (0, π).
         angle: f64,
     },
-    /// An extremum of a switching function touches zero: a contact is born or dies.
+    /// An extremum of a switching function reaches zero: a contact appears or vanishes.
     Grazing {
-        /// When, in drive periods from the orbit's first state.
+        /// Time of the extremum in drive periods, from the first state of the orbit.
         time: f64,
     },
 }
 
-/// A located bifurcation point.
+/// A located bifurcation.
 #[derive(Clone, Debug)]
 pub struct Bifurcation {
-    /// What happens.
+    /// Kind of the bifurcation.
     pub kind: BifurcationKind,
-    /// Where.
+    /// Parameter value.
     pub parameter: f64,
-    /// Width of the last bracket in the parameter.
+    /// Width of the final bracket, in units of the parameter.
     pub uncertainty: f64,
-    /// The orbit there. At a fold or crossing its error estimate is large: the
+    /// The orbit at the bifurcation. At a fold or crossing its error estimate is large, because the
     /// parameter alone does not determine it.
     pub orbit: PeriodicOrbit,
-    /// Index of the branch point before it, in the direction of travel.
+    /// Index of the branch point before it, in the direction of continuation.
     pub after_point: usize,
-    /// The solution, for switching branches.
+    /// The solution, used for branch switching.
     pub(crate) node: Node,
 }
 
-/// The signs that are watched, at one point.
+/// Values of the test functions at one point.
 #[derive(Clone, Debug)]
 pub(crate) struct Tests {
     pub(crate) fold: f64,
@@ -79,21 +80,29 @@ pub(crate) struct Tests {
 }
 
 impl Tests {
-    pub(crate) fn new<F: MapFamily>(solver: &mut BranchSolver<'_, F>, node: &Node) -> Option<Self> {
+    pub(crate) fn new<F: MapFamily>(
+        solver: &mut BranchSolver<'_, F>,
+        node: &Node,
+        grazings: bool,
+    ) -> Option<Self> {
         let multipliers = Multipliers::of_product(&node.jacobians).ok()?.values;
         let crossing = plus_one(&multipliers);
         Some(Self {
             fold: node.slope,
-            // Where a doubled branch begins, it crosses itself, a stroboscopic period later.
+            // A doubled branch crosses itself where it begins, one stroboscopic period later.
             crossing: if node.slope == 0.0 { 0.0 } else { crossing },
             flip: minus_one(&multipliers),
             neimark_sacker: pair_on_circle(&multipliers).0,
-            tangencies: solver.tangencies(node).ok()?,
+            tangencies: if grazings {
+                solver.tangencies(node).ok()?
+            } else {
+                Vec::new()
+            },
         })
     }
 
-    /// Whether there may be anything [`between`] two neighbouring points of an orbit of period
-    /// `n`.
+    /// True if [`between`] may find a bifurcation between two neighbouring points of an orbit of
+    /// period `n`.
     pub(crate) fn any_changes([a, b]: [&Self; 2], n: usize) -> bool {
         let signs = |tests: &Self| {
             [tests.fold, tests.crossing, tests.flip, tests.neimark_sacker].map(|test| test < 0.0)
@@ -108,7 +117,7 @@ impl Tests {
     }
 }
 
-/// How many extrema are below zero.
+/// Number of extrema below zero.
 fn negative(tangencies: &[OrbitTangency]) -> usize {
     tangencies.iter().filter(|t| t.value < 0.0).count()
 }
@@ -155,7 +164,7 @@ fn pair_on_circle(multipliers: &[Complex<f64>]) -> (f64, Option<(Complex<f64>, f
             } else {
                 a * b - 1.0
             };
-            // Products that are not real come in conjugate couples: positive.
+            // Products that are not real come in conjugate pairs, whose contribution is positive.
             let real = conjugates || (a.im == 0.0 && b.im == 0.0);
             negative ^= real && factor.re < 0.0;
             smallest = smallest.min(factor.modulus());
@@ -179,24 +188,24 @@ struct Zero {
     value: f64,
 }
 
-/// A stretch of a branch: its two ends, and where they lie along the tangent of `from`.
+/// Part of a branch: its two ends and their positions along the tangent of `from`.
 #[derive(Clone, Copy)]
-struct Stretch<'a> {
+struct Segment<'a> {
     from: &'a Node,
     ends: [&'a Node; 2],
     span: (f64, f64),
 }
 
-/// Narrows down the sign change of `test` over a stretch: regula falsi (Illinois) with a
-/// bisection at every third trial. `None` if the orbit is lost on the way, or if what changes
-/// sign jumps instead of vanishing.
-fn narrow<F: MapFamily>(
+/// Locates the sign change of `test` on a part of the branch: regula falsi (Illinois) with a
+/// bisection at every third trial. `None` if the corrector fails, or if the function jumps instead
+/// of vanishing.
+fn locate_zero<F: MapFamily>(
     solver: &mut BranchSolver<'_, F>,
-    Stretch {
+    Segment {
         from,
         ends: [first, last],
         span,
-    }: Stretch<'_>,
+    }: Segment<'_>,
     values: (f64, f64),
     mut test: impl FnMut(&mut BranchSolver<'_, F>, &Node, f64) -> Option<f64>,
 ) -> Option<Zero> {
@@ -215,9 +224,9 @@ fn narrow<F: MapFamily>(
         if !(at > low && at < high) {
             break;
         }
-        // Where branches cross the bordered system is singular: try beside it.
-        let beside = at + 1e-3 * (high - at);
-        let Some((at, node)) = [at, beside]
+        // The bordered system is singular where branches cross: try a point near it.
+        let nearby = at + 1e-3 * (high - at);
+        let Some((at, node)) = [at, nearby]
             .into_iter()
             .find_map(|at| Some((at, solver.along_cubic(from, at, [&below, &above]).ok()?)))
         else {
@@ -261,8 +270,8 @@ fn narrow<F: MapFamily>(
         })
 }
 
-/// The step along the tangent of `from` at which the difference of the states `m`
-/// periods apart reverses: the branch has run into an orbit of period `m`.
+/// The step along the tangent of `from` at which the difference of the states `m` periods apart
+/// changes sign: there the branch meets an orbit of period `m`.
 pub(crate) fn collapse<F: MapFamily>(
     solver: &mut BranchSolver<'_, F>,
     from: &Node,
@@ -276,16 +285,16 @@ pub(crate) fn collapse<F: MapFamily>(
     if last.is_nan() || last >= 0.0 {
         return None;
     }
-    let stretch = Stretch {
+    let stretch = Segment {
         from,
         ends: [from, to],
         span: (0.0, step),
     };
-    let zero = narrow(solver, stretch, (1.0, last), |solver, node, _| {
+    let zero = locate_zero(solver, stretch, (1.0, last), |solver, node, _| {
         Some(dot(&reference, &solver.gap(node, m)) / square)
     });
     if let Some(z) = zero {
-        // A difference that only turns by a right angle is no meeting.
+        // A difference that only turns by a right angle is not such a point.
         let left = solver.gap(&z.node, m);
         return (dot(&left, &left) <= 0.01 * square).then_some((z.at, z.node.parameter));
     }
@@ -306,19 +315,19 @@ pub(crate) fn between<F: MapFamily>(
     after_point: usize,
 ) -> Vec<Bifurcation> {
     let mut zeros: Vec<(BifurcationKind, Zero)> = Vec::new();
-    let whole = Stretch {
+    let whole = Segment {
         from: a,
         ends: [a, b],
         span: (0.0, step),
     };
     let changes = |x: f64, y: f64| x * y < 0.0;
     if changes(tests_a.fold, tests_b.fold) {
-        let zero = narrow(solver, whole, (tests_a.fold, tests_b.fold), |_, node, _| {
+        let zero = locate_zero(solver, whole, (tests_a.fold, tests_b.fold), |_, node, _| {
             Some(node.slope)
         });
         zeros.extend(zero.map(|z| (BifurcationKind::Fold, z)));
     } else if changes(tests_a.crossing, tests_b.crossing) {
-        let zero = narrow(
+        let zero = locate_zero(
             solver,
             whole,
             (tests_a.crossing, tests_b.crossing),
@@ -327,13 +336,13 @@ pub(crate) fn between<F: MapFamily>(
         zeros.extend(zero.map(|z| (BifurcationKind::Crossing, z)));
     }
     if changes(tests_a.flip, tests_b.flip) {
-        let zero = narrow(solver, whole, (tests_a.flip, tests_b.flip), |_, node, _| {
+        let zero = locate_zero(solver, whole, (tests_a.flip, tests_b.flip), |_, node, _| {
             of_multipliers(node, minus_one)
         });
         zeros.extend(zero.map(|z| (BifurcationKind::Flip, z)));
     }
     if changes(tests_a.neimark_sacker, tests_b.neimark_sacker) {
-        let zero = narrow(
+        let zero = locate_zero(
             solver,
             whole,
             (tests_a.neimark_sacker, tests_b.neimark_sacker),
@@ -341,7 +350,7 @@ pub(crate) fn between<F: MapFamily>(
         );
         zeros.extend(zero.and_then(|z| {
             let multipliers = Multipliers::of_product(&z.node.jacobians).ok()?.values;
-            // A real pair of product 1 (a neutral saddle) is no bifurcation.
+            // A real pair with product 1 (a neutral saddle) is not a bifurcation.
             let (pair, factor) = pair_on_circle(&multipliers).1?;
             (factor.abs() <= 1e-6).then(|| {
                 let angle = nanotap_arithmetic::atan2(pair.im, pair.re);
@@ -370,14 +379,14 @@ fn of_multipliers(node: &Node, test: impl Fn(&[Complex<f64>]) -> f64) -> Option<
     Some(test(&Multipliers::of_product(&node.jacobians).ok()?.values))
 }
 
-/// Shortest way round from time `a` to time `b` on an orbit of period `n`.
+/// Shortest signed time from `a` to `b` on an orbit of period `n`.
 fn time_shift(a: f64, b: f64, n: f64) -> f64 {
     let shift = (b - a).rem_euclid(n);
     if shift > 0.5 * n { shift - n } else { shift }
 }
 
-/// The tangency nearest to one in time; of those at one extremum (which may graze several
-/// switches) that of the nearest value.
+/// The tangency nearest in time. If one extremum has several switching functions, the one with the
+/// nearest value.
 fn nearest(tangencies: &[OrbitTangency], to: OrbitTangency, n: f64) -> Option<(usize, f64)> {
     let apart = |t: &OrbitTangency| (time_shift(to.time, t.time, n), (t.value - to.value).abs());
     tangencies
@@ -388,12 +397,12 @@ fn nearest(tangencies: &[OrbitTangency], to: OrbitTangency, n: f64) -> Option<(u
         .map(|(k, (shift, _))| (k, shift))
 }
 
-/// Tangencies whose value changes sign over a stretch. Extrema are matched with each other's
-/// nearest in time; if the numbers of negative ones differ and no match says why, the span is
-/// halved, `depth` times at most.
+/// Tangencies whose value changes sign on a part of the branch. Extrema are matched with their
+/// nearest in time. If the numbers of negative values differ and no match explains it, the interval
+/// is halved, at most `depth` times.
 fn grazings<F: MapFamily>(
     solver: &mut BranchSolver<'_, F>,
-    stretch: Stretch<'_>,
+    stretch: Segment<'_>,
     [first, last]: [&Tests; 2],
     depth: usize,
     zeros: &mut Vec<(BifurcationKind, Zero)>,
@@ -410,7 +419,7 @@ fn grazings<F: MapFamily>(
         if !mutual || t.value * u.value >= 0.0 {
             continue;
         }
-        let zero = narrow(solver, stretch, (t.value, u.value), |solver, node, at| {
+        let zero = locate_zero(solver, stretch, (t.value, u.value), |solver, node, at| {
             let fraction = (at - span.0) / (span.1 - span.0);
             let tangencies = solver.tangencies(node).ok()?;
             let expected = OrbitTangency {
@@ -438,12 +447,12 @@ fn grazings<F: MapFamily>(
         let Ok(node) = solver.along_cubic(stretch.from, middle, stretch.ends) else {
             return;
         };
-        let Some(tests) = Tests::new(solver, &node) else {
+        let Some(tests) = Tests::new(solver, &node, true) else {
             return;
         };
         let halves = [
             (
-                Stretch {
+                Segment {
                     ends: [stretch.ends[0], &node],
                     span: (span.0, middle),
                     ..stretch
@@ -451,7 +460,7 @@ fn grazings<F: MapFamily>(
                 [first, &tests],
             ),
             (
-                Stretch {
+                Segment {
                     ends: [&node, stretch.ends[1]],
                     span: (middle, span.1),
                     ..stretch
@@ -477,8 +486,8 @@ mod tests {
         assert!((found - expected).abs() < 1e-14, "{found} {expected}");
     }
 
-    /// The sign of Π(1 ∓ μ) with the smallest factor: two factors below zero make a product above
-    /// it, and so does a pair.
+    /// The sign of Π(1 ∓ μ) with the smallest factor: two negative factors, or a complex pair, give
+    /// a positive product.
     #[test]
     fn products_over_real_multipliers() {
         near(plus_one(&real(&[0.75])), 0.25);
@@ -490,7 +499,7 @@ mod tests {
         near(plus_one(&pair), 0.5f64.hypot(2.0));
     }
 
-    /// Π (μ_i μ_j − 1) over the couples, real ones first.
+    /// Π (μ_i μ_j − 1) over all pairs, for real multipliers first.
     #[test]
     fn products_over_couples_of_multipliers() {
         let sign = |values: &[f64]| pair_on_circle(&real(values));
@@ -504,7 +513,7 @@ mod tests {
         let (p, q) = (Complex::new(0.6, 0.7), Complex::new(-0.9, 0.6));
         for pair in [[p, p.conj()], [p.conj(), p]] {
             let mut values = pair.to_vec();
-            // Beside a real one: two couples that are conjugates of each other.
+            // With an additional real multiplier: two pairs of complex conjugates.
             for others in [&[][..], &[0.5], &[-20.0]] {
                 values.truncate(2);
                 values.extend(real(others));
@@ -515,8 +524,8 @@ mod tests {
                 near(factor, -0.15);
             }
         }
-        // The pair nearest the circle is that which is named: |q|² − 1 = 0.17, |p|² − 1 = −0.15,
-        // |2 q|² − 1 = 3.68.
+        // The pair nearest the unit circle is reported: |q|² − 1 = 0.17, |p|² − 1 = −0.15, |2 q|² −
+        // 1 = 3.68.
         let of = |values: [Complex<f64>; 4]| {
             let (product, found) = pair_on_circle(&values);
             (product, found.unwrap().0)
@@ -529,7 +538,7 @@ mod tests {
         assert_eq!(named, q);
     }
 
-    /// Times on an orbit of period 2 are compared the short way round.
+    /// Times on an orbit of period 2 are compared modulo the period.
     #[test]
     fn the_short_way_round_an_orbit() {
         for (a, b, shift) in [

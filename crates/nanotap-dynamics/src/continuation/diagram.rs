@@ -1,15 +1,15 @@
-//! The whole picture of branches, assembled by itself.
+//! Assembly of a bifurcation diagram from seed orbits.
 //!
-//! Every seed orbit (from a census at one parameter value or several) is followed
-//! both ways; at each flip the doubled branch is followed, down to a given depth;
-//! where a branch runs into one of shorter period, that one becomes a seed. An orbit
-//! that lies on a branch already there is not followed again.
+//! Every seed orbit (from a census at one or more parameter values) is followed in both directions.
+//! At each flip the doubled branch is followed, down to a given depth. Where a branch meets one of
+//! shorter period, that one becomes a seed. An orbit on a branch that is already in the diagram is
+//! not followed again.
 //!
-//! Fails by omission: isolated branches that no seed lies on are not found.
+//! Fails by omission: isolated branches without a seed are not found.
 
 use crate::continuation::bifurcation::BifurcationKind;
 use crate::continuation::follow::solver_for;
-use crate::continuation::passing::lies_between;
+use crate::continuation::orbit_on_branch::lies_between;
 use crate::continuation::switching::switch_at_flip;
 use crate::continuation::{
     Branch, BranchEnd, ContinuationError, ContinuationOptions, Direction, continue_orbit,
@@ -20,40 +20,41 @@ use crate::orbit::PeriodicOrbit;
 use crate::orbit::shooting::{ShootingOptions, close_orbit_from_points};
 use rayon::prelude::*;
 
-/// How a diagram is assembled.
+/// Options of the assembly of a diagram.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DiagramOptions {
-    /// How each branch is followed.
+    /// Options for each branch.
     pub continuation: ContinuationOptions,
-    /// Doublings to follow from each seed: 0 for none.
+    /// Number of period doublings that are followed from each seed; 0 for none.
     pub doublings: usize,
     /// Whether a doubled branch ends at its first orbit that is not stable.
     pub stable_doublings: bool,
-    /// Branches after which assembly stops.
+    /// Number of branches at which the assembly stops.
     pub max_branches: usize,
 }
 
-/// A branch of the diagram, with where it came from.
+/// A branch of the diagram and its origin.
 #[derive(Clone, Debug)]
 pub struct DiagramBranch {
-    /// The branch, one way.
+    /// The branch, in one direction.
     pub branch: Branch,
-    /// Index of the branch that it left at a flip, if it did.
+    /// Index of the branch from which it bifurcates at a flip; `None` for the branch of a seed.
     pub parent: Option<usize>,
-    /// Doublings between it and a seed.
+    /// Number of period doublings between the seed and this branch.
     pub depth: usize,
 }
 
-/// All branches, and what could not be followed.
+/// All branches, and the seeds and flips that could not be followed.
 #[derive(Clone, Debug, Default)]
 pub struct Diagram {
-    /// Each seed gives two, one each way, or a closed one; each flip gives one.
+    /// Each seed gives two branches, one in each direction, or one closed branch; each flip gives
+    /// one.
     pub branches: Vec<DiagramBranch>,
-    /// Seeds and flips that could not be followed: the parameter and the reason.
+    /// Seeds and flips that could not be followed: parameter value and reason.
     pub failures: Vec<(f64, String)>,
 }
 
-/// Assembles the diagram from seeds: orbits with their parameter values.
+/// Assembles a diagram from seeds: orbits with their parameter values.
 pub fn assemble_diagram<F: MapFamily>(
     family: &F,
     seeds: &[(f64, PeriodicOrbit)],
@@ -65,28 +66,28 @@ pub fn assemble_diagram<F: MapFamily>(
     diagram
 }
 
-/// A branch followed towards greater and smaller parameters.
-type Ways = Box<[Result<Branch, ContinuationError>; 2]>;
+/// A branch followed towards larger and smaller parameter values.
+type BothDirections = Box<[Result<Branch, ContinuationError>; 2]>;
 
-/// An orbit whose branch is to be followed, unless it turns out to be known.
-struct Waiting {
+/// An orbit to be followed, unless it lies on a known branch.
+struct PendingOrbit {
     parameter: f64,
     orbit: PeriodicOrbit,
     depth: usize,
-    /// The branch, where a thread had nothing else to do.
-    followed: Option<Ways>,
-    /// How many of the diagram's branches it is known not to lie on.
-    seen: usize,
+    /// Its branch, if an idle thread has computed it already.
+    followed: Option<BothDirections>,
+    /// Number of the diagram's branches on which it is known not to lie.
+    checked_branches: usize,
 }
 
-impl Waiting {
+impl PendingOrbit {
     fn seed((parameter, orbit): &(f64, PeriodicOrbit)) -> Self {
         Self {
             parameter: *parameter,
             orbit: orbit.clone(),
             depth: 0,
             followed: None,
-            seen: 0,
+            checked_branches: 0,
         }
     }
 
@@ -95,21 +96,22 @@ impl Waiting {
     }
 }
 
-/// Which of those waiting other threads may follow beside `orbit`: those that come next and have
-/// other periods than it and each other, so that they are likely to lie on other branches. Where
-/// one comes to lie on a branch after all, the work was in vain and the diagram is the same.
-fn likely_next(orbit: &Waiting, waiting: &[Waiting]) -> Vec<usize> {
-    let wanted = rayon::current_num_threads() - 1;
+/// Indices of the pending orbits that other threads may follow in parallel with `orbit`: the next
+/// ones whose periods differ from its period and from each other, so that they are likely to lie on
+/// other branches. If one turns out to lie on a known branch, its result is discarded; the diagram
+/// does not depend on this.
+fn likely_on_other_branches(orbit: &PendingOrbit, pending: &[PendingOrbit]) -> Vec<usize> {
+    let max_count = rayon::current_num_threads() - 1;
     let mut periods = vec![orbit.orbit.period];
     let mut chosen = Vec::new();
-    for (k, other) in waiting.iter().enumerate().rev() {
-        if chosen.len() == wanted {
+    for (k, other) in pending.iter().enumerate().rev() {
+        if chosen.len() == max_count {
             break;
         }
         let period = other.orbit.period;
-        // One of half the length may be what a branch of doubled period ends at.
-        let alike = |p: &usize| *p == period || *p == 2 * period || 2 * *p == period;
-        if other.followed.is_none() && !periods.iter().any(alike) {
+        // A branch of doubled period may end at an orbit of half the period.
+        let is_related = |p: &usize| *p == period || *p == 2 * period || 2 * *p == period;
+        if other.followed.is_none() && !periods.iter().any(is_related) {
             periods.push(period);
             chosen.push(k);
         }
@@ -117,13 +119,13 @@ fn likely_next(orbit: &Waiting, waiting: &[Waiting]) -> Vec<usize> {
     chosen
 }
 
-/// Follows an orbit both ways.
-fn both_ways<F: MapFamily>(
+/// Follows an orbit in both directions.
+fn follow_both_directions<F: MapFamily>(
     family: &F,
     (parameter, orbit): &(f64, PeriodicOrbit),
     options: &DiagramOptions,
     control: &Control<'_>,
-) -> Ways {
+) -> BothDirections {
     let follow = |direction| {
         let continuation = &options.continuation;
         continue_orbit(family, *parameter, orbit, direction, continuation, control)
@@ -136,7 +138,7 @@ fn both_ways<F: MapFamily>(
 }
 
 impl Diagram {
-    /// Adds the branches of further seeds, as if they had been the last to be given.
+    /// Adds the branches of further seeds, as if they were the last of the original list.
     pub fn extend<F: MapFamily>(
         &mut self,
         family: &F,
@@ -144,71 +146,74 @@ impl Diagram {
         options: &DiagramOptions,
         control: &Control<'_>,
     ) {
-        let mut waiting: Vec<Waiting> = seeds.iter().rev().map(Waiting::seed).collect();
+        let mut pending: Vec<PendingOrbit> = seeds.iter().rev().map(PendingOrbit::seed).collect();
         loop {
-            waiting = waiting
+            pending = pending
                 .into_par_iter()
                 .with_max_len(1)
-                .filter_map(|orbit| self.lacks(family, orbit, &options.continuation))
+                .filter_map(|orbit| self.pending_if_new(family, orbit, &options.continuation))
                 .collect();
-            let Some(next) = waiting.pop() else {
+            let Some(next) = pending.pop() else {
                 break;
             };
             if control.is_cancelled() || self.branches.len() >= options.max_branches {
                 break;
             }
-            let others = likely_next(&next, &waiting);
-            let starts: Vec<_> = others.iter().map(|k| waiting[*k].start()).collect();
-            let ((), ways) = rayon::join(
-                || self.add(family, next, options, control, &mut waiting),
+            let others = likely_on_other_branches(&next, &pending);
+            let starts: Vec<_> = others.iter().map(|k| pending[*k].start()).collect();
+            let ((), directions) = rayon::join(
+                || self.add_orbit(family, next, options, control, &mut pending),
                 || {
-                    let follow = |start: &_| both_ways(family, start, options, control);
+                    let follow =
+                        |start: &_| follow_both_directions(family, start, options, control);
                     starts.par_iter().map(follow).collect::<Vec<_>>()
                 },
             );
-            for (k, ways) in others.into_iter().zip(ways) {
-                waiting[k].followed = Some(ways);
+            for (k, directions) in others.into_iter().zip(directions) {
+                pending[k].followed = Some(directions);
             }
         }
     }
 
-    /// An orbit that waits, if it lies on no branch.
-    fn lacks<F: MapFamily>(
+    /// Returns the orbit if it lies on no branch of the diagram.
+    fn pending_if_new<F: MapFamily>(
         &self,
         family: &F,
-        mut waiting: Waiting,
+        mut pending: PendingOrbit,
         options: &ContinuationOptions,
-    ) -> Option<Waiting> {
-        let new = &self.branches[waiting.seen..];
-        waiting.seen = self.branches.len();
-        let held = !new.is_empty() && hold(new, family, waiting.parameter, &waiting.orbit, options);
-        (!held).then_some(waiting)
+    ) -> Option<PendingOrbit> {
+        let new = &self.branches[pending.checked_branches..];
+        pending.checked_branches = self.branches.len();
+        let known =
+            !new.is_empty() && lies_on_any(new, family, pending.parameter, &pending.orbit, options);
+        (!known).then_some(pending)
     }
 
-    /// Adds the branch of an orbit, both ways, and what leaves it.
-    fn add<F: MapFamily>(
+    /// Adds the branches of an orbit in both directions, and those that bifurcate from them.
+    fn add_orbit<F: MapFamily>(
         &mut self,
         family: &F,
-        orbit: Waiting,
+        orbit: PendingOrbit,
         options: &DiagramOptions,
         control: &Control<'_>,
-        waiting: &mut Vec<Waiting>,
+        pending: &mut Vec<PendingOrbit>,
     ) {
         let (parameter, depth) = (orbit.parameter, orbit.depth);
         let start = orbit.start();
-        let ways = orbit.followed;
-        let [up, down] = *ways.unwrap_or_else(|| both_ways(family, &start, options, control));
-        // The way back along a closed branch is the same branch.
+        let directions = orbit.followed;
+        let [up, down] =
+            *directions.unwrap_or_else(|| follow_both_directions(family, &start, options, control));
+        // Both directions along a closed branch give the same branch.
         let closed = matches!(&up, Ok(branch) if matches!(branch.end, BranchEnd::Closed));
         for followed in std::iter::once(up).chain((!closed).then_some(down)) {
-            self.take(
-                family, followed, parameter, None, depth, options, control, waiting,
+            self.add_branch(
+                family, followed, parameter, None, depth, options, control, pending,
             );
         }
     }
 
-    /// Adds a branch, then what leaves it.
-    fn take<F: MapFamily>(
+    /// Adds a branch, then those that bifurcate from it.
+    fn add_branch<F: MapFamily>(
         &mut self,
         family: &F,
         followed: Result<Branch, ContinuationError>,
@@ -217,7 +222,7 @@ impl Diagram {
         depth: usize,
         options: &DiagramOptions,
         control: &Control<'_>,
-        waiting: &mut Vec<Waiting>,
+        pending: &mut Vec<PendingOrbit>,
     ) {
         let branch = match followed {
             Ok(branch) => branch,
@@ -227,10 +232,10 @@ impl Diagram {
                 return;
             }
         };
-        if let Some((parameter, orbit)) = met(family, &branch) {
-            waiting.push(Waiting {
+        if let Some((parameter, orbit)) = orbit_at_collapse(family, &branch) {
+            pending.push(PendingOrbit {
                 depth,
-                ..Waiting::seed(&(parameter, orbit))
+                ..PendingOrbit::seed(&(parameter, orbit))
             });
         }
         let flips: Vec<_> = branch
@@ -252,12 +257,12 @@ impl Diagram {
             if control.is_cancelled() || self.branches.len() >= options.max_branches {
                 return;
             }
-            // A few points tell whether the doubled branch is there already.
-            let glimpse = ContinuationOptions {
+            // A few points are enough to recognise a doubled branch that is already in the diagram.
+            let probe = ContinuationOptions {
                 max_points: 4,
                 ..options.continuation.clone()
             };
-            match switch_at_flip(family, &flip, &glimpse, control) {
+            match switch_at_flip(family, &flip, &probe, control) {
                 Ok(short) => {
                     let known = short.points.last().is_some_and(|p| {
                         self.holds(family, p.parameter, &p.orbit, &options.continuation)
@@ -277,7 +282,7 @@ impl Diagram {
                 ..options.continuation.clone()
             };
             let doubled = switch_at_flip(family, &flip, &doubled, control);
-            self.take(
+            self.add_branch(
                 family,
                 doubled,
                 flip.parameter,
@@ -285,13 +290,13 @@ impl Diagram {
                 depth + 1,
                 options,
                 control,
-                waiting,
+                pending,
             );
         }
     }
 
-    /// True if an orbit lies on a branch of the diagram, at whichever strobe it begins: between
-    /// two points of the branch, Newton from their chord closes the same orbit.
+    /// True if an orbit lies on a branch of the diagram, whichever strobe it starts from: Newton
+    /// from the chord between two points of the branch closes the same orbit.
     pub fn holds<F: MapFamily>(
         &self,
         family: &F,
@@ -299,11 +304,11 @@ impl Diagram {
         orbit: &PeriodicOrbit,
         options: &ContinuationOptions,
     ) -> bool {
-        hold(&self.branches, family, parameter, orbit, options)
+        lies_on_any(&self.branches, family, parameter, orbit, options)
     }
 }
 
-fn hold<F: MapFamily>(
+fn lies_on_any<F: MapFamily>(
     branches: &[DiagramBranch],
     family: &F,
     parameter: f64,
@@ -319,8 +324,8 @@ fn hold<F: MapFamily>(
         .any(|pair| lies_between(&mut solver, (&pair[0], &pair[1]), (&points, parameter)))
 }
 
-/// The orbit of shorter period that a branch ran into, beside the meeting.
-fn met<F: MapFamily>(family: &F, branch: &Branch) -> Option<(f64, PeriodicOrbit)> {
+/// The orbit of shorter period that a branch ran into, near the point where they meet.
+fn orbit_at_collapse<F: MapFamily>(family: &F, branch: &Branch) -> Option<(f64, PeriodicOrbit)> {
     let BranchEnd::Collapsed { period, .. } = branch.end else {
         return None;
     };

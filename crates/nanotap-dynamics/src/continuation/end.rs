@@ -1,4 +1,4 @@
-//! Why a branch does not go on.
+//! The reason why a branch ends.
 
 use crate::continuation::bifurcation::{Bifurcation, BifurcationKind};
 use crate::continuation::solver::{BranchSolver, Node};
@@ -6,15 +6,15 @@ use crate::continuation::step::Rejected;
 use crate::continuation::{Branch, BranchEnd, BranchPoint, OrbitTangency};
 use crate::map::MapFamily;
 
-/// Distance to a grazing, as a part of the range, within which it is what ends a branch.
-const NEAR: f64 = 1e-6;
-/// Distance of the grazing orbit, in units of the branch, from the branch's last one.
-const SAME_ORBIT: f64 = 1e-2;
+/// Distance to a grazing, as a fraction of the range, within which the grazing is the reason for
+/// the end.
+const GRAZING_DISTANCE: f64 = 1e-6;
+/// Largest distance of the grazing orbit from the branch's last orbit, in scaled arclength.
+const MAX_ORBIT_DISTANCE: f64 = 1e-2;
 
-/// What stopped the branch at the shortest step: an extremum that reaches zero just
-/// there is a grazing that the orbit does not survive. The last few points may lie
-/// beyond it already, with a touch too soft for Newton to notice and the extremum
-/// gone.
+/// Finds the reason why no point was found at the shortest step. An extremum that reaches zero
+/// there is a grazing that the orbit does not survive. The last few points may lie beyond it
+/// already: the contact is too weak for Newton to notice, and the extremum has vanished.
 pub(crate) fn dead_end<F: MapFamily>(
     solver: &BranchSolver<'_, F>,
     branch: &mut Branch,
@@ -22,7 +22,9 @@ pub(crate) fn dead_end<F: MapFamily>(
     why: &Rejected,
 ) -> BranchEnd {
     let count = branch.points.len();
-    let near = |parameter: f64| (parameter - node.parameter).abs() <= NEAR * solver.parameter_scale;
+    let near = |parameter: f64| {
+        (parameter - node.parameter).abs() <= GRAZING_DISTANCE * solver.parameter_scale
+    };
     if let Some(touch) = locate_grazing(solver, node)
         && near(touch.node.parameter)
         && let Ok(orbit) = solver.orbit(&touch.node)
@@ -62,18 +64,19 @@ pub(crate) fn dead_end<F: MapFamily>(
 }
 
 /// An orbit that grazes.
-struct Touch {
+struct GrazingOrbit {
     node: Node,
-    /// When, in drive periods from its first state.
+    /// Time in drive periods, from the first state of the orbit.
     time: f64,
-    /// Last change of the parameter.
+    /// Last change of the parameter in the secant iteration.
     uncertainty: f64,
 }
 
 /// The orbit near `node` at which the extremum of a switching function that is nearest to zero
-/// vanishes, by the secant method. Touches are passed through, so that orbits depend smoothly on
-/// the parameter on both sides of the grazing.
-fn locate_grazing<F: MapFamily>(solver: &BranchSolver<'_, F>, node: &Node) -> Option<Touch> {
+/// vanishes, by the secant method. Contacts of rigid stops are ignored
+/// ([`StroboscopicMap::pass_touches`](crate::map::StroboscopicMap::pass_touches)), so that orbits
+/// depend smoothly on the parameter on both sides of the grazing.
+fn locate_grazing<F: MapFamily>(solver: &BranchSolver<'_, F>, node: &Node) -> Option<GrazingOrbit> {
     let mut passing = solver.another();
     passing.passes_touches = true;
     let mut at = |from: &Node, parameter: f64, near: Option<OrbitTangency>| {
@@ -93,15 +96,15 @@ fn locate_grazing<F: MapFamily>(solver: &BranchSolver<'_, F>, node: &Node) -> Op
         below = (before, here.value);
         let next = before - here.value / rate;
         let away = (next - node.parameter).abs() / solver.parameter_scale;
-        if away.is_nan() || away > 1e3 * NEAR {
+        if away.is_nan() || away > 1e3 * GRAZING_DISTANCE {
             return None;
         }
         (here, found) = at(&found, next, Some(here))?;
         let uncertainty = (next - before).abs();
         if uncertainty <= 1e-13 * next.abs().max(solver.parameter_scale) || here.value == below.1 {
             let (time, same) = (here.time, (node.solution(), found.solution()));
-            let is_same = solver.separation(same.0, same.1) <= SAME_ORBIT;
-            return is_same.then_some(Touch {
+            let is_same = solver.separation(same.0, same.1) <= MAX_ORBIT_DISTANCE;
+            return is_same.then_some(GrazingOrbit {
                 node: found,
                 time,
                 uncertainty,
@@ -111,8 +114,8 @@ fn locate_grazing<F: MapFamily>(solver: &BranchSolver<'_, F>, node: &Node) -> Op
     None
 }
 
-/// For every tangency of the last of some points: the parameter at which its value
-/// extrapolates to zero, its time and its value.
+/// For every tangency of the last of some points: the parameter at which its value extrapolates to
+/// zero, its time in drive periods, and its value.
 fn vanishing<F: MapFamily>(
     solver: &BranchSolver<'_, F>,
     points: &[BranchPoint],
@@ -120,7 +123,7 @@ fn vanishing<F: MapFamily>(
     let Some((b, before)) = points.split_last() else {
         return Vec::new();
     };
-    // Far enough back for the rate not to be rounding.
+    // Far enough back that the rate is not dominated by rounding.
     let far = 1e-7 * solver.parameter_scale;
     let Some(a) = before
         .iter()
@@ -177,8 +180,8 @@ mod tests {
         }
     }
 
-    /// Two extrema that fall in proportion to the parameter, and two at one time, of which each
-    /// goes on from that of its own value. A point too near for a rate is passed over.
+    /// Two extrema that fall in proportion to the parameter, and two at the same time, each one matched
+    /// with the one of equal value. A point that is too near to give a rate is skipped.
     #[test]
     fn extrema_are_extrapolated_to_zero() {
         let points = [
@@ -196,8 +199,8 @@ mod tests {
         assert!(vanishing(&solver(1), &points[..1]).is_empty());
     }
 
-    /// A branch that stops 1e-7 short of where an extremum vanishes has grazed; 1e-5 short it is
-    /// cut.
+    /// A branch that stops 1e-7 before an extremum vanishes ends in a grazing; 1e-5 before it, the
+    /// branch is cut.
     #[test]
     fn a_branch_that_stops_at_a_touch_has_grazed() {
         for (short, grazes) in [(1e-7, true), (1e-5, false)] {

@@ -1,12 +1,12 @@
-//! From a first point step by step until the branch ends.
+//! The continuation loop: steps from a first point until the branch ends.
 
 use std::sync::{Mutex, PoisonError};
 
 use crate::continuation::bifurcation::{Bifurcation, Tests, between};
+use crate::continuation::bifurcation_tasks::BifurcationTasks;
 use crate::continuation::end::dead_end;
-use crate::continuation::locating::Locating;
-use crate::continuation::meeting::{meeting, shortest_collapse, slipped};
-use crate::continuation::passing::closing;
+use crate::continuation::orbit_on_branch::closing;
+use crate::continuation::period_division::{meeting, shortest_collapse, slipped};
 use crate::continuation::solver::{BranchSolver, Node};
 use crate::continuation::step::{Rejected, angle, at_range_end, trial};
 use crate::continuation::{Branch, BranchEnd, BranchPoint, ContinuationError, ContinuationOptions};
@@ -14,16 +14,16 @@ use crate::control::Control;
 use crate::map::MapFamily;
 use crate::orbit::PeriodicOrbit;
 
-/// Scaled step at which a branch that keeps slipping onto one of shorter period is
-/// taken to have met it.
-const SHORTEST_MEETING: f64 = 1e-6;
-/// How far beyond −1 a multiplier may be at the first point after a flip.
+/// Scaled step below which a branch that repeatedly converges to one of shorter period is taken to
+/// have met it.
+const MIN_COLLAPSE_STEP: f64 = 1e-6;
+/// Largest distance of a multiplier beyond −1 at the first point after a flip.
 const FLIP_OVERSHOOT: f64 = 0.5;
-/// Scaled step at which a flip is taken as it is.
-const SHORTEST_FLIP_STEP: f64 = 1e-6;
+/// Scaled step below which a flip is accepted without a further reduction.
+const MIN_FLIP_STEP: f64 = 1e-6;
 
-/// Most numbers of the states of all points of a branch: 800 MB.
-const MAX_NUMBERS: usize = 100_000_000;
+/// Largest number of state entries of all points of a branch: 800 MB.
+const MAX_STATE_ENTRIES: usize = 100_000_000;
 
 pub(crate) fn solver_for<'a, F: MapFamily>(
     family: &'a F,
@@ -53,7 +53,7 @@ pub(crate) fn check(
     let (low, high) = options.range;
     if !(low < high && (high - low).is_finite()) {
         return bad(format!(
-            "the range {low} … {high} must run upwards between finite numbers"
+            "the range needs finite ends in ascending order, got {low} … {high}"
         ));
     }
     if !(low..=high).contains(&parameter) {
@@ -64,7 +64,7 @@ pub(crate) fn check(
     let steps = [options.min_step, options.initial_step, options.max_step];
     if !(steps[0] > 0.0 && steps[0] <= steps[1] && steps[1] <= steps[2] && steps[2].is_finite()) {
         return bad(format!(
-            "steps must satisfy 0 < min ≤ initial ≤ max, {steps:?} given"
+            "steps must satisfy 0 < min ≤ initial ≤ max, got {steps:?}"
         ));
     }
     for scale in [options.state_scale, options.parameter_scale]
@@ -72,19 +72,19 @@ pub(crate) fn check(
         .flatten()
     {
         if !(scale > 0.0 && scale.is_finite()) {
-            return bad(format!("a scale must be positive, {scale} given"));
+            return bad(format!("a scale must be positive, got {scale}"));
         }
     }
     if options.max_angle.is_nan() || options.max_angle <= 0.0 {
         return bad(format!(
-            "the largest angle must be positive, {} given",
+            "the largest angle must be positive, got {}",
             options.max_angle
         ));
     }
     Ok(())
 }
 
-/// Steps from a first node until the branch ends.
+/// Follows a branch from its first node until it ends.
 pub(crate) fn follow<F: MapFamily>(
     solver: &mut BranchSolver<'_, F>,
     first: Node,
@@ -93,15 +93,15 @@ pub(crate) fn follow<F: MapFamily>(
 ) -> Result<Branch, ContinuationError> {
     let found = Mutex::new(Vec::new());
     let mut branch = rayon::in_place_scope(|scope| {
-        let locating = Locating {
+        let tasks = BifurcationTasks {
             scope,
             found: &found,
             control,
         };
-        step_by_step(solver, first, options, &locating)
+        step_by_step(solver, first, options, &tasks)
     })?;
     let found = found.into_inner().unwrap_or_else(PoisonError::into_inner);
-    branch.take(found, options.range);
+    branch.add_bifurcations(found, options.range);
     branch.bifurcations.sort_by_key(|b| b.after_point);
     Ok(branch)
 }
@@ -111,11 +111,11 @@ fn step_by_step<'scope, 'a: 'scope, F: MapFamily + 'scope>(
     solver: &mut BranchSolver<'a, F>,
     first: Node,
     options: &ContinuationOptions,
-    locating: &Locating<'_, 'scope>,
+    tasks: &BifurcationTasks<'_, 'scope>,
 ) -> Result<Branch, ContinuationError> {
-    let control = locating.control;
+    let control = tasks.control;
     let least = solver.size(&first.points);
-    let mut tests = tests_at(solver, &first)?;
+    let mut tests = tests_at(solver, &first, options.grazings)?;
     let mut arclength = 0.0;
     let mut branch = Branch {
         period: solver.n,
@@ -135,7 +135,7 @@ fn step_by_step<'scope, 'a: 'scope, F: MapFamily + 'scope>(
     let mut step = options.initial_step;
     let max_points = options
         .max_points
-        .min(MAX_NUMBERS / start.points.len().max(1));
+        .min(MAX_STATE_ENTRIES / start.points.len().max(1));
     while branch.points.len() < max_points {
         if control.is_cancelled() {
             break;
@@ -156,6 +156,9 @@ fn step_by_step<'scope, 'a: 'scope, F: MapFamily + 'scope>(
             Err(why) => {
                 step *= 0.5;
                 if step < options.min_step {
+                    if !options.grazings {
+                        add_last_tangencies(solver, &mut branch);
+                    }
                     branch.end = dead_end(solver, &mut branch, &node, &why);
                     break;
                 }
@@ -164,7 +167,7 @@ fn step_by_step<'scope, 'a: 'scope, F: MapFamily + 'scope>(
         };
         if let Some(m) = slipped(solver, &node, &next) {
             step *= 0.5;
-            if step < SHORTEST_MEETING.max(options.min_step) {
+            if step < MIN_COLLAPSE_STEP.max(options.min_step) {
                 branch.end = BranchEnd::Collapsed {
                     period: m,
                     parameter: node.parameter,
@@ -183,7 +186,7 @@ fn step_by_step<'scope, 'a: 'scope, F: MapFamily + 'scope>(
         if let Some((at, end)) = closed {
             (taken, next) = (at, end);
         }
-        let Some(next_tests) = Tests::new(solver, &next) else {
+        let Some(mut next_tests) = Tests::new(solver, &next, options.grazings) else {
             step *= 0.5;
             if step < options.min_step {
                 branch.end = BranchEnd::StepTooSmall {
@@ -194,20 +197,20 @@ fn step_by_step<'scope, 'a: 'scope, F: MapFamily + 'scope>(
             }
             continue;
         };
-        // A multiplier that passes −1 by far may have passed more flips than can be told.
+        // A multiplier far beyond −1 may have passed several flips.
         let passes_flip = tests.flip > 0.0 && next_tests.flip < -FLIP_OVERSHOOT;
-        if passes_flip && !is_closed && step > SHORTEST_FLIP_STEP.max(options.min_step) {
+        if passes_flip && !is_closed && step > MIN_FLIP_STEP.max(options.min_step) {
             step *= 0.5;
             continue;
         }
         let index = branch.points.len() - 1;
         if let Some((m, at, mut parameter)) = shortest_collapse(solver, &node, &next, taken) {
-            // What happens before the meeting still counts.
+            // Bifurcations before the meeting still count.
             if let Ok(near) = solver.along(&node, 0.9 * at) {
                 parameter = meeting(solver, &node, &near, m).unwrap_or(parameter);
             }
             if let Ok(near) = solver.along(&node, 0.99 * at)
-                && let Some(near_tests) = Tests::new(solver, &near)
+                && let Some(near_tests) = Tests::new(solver, &near, options.grazings)
             {
                 let found = between(
                     solver,
@@ -216,7 +219,7 @@ fn step_by_step<'scope, 'a: 'scope, F: MapFamily + 'scope>(
                     0.99 * at,
                     index,
                 );
-                branch.take(found, options.range);
+                branch.add_bifurcations(found, options.range);
                 branch
                     .points
                     .push(point(solver, &near, &near_tests, arclength + 0.99 * at)?);
@@ -227,17 +230,22 @@ fn step_by_step<'scope, 'a: 'scope, F: MapFamily + 'scope>(
             };
             break;
         }
-        let (nodes, changes) = ([&node, &next], [&tests, &next_tests]);
-        let found = locating.between(solver, nodes, changes, taken, index);
-        if control.is_cancelled() {
-            break;
-        }
-        branch.take(found, options.range);
         arclength += taken;
         let reached = point(solver, &next, &next_tests, arclength)?;
         let multiplier = reached.orbit.spectral_radius();
         let turns = node.slope * next.slope < 0.0;
         let unstable = turns || !reached.orbit.is_stable();
+        if options.until_unstable && unstable && !options.grazings {
+            for (tests, node) in [(&mut tests, &node), (&mut next_tests, &next)] {
+                tests.tangencies = solver.tangencies(node).unwrap_or_default();
+            }
+        }
+        let (nodes, changes) = ([&node, &next], [&tests, &next_tests]);
+        let found = tasks.between(solver, nodes, changes, taken, index);
+        if control.is_cancelled() {
+            break;
+        }
+        branch.add_bifurcations(found, options.range);
         branch.points.push(reached);
         if options.until_unstable && unstable {
             branch.end = BranchEnd::Unstable {
@@ -267,16 +275,27 @@ fn step_by_step<'scope, 'a: 'scope, F: MapFamily + 'scope>(
             break;
         }
     }
-    // The map may have ended the last step.
+    // A cancelled map may be the reason for the failure of the last step.
     if control.is_cancelled() {
         branch.end = BranchEnd::Cancelled;
     }
     Ok(branch)
 }
 
+/// Points before a dead end whose tangencies show whether it is a grazing.
+const LAST_POINTS: usize = 12;
+
+fn add_last_tangencies<F: MapFamily>(solver: &mut BranchSolver<'_, F>, branch: &mut Branch) {
+    for point in branch.points.iter_mut().rev().take(LAST_POINTS) {
+        let states = point.orbit.states.concat();
+        let found = solver.tangencies_at(point.parameter, &states);
+        point.tangencies = found.unwrap_or_default();
+    }
+}
+
 impl Branch {
-    /// Adds what was found between two points, as far as it lies in the range.
-    fn take(&mut self, found: Vec<Bifurcation>, (low, high): (f64, f64)) {
+    /// Adds bifurcations between two points, restricted to the parameter range.
+    fn add_bifurcations(&mut self, found: Vec<Bifurcation>, (low, high): (f64, f64)) {
         let inside = |b: &Bifurcation| (low..=high).contains(&b.parameter);
         self.bifurcations.extend(found.into_iter().filter(inside));
     }
@@ -285,8 +304,9 @@ impl Branch {
 fn tests_at<F: MapFamily>(
     solver: &mut BranchSolver<'_, F>,
     node: &Node,
+    grazings: bool,
 ) -> Result<Tests, ContinuationError> {
-    Tests::new(solver, node).ok_or(ContinuationError::NoStart {
+    Tests::new(solver, node, grazings).ok_or(ContinuationError::NoStart {
         parameter: node.parameter,
         reason: "its multipliers or tangencies could not be computed".into(),
     })

@@ -1,25 +1,24 @@
 //! Branches of periodic orbits in one parameter, stable and unstable, by
 //! pseudo-arclength continuation of all strobe points.
 //!
-//! The arc is measured in (x_0, λ), scaled by the size of the orbit *as it is now* and
-//! the length of the parameter range: through a resonance the orbit grows by a factor of
-//! hundreds, and a step that was a per cent of it at the foot would be a hundredth of a
-//! per cent at the top. A step along the tangent is corrected by Newton in the plane
-//! across it; it is halved when Newton is slow, the tangent turns by too much, or the
-//! correction is large (another branch), and lengthened when all is easy. The map
-//! need only be C¹: at a 3/2-power grazing the tangent is continuous but turns fast,
-//! and the steps shorten by themselves.
+//! The arclength is measured in (x_0, λ), scaled by the *present* size of the orbit and the length
+//! of the parameter range: through a resonance the orbit grows by a factor of hundreds, and a step
+//! of 1 % of its size at the foot would be 0.01 % at the top. A step along the tangent is corrected
+//! by Newton in the plane perpendicular to it. It is halved when Newton converges slowly, when the
+//! tangent turns by too much, or when the correction is large (another branch); otherwise it is
+//! lengthened. The map need only be C¹: at a 3/2-power grazing the tangent is continuous but turns
+//! fast, and the step control shortens the steps.
 //!
-//! Fails: with a typed [`BranchEnd`]. A branch may jump to another one that comes
-//! within a step of it with nearly the same direction; shorter steps prevent that.
+//! Fails with a typed [`BranchEnd`]. The continuation may jump to another branch that comes within
+//! one step with nearly the same direction; shorter steps prevent that.
 
 pub mod bifurcation;
+mod bifurcation_tasks;
 pub mod diagram;
 mod end;
 mod follow;
-mod locating;
-mod meeting;
-mod passing;
+mod orbit_on_branch;
+mod period_division;
 pub(crate) mod solver;
 mod step;
 pub mod switching;
@@ -37,39 +36,42 @@ pub use diagram::{Diagram, DiagramBranch, DiagramOptions, assemble_diagram};
 pub use solver::OrbitTangency;
 pub use switching::switch_at_flip;
 
-/// How a branch is followed.
+/// Options of the continuation of a branch.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ContinuationOptions {
-    /// Range of the parameter, lower end first.
+    /// Range of the parameter, lower end first, in units of the parameter.
     pub range: (f64, f64),
-    /// First step, as a fraction of the scaled arc (1 is the whole range).
+    /// First step in scaled arclength (1 is the whole range).
     pub initial_step: f64,
-    /// Shortest step.
+    /// Shortest step in scaled arclength.
     pub min_step: f64,
-    /// Longest step.
+    /// Longest step in scaled arclength.
     pub max_step: f64,
     /// Largest turn of the tangent over one step, in radians.
     pub max_angle: f64,
-    /// Points after which the branch is cut.
+    /// Number of points at which the branch is cut.
     pub max_points: usize,
-    /// A state with an entry above this has left the domain.
+    /// Largest entry of a state inside the domain, in units of the state.
     pub bound: f64,
-    /// Unit of the state along the arc; by default the largest entry of the orbit as it
-    /// is now, but not below that of the first.
+    /// Unit of the state along the arc. Default: the largest entry of the present orbit, but at
+    /// least that of the first orbit.
     pub state_scale: Option<f64>,
-    /// Unit of the parameter along the arc; by default the length of the range.
+    /// Unit of the parameter along the arc. Default: the length of the range.
     pub parameter_scale: Option<f64>,
-    /// Residual, in units of the orbit's scale, at which a stalled Newton iteration
-    /// is accepted: the accuracy of the map.
+    /// Residual, in units of the orbit's scale, at which a stalled Newton iteration is accepted.
+    /// Set it to the accuracy of the map.
     pub residual_tolerance: f64,
     /// Whether the branch ends at its first orbit that is not stable.
     pub until_unstable: bool,
-    /// The branch is left where a disturbance grows by more than this in the orbit's period.
+    /// Whether grazings are located all along the branch; otherwise only before the orbit at which
+    /// [`until_unstable`](Self::until_unstable) ends it.
+    pub grazings: bool,
+    /// Largest multiplier: beyond it the branch ends as [`BranchEnd::Repelling`].
     pub max_multiplier: f64,
 }
 
 impl ContinuationOptions {
-    /// Defaults for a parameter range (in either order).
+    /// Default options for a parameter range, whose ends may be in either order.
     pub fn over(from: f64, to: f64) -> Self {
         Self {
             range: (from.min(to), from.max(to)),
@@ -83,45 +85,46 @@ impl ContinuationOptions {
             parameter_scale: None,
             residual_tolerance: 1e-10,
             until_unstable: false,
+            grazings: true,
             max_multiplier: f64::INFINITY,
         }
     }
 }
 
-/// Which way to set out.
+/// Direction of continuation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Direction {
-    /// Towards larger parameters.
+    /// Towards larger parameter values.
     Increasing,
-    /// Towards smaller parameters.
+    /// Towards smaller parameter values.
     Decreasing,
 }
 
 /// One point of a branch.
 #[derive(Clone, Debug)]
 pub struct BranchPoint {
-    /// The parameter.
+    /// Parameter value.
     pub parameter: f64,
-    /// The orbit there, with multipliers and stability.
+    /// The orbit at this value, with multipliers and stability.
     pub orbit: PeriodicOrbit,
     /// Scaled arclength from the first point.
     pub arclength: f64,
-    /// dλ/ds: positive where the branch runs towards larger parameters.
+    /// dλ/ds: positive where the branch runs towards larger parameter values.
     pub slope: f64,
     /// Extrema of the switching functions along the orbit.
     pub tangencies: Vec<OrbitTangency>,
 }
 
-/// A branch of orbits of one period.
+/// A branch of periodic orbits with one period.
 #[derive(Clone, Debug)]
 pub struct Branch {
-    /// Period of its orbits.
+    /// Period of its orbits in drive periods.
     pub period: usize,
-    /// Points in order along the arc.
+    /// Points in order of arclength.
     pub points: Vec<BranchPoint>,
-    /// Bifurcations in order along the arc.
+    /// Bifurcations in order of arclength.
     pub bifurcations: Vec<Bifurcation>,
-    /// Why it ends; [`BranchEnd::is_failure`] tells whether it should have gone on.
+    /// Why it ends; [`BranchEnd::is_failure`] tells an end from a cut.
     pub end: BranchEnd,
 }
 
@@ -130,65 +133,64 @@ pub struct Branch {
 pub enum BranchEnd {
     /// The parameter reached an end of its range.
     RangeEnd,
-    /// The branch came back to its first orbit, at any strobe of it.
+    /// The branch returned to its first orbit, at any strobe of it.
     Closed,
-    /// Its period divided: it ran into a branch of shorter period (at a flip of that
-    /// branch, if the period halves).
+    /// The branch met one of shorter period (at a flip of that branch, if the period halves).
     Collapsed {
-        /// Period of the other branch.
+        /// Period of the other branch in drive periods.
         period: usize,
-        /// Where they meet, extrapolated from the last points: about as exact as the
-        /// square of the last step. Where it matters, follow the other branch, whose
-        /// flip is located exactly.
+        /// Parameter value where they meet, extrapolated from the last points; the error is about
+        /// the square of the last step. For the exact value follow the other branch, whose flip is
+        /// located exactly.
         parameter: f64,
     },
-    /// The orbit shrank to a point at an end of the range, where the map is not
-    /// differentiable: a drive of amplitude zero on a tip that touches at rest.
+    /// The orbit shrank to a point at an end of the range, where the map is not differentiable: for
+    /// example drive amplitude zero with a tip that touches the sample at rest.
     Vanished {
-        /// Where.
+        /// Parameter value.
         parameter: f64,
     },
-    /// A state outgrew the bound.
+    /// A state exceeded the bound.
     LeftDomain,
-    /// No point was found at the shortest step.
+    /// The corrector failed at the shortest step.
     StepTooSmall {
-        /// The last point.
+        /// Parameter value of the last point.
         parameter: f64,
-        /// What failed there.
+        /// Reason of the failure.
         reason: String,
     },
-    /// An extremum of a switching function reached zero and the orbit does not go on
-    /// beyond (a hard impact).
+    /// An extremum of a switching function reached zero, and the orbit does not exist beyond it (a
+    /// hard impact).
     Grazing {
-        /// Where.
+        /// Parameter value.
         parameter: f64,
     },
-    /// The orbit is no longer stable, and the branch was to end there. The last point is the
-    /// first that is not stable.
+    /// The orbit is no longer stable, and [`ContinuationOptions::until_unstable`] is set. The last
+    /// point is the first one that is not stable.
     Unstable {
-        /// The last parameter at which it was stable.
+        /// Last parameter value at which it was stable.
         parameter: f64,
     },
-    /// Its multipliers passed [`ContinuationOptions::max_multiplier`].
+    /// A multiplier exceeded [`ContinuationOptions::max_multiplier`].
     Repelling {
-        /// Where.
+        /// Parameter value.
         parameter: f64,
     },
-    /// The allowed number of points was used up.
+    /// The largest number of points was reached.
     PointLimit,
-    /// The caller stopped it.
+    /// The caller cancelled the computation.
     Cancelled,
 }
 
 impl BranchEnd {
-    /// In words, a value of the parameter as `shown` writes it.
+    /// Describes the end in words; `shown` formats a parameter value.
     pub fn words(&self, shown: impl Fn(f64) -> String) -> String {
         match self {
             Self::RangeEnd => "the end of the parameter range".into(),
             Self::Closed => "the branch is closed".into(),
             Self::Collapsed { period, parameter } => {
                 format!(
-                    "the branch meets one of period {period} at {}",
+                    "the branch meets a branch of period {period} at {}",
                     shown(*parameter)
                 )
             }
@@ -211,7 +213,7 @@ impl BranchEnd {
                 format!("the orbit is not stable beyond {}", shown(*parameter))
             }
             Self::Repelling { parameter } => format!(
-                "the orbit repels too strongly to be met beyond {}",
+                "the orbit is too unstable to be followed beyond {}",
                 shown(*parameter)
             ),
             Self::PointLimit => "the allowed number of points".into(),
@@ -219,8 +221,7 @@ impl BranchEnd {
         }
     }
 
-    /// True if the branch was cut rather than came to an end: what lies beyond is not
-    /// known.
+    /// True if the branch was cut: what lies beyond its last point is unknown.
     pub fn is_failure(&self) -> bool {
         match self {
             Self::RangeEnd
@@ -243,36 +244,36 @@ impl fmt::Display for BranchEnd {
     }
 }
 
-/// Why a branch could not be begun.
+/// Why a branch could not be started.
 #[derive(Clone, Debug, thiserror::Error)]
 pub enum ContinuationError {
-    /// Options that make no sense.
-    #[error("bad continuation options: {0}")]
+    /// Invalid options.
+    #[error("invalid continuation options: {0}")]
     BadOptions(String),
-    /// The orbit given is not one at this parameter.
-    #[error("no orbit could be corrected at parameter {parameter}: {reason}")]
+    /// The given orbit is not an orbit at this parameter value.
+    #[error("the corrector found no orbit at parameter {parameter}: {reason}")]
     NoStart {
-        /// The parameter.
+        /// Parameter value.
         parameter: f64,
-        /// What failed.
+        /// Reason of the failure.
         reason: String,
     },
-    /// The point given is not of the right kind.
-    #[error("branches are switched at flips only")]
+    /// The given bifurcation is not a flip.
+    #[error("branch switching needs a flip")]
     NotAFlip,
     /// The map failed at the first point.
     #[error(transparent)]
     Map(#[from] MapFailure),
-    /// The first orbit's multipliers could not be computed.
+    /// The multipliers of the first orbit could not be computed.
     #[error(transparent)]
     Orbit(#[from] ShootingError),
 }
 
-/// Follows the branch through `orbit` at `parameter` one way.
+/// Follows the branch through `orbit` at `parameter` in one direction.
 ///
 /// # Errors
-/// If the options make no sense or the orbit is not one at this parameter; what
-/// happens later is told by [`Branch::end`].
+/// If the options are invalid or the orbit is not an orbit at this parameter value. Later failures
+/// are reported in [`Branch::end`].
 pub fn continue_orbit<F: MapFamily>(
     family: &F,
     parameter: f64,

@@ -1,9 +1,8 @@
-//! One point of a branch: the bordered Newton corrector and the tangent.
+//! One point of a branch: bordered Newton corrector and tangent.
 //!
-//! Unknown are all strobe points and the parameter. The border is a plane in
-//! (x_0, λ), measured in units of a state scale and a parameter scale; the tangent
-//! follows from (DP − 1, ∂P/∂λ) with the previous tangent as border, so its
-//! orientation carries over.
+//! The unknowns are all strobe points and the parameter. The border is a plane in (x_0, λ), scaled
+//! by a state scale and a parameter scale. The tangent follows from (DP − 1, ∂P/∂λ) with the
+//! previous tangent as border, which preserves its orientation.
 
 use nalgebra::DMatrix;
 
@@ -11,22 +10,22 @@ use crate::failure::{MapFailure, advance_with_tangencies, finite};
 use crate::map::{MapFamily, StroboscopicMap};
 use crate::orbit::PeriodicOrbit;
 use crate::orbit::block_cyclic::BlockCyclic;
+use crate::orbit::parallel::for_each_period;
 use crate::orbit::shooting::{
-    LAST_STEP, MOST_SETTINGS, ROUNDING, Segments, ShootingError, ends_to_residuals,
+    MAX_DISCRETE_UPDATES, MAX_FINAL_STEP, ROUNDING, Segments, ShootingError, ends_to_residuals,
     set_discrete_entries,
 };
-use crate::orbit::side_by_side::side_by_side;
 use crate::vector::{difference, dot, norm};
 
-/// Newton steps after which a corrector gives up: the caller shortens its step.
-const ITERATIONS: usize = 12;
+/// Newton steps after which the corrector fails; the caller then shortens its step.
+const MAX_ITERATIONS: usize = 12;
 
-/// A tangency somewhere on an orbit.
+/// A local extremum of a switching function on an orbit.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct OrbitTangency {
-    /// When, in drive periods from the first state of the orbit: 0 ≤ time < period.
+    /// Time in drive periods from the first state of the orbit: 0 ≤ time < period.
     pub time: f64,
-    /// Value of the switching function there.
+    /// Value of the switching function.
     pub value: f64,
 }
 
@@ -50,7 +49,7 @@ impl Node {
         (&self.points, self.parameter)
     }
 
-    /// Where the tangent leads in a step: no solution yet.
+    /// The prediction a step along the tangent.
     pub(crate) fn ahead(&self, step: f64) -> (Vec<f64>, f64) {
         let points = self.points.iter().zip(&self.tangent);
         (
@@ -60,7 +59,7 @@ impl Node {
     }
 }
 
-/// Why there is no point where one was looked for.
+/// Why the corrector found no point.
 #[derive(Clone, Debug, thiserror::Error)]
 pub(crate) enum CorrectorFailure {
     #[error(transparent)]
@@ -75,13 +74,13 @@ pub(crate) enum CorrectorFailure {
 pub(crate) struct BranchSolver<'a, F: MapFamily> {
     pub(crate) family: &'a F,
     pub(crate) d: usize,
-    /// How many entries of a state are continuous: the others, after them, are whole numbers
-    /// that the map sets.
+    /// Number of continuous entries of a state. The entries after them are whole numbers that the
+    /// map sets.
     pub(crate) continuous: usize,
     pub(crate) n: usize,
     pub(crate) state_scale: f64,
     pub(crate) parameter_scale: f64,
-    /// Residual, in units of the orbit's scale, that a stalled corrector may have.
+    /// Residual, in units of the orbit's scale, at which a stalled corrector is accepted.
     tolerance: f64,
     points: Vec<f64>,
     residuals: Vec<f64>,
@@ -89,7 +88,7 @@ pub(crate) struct BranchSolver<'a, F: MapFamily> {
     jacobians: Vec<DMatrix<f64>>,
     step: Vec<f64>,
     system: BlockCyclic,
-    /// The map at the parameter value last asked for.
+    /// The map at the last parameter value.
     map: Option<(f64, F::Map)>,
     /// Whether the map passes through rigid stops that are hardly touched.
     pub(crate) passes_touches: bool,
@@ -124,7 +123,7 @@ impl<'a, F: MapFamily> BranchSolver<'a, F> {
         }
     }
 
-    /// Another work space with the same scales.
+    /// Another solver with the same scales.
     pub(crate) fn another(&self) -> Self {
         Self::new(
             self.family,
@@ -137,13 +136,13 @@ impl<'a, F: MapFamily> BranchSolver<'a, F> {
         )
     }
 
-    /// Largest entry of any state, discrete ones apart.
+    /// Largest continuous entry of any state.
     pub(crate) fn size(&self, points: &[f64]) -> f64 {
         let states = points.chunks(self.d);
         states.fold(0.0, |size, state| size.max(norm(&state[..self.continuous])))
     }
 
-    /// The map at `parameter`, made unless it is the one last asked for.
+    /// The map at `parameter`, created unless it is the last one.
     fn map_at<'b>(
         family: &F,
         known: &'b mut Option<(f64, F::Map)>,
@@ -163,11 +162,11 @@ impl<'a, F: MapFamily> BranchSolver<'a, F> {
         Ok(&mut known.insert((parameter, map)).1)
     }
 
-    /// The largest residual at the present points, of which discrete entries are set to what the
-    /// map makes of them.
+    /// Evaluates the map at the present points and returns the largest residual. Discrete entries
+    /// are set to the values that the map gives.
     fn evaluate(&mut self, parameter: f64) -> Result<f64, MapFailure> {
         let mut residual = self.evaluate_points(parameter)?;
-        for _ in 0..MOST_SETTINGS {
+        for _ in 0..MAX_DISCRETE_UPDATES {
             if !set_discrete_entries(&mut self.points, &self.residuals, self.d, self.continuous) {
                 break;
             }
@@ -183,7 +182,7 @@ impl<'a, F: MapFamily> BranchSolver<'a, F> {
         let ends = self.residuals.chunks_exact_mut(d);
         let derivatives = self.derivatives.chunks_exact_mut(d);
         let mut periods: Vec<_> = ends.zip(derivatives).zip(&mut self.jacobians).collect();
-        side_by_side(
+        for_each_period(
             map,
             &mut periods,
             &|map, ((state, derivative), jacobian)| {
@@ -214,8 +213,8 @@ impl<'a, F: MapFamily> BranchSolver<'a, F> {
         (row, slope / (self.parameter_scale * self.parameter_scale))
     }
 
-    /// The solution at a given parameter near `points`; its tangent points towards
-    /// larger parameters if `rising`.
+    /// The solution at a given parameter near `points`. Its tangent points towards larger
+    /// parameters if `rising`.
     pub(crate) fn at_parameter(
         &mut self,
         points: &[f64],
@@ -227,15 +226,15 @@ impl<'a, F: MapFamily> BranchSolver<'a, F> {
         self.correct(points, parameter, &row, 1.0, &row, sign)
     }
 
-    /// The solution a scaled arclength `step` along the tangent of `from`.
+    /// The solution at scaled arclength `step` along the tangent of `from`.
     pub(crate) fn along(&mut self, from: &Node, step: f64) -> Result<Node, CorrectorFailure> {
         let (points, parameter) = from.ahead(step);
         let (row, corner) = self.row(&from.tangent, from.slope);
         self.correct(&points, parameter, &row, corner, &row, corner)
     }
 
-    /// As [`Self::along`], begun on the cubic through two nodes of the branch near by, or, where
-    /// that leads nowhere, on the tangent.
+    /// As [`Self::along`], started on the cubic through two neighbouring nodes of the branch, or on
+    /// the tangent if that fails.
     pub(crate) fn along_cubic(
         &mut self,
         from: &Node,
@@ -252,14 +251,14 @@ impl<'a, F: MapFamily> BranchSolver<'a, F> {
             .map_or_else(|| self.along(from, step), Ok)
     }
 
-    /// Hermite's cubic through two nodes with their tangents, at a scaled arclength `step` along
-    /// the tangent of `from`. None where one of them runs across that tangent.
+    /// Hermite's cubic through two nodes with their tangents, at scaled arclength `step` along the
+    /// tangent of `from`. `None` if a tangent is nearly perpendicular to that of `from`.
     fn on_cubic(&self, from: &Node, step: f64, [a, b]: [&Node; 2]) -> Option<(Vec<f64>, f64)> {
-        // The cosine of the turn from here to there.
-        const ALONG: f64 = 0.5;
+        // Smallest cosine of the angle between the tangents.
+        const MIN_COSINE: f64 = 0.5;
         let rate = |node: &Node| self.product(&node.tangent, node.slope, &from.tangent, from.slope);
         let (rate_a, rate_b) = (rate(a), rate(b));
-        if !(rate_a >= ALONG && rate_b >= ALONG) {
+        if !(rate_a >= MIN_COSINE && rate_b >= MIN_COSINE) {
             return None;
         }
         let (at_a, at_b) = (self.projection(from, a), self.projection(from, b));
@@ -299,7 +298,7 @@ impl<'a, F: MapFamily> BranchSolver<'a, F> {
         )
     }
 
-    /// As [`Self::along`], but onto the plane of this parameter, oriented as `from`.
+    /// As [`Self::along`], but in the plane of this parameter value, oriented as `from`.
     pub(crate) fn onto_parameter(
         &mut self,
         from: &Node,
@@ -312,8 +311,8 @@ impl<'a, F: MapFamily> BranchSolver<'a, F> {
         self.correct(&points, parameter, &plane, 1.0, &row, corner)
     }
 
-    /// Measures the arc in units of this orbit's size from here on, `least` at least: an
-    /// orbit that shrinks to nothing would be reached by no number of steps.
+    /// Measures the arc in units of this orbit's size from now on, with `least` as the smallest
+    /// unit: otherwise no number of steps would reach an orbit that shrinks to a point.
     pub(crate) fn rescale(&mut self, node: &mut Node, least: f64) {
         let scale = self.size(&node.points).max(least);
         if scale > 0.0 {
@@ -328,8 +327,8 @@ impl<'a, F: MapFamily> BranchSolver<'a, F> {
         }
     }
 
-    /// Newton in the plane `row`·(x_0, λ) = its value at the prediction; the tangent
-    /// has a positive component along the orientation.
+    /// Newton in the plane where `row`·(x_0, λ) keeps its value at the prediction. The tangent has
+    /// a positive component along the orientation.
     fn correct(
         &mut self,
         points: &[f64],
@@ -340,7 +339,7 @@ impl<'a, F: MapFamily> BranchSolver<'a, F> {
         orientation_corner: f64,
     ) -> Result<Node, CorrectorFailure> {
         self.points.copy_from_slice(points);
-        // A plane of one parameter value: rounding must not leave it.
+        // In a plane of constant parameter, rounding must not change the parameter.
         let fixed = row.iter().all(|r| *r == 0.0);
         let mut parameter = parameter;
         let mut residual = self.evaluate(parameter)?;
@@ -353,7 +352,7 @@ impl<'a, F: MapFamily> BranchSolver<'a, F> {
                 .system
                 .solve_bordered(row, corner, 0.0, true, &mut self.step);
             let closed = residual <= ROUNDING * scale;
-            if closed && (change.is_none() || norm(&self.step) > LAST_STEP * scale) {
+            if closed && (change.is_none() || norm(&self.step) > MAX_FINAL_STEP * scale) {
                 break;
             }
             let change = change.ok_or(CorrectorFailure::Singular)?;
@@ -372,14 +371,14 @@ impl<'a, F: MapFamily> BranchSolver<'a, F> {
             if closed {
                 break;
             }
-            if iterations == ITERATIONS {
+            if iterations == MAX_ITERATIONS {
                 return Err(CorrectorFailure::NoConvergence);
             }
             iterations += 1;
             let before = residual;
             residual = self.evaluate(parameter)?;
             let stalled = residual > 0.5 * before;
-            // A step that leaves a solution behind where the map jumps is no rounding.
+            // A step across a jump of the map does not stall because of rounding.
             let small = before.max(residual) <= self.tolerance * scale;
             if stalled && small {
                 self.system
@@ -413,13 +412,22 @@ impl<'a, F: MapFamily> BranchSolver<'a, F> {
         })
     }
 
-    /// Every tangency of an orbit, in order of time.
+    /// All tangencies of an orbit, in order of time.
     pub(crate) fn tangencies(&mut self, node: &Node) -> Result<Vec<OrbitTangency>, MapFailure> {
+        self.tangencies_at(node.parameter, &node.points)
+    }
+
+    /// Every tangency of the orbit through these points, in order of time.
+    pub(crate) fn tangencies_at(
+        &mut self,
+        parameter: f64,
+        points: &[f64],
+    ) -> Result<Vec<OrbitTangency>, MapFailure> {
         let (family, touches) = (self.family, self.passes_touches);
-        let map = Self::map_at(family, &mut self.map, node.parameter, touches)?;
-        let points = node.points.chunks_exact(self.d);
+        let map = Self::map_at(family, &mut self.map, parameter, touches)?;
+        let points = points.chunks_exact(self.d);
         let mut periods: Vec<_> = points.map(|point| (point.to_vec(), Vec::new())).collect();
-        side_by_side(map, &mut periods, &|map, (state, found)| {
+        for_each_period(map, &mut periods, &|map, (state, found)| {
             advance_with_tangencies(map, state, found)
         })?;
         let found = periods.iter().enumerate().flat_map(|(k, (_, found))| {
@@ -438,7 +446,7 @@ impl<'a, F: MapFamily> BranchSolver<'a, F> {
         segments.points.copy_from_slice(&node.points);
         segments.jacobians.clone_from_slice(&node.jacobians);
         segments.scale = self.state_scale.max(self.size(&node.points));
-        // At a fold the orbit is not determined by the parameter: say so.
+        // At a fold the parameter does not determine the orbit: the error estimate must show it.
         let error = segments
             .error_estimate()
             .unwrap_or(f64::INFINITY)
@@ -446,7 +454,7 @@ impl<'a, F: MapFamily> BranchSolver<'a, F> {
         segments.into_orbit(node.residual, error)
     }
 
-    /// By how much the first state differs from that `m` periods later, discrete entries apart.
+    /// Difference of the states `m` periods apart, without discrete entries.
     pub(crate) fn gap(&self, node: &Node, m: usize) -> Vec<f64> {
         let state = |k: usize| &node.points[k * self.d..][..self.continuous];
         difference(state(0), state(m))
@@ -465,9 +473,11 @@ pub(crate) mod tests {
 
     use super::*;
 
-    /// x → r x (1 − x), for the tests of this folder.
+    /// x → r x (1 − x), for the tests of this module.
     #[derive(Clone)]
     pub(crate) struct Logistic(pub(crate) f64);
+
+    impl crate::Scheduling for Logistic {}
 
     impl StroboscopicMap for Logistic {
         type Error = Infallible;
@@ -518,12 +528,12 @@ pub(crate) mod tests {
         }
     }
 
-    /// A solver for orbits of period `n`, in the units of the states and of the parameter.
+    /// A solver for orbits of period `n` with unit scales of states and parameter.
     pub(crate) fn solver(n: usize) -> BranchSolver<'static, LogisticFamily> {
         BranchSolver::new(&LogisticFamily, 1, 1, n, 1.0, 1.0, 1e-10)
     }
 
-    /// A solution without its derivatives.
+    /// A node without derivatives.
     pub(crate) fn bare(parameter: f64, points: &[f64]) -> Node {
         Node {
             parameter,
@@ -536,7 +546,7 @@ pub(crate) mod tests {
         }
     }
 
-    /// The largest over points and parameter, each in its unit.
+    /// The largest difference in points or parameter, each in its unit.
     #[test]
     fn separations_are_measured_in_their_units() {
         let solver = BranchSolver::new(&LogisticFamily, 1, 1, 2, 4.0, 0.25, 1e-10);

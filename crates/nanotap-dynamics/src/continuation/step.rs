@@ -1,11 +1,11 @@
-//! One step along a branch: tried, judged, taken or refused.
+//! One step along a branch: prediction, correction and acceptance.
 
 use crate::continuation::ContinuationOptions;
 use crate::continuation::solver::{BranchSolver, CorrectorFailure, Node};
 use crate::map::MapFamily;
 use crate::vector::{distance, norm};
 
-/// Why a trial step was not taken.
+/// Why a trial step was rejected.
 pub(crate) enum Rejected {
     Corrector(CorrectorFailure),
     Turn,
@@ -16,10 +16,10 @@ pub(crate) enum Rejected {
     },
 }
 
-/// Part of an orbit's size that a prediction of it may keep to be called a point.
-const POINT: f64 = 1e-6;
-/// Part of the Jacobian by which it may jump where an orbit becomes a point.
-const CONTINUOUS: f64 = 0.1;
+/// Largest size of a predicted orbit that counts as a point, as a fraction of the orbit's size.
+const POINT_SIZE: f64 = 1e-6;
+/// Largest jump of the Jacobian where an orbit shrinks to a point, as a fraction of its size.
+const MAX_JACOBIAN_JUMP: f64 = 0.1;
 
 impl std::fmt::Display for Rejected {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
@@ -32,15 +32,15 @@ impl std::fmt::Display for Rejected {
     }
 }
 
-/// True if the branch is at an end of the range and heading out of it.
+/// True if the branch is at an end of the range and leaves it.
 pub(crate) fn at_range_end(node: &Node, options: &ContinuationOptions) -> bool {
     let margin = 1e-12 * (options.range.1 - options.range.0);
     node.slope > 0.0 && node.parameter >= options.range.1 - margin
         || node.slope < 0.0 && node.parameter <= options.range.0 + margin
 }
 
-/// One step, onto the end of the range if it would lead out. `before` is the node before this
-/// one, if any.
+/// One trial step, shortened to the end of the range if it would leave it. `before` is the node
+/// before this one, if any.
 pub(crate) fn trial<F: MapFamily>(
     solver: &mut BranchSolver<'_, F>,
     before: Option<&Node>,
@@ -62,7 +62,11 @@ pub(crate) fn trial<F: MapFamily>(
         let next = solver
             .onto_parameter(node, end)
             .map_err(Rejected::Corrector);
-        if is_point_at(node, end) && !next.as_ref().is_ok_and(|next| goes_on(node, next)) {
+        if is_point_at(node, end)
+            && !next
+                .as_ref()
+                .is_ok_and(|next| is_differentiable(node, next))
+        {
             return Err(Rejected::Vanished { parameter: end });
         }
         next
@@ -80,22 +84,22 @@ pub(crate) fn trial<F: MapFamily>(
             None => next,
         }
     };
-    // At the shortest steps a turn is a kink, to be passed.
-    let forgiving = step < 1e3 * options.min_step;
-    if !forgiving && angle(solver, node, &next) > options.max_angle {
+    // At the shortest steps a turn of the tangent is a kink, which is accepted.
+    let accepts_kinks = step < 1e3 * options.min_step;
+    if !accepts_kinks && angle(solver, node, &next) > options.max_angle {
         return Err(Rejected::Turn);
     }
     let taken = solver.projection(node, &next);
     let (predicted, _) = node.ahead(taken);
     let c = solver.continuous;
     let correction = distance(&predicted[..c], &next.points[..c]) / solver.state_scale;
-    if taken <= 0.0 || !forgiving && correction > 0.5 * taken {
+    if taken <= 0.0 || !accepts_kinks && correction > 0.5 * taken {
         return Err(Rejected::Jump);
     }
     Ok(next)
 }
 
-/// True if the orbit, going on as its tangent says, has no size left at `end`.
+/// True if the linear prediction of the orbit has no size at `end`.
 fn is_point_at(node: &Node, end: f64) -> bool {
     let step = (end - node.parameter) / node.slope;
     let left = node
@@ -103,15 +107,15 @@ fn is_point_at(node: &Node, end: f64) -> bool {
         .iter()
         .zip(&node.tangent)
         .fold(0.0, |m: f64, (x, t)| m.max((x + step * t).abs()));
-    left <= POINT * norm(&node.points)
+    left <= POINT_SIZE * norm(&node.points)
 }
 
-/// True if the map's derivative is continuous from one node to the next: it is not where
-/// a homogeneous map (all motions double with the drive) is taken at zero.
-fn goes_on(node: &Node, next: &Node) -> bool {
+/// True if the map's derivative is continuous from one node to the next. It is not where a
+/// homogeneous map (all motions scale with the drive) is evaluated at drive amplitude zero.
+fn is_differentiable(node: &Node, next: &Node) -> bool {
     node.jacobians.iter().zip(&next.jacobians).all(|(a, b)| {
         let jump = (a - b).amax();
-        jump <= CONTINUOUS * a.amax()
+        jump <= MAX_JACOBIAN_JUMP * a.amax()
     })
 }
 
@@ -130,7 +134,7 @@ mod tests {
     use super::*;
     use crate::continuation::solver::tests::bare;
 
-    /// An orbit as large as its parameter, taken to zero along its tangent.
+    /// An orbit whose size is proportional to its parameter, predicted at zero along its tangent.
     #[test]
     fn an_orbit_as_large_as_its_drive_is_a_point_without_it() {
         let at = |offset: f64| Node {
@@ -151,11 +155,11 @@ mod tests {
             jacobians: vec![DMatrix::from_row_slice(1, 2, &[40.0, entry])],
             ..bare(0.0, &[0.0])
         };
-        assert!(goes_on(&with(1.0), &with(4.9)));
-        assert!(!goes_on(&with(1.0), &with(5.1)));
+        assert!(is_differentiable(&with(1.0), &with(4.9)));
+        assert!(!is_differentiable(&with(1.0), &with(5.1)));
     }
 
-    /// Only on the way out of the range, within rounding of its end.
+    /// Only in the outward direction, within rounding of the end.
     #[test]
     fn a_range_ends_where_it_is_left() {
         let options = ContinuationOptions::over(100.0, 300.0);

@@ -1,14 +1,14 @@
-//! From a flip onto the branch of doubled period.
+//! Branch switching at a flip, onto the branch of doubled period.
 //!
-//! At a flip the linearised return map sends a vector v to −v. The doubled orbit is
-//! born along it: x_k + a v_k first, x_k − a v_k the second time round, with the
-//! parameter changing by O(a²) only (or O(a^{3/2}) where the flip is at a grazing).
-//! v comes from the antiperiodic Newton system, so long unstable orbits lose nothing. The
-//! branch's first point is the flip itself, and a is so small that no multiplier crosses −1
-//! before the second: far along a cascade a fixed step would pass the next flips unseen.
+//! At a flip the linearised return map has an eigenvector v with v → −v. The doubled orbit starts
+//! as x_k + a v_k in the first pass and x_k − a v_k in the second, while the parameter changes by
+//! O(a²) only (O(a^{3/2}) if the flip is at a grazing). v is the solution of the antiperiodic
+//! Newton system, which is accurate for long unstable orbits too. The first point of the branch is
+//! the flip itself. The amplitude a is so small that no multiplier crosses −1 before the second
+//! point: far along a cascade a fixed step would miss the next flips.
 //!
-//! Fails: where no size of a between a hundredth and a millionth of the orbit leads
-//! Newton to an orbit of doubled period.
+//! Fails if Newton finds no orbit of doubled period for any a between 1e-2 and 1e-6 of the orbit's
+//! size.
 
 use crate::continuation::bifurcation::{Bifurcation, BifurcationKind, flip_test};
 use crate::continuation::follow::{check, follow, solver_for};
@@ -19,10 +19,10 @@ use crate::map::MapFamily;
 use crate::orbit::block_cyclic::BlockCyclic;
 use crate::vector::{dot, norm, unit};
 
-/// Follows the doubled branch away from a flip.
+/// Follows the doubled branch from a flip.
 ///
 /// # Errors
-/// If the point is no flip, the options make no sense, or no doubled orbit is found.
+/// If the bifurcation is not a flip, the options are invalid, or no doubled orbit is found.
 pub fn switch_at_flip<F: MapFamily>(
     family: &F,
     flip: &Bifurcation,
@@ -94,7 +94,7 @@ pub fn switch_at_flip<F: MapFamily>(
     follow(&mut solver, start, &options, control)
 }
 
-/// By how much the distance of the multipliers from −1 may change over the first step.
+/// Largest change of the distance of the multipliers from −1 in the first step.
 const MULTIPLIER_STEP: f64 = 0.5;
 
 /// v_0 … v_{n−1} with A_k v_k = v_{k+1}, v_n = −v_0.
@@ -110,7 +110,7 @@ fn antiperiodic_vector(node: &Node, d: usize) -> Option<Vec<f64>> {
     let mut system = BlockCyclic::new(d, n);
     system.factor(&jacobians, &zeros, Some(&border));
     let mut out = vec![0.0; n * d];
-    // Once with a chance border, once with the vector itself for good conditioning.
+    // The second pass uses the vector itself as border, for good conditioning.
     for _ in 0..2 {
         system.solve_bordered(&row, 0.0, 1.0, false, &mut out)?;
         let length = norm(&out[..d]);

@@ -1,11 +1,11 @@
 //! Means of a correlated sequence with error bars from block averages.
 //!
-//! Values are summed in blocks; whenever 64 blocks are full, neighbours merge, so
-//! memory stays fixed and the block length grows with the run. The error of the mean
-//! is the scatter of the block means over the root of their number, taken at two
-//! block lengths and the larger kept (Flyvbjerg and Petersen, J. Chem. Phys. 91,
-//! 461, 1989). It fails, by being too small, while the correlation time is longer
-//! than a block: the number of blocks is therefore never above 64.
+//! Values are summed in blocks. When 64 blocks are full, neighbouring blocks are merged, so the
+//! memory is fixed and the block length grows with the run. The error of the mean is the standard
+//! deviation of the block means over the root of their number; it is computed at two block lengths
+//! and the larger one is returned (Flyvbjerg and Petersen, J. Chem. Phys. 91, 461, 1989). The error
+//! is too small while the correlation time is longer than a block, which is why there are never
+//! more than 64 blocks.
 
 const BLOCKS: usize = 64;
 
@@ -16,7 +16,7 @@ pub(crate) struct BlockAverage {
     block_length: usize,
     filled: usize,
     current: Vec<f64>,
-    /// Finished block sums, `width` values each.
+    /// Sums of the finished blocks, `width` values each.
     blocks: Vec<f64>,
     total: Vec<f64>,
     count: usize,
@@ -121,8 +121,8 @@ mod tests {
         assert!((average.mean()[0] - 0.5).abs() < 4.0 * expected);
     }
 
-    /// An autoregressive sequence with correlation time 50 has an error √100 times
-    /// that of white noise of its variance.
+    /// An autoregressive sequence with correlation time 50 has √100 times the error of white noise
+    /// with the same variance.
     #[test]
     fn correlation_widens_the_error() {
         let (a, n) = (1.0 - 1.0 / 50.0, 200_000);
@@ -137,9 +137,9 @@ mod tests {
         assert!(error > 0.6 * expected && error < 1.7 * expected);
     }
 
-    /// Sixteen zeros and ones, by hand: in pairs of equals the means of two scatter more
-    /// (variance 2/7 of eight), alternating the values themselves do (4/15 of sixteen). The
-    /// larger of both errors is the one that counts.
+    /// Sixteen zeros and ones: in equal pairs, the means of two have the larger variance (2/7 of
+    /// eight); alternating, the values themselves do (4/15 of sixteen). The larger error is
+    /// returned.
     #[test]
     fn both_block_lengths_count() {
         let error = |pattern: [f64; 4]| {

@@ -1,16 +1,15 @@
-//! Lyapunov spectrum by QR on the exact Jacobians, with error bars.
+//! Lyapunov spectrum by QR decomposition of the exact Jacobians, with error bars.
 //!
-//! A frame of d tangent vectors is carried along, orthonormalised after every
-//! period (Benettin et al. 1980); the logarithms of the stretch factors average to
-//! the exponents, in natural logarithm per period. Error bars come from block
-//! averages (`block_average.rs`), which follow the correlations of the motion.
+//! A frame of d tangent vectors is advanced and orthonormalised after every period (Benettin et al.
+//! 1980). The averages of the logarithmic stretch factors are the exponents, as natural logarithms
+//! per period. Error bars come from block averages (`block_average.rs`), which account for
+//! correlations.
 //!
-//! Fails: exponents of a finite stretch say nothing of what the motion does later;
-//! positive ones for thousands of periods may be a transient ([`mod@crate::classify`] and
-//! [`mod@crate::census`] look for the escape). Near zero, convergence is like 1/T with
-//! no random scatter, so a bar may understate the error by up to about
-//! log(stretch)/T. A singular Jacobian counts as a stretch of the smallest positive
-//! number.
+//! Fails: the exponents of a finite run do not predict the later motion. Positive exponents over
+//! thousands of periods may belong to a transient ([`mod@crate::classify`] and
+//! [`mod@crate::census`] look for the escape). Near zero the exponents converge like 1/T without
+//! random scatter, so an error bar may be too small by about log(stretch)/T. A singular Jacobian
+//! counts as a stretch by the smallest positive number.
 
 mod block_average;
 mod strobe_means;
@@ -23,27 +22,26 @@ use crate::failure::{MapFailure, advance_with_jacobian_and_determinant};
 use crate::map::StroboscopicMap;
 
 pub use strobe_means::StrobeMeans;
-use strobe_means::{agree, sampled};
+use strobe_means::{agree, write_sample};
 
-/// Standard error of an exponent up to which exponents tell motions apart.
-const TELLING_ERROR: f64 = 0.01;
-/// Part of a Jacobian's largest entry below which a stretch is rounding.
+/// Largest standard error of an exponent, per period, at which motions may be compared.
+const MAX_COMPARISON_ERROR: f64 = 0.01;
+/// Smallest stretch that is not rounding, as a fraction of the largest entry of a Jacobian.
 const ROUNDING: f64 = 1e-10;
 
-/// How many periods to average over.
+/// Length and accuracy of the averages.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LyapunovOptions {
-    /// Periods run first without counting, for the frame to align (the state moves
-    /// on as well).
+    /// Periods before averaging starts, for the alignment of the frame. The state advances too.
     pub alignment: usize,
-    /// Periods counted at least.
+    /// Smallest number of periods in the averages.
     pub min_periods: usize,
-    /// Periods counted at most. Set equal to `min_periods` for a fixed length.
+    /// Largest number of periods in the averages. Set it equal to `min_periods` for a fixed length.
     pub max_periods: usize,
-    /// The run stops between the two once every error bar is below this plus
-    /// `relative_error` of its exponent.
+    /// The run stops between the two once every error bar is below this (per period) plus
+    /// `relative_error` times its exponent.
     pub absolute_error: f64,
-    /// See `absolute_error`.
+    /// Fraction of the exponent; see `absolute_error`.
     pub relative_error: f64,
 }
 
@@ -60,7 +58,7 @@ impl Default for LyapunovOptions {
 }
 
 impl LyapunovOptions {
-    /// True if every error bar is within the two allowances.
+    /// True if every error bar is within the requested tolerances.
     pub(crate) fn is_met_by(&self, spectrum: &LyapunovSpectrum) -> bool {
         spectrum
             .exponents
@@ -70,25 +68,25 @@ impl LyapunovOptions {
     }
 }
 
-/// Lyapunov exponents per period and what the same run says of the motion.
+/// Lyapunov exponents per period, and averages over the same run.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LyapunovSpectrum {
-    /// Exponents, natural logarithm per drive period, largest first.
+    /// Exponents, natural logarithm per drive period, in descending order.
     pub exponents: Vec<f64>,
-    /// One standard error of each.
+    /// Standard error of each exponent, per period.
     pub errors: Vec<f64>,
-    /// Periods averaged over.
+    /// Number of drive periods in the averages.
     pub periods: usize,
     /// Means of the strobe states.
     pub strobe: StrobeMeans,
-    /// Mean of log|det DP| over the same periods, which the sum of the exponents must
-    /// be: by other means than the Jacobian where the map has any
-    /// ([`StroboscopicMap::advance_with_jacobian_and_determinant`]), else by its LU factors.
+    /// Mean of log|det DP| over the same periods, which equals the sum of the exponents. It is
+    /// computed independently of the Jacobian if the map can
+    /// ([`StroboscopicMap::advance_with_jacobian_and_determinant`]), otherwise from LU factors.
     pub log_determinant: f64,
 }
 
 impl LyapunovSpectrum {
-    /// Largest exponent with its standard error.
+    /// The largest exponent and its standard error, per period.
     pub fn largest(&self) -> (f64, f64) {
         (
             self.exponents.first().copied().unwrap_or(f64::NAN),
@@ -96,14 +94,14 @@ impl LyapunovSpectrum {
         )
     }
 
-    /// True if exponents and means are known well enough to tell motions apart.
-    pub(crate) fn is_telling(&self) -> bool {
-        self.errors.iter().all(|e| *e <= TELLING_ERROR) && self.strobe.is_telling()
+    /// True if exponents and means are accurate enough to compare motions.
+    pub(crate) fn is_comparable(&self) -> bool {
+        self.errors.iter().all(|e| *e <= MAX_COMPARISON_ERROR) && self.strobe.is_comparable()
     }
 
     /// True if two motions have the same exponents and the same means of the strobe states and
-    /// their squares, within six standard errors of the difference (and what 1/T convergence
-    /// leaves).
+    /// their squares, within six standard errors of the difference and a term that converges like
+    /// 1/T.
     pub(crate) fn agrees_with(&self, other: &Self) -> bool {
         let length = self.periods.min(other.periods).max(1) as f64;
         let ours = self.exponents.iter().zip(&self.errors);
@@ -113,13 +111,13 @@ impl LyapunovSpectrum {
         }) && self.strobe.agree_with(&other.strobe)
     }
 
-    /// What an exponent of zero may differ from it: three standard errors of the largest, and what
-    /// a bounded logarithm leaves of an average over so many periods.
+    /// Largest modulus of an exponent that counts as zero: three standard errors of the largest
+    /// exponent, plus the mean of a bounded logarithm over the run.
     pub(crate) fn zero(&self) -> f64 {
         (3.0 * self.largest().1).max(10.0 / self.periods as f64)
     }
 
-    /// How many of the largest exponents are zero within `zero`: the dimension of a torus.
+    /// Number of leading exponents that are zero within their errors: the dimension of a torus.
     pub fn neutral_directions(&self) -> usize {
         let zero = self.zero();
         self.exponents
@@ -128,10 +126,10 @@ impl LyapunovSpectrum {
             .count()
     }
 
-    /// Kaplan–Yorke dimension of the strobe points: j + Σ_{i≤j}λ_i/|λ_{j+1}| for the
-    /// last j with a non-negative sum; the dimension of the state if no sum is
-    /// negative, 0 if λ₁ is. On a torus the first exponents are zero and measured with an error of
-    /// either sign: [`Self::neutral_directions`] is its dimension.
+    /// Kaplan–Yorke dimension of the strobe points: j + Σ_{i≤j}λ_i/|λ_{j+1}| for the last j with a
+    /// non-negative sum; the dimension of the state if no sum is negative, 0 if λ₁ is negative. On
+    /// a torus the leading exponents are zero and their errors have either sign: use
+    /// [`Self::neutral_directions`] there.
     pub fn kaplan_yorke_dimension(&self) -> f64 {
         let mut sum = 0.0;
         for (j, &exponent) in self.exponents.iter().enumerate() {
@@ -144,11 +142,10 @@ impl LyapunovSpectrum {
     }
 }
 
-/// The spectrum of the motion that starts at `state`, which is replaced by where
-/// the run ends.
+/// Computes the Lyapunov spectrum of the motion from `state`, which is replaced by the final state.
 ///
 /// # Errors
-/// When the map cannot be followed.
+/// If the map fails.
 pub fn lyapunov_spectrum<M: StroboscopicMap>(
     map: &mut M,
     state: &mut [f64],
@@ -167,7 +164,7 @@ pub fn lyapunov_spectrum<M: StroboscopicMap>(
     Ok(run.spectrum())
 }
 
-/// A spectrum under way, to be lengthened piece by piece.
+/// A run that accumulates a spectrum and can be continued.
 #[derive(Clone, Debug)]
 pub(crate) struct LyapunovRun {
     d: usize,
@@ -175,10 +172,10 @@ pub(crate) struct LyapunovRun {
     frame: Vec<f64>,
     image: Vec<f64>,
     jacobian: DMatrix<f64>,
-    /// Logarithms of the stretches, the state and its squares, log|det DP|.
+    /// Logarithms of the stretches, the state and its squares, and log|det DP|.
     sample: Vec<f64>,
     average: BlockAverage,
-    /// The same over the last stretch alone.
+    /// Averages since [`Self::begin_last_stretch`].
     last: BlockAverage,
 }
 
@@ -228,25 +225,25 @@ impl LyapunovRun {
         Ok(())
     }
 
-    /// Counts the period just stepped, which ended at `state`.
+    /// Records the period just computed, which ended at `state`.
     #[inline]
     pub(crate) fn record(&mut self, state: &[f64]) {
-        sampled(state, &mut self.sample[self.d..3 * self.d]);
+        write_sample(state, &mut self.sample[self.d..3 * self.d]);
         self.average.push(&self.sample);
         self.last.push(&self.sample);
     }
 
-    /// Begins the last stretch here.
+    /// Starts the separate averages of the last part of the run.
     pub(crate) fn begin_last_stretch(&mut self) {
         self.last = BlockAverage::new(3 * self.d + 1);
     }
 
-    /// Discards everything before the last stretch.
+    /// Discards everything before the last part.
     pub(crate) fn keep_last_stretch(&mut self) {
         self.average = self.last.clone();
     }
 
-    /// One period of the state and the frame, not yet counted.
+    /// Advances the state and the frame by one period without recording it.
     pub(crate) fn step<M: StroboscopicMap>(
         &mut self,
         map: &mut M,
@@ -273,8 +270,8 @@ impl LyapunovRun {
         if let Some(exact) = exact
             && d > 1
         {
-            // A direction shrunk below the rounding of the Jacobian has lost its length:
-            // what the determinant leaves over is the last direction's.
+            // The length of a direction shrunk below the rounding of the Jacobian is lost: the last
+            // direction takes the remainder of the determinant.
             let others: f64 = self.sample[..d - 1].iter().sum();
             let hidden = self.jacobian.amax() * ROUNDING;
             if exact - others < nanotap_arithmetic::ln(hidden) {
@@ -284,8 +281,8 @@ impl LyapunovRun {
         Ok(())
     }
 
-    /// Gram–Schmidt with one repetition on the image, the logarithms of the lengths
-    /// into the sample. A vector that vanishes is replaced by a unit vector.
+    /// Gram–Schmidt with one repetition; the logarithms of the lengths go into the sample. A vector
+    /// that vanishes is replaced by a unit vector.
     fn orthonormalise(&mut self) {
         let d = self.d;
         for k in 0..d {
@@ -313,7 +310,7 @@ impl LyapunovRun {
         self.spectrum_of(&self.average)
     }
 
-    /// The spectrum over the last stretch alone.
+    /// The spectrum of the last part of the run.
     pub(crate) fn last_spectrum(&self) -> LyapunovSpectrum {
         self.spectrum_of(&self.last)
     }
@@ -338,7 +335,7 @@ impl LyapunovRun {
     }
 }
 
-/// log|det A| by LU, of the smallest positive number where it vanishes.
+/// log|det A| by LU; a determinant of zero counts as the smallest positive number.
 fn log_determinant(matrix: &DMatrix<f64>) -> f64 {
     let lu = matrix.clone().lu();
     let pivots = lu.u().diagonal();
@@ -348,8 +345,8 @@ fn log_determinant(matrix: &DMatrix<f64>) -> f64 {
         .sum()
 }
 
-/// Removes from `v` its parts along the orthonormal rows of `done`, twice, and
-/// returns what length is left.
+/// Removes the components of `v` along the orthonormal rows of `done`, twice, and returns the
+/// remaining length.
 #[inline]
 fn remove(done: &[f64], v: &mut [f64], d: usize) -> f64 {
     for _ in 0..2 {

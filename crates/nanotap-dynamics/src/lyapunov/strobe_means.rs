@@ -1,28 +1,29 @@
-//! Means of a motion's strobe states, by which motions that do not close are told apart.
+//! Means of the strobe states, by which non-periodic motions are compared.
 
 use super::block_average::BlockAverage;
 
-/// Standard error of a mean, as a part of the deviation, up to which means tell motions apart.
-const TELLING: f64 = 0.2;
+/// Largest standard error of a mean, as a fraction of the standard deviation, at which motions may
+/// be compared.
+const MAX_RELATIVE_ERROR: f64 = 0.2;
 
-/// Means of the strobe states' d entries, then of their squares.
+/// Means of the d entries of the strobe states, then of their squares.
 #[derive(Clone, Debug, PartialEq)]
 pub struct StrobeMeans {
-    /// The means, 2 d of them.
+    /// The 2 d means, in units of the state and their squares.
     pub means: Vec<f64>,
-    /// One standard error of each.
+    /// Standard error of each mean.
     pub errors: Vec<f64>,
-    /// Periods averaged over.
+    /// Number of drive periods in the means.
     pub periods: usize,
 }
 
 impl StrobeMeans {
-    /// Those of `states`, `d` entries each in the order in which they came.
+    /// Means of `states`, `d` entries each, in order of time.
     pub(crate) fn of(states: &[f64], d: usize) -> Self {
         let mut average = BlockAverage::new(2 * d);
         let mut sample = vec![0.0; 2 * d];
         for state in states.chunks_exact(d) {
-            sampled(state, &mut sample);
+            write_sample(state, &mut sample);
             average.push(&sample);
         }
         Self {
@@ -32,13 +33,13 @@ impl StrobeMeans {
         }
     }
 
-    /// The mean state.
+    /// The mean state: the first d means.
     pub fn mean_state(&self) -> &[f64] {
         &self.means[..self.means.len() / 2]
     }
 
-    /// Standard deviation of each entry of the states, a millionth of the largest at least, so
-    /// that an entry which hardly moves can be divided by it.
+    /// Standard deviation of each entry of the states, at least 1e-6 of the largest, so that it can
+    /// be used as a divisor.
     pub(crate) fn deviations(&self) -> Vec<f64> {
         let (means, squares) = self.means.split_at(self.means.len() / 2);
         let variances = means.iter().zip(squares).map(|(m, s)| s - m * m);
@@ -47,15 +48,15 @@ impl StrobeMeans {
         deviations.into_iter().map(|v| v.max(least)).collect()
     }
 
-    /// True if the errors of the mean state are small enough for means to tell motions apart.
-    pub(crate) fn is_telling(&self) -> bool {
+    /// True if the errors of the mean state are small enough to compare motions.
+    pub(crate) fn is_comparable(&self) -> bool {
         let deviations = self.deviations();
         let mut pairs = deviations.iter().zip(&self.errors);
-        pairs.all(|(deviation, error)| *error <= TELLING * deviation)
+        pairs.all(|(deviation, error)| *error <= MAX_RELATIVE_ERROR * deviation)
     }
 
-    /// True if all agree within six standard errors of the difference (and what 1/T
-    /// convergence leaves).
+    /// True if all means agree within six standard errors of the difference and a term that
+    /// converges like 1/T.
     pub(crate) fn agree_with(&self, other: &Self) -> bool {
         let d = self.means.len() / 2;
         let length = self.periods.min(other.periods).max(1) as f64;
@@ -71,8 +72,8 @@ impl StrobeMeans {
     }
 }
 
-/// Writes what is averaged of a state.
-pub(crate) fn sampled(state: &[f64], sample: &mut [f64]) {
+/// Writes a state and its squares to `sample`.
+pub(crate) fn write_sample(state: &[f64], sample: &mut [f64]) {
     let (entries, squares) = sample.split_at_mut(state.len());
     entries.copy_from_slice(state);
     for (square, x) in squares.iter_mut().zip(state) {
@@ -80,8 +81,8 @@ pub(crate) fn sampled(state: &[f64], sample: &mut [f64]) {
     }
 }
 
-/// Whether a difference of two means over so many periods is within six standard errors, and
-/// within what an average that converges like 1/T without scatter leaves of `scale`.
+/// True if a difference of two means over this many periods is within six standard errors plus
+/// `scale` over the number of periods (averages without scatter converge like 1/T).
 pub(crate) fn agree(difference: f64, error: f64, scale: f64, periods: f64) -> bool {
     difference.abs() <= 6.0 * error + 20.0 * scale / periods
 }
@@ -90,8 +91,8 @@ pub(crate) fn agree(difference: f64, error: f64, scale: f64, periods: f64) -> bo
 mod tests {
     use super::*;
 
-    /// 10 ± 30 and a constant: the mean state, and deviations of 30 and, for what does not move, a
-    /// millionth of it.
+    /// 10 ± 30 and a constant: the mean state, a standard deviation of 30, and 1e-6 of it for the
+    /// constant.
     #[test]
     fn means_and_deviations_of_two_states() {
         let states: Vec<f64> = (0..64)

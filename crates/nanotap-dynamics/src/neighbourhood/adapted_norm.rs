@@ -1,13 +1,12 @@
-//! A norm in which a stable monodromy matrix contracts at every step.
+//! A norm in which a stable monodromy matrix contracts in every step.
 //!
-//! The Euclidean distance to a stable orbit may grow for a while (complex
-//! multipliers in badly scaled coordinates). With H = Σ_k (Mᵀ/ρ)^k W (M/ρ)^k for a
-//! rate ρ between the spectral radius and 1, ‖M δ‖_H ≤ ρ ‖δ‖_H for every δ: the
-//! linearised distance falls by ρ each time round, exactly. The sum is taken by
-//! doubling (squared Smith iteration), so a rate near 1 costs no more.
+//! The Euclidean distance to a stable orbit may grow at first (complex multipliers in badly scaled
+//! coordinates). With H = Σ_k (Mᵀ/ρ)^k W (M/ρ)^k for a rate ρ between the spectral radius and 1, ‖M
+//! δ‖_H ≤ ρ ‖δ‖_H for every δ: the linearised distance decreases by the factor ρ in every return.
+//! The sum is computed by doubling (squared Smith iteration), so rates near 1 are as cheap.
 //!
-//! Fails (returns `None`) if the spectral radius is not below 1, or so near it that
-//! H is not positive definite in rounding.
+//! Fails (returns `None`) if the spectral radius is not below 1, or so close to 1 that H is not
+//! positive definite after rounding.
 
 use nalgebra::linalg::balancing::balance_parlett_reinsch;
 use nalgebra::{DMatrix, DVector};
@@ -24,7 +23,7 @@ pub(crate) struct AdaptedNorm {
     upper_matrix: DMatrix<f64>,
     /// L⁻ᵀ.
     inverse: DMatrix<f64>,
-    /// Factor by which the linearised return map contracts this norm at least.
+    /// Contraction rate of the linearised return map in this norm.
     rate: f64,
 }
 
@@ -39,7 +38,7 @@ impl AdaptedNorm {
         if !usable {
             return None;
         }
-        // Half way: the nearer to the radius the rate, the worse conditioned H.
+        // Half way to 1: H is ill-conditioned for rates near the spectral radius.
         let rate = 0.5 * (1.0 + spectral_radius);
         let mut balanced = monodromy.clone();
         let weights = balance_parlett_reinsch(&mut balanced);
@@ -68,8 +67,8 @@ impl AdaptedNorm {
         })
     }
 
-    /// Factor by which a return that is not linear is asked to contract it: half way from that of
-    /// the linearised one to 1.
+    /// Contraction rate required of the nonlinear return map: half way between the linear rate and
+    /// 1.
     pub(crate) fn rate_of_return(&self) -> f64 {
         0.5 * (1.0 + self.rate)
     }
@@ -89,8 +88,8 @@ impl AdaptedNorm {
         sum.sqrt()
     }
 
-    /// Distance below which rounding hides any contraction: that by which the orbit
-    /// fails to close and that of a few units in the last place of its state.
+    /// Distance below which rounding hides any contraction: the sum of the closing error of the
+    /// orbit and a few units in the last place of its state.
     pub(crate) fn floor(&self, center: &[f64], image: &[f64]) -> f64 {
         let off: Vec<f64> = center
             .iter()
@@ -106,25 +105,24 @@ impl AdaptedNorm {
         10.0 * (self.distance(center, image) + self.distance(center, &off))
     }
 
-    /// Half width, coordinate by coordinate, of the box around the unit ball.
+    /// Half widths of the bounding box of the unit ball, one per coordinate.
     pub(crate) fn extents(&self) -> Vec<f64> {
         self.inverse.row_iter().map(|r| r.norm()).collect()
     }
 
-    /// Radius of the ball whose widest half width is `scale`.
+    /// Radius of the ball whose largest half width is `scale`.
     pub(crate) fn radius(&self, scale: f64) -> f64 {
         scale / self.extents().into_iter().fold(0.0, f64::max)
     }
 
-    /// The vector of the unit ball that `direction` (on the Euclidean unit sphere)
-    /// stands for: L⁻ᵀ direction.
+    /// The vector on the unit ball for a `direction` on the Euclidean unit sphere: L⁻ᵀ direction.
     pub(crate) fn unit_vector(&self, direction: &[f64], out: &mut [f64]) {
         for (o, row) in out.iter_mut().zip(self.inverse.row_iter()) {
             *o = row.iter().zip(direction).map(|(a, b)| a * b).sum();
         }
     }
 
-    /// Lᵀ `away`, whose Euclidean length is the norm of `away`.
+    /// Lᵀ `away`, whose Euclidean length is ‖`away`‖_H.
     pub(crate) fn coordinates(&self, away: &DVector<f64>) -> DVector<f64> {
         &self.upper_matrix * away
     }
@@ -146,8 +144,8 @@ impl AdaptedNorm {
 mod tests {
     use super::*;
 
-    /// The defining property, on a badly scaled, non-normal matrix whose Euclidean
-    /// norm is a thousand times its spectral radius.
+    /// The defining property, for a badly scaled, non-normal matrix whose Euclidean norm is a
+    /// thousand times its spectral radius.
     #[test]
     fn the_linear_map_contracts_by_the_rate() {
         let m = DMatrix::from_row_slice(2, 2, &[0.9, 700.0, 0.0, 0.85]);

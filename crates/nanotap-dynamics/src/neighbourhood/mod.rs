@@ -1,18 +1,16 @@
-//! A neighbourhood of a stable orbit from which every motion goes to that orbit.
+//! A neighbourhood of a stable orbit from which every motion converges to that orbit.
 //!
-//! It is a ball of the adapted norm (`adapted_norm.rs`) around one strobe
-//! point x*. If the Jacobian of the return map Pⁿ has operator norm at most q < 1 at
-//! *every* point of the ball, the mean value theorem (the ball is convex and Pⁿ is
-//! C¹) gives ‖Pⁿ(x) − x*‖ ≤ q ‖x − x*‖: the ball maps into itself and everything in
-//! it converges to the orbit.
+//! The neighbourhood is a ball of the adapted norm (`adapted_norm.rs`) around one strobe point x*.
+//! If the Jacobian of the return map Pⁿ has operator norm at most q < 1 at *every* point of the
+//! ball, the mean value theorem (the ball is convex and Pⁿ is C¹) gives ‖Pⁿ(x) − x*‖ ≤ q ‖x − x*‖:
+//! the ball maps into itself, and every motion in it converges to the orbit.
 //!
-//! What is checked: the Jacobian norm and the contraction itself, at sample points
-//! on the ball's axes and in pseudo-random directions, at its surface and at half
-//! its radius; of the radius that passes, three quarters are used. That is a proof at the samples
-//! and evidence between them; it can fail where the map changes on a scale below
-//! the spacing of the samples, or for a map with square-root (hard impact) grazing
-//! inside the ball, whose Jacobian is unbounded on a thin set. Hence
-//! [`Neighbourhood::holds`] and its users ask, on entry, that the next return has
+//! The Jacobian norm and the contraction itself are checked at sample points on the axes of the
+//! ball and in pseudo-random directions, at its surface and at half its radius. Three quarters of
+//! the largest radius that passes are used. This is a proof at the samples and evidence between
+//! them. It can fail where the map changes on a scale below the spacing of the samples, or for a
+//! map with square-root (hard impact) grazing inside the ball, whose Jacobian is unbounded on a
+//! thin set. [`Neighbourhood::holds`] therefore checks that the next return has contracted.
 //! really contracted.
 
 mod adapted_norm;
@@ -26,47 +24,49 @@ use crate::map::StroboscopicMap;
 use crate::orbit::PeriodicOrbit;
 use crate::vector::unit;
 
-/// Factor between the radii tried, and between the radius that passes and the one used.
+/// Ratio of successive trial radii, and of the radius used to the radius that passes.
 const SHRINK: f64 = 0.75;
-/// Radii tried: down to 1e-10 of the orbit's scale.
-const TRIALS: usize = 80;
-/// Factor by which a block of returns contracts the distance at the samples.
+/// Number of trial radii: down to 1e-10 of the orbit's scale.
+const MAX_TRIALS: usize = 80;
+/// Required contraction of the distance by a block of returns.
 const BLOCK_RATE: f64 = 0.75;
-/// Radius that is tried first of a block, as a part of the orbit's scale.
+/// Decay time in drive periods above which a block is shorter than it.
+const MAX_BLOCK: f64 = 2048.0;
+/// First trial radius of a block, as a fraction of the orbit's scale.
 const FIRST_RADIUS: f64 = 1e-3;
-/// Factors between radii tried as long as a block contracts: large ones first.
+/// Ratios of successive trial radii while a block contracts, largest first.
 const GROWTH: [f64; 2] = [2.0, 1.4];
-/// Pseudo-random directions in which a block is tried, in addition to the axes.
+/// Number of pseudo-random directions in which a block is tested, in addition to the axes.
 const DIRECTIONS: usize = 12;
-/// Part of the distance to the nearest other orbit up to which a ball reaches.
-const REACH: f64 = 0.7;
+/// Largest extent of a ball, as a fraction of the distance to the nearest other orbit.
+const MAX_REACH: f64 = 0.7;
 
 /// A contracting ball around the first state of a stable orbit.
 #[derive(Clone, Debug)]
 pub struct Neighbourhood {
     center: Vec<f64>,
-    /// Drive periods over which it contracts: one return, or a block of them.
+    /// Drive periods of one contraction: one return, or a block of returns.
     period: usize,
     norm: AdaptedNorm,
     radius: f64,
-    /// Factor by which it contracts in these.
+    /// Contraction rate over these periods.
     rate: f64,
-    /// Periods after which a state in it that came no nearer is worth looking at again.
+    /// Periods after which to check a state in the ball again that came no nearer.
     retry: usize,
     /// −ln|μ| of the largest multiplier, per period.
     decay: f64,
-    /// Half width of the box that holds the ball: a cheap first test.
+    /// Half widths of the ball's bounding box, in units of the state: a cheap first test.
     extents: Vec<f64>,
     /// Below this distance rounding hides any contraction.
     floor: f64,
 }
 
 impl Neighbourhood {
-    /// The largest ball, of those that shrink by quarters from the orbit's scale, that
-    /// passes the checks; `None` if the orbit is not stable or none passes.
+    /// The largest ball that passes the checks, for radii that decrease by a quarter from the
+    /// orbit's scale; `None` if the orbit is not stable or no radius passes.
     ///
     /// # Errors
-    /// When the orbit itself cannot be followed.
+    /// If the map fails on the orbit.
     pub fn around<M: StroboscopicMap>(
         map: &mut M,
         orbit: &PeriodicOrbit,
@@ -74,9 +74,9 @@ impl Neighbourhood {
         let Some(mut ball) = Self::empty(map, orbit)? else {
             return Ok(None);
         };
-        let mut work = Return::new(orbit.dimension());
+        let mut work = ReturnMap::new(orbit.dimension());
         let mut radius = ball.norm.radius(orbit.scale().max(1e3 * orbit.error));
-        for _ in 0..TRIALS {
+        for _ in 0..MAX_TRIALS {
             if radius < 8.0 * ball.floor {
                 break;
             }
@@ -91,36 +91,48 @@ impl Neighbourhood {
 
     /// The largest ball in which a block of returns, one decay time long, contracts by
     /// [`BLOCK_RATE`] at sample points, and that reaches over none of the `others`; `None` if the
-    /// orbit is not stable or none passes.
+    /// orbit is not stable or none passes. A block of many periods is a quarter as long and contracts
+    /// by the fourth root. No larger ball is tried once the search has cost so many `steps`
+    /// ([`StroboscopicMap::cost`]).
     ///
     /// # Errors
-    /// When the orbit itself cannot be followed.
+    /// If the map fails on the orbit.
     pub(crate) fn over_block<'a, M: StroboscopicMap>(
         map: &mut M,
         orbit: &PeriodicOrbit,
         others: impl Iterator<Item = &'a PeriodicOrbit>,
+        steps: u64,
     ) -> Result<Option<Self>, MapFailure> {
         let Some(mut ball) = Self::empty(map, orbit)? else {
             return Ok(None);
         };
-        let returns = (1.0 / (ball.decay * orbit.period as f64)).ceil().max(1.0);
+        let decay_time = 1.0 / ball.decay;
+        let (block, rate) = if decay_time > MAX_BLOCK {
+            (0.25 * decay_time, BLOCK_RATE.sqrt().sqrt())
+        } else {
+            (decay_time, BLOCK_RATE)
+        };
+        let returns = (block / orbit.period as f64).ceil().max(1.0);
         ball.period = orbit.period.saturating_mul(returns as usize);
-        ball.rate = BLOCK_RATE;
+        ball.rate = rate;
+        let largest_cost = map.cost().saturating_add(steps);
         ball.retry = ball.period;
         let size = orbit.scale().max(1e3 * orbit.error);
         let mut largest = ball.norm.radius(size);
         for other in others {
-            largest = largest.min(REACH * ball.distance_to(other));
+            largest = largest.min(MAX_REACH * ball.distance_to(other));
         }
         let mut radius = ball.norm.radius(FIRST_RADIUS * size).min(largest);
-        while !ball.block_contracts(map, radius) {
+        while !ball.block_contracts(map, radius, largest_cost) {
             radius *= 0.25;
-            if radius < 8.0 * ball.floor {
+            if radius < 8.0 * ball.floor || map.cost() > largest_cost {
                 return Ok(None);
             }
         }
         for growth in GROWTH {
-            while growth * radius <= largest && ball.block_contracts(map, growth * radius) {
+            while growth * radius <= largest
+                && ball.block_contracts(map, growth * radius, largest_cost)
+            {
                 radius *= growth;
             }
         }
@@ -138,7 +150,7 @@ impl Neighbourhood {
             return Ok(None);
         }
         let center = orbit.states[0].clone();
-        let mut work = Return::new(center.len());
+        let mut work = ReturnMap::new(center.len());
         let monodromy = work.jacobian(map, &center, orbit.period)?.clone();
         let Some(norm) = AdaptedNorm::new(&monodromy, orbit.spectral_radius()) else {
             return Ok(None);
@@ -171,9 +183,9 @@ impl Neighbourhood {
         distances.fold(f64::INFINITY, f64::min)
     }
 
-    /// Shrinks the ball if it reaches over an orbit that was found since.
+    /// Shrinks the ball if it comes too close to a newly found orbit.
     pub(crate) fn keep_clear_of(&mut self, orbit: &PeriodicOrbit) {
-        let largest = REACH * self.distance_to(orbit);
+        let largest = MAX_REACH * self.distance_to(orbit);
         if self.radius > largest {
             self.set_radius(largest);
         }
@@ -190,26 +202,26 @@ impl Neighbourhood {
         self.norm.distance(state, &self.center) <= self.radius
     }
 
-    /// Radius in the adapted norm.
+    /// Radius in the adapted norm (dimensionless).
     pub fn radius(&self) -> f64 {
         self.radius
     }
 
-    /// Factor by which one return contracts the distance at the samples, at least.
+    /// Contraction rate of the distance over one return at the samples.
     pub fn rate(&self) -> f64 {
         self.rate
     }
 
-    /// Half width of the ball along each coordinate.
+    /// Half width of the ball along each coordinate, in units of the state.
     pub fn extents(&self) -> &[f64] {
         &self.extents
     }
 
-    /// True if `state` lies in the ball and its next return really is nearer, by the
-    /// ball's rate (or is at the orbit to rounding). `state` is left as it is.
+    /// True if `state` lies in the ball and its next return is nearer by the ball's rate, or at the
+    /// orbit to rounding. `state` is not changed.
     ///
     /// # Errors
-    /// When the map cannot be followed from `state`.
+    /// If the map fails.
     pub fn holds<M: StroboscopicMap>(
         &self,
         map: &mut M,
@@ -226,8 +238,13 @@ impl Neighbourhood {
         Ok(after <= self.rate * before || after <= self.floor)
     }
 
-    /// The checks of one return at one radius.
-    fn contracts<M: StroboscopicMap>(&self, map: &mut M, radius: f64, work: &mut Return) -> bool {
+    /// Checks one return at one radius.
+    fn contracts<M: StroboscopicMap>(
+        &self,
+        map: &mut M,
+        radius: f64,
+        work: &mut ReturnMap,
+    ) -> bool {
         let d = self.center.len();
         let mut samples = (0..2 * d + 16 + 2 * d).flat_map(|k| [(k, 1.0), (k, 0.5)]);
         samples.all(|(sample, fraction)| {
@@ -241,17 +258,24 @@ impl Neighbourhood {
         })
     }
 
-    /// Whether a block of returns comes nearer from all samples at one radius.
-    fn block_contracts<M: StroboscopicMap>(&self, map: &mut M, radius: f64) -> bool {
+    /// Whether a block of returns comes nearer from all samples at one radius; not where that takes the
+    /// map to its largest cost.
+    fn block_contracts<M: StroboscopicMap>(
+        &self,
+        map: &mut M,
+        radius: f64,
+        largest_cost: u64,
+    ) -> bool {
         (0..2 * self.center.len() + DIRECTIONS).all(|sample| {
             let mut point = self.point(sample, radius);
             let before = self.norm.distance(&point, &self.center);
-            advance_by(map, &mut point, self.period).is_ok()
+            map.cost() <= largest_cost
+                && advance_by(map, &mut point, self.period).is_ok()
                 && self.norm.distance(&point, &self.center) <= self.rate * before + self.floor
         })
     }
 
-    /// A sample point so far from the centre.
+    /// A sample point at this distance from the centre.
     fn point(&self, sample: usize, radius: f64) -> Vec<f64> {
         let d = self.center.len();
         let (mut direction, mut offset) = (vec![0.0; d], vec![0.0; d]);
@@ -261,37 +285,36 @@ impl Neighbourhood {
         places.map(|(c, o)| c + radius * o).collect()
     }
 
-    /// Drive periods after which it comes round again.
+    /// Drive periods of one contraction.
     pub(crate) fn period(&self) -> usize {
         self.period
     }
 
-    /// Periods after which a state in it that came no nearer is worth looking at again.
+    /// Periods after which to check a state in the ball again that came no nearer.
     pub(crate) fn retry(&self) -> usize {
         self.retry
     }
 
-    /// Periods after which `state` would have come to the ball if it came at the rate of the
-    /// largest multiplier; 0 in the ball.
+    /// Periods until `state` reaches the ball at the rate of the largest multiplier; 0 in the ball.
     pub(crate) fn periods_away(&self, state: &[f64]) -> f64 {
         let distance = self.norm.distance(state, &self.center);
         nanotap_arithmetic::ln(distance / self.radius).max(0.0) / self.decay
     }
 
-    /// Periods after which a motion that comes from a box with these sides, and decays
-    /// as the largest multiplier says, has entered the ball.
+    /// Periods until a motion from a box with these sides enters the ball at the rate of the
+    /// largest multiplier.
     pub(crate) fn expected_entry(&self, sides: &[f64]) -> f64 {
         nanotap_arithmetic::ln(self.widening(sides)) / self.decay
     }
 
-    /// Periods that the slowest linear decay needs from a box with these sides to the
-    /// ball: the natural length of a transient that is no chaos.
+    /// Periods of the slowest linear decay from a box with these sides to the ball: the length of a
+    /// transient without chaos.
     pub fn relaxation(&self, sides: &[f64]) -> f64 {
         nanotap_arithmetic::ln(self.widening(sides)) * self.period as f64
             / -nanotap_arithmetic::ln(self.rate)
     }
 
-    /// How many times wider than the ball a box with these sides is.
+    /// Ratio of a box with these sides to the ball.
     fn widening(&self, sides: &[f64]) -> f64 {
         sides
             .iter()
@@ -302,15 +325,15 @@ impl Neighbourhood {
 }
 
 /// Work space for the return map.
-pub(crate) struct Return {
-    /// Where the return ended.
+pub(crate) struct ReturnMap {
+    /// State at the end of the return.
     pub(crate) state: Vec<f64>,
     factor: DMatrix<f64>,
     product: DMatrix<f64>,
     next: DMatrix<f64>,
 }
 
-impl Return {
+impl ReturnMap {
     pub(crate) fn new(d: usize) -> Self {
         Self {
             state: vec![0.0; d],
@@ -338,7 +361,7 @@ impl Return {
     }
 }
 
-/// The axes both ways, then pseudo-random directions of length 1.
+/// The axes in both directions, then pseudo-random unit vectors.
 fn sample_direction(sample: usize, direction: &mut [f64]) {
     let d = direction.len();
     if sample < 2 * d {
@@ -349,7 +372,7 @@ fn sample_direction(sample: usize, direction: &mut [f64]) {
     let mut counter = (sample as u64) << 24;
     let mut sum = 0.0;
     for v in direction.iter_mut() {
-        // Sum of four uniforms: near enough to normal for an even spread.
+        // The sum of four uniforms is close enough to a normal distribution for an even spread.
         *v = -2.0;
         for _ in 0..4 {
             *v += unit(counter);
@@ -370,12 +393,14 @@ mod tests {
     use super::*;
     use crate::orbit::{ShootingOptions, close_orbit};
 
-    /// x → r x (1 − x), or every state where it is.
+    /// x → r x (1 − x), or the identity.
     #[derive(Clone)]
     enum Line {
         Logistic(f64),
         Still,
     }
+
+    impl crate::Scheduling for Line {}
 
     impl StroboscopicMap for Line {
         type Error = Infallible;
@@ -413,7 +438,7 @@ mod tests {
     }
 
     /// The orbit of period 2 at r = 3.2 has the multiplier 4 + 2 r − r² = 0.16: 0.4 per period. The
-    /// norm's rate is half way from there to 1, the ball's half way from the norm's.
+    /// norm's rate is half way between 0.16 and 1, the ball's half way between the norm's and 1.
     #[test]
     fn a_ball_tells_its_times_from_its_multiplier() {
         let mut map = Line::Logistic(3.2);
@@ -425,7 +450,7 @@ mod tests {
         let half = ball.extents()[0];
         assert!(ball.contains(&[centre + 0.999 * half]) && ball.contains(&[centre - 0.999 * half]));
         assert!(!ball.contains(&[centre + 1.001 * half]));
-        // In one dimension the norm is the distance in some unit.
+        // In one dimension the norm is the distance up to a factor.
         near(
             ball.radius() / ball.norm.distance(&[centre + half], &[centre]),
             1.0,
@@ -444,7 +469,7 @@ mod tests {
         );
     }
 
-    /// What stays where it is does not come nearer; at the orbit itself nothing can.
+    /// A state that does not move does not contract; at the orbit itself nothing can.
     #[test]
     fn a_ball_holds_what_comes_nearer() {
         let mut map = Line::Logistic(3.2);
@@ -460,7 +485,7 @@ mod tests {
         assert!(holds(&mut Line::Still, centre));
     }
 
-    /// The axes both ways, then unit vectors that favour no side.
+    /// The axes in both directions, then unit vectors without a preferred direction.
     #[test]
     fn directions_are_spread_over_the_sphere() {
         let mut direction = [0.0; 3];
@@ -491,11 +516,13 @@ mod tests {
         );
     }
 
-    /// z → 0.98 e^{iθ} (1 + |z|²/40) z with θ = 1 + 40 |z|² turns faster farther out: near rest 0.98
-    /// contracts, and beyond |z| = 0.9 the distance grows. The shear keeps a single return from
-    /// contracting every vector where a block of them still contracts.
+    /// z → 0.98 e^{iθ} (1 + |z|²/40) z with θ = 1 + 40 |z|² rotates faster at larger radius. Near 0
+    /// the factor 0.98 contracts; beyond |z| = 0.9 the distance grows. Because of the shear a
+    /// single return does not contract every vector, while a block of returns does.
     #[derive(Clone)]
     struct Twist;
+
+    impl crate::Scheduling for Twist {}
 
     impl StroboscopicMap for Twist {
         type Error = Infallible;
@@ -538,8 +565,8 @@ mod tests {
         }
     }
 
-    /// A block of ⌈1/−ln 0.98⌉ = 50 returns contracts by 0.98⁵⁰ = 0.36 at rest, and by 3/4 from
-    /// |z| = 0.7, which iterating the factor gives.
+    /// A block of ⌈1/−ln 0.98⌉ = 50 returns contracts by 0.98⁵⁰ = 0.36 at 0, and by 3/4 from |z| =
+    /// 0.7, as iteration of the factor gives.
     #[test]
     fn blocks_contract_farther_out_than_single_returns() {
         let mut map = Twist;
@@ -554,7 +581,7 @@ mod tests {
         };
         let single = Neighbourhood::around(&mut map, &orbit).unwrap().unwrap();
         let none = || std::iter::empty::<&PeriodicOrbit>();
-        let block = Neighbourhood::over_block(&mut map, &orbit, none())
+        let block = Neighbourhood::over_block(&mut map, &orbit, none(), u64::MAX)
             .unwrap()
             .unwrap();
         assert_eq!(block.period(), 50);
@@ -572,13 +599,14 @@ mod tests {
                 .holds(&mut map, &[0.9 * block.extents()[0], 0.0], &mut [0.0; 2])
                 .unwrap()
         );
-        // Another orbit in it ends it before that.
+        // Another orbit inside the ball limits it.
         let other = PeriodicOrbit {
             states: vec![vec![0.5 * block.extents()[0], 0.0]],
             ..orbit.clone()
         };
         let apart = other.states[0][0];
-        let smaller = Neighbourhood::over_block(&mut map, &orbit, std::iter::once(&other));
+        let smaller =
+            Neighbourhood::over_block(&mut map, &orbit, std::iter::once(&other), u64::MAX);
         let smaller = smaller.unwrap().unwrap();
         assert!(smaller.extents()[0] < 0.75 * apart && !smaller.contains(&other.states[0]));
         let mut cut = block;

@@ -7,16 +7,16 @@
 //! A_k δ_k − δ_{k+1} + b_k δ_λ = −f_k
 //! ```
 //!
-//! and, if the parameter λ is free, one bordering row on (δ_0, δ_λ). Multiplying
-//! the A_k together would lose the contracting directions of a chaotic stretch
-//! under the growing ones; Householder elimination keeps both. Cost O(n d³).
+//! If the parameter λ is free, one bordering row on (δ_0, δ_λ) is added. A product of the A_k would
+//! lose the contracting directions of a chaotic segment among the growing ones; Householder
+//! elimination keeps both. The cost is O(n d³).
 //!
-//! Fails (returns `None`) where the closing block is exactly singular; near that,
-//! the solution is large, which is what the caller measures.
+//! Fails (returns `None`) where the closing block is exactly singular. Near that point the solution
+//! is large, which the caller measures.
 
 use nalgebra::{DMatrix, DVector};
 
-/// The eliminated system; its storage is reused from one factorisation to the next.
+/// The eliminated system; its storage is reused by the next factorisation.
 #[derive(Debug)]
 pub(crate) struct BlockCyclic {
     d: usize,
@@ -24,10 +24,10 @@ pub(crate) struct BlockCyclic {
     /// n − 1 panels of 2d rows × (3d + 2) columns, row by row:
     /// δ_k | δ_0 | δ_{k+1} | δ_λ | right side.
     panels: Vec<f64>,
-    /// The present reflector, and with which factor it is subtracted from each column.
+    /// The current reflector, and the factor with which it is subtracted from each column.
     reflector: Vec<f64>,
     factors: Vec<f64>,
-    /// Closing d × d block, parameter column and right side.
+    /// Closing d × d block, parameter column and right-hand side.
     closing: DMatrix<f64>,
     column: DVector<f64>,
     right: DVector<f64>,
@@ -95,15 +95,15 @@ impl BlockCyclic {
         self.closing = u + v;
     }
 
-    /// Newton correction at a fixed parameter, written to `out` (n rows of d).
+    /// Newton correction at a fixed parameter, written to `out` (n rows of d values).
     pub(crate) fn solve(&self, out: &mut [f64]) -> Option<()> {
         let first = self.closing.clone().lu().solve(&self.right)?;
         self.back_substitute(first.as_slice(), 0.0, true, out);
         Some(())
     }
 
-    /// Solution with the bordering row `row·δ_0 + corner δ_λ = value`; the right
-    /// sides of the segments count only if `with_residual`. Returns δ_λ.
+    /// Solution with the bordering row `row·δ_0 + corner δ_λ = value`. The right-hand sides of the
+    /// segments are included only if `with_residual`. Returns δ_λ.
     pub(crate) fn solve_bordered(
         &self,
         row: &[f64],
@@ -157,7 +157,7 @@ impl BlockCyclic {
 }
 
 /// Householder triangularisation of the first `d` columns of a panel of 2d rows, applied to all
-/// its columns. `reflector` and `factors` have room for a column and for a row.
+/// columns. `reflector` holds one column, `factors` one row.
 fn triangularise(panel: &mut [f64], d: usize, reflector: &mut [f64], factors: &mut [f64]) {
     let columns = factors.len();
     for j in 0..d {
@@ -205,9 +205,8 @@ mod tests {
         2.0 * unit(*seed) - 1.0
     }
 
-    /// The structured solution against a dense LU of the whole system, with periods among the
-    /// others that forget nearly all of their start: columns to be reflected that hardly differ
-    /// from their first entry, of either sign.
+    /// The structured solution agrees with a dense LU of the whole system. Some periods contract
+    /// strongly: columns that differ little from a multiple of e_0, of either sign.
     #[test]
     fn agrees_with_the_dense_system() {
         let mut seed = 7;

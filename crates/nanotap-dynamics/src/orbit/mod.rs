@@ -1,10 +1,10 @@
-//! A periodic orbit of the stroboscopic map, closed by Newton.
+//! Periodic orbits of the stroboscopic map, by Newton's method.
 
 pub(crate) mod block_cyclic;
 pub mod multipliers;
+pub(crate) mod parallel;
 pub mod search;
 pub mod shooting;
-pub(crate) mod side_by_side;
 
 use nalgebra::Complex;
 use nanotap_arithmetic::ComplexFunctions as _;
@@ -16,33 +16,34 @@ pub use shooting::{
     close_orbit_from_points,
 };
 
+use crate::same_motion::SameMotion;
 use crate::vector::{distance, norm};
 
-/// A periodic orbit, its accuracy and its stability.
+/// A periodic orbit with its accuracy and stability.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PeriodicOrbit {
     /// Minimal period in drive periods.
     pub period: usize,
     /// All `period` strobe points `x_0 … x_{n−1}`, `P(x_k) = x_{k+1 mod n}`.
     pub states: Vec<Vec<f64>>,
-    /// Largest entry of `P(x_k) − x_{k+1}` over the orbit, in units of the state, as it was before a
-    /// last step of Newton's within rounding.
+    /// Largest entry of `P(x_k) − x_{k+1}` over the orbit, in units of the state, before a final
+    /// Newton step within rounding.
     pub residual: f64,
-    /// Estimated distance of `states` from the true orbit (largest entry): the
-    /// residual and the rounding of one period, carried through the inverse of
-    /// the Newton system. Two orbits closer than a few of these are one orbit.
+    /// Estimated distance of `states` from the exact orbit (largest entry, in units of the state):
+    /// the residual and the rounding of one period, multiplied by the inverse of the Newton system.
+    /// Two orbits closer than a few of these are the same orbit.
     pub error: f64,
-    /// Floquet multipliers, largest modulus first; a pair has its positive
-    /// imaginary part first.
+    /// Floquet multipliers in descending order of modulus; of a pair, the one with positive
+    /// imaginary part comes first.
     pub multipliers: Vec<Complex<f64>>,
-    /// log|det DPⁿ|, summed over the factors: an independent check of the
-    /// multipliers and of any trace formula the system has.
+    /// log|det DPⁿ|, summed over the factors: an independent check of the multipliers and of a
+    /// trace formula.
     pub log_determinant: f64,
-    /// What the multipliers say.
+    /// Stability according to the multipliers.
     pub stability: Stability,
-    /// How many of the last entries of a state are whole numbers that the map sets
-    /// ([`StroboscopicMap::discrete_entries`](crate::StroboscopicMap::discrete_entries)): no part
-    /// of sizes and distances.
+    /// Number of trailing entries of a state that are whole numbers set by the map
+    /// ([`StroboscopicMap::discrete_entries`](crate::StroboscopicMap::discrete_entries)). Sizes and
+    /// distances do not include them.
     pub discrete: usize,
 }
 
@@ -52,8 +53,8 @@ impl PeriodicOrbit {
         self.states.first().map_or(0, Vec::len)
     }
 
-    /// The state at phase 0 that is nearest to `state`, and how near it is; nothing, and not a
-    /// number, of an orbit without states.
+    /// The strobe state that is nearest to `state`, and its distance; an empty slice and NaN if the
+    /// orbit has no states.
     pub fn nearest(&self, state: &[f64]) -> (&[f64], f64) {
         self.states
             .iter()
@@ -67,13 +68,13 @@ impl PeriodicOrbit {
         self.multipliers.first().map_or(0.0, |m| m.modulus())
     }
 
-    /// True if every multiplier lies inside the unit circle by more than the margin
-    /// of [`Stability`].
+    /// True if every multiplier is inside the unit circle by more than
+    /// [`MARGIN`](multipliers::MARGIN).
     pub fn is_stable(&self) -> bool {
         self.stability == Stability::Stable
     }
 
-    /// Largest entry of any state.
+    /// Largest entry of any state, in units of the state.
     pub fn scale(&self) -> f64 {
         let states = self.states.iter();
         states.fold(0.0, |m, s| m.max(norm(self.continuous(s))))
@@ -84,10 +85,9 @@ impl PeriodicOrbit {
         &state[..state.len().saturating_sub(self.discrete)]
     }
 
-    /// Smallest distance (largest entry over all phases) to another orbit of the
-    /// same period over all cyclic shifts, with the shift `s` that gives it
-    /// (`states[k]` beside `other.states[(k + s) mod n]`); infinite if periods or
-    /// dimensions differ.
+    /// Smallest distance (largest entry over all phases) to another orbit of the same period over
+    /// all cyclic shifts, with the shift `s` at which it occurs (`states[k]` is compared with
+    /// `other.states[(k + s) mod n]`). Infinite if periods or dimensions differ.
     pub fn distance_to(&self, other: &Self) -> (usize, f64) {
         if self.period != other.period || self.dimension() != other.dimension() {
             return (0, f64::INFINITY);
@@ -110,17 +110,19 @@ impl PeriodicOrbit {
         best
     }
 
-    /// True if the two are one orbit up to a cyclic shift: closer than ten times
-    /// the sum of their error estimates.
-    ///
-    /// Fails, by calling one what is two, only within that distance of a fold or
-    /// flip, where the error estimates themselves grow and say so.
+    /// Whether the two are one orbit: see [`SameMotion`](crate::SameMotion).
     pub fn is_same_as(&self, other: &Self) -> bool {
-        self.distance_to(other).1 <= 10.0 * (self.error + other.error)
+        SameMotion::orbits(self, other)
     }
 
-    /// The same orbit starting from its lexicographically smallest state, so that
-    /// the phase at which it happened to be found does not show.
+    /// Whether the other orbit differs by at most this part of the size of the larger one, as a
+    /// continuation at a nearby parameter does.
+    pub fn is_near(&self, other: &Self, part: f64) -> bool {
+        self.distance_to(other).1 <= part * self.scale().max(other.scale())
+    }
+
+    /// The same orbit starting from its lexicographically smallest state, independent of the phase
+    /// at which it was found.
     #[must_use]
     pub fn canonical(mut self) -> Self {
         if let Some(first) = (0..self.states.len()).min_by(|&a, &b| {
@@ -133,7 +135,7 @@ impl PeriodicOrbit {
         self
     }
 
-    /// The states in one row-major block, `period × dimension`.
+    /// The states as one row-major block, `period × dimension`.
     pub(crate) fn flat(&self) -> Vec<f64> {
         self.states.concat()
     }

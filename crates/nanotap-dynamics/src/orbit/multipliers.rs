@@ -1,49 +1,47 @@
 //! Floquet multipliers: the eigenvalues of the monodromy matrix
 //! DPⁿ = A_{n−1} … A_0.
 //!
-//! When the product spans many orders of magnitude its small eigenvalues would be
-//! rubbish; then the factors are swept by QR (treppen iteration, the simultaneous
-//! iteration of a cyclic product) until the invariant subspaces of well-separated
-//! moduli part, and each diagonal block is multiplied up on its own. The
-//! determinant, summed from the factors, checks the result.
+//! When the product spans many orders of magnitude, its small eigenvalues are lost to rounding.
+//! Then QR sweeps over the factors (treppen iteration, the simultaneous iteration of a cyclic
+//! product) separate the invariant subspaces of different moduli, and each diagonal block is
+//! multiplied separately. The determinant, summed over the factors, checks the result.
 //!
-//! Fails: eigenvalues of a nearly defective product are only accurate to the
-//! square root of rounding, as for any method; a QR iteration that does not
-//! converge is reported.
+//! Fails: the eigenvalues of a nearly defective product are accurate only to the square root of
+//! rounding, as in any method. A QR iteration that does not converge is an error.
 
 use nalgebra::linalg::balancing::balance_parlett_reinsch;
 use nalgebra::{Complex, DMatrix, Schur};
 use nanotap_arithmetic::ComplexFunctions as _;
 
-/// A modulus within this of 1 is called marginal: a motion that needs ten million
-/// periods to grow or fade by a factor e, and the accuracy to which a double
-/// multiplier on the unit circle (an undamped system) is known.
+/// A multiplier whose modulus is within this of 1 is marginal: the motion needs ten million periods
+/// to grow or decay by a factor e. A double multiplier on the unit circle (an undamped system) is
+/// known to about this accuracy.
 pub const MARGIN: f64 = 1e-7;
 
-/// Span (natural logarithm) of the factors' diagonal beyond which the plain product
-/// is not trusted: 1e5, so that small multipliers keep ten digits.
+/// Largest span (natural logarithm) of the factors' diagonal for which the plain product is used: a
+/// factor of 1e5, which leaves ten digits to small multipliers.
 const PLAIN_SPAN: f64 = 11.5;
-/// Coupling between two blocks below which they are taken as parted.
-const PARTED: f64 = 1e-13;
-const SWEEPS: usize = 80;
+/// Coupling below which two blocks count as separated.
+const SEPARATED: f64 = 1e-13;
+const MAX_SWEEPS: usize = 80;
 
-/// What the multipliers say about an orbit.
+/// Stability of an orbit according to its multipliers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Stability {
     /// Every multiplier is inside the unit circle by more than [`MARGIN`].
     Stable,
     /// Some multipliers are outside the unit circle by more than [`MARGIN`].
     Unstable {
-        /// How many, pairs counted twice.
+        /// Number of unstable multipliers; a pair counts twice.
         unstable_dimension: usize,
     },
-    /// None is outside, but some lie on the unit circle within [`MARGIN`]:
-    /// an undamped system, or a bifurcation point.
+    /// No multiplier is outside, but some are on the unit circle within [`MARGIN`]: an undamped
+    /// system, or a bifurcation.
     Marginal,
 }
 
 impl Stability {
-    /// In a word: stable, unstable or marginal.
+    /// Name of the stability: stable, unstable or marginal.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Stable => "stable",
@@ -56,19 +54,18 @@ impl Stability {
 /// Eigenvalues of a product of matrices.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Multipliers {
-    /// Largest modulus first; a pair has its positive imaginary part first.
+    /// In descending order of modulus; of a pair, the one with positive imaginary part comes first.
     pub values: Vec<Complex<f64>>,
     /// log|det| summed over the factors.
     pub log_determinant: f64,
-    /// |Σ log|μ| − log|det||: what the two computations disagree by; 0 for a
-    /// singular product.
+    /// |Σ log|μ| − log|det||: the difference between the two computations; 0 for a singular product.
     pub determinant_defect: f64,
 }
 
 /// Why the multipliers could not be computed.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum MultiplierError {
-    /// No factor, or factors that are not square and of one size.
+    /// There is no factor, or the factors are not square matrices of one size.
     #[error("multipliers need at least one square factor, all of one size")]
     Shape,
     /// An entry is infinite or NaN, or the product overflows.
@@ -97,7 +94,7 @@ impl Multipliers {
         let mut values = if factors.len() == 1 || span(factors) < PLAIN_SPAN {
             product.eigenvalues()?
         } else {
-            swept(factors, &product)?
+            by_qr_sweeps(factors, &product)?
         };
         if values
             .iter()
@@ -111,7 +108,7 @@ impl Multipliers {
                 .then(b.re.total_cmp(&a.re))
                 .then(b.im.total_cmp(&a.im))
         });
-        pair_up(&mut values);
+        sort_pairs(&mut values);
         let sum: f64 = values
             .iter()
             .map(|v| nanotap_arithmetic::ln(v.modulus()))
@@ -124,13 +121,13 @@ impl Multipliers {
         })
     }
 
-    /// What the moduli say.
+    /// Stability according to the moduli.
     pub fn stability(&self) -> Stability {
         stability_of(&self.values)
     }
 }
 
-/// What a set of multipliers says about its orbit.
+/// Stability of an orbit with these multipliers.
 pub fn stability_of(multipliers: &[Complex<f64>]) -> Stability {
     let outside = multipliers
         .iter()
@@ -147,9 +144,9 @@ pub fn stability_of(multipliers: &[Complex<f64>]) -> Stability {
     }
 }
 
-/// Puts each conjugate pair side by side, positive imaginary part first: rounding
-/// may part two pairs of equal modulus.
-fn pair_up(values: &mut [Complex<f64>]) {
+/// Makes conjugate pairs adjacent, positive imaginary part first: rounding may separate pairs of
+/// equal modulus.
+fn sort_pairs(values: &mut [Complex<f64>]) {
     let mut k = 0;
     while k + 1 < values.len() {
         if values[k].im == 0.0 {
@@ -172,7 +169,7 @@ fn pair_up(values: &mut [Complex<f64>]) {
     }
 }
 
-/// log|det A|, minus infinity for a singular matrix.
+/// log|det A|; −∞ for a singular matrix.
 fn log_determinant(matrix: &DMatrix<f64>) -> f64 {
     let lu = matrix.clone().lu();
     lu.u()
@@ -182,7 +179,7 @@ fn log_determinant(matrix: &DMatrix<f64>) -> f64 {
         .sum()
 }
 
-/// Spread of log|R_ii| summed over one QR sweep: how graded the product is.
+/// Spread of log|R_ii| summed over one QR sweep: the grading of the product.
 fn span(factors: &[DMatrix<f64>]) -> f64 {
     let d = factors[0].nrows();
     let mut q = DMatrix::identity(d, d);
@@ -199,7 +196,7 @@ fn span(factors: &[DMatrix<f64>]) -> f64 {
     high - low
 }
 
-/// A matrix times a power of two, so that long products neither overflow nor vanish.
+/// A matrix times a power of two, which avoids overflow and underflow of long products.
 struct Scaled {
     matrix: DMatrix<f64>,
     exponent: i64,
@@ -241,8 +238,8 @@ impl Scaled {
         let mut values = eigenvalues(&self.matrix)?;
         let exponent = self.exponent.clamp(-4000, 4000) as i32;
         for v in &mut values {
-            // In two halves, so that a representable product of a large power and a
-            // small value does not overflow on the way.
+            // In two steps, so that the product of a large power and a small value does not
+            // overflow.
             let half = exponent / 2;
             *v = *v * 2f64.powi(half) * 2f64.powi(exponent - half);
         }
@@ -264,14 +261,17 @@ fn eigenvalues(matrix: &DMatrix<f64>) -> Result<Vec<Complex<f64>>, MultiplierErr
 }
 
 /// Eigenvalues of a graded product by QR sweeps over the factors.
-fn swept(factors: &[DMatrix<f64>], product: &Scaled) -> Result<Vec<Complex<f64>>, MultiplierError> {
+fn by_qr_sweeps(
+    factors: &[DMatrix<f64>],
+    product: &Scaled,
+) -> Result<Vec<Complex<f64>>, MultiplierError> {
     let d = factors[0].nrows();
     let mut start = Schur::try_new(product.matrix.clone(), f64::EPSILON, 400 * d)
         .map_or_else(|| DMatrix::identity(d, d), |s| s.unpack().0);
     let mut triangles = Vec::with_capacity(factors.len());
     let mut turn = DMatrix::identity(d, d);
     let mut previous = f64::INFINITY;
-    for sweep in 0..SWEEPS {
+    for sweep in 0..MAX_SWEEPS {
         triangles.clear();
         let mut q = start.clone();
         for a in factors {
@@ -281,10 +281,10 @@ fn swept(factors: &[DMatrix<f64>], product: &Scaled) -> Result<Vec<Complex<f64>>
         }
         turn = start.transpose() * &q;
         start = q;
-        // Stop once no coupling that is still falling is above the threshold.
+        // Stop when no coupling that still decreases is above the threshold.
         let remaining: f64 = (1..d)
             .map(|j| coupling(&turn, j))
-            .filter(|&c| c > PARTED)
+            .filter(|&c| c > SEPARATED)
             .sum();
         if remaining == 0.0 || (sweep > 10 && remaining > 0.999 * previous) {
             break;
@@ -294,7 +294,7 @@ fn swept(factors: &[DMatrix<f64>], product: &Scaled) -> Result<Vec<Complex<f64>>
     let mut values = Vec::with_capacity(d);
     let mut first = 0;
     for end in 1..=d {
-        if end < d && coupling(&turn, end) > PARTED {
+        if end < d && coupling(&turn, end) > SEPARATED {
             continue;
         }
         let size = end - first;
@@ -310,8 +310,7 @@ fn swept(factors: &[DMatrix<f64>], product: &Scaled) -> Result<Vec<Complex<f64>>
     Ok(values)
 }
 
-/// Largest entry of the lower-left block that would be zero if the first `j`
-/// directions were invariant.
+/// Largest entry of the lower-left block, which is zero if the first `j` directions are invariant.
 fn coupling(turn: &DMatrix<f64>, j: usize) -> f64 {
     turn.view((j, 0), (turn.nrows() - j, j)).amax()
 }
@@ -331,8 +330,8 @@ mod tests {
         assert!(m.determinant_defect < 1e-14);
     }
 
-    /// The eigenvalues of (B A)ᵏ are powers of those of B A, over 60 orders of
-    /// magnitude: the plain product would lose the small one entirely.
+    /// The eigenvalues of (B A)ᵏ are powers of those of B A, over 60 orders of magnitude: the plain
+    /// product would lose the small one.
     #[test]
     fn small_multipliers_of_a_long_product_keep_their_digits() {
         let a = DMatrix::from_row_slice(3, 3, &[2.0, 1.0, 0.3, 0.5, 0.4, -0.2, 0.1, 0.7, 0.05]);
@@ -376,8 +375,8 @@ mod tests {
         assert_eq!(m.determinant_defect, 0.0);
     }
 
-    /// Products that overflow or vanish on the way, with factors that undo it; and one that is
-    /// itself beyond the range, or at its lower end.
+    /// Products that overflow or underflow on the way, with factors that compensate; and one that
+    /// is itself beyond the range or at its lower end.
     #[test]
     fn a_long_product_neither_overflows_nor_vanishes() {
         let scaled = |power: i32| DMatrix::from_element(1, 1, 2f64.powi(power));
@@ -394,7 +393,7 @@ mod tests {
     }
 
     /// Factors S_{k+1} D_k S_k⁻¹ with S_n = S_0: the multipliers are the products of the diagonals,
-    /// here from 4²⁰ to 0.003²⁰, of which a plain product keeps the first two.
+    /// from 4²⁰ to 0.003²⁰. A plain product keeps the first two only.
     #[test]
     fn known_multipliers_of_factors_that_share_no_directions() {
         let (n, diagonal) = (20, [4.0, 1.5, -0.1, 0.003]);
@@ -418,15 +417,16 @@ mod tests {
         }
     }
 
-    /// Rounding may part pairs of one modulus; real ones before and after stay where they are.
+    /// Rounding may separate pairs of equal modulus; real multipliers before and after keep their
+    /// places.
     #[test]
-    fn pairs_stand_side_by_side() {
+    fn pairs_are_adjacent() {
         let p = Complex::new(0.6, 0.8);
         let q = Complex::new(0.8, 0.6);
         let real = |x: f64| Complex::new(x, 0.0);
         let paired = |values: &[Complex<f64>]| {
             let mut values = values.to_vec();
-            pair_up(&mut values);
+            sort_pairs(&mut values);
             values
         };
         let both = [p, p.conj(), q, q.conj()];
@@ -437,7 +437,7 @@ mod tests {
         assert_eq!(paired(&parted), among);
     }
 
-    /// A modulus exactly at the margin is marginal on either side.
+    /// A modulus exactly at the margin is marginal, on either side.
     #[test]
     fn the_margin_itself_is_marginal() {
         for modulus in [1.0 + MARGIN, 1.0, 1.0 - MARGIN] {
@@ -462,7 +462,7 @@ mod tests {
     }
 
     proptest! {
-        /// A cyclic rotation of the factors leaves the multipliers alone.
+        /// A cyclic permutation of the factors does not change the multipliers.
         #[test]
         fn multipliers_do_not_depend_on_the_phase(
             entries in prop::collection::vec(-1.0f64..1.0, 3 * 9),
@@ -475,7 +475,7 @@ mod tests {
             turned.rotate_left(1);
             let a = Multipliers::of_product(&factors).unwrap();
             let b = Multipliers::of_product(&turned).unwrap();
-            // Nearly double eigenvalues move by the square root of rounding.
+            // Nearly double eigenvalues change by the square root of rounding.
             let gap = a.values[0].modulus().max(1.0) * 1e-6;
             for x in &a.values {
                 prop_assert!(b.values.iter().any(|y| (x - y).modulus() < gap));

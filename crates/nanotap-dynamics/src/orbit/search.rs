@@ -1,10 +1,10 @@
-//! Every periodic orbit that Newton reaches, unstable ones included.
+//! Search for periodic orbits, stable and unstable.
 //!
-//! From each start, Newton is tried for every period on the start itself and on the
-//! nearest recurrence of each period in the run from it: a chaotic motion passes
-//! close to the unstable orbits that are embedded in it.
+//! From each start, Newton is tried for every period at the start itself and at the nearest
+//! recurrence of that period in the run from it: a chaotic motion passes close to the unstable
+//! orbits embedded in it.
 //!
-//! Fails by omission: a list from finitely many starts is never proved complete.
+//! Fails by omission: a list from finitely many starts is never proved to be complete.
 
 use std::sync::atomic::AtomicUsize;
 
@@ -16,16 +16,16 @@ use crate::map::StroboscopicMap;
 use crate::orbit::{PeriodicOrbit, ShootingOptions, close_orbit, close_orbit_from_points};
 use crate::vector::{distance, norm};
 
-/// What to search for orbits.
+/// Options of the search.
 #[derive(Clone, Debug, PartialEq)]
 pub struct OrbitSearch {
-    /// Longest period.
+    /// Longest period in drive periods.
     pub max_period: usize,
-    /// Periods that are run from each start in search of recurrences; 0 for none.
+    /// Number of drive periods run from each start in search of recurrences; 0 for none.
     pub run: usize,
-    /// States with a larger entry end a run.
+    /// A run ends at a state with an entry above this, in units of the state.
     pub bound: f64,
-    /// Newton's options.
+    /// Options of Newton's method.
     pub shooting: ShootingOptions,
 }
 
@@ -40,8 +40,8 @@ impl Default for OrbitSearch {
     }
 }
 
-/// All orbits found from these starts, each once, by period and then by largest
-/// multiplier and first state. The same for any number of threads.
+/// Finds the orbits from these starts, each once, in order of period, largest multiplier and first
+/// state. The result does not depend on the number of threads.
 pub fn find_orbits<M: StroboscopicMap>(
     map: &M,
     starts: &[Vec<f64>],
@@ -80,7 +80,7 @@ pub fn find_orbits<M: StroboscopicMap>(
     all
 }
 
-/// Index of an orbit in a list, after adding it (in canonical phase) if it is new.
+/// Index of an orbit in a list; a new orbit is appended (in canonical phase).
 pub(crate) fn merge(all: &mut Vec<PeriodicOrbit>, orbit: PeriodicOrbit) -> usize {
     if let Some(index) = all.iter().position(|o| o.is_same_as(&orbit)) {
         return index;
@@ -118,7 +118,7 @@ fn from_one_start<M: StroboscopicMap>(
     }
     let count = run.len() / d;
     let at = |k: usize| &run[k * d..(k + 1) * d];
-    // A quarter of the run lets the start's own transient pass.
+    // The first quarter of the run is the transient of the start.
     for period in 1..=search.max_period.min(count - 1) {
         let nearest = (count / 4..count - period).min_by(|&a, &b| {
             distance(at(a), at(a + period)).total_cmp(&distance(at(b), at(b + period)))

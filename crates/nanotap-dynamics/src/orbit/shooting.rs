@@ -1,18 +1,18 @@
-//! Periodic orbits by Newton's method on all their strobe points at once
-//! (multiple shooting; for period 1 it is single shooting).
+//! Periodic orbits by Newton's method on all strobe points at once (multiple shooting; single
+//! shooting for period 1).
 //!
-//! Unknown are x_0 … x_{n−1} with P(x_k) = x_{k+1}, x_n = x_0, so a chaotic stretch
-//! grows by one period only. Steps are damped until the sum of squared residuals
-//! falls. Iteration goes on until rounding stops it, not until a tolerance is met.
+//! The unknowns are x_0 … x_{n−1} with P(x_k) = x_{k+1}, x_n = x_0, so errors in a chaotic segment
+//! grow over one period only. Steps are damped until the sum of squared residuals decreases. The
+//! iteration stops when rounding prevents progress, not at a tolerance.
 //!
-//! The minimal period is proved, not read off: for every proper divisor m of n,
-//! either P^m(x) differs from x by far more than the orbit's error estimate, or
-//! Newton on P^m from x finds an orbit at the same place, which is then the answer.
+//! The minimal period is verified: for every proper divisor m of n, either P^m(x) differs from x by
+//! much more than the orbit's error estimate, or Newton on P^m from x finds an orbit at the same
+//! place, which is then returned.
 //!
-//! Fails, with a typed reason: where no descent is possible (a residual minimum that
-//! is no orbit, a map that refuses), and near a multiplier +1 (fold), where the
-//! orbit is not isolated to rounding. Newton finds *an* orbit near the guess, not
-//! necessarily the one that the motion tends to: [`mod@crate::classify`] checks that.
+//! Fails with a typed error if no descent is possible (a minimum of the residual that is not an
+//! orbit, or a failing map), and near a multiplier +1 (fold), where the orbit is not isolated to
+//! rounding. Newton finds *an* orbit near the guess, not necessarily the one that the motion
+//! converges to: [`mod@crate::classify`] checks that.
 
 use nalgebra::DMatrix;
 use nanotap_arithmetic::ComplexFunctions as _;
@@ -22,26 +22,25 @@ use crate::map::StroboscopicMap;
 use crate::orbit::PeriodicOrbit;
 use crate::orbit::block_cyclic::BlockCyclic;
 use crate::orbit::multipliers::{MultiplierError, Multipliers};
-use crate::orbit::side_by_side::side_by_side;
+use crate::orbit::parallel::for_each_period;
 use crate::vector::{distance, mix, norm, sum_of_squares};
 
-/// How hard Newton tries.
+/// Options of Newton's method.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ShootingOptions {
     /// Largest number of Newton steps.
     pub max_iterations: usize,
-    /// Shortest fraction of a Newton step that is tried before giving up.
+    /// Smallest fraction of a Newton step that is tried.
     pub min_damping: f64,
-    /// A residual above this times the orbit's scale (its largest entry) when the
-    /// iteration stalls is not an orbit. Set it to the accuracy of the map; the
-    /// residual reached is normally far below.
+    /// Largest residual of an orbit when the iteration stalls, as a fraction of the orbit's scale
+    /// (its largest entry). Set it to the accuracy of the map; the final residual is normally much
+    /// smaller.
     pub residual_tolerance: f64,
-    /// Newton gives up where the linearised return from the points it has come to stretches
-    /// some direction by more than this: the orbits near are unstable. Infinite where those
-    /// are wanted too.
+    /// Newton stops if the linearised return at the current points stretches some direction by more
+    /// than this: the orbits nearby are unstable. Infinite to find unstable orbits too.
     pub max_growth: f64,
-    /// Whether a stall beside a multiplier +1 is told from any other, which takes the
-    /// multipliers.
+    /// Whether to compute the multipliers after a stall, to report a multiplier near +1 as the
+    /// reason.
     pub explains_stalls: bool,
 }
 
@@ -57,26 +56,26 @@ impl Default for ShootingOptions {
     }
 }
 
-/// Why no orbit was closed.
+/// Why no orbit was found.
 #[derive(Clone, Debug, thiserror::Error)]
 pub enum ShootingError {
     /// The guess does not fit the map.
-    #[error("bad guess: {0}")]
+    #[error("invalid initial guess: {0}")]
     BadGuess(String),
-    /// The orbit's Jacobians would take gigabytes.
+    /// The Jacobians of the orbit would need gigabytes of memory.
     #[error(
-        "an orbit of period {period} in {dimension} variables takes too much memory; its period can be {limit} at most"
+        "an orbit of period {period} in {dimension} variables needs too much memory; the largest period is {limit}"
     )]
     TooLarge {
         /// Requested period, in drive periods.
         period: usize,
         /// Dimension of the map.
         dimension: usize,
-        /// Longest period in so many variables.
+        /// Longest period for this dimension.
         limit: usize,
     },
     /// The map failed at the guess.
-    #[error("the map could not be followed from the guess")]
+    #[error("the map failed at the initial guess")]
     Map(#[from] MapFailure),
     /// Newton stalled where there is no orbit.
     #[error(
@@ -85,11 +84,11 @@ pub enum ShootingError {
     Diverged {
         /// Requested period, in drive periods.
         period: usize,
-        /// Newton steps taken.
+        /// Number of Newton steps.
         iterations: usize,
-        /// Largest entry of the residual at the end.
+        /// Largest entry of the final residual, in units of the state.
         residual: f64,
-        /// What stopped it.
+        /// Reason of the stall.
         reason: DivergenceReason,
     },
     /// The orbit is not isolated to rounding: a multiplier is too near +1.
@@ -101,7 +100,7 @@ pub enum ShootingError {
         period: usize,
         /// Distance of the nearest multiplier from +1 where Newton stopped.
         distance: f64,
-        /// Largest entry of the residual there.
+        /// Largest entry of the residual there, in units of the state.
         residual: f64,
     },
     /// The multipliers of a closed orbit could not be computed.
@@ -109,23 +108,22 @@ pub enum ShootingError {
     Multipliers(#[from] MultiplierError),
 }
 
-/// What stopped a Newton iteration that found nothing.
+/// Why a Newton iteration stalled.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum DivergenceReason {
     /// No fraction of the step lowers the residual.
     #[error("no step lowers the residual")]
     NoDescent,
-    /// The allowed number of steps was used up.
+    /// The largest number of steps was reached.
     #[error("too many steps")]
     TooManySteps,
-    /// Only unstable orbits are near, and they were not wanted.
+    /// Only unstable orbits are nearby, and [`ShootingOptions::max_growth`] excludes them.
     #[error("only unstable orbits are near")]
     Unstable,
 }
 
-/// Closes a period-`period` orbit near the trajectory that starts at `guess`
-/// (length: dimension of the map). The orbit that comes back has its minimal
-/// period, which may divide `period`.
+/// Finds an orbit of period `period` near the trajectory from `guess` (length: dimension of the
+/// map). The returned orbit has its minimal period, which may divide `period`.
 ///
 /// # Errors
 /// See [`ShootingError`].
@@ -148,8 +146,8 @@ pub fn close_orbit<M: StroboscopicMap>(
     close_orbit_from_points(map, &points, period, options)
 }
 
-/// As [`close_orbit`], from guesses for all strobe points, row by row
-/// (`period × dimension` values).
+/// As [`close_orbit`], from guesses for all strobe points, row by row (`period × dimension`
+/// values).
 ///
 /// # Errors
 /// See [`ShootingError`].
@@ -166,10 +164,11 @@ pub fn close_orbit_from_points<M: StroboscopicMap>(
     newton.into_minimal_orbit(map, options)
 }
 
-/// Most entries of the Jacobians of all periods of an orbit: Newton keeps several times as many.
+/// Largest number of entries of the Jacobians of all periods of an orbit: Newton stores several
+/// times as many.
 const MAX_ENTRIES: usize = 1 << 24;
 
-/// Refuses an orbit whose Jacobians do not fit into memory.
+/// Checks that the Jacobians of an orbit fit into memory.
 ///
 /// # Errors
 /// [`ShootingError::TooLarge`].
@@ -200,7 +199,7 @@ fn check<M: StroboscopicMap>(
     check_size(d, period)?;
     if values.len() != rows * d {
         return Err(ShootingError::BadGuess(format!(
-            "{} numbers given, {} needed ({rows} states of {d})",
+            "got {} numbers, expected {} ({rows} states of dimension {d})",
             values.len(),
             rows * d
         )));
@@ -211,19 +210,19 @@ fn check<M: StroboscopicMap>(
     Ok(())
 }
 
-/// Residual, in units of the orbit's scale, below which a last step of Newton's is taken and not
-/// looked at: what it leaves is rounding.
+/// Residual, in units of the orbit's scale, below which a final Newton step is accepted without a
+/// check: the remaining error is rounding.
 pub(crate) const ROUNDING: f64 = 32.0 * f64::EPSILON;
-/// The longest such step, in the same units: its square is rounding. A longer one is the noise of
-/// an orbit that is hardly determined.
-pub(crate) const LAST_STEP: f64 = 1e-8;
+/// Largest final step in the same units: its square is rounding. A longer step is the noise of a
+/// poorly determined orbit.
+pub(crate) const MAX_FINAL_STEP: f64 = 1e-8;
 
-/// How often discrete entries are set anew at one place: where they do not come to rest, the
-/// residual says so.
-pub(crate) const MOST_SETTINGS: usize = 3;
+/// Largest number of updates of the discrete entries at one place. If they do not settle, the
+/// residual shows it.
+pub(crate) const MAX_DISCRETE_UPDATES: usize = 3;
 
-/// Sets the discrete entries of points, those after the `continuous` ones of each, to what the map
-/// made of the points before; false if they were that.
+/// Sets the discrete entries of points, those after the `continuous` ones of each, to the values
+/// that the map gave at the points before; returns false if nothing changed.
 pub(crate) fn set_discrete_entries(
     points: &mut [f64],
     residuals: &[f64],
@@ -244,7 +243,7 @@ pub(crate) fn set_discrete_entries(
     changed
 }
 
-/// What is missing for the periods that end at `ends` to lead from each of the points to the next.
+/// Replaces the ends of the periods by their differences from the next points.
 pub(crate) fn ends_to_residuals(ends: &mut [f64], points: &[f64], d: usize) {
     let next = points[d..].iter().chain(&points[..d]);
     for (end, next) in ends.iter_mut().zip(next) {
@@ -259,10 +258,9 @@ pub(crate) struct Segments {
     pub(crate) points: Vec<f64>,
     pub(crate) residuals: Vec<f64>,
     pub(crate) jacobians: Vec<DMatrix<f64>>,
-    /// Largest entry of any state, the guess's included: an orbit at the origin
-    /// has no scale of its own.
+    /// Largest entry of any state, including the guess: an orbit at the origin has no scale.
     pub(crate) scale: f64,
-    /// How many of the last entries of a state are whole numbers that the map sets.
+    /// Number of trailing entries of a state that are whole numbers set by the map.
     pub(crate) discrete: usize,
 }
 
@@ -279,8 +277,8 @@ impl Segments {
         }
     }
 
-    /// Residuals, and Jacobians if wanted, at the present points, of which discrete entries are
-    /// set to what the map makes of them.
+    /// Residuals, and Jacobians on request, at the current points. Discrete entries are set to the
+    /// values that the map gives.
     fn evaluate<M: StroboscopicMap>(
         &mut self,
         map: &mut M,
@@ -288,7 +286,7 @@ impl Segments {
     ) -> Result<(), MapFailure> {
         self.discrete = map.discrete_entries();
         self.evaluate_points(map, jacobians)?;
-        for _ in 0..MOST_SETTINGS {
+        for _ in 0..MAX_DISCRETE_UPDATES {
             let continuous = self.d - self.discrete;
             if !set_discrete_entries(&mut self.points, &self.residuals, self.d, continuous) {
                 break;
@@ -306,7 +304,7 @@ impl Segments {
         self.residuals.copy_from_slice(&self.points);
         let ends = self.residuals.chunks_exact_mut(self.d);
         let mut periods: Vec<_> = ends.zip(&mut self.jacobians).collect();
-        side_by_side(map, &mut periods, &|map, (state, jacobian)| {
+        for_each_period(map, &mut periods, &|map, (state, jacobian)| {
             if jacobians {
                 advance_with_jacobian(map, state, jacobian)
             } else {
@@ -317,7 +315,7 @@ impl Segments {
         Ok(())
     }
 
-    /// Moves the points by `step`, what is discrete in them apart.
+    /// Adds `step` to the continuous entries of the points.
     fn take(&mut self, step: &[f64]) {
         let steps = step.chunks_exact(self.d);
         for (point, step) in self.points.chunks_exact_mut(self.d).zip(steps) {
@@ -327,7 +325,7 @@ impl Segments {
         }
     }
 
-    /// Newton until rounding stops it.
+    /// Newton's method until rounding prevents progress.
     fn converge<M: StroboscopicMap>(
         &mut self,
         map: &mut M,
@@ -352,7 +350,7 @@ impl Segments {
                 return Err(self.singular(residual));
             }
             if residual <= ROUNDING * self.scale {
-                if norm(&step) <= LAST_STEP * self.scale {
+                if norm(&step) <= MAX_FINAL_STEP * self.scale {
                     self.take(&step);
                 }
                 return Ok(());
@@ -363,8 +361,9 @@ impl Segments {
                 for ((t, x), s) in trial.points.iter_mut().zip(&self.points).zip(&step) {
                     *t = x + damping * s;
                 }
-                // A map that refuses the trial point is one more reason to go less far. A full
-                // step mostly holds; of a shorter one the Jacobians are computed once it does.
+                // A map that fails at the trial point is a reason to shorten the step. A full step
+                // usually succeeds; for a shorter one the Jacobians are computed after it has been
+                // accepted.
                 let full = damping == 1.0;
                 let wanted = 1.0 - 0.5 * damping;
                 let lowered = trial.evaluate(map, full).is_ok()
@@ -376,7 +375,7 @@ impl Segments {
                     break;
                 }
                 if small {
-                    // At rounding level: a full step no longer halves the residual.
+                    // At rounding level a full step no longer halves the residual.
                     return Ok(());
                 }
                 damping *= 0.5;
@@ -397,8 +396,8 @@ impl Segments {
         }
     }
 
-    /// What the second of two linearised returns does to the length of a vector: near the
-    /// largest modulus of the multipliers, and above it where they are not normal.
+    /// Growth of the length of a vector in the second of two linearised returns: close to the
+    /// largest modulus of the multipliers, or above it if the monodromy matrix is not normal.
     fn growth(&self) -> f64 {
         let d = self.d;
         let mut v: Vec<f64> = (0..d).map(|i| 1.0 + (mix(i as u64) & 7) as f64).collect();
@@ -452,7 +451,7 @@ impl Segments {
         if !options.explains_stalls {
             return self.diverged(iterations, reason);
         }
-        // A stall beside a multiplier +1 is the mark of a fold just passed.
+        // A stall near a multiplier +1 is typical of a fold just passed.
         let distance = self.distance_from_one();
         if distance < 1e-6 {
             return ShootingError::Singular {
@@ -473,8 +472,8 @@ impl Segments {
         }
     }
 
-    /// How far the points may be from the true orbit: the Newton corrections that
-    /// answer the residual and a rounding error in every entry of every period.
+    /// Estimated distance of the points from the exact orbit: the Newton corrections for the
+    /// residual and for a rounding error in every entry of every period.
     pub(crate) fn error_estimate(&self) -> Option<f64> {
         let noise = self.rounding();
         let mut system = BlockCyclic::new(self.d, self.n);
@@ -502,8 +501,8 @@ impl Segments {
         Some(error)
     }
 
-    /// Rounding of each entry of each P(x_k): some tens of operations on every
-    /// entry of x_k, carried through DP, and of the result.
+    /// Rounding error of each entry of each P(x_k): some tens of operations on every entry of x_k,
+    /// multiplied by DP, and on the result.
     fn rounding(&self) -> Vec<f64> {
         let (d, n) = (self.d, self.n);
         let mut noise = vec![0.0; n * d];
@@ -556,7 +555,7 @@ impl Segments {
                 }
             }
             if reach.is_some() {
-                // Neither far from closing early nor closing early.
+                // The orbit is neither clearly of shorter period nor clearly not.
                 return Err(self.singular(residual));
             }
         }
@@ -596,8 +595,8 @@ mod tests {
         segments
     }
 
-    /// Three points of two numbers and a flag: what the map makes of the flag of one belongs to
-    /// the next, what it makes of the last to the first.
+    /// Three points of two numbers and a flag: the flag that the map returns for one point belongs
+    /// to the next, and that of the last point to the first.
     #[test]
     fn flags_go_to_the_point_that_follows() {
         let mut points = [1.0, 2.0, 0.0, 3.0, 4.0, 1.0, 5.0, 6.0, 0.0];
@@ -608,8 +607,8 @@ mod tests {
         assert!(!set_discrete_entries(&mut points, &settled, 3, 2));
     }
 
-    /// A scaled rotation stretches every vector alike; a matrix of rank one turns all into one
-    /// direction at the first return and stretches it by its trace at the second.
+    /// A scaled rotation stretches every vector by the same factor. A matrix of rank one maps all
+    /// vectors to one direction in the first return and stretches it by its trace in the second.
     #[test]
     fn growth_of_known_products() {
         let turn = |size: f64| DMatrix::from_row_slice(2, 2, &[0.6, -0.8, 0.8, 0.6]) * size;

@@ -50,11 +50,11 @@ fn branch<F: MapFamily>(
     .unwrap()
 }
 
-fn parameters(branch: &Branch, wanted: fn(&BifurcationKind) -> bool) -> Vec<f64> {
+fn parameters(branch: &Branch, is_wanted: fn(&BifurcationKind) -> bool) -> Vec<f64> {
     branch
         .bifurcations
         .iter()
-        .filter(|b| wanted(&b.kind))
+        .filter(|b| is_wanted(&b.kind))
         .map(|b| b.parameter)
         .collect()
 }
@@ -74,10 +74,10 @@ const TORUS: fn(&BifurcationKind) -> bool = |k| matches!(k, BifurcationKind::Nei
 
 const HENON: Family<Henon> = Family(|a| Henon { a, b: 0.3 });
 
-/// Downwards from a = 0.2: round the fold at a = −(1−b)²/4 and up the unstable side,
-/// which runs off to infinity as a → 0.
+/// Downwards from a = 0.2: through the fold at a = −(1−b)²/4 and up the unstable side, which goes
+/// to infinity as a → 0.
 #[test]
-fn the_henon_fixed_point_turns_at_its_fold() {
+fn the_henon_fixed_point_branch_turns_at_its_fold() {
     let orbit = orbit_at(&HENON, 0.2, &[0.8, 0.2], 1);
     let options = ContinuationOptions {
         bound: 50.0,
@@ -113,7 +113,7 @@ fn the_henon_fixed_point_turns_at_its_fold() {
 
 /// The fixed point 1 − 1/r of the logistic map has the multiplier 2 − r: −1.5 at r = 3.5.
 #[test]
-fn a_branch_is_left_where_its_orbit_repels_too_strongly() {
+fn a_branch_ends_where_its_multiplier_exceeds_the_limit() {
     let orbit = orbit_at(&LOGISTIC, 2.5, &[0.6], 1);
     let options = ContinuationOptions {
         max_multiplier: 1.5,
@@ -148,7 +148,7 @@ fn henon_flips_and_its_doubled_branch() {
 
 const LOGISTIC: Family<Logistic> = Family(Logistic);
 
-/// Doubled twice: 3, 1 + √6, and 3.5440903596 (the period-4 orbit's flip).
+/// Two doublings: at 3 and 1 + √6; the period-4 orbit doubles at 3.5440903596.
 #[test]
 fn the_logistic_cascade() {
     let options = ContinuationOptions::over(2.0, 4.0);
@@ -173,8 +173,8 @@ fn the_logistic_cascade() {
     near(&parameters(&third, FLIP), &[3.5440903596], 1e-9);
 }
 
-/// The period-3 window opens in a fold at 1 + √8; followed down from its stable side
-/// the branch comes back up unstable.
+/// The period-3 window opens in a fold at 1 + √8. Followed downwards from its stable side, the
+/// branch returns upwards unstable.
 #[test]
 fn the_period_three_window_opens_in_a_fold() {
     let b = branch(&LOGISTIC, 3.835, &[0.5], 3, 3.0, (3.5, 4.0));
@@ -185,9 +185,9 @@ fn the_period_three_window_opens_in_a_fold() {
     assert_eq!(b.period, 3);
 }
 
-/// Followed down, the period-2 branch runs into the fixed point at r = 3.
+/// Followed downwards, the period-2 branch meets the fixed point at r = 3.
 #[test]
-fn a_doubled_branch_ends_where_it_was_born() {
+fn a_doubled_branch_ends_at_its_flip() {
     let b = branch(&LOGISTIC, 3.3, &[0.8], 2, 2.0, (2.5, 3.5));
     let BranchEnd::Collapsed { period, parameter } = b.end else {
         panic!("{:?}", b.end)
@@ -197,10 +197,10 @@ fn a_doubled_branch_ends_where_it_was_born() {
     assert!(b.bifurcations.is_empty(), "{:?}", b.bifurcations);
 }
 
-/// The origin of the logistic map is crossed at r = 1, that of the cubic map meets a
+/// Another branch crosses the origin of the logistic map at r = 1; that of the cubic map has a
 /// pitchfork at r = 1: a multiplier +1 without a fold.
 #[test]
-fn crossings_are_no_folds() {
+fn crossings_are_not_reported_as_folds() {
     let b = branch(&LOGISTIC, 0.4, &[0.0], 1, 2.0, (0.1, 2.0));
     near(&parameters(&b, CROSSING), &[1.0], 1e-12);
     assert!(parameters(&b, FOLD).is_empty());
@@ -210,7 +210,7 @@ fn crossings_are_no_folds() {
 
 /// The delayed logistic map: a = 2, multipliers e^{±iπ/3}.
 #[test]
-fn the_torus_is_born_at_its_exact_place() {
+fn the_neimark_sacker_point_is_exact() {
     let b = branch(
         &Family(DelayedLogistic),
         1.5,
@@ -227,8 +227,8 @@ fn the_torus_is_born_at_its_exact_place() {
     assert_eq!(b.bifurcations.len(), 1);
 }
 
-/// Two uncoupled real directions with multipliers λ and 1/(2 − λ)… whose product
-/// passes 1 while neither is complex: a neutral saddle, no bifurcation.
+/// Two uncoupled real directions with multipliers λ and 1/(2 − λ). Their product passes 1 while
+/// neither is complex: a neutral saddle, which is not a bifurcation.
 #[derive(Clone, Debug)]
 struct NeutralSaddle(f64);
 
@@ -250,7 +250,7 @@ impl Formula for NeutralSaddle {
 }
 
 #[test]
-fn a_neutral_saddle_is_no_bifurcation() {
+fn a_neutral_saddle_is_not_a_bifurcation() {
     let b = branch(&Family(NeutralSaddle), 0.3, &[0.0, 0.0], 1, 0.8, (0.2, 0.8));
     assert!(b.bifurcations.is_empty(), "{:?}", b.bifurcations);
     assert!(matches!(b.end, BranchEnd::RangeEnd));
@@ -258,7 +258,7 @@ fn a_neutral_saddle_is_no_bifurcation() {
 
 const A: f64 = 0.4;
 
-/// Grazing at μ = 0 and the fold it brings at μ = 4(1−a)³/(27b²), beside each other.
+/// Grazing at μ = 0 and the nearby fold at μ = 4(1−a)³/(27b²).
 #[test]
 fn a_soft_grazing_and_its_fold() {
     let family = Family(|mu| Grazing { mu, a: A, b: 1.5 });
@@ -274,7 +274,7 @@ fn a_soft_grazing_and_its_fold() {
     assert!((last.parameter - ((1.0 - A) * x - 1.5 * x.powf(1.5))).abs() < 1e-12);
 }
 
-/// With b < 0 the contact brings a flip, at √x = −2(1 + a)/(3b).
+/// With b < 0 the contact causes a flip, at √x = −2(1 + a)/(3b).
 #[test]
 fn a_soft_grazing_and_its_flip() {
     let family = Family(|mu| Grazing { mu, a: A, b: -3.0 });
@@ -288,8 +288,8 @@ fn a_soft_grazing_and_its_flip() {
     );
 }
 
-/// A hard grazing is found from the side where the orbit is smooth, whether the orbit
-/// goes on beyond with a vertical tangent (b > 0) or turns back in a corner (b < 0).
+/// A hard grazing is found from the side on which the orbit is smooth, whether the orbit continues
+/// beyond it with a vertical tangent (b > 0) or turns back in a corner (b < 0).
 #[test]
 fn a_hard_grazing_is_located() {
     for strength in [1.0, -1.0] {
@@ -303,9 +303,12 @@ fn a_hard_grazing_is_located() {
     }
 }
 
-/// x → (x + μ)/2 with the fixed point μ, and extrema of several switching functions along it.
+/// x → (x + μ)/2 with the fixed point μ, and extrema of several switching functions along the
+/// orbit.
 #[derive(Clone, Debug)]
 struct Watched(f64);
+
+impl nanotap_dynamics::Scheduling for Watched {}
 
 impl StroboscopicMap for Watched {
     type Error = Infallible;
@@ -339,16 +342,16 @@ impl StroboscopicMap for Watched {
     ) -> Result<(), Infallible> {
         let x = state[0];
         let mut extrema = vec![
-            // Its time goes with the parameter.
+            // Its time depends on the parameter.
             (0.2 + 0.1 * x, x - 0.3),
-            // Two switches at one extremum.
+            // Two switching functions with one extremum.
             (0.45, x - 0.8),
             (0.45, 3.0),
             (0.7, 0.5 - x),
-            // Comes round past the strobe at x = 0.4.
+            // Passes the strobe at x = 0.4.
             ((0.9 + 0.25 * x) % 1.0, x - 0.62),
         ];
-        // A minimum and a maximum are born, both away from zero.
+        // A minimum and a maximum appear, both away from zero.
         if x > 0.66 {
             extrema.extend([(0.31, 2.0), (0.33, 2.5)]);
         }
@@ -385,9 +388,10 @@ impl MapFamily for WatchedFamily {
     }
 }
 
-/// Each extremum grazes where its own value vanishes, at its own time, whichever others are near.
+/// Each extremum grazes where its own value vanishes, at its own time, whatever other extrema are
+/// near.
 #[test]
-fn extrema_that_move_meet_and_are_born_are_told_apart() {
+fn moving_and_appearing_extrema_are_distinguished() {
     let b = branch(&WatchedFamily, 0.05, &[0.05], 1, 1.0, (0.05, 1.0));
     near(&parameters(&b, GRAZING), &[0.3, 0.5, 0.62, 0.8], 1e-12);
     assert_eq!(b.bifurcations.len(), 4);
@@ -399,9 +403,10 @@ fn extrema_that_move_meet_and_are_born_are_told_apart() {
     }
 }
 
-/// Other threads locate them while the branch goes on; each comes to its place, to the last digit.
+/// Other threads locate them during the continuation; their positions are the same to the last
+/// digit.
 #[test]
-fn bifurcations_are_the_same_whoever_locates_them() {
+fn bifurcations_do_not_depend_on_the_thread_that_locates_them() {
     let located = || {
         let watched = branch(&WatchedFamily, 0.05, &[0.05], 1, 1.0, (0.05, 1.0));
         let circle = branch(&Family(Isola), 0.1, &[1.0], 1, 1.0, (-2.0, 2.0));
@@ -507,10 +512,10 @@ fn bad_options_and_starts_are_refused() {
     ));
 }
 
-/// Through a resonance the orbit grows ten-thousandfold and shrinks again: the branch
-/// reaches the other end in steps that keep to its size, not to that of its foot.
+/// Through a resonance the orbit grows by a factor of ten thousand and shrinks again: the branch
+/// reaches the other end in steps relative to its present size, not to its first one.
 #[test]
-fn a_branch_does_not_creep_through_a_resonance() {
+fn a_branch_passes_a_resonance_in_few_steps() {
     let radius = 0.9999;
     let family = Family(|angle| {
         Resonance(Focus {
@@ -536,10 +541,10 @@ fn a_branch_does_not_creep_through_a_resonance() {
     assert!((state[0].hypot(state[1]) / size - 1.0).abs() < 1e-12);
 }
 
-/// Towards a drive of zero a homogeneous orbit shrinks to a point: the branch comes to
-/// that end, with no parameter outside its range and no bifurcation made of rounding.
+/// Towards drive amplitude zero a homogeneous orbit shrinks to a point: the branch reaches that end
+/// without leaving the range and without a bifurcation caused by rounding.
 #[test]
-fn a_homogeneous_branch_comes_to_its_point() {
+fn a_homogeneous_branch_vanishes_at_zero_drive() {
     for (a, b) in [(0.3, 0.4), (0.3, -0.9), (-0.5, 0.2)] {
         for from in [1.0, 1e-3, 7.3e4] {
             let family = Family(match (a, b) {
@@ -569,7 +574,7 @@ fn a_homogeneous_branch_comes_to_its_point() {
     }
 }
 
-/// A branch that is cut says so; one that comes to an end does not.
+/// A branch that is cut is a failure; one that reaches an end is not.
 #[test]
 fn only_a_cut_branch_is_a_failure() {
     let family = Family(Logistic);

@@ -1,4 +1,4 @@
-//! Branches of subharmonic orbits that come back to themselves, by closed forms.
+//! Closed branches of subharmonic orbits, compared with closed forms.
 
 use std::f64::consts::{FRAC_PI_4, PI};
 
@@ -9,10 +9,10 @@ use nanotap_dynamics::{
 
 use crate::systems::{Family, Formula};
 
-/// A mode-locked torus: on an ellipse of half-axes 10 and 1 the angle advances by
-/// π/4 + (λ − cos 8φ)/20, and the size of the ellipse relaxes to 1. Its orbits of period 8 are
-/// cos 8φ = λ, a stable and an unstable one for |λ| < 1, on one closed branch: once round it φ
-/// grows by π/4, which is the same orbit at the next strobe.
+/// A mode-locked torus: on an ellipse with half-axes 10 and 1 the angle advances by π/4 + (λ − cos
+/// 8φ)/20, and the size of the ellipse relaxes to 1. Its orbits of period 8 satisfy cos 8φ = λ: a
+/// stable and an unstable one for |λ| < 1, on one closed branch. Once around the branch φ grows by
+/// π/4, which is the same orbit at the next strobe.
 #[derive(Clone, Debug)]
 struct Tongue(f64);
 
@@ -80,7 +80,8 @@ fn fold_parameters(branch: &nanotap_dynamics::Branch) -> Vec<f64> {
         .collect()
 }
 
-/// Wherever it is begun, and whichever way: two folds, λ = ±1, and an end at the first orbit.
+/// From any first orbit and in either direction: two folds, at λ = ±1, and an end at the first
+/// orbit.
 #[test]
 fn a_branch_that_meets_its_first_orbit_at_another_strobe_is_closed() {
     let options = ContinuationOptions::over(-2.0, 2.0);
@@ -105,8 +106,8 @@ fn a_branch_that_meets_its_first_orbit_at_another_strobe_is_closed() {
     }
 }
 
-/// Seeds on both orbits and at several strobes, one beside a fold where no point of the branch
-/// is on its other side, give one branch.
+/// Seeds on both orbits and at several strobes, one of them near a fold with all points of the
+/// branch on one side, give one branch.
 #[test]
 fn orbits_on_one_closed_branch_are_one_branch_of_the_diagram() {
     let options = DiagramOptions {

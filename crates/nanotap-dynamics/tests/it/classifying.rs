@@ -1,4 +1,4 @@
-//! The verdict on one start.
+//! Classification of the motion from one start.
 
 use nanotap_dynamics::{
     Chaos, ClassifyOptions, LyapunovOptions, MotionKind, UndecidedReason, classify, classify_beside,
@@ -18,8 +18,8 @@ fn period_of(verdict: &MotionKind) -> usize {
     }
 }
 
-/// Logistic map: 1, 2, 4, the period-3 window, and a fixed point one part in 1e5
-/// before its doubling, where 1 − |μ| = 1e-5: no long period, no chaos.
+/// Logistic map: periods 1, 2, 4, the period-3 window, and a fixed point 1e-5 before its doubling,
+/// where 1 − |μ| = 1e-5: neither a long period nor chaos.
 #[test]
 fn known_periods_are_found() {
     let options = ClassifyOptions::default();
@@ -36,10 +36,10 @@ fn known_periods_are_found() {
     }
 }
 
-/// A focus with |μ| = 0.9999 whose angle is near 2π/5: strobe points nearly repeat
-/// after 5 for thousands of periods.
+/// A focus with |μ| = 0.9999 whose angle is near 2π/5: strobe points nearly repeat after 5 periods
+/// for thousands of periods.
 #[test]
-fn slow_decay_does_not_pass_for_a_long_period() {
+fn slow_decay_is_not_a_long_period() {
     let mut map = System(Focus {
         radius: 0.9999,
         angle: 2.0 * std::f64::consts::PI / 5.0 + 1e-4,
@@ -67,7 +67,7 @@ fn the_henon_attractor_is_chaotic_with_a_bound() {
 /// Past its Neimark–Sacker point at a = 2 the delayed logistic map moves on a
 /// closed curve.
 #[test]
-fn tori_are_named_with_their_evidence() {
+fn tori_are_reported_with_their_evidence() {
     for start in [[0.6, 0.5], [0.45, 0.5]] {
         let classified = classify(
             &mut System(DelayedLogistic(2.05)),
@@ -84,10 +84,10 @@ fn tori_are_named_with_their_evidence() {
     }
 }
 
-/// A rigid turn by a rational angle is periodic from every start, but no orbit of it
-/// is isolated: neither "periodic" nor "quasi-periodic" would be right.
+/// A rotation by a rational angle is periodic from every start, but none of its orbits is isolated:
+/// neither "periodic" nor "quasi-periodic" would be right.
 #[test]
-fn a_resonant_turn_is_left_undecided_with_its_reason() {
+fn a_rational_rotation_is_undecided_with_a_reason() {
     let mut map = System(Turning {
         angle: 2.0 * std::f64::consts::PI * 3.0 / 7.0,
         gain: 0.2,
@@ -106,9 +106,9 @@ fn a_resonant_turn_is_left_undecided_with_its_reason() {
     );
 }
 
-/// Survival 2/s per period with s = 2.002: thousands of chaotic periods, then the sink.
+/// Survival probability 2/s per period with s = 2.002: thousands of chaotic periods, then the sink.
 #[test]
-fn transient_chaos_is_not_taken_for_an_attractor() {
+fn transient_chaos_is_not_an_attractor() {
     let options = ClassifyOptions {
         max_transient: 64,
         lyapunov: LyapunovOptions {
@@ -140,7 +140,7 @@ fn transient_chaos_is_not_taken_for_an_attractor() {
 }
 
 #[test]
-fn a_motion_that_runs_off_is_unbounded() {
+fn a_growing_motion_is_unbounded() {
     let classified = classify(
         &mut System(Henon { a: 1.4, b: 0.3 }),
         &[3.0, 3.0],
@@ -150,8 +150,7 @@ fn a_motion_that_runs_off_is_unbounded() {
     assert!(classified.periods < 20);
 }
 
-/// Started exactly on an unstable fixed point, the run never leaves it; that is no
-/// attractor.
+/// Started exactly on an unstable fixed point, the run never leaves it; it is not an attractor.
 #[test]
 fn a_run_on_an_unstable_orbit_is_not_called_an_attractor() {
     let classified = classify(
@@ -168,7 +167,7 @@ fn a_run_on_an_unstable_orbit_is_not_called_an_attractor() {
     ));
 }
 
-/// An undamped oscillator beats for ever: a torus, exponents zero.
+/// An undamped oscillator beats for ever: a torus with exponents zero.
 #[test]
 fn an_undamped_beat_is_a_torus() {
     let mut map = System(Focus {
@@ -201,12 +200,12 @@ fn bad_starts_are_refused() {
     }
 }
 
-/// The cubic map x → r x − x³ has at r = 5/2 two chaotic motions, each the other's mirror image. A
-/// start on the one that is known has its exponents, and is watched no less long than a start whose
-/// exponents are measured; the one is not taken for the other, nor either for the fixed point that
-/// attracts at r = 3/2.
+/// At r = 5/2 the cubic map x → r x − x³ has two chaotic attractors, mirror images of each other. A
+/// start on a known one takes over its exponents and is observed as long as a start whose exponents
+/// are measured. Neither is confused with the other, nor with the fixed point that is stable at r =
+/// 3/2.
 #[test]
-fn chaos_that_is_known_is_told_from_other_motions() {
+fn known_chaos_is_distinguished_from_other_motions() {
     let options = ClassifyOptions::default();
     let mut map = System(Cubic(2.5));
     let chaotic = |kind: MotionKind| -> Chaos {
@@ -219,13 +218,13 @@ fn chaos_that_is_known_is_told_from_other_motions() {
     let lower = chaotic(classify(&mut map, &[-0.3], &options).kind);
     let known = [lower.spectrum.clone(), upper.spectrum.clone()];
 
-    let beside = classify_beside(&mut map, &[0.5], &known, &options);
+    let recognised = classify_beside(&mut map, &[0.5], &known, &options);
     let measured = &options.lyapunov;
     let least = options.max_transient + measured.alignment + measured.min_periods;
-    assert!(beside.periods >= least, "{}", beside.periods);
-    let second = chaotic(beside.kind);
+    assert!(recognised.periods >= least, "{}", recognised.periods);
+    let second = chaotic(recognised.kind);
     assert_eq!(second.spectrum, upper.spectrum);
-    assert_eq!(second.observed, beside.periods);
+    assert_eq!(second.observed, recognised.periods);
 
     let unlike = classify_beside(&mut map, &[0.5], &known[..1], &options);
     assert_ne!(chaotic(unlike.kind).spectrum, lower.spectrum);
@@ -234,9 +233,9 @@ fn chaos_that_is_known_is_told_from_other_motions() {
     assert_eq!(period_of(&fixed.kind), 1);
 }
 
-/// A turning circle whose third coordinate is chaotic (λ = ln 2) until it leaves through a narrow
-/// gap, between 1100 and 1500 periods: the exponents of the first periods that are measured are
-/// those of a transient, and the motion is a torus.
+/// A rotating circle whose third coordinate is chaotic (λ = ln 2) until it escapes through a narrow
+/// gap, after 1100 to 1500 periods: the first exponents are those of a transient, and the motion is
+/// a torus.
 #[test]
 fn a_torus_after_a_chaotic_transient_is_a_torus() {
     let mut tried = 0;

@@ -1,4 +1,4 @@
-//! Newton, minimal periods, multipliers.
+//! Newton's method, minimal periods and multipliers.
 
 use nanotap_arithmetic::ComplexFunctions as _;
 use nanotap_dynamics::{
@@ -8,10 +8,10 @@ use nanotap_dynamics::{
 
 use crate::systems::{Flagged, Focus, Formula, Henon, Logistic, System};
 
-/// From a guess whose flag is not the orbit's Newton takes it from the map; flags are no part of
-/// distances. Fixed points: μ below 1, μ + 1/50 above.
+/// If the flag of the guess differs from that of the orbit, Newton takes it from the map; flags do
+/// not count in distances. Fixed points: μ below 1, μ + 1/50 above.
 #[test]
-fn entries_that_the_map_sets_are_taken_from_it() {
+fn discrete_entries_are_taken_from_the_map() {
     let options = ShootingOptions::default();
     let closed = |mu: f64, guess: [f64; 2]| {
         close_orbit(&mut System(Flagged(mu)), &guess, 1, &options).unwrap()
@@ -24,7 +24,7 @@ fn entries_that_the_map_sets_are_taken_from_it() {
         assert!((orbit.scale() - x).abs() < 1e-15);
     }
     assert!((above.distance_to(&below).1 - 0.22).abs() < 1e-15);
-    // A flag that is not the orbit's at the start either.
+    // The flag of the start differs from that of the orbit, too.
     assert!(closed(0.9, [0.95, 1.0]).is_same_as(&below));
 }
 
@@ -46,9 +46,9 @@ fn the_henon_fixed_point_closes_to_rounding() {
     assert_eq!(orbit.stability, Stability::Stable);
 }
 
-/// Asking for period 4 of a fixed point gives the fixed point: 1 and 2 are tried.
+/// Period 4 requested at a fixed point gives the fixed point: 1 and 2 are tried.
 #[test]
-fn a_multiple_of_the_period_comes_back_minimal() {
+fn a_multiple_of_the_period_gives_the_minimal_period() {
     let mut map = System(Logistic(2.8));
     for period in [2, 3, 4, 12] {
         let orbit = close_orbit(&mut map, &[0.6], period, &ShootingOptions::default()).unwrap();
@@ -57,10 +57,10 @@ fn a_multiple_of_the_period_comes_back_minimal() {
     }
 }
 
-/// Just past the doubling at r = 3 the two points are ±√(r−3)·const apart, and the
-/// fixed point is still there: both must be told apart however near.
+/// Just past the doubling at r = 3 the two points are ±√(r−3)·const apart, and the fixed point
+/// still exists: the two orbits must be distinguished at any distance.
 #[test]
-fn a_newborn_doubled_orbit_is_told_from_its_parent() {
+fn a_doubled_orbit_is_distinguished_from_its_parent_near_the_flip() {
     for excess in [1e-2, 1e-4, 1e-6, 1e-8] {
         let r: f64 = 3.0 + excess;
         let mut map = System(Logistic(r));
@@ -78,8 +78,8 @@ fn a_newborn_doubled_orbit_is_told_from_its_parent() {
     }
 }
 
-/// A period-17 orbit of the chaotic Hénon map: single shooting would face a growth
-/// of e^{0.42·17} ≈ 1260 and worse along bad stretches.
+/// A period-17 orbit of the chaotic Hénon map: errors of single shooting would grow by e^{0.42·17}
+/// ≈ 1260, and more along unfavourable segments.
 #[test]
 fn long_unstable_orbits_close_and_repeat() {
     let mut map = System(Henon { a: 1.4, b: 0.3 });
@@ -100,7 +100,7 @@ fn long_unstable_orbits_close_and_repeat() {
                     unstable_dimension: 1
                 }
             );
-            // |det| = b^17, though the other multiplier is thousands.
+            // |det| = b^17, although the other multiplier is in the thousands.
             let sum: f64 = orbit.multipliers.iter().map(|m| m.modulus().ln()).sum();
             assert!((sum - 17.0 * 0.3f64.ln()).abs() < 1e-8);
         }
@@ -120,7 +120,7 @@ fn an_undamped_oscillator_is_marginal() {
 
 /// Below its fold (a < −(1−b)²/4) the Hénon map has no fixed point.
 #[test]
-fn where_there_is_no_orbit_newton_says_so() {
+fn without_an_orbit_newton_reports_a_failure() {
     let mut map = System(Henon { a: -0.2, b: 0.3 });
     let error = close_orbit(&mut map, &[1.0, 0.0], 1, &ShootingOptions::default()).unwrap_err();
     assert!(matches!(
@@ -129,8 +129,8 @@ fn where_there_is_no_orbit_newton_says_so() {
     ));
 }
 
-/// x → x + c + x², whose fixed points have met at c = 0: how far beyond it is told by the
-/// multiplier where Newton stalls.
+/// x → x + c + x², whose fixed points meet at c = 0: beyond it, the multiplier where Newton stalls
+/// shows how far.
 #[derive(Clone, Debug)]
 struct Saddle(f64);
 
@@ -148,7 +148,7 @@ impl Formula for Saddle {
 }
 
 #[test]
-fn a_stall_beside_a_fold_is_told_from_any_other() {
+fn a_stall_near_a_fold_has_its_own_reason() {
     let options = ShootingOptions {
         residual_tolerance: 1e-15,
         ..ShootingOptions::default()
@@ -179,7 +179,7 @@ fn a_stall_beside_a_fold_is_told_from_any_other() {
     assert_eq!(near, DivergenceReason::NoDescent);
 }
 
-/// Where every orbit is shifted by the same amount none closes, and a multiplier is 1.
+/// Every point is shifted by the same amount: no orbit closes, and a multiplier is 1.
 #[derive(Clone, Debug)]
 struct Shift;
 
@@ -211,8 +211,8 @@ fn a_shift_is_singular() {
     assert_eq!(distance, 0.0);
 }
 
-/// x → x − atan x: Newton's full step from beyond 1.3917 leads away from 0 (the well-known
-/// example), a shorter one does not.
+/// x → x − atan x: Newton's full step from beyond 1.3917 leads away from 0 (a well-known example),
+/// a shorter one does not.
 #[derive(Clone, Debug)]
 struct Arctangent;
 
@@ -244,7 +244,7 @@ fn steps_that_lead_away_are_shortened() {
 
 /// The fixed point 3/4 of the full logistic map has the multiplier −2.
 #[test]
-fn unstable_orbits_are_left_where_they_are_not_wanted() {
+fn unstable_orbits_are_rejected_on_request() {
     let closed = |max_growth: f64| {
         let options = ShootingOptions {
             max_growth,
@@ -262,7 +262,7 @@ fn unstable_orbits_are_left_where_they_are_not_wanted() {
     assert!((closed(3.0).unwrap().multipliers[0].re + 2.0).abs() < 1e-14);
 }
 
-/// The Hénon map in other units, each result rounded to 40 bits of them, as of a map that is
+/// The Hénon map in other units, with each result rounded to 40 bits, as for a map that is
 /// integrated to a tolerance.
 #[derive(Clone, Debug)]
 struct Coarse(f64);
@@ -285,7 +285,7 @@ impl Formula for Coarse {
 }
 
 #[test]
-fn the_accuracy_asked_for_is_of_the_orbits_own_size() {
+fn the_requested_accuracy_is_relative_to_the_orbit() {
     let exact = Henon { a: 0.3, b: 0.3 }.fixed_point();
     for unit in [1e-6, 1.0, 1e6] {
         for max_iterations in [40, 4] {
@@ -313,8 +313,8 @@ fn the_accuracy_asked_for_is_of_the_orbits_own_size() {
     assert_eq!((iterations, reason), (1, DivergenceReason::TooManySteps));
 }
 
-/// Orbits of period 2 beside each other: the smallest over shifts of the largest distance, and of
-/// equal ones the first.
+/// Neighbouring orbits of period 2: the smallest over shifts of the largest distance; of equal
+/// values the first shift.
 #[test]
 fn the_distance_of_orbits_is_over_all_their_states() {
     let fixed = close_orbit(
@@ -345,7 +345,7 @@ fn a_continuum_of_orbits_is_singular() {
     let error = close_orbit(&mut map, &[3.0, 0.3], 4, &ShootingOptions::default());
     match error {
         Err(ShootingError::Singular { distance, .. }) => assert!(distance < 1e-12),
-        // Its centre is the fixed point, an honest answer too.
+        // Its centre is the fixed point, which is a valid result too.
         Ok(orbit) => assert_eq!(orbit.period, 1),
         Err(other) => panic!("{other}"),
     }

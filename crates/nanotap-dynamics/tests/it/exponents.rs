@@ -6,7 +6,7 @@ use nanotap_dynamics::{
     DMatrix, LyapunovOptions, LyapunovSpectrum, StroboscopicMap, birkhoff_digits, lyapunov_spectrum,
 };
 
-use crate::systems::{Focus, Formula, Henon, Logistic, System, Turning, thrown};
+use crate::systems::{Focus, Formula, Henon, Logistic, System, Turning, advanced};
 
 fn fixed(periods: usize) -> LyapunovOptions {
     LyapunovOptions {
@@ -20,7 +20,7 @@ fn fixed(periods: usize) -> LyapunovOptions {
 #[test]
 fn the_henon_attractor_has_the_published_spectrum() {
     let mut map = System(Henon { a: 1.4, b: 0.3 });
-    let mut x = thrown(&mut map, &[0.1, 0.1], 100);
+    let mut x = advanced(&mut map, &[0.1, 0.1], 100);
     let s = lyapunov_spectrum(&mut map, &mut x, &fixed(200_000)).unwrap();
     let (largest, error) = s.largest();
     assert!(error < 2e-3);
@@ -33,12 +33,14 @@ fn the_henon_attractor_has_the_published_spectrum() {
     assert!((s.kaplan_yorke_dimension() - 1.2583).abs() < 2e-3);
 }
 
-/// A map with one Jacobian for all states, whose log|det| is known by other means.
+/// A map with one Jacobian for all states, whose log|det| is known independently.
 #[derive(Clone)]
 struct Constant {
     jacobian: DMatrix<f64>,
     log_determinant: Option<f64>,
 }
+
+impl nanotap_dynamics::Scheduling for Constant {}
 
 impl StroboscopicMap for Constant {
     type Error = Infallible;
@@ -83,11 +85,11 @@ fn exponents_of(entries: &[f64], log_determinant: Option<f64>) -> LyapunovSpectr
     lyapunov_spectrum(&mut map, &mut vec![0.0; d], &fixed(64)).unwrap()
 }
 
-/// (1, 1/2) (1, 1)ᵀ, of rank one, stretches by 3/2: what is left of a determinant of 3/2 e⁻⁶⁰, which
-/// no Jacobian in double precision shows, belongs to the direction that is lost in rounding. One
-/// that is not lost keeps its measured length.
+/// (1, 1/2) (1, 1)ᵀ, of rank one, stretches by 3/2. The remainder of a determinant of 3/2 e⁻⁶⁰,
+/// which a double-precision Jacobian cannot show, is assigned to the direction that is lost in
+/// rounding. A direction that is not lost keeps its measured length.
 #[test]
-fn what_a_jacobian_has_lost_the_determinant_gives_back() {
+fn the_determinant_replaces_what_the_jacobian_lost() {
     let first = 1.5f64.ln();
     let lost = exponents_of(&[1.0, 1.0, 0.5, 0.5], Some(first - 60.0));
     assert!((lost.exponents[0] - first).abs() < 1e-13);
@@ -100,14 +102,14 @@ fn what_a_jacobian_has_lost_the_determinant_gives_back() {
     let seen = exponents_of(&[2.0, 0.0, 0.0, 0.5], Some(-0.25));
     assert!((seen.exponents[1] + 2f64.ln()).abs() < 1e-13);
     assert_eq!(seen.log_determinant, -0.25);
-    // Without other means it is the Jacobian's: 3 · 4 − 2 · 1.
+    // Without an independent value it is that of the Jacobian: 3 · 4 − 2 · 1.
     let own = exponents_of(&[3.0, 2.0, 1.0, 4.0], None);
     assert!((own.log_determinant - 10f64.ln()).abs() < 1e-13);
 }
 
-/// Directions that are mapped to nothing leave the others theirs.
+/// Directions that are mapped to zero do not affect the exponents of the others.
 #[test]
-fn directions_that_vanish_leave_the_others_theirs() {
+fn vanishing_directions_do_not_affect_the_others() {
     let s = exponents_of(&[0.0, 0.0, 0.0, 0.0, 2.0, 0.0, 0.0, 0.0, 0.0], None);
     assert!(
         (s.exponents[0] - 2f64.ln()).abs() < 1e-12,
@@ -119,15 +121,15 @@ fn directions_that_vanish_leave_the_others_theirs() {
     assert!((s.exponents[2] - nothing).abs() < 1e-9);
 }
 
-/// x → −ρ x: the mean is zero to all digits, the mean square falls by ρ²ᵀ from one stretch of T to
-/// the next, about ρᵀ e^(±…) in the middle of each; in units of the squared spread, 4.
+/// x → −ρ x: the mean is zero to all digits; the mean square decreases by ρ²ᵀ from one part of T
+/// periods to the next, about ρᵀ e^(±…) in the middle of each; in units of the squared spread, 4.
 #[test]
-fn a_slow_spiral_has_no_torus_s_mean_squares() {
+fn mean_squares_of_a_slow_spiral_are_not_those_of_a_torus() {
     let mut map = Constant {
         jacobian: DMatrix::from_element(1, 1, 0.0),
         log_determinant: None,
     };
-    // At rest there is nothing to tell: all digits.
+    // At rest there is nothing to compare: all digits.
     assert_eq!(birkhoff_digits(&mut map, &mut [3.0], 100).unwrap(), 16.0);
     let mut spiral = System(Alternating {
         rho: 0.9999,
@@ -139,7 +141,7 @@ fn a_slow_spiral_has_no_torus_s_mean_squares() {
     assert!((digits - expected).abs() < 0.02, "{digits} {expected}");
 }
 
-/// x → −ρ x beside a number in chaos that is `noise` in size (Ulam's map), both in a unit.
+/// x → −ρ x together with a chaotic number of size `noise` (Ulam's map), both in a unit.
 #[derive(Clone, Debug)]
 struct Alternating {
     rho: f64,
@@ -166,10 +168,10 @@ impl Formula for Alternating {
     }
 }
 
-/// A coordinate of a ten-thousand-millionth of the others' motion is rounding, one of a hundredth
-/// is not, in any unit.
+/// A coordinate with 1e-10 of the motion of the others is rounding; one with 1e-2 is not, in any
+/// unit.
 #[test]
-fn what_hardly_moves_has_no_say_in_any_unit() {
+fn tiny_coordinates_do_not_count_in_any_unit() {
     for unit in [1.0, 1e-6, 1e6] {
         let digits = |noise: f64| {
             let mut map = System(Alternating {
@@ -184,8 +186,8 @@ fn what_hardly_moves_has_no_say_in_any_unit() {
     }
 }
 
-/// A turn about a centre far off has the digits of one about the origin, but for those that its
-/// states have lost.
+/// A rotation about a distant centre gives the digits of one about the origin, except for those
+/// that its states have lost.
 #[test]
 fn a_mean_far_from_zero_costs_no_digits() {
     let (s, c) = 2.4f64.sin_cos();
@@ -230,15 +232,15 @@ fn the_full_logistic_map_has_ln_2() {
 fn a_rigidly_turning_circle_has_exponent_zero() {
     let gain = 0.2;
     let mut map = System(Turning { angle: 2.4, gain });
-    let mut x = thrown(&mut map, &[0.3, 0.1], 200);
+    let mut x = advanced(&mut map, &[0.3, 0.1], 200);
     let s = lyapunov_spectrum(&mut map, &mut x, &fixed(20_000)).unwrap();
     assert!(s.exponents[0].abs() < 1e-10);
     assert!((s.exponents[1] - (1.0f64 - 2.0 * gain).ln()).abs() < 1e-10);
 }
 
-/// An adaptive run stops once the bars are met, and no later than allowed.
+/// An adaptive run stops once the error bars are small enough, and at the latest at its limit.
 #[test]
-fn the_length_follows_the_error_asked_for() {
+fn the_length_follows_the_requested_error() {
     let mut map = System(Henon { a: 1.4, b: 0.3 });
     let run = |relative_error| {
         let options = LyapunovOptions {
@@ -258,7 +260,7 @@ fn the_length_follows_the_error_asked_for() {
     assert!(lyapunov_spectrum(&mut map, &mut x, &fixed(10)).is_err());
 }
 
-/// Exponents of a stable focus are ln ρ, both.
+/// Both exponents of a stable focus are ln ρ.
 #[test]
 fn a_focus_decays_at_the_logarithm_of_its_multiplier() {
     let mut map = System(Focus {
@@ -273,15 +275,15 @@ fn a_focus_decays_at_the_logarithm_of_its_multiplier() {
 }
 
 #[test]
-fn birkhoff_digits_tell_a_torus_from_chaos() {
+fn birkhoff_digits_distinguish_a_torus_from_chaos() {
     let golden = 2.0 * std::f64::consts::PI * 0.618_033_988_749_894_9;
     let mut torus = System(Turning {
         angle: golden,
         gain: 0.2,
     });
-    let mut x = thrown(&mut torus, &[0.3, 0.1], 200);
+    let mut x = advanced(&mut torus, &[0.3, 0.1], 200);
     assert!(birkhoff_digits(&mut torus, &mut x, 4000).unwrap() > 12.0);
-    // A spiral that loses 1e-7 of its size per turn is no torus yet.
+    // A spiral that loses 1e-7 of its size per revolution is not yet a torus.
     let mut spiral = System(Focus {
         radius: 1.0 - 1e-7,
         angle: golden,
@@ -289,6 +291,6 @@ fn birkhoff_digits_tell_a_torus_from_chaos() {
     let digits = birkhoff_digits(&mut spiral, &mut [3.0, 0.0], 4000).unwrap();
     assert!(digits < 5.0, "{digits}");
     let mut chaos = System(Henon { a: 1.4, b: 0.3 });
-    let mut x = thrown(&mut chaos, &[0.1, 0.1], 200);
+    let mut x = advanced(&mut chaos, &[0.1, 0.1], 200);
     assert!(birkhoff_digits(&mut chaos, &mut x, 4000).unwrap() < 4.0);
 }

@@ -1,4 +1,4 @@
-//! What must hold for every system, tried on random ones.
+//! Properties that hold for every system, tested on random ones.
 
 use std::convert::Infallible;
 
@@ -8,7 +8,7 @@ use nanotap_dynamics::{
 };
 use proptest::prelude::*;
 
-use crate::systems::{Henon, Logistic, System, thrown};
+use crate::systems::{Henon, Logistic, System, advanced};
 
 /// x → A x + b.
 #[derive(Clone, Debug)]
@@ -16,6 +16,8 @@ struct Affine {
     matrix: DMatrix<f64>,
     offset: Vec<f64>,
 }
+
+impl nanotap_dynamics::Scheduling for Affine {}
 
 impl StroboscopicMap for Affine {
     type Error = Infallible;
@@ -71,9 +73,9 @@ prop_compose! {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(64))]
 
-    /// Every start of a contraction settles on its one fixed point (1 − A)⁻¹ b.
+    /// Every start of a contraction converges to its only fixed point (1 − A)⁻¹ b.
     #[test]
-    fn contractions_settle_on_their_fixed_point(
+    fn contractions_converge_to_their_fixed_point(
         map in contraction(),
         start in prop::collection::vec(-50.0f64..50.0, 4),
     ) {
@@ -94,10 +96,10 @@ proptest! {
         prop_assert!((orbit.log_determinant - determinant).abs() < 1e-9);
     }
 
-    /// Whatever starts in a contracting ball is nearer after one return, stays in it,
-    /// and ends on the orbit.
+    /// Every start in a contracting ball is nearer after one return, stays in the ball, and
+    /// converges to the orbit.
     #[test]
-    fn balls_hold_what_they_promise(a in 0.05f64..0.36, u in -1.0f64..1.0, v in -1.0f64..1.0) {
+    fn balls_contract(a in 0.05f64..0.36, u in -1.0f64..1.0, v in -1.0f64..1.0) {
         let mut map = System(Henon { a, b: 0.3 });
         let fixed = map.0.fixed_point();
         let orbit = close_orbit(&mut map, &fixed, 1, &ShootingOptions::default()).unwrap();
@@ -106,13 +108,13 @@ proptest! {
         let start = [fixed[0] + u * extents[0], fixed[1] + v * extents[1]];
         prop_assume!(ball.contains(&start));
         prop_assert!(ball.holds(&mut map, &start, &mut [0.0; 2]).unwrap());
-        let next = thrown(&mut map, &start, 1);
+        let next = advanced(&mut map, &start, 1);
         prop_assert!(ball.contains(&next));
-        let end = thrown(&mut map, &start, 20_000);
+        let end = advanced(&mut map, &start, 20_000);
         prop_assert!((end[0] - fixed[0]).abs() < 1e-9);
     }
 
-    /// Every start of a census has exactly one outcome_of_start, and fractions add up to one.
+    /// Every start of a census has exactly one outcome, and the fractions add up to one.
     #[test]
     fn every_start_is_counted_once(r in 1.1f64..4.0, seed: u64) {
         let starts = StartBox::new(vec![-0.2], vec![1.2]).unwrap().starts(seed, 24);
@@ -138,12 +140,12 @@ proptest! {
             );
             prop_assert_eq!(outcomes_by_start.count(), attractor.fraction.count);
         }
-        // Outside [0, 1] all runs off, inside nothing does.
+        // All starts outside [0, 1] are unbounded, none inside.
         for (start, outcome_of_start) in starts.iter().zip(&result.outcomes_by_start) {
             let inside = (0.0..=1.0).contains(&start[0]);
             prop_assert_eq!(*outcome_of_start != StartOutcome::Unbounded, inside);
         }
-        // The logistic map has one attractor at most (negative Schwarzian derivative).
+        // The logistic map has at most one attractor (negative Schwarzian derivative).
         prop_assert!(result.attractors.len() <= 1, "{:?}", result.attractors);
     }
 }

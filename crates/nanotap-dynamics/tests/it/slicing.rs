@@ -4,10 +4,10 @@ use nanotap_dynamics::{
     BasinOptions, Basins, CensusOptions, Control, Label, Slice, SliceAxis, StartBox, census,
 };
 
-use crate::systems::{ChaosBesideRest, Cubic, Formula, Henon, System};
+use crate::systems::{ChaosAndRest, Cubic, Formula, Henon, System};
 use nanotap_dynamics::DMatrix;
 
-/// Two uncoupled cubic maps: four attractors in the four quadrants.
+/// Two uncoupled cubic maps: four attractors, one in each quadrant.
 #[derive(Clone, Debug)]
 struct TwoCubics;
 
@@ -35,7 +35,7 @@ fn axis(coordinate: usize, from: f64, to: f64, count: usize) -> SliceAxis {
 }
 
 #[test]
-fn quadrants_go_to_their_own_attractors() {
+fn each_quadrant_is_the_basin_of_one_attractor() {
     let map = System(TwoCubics);
     let starts = StartBox::new(vec![-1.0, -1.0], vec![1.0, 1.0])
         .unwrap()
@@ -70,10 +70,10 @@ fn quadrants_go_to_their_own_attractors() {
         let goal = &found.attractors[*k as usize].state;
         assert!(goal[0] * state[0] > 0.0 && goal[1] * state[1] > 0.0);
     }
-    // Chunks are pieces of the whole, and the end is cut.
+    // Chunks are parts of the whole; the last one is cut at the end.
     assert_eq!(basins.chunk(&mut map.clone(), 100..250), all[100..250]);
     assert_eq!(basins.chunk(&mut map.clone(), 1190..5000), all[1190..]);
-    // The saddle at the origin stays where it is: no label.
+    // The saddle at the origin is a fixed point: no label.
     let origin = Slice::new(vec![0.0, 0.0], axis(0, 0.0, 0.0, 1), axis(1, 0.0, 0.0, 1)).unwrap();
     let basins = Basins::new(&map, origin, &found.attractors, BasinOptions::default()).unwrap();
     assert_eq!(basins.chunk(&mut map.clone(), 0..1), [Label::Unsettled]);
@@ -107,16 +107,16 @@ fn chaotic_attractors_are_labelled_by_their_box() {
             .iter()
             .all(|l| matches!(l, Label::Attractor(0) | Label::Unbounded))
     );
-    // The middle of the picture is in the attractor's basin, a far corner is not.
+    // The centre of the slice is in the attractor's basin, a far corner is not.
     assert_eq!(labels[10 * 21 + 10], Label::Attractor(0));
     assert_eq!(labels[0], Label::Unbounded);
 }
 
-/// What rests beside a chaotic attractor is not in the box of its states, whose sides along the
-/// resting coordinate have no length.
+/// A rest position near a chaotic attractor is not in the box of its states, whose sides along the
+/// constant coordinate have zero length.
 #[test]
-fn what_is_beside_a_chaotic_attractor_is_not_in_its_box() {
-    let map = System(ChaosBesideRest);
+fn a_rest_position_near_a_chaotic_attractor_is_not_in_its_box() {
+    let map = System(ChaosAndRest);
     let starts = vec![vec![0.1, -1.0]];
     let found = census(
         &map,
@@ -137,7 +137,7 @@ fn what_is_beside_a_chaotic_attractor_is_not_in_its_box() {
 
 /// Row by row, the first axis fastest.
 #[test]
-fn a_slice_counts_its_points_row_by_row() {
+fn points_of_a_slice_are_numbered_row_by_row() {
     let slice = Slice::new(
         vec![7.0, 7.0, 7.0],
         axis(2, 0.0, 1.0, 3),
@@ -157,7 +157,7 @@ fn a_slice_counts_its_points_row_by_row() {
 }
 
 #[test]
-fn bad_slices_are_refused() {
+fn invalid_slices_are_refused() {
     for (x, y) in [
         (axis(0, 0.0, 1.0, 0), axis(1, 0.0, 1.0, 2)),
         (axis(0, 0.0, f64::NAN, 3), axis(1, 0.0, 1.0, 2)),

@@ -1,17 +1,18 @@
-//! Attractors over grids of parameter values.
+//! Continuation of attractors over grids of parameter values.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use nanotap_dynamics::{
-    AttractorKind, CensusOptions, Control, DMatrix, GlobalOptions, GlobalValue, MotionKind,
-    StartBox, StartSet, attractors_along, classify, grid_neighbours, orbits_shared,
+    AttractorContinuationOptions, AttractorKind, AttractorsAtValue, CensusOptions, Control,
+    DMatrix, MotionKind, StartBox, StartSet, classify, continue_attractors, grid_neighbours,
+    share_orbits,
 };
 
 use crate::systems::{Cubic, Family, Formula, Logistic, Nested, System};
 
-fn few() -> GlobalOptions {
-    GlobalOptions {
+fn few() -> AttractorContinuationOptions {
+    AttractorContinuationOptions {
         census: CensusOptions {
             max_starts: 24,
             ..CensusOptions::default()
@@ -19,7 +20,7 @@ fn few() -> GlobalOptions {
     }
 }
 
-fn fixed_points(value: &GlobalValue) -> Vec<f64> {
+fn fixed_points(value: &AttractorsAtValue) -> Vec<f64> {
     let mut found: Vec<f64> = value
         .attractors
         .iter()
@@ -35,10 +36,10 @@ fn fixed_points(value: &GlobalValue) -> Vec<f64> {
     found
 }
 
-/// The mirror image is started at one value only, and known at all; the two form two
+/// The mirror image is started at one value only and found at all values; the two form two
 /// branches.
 #[test]
-fn what_one_value_shows_all_know() {
+fn an_attractor_of_one_value_is_found_at_all() {
     let values: Vec<f64> = (0..41).map(|k| 1.1 + 0.02 * f64::from(k)).collect();
     let starts = |k: usize, _: &System<Cubic>| {
         let mut states = vec![vec![0.5]];
@@ -47,7 +48,7 @@ fn what_one_value_shows_all_know() {
         }
         StartSet::given(states)
     };
-    let found = attractors_along(&Family(Cubic), &values, starts, &few(), &Control::default());
+    let found = continue_attractors(&Family(Cubic), &values, starts, &few(), &Control::default());
     let branch_of_positive = found[0].attractors[0].branch;
     for (r, value) in values.iter().zip(&found) {
         let expected = (r - 1.0).sqrt();
@@ -60,24 +61,24 @@ fn what_one_value_shows_all_know() {
             assert!(a.branch < 2);
         }
     }
-    assert_eq!(found[16].attractors[1].shown_by, Some(17));
-    assert_eq!(found[17].attractors[1].shown_by, None);
+    assert_eq!(found[16].attractors[1].found_from, Some(17));
+    assert_eq!(found[17].attractors[1].found_from, None);
 }
 
-/// The period-3 window of the logistic map, 1 + √8 = 3.828427 … 3.841499 for its period
-/// 3: found where the grid has it, however few the starts.
+/// The period-3 window of the logistic map, 1 + √8 = 3.828427 … 3.841499 for period 3: it is found
+/// on all its grid values, however few the starts.
 #[test]
-fn a_window_keeps_its_period() {
+fn a_periodic_window_is_complete() {
     let values: Vec<f64> = (0..31).map(|k| 3.825 + 0.0005 * f64::from(k)).collect();
     let sides = StartBox::new(vec![0.0], vec![1.0]).unwrap();
     let starts = |_: usize, _: &System<Logistic>| StartSet::drawn(sides.clone(), 2);
-    let options = GlobalOptions {
+    let options = AttractorContinuationOptions {
         census: CensusOptions {
             max_starts: 4,
             ..CensusOptions::default()
         },
     };
-    let found = attractors_along(
+    let found = continue_attractors(
         &Family(Logistic),
         &values,
         starts,
@@ -97,9 +98,9 @@ fn a_window_keeps_its_period() {
 
 /// Three columns of two rows: 0 1 2 above 3 4 5.
 #[test]
-fn values_beside_a_value_of_a_grid() {
-    let beside = grid_neighbours(&[3, 2]);
-    let found: Vec<_> = (0..6).map(beside).collect();
+fn neighbours_of_a_grid_value() {
+    let neighbours = grid_neighbours(&[3, 2]);
+    let found: Vec<_> = (0..6).map(neighbours).collect();
     let exact: [&[usize]; 6] = [&[1, 3], &[0, 2, 4], &[1, 5], &[4, 0], &[3, 5, 1], &[4, 2]];
     assert_eq!(found, exact);
     let along = grid_neighbours(&[3]);
@@ -109,9 +110,9 @@ fn values_beside_a_value_of_a_grid() {
     );
 }
 
-/// Small motions known at one corner of a plane are known all over it.
+/// Small motions known at one corner of a plane are found everywhere on it.
 #[test]
-fn a_plane_fills_from_one_corner() {
+fn attractors_spread_over_a_plane_from_one_corner() {
     let first: Vec<f64> = (0..6).map(|k| 1.2 + 0.1 * f64::from(k)).collect();
     let second: Vec<f64> = (0..5).map(|k| 1e-3 * 1.3f64.powi(k)).collect();
     let at = |k: usize| {
@@ -127,7 +128,7 @@ fn a_plane_fills_from_one_corner() {
         known[0].push(orbit);
     }
     let filled = || {
-        orbits_shared(
+        share_orbits(
             known.clone(),
             at,
             grid_neighbours(&[6, 5]),
@@ -153,13 +154,13 @@ fn a_plane_fills_from_one_corner() {
     assert_eq!(format!("{one:?}"), format!("{again:?}"));
 }
 
-/// A rest at `centre`, to which all goes. From the left of it Newton does not find it: where the
-/// step of the map is least, (x − centre + 1.2)² + 0.15, there is no rest.
+/// A rest position at `centre`, to which all motions converge. From the left Newton does not find
+/// it: where the step of the map is smallest, (x − centre + 1.2)² + 0.15, there is no rest
+/// position.
 #[derive(Clone)]
 struct OneSided {
     centre: f64,
-    /// How often the map was taken of a state on the last way to the rest, where Newton needs one
-    /// step.
+    /// Number of evaluations at states on the last part of the way, where Newton needs one step.
     near: Arc<AtomicUsize>,
 }
 
@@ -186,10 +187,10 @@ impl Formula for OneSided {
     fn derivative(&self, _: &[f64], _: &mut [f64]) {}
 }
 
-/// An orbit that Newton follows from one value to the next in one direction only is not run after
-/// in the other.
+/// If Newton continues an orbit from one value to the next in one direction, no run is made in the
+/// other direction.
 #[test]
-fn what_goes_on_one_way_is_not_tried_the_other() {
+fn a_known_continuation_is_not_repeated_in_the_other_direction() {
     for direction in [1.0, -1.0] {
         let near = Arc::new(AtomicUsize::new(0));
         let centre = |k: usize| direction * (10.0 + k as f64);
@@ -209,7 +210,7 @@ fn what_goes_on_one_way_is_not_tried_the_other() {
             .collect();
         assert!(near.swap(0, Ordering::Relaxed) > 20);
         let neighbours = grid_neighbours(&[20]);
-        let shared = orbits_shared(
+        let shared = share_orbits(
             known,
             at,
             neighbours,

@@ -1,4 +1,4 @@
-//! Systems whose answers are known, shared by all tests.
+//! Systems with known properties, shared by all tests.
 
 use std::convert::Infallible;
 
@@ -7,15 +7,15 @@ use nanotap_dynamics::{DMatrix, MapFamily, StroboscopicMap, Tangency};
 /// A map given by formulas.
 pub(crate) trait Formula: Clone + Send + Sync {
     const DIMENSION: usize;
-    /// How many of the last entries are whole numbers that the map sets.
+    /// Number of trailing entries that are whole numbers set by the map.
     const DISCRETE: usize = 0;
-    /// How many motions at a time a census follows.
-    const SIDE_BY_SIDE: usize = 1;
+    /// Number of motions that a census follows at a time.
+    const BATCH_SIZE: usize = 1;
     fn image(&self, x: &[f64], out: &mut [f64]);
     fn jacobian(&self, x: &[f64], out: &mut DMatrix<f64>);
     /// Derivative with respect to the family's parameter.
     fn derivative(&self, x: &[f64], out: &mut [f64]);
-    /// Value of the one tangency per period, if the system has one.
+    /// Value of the only tangency per period, if the system has one.
     fn tangency(&self, _x: &[f64]) -> Option<f64> {
         None
     }
@@ -24,6 +24,12 @@ pub(crate) trait Formula: Clone + Send + Sync {
 /// The stroboscopic map of a formula.
 #[derive(Clone, Debug)]
 pub(crate) struct System<F>(pub F);
+
+impl<F: Formula> nanotap_dynamics::Scheduling for System<F> {
+    fn batch_size(&self) -> usize {
+        F::BATCH_SIZE
+    }
+}
 
 impl<F: Formula> StroboscopicMap for System<F> {
     type Error = Infallible;
@@ -38,10 +44,6 @@ impl<F: Formula> StroboscopicMap for System<F> {
 
     fn discrete_entries(&self) -> usize {
         F::DISCRETE
-    }
-
-    fn side_by_side(&self) -> usize {
-        F::SIDE_BY_SIDE
     }
 
     fn advance(&mut self, state: &mut [f64]) -> Result<(), Infallible> {
@@ -117,7 +119,7 @@ impl Henon {
 
 impl Formula for Henon {
     const DIMENSION: usize = 2;
-    const SIDE_BY_SIDE: usize = 16;
+    const BATCH_SIZE: usize = 16;
     fn image(&self, x: &[f64], out: &mut [f64]) {
         out[0] = 1.0 - self.a * x[0] * x[0] + x[1];
         out[1] = self.b * x[0];
@@ -175,8 +177,8 @@ impl Formula for DelayedLogistic {
     }
 }
 
-/// z → e^{iθ} z (1 + g (1 − |z|²)): for 0 < g < 1 the unit circle attracts, radially
-/// by 1 − 2g, and turns rigidly by θ: exponents 0 and ln(1 − 2g). The parameter is θ.
+/// z → e^{iθ} z (1 + g (1 − |z|²)): for 0 < g < 1 the unit circle attracts radially by 1 − 2g and
+/// rotates by θ: exponents 0 and ln(1 − 2g). The parameter is θ.
 #[derive(Clone, Debug)]
 pub(crate) struct Turning {
     pub angle: f64,
@@ -210,8 +212,8 @@ impl Formula for Turning {
     }
 }
 
-/// A circle that turns by 2.4 rad, and z → r z (1 − z) with r = 4 + 4e-7, which leaves [0, 1] after
-/// some thousands of periods and is then drawn to −1.
+/// A circle that rotates by 2.4 rad, and z → r z (1 − z) with r = 4 + 4e-7, which leaves [0, 1]
+/// after some thousands of periods and then converges to −1.
 #[derive(Clone, Debug)]
 pub(crate) struct Calming;
 
@@ -278,11 +280,11 @@ impl Formula for Focus {
     }
 }
 
-/// An open tent map with a hole that leads to a sink.
+/// An open tent map with a gap that leads to a sink.
 ///
-/// On [0, 1]: x → s min(x, 1 − x), s > 2, of which the fraction 2/s stays in [0, 1];
-/// survivors stay uniform, so lifetimes are geometric with survival 2/s exactly.
-/// What leaves goes to the fixed point 2, which attracts by 1/2.
+/// On [0, 1]: x → s min(x, 1 − x), s > 2, of which the fraction 2/s stays in [0, 1]. Survivors stay
+/// uniformly distributed, so lifetimes are geometric with survival probability exactly 2/s. All
+/// others go to the fixed point 2, which attracts by 1/2.
 #[derive(Clone, Debug)]
 pub(crate) struct OpenTent(pub f64);
 
@@ -342,8 +344,8 @@ impl Formula for Grazing {
     }
 }
 
-/// The normal form of a hard (square-root) grazing (Nordmark 1991) in one dimension,
-/// x → μ + a x − b √max(x, 0): no fixed point near goes on smoothly past μ = 0.
+/// The normal form of a hard (square-root) grazing (Nordmark 1991) in one dimension, x → μ + a x −
+/// b √max(x, 0): no nearby fixed point continues smoothly past μ = 0.
 #[derive(Clone, Debug)]
 pub(crate) struct HardGrazing {
     pub mu: f64,
@@ -371,8 +373,8 @@ impl Formula for HardGrazing {
     }
 }
 
-/// x → r x − x³, 1 < r < 2: the fixed points ±√(r−1) attract with μ = 3 − 2r, and by
-/// symmetry each takes half of a symmetric box. Beyond |x| = √(r+1) all runs off.
+/// x → r x − x³, 1 < r < 2: the fixed points ±√(r−1) attract with μ = 3 − 2r, and by symmetry each
+/// takes half of a symmetric box. Starts beyond |x| = √(r+1) are unbounded.
 #[derive(Clone, Debug)]
 pub(crate) struct Cubic(pub f64);
 
@@ -389,8 +391,8 @@ impl Formula for Cubic {
     }
 }
 
-/// The orbit of `start` thrown forward `periods` times.
-pub(crate) fn thrown(map: &mut impl StroboscopicMap, start: &[f64], periods: usize) -> Vec<f64> {
+/// The state `periods` periods after `start`.
+pub(crate) fn advanced(map: &mut impl StroboscopicMap, start: &[f64], periods: usize) -> Vec<f64> {
     let mut x = start.to_vec();
     for _ in 0..periods {
         map.advance(&mut x).expect("the map can be followed");
@@ -398,9 +400,9 @@ pub(crate) fn thrown(map: &mut impl StroboscopicMap, start: &[f64], periods: usi
     x
 }
 
-/// Two sizes on one line: within |x| ≤ 2s a copy of [`Cubic`] shrunk by `s`, with the
-/// attractors ±s √(r−1) whose basins together are |x| < s √(r+1) (exactly: what
-/// starts between that and 2s grows past 2s); beyond 2s everything goes to ±2.
+/// Two scales on one line: within |x| ≤ 2s a copy of [`Cubic`] scaled by `s`, with the attractors
+/// ±s √(r−1), whose basins together are |x| < s √(r+1) (exactly: starts between that and 2s grow
+/// past 2s). Beyond 2s everything goes to ±2.
 #[derive(Clone, Debug)]
 pub(crate) struct Nested {
     pub r: f64,
@@ -431,9 +433,9 @@ impl Formula for Nested {
     }
 }
 
-/// Ulam's map x → 1 − 2x² beside a number that changes sign every period and whose size goes to
-/// 1 from below 3/2 and to 2 from above: two chaotic attractors with the same exponents, ln 2 and
-/// −ln 2, and the same mean state, zero; only their mean squares differ.
+/// Ulam's map x → 1 − 2x² together with a number that changes sign every period and whose size
+/// converges to 1 from below 3/2 and to 2 from above: two chaotic attractors with the same
+/// exponents, ln 2 and −ln 2, and the same mean state, zero. Only their mean squares differ.
 #[derive(Clone, Debug)]
 pub(crate) struct TwoShells;
 
@@ -455,8 +457,8 @@ impl Formula for TwoShells {
     }
 }
 
-/// x → x/2 + μ/2, and whether the image lies above 1: the fixed point is μ, its flag 1 for μ > 1.
-/// With the flag set the image is a hundredth further on, as of a neck that pulls.
+/// x → x/2 + μ/2, and a flag that is 1 if the image is above 1: the fixed point is μ, its flag 1
+/// for μ > 1. With the flag set the image is larger by 1/100, as for a neck that pulls.
 #[derive(Clone, Debug)]
 pub(crate) struct Flagged(pub f64);
 
@@ -477,12 +479,12 @@ impl Formula for Flagged {
     }
 }
 
-/// Ulam's map where the second number is negative, which stays so and goes to −1; a fixed point at
-/// (0, 1) for the others.
+/// Ulam's map if the second number is negative (it stays negative and converges to −1); a fixed
+/// point at (0, 1) for the others.
 #[derive(Clone, Debug)]
-pub(crate) struct ChaosBesideRest;
+pub(crate) struct ChaosAndRest;
 
-impl Formula for ChaosBesideRest {
+impl Formula for ChaosAndRest {
     const DIMENSION: usize = 2;
     fn image(&self, x: &[f64], out: &mut [f64]) {
         let side = 1f64.copysign(x[1]);
@@ -524,9 +526,9 @@ impl Formula for Resonance {
     }
 }
 
-/// x → a x + b |x| + μ: homogeneous of degree one in (x, μ). Fixed points μ/(1 − a − b)
-/// for μ > 0 where 0 < 1 − a − b, with the multiplier a + b all the way to μ = 0, where
-/// the map has no derivative. The parameter is μ.
+/// x → a x + b |x| + μ: homogeneous of degree one in (x, μ). For 0 < 1 − a − b the fixed points are
+/// μ/(1 − a − b), μ > 0, with the multiplier a + b down to μ = 0, where the map has no derivative.
+/// The parameter is μ.
 #[derive(Clone, Debug)]
 pub(crate) struct Kinked {
     pub mu: f64,

@@ -1,4 +1,4 @@
-//! Loci in two parameters and assembled diagrams.
+//! Curves of bifurcations in two parameters, and assembled diagrams.
 
 use std::convert::Infallible;
 
@@ -207,9 +207,9 @@ fn a_neimark_sacker_locus() {
     check(&locus, (-0.2, 0.3), |c| 2.0 / (1.0 + c), 1e-11);
 }
 
-/// The trace there is a − 1: both multipliers come to 1 at a = 3, c = −1/3, where the curve ends.
+/// The trace on it is a − 1: both multipliers reach 1 at a = 3, c = −1/3, where the curve ends.
 #[test]
-fn a_neimark_sacker_locus_ends_in_its_resonance() {
+fn a_neimark_sacker_curve_ends_at_its_resonance() {
     let plane: Plane<Shifted> = Plane {
         make: Shifted,
         second: |_, _, out| {
@@ -267,7 +267,7 @@ impl Formula for Sphere {
     }
 }
 
-/// Once round each way, wherever the orbits are; at the origin they have no size of their own.
+/// Once around in each direction, wherever the orbits are; at the origin they have no size.
 #[test]
 fn a_closed_curve_of_folds_closes() {
     type Make = fn(f64, f64) -> Sphere;
@@ -280,11 +280,11 @@ fn a_closed_curve_of_folds_closes() {
         |a| Sphere { a, b: 0.25, c: 0.0 },
     );
     for ((make, line), c) in [(at_two, 2.0), (at_origin, 0.0)] {
-        goes_round(make, line, c);
+        check_closed_curve(make, line, c);
     }
 }
 
-fn goes_round(make: fn(f64, f64) -> Sphere, line: fn(f64) -> Sphere, c: f64) {
+fn check_closed_curve(make: fn(f64, f64) -> Sphere, line: fn(f64) -> Sphere, c: f64) {
     let plane: Plane<Sphere> = Plane {
         make,
         second: |map, _, out| out[0] = -0.5 * map.b,
@@ -306,13 +306,13 @@ fn goes_round(make: fn(f64, f64) -> Sphere, line: fn(f64) -> Sphere, c: f64) {
         assert!((q.first.hypot(q.second) - 1.0).abs() < 1e-11);
         turned += (p.first * q.second - q.first * p.second).asin();
     }
-    // Up to a step beyond on either way.
+    // At most one step beyond, in either direction.
     let rounds = turned.abs() / std::f64::consts::TAU;
     assert!((1.9..2.2).contains(&rounds), "{rounds}");
 }
 
 #[test]
-fn boxes_that_do_not_hold_the_start_are_refused() {
+fn boxes_that_do_not_contain_the_start_are_refused() {
     let family: Family<Henon> = Family(|a| Henon { a, b: 0.3 });
     let flip = first_of(
         &family,
@@ -349,8 +349,8 @@ fn boxes_that_do_not_hold_the_start_are_refused() {
     }
 }
 
-/// From a census at r = 3.2 (one period-2 attractor): the doubled branch, the fixed
-/// point it was born from, and two more doublings, each once.
+/// From a census at r = 3.2 (one period-2 attractor): the doubled branch, the fixed point from
+/// which it bifurcates, and two more doublings, each once.
 #[test]
 fn the_logistic_diagram_assembles_from_one_attractor() {
     let family: Family<Logistic> = Family(Logistic);
@@ -370,7 +370,7 @@ fn the_logistic_diagram_assembles_from_one_attractor() {
         doublings: 3,
         max_branches: 100,
     };
-    // The same orbit twice: followed once.
+    // The same orbit twice is followed once.
     let seeds = vec![(3.2, orbit.clone()), (3.2, orbit.clone())];
     let diagram = assemble_diagram(&family, &seeds, &options, &Control::default());
     assert!(diagram.failures.is_empty(), "{:?}", diagram.failures);
@@ -400,11 +400,11 @@ fn the_logistic_diagram_assembles_from_one_attractor() {
     }
 }
 
-/// Threads that have nothing to do follow seeds of other periods beforehand, also those that turn
-/// out to lie on a branch: a period-2 orbit on the first seed's doubled branch, a period-4 orbit
-/// on that of the second, and a period-3 orbit twice.
+/// Idle threads follow seeds of other periods in advance, including those that turn out to lie on a
+/// known branch: a period-2 orbit on the doubled branch of the first seed, a period-4 orbit on that
+/// of the second, and a period-3 orbit twice.
 #[test]
-fn a_diagram_is_the_same_on_any_number_of_threads() {
+fn a_diagram_does_not_depend_on_the_number_of_threads() {
     let family: Family<Logistic> = Family(Logistic);
     let seed = |r: f64, period: usize| {
         let mut map = family.at(r).unwrap();
@@ -416,8 +416,7 @@ fn a_diagram_is_the_same_on_any_number_of_threads() {
         assert_eq!(orbit.period, period);
         (r, orbit)
     };
-    // Of the windows of the logistic map that of period 3 opens at 1 + √8, that of period 5 at
-    // 3.738 (May 1976).
+    // Windows of the logistic map: period 3 opens at 1 + √8, period 5 at 3.738 (May 1976).
     let seeds = [
         seed(2.5, 1),
         seed(3.2, 2),
@@ -446,7 +445,7 @@ fn a_diagram_is_the_same_on_any_number_of_threads() {
     for threads in [2, 4] {
         assert_eq!(format!("{:?}", assembled(threads)), format!("{alone:?}"));
     }
-    // Seeds that come later are as if they had been the last to be given.
+    // Seeds that are added later give the same result as seeds at the end of the list.
     let mut later = Diagram::default();
     for part in [&seeds[..2], &seeds[2..]] {
         later.extend(&family, part, &options, &Control::default());
@@ -454,10 +453,10 @@ fn a_diagram_is_the_same_on_any_number_of_threads() {
     assert_eq!(format!("{later:?}"), format!("{alone:?}"));
 }
 
-/// The two fixed points ±√(r − 1) of the cubic map are mirror images with one multiplier 3 − 2r, and
-/// branches of their own; one that is given twice is followed once.
+/// The two fixed points ±√(r − 1) of the cubic map are mirror images with the same multiplier 3 −
+/// 2r, on separate branches; a seed that is given twice is followed once.
 #[test]
-fn mirror_images_are_branches_of_their_own() {
+fn mirror_images_are_separate_branches() {
     let family: Family<Cubic> = Family(Cubic);
     let seed = |x: f64| {
         let mut map = family.at(1.5).unwrap();

@@ -2,11 +2,10 @@
 
 use std::sync::Arc;
 
-use super::request::{
-    End, ExtremumKey, FourierKey, IntegralKey, Plan, ProductKey, RangePlan, RegimePlan, Sign,
-};
+use super::request::{Plan, RangePlan, RegimePlan, Sign};
 use super::stretch::Stretch;
 use crate::Complex;
+use crate::functional::Functional;
 use crate::integral::{fourier_integral, integral, product_integral};
 use crate::observer::{Observer, SegmentView, SwitchView};
 use crate::search::range::{Extend, Range, RangeWork, extend_by_certified_steps};
@@ -33,10 +32,8 @@ pub struct Switches {
 #[derive(Clone, Debug)]
 pub struct Accumulator {
     plan: Arc<Plan>,
-    extrema: Vec<f64>,
-    integrals: Vec<f64>,
-    products: Vec<f64>,
-    fouriers: Vec<Complex>,
+    /// By number of the functional.
+    values: Vec<Complex>,
     times: Vec<f64>,
     switches: Vec<Switches>,
     duration: f64,
@@ -49,12 +46,9 @@ pub struct Accumulator {
 impl Accumulator {
     /// Of a motion that is still to run.
     pub fn new(plan: &Arc<Plan>) -> Self {
-        let (request, regimes) = (&plan.request, plan.regimes());
+        let regimes = plan.regimes();
         let mut accumulator = Self {
-            extrema: vec![0.0; request.extrema.len()],
-            integrals: vec![0.0; request.integrals.len()],
-            products: vec![0.0; request.products.len()],
-            fouriers: vec![Complex::new(0.0, 0.0); request.fouriers.len()],
+            values: vec![Complex::new(0.0, 0.0); plan.functionals.len()],
             times: vec![0.0; regimes],
             switches: vec![Switches::default(); regimes * regimes],
             duration: 0.0,
@@ -72,14 +66,11 @@ impl Accumulator {
         &self.plan
     }
 
-    /// Begins anew.
+    /// Clears all values.
     pub fn clear(&mut self) {
-        for (extremum, (_, end)) in self.extrema.iter_mut().zip(&self.plan.request.extrema) {
-            *extremum = nothing_yet(*end);
+        for (value, functional) in self.values.iter_mut().zip(&self.plan.functionals) {
+            *value = functional.initial();
         }
-        self.integrals.fill(0.0);
-        self.products.fill(0.0);
-        self.fouriers.fill(Complex::new(0.0, 0.0));
         self.times.fill(0.0);
         self.switches.fill(Switches::default());
         self.duration = 0.0;
@@ -111,38 +102,16 @@ impl Accumulator {
         }
     }
 
-    /// A least or greatest value; of no time, plus or minus infinity.
-    pub fn extremum(&self, key: ExtremumKey) -> f64 {
-        self.extrema[key.0]
+    /// The functionals' values by number: real but for Fourier coefficients; extrema of no time are
+    /// infinite.
+    pub fn values(&self) -> &[Complex] {
+        &self.values
     }
 
-    /// The same, which begins anew.
-    pub fn take_extremum(&mut self, key: ExtremumKey) -> f64 {
-        let (_, end) = self.plan.request.extrema[key.0];
-        std::mem::replace(&mut self.extrema[key.0], nothing_yet(end))
-    }
-
-    /// `∫ g dt`.
-    pub fn integral(&self, key: IntegralKey) -> f64 {
-        self.integrals[key.0]
-    }
-
-    /// `∫ g h dt`.
-    pub fn product(&self, key: ProductKey) -> f64 {
-        self.products[key.0]
-    }
-
-    /// `∫ g e^{−iωt} dt`.
-    pub fn fourier(&self, key: FourierKey) -> Complex {
-        self.fouriers[key.0]
-    }
-}
-
-/// An extremum of no value.
-fn nothing_yet(end: End) -> f64 {
-    match end {
-        End::Least => f64::INFINITY,
-        End::Greatest => f64::NEG_INFINITY,
+    /// The value of functional `number`, which begins anew.
+    pub fn take(&mut self, number: usize) -> f64 {
+        let initial = self.plan.functionals[number].initial();
+        std::mem::replace(&mut self.values[number], initial).re
     }
 }
 
@@ -163,16 +132,15 @@ impl Accumulator {
             .extend(terms.chain([[Complex::new(1.0, 0.0); 2]]));
         let used = |channel: usize| !regime.weights[channel].is_empty();
 
-        let integrals = &plan.request.integrals;
-        if integrals.iter().any(|&c| used(c)) {
+        if plan.integrals.iter().any(|&(_, c)| used(c)) {
             stretch.integrate(&regime.rates);
-            for (sum, &channel) in self.integrals.iter_mut().zip(integrals) {
-                *sum += stretch.integral(&regime.weights[channel]);
+            for &(number, channel) in &plan.integrals {
+                self.values[number].re += stretch.integral(&regime.weights[channel]);
             }
         }
         for (number, (frequency, rates)) in plan.frequencies.iter().zip(&regime.turned).enumerate()
         {
-            let wanted = |&(c, n): &(usize, usize)| n == number && used(c);
+            let wanted = |&(_, c, n): &(usize, usize, usize)| n == number && used(c);
             if !plan.fouriers.iter().any(wanted) {
                 continue;
             }
@@ -187,16 +155,14 @@ impl Accumulator {
                 })
             };
             stretch.turn(rates, start.conj(), over.conj());
-            for (sum, fourier) in self.fouriers.iter_mut().zip(&plan.fouriers) {
-                if wanted(fourier) {
-                    *sum += stretch.fourier(&regime.weights[fourier.0]);
-                }
+            for fourier in plan.fouriers.iter().filter(|f| wanted(f)) {
+                self.values[fourier.0] += stretch.fourier(&regime.weights[fourier.1]);
             }
         }
         if regime.products.iter().any(|weights| !weights.is_empty()) {
             stretch.pair(&regime.rates);
-            for (sum, weights) in self.products.iter_mut().zip(&regime.products) {
-                *sum += stretch.product(weights);
+            for (&(number, ..), weights) in plan.products.iter().zip(&regime.products) {
+                self.values[number].re += stretch.product(weights);
             }
         }
     }
@@ -207,21 +173,23 @@ impl Accumulator {
         let length = segment.length;
         let signal = |channel: usize| signal(plan, segment, channel);
         let time = self.periods as f64 * segment.system.drive().period() + segment.phase;
-        for (sum, &channel) in self.integrals.iter_mut().zip(&plan.request.integrals) {
-            *sum += integral(&signal(channel), length);
-        }
-        for (sum, &(channel, omega)) in self.fouriers.iter_mut().zip(&plan.request.fouriers) {
-            *sum += fourier_integral(&signal(channel), time, length, omega);
-        }
-        for (sum, &(g, h)) in self.products.iter_mut().zip(&plan.request.products) {
-            *sum += product_integral(&signal(g), &signal(h), length);
+        for (sum, functional) in self.values.iter_mut().zip(&plan.functionals) {
+            *sum += match *functional {
+                Functional::Least(_) | Functional::Greatest(_) => continue,
+                Functional::Integral(g) => integral(&signal(g), length).into(),
+                Functional::Product(g, h) => {
+                    product_integral(&signal(g), &signal(h), length).into()
+                }
+                Functional::Fourier(g, omega) => fourier_integral(&signal(g), time, length, omega),
+            };
         }
     }
 
     /// Extends the extrema of channel `wanted.channel` over a stretch.
     #[inline(always)]
     fn extend_range(&mut self, plan: &Plan, segment: &SegmentView<'_>, wanted: &RangePlan) {
-        let known = |key: Option<usize>, otherwise: f64| key.map_or(otherwise, |k| self.extrema[k]);
+        let known =
+            |key: Option<usize>, otherwise: f64| key.map_or(otherwise, |k| self.values[k].re);
         let mut range = Range {
             least: known(wanted.least, f64::MIN),
             greatest: known(wanted.greatest, f64::MAX),
@@ -272,10 +240,10 @@ impl Accumulator {
             extend_by_certified_steps(&mut range, &signal, segment.length);
         }
         if let Some(key) = wanted.least {
-            self.extrema[key] = range.least;
+            self.values[key].re = range.least;
         }
         if let Some(key) = wanted.greatest {
-            self.extrema[key] = range.greatest;
+            self.values[key].re = range.greatest;
         }
     }
 
@@ -299,16 +267,7 @@ impl Accumulator {
 const DROWNED: f64 = 128.0 * f64::EPSILON;
 
 fn signal(plan: &Plan, segment: &SegmentView<'_>, channel: usize) -> Signal {
-    let output = &plan.regimes[segment.regime].outputs[channel];
-    let drive = segment.system.drive();
-    Signal::of(
-        segment.regime(),
-        drive,
-        output,
-        segment.modal,
-        segment.phase,
-        segment.length,
-    )
+    segment.signal(&plan.regimes[segment.regime].outputs[channel])
 }
 
 impl Observer for Accumulator {

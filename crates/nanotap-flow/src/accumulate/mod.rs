@@ -8,7 +8,7 @@
 //! the sums along:
 //!
 //! ```
-//! use nanotap_flow::accumulate::{Accumulator, Request};
+//! use nanotap_flow::accumulate::{Accumulator, Functional, Request};
 //! # use nalgebra::{DMatrix, DVector, RowDVector};
 //! # use nanotap_flow::{Drive, Flow, HarmonicVector, Output, Regime, System};
 //! # let drive = Drive::single(1.0)?;
@@ -20,8 +20,9 @@
 //! let x = Output::linear(RowDVector::from_row_slice(&[1.0, 0.0]), 1);
 //! let mut request = Request::new();
 //! let position = request.output(&x);
-//! let (highest, mean) = (request.greatest(position), request.integral(position));
-//! let first = request.fourier(position, 1.0);
+//! let highest = request.add(Functional::Greatest(position));
+//! let mean = request.add(Functional::Integral(position));
+//! let first = request.add(Functional::Fourier(position, 1.0));
 //!
 //! let mut accumulator = Accumulator::new(&request.plan(&system)?);
 //! let mut flow = Flow::new(system);
@@ -30,8 +31,9 @@
 //!     flow.run_period(&mut accumulator)?;
 //! }
 //! let duration = accumulator.duration();
-//! println!("{} {}", accumulator.extremum(highest), accumulator.integral(mean) / duration);
-//! println!("{}", accumulator.fourier(first).norm_sqr().sqrt() * 2.0 / duration);
+//! let values = accumulator.values();
+//! println!("{} {}", values[highest].re, values[mean].re / duration);
+//! println!("{}", values[first].norm_sqr().sqrt() * 2.0 / duration);
 //! # Ok::<(), nanotap_flow::FlowError>(())
 //! ```
 //!
@@ -47,8 +49,8 @@
 //!   zero of the rate that was found. None is taken from samples.
 //! - An output that differs between regimes jumps at switches; both one-sided values count.
 //!   Where an output is identically zero in a regime, that zero counts as a value of it.
-//! - A request for the same thing twice returns the same key and costs nothing.
-//! - [`Accumulator::clear`] begins anew, [`Accumulator::take_extremum`] begins anew for one
+//! - A request for the same thing twice returns the same number and costs nothing.
+//! - [`Accumulator::clear`] begins anew, [`Accumulator::take`] begins anew for one
 //!   extremum alone (extrema of every period, say). Time is counted, for Fourier
 //!   coefficients, from the start of the drive period in which the accumulator was last
 //!   cleared.
@@ -58,5 +60,6 @@ mod accumulator;
 mod request;
 mod stretch;
 
+pub use crate::functional::Functional;
 pub use accumulator::{Accumulator, Switches};
-pub use request::{Channel, ExtremumKey, FourierKey, IntegralKey, Plan, ProductKey, Request};
+pub use request::{Plan, Request};

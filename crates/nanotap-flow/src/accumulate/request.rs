@@ -1,39 +1,13 @@
-//! What is to be accumulated, and the same made ready for one system.
+//! A request for functionals of outputs, and the same made ready for one system.
 
 use std::sync::Arc;
 
 use super::stretch::{Rates, pair_weights};
+use crate::functional::Functional;
 use crate::rate::Rate;
 use crate::regime::{Kernel, KernelFrame, ModalOutput};
 use crate::search::table::Table;
 use crate::{Complex, Drive, FlowError, Output, Regime, System};
-
-/// An output of a [`Request`].
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub struct Channel(pub(super) usize);
-
-/// A least or greatest value that was asked for.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub struct ExtremumKey(pub(super) usize);
-
-/// An integral that was asked for.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub struct IntegralKey(pub(super) usize);
-
-/// An integral of a product that was asked for.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub struct ProductKey(pub(super) usize);
-
-/// A Fourier coefficient that was asked for.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub struct FourierKey(pub(super) usize);
-
-/// Which end of an output's range.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum End {
-    Least,
-    Greatest,
-}
 
 /// An output in every regime.
 #[derive(Clone, Debug, PartialEq)]
@@ -42,14 +16,11 @@ enum Outputs {
     ByRegime(Vec<Output>),
 }
 
-/// Outputs, and what is wanted of each. See the [module](super).
+/// Outputs and functionals of them, both by number. See the [module](super).
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Request {
     outputs: Vec<Outputs>,
-    pub(super) extrema: Vec<(usize, End)>,
-    pub(super) integrals: Vec<usize>,
-    pub(super) products: Vec<(usize, usize)>,
-    pub(super) fouriers: Vec<(usize, f64)>,
+    functionals: Vec<Functional>,
 }
 
 impl Request {
@@ -58,46 +29,29 @@ impl Request {
         Self::default()
     }
 
-    /// An output that is the same in every regime.
-    pub fn output(&mut self, output: &Output) -> Channel {
-        self.channel(Outputs::Same(output.clone()))
+    /// The functionals, in the order of their numbers.
+    pub fn functionals(&self) -> &[Functional] {
+        &self.functionals
     }
 
-    /// An output that differs from regime to regime, such as a contact force: one entry a
-    /// regime.
-    pub fn output_by_regime(&mut self, outputs: &[Output]) -> Channel {
-        self.channel(Outputs::ByRegime(outputs.to_vec()))
+    /// Adds an output that is the same in every regime, and returns its number.
+    pub fn output(&mut self, output: &Output) -> usize {
+        place(&mut self.outputs, Outputs::Same(output.clone()))
     }
 
-    fn channel(&mut self, outputs: Outputs) -> Channel {
-        Channel(place(&mut self.outputs, outputs))
+    /// Adds an output that differs from regime to regime, such as a contact force (one entry a
+    /// regime), and returns its number.
+    pub fn output_by_regime(&mut self, outputs: &[Output]) -> usize {
+        place(&mut self.outputs, Outputs::ByRegime(outputs.to_vec()))
     }
 
-    /// The least value.
-    pub fn least(&mut self, channel: Channel) -> ExtremumKey {
-        ExtremumKey(place(&mut self.extrema, (channel.0, End::Least)))
-    }
-
-    /// The greatest value.
-    pub fn greatest(&mut self, channel: Channel) -> ExtremumKey {
-        ExtremumKey(place(&mut self.extrema, (channel.0, End::Greatest)))
-    }
-
-    /// `∫ g dt`.
-    pub fn integral(&mut self, channel: Channel) -> IntegralKey {
-        IntegralKey(place(&mut self.integrals, channel.0))
-    }
-
-    /// `∫ g h dt`; with itself, of the square.
-    pub fn product(&mut self, g: Channel, h: Channel) -> ProductKey {
-        let pair = (g.0.min(h.0), g.0.max(h.0));
-        ProductKey(place(&mut self.products, pair))
-    }
-
-    /// `∫ g e^{−iωt} dt`. Twice this over the duration `D`, `c = (2/D) ∫ g e^{−iωt} dt`, is the
-    /// amplitude of the component `Re(c e^{iωt})`.
-    pub fn fourier(&mut self, channel: Channel, omega: f64) -> FourierKey {
-        FourierKey(place(&mut self.fouriers, (channel.0, omega)))
+    /// Adds a functional of the outputs, and returns its number.
+    pub fn add(&mut self, functional: Functional) -> usize {
+        let functional = match functional {
+            Functional::Product(g, h) => Functional::Product(g.min(h), g.max(h)),
+            other => other,
+        };
+        place(&mut self.functionals, functional)
     }
 
     /// The request made ready for `system`.
@@ -108,7 +62,8 @@ impl Request {
     pub fn plan(&self, system: &System) -> Result<Arc<Plan>, FlowError> {
         let (n, tones) = (system.dimension(), system.drive().frequencies().len());
         let regimes = system.regimes();
-        if self.fouriers.iter().any(|(_, omega)| !omega.is_finite()) {
+        let mut omegas = self.functionals.iter().filter_map(|f| f.frequency());
+        if omegas.any(|omega| !omega.is_finite()) {
             return Err(FlowError::NotFinite {
                 what: "a frequency of a Fourier coefficient",
             });
@@ -143,25 +98,32 @@ impl Request {
                 }));
             }
         }
-        let mut frequencies = Vec::new();
-        let fouriers = self.fouriers.iter();
-        let fouriers = fouriers
-            .map(|&(c, omega)| (c, place(&mut frequencies, omega)))
-            .collect();
-        let mut ranges = Vec::new();
-        for (key, &(channel, end)) in self.extrema.iter().enumerate() {
-            let at = ranges.iter().position(|r: &RangePlan| r.channel == channel);
-            let at = at.unwrap_or_else(|| {
-                ranges.push(RangePlan {
-                    channel,
-                    least: None,
-                    greatest: None,
-                });
-                ranges.len() - 1
-            });
-            match end {
-                End::Least => ranges[at].least = Some(key),
-                End::Greatest => ranges[at].greatest = Some(key),
+        let (mut frequencies, mut fouriers) = (Vec::new(), Vec::new());
+        let (mut integrals, mut products) = (Vec::new(), Vec::new());
+        let mut ranges: Vec<RangePlan> = Vec::new();
+        for (number, functional) in self.functionals.iter().enumerate() {
+            match *functional {
+                Functional::Least(channel) | Functional::Greatest(channel) => {
+                    let at = ranges.iter().position(|r| r.channel == channel);
+                    let at = at.unwrap_or_else(|| {
+                        ranges.push(RangePlan {
+                            channel,
+                            least: None,
+                            greatest: None,
+                        });
+                        ranges.len() - 1
+                    });
+                    match functional {
+                        Functional::Least(_) => ranges[at].least = Some(number),
+                        _ => ranges[at].greatest = Some(number),
+                    }
+                }
+                Functional::Integral(channel) => integrals.push((number, channel)),
+                Functional::Product(g, h) => products.push((number, g, h)),
+                Functional::Fourier(channel, omega) => {
+                    let frequency = place(&mut frequencies, omega);
+                    fouriers.push((number, channel, frequency));
+                }
             }
         }
         let regimes = regimes.iter().zip(outputs).zip(signs).enumerate();
@@ -173,21 +135,17 @@ impl Request {
                     .iter()
                     .any(|transition| transition.table.as_ref().is_some_and(Table::is_complete));
                 let drive = system.drive();
-                let plan = RegimePlan::new(
-                    regime,
-                    drive,
-                    outputs,
-                    &frequencies,
-                    &self.products,
-                    tabulated,
-                );
+                let plan =
+                    RegimePlan::new(regime, drive, outputs, &frequencies, &products, tabulated);
                 RegimePlan { signs, ..plan }
             })
             .collect();
         let frequencies = frequencies.into_iter();
         Ok(Arc::new(Plan {
-            request: self.clone(),
+            functionals: self.functionals.clone(),
             ranges,
+            integrals,
+            products,
             fouriers,
             frequencies: frequencies
                 .map(|omega| Frequency::new(omega, system.drive()))
@@ -197,7 +155,7 @@ impl Request {
     }
 }
 
-/// Where `item` stands in the list, at its end if it was not there.
+/// The position of `item` in the list, to whose end it is added if it was not there.
 fn place<T: PartialEq>(list: &mut Vec<T>, item: T) -> usize {
     list.iter()
         .position(|other| *other == item)
@@ -210,10 +168,14 @@ fn place<T: PartialEq>(list: &mut Vec<T>, item: T) -> usize {
 /// A [`Request`] made ready for one [`System`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct Plan {
-    pub(super) request: Request,
+    pub(super) functionals: Vec<Functional>,
     pub(super) ranges: Vec<RangePlan>,
-    /// Channel and number of the frequency of each Fourier coefficient.
-    pub(super) fouriers: Vec<(usize, usize)>,
+    /// Number and channel of each integral.
+    pub(super) integrals: Vec<(usize, usize)>,
+    /// Number and channels of each product.
+    pub(super) products: Vec<(usize, usize, usize)>,
+    /// Number, channel and number of the frequency of each Fourier coefficient.
+    pub(super) fouriers: Vec<(usize, usize, usize)>,
     pub(super) frequencies: Vec<Frequency>,
     pub(super) regimes: Vec<RegimePlan>,
 }
@@ -244,7 +206,7 @@ impl Frequency {
     }
 }
 
-/// The extrema of one channel: their keys, where they are asked for.
+/// The extrema of one channel: their numbers among the functionals, where requested.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct RangePlan {
     pub(super) channel: usize,
@@ -284,11 +246,11 @@ impl RegimePlan {
         drive: &Drive,
         outputs: Vec<ModalOutput>,
         frequencies: &[f64],
-        products: &[(usize, usize)],
+        products: &[(usize, usize, usize)],
         tabulated: bool,
     ) -> Self {
         let weights: Vec<Vec<Complex>> = outputs.iter().map(weights).collect();
-        let product = |&(g, h): &(usize, usize)| pair_weights(&weights[g], &weights[h]);
+        let product = |&(_, g, h): &(usize, usize, usize)| pair_weights(&weights[g], &weights[h]);
         let pairs = products.iter().map(product).collect();
         let frame = KernelFrame::new(regime, drive);
         let kernels: Vec<Kernel> = outputs.iter().map(|o| frame.kernel(o)).collect();

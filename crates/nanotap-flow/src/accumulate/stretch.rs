@@ -13,7 +13,7 @@ pub(super) struct Rates {
     period: f64,
     pub(super) single: Vec<Rate>,
     /// `λ_j + λ_k` and `λ_j + λ̄_k` for `j ≤ k`, row after row; empty where no product is
-    /// asked for.
+    /// requested.
     pairs: Vec<[Rate; 2]>,
 }
 

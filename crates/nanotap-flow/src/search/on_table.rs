@@ -91,7 +91,7 @@ impl Decision {
 }
 
 /// Evaluations of the signal near a quintic's zero before it is left to certified steps.
-const MOST_EVALUATIONS: usize = 4;
+const MAX_EVALUATIONS: usize = 4;
 
 /// A search through the intervals of a table's fine grid.
 struct IntervalSearch<'a> {
@@ -155,7 +155,7 @@ impl IntervalSearch<'_> {
         // The signal too falls all the way.
         let falls = gentlest > rate_error;
         let mut at = interval.start + quintic.zero() * interval.width;
-        for evaluated in 0..MOST_EVALUATIONS {
+        for evaluated in 0..MAX_EVALUATIONS {
             self.statistics.evaluations += 1;
             let (jet, jerk) = self.signal.jet_keeping_factors::<S>(at);
             let near = Near::<Single> {

@@ -42,7 +42,7 @@ const DROWNED: f64 = 32.0;
 /// series then leaves out is below rounding.
 const LAST_STEP: f64 = 3e-4;
 /// Steps before it is given up.
-const MOST_STEPS: usize = 5;
+const MAX_STEPS: usize = 5;
 
 /// Work space of a search for extrema.
 #[derive(Clone, Debug, Default)]
@@ -409,7 +409,7 @@ fn extremum<S: Simd>(
     }
     // The signal's.
     let mut at = interval.start + t * h;
-    for _ in 0..MOST_STEPS {
+    for _ in 0..MAX_STEPS {
         let (jet, jerk) = signal.jet_keeping_factors::<S>(at);
         let (rate, curvature, jerk) = (side * jet.rate, side * jet.curvature, side * jerk);
         if curvature >= 0.0 || curvature.is_nan() {

@@ -1,11 +1,11 @@
 //! The walk along the points of a table for eight signals side by side, a lane each.
 //!
-//! In a lane of its own a signal cannot stop early, so the proof has to be cheap everywhere. Most of a
+//! In a separate lane a signal cannot stop early, so the proof has to be cheap everywhere. Most of a
 //! flight is far from zero, and there the slow terms' values are enough: between two points they keep
 //! above the lower one, less than what curvature takes from a chord, and every other term takes its
 //! amplitude at most. What that leaves open, mostly the first interval of a flight and the last ones,
 //! is looked at as in the walk of a single signal ([`walk`](super::walk)), with all followed terms, by
-//! the quintic's Bernstein coefficients: each lane looks at an open interval of its own then.
+//! the quintic's Bernstein coefficients: each lane then examines its own next open interval.
 
 use super::interval::Quintic;
 use super::table::Table;
@@ -14,7 +14,7 @@ use crate::regime::Kernel;
 use crate::simd::{self, ComplexOctet, LANES, Octet, WIDTH, Wide, layout};
 
 /// The most intervals that are looked at: a bit each.
-const MOST_INTERVALS: usize = 64;
+const MAX_INTERVALS: usize = 64;
 /// The most terms that are followed; where there are fewer, the rest is zero.
 const TERMS: usize = 4;
 
@@ -48,7 +48,7 @@ pub(crate) struct Intervals<W: Wide> {
 
 /// How far the signals of a table can be searched side by side.
 pub(crate) fn reach(table: &Table) -> f64 {
-    (table.fine.points() - 1).min(MOST_INTERVALS) as f64 * table.fine.step
+    (table.fine.points() - 1).min(MAX_INTERVALS) as f64 * table.fine.step
 }
 
 /// Whether the signals of a table can be searched side by side.
@@ -115,7 +115,7 @@ impl Signals<'_> {
         let mut before = W::splat(f64::MAX);
         let mut ended = self.idle;
         // The first is that before the first point.
-        let mut open = [0_u8; MOST_INTERVALS + WIDTH];
+        let mut open = [0_u8; MAX_INTERVALS + WIDTH];
         let vectors = grid.table.chunks_exact(grid.terms);
         let mut points = 0;
         for (vector, open) in vectors.zip(open.chunks_exact_mut(WIDTH)) {
@@ -196,7 +196,7 @@ impl Signals<'_> {
         let (mut points, mut start) = ([0; LANES], Octet::default());
         let (mut at_start, mut looking) = (0, 0);
         for (lane, open) in open.iter_mut().enumerate() {
-            let point = open.trailing_zeros() as usize % MOST_INTERVALS;
+            let point = open.trailing_zeros() as usize % MAX_INTERVALS;
             points[lane] = point;
             start[lane] = point as f64;
             at_start |= u32::from(point == 0) << lane;
@@ -299,7 +299,7 @@ struct Term<W: Wide> {
 
 /// Bits by interval and lane as bits by lane and interval. The first of the intervals is none.
 #[inline(always)]
-fn transposed(open: &[u8; MOST_INTERVALS + WIDTH], count: usize) -> [u64; LANES] {
+fn transposed(open: &[u8; MAX_INTERVALS + WIDTH], count: usize) -> [u64; LANES] {
     let mut lanes = [0_u64; LANES];
     let groups = open[1..].chunks_exact(8).take(count.div_ceil(8));
     for (group, eight) in groups.enumerate() {
@@ -333,12 +333,12 @@ mod tests {
 
     #[test]
     fn bits_change_places() {
-        let mut open = [0; MOST_INTERVALS + WIDTH];
+        let mut open = [0; MAX_INTERVALS + WIDTH];
         for (interval, lanes) in open.iter_mut().enumerate() {
             *lanes = (interval * 37 + interval / 7) as u8;
         }
-        let lanes = transposed(&open, MOST_INTERVALS);
-        for (interval, bits) in open[1..=MOST_INTERVALS].iter().enumerate() {
+        let lanes = transposed(&open, MAX_INTERVALS);
+        for (interval, bits) in open[1..=MAX_INTERVALS].iter().enumerate() {
             for (lane, intervals) in lanes.iter().enumerate() {
                 assert_eq!(u64::from(bits >> lane) & 1, (intervals >> interval) & 1);
             }

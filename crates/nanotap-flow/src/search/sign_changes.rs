@@ -6,7 +6,7 @@ use crate::signal::Signal;
 /// Zeros nearer to each other than this part of the length …
 const CROWDED: f64 = 1e-13;
 /// … and more than this many in a row are rounding: a signal that is zero but for it.
-const MOST_CROWDED: u32 = 32;
+const MAX_CROWDED: u32 = 32;
 
 /// Every zero in `(0, length)` at which the signal changes sign, in order. A signal that
 /// drowns in its own rounding has none from there on.
@@ -45,7 +45,7 @@ pub fn sign_changes(signal: &Signal, length: f64) -> Vec<f64> {
         } else {
             0
         };
-        if crowded > MOST_CROWDED {
+        if crowded > MAX_CROWDED {
             break;
         }
         if crossing.at > 0.0 {

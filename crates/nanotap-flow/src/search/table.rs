@@ -29,7 +29,7 @@ const CHEAP: f64 = 1500.0;
 const LARGEST: usize = 64;
 /// The most points of the fine grid: faster terms are not followed. With that many the tables of
 /// a regime stay below 16 MiB.
-const MOST_POINTS: f64 = 8192.0;
+const MAX_POINTS: f64 = 8192.0;
 /// How far a slow term of amplitude one may keep away from its chord over an interval.
 const SLOW: f64 = 0.5;
 /// What rounding, in table and sums, could take from a value, in units of the terms' size.
@@ -106,7 +106,7 @@ impl Table {
         };
         // The slowest term sets how coarse the coarse grid can be.
         let slowest = step_of(0, 1);
-        let follows = |term: &usize| slowest <= MOST_POINTS * step_of(*term, 0);
+        let follows = |term: &usize| slowest <= MAX_POINTS * step_of(*term, 0);
         let fine_terms = (1..order.len().min(most)).take_while(follows).count() + 1;
         let fastest = kernel.rate(order[fine_terms - 1]).modulus();
         let slow = order

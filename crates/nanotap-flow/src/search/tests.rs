@@ -146,7 +146,7 @@ proptest! {
 }
 
 /// Eight signals of one guard: their amplitudes are those of `packed`, each lane's multiplied by
-/// factors of its own.
+/// different factors.
 fn eight(
     kernel: &Kernel,
     packed: &[ComplexVector],
@@ -235,7 +235,7 @@ proptest! {
             } else if !on_surface && first.value > 0.0 {
                 Some(Start::Inside)
             } else {
-                // Of what does not rise from the surface nothing is asked. What is below zero is looked
+                // Lanes that do not rise from the surface need no certificate. What is below zero is looked
                 // at, and not certified.
                 signals.idle |= u32::from(on_surface) << lane;
                 None

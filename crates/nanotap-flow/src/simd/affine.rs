@@ -5,7 +5,7 @@ use super::{ComplexOctet, ComplexVector, Simd, WIDTH, Wide, layout};
 /// `z ↦ Σ_k (a_k Re z_k + b_k Im z_k) + c` with complex vectors `a_k`, `b_k`, `c`.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct AffineMap {
-    /// The columns one after the other: all `a_k`, all `b_k`, then `c`.
+    /// The columns in sequence: all `a_k`, all `b_k`, then `c`.
     columns: Vec<ComplexVector>,
     /// Vectors a column.
     vectors: usize,
@@ -38,6 +38,13 @@ impl AffineMap {
             let (vector, lane) = layout::place(row);
             vectors[vector][part][lane] = 1.0;
         }
+    }
+
+    /// Calls `visit` with every part of the constant `c`.
+    pub(crate) fn each_constant(&mut self, visit: &mut dyn FnMut(&mut f64)) {
+        let linear = self.columns.len() - self.vectors;
+        let parts = self.columns[linear..].iter_mut().flatten().flatten();
+        parts.for_each(visit);
     }
 
     /// Writes the image of `z` to `out`.

@@ -5,7 +5,7 @@ use nalgebra::DMatrix;
 use super::{ComplexVector, Simd, WIDTH, Work, complex_mul, dispatch, layout};
 
 /// `z ↦ Σ_k (a_k Re z_k + b_k Im z_k)` with complex vectors `a_k`, `b_k`, of lists of `z` that lie
-/// one after the other.
+/// in sequence.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct LinearMap {
     /// Row by row of vectors: all `a_k`, then all `b_k`.
@@ -116,7 +116,7 @@ impl Work for Apply<'_> {
     }
 }
 
-/// Multiplies each list in `lists`, one after the other, by `factors`, number by number.
+/// Multiplies each of the lists in `lists` (in sequence) by `factors`, number by number.
 pub(crate) fn scale(lists: &mut [ComplexVector], factors: &[ComplexVector]) {
     dispatch(Scale { lists, factors });
 }

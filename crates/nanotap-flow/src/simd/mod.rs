@@ -5,9 +5,8 @@
 //! the same order, each rounded once, and so give the same bits. `NANOTAP_ARITHMETIC=plain` in
 //! the environment picks the first: it is how tests run both.
 //!
-//! One motion has its terms in the lanes of a register ([`Simd`]). Eight motions side by side have
-//! a lane each ([`Wide`]): in one register of eight (`Avx512`, unless `NANOTAP_ARITHMETIC=avx2`), or
-//! in two of four ([`Twice`]).
+//! One motion has its terms in the lanes of a register ([`Simd`]). Eight motions in a batch have
+//! a lane each ([`Wide`]), in two registers of four ([`Twice`]).
 //!
 //! [`functions`] has the exponentials, [`layout`] how lists lie in vectors, [`affine`] the
 //! change of coordinates at a switch, [`linear`] the same of a whole matrix.
@@ -31,8 +30,6 @@ macro_rules! instructions {
 pub(crate) mod affine;
 #[cfg(target_arch = "x86_64")]
 mod avx2;
-#[cfg(target_arch = "x86_64")]
-mod avx512;
 mod functions;
 pub(crate) mod layout;
 pub(crate) mod linear;
@@ -154,7 +151,7 @@ pub(crate) trait Wide: Lanes {
 
 /// Work that is compiled once for each arithmetic.
 pub(crate) trait Work {
-    /// What comes of it.
+    /// The result.
     type Output;
     /// Does it.
     fn run<S: Simd>(self) -> Self::Output;
@@ -162,7 +159,7 @@ pub(crate) trait Work {
 
 /// The same for eight motions side by side.
 pub(crate) trait WideWork {
-    /// What comes of it.
+    /// The result.
     type Output;
     /// Does it.
     fn run<W: Wide>(self) -> Self::Output;
@@ -179,15 +176,12 @@ pub(crate) fn dispatch<W: Work>(work: W) -> W::Output {
     work.run::<Plain>()
 }
 
-/// The same for eight motions side by side.
+/// The same for eight motions in a batch.
 pub(crate) fn dispatch_wide<W: WideWork>(work: W) -> W::Output {
     #[cfg(target_arch = "x86_64")]
-    match (avx512_available(), avx2_available()) {
+    if avx2_available() {
         // SAFETY: the machine has these instructions.
-        (true, true) => return unsafe { avx512::run(work) },
-        // SAFETY: the machine has these instructions.
-        (false, true) => return unsafe { avx2::run_wide(work) },
-        (_, false) => {}
+        return unsafe { avx2::run_wide(work) };
     }
     work.run::<Twice<Plain>>()
 }
@@ -195,39 +189,24 @@ pub(crate) fn dispatch_wide<W: WideWork>(work: W) -> W::Output {
 /// See [`crate::vector_instructions`].
 pub(crate) fn vector_instructions() -> &'static str {
     #[cfg(target_arch = "x86_64")]
-    match (avx512_available(), avx2_available()) {
-        (true, true) => "AVX-512",
-        (false, true) => "AVX2",
-        (_, false) => "without AVX2: piecewise-linear cases take several times as long",
+    if avx2_available() {
+        "AVX2"
+    } else {
+        "without AVX2: piecewise-linear cases take several times as long"
     }
     #[cfg(not(target_arch = "x86_64"))]
     "portable"
 }
 
-/// Whether `NANOTAP_ARITHMETIC` in the environment does not ask for less than this machine has.
-#[cfg(target_arch = "x86_64")]
-fn nobody_asks_for(paths: &[&str]) -> bool {
-    !std::env::var("NANOTAP_ARITHMETIC").is_ok_and(|path| paths.contains(&path.as_str()))
-}
-
-/// Whether this machine has fused multiply-add in vectors of four, and nobody asked for the plain
-/// path.
+/// Whether this machine has fused multiply-add in vectors of four, and `NANOTAP_ARITHMETIC` in the
+/// environment is not `plain`.
 #[cfg(target_arch = "x86_64")]
 #[inline(always)]
 fn avx2_available() -> bool {
-    static WANTED: LazyLock<bool> = LazyLock::new(|| {
-        nobody_asks_for(&["plain"])
+    static AVAILABLE: LazyLock<bool> = LazyLock::new(|| {
+        !std::env::var("NANOTAP_ARITHMETIC").is_ok_and(|path| path == "plain")
             && std::arch::is_x86_feature_detected!("avx2")
             && std::arch::is_x86_feature_detected!("fma")
     });
-    *WANTED
-}
-
-/// Whether this machine has vectors of eight, and nobody asked for less.
-#[cfg(target_arch = "x86_64")]
-fn avx512_available() -> bool {
-    static WANTED: LazyLock<bool> = LazyLock::new(|| {
-        nobody_asks_for(&["plain", "avx2"]) && std::arch::is_x86_feature_detected!("avx512f")
-    });
-    *WANTED
+    *AVAILABLE
 }

@@ -11,63 +11,51 @@ pub(crate) struct Plain;
 #[derive(Clone, Copy)]
 pub(crate) struct Library;
 
+/// Operations, each an expression of the numbers of one lane.
+macro_rules! lane_by_lane {
+    ($($operation:ident($($operand:ident),+) = $value:expr;)+) => {
+        $(
+            #[inline(always)]
+            fn $operation($($operand: Vector),+) -> Vector {
+                std::array::from_fn(|i| {
+                    $(let $operand = $operand[i];)+
+                    $value
+                })
+            }
+        )+
+    };
+}
+
 /// The arithmetic of arrays, shared by [`Plain`] and [`Library`], with its `a b + c`.
 macro_rules! arrays {
     ($fma:expr) => {
         type Register = Vector;
 
+        lane_by_lane! {
+            add(a, b) = a + b;
+            sub(a, b) = a - b;
+            mul(a, b) = a * b;
+            div(a, b) = a / b;
+            fma(a, b, c) = $fma(a, b, c);
+            fnma(a, b, c) = $fma(-a, b, c);
+            sqrt(a) = a.sqrt();
+            min(a, b) = if a < b { a } else { b };
+            max(a, b) = if a > b { a } else { b };
+            power_of_two(shifted) =
+                f64::from_bits((shifted.to_bits() << 52).wrapping_add(1.0_f64.to_bits()));
+        }
         #[inline(always)]
         fn splat(a: f64) -> Vector {
             [a; WIDTH]
-        }
-        #[inline(always)]
-        fn add(a: Vector, b: Vector) -> Vector {
-            std::array::from_fn(|i| a[i] + b[i])
-        }
-        #[inline(always)]
-        fn sub(a: Vector, b: Vector) -> Vector {
-            std::array::from_fn(|i| a[i] - b[i])
-        }
-        #[inline(always)]
-        fn mul(a: Vector, b: Vector) -> Vector {
-            std::array::from_fn(|i| a[i] * b[i])
-        }
-        #[inline(always)]
-        fn fma(a: Vector, b: Vector, c: Vector) -> Vector {
-            std::array::from_fn(|i| $fma(a[i], b[i], c[i]))
-        }
-        #[inline(always)]
-        fn fnma(a: Vector, b: Vector, c: Vector) -> Vector {
-            std::array::from_fn(|i| $fma(-a[i], b[i], c[i]))
-        }
-        #[inline(always)]
-        fn div(a: Vector, b: Vector) -> Vector {
-            std::array::from_fn(|i| a[i] / b[i])
         }
         #[inline(always)]
         fn map(a: Vector, function: fn(f64) -> f64) -> Vector {
             a.map(function)
         }
         #[inline(always)]
-        fn sqrt(a: Vector) -> Vector {
-            a.map(f64::sqrt)
-        }
-        #[inline(always)]
-        fn min(a: Vector, b: Vector) -> Vector {
-            std::array::from_fn(|i| if a[i] < b[i] { a[i] } else { b[i] })
-        }
-        #[inline(always)]
-        fn max(a: Vector, b: Vector) -> Vector {
-            std::array::from_fn(|i| if a[i] > b[i] { a[i] } else { b[i] })
-        }
-        #[inline(always)]
         fn below(a: Vector, b: Vector) -> u32 {
             let at_least = |i: usize| a[i] >= b[i];
             (0..WIDTH).fold(0, |bits, i| bits | (u32::from(!at_least(i)) << i))
-        }
-        #[inline(always)]
-        fn power_of_two(shifted: Vector) -> Vector {
-            shifted.map(|s| f64::from_bits((s.to_bits() << 52).wrapping_add(1.0_f64.to_bits())))
         }
         #[inline(always)]
         fn turn(shifted: Vector, sine: Vector, cosine: Vector) -> (Vector, Vector) {

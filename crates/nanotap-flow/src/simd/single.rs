@@ -6,57 +6,39 @@ use super::Lanes;
 #[derive(Clone, Copy)]
 pub(crate) struct Single;
 
+/// Operations, each an expression of plain numbers.
+macro_rules! expressions {
+    ($($operation:ident($($operand:ident),+) = $value:expr;)+) => {
+        $(
+            #[inline(always)]
+            fn $operation($($operand: f64),+) -> f64 {
+                $value
+            }
+        )+
+    };
+}
+
 impl Lanes for Single {
     type Register = f64;
 
-    #[inline(always)]
-    fn splat(a: f64) -> f64 {
-        a
-    }
-    #[inline(always)]
-    fn add(a: f64, b: f64) -> f64 {
-        a + b
-    }
-    #[inline(always)]
-    fn sub(a: f64, b: f64) -> f64 {
-        a - b
-    }
-    #[inline(always)]
-    fn mul(a: f64, b: f64) -> f64 {
-        a * b
-    }
-    #[inline(always)]
-    fn div(a: f64, b: f64) -> f64 {
-        a / b
-    }
-    #[inline(always)]
-    fn fma(a: f64, b: f64, c: f64) -> f64 {
-        a * b + c
-    }
-    #[inline(always)]
-    fn fnma(a: f64, b: f64, c: f64) -> f64 {
-        c - a * b
-    }
-    #[inline(always)]
-    fn sqrt(a: f64) -> f64 {
-        a.sqrt()
-    }
-    #[inline(always)]
-    fn min(a: f64, b: f64) -> f64 {
-        if a < b { a } else { b }
-    }
-    #[inline(always)]
-    fn max(a: f64, b: f64) -> f64 {
-        if a > b { a } else { b }
+    expressions! {
+        splat(a) = a;
+        add(a, b) = a + b;
+        sub(a, b) = a - b;
+        mul(a, b) = a * b;
+        div(a, b) = a / b;
+        fma(a, b, c) = a * b + c;
+        fnma(a, b, c) = c - a * b;
+        sqrt(a) = a.sqrt();
+        min(a, b) = if a < b { a } else { b };
+        max(a, b) = if a > b { a } else { b };
+        power_of_two(shifted) =
+            f64::from_bits((shifted.to_bits() << 52).wrapping_add(1.0_f64.to_bits()));
     }
     #[inline(always)]
     fn below(a: f64, b: f64) -> u32 {
         let at_least = a >= b;
         u32::from(!at_least)
-    }
-    #[inline(always)]
-    fn power_of_two(shifted: f64) -> f64 {
-        f64::from_bits((shifted.to_bits() << 52).wrapping_add(1.0_f64.to_bits()))
     }
     #[inline(always)]
     fn turn(shifted: f64, sine: f64, cosine: f64) -> (f64, f64) {

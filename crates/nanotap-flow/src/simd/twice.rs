@@ -7,57 +7,41 @@ use std::marker::PhantomData;
 #[derive(Clone, Copy)]
 pub(crate) struct Twice<S>(PhantomData<S>);
 
+/// Operations of both registers.
+macro_rules! both {
+    ($($operation:ident($($operand:ident),+);)+) => {
+        $(
+            #[inline(always)]
+            fn $operation($($operand: Self::Register),+) -> Self::Register {
+                [S::$operation($($operand[0]),+), S::$operation($($operand[1]),+)]
+            }
+        )+
+    };
+}
+
 impl<S: Simd> Lanes for Twice<S> {
     const LIBRARY: bool = S::LIBRARY;
     type Register = [S::Register; 2];
 
+    both! {
+        add(a, b);
+        sub(a, b);
+        mul(a, b);
+        div(a, b);
+        fma(a, b, c);
+        fnma(a, b, c);
+        sqrt(a);
+        min(a, b);
+        max(a, b);
+        power_of_two(shifted);
+    }
     #[inline(always)]
     fn splat(a: f64) -> Self::Register {
         [S::splat(a); 2]
     }
     #[inline(always)]
-    fn add(a: Self::Register, b: Self::Register) -> Self::Register {
-        [S::add(a[0], b[0]), S::add(a[1], b[1])]
-    }
-    #[inline(always)]
-    fn sub(a: Self::Register, b: Self::Register) -> Self::Register {
-        [S::sub(a[0], b[0]), S::sub(a[1], b[1])]
-    }
-    #[inline(always)]
-    fn mul(a: Self::Register, b: Self::Register) -> Self::Register {
-        [S::mul(a[0], b[0]), S::mul(a[1], b[1])]
-    }
-    #[inline(always)]
-    fn div(a: Self::Register, b: Self::Register) -> Self::Register {
-        [S::div(a[0], b[0]), S::div(a[1], b[1])]
-    }
-    #[inline(always)]
-    fn fma(a: Self::Register, b: Self::Register, c: Self::Register) -> Self::Register {
-        [S::fma(a[0], b[0], c[0]), S::fma(a[1], b[1], c[1])]
-    }
-    #[inline(always)]
-    fn fnma(a: Self::Register, b: Self::Register, c: Self::Register) -> Self::Register {
-        [S::fnma(a[0], b[0], c[0]), S::fnma(a[1], b[1], c[1])]
-    }
-    #[inline(always)]
-    fn sqrt(a: Self::Register) -> Self::Register {
-        [S::sqrt(a[0]), S::sqrt(a[1])]
-    }
-    #[inline(always)]
-    fn min(a: Self::Register, b: Self::Register) -> Self::Register {
-        [S::min(a[0], b[0]), S::min(a[1], b[1])]
-    }
-    #[inline(always)]
-    fn max(a: Self::Register, b: Self::Register) -> Self::Register {
-        [S::max(a[0], b[0]), S::max(a[1], b[1])]
-    }
-    #[inline(always)]
     fn below(a: Self::Register, b: Self::Register) -> u32 {
         S::below(a[0], b[0]) | (S::below(a[1], b[1]) << WIDTH)
-    }
-    #[inline(always)]
-    fn power_of_two(shifted: Self::Register) -> Self::Register {
-        [S::power_of_two(shifted[0]), S::power_of_two(shifted[1])]
     }
     #[inline(always)]
     fn turn(

@@ -1,10 +1,10 @@
 """Simulation of an AFM cantilever whose tip taps a sample.
 
 A `Case` describes cantilever, sample and drive. There is a function for every command of the
-terminal: `modes`, `simulate`, `orbit`, `attractors`, `sweep`, `basin`, `branch`, `approach`, `fit`,
-`reconstruct`, `window`, `lyapunov`, `convergence`, `contact_laws`, `paper`, `merge`. Results are
-xarray Datasets, objects and lists of objects, with the names of the terminal's JSON. A `Map` is the
-exact stroboscopic map, for your own algorithms.
+terminal: `modes`, `simulate`, `orbit`, `attractors`, `sweep`, `basin`, `branch`, `approach`,
+`fm`, `scan`, `fit`, `reconstruct`, `window`, `lyapunov`, `convergence`, `contact_laws`, `paper`,
+`merge`. Results are xarray Datasets, objects and lists of objects, with the names of the terminal's
+JSON. A `Map` is the exact stroboscopic map, for your own algorithms.
 
 >>> import nanotap
 >>> case = nanotap.Case(alpha1=0.1, alpha2=0.1, alpha3=0.1, alpha4=20, alpha6=0.2, omega=3)

@@ -32,12 +32,12 @@ _MOST = 2**63 - 1
 def whole(name: str, value: Any) -> int:
     """A whole number."""
     if isinstance(value, bool | np.bool_):
-        message = f"{name}: {value} is no number"
+        message = f"{name}: {value} is not a number"
         raise TypeError(message)
     try:
         return operator.index(value)
     except TypeError:
-        message = f"{name}: a whole number is needed, not {value!r}"
+        message = f"{name}: expected a whole number, got {value!r}"
         raise TypeError(message) from None
 
 
@@ -45,7 +45,7 @@ def count(name: str, value: Any, least: int = 0) -> int:
     """A whole number that is at least `least`."""
     number = whole(name, value)
     if not least <= number <= _MOST:
-        message = f"{name}: {number} is out of range; a whole number from {least} on is needed"
+        message = f"{name}: {number} is out of range; expected a whole number of at least {least}"
         raise ValueError(message)
     return number
 
@@ -63,12 +63,12 @@ def seed(value: Any) -> int:
 def number(name: str, value: Any) -> float:
     """A real number, finite or not; the library checks its range."""
     if isinstance(value, bool | np.bool_ | str | bytes | complex):
-        message = f"{name}: a number is needed, not {value!r}"
+        message = f"{name}: expected a number, got {value!r}"
         raise TypeError(message)
     try:
         return float(value)
     except (TypeError, ValueError):
-        message = f"{name}: a number is needed, not {value!r}"
+        message = f"{name}: expected a number, got {value!r}"
         raise TypeError(message) from None
 
 
@@ -83,7 +83,7 @@ def row(name: str, value: Any) -> Floats:
     """One row of real numbers."""
     array = real(value, name)
     if array.ndim != 1:
-        message = f"{name}: one row of numbers is needed, not an array of {array.ndim} dimensions"
+        message = f"{name}: expected one row of numbers, got an array with {array.ndim} dimensions"
         raise ValueError(message)
     return array
 
@@ -96,18 +96,18 @@ def real(value: Any, name: str) -> Floats:
         message = f"{name}: {error}"
         raise ValueError(message) from None
     if array.dtype.kind not in "iuf" and array.size:
-        message = f"{name}: real numbers are needed, not {array.dtype}"
+        message = f"{name}: expected real numbers, got {array.dtype}"
         raise TypeError(message)
     return np.require(array, np.float64, ["C", "A"])
 
 
 def _pair(name: str, value: Any) -> tuple[Any, Any]:
     if isinstance(value, str) or not isinstance(value, Iterable):
-        message = f"{name}: a lower and an upper end are needed, not {value!r}"
+        message = f"{name}: expected a lower and an upper end, got {value!r}"
         raise TypeError(message)
     ends = tuple(value)
     if len(ends) != 2:
-        message = f"{name}: a lower and an upper end are needed, not {len(ends)} values"
+        message = f"{name}: expected a lower and an upper end, got {len(ends)} values"
         raise ValueError(message)
     return ends[0], ends[1]
 
@@ -124,7 +124,9 @@ def axis(name: str, values: Any) -> str:
     """An axis as the terminal writes it: `omega=2:4:400`, `alpha4=1:1000:50:log`, `omega=2,2.5,4`."""
     if isinstance(values, tuple):
         if len(values) not in (3, 4):
-            message = f"{name}: first, last and how many are needed, as in (2, 4, 400)"
+            message = (
+                f"{name}: expected first value, last value and count, as in (2, 4, 400)"
+            )
             raise ValueError(message)
         first, last, number_of, *spacing = values
         words = [
@@ -138,7 +140,7 @@ def axis(name: str, values: Any) -> str:
         return f"{name}={','.join(values.tolist())}"
     array = real(values, name)
     if array.ndim != 1 or array.size == 0:
-        message = f"{name}: a row of values is needed, as in numpy.linspace(2, 4, 400)"
+        message = f"{name}: expected a row of values, as in numpy.linspace(2, 4, 400)"
         raise ValueError(message)
     first, last, size = float(array[0]), float(array[-1]), array.size
     if np.allclose(array, np.linspace(first, last, size), rtol=1e-12, atol=0):
@@ -203,6 +205,12 @@ def counted(study: str) -> str:
     return _studies()[study][0]
 
 
+def options(study: str, arguments: Mapping[str, Any]) -> dict[str, Any]:
+    """The options of a study among the arguments of its function."""
+    names = _studies()[study][1]
+    return {name: arguments["from_" if name == "from" else name] for name in names}
+
+
 def request(study: str, options: Mapping[str, Any]) -> str:
     """The request of a study, as JSON.
 
@@ -260,7 +268,7 @@ def names(name: str, value: Any) -> list[str]:
     """Names: a single text, or several."""
     given = [value] if isinstance(value, str) else value
     if not isinstance(given, Iterable) or not all(isinstance(v, str) for v in given):
-        message = f"{name}: names are needed, not {value!r}"
+        message = f"{name}: expected names, got {value!r}"
         raise TypeError(message)
     return list(given)
 
@@ -289,7 +297,7 @@ def tables(data: Any) -> list[dict[str, Any]]:
             {**table, "name": table.get("name", f"curve {k + 1}")}
             for k, table in enumerate(many)
         ]
-    message = f"data: a table of columns is needed, not {data!r}"
+    message = f"data: expected a table of columns, got {data!r}"
     raise TypeError(message)
 
 
@@ -304,7 +312,7 @@ def column(name: str, values: Any) -> list[Any]:
     """Entries of a column: numbers or texts; `None` for NaN."""
     array = np.asarray(values)
     if array.ndim != 1:
-        message = f"{name}: a row of entries is needed, not an array of {array.ndim} dimensions"
+        message = f"{name}: expected a row of entries, got an array with {array.ndim} dimensions"
         raise ValueError(message)
     if array.dtype.kind in "iuf":
         return [None if math.isnan(v) else _finite(v) for v in array.tolist()]

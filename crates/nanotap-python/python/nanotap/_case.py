@@ -91,7 +91,7 @@ class Case:
     def from_toml(cls, text: str, *, name: str = "case", **keys: Value) -> "Case":
         """The case of a TOML text, called `name` in error messages."""
         if not isinstance(text, str):
-            message = f"text: a TOML text is needed, not {text!r}"
+            message = f"text: expected a TOML text, got {text!r}"
             raise TypeError(message)
         return _again(cls, (name, text), key_words(keys), [])
 
@@ -196,7 +196,7 @@ class Case:
         """
         text = self._core.toml
         if text is None:
-            message = "an oscillator is not written out"
+            message = "an oscillator cannot be written as a case file"
             raise ValueError(message)
         return text
 
@@ -215,7 +215,7 @@ class Case:
 
     def __setattr__(self, name: str, value: object) -> None:
         if name not in Case.__slots__:
-            message = f"a case does not change: case.with_({name}=…) is another one"
+            message = f"a case is immutable; case.with_({name}=…) creates a changed one"
             raise AttributeError(message)
         super().__setattr__(name, value)
 
@@ -343,7 +343,7 @@ def _written(name: str, value: Any) -> str:
         return json.dumps(text(name, value)) if si_unit(name) else repr(value)
     if name == "sample.table":
         return json.dumps(_rows(value))
-    message = f"{name}: a number or a text is needed, not {value!r}"
+    message = f"{name}: expected a number or a text, got {value!r}"
     raise TypeError(message)
 
 

@@ -97,7 +97,7 @@ def chunk_files(task: tuple[str, str, Case, str], chunk: int) -> list[bytes]:
     version, study, case, request = task
     if version != _nanotap.__version__:
         message = (
-            f"this worker has nanotap {_nanotap.__version__}, {version} is asked of it"
+            f"this worker has nanotap {_nanotap.__version__}, but {version} is required"
         )
         raise RuntimeError(message)
     # Dask counts one thread for a task.

@@ -68,7 +68,7 @@ def _state_of(entry: Any, name: str) -> list[float]:
     found = getattr(entry, "state", entry)
     array = _arguments.real(found, name)
     if array.ndim != 1:
-        message = f"{name}: a state is needed, not an array of {array.ndim} dimensions"
+        message = f"{name}: expected a state, got an array with {array.ndim} dimensions"
         raise ValueError(message)
     return [float(value) for value in array]
 
@@ -85,7 +85,7 @@ def open(path: Path) -> "xr.Dataset":
 
     name = os.fspath(path)
     if not os.path.isdir(name):
-        message = f"{name} is not a dataset of nanotap: it is not there"
+        message = f"{name} is not a dataset of nanotap: it does not exist"
         raise ValueError(message)
     if not os.path.isfile(os.path.join(name, ".zmetadata")):
         message = f"{name} is not a dataset of nanotap: it has no .zmetadata"
@@ -114,7 +114,7 @@ def merge(sources: Iterable[Path], out: Path) -> Record:
         ValueError: one is not a dataset, or two do not belong together.
     """
     if isinstance(sources, str | os.PathLike):
-        message = "sources: several datasets are needed, as a list"
+        message = "sources: expected a list of datasets"
         raise TypeError(message)
     _ending(out, "out")
     names = [os.fspath(source) for source in sources]
@@ -171,7 +171,7 @@ def _path_of(ds: "xr.Dataset | Path") -> str:
 def _ending(path: Path, name: str) -> str:
     text = os.fspath(path)
     if not text.endswith(".zarr"):
-        message = f"{name} {text}: the ending says no format that is written here; end the name in .zarr"
+        message = f"{name} {text}: unsupported file extension; use .zarr"
         raise ValueError(message)
     return text
 
@@ -187,7 +187,7 @@ def _computed(
 ) -> "xr.Dataset":
     """Computes the missing chunks of the store, then opens it."""
     if client is not None and chunk != "1/1":
-        message = f"chunk {chunk}: a client computes all chunks; leave one of them away"
+        message = f"chunk {chunk}: a client computes all chunks; omit one of the two"
         raise ValueError(message)
     recipe = _recipe(plan, threads, progress)
     if out is not None:
@@ -195,7 +195,7 @@ def _computed(
         stopped = _work(recipe, plan, noun, store, chunk, threads, client, progress)
         ds = open(store)
         if stopped:
-            message = f"stopped; what is finished is in {store}; the same call goes on"
+            message = f"stopped; the finished part is in {store}; the same call resumes"
             raise Interrupted(message, ds)
         return ds
     folder = tempfile.mkdtemp(prefix="nanotap-")
@@ -211,7 +211,7 @@ def _computed(
     # It may be written elsewhere; the compression of the store no longer applies.
     ds = ds.drop_encoding()
     if stopped:
-        message = "stopped; what was not reached is missing"
+        message = "stopped; unfinished values are missing"
         raise Interrupted(message, ds)
     return ds
 

@@ -127,7 +127,7 @@ def _chosen(panels: list[dict[str, Any]], letters: str | None) -> list[dict[str,
     }
     missing = [letter for letter in letters if letter not in known]
     if missing or not letters:
-        message = f"panels: there is no panel {''.join(missing)!r}; there are {''.join(known)}"
+        message = f"panels: unknown panel {''.join(missing)!r}; the panels are {''.join(known)}"
         raise ValueError(message)
     return [known[letter] for letter in letters]
 

@@ -40,7 +40,7 @@ class Map:
 
     def __init__(self, case: Case, **keys: Any) -> None:
         if not isinstance(case, Case):
-            message = f"case: a nanotap.Case is needed, not {type(case).__name__}"
+            message = f"case: expected a nanotap.Case, got {type(case).__name__}"
             raise TypeError(message)
         self.case = case.with_(**keys)
         self._core = _nanotap.MapCore(self.case._core)
@@ -166,14 +166,14 @@ class Map:
         array = _arguments.real(z, "z")
         n = self.dimension
         if array.ndim == 0 or array.shape[-1] != n:
-            message = f"z: the last axis of an array of states has {n} numbers, not {array.shape}"
+            message = f"z: the last axis of an array of states must have length {n}, got shape {array.shape}"
             raise ValueError(message)
         return array.reshape(-1, n), array.shape
 
     def _one(self, z: npt.ArrayLike, name: str) -> Floats:
         array = _arguments.real(z, name)
         if array.shape != (self.dimension,):
-            message = f"{name}: one state of {self.dimension} numbers is needed, not {array.shape}"
+            message = f"{name}: expected one state of {self.dimension} numbers, got shape {array.shape}"
             raise ValueError(message)
         return array
 
@@ -255,7 +255,7 @@ class Motion:
     def __init__(self, map: Map, z: Floats, tau: npt.ArrayLike, start: float) -> None:
         times = _arguments.real(tau, "tau")
         if times.size == 0:
-            message = "tau: at least one time is needed"
+            message = "tau: expected at least one time"
             raise ValueError(message)
         self._made_of = (map, z, times, start)
         self._core = map._core.flow(z, start, float(times.max()) - start)

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 # Largest number of periods of a time series by default.
 _SHOWN_PERIODS = 100
 # Largest number of rows of a time series: 800 MB at N = 3.
-_MOST_ROWS = 8_000_000
+_MAX_ROWS = 8_000_000
 
 
 def modes(case: Case, options: Mapping[str, Any]) -> Modes:
@@ -38,7 +38,9 @@ def modes(case: Case, options: Mapping[str, Any]) -> Modes:
         name="phi",
         attrs={"long_name": "mode shape of the bare beam", "units": "1"},
     )
-    table.xi.attrs.update(long_name="place along the beam, clamp 0 to tip 1", units="L")
+    table.xi.attrs.update(
+        long_name="position along the beam, clamp 0 to tip 1", units="L"
+    )
     return Modes.of(_document(document), shapes=table)
 
 
@@ -55,7 +57,7 @@ def simulate(
     states = _states(options)
     if varied or states is not None:
         if options["method"] == "rk4":
-            message = "rk4 runs one case at a time; leave the arrays away"
+            message = "rk4 runs one case at a time; omit the arrays"
             raise ValueError(message)
         return _over(case, varied, "simulate", options, states, threads, progress)
     request = _arguments.request("simulate", options)
@@ -112,16 +114,16 @@ def words(names: Sequence[str]) -> "np.typing.NDArray[np.str_]":
 
 def _cased(case: Any) -> Case:
     if not isinstance(case, Case):
-        message = f"case: a nanotap.Case is needed, not {type(case).__name__}"
+        message = f"case: expected a nanotap.Case, got {type(case).__name__}"
         raise TypeError(message)
     return case
 
 
 def _refuse_rows(periods: int, resolution: int) -> None:
-    if periods * resolution > _MOST_ROWS:
+    if periods * resolution > _MAX_ROWS:
         message = (
             f"resolution: {resolution} samples in each of {periods} periods are too many; "
-            f"{_MOST_ROWS} in all at most"
+            f"the limit is {_MAX_ROWS} in total"
         )
         raise ValueError(message)
 
@@ -135,7 +137,7 @@ def _split(
     for key, value in parameters.items():
         near = get_close_matches(key, options, 1, 0.8)
         if near:
-            message = f"{key}: there is no such argument and no such key; did you mean {near[0]}?"
+            message = f"{key}: unknown argument or key; did you mean {near[0]}?"
             raise TypeError(message)
         one = isinstance(value, str | Mapping) or np.ndim(in_si(key, value)) == 0
         (fixed if one else varied)[key] = value
@@ -176,10 +178,10 @@ def _recorded(
         rates = np.array([event["gap_rate"] for event in events], dtype=float)
         variables["event_gap_rate"] = ("event", rates)
     last = document["periods"]
-    told = {"long_name": "end of this recorded period", "units": "drive periods"}
+    attrs = {"long_name": "end of this recorded period", "units": "drive periods"}
     ends = np.arange(last - len(strobe) + 1, last + 1)
     return variables, {
-        "strobe_period": ("strobe_period", ends, told),
+        "strobe_period": ("strobe_period", ends, attrs),
         "state": words(entries),
     }
 
@@ -270,7 +272,7 @@ def _states(options: Mapping[str, Any]) -> Floats | None:
     if states.ndim < 2:
         return None
     if states.ndim != 2 or states.size == 0:
-        message = f"state: one state, or rows of them, are needed, not an array of shape {states.shape}"
+        message = f"state: expected one state, or one per row, got an array of shape {states.shape}"
         raise ValueError(message)
     return states
 
@@ -291,7 +293,9 @@ def _over(
     arrays = {key: _as_array(key, value) for key, value in varied.items()}
     if states is not None:
         if "start" in arrays:
-            message = "start: this is the dimension of the initial states"
+            message = (
+                "start: this name is reserved for the dimension of the initial states"
+            )
             raise ValueError(message)
         starts = np.arange(len(states))
         arrays["start"] = xr.DataArray(starts, dims="start", coords={"start": starts})
@@ -333,22 +337,22 @@ def _over(
         array = np.array(values).reshape(shape + np.shape(values)[1:])
         variables[name] = (dims + inner * bool(along), array)
     failed = np.array(failures, dtype=str).reshape(shape)
-    why = {"long_name": "why there is none, empty where there is one", "units": "1"}
+    why = {"long_name": "reason of the failure, empty if there is none", "units": "1"}
     variables["failure"] = (dims, failed, why)
     coords = _coords(arrays, variables, names, options)
     if states is not None:
-        told = {"long_name": "initial state, from 0", "units": "1"}
-        coords["start"] = ("start", np.arange(len(states)), told)
+        attrs = {"long_name": "initial state, from 0", "units": "1"}
+        coords["start"] = ("start", np.arange(len(states)), attrs)
         if states.shape[1] == len(entries):
-            told = {"long_name": "initial state", "units": "model units"}
-            variables["initial_state"] = (("start", "state"), states, told)
+            attrs = {"long_name": "initial state", "units": "model units"}
+            variables["initial_state"] = (("start", "state"), states, attrs)
             coords["state"] = words(entries)
     # The value in the case of a parameter that varies does not matter.
     attributes = case_attributes(case, noun) | {"over": json.dumps(list(varied))}
     ds = dataset(variables, coords, attributes)
     if interrupted:
         done = failures.count("")
-        message = f"stopped; {done} of {len(failures)} are done"
+        message = f"stopped; {done} of {len(failures)} are finished"
         raise Interrupted(message, ds)
     return ds
 
@@ -384,12 +388,12 @@ def _as_array(key: str, value: Any) -> "xr.DataArray":
     array = many(key, value)
     if array.ndim != 1 or array.size == 0:
         message = (
-            f"{key}: a row of values is needed, not an array of shape {array.shape}; for more "
-            "dimensions give an xarray.DataArray, which names them"
+            f"{key}: expected a row of values, got an array of shape {array.shape}; for more "
+            "dimensions pass an xarray.DataArray, which names them"
         )
         raise ValueError(message)
     if array.dtype.kind not in "iufU":
-        message = f"{key}: real numbers are needed, not {array.dtype}"
+        message = f"{key}: expected real numbers, got {array.dtype}"
         raise TypeError(message)
     values = xr.DataArray(array, dims=key, coords={key: array}, name=key)
     if si_unit(key) and array.dtype.kind != "U":

@@ -1,4 +1,4 @@
-"""The compiled part; see the package for what each is for."""
+"""The compiled part, used by the modules of the package."""
 
 import os
 from collections.abc import Callable

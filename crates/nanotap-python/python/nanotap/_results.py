@@ -134,10 +134,10 @@ class Result:
     _complex: ClassVar[frozenset[str]] = frozenset()
 
     @classmethod
-    def of(cls, document: Mapping[str, Any], **beside: Any) -> Self:
-        """The result of a document; `beside` has fields that are not in the document."""
+    def of(cls, document: Mapping[str, Any], **further: Any) -> Self:
+        """The result of a document; `further` has fields that are not in the document."""
         record = document if isinstance(document, Record) else Record(document)
-        values: dict[str, Any] = {"document": record, **beside}
+        values: dict[str, Any] = {"document": record, **further}
         for name in cls.__dataclass_fields__:
             if name in values or name not in record._entries:
                 continue

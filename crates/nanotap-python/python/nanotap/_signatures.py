@@ -5,7 +5,7 @@
 from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Literal, overload
 
-from . import _datasets, _motions, _studies
+from . import _arguments, _datasets, _motions, _studies
 from ._arguments import Box, Progress, Varied
 from ._case import Case, Path, Value
 from ._record import Record
@@ -23,10 +23,12 @@ __all__ = [
     "contact_laws",
     "convergence",
     "fit",
+    "fm",
     "lyapunov",
     "modes",
     "orbit",
     "reconstruct",
+    "scan",
     "simulate",
     "sweep",
     "window",
@@ -37,12 +39,12 @@ def modes(
     *,
     points: int = 201,
 ) -> Modes:
-    """Mode shapes and frequencies, in free flight and in contact.
+    """Compute mode shapes and frequencies, in free flight and in contact.
 
     Parameters
     ----------
     case : Case
-        What is studied.
+        The case.
     points : int
         Points along the beam in the table of mode shapes (2 to 1000000).
 
@@ -54,13 +56,11 @@ def modes(
     Raises
     ------
     ValueError
-        Something that was asked for is not right.
+        An argument is invalid; the message names it.
     RuntimeError
-        The computation did not succeed.
+        The computation failed.
     """
-    options = {
-        "points": points,
-    }
+    options = _arguments.options("modes", locals())
     return _motions.modes(case, options)
 
 def simulate(
@@ -82,81 +82,68 @@ def simulate(
     progress: Progress = None,
     **parameters: Varied,
 ) -> "xr.Dataset":
-    """One run: its steady state, or how it gets there.
+    """Simulate a motion: its steady state or its transient.
 
     Parameters
     ----------
     case : Case
-        What is studied.
+        The case.
     periods : int
-        Drive periods recorded (1 to 2000000).
+        Number of recorded drive periods (1 to 2000000).
     transient : int | None
-        Drive periods discarded first; without it, as many as the motion is measured
-        to need; 0: from the start (0 to 100000000).
+        Drive periods of the discarded transient; default: until the motion has
+        settled; 0: none (0 to 100000000).
     state : Any
-        State at the start, drive phase 0: a1,…,aN,v1,…,vN (oscillator: x,v);
-        without it, rest.
+        Initial state at drive phase 0: a1,…,aN,v1,…,vN (oscillator: x,v); default:
+        rest.
     strobe : int
-        How many of the last states at drive phase 0 to keep (0 to 1000000).
+        Number of last states at drive phase 0 to keep (0 to 1000000).
     events : int
-        How many contacts and releases to list at most, the first ones (0 to
-        1000000).
+        Maximum number of listed contacts and releases (0 to 1000000).
     max_period : int
-        Longest period looked for (1 to 10000).
+        Longest period of orbits, in drive periods (1 to 10000).
     observables : Sequence[str] | None
-        Observables to measure; without it, every one that there is, the beam's
-        clearance included.
+        Observables to measure; default: all, including the clearance of the beam.
     resolution : int
-        Samples a drive period in the time series (1 to 1000000).
+        Samples per drive period in the time series (1 to 1000000).
     method : Literal["exact", "rk4"]
-        How the motion is computed; `exact`: The exact flow: no time step, no
-        contact missed; `rk4`: The paper's method, to compare: Runge–Kutta steps
-        that switch on their grid.
+        Method of computation; `exact`: The exact flow: no time step, no contact
+        missed; `rk4`: The paper's method, to compare: Runge–Kutta steps that switch
+        on their grid.
     steps : int | Sequence[int]
-        Of rk4: steps a drive period, in free flight and (after a comma) in contact
-        (1 to 10000000).
+        For rk4: steps per drive period, in free flight and (after a comma) in
+        contact (1 to 10000000).
     switching : Literal["step", "stage"]
-        Of rk4: where within a step the regime is looked at; `step`: Once a step;
+        For rk4: where within a step the regime is checked; `step`: Once a step;
         `stage`: At every stage of a step.
     series : int | None
-        Periods of the time series, from the start of the recording; without it, all
-        up to 100.
+        Number of periods of the time series, from the start of the recording;
+        default: all, up to 100.
     threads : int | None
-        Of arrays: threads; without it, one a core.
+        Number of threads for arrays; default: one per core.
     progress : Progress
-        Of arrays: as everywhere, a bar or a function.
+        Progress of arrays: whether to show a bar, or a function as in other
+        studies.
     **parameters : Varied
-        Keys of the case to change. Arrays (one-dimensional, or xarray's DataArrays)
-        make a Dataset over them, each a dimension.
+        Keys of the case to change. Arrays (one-dimensional, or xarray DataArrays)
+        give a Dataset with one dimension per array.
 
     Returns
     -------
-    What was observed, by the names of the terminal's JSON: `classification`,
+    The observables, with the names of the terminal's JSON: `classification`,
     `period`, `tip_max` …; `strobe` over `strobe_period` and `state`; `events`
     (their times) with `event_kind`; and the time series `tip`, `gap`, `force` …
-    over `tau`. Over arrays, what is a number in each run, and `failure` where there
-    is none.
+    over `tau`. Over arrays, the numeric observables of each run, and `failure` for
+    a run that failed.
 
     Raises
     ------
     ValueError
-        Something that was asked for is not right.
+        An argument is invalid; the message names it.
     RuntimeError
-        The computation did not succeed.
+        The computation failed.
     """
-    options = {
-        "periods": periods,
-        "transient": transient,
-        "state": state,
-        "strobe": strobe,
-        "events": events,
-        "max_period": max_period,
-        "observables": observables,
-        "resolution": resolution,
-        "method": method,
-        "steps": steps,
-        "switching": switching,
-    }
+    options = _arguments.options("simulate", locals())
     return _motions.simulate(case, options, series, threads, progress, parameters)
 
 @overload
@@ -203,58 +190,50 @@ def orbit(
     progress: Progress = None,
     **parameters: Varied,
 ) -> "Orbit | xr.Dataset":
-    """A periodic orbit by Newton, stable or not.
+    """Compute a periodic orbit by Newton's method, stable or not.
 
     Parameters
     ----------
     case : Case
-        What is studied.
+        The case.
     period : int | None
-        Its period in drive periods; without it, that of the motion to which a run
+        Period in drive periods; default: that of the motion to which a run
         converges (1 to 10000).
     state : Any
-        State to look near, at drive phase 0: a1,…,aN,v1,…,vN (oscillator: x,v).
+        State near the orbit, at drive phase 0: a1,…,aN,v1,…,vN (oscillator: x,v).
     harmonics : int
-        Harmonics of the drive frequency to report (0 to 100000).
+        Number of reported harmonics of the drive frequency (0 to 100000).
     observables : Sequence[str] | None
-        Observables to measure; without it, every one that there is, the beam's
-        clearance included.
+        Observables to measure; default: all, including the clearance of the beam.
     resolution : int
-        Samples a drive period in the time series (1 to 1000000).
+        Samples per drive period in the time series (1 to 1000000).
     derivatives : Sequence[str] | None
-        Keys of the case by which to differentiate the orbit and all that is
-        observed of it; what stays is what stays in a sweep.
+        Keys of the case for derivatives of the orbit and its observables; the same
+        quantities stay constant as in a sweep.
     prove : bool
-        Prove in interval arithmetic that it exists, is alone, and is stable or not.
+        Prove existence, local uniqueness and stability by interval arithmetic.
     threads : int | None
-        Of arrays: threads; without it, one a core.
+        Number of threads for arrays; default: one per core.
     progress : Progress
-        Of arrays: as everywhere, a bar or a function.
+        Progress of arrays: whether to show a bar, or a function as in other
+        studies.
     **parameters : Varied
-        Keys of the case to change. Arrays (one-dimensional, or xarray's DataArrays)
-        make a Dataset over them, each a dimension.
+        Keys of the case to change. Arrays (one-dimensional, or xarray DataArrays)
+        give a Dataset with one dimension per array.
 
     Returns
     -------
-    The orbit, or over arrays a Dataset of what is observed of each, with `failure`
+    The orbit; over arrays, a Dataset of the observables of each, with `failure`
     where there is none.
 
     Raises
     ------
     ValueError
-        Something that was asked for is not right.
+        An argument is invalid; the message names it.
     RuntimeError
-        The computation did not succeed.
+        The computation failed.
     """
-    options = {
-        "period": period,
-        "state": state,
-        "harmonics": harmonics,
-        "observables": observables,
-        "resolution": resolution,
-        "derivatives": derivatives,
-        "prove": prove,
-    }
+    options = _arguments.options("orbit", locals())
     return _motions.orbit(case, options, threads, progress, parameters)
 
 def attractors(
@@ -270,42 +249,43 @@ def attractors(
     threads: int | None = None,
     progress: Progress = None,
 ) -> Attractors:
-    """Every motion that coexists: a census from many seeded starts.
+    """Find coexisting attractors by sampling initial states.
 
     Parameters
     ----------
     case : Case
-        What is studied.
+        The case.
     starts : int | None
-        Starts, spread evenly over one box of states. Without it, starts of every
-        size, from the resonant response down to below the gap, go on until the
-        share of starts that may lead to motions not found is below `unseen`, or
-        5000 starts or 2,000,000 drive periods (600,000 under a nonlinear law) are
-        done (1 to 1000000).
+        Number of initial states, spread evenly over one box. Default: initial
+        states at all amplitudes, from the resonant response down to below the gap,
+        until the share that may lead to undiscovered motions is below `unseen`, or
+        5000 initial states or 2,000,000 drive periods (600,000 under a nonlinear
+        law) are reached. Under a nonlinear law an initial state is followed for at
+        most 10 million steps of the approximate flow, and all together for 50
+        million; a step of the exact flow counts as 100 (1 to 1000000).
     unseen : float | None
-        Share of starts that may lead to motions not found, with 95 % confidence, at
-        which no more are drawn. Without it, 0.01 under a nonlinear law and 0.002
-        under a piecewise-linear one; a smaller one raises the limits of `starts`
-        and drive periods in proportion.
+        Share of initial states that may lead to undiscovered motions, with 95 %
+        confidence, at which sampling ends. Default: 0.01 under a nonlinear law and
+        0.002 under a piecewise-linear one; a smaller value raises the limits of
+        `starts`, drive periods and steps in proportion.
     seed : int
-        Seed of the starts: the same seed gives the same answer on any number of
-        threads.
+        Seed of the initial states; results do not depend on the number of threads.
     box : Box
-        Sides of one box of starts, as in a1=-1:1 or v2=-4:4; the others are derived
-        from the linear response to the drive. 256 starts if `starts` says no
-        number.
+        Sides of one box of initial states, as in a1=-1:1 or v2=-4:4; other sides
+        follow from the linear response to the drive. 256 initial states unless
+        `starts` is given.
     max_period : int
-        Longest period looked for (1 to 10000).
+        Longest period of orbits, in drive periods (1 to 10000).
     unstable : int
         Also list unstable orbits up to this period (0 to 10000).
     prove : bool
-        Prove in interval arithmetic that each orbit exists, is alone, and is stable
-        or not.
+        Prove existence, local uniqueness and stability of each orbit by interval
+        arithmetic.
     threads : int | None
-        Threads; without it, one a core.
+        Number of threads; default: one per core.
     progress : Progress
-        Whether to show a bar, or a function that is called with what is done and
-        the total.
+        Whether to show a bar, or a function that is called with the finished and
+        the total count.
 
     Returns
     -------
@@ -314,19 +294,11 @@ def attractors(
     Raises
     ------
     ValueError
-        Something that was asked for is not right.
+        An argument is invalid; the message names it.
     RuntimeError
-        The computation did not succeed.
+        The computation failed.
     """
-    options = {
-        "starts": starts,
-        "unseen": unseen,
-        "seed": seed,
-        "box": box,
-        "max_period": max_period,
-        "unstable": unstable,
-        "prove": prove,
-    }
+    options = _arguments.options("attractors", locals())
     return _studies.attractors(case, options, threads, progress)
 
 def branch(
@@ -353,72 +325,60 @@ def branch(
     Parameters
     ----------
     case : Case
-        What is studied.
+        The case.
     parameter : str
-        The parameter, as the case file calls it (omega, alpha4, gap …); of a
-        physical case also a quantity of it (drive.frequency, gap.tip,
-        sample.stiffness …).
+        Parameter, by its name in the case file (omega, alpha4, gap …); for a
+        physical case also a quantity (drive.frequency, gap.tip, sample.stiffness
+        …).
     from_ : float | str
-        Its value at the start; of a physical case also with a unit, as in "70 kHz".
+        Value of the parameter at the start; for a physical case also with a unit,
+        as in "70 kHz".
     to : float | str
-        The other end of its range.
+        Value of the parameter at the other end of the range.
     period : int | None
-        Period of the orbit at the start; without it, that of the motion to which a
-        run converges (1 to 10000).
+        Period of the orbit at the start; default: that of the motion to which a run
+        converges (1 to 10000).
     state : Any
-        State near which the orbit at the start is looked for: a1,…,aN,v1,…,vN.
+        State near the orbit at the start: a1,…,aN,v1,…,vN.
     switch : int | None
-        Also follow the doubled branches at flips, so many doublings deep (0 to 12).
+        Also follow doubled branches at flips, up to this number of doublings (0 to
+        12).
     diagram : bool
-        Assemble the whole picture: every stable orbit of a census at several
-        values, followed both ways and through two doublings (or as `switch` says).
+        Find the branches of all attractors: stable orbits from a census at several
+        values, followed in both directions and through two doublings (or `switch`).
     values : int
-        Of the `diagram`: values of the parameter at which a census is taken (2 to
-        10000).
+        For `diagram`: number of parameter values with a census (2 to 10000).
     starts : int
-        Of the `diagram`: starts at each (1 to 100000).
+        For `diagram`: initial states at each value (1 to 100000).
     seed : int
-        Of the `diagram`: seed of the starts.
+        For `diagram`: seed of the initial states.
     second : Mapping[str, tuple[float | str, float | str]] | str | None
-        A second parameter and its range, as in alpha4=5:40: the bifurcation curves
-        are traced in both.
+        Second parameter and its range, as in alpha4=5:40, for bifurcation curves in
+        both.
     max_step : float
-        Longest step, as a part of the range.
+        Longest step, as a fraction of the range.
     threads : int | None
-        Threads; without it, one a core.
+        Number of threads; default: one per core.
     progress : Progress
-        Whether to show a bar, or a function that is called with what is done and
-        the total.
+        Whether to show a bar, or a function that is called with the finished and
+        the total count.
 
     Returns
     -------
     The orbits over `point` (`branch`, the parameter by its name, `stable`,
     `tip_max`, `states` …) and the bifurcations over `bifurcation`
     (`bifurcation_kind`, `bifurcation_parameter`, `bifurcation_states` …); curves in
-    two parameters over `locus_point`. The attributes say of each branch why it
-    ends, and what could not be followed.
+    two parameters over `locus_point`. The attributes state why each branch ends,
+    and list failures.
 
     Raises
     ------
     ValueError
-        Something that was asked for is not right.
+        An argument is invalid; the message names it.
     RuntimeError
-        The computation did not succeed.
+        The computation failed.
     """
-    options = {
-        "parameter": parameter,
-        "from": from_,
-        "to": to,
-        "period": period,
-        "state": state,
-        "switch": switch,
-        "diagram": diagram,
-        "values": values,
-        "starts": starts,
-        "seed": seed,
-        "second": second,
-        "max_step": max_step,
-    }
+    options = _arguments.options("branch", locals())
     return _studies.branch(case, options, threads, progress)
 
 def approach(
@@ -444,75 +404,119 @@ def approach(
     Parameters
     ----------
     case : Case
-        What is studied.
+        The case.
     from_ : float | str | None
-        Distance at which to begin, in units of the case ("30 nm") or as alpha5;
-        without it, 1.25 times what the free tip swings towards the sample.
+        First distance, in units of the case ("30 nm") or as alpha5; default: 1.25
+        times the free swing of the tip towards the sample.
     to : float | str | None
-        Distance at which to turn back; without it, 0.
+        Last distance of the approach; default: 0.
     points : int
-        Distances each way (2 to 20000).
+        Number of distances in each direction. Under a nonlinear law the lever is
+        followed for at most 40 million steps of the approximate flow, and as many
+        are taken for the rows; a step of the exact flow counts as 100 (2 to 20000).
     branches : bool
-        Also continue the branches that coexist, stable and unstable.
+        Also continue coexisting branches, stable and unstable.
     switch : int
-        Doublings of branches to follow, as far as their orbits are stable (0 to
-        12).
+        Number of period doublings to follow, as far as their orbits are stable (0
+        to 12).
     max_period : int
-        Longest period looked for (1 to 10000).
+        Longest period of orbits, in drive periods (1 to 10000).
     speed : float | str | None
-        Speed of the approach and of the retraction, in units of the case ("500
-        nm/s") or as alpha5 a unit of time: the distance changes each drive period
-        and the lever does not settle; without it, both are so slow that it always
-        does.
+        Speed of approach and retract, in units of the case ("500 nm/s") or as
+        alpha5 per unit of time: the distance changes each drive period; default:
+        quasi-static.
     fm : bool
-        Frequency modulation: hold amplitude (the case's free amplitude) and phase
-        by frequency and strength of the drive, and tell the frequency shift.
+        Frequency modulation: keep the amplitude (the free amplitude of the case)
+        and phase constant by frequency and strength of the drive, and report the
+        frequency shift.
     phase : float
-        Phase behind the drive that frequency modulation holds, in degrees.
+        Phase lag kept by frequency modulation, in degrees.
     shift : float | str | None
-        Frequency shift of frequency modulation whose distances are to be found, in
-        units of the case ("-50 Hz") or as omega.
+        Frequency shift whose distances to find under frequency modulation, in units
+        of the case ("-50 Hz") or as omega.
     closest : float | str | None
-        Least distance of the oscillation that frequency modulation keeps, in units
-        of the case ("1 nm") or as alpha5: the amplitude then changes with the
+        Least distance of the oscillation kept by frequency modulation, in units of
+        the case ("1 nm") or as alpha5: the amplitude then changes with the
         distance.
     threads : int | None
-        Threads; without it, one a core.
+        Number of threads; default: one per core.
     progress : Progress
-        Whether to show a bar, or a function that is called with what is done and
-        the total.
+        Whether to show a bar, or a function that is called with the finished and
+        the total count.
 
     Returns
     -------
-    What is observed over `way` (approach, retract) and the distance (by the name of
-    its parameter, with `zc` in metres for a physical case): `first_harmonic`,
+    The observables over `way` (approach, retract) and the distance (with the name
+    of its parameter, with `zc` in metres for a physical case): `first_harmonic`,
     `phase`, `peak_force`, `dissipation` … and in SI `physical_A`, `physical_F_max`,
-    `physical_E_dis` …; the branches over `branch_point`; where the lever jumps in
-    the attribute `jumps`. With `fm=True` also `relative_shift`, `drive_ratio`,
-    `sader_jarvis_force` … and in SI `physical_frequency_shift` …, with what is held
-    in the attribute `modulation`.
+    `physical_E_dis` …; the branches over `branch_point`; the jumps in the attribute
+    `jumps`. With `fm=True` also `relative_shift`, `drive_ratio`,
+    `sader_jarvis_force` … and in SI `physical_frequency_shift` …, with the settings
+    of the loop in the attribute `modulation`.
 
     Raises
     ------
     ValueError
-        Something that was asked for is not right.
+        An argument is invalid; the message names it.
     RuntimeError
-        The computation did not succeed.
+        The computation failed.
     """
-    options = {
-        "from": from_,
-        "to": to,
-        "points": points,
-        "branches": branches,
-        "switch": switch,
-        "max_period": max_period,
-        "speed": speed,
-        "fm": fm,
-        "phase": phase,
-        "shift": shift,
-        "closest": closest,
-    }
+    options = _arguments.options("approach", locals())
     return _studies.approach(case, options, threads, progress)
+
+def fm(
+    case: Case,
+    *,
+    from_: float | str | None = None,
+    to: float | str | None = None,
+    points: int = 80,
+    phase: float = 90.0,
+    shift: float | str | None = None,
+    closest: float | str | None = None,
+    threads: int | None = None,
+    progress: Progress = None,
+) -> Record:
+    """Frequency shift and excitation against the distance to the sample, with amplitude
+    and phase held.
+
+    Parameters
+    ----------
+    case : Case
+        The case.
+    from_ : float | str | None
+        First distance, in units of the case ("30 nm") or as alpha5; default: 1.25
+        times the free amplitude towards the sample.
+    to : float | str | None
+        Last distance of the approach; default: 0.
+    points : int
+        Number of distances in each direction (2 to 20000).
+    phase : float
+        Phase lag to keep, in degrees.
+    shift : float | str | None
+        Frequency shift whose distances to find, in units of the case ("-50 Hz") or
+        as omega.
+    closest : float | str | None
+        Least distance of the oscillation to keep, in units of the case ("1 nm") or
+        as alpha5: the amplitude then changes with the distance.
+    threads : int | None
+        Number of threads; default: one per core.
+    progress : Progress
+        Whether to show a bar, or a function that is called with the finished and
+        the total count.
+
+    Returns
+    -------
+    The document, with the names of the terminal's JSON.
+
+    Raises
+    ------
+    ValueError
+        An argument is invalid; the message names it.
+    RuntimeError
+        The computation failed.
+    """
+    options = _arguments.options("fm", locals())
+    return _studies.document("fm", case, options, threads, progress)
 
 def fit(
     case: Case,
@@ -532,12 +536,12 @@ def fit(
     threads: int | None = None,
     progress: Progress = None,
 ) -> Fit:
-    """Parameters of lever and sample from measured curves.
+    """Fit parameters of lever and sample to measured curves.
 
     Parameters
     ----------
     case : Case
-        What is studied.
+        The case.
     data : Any
         Measured curves: tables whose columns are named as in `distance (nm)`,
         `amplitude (nm)`, `phase (deg)`.
@@ -545,32 +549,31 @@ def fit(
         Parameters to find: keys of the case, gap.offset, and NAME.offset or
         NAME.scale of a column.
     per_curve : Sequence[str] | None
-        Parameters to find, one value a curve.
+        Parameters to find with one value per curve.
     bounds : Mapping[str, tuple[float | str, float | str]] | str | None
         Bounds of parameters, as in sample.stiffness="1 N/m:100 N/m".
     columns : Sequence[str] | None
-        Columns of the data that count; without it, all.
+        Columns of the data to use; default: all.
     laws : Sequence[str] | None
-        Contact laws to compare, as in hertz,dmt; without it, the case's own.
+        Contact laws to compare, as in hertz,dmt; default: the law of the case.
     starts : int
-        Starts to try as long as nothing describes the data (1 to 1000).
+        Initial values to try until the data are described (1 to 1000).
     seed : int
-        Seed of the further starts.
+        Seed of the further initial values.
     max_period : int
-        Longest period of the orbits looked for (1 to 64).
+        Longest period of the orbits, in drive periods (1 to 64).
     jumps : bool
-        The place at which the data jump from a branch that ends in a fold counts
-        too.
+        Use the locations of jumps at folds as data.
     phase : float
-        Phase behind the drive that the loop held, in degrees, of curves of a
-        frequency shift.
+        Phase lag that the loop maintains, in degrees, for curves of a frequency
+        shift.
     profile : bool
-        Intervals by the profile of the likelihood.
+        Intervals from the profile of the likelihood.
     threads : int | None
-        Threads; without it, one a core.
+        Number of threads; default: one per core.
     progress : Progress
-        Whether to show a bar, or a function that is called with what is done and
-        the total.
+        Whether to show a bar, or a function that is called with the finished and
+        the total count.
 
     Returns
     -------
@@ -581,24 +584,11 @@ def fit(
     Raises
     ------
     ValueError
-        Something that was asked for is not right.
+        An argument is invalid; the message names it.
     RuntimeError
-        The computation did not succeed.
+        The computation failed.
     """
-    options = {
-        "data": data,
-        "free": free,
-        "per_curve": per_curve,
-        "bounds": bounds,
-        "columns": columns,
-        "laws": laws,
-        "starts": starts,
-        "seed": seed,
-        "max_period": max_period,
-        "jumps": jumps,
-        "phase": phase,
-        "profile": profile,
-    }
+    options = _arguments.options("fit", locals())
     return _studies.fit(case, options, threads, progress)
 
 def reconstruct(
@@ -621,7 +611,7 @@ def reconstruct(
     Parameters
     ----------
     case : Case
-        What is studied.
+        The case.
     data : Any
         Measured curves: tables whose columns are named as in `distance (nm)`,
         `amplitude (nm)`, `phase (deg)`, or `frequency_shift (Hz)`.
@@ -647,10 +637,10 @@ def reconstruct(
     rows : int
         Longer curves are averaged to about this many rows (20 to 2000).
     threads : int | None
-        Threads; without it, one a core.
+        Number of threads; default: one per core.
     progress : Progress
-        Whether to show a bar, or a function that is called with what is done and
-        the total.
+        Whether to show a bar, or a function that is called with the finished and
+        the total count.
 
     Returns
     -------
@@ -661,21 +651,11 @@ def reconstruct(
     Raises
     ------
     ValueError
-        Something that was asked for is not right.
+        An argument is invalid; the message names it.
     RuntimeError
-        The computation did not succeed.
+        The computation failed.
     """
-    options = {
-        "data": data,
-        "columns": columns,
-        "convert": convert,
-        "free_amplitude": free_amplitude,
-        "free_phase": free_phase,
-        "amplitude_error": amplitude_error,
-        "phase_error": phase_error,
-        "phase": phase,
-        "rows": rows,
-    }
+    options = _arguments.options("reconstruct", locals())
     return _studies.reconstruct(case, options, threads, progress)
 
 def sweep(
@@ -697,81 +677,69 @@ def sweep(
     client: "Client | None" = None,
     progress: Progress = None,
 ) -> "xr.Dataset":
-    """How the motion changes with one or two parameters, from any number of starts.
+    """Sweep one or two parameters, from any number of initial states.
 
     Parameters
     ----------
     case : Case
-        What is studied.
+        The case.
     over : str | Sequence[str] | Mapping[str, Any]
-        A parameter and its values, as in omega=2:4:400 (first, last, how many), or
-        alpha4=1:1000:50:log in equal ratios, or any that ascend, omega=2,2.5,4;
-        modes too; of a physical case also drive.frequency=60kHz:80kHz:200; once or
+        Parameter and its values, as in omega=2:4:400 (first, last, count),
+        alpha4=1:1000:50:log in equal ratios, or ascending values omega=2,2.5,4;
+        modes too; for a physical case also drive.frequency=60kHz:80kHz:200; once or
         twice.
     starts : int | None
-        Quasi-random starts at each value, spread over a box of states; without it,
-        one start from rest (1 to 1000000).
+        Quasi-random initial states at each value, spread over a box; default: rest
+        alone (1 to 1000000).
     seed : int
-        Seed of the starts.
+        Seed of the initial states.
     box : Box
-        Sides of the box, as in a1=-1:1 or v2=-4:4; the others are derived from the
+        Sides of the box, as in a1=-1:1 or v2=-4:4; other sides follow from the
         linear response to the drive.
     state : Any
         Start from this state at drive phase 0: a1,…,aN,v1,…,vN (oscillator: x,v).
     follow : Literal["off", "up", "down", "both"]
-        Start each value from the last state of the one before, along the first
-        parameter: up, down or both. A whole line is then one piece of work, lost
-        when interrupted; `off`: Every value starts anew.; `up`: From the least
-        value to the greatest.; `down`: From the greatest value to the least.;
-        `both`: Both..
+        Start each value from the last state of the previous one, along the first
+        parameter: up, down or both. An interrupted line is lost; `off`: Every value
+        starts anew.; `up`: From the least value to the greatest.; `down`: From the
+        greatest value to the least.; `both`: Both..
     periods : int
-        Drive periods recorded (1 to 100000000).
+        Number of recorded drive periods (1 to 100000000).
     strobe : int | None
-        States kept, at the end of each of the last periods; without it, of every
-        recorded one (0 to 100000000).
+        Number of last periods whose final states are kept; default: all recorded
+        ones (0 to 100000000).
     transient : int | None
-        Drive periods discarded first; without it, as many as the motion is measured
-        to need (0 to 100000000).
+        Drive periods of the discarded transient; default: until the motion has
+        settled (0 to 100000000).
     max_period : int
-        Longest period looked for (1 to 10000).
+        Longest period of orbits, in drive periods (1 to 10000).
     out : Path | None
-        The dataset, a folder ending in .zarr; where it is there already, the work
-        goes on where it stopped. Without it, everything is in memory.
+        The dataset, a folder with the extension .zarr; an existing one is resumed.
+        Without it, everything is in memory.
     chunk : str
-        One of n shares only, as in "2/8"; `merge` puts the shares together.
+        Only one of n shares, as in "2/8"; `merge` merges the shares.
     threads : int | None
-        Threads; without it, one a core.
+        Number of threads; default: one per core.
     client : "Client | None"
-        A Dask client, on whose workers the chunks are computed: the same bytes.
+        A Dask client on whose workers the chunks are computed, with the same bytes.
     progress : Progress
-        Whether to show a bar, or a function that is called with what is done and
-        the total.
+        Whether to show a bar, or a function that is called with the finished and
+        the total count.
 
     Returns
     -------
     The dataset, as `open` opens it: lazily from `out`. After Ctrl-C, the `result`
-    of the exception is the dataset with what is finished, and the same call goes on
+    of the exception is the finished part of the dataset, and the same call resumes
     in `out`.
 
     Raises
     ------
     ValueError
-        Something that was asked for is not right.
+        An argument is invalid; the message names it.
     RuntimeError
-        The computation did not succeed.
+        The computation failed.
     """
-    options = {
-        "over": over,
-        "starts": starts,
-        "seed": seed,
-        "box": box,
-        "state": state,
-        "follow": follow,
-        "periods": periods,
-        "strobe": strobe,
-        "transient": transient,
-        "max_period": max_period,
-    }
+    options = _arguments.options("sweep", locals())
     return _datasets.sweep(case, options, out, chunk, threads, client, progress)
 
 def window(
@@ -792,48 +760,43 @@ def window(
     Parameters
     ----------
     case : Case
-        What is studied.
+        The case.
     over : str | Sequence[str] | Mapping[str, Any]
-        A parameter and its values, as in gap.tip=5nm:25nm:41,
-        drive.free_amplitude=10nm:60nm:26, omega=2:4:81, or any that ascend,
-        omega=2,2.5,4; twice, the first is the horizontal axis.
+        Parameter and its values, as in gap.tip=5nm:25nm:41,
+        drive.free_amplitude=10nm:60nm:26, omega=2:4:81, or ascending values
+        omega=2,2.5,4; twice, first the horizontal axis.
     starts : int
-        Starts of the census at each point: rest, the linear responses, and draws of
-        every size (1 to 1000000).
+        Initial states at each point: rest, the linear responses, and samples at all
+        amplitudes (1 to 1000000).
     seed : int
-        Seed of the starts.
+        Seed of the initial states.
     max_period : int
-        Longest period looked for (1 to 10000).
+        Longest period of orbits, in drive periods (1 to 10000).
     out : Path | None
-        The dataset, a folder ending in .zarr; where it is there already, the work
-        goes on where it stopped. Without it, everything is in memory.
+        The dataset, a folder with the extension .zarr; an existing one is resumed.
+        Without it, everything is in memory.
     threads : int | None
-        Threads; without it, one a core.
+        Number of threads; default: one per core.
     client : "Client | None"
-        A Dask client, on whose workers the chunks are computed: the same bytes.
+        A Dask client on whose workers the chunks are computed, with the same bytes.
     progress : Progress
-        Whether to show a bar, or a function that is called with what is done and
-        the total.
+        Whether to show a bar, or a function that is called with the finished and
+        the total count.
 
     Returns
     -------
     The sweep with `condition` over both parameters: no-contact, one-period-1,
-    second-state, subharmonic, irregular or undecided; `share` says how much of each
-    there is.
+    second-state, subharmonic, irregular or undecided; `share` is the fraction of
+    each.
 
     Raises
     ------
     ValueError
-        Something that was asked for is not right.
+        An argument is invalid; the message names it.
     RuntimeError
-        The computation did not succeed.
+        The computation failed.
     """
-    options = {
-        "over": over,
-        "starts": starts,
-        "seed": seed,
-        "max_period": max_period,
-    }
+    options = _arguments.options("window", locals())
     return _datasets.window(case, options, out, threads, client, progress)
 
 def basin(
@@ -853,42 +816,42 @@ def basin(
     client: "Client | None" = None,
     progress: Progress = None,
 ) -> "xr.Dataset":
-    """Basins of attraction on a two-dimensional slice of initial states.
+    """Compute basins of attraction on a two-dimensional slice of initial states.
 
     Parameters
     ----------
     case : Case
-        What is studied.
+        The case.
     x : str | Mapping[str, Any]
-        The horizontal axis, as in a1=-1:1:200: entry of the state, first value,
-        last value, how many (a1…aN, v1…vN; oscillator: x, v).
+        Horizontal axis, as in a1=-1:1:200: entry of the state (a1…aN, v1…vN;
+        oscillator: x, v), first value, last value, count.
     y : str | Mapping[str, Any]
-        The vertical axis.
+        Vertical axis, in the same form.
     state : Any
-        The other entries of the state, in full: a1,…,aN,v1,…,vN; without it, 0.
+        State with the other entries: a1,…,aN,v1,…,vN; default: 0.
     attractors : Iterable[Any] | None
-        States on the attractors, or what a census found; without it, a census in
-        the slice finds them.
+        States on the attractors, or the result of a census; default: a census in
+        the slice.
     starts : int
-        Starts of the census (1 to 1000000).
+        Initial states of the census (1 to 1000000).
     seed : int
         Seed of the census.
     periods : int
-        Drive periods after which a point is called unsettled (1 to 100000000).
+        Drive periods after which a point counts as unsettled (1 to 100000000).
     max_period : int
-        Longest period looked for (1 to 10000).
+        Longest period of orbits, in drive periods (1 to 10000).
     out : Path | None
-        The dataset, a folder ending in .zarr; where it is there already, the work
-        goes on where it stopped. Without it, everything is in memory.
+        The dataset, a folder with the extension .zarr; an existing one is resumed.
+        Without it, everything is in memory.
     chunk : str
-        One of n shares only, as in "2/8"; `merge` puts the shares together.
+        Only one of n shares, as in "2/8"; `merge` merges the shares.
     threads : int | None
-        Threads; without it, one a core.
+        Number of threads; default: one per core.
     client : "Client | None"
-        A Dask client, on whose workers the chunks are computed: the same bytes.
+        A Dask client on whose workers the chunks are computed, with the same bytes.
     progress : Progress
-        Whether to show a bar, or a function that is called with what is done and
-        the total.
+        Whether to show a bar, or a function that is called with the finished and
+        the total count.
 
     Returns
     -------
@@ -898,20 +861,11 @@ def basin(
     Raises
     ------
     ValueError
-        Something that was asked for is not right.
+        An argument is invalid; the message names it.
     RuntimeError
-        The computation did not succeed.
+        The computation failed.
     """
-    options = {
-        "x": x,
-        "y": y,
-        "state": state,
-        "attractors": attractors,
-        "starts": starts,
-        "seed": seed,
-        "periods": periods,
-        "max_period": max_period,
-    }
+    options = _arguments.options("basin", locals())
     return _datasets.basin(case, options, out, chunk, threads, client, progress)
 
 def lyapunov(
@@ -924,26 +878,26 @@ def lyapunov(
     phase: float = 0.0,
     points: int = 5000,
 ) -> Lyapunov:
-    """Lyapunov spectrum with error bars, and a Poincaré section.
+    """Compute the Lyapunov spectrum with error bars, and a Poincaré section.
 
     Parameters
     ----------
     case : Case
-        What is studied.
+        The case.
     periods : int
-        Drive periods averaged over (1 to 100000000).
+        Drive periods of the average (1 to 100000000).
     transient : int
-        Drive periods discarded first (0 to 100000000).
+        Drive periods of the discarded transient (0 to 100000000).
     state : Any
-        State at the start, drive phase 0: a1,…,aN,v1,…,vN (oscillator: x,v);
-        without it, rest.
+        Initial state at drive phase 0: a1,…,aN,v1,…,vN (oscillator: x,v); default:
+        rest.
     section : Literal["phase", "contact"]
-        Where the section is taken; `phase`: Once a drive period, at one phase;
-        `contact`: At the beginning of every contact.
+        Poincaré section; `phase`: Once a drive period, at one phase; `contact`: At
+        the beginning of every contact.
     phase : float
         Drive phase of the section in degrees.
     points : int
-        Points of the section (0 to 2000000).
+        Number of points of the section (0 to 2000000).
 
     Returns
     -------
@@ -952,18 +906,11 @@ def lyapunov(
     Raises
     ------
     ValueError
-        Something that was asked for is not right.
+        An argument is invalid; the message names it.
     RuntimeError
-        The computation did not succeed.
+        The computation failed.
     """
-    options = {
-        "periods": periods,
-        "transient": transient,
-        "state": state,
-        "section": section,
-        "phase": phase,
-        "points": points,
-    }
+    options = _arguments.options("lyapunov", locals())
     return _studies.lyapunov(case, options)
 
 def convergence(
@@ -973,20 +920,19 @@ def convergence(
     tolerance: float = 0.01,
     period: int | None = None,
 ) -> Convergence:
-    """The same motion with N = 1 … K modes: how many are enough.
+    """Compare the motion with 1 to K modes: how many are enough.
 
     Parameters
     ----------
     case : Case
-        What is studied.
+        The case.
     largest : int
         Largest number of modes (2 to 50).
     tolerance : float
-        Difference of the tip deflection, as a part of the amplitude, that is small
-        enough.
+        Tolerance of the tip deflection, as a fraction of the amplitude.
     period : int | None
-        Period of the orbit to compare; without it, the motion to which a run from
-        rest converges (1 to 10000).
+        Period of the orbit to compare; default: the motion to which a run from rest
+        converges (1 to 10000).
 
     Returns
     -------
@@ -995,15 +941,11 @@ def convergence(
     Raises
     ------
     ValueError
-        Something that was asked for is not right.
+        An argument is invalid; the message names it.
     RuntimeError
-        The computation did not succeed.
+        The computation failed.
     """
-    options = {
-        "largest": largest,
-        "tolerance": tolerance,
-        "period": period,
-    }
+    options = _arguments.options("convergence", locals())
     return _studies.convergence(case, options)
 
 def contact_laws(
@@ -1016,42 +958,165 @@ def contact_laws(
     threads: int | None = None,
     progress: Progress = None,
 ) -> Record:
-    """The same lever and drive on every contact law: what difference the sample makes.
+    """Compare contact laws under the same lever and drive.
 
     Parameters
     ----------
     case : Case
-        What is studied.
+        The case.
     period : int
-        Period of the orbits compared (1 to 10000).
+        Period of the compared orbits (1 to 10000).
     arm : float | None
-        Stiffness of the standard linear solid's arm; without it, the case's, or
-        twice alpha4.
+        Stiffness of the relaxing arm; default: that of the case, or twice alpha4.
     from_ : float | str | None
         Lowest drive frequency to which the orbits are followed.
     to : float | str | None
         Highest drive frequency to which the orbits are followed.
     threads : int | None
-        Threads; without it, one a core.
+        Number of threads; default: one per core.
     progress : Progress
-        Whether to show a bar, or a function that is called with what is done and
-        the total.
+        Whether to show a bar, or a function that is called with the finished and
+        the total count.
 
     Returns
     -------
-    What the terminal's JSON has, by its names.
+    The document, with the names of the terminal's JSON.
 
     Raises
     ------
     ValueError
-        Something that was asked for is not right.
+        An argument is invalid; the message names it.
     RuntimeError
-        The computation did not succeed.
+        The computation failed.
     """
-    options = {
-        "period": period,
-        "arm": arm,
-        "from": from_,
-        "to": to,
-    }
+    options = _arguments.options("contact-laws", locals())
     return _studies.document("contact-laws", case, options, threads, progress)
+
+def scan(
+    case: Case,
+    *,
+    method: Literal["exact", "fast", "quasi-static"] | None = None,
+    list: Any = None,
+    size: float | str | None = None,
+    size_y: float | str | None = None,
+    lines: int | None = None,
+    pixels: int | None = None,
+    settle: int | None = None,
+    periods: int | None = None,
+    line_rate: float | str | None = None,
+    speed: float | str | None = None,
+    retrace: bool | None = None,
+    line_settle: int | None = None,
+    mode: Literal["constant-amplitude", "constant-height"] | None = None,
+    setpoint: float | str | None = None,
+    integral_gain: float | str | None = None,
+    integral_bandwidth: float | str | None = None,
+    proportional_gain: float | None = None,
+    z0: float | str | None = None,
+    lock_in: Any = None,
+    z_scanner: Any = None,
+    delay: int | None = None,
+    slew_rate: float | str | None = None,
+    z_range: Any = None,
+    dynamic_threshold: float | None = None,
+    dynamic_gain: float | None = None,
+    surface: Any = None,
+    profile: Any = None,
+    image: str | None = None,
+    image_height: float | str | None = None,
+    dilate: float | str | None = None,
+    material: Any = None,
+    threads: int | None = None,
+    progress: Progress = None,
+) -> Record:
+    """Scan of a line or an image under feedback, drive period by period.
+
+    Parameters
+    ----------
+    case : Case
+        The case.
+    method : Literal["exact", "fast", "quasi-static"] | None
+        How the drive periods are computed.
+    list : Any
+        Drive periods to list, counted from the start of settling.
+    size : float | str | None
+        Length of a line.
+    size_y : float | str | None
+        Extent across the lines; without it, as long as a line.
+    lines : int | None
+        Lines (1 to 65536).
+    pixels : int | None
+        Pixels of a line (1 to 65536).
+    settle : int | None
+        Drive periods before the first line (0 to 10000000).
+    periods : int | None
+        Drive periods of a line in one direction (2 to 10000000).
+    line_rate : float | str | None
+        Lines a second, trace and retrace together, in place of `periods`.
+    speed : float | str | None
+        Speed of the tip along the line, in place of `periods`.
+    retrace : bool | None
+        Scan every line back, too.
+    line_settle : int | None
+        Drive periods that each line settles before it: lines are then independent
+        and run at the same time on all cores (0 to 10000000).
+    mode : Literal["constant-amplitude", "constant-height"] | None
+        What the feedback does.
+    setpoint : float | str | None
+        Amplitude that the feedback holds: a part of the free amplitude, or a
+        length.
+    integral_gain : float | str | None
+        Integral gain in 1/s: the crossover frequency times 2π where the amplitude
+        falls as the distance does.
+    integral_bandwidth : float | str | None
+        The same as a frequency.
+    proportional_gain : float | None
+        Proportional gain.
+    z0 : float | str | None
+        Height at the start; without it, where the amplitude of a lever that comes
+        from far has fallen to the setpoint.
+    lock_in : Any
+        Lock-in amplifier.
+    z_scanner : Any
+        Resonance of the z scanner.
+    delay : int | None
+        Drive periods by which the controller is late (0 to 10000).
+    slew_rate : float | str | None
+        Largest speed of the z command.
+    z_range : Any
+        Lowest and highest z command.
+    dynamic_threshold : float | None
+        Amplitude above which the error is amplified, a part of the free amplitude.
+    dynamic_gain : float | None
+        Gain on the amplitude above the threshold.
+    surface : Any
+        Features of the surface; their heights add up.
+    profile : Any
+        Measured heights of the line: a CSV file named relative to the case file.
+    image : str | None
+        Greyscale image of the heights, a PNG file named relative to the case file.
+    image_height : float | str | None
+        Height of white in the image.
+    dilate : float | str | None
+        Widen the sampled heights by a sphere of this radius, the tip.
+    material : Any
+        Stretches of the line with another sample.
+    threads : int | None
+        Number of threads; default: one per core.
+    progress : Progress
+        Whether to show a bar, or a function that is called with the finished and
+        the total count.
+
+    Returns
+    -------
+    The document, with the names of the terminal's JSON.
+
+    Raises
+    ------
+    ValueError
+        An argument is invalid; the message names it.
+    RuntimeError
+        The computation failed.
+    """
+    options = _arguments.options("scan", locals())
+    return _studies.document("scan", case, options, threads, progress)

@@ -54,9 +54,7 @@ def attractors(
     document, interrupted = _run("attractors", case, options, threads, progress)
     found = Attractors(case, document)
     if interrupted:
-        message = (
-            "stopped before all starts were done: the fractions are of what was done"
-        )
+        message = "stopped before all starts were finished: the fractions refer to the finished ones"
         raise Interrupted(message, found)
     return found
 
@@ -64,7 +62,7 @@ def attractors(
 def _finished(found: Found, interrupted: bool) -> Found:
     """The result of a study; raises `Interrupted` if it was stopped."""
     if interrupted:
-        message = "stopped before it was done"
+        message = "stopped before it was finished"
         raise Interrupted(message, found)
     return found
 
@@ -276,7 +274,7 @@ def fit(
 ) -> Fit:
     """The parameters that describe measured curves best."""
     if options["data"] is None:
-        message = "data: measured curves are needed"
+        message = "data: expected measured curves"
         raise TypeError(message)
     lists = {
         name: _arguments.names(name, options[name])
@@ -337,6 +335,6 @@ def paper(
         )
     report = Paper.of(json.loads(text))
     if interrupted:
-        message = f"stopped; the report in {report.out} is of what was computed"
+        message = f"stopped; the report in {report.out} contains the finished sections"
         raise Interrupted(message, report)
     return report

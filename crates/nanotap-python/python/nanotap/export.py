@@ -37,7 +37,7 @@ def table(result: Any) -> pd.DataFrame:
             raise ValueError(message)
         return _frame(result.series, ("tau",))
     if not hasattr(result, "data_vars"):
-        message = f"there is no table of a {type(result).__name__}"
+        message = f"a {type(result).__name__} cannot be converted to a table"
         raise TypeError(message)
     if "period_max" in result.variables:
         return _frame(result, tuple(map(str, result.classification.dims)))
@@ -65,12 +65,12 @@ def _frame(ds: "xr.Dataset", dims: tuple[str, ...]) -> pd.DataFrame:
             for entry in ds.state.values:
                 chosen[str(entry)] = variable.sel(state=entry, drop=True)
     part = ds[list(set(dims) & set(map(str, ds.coords)))].assign(chosen)
-    beside = {
+    coords = {
         str(name): coord
         for name, coord in ds.coords.items()
         if coord.dims and set(coord.dims) <= set(dims)
     }
-    return part.assign_coords(beside).to_dataframe(dim_order=list(dims))
+    return part.assign_coords(coords).to_dataframe(dim_order=list(dims))
 
 
 def csv(result: Any, path: Path) -> None:
@@ -104,7 +104,7 @@ def hdf5(result: Any, path: Path) -> None:
     elif hasattr(result, "data_vars"):
         arrays, harmonics, series, attributes = {}, None, result, {}
     else:
-        message = f"hdf5 holds orbits and Datasets, not a {type(result).__name__}"
+        message = f"expected an orbit or a Dataset, got a {type(result).__name__}"
         raise TypeError(message)
 
     def write(target: str) -> None:
@@ -159,16 +159,16 @@ def gsf(
     """
     name = variable or ("attractor" if "attractor" in ds else "amplitude")
     if name not in ds:
-        message = f"variable: there is no `{name}`; there are {', '.join(map(str, ds.data_vars))}"
+        message = f"variable: unknown `{name}`; the variables are {', '.join(map(str, ds.data_vars))}"
         raise ValueError(message)
     field = ds[name]
     if "start" in field.dims:
         if not 0 <= start < field.sizes["start"]:
-            message = f"start: {start} is none of the {field.sizes['start']} starts"
+            message = f"start: {start} is out of range; there are {field.sizes['start']} starts"
             raise ValueError(message)
         field = field.isel(start=start)
     if field.ndim != 2:
-        message = f"variable: `{name}` lies over {', '.join(map(str, field.dims))}; a map has two axes"
+        message = f"variable: `{name}` has the dimensions {', '.join(map(str, field.dims))}; a map has two"
         raise ValueError(message)
     y, x = field.dims
     file = _nanotap.gsf(

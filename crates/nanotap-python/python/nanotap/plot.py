@@ -67,16 +67,16 @@ BLUE, VERMILLION, GREEN, PURPLE, ORANGE, SKY, _ = LINES
 YELLOW, GREY, LIGHT_GREY = "#f0e442", "#808080", "#e2e2e2"
 
 _LABELS = {
-    "tip_max": "greatest tip deflection $W_{max}$",
-    "tip_min": "least tip deflection $W_{min}$",
+    "tip_max": "largest tip deflection $W_{max}$",
+    "tip_min": "smallest tip deflection $W_{min}$",
     "amplitude": "amplitude (half of peak to peak)",
     "first_harmonic": "amplitude at the drive frequency",
     "phase": "phase (°)",
-    "contact_fraction": "part of the time in contact",
-    "peak_force": "greatest force",
+    "contact_fraction": "contact time / period",
+    "peak_force": "peak force",
     "dissipation": "dissipation $E_{dis}$",
     "indentation": "indentation",
-    "impact_speed": "speed of approach",
+    "impact_speed": "impact speed",
     "spectral_radius": "largest |$μ$|",
 }
 
@@ -145,7 +145,7 @@ def run(
 ) -> "Figure":
     """A run of `simulate`: time series with the contacts shaded, and phase portrait."""
     if "tau" not in ds.dims or ds.sizes["tau"] < 2:
-        message = "the run has no time series; leave series= away"
+        message = "the run has no time series; omit series="
         raise ValueError(message)
     recorded = float(ds.tau[-1]) / _period_of(ds)
     named = ds.get("period", ds.get("apparent_period"))
@@ -157,7 +157,7 @@ def run(
         word = str(ds.classification.item())
         title = f"period {period:.0f}" if np.isfinite(period) else word
     else:
-        title = f"Runge–Kutta, {ds.attrs['steps'][0]} steps a period"
+        title = f"Runge–Kutta, {ds.attrs['steps'][0]} steps per period"
     if "contact" not in ds:
         ds = ds.assign(contact=("tau", np.zeros(ds.sizes["tau"], bool)))
     return _drawn("motion", _motion(ds, title, shown, endless=not repeats), where)
@@ -253,7 +253,9 @@ def _over_one(
 
     if show not in ds or ds[show].dtype.kind not in "iuf":
         known = (str(n) for n, v in ds.data_vars.items() if v.dtype.kind in "iuf")
-        message = f"show: `{show}` is no number here; there are {', '.join(known)}"
+        message = (
+            f"show: `{show}` is not a numeric variable; available: {', '.join(known)}"
+        )
         raise ValueError(message)
     shown = ds[show]
     x, branch, shown = xr.broadcast(ds[name], branch, shown)
@@ -307,7 +309,7 @@ def orbits(
     """
     names = [name for name in json.loads(ds.attrs.get("over", "[]")) if name in ds.dims]
     if len(names) != 1:
-        message = "orbits: this figure has one parameter; select values of the others"
+        message = "orbits: the figure needs one parameter; select values of the others"
         raise ValueError(message)
     starts = ds.start if "start" in ds.dims else ds[names[0]] * 0
     return _over_one(ds, names[0], show, starts, where)
@@ -321,7 +323,9 @@ def sweep(
     if show is not None:
         names = [str(d) for d in ds.classification.dims if d != "start"]
         if len(names) != 1:
-            message = "show: a variable is drawn over one parameter; select values of the other"
+            message = (
+                "show: the figure needs one parameter; select values of the others"
+            )
             raise ValueError(message)
         starts = ds.start if "start" in ds.dims else ds[names[0]] * 0
         return _over_one(ds, names[0], show, starts, where)
@@ -370,7 +374,7 @@ def branch(
     bifurcation curves in two parameters, if they were traced."""
     known = [str(n) for n, v in ds.data_vars.items() if v.dims == ("point",)]
     if show not in known or ds[show].dtype.kind not in "iuf":
-        message = f"show: `{show}` is none; there are {', '.join(known)}"
+        message = f"show: unknown variable `{show}`; available: {', '.join(known)}"
         raise ValueError(message)
     name = ds.attrs["parameter"]
     marks: list[dict[str, Any]] = []
@@ -457,9 +461,9 @@ def approach(ds: "xr.Dataset", **where: Unpack[Where]) -> "Figure":
     electronvolts = 1.602176634e-19
     rows: tuple[tuple[str, str, str, str, float], ...] = (
         ("first_harmonic", "physical_A", "amplitude $A$", "m", 1.0),
-        ("phase", "physical_phase", "phase behind the drive (°)", "", 1.0),
+        ("phase", "physical_phase", "phase lag (°)", "", 1.0),
         ("dissipation", "physical_E_dis", "dissipation $E_{dis}$", "eV", electronvolts),
-        ("peak_force", "physical_F_max", "greatest force $F_{max}$", "N", 1.0),
+        ("peak_force", "physical_F_max", "peak force $F_{max}$", "N", 1.0),
     )
     if "modulation" in ds.attrs:
         shift, force = "frequency_shift", "sader_jarvis_force"
@@ -467,7 +471,7 @@ def approach(ds: "xr.Dataset", **where: Unpack[Where]) -> "Figure":
             (shift, f"physical_{shift}", "frequency shift $Δf$", "Hz", 1.0),
             ("drive_ratio", "drive_ratio", "drive over free drive", "", 1.0),
             rows[2],
-            (force, f"physical_{force}", "force after Sader, Jarvis", "N", 1.0),
+            (force, f"physical_{force}", "force (Sader–Jarvis)", "N", 1.0),
         )
     # With a constant least distance the amplitude grows with the distance.
     kept = "closest" in json.loads(ds.attrs.get("modulation", "{}"))
@@ -608,7 +612,7 @@ def show(result: Any, **options: Any) -> "Figure":
     for name, draw_it in _FIGURES_BY_VARIABLE.items():
         if name in getattr(result, "variables", ()):
             return draw_it(result, **options)
-    message = f"there is no figure of a {type(result).__name__}"
+    message = f"there is no figure for a {type(result).__name__}"
     raise TypeError(message)
 
 

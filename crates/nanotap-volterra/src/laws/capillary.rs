@@ -6,13 +6,13 @@
 //! Herminghaus, Mugele, Phys. Rev. B 66, 2002). In contact the force stays as it is at `a0`.
 //! Whether there is a bridge is a state.
 
-use crate::dual::Scalar;
 use crate::laws::elastic::reduced_modulus;
 use crate::laws::entry::{
     CONTACT_DISTANCE, Dimension, Entry, MODULUS, POISSON, RADIUS, Range, TIP_MODULUS, TIP_POISSON,
     own,
 };
 use crate::laws::formula::{Edge, Formula, Way};
+use nanotap_arithmetic::Scalar;
 use std::f64::consts::PI;
 
 /// See the module.

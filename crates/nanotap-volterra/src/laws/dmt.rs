@@ -5,13 +5,13 @@
 //! modulation by García and San Paulo, Phys. Rev. B 60, 1999). The adhesion is `4πRγ` with
 //! `γ = H/(24π a0²)`.
 
-use crate::dual::Scalar;
 use crate::law::{Approach, Remark};
 use crate::laws::elastic::{Shape, contact_ways, deep, reduced_modulus};
 use crate::laws::entry::{
     CONTACT_DISTANCE, Entry, HAMAKER, MODULUS, POISSON, Part, RADIUS, TIP_MODULUS, TIP_POISSON,
 };
 use crate::laws::formula::{Formula, Way};
+use nanotap_arithmetic::Scalar;
 
 /// See the module.
 #[derive(Clone, Copy, Debug)]

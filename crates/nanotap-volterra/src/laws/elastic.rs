@@ -4,13 +4,13 @@
 //! 92, 1881); cone `k = (2/π) E* tan θ`, `p = 2`, and flat punch `k = 2 E* R`, `p = 1`
 //! (Sneddon, Int. J. Eng. Sci. 3, 1965). `1/E* = (1 − ν_s²)/E_s + (1 − ν_t²)/E_t`.
 
-use crate::dual::Scalar;
 use crate::law::{Approach, Remark};
 use crate::laws::entry::{
     CONTACT_DISTANCE, Entry, HALF_ANGLE, MODULUS, POISSON, ParameterEntry, Part, RADIUS,
     TIP_MODULUS, TIP_POISSON,
 };
 use crate::laws::formula::{Edge, Formula, Way};
+use nanotap_arithmetic::Scalar;
 
 /// The shape of the tip.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

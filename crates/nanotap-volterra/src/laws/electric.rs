@@ -5,13 +5,13 @@
 //! 2005), `ε` the absolute permittivity of the medium. In contact (`d < a0`) each stays as it
 //! is at `a0`, so that neither jumps there.
 
-use crate::dual::Scalar;
 use crate::law::Approach;
 use crate::laws::elastic::contact_ways;
 use crate::laws::entry::{
     CONTACT_DISTANCE, Dimension, Entry, HAMAKER, ParameterEntry, Part, RADIUS, Range, own,
 };
 use crate::laws::formula::{Formula, Way};
+use nanotap_arithmetic::Scalar;
 use std::f64::consts::PI;
 
 const PERMITTIVITY: ParameterEntry = own(

@@ -1,4 +1,4 @@
-//! What is said of a law once, for case files, help, schema and pictures alike.
+//! The description of a law, for case files, help, schema and figures.
 
 /// Exponents of mass, length, time and electric charge.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

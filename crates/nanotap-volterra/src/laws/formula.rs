@@ -3,10 +3,10 @@
 // Only what is inlined into a function for wide registers gets their instructions.
 #![allow(clippy::inline_always)]
 
-use crate::dual::{Dual, Scalar};
 use crate::law::{Approach, Exit, Force, ForceLaw, Guard, Remark};
 use crate::laws::entry::Entry;
 use crate::linear::wide_registers;
+use nanotap_arithmetic::{Dual, Scalar};
 use std::fmt::Debug;
 
 /// When a branch is left, with a level of the gap named by its place among the constants.

@@ -6,9 +6,9 @@
 //! state, not the sign of the velocity: a tip that turns again before it has left stays on
 //! `w_r`.
 
-use crate::dual::Scalar;
 use crate::laws::entry::{CONTACT_DISTANCE, Dimension, Entry, Part, RADIUS, Range, own};
 use crate::laws::formula::{Edge, Formula, Way};
+use nanotap_arithmetic::Scalar;
 use std::f64::consts::PI;
 
 /// See the module.

@@ -2,10 +2,9 @@
 //!
 //! `F = 4E*a³/(3R) − √(8π w E* a³)`, `δ = a²/R − √(2πwa/E*)` with the contact radius `a`
 //! (Johnson, Kendall, Roberts, Proc. R. Soc. A 324, 1971). On approach contact forms at
-//! `d = a0`; it lets go at `a³ = πwR²/(8E*)`, where at held ends `F = −(5/6)πwR`: whether the
+//! `d = a0`; the neck breaks at `a³ = πwR²/(8E*)`, where at held ends `F = −(5/6)πwR`: whether the
 //! tip is attached is a state, and no force acts while it is not.
 
-use crate::dual::Scalar;
 use crate::law::{Approach, Remark};
 use crate::laws::elastic::{deep, reduced_modulus};
 use crate::laws::entry::{
@@ -13,6 +12,7 @@ use crate::laws::entry::{
     WORK_OF_ADHESION,
 };
 use crate::laws::formula::{Edge, Formula, Way};
+use nanotap_arithmetic::Scalar;
 use std::f64::consts::PI;
 
 /// See the module.
@@ -91,8 +91,8 @@ impl Formula for Jkr {
 }
 
 /// `√a`, the larger root of `s⁴/R − s √(2πw/E*) = δ`; that of the end beyond it. The
-/// end is told by the gap itself: from `δ` rounding would at times put it on the root's side, where
-/// the slope has no bound, and derivatives by parameters with it.
+/// end is recognized by the gap itself: from `δ` rounding would at times put it on the root's side,
+/// where the slope has no bound, and derivatives by parameters with it.
 fn contact_radius_root<S: Scalar>(c: &[S], gap: S) -> S {
     if gap.value() >= c[4].value() {
         return c[3];
@@ -125,11 +125,11 @@ fn contact_radius_root<S: Scalar>(c: &[S], gap: S) -> S {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::dual::Dual;
+    use nanotap_arithmetic::Dual;
 
-    /// Where the neck lets go the force is −(5/6)πwR whatever the modulus (Johnson, Kendall, Roberts
-    /// 1971), on every scale: no rounding of the gap puts the end on the side where the force's slope
-    /// has no bound.
+    /// Where the neck breaks the force is −(5/6)πwR whatever the modulus (Johnson, Kendall, Roberts
+    /// 1971), on every scale: no rounding of the gap puts the end on the side where the force's
+    /// slope has no bound.
     #[test]
     fn at_its_end_the_neck_pulls_with_what_the_work_of_adhesion_says() {
         for k in 0..400 {

@@ -3,17 +3,17 @@
 //! If the elastic law is `E g(δ)`, the force is `E g(δ) + η g'(δ) δ̇` (García, Gómez, Martínez,
 //! Patil, Dietz, Magerle, Phys. Rev. Lett. 97, 2006; García, Chem. Soc. Rev. 49, 2020): for the
 //! sphere `4/3 √(Rδ)/(1 − ν²) (Eδ + 3/2 ηδ̇)`, on a rigid tip. On the way out the sum becomes
-//! negative before the contact ends. A surface that cannot pull lets go where `F = 0` and is
-//! then where the tip is not: no force, until the tip is outside or presses again; a surface
-//! that pulls stays until `d = a0`.
+//! negative before the contact ends. A surface that cannot pull releases the tip where `F = 0`, and
+//! then there is no force until the tip is outside or presses again; a surface that pulls stays
+//! until `d = a0`.
 
-use crate::dual::Scalar;
 use crate::law::{Approach, Remark};
 use crate::laws::elastic::{Shape, deep};
 use crate::laws::entry::{
     CONTACT_DISTANCE, Entry, HALF_ANGLE, MODULUS, POISSON, ParameterEntry, Part, RADIUS, VISCOSITY,
 };
 use crate::laws::formula::{Edge, Formula, Way};
+use nanotap_arithmetic::Scalar;
 
 /// See the module.
 #[derive(Clone, Copy, Debug)]
@@ -48,7 +48,7 @@ const fn entry(
 /// A sphere, letting go.
 pub static SPHERE: Entry = entry(
     "voigt-sphere",
-    "Kelvin–Voigt sample under a sphere; lets go where the force vanishes",
+    "Kelvin–Voigt sample under a sphere; releases where the force vanishes",
     "4/3 √(Rδ)/(1 − ν²) (Eδ + 3/2 ηδ̇), never below zero",
     ROUND,
 );
@@ -62,7 +62,7 @@ pub static SPHERE_PULLING: Entry = entry(
 /// A cone, letting go.
 pub static CONE: Entry = entry(
     "voigt-cone",
-    "Kelvin–Voigt sample under a cone; lets go where the force vanishes",
+    "Kelvin–Voigt sample under a cone; releases where the force vanishes",
     "(2/π) tan θ/(1 − ν²) (Eδ² + 2ηδδ̇), never below zero",
     POINTED,
 );
@@ -76,7 +76,7 @@ pub static CONE_PULLING: Entry = entry(
 /// A punch, letting go.
 pub static PUNCH: Entry = entry(
     "voigt-punch",
-    "Kelvin–Voigt sample under a flat cylinder; lets go where the force vanishes",
+    "Kelvin–Voigt sample under a flat cylinder; releases where the force vanishes",
     "2R/(1 − ν²) (Eδ + ηδ̇), never below zero",
     ROUND,
 );
@@ -164,7 +164,7 @@ impl Formula for KelvinVoigt {
         if index == 0 { sum } else { -sum }
     }
 
-    /// Where the surface has let go the tip is free.
+    /// A released tip is free.
     fn touches(&self, branch: usize) -> bool {
         branch == 1
     }

@@ -4,9 +4,9 @@
 //! Derjaguin's approximation (Israelachvili, Intermolecular and Surface Forces; Basso,
 //! Giarré, Dahleh, Mezić, ACC 1998).
 
-use crate::dual::Scalar;
 use crate::laws::entry::{Dimension, Entry, Part, RADIUS, Range, own};
 use crate::laws::formula::{Formula, Way};
+use nanotap_arithmetic::Scalar;
 
 /// See the module.
 #[derive(Clone, Copy, Debug)]

@@ -34,7 +34,7 @@ pub const MAX_TERMS: usize = 8;
 /// A law of the table.
 #[derive(Clone, Copy, Debug)]
 pub struct TableLaw {
-    /// What is said of it.
+    /// Its description.
     pub entry: &'static Entry,
     make: Make,
 }
@@ -65,7 +65,7 @@ impl TableLaw {
         }
     }
 
-    /// Whether it is said by rows of gap and force.
+    /// Whether it is a table of gap and force.
     pub const fn has_rows(&self) -> bool {
         matches!(self.make, Make::Rows)
     }
@@ -109,7 +109,7 @@ const fn voigt(shape: Shape, pulls: bool) -> kelvin_voigt::KelvinVoigt {
     kelvin_voigt::KelvinVoigt { shape, pulls }
 }
 
-/// Every law that parameters alone say ([`polyline::TABLE`] has rows beside them).
+/// Every law given by parameters alone ([`polyline::TABLE`] has rows in addition).
 pub static TABLE: &[TableLaw] = table! {
     elastic::HERTZ => elastic::Elastic(Shape::Sphere),
     elastic::CONE => elastic::Elastic(Shape::Cone),

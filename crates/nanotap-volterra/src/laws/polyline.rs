@@ -128,7 +128,14 @@ pub struct Polyline {
     force_factor: f64,
     /// The place of contact among the points, where no row is.
     between: Option<usize>,
+    /// Pieces at the lower ends of equal intervals, from the first point to the last.
+    pieces: Vec<usize>,
+    /// Intervals per unit of the gap.
+    density: f64,
 }
+
+/// Intervals of the gap for each point, in which pieces are looked up.
+const INTERVALS_PER_POINT: usize = 4;
 
 impl Polyline {
     /// The polyline through `(gap, force)` points, touching at gap 0.
@@ -159,7 +166,14 @@ impl Polyline {
             potential[k] =
                 potential[k + 1] + 0.5 * (forces[k] + forces[k + 1]) * (gaps[k + 1] - gaps[k]);
         }
+        let intervals = INTERVALS_PER_POINT * gaps.len();
+        let (first, last) = (gaps[0], gaps[gaps.len() - 1]);
+        let density = intervals as f64 / (last - first);
+        let lower = |k: usize| first + k as f64 / density;
+        let piece = |k: usize| gaps.partition_point(|g| *g <= lower(k)).saturating_sub(1);
         Self {
+            pieces: (0..intervals).map(piece).collect(),
+            density,
             gaps,
             forces,
             potential,
@@ -190,7 +204,21 @@ impl ForceLaw for Polyline {
     }
 
     fn branch_at(&self, gap: f64, _rate: f64) -> usize {
-        self.gaps.partition_point(|g| *g <= gap).saturating_sub(1)
+        let last = self.gaps.len() - 1;
+        let interval = (gap - self.gaps[0]) * self.density;
+        // Also where the gap is not a number.
+        if !(interval >= 0.0 && gap < self.gaps[last]) {
+            return if gap >= self.gaps[last] { last } else { 0 };
+        }
+        let interval = (interval as usize).min(self.pieces.len() - 1);
+        let mut piece = self.pieces[interval];
+        while piece > 0 && self.gaps[piece] > gap {
+            piece -= 1;
+        }
+        while piece < last && self.gaps[piece + 1] <= gap {
+            piece += 1;
+        }
+        piece
     }
 
     fn force(&self, branch: usize, gap: f64, _rate: f64) -> Force {

@@ -3,11 +3,11 @@
 //! `F = k δ − c ḋ` for `δ = a0 − d > 0`; contact begins and ends at `d = a0`, where the damper
 //! makes the force jump.
 
-use crate::dual::Scalar;
 use crate::law::Approach;
 use crate::laws::elastic::contact_ways;
 use crate::laws::entry::{CONTACT_DISTANCE, Dimension, Entry, Part, Range, own};
 use crate::laws::formula::{Formula, Way};
+use nanotap_arithmetic::Scalar;
 
 /// See the module.
 #[derive(Clone, Copy, Debug)]

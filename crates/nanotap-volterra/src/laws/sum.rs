@@ -111,6 +111,10 @@ impl ForceLaw for Sum {
             .sum()
     }
 
+    fn has_terms(&self) -> bool {
+        true
+    }
+
     fn depends_on_rate(&self) -> bool {
         self.terms.iter().any(|t| t.depends_on_rate())
     }

@@ -5,13 +5,13 @@
 //! punch `(8/3) E a δ (1 + 1.133χ + 1.283χ² + 0.598χ³ − 0.291χ⁴)`, `χ = a/h` (García and García,
 //! Biophys. J. 114, 2018; ν = ½). The series hold for `χ < 1`.
 
-use crate::dual::Scalar;
 use crate::law::Remark;
 use crate::laws::elastic::{Shape, contact_ways};
 use crate::laws::entry::{
     CONTACT_DISTANCE, Entry, HALF_ANGLE, MODULUS, ParameterEntry, Part, RADIUS, THICKNESS,
 };
 use crate::laws::formula::{Formula, Way};
+use nanotap_arithmetic::Scalar;
 use std::f64::consts::PI;
 
 /// See the module.

@@ -4,11 +4,11 @@
 //! Hamaker, Physica 4, 1937; Israelachvili, Intermolecular and Surface Forces). In contact
 //! (`d < a0`) the force stays as it is at `a0`.
 
-use crate::dual::Scalar;
 use crate::law::Approach;
 use crate::laws::elastic::{Shape, contact_ways};
 use crate::laws::entry::{CONTACT_DISTANCE, Entry, HALF_ANGLE, HAMAKER, Part, RADIUS};
 use crate::laws::formula::{Formula, Way};
+use nanotap_arithmetic::Scalar;
 
 /// See the module.
 #[derive(Clone, Copy, Debug)]

@@ -1,14 +1,14 @@
-//! Dissipation beside any elastic law: viscosity that grows with the contact radius, and
-//! damping that falls off across the gap.
+//! Dissipation added to any elastic law: viscosity that grows with the contact radius, and damping
+//! that falls off across the gap.
 //!
 //! `−η √(Rδ) ḋ` in contact (Garcia, Gómez et al.; used by dForce) and `−γ₀ e^{−d/x} ḋ` at any
 //! gap (Gotsmann, Seidel, Anczykowski, Fuchs, Phys. Rev. B 60, 1999).
 
-use crate::dual::Scalar;
 use crate::law::Approach;
 use crate::laws::elastic::contact_ways;
 use crate::laws::entry::{CONTACT_DISTANCE, Dimension, Entry, RADIUS, Range, VISCOSITY, own};
 use crate::laws::formula::{Formula, Way};
+use nanotap_arithmetic::Scalar;
 
 /// `−η √(Rδ) ḋ`.
 #[derive(Clone, Copy, Debug)]

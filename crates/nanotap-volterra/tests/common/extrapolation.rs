@@ -1,17 +1,17 @@
-//! An independent integrator: Gragg's modified midpoint rule extrapolated to order 16, with
-//! the law's switches located by solving for the length of the step that ends on them.
+//! An independent integrator: Gragg's modified midpoint rule extrapolated to order 16. Switches of
+//! the law are located by solving for the length of the step that ends on them.
 
 use nanotap_volterra::{ForceLaw, Guard};
 
 const COLUMNS: usize = 8;
 
-/// The same chain of modes as [`super::beam`], written as plain equations of motion.
+/// The chain of modes of [`super::beam`], written as equations of motion.
 pub(crate) struct Plain<'a> {
     pub(crate) law: &'a dyn ForceLaw,
     /// Stiffness and damping of every mode over its mass, and its sign at the tip.
     pub(crate) modes: Vec<(f64, f64, f64)>,
     pub(crate) k: f64,
-    /// Of the drive's force over the mass.
+    /// Drive force over mass.
     pub(crate) drive: f64,
     pub(crate) zc: f64,
 }
@@ -88,8 +88,8 @@ impl Plain<'_> {
         (table.swap_remove(0), error)
     }
 
-    /// Where a level is passed both ways within a step of length `h`: the part of the step after
-    /// which the gap turns, and the guard there.
+    /// If a level is crossed in both directions within a step of length `h`: the fraction of the
+    /// step after which the gap turns, and the guard there.
     fn dip(
         &self,
         guard: Guard,

@@ -1,5 +1,5 @@
-//! What several tests share: a stroboscopic map over the flow and the reference lever.
-// Every test takes what it needs.
+//! Shared by several tests: a stroboscopic map of the flow, and the reference lever.
+// Not every test uses all of it.
 #![allow(dead_code)]
 
 use nalgebra::{DMatrix, DVector, RowDVector};
@@ -30,6 +30,8 @@ impl Strobe {
         }
     }
 }
+
+impl nanotap_dynamics::Scheduling for Strobe {}
 
 impl StroboscopicMap for Strobe {
     type Error = VolterraError;
@@ -63,7 +65,7 @@ impl StroboscopicMap for Strobe {
     }
 }
 
-/// DMT with van der Waals attraction, as in CONTACT's reference orbits.
+/// DMT with van der Waals attraction, as for the reference orbits.
 pub(crate) fn dmt() -> Arc<dyn ForceLaw> {
     laws::build(
         "dmt",
@@ -125,8 +127,8 @@ impl Lever {
     }
 }
 
-/// A chain of `count` modes like those of a beam whose first has unit frequency, driven at
-/// the tip, with the reading of the gap at the free end.
+/// A chain of `count` modes like those of a beam whose first mode has unit frequency, driven at the
+/// tip, with the gap at the free end.
 pub(crate) fn beam(
     law: Arc<dyn ForceLaw>,
     count: usize,
@@ -211,8 +213,8 @@ pub(crate) fn value(name: &str) -> f64 {
         .map_or(0.01, |(_, value)| *value)
 }
 
-/// A law of the table with [`value`]s, one of them changed; attraction and dissipation alone
-/// would pull the tip in, so they get an elastic contact beside them.
+/// A law of the table with [`value`]s, one of them changed. Attraction or dissipation alone would
+/// pull the tip into the sample, so an elastic contact is added.
 pub(crate) fn table_law(index: usize, change: Option<(usize, f64)>) -> Arc<dyn ForceLaw> {
     let of =
         |entry: &Entry| -> Vec<f64> { entry.parameters.iter().map(|p| value(p.name)).collect() };
@@ -248,7 +250,7 @@ pub(crate) fn beam_modes(count: usize, q: f64) -> Vec<(f64, f64, f64)> {
     (0..count)
         .map(|n| {
             let ratio = (root(n) / root(0)).powi(2);
-            // Every mode's modal mass at the tip is the same, a quarter of the beam's.
+            // All modes have the same modal mass at the tip, a quarter of the beam's mass.
             let sign = if n % 2 == 0 { 1.0 } else { -1.0 };
             (ratio * ratio, ratio / q, sign)
         })

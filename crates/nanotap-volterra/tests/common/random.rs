@@ -1,11 +1,11 @@
-//! Numbers that are the same in every run.
+//! Reproducible random numbers.
 
 /// Numbers between −1 and 1 (a multiplicative congruence).
 pub(crate) struct Random(pub(crate) u64);
 
 impl Random {
-    /// Those of a long run: of the seed that the random tests take from their variable, or else of
-    /// the `usual` one.
+    /// Random numbers of a long run: from the seed in the random tests' environment variable, or
+    /// the `usual` seed.
     #[allow(dead_code, reason = "not every test that draws numbers is a long run")]
     pub(crate) fn of_a_long_run(usual: u64) -> Self {
         let seed = std::env::var("PROPTEST_RNG_SEED");

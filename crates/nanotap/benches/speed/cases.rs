@@ -1,4 +1,4 @@
-//! The cases that are timed.
+//! The timed cases.
 
 use nanotap_arithmetic::ComplexFunctions as _;
 use std::sync::Arc;
@@ -12,7 +12,7 @@ use nanotap_flow::Flow;
 pub(crate) const MODES: [usize; 6] = [1, 2, 3, 5, 10, 20];
 /// Low, medium and high damping of the beam, α3.
 pub(crate) const DAMPINGS: [f64; 3] = [0.01, 0.1, 1.0];
-/// Periods after which transients are gone, with the least damping too.
+/// Periods of the transient with the lowest damping.
 const TRANSIENT: usize = 400;
 
 /// The paper's case, at Ω = 2.6 (chaotic: 2.3 switches a period at N = 3).
@@ -32,12 +32,12 @@ pub(crate) fn coexisting(modes: usize) -> Cantilever {
     }
 }
 
-/// The model of a case that makes sense.
+/// The model of a valid case.
 pub(crate) fn model(case: &Cantilever) -> Model {
     Model::cantilever(case).expect("a valid case")
 }
 
-/// What sweeps and basins take.
+/// The case for sweeps and basins.
 pub(crate) fn subject(case: &Cantilever) -> Case {
     Case::from(case.clone())
 }
@@ -64,9 +64,9 @@ pub(crate) fn run(flow: &mut Flow, periods: usize) {
     }
 }
 
-/// The case N = 3, Ω = 2.6 with the sample so far away that the tip, swinging freely, comes
-/// within `gap` times its amplitude of it (negative: presses into it), and the state of the
-/// free motion at phase 0: an orbit of the impacting system too where `gap` ≥ 0.
+/// The case N = 3, Ω = 2.6 at a distance at which the freely oscillating tip comes within `gap`
+/// times its amplitude of the sample (negative: indents it), and the state of the free motion at
+/// phase 0, which is an orbit of the impacting system if `gap` ≥ 0.
 pub(crate) fn grazing(gap: f64) -> (Cantilever, Vec<f64>) {
     let case = paper(3);
     let model = model(&case);

@@ -3,7 +3,7 @@
 use divan::Bencher;
 use nalgebra::DMatrix;
 use nanotap::case::Key;
-use nanotap::model::strobe::Strobe;
+use nanotap::model::model_map::ModelMap;
 use nanotap_dynamics::StroboscopicMap;
 
 use crate::cases::{self, MODES};
@@ -38,7 +38,7 @@ fn map_with_parameter(bencher: Bencher<'_, '_>, modes: usize) {
     let tangent = cases::subject(&case)
         .tangent(&model, Key::Omega)
         .expect("a smooth family");
-    let mut map = Strobe::with_tangents(&model, vec![tangent]);
+    let mut map = ModelMap::with_tangents(&model, vec![tangent]);
     let (_, state) = on_attractor(modes);
     let mut jacobian = DMatrix::zeros(2 * modes, 2 * modes);
     let mut derivative = DMatrix::zeros(2 * modes, 1);
@@ -51,9 +51,9 @@ fn map_with_parameter(bencher: Bencher<'_, '_>, modes: usize) {
 }
 
 /// The paper's case and a state on its attractor.
-fn on_attractor(modes: usize) -> (Strobe, Vec<f64>) {
+fn on_attractor(modes: usize) -> (ModelMap, Vec<f64>) {
     let case = cases::paper(modes);
     let mut state = vec![0.0; 2 * modes];
     cases::settled(&case).state(&mut state);
-    (Strobe::new(&cases::model(&case)), state)
+    (ModelMap::new(&cases::model(&case)), state)
 }

@@ -1,7 +1,7 @@
-//! What the exact flow and what is built upon it cost: `cargo bench -p nanotap`.
+//! Cost of the exact flow and of what uses it: `cargo bench -p nanotap`.
 //!
-//! A name after `--` picks benches (`cargo bench -p nanotap -- setup`). `cargo test` runs
-//! each once. `docs/performance.md` says what was found.
+//! A name after `--` selects benches (`cargo bench -p nanotap -- setup`). `cargo test` runs each
+//! once. Results are in `docs/performance.md`.
 
 #![allow(
     clippy::disallowed_methods,
@@ -21,7 +21,7 @@ mod simulate;
 mod sweep;
 mod switch;
 
-/// The one that the programs have.
+/// The allocator of the programs.
 #[global_allocator]
 static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
 

@@ -3,18 +3,18 @@
 use divan::Bencher;
 use divan::counter::ItemsCount;
 use nanotap::model::cantilever::Cantilever;
-use nanotap::observe::{Set, measure};
+use nanotap::observe::{ObservableSet, measure};
 use nanotap_flow::{Ensemble, Flow, FlowError};
 use std::sync::Arc;
 
 use crate::cases::{self, DAMPINGS, MODES};
 
-/// Periods a run: chaotic motion differs from period to period.
+/// Periods per run: chaotic motion differs from period to period.
 const PERIODS: usize = 100;
-/// Motions side by side.
+/// Number of simultaneous motions.
 const MOTIONS: usize = 64;
 
-/// Times [`PERIODS`] periods from where `flow` is.
+/// Times [`PERIODS`] periods from the present state of `flow`.
 fn periods(bencher: Bencher<'_, '_>, flow: &Flow) {
     bencher
         .counter(ItemsCount::new(PERIODS))
@@ -40,7 +40,7 @@ fn high_damping(bencher: Bencher<'_, '_>, modes: usize) {
     periods(bencher, &damped(modes, DAMPINGS[2]));
 }
 
-/// The paper's case again, without stopping at the ends of periods.
+/// The paper's case without stopping at the ends of periods.
 #[divan::bench(args = MODES)]
 fn in_one_go(bencher: Bencher<'_, '_>, modes: usize) {
     let flow = damped(modes, DAMPINGS[1]);
@@ -50,7 +50,7 @@ fn in_one_go(bencher: Bencher<'_, '_>, modes: usize) {
         .bench_local_refs(|flow| flow.run_periods(PERIODS).expect("a bounded motion"));
 }
 
-/// 64 motions of it side by side, each over as many periods. Items are periods.
+/// 64 simultaneous motions, each over as many periods. Items are periods.
 #[divan::bench(args = MODES)]
 fn side_by_side(bencher: Bencher<'_, '_>, modes: usize) {
     together(bencher, modes, |ensemble, states, periods, _| {
@@ -58,7 +58,7 @@ fn side_by_side(bencher: Bencher<'_, '_>, modes: usize) {
     });
 }
 
-/// The same with the states at the ends of all periods.
+/// The same, with the states at the ends of all periods.
 #[divan::bench(args = MODES)]
 fn side_by_side_strobed(bencher: Bencher<'_, '_>, modes: usize) {
     together(bencher, modes, Ensemble::advance_through);
@@ -89,19 +89,19 @@ fn together(
         .bench_local_refs(|states| run(states, PERIODS));
 }
 
-/// The same with what sweeps record of every motion measured.
+/// The same, with the observables that sweeps record.
 #[divan::bench(args = MODES)]
 fn measured(bencher: Bencher<'_, '_>, modes: usize) {
-    recorded(bencher, modes, Set::COMMON);
+    recorded(bencher, modes, ObservableSet::COMMON);
 }
 
-/// The same with all that is known of a motion measured, the beam's clearance too.
+/// The same, with all observables, including the beam's clearance.
 #[divan::bench(args = MODES)]
 fn measured_all(bencher: Bencher<'_, '_>, modes: usize) {
-    recorded(bencher, modes, Set::ALL);
+    recorded(bencher, modes, ObservableSet::ALL);
 }
 
-fn recorded(bencher: Bencher<'_, '_>, modes: usize, set: Set) {
+fn recorded(bencher: Bencher<'_, '_>, modes: usize, set: ObservableSet) {
     let model = cases::model(&cases::paper(modes));
     let mut state = vec![0.0; 2 * modes];
     damped(modes, DAMPINGS[1]).state(&mut state);
@@ -116,7 +116,7 @@ fn fast_drive(bencher: Bencher<'_, '_>, modes: usize) {
     periods(bencher, &cases::settled(&cases::coexisting(modes)));
 }
 
-/// The period-1 orbit that touches without pressing (N = 3), just misses, or presses a little.
+/// The period-1 orbit that touches without indenting (N = 3), just misses, or indents slightly.
 #[divan::bench(args = [0.0, 1e-6, -1e-6])]
 fn grazing(bencher: Bencher<'_, '_>, gap: f64) {
     let (case, state) = cases::grazing(gap);

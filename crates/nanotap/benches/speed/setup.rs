@@ -1,25 +1,39 @@
 //! Setting up a model for one value of the parameters.
 
 use divan::{Bencher, black_box};
-use nanotap::case::Key;
+use nanotap::case::{Key, MovingGap};
 use nanotap::model::Model;
 
 use crate::cases::{self, MODES};
 
-/// From case to a model that is ready to run, as along a sweep over the drive.
+/// From a case to a model that is ready to run, as in a sweep over the drive.
 #[divan::bench(args = MODES)]
 fn model(bencher: Bencher<'_, '_>, modes: usize) {
     let case = cases::paper(modes);
     bencher.bench_local(|| Model::cantilever(black_box(&case)).expect("a valid case"));
 }
 
-/// The same of a case whose eigenbases are not known from one before.
+/// The same for a case whose eigenbases are not known from a previous one.
 #[divan::bench(args = MODES)]
 fn another_stiffness(bencher: Bencher<'_, '_>, modes: usize) {
     let mut case = cases::paper(modes);
     bencher.bench_local(|| {
         case.alpha4 += 1e-3;
         Model::cantilever(black_box(&case)).expect("a valid case")
+    });
+}
+
+/// One drive period at a gap that changes before each, which needs no new model; compare with
+/// `period`.
+#[divan::bench(args = MODES)]
+fn period_at_another_gap(bencher: Bencher<'_, '_>, modes: usize) {
+    let mut moving = MovingGap::new(&cases::subject(&cases::paper(modes))).expect("a valid case");
+    let mut state = moving.model().expect("a finite gap").rest();
+    let mut gap = 0.0;
+    bencher.bench_local(|| {
+        gap += 1e-9;
+        moving.set(gap).expect("a finite gap");
+        moving.advance(&mut state)
     });
 }
 

@@ -5,12 +5,13 @@ use divan::counter::ItemsCount;
 use nanotap::control::Control;
 use nanotap::dataset::{Share, Store, Work};
 use nanotap::model::cantilever::Cantilever;
-use nanotap::study::sweep::{Over, Starts, Sweep, SweepOptions};
+use nanotap::study::Computation as _;
+use nanotap::study::sweep::{Sweep, SweepOptions};
 
 use crate::cases;
 use crate::folder::Folder;
 
-/// The runs of [`runs_96`] without anything but the motion: what it should cost little more than.
+/// The motions of [`runs_96`] without recording: a lower bound of its cost.
 #[divan::bench(sample_count = 5, sample_size = 1)]
 fn bare(bencher: Bencher<'_, '_>) {
     const VALUES: usize = 24;
@@ -36,22 +37,17 @@ fn bare(bencher: Bencher<'_, '_>) {
         });
 }
 
-/// Ω from 2 to 4 in 24 values, 4 starts each, 400 periods discarded and 100 recorded, by one
-/// thread or two. Items are runs.
+/// Ω from 2 to 4 in 24 values, 4 starts each, 400 periods discarded and 100 recorded, on one thread
+/// and on two. Items are runs.
 #[divan::bench(args = [1, 2], sample_count = 5, sample_size = 1)]
 fn runs_96(bencher: Bencher<'_, '_>, threads: usize) {
     let subject = cases::subject(&cases::paper(3));
-    let over = Over::parse("omega=2:4:24", &subject).expect("a range");
     let options = SweepOptions {
         transient: Some(400),
-        starts: Starts::Seeded {
-            count: 4,
-            seed: 1,
-            sides: Vec::new(),
-        },
-        ..SweepOptions::new(vec![over])
+        starts: Some(4),
+        ..SweepOptions::over(["omega=2:4:24"])
     };
-    let sweep = Sweep::new(subject, options).expect("options that make sense");
+    let sweep = Sweep::new(&subject, options).expect("options that make sense");
     let how = Work {
         share: Share::default(),
         threads,

@@ -6,17 +6,17 @@ use nanotap_flow::{Flow, Trajectory};
 
 use crate::cases::{self, MODES};
 
-/// How long before and after the switch, in drive periods.
+/// Time before and after the switch, in drive periods.
 const AROUND: f64 = 1e-4;
 
-/// From a moment before a contact begins to a moment after: search, propagation twice and
-/// the change of basis.
+/// From just before the beginning of a contact to just after: search, two propagations and the
+/// change of basis.
 #[divan::bench(args = MODES)]
 fn into_contact(bencher: Bencher<'_, '_>, modes: usize) {
     switch(bencher, modes, 1);
 }
 
-/// The same where a contact ends.
+/// The same at the end of a contact.
 #[divan::bench(args = MODES)]
 fn into_flight(bencher: Bencher<'_, '_>, modes: usize) {
     switch(bencher, modes, 0);
@@ -29,8 +29,8 @@ fn switch(bencher: Bencher<'_, '_>, modes: usize, into: usize) {
         .bench_local_refs(|flow| flow.run_until(end, &mut ()).expect("a bounded motion"));
 }
 
-/// A flow shortly before the first switch of its attractor that enters regime `into`, and
-/// the time to run to, which is after that switch and before the next.
+/// A flow shortly before the first switch of its attractor that enters regime `into`, and the end
+/// time, which is after that switch and before the next one.
 fn before_switch(case: &Cantilever, into: usize) -> (Flow, f64) {
     let model = cases::model(case);
     let mut flow = cases::settled(case);

@@ -1,19 +1,18 @@
-//! A case as a document: every parameter, and what stands behind it in SI.
+//! A case as a document: every parameter, with its physical quantity in SI.
 
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 
-use serde::Serialize;
+use serde::{Serialize, Serializer};
 
 use crate::case::Case;
 use crate::case::physical::{MappingRow, Physical};
 use crate::model::cantilever::Cantilever;
-use crate::model::contact::ContactLaw;
-use crate::model::contact::moving_surface::MovingSurface;
 use crate::model::nonlinear::Equilibrium;
 use crate::model::oscillator::{Oscillator, OscillatorParameter, Stop};
+use crate::model::parameter::Parameter;
 
-/// A case, checked and view.
+/// A checked case as a document.
 #[derive(Clone, Debug, Serialize)]
 #[serde(untagged)]
 pub enum CaseDocument {
@@ -33,15 +32,15 @@ pub struct CantileverDocument {
     pub case: Cantilever,
     /// Drive period 2π/Ω.
     pub period: f64,
-    /// Where the undriven lever can rest over a sample that attracts.
+    /// Rest positions of the undriven lever over an attractive sample.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub equilibria: Vec<Equilibrium>,
-    /// What is known of it in SI.
+    /// Quantities in SI, for a physical case.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub physical: Option<PhysicalSummary>,
 }
 
-/// The physical quantities behind a case, in SI, frequencies in Hz.
+/// The physical quantities of a case in SI, frequencies in Hz.
 #[derive(Clone, Debug, Serialize)]
 pub struct PhysicalSummary {
     /// Spring constant at the tip, N/m.
@@ -61,9 +60,9 @@ pub struct PhysicalSummary {
     pub drive_frequency: f64,
     /// Free amplitude of the tip, m.
     pub free_amplitude: f64,
-    /// Its phase behind the drive.
+    /// Phase lag of the free deflection, degrees.
     pub free_phase_degrees: f64,
-    /// What phases are counted from.
+    /// Reference of phases.
     pub phase_reference: &'static str,
     /// Free amplitude of the second tone, m, if there is one.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -80,13 +79,9 @@ pub struct PhysicalSummary {
     pub contact_stiffness: f64,
     /// Contact damping, N s/m.
     pub contact_damping: f64,
-    /// Stiffness of a standard linear solid's relaxing arm, N/m; 0 of other samples.
-    pub relaxation_stiffness: f64,
-    /// Its relaxation time, s.
-    pub relaxation_time: f64,
-    /// What a moving surface has of its own, N/m, N s/m and N.
-    #[serde(flatten)]
-    pub surface: MovingSurface,
+    /// Further quantities of the contact law by parameter, in SI.
+    #[serde(flatten, serialize_with = "as_map")]
+    pub contact_law: Vec<(Parameter, f64)>,
     /// Parameters of a nonlinear force law, in place of contact stiffness and damping.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub force_law: Vec<LawParameterDocument>,
@@ -121,35 +116,38 @@ pub struct LawParameterDocument {
 }
 
 impl PhysicalSummary {
-    /// What is known of a physical case.
+    /// The quantities of a physical case.
     pub fn of(view: &Physical) -> Self {
         let Physical {
             lever,
             parameters,
             scales,
+            cantilever,
             ..
         } = view;
-        let second = view.cantilever.tone2_ratio;
+        let quantity = |parameter| parameters.get(parameter);
+        let second = cantilever.tone2_ratio;
         Self {
             k: lever.k,
             f0: lever.f0,
             quality_factor: lever.quality_factor,
             beam_mass: lever.beam_mass,
-            tip_mass: parameters.tip_mass,
-            drive_amplitude: parameters.drive_amplitude,
-            drive_frequency: parameters.drive_frequency,
+            tip_mass: quantity(Parameter::Alpha1),
+            drive_amplitude: quantity(Parameter::Alpha2),
+            drive_frequency: quantity(Parameter::Omega),
             free_amplitude: view.free_amplitude,
             free_phase_degrees: view.free_phase,
             phase_reference: view.phase_reference(),
             second_free_amplitude: view.second_free_amplitude,
-            second_frequency: second.map(|ratio| ratio.value() * parameters.drive_frequency),
-            second_amplitude: second.map(|_| parameters.tone2_amplitude),
+            second_frequency: second.map(|ratio| ratio.value() * quantity(Parameter::Omega)),
+            second_amplitude: second.map(|_| quantity(Parameter::Tone2Amplitude)),
             setpoint: view.setpoint,
-            contact_stiffness: parameters.contact_stiffness,
-            contact_damping: parameters.contact_damping,
-            relaxation_stiffness: parameters.relaxation_stiffness,
-            relaxation_time: parameters.relaxation_time,
-            surface: parameters.surface,
+            contact_stiffness: quantity(Parameter::Alpha4),
+            contact_damping: quantity(Parameter::Alpha6),
+            contact_law: cantilever
+                .written_law_numbers()
+                .map(|parameter| (parameter, quantity(parameter)))
+                .collect(),
             force_law: view.sample.force.as_ref().map_or_else(Vec::new, |force| {
                 let rows = force.parameters();
                 rows.map(|(parameter, key, value)| LawParameterDocument {
@@ -166,7 +164,7 @@ impl PhysicalSummary {
                 .as_ref()
                 .and_then(|force| force.table.as_ref())
                 .map_or_else(Vec::new, |table| table.rows().points().to_vec()),
-            tip_gap: parameters.tip_gap,
+            tip_gap: quantity(Parameter::Alpha5),
             beam_gap: scales.length,
             length_unit: scales.length,
             time_unit: scales.time,
@@ -229,11 +227,15 @@ impl CantileverDocument {
     }
 }
 
-/// The equilibria of a case whose sample attracts: one with a nonlinear force law, or with a
-/// moving surface.
+/// Numbers as a map from their parameters' names.
+fn as_map<S: Serializer>(numbers: &[(Parameter, f64)], serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.collect_map(numbers.iter().copied())
+}
+
+/// The equilibria of a case whose sample attracts: one with a nonlinear force law, or with an
+/// attractive surface.
 pub fn equilibria(case: &Case) -> Vec<Equilibrium> {
-    let attracts =
-        |case: &Cantilever| case.law.is_some() || case.contact == ContactLaw::MovingSurface;
+    let attracts = |case: &Cantilever| case.law.is_some() || case.has_attractive_surface();
     if !case.cantilever().is_some_and(attracts) {
         return Vec::new();
     }
@@ -241,7 +243,7 @@ pub fn equilibria(case: &Case) -> Vec<Equilibrium> {
     model.map_or_else(|_| Vec::new(), |model| model.equilibria())
 }
 
-/// One parameter between the two worlds, as a document.
+/// A dimensionless parameter with its physical quantity, as a document.
 #[derive(Clone, Debug, Serialize)]
 pub struct MappingDocument {
     /// The key of the dimensionless model.

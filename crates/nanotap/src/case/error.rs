@@ -1,4 +1,4 @@
-//! Why a case has no model, a key is none, or a value cannot be read.
+//! Errors of cases, keys and values.
 
 use super::file::CaseFileError;
 use super::key::Key;
@@ -9,10 +9,10 @@ use crate::model::cantilever::CantileverError;
 /// Why a case has no model.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum CaseError {
-    /// Its quantities make no sense; points at the place where they were said.
+    /// The quantities are invalid; points to their place.
     #[error(transparent)]
     Stated(#[from] Box<CaseFileError>),
-    /// Its numbers make no sense, or cannot be solved in closed form.
+    /// The numbers are invalid, or have no solution in closed form.
     #[error(transparent)]
     Model(#[from] ModelError),
 }
@@ -23,17 +23,17 @@ impl From<CantileverError> for CaseError {
     }
 }
 
-/// A name that is no key that can vary.
+/// A name that is not a key that can vary.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum NoSuchKey {
     /// An unknown name.
     #[error("no parameter `{given}` here; there are {known}{hint}")]
     Unknown {
-        /// What was asked for.
+        /// The given name.
         given: String,
-        /// What there is.
+        /// The known keys.
         known: String,
-        /// The nearest one, as a question.
+        /// The nearest key, as a question.
         hint: String,
     },
     /// A key that cannot vary.
@@ -41,26 +41,26 @@ pub enum NoSuchKey {
     Fixed {
         /// The key.
         key: Key,
-        /// Why not, and what can.
+        /// The reason, and the keys that can vary.
         reason: &'static str,
     },
 }
 
-/// A value of a key that cannot be read.
+/// Why the value of a key cannot be parsed.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ValueOfKeyError {
-    /// Of a dimensionless case only numbers are taken.
+    /// A dimensionless case needs a number.
     #[error("{text}: not a number")]
     NotANumber {
-        /// What was given.
+        /// The given text.
         text: String,
     },
-    /// Not the quantity that the key is.
+    /// The quantity of the key was expected.
     #[error("{text}: {key}: {error}")]
     Quantity {
         /// The key.
         key: Key,
-        /// What was given.
+        /// The given text.
         text: String,
         /// Why.
         error: Box<QuantityError>,

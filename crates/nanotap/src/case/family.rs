@@ -6,7 +6,7 @@ use nanotap_dynamics::{MapFamily, StroboscopicMap, TwoParameterFamily};
 use super::error::CaseError;
 use super::{Case, Key};
 use crate::model::MotionError;
-use crate::model::strobe::Strobe;
+use crate::model::model_map::ModelMap;
 
 /// A case with one free parameter.
 #[derive(Clone, Debug)]
@@ -18,21 +18,21 @@ pub struct Family {
 }
 
 impl MapFamily for Family {
-    type Map = Strobe;
+    type Map = ModelMap;
     type Error = CaseError;
 
-    fn at(&self, parameter: f64) -> Result<Strobe, CaseError> {
+    fn at(&self, parameter: f64) -> Result<ModelMap, CaseError> {
         strobe_at(&self.case, &[(self.key, parameter)])
     }
 
     fn advance_with_derivatives(
         &self,
         _parameter: f64,
-        map: &mut Strobe,
+        map: &mut ModelMap,
         state: &mut [f64],
         jacobian: &mut DMatrix<f64>,
         derivative: &mut [f64],
-    ) -> Result<(), <Strobe as StroboscopicMap>::Error> {
+    ) -> Result<(), <ModelMap as StroboscopicMap>::Error> {
         let mut derivatives = DMatrix::zeros(state.len(), 1);
         map.advance_with_derivatives(state, jacobian, &mut derivatives)?;
         derivative.copy_from_slice(derivatives.as_slice());
@@ -50,17 +50,17 @@ pub struct PlaneFamily {
 }
 
 impl TwoParameterFamily for PlaneFamily {
-    type Map = Strobe;
+    type Map = ModelMap;
     type Error = CaseError;
 
-    fn at(&self, first: f64, second: f64) -> Result<Strobe, CaseError> {
+    fn at(&self, first: f64, second: f64) -> Result<ModelMap, CaseError> {
         strobe_at(&self.case, &[(self.keys[0], first), (self.keys[1], second)])
     }
 
     fn advance_with_derivatives(
         &self,
         _parameters: [f64; 2],
-        map: &mut Strobe,
+        map: &mut ModelMap,
         state: &mut [f64],
         jacobian: &mut DMatrix<f64>,
         derivatives: [&mut [f64]; 2],
@@ -74,8 +74,8 @@ impl TwoParameterFamily for PlaneFamily {
     }
 }
 
-/// The map at these values of the free parameters, with its derivatives to them.
-fn strobe_at(case: &Case, values: &[(Key, f64)]) -> Result<Strobe, CaseError> {
+/// The map at these values of the free parameters, with its derivatives.
+fn strobe_at(case: &Case, values: &[(Key, f64)]) -> Result<ModelMap, CaseError> {
     let case = values
         .iter()
         .fold(case.clone(), |case, &(key, value)| case.with(key, value));
@@ -84,5 +84,5 @@ fn strobe_at(case: &Case, values: &[(Key, f64)]) -> Result<Strobe, CaseError> {
         .iter()
         .map(|&(key, _)| case.tangent(&model, key))
         .collect::<Result<_, _>>()?;
-    Ok(Strobe::with_tangents(&model, tangents))
+    Ok(ModelMap::with_tangents(&model, tangents))
 }

@@ -1,8 +1,8 @@
-//! A force curve as a case states it: rows of gap and force, the first of them with the units.
+//! A force table as stated in a case: rows of gap and force, the first one with the units.
 //!
-//! In a case file it is an array, `table = [["gap (nm)", "force (nN)"], [-1, 8.5], [0, 0], [9, 0]]`,
-//! or the name of a CSV file with these columns. Such a file is read where the case file is, and
-//! stands in the case as an array from then on: nothing reads it later.
+//! In a case file it is an array, `table = [["gap (nm)", "force (nN)"], [-1, 8.5], [0, 0], [9,
+//! 0]]`, or the name of a CSV file with these columns. Such a file is read relative to the case
+//! file, once; the case then contains the array.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -14,16 +14,16 @@ use super::quantity::Kind;
 use crate::Error;
 use crate::case::table::{Entry, Header, Table};
 
-/// How a table is written.
+/// Syntax of a table, for remedies.
 const SHAPE: &str = "write rows as in [[\"gap (nm)\", \"force (nN)\"], [-1, 8.5], [0, 0], [9, 0]]";
 
-/// Why rows are no force curve.
+/// Why rows are not a force table.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{message}")]
 pub struct ForceTableError {
     /// What is wrong, and where.
     pub message: String,
-    /// What would be right.
+    /// The remedy.
     pub remedy: String,
 }
 
@@ -46,7 +46,7 @@ impl ForceTableError {
     }
 }
 
-/// Rows of gap in m and force in N.
+/// A force table: rows of gap in m and force in N.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ForceTable(Arc<Rows>);
 
@@ -59,15 +59,15 @@ impl ForceTable {
     /// The table of a CSV file.
     ///
     /// # Errors
-    /// When it cannot be read or is no force curve, with the place.
+    /// If it cannot be read or is not a force table, with the place.
     pub(crate) fn read(path: &Path) -> Result<Self, ForceTableError> {
         Self::of(&Table::read(path)?)
     }
 
-    /// The table that an array, or the text of a CSV file, says.
+    /// Parses an array, or the text of a CSV file.
     ///
     /// # Errors
-    /// As [`read`](Self::read); and when `text` names a file, which is not opened.
+    /// As [`read`](Self::read), and if `text` names a file, which is not opened.
     pub(crate) fn parse(text: &str) -> Result<Self, ForceTableError> {
         if let Some(name) = file_named(text) {
             return Err(ForceTableError::new(
@@ -78,17 +78,15 @@ impl ForceTable {
         if text.trim_start().starts_with('[') {
             let array = DeValue::parse(text).ok();
             let table = array.and_then(|array| table_of(array.get_ref()));
-            return Self::of(
-                &table.ok_or_else(|| ForceTableError::new("this is no table", SHAPE))?,
-            );
+            return Self::of(&table.ok_or_else(|| ForceTableError::new("not a table", SHAPE))?);
         }
         Self::of(&Table::parse("the table", text)?)
     }
 
-    /// What the columns `gap` and `force` of a table hold.
+    /// Creates a force table from the columns `gap` and `force` of a table.
     ///
     /// # Errors
-    /// When they are missing, have no unit, or are no function of the gap.
+    /// If they are missing, have no unit, or are not a function of the gap.
     pub(crate) fn of(table: &Table) -> Result<Self, ForceTableError> {
         let column = |names: &[&str], kind: Kind, example: &str| {
             let headers = || table.columns.iter().map(|(written, _)| Header::of(written));
@@ -132,8 +130,8 @@ impl ForceTable {
             let number = |(row, entry): (usize, &Entry)| {
                 let what = match entry {
                     Entry::Number(number) => return Ok(number * factor),
-                    Entry::Missing => "there is no number".to_owned(),
-                    Entry::Text(text) => format!("`{text}` is no number"),
+                    Entry::Missing => "missing number".to_owned(),
+                    Entry::Text(text) => format!("`{text}` is not a number"),
                 };
                 Err(refuse(Some(row), what, "give a finite number".to_owned()))
             };
@@ -149,7 +147,7 @@ impl ForceTable {
         Ok(Self(Arc::new(rows)))
     }
 
-    /// As an array that is read back as the same.
+    /// The table as an array that is read back as the same.
     pub(crate) fn text(&self) -> String {
         let rows = self.0.points().iter();
         let rows = rows.map(|(gap, force)| format!("[{gap:?}, {force:?}]"));
@@ -159,13 +157,13 @@ impl ForceTable {
     }
 }
 
-/// The file that a text names, if it is not a table itself.
+/// The file that a text names, if it is not a table.
 pub(crate) fn file_named(text: &str) -> Option<&str> {
     let name = text.trim();
     (!name.contains('\n') && !name.starts_with('[')).then_some(name)
 }
 
-/// An array of rows, the first of them the names of the columns.
+/// Converts an array of rows, of which the first contains the names of the columns.
 pub(crate) fn table_of(value: &DeValue<'_>) -> Option<Table> {
     let DeValue::Array(rows) = value else {
         return None;

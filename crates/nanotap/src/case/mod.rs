@@ -1,22 +1,20 @@
-//! The case: what a user states, in dimensionless numbers or in physical quantities, read
-//! from files and words, and mapped to the model.
+//! The case: dimensionless numbers or physical quantities, read from files and overrides, and
+//! mapped to the model.
 //!
-//! A [`Case`] has values by [`Key`]; all keys stand in one table. Parsing a file, `key=value`
-//! words, refusals, units, sweeps and branches go through it, and numbers stay numbers all
-//! the way.
+//! A [`Case`] has values by [`Key`]; all keys are declared in one table, which is used for parsing,
+//! overrides, error messages, units, sweeps and branches.
 //!
 //! # What is stated, and what varies
 //!
-//! A value that is *stated*, in a file or set beside it, stands in place of whatever says the
-//! same in another way (`drive.amplitude` in place of `drive.free_amplitude`), and all that
-//! else was stated still holds: with a stated free amplitude, another frequency is another
-//! strength of the drive.
+//! A value that is *stated*, in a file or by an override, replaces its alternatives
+//! (`drive.amplitude` replaces `drive.free_amplitude`); everything else that was stated remains
+//! valid. With a stated free amplitude, another frequency therefore means another strength of the
+//! drive.
 //!
-//! A value that *varies* in a study ([`Case::with`]: a sweep, a branch, a window) is one knob
-//! of one instrument, and the others stay as they are: the drive keeps its own amplitude (a
-//! piezo its voltage), the sample its distance, g₀ its length, and a second tone its place
-//! among the harmonics of the first. [`Case::held`] says which numbers these are. Stated
-//! beside the varied value they give the same point again.
+//! A value that *varies* in a study ([`Case::with`]: a sweep, a branch, a window) changes alone, as
+//! one control of an instrument does. Constant are the drive amplitude (the voltage of a piezo),
+//! the distance of the sample, g₀, and the ratio of a second tone to the first. [`Case::implied_constants`]
+//! lists these numbers; stated together with the varied value they give the same point.
 
 pub mod document;
 mod error;
@@ -24,6 +22,7 @@ mod family;
 pub mod file;
 pub mod force_table;
 pub mod key;
+mod moving_gap;
 pub mod near_name;
 pub mod physical;
 mod quantities;
@@ -44,6 +43,7 @@ use serde::{Serialize, Serializer};
 pub use error::{CaseError, NoSuchKey, ValueOfKeyError};
 pub use family::{Family, PlaneFamily};
 pub use key::Key;
+pub use moving_gap::MovingGap;
 pub use stated::{Value, ValueError};
 
 use file::{CaseFileError, Described, Source};
@@ -59,27 +59,32 @@ use crate::model::oscillator::{Oscillator, OscillatorParameter, Stop};
 use crate::model::{Model, ModelTangent, Tangent, cantilever_model_tangent};
 use crate::number::shortest;
 
-/// How many modes a case has that does not say.
+/// Default number of modes.
 pub const DEFAULT_MODES: usize = 3;
 
 /// A checked case: a cantilever, dimensionless or in physical quantities, or an oscillator.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Case {
     title: Arc<str>,
-    what: What,
-    /// What ends the motions of its models from outside.
+    what: CaseKind,
+    /// Table `[scan]` of its file, with the words that were set in addition.
+    scan: Option<Arc<serde_json::Map<String, serde_json::Value>>>,
+    /// Folder to which names of files in `[scan]` are relative; `None` where files are not read.
+    folder: Option<Arc<Path>>,
+    /// Flag that cancels the motions of its models.
     cancel: CancelFlag,
 }
 
-/// The kinds of case.
+/// Kind of a case, with its data.
+#[expect(clippy::large_enum_variant, reason = "cases are few")]
 #[derive(Clone, Debug, PartialEq)]
-enum What {
+enum CaseKind {
     Cantilever(Cantilever),
     Oscillator(Oscillator),
     Quantities(Box<Quantities>),
 }
 
-/// What a key of the dimensionless model is in SI.
+/// SI unit of a key of the dimensionless model.
 #[derive(Clone, Copy, Debug, Serialize, JsonSchema)]
 pub struct ParameterUnit {
     /// The quantity: "drive frequency f".
@@ -88,56 +93,63 @@ pub struct ParameterUnit {
     pub unit: &'static str,
     /// The SI value of 1.
     pub si: f64,
-    /// What it measures.
+    /// Kind of quantity.
     #[serde(skip)]
     pub kind: Kind,
 }
 
 impl From<Cantilever> for Case {
     fn from(cantilever: Cantilever) -> Self {
-        Self::new(What::Cantilever(cantilever))
+        Self::new(CaseKind::Cantilever(cantilever))
     }
 }
 
 impl From<Oscillator> for Case {
     fn from(oscillator: Oscillator) -> Self {
-        Self::new(What::Oscillator(oscillator))
+        Self::new(CaseKind::Oscillator(oscillator))
     }
 }
 
 impl Case {
-    fn new(what: What) -> Self {
+    fn new(what: CaseKind) -> Self {
         Self {
             title: "case".into(),
             what,
+            scan: None,
+            folder: None,
             cancel: CancelFlag::default(),
         }
     }
 
-    /// The case of the file at `path`, if one is given, with the `key=value` words of
-    /// `overrides` in place of what it says; levers and materials are those of `catalogue`.
+    /// Loads the case file at `path`, if given, with the `key=value` words of `overrides` and the
+    /// levers and materials of `catalogue`.
     ///
     /// # Errors
-    /// Everything that is wrong with the file and the words, each with its place, and with the
-    /// force curve that one of them names.
+    /// All problems of the file, the words and a force table that one of them names, each with its
+    /// place.
     pub fn load(
         path: Option<&Path>,
         overrides: &[String],
         catalogue: &Arc<Catalogue>,
     ) -> Result<Self, CaseFileError> {
         let overrides = file::with_tables(overrides)?;
-        Self::parse_with(path.map(file::read).transpose()?, &overrides, catalogue)
+        let case = Self::parse_with(path.map(file::read).transpose()?, &overrides, catalogue)?;
+        let folder = path.and_then(Path::parent).unwrap_or_else(|| Path::new(""));
+        Ok(Self {
+            folder: Some(folder.into()),
+            ..case
+        })
     }
 
-    /// The case of a text and of `key=value` words, with the built-in levers and materials.
+    /// Parses a case from a text and `key=value` words, with the built-in levers and materials.
     ///
     /// # Errors
-    /// As [`load`](Self::load), less what can go wrong in reading.
+    /// As [`load`](Self::load), without those of reading files.
     pub fn parse(source: Option<Source>, overrides: &[String]) -> Result<Self, CaseFileError> {
         Self::parse_with(source, overrides, &Catalogue::shared())
     }
 
-    /// The same with levers and materials of `catalogue`.
+    /// As [`parse`](Self::parse), with the levers and materials of `catalogue`.
     ///
     /// # Errors
     /// As [`parse`](Self::parse).
@@ -147,42 +159,50 @@ impl Case {
         catalogue: &Arc<Catalogue>,
     ) -> Result<Self, CaseFileError> {
         let title = source.as_ref().map(|source| source.name.clone());
-        let what = match file::parse(source, overrides)? {
-            Described::Cantilever(cantilever) => What::Cantilever(cantilever),
-            Described::Oscillator(oscillator) => What::Oscillator(oscillator),
+        let (described, scan) = file::parse_with_scan(source, overrides)?;
+        let what = match described {
+            Described::Cantilever(cantilever) => CaseKind::Cantilever(cantilever),
+            Described::Oscillator(oscillator) => CaseKind::Oscillator(oscillator),
             Described::Physical(stated) => {
                 let catalogue = Arc::clone(catalogue);
                 let quantities = Quantities::new(stated, catalogue);
-                What::Quantities(Box::new(quantities.possible()?))
+                CaseKind::Quantities(Box::new(quantities.validated()?))
             }
         };
-        let case = Self::new(what);
+        let case = Self {
+            scan: scan.map(Arc::new),
+            ..Self::new(what)
+        };
         Ok(match title {
             Some(title) => case.called(&title),
             None => case,
         })
     }
 
-    /// The same under another name in headings.
+    /// Sets the title of the case.
     #[must_use]
     pub fn called(mut self, title: &str) -> Self {
         self.title = title.into();
         self
     }
 
-    /// The same, whose models' motions end with an error once `control` cancels the work; with a
-    /// control that cannot, the same.
+    /// The same case, whose motions end with an error once `control` cancels the computation.
     #[must_use]
     pub fn cancelled_by(&self, control: &Control<'_>) -> Self {
-        let mut case = self.clone();
-        if let Some(cancel) = control.cancel {
-            case.cancel = cancel.clone();
-        }
-        case
+        self.with_flag(control.cancel.unwrap_or(&self.cancel))
     }
 
-    /// The same, whose models' motions may go on for a moment after the work was cancelled: for
-    /// reports of what is finished.
+    /// The same, whose models' motions end with an error once `flag` is set or its budget spent.
+    #[must_use]
+    pub(crate) fn with_flag(&self, flag: &CancelFlag) -> Self {
+        Self {
+            cancel: flag.clone(),
+            ..self.clone()
+        }
+    }
+
+    /// The same case, whose motions may continue for a moment after a cancellation: for reports of
+    /// finished parts.
     #[must_use]
     pub(crate) fn with_grace(&self) -> Self {
         Self {
@@ -191,50 +211,89 @@ impl Case {
         }
     }
 
-    /// What ends the motions of its models from outside.
+    /// The table `[scan]` of its file, as JSON: options of the study `scan`.
+    pub fn scan(&self) -> Option<&serde_json::Map<String, serde_json::Value>> {
+        self.scan.as_deref()
+    }
+
+    /// The path of a file that `[scan]` names, relative to the case file.
+    ///
+    /// # Errors
+    /// When the case was not read from a file: nothing is then read from disk.
+    pub(crate) fn relative_file(&self, name: &str) -> Result<std::path::PathBuf, crate::Error> {
+        let folder = self.folder.as_ref().ok_or_else(|| {
+            crate::Error::input(
+                format!("{name}: a case that was not read from a file cannot name other files"),
+                "load the case from a file",
+            )
+        })?;
+        Ok(folder.join(name))
+    }
+
+    /// The same case with `key=value` words that replace what it states.
+    ///
+    /// # Errors
+    /// As [`parse`](Self::parse).
+    pub(crate) fn restated(&self, words: &[String]) -> Result<Self, CaseFileError> {
+        let source = Source {
+            name: self.title.to_string(),
+            text: self.to_toml(),
+        };
+        let catalogue = match &self.what {
+            CaseKind::Quantities(quantities) => quantities.catalogue(),
+            _ => Catalogue::shared(),
+        };
+        let restated = Self::parse_with(Some(source), words, &catalogue)?;
+        Ok(Self {
+            what: restated.what,
+            ..self.clone()
+        })
+    }
+
+    /// Flag that cancels the motions of its models.
     pub fn cancel(&self) -> &CancelFlag {
         &self.cancel
     }
 
-    /// What it is called in a heading.
+    /// Title of the case.
     pub fn title(&self) -> &str {
         &self.title
     }
 
-    /// The dimensionless cantilever that it is; `None` of an oscillator, and where physical
-    /// quantities make no sense.
+    /// The dimensionless cantilever; `None` for an oscillator, and if the physical quantities are
+    /// invalid.
     pub fn cantilever(&self) -> Option<&Cantilever> {
         match &self.what {
-            What::Cantilever(cantilever) => Some(cantilever),
-            What::Oscillator(_) => None,
-            What::Quantities(_) => self.physical().map(|view| &view.cantilever),
+            CaseKind::Cantilever(cantilever) => Some(cantilever),
+            CaseKind::Oscillator(_) => None,
+            CaseKind::Quantities(_) => self.physical().map(|view| &view.cantilever),
         }
     }
 
-    /// The oscillator that it is, if it is one.
+    /// The oscillator, if the case is one.
     pub const fn oscillator(&self) -> Option<&Oscillator> {
         match &self.what {
-            What::Oscillator(oscillator) => Some(oscillator),
+            CaseKind::Oscillator(oscillator) => Some(oscillator),
             _ => None,
         }
     }
 
-    /// What is known of it in SI, if it is a physical case and makes sense.
+    /// The view in SI, for a valid physical case.
     pub fn physical(&self) -> Option<&Physical> {
         match &self.what {
-            What::Quantities(quantities) => quantities.view.as_deref().ok(),
+            CaseKind::Quantities(quantities) => quantities.view.as_deref().ok(),
             _ => None,
         }
     }
 
-    /// Whether it was stated in physical quantities.
+    /// True if it was stated in physical quantities.
     pub const fn is_physical(&self) -> bool {
-        matches!(self.what, What::Quantities(_))
+        matches!(self.what, CaseKind::Quantities(_))
     }
 
-    /// What had to be assumed, and what puts it in doubt.
+    /// Assumptions and warnings.
     pub fn remarks(&self) -> Vec<Remark> {
-        let (What::Quantities(quantities), Some(view)) = (&self.what, self.physical()) else {
+        let (CaseKind::Quantities(quantities), Some(view)) = (&self.what, self.physical()) else {
             return Vec::new();
         };
         let mut remarks = view.remarks(quantities.reader());
@@ -243,24 +302,24 @@ impl Case {
         remarks
     }
 
-    /// What its file says and does not count, because a key that was set beside it says the same.
+    /// Notes about entries of the file that overrides replace.
     pub fn replaced(&self) -> Vec<Remark> {
-        let What::Quantities(quantities) = &self.what else {
+        let CaseKind::Quantities(quantities) = &self.what else {
             return Vec::new();
         };
         let replaced = quantities.stated.origin.replaced.iter();
         let words = |Replaced { key, written, by }: &Replaced| {
             Remark::note(format!(
-                "{by}, set beside the file, takes the place of its {key} = {written}"
+                "{by}, set in addition to the file, replaces its {key} = {written}"
             ))
         };
         replaced.map(words).collect()
     }
 
-    /// The numbers of the equations that it has.
+    /// Keys of the numbers of its equations.
     pub fn keys(&self) -> Vec<Key> {
         match &self.what {
-            What::Oscillator(oscillator) => crate::model::oscillator::OscillatorParameter::ALL
+            CaseKind::Oscillator(oscillator) => crate::model::oscillator::OscillatorParameter::ALL
                 .into_iter()
                 .filter(|parameter| oscillator.get(*parameter).is_some())
                 .map(Key::of_oscillator)
@@ -271,11 +330,11 @@ impl Case {
         }
     }
 
-    /// The key that is called `name` and can vary, with or without `model.` before it: a
-    /// number of the equations, or a quantity of a physical case.
+    /// The key called `name` (with or without `model.`) that can vary: a number of the equations,
+    /// or a quantity of a physical case.
     ///
     /// # Errors
-    /// [`NoSuchKey`] with what there is and the nearest name.
+    /// [`NoSuchKey`] with the known names and the nearest one.
     pub fn key(&self, name: &str) -> Result<Key, NoSuchKey> {
         let plain = name.strip_prefix("model.").unwrap_or(name);
         let keys = self.keys();
@@ -302,7 +361,7 @@ impl Case {
 
     fn model_kind(&self) -> ModelKind {
         match &self.what {
-            What::Oscillator(oscillator) => match oscillator.stop {
+            CaseKind::Oscillator(oscillator) => match oscillator.stop {
                 Stop::Soft { .. } => ModelKind::VibroImpact,
                 Stop::Rigid { .. } => ModelKind::Impact,
             },
@@ -310,70 +369,69 @@ impl Case {
         }
     }
 
-    /// The value of a key, in SI of a physical quantity; NaN where the case does not have it.
+    /// Value of a key, in SI for a physical quantity; NaN if the case does not have it.
     pub fn get(&self, key: Key) -> f64 {
         let found = match (&self.what, key.entry().means) {
-            (What::Oscillator(oscillator), key::Means::Oscillator(parameter)) => {
+            (CaseKind::Oscillator(oscillator), key::Means::Oscillator(parameter)) => {
                 oscillator.get(parameter)
             }
-            (What::Oscillator(_), _) => None,
+            (CaseKind::Oscillator(_), _) => None,
             (_, key::Means::Cantilever(parameter)) => {
                 self.cantilever().map(|case| case.get(parameter))
             }
             (_, _) if key == Key::Modes => self.cantilever().map(|case| case.modes as f64),
-            (What::Quantities(quantities), _) => quantities.get(key),
+            (CaseKind::Quantities(quantities), _) => quantities.get(key),
             _ => None,
         };
         found.unwrap_or(f64::NAN)
     }
 
-    /// What a physical case states of a key.
+    /// The stated value of a key of a physical case.
     pub fn stated(&self, key: Key) -> Option<&Value> {
         match &self.what {
-            What::Quantities(quantities) => quantities.stated.get(key),
+            CaseKind::Quantities(quantities) => quantities.stated.get(key),
             _ => None,
         }
     }
 
-    /// The same case with one value varied (unchanged where it does not have the key). What
-    /// stays is said in the module's documentation; whether the value makes sense, by
-    /// [`model`](Self::model).
+    /// The same case with one value varied (unchanged if it does not have the key). The
+    /// documentation of the module lists what stays constant; [`model`](Self::model) checks the
+    /// value.
     #[must_use]
     pub fn with(&self, key: Key, value: f64) -> Self {
         let what = match (&self.what, key.entry().means) {
-            (What::Cantilever(cantilever), key::Means::Cantilever(parameter)) => {
-                What::Cantilever(cantilever.clone().with(parameter, value))
+            (CaseKind::Cantilever(cantilever), key::Means::Cantilever(parameter)) => {
+                CaseKind::Cantilever(cantilever.clone().with(parameter, value))
             }
-            (What::Cantilever(cantilever), _) if key == Key::Modes => {
-                What::Cantilever(cantilever.clone().with_modes(value as usize))
+            (CaseKind::Cantilever(cantilever), _) if key == Key::Modes => {
+                CaseKind::Cantilever(cantilever.clone().with_modes(value as usize))
             }
-            (What::Oscillator(oscillator), key::Means::Oscillator(parameter)) => {
-                What::Oscillator(oscillator.with(parameter, value))
+            (CaseKind::Oscillator(oscillator), key::Means::Oscillator(parameter)) => {
+                CaseKind::Oscillator(oscillator.with(parameter, value))
             }
-            (What::Quantities(quantities), means) => match means {
+            (CaseKind::Quantities(quantities), means) => match means {
                 key::Means::Oscillator(_) => return self.clone(),
-                _ => What::Quantities(Box::new(quantities.with(key, value))),
+                _ => CaseKind::Quantities(Box::new(quantities.with(key, value))),
             },
             _ => return self.clone(),
         };
         Self {
-            title: Arc::clone(&self.title),
             what,
-            cancel: self.cancel.clone(),
+            ..self.clone()
         }
     }
 
-    /// The numbers that stay while a quantity varies though they were not stated as such:
-    /// stated beside the value of `key` they give the same case again. Empty where all that
-    /// was stated simply stays.
-    pub fn held(&self, key: Key) -> Vec<(Key, f64)> {
-        let What::Quantities(quantities) = &self.what else {
+    /// The numbers that stay constant while `key` varies, although they were not stated: stated
+    /// together with the value of `key` they give the same case. Empty if the stated values stay
+    /// constant.
+    pub fn implied_constants(&self, key: Key) -> Vec<(Key, f64)> {
+        let CaseKind::Quantities(quantities) = &self.what else {
             return Vec::new();
         };
         let (true, Ok(view)) = (key.is_physical(), &quantities.view) else {
             return Vec::new();
         };
-        let held = view.held(&quantities.stated);
+        let held = view.implied_constants(&quantities.stated);
         held.iter()
             .filter(|(other, value)| {
                 let same = quantities.stated.get(*other) == Some(*value);
@@ -387,12 +445,12 @@ impl Case {
     /// Its model.
     ///
     /// # Errors
-    /// When it makes no sense or cannot be solved in closed form.
+    /// If the case is invalid or has no solution in closed form.
     pub fn model(&self) -> Result<Model, CaseError> {
         let model = match &self.what {
-            What::Cantilever(cantilever) => Model::cantilever(cantilever)?,
-            What::Oscillator(oscillator) => oscillator.model()?,
-            What::Quantities(quantities) => {
+            CaseKind::Cantilever(cantilever) => Model::cantilever(cantilever)?,
+            CaseKind::Oscillator(oscillator) => oscillator.model()?,
+            CaseKind::Quantities(quantities) => {
                 let model = Model::cantilever(&quantities.view()?.cantilever)?;
                 let start = quantities.start.as_ref();
                 Model {
@@ -404,7 +462,7 @@ impl Case {
         Ok(model.cancelled_by(&self.cancel))
     }
 
-    /// How its map changes with the value of a key.
+    /// Derivative of its map with respect to a key.
     ///
     /// # Errors
     /// As [`model`](Self::model).
@@ -419,7 +477,7 @@ impl Case {
         Ok(Tangent::along(cantilever, model, &slopes, &law)?)
     }
 
-    /// The derivative of its model with respect to the value of a key.
+    /// Derivative of its model with respect to a key.
     ///
     /// # Errors
     /// As [`model`](Self::model).
@@ -440,19 +498,19 @@ impl Case {
 
     fn oscillator_parameter(&self, key: Key) -> Option<(&Oscillator, OscillatorParameter)> {
         match (&self.what, key.entry().means) {
-            (What::Oscillator(oscillator), key::Means::Oscillator(parameter)) => {
+            (CaseKind::Oscillator(oscillator), key::Means::Oscillator(parameter)) => {
                 Some((oscillator, parameter))
             }
             _ => None,
         }
     }
 
-    /// The numbers of a cantilever's equations that change with a key, each with its derivative.
+    /// The parameters of the cantilever that depend on a key, with their derivatives.
     fn parameters_by(&self, key: Key) -> Result<Slopes, CaseError> {
         match (&self.what, key.entry().means) {
-            (What::Oscillator(_), _) => Ok(Slopes::default()),
+            (CaseKind::Oscillator(_), _) => Ok(Slopes::default()),
             (_, key::Means::Cantilever(parameter)) => Ok((vec![(parameter, 1.0)], Vec::new())),
-            (What::Quantities(quantities), _) if key.is_physical() => {
+            (CaseKind::Quantities(quantities), _) if key.is_physical() => {
                 quantities.view()?;
                 Ok(quantities.derivatives(key)?)
             }
@@ -460,8 +518,7 @@ impl Case {
         }
     }
 
-    /// The keys of the numbers of a cantilever's equations that change with a key, each with its
-    /// derivative.
+    /// The keys of the parameters of the cantilever that depend on a key, with their derivatives.
     pub(crate) fn numbers_by(&self, key: Key) -> Result<Vec<(Key, f64)>, CaseError> {
         let (slopes, _) = self.parameters_by(key)?;
         Ok(slopes
@@ -470,19 +527,19 @@ impl Case {
             .collect())
     }
 
-    /// The units of the model beside a value of a key, below and above it, and how far apart
-    /// these values are; `None` where the units do not follow from the key.
+    /// The units of the model slightly below and above the value of a key, and the distance of
+    /// these values; `None` if the units do not depend on the key.
     pub(crate) fn scales_beside(
         &self,
         key: Key,
     ) -> Result<Option<(Scales, Scales, f64)>, CaseError> {
-        let What::Quantities(quantities) = &self.what else {
+        let CaseKind::Quantities(quantities) = &self.what else {
             return Ok(None);
         };
         if !key.is_physical() {
             return Ok(None);
         }
-        let (low, high, width) = quantities.beside(key)?;
+        let (low, high, width) = quantities.bracket(key)?;
         Ok(Some((low.scales, high.scales, width)))
     }
 
@@ -494,12 +551,12 @@ impl Case {
         }
     }
 
-    /// The units in which to show it.
+    /// Units for display.
     pub fn units(&self) -> Units {
         Units::of(self.physical().map(|view| &view.scales))
     }
 
-    /// What a key is in SI, if the case is physical.
+    /// SI unit of a key, for a physical case.
     pub fn parameter_unit(&self, key: Key) -> Option<ParameterUnit> {
         let view = self.physical()?;
         let Some(parameter) = key.parameter() else {
@@ -521,7 +578,7 @@ impl Case {
         })
     }
 
-    /// A value of a key to ten digits, of a physical case in SI with a prefix.
+    /// A value of a key with ten digits; for a physical case in SI with a prefix.
     pub fn shown(&self, key: Key, value: f64) -> String {
         const DIGITS: usize = 10;
         self.parameter_unit(key).map_or_else(
@@ -533,11 +590,11 @@ impl Case {
         )
     }
 
-    /// A value of a key from text: a number of the dimensionless model, of a physical case
-    /// also as a quantity with its unit.
+    /// Parses a value of a key: a number of the dimensionless model, or for a physical case also a
+    /// quantity with its unit.
     ///
     /// # Errors
-    /// When `text` is neither.
+    /// If `text` is neither.
     pub fn value(&self, key: Key, text: &str) -> Result<f64, ValueOfKeyError> {
         let of_quantity = |error| ValueOfKeyError::Quantity {
             key,
@@ -562,15 +619,15 @@ impl Case {
         }
     }
 
-    /// The key of the distance between tip and sample, in the model's unit of length.
+    /// Key of the tip–sample distance in the model's unit of length.
     pub const fn gap_key(&self) -> Key {
         match self.what {
-            What::Oscillator(_) => Key::OscillatorGap,
+            CaseKind::Oscillator(_) => Key::OscillatorGap,
             _ => Key::Alpha5,
         }
     }
 
-    /// The same with another frequency and strength of the drive, as numbers of the equations.
+    /// The same case with another frequency and strength of the drive, in the model's units.
     #[must_use]
     pub fn with_drive(&self, frequency: f64, strength: f64) -> Self {
         let [frequency_key, strength_key] = self.drive_keys();
@@ -578,41 +635,41 @@ impl Case {
             .with(strength_key, strength)
     }
 
-    /// The keys of the drive's frequency and strength among the numbers of the equations.
+    /// Keys of the frequency and strength of the drive in the model's units.
     pub const fn drive_keys(&self) -> [Key; 2] {
         match self.what {
-            What::Oscillator(_) => [Key::OscillatorOmega, Key::Forcing],
+            CaseKind::Oscillator(_) => [Key::OscillatorOmega, Key::Forcing],
             _ => [Key::Omega, Key::Alpha2],
         }
     }
 
-    /// Drive frequency, in the model's unit; NaN where physical quantities make no sense.
+    /// Drive frequency in the model's unit; NaN if the physical quantities are invalid.
     pub fn omega(&self) -> f64 {
         match &self.what {
-            What::Oscillator(oscillator) => oscillator.omega,
+            CaseKind::Oscillator(oscillator) => oscillator.omega,
             _ => self.cantilever().map_or(f64::NAN, |case| case.omega),
         }
     }
 
-    /// Whether its stop is rigid: contact is an instant there.
+    /// True if its stop is rigid: contacts are instantaneous.
     pub fn has_rigid_stop(&self) -> bool {
         self.model_kind() == ModelKind::Impact
     }
 
-    /// Whether the distance is left to a setpoint: `drive.setpoint` without `gap.tip`.
+    /// True if the distance follows from a setpoint: `drive.setpoint` without `gap.tip`.
     pub fn leaves_distance_to_setpoint(&self) -> bool {
         match &self.what {
-            What::Quantities(quantities) => {
+            CaseKind::Quantities(quantities) => {
                 quantities.stated.has(Key::DriveSetpoint) && !quantities.stated.has(Key::GapTip)
             }
             _ => false,
         }
     }
 
-    /// The same with its distance left to the setpoint, if `original` leaves its distance so.
+    /// The same case with its distance following from the setpoint, if that of `original` does.
     #[must_use]
     pub(crate) fn leaving_distance_as(self, original: &Self) -> Self {
-        let (What::Quantities(quantities), Some(setpoint)) =
+        let (CaseKind::Quantities(quantities), Some(setpoint)) =
             (&self.what, original.stated(Key::DriveSetpoint))
         else {
             return self;
@@ -624,25 +681,24 @@ impl Case {
         quantities.stated.remove(Key::GapTip);
         quantities.stated.put(Key::DriveSetpoint, setpoint.clone());
         Self {
-            what: What::Quantities(Box::new(quantities.mapped(true))),
+            what: CaseKind::Quantities(Box::new(quantities.mapped(true))),
             ..self
         }
     }
 
-    /// The same with the tip at `distance` (in m) from the sample, where its setpoint is
-    /// reached, and a note that says so. Its motions start from `state`, at drive phase 0. The
-    /// unit of length stays; the beam, which moves with the tip, is out of place by less than the
-    /// free amplitude.
+    /// The same case with the tip at `distance` (m) from the sample, where its setpoint is reached,
+    /// with a note. Its motions start from `state` at drive phase 0. The unit of length is
+    /// unchanged; the distance of the beam is then off by less than the free amplitude.
     ///
     /// # Errors
-    /// When the quantities make no sense there.
+    /// If the quantities are invalid there.
     pub fn at_distance(
         &self,
         distance: f64,
         note: Remark,
         state: Vec<f64>,
     ) -> Result<Self, CaseFileError> {
-        let What::Quantities(quantities) = &self.what else {
+        let CaseKind::Quantities(quantities) = &self.what else {
             return Ok(self.clone());
         };
         let mut quantities = quantities.clone();
@@ -656,14 +712,13 @@ impl Case {
         quantities.notes.push(note);
         quantities.start = Some(state);
         Ok(Self {
-            title: Arc::clone(&self.title),
-            what: What::Quantities(Box::new(quantities.mapped(true).possible()?)),
-            cancel: self.cancel.clone(),
+            what: CaseKind::Quantities(Box::new(quantities.mapped(true).validated()?)),
+            ..self.clone()
         })
     }
 }
 
-/// A state with as many modes as a model has: more are at rest, fewer are left out.
+/// A state with the number of modes of a model: additional modes are at rest, others are left out.
 fn with_modes(state: &[f64], model: &Model) -> Vec<f64> {
     let dimension = model.dimension();
     let [own, wanted] = [state.len(), dimension].map(|n| n.saturating_sub(model.memory) / 2);
@@ -678,13 +733,13 @@ fn with_modes(state: &[f64], model: &Model) -> Vec<f64> {
 }
 
 impl Serialize for Case {
-    /// The numbers of the equations by key; of a physical case also its quantities as text,
-    /// by `section.key`.
+    /// The numbers of the equations by key; for a physical case also its quantities as text, by
+    /// `section.key`.
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         let quantities = match &self.what {
-            What::Cantilever(cantilever) => return cantilever.serialize(serializer),
-            What::Oscillator(oscillator) => return oscillator.serialize(serializer),
-            What::Quantities(quantities) => quantities,
+            CaseKind::Cantilever(cantilever) => return cantilever.serialize(serializer),
+            CaseKind::Oscillator(oscillator) => return oscillator.serialize(serializer),
+            CaseKind::Quantities(quantities) => quantities,
         };
         let cantilever = self.cantilever();
         quantities.document(cantilever).serialize(serializer)

@@ -1,11 +1,11 @@
-//! "Did you mean …?": the known name that a mistyped one was probably meant to be. One rule
-//! for keys, parameters, units' names and the catalogue.
+//! Suggestions for misspelt names ("did you mean …?"): one rule for keys, parameters, units and the
+//! catalogue.
 
-/// Names near `written`, nearest first; ties keep the given order.
+/// Names similar to `written`, nearest first; ties keep the given order.
 ///
-/// Case, hyphens and blanks in place of underscores, and the Greek letters themselves are
-/// forgiven altogether. Then one slip in three letters (two swapped letters are one) still
-/// points at a name; more does not, nor does a slip for every letter.
+/// Case, hyphens and spaces in place of underscores, and Greek letters are ignored. One error in
+/// three letters is then accepted (two swapped letters are one error), but not more, and not an
+/// error for every letter.
 pub fn near_names<'a>(written: &str, names: impl IntoIterator<Item = &'a str>) -> Vec<&'a str> {
     let plain = plainly(written);
     let mut found: Vec<(usize, &str)> = names
@@ -20,8 +20,8 @@ pub fn near_names<'a>(written: &str, names: impl IntoIterator<Item = &'a str>) -
     found.into_iter().map(|(_, name)| name).collect()
 }
 
-/// The nearest of `names`, if any is near; failing that, the only one that begins with what
-/// was written, of which three letters must be there.
+/// The nearest of `names`, if one is similar; otherwise the only one that begins with `written`,
+/// which must have at least three letters.
 pub fn near_name<'a>(
     written: &str,
     names: impl IntoIterator<Item = &'a str> + Clone,
@@ -34,7 +34,7 @@ pub fn near_name<'a>(
         .into_iter()
         .filter(|name| plain.chars().count() > 2 && plainly(name).starts_with(&plain));
     let first = longer.next()?;
-    // A name may stand twice in the list.
+    // A name may occur twice in the list.
     longer.all(|other| other == first).then_some(first)
 }
 

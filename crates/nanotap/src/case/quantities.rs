@@ -1,5 +1,4 @@
-//! A physical case: the quantities that were stated, what they come to, and how that changes with
-//! one of them.
+//! A physical case: stated quantities, their mapping, and its derivatives.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -14,17 +13,17 @@ use super::stated::{Stated, Value};
 use crate::model::cantilever::Cantilever;
 use crate::model::parameter::Parameter;
 
-/// Physical quantities and what they come to.
+/// Physical quantities and their mapping.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Quantities {
     pub(super) stated: Stated,
     catalogue: Arc<Catalogue>,
-    /// Dimensionless numbers that vary, in place of those mapped.
+    /// Dimensionless numbers that vary, in place of the mapped ones.
     numbers: Vec<(Parameter, f64)>,
-    /// Whether what stays while others vary is said by its own numbers.
+    /// Whether constant quantities are stated by their own numbers.
     pub(super) held: bool,
     pub(super) view: Result<Box<Physical>, Box<CaseFileError>>,
-    /// What a study found out about the case.
+    /// Notes of a study about the case.
     pub(super) notes: Vec<Remark>,
     /// State at drive phase 0 of the orbit at the setpoint, from which motions start.
     pub(super) start: Option<Vec<f64>>,
@@ -45,6 +44,10 @@ impl Quantities {
         quantities.mapped(false)
     }
 
+    pub(super) fn catalogue(&self) -> Arc<Catalogue> {
+        Arc::clone(&self.catalogue)
+    }
+
     pub(super) fn reader(&self) -> Reader<'_> {
         Reader {
             stated: &self.stated,
@@ -52,7 +55,7 @@ impl Quantities {
         }
     }
 
-    /// The same, its quantities mapped; where neither lever nor tip nor modes changed, the lever stays.
+    /// Maps the quantities; the lever is kept if lever, tip and modes are unchanged.
     pub(super) fn mapped(mut self, same_lever: bool) -> Self {
         let lever = self.view.as_ref().ok().map(|view| view.lever);
         let lever = lever.filter(|_| same_lever);
@@ -67,8 +70,8 @@ impl Quantities {
         self
     }
 
-    /// The same, if it makes sense.
-    pub(super) fn possible(self) -> Result<Self, CaseFileError> {
+    /// Returns it if it is valid.
+    pub(super) fn validated(self) -> Result<Self, CaseFileError> {
         match &self.view {
             Ok(_) => Ok(self),
             Err(error) => Err((**error).clone()),
@@ -79,7 +82,7 @@ impl Quantities {
         self.view.as_deref().map_err(Clone::clone)
     }
 
-    /// A value that is stated or follows from what is.
+    /// A stated or derived value.
     pub(super) fn get(&self, key: Key) -> Option<f64> {
         let inferred = || self.view.as_ref().ok()?.value(key);
         self.stated.number(key).or_else(inferred)
@@ -97,18 +100,18 @@ impl Quantities {
             return varied.mapped(false);
         }
         if let (false, Ok(view)) = (self.held, &self.view) {
-            varied.stated = view.held(&self.stated);
+            varied.stated = view.implied_constants(&self.stated);
             varied.held = true;
         }
         varied.stated.set(key, value);
         varied.mapped(!matches!(key.section(), Section::Cantilever | Section::Tip))
     }
 
-    /// How the numbers of the equations change with a quantity: those that do, each with its
-    /// derivative, and those of the parameters of a nonlinear law, by central differences of the
-    /// mapping, which is a chain of closed forms.
+    /// Derivatives with respect to a quantity of the numbers of the equations that depend on it,
+    /// and of the parameters of a nonlinear law, by central differences of the mapping, which is a
+    /// sequence of closed forms.
     pub(super) fn derivatives(&self, key: Key) -> Result<Slopes, Box<CaseFileError>> {
-        let (low, high, width) = self.beside(key)?;
+        let (low, high, width) = self.bracket(key)?;
         let slope = |p| (high.cantilever.get(p) - low.cantilever.get(p)) / width;
         let numbers = Parameter::every()
             .map(|parameter| (parameter, slope(parameter)))
@@ -133,9 +136,11 @@ impl Quantities {
         Ok((numbers, law))
     }
 
-    /// What it comes to a little below and a little above the value of a key, and how far
-    /// apart these values are.
-    pub(super) fn beside(&self, key: Key) -> Result<(Physical, Physical, f64), Box<CaseFileError>> {
+    /// The mapping slightly below and above the value of a key, and the distance of these values.
+    pub(super) fn bracket(
+        &self,
+        key: Key,
+    ) -> Result<(Physical, Physical, f64), Box<CaseFileError>> {
         let here = self.view()?;
         let value = self.get(key).unwrap_or(f64::NAN);
         // Where the mapping is smooth its third derivative is of order 1/value³, so that
@@ -149,14 +154,14 @@ impl Quantities {
         let (low, high) = (self.with(key, value - step), self.with(key, value + step));
         match (low.view, high.view) {
             (Ok(low), Ok(high)) => Ok((*low, *high, 2.0 * step)),
-            // At the edge of what makes sense, on one side.
+            // At the edge of the valid range: one-sided.
             (Err(_), Ok(high)) => Ok((here.clone(), *high, step)),
             (Ok(low), Err(_)) => Ok((*low, here.clone(), step)),
             (Err(error), Err(_)) => Err(error),
         }
     }
 
-    /// The numbers that it comes to, unless quantities vary, and what was stated.
+    /// The mapped numbers, unless quantities vary, and the stated values.
     pub(super) fn document<'a>(
         &self,
         cantilever: Option<&'a Cantilever>,
@@ -191,8 +196,8 @@ fn scale_of(view: &Physical, kind: Kind) -> f64 {
     }
 }
 
-/// A physical case: the numbers that it comes to, unless quantities vary, and what was
-/// stated.
+/// A physical case as a document: the mapped numbers, unless quantities vary, and the stated
+/// values.
 #[derive(Serialize)]
 pub(super) struct QuantitiesDocument<'a> {
     #[serde(flatten)]

@@ -1,4 +1,4 @@
-//! The JSON schema of a case, made of the table of keys.
+//! The JSON schema of a case, from the table of keys.
 
 use schemars::{Schema, json_schema};
 use serde_json::{Map, Value, json};
@@ -8,9 +8,9 @@ use super::key::{Default, Entry, Key, Section, Takes};
 /// The JSON schema of a case: its tables with their keys, as a case file states them.
 ///
 /// A key of a physical table is a text with its unit, `"65 kHz"`; its range, default and
-/// `x-unit` are those of the number in SI. Beside JSON schema's own words a key has `x-alias`,
-/// its second name; `x-symbol`; `x-models`, the kinds of `[model]` that take it; and
-/// `x-instead-of`, the keys that say the same and cannot be given with it.
+/// `x-unit` are those of the number in SI. In addition to the words of JSON schema a key has
+/// `x-alias`, its second name; `x-symbol`; `x-models`, the kinds of `[model]` that take it; and
+/// `x-instead-of`, the keys that state the same quantity and cannot be given with it.
 pub fn schema() -> Schema {
     let tables = Section::ALL.into_iter().map(|section| {
         let keys: Map<_, _> = section

@@ -1,4 +1,4 @@
-//! What a case states: values by key, and where each was said.
+//! Stated values of a case by key, with their places.
 
 use std::sync::Arc;
 
@@ -11,6 +11,7 @@ use nanotap_volterra::VolterraError;
 use crate::model::contact::ContactLaw;
 use crate::model::drive_form::{FrequencyRatio, RatioError};
 use crate::model::sample_law::SampleLaw;
+use crate::model::words::plain;
 
 /// A value of a key.
 #[derive(Clone, Debug, PartialEq)]
@@ -40,7 +41,7 @@ impl Value {
     }
 }
 
-/// Why a text is no value of a key.
+/// Why a text is not a value of a key.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ValueError {
     /// Not the quantity that the key takes.
@@ -49,7 +50,7 @@ pub enum ValueError {
     /// None of the key's words.
     #[error("\"{given}\" is not one of {}", quoted(words))]
     Word {
-        /// What was given.
+        /// The given text.
         given: String,
         /// What could be.
         words: &'static [&'static str],
@@ -61,7 +62,7 @@ pub enum ValueError {
     #[error(transparent)]
     Table(#[from] ForceTableError),
     /// No contact law.
-    #[error("there is no law \"{given}\"; there are {}", laws().join(", "))]
+    #[error("unknown law \"{given}\"; the laws are {}", laws().join(", "))]
     Law {
         /// The name that is none.
         given: String,
@@ -112,7 +113,6 @@ impl Key {
                 Value::Number(kind.parse(text)?, kind)
             }
             Takes::Word(words) => {
-                let plain = |word: &str| word.trim().to_lowercase().replace(['_', ' '], "-");
                 let given = plain(text);
                 let word = words.iter().find(|word| plain(word) == given);
                 Value::Word(word.ok_or_else(|| ValueError::Word {
@@ -135,13 +135,13 @@ pub(crate) struct Said {
     pub(crate) name: String,
     /// The value as typed.
     pub(crate) written: String,
-    /// Where the key stands.
+    /// Place of the key.
     pub(crate) key_place: Place,
-    /// Where the value stands.
+    /// Place of the value.
     pub(crate) value_place: Place,
 }
 
-/// A value of the file that another key, set beside the file, takes the place of.
+/// A value of the file that an override of another key replaces.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Replaced {
     /// The key of the file.
@@ -155,11 +155,11 @@ pub(crate) struct Replaced {
 /// The file that places point into, and who said what there.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Origin {
-    /// The file, where there is one.
+    /// The file, if there is one.
     pub(crate) source: Option<Source>,
     /// Its tables.
     pub(crate) headers: Vec<Header>,
-    /// Where each value was said.
+    /// Place of each value.
     pub(crate) said: Vec<(Key, Said)>,
     /// What the file says and does not count.
     pub(crate) replaced: Vec<Replaced>,
@@ -221,7 +221,7 @@ impl Stated {
         self.values.retain(|(other, _)| *other != key);
     }
 
-    /// Where a value was said that is still as written.
+    /// Place of a value that is unchanged.
     pub(crate) fn said(&self, key: Key) -> Option<&Said> {
         let said = self.origin.said.iter().find(|(other, _)| *other == key);
         said.filter(|_| self.has(key) && !self.changed.contains(&key))

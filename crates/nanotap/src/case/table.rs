@@ -11,11 +11,11 @@ use serde_json::{Map, Value, json};
 use crate::Error;
 
 /// Most rows of a table.
-pub const MOST_ROWS: usize = 100_000;
+pub const MAX_ROWS: usize = 100_000;
 /// Most bytes of a file.
-const MOST_BYTES: u64 = 256 << 20;
+const MAX_BYTES: u64 = 256 << 20;
 
-/// What stands in one place of a table.
+/// An entry of a table.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(untagged)]
 pub enum Entry {
@@ -48,9 +48,9 @@ impl Table {
         let name = path.display().to_string();
         let refuse = |error: std::io::Error| Error::files(format!("cannot read {name}: {error}"));
         let size = std::fs::metadata(path).map_err(refuse)?.len();
-        if size > MOST_BYTES {
+        if size > MAX_BYTES {
             return Err(Error::input(
-                format!("{name} has {size} bytes; {MOST_BYTES} at most"),
+                format!("{name} has {size} bytes; {MAX_BYTES} at most"),
                 "keep fewer rows",
             ));
         }
@@ -90,9 +90,9 @@ impl Table {
         };
         for record in reader.records() {
             let record = record.map_err(|error| refuse(&error))?;
-            if table.lines.len() == MOST_ROWS {
+            if table.lines.len() == MAX_ROWS {
                 return Err(Error::input(
-                    format!("{name} has more than {MOST_ROWS} rows"),
+                    format!("{name} has more than {MAX_ROWS} rows"),
                     "keep fewer",
                 ));
             }

@@ -3,7 +3,7 @@
 use super::key::Key;
 use super::physical::force::{keys_of_contacts, linear_takes, takes};
 use super::stated::Value;
-use super::{Case, What};
+use super::{Case, CaseKind};
 use crate::Error;
 use crate::model::contact::ContactLaw;
 use crate::model::sample_law::SampleLaw;
@@ -25,7 +25,7 @@ impl LawName {
         self.0.text()
     }
 
-    /// Whether a key can be stated beside this law.
+    /// True if a key can be stated with this law.
     pub(crate) fn takes(&self, key: Key) -> bool {
         if !keys_of_contacts().any(|of_some| of_some == key) {
             return true;
@@ -45,7 +45,7 @@ impl Case {
     /// # Errors
     /// When the case is not a physical one, or does not say all that the law needs.
     pub(crate) fn under_law(&self, law: &LawName, more: &[(Key, f64)]) -> Result<Self, Error> {
-        let What::Quantities(quantities) = &self.what else {
+        let CaseKind::Quantities(quantities) = &self.what else {
             return Err(Error::input(
                 "contact laws are compared on cases in physical quantities",
                 "state lever and sample by their quantities",
@@ -64,9 +64,8 @@ impl Case {
             }
         }
         Ok(Self {
-            title: self.title.clone(),
-            what: What::Quantities(Box::new(quantities.mapped(true).possible()?)),
-            cancel: self.cancel.clone(),
+            what: CaseKind::Quantities(Box::new(quantities.mapped(true).validated()?)),
+            ..self.clone()
         })
     }
 }

@@ -1,6 +1,7 @@
 //! The units in which motions are shown: the model's own, or SI where the case has them.
 
 use crate::case::physical::{Kind, Scales};
+use crate::case::quantity::prefix_of;
 
 /// What multiplies the model's numbers before they are shown.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -10,21 +11,6 @@ pub enum Units {
     /// SI, with the prefix that fits.
     Si(Scales),
 }
-
-/// SI prefixes by power of ten.
-const PREFIXES: [(i32, &str); 11] = [
-    (-18, "a"),
-    (-15, "f"),
-    (-12, "p"),
-    (-9, "n"),
-    (-6, "µ"),
-    (-3, "m"),
-    (0, ""),
-    (3, "k"),
-    (6, "M"),
-    (9, "G"),
-    (12, "T"),
-];
 
 impl Units {
     /// SI where `scales` are known.
@@ -76,10 +62,7 @@ pub fn prefixed(kind: Kind, si: f64, size: f64) -> (f64, String) {
     } else {
         0
     };
-    let prefix = PREFIXES
-        .iter()
-        .find(|(p, _)| *p == power)
-        .map_or("", |(_, name)| name);
+    let prefix = prefix_of(power).unwrap_or_default();
     (si / 10f64.powi(power), format!("{prefix}{unit}"))
 }
 

@@ -1,4 +1,4 @@
-//! Attributes that say what made a dataset, and what differs between two of them.
+//! Attributes that identify a dataset, and the differences between two sets of them.
 
 use serde::Serialize;
 use serde_json::Value;
@@ -6,27 +6,28 @@ use serde_json::Value;
 use super::schema::Attributes;
 use crate::case::Case;
 
-/// The attributes that every dataset begins with: what it is, the program's version,
-/// and the case as JSON text (an attribute that every file format can hold).
+/// The first attributes of every dataset: title, kind, the program's version, and the case as JSON
+/// text (which every file format can store).
 pub fn of_case(title: &str, kind: &str, case: &Case) -> Attributes {
     let mut attributes = Attributes::new();
     attributes.insert("Conventions".into(), "CF-1.11".into());
     attributes.insert("title".into(), title.into());
     attributes.insert("kind".into(), kind.into());
     attributes.insert("nanotap_version".into(), env!("CARGO_PKG_VERSION").into());
-    // Chunks of different arithmetics differ in their last digits: they are not mixed.
+    // The last digits of results depend on the arithmetic: chunks of different versions are not
+    // mixed.
     attributes.insert("arithmetic".into(), nanotap_arithmetic::VERSION.into());
     attributes.insert("case".into(), text(case));
     attributes
 }
 
-/// `value` as JSON text in an attribute.
+/// Converts `value` to JSON text for an attribute.
 pub fn text(value: &impl Serialize) -> Value {
     serde_json::to_string(value).unwrap_or_default().into()
 }
 
-/// What differs between two sets of attributes, an entry a key: `omega: 2.6 there, 3 here`.
-/// JSON text is looked into.
+/// Lists the differences between two sets of attributes, one per key: `omega: 2.6 there, 3 here`.
+/// JSON texts are compared entry by entry.
 pub fn differences(there: &Value, here: &Value) -> Vec<String> {
     let mut found = Vec::new();
     compare("", there, here, &mut found);
@@ -65,7 +66,7 @@ fn compare(path: &str, there: &Value, here: &Value, found: &mut Vec<String>) {
     }
 }
 
-/// JSON text as what it says.
+/// Parses JSON text in an attribute; other values are returned unchanged.
 fn opened(value: &Value) -> Value {
     match value {
         Value::String(text) if text.starts_with(['{', '[']) => {

@@ -1,7 +1,7 @@
-//! zlib streams of chunks, without a compressor's third of a megabyte anew for each.
+//! zlib streams of chunks, with one compressor per thread.
 //!
-//! Handing that much back to the system and asking for it again, a thousand times a second,
-//! cost a tenth of a sweep, and more the more threads did it.
+//! A compressor has a third of a megabyte. Allocating it a thousand times per second cost a tenth
+//! of a sweep, and more with more threads.
 
 use std::cell::RefCell;
 
@@ -9,15 +9,15 @@ use miniz_oxide::deflate::core::{
     CompressorOxide, TDEFLFlush, TDEFLStatus, compress, create_comp_flags_from_zip_params,
 };
 
-/// How hard zlib tries: repeating motions shrink to almost nothing already here, and
-/// the digits of chaotic ones shrink nowhere.
+/// Compression level of zlib: repeating motions are compressed to almost nothing at this level, and
+/// the digits of chaotic ones cannot be compressed at any level.
 pub(super) const LEVEL: u8 = 3;
-/// What zlib adds to data that shrinks nowhere, at most, beside its header: five bytes for
+/// Largest overhead of zlib for incompressible data, in addition to its header: five bytes for
 /// every block of 31 KiB.
 const OVERHEAD: (usize, usize) = (64, 4096);
 
 thread_local! {
-    /// Each thread's own compressor.
+    /// The compressor of each thread.
     static COMPRESSOR: RefCell<CompressorOxide> = RefCell::new(compressor());
 }
 
@@ -26,7 +26,7 @@ fn compressor() -> CompressorOxide {
     CompressorOxide::new(create_comp_flags_from_zip_params(i32::from(LEVEL), 1, 0))
 }
 
-/// The zlib stream of some bytes; the same bytes whatever was compressed before.
+/// Compresses bytes to a zlib stream, which does not depend on what was compressed before.
 pub(super) fn deflate(bytes: &[u8]) -> Vec<u8> {
     COMPRESSOR.with_borrow_mut(|compressor| {
         compressor.reset();
@@ -36,8 +36,8 @@ pub(super) fn deflate(bytes: &[u8]) -> Vec<u8> {
             let (status, taken, made) =
                 compress(compressor, left, &mut stream[written..], TDEFLFlush::Finish);
             (left, written) = (&left[taken..], written + made);
-            // Anything but lack of room would be a mistake in the compressor: it is then as
-            // if there were none, and the reader finds the damage by its checksum.
+            // Any failure other than lack of space would be an error in the compressor. The stream
+            // is then incomplete, which the reader detects by its checksum.
             if status != TDEFLStatus::Okay {
                 break;
             }
@@ -54,7 +54,7 @@ mod tests {
     use miniz_oxide::deflate::compress_to_vec_zlib;
     use miniz_oxide::inflate::decompress_to_vec_zlib;
 
-    /// Repeating, then without any pattern, then nothing.
+    /// Repeating data, data without a pattern, no data.
     fn samples() -> Vec<Vec<u8>> {
         let mut seed = 1_u64;
         let noise = (0..300_000)

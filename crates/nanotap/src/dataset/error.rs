@@ -1,73 +1,73 @@
-//! Why a store could not be used.
+//! Errors of dataset stores.
 
 use std::path::{Path, PathBuf};
 
 /// Why a store could not be used.
 #[derive(Debug, thiserror::Error)]
 pub enum StoreError {
-    /// Something else stands where the store should be.
-    #[error("{} is there already and is not a dataset: {what}", path.display())]
+    /// The path exists and is not a dataset.
+    #[error("{} already exists and is not a dataset: {what}", path.display())]
     Occupied {
-        /// Where.
+        /// Path of the store.
         path: PathBuf,
-        /// What was found.
+        /// What the path is.
         what: String,
     },
-    /// A store that there is not.
+    /// The store does not exist or is not a dataset of nanotap.
     #[error("{} is not a dataset of nanotap: {what}", path.display())]
     NotAStore {
-        /// Where.
+        /// Path of the store.
         path: PathBuf,
         /// What is missing or wrong.
         what: String,
     },
-    /// The store was made by another case or with other options.
+    /// The store belongs to another case or other options.
     #[error(
-        "{} was made otherwise: {}",
+        "{} belongs to another case or other options: {}",
         path.display(),
         differences.join("; ")
     )]
     Mismatch {
-        /// Where.
+        /// Path of the store.
         path: PathBuf,
-        /// What differs, an entry a key, `key: there, here`.
+        /// The differences, one per key, as `key: there, here`.
         differences: Vec<String>,
     },
-    /// A chunk that a reader needs is not there.
+    /// Chunks are missing.
     #[error(
         "{}: {missing} of {total} chunks are missing; run the same command again to finish it",
         path.display()
     )]
     Unfinished {
-        /// Where.
+        /// Path of the store.
         path: PathBuf,
-        /// How many chunks are missing.
+        /// Number of missing chunks.
         missing: usize,
-        /// How many there must be.
+        /// Number of all chunks.
         total: usize,
     },
-    /// A file of the store does not hold what it should.
+    /// The content of a file is invalid.
     #[error("{} is damaged: {what}", path.display())]
     Damaged {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// What is wrong with it.
+        /// What is wrong.
         what: String,
     },
-    /// The file system refused.
+    /// The file system returned an error.
     #[error("cannot {doing} {}: {source}", path.display())]
     Io {
-        /// Reading, writing …
+        /// The operation: reading, writing …
         doing: &'static str,
-        /// Which file.
+        /// Path of the file.
         path: PathBuf,
-        /// Why.
+        /// Error of the operating system.
         source: std::io::Error,
     },
 }
 
 impl StoreError {
-    /// For `map_err`: what was being done with which file.
+    /// For `map_err`: records the operation and the file.
     pub(crate) fn io(doing: &'static str, path: &Path) -> impl FnOnce(std::io::Error) -> Self {
         let path = path.to_owned();
         move |source| Self::Io {

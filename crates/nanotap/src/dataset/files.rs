@@ -1,7 +1,7 @@
-//! Files that appear whole or not at all.
+//! Files that are written completely or not at all.
 //!
-//! A file is written under a temporary name beside its place, then renamed. A link stays a link
-//! (what it points to is replaced), and a file that is replaced hands on its permissions.
+//! A file is written under a temporary name in the same folder, then renamed. If the path is a
+//! link, its target is replaced. The new file takes over the permissions of the old one.
 
 use std::fs::{self, File, OpenOptions};
 use std::hash::{BuildHasher as _, RandomState};
@@ -9,23 +9,23 @@ use std::io::{self, BufWriter, ErrorKind, Write as _};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, SystemTime};
 
-/// The ending of files that are being written.
+/// Extension of files that are being written.
 const TEMPORARY: &str = "tmp";
-/// A temporary file older than this belongs to nobody: to write one takes seconds.
+/// A temporary file older than this is abandoned: writing one takes seconds.
 const ABANDONED: Duration = Duration::from_secs(3600);
 
-/// Writes `bytes` to `path`, on the disk before they take their name.
+/// Writes `bytes` to `path`, synchronised to disk before the rename.
 ///
 /// # Errors
-/// When the file system refuses; what was there before is still there.
+/// If the file system fails; an existing file is then unchanged.
 pub fn write(path: &Path, bytes: &[u8]) -> io::Result<()> {
     write_with(path, |file| file.write_all(bytes))
 }
 
-/// Writes what `fill` makes to `path`, on the disk before it takes its name.
+/// Writes the output of `fill` to `path`, synchronised to disk before the rename.
 ///
 /// # Errors
-/// Those of `fill`, and when the file system refuses; what was there before is still there.
+/// The errors of `fill` and of the file system; an existing file is then unchanged.
 pub fn write_with<E: From<io::Error>>(
     path: &Path,
     fill: impl FnOnce(&mut BufWriter<File>) -> Result<(), E>,
@@ -33,11 +33,11 @@ pub fn write_with<E: From<io::Error>>(
     put(path, true, fill)
 }
 
-/// The same in the order in which the operating system sees fit, many times faster: a power cut
-/// may leave `path` empty.
+/// As [`write`], without synchronisation, which is many times faster: after a power failure `path`
+/// may be empty.
 ///
 /// # Errors
-/// When the file system refuses.
+/// If the file system fails.
 pub(crate) fn write_unsynced(path: &Path, bytes: &[u8]) -> io::Result<()> {
     put(path, false, |file| file.write_all(bytes))
 }
@@ -49,8 +49,16 @@ fn put<E: From<io::Error>>(
 ) -> Result<(), E> {
     let target = followed(path)?;
     let there = fs::metadata(&target).ok();
-    if there.as_ref().is_some_and(fs::Metadata::is_dir) {
-        return Err(io::Error::new(ErrorKind::IsADirectory, "it is a folder").into());
+    if let Some(there) = &there
+        && !there.is_file()
+    {
+        // A pipe or a device would be replaced by a file.
+        let kind = if there.is_dir() {
+            "a folder"
+        } else {
+            "not a regular file"
+        };
+        return Err(io::Error::other(format!("it is {kind}")).into());
     }
     let temporary = temporary(&target)?;
     let write = || -> Result<(), E> {
@@ -70,14 +78,14 @@ fn put<E: From<io::Error>>(
         Ok(fs::rename(&temporary, &target)?)
     };
     write().inspect_err(|_| {
-        // What is half written is of no use; that it may not be there is fine.
+        // An incomplete file is useless; it may not exist.
         let _ = fs::remove_file(&temporary);
     })
 }
 
-/// Where a chain of links ends; of a dangling one, what it points to.
+/// The target of a chain of links; for a dangling link, the missing target.
 fn followed(path: &Path) -> io::Result<PathBuf> {
-    /// Longer chains are circles.
+    /// Longer chains are cycles.
     const LINKS: usize = 40;
     let mut path = path.to_path_buf();
     for _ in 0..LINKS {
@@ -89,18 +97,18 @@ fn followed(path: &Path) -> io::Result<PathBuf> {
             None => to,
         };
     }
-    Err(io::Error::other("its links go round in circles"))
+    Err(io::Error::other("its symbolic links form a cycle"))
 }
 
-/// A name beside `path` that nobody else has: two runs, on two machines even, may write the same
-/// file at the same time.
+/// A unique name next to `path`: several runs, even on several machines, may write the same file at
+/// the same time.
 fn temporary(path: &Path) -> io::Result<PathBuf> {
     let name = path
         .file_name()
         .ok_or_else(|| io::Error::new(ErrorKind::InvalidInput, "it has no file name"))?;
     let mut hidden = std::ffi::OsString::from(".");
     hidden.push(name);
-    // The standard library's hasher starts anywhere.
+    // The standard library's hasher has a random start.
     let unique = RandomState::new().hash_one(std::process::id());
     hidden.push(format!(".{unique:016x}.{TEMPORARY}"));
     Ok(path.with_file_name(hidden))
@@ -111,7 +119,7 @@ pub fn checksum(bytes: &[u8]) -> u32 {
     crc32fast::hash(bytes)
 }
 
-/// Whether a file is one that is being written, or was when its program ended.
+/// True if a file is being written, or was when its program ended.
 pub(crate) fn is_temporary(path: &Path) -> bool {
     let hidden = path
         .file_name()
@@ -119,13 +127,13 @@ pub(crate) fn is_temporary(path: &Path) -> bool {
     hidden && path.extension().is_some_and(|ending| ending == TEMPORARY)
 }
 
-/// Removes a temporary file that nobody can be writing any more.
+/// Removes a temporary file that no process can be writing any more.
 pub(crate) fn remove_abandoned(path: &Path) {
     let age = fs::metadata(path)
         .and_then(|metadata| metadata.modified())
         .map(|changed| SystemTime::now().duration_since(changed));
     if is_temporary(path) && matches!(age, Ok(Ok(age)) if age > ABANDONED) {
-        // Another process may just have removed it.
+        // Another process may have removed it.
         let _ = fs::remove_file(path);
     }
 }
@@ -156,13 +164,20 @@ mod tests {
         assert_eq!(fs::read_to_string(&file).unwrap(), "after");
         let mode = fs::metadata(&file).unwrap().permissions().mode();
         assert_eq!(mode & 0o777, 0o640);
-        // A link to nothing yet, and one to itself.
+        // A link to a file that does not exist yet, and a link to itself.
         symlink("new.csv", folder.join("early.csv")).unwrap();
         write(&folder.join("early.csv"), b"x").unwrap();
         assert_eq!(fs::read_to_string(folder.join("new.csv")).unwrap(), "x");
         symlink("circle", folder.join("circle")).unwrap();
         assert!(write(&folder.join("circle"), b"x").is_err());
         fs::remove_dir_all(&folder).unwrap();
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn devices_are_not_replaced() {
+        let refused = write(Path::new("/dev/null"), b"x").unwrap_err();
+        assert_eq!(refused.to_string(), "it is not a regular file");
     }
 
     #[test]

@@ -2,19 +2,19 @@
 
 use std::ops::Range;
 
-/// A dimension that is cut into chunks.
+/// A dimension that is divided into chunks.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Axis {
-    /// Its name in the dataset.
+    /// Name of the dimension in the dataset.
     pub name: String,
-    /// Number of entries, 1 at least.
+    /// Number of entries, at least 1.
     pub length: usize,
-    /// Entries a chunk, 1 at least; the last chunk may have fewer.
+    /// Number of entries per chunk, at least 1; the last chunk may be shorter.
     pub chunk: usize,
 }
 
 impl Axis {
-    /// An axis; a chunk is no longer than the axis and neither is empty.
+    /// Creates an axis. Lengths below 1 become 1, and a chunk is at most as long as the axis.
     pub fn new(name: impl Into<String>, length: usize, chunk: usize) -> Self {
         let length = length.max(1);
         Self {
@@ -24,27 +24,27 @@ impl Axis {
         }
     }
 
-    /// Number of chunks along it.
+    /// Number of chunks along this axis.
     pub fn chunks(&self) -> usize {
         self.length.div_ceil(self.chunk)
     }
 }
 
-/// The axes, slowest first.
+/// A grid of chunks.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Grid {
-    /// The axes.
+    /// The axes, slowest first.
     pub axes: Vec<Axis>,
 }
 
 /// One chunk of a grid: a range of entries along each axis.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Block {
-    /// The chunk's index among all chunks, row-major.
+    /// Index of the chunk among all chunks, row-major.
     pub chunk: usize,
-    /// Its place along each axis, in chunks.
+    /// Index of the chunk along each axis.
     pub place: Vec<usize>,
-    /// Its entries along each axis.
+    /// Range of entries along each axis.
     pub ranges: Vec<Range<usize>>,
 }
 
@@ -54,17 +54,17 @@ impl Block {
         self.ranges.iter().map(ExactSizeIterator::len).product()
     }
 
-    /// Never true: a chunk has one entry at least.
+    /// Always false: a chunk has at least one entry.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
 
-    /// The entries (an index along each axis), row-major.
+    /// The entries (one index per axis), row-major.
     pub fn entries(&self) -> impl Iterator<Item = Vec<usize>> + '_ {
         (0..self.len()).map(|flat| self.entry(flat))
     }
 
-    /// The `flat`-th entry, row-major.
+    /// The entry at the row-major index `flat`.
     pub fn entry(&self, mut flat: usize) -> Vec<usize> {
         let mut entry = vec![0; self.ranges.len()];
         for (slot, range) in entry.iter_mut().zip(&self.ranges).rev() {
@@ -91,7 +91,7 @@ impl Grid {
         self.axes.iter().map(|a| a.chunk).product()
     }
 
-    /// The `chunk`-th chunk, row-major.
+    /// The chunk with the row-major index `chunk`.
     pub fn block(&self, chunk: usize) -> Block {
         let mut rest = chunk;
         let mut place = vec![0; self.axes.len()];
@@ -111,7 +111,7 @@ impl Grid {
         }
     }
 
-    /// Where the `index`-th entry of `block` (row-major) stands in a full chunk.
+    /// Position in a full chunk of the entry with row-major index `index` of `block`.
     pub(crate) fn slot(&self, block: &Block, index: usize) -> usize {
         block
             .entry(index)
@@ -126,7 +126,7 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    /// Ten entries by four are three chunks, the last one short; eight are two, none empty.
+    /// Ten entries in chunks of four give three chunks, the last one short; eight give two.
     #[test]
     fn chunks_are_as_many_and_as_long_as_counted_by_hand() {
         let ranges = |length, chunk| {
@@ -140,7 +140,7 @@ mod tests {
         assert_eq!(ranges(10, 4), [(0, 4), (4, 8), (8, 10)]);
         assert_eq!(ranges(8, 4), [(0, 4), (4, 8)]);
         assert_eq!(ranges(3, 9), [(0, 3)]);
-        // Two rows by five columns, by two: row-major, as Zarr's names say.
+        // Two rows by five columns in chunks of two: row-major, as in Zarr's names.
         let axes = vec![Axis::new("y", 2, 1), Axis::new("x", 5, 2)];
         let block = Grid { axes }.block(4);
         assert_eq!((block.place, block.ranges), (vec![1, 1], vec![1..2, 2..4]));

@@ -1,21 +1,21 @@
-//! Maps as Gwyddion's simple fields, `.gsf`, which programs for AFM data open.
+//! Maps as Gwyddion Simple Field files (`.gsf`), which programs for AFM data can open.
 //!
 //! A file is a text header, zeros up to the next multiple of four bytes, and the values as
-//! little-endian 32-bit floats, row by row from the top. Since pictures have their origin at
-//! the top, the row of the greatest `y` comes first. What is not known is NaN.
+//! little-endian 32-bit floats, row by row from the top. Since images have their origin at the top,
+//! the row of the largest `y` comes first. Unknown values are NaN.
 
 use std::fmt::Write as _;
 
-/// Two axes and a value at each of their crossings.
+/// Two axes and a value at each grid point.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Field {
-    /// What it shows; one line.
+    /// Title; one line.
     pub title: String,
-    /// Values of the horizontal axis, in equal steps, rising.
+    /// Values of the horizontal axis, equidistant and ascending.
     pub x: Vec<f64>,
-    /// Values of the vertical axis, in equal steps, rising.
+    /// Values of the vertical axis, equidistant and ascending.
     pub y: Vec<f64>,
-    /// The values, a row a value of `y`.
+    /// The values, one row per value of `y`.
     pub values: Vec<f64>,
     /// Unit of the axes in SI, empty if they have none.
     pub axis_unit: String,
@@ -23,26 +23,28 @@ pub struct Field {
     pub value_unit: String,
 }
 
-/// A field that the format cannot hold.
+/// Why a field cannot be written as GSF.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum FieldError {
     /// The values do not fill the axes.
-    #[error("{found} values where {columns} by {rows} are needed")]
+    #[error("got {found} values, expected {columns} × {rows}")]
     Size {
-        /// How many there are.
+        /// Number of values.
         found: usize,
-        /// Values of the horizontal axis.
+        /// Length of the horizontal axis.
         columns: usize,
-        /// Values of the vertical axis.
+        /// Length of the vertical axis.
         rows: usize,
     },
-    /// An axis is no row of pixels.
-    #[error("the {axis} axis does not rise in equal steps, as the pixels of a GSF file do")]
+    /// The values of an axis are not equidistant and ascending.
+    #[error(
+        "a GSF file needs equal steps, but the values of the {axis} axis are not ascending and equidistant"
+    )]
     Steps {
         /// `horizontal` or `vertical`.
         axis: &'static str,
     },
-    /// An axis has no value at all.
+    /// An axis is empty.
     #[error("the {axis} axis is empty")]
     Empty {
         /// `horizontal` or `vertical`.
@@ -50,16 +52,16 @@ pub enum FieldError {
     },
 }
 
-/// Largest deviation of a value from its place, as a part of a step.
+/// Largest deviation of an axis value from an equidistant one, as a fraction of the step.
 const TOLERANCE: f64 = 1e-6;
-/// What the header is padded to.
+/// Alignment of the end of the header, in bytes.
 const ALIGNMENT: usize = 4;
 
 impl Field {
-    /// The file.
+    /// Encodes the field as a GSF file.
     ///
     /// # Errors
-    /// [`FieldError`] where the format cannot hold it.
+    /// [`FieldError`] if the format cannot represent it.
     pub fn to_gsf(&self) -> Result<Vec<u8>, FieldError> {
         let (columns, rows) = (self.x.len(), self.y.len());
         let (width, left) = extent(&self.x, "horizontal")?;
@@ -72,7 +74,7 @@ impl Field {
             });
         }
         let mut header = String::from("Gwyddion Simple Field 1.0\n");
-        // Writing to a string does not fail.
+        // Writing to a string cannot fail.
         let _ = write!(
             header,
             "XRes = {columns}\nYRes = {rows}\nXReal = {width:e}\nYReal = {height:e}\n\
@@ -89,7 +91,7 @@ impl Field {
             }
         }
         let mut file = header.into_bytes();
-        // One zero at least ends the header.
+        // The header ends with at least one zero.
         let zeros = ALIGNMENT - file.len() % ALIGNMENT;
         file.resize(file.len() + zeros, 0);
         for row in self.values.chunks_exact(columns).rev() {
@@ -99,7 +101,7 @@ impl Field {
     }
 }
 
-/// The length of an axis of pixels and where it begins: half a step before the first value.
+/// Length of an axis of pixels, and its beginning: half a step before the first value.
 fn extent(values: &[f64], axis: &'static str) -> Result<(f64, f64), FieldError> {
     let (Some(first), Some(last)) = (values.first(), values.last()) else {
         return Err(FieldError::Empty { axis });
@@ -114,7 +116,7 @@ fn extent(values: &[f64], axis: &'static str) -> Result<(f64, f64), FieldError> 
     let step = (last - first) / (values.len() - 1) as f64;
     let in_place =
         |(k, value): (usize, &f64)| (value - (first + step * k as f64)).abs() <= TOLERANCE * step;
-    // A step that is no number is not greater than zero.
+    // The comparison is false for a step that is NaN.
     if step > 0.0 && step.is_finite() && values.iter().enumerate().all(in_place) {
         Ok((step * values.len() as f64, first - 0.5 * step))
     } else {

@@ -1,30 +1,29 @@
-//! Putting together what several machines computed of one dataset.
+//! Merging of partial datasets that several machines have computed.
 
 use std::path::{Path, PathBuf};
 
 use super::error::StoreError;
 use super::store::{Store, mismatch, same};
 
-/// What a merge came to.
+/// Result of a merge.
 #[derive(Clone, Debug, PartialEq, Eq, serde::Serialize)]
 pub struct Merged {
-    /// The merged store.
+    /// Path of the merged store.
     pub path: PathBuf,
-    /// Chunks of the dataset.
+    /// Number of chunks of the dataset.
     pub chunks: usize,
-    /// Chunks that were copied now.
+    /// Number of chunks copied in this merge.
     pub copied: usize,
-    /// Chunks that are in none of the stores, by index.
+    /// Indices of chunks that are in none of the stores.
     pub missing: Vec<usize>,
 }
 
-/// Copies the finished chunks of `sources` into the store at `target`, which is made if
-/// it is not there: byte for byte what one machine would have made. What is damaged in
-/// one source is taken from another, or missing.
+/// Copies the finished chunks of `sources` into the store at `target`, which is created if
+/// necessary; the bytes are those that one machine would have written. A chunk that is damaged in
+/// one source is taken from another one, or is missing.
 ///
 /// # Errors
-/// When a source is no store, when two do not belong together, or when the file system
-/// refuses.
+/// If a source is not a store, if two do not belong together, or if the file system fails.
 pub fn merge(sources: &[PathBuf], target: &Path) -> Result<Merged, StoreError> {
     let mut stores = Vec::with_capacity(sources.len());
     for source in sources {
@@ -38,7 +37,7 @@ pub fn merge(sources: &[PathBuf], target: &Path) -> Result<Merged, StoreError> {
         stores.push(store);
     }
     let Some(first) = stores.first() else {
-        let what = "no store was given to merge".into();
+        let what = "no dataset to merge".into();
         return Err(StoreError::NotAStore {
             path: target.into(),
             what,

@@ -1,27 +1,24 @@
-//! Datasets of long work: chunked stores on disk that open with `xarray.open_zarr`.
+//! Datasets of many runs: chunked stores on disk that open with `xarray.open_zarr`.
 //!
-//! A store is a folder in the Zarr format, version 2, with consolidated metadata: every
-//! Zarr reader opens it (Python, Julia, MATLAB, C++, Rust). Arrays have named dimensions,
-//! coordinates and units; the root's attributes hold the case and everything else that
-//! decides the numbers, so that one set of attributes has one set of bytes.
+//! A store is a folder in the Zarr format, version 2, with consolidated metadata, which every Zarr
+//! reader can open (Python, Julia, MATLAB, C++, Rust). Arrays have named dimensions, coordinates
+//! and units. The attributes of the root contain the case and everything else that determines the
+//! numbers, so that the same attributes mean the same bytes.
 //!
-//! All computed variables share one grid of chunks. A chunk is a pure function of the
-//! attributes and its index, and the unit of parallel work, of resuming and of work on
-//! another machine:
+//! All computed variables share one grid of chunks. A chunk is a pure function of the attributes
+//! and its index. It is the unit of parallel work, of resuming, and of work on other machines:
 //!
 //! - its files are written under temporary names and renamed;
-//! - then its [marker](store::Store) is, which holds a checksum of each of them. A chunk
-//!   counts as finished if its marker is there and its files are what the marker says,
-//!   so that nothing can come between (a kill between two variables, a lost page after a
-//!   power failure) without being noticed: the chunk is computed again;
-//! - stores made of the same attributes on several machines are put together by
-//!   [`merge()`], to the same bytes as one machine makes;
-//! - several processes may even work on one store on a shared disk, each on its
-//!   [`Share`].
+//! - then its [marker](store::Store) is written, which contains a checksum of each file. A chunk is
+//!   finished if its marker exists and its files agree with it. Damage in between (a kill between
+//!   two variables, a page lost in a power failure) is detected, and the chunk is computed again;
+//! - stores with the same attributes from several machines are merged by [`merge()`], to the same
+//!   bytes as from one machine;
+//! - several processes may work on one store on a shared disk, each on its [`Share`].
 //!
-//! Zarr's own files are few and plain (JSON, and a zlib stream of little-endian numbers
-//! a chunk), so they are written here: the zarrs crate costs a minute and a half of
-//! building and has no rename-when-complete.
+//! Zarr's files are few and simple (JSON, and one zlib stream of little-endian numbers per chunk),
+//! so they are written here: the zarrs crate takes a minute and a half to build and does not rename
+//! complete files.
 
 pub mod attributes;
 mod deflate;

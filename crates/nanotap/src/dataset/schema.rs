@@ -1,4 +1,4 @@
-//! What a dataset holds: its grid, its variables, its coordinates, its attributes.
+//! Content of a dataset: grid, variables, coordinates and attributes.
 
 use serde_json::{Map, Value};
 
@@ -7,21 +7,21 @@ use super::grid::Grid;
 /// Attributes of a dataset or of a variable.
 pub type Attributes = Map<String, Value>;
 
-/// Numbers or words of one variable.
+/// Values of one variable.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Values {
-    /// Real numbers; a missing one is NaN.
+    /// Real numbers; missing values are NaN.
     Real(Vec<f64>),
-    /// Whole numbers; the padding of a chunk is 0.
+    /// Integers; the padding of a chunk is 0.
     Whole(Vec<i32>),
-    /// Codes, as CF's `flag_values`; 0 is missing.
+    /// Codes for CF `flag_values`; 0 is missing.
     Code(Vec<u8>),
-    /// Words.
+    /// Texts.
     Text(Vec<String>),
 }
 
 impl Values {
-    /// How many.
+    /// Number of values.
     pub fn len(&self) -> usize {
         match self {
             Self::Real(v) => v.len(),
@@ -31,9 +31,19 @@ impl Values {
         }
     }
 
-    /// Whether there are none.
+    /// True if there are no values.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
+    }
+
+    /// The values as numbers; none of words.
+    pub fn numbers(self) -> Vec<f64> {
+        match self {
+            Self::Real(values) => values,
+            Self::Whole(values) => values.into_iter().map(f64::from).collect(),
+            Self::Code(values) => values.into_iter().map(f64::from).collect(),
+            Self::Text(_) => Vec::new(),
+        }
     }
 
     pub(crate) fn kind(&self) -> Kind {
@@ -53,7 +63,7 @@ impl Values {
     }
 }
 
-/// What the entries of a variable are.
+/// Type of the entries of a variable.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
     /// `f64`.
@@ -62,12 +72,12 @@ pub enum Kind {
     Whole,
     /// `u8`.
     Code,
-    /// Words of at most so many characters.
+    /// Texts of at most this many characters.
     Text(usize),
 }
 
 impl Kind {
-    /// Bytes an entry.
+    /// Number of bytes per entry.
     pub fn size(self) -> usize {
         match self {
             Self::Real => 8,
@@ -78,22 +88,22 @@ impl Kind {
     }
 }
 
-/// A computed variable: over all axes of the grid, and then over further dimensions
-/// that are not cut into chunks.
+/// A computed variable over all axes of the grid, and over further dimensions that are not divided
+/// into chunks.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Variable {
-    /// Its name.
+    /// Name of the variable.
     pub name: String,
-    /// What its entries are.
+    /// Type of the entries.
     pub kind: Kind,
-    /// The further dimensions, name and length.
+    /// Further dimensions: name and length.
     pub tail: Vec<(String, usize)>,
-    /// `long_name`, `units` and the like.
+    /// `long_name`, `units` and other attributes.
     pub attributes: Attributes,
 }
 
 impl Variable {
-    /// A variable over the grid alone.
+    /// Creates a variable over the grid alone.
     pub fn new(name: &str, kind: Kind, long_name: &str, units: &str) -> Self {
         let mut attributes = Attributes::new();
         attributes.insert("long_name".into(), long_name.into());
@@ -106,41 +116,41 @@ impl Variable {
         }
     }
 
-    /// With one more dimension.
+    /// Adds a dimension.
     #[must_use]
     pub fn along(mut self, dimension: &str, length: usize) -> Self {
         self.tail.push((dimension.into(), length));
         self
     }
 
-    /// With one more attribute.
+    /// Adds an attribute.
     #[must_use]
     pub fn attribute(mut self, key: &str, value: impl Into<Value>) -> Self {
         self.attributes.insert(key.into(), value.into());
         self
     }
 
-    /// Entries for each entry of the grid.
+    /// Number of entries for each entry of the grid.
     pub fn stride(&self) -> usize {
         self.tail.iter().map(|(_, length)| length).product()
     }
 }
 
-/// A coordinate: short, known from the start, written whole.
+/// A coordinate: short, known in advance, stored in one piece.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Coordinate {
-    /// Its name; with the name of a dimension it labels that dimension.
+    /// Name of the coordinate; if it is that of a dimension, the coordinate labels this dimension.
     pub name: String,
-    /// Its dimensions.
+    /// Names of its dimensions.
     pub dimensions: Vec<String>,
     /// Its values, row-major.
     pub values: Values,
-    /// `long_name`, `units` and the like.
+    /// `long_name`, `units` and other attributes.
     pub attributes: Attributes,
 }
 
 impl Coordinate {
-    /// The labels of a dimension.
+    /// Creates the labels of a dimension.
     pub fn of(dimension: &str, values: Values, long_name: &str, units: &str) -> Self {
         let mut attributes = Attributes::new();
         attributes.insert("long_name".into(), long_name.into());
@@ -154,26 +164,26 @@ impl Coordinate {
     }
 }
 
-/// What a dataset holds.
+/// Content of a dataset.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Schema {
     /// The grid of chunks.
     pub grid: Grid,
-    /// The computed variables. Their names are not those of coordinates.
+    /// The computed variables; their names differ from those of coordinates.
     pub variables: Vec<Variable>,
     /// The coordinates.
     pub coordinates: Vec<Coordinate>,
-    /// Everything that decides the numbers.
+    /// Everything that determines the numbers.
     pub attributes: Attributes,
 }
 
 impl Schema {
-    /// The place of the variable called `name`.
+    /// Index of the variable called `name`.
     pub fn index_of(&self, name: &str) -> Option<usize> {
         self.variables.iter().position(|v| v.name == name)
     }
 
-    /// The values along an axis of the grid; where they are no numbers, these are counted.
+    /// Values along an axis of the grid; for labels that are not numbers, their indices.
     pub fn axis_values(&self, axis: usize) -> Vec<f64> {
         let axis = &self.grid.axes[axis];
         match self.coordinate(&axis.name).map(|c| &c.values) {

@@ -1,34 +1,34 @@
-//! One machine's share of the chunks.
+//! The share of the chunks that one machine computes.
 
 use std::fmt;
 use std::str::FromStr;
 
-/// The `index`-th of `count` shares: the chunks `index`, `index + count`, … (shares
-/// count from 1, chunks from 0), so that dear and cheap regions spread evenly.
+/// The `index`-th of `count` shares: the chunks `index − 1`, `index − 1 + count`, … (shares count
+/// from 1, chunks from 0), so that expensive and cheap regions are distributed evenly.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Share {
     index: usize,
     count: usize,
 }
 
-/// A share that makes no sense.
+/// An invalid share.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("`{given}` is not a share: write i/n with 1 ≤ i ≤ n, as in 2/8 for the second of eight")]
+#[error("`{given}` is not a share: expected i/n with 1 ≤ i ≤ n, as in 2/8 for the second of eight")]
 pub struct ShareError {
-    /// What was given.
+    /// The given text.
     pub given: String,
 }
 
 impl Share {
-    /// Everything.
+    /// All chunks.
     pub const WHOLE: Self = Self { index: 1, count: 1 };
 
-    /// Whether `chunk` belongs to it.
+    /// True if `chunk` belongs to the share.
     pub fn holds(self, chunk: usize) -> bool {
         chunk % self.count == self.index - 1
     }
 
-    /// Whether it is everything.
+    /// True if the share contains all chunks.
     pub fn is_whole(self) -> bool {
         self.count == 1
     }

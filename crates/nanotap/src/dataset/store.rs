@@ -1,4 +1,4 @@
-//! One dataset on disk.
+//! A dataset on disk.
 
 use std::fs;
 use std::io::ErrorKind;
@@ -14,19 +14,18 @@ use super::schema::{Attributes, Coordinate, Kind, Schema, Values, Variable};
 use super::zarr;
 use crate::dataset::files::{self, is_temporary};
 
-/// The folder of markers, one a finished chunk. Zarr readers look at metadata only and
-/// never see it.
+/// The folder of markers, one per finished chunk. Zarr readers look at the metadata only and ignore
+/// it.
 const MARKERS: &str = ".chunks";
-/// The attribute that says which axes are cut how, and which arrays are computed.
+/// The attribute with the chunks of each axis and the names of the computed arrays.
 const LAYOUT: &str = "chunk_layout";
-/// The attribute by which xarray knows coordinates that label no dimension.
+/// The attribute from which xarray knows coordinates that do not label a dimension.
 const COORDINATES: &str = "coordinates";
 
-/// One dataset on disk.
+/// A dataset on disk.
 ///
-/// A chunk is finished when its marker, `.chunks/<index>`, is there and names the length
-/// and the CRC-32 of the chunk's file of every variable as they are. Markers are looked
-/// at when the store is opened.
+/// A chunk is finished if its marker, `.chunks/<index>`, exists and states the length and the
+/// CRC-32 of the chunk's file for every variable. Markers are read when the store is opened.
 #[derive(Debug)]
 pub struct Store {
     path: PathBuf,
@@ -36,11 +35,11 @@ pub struct Store {
 }
 
 impl Store {
-    /// The store at `path`, made now if there is none.
+    /// Opens the store at `path`, or creates it.
     ///
     /// # Errors
-    /// When something else stands there, when it was made with other attributes, or when
-    /// the file system refuses.
+    /// If the path is something else, if the store has other attributes, or if the file system
+    /// fails.
     pub fn create_or_resume(path: &Path, schema: Schema) -> Result<Self, StoreError> {
         let documents = documents(&schema);
         let metadata = consolidated(&documents);
@@ -53,7 +52,10 @@ impl Store {
                     what: "a file".into(),
                 });
             }
-            Ok(_) => refuse_strangers(path, &metadata, &documents)?,
+            Ok(_) => {
+                refuse_links(path)?;
+                refuse_strangers(path, &metadata, &documents)?;
+            }
         }
         for (name, document) in &documents {
             write_if_other(&path.join(name), document.as_bytes())?;
@@ -64,15 +66,15 @@ impl Store {
             write_if_other(&file, &zarr::encode(&coordinate.values))?;
         }
         make_folder(&path.join(MARKERS))?;
-        // Last, because a folder with this document counts as a store.
+        // Written last, because a folder with this document counts as a store.
         write_if_other(&path.join(zarr::CONSOLIDATED), metadata.as_bytes())?;
         Ok(Self::with(path, schema, metadata))
     }
 
-    /// The store at `path`, whatever made it.
+    /// Opens an existing store.
     ///
     /// # Errors
-    /// When there is none, or it is not one of nanotap's.
+    /// If it does not exist or is not a store of nanotap.
     pub fn open(path: &Path) -> Result<Self, StoreError> {
         let document = path.join(zarr::CONSOLIDATED);
         let refuse = |what: &str| StoreError::NotAStore {
@@ -85,10 +87,10 @@ impl Store {
                 return Err(refuse(if path.exists() {
                     "it has no .zmetadata"
                 } else {
-                    "it is not there"
+                    "it does not exist"
                 }));
             }
-            Err(_) if path.is_file() => return Err(refuse("it is a file, no folder")),
+            Err(_) if path.is_file() => return Err(refuse("it is a file, not a folder")),
             Err(error) => return Err(StoreError::io("read", &document)(error)),
         };
         let (parsed, metadata) = if let Ok(parsed) = serde_json::from_str::<Value>(&metadata) {
@@ -117,17 +119,17 @@ impl Store {
         store
     }
 
-    /// Where it is.
+    /// Path of the store.
     pub fn path(&self) -> &Path {
         &self.path
     }
 
-    /// What it holds.
+    /// Content of the store.
     pub fn schema(&self) -> &Schema {
         &self.schema
     }
 
-    /// All its metadata, as text: equal for stores whose chunks fit together.
+    /// The metadata as text, equal for stores whose chunks fit together.
     pub fn metadata(&self) -> &str {
         &self.metadata
     }
@@ -137,19 +139,19 @@ impl Store {
         self.finished.len()
     }
 
-    /// Whether a chunk is finished.
+    /// True if the chunk is finished.
     pub fn is_finished(&self, chunk: usize) -> bool {
         self.finished
             .get(chunk)
             .is_some_and(|f| f.load(Ordering::Acquire))
     }
 
-    /// Number of chunks that are not finished.
+    /// Number of unfinished chunks.
     pub fn missing(&self) -> usize {
         (0..self.chunks()).filter(|c| !self.is_finished(*c)).count()
     }
 
-    /// Whether the marker and every file of a chunk are there and fit together.
+    /// True if the marker and every file of a chunk exist and agree.
     fn is_whole(&self, chunk: usize) -> bool {
         let Ok(marker) = fs::read_to_string(self.marker(chunk)) else {
             return false;
@@ -172,23 +174,22 @@ impl Store {
             .join(zarr::chunk_name(&block.place, variable.tail.len()))
     }
 
-    /// Writes a finished chunk: `columns` has the values of each variable, in order, for
-    /// the block's entries row-major.
+    /// Writes a finished chunk. `columns` contains the values of each variable, in order, for the
+    /// entries of the block, row-major.
     ///
     /// # Errors
-    /// When the file system refuses.
+    /// If the file system fails.
     ///
     /// # Panics
-    /// When a column has the wrong length or kind: a mistake of the caller.
+    /// If a column has the wrong length or type.
     pub fn write_chunk(&self, block: &Block, columns: &[Values]) -> Result<(), StoreError> {
         self.write_files(block, &chunk_files(&self.schema, block, columns))
     }
 
-    /// Takes a finished chunk that was computed elsewhere: the files that [`chunk_files`]
-    /// made of it.
+    /// Stores a finished chunk that was computed elsewhere, as the files made by [`chunk_files`].
     ///
     /// # Errors
-    /// When they are not the files of such a chunk, or the file system refuses.
+    /// If they are not the files of this chunk, or the file system fails.
     pub fn take_files(&self, chunk: usize, files: &[Vec<u8>]) -> Result<(), StoreError> {
         let damaged = |what: String| StoreError::Damaged {
             path: self.marker(chunk),
@@ -197,7 +198,7 @@ impl Store {
         let variables = &self.schema.variables;
         if chunk >= self.chunks() || files.len() != variables.len() {
             return Err(damaged(format!(
-                "{} files of chunk {chunk} where {} files of one of {} chunks are expected",
+                "got {} files of chunk {chunk}, expected {} files of one of {} chunks",
                 files.len(),
                 variables.len(),
                 self.chunks()
@@ -223,10 +224,10 @@ impl Store {
         Ok(())
     }
 
-    /// Takes a finished chunk over from a store of the same metadata, byte for byte.
+    /// Copies a finished chunk from a store with the same metadata, byte for byte.
     ///
     /// # Errors
-    /// When a file cannot be read or written.
+    /// If a file cannot be read or written.
     pub(super) fn take_chunk(&self, from: &Self, chunk: usize) -> Result<(), StoreError> {
         let block = self.schema.grid.block(chunk);
         let mut files = Vec::new();
@@ -237,11 +238,11 @@ impl Store {
         self.write_files(&block, &files)
     }
 
-    /// The values of a variable (by its place in the schema) in a finished chunk, for
-    /// the block's entries row-major.
+    /// Reads the values of a variable (by its index in the schema) in a finished chunk, for the
+    /// entries of the block, row-major.
     ///
     /// # Errors
-    /// When the file cannot be read or is damaged.
+    /// If the file cannot be read or is damaged.
     pub fn read_chunk(&self, block: &Block, variable: usize) -> Result<Values, StoreError> {
         let variable = &self.schema.variables[variable];
         let path = self.file(variable, block);
@@ -257,7 +258,37 @@ impl Store {
         })
     }
 
-    /// Refuses a store with chunks missing.
+    /// Calls a function for each entry of a finished dataset, with the entry and its numbers of some
+    /// variables.
+    ///
+    /// # Errors
+    /// When a variable or a chunk is missing or damaged.
+    pub fn each<const N: usize>(
+        &self,
+        names: [&str; N],
+        mut call: impl FnMut(&[usize], [f64; N]),
+    ) -> Result<(), StoreError> {
+        for chunk in 0..self.chunks() {
+            let block = self.schema.grid.block(chunk);
+            let column = |name: &&str| {
+                let missing = || StoreError::NotAStore {
+                    path: self.path.clone(),
+                    what: format!("not a sweep: it has no variable `{name}`"),
+                };
+                let variable = self.schema.index_of(name).ok_or_else(missing)?;
+                Ok(self.read_chunk(&block, variable)?.numbers())
+            };
+            let columns = names.iter().map(column).collect::<Result<Vec<_>, _>>()?;
+            let number = |k: usize, flat: usize| columns[k].get(flat).copied();
+            for (flat, entry) in block.entries().enumerate() {
+                let row = std::array::from_fn(|k| number(k, flat).unwrap_or(f64::NAN));
+                call(&entry, row);
+            }
+        }
+        Ok(())
+    }
+
+    /// Returns an error if chunks are missing.
     ///
     /// # Errors
     /// [`StoreError::Unfinished`].
@@ -272,18 +303,18 @@ impl Store {
         }
     }
 
-    /// Writes a document beside the arrays, whole or not at all.
+    /// Writes a document next to the arrays, completely or not at all.
     ///
     /// # Errors
-    /// When the file system refuses.
+    /// If the file system fails.
     pub fn write_beside(&self, name: &str, bytes: &[u8]) -> Result<(), StoreError> {
         write_if_other(&self.path.join(name), bytes)
     }
 
-    /// A document beside the arrays; `None` if it is not there.
+    /// Reads a document next to the arrays; `None` if it does not exist.
     ///
     /// # Errors
-    /// When the file system refuses.
+    /// If the file system fails.
     pub fn read_beside(&self, name: &str) -> Result<Option<Vec<u8>>, StoreError> {
         let path = self.path.join(name);
         match fs::read(&path) {
@@ -293,11 +324,11 @@ impl Store {
         }
     }
 
-    /// Once every chunk is finished: removes what killed runs left half-written long ago (others
-    /// may be at work on the same store). Returns whether every chunk is.
+    /// Returns true if every chunk is finished. Then it also removes temporary files that killed
+    /// runs left long ago (other processes may be working on the same store).
     ///
     /// # Errors
-    /// When the file system refuses.
+    /// If the file system fails.
     pub fn tidy(&self) -> Result<bool, StoreError> {
         if self.missing() > 0 {
             return Ok(false);
@@ -315,11 +346,11 @@ impl Store {
     }
 }
 
-/// The files of a chunk, one a variable: `columns` has the values of each, in order, for the
-/// block's entries row-major.
+/// The files of a chunk, one per variable. `columns` contains the values of each variable, in
+/// order, for the entries of the block, row-major.
 ///
 /// # Panics
-/// When a column has the wrong length or kind: a mistake of the caller.
+/// If a column has the wrong length or type.
 pub fn chunk_files(schema: &Schema, block: &Block, columns: &[Values]) -> Vec<Vec<u8>> {
     assert_eq!(columns.len(), schema.variables.len());
     let file = |(variable, column): (&Variable, &Values)| {
@@ -337,7 +368,7 @@ fn marker_line(name: &str, bytes: &[u8]) -> String {
     format!("{name} {} {:08x}", bytes.len(), crc32fast::hash(bytes))
 }
 
-/// A column as it stands in a full chunk; entries beyond the end of the axes are missing.
+/// A column in a full chunk; entries beyond the end of the axes are missing values.
 fn padded(grid: &Grid, block: &Block, column: &Values, stride: usize) -> Values {
     let full = grid.chunk_entries() * stride;
     match column {
@@ -371,7 +402,7 @@ fn unpadded<T: Clone>(grid: &Grid, block: &Block, full: &[T], stride: usize) -> 
         .collect()
 }
 
-/// All metadata documents by their names in the store, `.zmetadata` excepted.
+/// All metadata documents by their names in the store, except `.zmetadata`.
 fn documents(schema: &Schema) -> Vec<(String, String)> {
     let mut root = schema.attributes.clone();
     let axes: Vec<Value> = schema
@@ -387,14 +418,14 @@ fn documents(schema: &Schema) -> Vec<(String, String)> {
             .to_string()
             .into(),
     );
-    let beside: Vec<&str> = schema
+    let coordinates: Vec<&str> = schema
         .coordinates
         .iter()
         .filter(|c| c.dimensions.as_slice() != [c.name.clone()])
         .map(|c| c.name.as_str())
         .collect();
-    if !beside.is_empty() {
-        root.insert(COORDINATES.into(), beside.join(" ").into());
+    if !coordinates.is_empty() {
+        root.insert(COORDINATES.into(), coordinates.join(" ").into());
     }
     let mut all = vec![
         (zarr::GROUP.to_owned(), zarr::group()),
@@ -467,7 +498,28 @@ fn pretty(document: &Value) -> String {
     serde_json::to_string_pretty(document).unwrap_or_default() + "\n"
 }
 
-/// Refuses a folder that is a store of other attributes, or no store at all.
+/// Refuses a folder that contains symbolic links: files would be written outside the store.
+fn refuse_links(path: &Path) -> Result<(), StoreError> {
+    let listing = fs::read_dir(path).map_err(StoreError::io("list", path))?;
+    for entry in listing.flatten() {
+        let kind = entry.file_type().map_err(StoreError::io("look at", path))?;
+        if kind.is_symlink() {
+            return Err(StoreError::Occupied {
+                path: path.into(),
+                what: format!(
+                    "a folder with the symbolic link {} in it",
+                    entry.file_name().display()
+                ),
+            });
+        }
+        if kind.is_dir() {
+            refuse_links(&entry.path())?;
+        }
+    }
+    Ok(())
+}
+
+/// Refuses a folder that is a store with other attributes, or not a store.
 fn refuse_strangers(
     path: &Path,
     metadata: &str,
@@ -476,8 +528,8 @@ fn refuse_strangers(
     match fs::read_to_string(path.join(zarr::CONSOLIDATED)) {
         Ok(there) if same(&there, metadata) => return Ok(()),
         Ok(there) if is_whole(&there) => return Err(mismatch(path, &there, metadata)),
-        // Torn by a power cut: written anew if the dataset's own attributes are still there to
-        // say that this command made it.
+        // Incomplete after a power failure: rewritten if the attributes show that the same command
+        // created the dataset.
         Ok(_) => {
             let root = |text: &str| {
                 let all: Value = serde_json::from_str(text).unwrap_or_default();
@@ -492,7 +544,7 @@ fn refuse_strangers(
         Err(error) if error.kind() == std::io::ErrorKind::NotFound => {}
         Err(error) => return Err(StoreError::io("read", path)(error)),
     }
-    // Without that document it may be a store whose making was cut short.
+    // Without that document the folder may be a store whose creation was interrupted.
     let listing = fs::read_dir(path).map_err(StoreError::io("list", path))?;
     for entry in listing.flatten() {
         let name = entry.file_name().to_string_lossy().into_owned();
@@ -511,13 +563,13 @@ fn refuse_strangers(
     Ok(())
 }
 
-/// Whether two texts of metadata say the same, in any order.
+/// True if two metadata texts have the same content, in any order.
 pub(super) fn same(a: &str, b: &str) -> bool {
     let parsed = |text: &str| serde_json::from_str::<Value>(text).ok();
     a == b || parsed(a).is_some_and(|a| parsed(b) == Some(a))
 }
 
-/// The refusal of a store that does not say any more what it is of.
+/// The error for a store whose content can no longer be determined.
 fn torn(path: &Path) -> StoreError {
     StoreError::NotAStore {
         path: path.into(),
@@ -528,13 +580,12 @@ fn torn(path: &Path) -> StoreError {
     }
 }
 
-/// Whether a text of metadata is there to its end.
+/// True if a metadata text is complete.
 fn is_whole(text: &str) -> bool {
     serde_json::from_str::<Value>(text).is_ok()
 }
 
-/// The consolidated metadata, from the documents that they are made of; `None` where one of
-/// those is damaged too.
+/// The consolidated metadata, rebuilt from their parts; `None` if one of these is damaged too.
 fn rebuilt(path: &Path) -> Option<Value> {
     let document = |name: &str| -> Option<Value> {
         serde_json::from_str(&fs::read_to_string(path.join(name)).ok()?).ok()
@@ -560,19 +611,19 @@ fn rebuilt(path: &Path) -> Option<Value> {
     Some(json!({ "zarr_consolidated_format": 1, "metadata": all }))
 }
 
-/// The refusal of a store whose metadata differ.
+/// The error for a store with different metadata.
 pub(super) fn mismatch(path: &Path, there: &str, here: &str) -> StoreError {
     let root = |text: &str| {
         let all: Value = serde_json::from_str(text).unwrap_or_default();
         all["metadata"][zarr::ATTRIBUTES].clone()
     };
     let mut differences = differences(&root(there), &root(here));
-    // How it is cut into chunks follows from the rest.
+    // The division into chunks follows from the other attributes.
     if differences.iter().any(|d| !d.starts_with(LAYOUT)) {
         differences.retain(|d| !d.starts_with(LAYOUT));
     }
     if differences.is_empty() {
-        differences.push("its variables are not those of this version".into());
+        differences.push("its variables are those of another version".into());
     }
     StoreError::Mismatch {
         path: path.into(),
@@ -580,14 +631,14 @@ pub(super) fn mismatch(path: &Path, there: &str, here: &str) -> StoreError {
     }
 }
 
-/// Most entries that an array may have and most characters that a word may: more were not
-/// written by nanotap, and would fill the memory.
-const MOST_ENTRIES: u64 = 1 << 32;
+/// Largest number of entries of an array and of characters of a text: larger ones were not written
+/// by nanotap and would fill the memory.
+const MAX_ENTRIES: u64 = 1 << 32;
 const LONGEST_WORD: usize = 1 << 16;
-/// Most chunks: each is looked at when a store is opened.
-const MOST_CHUNKS: usize = 10_000_000;
+/// Largest number of chunks: each one is checked when a store is opened.
+const MAX_CHUNKS: usize = 10_000_000;
 
-/// Whether an array can be called `name`: it is a folder of the store, and nowhere else.
+/// True if `name` is a valid name of an array: a folder inside the store.
 fn is_name(name: &str) -> bool {
     let mut parts = Path::new(name).components();
     let plain = matches!(parts.next(), Some(std::path::Component::Normal(_)));
@@ -599,13 +650,13 @@ fn entries(sizes: impl IntoIterator<Item = usize>) -> Option<usize> {
     let product = sizes
         .into_iter()
         .try_fold(1_u64, |product, size| product.checked_mul(size as u64))?;
-    (product <= MOST_ENTRIES).then_some(product as usize)
+    (product <= MAX_ENTRIES).then_some(product as usize)
 }
 
-/// The schema that consolidated metadata describe; `None` if they are not ours.
+/// The schema that consolidated metadata describe; `None` if nanotap did not write them.
 ///
 /// # Errors
-/// When a coordinate cannot be read, and when names or sizes are such as no dataset has.
+/// If a coordinate cannot be read, or if names or sizes are invalid.
 fn schema_of(path: &Path, documents: &Value) -> Result<Option<Schema>, StoreError> {
     let Some(root) = documents[zarr::ATTRIBUTES].as_object() else {
         return Ok(None);
@@ -636,8 +687,8 @@ fn schema_of(path: &Path, documents: &Value) -> Result<Option<Schema>, StoreErro
         path: path.into(),
         what,
     };
-    let too_large = |name: &str| strange(format!("`{name}` has sizes that no dataset has"));
-    // Names and sizes are checked before anything is opened or allocated by them.
+    let too_large = |name: &str| strange(format!("the sizes of `{name}` are invalid"));
+    // Names and sizes are checked before files are opened or memory is allocated.
     let arrays = documents.as_object().into_iter().flatten();
     let arrays = arrays.filter_map(|(key, _)| key.strip_suffix("/.zarray"));
     let names: Vec<&str> = layout["variables"]
@@ -647,11 +698,13 @@ fn schema_of(path: &Path, documents: &Value) -> Result<Option<Schema>, StoreErro
         .filter_map(Value::as_str)
         .collect();
     if let Some(name) = arrays.chain(names.iter().copied()).find(|n| !is_name(n)) {
-        return Err(strange(format!("`{name}` is no name of a variable")));
+        return Err(strange(format!(
+            "`{name}` is not a valid name of a variable"
+        )));
     }
     let chunks = entries(schema.grid.axes.iter().map(Axis::chunks));
     if entries(schema.grid.axes.iter().map(|axis| axis.length)).is_none()
-        || chunks.is_none_or(|chunks| chunks > MOST_CHUNKS)
+        || chunks.is_none_or(|chunks| chunks > MAX_CHUNKS)
     {
         return Err(too_large("chunk_layout"));
     }
@@ -706,7 +759,7 @@ fn schema_of(path: &Path, documents: &Value) -> Result<Option<Schema>, StoreErro
     Ok(Some(schema))
 }
 
-/// What the two documents of an array say.
+/// Content of the two documents of an array.
 struct ArrayDocument {
     shape: Vec<usize>,
     kind: Kind,
@@ -744,7 +797,7 @@ impl ArrayDocument {
 }
 
 fn make_folder(path: &Path) -> Result<(), StoreError> {
-    fs::create_dir_all(path).map_err(StoreError::io("make the folder", path))
+    fs::create_dir_all(path).map_err(StoreError::io("create the folder", path))
 }
 
 fn write_if_other(path: &Path, bytes: &[u8]) -> Result<(), StoreError> {
@@ -755,13 +808,13 @@ fn write_if_other(path: &Path, bytes: &[u8]) -> Result<(), StoreError> {
     }
 }
 
-/// Writes a file of a chunk, in a folder that may have to be made. Its marker tells whether it
-/// is whole, so that it need not be on the disk at once.
+/// Writes a file of a chunk; its folder is created if necessary. The marker shows whether the file
+/// is complete, so that it need not be synchronised to disk.
 fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), StoreError> {
     in_folder(path, || files::write_unsynced(path, bytes))
 }
 
-/// Does `write`, once more after making the folder if it is not there.
+/// Calls `write`; if the folder is missing, creates it and tries again.
 fn in_folder(path: &Path, write: impl Fn() -> std::io::Result<()>) -> Result<(), StoreError> {
     let mut written = write();
     if written

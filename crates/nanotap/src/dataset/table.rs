@@ -1,4 +1,4 @@
-//! A dataset as a table: a row an entry of the grid.
+//! A dataset as a table with one row per entry of the grid.
 
 use std::fmt::Write as _;
 
@@ -7,12 +7,11 @@ use super::schema::{Attributes, Coordinate, Schema, Values, Variable};
 use super::store::Store;
 use crate::number::shortest;
 
-/// Hands `sink` the table as CSV, piece by piece: the coordinates, then every variable
-/// that has no further dimension. Codes are written as the words of their
-/// `flag_meanings`; what is not a number is left empty.
+/// Writes the table as CSV to `sink`, in pieces: the coordinates, then every variable without
+/// further dimensions. Codes are written as the names in `flag_meanings`; missing values are empty.
 ///
 /// # Errors
-/// When a chunk is missing or cannot be read, or when `sink` refuses.
+/// If a chunk is missing or cannot be read, or if `sink` fails.
 pub fn csv<E: From<StoreError>>(
     store: &Store,
     mut sink: impl FnMut(&str) -> Result<(), E>,
@@ -54,8 +53,8 @@ pub fn csv<E: From<StoreError>>(
     Ok(())
 }
 
-/// The header of a column: where its numbers are in SI it says so. Numbers without a unit, and
-/// those in the model's units, stand under their bare names.
+/// The header of a column, with the unit if the numbers are in SI. Numbers without a unit or in the
+/// model's units have the name only.
 fn with_unit(name: &str, attributes: &Attributes) -> String {
     let unit = attributes.get("units").and_then(|unit| unit.as_str());
     let si = |unit: &&str| unit.split('/').all(|part| SI.contains(&part));
@@ -65,7 +64,7 @@ fn with_unit(name: &str, attributes: &Attributes) -> String {
     }
 }
 
-/// Symbols of which SI units are made.
+/// Symbols of SI units.
 const SI: [&str; 10] = ["m", "s", "kg", "N", "N s", "J", "W", "Hz", "Pa", "rad"];
 
 /// The coordinates along the axes of the grid: header, axis, values.
@@ -77,7 +76,7 @@ fn labels(schema: &Schema) -> Vec<(String, usize, &Values)> {
             .iter()
             .filter(|c| c.dimensions.as_slice() == std::slice::from_ref(&dimension.name))
             .collect();
-        // The axis itself before what else is known along it.
+        // The axis itself comes before other coordinates along it.
         along.sort_by_key(|c| c.name != dimension.name);
         labels.extend(
             along

@@ -1,8 +1,8 @@
-//! Computing the chunks of a store on several threads.
+//! Computation of the chunks of a store on several threads.
 //!
-//! Threads take the items of the chunks one by one, in order; whoever completes a chunk
-//! writes it. So all threads stay busy to the end of a chunk, no more chunks than
-//! threads are in memory (and one), and the bytes do not depend on who did what.
+//! Threads take the items of the chunks in order, and the thread that completes a chunk writes it.
+//! All threads are busy until the end, at most one more chunk than there are threads is in memory,
+//! and the bytes do not depend on the threads.
 
 use std::collections::BTreeMap;
 use std::sync::Mutex;
@@ -16,21 +16,21 @@ use super::schema::Values;
 use super::share::Share;
 use super::store::Store;
 
-/// How to work.
+/// Options of the computation of a dataset.
 #[derive(Clone, Copy, Debug)]
 pub struct Work<'a> {
-    /// Which chunks.
+    /// The chunks to compute.
     pub share: Share,
-    /// Number of threads; 0 is as many as the machine offers.
+    /// Number of threads; 0: one per core.
     pub threads: usize,
-    /// How to stop it, and who hears of progress (in items that are left to do).
+    /// Cancellation, and progress in items left to compute.
     pub control: Control<'a>,
 }
 
-/// Why work ended early.
+/// Why the computation ended early.
 #[derive(Debug, thiserror::Error)]
 pub enum WorkError {
-    /// It was stopped; what is finished is in the store.
+    /// Cancelled; the finished chunks are in the store.
     #[error("stopped; {finished} of {total} chunks are finished")]
     Cancelled {
         /// Finished chunks of the share.
@@ -38,31 +38,31 @@ pub enum WorkError {
         /// Chunks of the share.
         total: usize,
     },
-    /// It was stopped after the last chunk.
+    /// Cancelled after the last chunk.
     #[error(
-        "stopped; every chunk is finished, motions of neighbouring values are still to be tried"
+        "stopped; every chunk is finished, but orbits have not been continued to neighbouring values"
     )]
     Neighbours,
-    /// The threads cannot be had.
+    /// The threads could not be started.
     #[error(transparent)]
     Threads(Box<crate::Error>),
-    /// The store refused.
+    /// The store failed.
     #[error(transparent)]
     Store(#[from] StoreError),
 }
 
-/// What has come in of one chunk.
+/// Results received for one chunk.
 struct Pending<T> {
     results: Vec<Option<T>>,
     left: usize,
 }
 
-/// Computes and writes every chunk of the share that is not finished: `items` says how
-/// many items a chunk has (one at least), `compute` makes one (`None` when it was
-/// stopped meanwhile), `assemble` the columns of a chunk from all of its items.
+/// Computes and writes every unfinished chunk of the share. `items` returns the number of items of
+/// a chunk (at least one), `compute` computes one (`None` if cancelled), and `assemble` creates the
+/// columns of a chunk from its items.
 ///
 /// # Errors
-/// When it was stopped, or the store refuses.
+/// If the computation is cancelled or the store fails.
 pub fn work<T: Send>(
     store: &Store,
     how: &Work<'_>,
@@ -161,7 +161,7 @@ pub fn work<T: Send>(
     Ok(())
 }
 
-/// The number of threads that `given` means.
+/// Number of threads for the option value `given`.
 pub fn threads(given: usize) -> usize {
     if given > 0 {
         return given;
@@ -169,7 +169,7 @@ pub fn threads(given: usize) -> usize {
     std::thread::available_parallelism().map_or(1, std::num::NonZero::get)
 }
 
-/// The guarded value, also after a panic elsewhere, which ends the scope anyway.
+/// Locks a mutex, also after a panic of another thread, which ends the scope anyway.
 fn lock<T>(mutex: &Mutex<T>) -> std::sync::MutexGuard<'_, T> {
     mutex
         .lock()

@@ -1,8 +1,8 @@
 //! The Zarr format, version 2: metadata documents and the bytes of a chunk.
 //!
-//! <https://zarr-specs.readthedocs.io/en/latest/v2/v2.0.html>, with xarray's
-//! `_ARRAY_DIMENSIONS` for the names of dimensions and `.zmetadata` for all metadata in
-//! one document. Chunks are zlib streams of little-endian numbers in C order.
+//! <https://zarr-specs.readthedocs.io/en/latest/v2/v2.0.html>, with xarray's `_ARRAY_DIMENSIONS`
+//! for the names of dimensions and `.zmetadata` for all metadata in one document. Chunks are zlib
+//! streams of little-endian numbers in C order.
 
 use miniz_oxide::inflate::decompress_to_vec_zlib_with_limit;
 use serde_json::{Value, json};
@@ -10,7 +10,7 @@ use serde_json::{Value, json};
 use super::deflate::{LEVEL, deflate};
 use super::schema::{Attributes, Kind, Values};
 
-/// The names that Zarr gives its documents.
+/// Names of Zarr's documents.
 pub(super) const GROUP: &str = ".zgroup";
 pub(super) const ATTRIBUTES: &str = ".zattrs";
 pub(super) const ARRAY: &str = ".zarray";
@@ -23,7 +23,7 @@ pub(super) fn group() -> Value {
 
 /// The `.zarray` document of an array.
 pub(super) fn array(shape: &[usize], chunks: &[usize], kind: Kind) -> Value {
-    // A fill value would make xarray turn whole numbers into real ones.
+    // With a fill value xarray would convert integers to floats.
     let fill = if kind == Kind::Real {
         json!("NaN")
     } else {
@@ -50,7 +50,7 @@ fn dtype(kind: Kind) -> String {
     }
 }
 
-/// The kind that a `.zarray` document names, if it is one of ours.
+/// The type named in a `.zarray` document, if nanotap uses it.
 pub(super) fn kind(dtype: &str) -> Option<Kind> {
     match dtype {
         "<f8" => Some(Kind::Real),
@@ -106,12 +106,12 @@ pub(super) fn encode(values: &Values) -> Vec<u8> {
     deflate(&bytes)
 }
 
-/// What a chunk's file of `count` entries holds; the reason if it does not.
+/// Decodes a chunk's file of `count` entries, or returns the reason why it is invalid.
 pub(super) fn decode(file: &[u8], kind: Kind, count: usize) -> Result<Values, String> {
     let size = count * kind.size();
     let bytes = decompress_to_vec_zlib_with_limit(file, size).map_err(|e| e.to_string())?;
     if bytes.len() != size {
-        return Err(format!("{} bytes where {size} are expected", bytes.len()));
+        return Err(format!("got {} bytes, expected {size}", bytes.len()));
     }
     Ok(match kind {
         Kind::Real => {

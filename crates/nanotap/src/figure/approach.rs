@@ -72,7 +72,7 @@ pub struct ApproachCurves {
     pub x_label: String,
     /// Its range.
     pub x_range: [f64; 2],
-    /// Whether it stands in equal ratios, as amplitudes do.
+    /// Whether its values are in equal ratios, as amplitudes are.
     #[serde(default)]
     pub logarithmic: bool,
     /// What is drawn against it.

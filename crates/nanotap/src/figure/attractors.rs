@@ -13,9 +13,9 @@ use crate::study::lyapunov::{LyapunovReport, Section};
 
 /// Drive periods of a motion that does not repeat that are drawn.
 const WANDERING_PERIODS: usize = 48;
-/// Strobe points of such a motion.
+/// ModelMap points of such a motion.
 const STROBE_POINTS: usize = 3000;
-/// Attractors drawn at most: more cannot be told apart.
+/// Attractors drawn at most: more cannot be distinguished.
 const MOST: usize = 8;
 
 /// Phase portraits and strobe points of every attractor, each in its own colour, and the

@@ -99,8 +99,8 @@ pub(crate) fn with_marks(
     panel
 }
 
-/// Branches against the parameter, a colour a period, with their bifurcations; beside
-/// them the bifurcation curves in two parameters, if they were traced.
+/// Branches against the parameter, one colour for each period, with their bifurcations; in a second
+/// panel the bifurcation curves in two parameters, if they were traced.
 pub fn branch_figure(
     report: &BranchReport,
     shown: Shown,
@@ -175,7 +175,7 @@ pub fn branch_figure(
 }
 
 /// What size of a quantity matters: of the dissipation the work of the greatest force over the
-/// amplitude, beside which rounding is nothing; of others it is not known.
+/// amplitude, compared with which rounding is negligible; of others it is not known.
 pub(crate) fn natural_of(shown: Shown, largest: impl Fn(Shown) -> f64) -> Option<f64> {
     if shown != Shown::named("dissipation")? {
         return None;

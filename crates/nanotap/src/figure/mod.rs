@@ -2,15 +2,21 @@
 
 pub mod approach;
 pub mod attractors;
+#[cfg(feature = "dataset")]
 pub mod basin;
 pub mod branch;
 pub mod contact;
 pub mod contact_laws;
+#[cfg(feature = "fit")]
 pub mod fit;
 pub mod modes;
 pub mod motion;
 pub mod panels;
+#[cfg(feature = "fit")]
 pub mod reconstruct;
+pub mod scan;
 pub mod shown;
+#[cfg(feature = "dataset")]
 pub mod sweep;
+#[cfg(feature = "dataset")]
 pub mod window;

@@ -7,8 +7,8 @@ use crate::model::beam::Modes;
 /// The mode shapes φ_j(ξ) of the bare beam, the paper's Fig. 2e.
 pub fn shapes_figure(beam: &Modes) -> Figure {
     const POINTS: usize = 401;
-    // Beyond these the lines cannot be told apart.
-    const MOST_NAMED: usize = 8;
+    // More lines cannot be distinguished.
+    const MAX_NAMED: usize = 8;
     let mut panel = Panel::new(
         Axis::linear("position along the beam $ξ = x/L$").range(0.0, 1.0),
         Axis::linear("mode shape $φ_j(ξ)$"),
@@ -20,7 +20,7 @@ pub fn shapes_figure(beam: &Modes) -> Figure {
             (xi, mode.shape(xi))
         });
         let line = Line::new(shape);
-        panel = panel.with(if beam.count() <= MOST_NAMED {
+        panel = panel.with(if beam.count() <= MAX_NAMED {
             line.label(format!("mode {}", mode.number))
         } else {
             line

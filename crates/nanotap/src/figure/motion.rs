@@ -157,9 +157,9 @@ pub(crate) fn contact_intervals(
     let period = model.period();
     let mut intervals: Vec<(f64, f64)> = Vec::new();
     for s in recording
-        .stretches(model)
+        .pieces()
         .iter()
-        .filter(|s| s.contact && s.start < periods * period)
+        .filter(|s| model.touches(s.regime) && s.start < periods * period)
     {
         let (from, to) = (
             s.start / period,
@@ -229,13 +229,13 @@ pub fn orbit_figure(model: &Model, orbit: &OrbitReport, units: &Units) -> Figure
 
 /// The same motion with every number of modes, and how far each is from the best.
 pub fn convergence_figure(convergence: &Convergence, units: &Units) -> Figure {
-    /// Lines beyond these cannot be told apart; the first and the last matter.
-    const MOST_LINES: usize = 5;
+    /// More lines cannot be distinguished; the first and the last matter.
+    const MAX_LINES: usize = 5;
     let count = convergence.modes.len();
-    let chosen: Vec<usize> = if count <= MOST_LINES {
+    let chosen: Vec<usize> = if count <= MAX_LINES {
         (0..count).collect()
     } else {
-        (0..MOST_LINES - 1).chain([count - 1]).collect()
+        (0..MAX_LINES - 1).chain([count - 1]).collect()
     };
     let drawn: Vec<(usize, View<'_>)> = chosen
         .into_iter()

@@ -9,7 +9,7 @@ use serde::Deserialize;
 
 use crate::study::simulate::Classification;
 
-/// Strobe points beyond which they are drawn as small dots.
+/// ModelMap points beyond which they are drawn as small dots.
 const FEW_STROBES: usize = 200;
 
 /// What axes of motions are called, and their units.
@@ -318,7 +318,7 @@ pub struct SectionCurves {
     pub axes: MotionAxes,
     /// Drive phase of the section, in periods; none: the beginnings of contacts.
     pub phase: Option<f64>,
-    /// Tip and its velocity or, at contacts, drive phase in degrees and speed of approach.
+    /// Tip and its velocity or, at contacts, drive phase in degrees and impact speed.
     pub points: Vec<(f64, f64)>,
     /// Lyapunov exponents per drive period.
     pub exponents: Vec<f64>,
@@ -344,7 +344,7 @@ impl SectionCurves {
                 Axis::linear("drive phase at contact (°)")
                     .range(0.0, 360.0)
                     .marks([0.0, 90.0, 180.0, 270.0, 360.0].map(|d| (d, format!("{d:.0}")))),
-                Axis::linear(format!("speed of approach{}", self.axes.velocity)),
+                Axis::linear(format!("impact speed{}", self.axes.velocity)),
             )
             .title("at the beginning of contacts"),
         };

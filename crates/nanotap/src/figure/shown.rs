@@ -38,7 +38,7 @@ impl Shown {
             .chain([(SPECTRAL_RADIUS, "largest modulus of a multiplier")])
     }
 
-    /// What is shown of a case's branches if nobody says: the greatest displacement, but of an
+    /// The default observable of a case's branches: the greatest displacement, but of an
     /// oscillator with a wall that is where the wall stands.
     pub fn usual(case: &Case) -> Self {
         let name = if case.has_rigid_stop() {

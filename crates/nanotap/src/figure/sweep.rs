@@ -15,10 +15,10 @@ use crate::figure::branch::{natural_of, scale_of};
 use crate::figure::shown::Shown;
 use crate::observe::table::shown_phase;
 use crate::study::simulate::Classification;
-use crate::study::sweep::{FromNeighbour, Motions, class_of, from_neighbours};
+use crate::study::sweep::{FromNeighbour, class_of, from_neighbours};
 
 /// Categories of a map, and periods of a diagram, that get a colour of their own.
-const MOST_CATEGORIES: usize = 12;
+const MAX_CATEGORIES: usize = 12;
 /// What is beyond them.
 const OTHERS: Colour = Colour::rgb(222, 222, 222);
 
@@ -97,23 +97,23 @@ impl SweepTable {
             period_max: vec![f64::NAN; cells * stride],
             neighbours: from_neighbours(store)?,
         };
+        let cell_of = |entry: &[usize]| {
+            let axes = entry.iter().zip(&schema.grid.axes);
+            axes.fold(0, |cell, (index, axis)| cell * axis.length + index)
+        };
+        store.each(["classification", "period"], |entry, [code, period]| {
+            let cell = cell_of(entry);
+            table.classification[cell] = code as u8;
+            table.period[cell] = period as i32;
+        })?;
+        let Some(maxima) = maxima else {
+            return Ok(table);
+        };
         for chunk in 0..store.chunks() {
             let block = schema.grid.block(chunk);
-            let Motions { codes, periods } = Motions::read(store, chunk)?;
-            let highs = match maxima
-                .map(|index| store.read_chunk(&block, index))
-                .transpose()?
-            {
-                Some(Values::Real(highs)) => highs,
-                _ => Vec::new(),
-            };
+            let highs = store.read_chunk(&block, maxima)?.numbers();
             for (flat, entry) in block.entries().enumerate() {
-                let cell = entry
-                    .iter()
-                    .zip(&schema.grid.axes)
-                    .fold(0, |cell, (index, axis)| cell * axis.length + index);
-                table.classification[cell] = codes[flat];
-                table.period[cell] = periods[flat];
+                let cell = cell_of(&entry);
                 if let Some(row) = highs.get(flat * stride..(flat + 1) * stride) {
                     table.period_max[cell * stride..(cell + 1) * stride].copy_from_slice(row);
                 }
@@ -158,7 +158,7 @@ impl SweepTable {
         }
         let mut frequent: Vec<Motion> = counts.keys().copied().collect();
         frequent.sort_by_key(|motion| std::cmp::Reverse(counts[motion]));
-        frequent.truncate(MOST_CATEGORIES);
+        frequent.truncate(MAX_CATEGORIES);
         // None of what is too rare to be named.
         let mut clouds: BTreeMap<CloudOf<'_>, Vec<(f64, f64)>> = BTreeMap::new();
         for cell in 0..cells {
@@ -264,7 +264,7 @@ impl SweepTable {
         frequent.sort();
         let mut named: Vec<&BTreeSet<Option<Motion>>> = frequent
             .iter()
-            .take(MOST_CATEGORIES)
+            .take(MAX_CATEGORIES)
             .map(|(_, motions)| *motions)
             .collect();
         named.sort();
@@ -375,7 +375,7 @@ pub fn response(store: &Store) -> Result<Figure, StoreError> {
         .share_x();
     for (name, label) in [
         ("first_harmonic", "amplitude $A$"),
-        ("phase", "phase behind the drive (°)"),
+        ("phase", "phase lag (°)"),
     ] {
         let index = schema.index_of(name).unwrap_or(0);
         let mut curves: BTreeMap<(String, usize), Vec<(f64, f64)>> = BTreeMap::new();
@@ -433,7 +433,7 @@ fn maps(store: &Store) -> Result<Figure, StoreError> {
     let mut figure = Figure::new(3, 2)
         .width(DOUBLE_COLUMN)
         .height(195.0)
-        .with(motions.title("what motions there are"));
+        .with(motions.title("motions"));
     let mut values = Vec::new();
     for shown in SHOWN.into_iter().filter_map(Shown::named) {
         values.push((shown, of_first_start(store, shown)?));

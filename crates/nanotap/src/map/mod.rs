@@ -1,8 +1,8 @@
-//! The stroboscopic map of a case, for algorithms of one's own.
+//! The stroboscopic map of a case, for users' algorithms.
 //!
-//! A [`Map`] takes the state at drive phase 0 to the state one drive period later, exactly, and
-//! knows its derivatives with respect to the state and to every key of the case. It does not
-//! change, so that threads may share one; each call has a work space of its own.
+//! A [`Map`] takes the state at drive phase 0 to the state one drive period later, exactly, with
+//! its derivatives with respect to the state and to every key of the case. It is immutable, so that
+//! threads may share it; each call has its own work space.
 //!
 //! ```
 //! use nanotap::Map;
@@ -26,8 +26,8 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! A loop that advances one state for long goes faster with a work space of its own:
-//! [`Map::strobe`], which also is what `nanotap_dynamics` analyses.
+//! To advance one state many times, use a separate work space, [`Map::strobe`], which is also the
+//! map that `nanotap_dynamics` analyses.
 
 pub mod motion;
 
@@ -35,7 +35,8 @@ use std::sync::Arc;
 
 use nalgebra::DMatrix;
 use nanotap_dynamics::{
-    Control, PeriodicOrbit, ShootingError, ShootingOptions, StroboscopicMap as _, close_orbit,
+    Control, PeriodicOrbit, Scheduling as _, ShootingError, ShootingOptions, StroboscopicMap as _,
+    close_orbit,
 };
 use nanotap_flow::FlowError;
 use nanotap_volterra::VolterraError;
@@ -44,137 +45,137 @@ use rayon::prelude::*;
 pub use motion::{Motion, Point};
 
 use crate::case::{Case, CaseError, Key};
-use crate::model::strobe::{Strobe, together};
+use crate::model::model_map::{ModelMap, together};
 use crate::model::{Model, MotionError, Tangent};
 
-/// Most numbers that [`Map::iterate`] returns.
-pub const MOST_NUMBERS: usize = 200_000_000;
+/// Largest number of values that [`Map::iterate`] returns.
+pub const MAX_NUMBERS: usize = 200_000_000;
 
-/// Drive periods between two looks at whether the work is to stop.
+/// Drive periods between two checks for cancellation.
 pub(crate) const UNINTERRUPTED: usize = 1024;
 
-/// Why the map could not be made or applied.
+/// Why the map could not be created or applied.
 #[derive(Clone, Debug, thiserror::Error)]
 pub enum MapError {
-    /// The case makes no sense.
+    /// The case is invalid.
     #[error(transparent)]
     Case(#[from] CaseError),
-    /// The distance follows from a setpoint, and was not solved for.
+    /// The distance follows from a setpoint and has not been solved for.
     #[error("the case leaves its distance to the setpoint, and a map needs one")]
     NoDistance,
-    /// The numbers are no states.
+    /// The length of the input is not a multiple of the state dimension.
     #[error("{numbers} numbers are no rows of states of {dimension} numbers each")]
     Shape {
-        /// How many numbers there are.
+        /// Length of the input.
         numbers: usize,
-        /// How many each state has.
+        /// Dimension of a state.
         dimension: usize,
     },
-    /// More than fits.
+    /// The number of states exceeds the limit.
     #[error("{states} states are too many; {most} at most")]
     TooMany {
-        /// How many were asked for.
+        /// Requested number of states.
         states: usize,
-        /// How many there may be.
+        /// Largest number of states.
         most: usize,
     },
-    /// A time span that makes no sense.
+    /// The time span is invalid.
     #[error("a motion from τ = {from} over {length} cannot be followed: {reason}")]
     Span {
-        /// Where it was to begin.
+        /// Beginning of the span, in the model's time.
         from: f64,
-        /// How long it was to last.
+        /// Length of the span, in the model's time.
         length: f64,
-        /// What is wrong with it.
+        /// What is wrong.
         reason: &'static str,
     },
-    /// A motion could not be followed.
+    /// The flow of a state failed.
     #[error("state {index}: {error}")]
     Motion {
-        /// Which of the states, from 0.
+        /// Index of the state, from 0.
         index: usize,
-        /// Why.
+        /// Error of the flow.
         error: MotionError,
     },
     /// Newton found no orbit.
     #[error(transparent)]
     Orbit(#[from] ShootingError),
-    /// The work was stopped.
+    /// The computation was cancelled.
     #[error("stopped before the end")]
     Stopped,
 }
 
 /// The map of one case from the state at drive phase 0 to the state one drive period later.
 ///
-/// A state is (a₁ … a_N, ȧ₁ … ȧ_N) of a cantilever, after which comes the memory of a sample
-/// that recovers, and (x, ẋ) of an oscillator, in the model's units.
+/// A state is (a₁ … a_N, ȧ₁ … ȧ_N) for a cantilever, followed by the internal variables of the
+/// sample, and (x, ẋ) for an oscillator, in the model's units.
 #[derive(Clone, Debug)]
 pub struct Map {
     case: Arc<Case>,
     model: Arc<Model>,
-    /// A work space, to be copied.
-    strobe: Strobe,
+    /// A work space to be cloned.
+    strobe: ModelMap,
 }
 
-/// The map at a state, to first order.
+/// The linearised map at a state.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Linearised {
-    /// P(z), of length n.
+    /// P(z), length n.
     pub state: Vec<f64>,
     /// ∂P/∂z, `n × n`.
     pub jacobian: DMatrix<f64>,
-    /// ∂P/∂key at constant z, a column a key, `n × keys`; per SI unit of a physical quantity.
+    /// ∂P/∂key at constant z, `n × keys`; for a physical quantity per SI unit.
     pub derivatives: DMatrix<f64>,
 }
 
 impl Map {
-    /// The map of `case`.
+    /// Creates the map of `case`.
     ///
     /// # Errors
-    /// When the case makes no sense, or leaves its distance to a setpoint
-    /// ([`at_setpoint`](crate::study::setpoint::at_setpoint) solves for that).
+    /// If the case is invalid, or its distance follows from a setpoint
+    /// ([`at_setpoint`](crate::study::setpoint::at_setpoint) solves for it).
     pub fn new(case: &Case) -> Result<Self, MapError> {
         if case.leaves_distance_to_setpoint() {
             return Err(MapError::NoDistance);
         }
         let model = case.model()?;
         Ok(Self {
-            strobe: Strobe::new(&model),
+            strobe: ModelMap::new(&model),
             model: Arc::new(model),
             case: Arc::new(case.clone()),
         })
     }
 
-    /// The case.
+    /// The case of the map.
     pub fn case(&self) -> &Case {
         &self.case
     }
 
-    /// Its equations.
+    /// The model of the map.
     pub fn model(&self) -> &Arc<Model> {
         &self.model
     }
 
-    /// How many numbers a state has.
+    /// Dimension of a state.
     pub fn dimension(&self) -> usize {
         self.model.dimension()
     }
 
-    /// The drive period, 2π/Ω of one tone.
+    /// The drive period, 2π/Ω for one tone, in the model's time.
     pub fn period(&self) -> f64 {
         self.model.period()
     }
 
-    /// The map with a work space of its own, to advance one state again and again, and for
-    /// the algorithms of `nanotap_dynamics`.
-    pub fn strobe(&self) -> Strobe {
+    /// The map with a separate work space, for repeated use and for the algorithms of
+    /// `nanotap_dynamics`.
+    pub fn strobe(&self) -> ModelMap {
         self.strobe.clone()
     }
 
     /// `Pᵏ(state)` for `k = periods`; the state itself for 0.
     ///
     /// # Errors
-    /// When the state does not fit or its motion cannot be followed.
+    /// If the state has the wrong length or the flow fails.
     pub fn apply(&self, state: &[f64], periods: usize) -> Result<Vec<f64>, MapError> {
         let mut states = state.to_vec();
         self.fits(state, 1)?;
@@ -182,12 +183,12 @@ impl Map {
         Ok(states)
     }
 
-    /// Replaces every one of `states` (row by row, `rows × n`) by `Pᵏ` of it, `k = periods`,
-    /// on the threads of the present pool; the same bits whatever their number. Many states are
-    /// advanced side by side, and come out as one alone to rounding.
+    /// Replaces each of `states` (row by row, `rows × n`) by its image after `periods` drive
+    /// periods, on the threads of the current pool. The result does not depend on the number of
+    /// threads. Many states are advanced in batches; each agrees with a single state to rounding.
     ///
     /// # Errors
-    /// When the rows are no states, a motion cannot be followed, or the work was stopped.
+    /// If the length is not a multiple of n, a flow fails, or the computation is cancelled.
     pub fn apply_all(
         &self,
         states: &mut [f64],
@@ -200,7 +201,7 @@ impl Map {
             return advance(&mut self.strobe(), states, periods, control);
         }
         let together = together(&self.strobe, rows);
-        let some = |strobe: &mut Strobe, (number, states): (usize, &mut [f64])| {
+        let some = |strobe: &mut ModelMap, (number, states): (usize, &mut [f64])| {
             advance_all(strobe, states, periods, control)
                 .map_err(|error| error.after(number * together))
         };
@@ -213,12 +214,11 @@ impl Map {
         parts.try_for_each_init(|| self.strobe(), some)
     }
 
-    /// The states `z, Pᵉ(z), P²ᵉ(z), …` for `e = every`, `count` of them, row by row
-    /// (`count × n`).
+    /// The states `z, Pᵉ(z), P²ᵉ(z), …` for `e = every`: `count` states, row by row (`count × n`).
     ///
     /// # Errors
-    /// When the state does not fit, its motion cannot be followed, there would be more than
-    /// [`MOST_NUMBERS`] numbers, or the work was stopped.
+    /// If the state has the wrong length, the flow fails, there would be more than [`MAX_NUMBERS`]
+    /// values, or the computation is cancelled.
     pub fn iterate(
         &self,
         state: &[f64],
@@ -227,7 +227,7 @@ impl Map {
         control: &Control<'_>,
     ) -> Result<Vec<f64>, MapError> {
         self.fits(state, 1)?;
-        let most = MOST_NUMBERS / self.dimension();
+        let most = MAX_NUMBERS / self.dimension();
         if count > most {
             return Err(MapError::TooMany {
                 states: count,
@@ -247,12 +247,12 @@ impl Map {
         Ok(all)
     }
 
-    /// `Pᵏ` at a state with its derivatives with respect to the state and to `keys`,
-    /// `k = periods`.
+    /// The map over `periods` drive periods at a state, with its derivatives with respect to the
+    /// state and to `keys`.
     ///
     /// # Errors
-    /// When the state does not fit, its motion cannot be followed, or the case makes no sense
-    /// beside the value of a key.
+    /// If the state has the wrong length, the flow fails, or the case is invalid near the value of
+    /// a key.
     pub fn linearised(
         &self,
         state: &[f64],
@@ -262,10 +262,11 @@ impl Map {
         self.linearise(&self.tangents(keys)?, state, periods)
     }
 
-    /// The same of every one of `states` (row by row), on the threads of the present pool.
+    /// As [`Map::linearised`], for each of `states` (row by row), on the threads of the current
+    /// pool.
     ///
     /// # Errors
-    /// As [`Map::linearised`], and when the work was stopped.
+    /// As [`Map::linearised`], and if the computation is cancelled.
     pub fn linearised_all(
         &self,
         states: &[f64],
@@ -301,7 +302,7 @@ impl Map {
     ) -> Result<Linearised, MapError> {
         self.fits(state, 1)?;
         let n = self.dimension();
-        let mut strobe = Strobe::with_tangents(&self.model, tangents.to_vec());
+        let mut strobe = ModelMap::with_tangents(&self.model, tangents.to_vec());
         let mut at = Linearised {
             state: state.to_vec(),
             jacobian: DMatrix::identity(n, n),
@@ -319,23 +320,23 @@ impl Map {
         Ok(at)
     }
 
-    /// The periodic orbit that Newton finds near the motion that begins at `guess`, stable or
-    /// not, with its multipliers. Its minimal period may be a part of `period`.
+    /// Finds the periodic orbit near the motion from `guess` by Newton's method, stable or
+    /// unstable, with its multipliers. Its minimal period may divide `period`.
     ///
     /// # Errors
-    /// When there is none, or none that is isolated to rounding.
+    /// If there is none, or none that is isolated to rounding.
     pub fn orbit(&self, guess: &[f64], period: usize) -> Result<PeriodicOrbit, MapError> {
         self.fits(guess, 1)?;
         let options = ShootingOptions::default();
         Ok(close_orbit(&mut self.strobe(), guess, period, &options)?)
     }
 
-    /// The motion over a time `length` from a state at τ = `from` within the drive period
-    /// (0 is drive phase 0), known in closed form at every instant between.
+    /// The motion over the time `length` from a state at τ = `from` within the first drive period
+    /// (0 is drive phase 0), in closed form at every instant.
     ///
     /// # Errors
-    /// When the state does not fit, the motion cannot be followed, or the span makes no sense
-    /// or is longer than [`motion::MOST_PERIODS`].
+    /// If the state has the wrong length, the flow fails, or the span is invalid or longer than
+    /// [`motion::MAX_PERIODS`].
     pub fn flow(&self, state: &[f64], from: f64, length: f64) -> Result<Motion, MapError> {
         self.fits(state, 1)?;
         Motion::follow(&self.model, state, from, length)
@@ -360,10 +361,9 @@ impl Map {
     }
 }
 
-/// Replaces `state` by what comes of it after `periods` drive periods; every so often looks
-/// whether the work is to stop.
+/// Advances `state` by `periods` drive periods, with regular checks for cancellation.
 fn advance(
-    strobe: &mut Strobe,
+    strobe: &mut ModelMap,
     state: &mut [f64],
     periods: usize,
     control: &Control<'_>,
@@ -373,9 +373,9 @@ fn advance(
     })
 }
 
-/// The same of many states, one after the other.
+/// Advances many states in sequence.
 fn advance_all(
-    strobe: &mut Strobe,
+    strobe: &mut ModelMap,
     states: &mut [f64],
     periods: usize,
     control: &Control<'_>,
@@ -388,7 +388,7 @@ fn advance_all(
     })
 }
 
-/// Goes over `periods` in parts, between which it is looked whether the work is to stop.
+/// Advances by `periods` in parts, with a check for cancellation between them.
 fn in_parts(
     periods: usize,
     control: &Control<'_>,
@@ -408,7 +408,7 @@ fn of_state(index: usize) -> impl Fn(MotionError) -> MapError {
 }
 
 impl MapError {
-    /// The same, its state counted behind `states` others.
+    /// The same error, with its state counted after `states` others.
     fn after(self, states: usize) -> Self {
         match self {
             Self::Motion { index, error } => Self::Motion {

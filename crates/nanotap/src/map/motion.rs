@@ -1,4 +1,4 @@
-//! A motion between its strobes: every instant of it in closed form.
+//! A motion between its strobes, in closed form at every instant.
 
 use std::sync::Arc;
 
@@ -6,13 +6,12 @@ use nanotap_flow::trajectory::Recorder;
 use nanotap_flow::{Flow, FlowError, Output};
 
 use super::{MapError, of_state};
-use crate::model::nonlinear::Nonlinear;
-use crate::model::recording::Recording;
-use crate::model::{Model, MotionError};
-use crate::observe::{ContactEvent, Contacts, Kept, Set, watch};
+use crate::model::Model;
+use crate::model::recording::{Instant, Recording};
+use crate::observe::{ContactEvent, Contacts, ObservableSet, RecordOptions, record};
 
-/// Most drive periods that a [`Motion`] keeps.
-pub const MOST_PERIODS: f64 = 100_000.0;
+/// Maximum number of drive periods of a [`Motion`].
+pub const MAX_PERIODS: f64 = 100_000.0;
 
 /// A motion over a span of time.
 #[derive(Clone, Debug)]
@@ -22,29 +21,29 @@ pub struct Motion {
     recording: Recording,
     events: Vec<ContactEvent>,
     span: [f64; 2],
-    /// The only state of a span of no length.
-    start: (usize, Vec<f64>),
+    /// The only instant of a span of zero length.
+    start: Instant,
 }
 
-/// An instant of a motion; the model's units.
+/// An instant of a motion, in the model's units.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Point {
-    /// When, in the model's time, 0 at drive phase 0 of the first period.
+    /// Time, 0 at drive phase 0 of the first period.
     pub tau: f64,
     /// State, of length n.
     pub state: Vec<f64>,
-    /// Tip deflection W, of an oscillator x.
+    /// Tip deflection W; x for an oscillator.
     pub tip: f64,
-    /// Its rate.
+    /// Rate of the tip deflection.
     pub tip_rate: f64,
-    /// Height of the tip over the undeformed surface, V_T.
+    /// Height V_T of the tip above the undeformed surface.
     pub gap: f64,
     /// Force of the sample on the tip.
     pub force: f64,
-    /// What ends the present regime by falling to zero: in flight the gap, in contact what
-    /// keeps the contact. Not a number where nothing ends it.
+    /// Guard of the present regime, which ends when the guard falls to zero: the gap in flight, the
+    /// condition of contact in contact. NaN if nothing ends the regime.
     pub guard: f64,
-    /// Whether tip and sample touch.
+    /// Whether tip and sample are in contact.
     pub contact: bool,
 }
 
@@ -67,16 +66,40 @@ impl Motion {
         if length.is_nan() || length < 0.0 {
             return Err(refused("its length must be a number and not negative"));
         }
-        if length > MOST_PERIODS * period {
+        if length > MAX_PERIODS * period {
             return Err(refused("more than 100000 drive periods are not kept"));
         }
-        if let Some(nonlinear) = &model.nonlinear {
+        let motion = |recording, events, regime, end| Self {
+            tip_rate: model.tip_rate(),
+            recording,
+            events,
+            span: [from, end],
+            start: Instant {
+                state: state.to_vec(),
+                phase: from,
+                regime,
+                nonlinear_force: None,
+            },
+            model: Arc::clone(model),
+        };
+        if model.nonlinear.is_some() {
             if from != 0.0 {
                 return Err(refused(
                     "under a nonlinear force law it must begin at drive phase 0",
                 ));
             }
-            return Self::under(model, nonlinear, state, length).map_err(of_state(0));
+            // Whole periods, evaluated up to the end of the span.
+            let periods = ((length / period).ceil() as usize).max(1);
+            let options = RecordOptions {
+                recorded: periods,
+                events: true,
+                ..RecordOptions::default()
+            };
+            let recorded =
+                record(model, state, periods, ObservableSet::NONE, options).map_err(of_state(0))?;
+            let mut events = recorded.events;
+            events.retain(|event| event.tau <= length);
+            return Ok(motion(recorded.recording, events, 0, length));
         }
         let failed = |error: FlowError| of_state(0)(error.into());
         let mut flow = Flow::new(Arc::clone(&model.system));
@@ -94,55 +117,21 @@ impl Motion {
             flow.run_until(rest, &mut (&mut recorder, &mut contacts))
                 .map_err(failed)?;
         }
-        Ok(Self {
-            tip_rate: model.tip_rate(),
-            recording: Recording::Exact(recorder.finish(Arc::clone(&model.system))),
-            events: contacts.events(),
-            span: [from, end],
-            start: (regime, state.to_vec()),
-            model: Arc::clone(model),
-        })
+        let recording = Recording::PiecewiseLinear(recorder.finish(Arc::clone(&model.system)));
+        Ok(motion(recording, contacts.events(), regime, end))
     }
 
-    /// A motion under a nonlinear force, of whole periods that are read up to its end.
-    fn under(
-        model: &Arc<Model>,
-        nonlinear: &Nonlinear,
-        state: &[f64],
-        length: f64,
-    ) -> Result<Self, MotionError> {
-        let periods = (length / model.period()).ceil() as usize;
-        let kept = Kept {
-            recorded: periods,
-            events: true,
-            ..Kept::default()
-        };
-        let seen = watch(model, state, periods, Set::NONE, kept)?;
-        let mut events = seen.events;
-        events.retain(|event| event.tau <= length);
-        let n = nonlinear.system.dimension();
-        let (gap, rate) = nonlinear.system.gap(0.0, &state[..n]);
-        Ok(Self {
-            tip_rate: model.tip_rate(),
-            recording: seen.recording,
-            events,
-            span: [0.0, length],
-            start: (nonlinear.system.law().branch_at(gap, rate), state.to_vec()),
-            model: Arc::clone(model),
-        })
-    }
-
-    /// Where it begins and ends, in the model's time.
+    /// Beginning and end of the span, in the model's time.
     pub fn span(&self) -> [f64; 2] {
         self.span
     }
 
-    /// Contacts begun and ended, in order of time.
+    /// Beginnings and ends of contacts, in order of time.
     pub fn events(&self) -> &[ContactEvent] {
         &self.events
     }
 
-    /// The recording itself, for closed-form integrals, extrema and harmonics of any output.
+    /// The recording, for closed-form integrals, extrema and harmonics of any output.
     pub fn recording(&self) -> &Recording {
         &self.recording
     }
@@ -150,67 +139,28 @@ impl Motion {
     /// The motion at time `tau`; outside its span, at the nearer end.
     pub fn at(&self, tau: f64) -> Point {
         let tau = tau.clamp(self.span[0], self.span[1]);
-        let trajectory = match &self.recording {
-            Recording::Exact(trajectory) => trajectory,
-            Recording::Nonlinear(_) => return self.nonlinear_at(tau),
-        };
-        let (regime, start, mut state) = match trajectory.segment_at(tau) {
-            Some(segment) => (
-                segment.regime,
-                segment.start - segment.phase,
-                trajectory.state_at(tau).unwrap_or_default(),
-            ),
-            None => (self.start.0, 0.0, self.start.1.clone()),
-        };
-        let (model, phase) = (&self.model, tau - start);
+        let instant = self.recording.instant(tau);
+        let mut instant = instant.unwrap_or_else(|| self.start.clone());
+        let model = &self.model;
         let drive = model.system.drive();
-        let at = |output: &Output| output.at(drive, &state, phase);
-        let out = &model.system.transitions()[regime];
-        let contact = model.contact[regime];
+        let (phase, contact) = (instant.phase, model.touches(instant.regime));
+        let at = |output: &Output| output.at(drive, &instant.state, phase);
         let (tip, tip_rate, gap) = (at(&model.tip), at(&self.tip_rate), at(&model.height));
-        let force = at(&model.force[regime]);
-        let guard = out.first().map_or(f64::NAN, |out| at(&out.guard));
-        // In contact the surface is where the tip holds it: see `time_series`.
-        if model.forgetting.is_some() && contact {
-            let memory = state.len() - model.memory;
-            state[memory] = gap;
-        }
+        let force = model.force_at(&instant);
+        // A nonlinear law may have guards of another kind.
+        let transitions = model.system.transitions().get(instant.regime);
+        let first = transitions.and_then(|out| out.first());
+        let guard = first.map_or(f64::NAN, |out| at(&out.guard));
+        model.set_surface(&mut instant.state, contact, gap);
         Point {
             tau,
-            state,
+            state: instant.state,
             tip,
             tip_rate,
             gap,
             force,
             guard,
             contact,
-        }
-    }
-
-    /// The same under a nonlinear force, whose law may keep its own guards.
-    fn nonlinear_at(&self, tau: f64) -> Point {
-        let model = &self.model;
-        let phase = tau.rem_euclid(model.period());
-        let state = self.recording.state_at(tau);
-        let state = state.unwrap_or_else(|| self.start.1.clone());
-        let at = |output: &Output| output.at(model.system.drive(), &state, phase);
-        let force = self.recording.force(model).at(tau);
-        let stretches = self.recording.stretches(model);
-        let inside = |s: &&crate::model::recording::Stretch| s.start <= tau;
-        let contact = stretches
-            .iter()
-            .rev()
-            .find(inside)
-            .is_some_and(|s| s.contact);
-        Point {
-            tau,
-            tip: at(&model.tip),
-            tip_rate: at(&self.tip_rate),
-            gap: at(&model.height),
-            force: force.unwrap_or(f64::NAN),
-            guard: f64::NAN,
-            contact,
-            state,
         }
     }
 }

@@ -2,7 +2,7 @@
 //! and the sample's force at its tip as a contact law has it.
 //!
 //! Every regime is the free beam's with `M⁻¹p f` added to its accelerations, where the
-//! force f is a combination of the tip's height V_T, its rate and the sample's memory.
+//! force f is a linear form of the tip's height V_T, its rate and the surface's internal variables.
 
 use std::sync::Arc;
 
@@ -14,13 +14,13 @@ use nanotap_flow::{
 
 use crate::model::cantilever::CosineTerm;
 use crate::model::contact::dual::Dual;
-use crate::model::contact::law::{Answer, Bilinear, Combination, Law, Square};
+use crate::model::contact::law::{Bilinear, Law, LinearForm, SampleResponse};
 use crate::model::drive_form::Actuation;
 use crate::model::galerkin::{Forcing, Galerkin, Gap, Regime};
 use crate::model::measured_modes::Correction;
 use crate::model::parameter::Parameter;
 use crate::model::spectrum::{TipLoad, eigenbasis};
-use crate::model::{BeamOutputs, Forgetting, Powers, Product};
+use crate::model::{BeamOutputs, MemoryReset, Powers, Product};
 
 /// The free beam in the state (a, ȧ, s), ready for a sample.
 pub(crate) struct Beam<'a> {
@@ -45,10 +45,10 @@ pub(crate) struct Outputs {
     pub(crate) height: Output,
     pub(crate) force: Vec<Output>,
     pub(crate) beam: BeamOutputs,
-    pub(crate) forgetting: Option<Forgetting>,
+    pub(crate) memory_reset: Option<MemoryReset>,
 }
 
-/// Where things stand in a state.
+/// Layout of a state: modes, their velocities, internal variables of the surface.
 #[derive(Clone, Copy)]
 struct Layout {
     modes: usize,
@@ -69,13 +69,22 @@ impl Layout {
         Output::linear(row, self.tones)
     }
 
-    /// `factor` times the memory.
-    fn memory(self, factor: f64) -> Output {
+    /// `factors` times the internal variables of the surface.
+    fn internal(self, factors: impl Iterator<Item = f64>) -> Output {
         let mut row = RowDVector::zeros(self.dimension());
-        if self.memory > 0 {
-            row[2 * self.modes] = factor;
+        for (of, factor) in row.iter_mut().skip(2 * self.modes).zip(factors) {
+            *of = factor;
         }
         Output::linear(row, self.tones)
+    }
+
+    /// The direction of each internal variable in the state.
+    fn units(self) -> impl Iterator<Item = DVector<f64>> {
+        (2 * self.modes..self.dimension()).map(move |at| {
+            let mut unit = DVector::zeros(self.dimension());
+            unit[at] = 1.0;
+            unit
+        })
     }
 
     /// A vector at the velocities.
@@ -85,7 +94,7 @@ impl Layout {
         state
     }
 
-    /// `[[0, 1], [−K, −C]]`, the memory's row and column zero.
+    /// `[[0, 1], [−K, −C]]`, rows and columns of internal variables zero.
     fn companion(self, stiffness: &DMatrix<f64>, damping: &DMatrix<f64>) -> DMatrix<f64> {
         let (n, size) = (self.modes, self.dimension());
         let mut matrix = DMatrix::zeros(size, size);
@@ -143,15 +152,15 @@ fn add_force(
 }
 
 impl<'a> Beam<'a> {
-    /// The free beam of `galerkin`, with room for a memory or none.
+    /// The free beam of `galerkin`, with this number of internal variables of the surface.
     pub(crate) fn new(
         galerkin: &'a Galerkin,
         drive: &'a Drive,
-        has_memory: bool,
+        memory: usize,
     ) -> Result<Self, FlowError> {
         let layout = Layout {
             modes: galerkin.modes.count(),
-            memory: usize::from(has_memory),
+            memory,
             tones: drive.frequencies().len(),
         };
         let free = Regime::Free.index();
@@ -204,25 +213,26 @@ impl<'a> Beam<'a> {
         (&momentum.row * &self.kick)[0] - 1.0
     }
 
-    /// A combination as an output.
-    fn combined(&self, combination: &Combination) -> Output {
-        self.with_numbers(combination, |dual| dual.value)
+    /// A linear form as an output.
+    fn combined(&self, form: &LinearForm) -> Output {
+        self.with_numbers(form, |dual| dual.value)
     }
 
-    fn with_numbers(&self, combination: &Combination, number: impl Fn(Dual) -> f64) -> Output {
+    fn with_numbers(&self, form: &LinearForm, number: fn(Dual) -> f64) -> Output {
+        let internal = form.internal.iter().map(|by| number(*by));
         self.height
-            .scaled(number(combination.height))
-            .plus(number(combination.rate), &self.height_rate)
-            .plus(1.0, &self.layout.memory(number(combination.memory)))
-            .with_constant(number(combination.constant))
+            .scaled(number(form.height))
+            .plus(number(form.rate), &self.height_rate)
+            .plus(1.0, &self.layout.internal(internal))
+            .with_constant(number(form.constant))
     }
 
     /// One regime. `known` says that its spectrum is that of a beam with spring and damper
-    /// at its tip, beside a memory that fades by itself.
+    /// at its tip, apart from the internal variables.
     pub(crate) fn regime(
         &self,
         regime: Regime,
-        answer: &Answer,
+        response: &SampleResponse,
         known: bool,
     ) -> Result<nanotap_flow::Regime, FlowError> {
         let r = regime.index();
@@ -231,13 +241,14 @@ impl<'a> Beam<'a> {
             &mut matrix,
             &mut forcing,
             &self.kick,
-            &self.combined(&answer.force),
+            &self.combined(&response.force),
         );
-        if let Some(memory) = self.memory_unit() {
-            let rate = self.combined(&answer.memory_rate);
-            add_force(&mut matrix, &mut forcing, &memory, &rate);
+        for (unit, rate) in self.layout.units().zip(&response.rates) {
+            add_force(&mut matrix, &mut forcing, &unit, &self.combined(rate));
         }
-        if !known || !self.galerkin.corrections.is_empty() {
+        let mut rates = response.rates.iter().enumerate();
+        let decoupled = rates.all(|(k, rate)| rate.is_internal(k));
+        if !known || !decoupled || !self.galerkin.corrections.is_empty() {
             return nanotap_flow::Regime::new(r, matrix, forcing, self.drive);
         }
         let case = &self.galerkin.case;
@@ -252,73 +263,64 @@ impl<'a> Beam<'a> {
             let beam = matrix.view((0, 0), (n, n)).into_owned();
             Arc::new(SpectralBasis::of(&beam, self.drive.period(), r)?.into())
         };
-        let basis = match self.memory_unit() {
-            Some(_) => {
-                let fading = answer.memory_rate.memory.value;
-                Arc::new(with_fading_memory(basis.basis().clone(), fading).into())
-            }
-            None => basis,
-        };
+        let decays = response.rates.iter().enumerate();
+        let basis = decays.fold(basis, |basis, (k, rate)| {
+            let rate = rate.internal[k].value;
+            Arc::new(with_decaying_variable(basis.basis().clone(), rate).into())
+        });
         nanotap_flow::Regime::with_basis(r, matrix, forcing, self.drive, basis)
-    }
-
-    /// The memory's direction in the state.
-    fn memory_unit(&self) -> Option<DVector<f64>> {
-        (self.layout.memory > 0).then(|| {
-            let mut unit = DVector::zeros(self.layout.dimension());
-            unit[2 * self.layout.modes] = 1.0;
-            unit
-        })
     }
 
     /// The way out of flight, and out of contact.
     pub(crate) fn transitions(&self, law: &Law) -> Vec<Vec<Transition>> {
         let mut begins = Transition::new(self.combined(&law.gap), 1);
-        let mut ends = Transition::new(self.combined(&law.hold), 0);
+        let mut ends = Transition::new(self.combined(&law.release_guard), 0);
         if let Some([met, left]) = law.onsets {
             begins = begins.with_onset(met);
             ends = ends.with_onset(left);
         }
-        if let Some(left) = &law.left {
-            ends = ends.with_reset(self.memory_jump(&self.combined(left), 1.0));
+        if let Some(values) = &law.release_reset {
+            let outputs = values.iter().map(|value| self.combined(value));
+            ends = ends.with_reset(self.memory_jump(outputs, 1.0));
         }
         vec![vec![begins], vec![ends]]
     }
 
-    /// A jump of the memory to a value, the rest of the state times `rest`.
-    pub(crate) fn memory_jump(&self, value: &Output, rest: f64) -> Reset {
+    /// A jump of the internal variables to `values`, the rest of the state times `rest`.
+    pub(crate) fn memory_jump(&self, values: impl Iterator<Item = Output>, rest: f64) -> Reset {
         let size = self.layout.dimension();
         let mut matrix = DMatrix::from_diagonal_element(size, size, rest);
         let mut offset = HarmonicVector::zeros(size, self.layout.tones);
-        if let Some(memory) = self.memory_unit() {
-            let at = 2 * self.layout.modes;
+        for (at, value) in (2 * self.layout.modes..).zip(values) {
             matrix.row_mut(at).copy_from(&value.row);
-            offset.constant = &memory * value.constant;
+            offset.constant[at] = value.constant;
             for (tone, z) in offset.tones.iter_mut().zip(&value.tones) {
-                *tone = memory.map(|v| z * v);
+                tone[at] = *z;
             }
         }
         Reset { matrix, offset }
     }
 
-    /// What the joined system shows.
-    pub(crate) fn outputs(&self, law: &Law) -> Outputs {
+    /// Outputs of the joined system of so many regimes.
+    pub(crate) fn outputs(&self, law: &Law, regimes: usize) -> Outputs {
         let modes = &self.galerkin.modes;
         Outputs {
             tip: self.layout.row(&modes.tip, 0),
             gap: self.combined(&law.gap),
             height: self.height.clone(),
             force: [&law.flight, &law.contact]
-                .map(|answer| self.combined(&answer.force))
-                .into(),
+                .into_iter()
+                .take(regimes)
+                .map(|response| self.combined(&response.force))
+                .collect(),
             beam: BeamOutputs {
                 modes: Arc::clone(modes),
                 slope: self.layout.row(&modes.tip_slope, 0),
                 base: self.base(),
             },
-            forgetting: law.left.map(|_| Forgetting {
-                rate: law.flight.memory_rate.memory.value,
-                // Contact begins with the force −α6 ġ, and ġ has −ṡ in it: a state that
+            memory_reset: law.release_reset.as_ref().map(|_| MemoryReset {
+                rate: law.flight.rates[0].internal[0].value,
+                // Contact begins with the force −α6 ġ, and ġ contains −ṡ: a state that
                 // comes δs/ġ later has missed α6 δs of momentum.
                 kick: &self.kick * -law.contact.force.rate.value,
             }),
@@ -328,12 +330,14 @@ impl<'a> Beam<'a> {
     /// The drive itself, α2 sin Ωτ and the second tone.
     fn drive_output(&self) -> Output {
         let case = &self.galerkin.case;
-        let drive = self.layout.memory(0.0).with_tone(0, case.alpha2, 0.0);
+        let still = self.layout.internal(std::iter::empty());
+        let drive = still.with_tone(0, case.alpha2, 0.0);
         if case.tone2_ratio.is_none() {
             return drive;
         }
-        let (sin, cos) = nanotap_arithmetic::sin_cos(case.tone2_phase.to_radians());
-        drive.with_tone(1, case.tone2_amplitude * cos, case.tone2_amplitude * sin)
+        let (sin, cos) = nanotap_arithmetic::sin_cos(case.get(Parameter::Tone2Phase).to_radians());
+        let amplitude = case.get(Parameter::Tone2Amplitude);
+        drive.with_tone(1, amplitude * cos, amplitude * sin)
     }
 
     /// Displacement of the base: the drive, if it acts there.
@@ -344,10 +348,9 @@ impl<'a> Beam<'a> {
 
     /// Energy flows in each regime.
     pub(crate) fn powers(&self, law: &Law, system: &System) -> Vec<Powers> {
-        [&law.flight, &law.contact]
-            .into_iter()
-            .enumerate()
-            .map(|(r, answer)| self.powers_in(&system.regimes()[r], answer))
+        let regimes = system.regimes().iter().zip([&law.flight, &law.contact]);
+        regimes
+            .map(|(regime, response)| self.powers_in(regime, response))
             .collect()
     }
 
@@ -358,9 +361,9 @@ impl<'a> Beam<'a> {
     /// through the medium, takes α3 ∫(Ẇ + ẏ)² dξ; the sample takes and stores what its law
     /// says. The printed Eq. (14) is a further force on the modes, whose work counts as the
     /// drive's.
-    pub(crate) fn powers_in(&self, flow: &nanotap_flow::Regime, answer: &Answer) -> Powers {
+    fn powers_in(&self, flow: &nanotap_flow::Regime, response: &SampleResponse) -> Powers {
         let (case, modes) = (&self.galerkin.case, &self.galerkin.modes);
-        let (base, force) = (self.base(), self.combined(&answer.force));
+        let (base, force) = (self.base(), self.combined(&response.force));
         let rate = |o: &Output| o.rate(flow.matrix(), flow.forcing(), self.drive);
         let base_rate = rate(&base);
         let integral = self.layout.row(&modes.integral, 1);
@@ -423,7 +426,7 @@ impl<'a> Beam<'a> {
         stored.extend(
             (0..case.modes).map(|j| product(0.5 * modes.stiffness[j], &unit(j, 0), &unit(j, 0))),
         );
-        stored.extend(self.products(answer.stored.iter().copied()));
+        stored.extend(self.products(response.stored.iter()));
         let mut beam: Vec<Product> = weighted(case.alpha3).collect();
         for (each, speed) in corrections.iter().zip(&speeds) {
             let bent = self.layout.row(&each.row, 0);
@@ -434,9 +437,7 @@ impl<'a> Beam<'a> {
         Powers {
             drive,
             beam,
-            sample: self
-                .products(answer.dissipated.iter().copied().map(Square::into))
-                .collect(),
+            sample: self.products(response.dissipated.iter()).collect(),
             stored,
         }
     }
@@ -449,7 +450,7 @@ impl<'a> Beam<'a> {
 
     fn products<'b>(
         &'b self,
-        terms: impl Iterator<Item = Bilinear> + 'b,
+        terms: impl Iterator<Item = &'b Bilinear> + 'b,
     ) -> impl Iterator<Item = Product> + 'b {
         terms.map(|term| Product {
             weight: term.weight,
@@ -534,11 +535,11 @@ impl BeamTangent {
         &self.height
     }
 
-    /// The derivative of a combination.
-    pub(crate) fn combined(&self, beam: &Beam<'_>, combination: &Combination) -> Output {
-        beam.with_numbers(combination, |dual| dual.derivative)
-            .plus(combination.height.value, &self.height)
-            .plus(combination.rate.value, &self.height_rate)
+    /// The derivative of a linear form.
+    pub(crate) fn combined(&self, beam: &Beam<'_>, form: &LinearForm) -> Output {
+        beam.with_numbers(form, Dual::derivative)
+            .plus(form.height.value, &self.height)
+            .plus(form.rate.value, &self.height_rate)
     }
 
     /// The derivative of V_T.
@@ -555,9 +556,9 @@ impl BeamTangent {
         base
     }
 
-    /// The derivatives of the factors of what the beam's damping takes, as they stand in
-    /// [`Powers::beam`]: α3 ȧ_j and ȧ_j of every mode, α3 ẏ and 2 I·ȧ + ẏ; then those of
-    /// measured modes.
+    /// The derivatives of the factors of the beam's damping power, in the order of
+    /// [`Powers::beam`]: α3 ȧ_j and ȧ_j of every mode, α3 ẏ and 2 I·ȧ + ẏ; then those of measured
+    /// modes.
     pub(crate) fn beam_power(&self, beam: &Beam<'_>, parameter: Parameter) -> Vec<[Output; 2]> {
         let (layout, case) = (beam.layout, &beam.galerkin.case);
         let by = f64::from(u8::from(parameter == Parameter::Alpha3));
@@ -581,9 +582,9 @@ impl BeamTangent {
             let speed = beam.speed(&each, &moving);
             let change = layout
                 .row(&each.row_change, 1)
-                .plus(each.base.derivative, &moving)
+                .plus(each.base.derivative(), &moving)
                 .plus(each.base.value, &base_rate);
-            let weighted = speed.scaled(each.damping.derivative);
+            let weighted = speed.scaled(each.damping.derivative());
             of_measured.push([weighted.plus(each.damping.value, &change), change]);
         }
         factors.push([moving.scaled(by).plus(case.alpha3, &base_rate), base_rate]);
@@ -592,15 +593,15 @@ impl BeamTangent {
     }
 
     /// The derivative of a regime.
-    pub(crate) fn regime(&self, beam: &Beam<'_>, answer: &Answer) -> RegimeTangent {
+    pub(crate) fn regime(&self, beam: &Beam<'_>, response: &SampleResponse) -> RegimeTangent {
         let (mut matrix, mut forcing) = (self.matrix.clone(), self.forcing.clone());
         let mut add = |column: &DVector<f64>, force: &Output| {
             add_force(&mut matrix, &mut forcing, column, force);
         };
-        add(&self.kick, &beam.combined(&answer.force));
-        add(&beam.kick, &self.combined(beam, &answer.force));
-        if let Some(memory) = beam.memory_unit() {
-            add(&memory, &self.combined(beam, &answer.memory_rate));
+        add(&self.kick, &beam.combined(&response.force));
+        add(&beam.kick, &self.combined(beam, &response.force));
+        for (unit, rate) in beam.layout.units().zip(&response.rates) {
+            add(&unit, &self.combined(beam, rate));
         }
         RegimeTangent { matrix, forcing }
     }
@@ -640,8 +641,8 @@ impl Solve {
     }
 }
 
-/// The basis of a beam's regime beside one more state that fades at `rate` by itself.
-fn with_fading_memory(basis: SpectralBasis, rate: f64) -> SpectralBasis {
+/// The basis of a beam's regime with one more state, which decays at `rate` by itself.
+fn with_decaying_variable(basis: SpectralBasis, rate: f64) -> SpectralBasis {
     let (n, m) = basis.right.shape();
     let zero = Complex::new(0.0, 0.0);
     let one = Complex::new(1.0, 0.0);

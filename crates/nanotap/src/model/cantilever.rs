@@ -2,46 +2,33 @@
 
 use std::fmt;
 
-use serde::Serialize;
+use serde::ser::SerializeMap as _;
+use serde::{Serialize, Serializer};
 
 use crate::model::beam::{MAX_MODES, ModeCountError};
 use crate::model::contact::ContactLaw;
 use crate::model::contact::dual::Dual;
+use crate::model::contact::entry::Damper;
 use crate::model::contact::law::Law;
-use crate::model::contact::moving_surface::MovingSurface;
 use crate::model::drive_form::{Actuation, FrequencyRatio};
-use crate::model::higher_modes::HigherModes;
-use crate::model::parameter::Parameter;
+use crate::model::parameter::{Applies, LARGEST_ALPHA, Numbers, OMEGA_RANGE, Parameter, Unit};
 use crate::model::sample_law::SampleLaw;
+use crate::model::words::words;
 use crate::number::shortest;
 
-/// Which cosine term the drive has in Eq. (14) of the paper.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum CosineTerm {
-    /// −α2 α3 Ω I cos Ωτ, as Eq. (6) has it.
-    #[default]
-    Corrected,
-    /// −α2 α3 I cos Ωτ, as Eq. (14) is printed; kept for comparison.
-    Printed,
-}
-
-impl CosineTerm {
-    /// Both forms.
-    pub const ALL: [Self; 2] = [Self::Corrected, Self::Printed];
-
-    /// Its name in case files.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Corrected => "corrected",
-            Self::Printed => "printed",
-        }
+words! {
+    /// Which cosine term the drive has in Eq. (14) of the paper.
+    CosineTerm {
+        /// −α2 α3 Ω I cos Ωτ, as Eq. (6) has it.
+        Corrected = "corrected",
+        /// −α2 α3 I cos Ωτ, as Eq. (14) is printed; kept for comparison.
+        Printed = "printed",
     }
 }
 
 /// A dimensionless case. Fields are as given: [`validate`](Self::validate) says
 /// whether they make sense, and whatever is built from a case calls it.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Cantilever {
     /// Number of beam modes N, 1 to 50.
     pub modes: usize,
@@ -62,67 +49,17 @@ pub struct Cantilever {
     pub omega: f64,
     /// Which form of Eq. (14) drives the beam.
     pub cosine_term: CosineTerm,
-    /// How the sample answers the tip.
+    /// Contact law of the sample.
     pub contact: ContactLaw,
     /// A nonlinear force law in place of spring and damper, in the model's units.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub law: Option<SampleLaw>,
-    /// Stiffness of the standard linear solid's relaxing arm over bending stiffness, ≥ 0;
-    /// 0 with every other law.
-    pub relaxation_stiffness: f64,
-    /// Time in which that arm's force decays, ≥ 0; 0 with every other law.
-    pub relaxation_time: f64,
-    /// What a moving surface has of its own.
-    #[serde(flatten)]
-    pub surface: MovingSurface,
     /// Where the drive acts; α2 is an amplitude of motion or of force accordingly, see
     /// [`drive_form`](crate::model::drive_form).
     pub actuation: Actuation,
     /// Frequency of a second tone over Ω.
     pub tone2_ratio: Option<FrequencyRatio>,
-    /// Its amplitude, measured as α2, ≥ 0; 0 without a second tone.
-    pub tone2_amplitude: f64,
-    /// Its phase in degrees.
-    pub tone2_phase: f64,
-    /// What was measured of the second and third mode, in place of the uniform beam's.
-    #[serde(flatten)]
-    pub higher_modes: HigherModes,
-}
-
-/// Largest size of α1 … α6. Beyond it a number is a slip (a value in SI units, say),
-/// and products of parameters would no longer leave enough digits.
-const LARGEST_ALPHA: f64 = 1e9;
-/// Least damping of a moving surface, and its least part of the surface's stiffness.
-const LEAST_SURFACE_DAMPING: f64 = 1e-15;
-/// Range of Ω. The 50th mode is at 24,350 and the first at 3.5.
-const OMEGA_RANGE: (f64, f64) = (1e-6, 1e6);
-
-/// Where the value of a parameter stands.
-macro_rules! place {
-    ($case:ident, $parameter:ident $(, $mutable:tt)?) => {
-        match $parameter {
-            Parameter::Alpha1 => &$($mutable)? $case.alpha1,
-            Parameter::Alpha2 => &$($mutable)? $case.alpha2,
-            Parameter::Alpha3 => &$($mutable)? $case.alpha3,
-            Parameter::Alpha4 => &$($mutable)? $case.alpha4,
-            Parameter::Alpha5 => &$($mutable)? $case.alpha5,
-            Parameter::Alpha6 => &$($mutable)? $case.alpha6,
-            Parameter::Omega => &$($mutable)? $case.omega,
-            Parameter::RelaxationStiffness => &$($mutable)? $case.relaxation_stiffness,
-            Parameter::RelaxationTime => &$($mutable)? $case.relaxation_time,
-            Parameter::SurfaceStiffness => &$($mutable)? $case.surface.stiffness,
-            Parameter::SurfaceDamping => &$($mutable)? $case.surface.damping,
-            Parameter::AdhesionForce => &$($mutable)? $case.surface.adhesion,
-            Parameter::Tone2Amplitude => &$($mutable)? $case.tone2_amplitude,
-            Parameter::Tone2Phase => &$($mutable)? $case.tone2_phase,
-            Parameter::Mode2Frequency => &$($mutable)? $case.higher_modes.frequency[0],
-            Parameter::Mode3Frequency => &$($mutable)? $case.higher_modes.frequency[1],
-            Parameter::Mode2Quality => &$($mutable)? $case.higher_modes.quality[0],
-            Parameter::Mode3Quality => &$($mutable)? $case.higher_modes.quality[1],
-            Parameter::Mode2Stiffness => &$($mutable)? $case.higher_modes.stiffness[0],
-            Parameter::Mode3Stiffness => &$($mutable)? $case.higher_modes.stiffness[1],
-        }
-    };
+    /// The parameters that only some laws, drives and levers have; see [`get`](Self::get).
+    pub further: Numbers,
 }
 
 impl Cantilever {
@@ -140,14 +77,9 @@ impl Cantilever {
             cosine_term: CosineTerm::Corrected,
             contact: ContactLaw::SpringDamper,
             law: None,
-            relaxation_stiffness: 0.0,
-            relaxation_time: 0.0,
-            surface: MovingSurface::NONE,
             actuation: Actuation::Base,
             tone2_ratio: None,
-            tone2_amplitude: 0.0,
-            tone2_phase: 0.0,
-            higher_modes: HigherModes::NONE,
+            further: Numbers::ZERO,
         }
     }
 
@@ -163,14 +95,45 @@ impl Cantilever {
 
     /// The value of a parameter.
     pub const fn get(&self, parameter: Parameter) -> f64 {
-        *place!(self, parameter)
+        match parameter {
+            Parameter::Alpha1 => self.alpha1,
+            Parameter::Alpha2 => self.alpha2,
+            Parameter::Alpha3 => self.alpha3,
+            Parameter::Alpha4 => self.alpha4,
+            Parameter::Alpha5 => self.alpha5,
+            Parameter::Alpha6 => self.alpha6,
+            Parameter::Omega => self.omega,
+            further => self.further.get(further),
+        }
     }
 
     /// The same case with one parameter changed.
     #[must_use]
     pub fn with(mut self, parameter: Parameter, value: f64) -> Self {
-        *place!(self, parameter, mut) = value;
+        match parameter {
+            Parameter::Alpha1 => self.alpha1 = value,
+            Parameter::Alpha2 => self.alpha2 = value,
+            Parameter::Alpha3 => self.alpha3 = value,
+            Parameter::Alpha4 => self.alpha4 = value,
+            Parameter::Alpha5 => self.alpha5 = value,
+            Parameter::Alpha6 => self.alpha6 = value,
+            Parameter::Omega => self.omega = value,
+            further => self.further.set(further, value),
+        }
         self
+    }
+
+    /// The same case with another contact law and the numbers that only this law has, in the order
+    /// of [`Parameter::of_law`]; those of the law before become 0.
+    #[must_use]
+    pub fn on(mut self, contact: ContactLaw, numbers: &[f64]) -> Self {
+        for parameter in Parameter::of_law(self.contact) {
+            self.further.set(parameter, 0.0);
+        }
+        for (parameter, number) in Parameter::of_law(contact).zip(numbers) {
+            self.further.set(parameter, *number);
+        }
+        Self { contact, ..self }
     }
 
     /// The same case with another number of modes.
@@ -186,27 +149,52 @@ impl Cantilever {
         Parameter::every().filter(|of| self.has(*of)).collect()
     }
 
-    /// Whether a parameter has a meaning beside this case's law and drive.
-    fn has(&self, parameter: Parameter) -> bool {
-        let of_law = self.law.is_some();
-        match parameter {
-            Parameter::Alpha4 | Parameter::Alpha6 if of_law => false,
-            Parameter::Alpha6 => self.contact != ContactLaw::StandardLinearSolid,
-            Parameter::RelaxationStiffness | Parameter::RelaxationTime => {
-                self.contact == ContactLaw::StandardLinearSolid
-            }
-            Parameter::SurfaceStiffness | Parameter::SurfaceDamping | Parameter::AdhesionForce => {
-                self.contact == ContactLaw::MovingSurface && !of_law
-            }
-            Parameter::Tone2Amplitude | Parameter::Tone2Phase => self.tone2_ratio.is_some(),
-            Parameter::Mode2Frequency
-            | Parameter::Mode3Frequency
-            | Parameter::Mode2Quality
-            | Parameter::Mode3Quality
-            | Parameter::Mode2Stiffness
-            | Parameter::Mode3Stiffness => self.get(parameter) != 0.0,
-            _ => true,
+    /// Whether a parameter applies to this case's law, drive and lever.
+    pub(crate) fn has(&self, parameter: Parameter) -> bool {
+        match parameter.entry().applies {
+            Applies::Always => true,
+            Applies::Spring => self.law.is_none(),
+            Applies::Damper => self.law.is_none() && self.contact.has_damper(),
+            Applies::Law(law) => self.law.is_none() && self.contact == law,
+            Applies::SecondTone => self.tone2_ratio.is_some(),
+            Applies::Measured => self.get(parameter) != 0.0,
         }
+    }
+
+    /// The parameters beyond the paper's that documents give.
+    fn written(&self) -> impl Iterator<Item = Parameter> {
+        let further = Parameter::every().skip(Parameter::PAPER);
+        further.filter(|of| of.entry().always_written || self.has(*of))
+    }
+
+    /// The numbers of contact laws that documents give.
+    pub(crate) fn written_law_numbers(&self) -> impl Iterator<Item = Parameter> {
+        self.written().filter(|of| is_of_law(*of))
+    }
+
+    /// Whether modes were measured.
+    pub fn has_measured_modes(&self) -> bool {
+        Parameter::MEASURED.iter().any(|of| self.has(*of))
+    }
+
+    /// The numbers that only its contact law has.
+    pub(crate) fn own_numbers(&self) -> Vec<f64> {
+        let own = Parameter::of_law(self.contact);
+        own.map(|parameter| self.get(parameter)).collect()
+    }
+
+    /// Stiffness and damper of the arm that its contact law has in place of α6, if it has one.
+    pub fn arm(&self) -> Option<[f64; 2]> {
+        match self.contact.entry().damper {
+            Damper::InArm { arm, .. } => Some(arm(&self.own_numbers())),
+            Damper::Contact { .. } => None,
+        }
+    }
+
+    /// Whether the surface pulls a touching tip with a constant force, see
+    /// [`Entry::attracts`](crate::model::contact::entry::Entry::attracts).
+    pub(crate) fn has_attractive_surface(&self) -> bool {
+        self.law.is_none() && self.contact.entry().attracts
     }
 
     /// The period of the drive: 2π/Ω, or with a second tone the time after which both
@@ -216,30 +204,30 @@ impl Cantilever {
         f64::from(repetition) * std::f64::consts::TAU / self.omega
     }
 
-    /// What is wrong with the value of a parameter beside this case's law and drive: one that it
-    /// does not have, or one that it cannot do without.
+    /// What is wrong with the value of a parameter with this case's law and drive: one that does
+    /// not apply, or one that the law does not allow.
     pub(crate) fn misplaced(&self, parameter: Parameter) -> Option<Reason> {
-        let there = self.has(parameter);
-        let own = [Parameter::SurfaceStiffness, Parameter::SurfaceDamping];
-        if there && own.contains(&parameter) && self.get(parameter) == 0.0 {
-            return Some(Reason::BareSurface);
+        let applies = parameter.entry().applies;
+        if self.has(parameter) {
+            let Applies::Law(law) = applies else {
+                return None;
+            };
+            let k = Parameter::of_law(law).position(|own| own == parameter)?;
+            let objection = (law.entry().objection)(&self.own_numbers(), k);
+            return objection.map(Reason::Law);
         }
-        let slowest = LEAST_SURFACE_DAMPING * self.surface.stiffness.max(1.0);
-        if there && parameter == Parameter::SurfaceDamping && self.surface.damping < slowest {
-            return Some(Reason::FastSurface);
-        }
-        if there || self.get(parameter) == 0.0 {
+        if self.get(parameter) == 0.0 {
             return None;
         }
-        Some(match parameter {
-            Parameter::Alpha4 | Parameter::Alpha6 if self.law.is_some() => Reason::SpringOfLaw,
-            Parameter::Alpha6 => Reason::DamperOfSolid,
-            Parameter::Tone2Amplitude | Parameter::Tone2Phase => Reason::NoSecondTone,
-            Parameter::SurfaceStiffness | Parameter::SurfaceDamping | Parameter::AdhesionForce => {
-                Reason::NoMovingSurface
+        match (applies, self.contact.entry().damper) {
+            (Applies::Spring | Applies::Damper, _) if self.law.is_some() => {
+                Some(Reason::SpringOfLaw)
             }
-            _ => Reason::NoSolid,
-        })
+            (Applies::Damper, Damper::InArm { not_alpha6, .. }) => Some(Reason::Law(not_alpha6)),
+            (Applies::Law(law), _) => Some(Reason::OtherLaw(law)),
+            (Applies::SecondTone, _) => Some(Reason::NoSecondTone),
+            _ => None,
+        }
     }
 
     /// Checks every field.
@@ -279,13 +267,9 @@ impl Cantilever {
     }
 }
 
-/// The least and the greatest value of a parameter.
-pub const fn range(parameter: Parameter) -> (f64, f64) {
-    match parameter {
-        Parameter::Omega => OMEGA_RANGE,
-        Parameter::Alpha5 | Parameter::Tone2Phase => (-LARGEST_ALPHA, LARGEST_ALPHA),
-        _ => (0.0, LARGEST_ALPHA),
-    }
+/// Whether only one contact law has a parameter.
+fn is_of_law(parameter: Parameter) -> bool {
+    matches!(parameter.entry().applies, Applies::Law(_))
 }
 
 /// Checks one parameter on its own.
@@ -308,7 +292,7 @@ fn objection(parameter: Parameter, value: f64) -> Option<Reason> {
     if !value.is_finite() {
         return Some(Reason::NotFinite);
     }
-    let (least, greatest) = range(parameter);
+    let (least, greatest) = parameter.entry().range;
     if (least..=greatest).contains(&value) {
         return None;
     }
@@ -316,7 +300,7 @@ fn objection(parameter: Parameter, value: f64) -> Option<Reason> {
         Parameter::Omega if value <= 0.0 => Reason::FrequencyNotPositive,
         Parameter::Omega => Reason::FrequencyOutOfRange,
         _ if value.abs() > LARGEST_ALPHA => Reason::TooLarge,
-        Parameter::Alpha2 | Parameter::Tone2Amplitude => Reason::NegativeDrive,
+        _ if parameter.entry().unit == Unit::Drive => Reason::NegativeDrive,
         _ => Reason::Negative,
     })
 }
@@ -329,8 +313,34 @@ pub struct CantileverError {
     pub key: &'static str,
     /// The value given.
     pub value: f64,
-    /// What would be right.
+    /// The remedy.
     pub reason: Reason,
+}
+
+/// The keys of a case file, and a nonlinear law. Numbers that do not apply are left out, except
+/// those that every document gives.
+impl Serialize for Cantilever {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let mut map = serializer.serialize_map(None)?;
+        map.serialize_entry("modes", &self.modes)?;
+        for parameter in Parameter::ALL {
+            map.serialize_entry(parameter.name(), &self.get(parameter))?;
+        }
+        map.serialize_entry("cosine_term", &self.cosine_term)?;
+        map.serialize_entry("contact", &self.contact)?;
+        if let Some(law) = &self.law {
+            map.serialize_entry("law", law)?;
+        }
+        for parameter in self.written_law_numbers() {
+            map.serialize_entry(parameter.name(), &self.get(parameter))?;
+        }
+        map.serialize_entry("actuation", &self.actuation)?;
+        map.serialize_entry("tone2_ratio", &self.tone2_ratio)?;
+        for parameter in self.written().filter(|of| !is_of_law(*of)) {
+            map.serialize_entry(parameter.name(), &self.get(parameter))?;
+        }
+        map.end()
+    }
 }
 
 impl From<ModeCountError> for CantileverError {
@@ -360,18 +370,12 @@ pub enum Reason {
     FrequencyNotPositive,
     /// Ω outside 10⁻⁶ … 10⁶.
     FrequencyOutOfRange,
-    /// A damper beside a standard linear solid.
-    DamperOfSolid,
-    /// A spring or a damper beside a nonlinear law.
+    /// What the contact law objects to.
+    Law(&'static str),
+    /// A spring or a damper in addition to a nonlinear law.
     SpringOfLaw,
-    /// A relaxing arm of another law.
-    NoSolid,
-    /// A surface of its own under another law.
-    NoMovingSurface,
-    /// A moving surface without a spring or a damper of its own.
-    BareSurface,
-    /// A moving surface that recovers in no time that counts.
-    FastSurface,
+    /// A number that only this other law has.
+    OtherLaw(ContactLaw),
     /// A second tone without a frequency.
     NoSecondTone,
 }
@@ -401,29 +405,15 @@ impl fmt::Display for Reason {
                  is it in hertz?",
                 OMEGA_RANGE.0, OMEGA_RANGE.1
             ),
-            Self::DamperOfSolid => formatter.write_str(
-                "must be 0 with contact = \"standard-linear-solid\", whose damper is its arm's: \
-                 relaxation_stiffness times relaxation_time",
+            Self::Law(reason) => formatter.write_str(reason),
+            Self::SpringOfLaw => formatter.write_str(
+                "must be 0 with a nonlinear force law, which describes the whole sample",
             ),
-            Self::SpringOfLaw => formatter
-                .write_str("must be 0 beside a nonlinear force law, which is all of the sample"),
-            Self::NoSecondTone => formatter.write_str(
-                "there is no second tone: give tone2_ratio, as in \"25/4\", or leave this out",
-            ),
-            Self::NoSolid => formatter.write_str(
-                "belongs to contact = \"standard-linear-solid\"; leave it out with any other",
-            ),
-            Self::NoMovingSurface => formatter
-                .write_str("belongs to contact = \"moving-surface\"; leave it out with any other"),
-            Self::BareSurface => formatter.write_str(
-                "must be above 0 with contact = \"moving-surface\": the surface has a spring and a \
-                 damper of its own, and without one it is a \"kelvin-voigt\" or \"spring-damper\" \
-                 sample",
-            ),
-            Self::FastSurface => write!(
+            Self::NoSecondTone => formatter
+                .write_str("no second tone: give tone2_ratio, as in \"25/4\", or leave this out"),
+            Self::OtherLaw(law) => write!(
                 formatter,
-                "must be at least {LEAST_SURFACE_DAMPING:e}, and that part of surface_stiffness: \
-                 such a surface recovers at once"
+                "belongs to contact = \"{law}\"; leave it out with any other"
             ),
         }
     }

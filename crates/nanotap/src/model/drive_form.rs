@@ -3,8 +3,8 @@
 //! A tone is A sin(wτ + θ). Driven through the base (the paper's piezo), the clamped end
 //! moves by A in units of g₀. Driven directly, a force of amplitude A in units of EI g₀/L³ (a
 //! third of k g₀) acts on the tip (a magnet) or is spread evenly over the beam (light, heat),
-//! the clamped end is at rest, and the gap has no motion of its own. A static force A at the
-//! tip would bend it by A/3.
+//! the clamped end is at rest, and the gap is not modulated. A static force A at the tip would bend it
+//! by A/3.
 //!
 //! A second tone has p/q of the first one's frequency. Both repeat after q periods of the
 //! first, so that the stroboscopic map is of that period.
@@ -12,34 +12,23 @@
 use std::fmt;
 use std::str::FromStr;
 
-use serde::{Deserialize, Serialize, Serializer};
+use serde::{Serialize, Serializer};
 
-/// Where the drive acts.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Actuation {
-    /// The clamped end is moved, as in the paper.
-    #[default]
-    Base,
-    /// A force at the tip (magnetic).
-    Tip,
-    /// A force spread evenly over the beam (photothermal, electrostatic).
-    Distributed,
+use crate::model::words::words;
+
+words! {
+    /// Where the drive acts.
+    Actuation {
+        /// The clamped end is moved, as in the paper.
+        Base = "base",
+        /// A force at the tip (magnetic).
+        Tip = "tip",
+        /// A force spread evenly over the beam (photothermal, electrostatic).
+        Distributed = "distributed",
+    }
 }
 
 impl Actuation {
-    /// Every way.
-    pub const ALL: [Self; 3] = [Self::Base, Self::Tip, Self::Distributed];
-
-    /// Its name in case files.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Base => "base",
-            Self::Tip => "tip",
-            Self::Distributed => "distributed",
-        }
-    }
-
     /// What it is, in a few words.
     pub const fn meaning(self) -> &'static str {
         match self {
@@ -47,34 +36,6 @@ impl Actuation {
             Self::Tip => "a force at the tip",
             Self::Distributed => "a force spread evenly over the beam",
         }
-    }
-}
-
-impl fmt::Display for Actuation {
-    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-        formatter.pad(self.name())
-    }
-}
-
-/// A word that names no way of driving.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("`{given}` is no way of driving; there are {}", Actuation::ALL.map(Actuation::name).join(", "))]
-pub struct UnknownActuation {
-    /// The word.
-    pub given: String,
-}
-
-impl FromStr for Actuation {
-    type Err = UnknownActuation;
-
-    fn from_str(given: &str) -> Result<Self, UnknownActuation> {
-        let word = given.trim().to_lowercase();
-        Self::ALL
-            .into_iter()
-            .find(|way| way.name() == word)
-            .ok_or_else(|| UnknownActuation {
-                given: given.to_owned(),
-            })
     }
 }
 
@@ -94,9 +55,11 @@ const NEAR: f64 = 1e-9;
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum RatioError {
     /// Not a ratio at all.
-    #[error("\"{given}\" is no ratio of frequencies; write it as in \"25/4\", with whole numbers")]
+    #[error(
+        "\"{given}\" is not a ratio of frequencies; write it as in \"25/4\", with whole numbers"
+    )]
     Form {
-        /// What was given.
+        /// The given text.
         given: String,
     },
     /// Zero, or too large.
@@ -115,7 +78,7 @@ pub enum RatioError {
     One,
     /// Not a ratio of small whole numbers.
     #[error(
-        "the ratio {ratio} of the two frequencies is no fraction with a denominator up to {}, so the drive \
+        "the ratio {ratio} of the two frequencies is not a fraction with a denominator up to {}, so the drive \
          would not repeat; the nearest is {nearest}", LARGEST.0
     )]
     Irrational {

@@ -1,7 +1,7 @@
 //! The equations of cantilevers and oscillators with numbers that are intervals, for proofs.
 //!
 //! Every parameter is the interval of all decimal numbers that are read as its value
-//! ([`Interval::typed`]), wave numbers β_j come from an interval Newton step on
+//! ([`Interval::decimal`]), wave numbers β_j come from an interval Newton step on
 //! cos β + sech β = 0, and matrices, forcing and guards follow by the same formulas as the
 //! plain ones, Eqs. (8)–(18), rounded outwards.
 
@@ -13,10 +13,10 @@ use nanotap_proof::{
 use crate::model::beam::Modes;
 use crate::model::cantilever::{Cantilever, CosineTerm};
 use crate::model::contact::ContactLaw;
-use crate::model::contact::law::{Answer, Combination};
+use crate::model::contact::law::{LinearForm, SampleResponse};
 use crate::model::drive_form::{Actuation, FrequencyRatio};
-use crate::model::higher_modes::HigherModes;
 use crate::model::oscillator::{Oscillator, Stop};
+use crate::model::parameter::Parameter;
 
 /// Why a case has no equations in intervals.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -33,9 +33,12 @@ pub enum EnclosureError {
     /// A force that jumps where contact begins.
     #[error(
         "proofs are of contact forces that begin at zero or with a damper, and that of a \
-         \"moving-surface\" jumps by its adhesion"
+         \"{law}\" jumps by its adhesion"
     )]
-    MovingSurface,
+    ForceJumps {
+        /// The contact law.
+        law: ContactLaw,
+    },
     /// A motion that was integrated step by step.
     #[error("the motion is not known in closed form")]
     NotPiecewiseLinear,
@@ -63,7 +66,8 @@ struct EnclosedMode {
 /// The equations of motion in the state (a, ȧ, s).
 struct EnclosedBeam {
     modes: Vec<EnclosedMode>,
-    memory: bool,
+    /// Number of internal variables of the surface.
+    memory: usize,
     tones: usize,
     frequencies: Vec<Interval>,
     /// M⁻¹p over p.
@@ -86,25 +90,25 @@ pub fn enclosed(case: &Cantilever) -> Result<System, EnclosureError> {
     if let Some(law) = &case.law {
         return Err(EnclosureError::NonlinearLaw { law: law.name() });
     }
-    if case.higher_modes != HigherModes::NONE {
+    if case.has_measured_modes() {
         return Err(EnclosureError::MeasuredModes);
     }
-    if case.contact == ContactLaw::MovingSurface {
-        return Err(EnclosureError::MovingSurface);
+    if case.has_attractive_surface() {
+        return Err(EnclosureError::ForceJumps { law: case.contact });
     }
     let law = case.contact_law(None);
-    let beam = EnclosedBeam::new(case, law.has_memory)?;
+    let beam = EnclosedBeam::new(case, law.internal)?;
     let recovers = law.onsets.is_some();
     let gap = beam.combined(&law.gap, exact);
     let hold = if recovers {
-        beam.combined(&law.hold, derived)
+        beam.combined(&law.release_guard, derived)
     } else {
         scaled(&gap, -Interval::ONE)
     };
-    let reset = law
-        .left
-        .as_ref()
-        .map(|left| beam.memory_jump(&beam.combined(left, exact)));
+    let reset = law.release_reset.as_ref().map(|values| {
+        let outputs: Vec<Output> = values.iter().map(|of| beam.combined(of, exact)).collect();
+        beam.memory_jump(&outputs)
+    });
     let begins = Transition {
         guard: gap,
         target: 1,
@@ -124,7 +128,7 @@ pub fn enclosed(case: &Cantilever) -> Result<System, EnclosureError> {
     ];
     let repetition = case.tone2_ratio.map_or(1, FrequencyRatio::denominator);
     let period =
-        Interval::point(f64::from(2 * repetition)) * Interval::pi() / Interval::typed(case.omega);
+        Interval::point(f64::from(2 * repetition)) * Interval::pi() / Interval::decimal(case.omega);
     Ok(System::new(period, beam.frequencies.clone(), regimes)?)
 }
 
@@ -135,7 +139,7 @@ pub fn enclosed(case: &Cantilever) -> Result<System, EnclosureError> {
 /// # Errors
 /// [`EnclosureError::Flow`] where its flow cannot be enclosed.
 pub fn enclosed_oscillator(oscillator: &Oscillator) -> Result<System, EnclosureError> {
-    let typed = Interval::typed;
+    let typed = Interval::decimal;
     let (zero, one) = (Interval::ZERO, Interval::ONE);
     let (mass, wall) = (typed(oscillator.mass), typed(oscillator.gap));
     let still = HarmonicVector {
@@ -236,7 +240,7 @@ fn derived(value: f64) -> Interval {
     if value == 0.0 {
         return Interval::ZERO;
     }
-    let typed = Interval::typed(value);
+    let typed = Interval::decimal(value);
     typed + typed * Interval::around_zero(8.0 * f64::EPSILON)
 }
 
@@ -266,8 +270,8 @@ fn sum(a: &Output, b: &Output) -> Output {
 }
 
 impl EnclosedBeam {
-    fn new(case: &Cantilever, memory: bool) -> Result<Self, EnclosureError> {
-        let typed = Interval::typed;
+    fn new(case: &Cantilever, memory: usize) -> Result<Self, EnclosureError> {
+        let typed = Interval::decimal;
         let approximate = Modes::shared(case.modes)
             .map_err(|_| EnclosureError::WaveNumber { mode: case.modes })?;
         let modes = approximate
@@ -283,10 +287,10 @@ impl EnclosedBeam {
         if let Some(ratio) = case.tone2_ratio {
             let [p, q] = [ratio.numerator(), ratio.denominator()];
             frequencies.push(omega * Interval::point(f64::from(p)) / Interval::point(f64::from(q)));
-            let degrees = typed(case.tone2_phase);
+            let degrees = typed(case.get(Parameter::Tone2Phase));
             let phase = degrees * Interval::pi() / Interval::point(180.0);
             let turn = Rectangle::imaginary(phase).exp();
-            amplitudes.push((typed(case.tone2_amplitude), turn));
+            amplitudes.push((typed(case.get(Parameter::Tone2Amplitude)), turn));
         }
         let mut gap_tones = Vec::new();
         let mut drives = Vec::new();
@@ -312,7 +316,7 @@ impl EnclosedBeam {
             drives.push([tip, spread]);
             gap_tones.push(gap);
         }
-        let size = 2 * count + usize::from(memory);
+        let size = 2 * count + memory;
         let tip_row = |block: usize| {
             let mut row = vec![Interval::ZERO; size];
             for (j, mode) in modes.iter().enumerate() {
@@ -349,7 +353,7 @@ impl EnclosedBeam {
     }
 
     fn size(&self) -> usize {
-        2 * self.modes.len() + usize::from(self.memory)
+        2 * self.modes.len() + self.memory
     }
 
     /// M⁻¹ = 1 − α1 p pᵀ/(1 + 4N α1), times a vector.
@@ -365,18 +369,19 @@ impl EnclosedBeam {
         each.map(|(mode, &z)| z - taken.scale(mode.tip)).collect()
     }
 
-    fn combined(&self, combination: &Combination, number: fn(f64) -> Interval) -> Output {
+    fn combined(&self, form: &LinearForm, number: fn(f64) -> Interval) -> Output {
         let mut output = sum(
-            &scaled(&self.height, number(combination.height.value)),
-            &scaled(&self.height_rate, number(combination.rate.value)),
+            &scaled(&self.height, number(form.height.value)),
+            &scaled(&self.height_rate, number(form.rate.value)),
         );
-        if self.memory {
-            output.row[2 * self.modes.len()] += number(combination.memory.value);
+        let variables = &mut output.row[2 * self.modes.len()..];
+        for (factor, of) in variables.iter_mut().zip(&form.internal) {
+            *factor += number(of.value);
         }
         output
     }
 
-    fn regime(&self, answer: &Answer, exit: Transition) -> RegimeParts {
+    fn regime(&self, response: &SampleResponse, exit: Transition) -> RegimeParts {
         let (n, size) = (self.modes.len(), self.size());
         let mut matrix = Matrix::zeros(size, size);
         let mut constant = vec![Interval::ZERO; size];
@@ -403,15 +408,15 @@ impl EnclosedBeam {
                 .collect();
             tone[n..2 * n].copy_from_slice(&self.over_mass(&force));
         }
-        // The force acts along M⁻¹p, and a memory changes by itself.
-        let force = self.combined(&answer.force, derived);
+        // The force acts along M⁻¹p, and internal variables change by themselves.
+        let force = self.combined(&response.force, derived);
         let mut rows: Vec<(usize, Interval, Output)> = (0..n)
             .map(|i| (n + i, self.modes[i].tip * self.give, force.clone()))
             .collect();
-        if self.memory {
-            let rate = self.combined(&answer.memory_rate, derived);
-            rows.push((2 * n, Interval::ONE, rate));
-        }
+        rows.extend(response.rates.iter().enumerate().map(|(k, rate)| {
+            let rate = self.combined(rate, derived);
+            (2 * n + k, Interval::ONE, rate)
+        }));
         for (i, factor, output) in rows {
             for (j, &x) in output.row.iter().enumerate() {
                 matrix[(i, j)] += factor * x;
@@ -428,20 +433,22 @@ impl EnclosedBeam {
         }
     }
 
-    /// The memory becomes `value`, and nothing else changes.
-    fn memory_jump(&self, value: &Output) -> Reset {
-        let (size, at) = (self.size(), 2 * self.modes.len());
+    /// The internal variables become `values`, and nothing else changes.
+    fn memory_jump(&self, values: &[Output]) -> Reset {
+        let size = self.size();
         let mut matrix = Matrix::identity(size);
         let mut offset = HarmonicVector {
             constant: vec![Interval::ZERO; size],
             tones: vec![vec![Rectangle::ZERO; size]; self.tones],
         };
-        for (j, &x) in value.row.iter().enumerate() {
-            matrix[(at, j)] = x;
-        }
-        offset.constant[at] = value.constant;
-        for (tone, &z) in offset.tones.iter_mut().zip(&value.tones) {
-            tone[at] = z;
+        for (at, value) in (2 * self.modes.len()..).zip(values) {
+            for (j, &x) in value.row.iter().enumerate() {
+                matrix[(at, j)] = x;
+            }
+            offset.constant[at] = value.constant;
+            for (tone, &z) in offset.tones.iter_mut().zip(&value.tones) {
+                tone[at] = z;
+            }
         }
         Reset { matrix, offset }
     }

@@ -15,6 +15,7 @@ use crate::model::contact::dual::Dual;
 use crate::model::drive_form::{Actuation, FrequencyRatio};
 use crate::model::measured_modes::Correction;
 use crate::model::parameter::Parameter;
+use nanotap_arithmetic::Scalar as _;
 
 /// The two linear regimes of the tip.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -217,7 +218,7 @@ impl Tone<Dual> {
             Which::First => (dual(Parameter::Alpha2), zero),
             Which::Second(_) => (dual(Parameter::Tone2Amplitude), dual(Parameter::Tone2Phase)),
         };
-        let (sin, cos) = phase.sin_cos_degrees();
+        let (sin, cos) = phase.to_radians().sin_cos();
         // s sin(wτ + θ) + c cos(wτ + θ)
         let turned = |s: Dual, c: Dual| [s * cos - c * sin, s * sin + c * cos];
         let (tip, spread, gap) = match case.actuation {
@@ -302,7 +303,7 @@ impl Coefficients {
 
     /// The derivatives of [`of`](Self::of).
     fn derivative(case: &Cantilever, parameter: Parameter) -> Self {
-        Self::numbers(case, Some(parameter), |dual| dual.derivative)
+        Self::numbers(case, Some(parameter), Dual::derivative)
     }
 
     fn numbers(case: &Cantilever, parameter: Option<Parameter>, number: fn(Dual) -> f64) -> Self {
@@ -395,7 +396,7 @@ mod tests {
         }
     }
 
-    /// All entries of a set of equations, one after the other.
+    /// All entries of a set of equations, in sequence.
     fn entries(g: &GalerkinDerivative) -> Vec<f64> {
         let mut all: Vec<f64> = g.mass.iter().copied().collect();
         for r in Regime::ALL.map(Regime::index) {

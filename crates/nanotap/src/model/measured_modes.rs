@@ -2,8 +2,8 @@
 //!
 //! Damping proportional to mass gives the higher modes a quality factor in proportion to their
 //! frequency, several times that of real levers in air; and no lever is uniform. With the free
-//! modes v of the Galerkin equations, K v = ω² M v and vᵀMv = 1, and u = Mv, a mode with
-//! numbers of its own gets
+//! modes v of the Galerkin equations, K v = ω² M v and vᵀMv = 1, and u = Mv, a mode with its own
+//! frequency and quality factor gets
 //!
 //! ```text
 //! M + (s − 1) uuᵀ,   C + (sω′/Q − vᵀCv) uuᵀ,   K + (sω′² − ω²) uuᵀ,
@@ -23,6 +23,7 @@ use crate::model::beam::Modes;
 use crate::model::cantilever::Cantilever;
 use crate::model::contact::dual::Dual;
 use crate::model::parameter::Parameter;
+use nanotap_arithmetic::Scalar as _;
 
 /// What a measured mode adds: a term of rank one to each matrix, with its derivatives.
 #[derive(Clone, Debug, PartialEq)]
@@ -44,7 +45,7 @@ pub(crate) struct Correction {
 impl Correction {
     /// Those of a case; derivatives are by `parameter`.
     pub(crate) fn all(case: &Cantilever, beam: &Modes, parameter: Option<Parameter>) -> Vec<Self> {
-        if case.higher_modes.is_empty() {
+        if !case.has_measured_modes() {
             return Vec::new();
         }
         let free = FreeModes::of(case, beam);
@@ -80,14 +81,14 @@ impl Correction {
         if !derivative {
             return u * u.transpose() * number.value;
         }
-        u * u.transpose() * number.derivative
+        u * u.transpose() * number.derivative()
             + (u * du.transpose() + du * u.transpose()) * number.value
     }
 
     /// `number` times u, or the derivative of that.
     pub(crate) fn vector(&self, number: Dual, derivative: bool) -> DVector<f64> {
         if derivative {
-            &self.row * number.derivative + &self.row_change * number.value
+            &self.row * number.derivative() + &self.row_change * number.value
         } else {
             &self.row * number.value
         }
@@ -142,11 +143,11 @@ impl FreeModes {
             let part = -square * at_tip(j) * at_tip(k) / (square - other);
             change.axpy(part, &self.shapes.column(j), 1.0);
         }
-        change *= ratio.derivative;
+        change *= ratio.derivative();
         let loaded = |x: &DVector<f64>| x + p * (case.alpha1 * p.dot(x));
         let carried = p * case.alpha1 + &beam.integral;
         let deflection = Dual::new(at_tip(k), change.dot(p));
-        let own = Dual::new(square, -square * at_tip(k).powi(2) * ratio.derivative);
+        let own = Dual::new(square, -square * at_tip(k).powi(2) * ratio.derivative());
         let squared = frequency.map_or(own, |f| f * f);
         let mass = stiffness.map_or(Dual::constant(1.0), |stiffness| {
             stiffness * deflection * deflection / squared
@@ -156,7 +157,7 @@ impl FreeModes {
         Correction {
             base: Dual::new(
                 v.dot(&carried),
-                change.dot(&carried) + ratio.derivative * v.dot(p),
+                change.dot(&carried) + ratio.derivative() * v.dot(p),
             ),
             mass: mass - one,
             damping: quality.map_or((mass - one) * natural, |quality| {
@@ -164,7 +165,7 @@ impl FreeModes {
             }),
             stiffness: mass * squared - own,
             row: loaded(&v),
-            row_change: loaded(&change) + p * (at_tip(k) * ratio.derivative),
+            row_change: loaded(&change) + p * (at_tip(k) * ratio.derivative()),
         }
     }
 }
@@ -173,20 +174,22 @@ impl FreeModes {
 mod tests {
     use super::*;
     use crate::model::galerkin::{Galerkin, Regime};
-    use crate::model::higher_modes::HigherModes;
+    use crate::model::parameter::Numbers;
     use crate::model::spectrum::{dense_eigenvalues, dense_frequencies};
     use nanotap_arithmetic::ComplexFunctions as _;
+
+    /// Measured numbers in the order of [`Parameter::MEASURED`].
+    fn numbers(measured: [f64; 6]) -> Numbers {
+        let pairs = Parameter::MEASURED.into_iter().zip(measured);
+        pairs.fold(Numbers::ZERO, |all, (of, number)| all.with(of, number))
+    }
 
     /// A tip, a moving base, four modes; f2, Q2, k2, f3 and Q3 away from the beam's own.
     fn measured() -> Cantilever {
         Cantilever {
             modes: 4,
             alpha1: 0.13,
-            higher_modes: HigherModes {
-                frequency: [21.0, 58.0],
-                quality: [90.0, 120.0],
-                stiffness: [110.0, 800.0],
-            },
+            further: numbers([21.0, 58.0, 90.0, 120.0, 110.0, 800.0]),
             ..Cantilever::paper()
         }
     }
@@ -199,7 +202,7 @@ mod tests {
         let equations = Galerkin::new(&case).unwrap();
         let found = dense_frequencies(&equations, Regime::Free);
         let plain = Cantilever {
-            higher_modes: HigherModes::NONE,
+            further: Numbers::ZERO,
             ..case
         };
         let beam = dense_frequencies(&Galerkin::new(&plain).unwrap(), Regime::Free);
@@ -234,19 +237,23 @@ mod tests {
     #[test]
     fn the_beams_own_numbers_change_nothing() {
         let plain = Cantilever {
-            higher_modes: HigherModes::NONE,
+            further: Numbers::ZERO,
             alpha1: 0.0,
             ..measured()
         };
         let beam = Galerkin::new(&plain).unwrap();
         let frequencies = dense_frequencies(&beam, Regime::Free);
         let mut own = plain.clone();
-        own.higher_modes = HigherModes {
-            frequency: [frequencies[1], frequencies[2]],
-            quality: [1, 2].map(|k| frequencies[k] / plain.alpha3),
+        let [second, third] = [frequencies[1], frequencies[2]];
+        own.further = numbers([
+            second,
+            third,
+            second / plain.alpha3,
+            third / plain.alpha3,
             // β⁴/φ(1)² with φ(1)² = 4.
-            stiffness: [1, 2].map(|k| frequencies[k].powi(2) / 4.0),
-        };
+            second.powi(2) / 4.0,
+            third.powi(2) / 4.0,
+        ]);
         let same = Galerkin::new(&own).unwrap();
         let far = |a: &DMatrix<f64>, b: &DMatrix<f64>| (a - b).amax() / a.amax();
         assert!(far(&beam.mass, &same.mass) < 1e-11);

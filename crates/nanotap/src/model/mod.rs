@@ -4,22 +4,23 @@
 //! State: `(a_1 … a_N, ȧ_1 … ȧ_N)` for the cantilever, after which comes the memory of a
 //! sample that recovers (see [`contact`]), zero at rest; `(x, ẋ)` for an
 //! oscillator. Regime 0 is free flight. Everything that analyses or shows a motion works on a
-//! [`Model`] and asks no more where it came from.
+//! [`Model`].
 //!
-//! A sample with a [nonlinear] force law is no regime: such a model has free flight
-//! alone as a linear system, and the flow under the force beside it.
+//! A sample with a [nonlinear] force law is no regime: such a model has free flight alone as a
+//! linear system, and a separate flow under the force.
 
 pub mod beam;
 mod beam_equations;
 pub mod cantilever;
 pub mod contact;
 pub mod drive_form;
+#[cfg(feature = "proof")]
 pub mod enclosed;
 pub mod exact_beam;
 pub mod galerkin;
 mod grazed;
-pub mod higher_modes;
 mod measured_modes;
+pub mod model_map;
 mod motion_error;
 pub mod nonlinear;
 pub mod oscillator;
@@ -27,8 +28,8 @@ pub mod parameter;
 pub mod recording;
 pub mod sample_law;
 pub mod spectrum;
-pub mod strobe;
 mod tangent;
+pub mod words;
 
 use std::sync::{Arc, OnceLock};
 
@@ -42,10 +43,10 @@ pub use tangent::ModelTangent;
 use crate::model::beam::Modes;
 use crate::model::beam_equations::Beam;
 use crate::model::cantilever::{Cantilever, CantileverError};
+use crate::model::contact::law::Law;
 use crate::model::galerkin::{Galerkin, Regime};
 use crate::model::nonlinear::{Equilibrium, Nonlinear, Variation};
 use crate::model::parameter::Parameter;
-use crate::model::sample_law::SampleLaw;
 
 /// Why a cantilever or an oscillator has no model.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -91,9 +92,9 @@ pub struct Model {
     pub memory: usize,
     /// Phase of a second tone in rad.
     pub second_phase: f64,
-    /// What a sample's memory that is overwritten at the end of each contact does to
-    /// volumes of states.
-    pub forgetting: Option<Forgetting>,
+    /// How an internal variable of the surface that is overwritten at the end of each contact
+    /// changes volumes of states.
+    pub memory_reset: Option<MemoryReset>,
     /// The flow under a nonlinear force law; the system is then free flight alone.
     pub nonlinear: Option<Arc<Nonlinear>>,
     /// State at drive phase 0 from which a motion starts when no other is given; `None`: rest.
@@ -120,13 +121,13 @@ impl RigidStop {
     }
 }
 
-/// A memory `s` that is set anew when contact ends, fades in flight at a rate, and acts on
-/// the beam when it is met again.
+/// An internal variable `s` of the surface that is overwritten when contact ends, decays in flight,
+/// and acts on the beam when the tip meets the surface again.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Forgetting {
-    /// Its rate in flight, ≤ 0.
+pub struct MemoryReset {
+    /// Its rate in flight, in 1/time of the model, ≤ 0.
     pub rate: f64,
-    /// How much the state changes per change of `s` where contact begins.
+    /// Change of the state per change of `s` where contact begins.
     pub kick: nalgebra::DVector<f64>,
 }
 
@@ -144,13 +145,15 @@ pub struct Powers {
     pub stored: Vec<Product>,
 }
 
-/// [`Powers`] of every regime, worked out when first asked for: of the thousands of models
-/// that a sweep sets up, few ever are.
+/// [`Powers`] of every regime, computed on first use: few of the thousands of models that a sweep
+/// sets up need them.
 #[derive(Clone, Debug)]
 pub(crate) struct PowersOnDemand {
     known: OnceLock<Vec<Powers>>,
     /// What they follow from, where they are not known from the start.
     equations: Option<Arc<Galerkin>>,
+    /// Gap of the model, where it is another than that of the equations.
+    gap: Option<f64>,
 }
 
 impl PowersOnDemand {
@@ -159,7 +162,18 @@ impl PowersOnDemand {
         Self {
             known: OnceLock::new(),
             equations: Some(Arc::new(equations)),
+            gap: None,
         }
+    }
+
+    /// The equations at the model's gap.
+    fn equations(&self) -> Option<Arc<Galerkin>> {
+        let known = self.equations.as_ref()?;
+        let Some(gap) = self.gap else {
+            return Some(Arc::clone(known));
+        };
+        let case = known.case.clone().with(Parameter::Alpha5, gap);
+        Galerkin::new(&case).ok().map(Arc::new)
     }
 }
 
@@ -168,6 +182,7 @@ impl From<Vec<Powers>> for PowersOnDemand {
         Self {
             known: known.into(),
             equations: None,
+            gap: None,
         }
     }
 }
@@ -175,7 +190,8 @@ impl From<Vec<Powers>> for PowersOnDemand {
 impl PartialEq for PowersOnDemand {
     /// Whether they are the same, worked out or not.
     fn eq(&self, other: &Self) -> bool {
-        self.equations == other.equations && (self.equations.is_some() || self.known == other.known)
+        let of = |powers: &Self| (powers.equations.clone(), powers.gap);
+        of(self) == of(other) && (self.equations.is_some() || self.known == other.known)
     }
 }
 
@@ -237,19 +253,37 @@ impl Model {
     pub fn cantilever(case: &Cantilever) -> Result<Self, ModelError> {
         let galerkin = Galerkin::new(case)?;
         let drive = drive_of(case)?;
-        if let Some(law) = &case.law {
-            return Self::under(law, galerkin, &drive);
+        let Some(law) = &case.law else {
+            return Self::on(&case.contact_law(None), galerkin, &drive, None);
+        };
+        let bare = Beam::new(&galerkin, &drive, 0)?;
+        let free = bare.regime(Regime::Free, &contact::no_sample(0).flight, true)?;
+        let nonlinear = Nonlinear::new(law, &bare, &free, &drive)?;
+        let flight = contact::no_sample(nonlinear.discrete_entries());
+        Self::on(&flight, galerkin, &drive, Some(nonlinear))
+    }
+
+    /// The beam on a piecewise-linear sample, or in flight alone with the flow under a `nonlinear`
+    /// law.
+    fn on(
+        law: &Law,
+        galerkin: Galerkin,
+        drive: &Drive,
+        nonlinear: Option<Nonlinear>,
+    ) -> Result<Self, ModelError> {
+        let beam = Beam::new(&galerkin, drive, law.internal)?;
+        let mut regimes = vec![beam.regime(Regime::Free, &law.flight, true)?];
+        let mut transitions = vec![Vec::new()];
+        if nonlinear.is_none() {
+            regimes.push(beam.regime(Regime::Contact, &law.contact, law.plain_contact)?);
+            transitions = beam.transitions(law);
         }
-        let law = case.contact_law(None);
-        let beam = Beam::new(&galerkin, &drive, law.has_memory)?;
-        let regimes = vec![
-            beam.regime(Regime::Free, &law.flight, true)?,
-            beam.regime(Regime::Contact, &law.contact, law.plain_contact)?,
-        ];
-        let system = Arc::new(System::new(drive.clone(), regimes, beam.transitions(&law))?);
-        let outputs = beam.outputs(&law);
+        let contact: Vec<bool> = (0..regimes.len()).map(|r| r > 0).collect();
+        let outputs = beam.outputs(law, regimes.len());
+        let system = Arc::new(System::new(drive.clone(), regimes, transitions)?);
+        let second_phase = galerkin.case.get(Parameter::Tone2Phase).to_radians();
         Ok(Self {
-            contact: vec![false, true],
+            contact,
             tip: outputs.tip,
             gap: outputs.gap,
             height: outputs.height,
@@ -257,51 +291,29 @@ impl Model {
             power: PowersOnDemand::of(galerkin),
             rigid_stop: None,
             beam: Some(outputs.beam),
-            memory: usize::from(law.has_memory),
-            forgetting: outputs.forgetting,
-            second_phase: case.tone2_phase.to_radians(),
-            nonlinear: None,
+            memory: law.internal,
+            memory_reset: outputs.memory_reset,
+            second_phase,
+            nonlinear: nonlinear.map(Arc::new),
             start: None,
             system,
         })
     }
 
-    /// The beam under a nonlinear force law.
-    fn under(law: &SampleLaw, galerkin: Galerkin, drive: &Drive) -> Result<Self, ModelError> {
-        let free = |beam: &Beam<'_>, memory| {
-            let flight = contact::no_sample(memory).flight;
-            beam.regime(Regime::Free, &flight, true)
-        };
-        let bare = Beam::new(&galerkin, drive, false)?;
-        let nonlinear = Nonlinear::new(law, &bare, &free(&bare, false)?, drive)?;
-        let memory = nonlinear.remembers;
-        let beam = Beam::new(&galerkin, drive, memory)?;
-        let regime = free(&beam, memory)?;
-        let outputs = beam.outputs(&contact::no_sample(memory));
-        let system = System::new(drive.clone(), vec![regime], vec![Vec::new()])?;
-        let second_phase = galerkin.case.tone2_phase.to_radians();
-        Ok(Self {
-            contact: vec![false],
-            tip: outputs.tip,
-            gap: outputs.height.clone(),
-            force: vec![outputs.height.scaled(0.0)],
-            height: outputs.height,
-            beam: Some(outputs.beam),
-            power: PowersOnDemand::of(galerkin),
-            rigid_stop: None,
-            memory: usize::from(memory),
-            forgetting: None,
-            second_phase,
-            nonlinear: Some(Arc::new(nonlinear)),
-            start: None,
-            system: Arc::new(system),
-        })
+    /// The contact law of the piecewise-linear system, with derivatives by a parameter: that of the
+    /// case, or none under a nonlinear law.
+    fn law_of(&self, case: &Cantilever, parameter: Option<Parameter>) -> Law {
+        if self.nonlinear.is_some() {
+            contact::no_sample(self.memory)
+        } else {
+            case.contact_law(parameter)
+        }
     }
 
     /// The equations of the cantilever that this is the model of.
     fn equations_of(&self, case: &Cantilever) -> Result<Arc<Galerkin>, ModelError> {
-        match &self.power.equations {
-            Some(known) => Ok(Arc::clone(known)),
+        match self.power.equations() {
+            Some(known) => Ok(known),
             None => Ok(Arc::new(Galerkin::new(case)?)),
         }
     }
@@ -309,22 +321,45 @@ impl Model {
     /// What feeds and drains energy; an entry a regime.
     pub fn power(&self) -> &[Powers] {
         self.power.known.get_or_init(|| {
-            let Some(galerkin) = &self.power.equations else {
+            let Some(galerkin) = self.power.equations() else {
                 return Vec::new();
             };
-            let drive = self.system.drive();
-            if self.nonlinear.is_some() {
-                let flight = contact::no_sample(self.memory > 0).flight;
-                let free = &self.system.regimes()[0];
-                return Beam::new(galerkin, drive, self.memory > 0)
-                    .map(|beam| vec![beam.powers_in(free, &flight)])
-                    .unwrap_or_default();
-            }
-            let law = galerkin.case.contact_law(None);
-            Beam::new(galerkin, drive, law.has_memory)
+            let law = self.law_of(&galerkin.case, None);
+            Beam::new(&galerkin, self.system.drive(), law.internal)
                 .map(|beam| beam.powers(&law, &self.system))
                 .unwrap_or_default()
         })
+    }
+
+    /// Calls `visit` with every constant of its outputs: the numbers that move with the gap, apart
+    /// from those of its system.
+    pub(crate) fn each_output_constant(&mut self, visit: &mut dyn FnMut(&mut f64)) {
+        let outputs = [&mut self.gap, &mut self.height].into_iter();
+        for output in outputs.chain(&mut self.force) {
+            visit(&mut output.constant);
+        }
+        if let Some(stop) = &mut self.rigid_stop {
+            visit(&mut stop.tip);
+        }
+        if self.power.equations.is_some() {
+            return;
+        }
+        for powers in self.power.known.get_mut().into_iter().flatten() {
+            let products = [&mut powers.drive, &mut powers.beam, &mut powers.sample];
+            let products = products.into_iter().chain([&mut powers.stored]).flatten();
+            for product in products {
+                visit(&mut product.a.constant);
+                visit(&mut product.b.constant);
+            }
+        }
+    }
+
+    /// Tells what follows from the equations that the gap is another.
+    pub(crate) fn set_gap_of_equations(&mut self, gap: f64) {
+        if self.power.equations.is_some() {
+            self.power.known = OnceLock::new();
+            self.power.gap = Some(gap);
+        }
     }
 
     /// Where the undriven system can rest, the tip farthest away first: of a piecewise-linear one
@@ -427,7 +462,7 @@ pub struct Tangent(pub(crate) TangentKind);
 /// The engines' own terms.
 #[derive(Clone, Debug)]
 pub(crate) enum TangentKind {
-    Exact(SystemTangent),
+    PiecewiseLinear(SystemTangent),
     Nonlinear(Variation),
 }
 
@@ -435,7 +470,7 @@ impl Tangent {
     /// Of a model that does not change.
     pub(crate) fn zeros(model: &Model) -> Self {
         Self(match &model.nonlinear {
-            None => TangentKind::Exact(SystemTangent::zeros(&model.system)),
+            None => TangentKind::PiecewiseLinear(SystemTangent::zeros(&model.system)),
             Some(_) => TangentKind::Nonlinear(Variation::none()),
         })
     }
@@ -458,13 +493,13 @@ impl Tangent {
         for &(parameter, slope) in slopes {
             sum.add(slope, &cantilever_tangent(case, model, parameter)?);
         }
-        Ok(Self(TangentKind::Exact(sum)))
+        Ok(Self(TangentKind::PiecewiseLinear(sum)))
     }
 }
 
 impl From<SystemTangent> for Tangent {
     fn from(tangent: SystemTangent) -> Self {
-        Self(TangentKind::Exact(tangent))
+        Self(TangentKind::PiecewiseLinear(tangent))
     }
 }
 
@@ -482,27 +517,23 @@ pub fn cantilever_tangent(
     if parameter == Parameter::Omega {
         tangent.log_period = -1.0 / case.omega;
     }
+    let law = model.law_of(case, Some(parameter));
+    let beam = Beam::new(&galerkin, model.system.drive(), law.internal)?;
+    let change = beam.derivative(parameter);
+    let responses = [&law.flight, &law.contact];
+    for (regime, response) in tangent.regimes.iter_mut().zip(responses) {
+        *regime = change.regime(&beam, response);
+    }
     if model.nonlinear.is_some() {
-        // Free flight alone.
-        let memory = model.memory > 0;
-        let beam = Beam::new(&galerkin, model.system.drive(), memory)?;
-        let change = beam.derivative(parameter);
-        tangent.regimes[0] = change.regime(&beam, &contact::no_sample(memory).flight);
         return Ok(tangent);
     }
-    let law = case.contact_law(Some(parameter));
-    let beam = Beam::new(&galerkin, model.system.drive(), law.has_memory)?;
-    let change = beam.derivative(parameter);
-    for (r, answer) in [&law.flight, &law.contact].into_iter().enumerate() {
-        tangent.regimes[r] = change.regime(&beam, answer);
-    }
-    tangent.guards = vec![
-        vec![change.combined(&beam, &law.gap)],
-        vec![change.combined(&beam, &law.hold)],
-    ];
-    if let Some(left) = &law.left {
-        let change = change.combined(&beam, left);
-        tangent.resets[1][0] = Some(beam.memory_jump(&change, 0.0));
+    let guards = [&law.gap, &law.release_guard].into_iter();
+    tangent.guards = guards
+        .map(|guard| vec![change.combined(&beam, guard)])
+        .collect();
+    if let Some(values) = &law.release_reset {
+        let changes = values.iter().map(|value| change.combined(&beam, value));
+        tangent.resets[1][0] = Some(beam.memory_jump(changes, 0.0));
     }
     Ok(tangent)
 }
@@ -517,12 +548,8 @@ pub(crate) fn cantilever_model_tangent(
     parameter: Parameter,
 ) -> Result<ModelTangent, ModelError> {
     let galerkin = model.equations_of(case)?;
-    let law = if model.nonlinear.is_some() {
-        contact::no_sample(model.memory > 0)
-    } else {
-        case.contact_law(Some(parameter))
-    };
-    let beam = Beam::new(&galerkin, model.system.drive(), law.has_memory)?;
+    let law = model.law_of(case, Some(parameter));
+    let beam = Beam::new(&galerkin, model.system.drive(), law.internal)?;
     let change = beam.derivative(parameter);
     let second_phase = f64::from(u8::from(parameter == Parameter::Tone2Phase));
     Ok(ModelTangent {
@@ -531,7 +558,7 @@ pub(crate) fn cantilever_model_tangent(
         force: [&law.flight, &law.contact]
             .iter()
             .take(model.force.len())
-            .map(|answer| change.combined(&beam, &answer.force))
+            .map(|response| change.combined(&beam, &response.force))
             .collect(),
         beam_power: change.beam_power(&beam, parameter),
         height: change.into_height(),
@@ -555,3 +582,6 @@ impl From<ModelError> for crate::Error {
         }
     }
 }
+
+#[cfg(test)]
+mod tests;

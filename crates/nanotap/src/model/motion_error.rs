@@ -37,8 +37,7 @@ impl From<MotionError> for crate::Error {
     fn from(error: MotionError) -> Self {
         match error {
             MotionError::Flow(error) => error.into(),
-            MotionError::Nonlinear(VolterraError::Cancelled) => Self::stopped(),
-            MotionError::Nonlinear(error) => Self::numerics(error.to_string()),
+            MotionError::Nonlinear(error) => error.into(),
             MotionError::TooManyRows { .. } => Self::input(
                 error.to_string(),
                 "take fewer {periods} or a lower {resolution}",

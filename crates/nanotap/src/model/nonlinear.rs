@@ -12,8 +12,9 @@ use std::f64::consts::TAU;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use nalgebra::{DMatrix, DVector, RowDVector};
+use nanotap_dynamics::Tangency;
 use nanotap_flow::{Output, Regime};
-use nanotap_volterra::averaging::{about_rest, distances, motions};
+use nanotap_volterra::averaging::{about_rest, motions};
 use nanotap_volterra::{
     Coarse, Drive, Flow, Guard, Kernel, Modes, Options, Parameter as Change, Remark, System, Tone,
     ToneChange, Trajectory, VolterraError,
@@ -24,6 +25,7 @@ use crate::model::beam_equations::{Beam, BeamTangent};
 use crate::model::cantilever::Cantilever;
 use crate::model::galerkin::Galerkin;
 use crate::model::grazed::grazed;
+use crate::model::model_map::EngineMap;
 use crate::model::parameter::Parameter;
 use crate::model::sample_law::SampleLaw;
 use crate::model::{Model, ModelError, MotionError};
@@ -118,6 +120,11 @@ impl Nonlinear {
         self
     }
 
+    /// Changes the gap.
+    pub(crate) fn set_gap(&mut self, gap: f64) -> Result<(), MotionError> {
+        Ok(Arc::make_mut(&mut self.system).set_offset(gap)?)
+    }
+
     /// The branch of the law in a state of the model at drive phase 0: the one that it
     /// remembers, if that can be.
     fn branch(&self, state: &[f64]) -> usize {
@@ -171,16 +178,6 @@ impl Nonlinear {
         motions
             .chain(rests.iter().filter_map(about))
             .map(|motion| self.state(motion.state, motion.branch))
-            .collect()
-    }
-
-    /// Guesses of the distances at which the gap swings with this amplitude, the farthest first,
-    /// by averaging: the constant part of the gap, as [`Model::height`] has it, and the state at
-    /// drive phase 0.
-    pub(crate) fn averaged_distances(&self, amplitude: f64) -> Vec<(f64, Vec<f64>)> {
-        let motions = distances(&self.system, amplitude).into_iter();
-        motions
-            .map(|motion| (motion.offset, self.state(motion.state, motion.branch)))
             .collect()
     }
 
@@ -354,7 +351,7 @@ impl Nonlinear {
             .sum()
     }
 
-    /// The force at these gaps, met one after the other without haste.
+    /// The force at these gaps, evaluated quasi-statically, in this order.
     pub fn force_curve(&self, gaps: impl IntoIterator<Item = f64>) -> Vec<[f64; 2]> {
         let law = self.system.law();
         let mut last: Option<(f64, usize)> = None;
@@ -472,7 +469,7 @@ impl Variation {
         }
         let galerkin = Galerkin::new(case)?;
         let drive = model.system.drive();
-        let beam = Beam::new(&galerkin, drive, false)?;
+        let beam = Beam::new(&galerkin, drive, 0)?;
         let n = nonlinear.system.dimension();
         let mut change = Change {
             law: law.to_vec(),
@@ -566,13 +563,13 @@ fn add(change: &mut Change, of: &BeamTangent, slope: f64) {
 
 /// The map of a lever under a nonlinear force.
 #[derive(Clone, Debug)]
-pub(crate) struct NonlinearStrobe {
+pub(crate) struct NonlinearMap {
     nonlinear: Arc<Nonlinear>,
     flow: Flow,
     variations: Arc<[Variation]>,
 }
 
-impl NonlinearStrobe {
+impl NonlinearMap {
     pub(crate) fn new(nonlinear: &Arc<Nonlinear>, variations: Vec<Variation>) -> Self {
         Self {
             nonlinear: Arc::clone(nonlinear),
@@ -581,19 +578,8 @@ impl NonlinearStrobe {
         }
     }
 
-    /// The lever.
-    pub(crate) fn nonlinear(&self) -> &Arc<Nonlinear> {
-        &self.nonlinear
-    }
-
-    pub(crate) fn advance(&mut self, state: &mut [f64]) -> Result<(), MotionError> {
-        self.nonlinear.start(&mut self.flow, state)?;
-        self.flow.run_until(self.nonlinear.period)?;
-        self.nonlinear.end(&self.flow, state);
-        Ok(())
-    }
-
-    pub(crate) fn advance_with_derivatives(
+    /// Advances with the Jacobian and, if wanted, the derivatives by the parameters.
+    fn follow(
         &mut self,
         state: &mut [f64],
         jacobian: &mut DMatrix<f64>,
@@ -639,7 +625,7 @@ impl NonlinearStrobe {
                 Variation::Differences { low, high, width } => {
                     let end = |side: &Arc<Nonlinear>| {
                         let mut state = start.clone();
-                        Self::new(side, Vec::new()).advance(&mut state)?;
+                        Self::new(side, Vec::new()).advance_by(&mut state, 1)?;
                         Ok::<_, MotionError>(state)
                     };
                     let (low, high) = (end(low)?, end(high)?);
@@ -652,56 +638,143 @@ impl NonlinearStrobe {
         *derivatives = columns.resize(whole, self.variations.len(), 0.0);
         Ok(())
     }
+}
 
-    /// Evaluations of the law so far.
-    pub(crate) fn evaluations(&self) -> u64 {
+impl EngineMap for NonlinearMap {
+    fn boxed(&self) -> Box<dyn EngineMap> {
+        Box::new(self.clone())
+    }
+
+    fn dimension(&self) -> usize {
+        self.nonlinear.dimension()
+    }
+
+    fn period(&self) -> f64 {
+        self.nonlinear.period
+    }
+
+    fn move_gap(&mut self, gap: f64, _: &mut dyn FnMut(&mut f64)) -> Result<(), MotionError> {
+        Arc::make_mut(&mut self.nonlinear).set_gap(gap)?;
+        Ok(self.flow.system_mut().set_offset(gap)?)
+    }
+
+    fn evaluations(&self) -> u64 {
         self.flow.statistics().evaluations
     }
 
-    /// See [`Nonlinear::log_determinant_everywhere`].
-    pub(crate) fn log_determinant(&self) -> Option<f64> {
-        self.nonlinear.log_determinant_everywhere()
+    fn cost(&self) -> u64 {
+        self.flow.cost()
     }
 
-    /// The extrema of the gap over a period, as times and values over what they can graze.
-    pub(crate) fn advance_with_extrema(
+    fn add_cost(&mut self, cost: u64) {
+        self.flow.add_cost(cost);
+    }
+
+    fn discrete_entries(&self) -> usize {
+        self.nonlinear.discrete_entries()
+    }
+
+    fn is_costly(&self) -> bool {
+        true
+    }
+
+    /// By the Runge–Kutta method of [`nanotap_volterra::coarse`].
+    fn coarse(&self) -> Option<Box<dyn EngineMap>> {
+        Some(Box::new(CoarseMap {
+            coarse: Coarse::new(&self.nonlinear.system, self.nonlinear.period).ok()?,
+            nonlinear: Arc::clone(&self.nonlinear),
+        }))
+    }
+
+    fn advance_by(&mut self, state: &mut [f64], periods: usize) -> Result<(), MotionError> {
+        for _ in 0..periods {
+            self.nonlinear.start(&mut self.flow, state)?;
+            self.flow.run_until(self.nonlinear.period)?;
+            self.nonlinear.end(&self.flow, state);
+        }
+        Ok(())
+    }
+
+    fn advance_with_jacobian(
         &mut self,
         state: &mut [f64],
-    ) -> Result<Vec<(f64, f64)>, MotionError> {
+        jacobian: &mut DMatrix<f64>,
+    ) -> Result<(), MotionError> {
+        self.follow(state, jacobian, None)
+    }
+
+    fn advance_with_derivatives(
+        &mut self,
+        state: &mut [f64],
+        jacobian: &mut DMatrix<f64>,
+        derivatives: &mut DMatrix<f64>,
+    ) -> Result<(), MotionError> {
+        self.follow(state, jacobian, Some(derivatives))
+    }
+
+    fn log_determinant_bound(&self) -> f64 {
+        self.nonlinear.log_determinant_bound()
+    }
+
+    fn advance_with_tangencies(
+        &mut self,
+        state: &mut [f64],
+        tangencies: &mut Vec<Tangency>,
+    ) -> Result<(), MotionError> {
         self.nonlinear.start(&mut self.flow, state)?;
         let period = self.flow.record_until(self.nonlinear.period)?;
         self.nonlinear.end(&self.flow, state);
         let contact = self.nonlinear.contact_gap();
-        Ok(grazed(&self.nonlinear.system, &period, contact))
+        let extrema = grazed(&self.nonlinear.system, &period, contact).into_iter();
+        tangencies.extend(extrema.map(|(time, value)| Tangency {
+            phase: time / self.nonlinear.period,
+            value,
+        }));
+        Ok(())
     }
 }
 
 /// The approximate map of a lever under a nonlinear force, for transients.
 #[derive(Clone, Debug)]
-pub(crate) struct CoarseStrobe {
+struct CoarseMap {
     nonlinear: Arc<Nonlinear>,
     coarse: Coarse,
 }
 
-impl CoarseStrobe {
-    /// `None` where a mode of the lever has no tables.
-    pub(crate) fn new(nonlinear: &Arc<Nonlinear>) -> Option<Self> {
-        Some(Self {
-            coarse: Coarse::new(&nonlinear.system, nonlinear.period).ok()?,
-            nonlinear: Arc::clone(nonlinear),
-        })
+impl EngineMap for CoarseMap {
+    fn boxed(&self) -> Box<dyn EngineMap> {
+        Box::new(self.clone())
     }
 
-    /// The lever.
-    pub(crate) fn nonlinear(&self) -> &Arc<Nonlinear> {
-        &self.nonlinear
+    fn dimension(&self) -> usize {
+        self.nonlinear.dimension()
     }
 
-    pub(crate) fn advance_by(
-        &mut self,
-        state: &mut [f64],
-        periods: usize,
-    ) -> Result<(), MotionError> {
+    fn period(&self) -> f64 {
+        self.nonlinear.period
+    }
+
+    fn move_gap(&mut self, gap: f64, _: &mut dyn FnMut(&mut f64)) -> Result<(), MotionError> {
+        Arc::make_mut(&mut self.nonlinear).set_gap(gap)?;
+        if let Ok(coarse) = Coarse::new(&self.nonlinear.system, self.nonlinear.period) {
+            self.coarse = coarse;
+        }
+        Ok(())
+    }
+
+    fn evaluations(&self) -> u64 {
+        self.coarse.statistics().evaluations
+    }
+
+    fn cost(&self) -> u64 {
+        self.coarse.cost()
+    }
+
+    fn discrete_entries(&self) -> usize {
+        self.nonlinear.discrete_entries()
+    }
+
+    fn advance_by(&mut self, state: &mut [f64], periods: usize) -> Result<(), MotionError> {
         let (lever, memory) = self.nonlinear.split(state)?;
         let branch = remembered(memory);
         let reached = self.coarse.run_periods(lever, branch, periods)?;
@@ -709,7 +782,7 @@ impl CoarseStrobe {
         Ok(())
     }
 
-    pub(crate) fn advance_with_jacobian(
+    fn advance_with_jacobian(
         &mut self,
         state: &mut [f64],
         jacobian: &mut DMatrix<f64>,
@@ -724,9 +797,8 @@ impl CoarseStrobe {
         Ok(())
     }
 
-    /// Evaluations of the law so far.
-    pub(crate) fn evaluations(&self) -> u64 {
-        self.coarse.statistics().evaluations
+    fn log_determinant_bound(&self) -> f64 {
+        self.nonlinear.log_determinant_bound()
     }
 }
 
@@ -763,10 +835,11 @@ impl Nonlinear {
         (!varies).then(|| self.free_log_determinant())
     }
 
-    /// log|det DP| where it is the same everywhere; a law that remembers loses a direction.
-    pub(crate) fn log_determinant_everywhere(&self) -> Option<f64> {
+    /// log|det DP| where it is the same everywhere, else infinite; a law that remembers loses a
+    /// direction.
+    fn log_determinant_bound(&self) -> f64 {
         let known = self.constant_log_determinant();
-        known.filter(|_| !self.remembers)
+        known.filter(|_| !self.remembers).unwrap_or(f64::INFINITY)
     }
 
     /// log|det DP| of the lever's state over a recorded period, from the trace of the equations

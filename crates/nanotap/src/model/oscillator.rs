@@ -6,10 +6,11 @@
 use std::sync::Arc;
 
 use nalgebra::{DMatrix, DVector, RowDVector};
-use nanotap_flow::sensitivity::SystemTangent;
+use nanotap_flow::sensitivity::{RegimeTangent, SystemTangent};
 use nanotap_flow::{Drive, HarmonicVector, Output, Reset, Sticking, System, Transition};
 use serde::Serialize;
 
+use crate::model::contact::dual::Dual;
 use crate::model::{Model, ModelError, ModelTangent, Powers, Product, RigidStop};
 use crate::number::shortest;
 
@@ -59,88 +60,72 @@ pub struct OscillatorError {
     pub key: &'static str,
     /// Its value.
     pub value: f64,
-    /// What would be right.
+    /// The remedy.
     pub expected: &'static str,
-}
-
-/// A parameter of an oscillator.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum OscillatorParameter {
-    /// m.
-    Mass,
-    /// k.
-    Stiffness,
-    /// c.
-    Damping,
-    /// F.
-    Forcing,
-    /// ω.
-    Omega,
-    /// Where the stop stands.
-    Gap,
-    /// The soft stop's spring.
-    ContactStiffness,
-    /// The soft stop's damper.
-    ContactDamping,
-    /// The rigid stop's coefficient.
-    Restitution,
-}
-
-impl OscillatorParameter {
-    /// Every parameter.
-    pub const ALL: [Self; 9] = [
-        Self::Mass,
-        Self::Stiffness,
-        Self::Damping,
-        Self::Forcing,
-        Self::Omega,
-        Self::Gap,
-        Self::ContactStiffness,
-        Self::ContactDamping,
-        Self::Restitution,
-    ];
-
-    /// Its key in a case file.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Mass => "mass",
-            Self::Stiffness => "stiffness",
-            Self::Damping => "damping",
-            Self::Forcing => "forcing",
-            Self::Omega => "omega",
-            Self::Gap => "gap",
-            Self::ContactStiffness => "contact_stiffness",
-            Self::ContactDamping => "contact_damping",
-            Self::Restitution => "restitution",
-        }
-    }
 }
 
 /// Largest size of a number; beyond it products leave no digits.
 const LARGEST: f64 = 1e12;
+const POSITIVE: (f64, f64) = (f64::MIN_POSITIVE, LARGEST);
+const NOT_NEGATIVE: (f64, f64) = (0.0, LARGEST);
+const FINITE: (f64, f64) = (-LARGEST, LARGEST);
 
-/// The least and the greatest value of a parameter.
-pub const fn range(parameter: OscillatorParameter) -> (f64, f64) {
-    use OscillatorParameter as P;
-    match parameter {
-        P::Mass | P::Omega => (f64::MIN_POSITIVE, LARGEST),
-        P::Stiffness | P::Damping | P::ContactStiffness | P::ContactDamping => (0.0, LARGEST),
-        P::Restitution => (0.0, 1.0),
-        P::Forcing | P::Gap => (-LARGEST, LARGEST),
-    }
+/// The table of parameters: name in case files and range.
+macro_rules! parameters {
+    ($($(#[$doc:meta])* $parameter:ident: $name:literal, $range:expr;)*) => {
+        /// A parameter of an oscillator.
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+        pub enum OscillatorParameter { $($(#[$doc])* $parameter),* }
+
+        impl OscillatorParameter {
+            /// Every parameter.
+            pub const ALL: [Self; [$($name),*].len()] = [$(Self::$parameter),*];
+
+            /// Its key in a case file.
+            pub const fn name(self) -> &'static str {
+                match self { $(Self::$parameter => $name),* }
+            }
+
+            /// Its least and its greatest value.
+            pub const fn range(self) -> (f64, f64) {
+                match self { $(Self::$parameter => $range),* }
+            }
+        }
+    };
+}
+
+parameters! {
+    /// m.
+    Mass: "mass", POSITIVE;
+    /// k.
+    Stiffness: "stiffness", NOT_NEGATIVE;
+    /// c.
+    Damping: "damping", NOT_NEGATIVE;
+    /// F.
+    Forcing: "forcing", FINITE;
+    /// ω.
+    Omega: "omega", POSITIVE;
+    /// Position of the stop.
+    Gap: "gap", FINITE;
+    /// The soft stop's spring.
+    ContactStiffness: "contact_stiffness", NOT_NEGATIVE;
+    /// The soft stop's damper.
+    ContactDamping: "contact_damping", NOT_NEGATIVE;
+    /// The rigid stop's coefficient.
+    Restitution: "restitution", (0.0, 1.0);
 }
 
 impl Oscillator {
-    /// The value of a parameter, `None` where this stop does not have it.
-    pub fn get(&self, parameter: OscillatorParameter) -> Option<f64> {
+    /// Where a parameter is stored, `None` where this stop does not have it.
+    fn place(&mut self, parameter: OscillatorParameter) -> Option<&mut f64> {
         use OscillatorParameter as P;
-        match (parameter, self.stop) {
-            (P::Mass, _) => Some(self.mass),
-            (P::Stiffness, _) => Some(self.stiffness),
-            (P::Damping, _) => Some(self.damping),
-            (P::Forcing, _) => Some(self.forcing),
-            (P::Omega, _) => Some(self.omega),
-            (P::Gap, _) => Some(self.gap),
+        match (parameter, &mut self.stop) {
+            (P::Mass, _) => Some(&mut self.mass),
+            (P::Stiffness, _) => Some(&mut self.stiffness),
+            (P::Damping, _) => Some(&mut self.damping),
+            (P::Forcing, _) => Some(&mut self.forcing),
+            (P::Omega, _) => Some(&mut self.omega),
+            (P::Gap, _) => Some(&mut self.gap),
             (P::ContactStiffness, Stop::Soft { stiffness, .. }) => Some(stiffness),
             (P::ContactDamping, Stop::Soft { damping, .. }) => Some(damping),
             (P::Restitution, Stop::Rigid { restitution }) => Some(restitution),
@@ -148,24 +133,36 @@ impl Oscillator {
         }
     }
 
+    /// The value of a parameter, `None` where this stop does not have it.
+    pub fn get(&self, parameter: OscillatorParameter) -> Option<f64> {
+        let mut copy = *self;
+        copy.place(parameter).map(|value| *value)
+    }
+
     /// The same oscillator with one parameter changed (unchanged where this stop does
     /// not have it).
     #[must_use]
     pub fn with(mut self, parameter: OscillatorParameter, value: f64) -> Self {
-        use OscillatorParameter as P;
-        match (parameter, &mut self.stop) {
-            (P::Mass, _) => self.mass = value,
-            (P::Stiffness, _) => self.stiffness = value,
-            (P::Damping, _) => self.damping = value,
-            (P::Forcing, _) => self.forcing = value,
-            (P::Omega, _) => self.omega = value,
-            (P::Gap, _) => self.gap = value,
-            (P::ContactStiffness, Stop::Soft { stiffness, .. }) => *stiffness = value,
-            (P::ContactDamping, Stop::Soft { damping, .. }) => *damping = value,
-            (P::Restitution, Stop::Rigid { restitution }) => *restitution = value,
-            _ => {}
+        if let Some(place) = self.place(parameter) {
+            *place = value;
         }
         self
+    }
+
+    /// The numbers of the equations in a regime, outside the stop or in it: spring, damper, drive
+    /// and constant force over the mass, with their derivatives by a parameter.
+    fn coefficients(&self, inside: bool, parameter: Option<OscillatorParameter>) -> [Dual; 4] {
+        use OscillatorParameter as P;
+        let dual = |p: P| {
+            let by = f64::from(u8::from(Some(p) == parameter));
+            self.get(p)
+                .map_or(Dual::default(), |value| Dual::new(value, by))
+        };
+        let of_stop = |p: P| if inside { dual(p) } else { Dual::default() };
+        let stop = of_stop(P::ContactStiffness);
+        let stiffness = dual(P::Stiffness) + stop;
+        let damping = dual(P::Damping) + of_stop(P::ContactDamping);
+        [stiffness, damping, dual(P::Forcing), stop * dual(P::Gap)].map(|of| of / dual(P::Mass))
     }
 
     /// Checks every field.
@@ -178,7 +175,7 @@ impl Oscillator {
             let Some(value) = self.get(parameter) else {
                 continue;
             };
-            let (least, greatest) = range(parameter);
+            let (least, greatest) = parameter.range();
             if !(least..=greatest).contains(&value) {
                 let expected = match parameter {
                     P::Mass | P::Omega => "a positive, finite number of at most 1e12 is needed",
@@ -203,11 +200,11 @@ impl Oscillator {
     pub fn model(&self) -> Result<Model, ModelError> {
         self.validate()?;
         let drive = Drive::single(self.omega)?;
-        let free = self.regime(0, 0.0, 0.0, &drive)?;
+        let free = self.regime(0, &drive)?;
         let gap = self.gap_output();
         let (regimes, transitions) = match self.stop {
-            Stop::Soft { stiffness, damping } => {
-                let contact = self.regime(1, stiffness, damping, &drive)?;
+            Stop::Soft { .. } => {
+                let contact = self.regime(1, &drive)?;
                 let transitions = vec![
                     vec![Transition::new(gap.clone(), 1)],
                     vec![Transition::new(gap.scaled(-1.0), 0)],
@@ -220,20 +217,11 @@ impl Oscillator {
         Ok(self.outputs(system, gap))
     }
 
-    fn regime(
-        &self,
-        index: usize,
-        stiffness: f64,
-        damping: f64,
-        drive: &Drive,
-    ) -> Result<nanotap_flow::Regime, ModelError> {
-        let (k, c) = (self.stiffness + stiffness, self.damping + damping);
-        let matrix = DMatrix::from_row_slice(2, 2, &[0.0, 1.0, -k / self.mass, -c / self.mass]);
-        let lower = |v: f64| DVector::from_vec(vec![0.0, v / self.mass]);
-        let forcing = HarmonicVector::zeros(2, 1)
-            .with_tone(0, &DVector::zeros(2), &lower(self.forcing))
-            .with_constant(&lower(stiffness * self.gap));
-        Ok(nanotap_flow::Regime::new(index, matrix, forcing, drive)?)
+    fn regime(&self, index: usize, drive: &Drive) -> Result<nanotap_flow::Regime, ModelError> {
+        let numbers = self.coefficients(index == 1, None).map(|of| of.value);
+        let equations = equations(1.0, numbers);
+        let regime = nanotap_flow::Regime::new(index, equations.matrix, equations.forcing, drive);
+        Ok(regime?)
     }
 
     /// Flight with impacts, and sticking, in which the wall carries the spring and the
@@ -315,7 +303,7 @@ impl Oscillator {
             rigid_stop,
             beam: None,
             memory: 0,
-            forgetting: None,
+            memory_reset: None,
             nonlinear: None,
             start: None,
             second_phase: 0.0,
@@ -337,40 +325,13 @@ impl Oscillator {
     ) -> Result<SystemTangent, ModelError> {
         use OscillatorParameter as P;
         let mut tangent = SystemTangent::zeros(&model.system);
-        // (k, c, constant force, drive) of each moving regime, and their derivatives.
-        let (soft_k, soft_c) = match self.stop {
-            Stop::Soft { stiffness, damping } => (stiffness, damping),
-            Stop::Rigid { .. } => (0.0, 0.0),
+        let moving = match self.stop {
+            Stop::Soft { .. } => 2,
+            Stop::Rigid { .. } => 1,
         };
-        let moving = if matches!(self.stop, Stop::Soft { .. }) {
-            2
-        } else {
-            1
-        };
-        for r in 0..moving {
-            let inside = if r == 1 { 1.0 } else { 0.0 };
-            let (k, c) = (
-                self.stiffness + inside * soft_k,
-                self.damping + inside * soft_c,
-            );
-            let held = inside * soft_k * self.gap;
-            let m = self.mass;
-            let [dk, dc, dheld, df] = match parameter {
-                P::Mass => [-k / m, -c / m, -held / m, -self.forcing / m],
-                P::Stiffness => [1.0, 0.0, 0.0, 0.0],
-                P::Damping => [0.0, 1.0, 0.0, 0.0],
-                P::Forcing => [0.0, 0.0, 0.0, 1.0],
-                P::Gap => [0.0, 0.0, inside * soft_k, 0.0],
-                P::ContactStiffness => [inside, 0.0, inside * self.gap, 0.0],
-                P::ContactDamping => [0.0, inside, 0.0, 0.0],
-                P::Omega | P::Restitution => [0.0; 4],
-            };
-            let regime = &mut tangent.regimes[r];
-            regime.matrix = DMatrix::from_row_slice(2, 2, &[0.0, 0.0, -dk / m, -dc / m]);
-            let lower = |v: f64| DVector::from_vec(vec![0.0, v / m]);
-            regime.forcing = HarmonicVector::zeros(2, 1)
-                .with_tone(0, &DVector::zeros(2), &lower(df))
-                .with_constant(&lower(dheld));
+        for (r, regime) in tangent.regimes.iter_mut().enumerate().take(moving) {
+            let numbers = self.coefficients(r == 1, Some(parameter));
+            *regime = equations(0.0, numbers.map(Dual::derivative));
         }
         match (parameter, self.stop) {
             (P::Omega, _) => tangent.log_period = -1.0 / self.omega,
@@ -387,8 +348,12 @@ impl Oscillator {
             }
             _ => {}
         }
-        if let (Stop::Rigid { .. }, true) = (self.stop, moving == 1) {
-            self.release_tangent(&mut tangent, parameter);
+        if moving == 1 {
+            // The release guard −g̈ = (F cos ωt − k x − c ẋ)/m moves with the parameters.
+            let numbers = self.coefficients(false, Some(parameter));
+            let [k, c, force, _] = numbers.map(Dual::derivative);
+            tangent.guards[1][0] =
+                Output::linear(RowDVector::from_row_slice(&[-k, -c]), 1).with_tone(0, 0.0, force);
         }
         Ok(tangent)
     }
@@ -430,19 +395,15 @@ impl Oscillator {
         }
         Ok(tangent)
     }
+}
 
-    /// The release guard −g̈ = (F cos ωt − k x − c ẋ)/m moves with the parameters.
-    fn release_tangent(&self, tangent: &mut SystemTangent, parameter: OscillatorParameter) {
-        use OscillatorParameter as P;
-        let m = self.mass;
-        let [dk, dc, df] = match parameter {
-            P::Mass => [-self.stiffness / m, -self.damping / m, -self.forcing / m],
-            P::Stiffness => [1.0, 0.0, 0.0],
-            P::Damping => [0.0, 1.0, 0.0],
-            P::Forcing => [0.0, 0.0, 1.0],
-            _ => return,
-        };
-        tangent.guards[1][0] = Output::linear(RowDVector::from_row_slice(&[-dk / m, -dc / m]), 1)
-            .with_tone(0, 0.0, df / m);
+/// `[[0, velocity], [−k, −c]]` and the forcing of (k, c, F, constant force), each over the mass.
+fn equations(velocity: f64, [k, c, drive, constant]: [f64; 4]) -> RegimeTangent {
+    let lower = |v: f64| DVector::from_vec(vec![0.0, v]);
+    RegimeTangent {
+        matrix: DMatrix::from_row_slice(2, 2, &[0.0, velocity, -k, -c]),
+        forcing: HarmonicVector::zeros(2, 1)
+            .with_tone(0, &DVector::zeros(2), &lower(drive))
+            .with_constant(&lower(constant)),
     }
 }

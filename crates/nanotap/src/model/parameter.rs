@@ -1,60 +1,298 @@
-//! The numbers of the dimensionless model: the paper's seven,
-//! and those that only some samples and drives have.
+//! The numbers of the dimensionless cantilever, each declared once: the paper's seven, those of
+//! the contact laws, and those that only some drives and levers have.
+//!
+//! Case files, messages, documents, the mapping to physical quantities and the storage in a
+//! [`Cantilever`](crate::model::cantilever::Cantilever) follow from the table. A new number is
+//! an entry here, or in the file of its contact law, and the place where the equations read it.
 
 use std::fmt;
+use std::sync::LazyLock;
 
 use serde::{Serialize, Serializer};
 
-/// A dimensionless parameter of the model, Eqs. (5) and (7) of the paper.
+use crate::model::contact::{self, ContactLaw};
+
+/// Largest size of α1 … α6. A larger number is probably a value in SI units, and products of
+/// parameters would lose too many digits.
+pub const LARGEST_ALPHA: f64 = 1e9;
+/// Range of Ω. The 50th mode is at 24,350 and the first at 3.5.
+pub const OMEGA_RANGE: (f64, f64) = (1e-6, 1e6);
+
+/// A number of the equations: an index into the table of parameters.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub enum Parameter {
-    /// α1 = M/(mL): tip mass over beam mass.
-    Alpha1,
-    /// α2 = f/g₀: drive amplitude over the beam's gap.
-    Alpha2,
-    /// α3 = C√(L⁴/(m EI)): damping of the beam.
-    Alpha3,
-    /// α4 = K₁L³/(EI): contact stiffness over bending stiffness.
-    Alpha4,
-    /// α5 = g₁/g₀: the tip's gap over the beam's gap.
-    Alpha5,
-    /// α6 = (C₁/L)√(L⁴/(m EI)): damping of the contact.
-    Alpha6,
-    /// Ω = ω√(mL⁴/(EI)): drive frequency.
-    Omega,
-    /// k_m L³/(EI): stiffness of the standard linear solid's relaxing arm over bending
-    /// stiffness.
-    RelaxationStiffness,
-    /// Time in which the force of that arm decays at constant indentation, in the model's
-    /// unit of time √(mL⁴/(EI)).
-    RelaxationTime,
-    /// k_s L³/(EI): a moving surface's own stiffness over bending stiffness.
-    SurfaceStiffness,
-    /// Its own damping, as α6.
-    SurfaceDamping,
-    /// F L³/(EI g₀): force that pulls a touching tip to a moving surface.
-    AdhesionForce,
-    /// Amplitude of the second tone, measured as α2.
-    Tone2Amplitude,
-    /// Phase θ of the second tone in degrees: it is sin(ρΩτ + θ), ρ the ratio of frequencies.
-    Tone2Phase,
-    /// Measured frequency of the second free mode, as Ω.
-    Mode2Frequency,
-    /// Measured frequency of the third free mode, as Ω.
-    Mode3Frequency,
-    /// Measured quality factor of the second free mode.
-    Mode2Quality,
-    /// Measured quality factor of the third free mode.
-    Mode3Quality,
-    /// Measured stiffness k₂L³/(EI) of the second free mode at the tip.
-    Mode2Stiffness,
-    /// Measured stiffness k₃L³/(EI) of the third free mode at the tip.
-    Mode3Stiffness,
+pub struct Parameter(u8);
+
+/// What the table says of a parameter.
+#[derive(Clone, Copy, Debug)]
+pub struct ParameterEntry {
+    /// Name in case files, messages and data.
+    pub name: &'static str,
+    /// Second name.
+    pub alias: Option<&'static str>,
+    /// Symbol in formulas and on axes.
+    pub symbol: &'static str,
+    /// Meaning, in one line.
+    pub meaning: &'static str,
+    /// Value where none is given; `None` if one must be.
+    pub default: Option<f64>,
+    /// Value for examples.
+    pub example: f64,
+    /// Least and greatest value.
+    pub range: (f64, f64),
+    /// Unit of the physical quantity behind it.
+    pub unit: Unit,
+    /// How it follows from the quantity: `3 K1/k`.
+    pub formula: &'static str,
+    /// The physical quantity.
+    pub quantity: &'static str,
+    /// Formula and quantity where a force on the lever drives it.
+    pub by_force: Option<(&'static str, &'static str)>,
+    /// When it applies.
+    pub applies: Applies,
+    /// Whether documents give it where it does not apply, as 0.
+    pub always_written: bool,
+    /// The key of `[sample]` that states the quantity, of a number of a contact law.
+    pub stated_by: Option<SampleKey>,
 }
+
+/// When a parameter applies; elsewhere it is 0.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Applies {
+    /// To every cantilever.
+    Always,
+    /// With a piecewise-linear contact law.
+    Spring,
+    /// With a piecewise-linear contact law that has the damper α6.
+    Damper,
+    /// With this contact law.
+    Law(ContactLaw),
+    /// With a second tone.
+    SecondTone,
+    /// Where it is not 0: a measured number of a mode.
+    Measured,
+}
+
+/// What the model's unit of a parameter is in SI.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Unit {
+    /// Pure number.
+    Number,
+    /// Mass, kg.
+    Mass,
+    /// Length, m.
+    Length,
+    /// Time, s.
+    Time,
+    /// Frequency, Hz.
+    Frequency,
+    /// Stiffness, N/m.
+    Stiffness,
+    /// Damping, N s/m.
+    Damping,
+    /// Force, N.
+    Force,
+    /// Amplitude of the drive: m of a moving base, N of a force on the lever.
+    Drive,
+    /// Degrees.
+    Degrees,
+}
+
+/// The key of `[sample]` with a law number's own name.
+#[derive(Clone, Copy, Debug)]
+pub enum SampleKey {
+    /// A key of this law alone.
+    Own {
+        /// Meaning, in one line.
+        meaning: &'static str,
+        /// Whether 0 is allowed.
+        zero: bool,
+    },
+    /// A key that nonlinear laws have, too.
+    Shared,
+}
+
+impl ParameterEntry {
+    /// A number from 0 up that always applies and has no default.
+    pub(crate) const fn new(
+        name: &'static str,
+        symbol: &'static str,
+        meaning: &'static str,
+    ) -> Self {
+        Self {
+            name,
+            alias: None,
+            symbol,
+            meaning,
+            default: None,
+            example: 1.0,
+            range: (0.0, LARGEST_ALPHA),
+            unit: Unit::Number,
+            formula: "",
+            quantity: "",
+            by_force: None,
+            applies: Applies::Always,
+            always_written: false,
+            stated_by: None,
+        }
+    }
+
+    /// With a quantity and its formula.
+    pub(crate) const fn of(
+        self,
+        unit: Unit,
+        quantity: &'static str,
+        formula: &'static str,
+    ) -> Self {
+        Self {
+            unit,
+            formula,
+            quantity,
+            ..self
+        }
+    }
+
+    /// With quantity and formula where a force drives the lever.
+    const fn by_force(self, quantity: &'static str, formula: &'static str) -> Self {
+        Self {
+            by_force: Some((formula, quantity)),
+            ..self
+        }
+    }
+
+    const fn also(self, alias: &'static str) -> Self {
+        Self {
+            alias: Some(alias),
+            ..self
+        }
+    }
+
+    pub(crate) const fn or(self, default: f64) -> Self {
+        Self {
+            default: Some(default),
+            ..self
+        }
+    }
+
+    pub(crate) const fn such_as(self, example: f64) -> Self {
+        Self { example, ..self }
+    }
+
+    const fn within(self, range: (f64, f64)) -> Self {
+        Self { range, ..self }
+    }
+
+    const fn when(self, applies: Applies) -> Self {
+        Self { applies, ..self }
+    }
+
+    pub(crate) const fn always_written(self) -> Self {
+        Self {
+            always_written: true,
+            ..self
+        }
+    }
+
+    pub(crate) const fn stated_by(self, key: SampleKey) -> Self {
+        Self {
+            stated_by: Some(key),
+            ..self
+        }
+    }
+}
+
+const fn number(name: &'static str, symbol: &'static str, meaning: &'static str) -> ParameterEntry {
+    ParameterEntry::new(name, symbol, meaning)
+}
+
+const SIGNED: (f64, f64) = (-LARGEST_ALPHA, LARGEST_ALPHA);
+
+/// A measured number of a mode.
+const fn measured(
+    name: &'static str,
+    symbol: &'static str,
+    meaning: &'static str,
+) -> ParameterEntry {
+    number(name, symbol, meaning)
+        .or(0.0)
+        .when(Applies::Measured)
+}
+
+macro_rules! parameters {
+    ($($group:ident from $first:expr => { $($key:ident = $entry:expr;)* })*) => {
+        #[expect(non_upper_case_globals, reason = "named as the variants of an enum")]
+        #[expect(missing_docs, reason = "each entry has a meaning")]
+        impl Parameter {
+            $($(pub const $key: Self = Self(($first + $group::$key as usize) as u8);)*)*
+        }
+        $(
+            enum $group { $($key),* }
+            impl $group {
+                const ENTRIES: &[ParameterEntry] = &[$($entry),*];
+            }
+        )*
+    };
+}
+
+parameters! {
+    Paper from 0 => {
+        Alpha1 = number("alpha1", "α₁", "tip mass over beam mass, M/(mL)")
+            .also("tip_mass_ratio").such_as(0.1)
+            .of(Unit::Mass, "tip mass M", "M/(mL)");
+        Alpha2 = number("alpha2", "α₂", "drive amplitude over beam gap, f/g0")
+            .also("drive_amplitude").such_as(0.1)
+            .of(Unit::Drive, "base amplitude f", "f/g0")
+            .by_force("amplitude of the drive's force F", "F L^3/(EI g0) = 3 F/(k g0)");
+        Alpha3 = number("alpha3", "α₃", "viscous damping of the beam, C·√(L⁴/(m·EI))")
+            .also("beam_damping").such_as(0.1)
+            .of(Unit::Damping, "damping of the whole beam C L", "C sqrt(L^4/(m EI)) = (C L) T/(m L)");
+        Alpha4 = number("alpha4", "α₄", "contact stiffness over bending stiffness, K1·L³/(EI)")
+            .also("contact_stiffness").when(Applies::Spring).such_as(20.0)
+            .of(Unit::Stiffness, "contact stiffness K1", "K1 L^3/(EI) = 3 K1/k");
+        Alpha5 = number("alpha5", "α₅", "tip gap over beam gap, g1/g0 (negative: pressed in at rest)")
+            .also("gap").or(0.0).within(SIGNED)
+            .of(Unit::Length, "tip gap g1", "g1/g0");
+        Alpha6 = number("alpha6", "α₆", "viscous damping of the contact, (C1/L)·√(L⁴/(m·EI))")
+            .also("contact_damping").when(Applies::Damper).such_as(0.2)
+            .of(Unit::Damping, "contact damping C1", "(C1/L) sqrt(L^4/(m EI)) = C1 T/(m L)");
+        Omega = number("omega", "Ω", "drive frequency, ω·√(mL⁴/(EI))")
+            .also("drive_frequency").such_as(2.6).within(OMEGA_RANGE)
+            .of(Unit::Frequency, "drive frequency", "omega sqrt(m L^4/(EI)) = 2 pi f T");
+    }
+    Further from Parameter::PAPER + contact::NUMBERS => {
+        Tone2Amplitude = number("tone2_amplitude", "A₂", "amplitude of the second tone, measured as alpha2")
+            .also("second_tone_amplitude").or(0.0).when(Applies::SecondTone).always_written()
+            .of(Unit::Drive, "base amplitude of the second tone", "f2/g0")
+            .by_force("force of the second tone F2", "F2 L^3/(EI g0) = 3 F2/(k g0)");
+        Tone2Phase = number("tone2_phase", "θ₂", "phase of the second tone in degrees")
+            .also("second_tone_phase").or(0.0).when(Applies::SecondTone).within(SIGNED).always_written()
+            .of(Unit::Degrees, "phase of the second tone", "degrees");
+        Mode2Frequency = measured("mode2_frequency", "Ω₂", "measured frequency of the second free mode, as omega (0: the beam's own)")
+            .of(Unit::Frequency, "frequency of the second mode", "2 pi f2 T");
+        Mode3Frequency = measured("mode3_frequency", "Ω₃", "measured frequency of the third free mode, as omega (0: the beam's own)")
+            .of(Unit::Frequency, "frequency of the third mode", "2 pi f3 T");
+        Mode2Quality = measured("mode2_quality", "Q₂", "measured quality factor of the second free mode (0: as beam_damping has it)")
+            .of(Unit::Number, "quality factor of the second mode", "Q2");
+        Mode3Quality = measured("mode3_quality", "Q₃", "measured quality factor of the third free mode (0: as beam_damping has it)")
+            .of(Unit::Number, "quality factor of the third mode", "Q3");
+        Mode2Stiffness = measured("mode2_stiffness", "k₂", "measured stiffness of the second free mode at the tip, k2·L³/(EI) (0: the beam's own)")
+            .of(Unit::Stiffness, "stiffness of the second mode", "k2 L^3/(EI) = 3 k2/k");
+        Mode3Stiffness = measured("mode3_stiffness", "k₃", "measured stiffness of the third free mode at the tip, k3·L³/(EI) (0: the beam's own)")
+            .of(Unit::Stiffness, "stiffness of the third mode", "k3 L^3/(EI) = 3 k3/k");
+    }
+}
+
+static TABLE: LazyLock<Vec<ParameterEntry>> = LazyLock::new(|| {
+    let groups = [
+        Paper::ENTRIES.to_vec(),
+        contact::numbers(),
+        Further::ENTRIES.to_vec(),
+    ];
+    groups.concat()
+});
 
 impl Parameter {
     /// The paper's parameters, which every case has: α1 to α6 and then Ω.
-    pub const ALL: [Self; 7] = [
+    pub const ALL: [Self; Self::PAPER] = [
         Self::Alpha1,
         Self::Alpha2,
         Self::Alpha3,
@@ -63,16 +301,8 @@ impl Parameter {
         Self::Alpha6,
         Self::Omega,
     ];
-
-    /// Parameters that only some samples, drives and levers have; 0 where they are not said.
-    pub const FURTHER: [Self; 13] = [
-        Self::RelaxationStiffness,
-        Self::RelaxationTime,
-        Self::SurfaceStiffness,
-        Self::SurfaceDamping,
-        Self::AdhesionForce,
-        Self::Tone2Amplitude,
-        Self::Tone2Phase,
+    /// Measured numbers of the second and third mode.
+    pub const MEASURED: [Self; 6] = [
         Self::Mode2Frequency,
         Self::Mode3Frequency,
         Self::Mode2Quality,
@@ -80,36 +310,66 @@ impl Parameter {
         Self::Mode2Stiffness,
         Self::Mode3Stiffness,
     ];
+    /// How many of them are the paper's.
+    pub(crate) const PAPER: usize = Paper::ENTRIES.len();
+    /// How many parameters there are.
+    pub const COUNT: usize = Self::PAPER + contact::NUMBERS + Further::ENTRIES.len();
 
-    /// Every parameter there is.
-    pub fn every() -> impl Iterator<Item = Self> {
-        Self::ALL.into_iter().chain(Self::FURTHER)
+    /// All parameters: the paper's, those of contact laws, and the others.
+    pub fn every() -> impl DoubleEndedIterator<Item = Self> + Clone {
+        (0..Self::COUNT as u8).map(Self)
     }
 
-    /// The name in refusals, in case files and in data: `alpha1` … `alpha6`, `omega`.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Alpha1 => "alpha1",
-            Self::Alpha2 => "alpha2",
-            Self::Alpha3 => "alpha3",
-            Self::Alpha4 => "alpha4",
-            Self::Alpha5 => "alpha5",
-            Self::Alpha6 => "alpha6",
-            Self::Omega => "omega",
-            Self::RelaxationStiffness => "relaxation_stiffness",
-            Self::RelaxationTime => "relaxation_time",
-            Self::SurfaceStiffness => "surface_stiffness",
-            Self::SurfaceDamping => "surface_damping",
-            Self::AdhesionForce => "adhesion_force",
-            Self::Tone2Amplitude => "tone2_amplitude",
-            Self::Tone2Phase => "tone2_phase",
-            Self::Mode2Frequency => "mode2_frequency",
-            Self::Mode3Frequency => "mode3_frequency",
-            Self::Mode2Quality => "mode2_quality",
-            Self::Mode3Quality => "mode3_quality",
-            Self::Mode2Stiffness => "mode2_stiffness",
-            Self::Mode3Stiffness => "mode3_stiffness",
-        }
+    /// The parameters of a contact law alone.
+    pub fn of_law(law: ContactLaw) -> impl ExactSizeIterator<Item = Self> + Clone {
+        let first = Self::PAPER + law.first_number();
+        (first..first + law.entry().numbers.len()).map(|k| Self(k as u8))
+    }
+
+    /// The parameter with this name.
+    pub fn find(name: &str) -> Option<Self> {
+        Self::every().find(|parameter| parameter.name() == name)
+    }
+
+    /// Place in the table.
+    pub const fn index(self) -> usize {
+        self.0 as usize
+    }
+
+    /// Entry of the table.
+    pub fn entry(self) -> &'static ParameterEntry {
+        &TABLE[self.index()]
+    }
+
+    /// Name in messages, case files and data: `alpha1` … `alpha6`, `omega`.
+    pub fn name(self) -> &'static str {
+        self.entry().name
+    }
+}
+
+/// A value of each parameter.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Numbers([f64; Parameter::COUNT]);
+
+impl Numbers {
+    /// All zero.
+    pub const ZERO: Self = Self([0.0; Parameter::COUNT]);
+
+    /// The value of a parameter.
+    pub const fn get(&self, parameter: Parameter) -> f64 {
+        self.0[parameter.index()]
+    }
+
+    /// Sets the value of a parameter.
+    pub const fn set(&mut self, parameter: Parameter, value: f64) {
+        self.0[parameter.index()] = value;
+    }
+
+    /// The same with another value of a parameter.
+    #[must_use]
+    pub const fn with(mut self, parameter: Parameter, value: f64) -> Self {
+        self.set(parameter, value);
+        self
     }
 }
 

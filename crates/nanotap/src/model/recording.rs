@@ -1,22 +1,84 @@
-//! A recorded motion, of either engine, and the curves that are read off it.
+//! Recorded motions of both engines behind one trait, and the curves that are read off them.
 
+use std::fmt::Debug;
+use std::ops::Deref;
 use std::sync::{Arc, OnceLock};
 
 use nanotap_flow::extrema::Extremum;
-use nanotap_flow::trajectory::PiecewiseSignal;
-use nanotap_flow::{Complex, Output, Trajectory};
+use nanotap_flow::trajectory::{PiecewiseSignal, Recorder};
+use nanotap_flow::{Complex, Event, Output, Trajectory};
 use nanotap_volterra::{Flow, Sample, Trajectory as Period};
 
 use crate::model::nonlinear::Nonlinear;
 use crate::model::{Model, MotionError};
 
+/// A stretch of motion, of whole drive periods or less, as either flow computes it. Its time begins
+/// at 0.
+pub trait RecordedMotion: Debug {
+    /// Time at the end.
+    fn end(&self) -> f64;
+
+    /// Its smooth pieces, in order of time: in one regime, or on one branch of the force law.
+    fn pieces(&self) -> Vec<MotionPiece>;
+
+    /// Its switches between regimes or branches, in order of time, with the rate of the guard or,
+    /// under a nonlinear force, of the gap.
+    fn switches(&self) -> Vec<Event>;
+
+    /// The motion at time `t` (at the nearer end outside); `None` if it is empty.
+    fn instant(&self, t: f64) -> Option<Instant>;
+
+    /// The state just before a switch at time `t`.
+    fn state_before(&self, t: f64) -> Option<Vec<f64>>;
+
+    /// The state at time `t`; `None` if it is empty.
+    fn state_at(&self, t: f64) -> Option<Vec<f64>> {
+        Some(self.instant(t)?.state)
+    }
+}
+
+/// A smooth piece of a recorded motion.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MotionPiece {
+    /// Time at its start.
+    pub start: f64,
+    /// Length of time.
+    pub length: f64,
+    /// The regime, or the branch of the force law.
+    pub regime: usize,
+}
+
+/// An instant of a recorded motion.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Instant {
+    /// The state, of the model's dimension.
+    pub state: Vec<f64>,
+    /// Time since drive phase 0.
+    pub phase: f64,
+    /// The regime, or the branch of the force law.
+    pub regime: usize,
+    /// The nonlinear force; `None` where the force follows from regime and state.
+    pub nonlinear_force: Option<f64>,
+}
+
 /// A recorded motion.
 #[derive(Clone, Debug)]
 pub enum Recording {
     /// Of a piecewise-linear model, in closed form.
-    Exact(Trajectory),
+    PiecewiseLinear(Trajectory),
     /// Under a nonlinear force.
     Nonlinear(Arc<NonlinearRecording>),
+}
+
+impl Deref for Recording {
+    type Target = dyn RecordedMotion;
+
+    fn deref(&self) -> &Self::Target {
+        match self {
+            Self::PiecewiseLinear(trajectory) => trajectory,
+            Self::Nonlinear(recording) => &**recording,
+        }
+    }
 }
 
 /// A motion under a nonlinear force, period by period.
@@ -24,56 +86,68 @@ pub enum Recording {
 pub struct NonlinearRecording {
     nonlinear: Arc<Nonlinear>,
     periods: Vec<Period>,
-    /// Where in time the samples of a quadrature stand, with their weights.
+    /// The samples of a quadrature, with their weights.
     samples: OnceLock<Vec<(f64, Sample)>>,
 }
 
-/// A stretch of a recording in flight or in contact.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Stretch {
-    /// When it begins.
-    pub start: f64,
-    /// How long it lasts.
-    pub length: f64,
-    /// Whether tip and sample touch.
-    pub contact: bool,
-}
+/// Runs and records the next drive periods of a flow, as many as the number given.
+pub(crate) type RecordPeriods<'a> = dyn FnMut(usize) -> Result<Recording, MotionError> + 'a;
 
-/// A scalar over a recorded motion.
-#[derive(Clone, Debug)]
-pub enum Curve {
-    /// In closed form.
-    Exact(PiecewiseSignal),
-    /// Under a nonlinear force.
-    Nonlinear(Arc<NonlinearRecording>, nanotap_volterra::Output),
-}
-
-/// A stretch of a [`Curve`] on which it is smooth.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct CurvePiece {
-    /// Its number.
-    pub index: usize,
-    /// When it begins.
-    pub start: f64,
-    /// How long it lasts.
-    pub length: f64,
-}
-
-/// Runs a nonlinear model period by period from `state`, which ends where the motion does.
-pub(crate) fn each_period(
-    nonlinear: &Nonlinear,
-    state: &mut [f64],
-    periods: usize,
-    mut take: impl FnMut(&[f64], Period),
-) -> Result<(), MotionError> {
-    let mut flow = Flow::new(Arc::clone(&nonlinear.system));
-    for _ in 0..periods {
-        nonlinear.start(&mut flow, state)?;
-        let period = flow.record_until(nonlinear.period)?;
-        nonlinear.end(&flow, state);
-        take(state, period);
+impl Model {
+    /// Starts a flow from `state` at drive phase 0, to be recorded part by part.
+    ///
+    /// # Errors
+    /// When a piecewise-linear model has no regime that holds the state.
+    pub(crate) fn recorder(&self, state: &[f64]) -> Result<Box<RecordPeriods<'_>>, MotionError> {
+        if let Some(nonlinear) = &self.nonlinear {
+            let mut flow = Flow::new(Arc::clone(&nonlinear.system));
+            let mut state = state.to_vec();
+            return Ok(Box::new(move |periods| {
+                let mut period = || {
+                    nonlinear.start(&mut flow, &state)?;
+                    let period = flow.record_until(nonlinear.period)?;
+                    nonlinear.end(&flow, &mut state);
+                    Ok::<_, MotionError>(period)
+                };
+                let recorded = (0..periods).map(|_| period()).collect::<Result<_, _>>()?;
+                Ok(Recording::of_periods(nonlinear, recorded))
+            }));
+        }
+        let mut flow = nanotap_flow::Flow::new(Arc::clone(&self.system));
+        flow.start(state, 0.0)?;
+        Ok(Box::new(move |periods| {
+            let mut recorder = Recorder::default();
+            for _ in 0..periods {
+                flow.run_period(&mut recorder)?;
+            }
+            let system = Arc::clone(&self.system);
+            Ok(Recording::PiecewiseLinear(recorder.finish(system)))
+        }))
     }
-    Ok(())
+
+    /// Whether tip and sample touch in a regime, or on a branch of the force law.
+    pub fn touches(&self, regime: usize) -> bool {
+        let nonlinear = self.nonlinear.as_ref();
+        let contact = nonlinear.map_or(&self.contact, |nonlinear| &nonlinear.contact);
+        contact.get(regime).copied().unwrap_or(false)
+    }
+
+    /// Puts the position of a surface with a memory into a state: in contact it is where the tip
+    /// holds it, of which a memory that the end of the contact sets anew knows nothing.
+    pub(crate) fn set_surface(&self, state: &mut [f64], contact: bool, height: f64) {
+        if self.memory_reset.is_some() && contact {
+            state[self.dimension() - self.memory] = height;
+        }
+    }
+
+    /// The force of the sample on the tip.
+    pub fn force_at(&self, instant: &Instant) -> f64 {
+        let linear = || {
+            let force = &self.force[instant.regime];
+            force.at(self.system.drive(), &instant.state, instant.phase)
+        };
+        instant.nonlinear_force.unwrap_or_else(linear)
+    }
 }
 
 impl Recording {
@@ -82,19 +156,10 @@ impl Recording {
     /// # Errors
     /// When the flow fails.
     pub fn of(model: &Model, state: &[f64], periods: usize) -> Result<Self, MotionError> {
-        let Some(nonlinear) = &model.nonlinear else {
-            let trajectory = Trajectory::record(&model.system, state, periods)?;
-            return Ok(Self::Exact(trajectory));
-        };
-        let mut recorded = Vec::with_capacity(periods);
-        let mut state = state.to_vec();
-        each_period(nonlinear, &mut state, periods, |_, period| {
-            recorded.push(period);
-        })?;
-        Ok(Self::of_periods(nonlinear, recorded))
+        model.recorder(state)?(periods)
     }
 
-    /// These periods, one after the other.
+    /// These periods, in sequence.
     pub(crate) fn of_periods(nonlinear: &Arc<Nonlinear>, periods: Vec<Period>) -> Self {
         Self::Nonlinear(Arc::new(NonlinearRecording {
             nonlinear: Arc::clone(nonlinear),
@@ -106,86 +171,133 @@ impl Recording {
     /// The closed form, of a piecewise-linear model.
     pub const fn exact(&self) -> Option<&Trajectory> {
         match self {
-            Self::Exact(trajectory) => Some(trajectory),
+            Self::PiecewiseLinear(trajectory) => Some(trajectory),
             Self::Nonlinear(_) => None,
-        }
-    }
-
-    /// Time at the end; the start is 0.
-    pub fn end(&self) -> f64 {
-        match self {
-            Self::Exact(trajectory) => trajectory.end(),
-            Self::Nonlinear(recording) => recording.end(),
-        }
-    }
-
-    /// The lever's state at time `t`, `None` of an empty recording.
-    pub fn state_at(&self, t: f64) -> Option<Vec<f64>> {
-        match self {
-            Self::Exact(trajectory) => trajectory.state_at(t),
-            Self::Nonlinear(recording) => recording.state_at(t),
         }
     }
 
     /// An output that is the same in flight and in contact.
     pub fn curve(&self, output: &Output) -> Curve {
         match self {
-            Self::Exact(trajectory) => Curve::Exact(trajectory.signal(output)),
-            Self::Nonlinear(recording) => Curve::Nonlinear(
-                Arc::clone(recording),
-                recording.nonlinear.output(output, 0.0),
-            ),
+            Self::PiecewiseLinear(trajectory) => Curve::PiecewiseLinear(trajectory.signal(output)),
+            Self::Nonlinear(recording) => recording.curve(output, 0.0),
         }
     }
 
     /// The force of the sample on the tip.
     pub fn force(&self, model: &Model) -> Curve {
         match self {
-            Self::Exact(trajectory) => Curve::Exact(trajectory.signal_by_regime(&model.force)),
-            Self::Nonlinear(recording) => {
-                let nothing = model.tip.scaled(0.0);
-                Curve::Nonlinear(
-                    Arc::clone(recording),
-                    recording.nonlinear.output(&nothing, 1.0),
-                )
+            Self::PiecewiseLinear(trajectory) => {
+                Curve::PiecewiseLinear(trajectory.signal_by_regime(&model.force))
             }
+            Self::Nonlinear(recording) => recording.curve(&model.tip.scaled(0.0), 1.0),
         }
     }
 
-    /// When the tip hits a rigid stop, and the impulses on it.
+    /// Times at which the tip hits a rigid stop, and the impulses on it.
     pub fn impulses(&self, model: &Model) -> Vec<(f64, f64)> {
-        let (Self::Exact(trajectory), Some(stop)) = (self, model.rigid_stop) else {
+        let Some(stop) = model.rigid_stop else {
             return Vec::new();
         };
-        let hits = trajectory
-            .events()
-            .iter()
-            .filter(|e| !model.contact[e.from]);
+        let hits = self
+            .switches()
+            .into_iter()
+            .filter(|e| !model.touches(e.from));
         hits.map(|e| (e.time, -e.rate * stop.impulse(e.from, e.to)))
             .collect()
     }
+}
 
-    /// Flights and contacts, in order; a flight or a contact may be in several pieces.
-    pub fn stretches(&self, model: &Model) -> Vec<Stretch> {
-        match self {
-            Self::Exact(trajectory) => trajectory
-                .segments()
-                .iter()
-                .map(|s| Stretch {
-                    start: s.start,
-                    length: s.length,
-                    contact: model.contact[s.regime],
-                })
-                .collect(),
-            Self::Nonlinear(recording) => recording
-                .pieces()
-                .map(|(start, s)| Stretch {
-                    start,
-                    length: s.length,
-                    contact: recording.nonlinear.contact[s.branch],
-                })
-                .collect(),
+impl RecordedMotion for Trajectory {
+    fn end(&self) -> f64 {
+        self.end()
+    }
+
+    fn pieces(&self) -> Vec<MotionPiece> {
+        let piece = |s: &nanotap_flow::trajectory::Segment| MotionPiece {
+            start: s.start,
+            length: s.length,
+            regime: s.regime,
+        };
+        self.segments().iter().map(piece).collect()
+    }
+
+    fn switches(&self) -> Vec<Event> {
+        self.events().to_vec()
+    }
+
+    fn instant(&self, t: f64) -> Option<Instant> {
+        let segment = self.segment_at(t)?;
+        Some(Instant {
+            state: self.state_at(t)?,
+            phase: t - (segment.start - segment.phase),
+            regime: segment.regime,
+            nonlinear_force: None,
+        })
+    }
+
+    fn state_before(&self, t: f64) -> Option<Vec<f64>> {
+        let (n, tones) = (
+            self.system().dimension(),
+            self.system().drive().frequencies().len(),
+        );
+        let component = |i: usize| {
+            let mut row = nalgebra::RowDVector::zeros(n);
+            row[i] = 1.0;
+            let signal = self.signal(&Output::linear(row, tones));
+            let piece = signal.pieces.iter().rev().find(|p| p.start < t)?;
+            Some(piece.signal.at((t - piece.start).min(piece.length)))
+        };
+        (0..n).map(component).collect()
+    }
+}
+
+impl RecordedMotion for NonlinearRecording {
+    fn end(&self) -> f64 {
+        self.offset(self.periods.len())
+    }
+
+    fn pieces(&self) -> Vec<MotionPiece> {
+        let all = self.periods.iter().enumerate().flat_map(|(k, period)| {
+            period.stretches().map(move |s| MotionPiece {
+                start: self.offset(k) + s.start,
+                length: s.length,
+                regime: s.branch,
+            })
+        });
+        all.collect()
+    }
+
+    fn switches(&self) -> Vec<Event> {
+        let all = self.periods.iter().enumerate().flat_map(|(k, period)| {
+            period.switches().iter().map(move |s| Event {
+                time: self.offset(k) + s.time,
+                from: s.from,
+                to: s.to,
+                rate: s.rate,
+                grazing: false,
+                log_determinant: None,
+            })
+        });
+        all.collect()
+    }
+
+    fn instant(&self, t: f64) -> Option<Instant> {
+        let sample = self.sample_at(t)?;
+        let mut state = sample.state.as_slice().to_vec();
+        if self.nonlinear.remembers {
+            state.push(sample.branch as f64);
         }
+        Some(Instant {
+            state,
+            phase: sample.time,
+            regime: sample.branch,
+            nonlinear_force: Some(sample.force),
+        })
+    }
+
+    fn state_before(&self, t: f64) -> Option<Vec<f64>> {
+        self.state_at(t)
     }
 }
 
@@ -193,10 +305,6 @@ impl NonlinearRecording {
     /// Where a period begins.
     fn offset(&self, period: usize) -> f64 {
         period as f64 * self.nonlinear.period
-    }
-
-    fn end(&self) -> f64 {
-        self.offset(self.periods.len())
     }
 
     /// The periods.
@@ -215,23 +323,6 @@ impl NonlinearRecording {
         let recorded = &self.periods[period];
         let (start, end) = recorded.span();
         recorded.at((t - self.offset(period)).clamp(start, end))
-    }
-
-    fn state_at(&self, t: f64) -> Option<Vec<f64>> {
-        let sample = self.sample_at(t)?;
-        let mut state = sample.state.as_slice().to_vec();
-        if self.nonlinear.remembers {
-            state.push(sample.branch as f64);
-        }
-        Some(state)
-    }
-
-    /// All stretches, each with its beginning counted from that of the recording.
-    fn pieces(&self) -> impl Iterator<Item = (f64, nanotap_volterra::trajectory::Stretch)> + '_ {
-        self.periods.iter().enumerate().flat_map(|(k, period)| {
-            let offset = self.offset(k);
-            period.stretches().map(move |s| (offset + s.start, s))
-        })
     }
 
     /// The samples of a quadrature over everything, with their weights; times are counted from
@@ -274,14 +365,19 @@ impl NonlinearRecording {
         rows
     }
 
+    /// An output with a share of the nonlinear force.
+    fn curve(self: &Arc<Self>, output: &Output, force: f64) -> Curve {
+        Curve::Nonlinear(Arc::clone(self), self.nonlinear.output(output, force))
+    }
+
     /// The value of an output at a sample.
     fn read(&self, output: &nanotap_volterra::Output, sample: &Sample) -> f64 {
         read(&self.nonlinear, output, sample)
     }
 
-    fn integral(&self, mut integrand: impl FnMut(&Sample) -> Complex) -> Complex {
+    fn integral(&self, integrand: impl Fn(&Sample) -> f64) -> f64 {
         let samples = self.samples().iter();
-        samples.map(|(weight, s)| integrand(s) * *weight).sum()
+        samples.map(|(weight, s)| integrand(s) * weight).sum()
     }
 }
 
@@ -308,6 +404,26 @@ pub(crate) fn read(
     output.offset + linear + harmonic + output.force * sample.force
 }
 
+/// A scalar over a recorded motion.
+#[derive(Clone, Debug)]
+pub enum Curve {
+    /// In closed form.
+    PiecewiseLinear(PiecewiseSignal),
+    /// Under a nonlinear force.
+    Nonlinear(Arc<NonlinearRecording>, nanotap_volterra::Output),
+}
+
+/// A piece of a [`Curve`] on which it is smooth.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CurvePiece {
+    /// Its number.
+    pub index: usize,
+    /// Time at its start.
+    pub start: f64,
+    /// Length of time.
+    pub length: f64,
+}
+
 impl Curve {
     /// The stretches on which it is smooth.
     pub fn pieces(&self) -> Vec<CurvePiece> {
@@ -317,12 +433,12 @@ impl Curve {
             length,
         };
         match self {
-            Self::Exact(signal) => {
+            Self::PiecewiseLinear(signal) => {
                 let all = signal.pieces.iter().map(|p| (p.start, p.length));
                 all.enumerate().map(piece).collect()
             }
             Self::Nonlinear(recording, _) => {
-                let all = recording.pieces().map(|(start, s)| (start, s.length));
+                let all = recording.pieces().into_iter().map(|p| (p.start, p.length));
                 all.enumerate().map(piece).collect()
             }
         }
@@ -331,7 +447,7 @@ impl Curve {
     /// The value `s` after the beginning of a piece, at its very ends too.
     pub fn on(&self, piece: &CurvePiece, s: f64) -> f64 {
         match self {
-            Self::Exact(signal) => signal
+            Self::PiecewiseLinear(signal) => signal
                 .pieces
                 .get(piece.index)
                 .map_or(f64::NAN, |p| p.signal.at(s)),
@@ -352,7 +468,7 @@ impl Curve {
     /// The fastest rate at which it may turn on a piece.
     pub fn fastest(&self, piece: &CurvePiece) -> f64 {
         match self {
-            Self::Exact(signal) => signal
+            Self::PiecewiseLinear(signal) => signal
                 .pieces
                 .get(piece.index)
                 .map_or(0.0, |p| p.signal.fastest()),
@@ -363,7 +479,7 @@ impl Curve {
     /// The value at time `t` (of the nearest piece outside), `None` if empty.
     pub fn at(&self, t: f64) -> Option<f64> {
         match self {
-            Self::Exact(signal) => signal.at(t),
+            Self::PiecewiseLinear(signal) => signal.at(t),
             Self::Nonlinear(recording, output) => {
                 let sample = recording.sample_at(t)?;
                 Some(recording.read(output, &sample))
@@ -374,7 +490,7 @@ impl Curve {
     /// When it is least and when it is greatest, with the values; `None` if empty.
     pub fn range(&self) -> Option<(Extremum, Extremum)> {
         match self {
-            Self::Exact(signal) => signal.range(),
+            Self::PiecewiseLinear(signal) => signal.range(),
             Self::Nonlinear(recording, output) => {
                 let ends = recording.periods.iter().enumerate().map(|(k, period)| {
                     period
@@ -398,7 +514,7 @@ impl Curve {
     /// Length of time covered.
     pub fn duration(&self) -> f64 {
         match self {
-            Self::Exact(signal) => signal.duration(),
+            Self::PiecewiseLinear(signal) => signal.duration(),
             Self::Nonlinear(recording, _) => recording.end(),
         }
     }
@@ -406,34 +522,30 @@ impl Curve {
     /// The time mean (0 if empty).
     pub fn mean(&self) -> f64 {
         match self {
-            Self::Exact(signal) => signal.mean(),
+            Self::PiecewiseLinear(signal) => signal.mean(),
             Self::Nonlinear(recording, output) => {
-                let sum = recording.integral(|s| recording.read(output, s).into());
-                sum.re / recording.end().max(f64::MIN_POSITIVE)
+                let sum = recording.integral(|s| recording.read(output, s));
+                sum / recording.end().max(f64::MIN_POSITIVE)
             }
         }
     }
 
-    /// The same of several curves of one recording, a row a frequency.
+    /// The Fourier coefficients ([`Curve::fourier`]) of several curves of one recording, a row a
+    /// frequency.
     pub fn fouriers(curves: &[&Self], frequencies: &[f64]) -> Vec<Vec<Complex>> {
-        let exact: Option<Vec<&PiecewiseSignal>> = curves
-            .iter()
-            .map(|curve| match curve {
-                Self::Exact(signal) => Some(signal),
-                Self::Nonlinear(..) => None,
-            })
-            .collect();
-        if let Some(signals) = exact {
-            return nanotap_flow::integral::fouriers(&signals, frequencies);
+        let (mut signals, mut outputs, mut nonlinear) = (Vec::new(), Vec::new(), None);
+        for curve in curves {
+            match curve {
+                Self::PiecewiseLinear(signal) => signals.push(signal),
+                Self::Nonlinear(recording, output) => {
+                    outputs.push(output);
+                    nonlinear = Some(recording);
+                }
+            }
         }
-        let nonlinear = curves.iter().filter_map(|curve| match curve {
-            Self::Exact(_) => None,
-            Self::Nonlinear(recording, output) => Some((recording, output)),
-        });
-        let outputs: Vec<_> = nonlinear.clone().map(|(_, output)| output).collect();
-        match nonlinear.clone().next() {
-            Some((recording, _)) => recording.fouriers(&outputs, frequencies),
-            None => Vec::new(),
+        match nonlinear {
+            Some(recording) => recording.fouriers(&outputs, frequencies),
+            None => nanotap_flow::integral::fouriers(&signals, frequencies),
         }
     }
 
@@ -441,7 +553,7 @@ impl Curve {
     /// component at `ω` is `Re(c e^{iωt})`.
     pub fn fourier(&self, omega: f64) -> Complex {
         match self {
-            Self::Exact(signal) => signal.fourier(omega),
+            Self::PiecewiseLinear(signal) => signal.fourier(omega),
             Self::Nonlinear(recording, output) => recording.fouriers(&[output], &[omega])[0][0],
         }
     }
@@ -449,10 +561,9 @@ impl Curve {
     /// `∫ g h dt` with another curve of the same recording.
     pub fn product_integral(&self, other: &Self) -> f64 {
         match (self, other) {
-            (Self::Exact(a), Self::Exact(b)) => a.product_integral(b),
+            (Self::PiecewiseLinear(a), Self::PiecewiseLinear(b)) => a.product_integral(b),
             (Self::Nonlinear(recording, a), Self::Nonlinear(_, b)) => {
-                let product = |s: &Sample| recording.read(a, s) * recording.read(b, s);
-                recording.integral(|s| product(s).into()).re
+                recording.integral(|s| recording.read(a, s) * recording.read(b, s))
             }
             _ => f64::NAN,
         }

@@ -3,6 +3,7 @@
 
 use std::sync::Arc;
 
+use crate::model::words::plain;
 use nanotap_volterra::laws::entry::{Entry, ParameterEntry};
 use nanotap_volterra::laws::polyline::Rows;
 use nanotap_volterra::laws::{TableLaw, all, build_sum, law};
@@ -14,7 +15,7 @@ use serde::{Serialize, Serializer};
 #[derive(Clone, Debug)]
 pub struct SampleLaw {
     terms: Vec<&'static TableLaw>,
-    /// The parameters of the terms, one after the other.
+    /// The parameters of all terms, in sequence.
     values: Vec<f64>,
     /// The rows of a table, in whatever units its factors are measured in.
     rows: Option<Arc<Rows>>,
@@ -37,13 +38,11 @@ impl SampleLaw {
     /// # Errors
     /// [`VolterraError::UnknownLaw`] for the first name that is none.
     pub fn terms(text: &str) -> Result<Vec<&'static TableLaw>, VolterraError> {
-        text.split('+')
-            .map(|name| law(&name.trim().to_lowercase().replace(['_', ' '], "-")))
-            .collect()
+        text.split('+').map(|name| law(&plain(name))).collect()
     }
 
-    /// These laws with `values`, the parameters of all terms one after the other, in the model's
-    /// units, and the rows of a table if it is one of them.
+    /// These laws with `values`, the parameters of all terms in sequence, in the model's units, and
+    /// the rows of a table if it is one of them.
     ///
     /// # Errors
     /// When a value makes no sense, rows are missing, or two of the laws cannot be added.
@@ -65,7 +64,7 @@ impl SampleLaw {
         self.entries().map(|entry| entry.name)
     }
 
-    /// What is said of each term.
+    /// The table entry of each term.
     pub fn entries(&self) -> impl Iterator<Item = &'static Entry> {
         self.terms.iter().map(|term| term.entry)
     }

@@ -1,4 +1,4 @@
-//! A choice of observables as a request gives it: their names.
+//! Parsing of a choice of observables from their names.
 
 use std::borrow::Cow;
 
@@ -6,16 +6,16 @@ use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::de::Error as _;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
-use super::table::{OBSERVABLES, Observable, Set};
+use super::table::{OBSERVABLES, Observable, ObservableSet};
 use crate::case::near_name::near_name;
 
-impl Serialize for Set {
+impl Serialize for ObservableSet {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         serializer.collect_seq(self.iter().map(|observable| observable.name))
     }
 }
 
-impl<'de> Deserialize<'de> for Set {
+impl<'de> Deserialize<'de> for ObservableSet {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         let names = Vec::<String>::deserialize(deserializer)?;
         names.iter().try_fold(Self::NONE, |set, name| {
@@ -34,10 +34,10 @@ fn unknown(name: &str) -> String {
         || format!("; there are {}", names.join(", ")),
         |near| format!("; did you mean `{near}`?"),
     );
-    format!("there is no observable `{name}`{hint}")
+    format!("unknown observable `{name}`{hint}")
 }
 
-impl JsonSchema for Set {
+impl JsonSchema for ObservableSet {
     fn inline_schema() -> bool {
         true
     }

@@ -1,22 +1,22 @@
-//! Beam clearance: the least height of any point of the beam above the sample over a
-//! motion. Where it vanishes, another part than the tip touches (the paper's Fig. 2f),
-//! and the model no longer holds.
+//! Beam clearance: the least height of any point of the beam above the sample over a motion. Where
+//! it vanishes, a part other than the tip is in contact (the paper's Fig. 2f), and the model is not
+//! valid.
 //!
 //! # The bound
 //! With s = φ₁(ξ)/φ₁(1), which grows from 0 to 1 along the beam, the height is
 //!
 //! V(ξ) = (1 − s) V(0) + s V(1) + Σ_{j≥2} a_j (φ_j(ξ) − s φ_j(1)),
 //!
-//! so that over any stretch it is at least min(V(0), V(1)) − Σ_{j≥2} c_j max|a_j| with
-//! c_j = max_ξ |φ_j(ξ) − s φ_j(1)|. The greatest amplitudes are bounded by those of the modal
-//! coordinates at the start of the stretch, which decay. Exactly computed are only periods
-//! whose bound is below the least height already found.
+//! Over any interval of time it is therefore at least min(V(0), V(1)) − Σ_{j≥2} c_j max|a_j| with
+//! c_j = max_ξ |φ_j(ξ) − s φ_j(1)|. The largest amplitudes are bounded by those of the modal
+//! coordinates at the start of the interval, which decay. The clearance is computed exactly only
+//! for periods whose bound is below the least height found so far.
 
 use nanotap_arithmetic::ComplexFunctions as _;
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, PoisonError};
 
-use nanotap_flow::accumulate::{Accumulator, Request};
+use nanotap_flow::accumulate::{Accumulator, Functional, Request};
 use nanotap_flow::flow::SegmentView;
 use nanotap_flow::trajectory::Recorder;
 use nanotap_flow::{Complex, Flow, FlowError, Output, Trajectory};
@@ -28,41 +28,40 @@ use crate::model::nonlinear::Nonlinear;
 use crate::model::recording::{Recording, read};
 use crate::model::{BeamOutputs, Model};
 
-/// Where a beam comes nearest to the sample.
+/// The lowest point of a beam over a motion.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct Clearance<D = f64> {
-    /// The least V(ξ, τ), in units of g₀; below zero the beam would pass through the
-    /// sample.
+    /// Least V(ξ, τ), in units of g₀; negative if the beam would pass through the sample.
     pub height: D,
-    /// Where along the beam, 0 (clamp) to 1 (tip).
+    /// Position along the beam, 0 (clamp) to 1 (tip).
     pub xi: f64,
-    /// When, in drive periods from the start of the recording.
+    /// Time in drive periods from the start of the recording.
     pub period: f64,
 }
 
-/// Places looked at for each mode; the highest mode has one bulge for each half wave.
+/// Number of grid positions per mode; the highest mode has one antinode per half wave.
 const PLACES_PER_MODE: usize = 8;
-/// Width of the interval of places in which the beam is lowest.
+/// Final width of the interval of positions in which the beam is lowest.
 const PLACE: f64 = 1e-9;
-/// The place nearest to the clamp at which a slope is asked for.
+/// The position nearest to the clamp at which the slope is evaluated.
 const CLAMP: f64 = 1e-6;
-/// Slopes of a beam that is level.
+/// Slope below which a beam is level.
 const LEVEL: f64 = 1e-13;
-/// Newton's steps to the moment of a least height, …
-const MOST_STEPS: usize = 12;
-/// … the last of which is shorter than this part of a drive period.
+/// Largest number of Newton steps to the time of a least height.
+const MAX_STEPS: usize = 12;
+/// Length of the last Newton step, in drive periods.
 const SAME_MOMENT: f64 = 1e-9;
-/// A least height that was followed is the least over all time where both agree as well as this.
+/// Accuracy to which a least height found by Newton agrees with a search over all time.
 const FOLLOWED: f64 = 1e-11;
 
 impl Clearance {
-    /// Whether another part of the beam than the tip would touch.
+    /// True if a part of the beam other than the tip would be in contact.
     pub fn touches(&self) -> bool {
         self.height <= 0.0
     }
 }
 
-/// The beam over a short recording.
+/// The beam in a short recording.
 struct RecordedBeam<'a> {
     model: &'a Model,
     beam: &'a BeamOutputs,
@@ -70,11 +69,11 @@ struct RecordedBeam<'a> {
 }
 
 impl RecordedBeam<'_> {
-    /// The least height over all places, from the least heights on the grid of places (infinite
-    /// where a place does not matter).
+    /// The least height over all positions, from the least heights on the grid of positions
+    /// (infinite where a position does not matter).
     ///
-    /// The beam is lowest in one of the valleys of the grid, not always in that with the lowest
-    /// place on the grid.
+    /// The beam is lowest in one of the valleys of the grid, which need not be the one with the
+    /// lowest grid value.
     fn lowest(&self, heights: &[f64]) -> Option<Clearance> {
         let mut best: Option<Clearance> = None;
         for valley in valleys(heights) {
@@ -89,12 +88,12 @@ impl RecordedBeam<'_> {
         best
     }
 
-    /// The lowest point of a valley: the place where the beam is level at the moment when it is
-    /// lowest there. For the least height over time changes with the place as the height itself
-    /// does at that moment.
+    /// The lowest point of a valley: the position where the beam is level at the time when it is
+    /// lowest there. The derivative of the least height with respect to the position is that of the
+    /// height at that time.
     fn bottom(&self, valley: &Valley) -> Option<Clearance> {
         let first = self.least_height(valley.place)?;
-        // The moment of the least height is followed from place to place; at the end it is
+        // The time of the least height is followed from position to position; at the end it is
         // searched for over the whole motion.
         if let Some(near) = self.level(first, valley, |xi, from| self.least_near(xi, from)) {
             let certain = if near.xi == first.xi {
@@ -109,9 +108,9 @@ impl RecordedBeam<'_> {
         self.level(first, valley, |xi, _| self.least_height(xi))
     }
 
-    /// Where in a valley the beam is level at the moment when it is lowest there, downhill from
-    /// `first`; `least` finds the least height of a place, given a moment near it. The valley's
-    /// end where the beam falls all the way there.
+    /// The position in a valley where the beam is level at the time when it is lowest there,
+    /// downhill from `first`. `least` finds the least height at a position, given a time near it.
+    /// Returns the end of the valley if the beam slopes towards it everywhere.
     fn level(
         &self,
         first: Clearance,
@@ -120,7 +119,7 @@ impl RecordedBeam<'_> {
     ) -> Option<Clearance> {
         let mut best = first;
         let mut near = (first.xi, self.slope(&first)?);
-        // At the clamp itself every beam is level.
+        // Every beam is level at the clamp.
         let end = if near.1 < 0.0 {
             valley.high
         } else {
@@ -137,7 +136,7 @@ impl RecordedBeam<'_> {
             }
             let middle = 0.5 * (near.0 + far_xi);
             let xi = match far {
-                // The end comes first, then the middle until the beam rises beyond it.
+                // First the end, then the middle until the beam rises beyond it.
                 None if step == 0 => end,
                 None => middle,
                 Some((far, rises)) => {
@@ -162,23 +161,23 @@ impl RecordedBeam<'_> {
             } else if lower || far.is_some() {
                 near = (xi, slope);
             } else {
-                // Beyond a ridge.
+                // On the other side of a ridge.
                 far_xi = xi;
             }
         }
         Some(best)
     }
 
-    /// The least height of one place near the moment `from`, in drive periods: Newton's method
-    /// on its rate. Only of an exact motion.
+    /// The least height at one position near the time `from`, in drive periods: Newton's method on
+    /// its rate. Only for exact motions.
     fn least_near(&self, xi: f64, from: f64) -> Option<Clearance> {
-        let Recording::Exact(trajectory) = self.recording else {
+        let Recording::PiecewiseLinear(trajectory) = self.recording else {
             return None;
         };
         let height = self.beam.height(xi);
         let mut time = from * self.model.period();
         let mut piece = trajectory.piece_at(&height, time)?;
-        for _ in 0..MOST_STEPS {
+        for _ in 0..MAX_STEPS {
             let jet = piece.signal.jet(time - piece.start);
             if jet.curvature <= 0.0 {
                 return None;
@@ -202,7 +201,7 @@ impl RecordedBeam<'_> {
         None
     }
 
-    /// The least height of one place.
+    /// The least height at one position.
     fn least_height(&self, xi: f64) -> Option<Clearance> {
         let least = self.recording.curve(&self.beam.height(xi)).range()?.0;
         Some(Clearance {
@@ -212,7 +211,7 @@ impl RecordedBeam<'_> {
         })
     }
 
-    /// The slope of the beam where and when it is `lowest`.
+    /// The slope of the beam at its `lowest` point.
     fn slope(&self, lowest: &Clearance) -> Option<f64> {
         let time = lowest.period * self.model.period();
         let state = self.recording.state_at(time)?;
@@ -221,21 +220,21 @@ impl RecordedBeam<'_> {
     }
 }
 
-/// A place on the grid that is no higher than its neighbours.
+/// A grid position that is not higher than its neighbours.
 struct Valley {
     place: f64,
-    /// The neighbours.
+    /// The neighbouring positions.
     low: f64,
     high: f64,
-    /// The valley goes no deeper.
+    /// Lower bound of the height in the valley.
     bound: f64,
 }
 
-/// The valleys of the least heights on the grid of places, the lowest first.
+/// The valleys of the least heights on the grid of positions, lowest first.
 ///
-/// The least height over time is the lower envelope of smooth curves, so that it is smooth at its
-/// lowest points. The parabola through a place and its neighbours, a + c − 2b apart by second
-/// differences, goes at most (a + c − 2b)/8 below the place; here four times that is allowed.
+/// The least height over time is the lower envelope of smooth curves and is therefore smooth at its
+/// minima. The parabola through a position and its neighbours, with second difference a + c − 2b,
+/// goes at most (a + c − 2b)/8 below the middle one; four times that is allowed here.
 fn valleys(heights: &[f64]) -> Vec<Valley> {
     let last = heights.len() - 1;
     let place = |i: usize| i as f64 / last as f64;
@@ -262,26 +261,26 @@ fn valleys(heights: &[f64]) -> Vec<Valley> {
     valleys.into_iter().map(|(_, valley)| valley).collect()
 }
 
-/// Periods whose least height is found exactly, those with the lowest bounds first; the rest
-/// of the motions that need more is as the ones before it.
-const MOST_PERIODS: usize = 64;
-/// Two periods whose modal coordinates at the start differ by less than this, as a part of
-/// the greatest, are one.
+/// Largest number of periods whose least height is computed exactly, those with the lowest bounds
+/// first. Motions with more such periods repeat.
+const MAX_PERIODS: usize = 64;
+/// Two periods are the same if their modal coordinates at the start differ by less than this,
+/// relative to the largest.
 const SAME: f64 = 1e-10;
 
-/// Looks for the clearance while a motion runs.
+/// Search for the clearance during a run.
 #[derive(Clone)]
 pub(super) struct ClearanceSearch {
-    /// What is added to the height of the tip for that of the beam's end.
+    /// Height of the beam's end above the apex of the tip.
     above_tip: f64,
-    /// The least height of the clamped end.
+    /// Least height of the clamp.
     clamp: f64,
     bounds: Vec<RegimeBound>,
     start: Option<Start>,
-    /// The bound on what modes from the second on contribute in the period under way.
+    /// Bound on the contribution of the higher modes in the current period.
     higher: f64,
     periods: usize,
-    /// The least height of the beam's end so far.
+    /// Least height of the beam's end so far.
     end: f64,
     candidates: Vec<Candidate>,
 }
@@ -289,11 +288,11 @@ pub(super) struct ClearanceSearch {
 /// Bounds Σ_{j≥2} c_j |a_j| in one regime.
 #[derive(Clone)]
 struct RegimeBound {
-    /// By modal coordinate.
+    /// Weights of the modal coordinates.
     weights: Vec<f64>,
-    /// Of the response to the drive.
+    /// Bound of the response to the drive.
     response: f64,
-    /// Modal coordinates that do not grow alone, as simple exponentials.
+    /// Whether the modal coordinates are simple exponentials that do not grow.
     simple: bool,
 }
 
@@ -305,14 +304,14 @@ struct Start {
 
 #[derive(Clone)]
 struct Candidate {
-    /// No point of the beam was lower.
+    /// Lower bound of the beam's height.
     bound: f64,
     period: usize,
     start: Start,
 }
 
 impl ClearanceSearch {
-    /// In a motion of `model`; `None` if it is no beam.
+    /// For a motion of `model`; `None` if it is not a beam.
     pub(super) fn new(model: &Model) -> Option<Self> {
         let beam = model.beam.as_ref()?;
         let shares = shares(&beam.modes);
@@ -380,7 +379,7 @@ impl ClearanceSearch {
         self.higher = self.higher.max(all);
     }
 
-    /// A period has ended in which the tip's least height was `tip`.
+    /// Ends a period with the least height `tip` of the tip.
     pub(super) fn period_end(&mut self, tip: f64) {
         let end = tip + self.above_tip;
         self.end = self.end.min(end);
@@ -394,15 +393,14 @@ impl ClearanceSearch {
                 start,
             });
         }
-        if self.candidates.len() >= 4 * MOST_PERIODS {
+        if self.candidates.len() >= 4 * MAX_PERIODS {
             self.candidates = self.lowest();
         }
         self.higher = 0.0;
         self.periods += 1;
     }
 
-    /// The candidates that matter, those with the lowest bounds first; of periods that are one the
-    /// first.
+    /// The candidates that matter, lowest bounds first; of equal periods the first one.
     fn lowest(&mut self) -> Vec<Candidate> {
         let end = self.end;
         let mut all = std::mem::take(&mut self.candidates);
@@ -416,14 +414,14 @@ impl ClearanceSearch {
                     let bound = known.bound;
                     *known = Candidate { bound, ..candidate };
                 }
-            } else if kept.len() < MOST_PERIODS {
+            } else if kept.len() < MAX_PERIODS {
                 kept.push(candidate);
             }
         }
         kept
     }
 
-    /// The clearance of the periods that have ended.
+    /// The clearance over the finished periods.
     pub(super) fn found(mut self, model: &Model) -> Result<Option<Clearance>, FlowError> {
         let Some(beam) = &model.beam else {
             return Ok(None);
@@ -440,7 +438,7 @@ impl ClearanceSearch {
             let beam = RecordedBeam {
                 model,
                 beam,
-                recording: &Recording::Exact(period),
+                recording: &Recording::PiecewiseLinear(period),
             };
             let heights = least_heights(model, beam.beam, &state)?;
             let Some(here) = beam.lowest(&heights) else {
@@ -457,26 +455,26 @@ impl ClearanceSearch {
     }
 }
 
-/// The least heights at the places of the grid over one drive period from a state.
+/// The least heights at the grid positions over one drive period from a state.
 fn least_heights(model: &Model, beam: &BeamOutputs, state: &[f64]) -> Result<Vec<f64>, FlowError> {
     let count = PLACES_PER_MODE * beam.modes.count();
     let mut request = Request::new();
     let keys: Vec<_> = (0..=count)
         .map(|i| {
             let height = request.output(&beam.height(i as f64 / count as f64));
-            request.least(height)
+            request.add(Functional::Least(height))
         })
         .collect();
     let mut heights = Accumulator::new(&request.plan(&model.system)?);
     let mut flow = Flow::new(Arc::clone(&model.system));
     flow.start(state, 0.0)?;
     flow.run_period(&mut heights)?;
-    Ok(keys.iter().map(|key| heights.extremum(*key)).collect())
+    Ok(keys.iter().map(|key| heights.values()[*key].re).collect())
 }
 
-/// Looks for the clearance of motions under a nonlinear force: the places of the beam are
-/// sampled with the quadrature of the motion, and the period in which one is lowest is searched
-/// exactly at the places that came near.
+/// Search for the clearance under a nonlinear force: grid positions are sampled at the quadrature
+/// nodes of the motion, and the period with the lowest sample is searched exactly at the positions
+/// that came near.
 pub(super) struct SampledClearance {
     heights: Vec<nanotap_volterra::Output>,
     lowest: Option<LowestPeriod>,
@@ -486,9 +484,9 @@ pub(super) struct SampledClearance {
 struct LowestPeriod {
     number: usize,
     period: nanotap_volterra::Trajectory,
-    /// Least sampled height of each place.
+    /// Least sampled height at each position.
     places: Vec<f64>,
-    /// How far the lowest place swings.
+    /// Range of the height at the lowest position.
     swing: f64,
 }
 
@@ -498,11 +496,11 @@ impl LowestPeriod {
     }
 }
 
-/// Heights that samples leave open, as a part of the swing.
+/// Largest error of sampled heights, as a fraction of the range.
 const BETWEEN_SAMPLES: f64 = 0.01;
 
 impl SampledClearance {
-    /// In a motion of `model`; `None` if it is no beam.
+    /// For motions of `model`; `None` if it is not a beam.
     pub(super) fn new(model: &Model, nonlinear: &Nonlinear) -> Option<Self> {
         let beam = model.beam.as_ref()?;
         let count = PLACES_PER_MODE * beam.modes.count();
@@ -513,7 +511,7 @@ impl SampledClearance {
         })
     }
 
-    /// Takes period `number`, with the nodes of its quadrature.
+    /// Adds period `number` with its quadrature nodes.
     pub(super) fn period(
         &mut self,
         nonlinear: &Nonlinear,
@@ -545,7 +543,7 @@ impl SampledClearance {
         }
     }
 
-    /// The clearance of the periods taken.
+    /// The clearance over the added periods.
     pub(super) fn found(self, model: &Model, nonlinear: &Arc<Nonlinear>) -> Option<Clearance> {
         let lowest = self.lowest?;
         let near = lowest.least() + BETWEEN_SAMPLES * lowest.swing;
@@ -590,11 +588,11 @@ impl Start {
     }
 }
 
-/// c_j of the bound, by mode; the first is 0.
+/// c_j of the bound for each mode; the first is 0.
 fn shares(modes: &Modes) -> Arc<Vec<f64>> {
     static KNOWN: Mutex<BTreeMap<usize, Arc<Vec<f64>>>> = Mutex::new(BTreeMap::new());
-    /// Places for each mode: between them a share grows by less than (π/32)²/4 of the
-    /// greatest deflection, 2.
+    /// Number of positions per mode: between them a share changes by less than (π/32)²/4 of the
+    /// largest deflection, 2.
     const PLACES: usize = 32;
     const BETWEEN: f64 = 0.005;
     let count = modes.count();

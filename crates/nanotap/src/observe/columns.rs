@@ -1,19 +1,19 @@
-//! Observables as columns of a table of curves: the model's numbers under the observables' own
-//! names and, of a physical case, those that have a unit in SI under their names in SI with
-//! the unit in brackets.
+//! Observables as columns of a table of curves: in the model's units under the observables' names
+//! and, for a physical case, those with a unit also in SI, under their SI names with the unit in
+//! brackets.
 
-use super::table::{Observable, Observables, Set};
+use super::table::{Observable, ObservableSet, Observables};
 use super::{Dimension, PhysicalMotion};
 use crate::case::physical::quantity::JOULES_PER_ELECTRONVOLT;
 
-/// The observables that SI says more of than the model.
-fn with_units(set: Set) -> impl Iterator<Item = &'static Observable> {
+/// The observables whose values differ between the model and SI.
+fn with_units(set: ObservableSet) -> impl Iterator<Item = &'static Observable> {
     set.iter()
         .filter(|o| o.is_number && o.dimension.kind().is_some())
 }
 
-/// Names of the columns of `set`, of a physical case too.
-pub fn columns(set: Set, physical: bool) -> Vec<String> {
+/// Names of the columns of `set`, including those of a physical case.
+pub fn columns(set: ObservableSet, physical: bool) -> Vec<String> {
     let numbers = set.iter().filter(|o| o.is_number);
     let mut names: Vec<String> = numbers.map(|o| o.name.to_owned()).collect();
     if physical {
@@ -28,10 +28,10 @@ pub fn columns(set: Set, physical: bool) -> Vec<String> {
     names
 }
 
-/// The numbers of these columns: empty where a motion has none or is not known, and without
-/// those in SI where `physical` is `None`.
+/// The values of these columns: empty if a motion has none or is unknown, and without those in SI
+/// if `physical` is `None`.
 pub fn cells(
-    set: Set,
+    set: ObservableSet,
     observables: Option<&Observables>,
     physical: Option<Option<&PhysicalMotion>>,
 ) -> Vec<Option<f64>> {

@@ -1,4 +1,4 @@
-//! When contacts begin and end.
+//! Beginnings and ends of contacts.
 
 use nanotap_flow::flow::{Observer, SwitchView};
 use nanotap_flow::regime::ModalOutput;
@@ -11,42 +11,41 @@ use crate::model::Model;
 /// A switch between flight and contact.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct ContactEvent {
-    /// When, counted from the end of the transient.
+    /// Time from the end of the transient, in the model's unit.
     pub tau: f64,
-    /// Which way.
+    /// Kind of the switch.
     pub kind: ContactEventKind,
-    /// Rate of the gap just before it. Where contact with a Kelvin–Voigt surface ends, which
-    /// has followed the tip, that of the tip's height.
+    /// Rate of the gap just before the switch, in the model's unit. At the end of contact with a
+    /// Kelvin–Voigt surface, which followed the tip, it is the rate of the tip's height.
     pub gap_rate: f64,
 }
 
-/// Which way a switch goes.
+/// Kind of a switch.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum ContactEventKind {
-    /// The tip meets the sample.
+    /// Contact begins.
     ContactStart,
-    /// The tip leaves it.
+    /// Contact ends.
     ContactEnd,
-    /// The tip bounces off a rigid stop.
+    /// Impact on a rigid stop.
     Impact,
 }
 
-/// Notes the contacts of a motion while it runs.
+/// Records the contacts of a motion during a run.
 pub struct Contacts<'a> {
     model: &'a Model,
-    /// Rate of the gap, an entry a regime: what ends a contact may be the force and not the
-    /// gap.
+    /// Rate of the gap in each regime, because a contact may end by its force and not by the gap.
     rates: Vec<ModalOutput>,
     periods: usize,
     events: Vec<ContactEvent>,
 }
 
 impl<'a> Contacts<'a> {
-    /// Of a motion of `model` that is still to run.
+    /// For a motion of `model` that is about to run.
     pub fn of(model: &'a Model) -> Self {
         let drive = model.system.drive();
-        let gap = if model.forgetting.is_some() {
+        let gap = if model.memory_reset.is_some() {
             &model.height
         } else {
             &model.gap
@@ -60,18 +59,9 @@ impl<'a> Contacts<'a> {
         }
     }
 
-    /// The contacts.
+    /// The recorded contacts.
     pub fn events(self) -> Vec<ContactEvent> {
         self.events
-    }
-
-    fn gap_rate(&self, view: &SwitchView<'_>) -> f64 {
-        let drive = self.model.system.drive();
-        let rate = &self.rates[view.switch.from];
-        let phasors = (0..rate.tones.len()).map(|k| drive.phasor(k, view.phase));
-        let modes = rate.modal.iter().copied().zip(view.modal.iter().copied());
-        let terms = modes.chain(rate.tones.iter().copied().zip(phasors));
-        rate.constant + terms.map(|(w, q)| (w * q).re).sum::<f64>()
     }
 }
 
@@ -87,7 +77,9 @@ impl Observer for Contacts<'_> {
             };
             (kind, view.rate)
         } else if contact[from] && !contact[to] {
-            (ContactEventKind::ContactEnd, self.gap_rate(view))
+            let drive = view.system.drive();
+            let rate = self.rates[from].at(drive, view.modal, view.phase);
+            (ContactEventKind::ContactEnd, rate)
         } else {
             return;
         };

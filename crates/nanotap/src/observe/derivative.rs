@@ -1,43 +1,44 @@
-//! Derivatives of what is observed of a periodic orbit with respect to a key of the case.
+//! Derivatives of the observables of a periodic orbit with respect to a key of the case.
 //!
-//! An orbit x of period n is a zero of Pⁿ(x; θ) − x, so that by the implicit function theorem
-//! dx/dθ = (1 − DPⁿ)⁻¹ ∂Pⁿ/∂θ. With this start the sensitivity of the flow is the orbit's own,
-//! and a [`Variation`] has of every integral, Fourier coefficient and extremum that observables
-//! are read from its derivative; the observables are then read once more, each number with its
-//! derivative beside it. Where the period varies, derivatives are at constant drive phase.
+//! An orbit x of period n is a zero of Pⁿ(x; θ) − x, so that dx/dθ = (1 − DPⁿ)⁻¹ ∂Pⁿ/∂θ by the
+//! implicit function theorem. With this initial value the sensitivity of the flow is that of the
+//! orbit, and a [`Variation`] gives every integral, Fourier coefficient and extremum with its
+//! derivative. Observables are then computed from numbers with derivatives. If the period varies,
+//! derivatives are at constant drive phase.
 //!
-//! Under a nonlinear force the same is read off the variation's dense output
-//! ([`gather`](super::varied_motion)). Keys that change the lever's modes, by mass or damping, are the
-//! exception: there the engine's map is differenced, and what is observed with it.
+//! Under a nonlinear force the same values come from the dense output of the variation
+//! ([`gather`](super::varied_motion)). The exception are keys that change the modes of the lever by
+//! mass or damping: there map and observables are differenced.
 
 use std::borrow::Cow;
 use std::sync::Arc;
 
 use nalgebra::{DMatrix, DVector};
-use nanotap_flow::variation::{Variation, Varied, VariedOutput, Wanted};
-use nanotap_flow::{Flow, FlowError, Output};
+use nanotap_arithmetic::Dual;
+use nanotap_flow::variation::{Speeds, Variation, VariedOutput};
+use nanotap_flow::{Flow, FlowError, Output, accumulate};
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::ser::{Serialize, SerializeMap, Serializer};
 use serde_json::{Map, Value as Json, json};
 
 use super::clearance::Clearance;
-use super::measure::{beginnings, contact_regimes, frequency};
-use super::measured::{Beginnings, Found, Impacts, Measured, Need, Signal, Tone};
+use super::functional::{Requirements, Signal, Tone};
+use super::measure::beginnings;
+use super::measured::{Beginnings, Found, Impacts, Measured};
 use super::number::Phasor;
-use super::table::{OBSERVABLES, Observable, Observables, Set};
+use super::record::measure;
+use super::table::{OBSERVABLES, Observable, ObservableSet, Observables};
 use super::value::Value;
-use super::varied_motion::{Change, Gathered, gather};
-use super::watch::measure;
+use super::varied_motion::{Change, Varied, gather};
 use crate::case::{Case, CaseError, Key};
-use crate::model::contact::dual::Dual;
+use crate::model::model_map::ModelMap;
 use crate::model::nonlinear::{self, Nonlinear};
-use crate::model::strobe::Strobe;
 use crate::model::{Model, ModelTangent, MotionError, Tangent, TangentKind};
 
 /// Why an orbit has no derivative.
 #[derive(Clone, Debug, thiserror::Error)]
 pub enum DerivativeError {
-    /// The case makes no sense beside this value of the key.
+    /// The case is invalid near this value of the key.
     #[error(transparent)]
     Case(#[from] CaseError),
     /// The flow failed.
@@ -48,33 +49,36 @@ pub enum DerivativeError {
     NotIsolated,
 }
 
-/// The derivative of a periodic orbit and of what is observed of it.
+/// Derivatives of observables.
+type Changes = Vec<(&'static Observable, Value)>;
+
+/// The derivative of a periodic orbit and of its observables.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Derivative {
-    /// The unit of the key in SI; none of a number of the equations.
+    /// SI unit of the key; `None` for a number of the equations.
     pub unit: Option<&'static str>,
-    /// Of the state at drive phase 0, of length n.
+    /// Derivative of the state at drive phase 0, length n.
     pub state: Vec<f64>,
-    /// Of observables in the model's units; those that jump are left out.
+    /// Derivatives of observables in the model's units, without discontinuous ones.
     pub observables: Vec<(&'static Observable, Value)>,
-    /// The same in SI, of a physical case.
+    /// Derivatives of observables in SI, for a physical case.
     pub physical: Option<Vec<(&'static Observable, Value)>>,
 }
 
 impl Derivative {
-    /// Of the orbit of `period` drive periods from `state`, of the observables `set`, with
-    /// respect to `key`; `observed` is what is observed of it, all of `set` and the beam's
-    /// clearance if its derivative is wanted.
+    /// Derivatives of the orbit of `period` drive periods from `state`, and of its observables
+    /// `set`, with respect to `key`. `observed` contains the observables in `set`, and the
+    /// clearance of the beam if its derivative is requested.
     ///
     /// # Errors
-    /// When the case makes no sense beside the value, or the orbit is not isolated.
+    /// If the case is invalid near the value, or the orbit is not isolated.
     pub fn of(
         case: &Case,
         model: &Model,
         key: Key,
         (state, period): (&[f64], usize),
         observed: &Observables,
-        set: Set,
+        set: ObservableSet,
     ) -> Result<Self, DerivativeError> {
         let of_map = case.tangent(model, key)?;
         let start = orbit_derivative(model, of_map.clone(), state, period)?;
@@ -85,14 +89,13 @@ impl Derivative {
             (nonlinear, by) => nonlinear.as_ref().zip(by),
         };
         let tangent = case.model_tangent(model, key)?;
-        let mut followed = Followed::new(model, &tangent, set, observed.beam_clearance_xi);
-        match under {
+        let followed = Followed::new(model, &tangent, set, observed.beam_clearance_xi);
+        let observables = match under {
             None => followed
                 .run(state, &start, period)
                 .map_err(MotionError::from)?,
             Some((nonlinear, by)) => followed.run_under(nonlinear, state, by(&start), period)?,
-        }
-        let observables = followed.changes(set);
+        };
         let physical = case
             .physical()
             .map(|view| {
@@ -118,19 +121,19 @@ impl Derivative {
         })
     }
 
-    /// The same under a nonlinear force by a key that changes the modes: what is observed of the
-    /// orbit, which changes by `start`, is differenced along it, centrally.
+    /// Derivatives under a nonlinear force with respect to a key that changes the modes: central
+    /// differences along the change `start` of the orbit.
     fn by_differences(
         case: &Case,
         key: Key,
         (state, period): (&[f64], usize),
         start: Vec<f64>,
-        set: Set,
+        set: ObservableSet,
     ) -> Result<Self, DerivativeError> {
         let size = |values: &[f64]| values.iter().fold(0.0, |m: f64, v| m.max(v.abs()));
         let value = case.get(key);
-        // What balances the engine's error with the third derivative: the orbit changes by this
-        // part of itself, or the key does where the orbit does not follow it.
+        // Balances the error of the engine with the third derivative: a relative change of the
+        // orbit, or of the key if the orbit does not depend on it.
         let by_orbit = STEP * size(state) / size(&start);
         let by_key = STEP * if value == 0.0 { 1.0 } else { value.abs() };
         let step = if by_orbit.is_finite() {
@@ -139,11 +142,11 @@ impl Derivative {
             by_key
         };
         let observed = |side: f64| -> Result<(Observables, Option<Observables>), DerivativeError> {
-            let beside = case.with(key, value + side * step);
+            let varied = case.with(key, value + side * step);
             let change = state.iter().zip(&start);
             let from: Vec<f64> = change.map(|(x, by)| x + side * step * by).collect();
-            let seen = measure(&beside.model()?, &from, period, set)?;
-            let si = beside.physical().map(|view| seen.in_si(&view.scales));
+            let seen = measure(&varied.model()?, &from, period, set)?;
+            let si = varied.physical().map(|view| seen.in_si(&view.scales));
             Ok((seen, si))
         };
         let (low, high) = (observed(-1.0)?, observed(1.0)?);
@@ -163,13 +166,13 @@ impl Derivative {
         })
     }
 
-    /// The derivative of an observable that is one number, in the model's units.
+    /// Derivative of a scalar observable in the model's units.
     pub fn number(&self, observable: &Observable) -> Option<f64> {
         let known = self.observables.iter().find(|(o, _)| *o == observable);
         known.and_then(|(_, change)| change.number())
     }
 
-    /// The same in SI.
+    /// Derivative of a scalar observable in SI.
     pub fn number_in_si(&self, observable: &Observable) -> Option<f64> {
         let all = self.physical.as_ref()?;
         let known = all.iter().find(|(o, _)| *o == observable);
@@ -178,7 +181,7 @@ impl Derivative {
 }
 
 impl Serialize for Derivative {
-    /// A map: `unit`, `state`, the observables by name, and `physical` by their names in SI.
+    /// A map: `unit`, `state`, the observables by name, and `physical` by SI names.
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         let mut map = serializer.serialize_map(None)?;
         if let Some(unit) = self.unit {
@@ -233,13 +236,13 @@ impl JsonSchema for Derivative {
     }
 }
 
-/// How amplitude and phase (degrees) of the tip's first harmonic change over one drive period that
-/// starts in `state`, closed or not: a column a number of the state, then one a key, `2 × (n + k)`.
-/// `sizes` are those of the numbers of the state, `by` (`n × k`) how the end of the period changes
-/// with the keys.
+/// Derivatives of amplitude and phase (degrees) of the tip's first harmonic over one drive period
+/// from `state`, closed or not: one column per entry of the state, then one per key,
+/// `2 × (n + k)`. `sizes` are the scales of the entries of the state, and `by` (`n × k`) contains
+/// the derivatives of the end of the period by the keys.
 ///
 /// # Errors
-/// When the flow fails, or the case makes no sense beside the value of a key.
+/// If the flow fails, or the case is invalid near the value of a key.
 pub(crate) fn first_harmonic_changes(
     case: &Case,
     model: &Model,
@@ -249,13 +252,13 @@ pub(crate) fn first_harmonic_changes(
     by: &DMatrix<f64>,
 ) -> Result<DMatrix<f64>, DerivativeError> {
     let n = state.len();
-    let set = Set::FIRST_HARMONIC;
+    let set = ObservableSet::FIRST_HARMONIC;
     let mut rows = DMatrix::zeros(2, n + keys.len());
     let Some(nonlinear) = &model.nonlinear else {
         let mut of = |column: usize, tangent: &ModelTangent, start: &[f64]| {
-            let mut followed = Followed::new(model, tangent, set, None);
-            followed.run(state, start, 1).map_err(MotionError::from)?;
-            for (row, (_, change)) in followed.changes(set).iter().enumerate().take(2) {
+            let followed = Followed::new(model, tangent, set, None);
+            let changes = followed.run(state, start, 1).map_err(MotionError::from)?;
+            for (row, (_, change)) in changes.iter().enumerate().take(2) {
                 rows[(row, column)] = change.number().unwrap_or(f64::NAN);
             }
             Ok::<_, DerivativeError>(())
@@ -272,7 +275,7 @@ pub(crate) fn first_harmonic_changes(
         return Ok(rows);
     };
     let mut changes = Vec::new();
-    // Columns of the changes; those with a parameter stand last.
+    // Columns of the derivatives; those with a parameter come last.
     let mut columns = Vec::new();
     for k in 0..n - model.memory {
         let mut start = vec![0.0; n];
@@ -291,7 +294,7 @@ pub(crate) fn first_harmonic_changes(
             changes.push(by(&vec![0.0; n]));
             continue;
         }
-        // The same change of the motion, if the key may change so far.
+        // The same change of the motion, if the key allows it.
         let change = (0..n).fold(0.0, |m: f64, i| m.max(by[(i, k)].abs() / sizes[i]));
         let value = case.get(*key);
         let farthest = if value == 0.0 {
@@ -299,12 +302,12 @@ pub(crate) fn first_harmonic_changes(
         } else {
             3e-3 * value.abs()
         };
-        let step = (BESIDE / change).min(farthest);
-        let beside = |side: f64| -> Result<Observables, DerivativeError> {
+        let step = (HARMONIC_STEP / change).min(farthest);
+        let observables_at = |side: f64| -> Result<Observables, DerivativeError> {
             let there = case.with(*key, value + side * step).model()?;
             Ok(measure(&there, state, 1, set)?)
         };
-        let (low, high) = (beside(-1.0)?, beside(1.0)?);
+        let (low, high) = (observables_at(-1.0)?, observables_at(1.0)?);
         let turn = (high.phase - low.phase + 180.0).rem_euclid(360.0) - 180.0;
         rows[(0, n + k)] = (high.first_harmonic - low.first_harmonic) / (2.0 * step);
         rows[(1, n + k)] = turn / (2.0 * step);
@@ -317,7 +320,7 @@ pub(crate) fn first_harmonic_changes(
     Ok(rows)
 }
 
-/// How amplitude and phase of the tip's first harmonic over one drive period change.
+/// Derivatives of amplitude and phase of the tip's first harmonic over one drive period.
 fn tip_changes(
     model: &Model,
     nonlinear: &Arc<Nonlinear>,
@@ -325,27 +328,24 @@ fn tip_changes(
     changes: &[Change],
 ) -> Result<Vec<[f64; 2]>, MotionError> {
     let tip = nanotap_volterra::VariedOutput::fixed(nonlinear.output(&model.tip, 0.0));
-    let wanted = Wanted {
-        fouriers: vec![(0, frequency(model, Tone::First))],
-        ..Wanted::default()
-    };
-    let gathered = gather(nonlinear, state, 1, changes, (&[tip], &wanted), None)?;
-    let of = |gathered: &Gathered| {
-        let integral = phasor(gathered.fouriers[0]);
-        let component = integral.times(Dual::constant(2.0) / dual(gathered.duration));
-        [component.norm().derivative, component.lag().derivative]
+    let first = accumulate::Functional::Fourier(0, Tone::First.frequency(model));
+    let gathered = gather(nonlinear, state, 1, changes, (&[tip], &[first]), None)?;
+    let of = |varied: &Varied| {
+        let integral = Phasor::from(varied.values[0]);
+        let component = integral.times(Dual::constant(2.0) / varied.duration);
+        [component.norm().derivative(), component.lag().derivative()]
     };
     Ok(gathered.iter().map(of).collect())
 }
 
-/// Part of the amplitude by which a motion changes where its first harmonic is differenced, by keys
-/// that change the modes.
-const BESIDE: f64 = 1e-4;
+/// Relative change of the amplitude in differences of the first harmonic by keys that change the
+/// modes.
+const HARMONIC_STEP: f64 = 1e-4;
 
-/// Part of an orbit by which it changes where what is observed is differenced.
+/// Relative change of an orbit in differences of its observables.
 const STEP: f64 = 2e-4;
 
-/// A change of the motion that begins with a change of the state, where the engine knows it.
+/// The change of a motion for a change of its initial state, if the engine computes it.
 type Along<'a> = Box<dyn Fn(&[f64]) -> Change + 'a>;
 
 fn linearised(tangent: &Tangent) -> Option<Along<'_>> {
@@ -369,7 +369,7 @@ fn orbit_derivative(
     period: usize,
 ) -> Result<Vec<f64>, DerivativeError> {
     let n = state.len();
-    let mut map = Strobe::with_tangents(model, vec![tangent]);
+    let mut map = ModelMap::with_tangents(model, vec![tangent]);
     let mut x = state.to_vec();
     let (mut one, mut by) = (DMatrix::zeros(n, n), DMatrix::zeros(n, 1));
     let (mut all, mut change) = (DMatrix::identity(n, n), DMatrix::zeros(n, 1));
@@ -386,112 +386,73 @@ fn orbit_derivative(
         .ok_or(DerivativeError::NotIsolated)
 }
 
-/// An orbit on its way, and what is gathered of it.
+/// An orbit and its derivative, followed together.
 struct Followed<'a> {
     model: &'a Model,
     tangent: &'a ModelTangent,
-    needs: Vec<(Need, Place)>,
-    /// Each with its output.
-    signals: Vec<Signal>,
-    outputs: Vec<VariedOutput>,
-    wanted: Wanted,
+    set: ObservableSet,
+    required: Requirements,
+    /// Position of the lowest point of the beam, if the derivative of its clearance is requested.
     clearance: Option<f64>,
-    /// What was found, once it ran.
-    found: Option<Found<Dual>>,
-}
-
-/// Where a need stands among what is wanted.
-#[derive(Clone, Copy)]
-enum Place {
-    Extremum(usize),
-    Integral(usize),
-    Product(usize),
-    Fourier(usize),
 }
 
 impl<'a> Followed<'a> {
-    fn new(model: &'a Model, tangent: &'a ModelTangent, set: Set, clearance: Option<f64>) -> Self {
-        let mut asked = Measured::<Dual>::nothing(model);
-        Observables::changes(set, &mut asked);
-        let mut followed = Self {
+    fn new(
+        model: &'a Model,
+        tangent: &'a ModelTangent,
+        set: ObservableSet,
+        clearance: Option<f64>,
+    ) -> Self {
+        let mut measured = Measured::<Dual>::of(model, None);
+        Observables::changes(set, &mut measured);
+        Self {
             model,
             tangent,
-            needs: Vec::new(),
-            signals: Vec::new(),
-            outputs: Vec::new(),
-            wanted: Wanted::default(),
+            set,
+            required: measured.required,
             clearance,
-            found: None,
-        };
-        for need in asked.asked {
-            let place = followed.want(need);
-            followed.needs.push((need, place));
-        }
-        followed
-    }
-
-    fn want(&mut self, need: Need) -> Place {
-        let channel = |of: &mut Self, signal: Signal| {
-            if let Some(known) = of.signals.iter().position(|known| *known == signal) {
-                return known;
-            }
-            of.signals.push(signal);
-            of.outputs.push(varied(signal, of.model, of.tangent));
-            of.signals.len() - 1
-        };
-        match need {
-            Need::Least(signal) | Need::Greatest(signal) => {
-                let sign = if matches!(need, Need::Least(_)) {
-                    -1.0
-                } else {
-                    1.0
-                };
-                let output = channel(self, signal);
-                self.wanted.extrema.push((output, sign));
-                Place::Extremum(self.wanted.extrema.len() - 1)
-            }
-            Need::Integral(signal) => {
-                let output = channel(self, signal);
-                self.wanted.integrals.push(output);
-                Place::Integral(self.wanted.integrals.len() - 1)
-            }
-            Need::Product(a, b) => {
-                let (a, b) = (channel(self, a), channel(self, b));
-                self.wanted.products.push((a, b));
-                Place::Product(self.wanted.products.len() - 1)
-            }
-            Need::Fourier(signal, tone) => {
-                let output = channel(self, signal);
-                self.wanted
-                    .fouriers
-                    .push((output, frequency(self.model, tone)));
-                Place::Fourier(self.wanted.fouriers.len() - 1)
-            }
         }
     }
 
-    /// Follows the orbit, which changes by `start` at its beginning.
-    fn run(&mut self, state: &[f64], start: &[f64], period: usize) -> Result<(), FlowError> {
+    /// The outputs: the required signals, and the height of the lowest point of the beam.
+    fn outputs(&self) -> Vec<VariedOutput> {
+        let signals = self.required.signals.iter();
+        let own = signals.map(|signal| varied(*signal, self.model, self.tangent));
+        own.chain(self.lowest()).collect()
+    }
+
+    /// The functionals of these outputs; the least height of the beam is last.
+    fn functionals(&self) -> Vec<accumulate::Functional> {
+        let lowest = self.lowest().map(|_| self.required.signals.len());
+        let mut all = self.required.numbered(self.model);
+        all.extend(lowest.map(accumulate::Functional::Least));
+        all
+    }
+
+    /// The height of the lowest point of the beam.
+    fn lowest(&self) -> Option<VariedOutput> {
+        let (xi, beam) = self.clearance.zip(self.model.beam.as_ref())?;
+        // The base contributes as to the tip's height, apart from the beam's shape.
+        let zero = self.model.tip.scaled(0.0);
+        let change = zero.plus(1.0, &tones_of(&self.tangent.base));
+        let system = &self.model.system;
+        Some(VariedOutput::same(system, &beam.height(xi), &change))
+    }
+
+    /// Follows the orbit of a piecewise-linear model with the derivative `start` of its initial
+    /// state.
+    fn run(&self, state: &[f64], start: &[f64], period: usize) -> Result<Changes, FlowError> {
         let model = self.model;
-        let (mut outputs, mut wanted) = (self.outputs.clone(), self.wanted.clone());
-        // Beside what observables read: time in contact, speeds, the beam's least height.
+        let (mut outputs, mut functionals) = (self.outputs(), self.functionals());
+        // Additionally the contact time.
         let zero = model.tip.scaled(0.0);
-        let regimes = 0..model.contact.len();
-        let touching = |r| {
-            zero.clone()
-                .with_constant(f64::from(u8::from(model.contact[r])))
-        };
+        let touching = |contact: &bool| zero.clone().with_constant(f64::from(u8::from(*contact)));
         outputs.push(VariedOutput {
-            value: regimes.map(touching).collect(),
+            value: model.contact.iter().map(touching).collect(),
             change: vec![zero.clone(); model.contact.len()],
         });
-        wanted.integrals.push(outputs.len() - 1);
-        wanted.speeds = beginnings(model).collect();
-        if let Some(height) = self.lowest() {
-            outputs.push(height);
-            wanted.extrema.push((outputs.len() - 1, -1.0));
-        }
-        let mut flow = Flow::new(std::sync::Arc::clone(&model.system));
+        functionals.push(accumulate::Functional::Integral(outputs.len() - 1));
+        let mut flow = Flow::new(Arc::clone(&model.system));
         flow.start(state, 0.0)?;
         let mut variation = Variation::new(
             &model.system,
@@ -499,48 +460,44 @@ impl<'a> Followed<'a> {
             flow.regime(),
             start,
             outputs,
-            wanted,
+            functionals,
+            beginnings(model),
         );
         for _ in 0..period {
             flow.run_period(&mut variation)?;
         }
         variation.finish();
-        let mut gathered = Gathered {
-            duration: variation.duration,
-            contact_time: contact_regimes(model)
-                .next()
-                .map_or_else(Varied::default, |_| {
-                    variation.integrals[self.wanted.integrals.len()]
-                }),
-            ..Gathered::default()
-        };
-        for speed in &variation.speeds {
-            if speed.value > gathered.greatest_speed.value {
-                gathered.greatest_speed = *speed;
+        let contact_time = variation
+            .values
+            .pop()
+            .filter(|_| model.contact.contains(&true));
+        let mut greatest_speed = Dual::default();
+        for (_, speeds) in &variation.speeds {
+            if speeds.greatest.value > greatest_speed.value {
+                greatest_speed = speeds.greatest;
             }
         }
-        let impacts = self.impacts(&variation);
-        gathered.integrals = variation.integrals;
-        gathered.products = variation.products;
-        gathered.fouriers = variation.fouriers;
-        gathered.extrema = variation.extrema;
-        let mut found = self.read(&gathered, period);
-        found.impacts = impacts;
-        self.found = Some(found);
-        Ok(())
+        let impacts = self.impacts(&variation.speeds);
+        let gathered = Varied {
+            values: variation.values,
+            greatest_speed,
+            contact_time: contact_time.map_or_else(Dual::default, |time| time.re),
+            duration: variation.duration,
+        };
+        Ok(self.changes(gathered, impacts, period))
     }
 
-    /// What impacts on a rigid stop did.
-    fn impacts(&self, variation: &Variation<'_>) -> Impacts<Dual> {
+    /// Impacts on a rigid stop.
+    fn impacts(&self, speeds: &[((usize, usize), Speeds)]) -> Impacts<Dual> {
         let Some(stop) = self.model.rigid_stop else {
             return Impacts::default();
         };
         let by = self.tangent.rigid_stop;
         let (mut bounced, mut stuck) = ([Dual::default(); 2], [Dual::default(); 2]);
-        for (k, (from, to)) in beginnings(self.model).enumerate() {
+        for ((from, to), speeds) in speeds {
             let sums = if from == to { &mut bounced } else { &mut stuck };
-            sums[0] = sums[0] + dual(variation.summed_speeds[k]);
-            sums[1] = sums[1] + dual(variation.squared_speeds[k]);
+            sums[0] = sums[0] + speeds.sum;
+            sums[1] = sums[1] + speeds.squares;
         }
         let stop = [
             Dual::new(stop.mass, by.mass),
@@ -550,97 +507,63 @@ impl<'a> Followed<'a> {
         Impacts::new(stop, bounced, stuck)
     }
 
-    /// The same under a nonlinear force.
+    /// Follows the orbit of a model under a nonlinear force.
     fn run_under(
-        &mut self,
+        &self,
         nonlinear: &Arc<Nonlinear>,
         state: &[f64],
         change: Change,
         period: usize,
-    ) -> Result<(), MotionError> {
+    ) -> Result<Changes, MotionError> {
         let under = |output: &VariedOutput, force: f64| nanotap_volterra::VariedOutput {
             value: nonlinear.output(&output.value[0], force),
             changes: vec![nonlinear.output(&output.change[0], 0.0)],
         };
-        let signals = self.signals.iter().zip(&self.outputs);
-        let mut outputs: Vec<_> = signals
-            .map(|(signal, output)| under(output, signal.force_part(nonlinear)))
+        let forces = self
+            .required
+            .signals
+            .iter()
+            .map(|s| s.force_part(nonlinear));
+        let outputs = self.outputs();
+        let outputs = outputs.iter().zip(forces.chain([0.0]));
+        let outputs: Vec<_> = outputs
+            .map(|(output, force)| under(output, force))
             .collect();
-        let mut wanted = self.wanted.clone();
-        if let Some(height) = self.lowest() {
-            outputs.push(under(&height, 0.0));
-            wanted.extrema.push((outputs.len() - 1, -1.0));
-        }
         let rate = under(&varied(Signal::HeightRate, self.model, self.tangent), 0.0);
-        let asked = (outputs.as_slice(), &wanted);
-        let gathered = gather(nonlinear, state, period, &[change], asked, Some(&rate))?;
-        self.found = gathered.first().map(|gathered| self.read(gathered, period));
-        Ok(())
+        let wanted = (outputs.as_slice(), &*self.functionals());
+        let gathered = gather(nonlinear, state, period, &[change], wanted, Some(&rate))?;
+        let gathered = gathered.into_iter().next().unwrap_or_default();
+        Ok(self.changes(gathered, Impacts::default(), period))
     }
 
-    /// The height of the point of the beam that comes nearest to the sample.
-    fn lowest(&self) -> Option<VariedOutput> {
-        let (xi, beam) = self.clearance.zip(self.model.beam.as_ref())?;
-        // The base moves as the tip's height does beside the beam's shape.
-        let zero = self.model.tip.scaled(0.0);
-        let change = zero.plus(1.0, &tones_of(&self.tangent.base));
-        let system = &self.model.system;
-        Some(VariedOutput::same(system, &beam.height(xi), &change))
-    }
-
-    fn read(&self, gathered: &Gathered, period: usize) -> Found<Dual> {
-        let real = |number: Varied<f64>| Phasor {
-            re: dual(number),
-            im: Dual::default(),
-        };
-        let value = |place| match place {
-            Place::Extremum(at) => real(gathered.extrema[at]),
-            Place::Integral(at) => real(gathered.integrals[at]),
-            Place::Product(at) => real(gathered.products[at]),
-            Place::Fourier(at) => phasor(gathered.fouriers[at]),
-        };
-        let heights = gathered.extrema.get(self.wanted.extrema.len());
-        let values = self.needs.iter();
-        Found {
-            values: values.map(|&(need, place)| (need, value(place))).collect(),
-            duration: dual(gathered.duration),
+    fn changes(&self, gathered: Varied, impacts: Impacts<Dual>, period: usize) -> Changes {
+        let required = &self.required.functionals;
+        let lowest = gathered.values.get(required.len()).map(|value| value.re);
+        let values = gathered.values.into_iter().map(Phasor::from);
+        let found = Found {
+            values: required.iter().copied().zip(values).collect(),
+            duration: gathered.duration,
             periods: period as u64,
-            contact_time: dual(gathered.contact_time),
+            contact_time: gathered.contact_time,
             contacts: Beginnings {
-                greatest_speed: dual(gathered.greatest_speed),
+                greatest_speed: gathered.greatest_speed,
                 ..Beginnings::default()
             },
             stored: Dual::default(),
             stored_by_sample: Dual::default(),
-            clearance: self.clearance.zip(heights).map(|(xi, height)| Clearance {
-                height: dual(*height),
+            clearance: self.clearance.zip(lowest).map(|(xi, height)| Clearance {
+                height,
                 xi,
                 period: 0.0,
             }),
-            impacts: Impacts::default(),
+            impacts,
             second_phase: Dual::new(self.model.second_phase, self.tangent.second_phase),
-        }
-    }
-
-    fn changes(&mut self, set: Set) -> Vec<(&'static Observable, Value)> {
-        let mut measured = Measured::nothing(self.model);
-        measured.found = self.found.take();
-        Observables::changes(set, &mut measured)
+        };
+        Observables::changes(self.set, &mut Measured::of(self.model, Some(found)))
     }
 }
 
-const fn dual(number: Varied<f64>) -> Dual {
-    Dual::new(number.value, number.change)
-}
-
-fn phasor(number: Varied<nanotap_flow::Complex>) -> Phasor<Dual> {
-    Phasor {
-        re: Dual::new(number.value.re, number.change.re),
-        im: Dual::new(number.value.im, number.change.im),
-    }
-}
-
-/// The tones of an output alone.
+/// The tones of an output without its other parts.
 fn tones_of(output: &Output) -> Output {
     let mut tones = output.scaled(0.0);
     tones.tones.clone_from(&output.tones);

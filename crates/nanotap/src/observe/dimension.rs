@@ -1,4 +1,4 @@
-//! What kind of quantity an observable is, and its units: the model's own and SI.
+//! Dimensions of observables, with units of the model and of SI.
 
 use crate::case::physical::{Kind, Scales};
 
@@ -21,15 +21,15 @@ pub enum Dimension {
     Slope,
     /// Degrees.
     Angle,
-    /// A pure number: a part, a ratio.
+    /// A pure number: a fraction or a ratio.
     Number,
-    /// A number of things.
+    /// A count.
     Count,
-    /// A number of things a drive period.
+    /// A count per drive period.
     PerPeriod,
     /// Drive periods.
     Periods,
-    /// A place along the beam, 0 (clamp) to 1 (tip).
+    /// A position along the beam, 0 (clamp) to 1 (tip).
     Place,
 }
 
@@ -57,7 +57,7 @@ impl Dimension {
         }
     }
 
-    /// The unit of what is the same in the model and in SI.
+    /// The unit of quantities that are the same in the model and in SI.
     const fn fixed_unit(self) -> &'static str {
         match self {
             Self::Angle => "degree",
@@ -67,8 +67,8 @@ impl Dimension {
         }
     }
 
-    /// The kind of quantity that SI prefixes go with; `None` where SI says no more than the
-    /// model.
+    /// The kind of quantity, for SI prefixes; `None` if the value is the same in the model and in
+    /// SI.
     pub const fn kind(self) -> Option<Kind> {
         Some(match self {
             Self::Length => Kind::Length,
@@ -81,7 +81,7 @@ impl Dimension {
         })
     }
 
-    /// SI value of the model's unit; `None` of a slope where the lever's length is not known.
+    /// SI value of the model's unit; `None` for a slope if the lever's length is unknown.
     pub const fn si(self, scales: &Scales) -> Option<f64> {
         Some(match self {
             Self::Length => scales.length,

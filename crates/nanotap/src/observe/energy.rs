@@ -1,6 +1,6 @@
-//! The energy balance of a motion: what the drive feeds in is what the dampers take
-//! and what is stored. Over a period of a periodic orbit it closes to rounding, a
-//! check of the whole computation.
+//! The energy balance of a motion: the work of the drive equals the losses of the dampers plus the
+//! gain of stored energy. Over a period of a periodic orbit it closes to rounding, which checks the
+//! whole computation.
 
 use nanotap_flow::flow::SegmentView;
 use nanotap_flow::trajectory::Recorder;
@@ -12,24 +12,24 @@ use super::number::Number;
 use crate::model::nonlinear::Nonlinear;
 use crate::model::{Model, ModelTangent, Powers, Product};
 
-/// Energies over a recording, in the model's own units or in SI.
+/// Energies over a recording, in the model's units or in SI.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct EnergyBalance<D = f64> {
     /// Work of the drive.
     pub drive_work: D,
-    /// Taken by the beam's own damping.
+    /// Loss in the beam's damping.
     pub beam_damping: D,
-    /// Taken by the sample's damping, or by the impacts of a rigid stop; what the sample
-    /// stores and gives back is not in it.
+    /// Loss in the sample's damping, or in the impacts on a rigid stop, without energy that the
+    /// sample stores and returns.
     pub sample_damping: D,
     /// Gain of stored (kinetic and elastic) energy; zero over a period of an orbit.
     pub stored: D,
-    /// What does not add up, as a part of the energy that was moved.
+    /// Imbalance, relative to the energy converted.
     pub residual: D,
 }
 
 impl EnergyBalance {
-    /// Nothing is known.
+    /// All energies unknown.
     pub(super) const UNKNOWN: Self = Self {
         drive_work: f64::NAN,
         beam_damping: f64::NAN,
@@ -37,29 +37,36 @@ impl EnergyBalance {
         stored: f64::NAN,
         residual: f64::NAN,
     };
+}
 
-    /// The same, told in a unit of which 1 is `unit`.
-    pub(super) fn in_units(self, unit: f64) -> Self {
-        Self {
-            drive_work: self.drive_work * unit,
-            beam_damping: self.beam_damping * unit,
-            sample_damping: self.sample_damping * unit,
-            stored: self.stored * unit,
-            residual: self.residual,
+impl<D: Copy> EnergyBalance<D> {
+    /// Combines every energy with that of another balance.
+    pub(super) fn with<E: Copy, F>(
+        self,
+        other: EnergyBalance<E>,
+        residual: F,
+        energy: impl Fn(D, E) -> F,
+    ) -> EnergyBalance<F> {
+        EnergyBalance {
+            drive_work: energy(self.drive_work, other.drive_work),
+            beam_damping: energy(self.beam_damping, other.beam_damping),
+            sample_damping: energy(self.sample_damping, other.sample_damping),
+            stored: energy(self.stored, other.stored),
+            residual,
         }
     }
 }
 
-/// Of these energies, the last one the gain of stored energy.
+/// The balance of these energies; the last one is the gain of stored energy.
 pub(super) fn balance<D: Number>(
     drive_work: D,
     beam_damping: D,
     sample_damping: D,
     stored: D,
 ) -> EnergyBalance<D> {
-    // Signed works cancel; the damping and the stored energy say how much moved.
-    let (drive, gain) = (drive_work.plain().abs(), stored.plain().abs());
-    let moved = drive + beam_damping.plain() + sample_damping.plain() + gain;
+    // Works of both signs cancel; damping and stored energy measure the conversion.
+    let (drive, gain) = (drive_work.value().abs(), stored.value().abs());
+    let moved = drive + beam_damping.value() + sample_damping.value() + gain;
     let rest = drive_work - beam_damping - sample_damping - stored;
     EnergyBalance {
         drive_work,
@@ -100,17 +107,17 @@ impl Sum {
 }
 
 impl PowerTerm {
-    /// What the drive delivers.
+    /// Power of the drive.
     pub(super) fn of_drive(model: &Model) -> Vec<Self> {
         Self::all(model, Sum::Drive)
     }
 
-    /// What the beam's own damping takes.
+    /// Power lost in the beam's damping.
     pub(super) fn of_beam(model: &Model) -> Vec<Self> {
         Self::all(model, Sum::Beam)
     }
 
-    /// What the sample's damping takes.
+    /// Power lost in the sample's damping.
     pub(super) fn of_sample(model: &Model) -> Vec<Self> {
         Self::all(model, Sum::Sample)
     }
@@ -134,8 +141,8 @@ impl PowerTerm {
         }
     }
 
-    /// The factor, an entry a regime; zero where the regime has no such product. The first one
-    /// carries the weight.
+    /// The factor in each regime; zero if the regime has no such product. The first one carries the
+    /// weight.
     pub(super) fn outputs(self, model: &Model) -> Vec<Output> {
         let factor = |powers: &Powers| match self.sum.products(powers).get(self.index) {
             None => model.tip.scaled(0.0),
@@ -145,7 +152,7 @@ impl PowerTerm {
         model.power().iter().map(factor).collect()
     }
 
-    /// The derivative of [`PowerTerm::outputs`] of what the beam's damping takes.
+    /// Derivative of [`PowerTerm::outputs`] for the loss in the beam's damping.
     pub(super) fn changes(self, model: &Model, tangent: &ModelTangent) -> Vec<Output> {
         let factors = tangent.beam_power.get(self.index);
         let change = match factors.filter(|_| self.sum == Sum::Beam) {
@@ -155,8 +162,8 @@ impl PowerTerm {
         vec![change; model.system.regimes().len()]
     }
 
-    /// How much of a nonlinear law's force is added to the factor: the clamp, whose force is the
-    /// first factor of the drive's first product, feels the sample's.
+    /// Contribution of a nonlinear law's force to the factor: the clamp, whose force is the first
+    /// factor of the drive's first product, also carries the force of the sample.
     pub(super) fn force_part(self, nonlinear: &Nonlinear) -> f64 {
         let clamp = Self {
             sum: Sum::Drive,
@@ -171,7 +178,7 @@ impl PowerTerm {
     }
 }
 
-/// Energy stored in the lever in a state at drive phase 0.
+/// Energy stored in the lever for a state at drive phase 0.
 pub(super) fn stored_by_lever(model: &Model, state: &[f64]) -> f64 {
     let at = |output: &Output| output.at(model.system.drive(), state, 0.0);
     let stored = model
@@ -181,7 +188,7 @@ pub(super) fn stored_by_lever(model: &Model, state: &[f64]) -> f64 {
     stored.iter().map(|p| p.weight * at(&p.a) * at(&p.b)).sum()
 }
 
-/// Where a motion began and where it is: the stretch it began with, and the last one.
+/// The first and the last segment of a motion.
 #[derive(Clone, Default)]
 pub(super) struct Ends {
     first: Option<Stretch>,
@@ -205,7 +212,7 @@ impl Stretch {
         self.modal.extend_from_slice(segment.modal);
     }
 
-    /// Energy stored after a time `s` of it.
+    /// Energy stored at time `s` in the segment.
     fn stored(&self, model: &Model, s: f64) -> f64 {
         let drive = model.system.drive();
         let mut recorder = Recorder::default();
@@ -233,7 +240,7 @@ impl Ends {
         }
     }
 
-    /// Gain of stored energy from one end to the other.
+    /// Gain of stored energy over the motion.
     pub(super) fn gain(&self, model: &Model) -> f64 {
         self.first.as_ref().map_or(0.0, |first| {
             self.last.stored(model, self.last.length) - first.stored(model, 0.0)

@@ -1,5 +1,5 @@
-//! What the entries of results mean, and their units: the observables, and what stands beside
-//! them in documents, time series and datasets. For those who show results with their words.
+//! Descriptions and units of the entries of results: observables, and other entries of documents,
+//! time series and datasets.
 
 use std::collections::BTreeMap;
 
@@ -7,26 +7,26 @@ use serde::Serialize;
 
 use super::{Dimension, OBSERVABLES};
 
-/// What an entry is, and its unit.
+/// Description and unit of an entry.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct Entry {
-    /// What it is.
+    /// Description.
     pub words: &'static str,
-    /// Its unit.
+    /// Unit.
     pub unit: &'static str,
 }
 
-/// What entries mean, by name.
+/// Descriptions of entries by name.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct Glossary {
-    /// In the model's own units.
+    /// Entries in the model's units.
     pub model: BTreeMap<String, Entry>,
-    /// Under `physical`, in SI.
+    /// Entries under `physical`, in SI.
     pub physical: BTreeMap<String, Entry>,
 }
 
-/// What stands beside the observables.
-const BESIDE: &[(&str, &str, &str)] = &[
+/// Entries other than observables.
+const OTHER_ENTRIES: &[(&str, &str, &str)] = &[
     ("strobe", "state at drive phase 0", STATE),
     ("start", "state where the recording starts", STATE),
     ("state", "state at drive phase 0", STATE),
@@ -95,9 +95,9 @@ const BESIDE: &[(&str, &str, &str)] = &[
 const STATE: &str = "model units";
 const PERIODS: &str = Dimension::Periods.model_unit();
 
-/// The words.
+/// Creates the glossary.
 pub fn glossary() -> Glossary {
-    let beside = BESIDE
+    let others = OTHER_ENTRIES
         .iter()
         .map(|&(name, words, unit)| (name.to_owned(), Entry { words, unit }));
     let model = OBSERVABLES.iter().map(|o| {
@@ -124,7 +124,7 @@ pub fn glossary() -> Glossary {
         physical.insert(name.to_owned(), Entry { words, unit });
     }
     Glossary {
-        model: beside.chain(model).collect(),
+        model: others.chain(model).collect(),
         physical,
     }
 }

@@ -8,20 +8,20 @@ use serde::Serialize;
 use crate::model::Model;
 use crate::model::recording::{Curve, Recording};
 
-/// One component of a periodic motion.
+/// One component of a periodic motion, in the model's units.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct Harmonic {
-    /// Frequency as a multiple of the drive's; not whole for a subharmonic motion.
+    /// Frequency as a multiple of the drive frequency; fractional for a subharmonic motion.
     pub order: f64,
     /// Amplitude of the tip deflection.
     pub tip: f64,
-    /// Its phase lag behind sin(order · Ωτ), degrees in (−180, 180].
+    /// Phase lag of the tip deflection behind sin(order · Ωτ), degrees in (−180, 180].
     pub tip_phase: f64,
     /// Amplitude of the contact force.
     pub force: f64,
-    /// Its phase lag, as for the tip.
+    /// Phase lag of the contact force, degrees in (−180, 180].
     pub force_phase: f64,
-    /// Amplitude of the slope at the tip; of a beam.
+    /// Amplitude of the slope at the tip, for a beam.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub slope: Option<f64>,
 }
@@ -29,29 +29,29 @@ pub struct Harmonic {
 /// The spectrum of a periodic motion.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct Spectrum {
-    /// Components at `j Ω/n`, `j = 1, 2, …`, of a motion of period `n`.
+    /// Components at `j Ω/n`, `j = 1, 2, …`, for a motion of period `n`.
     pub harmonics: Vec<Harmonic>,
-    /// Part of the tip deflection's power (variance) outside the drive's frequency, 0 … 1:
-    /// the paper's total harmonic distortion. From the exact variance, not a truncated sum.
+    /// Fraction of the tip deflection's power (variance) outside the drive frequency, 0 … 1: the
+    /// paper's total harmonic distortion, from the exact variance and not from a truncated sum.
     pub thd: f64,
-    /// Phase lag of the tip deflection behind the drive, degrees in (−180, 180]; 90 at
-    /// the free resonance of a lever with high Q. Written out with the
-    /// [`Observables`](super::Observables), which stand beside the spectrum.
+    /// Phase lag of the tip deflection behind the drive, degrees in (−180, 180]; 90 at the free
+    /// resonance of a lever with high Q. It is serialised with the
+    /// [`Observables`](super::Observables).
     #[serde(skip)]
     pub phase: f64,
-    /// Amplitude of the tip deflection at the drive's frequency; written out as `phase`.
+    /// Amplitude of the tip deflection at the drive frequency; serialised with the observables.
     #[serde(skip)]
     pub first_harmonic: f64,
 }
 
 impl Spectrum {
-    /// The spectrum up to `orders` times the drive's frequency, of a recording that
-    /// holds exactly one repetition: `period` drive periods.
+    /// Computes the spectrum up to `orders` times the drive frequency from a recording of exactly
+    /// one repetition: `period` drive periods.
     pub fn of(model: &Model, recording: &Recording, period: usize, orders: usize) -> Self {
         let tip = recording.curve(&model.tip);
         let force = recording.force(model);
         let slope = model.beam.as_ref().map(|beam| recording.curve(&beam.slope));
-        // Both tones are whole multiples of the whole motion's own frequency.
+        // Both tones are multiples of the motion's fundamental frequency.
         let repetition = model.repetition() * period;
         let base = model.frequency() / repetition as f64;
         let count = orders * repetition;

@@ -1,332 +1,224 @@
-//! Measures a motion while it runs.
+//! Measurement of a piecewise-linear motion during a run.
 //!
-//! What observables are read from is gathered by `nanotap_flow`'s
-//! [accumulator](nanotap_flow::accumulate): extrema from zeros of rates, integrals in closed
-//! form, nothing from samples. An observable says what it needs by asking for it: before the
-//! run every observable that is wanted reads once from nothing, which notes what is to be
-//! gathered; afterwards it reads again, from what was.
+//! The functionals that observables require are accumulated by `nanotap_flow`'s
+//! [accumulator](nanotap_flow::accumulate): extrema from zeros of rates, integrals in closed form,
+//! never from samples.
 
 use std::sync::Arc;
 
-use nanotap_flow::accumulate::{
-    Accumulator, Channel, ExtremumKey, FourierKey, IntegralKey, Plan, ProductKey, Request,
-};
+use nanotap_flow::accumulate::{Accumulator, Plan, Request};
 use nanotap_flow::flow::{Observer, SegmentView, SwitchView};
-use nanotap_flow::{Complex, FlowError};
+use nanotap_flow::trajectory::Recorder;
+use nanotap_flow::{Flow, FlowError};
 
 use super::begins_contact;
 use super::clearance::ClearanceSearch;
+use super::contact_event::Contacts;
 use super::energy::Ends;
-use super::measured::{Beginnings, Found, Impacts, Measured, Need, Signal, Tone};
+use super::functional::{Functional, Requirements, Signal};
+use super::measured::{Beginnings, Found, Impacts};
 use super::number::Phasor;
-use super::table::{Observables, Set};
-use crate::model::Model;
+use super::record::{Engine, Measurements, RecordOptions, Run};
+use super::table::ObservableSet;
+use crate::model::recording::Recording;
+use crate::model::{Model, MotionError};
 
-/// Where it is found.
-#[derive(Clone, Copy, Debug)]
-enum Key {
-    Extremum(ExtremumKey),
-    Integral(IntegralKey),
-    Product(ProductKey),
-    Fourier(FourierKey),
-}
-
-impl Need {
-    /// Adds it to `request`; `channel` says where its signals are there.
-    fn key(
-        self,
-        request: &mut Request,
-        mut channel: impl FnMut(&mut Request, Signal) -> Channel,
-        model: &Model,
-    ) -> Key {
-        match self {
-            Self::Least(signal) => {
-                let channel = channel(request, signal);
-                Key::Extremum(request.least(channel))
-            }
-            Self::Greatest(signal) => {
-                let channel = channel(request, signal);
-                Key::Extremum(request.greatest(channel))
-            }
-            Self::Integral(signal) => {
-                let channel = channel(request, signal);
-                Key::Integral(request.integral(channel))
-            }
-            Self::Product(a, b) => {
-                let (a, b) = (channel(request, a), channel(request, b));
-                Key::Product(request.product(a, b))
-            }
-            Self::Fourier(signal, tone) => {
-                let channel = channel(request, signal);
-                Key::Fourier(request.fourier(channel, frequency(model, tone)))
-            }
-        }
-    }
-}
-
-impl Key {
-    /// What was gathered.
-    fn value(self, accumulator: &Accumulator) -> Complex {
-        match self {
-            Self::Extremum(key) => accumulator.extremum(key).into(),
-            Self::Integral(key) => accumulator.integral(key).into(),
-            Self::Product(key) => accumulator.product(key).into(),
-            Self::Fourier(key) => accumulator.fourier(key),
-        }
-    }
-}
-
-/// What a choice of observables needs, made ready for one model.
-#[derive(Debug)]
-struct Needs {
-    plan: Arc<Plan>,
-    keys: Vec<(Need, Key)>,
-    /// Whether stored energy is wanted.
-    ends: bool,
-    clearance: bool,
-}
-
-/// What a choice of observables asks for.
-pub(super) struct Asked {
-    pub(super) needs: Vec<Need>,
-    /// Whether the beam's least height is wanted.
-    pub(super) clearance: bool,
-    ends: bool,
-}
-
-impl Asked {
-    pub(super) fn of(model: &Model, set: Set) -> Self {
-        let mut measured = Measured::<f64>::nothing(model);
-        Observables::read(set, &mut measured);
-        Self {
-            needs: measured.asked,
-            clearance: measured.asked_clearance,
-            ends: measured.asked_ends,
-        }
-    }
-}
-
-impl Needs {
-    fn of(model: &Model, set: Set) -> Result<Self, FlowError> {
-        let asked = Asked::of(model, set);
-        let mut request = Request::new();
-        let mut channels: Vec<(Signal, Channel)> = Vec::new();
-        let mut channel = |request: &mut Request, signal: Signal| {
-            if let Some((_, known)) = channels.iter().find(|(s, _)| *s == signal) {
-                return *known;
-            }
-            let new = request.output_by_regime(&signal.outputs(model));
-            channels.push((signal, new));
-            new
-        };
-        let keys = asked
-            .needs
-            .into_iter()
-            .map(|need| (need, need.key(&mut request, &mut channel, model)))
-            .collect();
-        Ok(Self {
-            plan: request.plan(&model.system)?,
-            keys,
-            ends: asked.ends,
-            clearance: asked.clearance,
-        })
-    }
-
-    fn extremum(&self, need: Need) -> Option<ExtremumKey> {
-        self.keys.iter().find_map(|&(known, key)| match key {
-            Key::Extremum(key) if known == need => Some(key),
-            _ => None,
-        })
-    }
-}
-
-pub(super) fn frequency(model: &Model, tone: Tone) -> f64 {
-    match tone {
-        Tone::First => model.frequency(),
-        Tone::Second => {
-            let second = model.system.drive().frequencies().get(1).copied();
-            second.unwrap_or_else(|| model.frequency())
-        }
-        Tone::Harmonic(order) => f64::from(order) * model.frequency(),
-    }
-}
-
-/// Measures a motion of a model: an observer of its flow. A clone that was made before the run
-/// measures another motion, for much less than a new one.
-#[derive(Clone)]
-pub struct Measurement<'a> {
+/// The measurement of motions of a piecewise-linear model.
+pub(super) struct PiecewiseLinear<'a> {
     model: &'a Model,
-    set: Set,
-    needs: Arc<Needs>,
+    required: Requirements,
+    /// The index of each required functional in the plan.
+    numbers: Vec<usize>,
+    plan: Arc<Plan>,
+}
+
+impl<'a> PiecewiseLinear<'a> {
+    /// For the observables `set`.
+    ///
+    /// # Errors
+    /// If a number of the model is not finite.
+    pub(super) fn new(model: &'a Model, set: ObservableSet) -> Result<Self, FlowError> {
+        let required = Requirements::of(model, set);
+        let mut request = Request::new();
+        let signals = required.signals.iter();
+        let outputs: Vec<usize> = signals
+            .map(|signal| request.output_by_regime(&signal.outputs(model)))
+            .collect();
+        let functionals = required.numbered(model).into_iter();
+        let numbers = functionals.map(|f| request.add(f.map(|signal| outputs[signal], |f| f)));
+        Ok(Self {
+            numbers: numbers.collect(),
+            plan: request.plan(&model.system)?,
+            model,
+            required,
+        })
+    }
+
+    fn number(&self, functional: Functional) -> Option<usize> {
+        let all = &self.required.functionals;
+        let at = all.iter().position(|known| *known == functional)?;
+        Some(self.numbers[at])
+    }
+}
+
+impl Engine for PiecewiseLinear<'_> {
+    fn start(
+        &self,
+        state: &[f64],
+        options: RecordOptions,
+    ) -> Result<Box<dyn Run + '_>, MotionError> {
+        let mut flow = Flow::new(Arc::clone(&self.model.system));
+        flow.start(state, 0.0)?;
+        let required = &self.required;
+        let clearance = required.clearance.then(|| ClearanceSearch::new(self.model));
+        let mut measurement = Measurement {
+            of: self,
+            accumulator: Accumulator::new(&self.plan),
+            ends: required.stored.then(Ends::default),
+            clearance: clearance.flatten(),
+            per_period: Vec::new(),
+            contacts: options.events.then(|| Contacts::of(self.model)),
+            recorder: Recorder::default(),
+            records: false,
+        };
+        if measurement.clearance.is_some() {
+            measurement.restart_each_period(Functional::Least(Signal::Height));
+        }
+        if options.each_period {
+            measurement.restart_each_period(Functional::Least(Signal::Tip));
+            measurement.restart_each_period(Functional::Greatest(Signal::Tip));
+        }
+        Ok(Box::new(ExactRun { flow, measurement }))
+    }
+}
+
+/// A run with measurement.
+struct ExactRun<'a> {
+    flow: Flow,
+    measurement: Measurement<'a>,
+}
+
+impl Run for ExactRun<'_> {
+    fn period(&mut self, record: bool) -> Result<(), MotionError> {
+        self.measurement.records = record;
+        Ok(self.flow.run_period(&mut self.measurement)?)
+    }
+
+    fn state(&self) -> Vec<f64> {
+        let mut state = vec![0.0; self.flow.system().dimension()];
+        self.flow.state(&mut state);
+        state
+    }
+
+    fn finish(self: Box<Self>) -> Result<Measurements, MotionError> {
+        Ok(self.measurement.finish()?)
+    }
+}
+
+/// The accumulated measurements of a motion: an observer of its flow.
+struct Measurement<'a> {
+    of: &'a PiecewiseLinear<'a>,
     accumulator: Accumulator,
     ends: Option<Ends>,
     clearance: Option<ClearanceSearch>,
-    taken: Vec<Taken>,
+    per_period: Vec<PerPeriodExtremum>,
+    contacts: Option<Contacts<'a>>,
+    recorder: Recorder,
+    /// Whether the present period is recorded.
+    records: bool,
 }
 
-/// An extremum that begins anew with every drive period.
-#[derive(Clone)]
-struct Taken {
-    need: Need,
-    key: ExtremumKey,
-    /// Over all periods that have ended.
+/// An extremum that restarts in every drive period.
+struct PerPeriodExtremum {
+    /// Index in the plan.
+    number: usize,
+    is_least: bool,
+    /// Extremum over all finished periods.
     overall: f64,
-    /// Of the last one.
-    last: f64,
-    /// Of each of them.
+    /// Extremum of each finished period.
     each: Vec<f64>,
-    keeps_each: bool,
 }
 
-impl Taken {
-    fn new(need: Need, key: ExtremumKey) -> Self {
-        Self {
-            need,
-            key,
-            overall: f64::NAN,
-            last: f64::NAN,
-            each: Vec::new(),
-            keeps_each: false,
-        }
-    }
-
-    fn together(&self, value: f64) -> f64 {
-        match self.need {
-            Need::Least(_) => value.min(self.overall),
-            _ => value.max(self.overall),
-        }
-    }
-
-    fn take(&mut self, accumulator: &mut Accumulator) {
-        let value = accumulator.take_extremum(self.key);
-        self.overall = self.together(value);
-        self.last = value;
-        if self.keeps_each {
-            self.each.push(value);
+impl PerPeriodExtremum {
+    fn with(&self, value: f64) -> f64 {
+        if self.is_least {
+            value.min(self.overall)
+        } else {
+            value.max(self.overall)
         }
     }
 }
 
-impl<'a> Measurement<'a> {
-    /// Of the observables `set` of a motion of `model` that is still to run.
-    ///
-    /// # Errors
-    /// When a number of the model is not finite.
-    pub fn new(model: &'a Model, set: Set) -> Result<Self, FlowError> {
-        let needs = Arc::new(Needs::of(model, set)?);
-        let clearance = needs
-            .clearance
-            .then(|| ClearanceSearch::new(model))
-            .flatten();
-        let mut measurement = Self {
-            model,
-            set,
-            accumulator: Accumulator::new(&needs.plan),
-            ends: needs.ends.then(Ends::default),
-            taken: Vec::new(),
-            clearance,
-            needs,
-        };
-        if measurement.clearance.is_some() {
-            measurement.take(Need::Least(Signal::Height), false);
-        }
-        Ok(measurement)
-    }
-
-    /// Keeps the extrema of the tip deflection in every drive period too, where the choice of
-    /// observables has them.
-    #[must_use]
-    pub fn of_each_period(mut self) -> Self {
-        self.take(Need::Least(Signal::Tip), true);
-        self.take(Need::Greatest(Signal::Tip), true);
-        self
-    }
-
-    /// Outputs that are one share an extremum.
-    fn take(&mut self, need: Need, keeps_each: bool) {
-        let Some(key) = self.needs.extremum(need) else {
+impl Measurement<'_> {
+    /// Restarts an extremum in each period, if it is required.
+    fn restart_each_period(&mut self, functional: Functional) {
+        let Some(number) = self.of.number(functional) else {
             return;
         };
-        match self.taken.iter_mut().find(|taken| taken.key == key) {
-            Some(known) => known.keeps_each |= keeps_each,
-            None => self.taken.push(Taken {
-                keeps_each,
-                ..Taken::new(need, key)
-            }),
-        }
-    }
-
-    fn taken(&self, need: Need) -> Option<&Taken> {
-        let key = self.needs.extremum(need)?;
-        self.taken.iter().find(|taken| taken.key == key)
-    }
-
-    fn each(&self, need: Need) -> &[f64] {
-        self.taken(need).map_or(&[], |taken| &taken.each)
-    }
-
-    /// Least tip deflection of each drive period so far.
-    pub fn lows(&self) -> &[f64] {
-        self.each(Need::Least(Signal::Tip))
-    }
-
-    /// Greatest tip deflection of each drive period so far.
-    pub fn highs(&self) -> &[f64] {
-        self.each(Need::Greatest(Signal::Tip))
-    }
-
-    /// The observables of what ran so far.
-    ///
-    /// # Errors
-    /// When the beam's least height could not be found.
-    pub fn observables(mut self) -> Result<Observables, FlowError> {
-        if self.accumulator.duration() <= 0.0 {
-            return Ok(Observables::UNKNOWN);
-        }
-        let clearance = match self.clearance.take() {
-            Some(search) => search.found(self.model)?,
-            None => None,
-        };
-        let values = self.needs.keys.iter().map(|&(need, key)| {
-            let value = Phasor::from(key.value(&self.accumulator));
-            // What was taken at the ends of periods belongs to the whole.
-            let whole = self.taken(need).map(|taken| Phasor {
-                re: taken.together(value.re),
-                im: 0.0,
+        if self.per_period.iter().all(|known| known.number != number) {
+            self.per_period.push(PerPeriodExtremum {
+                number,
+                is_least: matches!(functional, Functional::Least(_)),
+                overall: f64::NAN,
+                each: Vec::new(),
             });
-            (need, whole.unwrap_or(value))
-        });
-        let gathered = &self.accumulator;
-        let found = Found {
-            values: values.collect(),
-            duration: gathered.duration(),
-            periods: gathered.periods(),
-            contact_time: contact_regimes(self.model)
-                .map(|r| gathered.time_in(r))
-                .sum(),
-            contacts: contacts(self.model, gathered),
-            stored: self.ends.as_ref().map_or(0.0, |ends| ends.gain(self.model)),
-            stored_by_sample: 0.0,
-            clearance,
-            impacts: impacts(self.model, gathered),
-            second_phase: self.model.second_phase,
+        }
+    }
+
+    fn per_period(&self, functional: Functional) -> Option<&PerPeriodExtremum> {
+        let number = self.of.number(functional)?;
+        self.per_period.iter().find(|known| known.number == number)
+    }
+
+    fn each(&self, functional: Functional) -> Vec<f64> {
+        let known = self.per_period(functional);
+        known.map_or_else(Vec::new, |known| known.each.clone())
+    }
+
+    fn finish(mut self) -> Result<Measurements, FlowError> {
+        let (lows, highs) = (
+            self.each(Functional::Least(Signal::Tip)),
+            self.each(Functional::Greatest(Signal::Tip)),
+        );
+        let model = self.of.model;
+        let (gathered, search) = (&self.accumulator, self.clearance.take());
+        let found = if gathered.duration() > 0.0 {
+            let clearance = search.map(|search| search.found(model)).transpose()?;
+            let value = |(functional, number): (&Functional, &usize)| {
+                let mut value = Phasor::from(gathered.values()[*number]);
+                // The ends of periods belong to the whole.
+                if let Some(known) = self.per_period(*functional) {
+                    value.re = known.with(value.re);
+                }
+                (*functional, value)
+            };
+            let functionals = self.of.required.functionals.iter();
+            Some(Found {
+                values: functionals.zip(&self.of.numbers).map(value).collect(),
+                duration: gathered.duration(),
+                periods: gathered.periods(),
+                contact_time: contact_regimes(model).map(|r| gathered.time_in(r)).sum(),
+                contacts: contacts(model, gathered),
+                stored: self.ends.as_ref().map_or(0.0, |ends| ends.gain(model)),
+                stored_by_sample: 0.0,
+                clearance: clearance.flatten(),
+                impacts: impacts(model, gathered),
+                second_phase: model.second_phase,
+            })
+        } else {
+            None
         };
-        Ok(found.observables(self.model, self.set))
+        Ok(Measurements {
+            found,
+            lows,
+            highs,
+            events: self.contacts.map_or_else(Vec::new, Contacts::events),
+            recording: Recording::PiecewiseLinear(self.recorder.finish(Arc::clone(&model.system))),
+        })
     }
 }
 
-impl Found<f64> {
-    /// The observables.
-    pub(super) fn observables(self, model: &Model, set: Set) -> Observables {
-        let mut measured = Measured {
-            found: Some(self),
-            ..Measured::nothing(model)
-        };
-        Observables::read(set, &mut measured)
-    }
-}
-
-/// The regimes that are contact.
+/// The regimes in contact.
 pub(super) fn contact_regimes(model: &Model) -> impl Iterator<Item = usize> + '_ {
     (0..model.contact.len()).filter(|&regime| model.contact[regime])
 }
@@ -351,7 +243,7 @@ fn contacts(model: &Model, gathered: &Accumulator) -> Beginnings<f64> {
     all
 }
 
-/// What impacts on a rigid stop did.
+/// The impacts on a rigid stop.
 fn impacts(model: &Model, gathered: &Accumulator) -> Impacts<f64> {
     let Some(stop) = model.rigid_stop else {
         return Impacts::default();
@@ -375,22 +267,38 @@ impl Observer for Measurement<'_> {
         if let Some(clearance) = &mut self.clearance {
             clearance.segment(segment);
         }
+        if self.records {
+            self.recorder.segment(segment);
+        }
     }
 
     fn switch(&mut self, switch: &SwitchView<'_>) {
         self.accumulator.switch(switch);
+        if let Some(contacts) = &mut self.contacts {
+            contacts.switch(switch);
+        }
+        if self.records {
+            self.recorder.switch(switch);
+        }
     }
 
     fn period_end(&mut self) {
-        for taken in &mut self.taken {
-            taken.take(&mut self.accumulator);
+        for extremum in &mut self.per_period {
+            let value = self.accumulator.take(extremum.number);
+            extremum.overall = extremum.with(value);
+            extremum.each.push(value);
         }
-        let lowest = self
-            .taken(Need::Least(Signal::Height))
-            .map(|taken| taken.last);
+        let height = self.per_period(Functional::Least(Signal::Height));
+        let lowest = height.and_then(|height| height.each.last().copied());
         if let Some((clearance, lowest)) = self.clearance.as_mut().zip(lowest) {
             clearance.period_end(lowest);
         }
         self.accumulator.period_end();
+        if let Some(contacts) = &mut self.contacts {
+            contacts.period_end();
+        }
+        if self.records {
+            self.recorder.period_end();
+        }
     }
 }

@@ -1,142 +1,47 @@
-//! What observables are read from: signals, what is gathered of them, and what follows.
-
-use nanotap_flow::{Complex, Output};
+//! Measurements of a motion, from which observables are computed.
 
 use super::above_rounding;
 use super::clearance::Clearance;
 use super::energy::{EnergyBalance, PowerTerm, balance};
+use super::functional::{Functional, Requirements, Signal, Tone};
 use super::number::{Number, Phasor};
+use super::table::{ObservableSet, Observables};
 use crate::model::Model;
-use crate::model::nonlinear::Nonlinear;
 
-/// A scalar along a motion.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Signal {
-    /// Tip deflection W.
-    Tip,
-    /// Height of the tip over the undeformed surface, V_T.
-    Height,
-    /// Its rate.
-    HeightRate,
-    /// Force of the sample on the tip.
-    Force,
-    /// Slope at the tip; 0 of an oscillator.
-    Slope,
-    /// A factor of a power that is fed in or taken.
-    Power(PowerTerm),
-}
-
-impl Signal {
-    /// What it is in a model with a nonlinear law.
-    pub(super) fn reading(self, model: &Model, nonlinear: &Nonlinear) -> nanotap_volterra::Output {
-        nonlinear.output(&self.outputs(model)[0], self.force_part(nonlinear))
-    }
-
-    /// How much of a nonlinear law's force is in it beside its output.
-    pub(super) fn force_part(self, nonlinear: &Nonlinear) -> f64 {
-        match self {
-            Self::Force => 1.0,
-            Self::Power(term) => term.force_part(nonlinear),
-            _ => 0.0,
-        }
-    }
-
-    /// What it is in `model`, an entry a regime.
-    pub(super) fn outputs(self, model: &Model) -> Vec<Output> {
-        let same = |output: &Output| vec![output.clone(); model.system.regimes().len()];
-        match self {
-            Self::Tip => same(&model.tip),
-            Self::Height => same(&model.height),
-            Self::HeightRate => {
-                let drive = model.system.drive();
-                let rate =
-                    |r: &nanotap_flow::Regime| model.height.rate(r.matrix(), r.forcing(), drive);
-                model.system.regimes().iter().map(rate).collect()
-            }
-            Self::Force => model.force.clone(),
-            Self::Slope => same(
-                &model
-                    .beam
-                    .as_ref()
-                    .map_or_else(|| model.tip.scaled(0.0), |beam| beam.slope.clone()),
-            ),
-            Self::Power(term) => term.outputs(model),
-        }
-    }
-}
-
-/// A frequency of the drive.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Tone {
-    /// The drive's, of several tones the first.
-    First,
-    /// The second tone's.
-    Second,
-    /// So many times the drive's.
-    Harmonic(u32),
-}
-
-/// What is gathered.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Need {
-    Least(Signal),
-    Greatest(Signal),
-    Integral(Signal),
-    Product(Signal, Signal),
-    Fourier(Signal, Tone),
-}
-
-impl Need {
-    /// The signals that it is made of.
-    pub(super) const fn signals(&self) -> (Signal, Option<Signal>) {
-        match *self {
-            Self::Least(signal)
-            | Self::Greatest(signal)
-            | Self::Integral(signal)
-            | Self::Fourier(signal, _) => (signal, None),
-            Self::Product(a, b) => (a, Some(b)),
-        }
-    }
-
-    /// What it is of no time.
-    pub(super) const fn nothing(&self) -> Complex {
-        Complex::new(
-            match self {
-                Self::Least(_) => f64::INFINITY,
-                Self::Greatest(_) => f64::NEG_INFINITY,
-                _ => 0.0,
-            },
-            0.0,
-        )
-    }
-}
-
-/// What observables are read from. Before a run it is empty, and notes what they ask for.
+/// The measurements of a motion. Before a run there are none, and reading one records that it is
+/// required.
 pub(super) struct Measured<'a, D = f64> {
     pub(super) model: &'a Model,
-    pub(super) asked: Vec<Need>,
-    pub(super) asked_ends: bool,
-    pub(super) asked_clearance: bool,
+    pub(super) required: Requirements,
     pub(super) found: Option<Found<D>>,
 }
 
-/// What was gathered of a motion.
+/// The measurements of a motion.
 pub(super) struct Found<D> {
-    pub(super) values: Vec<(Need, Phasor<D>)>,
+    /// The values of the required functionals, in their order.
+    pub(super) values: Vec<(Functional, Phasor<D>)>,
+    /// Duration.
     pub(super) duration: D,
-    /// Whole drive periods.
+    /// Number of drive periods.
     pub(super) periods: u64,
+    /// Contact time.
     pub(super) contact_time: D,
     pub(super) contacts: Beginnings<D>,
     /// Gain of stored energy.
     pub(super) stored: D,
-    /// The part of it that a nonlinear law stores.
+    /// Gain of energy stored in a nonlinear law.
     pub(super) stored_by_sample: D,
     pub(super) clearance: Option<Clearance<D>>,
-    /// What impacts on a rigid stop did.
     pub(super) impacts: Impacts<D>,
-    /// Phase of the second tone in rad.
+    /// Phase of the second tone in radians.
     pub(super) second_phase: D,
+}
+
+impl Found<f64> {
+    /// Computes the observables.
+    pub(super) fn observables(self, model: &Model, set: ObservableSet) -> Observables {
+        Observables::read(set, &mut Measured::of(model, Some(self)))
+    }
 }
 
 /// The contacts that began.
@@ -147,21 +52,21 @@ pub(super) struct Beginnings<D> {
     pub(super) greatest_speed: D,
 }
 
-/// What impacts on a rigid stop did: nothing where there is none.
+/// The impacts on a rigid stop, if there is one.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Impacts<D> {
-    /// Sum of their impulses on the tip.
+    /// Sum of the impulses on the tip.
     pub(super) impulse: D,
     /// Integral of force times tip displacement over the impacts.
     pub(super) virial: D,
-    /// Energy that they took.
+    /// Energy loss in the impacts.
     pub(super) energy: D,
 }
 
 impl<D: Number> Impacts<D> {
-    /// Of a stop of mass, restitution and position `[m, r, x]`: `bounced` and `stuck` are the sums
-    /// of the speeds and of their squares at impacts that bounce, and at those after which the
-    /// tip rests on the stop.
+    /// Impacts on a stop with mass, restitution and position `[m, r, x]`. `bounced` and `stuck` are
+    /// the sums of the speeds and of their squares at impacts that bounce, and at those after which
+    /// the tip rests on the stop.
     pub(super) fn new([mass, restitution, tip]: [D; 3], bounced: [D; 2], stuck: [D; 2]) -> Self {
         let one = D::from(1.0);
         let impulse = mass * ((one + restitution) * bounced[0] + stuck[0]);
@@ -175,82 +80,77 @@ impl<D: Number> Impacts<D> {
 }
 
 impl<'a, D: Number> Measured<'a, D> {
-    /// Before the run.
-    pub(super) const fn nothing(model: &'a Model) -> Self {
+    /// Creates measurements from those found, or `None` before the run.
+    pub(super) fn of(model: &'a Model, found: Option<Found<D>>) -> Self {
         Self {
             model,
-            asked: Vec::new(),
-            asked_ends: false,
-            asked_clearance: false,
-            found: None,
+            required: Requirements::default(),
+            found,
         }
     }
 
-    /// What was gathered; 0 before the run.
-    fn value(&mut self, need: Need) -> Phasor<D> {
-        if let Some(found) = &self.found {
-            let known = found.values.iter().find(|(known, _)| *known == need);
-            let nothing = Phasor {
-                re: D::from(f64::NAN),
-                im: D::default(),
-            };
-            known.map_or(nothing, |(_, value)| *value)
-        } else {
-            if !self.asked.contains(&need) {
-                self.asked.push(need);
-            }
-            Phasor::default()
-        }
+    /// The value of a functional; 0 before the run.
+    fn value(&mut self, functional: Functional) -> Phasor<D> {
+        let Some(found) = &self.found else {
+            self.required.add(functional);
+            return Phasor::default();
+        };
+        let known = found.values.iter().find(|(known, _)| *known == functional);
+        let unknown = Phasor {
+            re: D::from(f64::NAN),
+            im: D::default(),
+        };
+        known.map_or(unknown, |(_, value)| *value)
     }
 
     fn gathered(&self, read: impl Fn(&Found<D>) -> D) -> D {
         self.found.as_ref().map_or_else(D::default, read)
     }
 
-    /// The least value of a signal.
+    /// Minimum of a signal.
     pub(super) fn least(&mut self, signal: Signal) -> D {
-        self.value(Need::Least(signal)).re
+        self.value(Functional::Least(signal)).re
     }
 
-    /// Its greatest value.
+    /// Maximum of a signal.
     pub(super) fn greatest(&mut self, signal: Signal) -> D {
-        self.value(Need::Greatest(signal)).re
+        self.value(Functional::Greatest(signal)).re
     }
 
-    /// Both.
+    /// Minimum and maximum of a signal.
     pub(super) fn range(&mut self, signal: Signal) -> [D; 2] {
         [self.least(signal), self.greatest(signal)]
     }
 
     /// The time mean of a signal.
     pub(super) fn mean(&mut self, signal: Signal) -> D {
-        self.value(Need::Integral(signal)).re / self.duration()
+        self.value(Functional::Integral(signal)).re / self.duration()
     }
 
     /// `∫ a b dt`.
     fn product(&mut self, a: Signal, b: Signal) -> D {
-        self.value(Need::Product(a, b)).re
+        self.value(Functional::Product(a, b)).re
     }
 
-    /// The time mean of the force of the sample on the tip, impulses of a rigid stop included.
+    /// Time mean of the force of the sample on the tip, including impulses of a rigid stop.
     pub(super) fn mean_force(&mut self) -> D {
         self.mean(Signal::Force) + self.gathered(|found| found.impacts.impulse) / self.duration()
     }
 
-    /// The time mean of force times tip deflection, impulses of a rigid stop included.
+    /// Time mean of force times tip deflection, including impulses of a rigid stop.
     pub(super) fn mean_virial(&mut self) -> D {
         let impacts = self.gathered(|found| found.impacts.virial) / self.duration();
         self.mean_product(Signal::Force, Signal::Tip) + impacts
     }
 
-    /// The time mean of the product of two signals.
+    /// Time mean of the product of two signals.
     pub(super) fn mean_product(&mut self, a: Signal, b: Signal) -> D {
         self.product(a, b) / self.duration()
     }
 
-    /// The component `Re(c e^{iωt})` of a signal at a frequency of the drive.
+    /// The component `Re(c e^{iωt})` of a signal at a drive frequency.
     pub(super) fn component(&mut self, signal: Signal, tone: Tone) -> Phasor<D> {
-        let c = self.value(Need::Fourier(signal, tone));
+        let c = self.value(Functional::Fourier(signal, tone));
         let duration = self.duration();
         Phasor {
             re: c.re * 2.0 / duration,
@@ -258,24 +158,24 @@ impl<'a, D: Number> Measured<'a, D> {
         }
     }
 
-    /// How long the motion ran.
+    /// Duration of the motion.
     pub(super) fn duration(&self) -> D {
         self.found
             .as_ref()
             .map_or(1.0.into(), |found| found.duration)
     }
 
-    /// The same in drive periods.
+    /// Duration in drive periods.
     pub(super) fn periods(&self) -> f64 {
         let whole = self.found.as_ref().map_or(0, |found| found.periods);
         if whole > 0 {
             whole as f64
         } else {
-            self.duration().plain() / self.model.period()
+            self.duration().value() / self.model.period()
         }
     }
 
-    /// Time in contact.
+    /// Contact time.
     pub(super) fn contact_time(&self) -> D {
         self.gathered(|found| found.contact_time)
     }
@@ -287,37 +187,44 @@ impl<'a, D: Number> Measured<'a, D> {
             .map_or_else(Beginnings::default, |found| found.contacts)
     }
 
-    /// Whether the model is a beam.
+    /// Time mean of the force in contact; `None` without contact.
+    pub(super) fn mean_contact_force(&mut self) -> Option<D> {
+        let impulse = self.mean(Signal::Force) * self.duration();
+        let time = self.contact_time();
+        (time.value() > 0.0).then(|| impulse / time)
+    }
+
+    /// True if the model is a beam.
     pub(super) fn is_beam(&self) -> bool {
         self.model.beam.is_some()
     }
 
-    /// 1 where the tip deflection points away from the sample, as the cantilever's W does;
-    /// −1 where it points towards it, as an oscillator's x.
+    /// 1 if the tip deflection points away from the sample, as W of the cantilever; −1 if it points
+    /// towards the sample, as x of an oscillator.
     pub(super) fn along_tip(&self) -> f64 {
         if self.is_beam() { 1.0 } else { -1.0 }
     }
 
-    /// Greatest force of the sample on the tip: 0 without contact; impacts of a rigid stop are
-    /// impulses and do not count.
+    /// Peak force of the sample on the tip: 0 without contact. Impacts on a rigid stop are impulses
+    /// and do not count.
     pub(super) fn peak_force(&mut self) -> D {
         self.greatest(Signal::Force).at_least(0.0)
     }
 
-    /// Least force of the sample on the tip: below zero where it pulls, as the paper's damper
-    /// does on a tip that leaves. A force that vanishes where contact ends is 0.
+    /// Minimum force of the sample on the tip: negative if it pulls, as the paper's damper does on
+    /// a receding tip. A force that vanishes at the end of contact counts as 0.
     pub(super) fn least_force(&mut self) -> D {
         const ROUNDING: f64 = 1e-12;
         let (least, peak) = (self.least(Signal::Force), self.peak_force());
-        if least.plain().abs() <= ROUNDING * peak.plain() {
+        if least.value().abs() <= ROUNDING * peak.value() {
             0.0.into()
         } else {
             least
         }
     }
 
-    /// Greatest depth of the tip below the resting surface, 0 if it never gets there. Under a
-    /// nonlinear law contact begins at its intermolecular distance a0: δ = a0 − d.
+    /// Largest depth of the tip below the resting surface, 0 if the tip does not reach it. Under a
+    /// nonlinear law contact begins at the intermolecular distance a0: δ = a0 − d.
     pub(super) fn indentation(&mut self) -> D {
         if let Some(nonlinear) = &self.model.nonlinear {
             let Some(surface) = nonlinear.contact_gap() else {
@@ -328,53 +235,53 @@ impl<'a, D: Number> Measured<'a, D> {
         (-self.least(Signal::Height)).at_least(0.0)
     }
 
-    /// Work of the tip on the sample a drive period, −∫ F V̇_T dt, and what impacts take: what
-    /// the sample dissipates, whatever it is made of. 0 where it is the rounding of what the
-    /// contact stores and gives back, force times indentation.
+    /// Work of the tip on the sample per drive period, −∫ F V̇_T dt, plus the loss in impacts: the
+    /// dissipation in the sample, for any law. 0 if it is only the rounding of the energy stored
+    /// and returned by the contact, force times indentation.
     pub(super) fn dissipation(&mut self) -> D {
         let work = self.impacts() + self.work_on_sample();
         let work = work / self.periods();
         let (force, depth) = if self.model.nonlinear.is_some() {
-            // An attraction stores without contact.
+            // Attraction stores energy without contact.
             let [near, far] = self.range(Signal::Height);
-            let pull = -self.least(Signal::Force).plain();
+            let pull = -self.least(Signal::Force).value();
             (
-                self.peak_force().plain().max(pull),
-                (far.plain() - near.plain()),
+                self.peak_force().value().max(pull),
+                (far.value() - near.value()),
             )
         } else {
-            (self.peak_force().plain(), self.indentation().plain())
+            (self.peak_force().value(), self.indentation().value())
         };
-        if above_rounding(work.plain(), force, depth) == 0.0 {
+        if above_rounding(work.value(), force, depth) == 0.0 {
             0.0.into()
         } else {
             work
         }
     }
 
-    /// What the tip gives the sample and does not get back.
+    /// Net work of the tip on the sample.
     fn work_on_sample(&mut self) -> D {
         let stored = self.gathered(|found| found.stored_by_sample);
         -self.product(Signal::Force, Signal::HeightRate) - stored
     }
 
-    /// What impacts on a rigid stop take.
+    /// Energy loss in impacts on a rigid stop.
     fn impacts(&self) -> D {
         self.gathered(|found| found.impacts.energy)
     }
 
-    /// The component of the tip deflection at the second tone, if there is one, turned back by
-    /// the tone's own phase.
+    /// The component of the tip deflection at the second tone, if there is one, relative to the
+    /// phase of the tone.
     pub(super) fn second_tone(&mut self) -> Option<Phasor<D>> {
         self.model.system.drive().frequencies().get(1)?;
         let own = self.gathered(|found| found.second_phase);
         Some(self.component(Signal::Tip, Tone::Second).turned_back(own))
     }
 
-    /// What an optical lever reads at the drive's frequency: the slope at the tip, taken for a
+    /// The reading of an optical lever at the drive frequency: the slope at the tip, converted to a
     /// deflection as if a static force at the tip had bent the beam. Such a beam has the slope
-    /// 3W/2, so that W is taken to be ⅔ ∂W/∂ξ; the bare beam's first mode, whose slope is
-    /// 1.3765 W, then reads 0.918 W.
+    /// 3W/2, so the reading is ⅔ ∂W/∂ξ; for the first mode of the bare beam, whose slope is 1.3765
+    /// W, it is 0.918 W.
     pub(super) fn optical_lever(&mut self) -> Option<Phasor<D>> {
         let reads = |m: &mut Self| {
             let slope = m.component(Signal::Slope, Tone::First);
@@ -383,17 +290,17 @@ impl<'a, D: Number> Measured<'a, D> {
         self.is_beam().then(|| reads(self))
     }
 
-    /// The component of the tip's height at the drive's frequency, of a beam whose base moves:
-    /// deflection and base together. With the base at rest the tip moves as it is deflected.
+    /// The component of the tip's height at the drive frequency for a beam with a moving base:
+    /// deflection plus base. With the base at rest it equals the deflection.
     pub(super) fn tip_motion(&mut self) -> Option<Phasor<D>> {
         let base = &self.model.beam.as_ref()?.base;
         let moves = base.tones.iter().any(|tone| tone.norm_sqr() > 0.0);
         moves.then(|| self.component(Signal::Height, Tone::First))
     }
 
-    /// What the drive feeds in, and what takes it.
+    /// The energy balance of drive and losses.
     pub(super) fn energy_balance(&mut self) -> EnergyBalance<D> {
-        self.asked_ends = true;
+        self.required.stored = true;
         let model = self.model;
         let mut work = |terms: Vec<PowerTerm>| -> D {
             terms.into_iter().fold(D::default(), |sum, a| {
@@ -402,7 +309,7 @@ impl<'a, D: Number> Measured<'a, D> {
         };
         let beam = work(PowerTerm::of_beam(model));
         if D::VARIES {
-            // Of a periodic orbit, along which nothing is stored.
+            // For a periodic orbit, over which no energy is stored.
             let sample = self.dissipation() * self.periods();
             return balance(beam + sample, beam, sample, D::default());
         }
@@ -416,10 +323,10 @@ impl<'a, D: Number> Measured<'a, D> {
         balance(drive, beam, sample + self.impacts(), stored)
     }
 
-    /// Where the beam comes nearest to the sample.
+    /// The lowest point of the beam.
     pub(super) fn clearance(&mut self) -> Option<Clearance<D>> {
-        self.asked_clearance = true;
-        // The beam's end stands a fixed height over the tip.
+        self.required.clearance = true;
+        // The end of the beam is at a fixed height above the tip.
         self.least(Signal::Height);
         self.found.as_ref()?.clearance
     }

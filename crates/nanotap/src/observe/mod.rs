@@ -1,6 +1,6 @@
-//! What can be read off a motion: extrema, contact, forces, energy, harmonics,
-//! beam clearance. Everything is exact on the piecewise closed form: extrema from
-//! roots of rates, integrals in closed form, never from samples.
+//! Observables of a motion: extrema, contact, forces, energy, harmonics, beam clearance. They are
+//! exact for the piecewise closed form: extrema are roots of rates, integrals are in closed form;
+//! nothing comes from samples.
 
 mod choice;
 mod clearance;
@@ -9,19 +9,20 @@ mod contact_event;
 mod derivative;
 mod dimension;
 mod energy;
-mod gather;
+mod functional;
 pub mod glossary;
 mod harmonics;
 mod measure;
 mod measured;
+mod nonlinear;
 mod number;
 mod physical_motion;
+mod record;
 pub mod table;
 pub mod time_series;
 mod validity;
 mod value;
 mod varied_motion;
-mod watch;
 
 pub use clearance::Clearance;
 pub use contact_event::{ContactEvent, ContactEventKind, Contacts};
@@ -31,17 +32,16 @@ pub use dimension::Dimension;
 pub use energy::EnergyBalance;
 pub(crate) use harmonics::lag;
 pub use harmonics::{Harmonic, Spectrum};
-pub use measure::Measurement;
 pub use physical_motion::{PhysicalHarmonic, PhysicalMotion, Setting};
-pub use table::{OBSERVABLES, Observable, Observables, Set};
+pub use record::{RecordOptions, Recorded, Recorder, measure, record};
+pub use table::{OBSERVABLES, Observable, ObservableSet, Observables};
 pub use validity::OutOfRange;
 pub use value::Value;
-pub use watch::{Kept, Watched, Watcher, measure, watch};
 
 use crate::model::Model;
 
-/// `work` on a sample, or 0 where it is the rounding of what the contact stores and gives back,
-/// force times indentation.
+/// `work` on a sample, or 0 if it is only the rounding of the energy stored and returned by the
+/// contact, force times indentation.
 fn above_rounding(work: f64, peak_force: f64, indentation: f64) -> f64 {
     const ROUNDING: f64 = 1e-12;
     if work.abs() <= ROUNDING * peak_force * indentation {
@@ -51,7 +51,7 @@ fn above_rounding(work: f64, peak_force: f64, indentation: f64) -> f64 {
     }
 }
 
-/// Whether a switch begins a contact: from flight into contact, or an impact.
+/// True if a switch begins a contact: from flight into contact, or an impact.
 pub fn begins_contact(model: &Model, from: usize, to: usize) -> bool {
-    !model.contact[from] && (model.contact[to] || from == to)
+    !model.touches(from) && (model.touches(to) || from == to)
 }

@@ -1,29 +1,15 @@
-//! The numbers that observables are made of: plain, or with a derivative beside them.
+//! The numbers from which observables are computed: plain, or with a derivative.
 
-use std::ops::{Add, Div, Mul, Neg, Sub};
+use std::ops::Div;
 
-use nanotap_flow::Complex;
-
-use crate::model::contact::dual::Dual;
+use nalgebra::Complex;
+use nanotap_arithmetic::{Dual, Scalar};
 
 /// A real number, with or without a derivative.
-pub(super) trait Number:
-    Copy
-    + Default
-    + From<f64>
-    + Add<Output = Self>
-    + Sub<Output = Self>
-    + Mul<Output = Self>
-    + Div<Output = Self>
-    + Neg<Output = Self>
-    + Mul<f64, Output = Self>
-    + Div<f64, Output = Self>
-{
+pub(super) trait Number: Scalar + Default + From<f64> + Div<f64, Output = Self> {
     /// Whether it has a derivative.
     const VARIES: bool;
-    /// The number alone.
-    fn plain(self) -> f64;
-    /// At least `low`.
+    /// Returns at least `low`.
     fn at_least(self, low: f64) -> Self;
     /// √(x² + y²).
     fn hypotenuse(self, y: Self) -> Self;
@@ -31,14 +17,12 @@ pub(super) trait Number:
     fn degrees(self, x: Self) -> Self;
     /// Sine and cosine.
     fn turn(self) -> (Self, Self);
+    /// The square root; its derivative at zero is infinite.
+    fn root(self) -> Self;
 }
 
 impl Number for f64 {
     const VARIES: bool = false;
-
-    fn plain(self) -> f64 {
-        self
-    }
 
     fn at_least(self, low: f64) -> Self {
         self.max(low)
@@ -55,14 +39,14 @@ impl Number for f64 {
     fn turn(self) -> (Self, Self) {
         nanotap_arithmetic::sin_cos(self)
     }
+
+    fn root(self) -> Self {
+        self.sqrt()
+    }
 }
 
 impl Number for Dual {
     const VARIES: bool = true;
-
-    fn plain(self) -> f64 {
-        self.value
-    }
 
     fn at_least(self, low: f64) -> Self {
         if self.value >= low { self } else { low.into() }
@@ -70,21 +54,24 @@ impl Number for Dual {
 
     fn hypotenuse(self, y: Self) -> Self {
         let value = nanotap_arithmetic::hypot(self.value, y.value);
-        let change = self.value * self.derivative + y.value * y.derivative;
+        let change = self.value * self.derivative() + y.value * y.derivative();
         Self::new(value, change / value)
     }
 
     fn degrees(self, x: Self) -> Self {
         let size = self.value * self.value + x.value * x.value;
-        let change = (x.value * self.derivative - self.value * x.derivative) / size;
+        let change = (x.value * self.derivative() - self.value * x.derivative()) / size;
         let value = nanotap_arithmetic::atan2(self.value, x.value);
         Self::new(value.to_degrees(), change.to_degrees())
     }
 
     fn turn(self) -> (Self, Self) {
-        let (sin, cos) = nanotap_arithmetic::sin_cos(self.value);
-        let by = self.derivative;
-        (Self::new(sin, cos * by), Self::new(cos, -sin * by))
+        self.sin_cos()
+    }
+
+    fn root(self) -> Self {
+        let root = self.value.sqrt();
+        self.chain(root, 0.5 / root)
     }
 }
 
@@ -95,29 +82,29 @@ pub(super) struct Phasor<D> {
     pub(super) im: D,
 }
 
-impl From<Complex> for Phasor<f64> {
-    fn from(c: Complex) -> Self {
+impl<D> From<Complex<D>> for Phasor<D> {
+    fn from(c: Complex<D>) -> Self {
         Self { re: c.re, im: c.im }
     }
 }
 
 impl<D: Number> Phasor<D> {
-    /// Its amplitude.
+    /// Amplitude.
     pub(super) fn norm(self) -> D {
         self.re.hypotenuse(self.im)
     }
 
-    /// Its lag φ: `Re(c e^{iθ}) = |c| sin(θ − φ)`, degrees in (−180, 180].
+    /// Phase lag φ: `Re(c e^{iθ}) = |c| sin(θ − φ)`, degrees in (−180, 180].
     pub(super) fn lag(self) -> D {
         let degrees = -self.re.degrees(D::from(0.0) - self.im);
-        if degrees.plain() <= -180.0 {
-            degrees + 360.0.into()
+        if degrees.value() <= -180.0 {
+            degrees + 360.0
         } else {
             degrees
         }
     }
 
-    /// In other units.
+    /// Scales by `factor`.
     pub(super) fn times(self, factor: D) -> Self {
         Self {
             re: self.re * factor,
@@ -125,7 +112,7 @@ impl<D: Number> Phasor<D> {
         }
     }
 
-    /// Turned back by an angle in rad.
+    /// Rotates back by an angle in radians.
     pub(super) fn turned_back(self, angle: D) -> Self {
         let (sin, cos) = angle.turn();
         Self {

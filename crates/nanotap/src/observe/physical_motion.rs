@@ -1,4 +1,4 @@
-//! A motion in SI units, in the words of experimenters.
+//! A motion in SI units, with the names that experimenters use.
 
 use std::borrow::Cow;
 
@@ -13,30 +13,31 @@ use super::{Dimension, Harmonic, Spectrum};
 use crate::case::physical::quantity::JOULES_PER_ELECTRONVOLT;
 use crate::case::physical::sample::{Hertz, HertzMismatch};
 use crate::case::physical::{Physical, Scales};
+use crate::model::parameter::Parameter;
 
-/// What an experimenter would measure of a motion; SI units, angles in degrees. Written out
-/// by the observables' names in SI, energies in electronvolts too.
+/// Observables of a motion in SI units, angles in degrees. They are serialised under their SI
+/// names, with energies in electronvolts too.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PhysicalMotion {
     /// The observables in SI.
     pub observables: Observables,
-    /// A over the free amplitude A₀: the setpoint ratio of this motion.
+    /// Amplitude over the free amplitude A₀: the setpoint ratio of this motion.
     pub amplitude_ratio: f64,
-    /// What stands beside them where one motion is told alone.
+    /// Further entries if the motion is reported alone.
     pub setting: Option<Setting>,
 }
 
-/// What belongs to the case and not to the motion, and the motion's harmonics.
+/// Entries that belong to the case, and the harmonics of the motion.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct Setting {
-    /// What the phase is counted from.
+    /// Reference of the phase.
     pub phase_reference: &'static str,
     /// Drive frequency, Hz.
     pub frequency: f64,
-    /// Where Hertz's stiffness was taken at an indentation that this motion does not have.
+    /// If Hertz's stiffness was linearised at an indentation that this motion does not have.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub hertz_mismatch: Option<HertzMismatch>,
-    /// Harmonics of the drive's frequency; of a periodic motion.
+    /// Harmonics of the drive frequency, for a periodic motion.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub harmonics: Vec<PhysicalHarmonic>,
 }
@@ -44,25 +45,25 @@ pub struct Setting {
 /// One component of a periodic motion; SI units, angles in degrees.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct PhysicalHarmonic {
-    /// Frequency as a multiple of the drive's.
+    /// Frequency as a multiple of the drive frequency.
     pub order: f64,
     /// Frequency, Hz.
     pub frequency: f64,
     /// Amplitude of the tip deflection, m.
     pub tip: f64,
-    /// Its lag behind sin(order · ωt), degrees in (−180, 180].
+    /// Phase lag behind sin(order · ωt), degrees in (−180, 180].
     pub tip_phase: f64,
     /// Amplitude of the force, N.
     pub force: f64,
-    /// Its lag, degrees.
+    /// Phase lag of the force, degrees.
     pub force_phase: f64,
-    /// Amplitude of the slope dw/dx at the tip; where the lever's length is known.
+    /// Amplitude of the slope dw/dx at the tip, if the lever's length is known.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub slope: Option<f64>,
 }
 
 impl PhysicalMotion {
-    /// `observables`, of a motion of the case `view`, in SI.
+    /// Converts `observables` of a motion of the case `view` to SI.
     pub fn of(observables: &Observables, view: &Physical) -> Self {
         let observables = observables.in_si(&view.scales);
         Self {
@@ -72,13 +73,13 @@ impl PhysicalMotion {
         }
     }
 
-    /// The same of one motion alone: with its setting, and with `spectrum` its harmonics.
+    /// Converts a single motion, with its setting and, with `spectrum`, its harmonics.
     pub fn alone(observables: &Observables, spectrum: Option<&Spectrum>, view: &Physical) -> Self {
         let scales = &view.scales;
         let omega = view.cantilever.omega;
         let harmonics = spectrum.map_or(&[][..], |spectrum| &spectrum.harmonics);
-        // A stiffness given as a number since is not Hertz's.
-        let own = |h: &Hertz| h.stiffness() == view.parameters.contact_stiffness;
+        // A stiffness that was set as a number is not Hertz's.
+        let own = |h: &Hertz| h.stiffness() == view.parameters.get(Parameter::Alpha4);
         let hertz = view.sample.hertz.filter(own);
         Self {
             setting: Some(Setting {
@@ -146,8 +147,8 @@ impl JsonSchema for PhysicalMotion {
         let ratio = json!({"type": "number", "description": "A over the free amplitude"});
         properties.insert("A_ratio".to_owned(), ratio);
         let setting = Setting::json_schema(generator).to_value();
-        if let Some(Json::Object(beside)) = setting.get("properties") {
-            properties.extend(beside.clone());
+        if let Some(Json::Object(entries)) = setting.get("properties") {
+            properties.extend(entries.clone());
         }
         json_schema!({
             "type": "object",

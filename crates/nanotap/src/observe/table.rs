@@ -1,13 +1,13 @@
-//! Every observable, once: its name, its dimension, its words, and how it follows from what
-//! was [measured](super::measure). JSON, CSV, datasets, figures, the terminal and Python
-//! read this table; a new observable is one entry here.
+//! The table of observables: name, dimension, description, and how each follows from the
+//! [measurements](super::measure). JSON, CSV, datasets, figures, the terminal and Python read this
+//! table; a new observable is one entry.
 //!
 //! # Phase
-//! Phases are lags: of the tip deflection behind the drive sin Ωτ (of a driven base: behind
-//! the base's displacement), 90° at the free resonance of a lever with high Q. Data hold them
-//! in (−180°, 180°]. People who tap read them from 0° to 180°, and a lever driven through its
-//! base lags by a little more than 180° far above resonance; so text and figures show them
-//! in (−90°, 270°], where a response to tapping never jumps: see [`shown_phase`].
+//! Phases are lags of the tip deflection behind the drive sin Ωτ (for a driven base: behind the
+//! displacement of the base), 90° at the free resonance of a lever with high Q. Data contain them
+//! in (−180°, 180°]. In tapping mode phases are read from 0° to 180°, and a lever driven through
+//! its base lags by slightly more than 180° far above resonance. Text and figures therefore show
+//! them in (−90°, 270°], where the response of a tapping lever never jumps: see [`shown_phase`].
 
 use std::borrow::Cow;
 
@@ -15,33 +15,34 @@ use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::{Serialize, Serializer, ser::SerializeMap};
 use serde_json::Map;
 
-use super::measured::{Measured, Signal, Tone};
+use super::functional::{Signal, Tone};
+use super::measured::Measured;
 use super::number::{Number as _, Phasor};
 use super::value::{Measurable, Value, Varying};
 use super::{Dimension, EnergyBalance};
 use crate::case::physical::Scales;
 use crate::model::contact::dual::Dual;
 
-use Signal::{Force, Height, Slope, Tip};
+use Signal::{Height, Slope, Tip};
 
-/// One observable.
+/// An observable.
 #[derive(Debug)]
 pub struct Observable {
-    /// Its name in JSON, in CSV headers, in datasets, at the terminal and in Python.
+    /// Name in JSON, CSV headers, datasets, at the terminal and in Python.
     pub name: &'static str,
-    /// Its name among quantities in SI, where experimenters have one of their own.
+    /// Name among quantities in SI, if experimenters use another one.
     pub si_name: &'static str,
-    /// Its dimension.
+    /// Dimension.
     pub dimension: Dimension,
-    /// A few words and its symbol between `$`: the label of an axis.
+    /// Short description and symbol (between `$`): the label of an axis.
     pub label: &'static str,
-    /// What it is.
+    /// Description.
     pub words: &'static str,
-    /// Its value.
+    /// Returns the value.
     pub of: fn(&Observables) -> Value,
-    /// Whether it is one number, as a curve needs it.
+    /// Whether it is a single number, as a curve needs.
     pub is_number: bool,
-    /// The JSON schema of its value.
+    /// JSON schema of the value.
     pub(super) schema: fn(&mut SchemaGenerator) -> Schema,
     row: usize,
 }
@@ -55,12 +56,12 @@ impl PartialEq for Observable {
 impl Eq for Observable {}
 
 impl Observable {
-    /// The observable of this name.
+    /// The observable with this name.
     pub fn named(name: &str) -> Option<&'static Self> {
         OBSERVABLES.iter().find(|o| o.name == name)
     }
 
-    /// The label of an axis, of a cantilever or an oscillator.
+    /// Label of an axis, for a cantilever or an oscillator.
     pub fn axis_label(&self, beam: bool) -> String {
         if beam {
             return self.label.to_owned();
@@ -71,41 +72,41 @@ impl Observable {
     }
 }
 
-/// A choice of observables.
+/// A set of observables.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Set(u64);
+pub struct ObservableSet(u64);
 
-impl Set {
-    /// None.
+impl ObservableSet {
+    /// The empty set.
     pub const NONE: Self = Self(0);
 
-    /// Every one that there is.
+    /// All observables.
     pub const ALL: Self = Self(u64::MAX >> (64 - OBSERVABLES.len()));
 
-    /// With one more.
+    /// Adds an observable.
     #[must_use]
     pub const fn with(self, observable: &Observable) -> Self {
         Self(self.0 | 1 << observable.row)
     }
 
-    /// Whether this is one of them.
+    /// True if the set contains the observable.
     pub const fn contains(self, observable: &Observable) -> bool {
         self.0 >> observable.row & 1 == 1
     }
 
-    /// Those of both.
+    /// The union of two sets.
     #[must_use]
     pub const fn union(self, other: Self) -> Self {
         Self(self.0 | other.0)
     }
 
-    /// They, in the order of the table.
+    /// The observables of the set, in the order of the table.
     pub fn iter(self) -> impl Iterator<Item = &'static Observable> {
         OBSERVABLES.iter().filter(move |o| self.contains(o))
     }
 }
 
-/// A phase as text and figures show it: in (−90°, 270°].
+/// Converts a phase to the range of text and figures, (−90°, 270°].
 pub fn shown_phase(degrees: f64) -> f64 {
     if degrees <= -90.0 {
         degrees + 360.0
@@ -119,7 +120,7 @@ macro_rules! observables {
         $name:ident $(as $si_name:literal)?: $type:ty, $dimension:ident, $where:ident,
         $label:literal, $words:literal, $read:expr;
     )*) => {
-        /// The table.
+        /// The table of observables.
         pub static OBSERVABLES: &[Observable] = &[$(Observable {
             name: stringify!($name),
             si_name: observables!(@si $name $($si_name)?),
@@ -132,29 +133,28 @@ macro_rules! observables {
             row: Row::$name as usize,
         }),*];
 
-        /// The table's rows.
+        /// Rows of the table.
         #[allow(non_camel_case_types, reason = "the observables' own names")]
         #[derive(Clone, Copy)]
         enum Row { $($name),* }
 
-        /// Observables of a motion; in the model's own units, or in SI. What nobody asked for
-        /// is not a number.
+        /// Observables of a motion, in the model's units or in SI. Unrequested fields are NaN.
         #[derive(Clone, Copy, Debug, PartialEq)]
         pub struct Observables {
-            /// Length of time observed, in drive periods.
+            /// Observed time in drive periods.
             pub periods: f64,
             $(#[doc = $words] pub $name: $type,)*
         }
 
         impl Observables {
-            /// Nothing is known.
+            /// All fields unknown.
             pub const UNKNOWN: Self = Self {
                 periods: 0.0,
                 $($name: <$type as Measurable>::ABSENT,)*
             };
 
-            /// As `measured` has them.
-            pub(super) fn read(set: Set, measured: &mut Measured<'_>) -> Self {
+            /// Computes the observables of `set` from the measurements.
+            pub(super) fn read(set: ObservableSet, measured: &mut Measured<'_>) -> Self {
                 let mut all = Self { periods: measured.periods(), ..Self::UNKNOWN };
                 $(if set.contains(&OBSERVABLES[Row::$name as usize]) {
                     #[allow(clippy::redundant_closure_call)] // the table writes closures
@@ -163,10 +163,10 @@ macro_rules! observables {
                 all
             }
 
-            /// How those of `set` change, as `measured` has them; what jumps, or where
-            /// nothing is measured, is left out.
+            /// Derivatives of the observables of `set`, from `measured`; discontinuous ones are
+            /// left out.
             pub(super) fn changes(
-                set: Set,
+                set: ObservableSet,
                 measured: &mut Measured<'_, Dual>,
             ) -> Vec<(&'static Observable, Value)> {
                 let mut all = Vec::new();
@@ -183,7 +183,7 @@ macro_rules! observables {
                 all
             }
 
-            /// The same in SI.
+            /// Converts to SI.
             #[must_use]
             pub fn in_si(&self, scales: &Scales) -> Self {
                 Self {
@@ -193,18 +193,18 @@ macro_rules! observables {
             }
         }
 
-        impl Set {
-            /// What sweeps, branches and curves record of every motion.
+        impl ObservableSet {
+            /// The observables that sweeps, branches and curves record for every motion.
             pub const COMMON: Self = Self($(observables!(@$where $name))|*);
 
-            /// What a lock-in amplifier reads: amplitude and phase at the drive's frequency.
+            /// The readings of a lock-in amplifier: amplitude and phase at the drive frequency.
             pub const FIRST_HARMONIC: Self =
                 Self(1 << Row::first_harmonic as usize | 1 << Row::phase as usize);
 
-            /// The least and the greatest gap.
+            /// Minimum and maximum of the gap.
             pub(super) const GAP: Self = Self(1 << Row::gap_range as usize);
 
-            /// Where and when the beam is lowest.
+            /// Position and time of the lowest point of the beam.
             pub(super) const CLEARANCE: Self = Self(
                 1 << Row::beam_clearance as usize
                     | 1 << Row::beam_clearance_xi as usize
@@ -220,10 +220,10 @@ macro_rules! observables {
 
 observables! {
     tip_max: f64, Length, common,
-        "greatest tip deflection $W_{max}$", "greatest tip deflection W",
+        "largest tip deflection $W_{max}$", "largest tip deflection W",
         |m| m.greatest(Tip);
     tip_min: f64, Length, common,
-        "least tip deflection $W_{min}$", "least tip deflection W",
+        "smallest tip deflection $W_{min}$", "smallest tip deflection W",
         |m| m.least(Tip);
     amplitude: f64, Length, common,
         "amplitude (half of peak to peak)", "half of peak to peak of the tip deflection",
@@ -236,32 +236,32 @@ observables! {
         "amplitude of the tip deflection at the drive frequency: what a lock-in amplifier reads",
         |m| m.component(Tip, Tone::First).norm();
     phase: f64, Angle, common,
-        "phase behind the drive (°)",
-        "lag of the tip deflection at the drive frequency behind the drive",
+        "phase lag (°)",
+        "phase lag of the tip deflection behind the drive, at the drive frequency",
         |m| m.component(Tip, Tone::First).lag();
     indentation: f64, Length, common,
-        "indentation", "greatest depth of the tip below the resting surface",
+        "indentation", "largest depth of the tip below the surface at rest",
         |m| m.indentation();
     mean_force: f64, Force, common,
         "mean force", "time mean of the force of the sample on the tip",
         |m| m.mean_force();
     dissipation as "E_dis": f64, Energy, common,
-        "dissipation $E_{dis}$", "energy that the sample takes in one drive period",
+        "dissipation $E_{dis}$", "energy dissipated in the sample in one drive period",
         |m| m.dissipation();
     virial: f64, Energy, common,
-        "virial ⟨$F W$⟩", "time mean of force times tip deflection, the force counted along it",
+        "virial ⟨$F W$⟩", "time mean of force times tip deflection; sign: along the deflection",
         |m| m.along_tip() * m.mean_virial();
     contact_fraction: f64, Number, common,
-        "part of the time in contact", "part of the time in contact",
+        "contact time / period", "contact time / period",
         |m| m.contact_time() / m.duration();
     contacts_per_period: f64, PerPeriod, common,
-        "contacts a drive period", "contacts begun a drive period",
+        "contacts per drive period", "contacts begun per drive period",
         |m| m.contacts().count as f64 / m.periods();
     peak_force as "F_max": f64, Force, common,
-        "greatest force $F_{max}$", "greatest force of the sample on the tip",
+        "peak force $F_{max}$", "largest force of the sample on the tip",
         |m| m.peak_force();
     impact_speed: f64, Velocity, common,
-        "speed of approach", "greatest speed at which a contact begins",
+        "impact speed", "largest speed at which a contact begins",
         |m| m.contacts().greatest_speed;
     contact_time: f64, Time, common,
         "contact time", "time in contact in one drive period",
@@ -271,8 +271,8 @@ observables! {
         "amplitude of the tip deflection at the frequency of the second tone",
         |m| m.second_tone().map(Phasor::norm);
     tone2_lag: Option<f64>, Angle, rare,
-        "phase behind the second tone (°)",
-        "lag of the tip deflection behind the second tone",
+        "phase lag at the second tone (°)",
+        "phase lag of the tip deflection behind the second tone",
         |m| m.second_tone().map(Phasor::lag);
     second_harmonic: f64, Length, rare,
         "amplitude of the second harmonic",
@@ -319,29 +319,25 @@ observables! {
         "root mean square of the tip deflection about its mean",
         |m| {
             let mean = m.mean(Tip);
-            (m.mean_product(Tip, Tip) - mean * mean).at_least(0.0).sqrt()
+            (m.mean_product(Tip, Tip) - mean * mean).at_least(0.0).root()
         };
     gap_range: [f64; 2], Length, rare,
-        "gap", "least and greatest height of the tip over the undeformed surface",
+        "gap", "smallest and largest height of the tip above the undeformed surface",
         |m| m.range(Height);
     least_force: f64, Force, rare,
-        "least force", "least force of the sample on the tip: below zero where it pulls",
+        "smallest force", "smallest force of the sample on the tip; negative where it attracts",
         |m| m.least_force();
     contact_force: Option<f64>, Force, rare,
-        "mean force in contact", "time mean of the force of the sample on the tip while they touch",
-        |m| {
-            let impulse = m.mean(Force) * m.duration();
-            let time = m.contact_time();
-            (time.plain() > 0.0).then(|| impulse / time)
-        };
+        "mean force in contact", "time mean of the force of the sample on the tip during contact",
+        |m| m.mean_contact_force();
     drive_power: f64, Power, rare,
         "power of the drive", "mean power of the drive",
         |m| m.energy_balance().drive_work / m.duration();
     sample_power: f64, Power, rare,
-        "power that the sample takes", "mean power that the sample takes",
+        "power dissipated in the sample", "mean power dissipated in the sample",
         |m| m.dissipation() * m.periods() / m.duration();
     slope_range: Option<[f64; 2]>, Slope, rare,
-        "slope at the tip", "least and greatest slope at the tip",
+        "slope at the tip", "smallest and largest slope at the tip",
         |m| m.is_beam().then(|| m.range(Slope));
     optical_amplitude: Option<f64>, Length, rare,
         "amplitude read by an optical lever",
@@ -359,13 +355,13 @@ observables! {
         "phase of the tip's own motion (°)", "lag of the tip's height behind the base that moves it",
         |m| m.tip_motion().map(Phasor::lag);
     energy_balance: EnergyBalance, Energy, rare,
-        "energy", "energies over the recording; the residual as a part of what was moved",
+        "energy", "energies over the recording; the residual relative to the energy exchanged",
         |m| m.energy_balance();
     beam_clearance: Option<f64>, Length, rare,
-        "beam clearance", "least height of the beam above the sample",
+        "beam clearance", "smallest height of the beam above the sample",
         |m| m.clearance().map(|c| c.height);
     beam_clearance_xi: Option<f64>, Place, rare,
-        "place of the beam clearance $ξ$", "where the beam is lowest, clamp 0 to tip 1",
+        "position of the beam clearance $ξ$", "where the beam is lowest: 0 at the clamp, 1 at the tip",
         |m| m.clearance().map(|c| c.xi);
     beam_clearance_period: Option<f64>, Periods, rare,
         "time of the beam clearance", "when the beam is lowest",
@@ -383,7 +379,7 @@ fn change_of<R: Varying>(
 }
 
 impl Serialize for Observables {
-    /// As a map from names to values; what is absent is left out.
+    /// A map from names to values, without absent ones.
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         let mut map = serializer.serialize_map(None)?;
         for observable in OBSERVABLES {
@@ -397,7 +393,7 @@ impl Serialize for Observables {
 }
 
 impl Observable {
-    /// The JSON schema of its value, with what it is and its `x-unit`.
+    /// JSON schema of the value, with its description and `x-unit`.
     pub(super) fn described(&self, generator: &mut SchemaGenerator, unit: &str) -> Schema {
         let mut schema = (self.schema)(generator);
         schema.insert("description".into(), self.words.into());

@@ -1,45 +1,45 @@
-//! Where a motion leaves the range for which the sample's force law was derived.
+//! Motions outside the range in which the sample's force law is valid.
 
 use std::fmt;
 
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::table::{Observables, Set};
+use super::table::{ObservableSet, Observables};
 use crate::model::Model;
 
-/// A ratio that a force law takes to be small, and that a motion makes large.
+/// A ratio that a force law assumes to be small, and that a motion makes large.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct OutOfRange {
     /// The ratio, as a formula: `δ/R`.
     pub ratio: &'static str,
     /// Its largest value.
     pub value: f64,
-    /// The value up to which the law holds.
+    /// The value up to which the law is valid.
     pub limit: f64,
 }
 
 impl OutOfRange {
-    /// `set` with what [`OutOfRange::of`] looks at.
-    pub fn observed_with(model: &Model, set: Set) -> Set {
+    /// Adds the observables that [`OutOfRange::of`] needs to `set`.
+    pub fn observed_with(model: &Model, set: ObservableSet) -> ObservableSet {
         match model.nonlinear {
-            Some(_) => set.union(Set::GAP),
+            Some(_) => set.union(ObservableSet::GAP),
             None => set,
         }
     }
 
-    /// What the motion with these observables violates; their gap must have been measured.
+    /// The limits that a motion with these observables violates; its gap must be measured.
     pub fn of(model: &Model, seen: &Observables) -> Vec<Self> {
         Self::within(model, seen.gap_range[0])
     }
 
-    /// What is violated at any place where the undriven lever rests.
+    /// The limits violated at any rest position of the undriven lever.
     pub fn at_rest(model: &Model) -> Vec<Self> {
         let rests = model.equilibria().into_iter().filter(|e| e.stable);
         Self::within(model, rests.map(|e| e.gap).fold(f64::INFINITY, f64::min))
     }
 
-    /// What is violated as near as this to the sample.
+    /// The limits violated at this least distance from the sample.
     fn within(model: &Model, least_gap: f64) -> Vec<Self> {
         let Some(nonlinear) = &model.nonlinear else {
             return Vec::new();

@@ -1,4 +1,4 @@
-//! What an observable's value may be.
+//! Values of observables.
 
 use serde::Serialize;
 
@@ -9,21 +9,21 @@ use crate::model::contact::dual::Dual;
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 #[serde(untagged)]
 pub enum Value {
-    /// The motion has none, or nobody asked for it.
+    /// The motion has no such value, or it was not requested.
     Absent,
     /// A number.
     Number(f64),
-    /// A number of things.
+    /// A count.
     Count(usize),
-    /// The least and the greatest.
+    /// Minimum and maximum.
     Range([f64; 2]),
     /// Energies.
     Energies(EnergyBalance),
 }
 
 impl Value {
-    /// `factor · self + other · by`: an observable's derivative in another unit, which itself
-    /// changes. Both are of one kind.
+    /// `factor · self + other · by`: the derivative of an observable in another unit, which itself
+    /// varies. Both values are of one kind.
     pub(super) fn in_unit(self, factor: f64, value: Self, by: f64) -> Self {
         match (self, value) {
             (Self::Number(change), Self::Number(value)) => {
@@ -32,20 +32,18 @@ impl Value {
             (Self::Range(change), Self::Range(value)) => {
                 Self::Range([0, 1].map(|k| change[k] * factor + value[k] * by))
             }
-            (Self::Energies(change), Self::Energies(value)) => Self::Energies(EnergyBalance {
-                drive_work: change.drive_work * factor + value.drive_work * by,
-                beam_damping: change.beam_damping * factor + value.beam_damping * by,
-                sample_damping: change.sample_damping * factor + value.sample_damping * by,
-                stored: change.stored * factor + value.stored * by,
-                residual: 0.0,
-            }),
+            (Self::Energies(change), Self::Energies(value)) => {
+                let energies =
+                    change.with(value, 0.0, |change, value| change * factor + value * by);
+                Self::Energies(energies)
+            }
             _ => Self::Absent,
         }
     }
 }
 
 impl Value {
-    /// The number, if it is one.
+    /// The number, if the value is one.
     pub const fn number(self) -> Option<f64> {
         match self {
             Self::Number(number) => Some(number),
@@ -55,15 +53,15 @@ impl Value {
     }
 }
 
-/// A type that an observable may have.
+/// A type of observable.
 pub(super) trait Measurable: Copy {
-    /// Whether it is one number.
+    /// Whether it is a single number.
     const IS_NUMBER: bool = false;
     /// Not measured.
     const ABSENT: Self;
     /// The value.
     fn value(self) -> Value;
-    /// The value in a unit of which `1` is `unit`; absent where that is not known.
+    /// The value in a unit whose size is `unit`; absent if that is unknown.
     fn scaled(self, unit: Option<f64>) -> Self;
 }
 
@@ -125,7 +123,8 @@ impl Measurable for EnergyBalance {
     }
 
     fn scaled(self, unit: Option<f64>) -> Self {
-        unit.map_or(Self::UNKNOWN, |unit| self.in_units(unit))
+        let in_unit = |unit| self.with(self, self.residual, |energy, _| energy * unit);
+        unit.map_or(Self::UNKNOWN, in_unit)
     }
 }
 
@@ -142,7 +141,7 @@ impl<T: Measurable> Measurable for Option<T> {
     }
 }
 
-/// What an observable is while its derivative goes along.
+/// An observable with a derivative.
 pub(super) trait Varying {
     /// The derivative.
     fn change(self) -> Value;
@@ -150,8 +149,8 @@ pub(super) trait Varying {
 
 impl Varying for Dual {
     fn change(self) -> Value {
-        if self.derivative.is_finite() {
-            Value::Number(self.derivative)
+        if self.derivative().is_finite() {
+            Value::Number(self.derivative())
         } else {
             Value::Absent
         }
@@ -160,7 +159,7 @@ impl Varying for Dual {
 
 impl Varying for [Dual; 2] {
     fn change(self) -> Value {
-        let ends = self.map(|end| end.derivative);
+        let ends = self.map(Dual::derivative);
         if ends.iter().all(|end| end.is_finite()) {
             Value::Range(ends)
         } else {
@@ -171,13 +170,7 @@ impl Varying for [Dual; 2] {
 
 impl Varying for EnergyBalance<Dual> {
     fn change(self) -> Value {
-        let energies = EnergyBalance {
-            drive_work: self.drive_work.derivative,
-            beam_damping: self.beam_damping.derivative,
-            sample_damping: self.sample_damping.derivative,
-            stored: self.stored.derivative,
-            residual: 0.0,
-        };
+        let energies = self.with(self, 0.0, |energy, _| energy.derivative());
         if energies.drive_work.is_finite() {
             Value::Energies(energies)
         } else {
@@ -186,7 +179,7 @@ impl Varying for EnergyBalance<Dual> {
     }
 }
 
-/// Numbers that jump, or of which no derivative is known.
+/// Discontinuous numbers, or numbers without a known derivative.
 impl Varying for f64 {
     fn change(self) -> Value {
         Value::Absent

@@ -1,116 +1,41 @@
-//! Every motion that coexists: a census from many seeded starts, each attractor with what
-//! can be read off it.
+//! Coexisting attractors and their observables, found by a census: a sampling of initial states.
 
 use nanotap_arithmetic::ComplexFunctions as _;
 use nanotap_dynamics::{
     AttractorKind, Census, CensusEnd, CensusOptions, ClassifyOptions, Control, Fraction,
-    OrbitSearch, PeriodicOrbit, StartBox, StartBoxError, StartSet, census_of, find_orbits,
+    OrbitSearch, PeriodicOrbit, StartBox, StartSet, census_of, find_orbits,
 };
 use nanotap_volterra::coarse;
 use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 
 use crate::Error;
 use crate::case::Case;
 use crate::case::physical::Physical;
 use crate::model::Model;
-use crate::model::strobe::Strobe;
+use crate::model::model_map::ModelMap;
 use crate::observe::time_series::state_names;
-use crate::observe::{Observables, PhysicalMotion, Set, measure};
+use crate::observe::{ObservableSet, Observables, PhysicalMotion, measure};
+use crate::study::Study;
 use crate::study::approach::states_near;
 use crate::study::averaged_orbits::averaged_orbits;
 use crate::study::in_si::InSi;
-use crate::study::kind::Study;
-use crate::study::limits::MOST_PERIOD;
-use crate::study::orbit::{OrbitError, OrbitReport, report};
+use crate::study::limits::MAX_PERIOD;
+use crate::study::orbit::{OrbitReport, report};
 use crate::study::proof::Prover;
-use crate::study::simulate::{Classification, SimulateError, largest_exponent};
-use crate::study::start_box::{box_with, default_box, default_starts};
+use crate::study::request::options;
+use crate::study::simulate::{Classification, largest_exponent, orbit_evidence, torus_evidence};
+use crate::study::start_box::{box_with, default_starts};
 use crate::study::value::Intervals;
 
-/// How to look for attractors.
-#[derive(Clone, Debug, PartialEq)]
-pub struct AttractorsOptions {
-    /// Starts drawn evenly from the box; `None`: starts of every size, besides rest and the
-    /// linear responses, until the share of starts that may lead to motions not found is small
-    /// (the box is not used then).
-    pub starts: Option<usize>,
-    /// Seed of the starts.
-    pub seed: u64,
-    /// Where a given number of starts lies; `None`: [`default_box`].
-    pub start_box: Option<StartBox>,
-    /// Budgets of each start.
-    pub classify: ClassifyOptions,
-    /// Starts settled before any attractor is known.
-    pub pilots: usize,
-    /// Share of drawn starts that may lead to motions not found, with 95 % confidence, at which no more
-    /// are drawn; `None`: [`NONLINEAR_UNSEEN`] under a nonlinear law, else [`CensusOptions`]'s.
-    pub unseen: Option<f64>,
-    /// Periods in drive periods and states at drive phase 0 of orbits that are known near the model, in
-    /// addition to those from averaging: Newton closes them before any start is drawn.
-    pub seeds: Vec<(usize, Vec<f64>)>,
-    /// Longest period of unstable orbits to list; 0: none.
-    pub unstable: usize,
-    /// Harmonics reported of each orbit.
-    pub harmonics: usize,
-}
-
-impl Default for AttractorsOptions {
-    fn default() -> Self {
-        let census = CensusOptions::default();
-        Self {
-            starts: None,
-            seed: 1,
-            start_box: None,
-            classify: census.classify,
-            pilots: census.pilots,
-            unseen: None,
-            seeds: Vec::new(),
-            unstable: 0,
-            harmonics: 20,
-        }
-    }
-}
-
-/// Why there was no census.
-#[derive(Clone, Debug, thiserror::Error)]
-pub enum AttractorsError {
-    /// Nothing to start from.
-    #[error("at least one start is needed, 0 were asked for")]
-    NoStarts,
-    /// More than fit in memory.
-    #[error("{starts} starts are too many; {MOST_STARTS} at most")]
-    TooManyStarts {
-        /// How many were asked for.
-        starts: usize,
-    },
-    /// The box makes no sense.
-    #[error(transparent)]
-    Box(#[from] StartBoxError),
-    /// The box has another dimension than the model.
-    #[error("the box has {found} sides where {expected} are needed")]
-    Dimension {
-        /// Its sides.
-        found: usize,
-        /// The dimension of the model.
-        expected: usize,
-    },
-    /// An attractor could not be followed once more.
-    #[error(transparent)]
-    Motion(#[from] SimulateError),
-    /// An orbit could not be followed once more.
-    #[error(transparent)]
-    Orbit(#[from] OrbitError),
-}
-
-/// What a census found.
+/// Results of a census.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct Attractors {
-    /// Starts.
+    /// Number of initial states.
     pub starts: usize,
-    /// Seed of the starts.
+    /// Seed of the initial states.
     pub seed: u64,
-    /// Where the starts lay: name of the coordinate, lower and upper end.
+    /// Box of the initial states: name of the coordinate, lower and upper end.
     #[serde(rename = "box")]
     pub sides: Vec<Side>,
     /// Attractors, most frequent first.
@@ -118,52 +43,52 @@ pub struct Attractors {
     /// The same shares for each size of the starts, where they were drawn at several.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub sizes: Vec<SizeReport>,
-    /// How much may have been missed, where starts were drawn until that was small.
+    /// Bound on undiscovered motions, where sampling went on until it was small.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub unseen: Option<UnseenReport>,
-    /// Why no further start was followed.
+    /// Reason why the census ended.
     pub end: EndReport,
     /// Relative tolerance of the approximate flow on which starts were followed, if they were: shares,
     /// lifetimes and the bound of what was not seen are of that flow. Orbits, multipliers and exponents
     /// are always those of the exact flow.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub followed_at: Option<f64>,
-    /// Starts left undecided.
+    /// Undecided initial states.
     pub undecided: Vec<UndecidedStart>,
-    /// Part of the starts left undecided.
+    /// Fraction of the initial states that is undecided.
     pub undecided_fraction: Share,
-    /// Part of the starts that left every bound.
+    /// Fraction of the initial states whose motion is unbounded.
     pub unbounded: Share,
-    /// Chaos that ends, if some starts escaped from it while others had not yet.
+    /// Transient chaos, if some initial states escaped from it and others have not yet.
     pub transient_chaos: Option<TransientChaosReport>,
-    /// Unstable orbits, if they were looked for.
+    /// Unstable orbits, if requested.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub unstable: Option<Vec<InSi<OrbitReport>>>,
     /// Whether the work was stopped before all starts were done.
     pub cancelled: bool,
 }
 
-/// What became of the starts of one size.
+/// Results of the initial states of one size.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct SizeReport {
     /// Size of their box, as a part of the largest.
     pub scale: f64,
-    /// How many there were.
+    /// Number of initial states.
     pub starts: usize,
-    /// Part that goes to each attractor, in the order of the attractors.
+    /// Fraction that goes to each attractor, in the order of the attractors.
     pub fractions: Vec<f64>,
 }
 
-/// How much of the set of starts may lead to motions that were not found.
+/// Fraction of the initial states that may lead to undiscovered motions.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct UnseenReport {
-    /// Motions found.
+    /// Number of discovered motions.
     pub motions: usize,
-    /// Starts since the last of them was found.
+    /// Initial states since the last discovery.
     pub starts: usize,
-    /// With 95 % confidence at most this part of the starts leads to motions not found.
+    /// Upper bound, with 95 % confidence, of the fraction that leads to undiscovered motions.
     pub fraction: f64,
-    /// The part at which no more starts were to be drawn.
+    /// Fraction below which sampling ends.
     pub target: f64,
 }
 
@@ -171,28 +96,33 @@ pub struct UnseenReport {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
 #[serde(tag = "reason", rename_all = "snake_case")]
 pub enum EndReport {
-    /// All given starts were followed.
+    /// All requested initial states were followed.
     AllStarts,
-    /// The share of starts that may lead to motions not found is as small as requested.
+    /// The undiscovered fraction is as small as requested.
     BoundMet,
-    /// As many starts were drawn as a census draws at most.
+    /// The limit of initial states was reached.
     MaxStarts {
-        /// How many that is.
+        /// The limit.
         limit: usize,
     },
-    /// The starts took as many drive periods as a census takes at most.
+    /// The limit of drive periods was reached.
     MaxPeriods {
-        /// How many that is.
+        /// The limit.
         limit: usize,
+    },
+    /// The work took as many steps of the approximate flow as a census takes at most.
+    MaxSteps {
+        /// How many that is; a step of the exact flow counts as 100.
+        limit: u64,
     },
     /// The work was stopped.
     Cancelled,
 }
 
-/// A side of the box of starts.
+/// A side of the box of initial states.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct Side {
-    /// The coordinate.
+    /// Name of the coordinate.
     pub coordinate: String,
     /// Lower end.
     pub lower: f64,
@@ -200,14 +130,14 @@ pub struct Side {
     pub upper: f64,
 }
 
-/// A part of the starts.
+/// A fraction of the initial states.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct Share {
-    /// How many.
+    /// Count.
     pub count: usize,
-    /// As a part of all.
+    /// Fraction of all.
     pub fraction: f64,
-    /// Its 95 % interval (Wilson's).
+    /// 95 % confidence interval of the fraction (Wilson).
     pub fraction_interval: [f64; 2],
 }
 
@@ -221,25 +151,25 @@ impl From<Fraction> for Share {
     }
 }
 
-/// One attractor.
+/// An attractor.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct AttractorReport {
-    /// What it is.
+    /// Class of the motion.
     pub classification: Classification,
-    /// What part of the starts goes there.
+    /// Fraction of the initial states that reaches it.
     #[serde(flatten)]
     pub share: Share,
     /// Lyapunov exponents per drive period, largest first; of an orbit from its multipliers.
     pub lyapunov: Vec<f64>,
-    /// One standard error of each, where they are measured.
+    /// Standard error of each, where measured.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub lyapunov_errors: Option<Vec<f64>>,
-    /// Why it is named so, in words.
+    /// Evidence for the class, in words.
     pub evidence: String,
     /// The orbit, if it is periodic.
     #[serde(flatten)]
     pub orbit: Option<OrbitReport>,
-    /// What was seen of it, if it is not.
+    /// A recording of the motion, if it is not periodic.
     #[serde(flatten)]
     pub non_periodic: Option<NonPeriodic>,
     /// The same in SI, of a physical case.
@@ -248,7 +178,7 @@ pub struct AttractorReport {
 }
 
 impl Attractors {
-    /// Proves every orbit in it, as far as that can be.
+    /// Proves its orbits where possible.
     fn prove(&mut self, case: &Case) {
         let prover = Prover::new(case);
         let stable = self.attractors.iter_mut().filter_map(|a| a.orbit.as_mut());
@@ -280,7 +210,7 @@ impl Attractors {
     }
 }
 
-/// A motion that does not repeat.
+/// A motion that is not periodic.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct NonPeriodic {
     /// None.
@@ -292,39 +222,40 @@ pub struct NonPeriodic {
     pub observables: Observables,
 }
 
-/// A start left undecided.
+/// An undecided initial state.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct UndecidedStart {
-    /// Its number.
+    /// Number of the initial state.
     pub start: usize,
-    /// Where it began.
+    /// The initial state.
     pub state: Vec<f64>,
     /// Why there is none.
     pub reason: String,
 }
 
-/// Chaos that ends.
+/// Transient chaos.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct TransientChaosReport {
-    /// Lyapunov exponents per drive period while it lasts.
+    /// Lyapunov exponents per drive period while it lasts; empty where the exact flow was not followed
+    /// on it.
     pub lyapunov: Vec<f64>,
-    /// One standard error of each.
+    /// Standard error of each.
     pub lyapunov_errors: Vec<f64>,
     /// Mean lifetime in drive periods.
     pub lifetime: f64,
-    /// Its 95 % interval.
+    /// 95 % confidence interval of the mean lifetime.
     pub lifetime_interval: [f64; 2],
-    /// Escapes that it rests on.
+    /// Number of escapes behind the estimate.
     pub escapes: usize,
-    /// Part of the starts still on transient chaos at the end.
+    /// Fraction of the initial states that is still on transient chaos at the end.
     #[serde(rename = "wandering")]
     pub unescaped: Share,
-    /// Where the escaped ones went: index of the attractor and how many.
+    /// Attractors of the escapes: index and count.
     pub destinations: Vec<(usize, usize)>,
 }
 
 /// Most starts of a census: 480 MB of states at N = 3.
-pub const MOST_STARTS: usize = 1_000_000;
+pub const MAX_STARTS: usize = 1_000_000;
 /// Starts in a box that was given without their number.
 const STARTS_IN_A_BOX: usize = 256;
 /// Share of drawn starts that may lead to motions not found at which no more are drawn under a nonlinear
@@ -332,43 +263,50 @@ const STARTS_IN_A_BOX: usize = 256;
 pub const NONLINEAR_UNSEEN: f64 = 0.01;
 /// Drive periods of all starts together after which no more are drawn under a nonlinear law.
 const NONLINEAR_PERIODS: usize = 600_000;
+/// Harmonics reported of each orbit.
+const HARMONICS: usize = 20;
 /// Drive periods over which a motion that does not repeat is observed.
 pub const OBSERVED_PERIODS: usize = 512;
+/// Steps of the approximate flow after which a start is left undecided.
+const MAX_START_STEPS: u64 = 10_000_000;
 /// A state this many times larger than the box has left every bound.
 const OUT_OF_BOUNDS: f64 = 1e6;
 
-/// Takes the census.
+/// Finds coexisting attractors by sampling initial states.
 ///
 /// # Errors
-/// [`AttractorsError`] when the options make no sense.
+/// When the options are invalid for the model, or an attractor cannot be measured.
 pub fn attractors(
     model: &Model,
     options: &AttractorsOptions,
     control: &Control<'_>,
-) -> Result<Attractors, AttractorsError> {
-    match options.starts {
-        Some(0) => return Err(AttractorsError::NoStarts),
-        Some(starts) if starts > MOST_STARTS => {
-            return Err(AttractorsError::TooManyStarts { starts });
+) -> Result<Attractors, Error> {
+    let in_box = !options.sides.0.is_empty();
+    let starts = options.starts.or(in_box.then_some(STARTS_IN_A_BOX));
+    match starts {
+        Some(0) => {
+            return Err(Error::input(
+                "expected at least one start, got 0",
+                "give 1 or more {starts}",
+            ));
+        }
+        Some(starts) if starts > MAX_STARTS => {
+            return Err(Error::input(
+                format!("{starts} starts are too many; {MAX_STARTS} at most"),
+                "give fewer {starts}",
+            ));
         }
         _ => {}
     }
-    let start_box = options
-        .start_box
-        .clone()
-        .map_or_else(|| default_box(model), Ok)?;
-    if start_box.dimension() != model.dimension() {
-        let (found, expected) = (start_box.dimension(), model.dimension());
-        return Err(AttractorsError::Dimension { found, expected });
-    }
-    let set = match options.starts {
+    let start_box = box_with(model, &options.sides.numbers()?)?;
+    let set = match starts {
         Some(count) => StartSet::given(start_box.starts_until(options.seed, count, control)),
         None => default_starts(model, options.seed)?,
     };
     let averaged = averaged_orbits(model).into_iter();
     let averaged = averaged.map(|orbit| (orbit.period, orbit.states[0].clone()));
     let set = set.with_seeds(averaged.chain(options.seeds.iter().cloned()));
-    let map = Strobe::new(model);
+    let map = ModelMap::new(model);
     // Motions that were found are measured, also of work that was cancelled.
     let model = &model.with_grace();
     let budgets = budgets(model, options, &start_box);
@@ -405,16 +343,18 @@ fn budgets(model: &Model, options: &AttractorsOptions, start_box: &StartBox) -> 
     let unseen = options.unseen.unwrap_or(usual);
     let times = (usual / unseen).max(1.0);
     CensusOptions {
-        pilots: options.pilots,
-        classify: bounded(&options.classify, start_box),
+        classify: bounded(options, start_box),
         unseen,
-        max_starts: ((times * default.max_starts as f64) as usize).min(MOST_STARTS),
+        max_starts: ((times * default.max_starts as f64) as usize).min(MAX_STARTS),
         max_periods: (times * periods as f64) as usize,
+        max_steps: (times * default.max_steps as f64) as u64,
+        ..default
     }
 }
 
 /// The budgets of each start with a bound on the states that fits the box.
-fn bounded(classify: &ClassifyOptions, start_box: &StartBox) -> ClassifyOptions {
+fn bounded(options: &AttractorsOptions, start_box: &StartBox) -> ClassifyOptions {
+    let classify = ClassifyOptions::default();
     let widest = start_box
         .lower()
         .iter()
@@ -427,7 +367,9 @@ fn bounded(classify: &ClassifyOptions, start_box: &StartBox) -> ClassifyOptions 
     };
     ClassifyOptions {
         bound,
-        ..classify.clone()
+        max_steps: MAX_START_STEPS,
+        max_period: options.max_period,
+        ..classify
     }
 }
 
@@ -438,19 +380,23 @@ fn described(
     (options, budgets): (&AttractorsOptions, &CensusOptions),
     sides: Vec<Side>,
     unstable: Option<Vec<InSi<OrbitReport>>>,
-) -> Result<Attractors, AttractorsError> {
+) -> Result<Attractors, Error> {
     let starts = found.outcomes_by_start.len();
     let attractors = found
         .attractors
         .iter()
-        .map(|a| one(model, &a.kind, &a.state, a.fraction, options.harmonics))
+        .map(|a| one(model, &a.kind, &a.state, a.fraction))
         .collect::<Result<_, _>>()?;
     let transient_chaos = found
         .transient_chaos
         .as_ref()
         .map(|t| TransientChaosReport {
-            lyapunov: t.spectrum.exponents.clone(),
-            lyapunov_errors: t.spectrum.errors.clone(),
+            lyapunov: t
+                .spectrum
+                .iter()
+                .flat_map(|s| s.exponents.clone())
+                .collect(),
+            lyapunov_errors: t.spectrum.iter().flat_map(|s| s.errors.clone()).collect(),
             lifetime: t.lifetime.mean,
             lifetime_interval: [t.lifetime.low, t.lifetime.high],
             escapes: t.lifetime.escapes,
@@ -487,6 +433,9 @@ fn described(
             CensusEnd::MaxPeriods => EndReport::MaxPeriods {
                 limit: budgets.max_periods,
             },
+            CensusEnd::MaxSteps => EndReport::MaxSteps {
+                limit: budgets.max_steps,
+            },
         },
         followed_at: found.followed_coarsely.then_some(coarse::TOLERANCE),
         undecided: found
@@ -511,11 +460,9 @@ fn one(
     kind: &AttractorKind,
     state: &[f64],
     fraction: Fraction,
-    harmonics: usize,
-) -> Result<AttractorReport, AttractorsError> {
-    let non_periodic = || -> Result<Option<NonPeriodic>, AttractorsError> {
-        let observables =
-            measure(model, state, OBSERVED_PERIODS, Set::ALL).map_err(SimulateError::from)?;
+) -> Result<AttractorReport, Error> {
+    let non_periodic = || -> Result<Option<NonPeriodic>, Error> {
+        let observables = measure(model, state, OBSERVED_PERIODS, ObservableSet::ALL)?;
         Ok(Some(NonPeriodic {
             period: None,
             state: state.to_vec(),
@@ -524,29 +471,16 @@ fn one(
     };
     let (classification, spectrum, evidence, orbit, non_periodic) = match kind {
         AttractorKind::Periodic(orbit) => {
-            let evidence = format!(
-                "Newton closed a period-{} orbit (residual {:.1e}); largest |multiplier| {:.6}",
-                orbit.period,
-                orbit.residual,
-                orbit.spectral_radius()
-            );
+            let evidence = orbit_evidence(orbit);
             (Classification::Periodic, None, evidence, Some(orbit), None)
         }
-        AttractorKind::QuasiPeriodic(torus) => {
-            let evidence = format!(
-                "{}; Birkhoff averages agree to {:.1} digits; nearest return {:.1e}",
-                largest_exponent(&torus.spectrum),
-                torus.birkhoff_digits,
-                torus.nearest_return
-            );
-            (
-                Classification::QuasiPeriodic,
-                Some(&torus.spectrum),
-                evidence,
-                None,
-                non_periodic()?,
-            )
-        }
+        AttractorKind::QuasiPeriodic(torus) => (
+            Classification::QuasiPeriodic,
+            Some(&torus.spectrum),
+            torus_evidence(torus),
+            None,
+            non_periodic()?,
+        ),
         AttractorKind::Chaotic { spectrum, lifetime } => {
             let evidence = format!(
                 "{}; none of {} starts escaped in {:.0} periods together (mean lifetime above {:.0} at 95 %)",
@@ -573,7 +507,7 @@ fn one(
         ),
         lyapunov_errors: spectrum.map(|s| s.errors.clone()),
         evidence,
-        orbit: orbit.map(|o| report(model, o, harmonics)).transpose()?,
+        orbit: orbit.map(|o| report(model, o, HARMONICS)).transpose()?,
         non_periodic,
         physical: None,
     })
@@ -593,11 +527,11 @@ const SEARCHED_STARTS: usize = 64;
 
 fn unstable_orbits(
     model: &Model,
-    map: &Strobe,
+    map: &ModelMap,
     searched: &[Vec<f64>],
     options: &AttractorsOptions,
     control: &Control<'_>,
-) -> Result<Vec<InSi<OrbitReport>>, AttractorsError> {
+) -> Result<Vec<InSi<OrbitReport>>, Error> {
     let search = OrbitSearch {
         max_period: options.unstable,
         ..OrbitSearch::default()
@@ -607,82 +541,50 @@ fn unstable_orbits(
         .filter(|orbit| !orbit.is_stable())
         .map(|orbit| {
             Ok(InSi {
-                motion: report(model, orbit, options.harmonics)?,
+                motion: report(model, orbit, HARMONICS)?,
                 physical: None,
             })
         })
         .collect()
 }
 
-/// What a census is asked for.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct AttractorsRequest {
-    /// Starts, spread evenly over one box of states. Without it, starts of every size, from the
-    /// resonant response down to below the gap, go on until the share of starts that may lead to
-    /// motions not found is below {unseen}, or 5000 starts or 2,000,000 drive periods (600,000 under a
-    /// nonlinear law) are done
-    #[schemars(range(min = 1, max = MOST_STARTS), extend("x-value" = "S"))]
-    pub starts: Option<usize>,
-    /// Share of starts that may lead to motions not found, with 95 % confidence, at which no more are
-    /// drawn. Without it, 0.01 under a nonlinear law and 0.002 under a piecewise-linear one; a smaller
-    /// one raises the limits of {starts} and drive periods in proportion
-    #[schemars(range(min = 1e-5, max = 0.5), extend("x-value" = "PART"))]
-    pub unseen: Option<f64>,
-    /// Seed of the starts: the same seed gives the same answer on any number of threads
-    #[schemars(extend("x-value" = "K"))]
-    pub seed: u64,
-    /// Sides of one box of starts, as in a1=-1:1 or v2=-4:4; the others are derived from the linear
-    /// response to the drive. 256 starts if {starts} says no number
-    #[serde(rename = "box")]
-    #[schemars(extend("x-value" = "COORDINATE=LOW:HIGH"))]
-    pub sides: Intervals,
-    /// Longest period looked for
-    #[schemars(range(min = 1, max = MOST_PERIOD), extend("x-value" = "N"))]
-    pub max_period: usize,
-    /// Also list unstable orbits up to this period
-    #[schemars(range(min = 0, max = MOST_PERIOD), extend("x-value" = "N", "x-bare" = "4"))]
-    pub unstable: usize,
-    /// Prove in interval arithmetic that each orbit exists, is alone, and is stable or not
-    pub prove: bool,
-}
-
-impl Default for AttractorsRequest {
-    fn default() -> Self {
-        let options = AttractorsOptions::default();
-        Self {
-            starts: options.starts,
-            unseen: options.unseen,
-            seed: options.seed,
-            sides: Intervals::default(),
-            max_period: options.classify.max_period,
-            unstable: options.unstable,
-            prove: false,
-        }
-    }
-}
-
-impl AttractorsRequest {
-    /// How to look for the attractors of `model`.
-    ///
-    /// # Errors
-    /// When a side of the box is none.
-    pub fn options(&self, model: &Model) -> Result<AttractorsOptions, Error> {
-        let default = AttractorsOptions::default();
-        Ok(AttractorsOptions {
-            starts: self
-                .starts
-                .or((!self.sides.0.is_empty()).then_some(STARTS_IN_A_BOX)),
-            seed: self.seed,
-            unseen: self.unseen,
-            start_box: Some(box_with(model, &self.sides.numbers()?)?),
-            classify: ClassifyOptions {
-                max_period: self.max_period,
-                ..default.classify.clone()
-            },
-            unstable: self.unstable,
-            ..default
-        })
+options! {
+    /// Options of a census.
+    pub struct AttractorsOptions {
+        /// Number of initial states, spread evenly over one box. Default: initial states at all
+        /// amplitudes, from the resonant response down to below the gap, until the share that may
+        /// lead to undiscovered motions is below {unseen}, or 5000 initial states or 2,000,000
+        /// drive periods (600,000 under a nonlinear law) are reached. Under a nonlinear law an initial
+        /// state is followed for at most 10 million steps of the approximate flow, and all together
+        /// for 50 million; a step of the exact flow counts as 100
+        #[schemars(range(min = 1, max = MAX_STARTS), extend("x-value" = "S"))]
+        pub starts: Option<usize> = None,
+        /// Share of initial states that may lead to undiscovered motions, with 95 % confidence, at
+        /// which sampling ends. Default: 0.01 under a nonlinear law and 0.002 under a
+        /// piecewise-linear one; a smaller value raises the limits of {starts}, drive periods and
+        /// steps in proportion
+        #[schemars(range(min = 1e-5, max = 0.5), extend("x-value" = "PART"))]
+        pub unseen: Option<f64> = None,
+        /// Seed of the initial states; results do not depend on the number of threads
+        #[schemars(extend("x-value" = "K"))]
+        pub seed: u64 = 1,
+        /// Sides of one box of initial states, as in a1=-1:1 or v2=-4:4; other sides follow from
+        /// the linear response to the drive. 256 initial states unless {starts} is given
+        #[serde(rename = "box")]
+        #[schemars(extend("x-value" = "COORDINATE=LOW:HIGH"))]
+        pub sides: Intervals = Intervals::default(),
+        /// Longest period of orbits, in drive periods
+        #[schemars(range(min = 1, max = MAX_PERIOD), extend("x-value" = "N"))]
+        pub max_period: usize = ClassifyOptions::default().max_period,
+        /// Also list unstable orbits up to this period
+        #[schemars(range(min = 0, max = MAX_PERIOD), extend("x-value" = "N", "x-bare" = "4"))]
+        pub unstable: usize = 0,
+        /// Prove existence, local uniqueness and stability of each orbit by interval arithmetic
+        pub prove: bool = false,
+        /// Periods in drive periods and states at drive phase 0 of orbits that are known near the model, in
+        /// addition to those from averaging: Newton closes them before any start is drawn.
+        #[serde(skip)]
+        pub seeds: Vec<(usize, Vec<f64>)> = Vec::new(),
     }
 }
 
@@ -692,22 +594,21 @@ pub struct AttractorsStudy;
 
 impl Study for AttractorsStudy {
     const NAME: &'static str = "attractors";
-    const ABOUT: &'static str = "Every motion that coexists: a census from many seeded starts";
+    const ABOUT: &'static str = "Find coexisting attractors by sampling initial states";
     const COUNTED: &'static str = "starts";
     const PARTIAL: bool = true;
-    type Request = AttractorsRequest;
+    type Options = AttractorsOptions;
     type Report = Attractors;
 
     fn compute(
         case: &Case,
-        request: &AttractorsRequest,
+        options: &AttractorsOptions,
         control: &Control<'_>,
     ) -> Result<Attractors, Error> {
         let model = case.model()?;
-        let options = request.options(&model)?;
         // A piecewise-linear census takes less time than the approach.
         let known = match model.nonlinear {
-            Some(_) => states_near(case, options.classify.max_period, control)?,
+            Some(_) => states_near(case, options.max_period, control)?,
             None => Vec::new(),
         };
         let seeds = known.into_iter().filter_map(|orbit| {
@@ -716,31 +617,15 @@ impl Study for AttractorsStudy {
         });
         let options = AttractorsOptions {
             seeds: seeds.collect(),
-            ..options
+            ..options.clone()
         };
         let mut found = attractors(&model, &options, control)?;
-        if request.prove {
+        if options.prove {
             found.prove(case);
         }
         Ok(match case.physical() {
             Some(resolved) => found.in_si(resolved),
             None => found,
         })
-    }
-}
-
-impl From<AttractorsError> for crate::Error {
-    fn from(error: AttractorsError) -> Self {
-        match error {
-            AttractorsError::NoStarts => Self::input(error.to_string(), "give 1 or more {starts}"),
-            AttractorsError::TooManyStarts { .. } => {
-                Self::input(error.to_string(), "give fewer {starts}")
-            }
-            AttractorsError::Box(_) | AttractorsError::Dimension { .. } => {
-                Self::input(error.to_string(), "change it with {box}")
-            }
-            AttractorsError::Motion(error) => error.into(),
-            AttractorsError::Orbit(error) => error.into(),
-        }
     }
 }

@@ -6,10 +6,10 @@
 //!
 //! Fails by omission: subharmonic motions, and motions with strong harmonics of the gap.
 
-use nanotap_dynamics::{PeriodicOrbit, ShootingOptions, StroboscopicMap, close_orbit};
+use nanotap_dynamics::{PeriodicOrbit, Scheduling as _, ShootingOptions, close_orbit};
 
 use crate::model::Model;
-use crate::model::strobe::Strobe;
+use crate::model::model_map::ModelMap;
 
 /// Residual of an orbit of the approximate map, as a part of its scale.
 const COARSE_RESIDUAL: f64 = 1e-4;
@@ -22,7 +22,7 @@ pub fn averaged_orbits(model: &Model) -> Vec<PeriodicOrbit> {
     let Some(nonlinear) = &model.nonlinear else {
         return Vec::new();
     };
-    let mut exact = Strobe::new(model);
+    let mut exact = ModelMap::new(model);
     let states = nonlinear.averaged_states();
     let guesses = match exact.coarse() {
         Some(coarse) => coarse_states(coarse, &states),
@@ -40,7 +40,7 @@ pub fn averaged_orbits(model: &Model) -> Vec<PeriodicOrbit> {
 }
 
 /// The states of orbits of the approximate map from these guesses.
-fn coarse_states(mut coarse: Strobe, guesses: &[Vec<f64>]) -> Vec<Vec<f64>> {
+fn coarse_states(mut coarse: ModelMap, guesses: &[Vec<f64>]) -> Vec<Vec<f64>> {
     let options = ShootingOptions {
         residual_tolerance: COARSE_RESIDUAL,
         explains_stalls: false,
@@ -49,9 +49,7 @@ fn coarse_states(mut coarse: Strobe, guesses: &[Vec<f64>]) -> Vec<Vec<f64>> {
     let mut orbits: Vec<PeriodicOrbit> = Vec::new();
     for guess in guesses {
         if let Ok(orbit) = close_orbit(&mut coarse, guess, 1, &options) {
-            let near = |known: &PeriodicOrbit| {
-                known.distance_to(&orbit).1 <= COARSE_DISTANCE * orbit.scale()
-            };
+            let near = |known: &PeriodicOrbit| known.is_near(&orbit, COARSE_DISTANCE);
             if !orbits.iter().any(near) {
                 orbits.push(orbit);
             }
@@ -59,12 +57,4 @@ fn coarse_states(mut coarse: Strobe, guesses: &[Vec<f64>]) -> Vec<Vec<f64>> {
     }
     let states = orbits.into_iter().flat_map(|orbit| orbit.states);
     states.collect()
-}
-
-/// Guesses of the distances at which the gap swings with this amplitude, the farthest first: the
-/// distance ([`Model::height`] at rest) and the state at drive phase 0, for Newton's method. Empty
-/// for a model without a nonlinear force.
-pub fn averaged_distances(model: &Model, amplitude: f64) -> Vec<(f64, Vec<f64>)> {
-    let nonlinear = model.nonlinear.as_ref();
-    nonlinear.map_or_else(Vec::new, |own| own.averaged_distances(amplitude))
 }

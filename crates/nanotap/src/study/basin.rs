@@ -20,24 +20,23 @@ use serde_json::json;
 
 use crate::Error;
 use crate::case::Case;
-use crate::case::CaseError;
 use crate::dataset::schema::Kind;
 use crate::dataset::{
     Axis, Block, Coordinate, Grid, Schema, Store, StoreError, Values, Variable, Work, WorkError,
     attributes, chunk_files, work,
 };
 use crate::model::Model;
-use crate::model::strobe::{Strobe, together};
+use crate::model::model_map::{ModelMap, together};
 use crate::observe::time_series::state_names;
-use crate::study::attractors::MOST_STARTS;
-use crate::study::kind::DatasetStudy;
-use crate::study::limits::{MOST_PERIOD, MOST_PERIODS};
-use crate::study::recipe::{Computation, Recipe};
-use crate::study::simulate::{Classification, SimulateError, starting_state};
+use crate::study::attractors::MAX_STARTS;
+use crate::study::limits::{MAX_PERIOD, MAX_PERIODS};
+use crate::study::request::options;
+use crate::study::simulate::{Classification, starting_state};
+use crate::study::{Computation, DatasetPlan, DatasetStudy};
 
 /// Most points along an axis, and of a slice.
 const MOST: usize = 1_000_000;
-const MOST_POINTS: usize = 4_000_000_000;
+const MAX_POINTS: usize = 4_000_000_000;
 /// Points that a chunk should not exceed, and chunks that a large slice is cut into.
 const CHUNK_POINTS: usize = 1 << 20;
 const CHUNKS: usize = 64;
@@ -45,7 +44,7 @@ const CHUNKS: usize = 64;
 /// for, and how many of its points are classified at a time.
 const COARSE: usize = 64;
 const STRANGERS: usize = 64;
-/// Strobe points by which an attractor is shown.
+/// ModelMap points by which an attractor is shown.
 const SHOWN: usize = 512;
 /// Labels of points that go to no attractor.
 pub(crate) const UNSETTLED: i32 = -1;
@@ -62,11 +61,11 @@ const ENTRIES: &str = "state_entries";
 pub struct SliceRange {
     /// The name of the entry of the state.
     pub name: String,
-    /// First value.
+    /// First value of the axis.
     pub from: f64,
-    /// Last value.
+    /// Last value of the axis.
     pub to: f64,
-    /// How many values, both ends included.
+    /// Number of values, ends included.
     pub count: usize,
 }
 
@@ -74,11 +73,13 @@ impl SliceRange {
     /// Reads `name=from:to:count`.
     ///
     /// # Errors
-    /// [`BasinError::Range`] with what was given and what would be right.
-    pub fn parse(given: &str) -> Result<Self, BasinError> {
-        let refuse = |what: String| BasinError::Range {
-            given: given.into(),
-            what,
+    /// When the text has another form, or the range is empty or not finite.
+    pub fn parse(given: &str) -> Result<Self, Error> {
+        let refuse = |what: String| {
+            Error::input(
+                format!("`{given}`: {what}"),
+                "write a1=-1:1:200: entry, first value, last value, how many",
+            )
         };
         let form =
             || refuse("write it as in a1=-1:1:200: name, first value, last value, count".into());
@@ -89,12 +90,12 @@ impl SliceRange {
         };
         let number = |text: &str| match text.parse::<f64>() {
             Ok(value) if value.is_finite() => Ok(value),
-            _ => Err(refuse(format!("`{text}` is no finite number"))),
+            _ => Err(refuse(format!("`{text}` is not a finite number"))),
         };
         let (from, to) = (number(from)?, number(to)?);
         let count = count
             .parse()
-            .map_err(|_| refuse(format!("`{count}` is no whole number")))?;
+            .map_err(|_| refuse(format!("`{count}` is not a whole number")))?;
         if !(2..=MOST).contains(&count) {
             return Err(refuse(format!(
                 "{count} points; from 2 to {MOST} can be had"
@@ -113,15 +114,14 @@ impl SliceRange {
         })
     }
 
-    fn axis(&self, names: &[String]) -> Result<SliceAxis, BasinError> {
-        let coordinate =
-            names
-                .iter()
-                .position(|n| *n == self.name)
-                .ok_or_else(|| BasinError::Name {
-                    given: self.name.clone(),
-                    known: names.join(", "),
-                })?;
+    fn axis(&self, names: &[String]) -> Result<SliceAxis, Error> {
+        let coordinate = names.iter().position(|n| *n == self.name).ok_or_else(|| {
+            axes(format!(
+                "the state has no entry `{}`; there are {}",
+                self.name,
+                names.join(", ")
+            ))
+        })?;
         Ok(SliceAxis {
             coordinate,
             from: self.from,
@@ -131,120 +131,14 @@ impl SliceRange {
     }
 }
 
-/// Which slice, and how.
-#[derive(Clone, Debug, PartialEq)]
-pub struct BasinOptions {
-    /// The horizontal axis.
-    pub x: SliceRange,
-    /// The vertical axis.
-    pub y: SliceRange,
-    /// The other entries of the state (those of the axes do not matter); `None`: 0.
-    pub state: Option<Vec<f64>>,
-    /// States on the attractors, if they are known; `None`: a census finds them.
-    pub attractors: Option<Vec<Vec<f64>>>,
-    /// Starts of the census.
-    pub starts: usize,
-    /// Their seed.
-    pub seed: u64,
-    /// Periods after which a point is called unsettled.
-    pub periods: usize,
-    /// Longest period looked for.
-    pub max_period: usize,
-}
-
-impl BasinOptions {
-    /// The slice through rest, with a census of 64 starts and up to 1000 periods a point.
-    pub fn new(x: SliceRange, y: SliceRange) -> Self {
-        let (starts, periods, max_period) = (64, 1000, 64);
-        Self {
-            x,
-            y,
-            state: None,
-            attractors: None,
-            starts,
-            seed: 1,
-            periods,
-            max_period,
-        }
-    }
-
-    fn classify(&self) -> ClassifyOptions {
-        ClassifyOptions {
-            max_period: self.max_period,
-            lyapunov: LyapunovOptions {
-                max_periods: 5000,
-                ..LyapunovOptions::default()
-            },
-            ..ClassifyOptions::default()
-        }
-    }
-}
-
-/// Why basins could not be computed.
-#[derive(Debug, thiserror::Error)]
-pub enum BasinError {
-    /// Words that are no axis.
-    #[error("`{given}`: {what}")]
-    Range {
-        /// What was given.
-        given: String,
-        /// What is wrong, and what would be right.
-        what: String,
-    },
-    /// A name that is no entry of the state.
-    #[error("the state has no entry `{given}`; there are {known}")]
-    Name {
-        /// What was given.
-        given: String,
-        /// What there is.
-        known: String,
-    },
-    /// A slice has two directions.
-    #[error("both axes are `{name}`")]
-    SameAxis {
-        /// The entry of the state.
-        name: String,
-    },
-    /// More than fit in memory.
-    #[error("{starts} starts are too many; {MOST_STARTS} at most")]
-    TooManyStarts {
-        /// How many were asked for.
-        starts: usize,
-    },
-    /// A number that must be larger.
-    #[error("{what}; at least 1 is needed")]
-    Zero {
-        /// What was 0.
-        what: &'static str,
-    },
-    /// The slice makes no sense.
-    #[error(transparent)]
-    Slice(#[from] nanotap_dynamics::BasinError),
-    /// A state does not fit.
-    #[error(transparent)]
-    State(#[from] SimulateError),
-    /// The case makes no sense.
-    #[error(transparent)]
-    Model(#[from] CaseError),
-    /// Nothing attracts.
-    #[error("no attractor was found: {why}")]
-    NoAttractor {
-        /// What the starts came to instead.
-        why: String,
-    },
-    /// Stopped during the census.
-    #[error("stopped before the attractors were known")]
-    Cancelled,
-}
-
-/// An attractor, as the dataset holds it.
+/// An attractor of a basin dataset.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Known {
-    /// What it is.
+    /// Class of the motion.
     pub classification: String,
     /// Its minimal period, if it is an orbit.
     pub period: Option<usize>,
-    /// Largest modulus of a multiplier, if it is an orbit.
+    /// Largest |multiplier|, if it is an orbit.
     pub multiplier: Option<f64>,
     /// Largest Lyapunov exponent a period, if it was measured.
     pub lyapunov: Option<f64>,
@@ -265,46 +159,41 @@ impl Basin {
     /// Checks the options and finds the attractors.
     ///
     /// # Errors
-    /// When the options make no sense, nothing attracts, or `control` stopped it.
-    pub fn new(
-        case: &Case,
-        options: &BasinOptions,
-        control: &Control<'_>,
-    ) -> Result<Self, BasinError> {
+    /// When the options are invalid, no attractor is found, or the work was cancelled.
+    pub fn new(case: &Case, options: &BasinOptions, control: &Control<'_>) -> Result<Self, Error> {
         for (what, number) in [
             ("0 starts", options.starts),
             ("0 periods a point", options.periods),
             ("0 as the longest period", options.max_period),
         ] {
             if number == 0 {
-                return Err(BasinError::Zero { what });
+                return Err(axes(format!("{what}; at least 1 is needed")));
             }
         }
-        if options.starts > MOST_STARTS {
-            return Err(BasinError::TooManyStarts {
-                starts: options.starts,
-            });
+        if options.starts > MAX_STARTS {
+            return Err(Error::input(
+                format!(
+                    "{} starts are too many; {MAX_STARTS} at most",
+                    options.starts
+                ),
+                "give fewer {starts}",
+            ));
         }
-        if options.x.count.saturating_mul(options.y.count) > MOST_POINTS {
-            let what = format!(
-                "{} by {} points; {MOST_POINTS} at most",
-                options.x.count, options.y.count
-            );
-            return Err(BasinError::Range {
-                given: options.x.name.clone(),
-                what,
-            });
+        let [x, y] = &options.axes()?;
+        if x.count.saturating_mul(y.count) > MAX_POINTS {
+            return Err(axes(format!(
+                "`{}`: {} by {} points; {MAX_POINTS} at most",
+                x.name, x.count, y.count
+            )));
         }
         let model = case.model()?;
         let names = state_names(&model);
         let rest = vec![0.0; model.dimension()];
         let origin = starting_state(&model, Some(options.state.as_deref().unwrap_or(&rest)))?;
-        if options.x.name == options.y.name {
-            return Err(BasinError::SameAxis {
-                name: options.x.name.clone(),
-            });
+        if x.name == y.name {
+            return Err(axes(format!("both axes are `{}`", x.name)));
         }
-        let slice = Slice::new(origin, options.x.axis(&names)?, options.y.axis(&names)?)?;
+        let slice = Slice::new(origin, x.axis(&names)?, y.axis(&names)?)?;
         let starts = match &options.attractors {
             Some(states) => {
                 for state in states {
@@ -314,18 +203,18 @@ impl Basin {
             }
             None => starts_in(&slice, model.dimension(), options, control)?,
         };
-        let map = Strobe::new(&model);
+        let map = ModelMap::new(&model);
         let how = CensusOptions {
             classify: options.classify(),
             ..CensusOptions::default()
         };
         let found = census(&map, &starts, &how, control);
         if found.cancelled {
-            return Err(BasinError::Cancelled);
+            return Err(Error::stopped());
         }
         if found.attractors.is_empty() {
-            let why = format!(
-                "of {} starts {} left every bound, {} remained undecided{}",
+            return Err(Error::numerics(format!(
+                "no attractor was found: of {} starts {} left every bound, {} remained undecided{}",
                 starts.len(),
                 found.unbounded.count,
                 found.undecided.len(),
@@ -333,8 +222,7 @@ impl Basin {
                     .undecided
                     .first()
                     .map_or(String::new(), |(_, reason)| format!(" ({reason})")),
-            );
-            return Err(BasinError::NoAttractor { why });
+            )));
         }
         let budget = Budget {
             max_periods: options.periods,
@@ -343,7 +231,7 @@ impl Basin {
         let given = options.attractors.is_some();
         let mut attractors = found.attractors;
         let mut basins = Basins::new(&map, slice.clone(), &attractors, budget.clone())?;
-        // States that somebody gave are what points are to be told apart by.
+        // Given states are the only attractors that points are assigned to.
         while !given && !control.is_cancelled() {
             let strangers = strangers(&map, &slice, &basins);
             let taken = census(&map, &strangers, &how, control).attractors;
@@ -362,24 +250,19 @@ impl Basin {
             basins = Basins::new(&map, slice.clone(), &attractors, budget.clone())?;
         }
         if control.is_cancelled() {
-            return Err(BasinError::Cancelled);
+            return Err(Error::stopped());
         }
         let known: Vec<Known> = attractors
             .iter()
             .map(|a| Known::of(a, &mut map.clone()))
             .collect();
-        let schema = schema(case, options, &names, &basins, &known);
+        let schema = schema(case, options, [x, y], &names, &basins, &known);
         Ok(Self {
             model,
             basins,
             schema,
             known,
         })
-    }
-
-    /// What its dataset holds.
-    pub fn schema(&self) -> &Schema {
-        &self.schema
     }
 
     /// The attractors; a label is an index into them.
@@ -392,42 +275,15 @@ impl Basin {
         self.basins.len()
     }
 
-    /// Computes the chunks that `store`, made for [`schema`](Self::schema), still lacks.
-    ///
-    /// # Errors
-    /// When the work was stopped (what is finished stays), or the store refuses.
-    pub fn compute(&self, store: &Store, how: &Work<'_>) -> Result<(), WorkError> {
-        let map = self.map(&how.control);
-        work(
-            store,
-            how,
-            rows,
-            |block, item| self.row(&map, block, item, &how.control),
-            |_, rows| columns(&rows),
-        )
-    }
-
-    /// The files of one chunk, computed on this thread: the same bytes wherever that is.
-    /// `None` when it was stopped, and for a chunk that there is not.
-    pub fn chunk_files(&self, chunk: usize, control: &Control<'_>) -> Option<Vec<Vec<u8>>> {
-        let grid = &self.schema.grid;
-        let block = (chunk < grid.chunks()).then(|| grid.block(chunk))?;
-        let map = self.map(control);
-        let labels = (0..rows(&block))
-            .map(|item| self.row(&map, &block, item, control))
-            .collect::<Option<Vec<_>>>()?;
-        Some(chunk_files(&self.schema, &block, &columns(&labels)))
-    }
-
     /// The map, whose motions end once `control` cancels the work.
-    fn map(&self, control: &Control<'_>) -> Strobe {
-        Strobe::new(&self.model.clone().cancelled_by(&control.flag()))
+    fn map(&self, control: &Control<'_>) -> ModelMap {
+        ModelMap::new(&self.model.clone().cancelled_by(&control.flag()))
     }
 
     /// The labels of one row of the slice; `None` when it was stopped.
     fn row(
         &self,
-        map: &Strobe,
+        map: &ModelMap,
         block: &Block,
         item: usize,
         control: &Control<'_>,
@@ -437,7 +293,7 @@ impl Basin {
         let end = (y + 1) * length;
         let mut map = map.clone();
         let mut labels = Vec::with_capacity(length);
-        // A row may take minutes: whoever stops it need not wait for its end.
+        // A row may take minutes: cancelled work does not wait for its end.
         for start in (y * length..end).step_by(UNSTOPPED) {
             if control.is_cancelled() {
                 return None;
@@ -452,15 +308,28 @@ impl Basin {
 
 impl Computation for Basin {
     fn schema(&self) -> &Schema {
-        self.schema()
+        &self.schema
     }
 
     fn compute(&self, store: &Store, how: &Work<'_>) -> Result<(), WorkError> {
-        self.compute(store, how)
+        let map = self.map(&how.control);
+        work(
+            store,
+            how,
+            rows,
+            |block, item| self.row(&map, block, item, &how.control),
+            |_, rows| columns(&rows),
+        )
     }
 
     fn chunk_files(&self, chunk: usize, control: &Control<'_>) -> Option<Vec<Vec<u8>>> {
-        self.chunk_files(chunk, control)
+        let grid = &self.schema.grid;
+        let block = (chunk < grid.chunks()).then(|| grid.block(chunk))?;
+        let map = self.map(control);
+        let labels = (0..rows(&block))
+            .map(|item| self.row(&map, &block, item, control))
+            .collect::<Option<Vec<_>>>()?;
+        Some(chunk_files(&self.schema, &block, &columns(&labels)))
     }
 }
 
@@ -479,7 +348,7 @@ fn columns(rows: &[Vec<Label>]) -> Vec<Values> {
 }
 
 /// States among a coarse grid of the slice that come to none of the attractors.
-fn strangers(map: &Strobe, slice: &Slice, basins: &Basins) -> Vec<Vec<f64>> {
+fn strangers(map: &ModelMap, slice: &Slice, basins: &Basins) -> Vec<Vec<f64>> {
     let (x, y) = slice.axes();
     let some = |count: usize| {
         let many = COARSE.min(count);
@@ -511,20 +380,17 @@ fn starts_in(
     dimension: usize,
     options: &BasinOptions,
     control: &Control<'_>,
-) -> Result<Vec<Vec<f64>>, BasinError> {
+) -> Result<Vec<Vec<f64>>, Error> {
     // The first point has the least values along both axes, the last the greatest.
     let (mut lower, mut upper) = (vec![0.0; dimension], vec![0.0; dimension]);
     slice.state(0, &mut lower);
     slice.state(slice.len() - 1, &mut upper);
-    let sides = StartBox::new(lower, upper).map_err(|error| BasinError::Range {
-        given: options.x.name.clone(),
-        what: error.to_string(),
-    })?;
+    let sides = StartBox::new(lower, upper).map_err(|error| axes(error.to_string()))?;
     Ok(sides.starts_until(options.seed, options.starts, control))
 }
 
 impl Known {
-    fn of(attractor: &Attractor, map: &mut Strobe) -> Self {
+    fn of(attractor: &Attractor, map: &mut ModelMap) -> Self {
         let spectrum = |s: &nanotap_dynamics::LyapunovSpectrum| Some(s.largest().0);
         match &attractor.kind {
             AttractorKind::Periodic(orbit) => Self {
@@ -551,15 +417,15 @@ impl Known {
         }
     }
 
-    /// What it is called: `period 4`, `chaotic`.
+    /// Name of the attractor: `period 4`, `chaotic`.
     pub fn name(&self) -> String {
         self.period
             .map_or_else(|| self.classification.clone(), |n| format!("period {n}"))
     }
 }
 
-/// Strobe states along a motion.
-fn stretch(map: &mut Strobe, start: &[f64]) -> Vec<Vec<f64>> {
+/// ModelMap states along a motion.
+fn stretch(map: &mut ModelMap, start: &[f64]) -> Vec<Vec<f64>> {
     let mut state = start.to_vec();
     let mut states = Vec::new();
     while states.len() < SHOWN && map.advance(&mut state).is_ok() {
@@ -580,11 +446,11 @@ fn number(label: Label) -> i32 {
 fn schema(
     case: &Case,
     options: &BasinOptions,
+    [x, y]: [&SliceRange; 2],
     names: &[String],
     basins: &Basins,
     known: &[Known],
 ) -> Schema {
-    let (x, y) = (&options.x, &options.y);
     let rows = (basins.len().div_ceil(CHUNKS)).min(CHUNK_POINTS) / x.count;
     let grid = Grid {
         axes: vec![
@@ -644,31 +510,31 @@ fn schema(
     }
 }
 
-/// What part of a slice goes where.
+/// Fractions of a slice by attractor.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct Shares {
     /// Points of the slice.
     pub points: usize,
-    /// The attractors, with the part of the points that goes to each.
+    /// The attractors, each with its fraction of the points.
     pub attractors: Vec<AttractorShare>,
-    /// Part of the points that reached none within the periods.
+    /// Fraction of the points that reached no attractor within the periods.
     pub unsettled: f64,
-    /// Part of the points that left every bound.
+    /// Fraction of the points whose motion is unbounded.
     pub unbounded: f64,
-    /// Part of the points that could not be followed.
+    /// Fraction of the points that could not be computed.
     pub failed: f64,
 }
 
-/// An attractor and its part of a slice.
+/// An attractor and its fraction of a slice.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct AttractorShare {
-    /// What it is.
+    /// Class of the motion.
     pub classification: String,
     /// Its minimal period, if it is an orbit.
     pub period: Option<usize>,
     /// A state on it.
     pub state: Vec<f64>,
-    /// Part of the points of the slice that goes there.
+    /// Fraction of the points of the slice that reaches it.
     pub fraction: f64,
 }
 
@@ -697,7 +563,7 @@ pub(crate) fn labels(store: &Store, block: &Block) -> Result<Vec<i32>, StoreErro
     }
 }
 
-/// What part of a finished dataset goes where.
+/// Computes the fractions of a finished dataset.
 ///
 /// # Errors
 /// When a chunk is missing or damaged.
@@ -748,75 +614,76 @@ pub(crate) fn entries(store: &Store) -> Vec<String> {
     text.split(' ').map(Into::into).collect()
 }
 
-/// What the study of basins is asked for.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct BasinRequest {
-    /// The horizontal axis, as in a1=-1:1:200: entry of the state, first value, last value, how
-    /// many (a1…aN, v1…vN; oscillator: x, v)
-    #[schemars(extend("x-value" = "ENTRY=FROM:TO:COUNT", "x-required" = true))]
-    pub x: String,
-    /// The vertical axis
-    #[schemars(extend("x-value" = "ENTRY=FROM:TO:COUNT", "x-required" = true))]
-    pub y: String,
-    /// The other entries of the state, in full: a1,…,aN,v1,…,vN; without it, 0
-    #[schemars(extend("x-value" = "A1,…"))]
-    pub state: Option<Vec<f64>>,
-    /// States on the attractors, or what a census found; without it, a census in the slice
-    /// finds them
-    #[schemars(extend("x-own" = true))]
-    pub attractors: Option<Vec<Vec<f64>>>,
-    /// Starts of the census
-    #[schemars(range(min = 1, max = MOST_STARTS), extend("x-value" = "S"))]
-    pub starts: usize,
-    /// Seed of the census
-    #[schemars(extend("x-value" = "K"))]
-    pub seed: u64,
-    /// Drive periods after which a point is called unsettled
-    #[schemars(range(min = 1, max = MOST_PERIODS), extend("x-value" = "P"))]
-    pub periods: usize,
-    /// Longest period looked for
-    #[schemars(range(min = 1, max = MOST_PERIOD), extend("x-value" = "N"))]
-    pub max_period: usize,
+options! {
+    /// Options of basins of attraction.
+    pub struct BasinOptions {
+        /// Horizontal axis, as in a1=-1:1:200: entry of the state (a1…aN, v1…vN; oscillator: x, v),
+        /// first value, last value, count
+        #[schemars(extend("x-value" = "ENTRY=FROM:TO:COUNT", "x-required" = true))]
+        pub x: String = String::new(),
+        /// Vertical axis, in the same form
+        #[schemars(extend("x-value" = "ENTRY=FROM:TO:COUNT", "x-required" = true))]
+        pub y: String = String::new(),
+        /// State with the other entries: a1,…,aN,v1,…,vN; default: 0
+        #[schemars(extend("x-value" = "A1,…"))]
+        pub state: Option<Vec<f64>> = None,
+        /// States on the attractors, or the result of a census; default: a census in the slice
+        #[schemars(extend("x-own" = true))]
+        pub attractors: Option<Vec<Vec<f64>>> = None,
+        /// Initial states of the census
+        #[schemars(range(min = 1, max = MAX_STARTS), extend("x-value" = "S"))]
+        pub starts: usize = 64,
+        /// Seed of the census
+        #[schemars(extend("x-value" = "K"))]
+        pub seed: u64 = 1,
+        /// Drive periods after which a point counts as unsettled
+        #[schemars(range(min = 1, max = MAX_PERIODS), extend("x-value" = "P"))]
+        pub periods: usize = 1000,
+        /// Longest period of orbits, in drive periods
+        #[schemars(range(min = 1, max = MAX_PERIOD), extend("x-value" = "N"))]
+        pub max_period: usize = 64,
+    }
 }
 
-impl Default for BasinRequest {
-    fn default() -> Self {
+impl BasinOptions {
+    /// Default options on the slice of two axes, each as in `a1=-1:1:200`.
+    pub fn over(x: &str, y: &str) -> Self {
         Self {
-            x: String::new(),
-            y: String::new(),
-            state: None,
-            attractors: None,
-            starts: 64,
-            seed: 1,
-            periods: 1000,
-            max_period: 64,
+            x: x.to_owned(),
+            y: y.to_owned(),
+            ..Self::default()
+        }
+    }
+
+    /// The two axes of the slice.
+    ///
+    /// # Errors
+    /// When one is not valid.
+    pub fn axes(&self) -> Result<[SliceRange; 2], Error> {
+        let axis = |option, given: &str| SliceRange::parse(given).map_err(|error| error.at(option));
+        Ok([axis("x", &self.x)?, axis("y", &self.y)?])
+    }
+
+    fn classify(&self) -> ClassifyOptions {
+        ClassifyOptions {
+            max_period: self.max_period,
+            lyapunov: LyapunovOptions {
+                max_periods: 5000,
+                ..LyapunovOptions::default()
+            },
+            ..ClassifyOptions::default()
         }
     }
 }
 
-impl BasinRequest {
-    /// Which slice, and how.
-    ///
-    /// # Errors
-    /// When an axis is none.
-    pub fn options(&self) -> Result<BasinOptions, Error> {
-        let range = |option: &str, given: &str| {
-            SliceRange::parse(given).map_err(|error| {
-                let remedy = "write a1=-1:1:200: entry, first value, last value, how many";
-                Error::option(option, error.to_string(), remedy)
-            })
-        };
-        Ok(BasinOptions {
-            x: range("x", &self.x)?,
-            y: range("y", &self.y)?,
-            state: self.state.clone(),
-            attractors: self.attractors.clone(),
-            starts: self.starts,
-            seed: self.seed,
-            periods: self.periods,
-            max_period: self.max_period,
-        })
+/// An error that other axes would remove.
+fn axes(message: String) -> Error {
+    Error::input(message, "change {x} or {y}")
+}
+
+impl From<nanotap_dynamics::BasinError> for Error {
+    fn from(error: nanotap_dynamics::BasinError) -> Self {
+        axes(error.to_string())
     }
 }
 
@@ -826,36 +693,21 @@ pub struct BasinStudy;
 
 impl DatasetStudy for BasinStudy {
     const NAME: &'static str = "basin";
-    const ABOUT: &'static str = "Basins of attraction on a two-dimensional slice of initial states";
+    const ABOUT: &'static str =
+        "Compute basins of attraction on a two-dimensional slice of initial states";
     const COUNTED: &'static str = "rows";
-    type Request = BasinRequest;
+    type Options = BasinOptions;
     type Report = Shares;
 
-    fn plan(case: &Case, request: &BasinRequest, control: &Control<'_>) -> Result<Recipe, Error> {
-        let basin = Basin::new(case, &request.options()?, control)?;
-        Ok(Box::new(basin))
+    fn prepare(
+        case: &Case,
+        options: &BasinOptions,
+        control: &Control<'_>,
+    ) -> Result<DatasetPlan, Error> {
+        Ok(Box::new(Basin::new(case, options, control)?))
     }
 
     fn report(store: &Store) -> Result<Shares, StoreError> {
         shares(store)
-    }
-}
-
-impl From<BasinError> for crate::Error {
-    fn from(error: BasinError) -> Self {
-        match error {
-            BasinError::State(error) => error.into(),
-            BasinError::Model(error) => error.into(),
-            BasinError::NoAttractor { .. } => Self::numerics(error.to_string()),
-            BasinError::Cancelled => Self::new(
-                crate::ErrorKind::Stopped,
-                format!("{error}; nothing was written"),
-            )
-            .remedy("run it again"),
-            BasinError::TooManyStarts { .. } => {
-                Self::input(error.to_string(), "give fewer {starts}")
-            }
-            _ => Self::input(error.to_string(), "change {x} or {y}"),
-        }
     }
 }

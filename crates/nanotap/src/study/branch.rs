@@ -2,223 +2,121 @@
 //! bifurcations, and the loci of these in two parameters.
 
 use nanotap_dynamics::{
-    AttractorKind, Bifurcation, BifurcationKind, Branch, BranchEnd, BranchPoint, CensusOptions,
-    ClassifyOptions, ContinuationError, ContinuationOptions, Control, CurveOptions, Diagram,
-    DiagramBranch, DiagramOptions, Direction, GlobalOptions, LyapunovOptions, PeriodicOrbit,
-    StartBoxError, StartSet, assemble_diagram, attractors_along, continue_orbit, trace_curve,
+    AttractorContinuationOptions, AttractorKind, Bifurcation, BifurcationKind, Branch, BranchEnd,
+    BranchPoint, CensusOptions, ClassifyOptions, ContinuationOptions, Control, CurveOptions,
+    Diagram, DiagramBranch, DiagramOptions, Direction, LyapunovOptions, PeriodicOrbit,
+    ShootingOptions, StartSet, assemble_diagram, continue_attractors, continue_orbit, trace_curve,
 };
 use rayon::prelude::*;
 use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 
-use crate::Error;
-use crate::case::{Case, CaseError, Key, ParameterUnit, PlaneFamily};
+use crate::case::{Case, Key, ParameterUnit, PlaneFamily};
+use crate::model::Model;
+use crate::model::model_map::ModelMap;
 use crate::model::recording::Recording;
-use crate::model::strobe::Strobe;
-use crate::model::{Model, MotionError};
-use crate::observe::{Observables, PhysicalMotion, Set, measure};
-use crate::study::kind::Study;
-use crate::study::limits::{MOST_DOUBLINGS, MOST_PERIOD, MOST_SEED_STARTS};
-use crate::study::orbit::{OrbitError, OrbitOptions, orbit, pairs};
+use crate::observe::{ObservableSet, Observables, PhysicalMotion, measure};
+use crate::study::Study;
+use crate::study::limits::{MAX_DOUBLINGS, MAX_PERIOD, MAX_SEED_STARTS};
+use crate::study::orbit::{OrbitOptions, orbit, pairs};
+use crate::study::request::options;
 use crate::study::start_box::default_starts;
-use crate::study::value::{Amount, Interval, key_and_ends};
+use crate::study::value::{Amount, Interval, values};
+use crate::{Error, ErrorKind};
 
-/// How to follow.
-#[derive(Clone, Debug, PartialEq)]
-pub struct BranchOptions {
+/// A parameter and its range, in its own unit.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Range {
     /// The parameter.
     pub key: Key,
-    /// Its value at the start.
+    /// Value at the start.
     pub from: f64,
-    /// The other end of its range.
+    /// The other end.
     pub to: f64,
-    /// Period of the orbit at the start; `None`: that of the motion where a run settles.
-    pub period: Option<usize>,
-    /// State near which the orbit at the start is looked for; `None`: where a run settles.
-    pub state: Option<Vec<f64>>,
-    /// Doublings to follow: 0 for the one branch alone.
-    pub doublings: usize,
-    /// Whether doubled branches end at their first orbit that is not stable.
-    pub stable_doublings: bool,
-    /// Seeds from a census instead of the one orbit at the start.
-    pub census: Option<SeedOptions>,
-    /// A second parameter and its range: loci of the bifurcations are traced in both.
-    pub second: Option<(Key, f64, f64)>,
-    /// Longest step, as a part of the range.
-    pub max_step: f64,
-    /// Points after which a branch is cut.
-    pub max_points: usize,
-    /// Branches after which no more are followed.
-    pub max_branches: usize,
-    /// A branch is left where a disturbance grows by more than this in the orbit's period.
-    pub max_multiplier: f64,
-    /// What is measured of every orbit.
-    pub observables: Set,
 }
 
-/// A census at several parameter values.
-#[derive(Clone, Debug, PartialEq)]
-pub struct SeedOptions {
-    /// Parameter values, evenly spaced over the range, its ends included.
-    pub values: usize,
-    /// Starts drawn at each, besides rest and the linear responses.
-    pub starts: usize,
-    /// Seed of the starts.
-    pub seed: u64,
-    /// Longest period.
-    pub max_period: usize,
-}
-
-impl Default for SeedOptions {
-    fn default() -> Self {
-        Self {
-            values: 65,
-            starts: 16,
-            seed: 1,
-            max_period: 16,
+impl Range {
+    fn check(self, case: &Case) -> Result<(), Error> {
+        let Self { key, from, to } = self;
+        if !(from.is_finite() && to.is_finite() && from != to) {
+            return Err(Error::input(
+                format!(
+                    "{} cannot be followed from {from} to {to}: two different, finite values are \
+                     needed",
+                    key.path()
+                ),
+                "change {from} or {to}",
+            ));
         }
-    }
-}
-
-impl BranchOptions {
-    /// Defaults for one parameter over a range.
-    pub fn over(key: Key, from: f64, to: f64) -> Self {
-        let continuation = ContinuationOptions::over(from, to);
-        Self {
-            key,
-            from,
-            to,
-            period: None,
-            state: None,
-            doublings: 0,
-            stable_doublings: false,
-            census: None,
-            second: None,
-            max_step: continuation.max_step,
-            max_points: 20_000,
-            max_branches: 64,
-            max_multiplier: continuation.max_multiplier,
-            observables: Set::COMMON,
-        }
+        [from, to]
+            .into_iter()
+            .try_for_each(|value| self.model(case, value).map(drop))
     }
 
-    fn continuation(&self) -> ContinuationOptions {
+    fn model(self, case: &Case, value: f64) -> Result<Model, Error> {
+        case.with(self.key, value).model().map_err(|error| {
+            Error::input(
+                format!("at {} = {value}: {error}", self.key.path()),
+                "keep {from}, {to} and {second} where the model makes sense",
+            )
+        })
+    }
+
+    fn continuation(self, options: &BranchOptions) -> ContinuationOptions {
         let over = ContinuationOptions::over(self.from, self.to);
         ContinuationOptions {
-            max_step: self.max_step,
-            initial_step: over.initial_step.min(self.max_step),
-            max_points: self.max_points,
-            max_multiplier: self.max_multiplier,
+            max_step: options.max_step,
+            initial_step: over.initial_step.min(options.max_step),
+            max_points: options.max_points,
+            grazings: options.grazings,
+            max_multiplier: options.max_multiplier,
             ..over
         }
     }
 
-    fn diagram(&self) -> DiagramOptions {
+    fn diagram(self, options: &BranchOptions) -> DiagramOptions {
         DiagramOptions {
-            continuation: self.continuation(),
-            doublings: self.doublings,
-            stable_doublings: self.stable_doublings,
-            max_branches: self.max_branches,
+            continuation: self.continuation(options),
+            doublings: options.doublings(),
+            stable_doublings: options.stable_doublings,
+            max_branches: MAX_BRANCHES,
         }
     }
 }
 
-/// Why there is no branch.
-#[derive(Clone, Debug, thiserror::Error)]
-pub enum BranchError {
-    /// A range that is none.
-    #[error(
-        "{name} cannot be followed from {from} to {to}: two different, finite values are needed"
-    )]
-    Range {
-        /// The parameter.
-        name: &'static str,
-        /// Its start.
-        from: f64,
-        /// Its end.
-        to: f64,
-    },
-    /// A step that is none.
-    #[error("a longest step of {given} is no part of the range: between 0 and 1 is needed")]
-    Step {
-        /// What was given.
-        given: f64,
-    },
-    /// The case at a parameter value makes no sense.
-    #[error("at {name} = {value}: {error}")]
-    Model {
-        /// The parameter.
-        name: &'static str,
-        /// Its value.
-        value: f64,
-        /// Why not.
-        error: CaseError,
-    },
-    /// No orbit at the start.
-    #[error("at {name} = {value}: {error}")]
-    Start {
-        /// The parameter.
-        name: &'static str,
-        /// Its value.
-        value: f64,
-        /// Why not.
-        error: OrbitError,
-    },
-    /// A census found no periodic motion anywhere.
-    #[error(
-        "no stable orbit was found at any of {values} values of {name}, so there is nothing to follow"
-    )]
-    NoSeeds {
-        /// The parameter.
-        name: &'static str,
-        /// Values tried.
-        values: usize,
-    },
-    /// The second parameter is the first.
-    #[error("the second parameter must be another than {name}")]
-    SameParameter {
-        /// The parameter.
-        name: &'static str,
-    },
-    /// The default box makes no sense.
-    #[error(transparent)]
-    Box(#[from] StartBoxError),
-    /// The branch could not be begun.
-    #[error(transparent)]
-    Continuation(#[from] ContinuationError),
-    /// A point could not be followed once more.
-    #[error(transparent)]
-    Flow(#[from] MotionError),
-}
+/// Points after which a branch is cut.
+const MAX_POINTS: usize = 20_000;
+/// Branches after which no more are followed.
+const MAX_BRANCHES: usize = 64;
 
 /// Branches with their points and bifurcations.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct BranchReport {
     /// The parameter's key.
     pub parameter: &'static str,
-    /// Its value at the start.
+    /// Value at the start.
     pub from: f64,
-    /// The other end of its range.
+    /// Value at the other end of the range.
     pub to: f64,
     /// The branches.
     pub branches: Vec<BranchSummary>,
-    /// Their points, branch by branch, in order along the arc.
+    /// Points, branch by branch, in order of arc length.
     pub points: Vec<PointReport>,
-    /// How many points between these are not listed.
+    /// Number of omitted points between these.
     pub points_left_out: usize,
-    /// Their bifurcations.
+    /// Bifurcations of the branches.
     pub bifurcations: Vec<BifurcationReport>,
-    /// Loci in two parameters, if a second one was given.
+    /// Bifurcation curves in two parameters, if requested.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub loci: Option<Loci>,
-    /// What could not be followed.
+    /// Failures.
     pub failures: Vec<FailureReport>,
     /// Whether the work was stopped before it was done.
     pub cancelled: bool,
     /// The parameter, for figures.
     #[serde(skip)]
     pub key: Key,
-    /// Of a physical case: what a value of the parameter is to be multiplied with for SI.
+    /// For a physical case, the factor from values of the parameter to SI.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub parameter_unit: Option<ParameterUnit>,
 }
@@ -238,20 +136,20 @@ impl BranchReport {
     }
 }
 
-/// One branch.
+/// A branch.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct BranchSummary {
     /// Period of its orbits.
     pub period: usize,
-    /// Index of the branch that it left at a flip.
+    /// Index of the branch from which it emerges at a flip.
     pub parent: Option<usize>,
-    /// Doublings between it and a seed.
+    /// Number of period doublings from a seed.
     pub depth: usize,
-    /// Points.
+    /// Number of points.
     pub points: usize,
     /// Least and greatest parameter reached.
     pub range: [f64; 2],
-    /// Why it ends.
+    /// Reason of its end.
     pub end: String,
     /// Whether it was followed to its end: out of the range, into another branch, or to
     /// where the motion ceases to be.
@@ -261,11 +159,11 @@ pub struct BranchSummary {
 /// One orbit of a branch.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct PointReport {
-    /// Index of its branch.
+    /// Index of the branch.
     pub branch: usize,
     /// Period.
     pub period: usize,
-    /// The parameter.
+    /// Value of the parameter.
     pub parameter: f64,
     /// State at drive phase 0.
     pub state: Vec<f64>,
@@ -273,7 +171,7 @@ pub struct PointReport {
     pub multipliers: Vec<[f64; 2]>,
     /// Whether every multiplier is inside the unit circle.
     pub stable: bool,
-    /// What it looks like.
+    /// Observables in the model's units.
     #[serde(flatten)]
     pub observables: Observables,
     /// The same in SI, where the parameter is a quantity of a physical case.
@@ -286,25 +184,25 @@ pub struct PointReport {
 pub struct BifurcationReport {
     /// fold, flip, neimark-sacker, grazing or crossing.
     pub kind: &'static str,
-    /// Index of its branch.
+    /// Index of the branch.
     pub branch: usize,
     /// Period of the orbit.
     pub period: usize,
-    /// The parameter.
+    /// Value of the parameter.
     pub parameter: f64,
-    /// Width of the last bracket of the parameter.
+    /// Width of the final bracket of the parameter.
     pub uncertainty: f64,
     /// State at drive phase 0.
     pub state: Vec<f64>,
     /// Floquet multipliers.
     pub multipliers: Vec<[f64; 2]>,
-    /// Of a Neimark–Sacker point: angle of the pair in degrees.
+    /// Angle of the multiplier pair at a Neimark–Sacker point, degrees.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub angle: Option<f64>,
-    /// Of a grazing: when, in drive periods from the state.
+    /// Time of a grazing, in drive periods from the state.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub time: Option<f64>,
-    /// What it looks like.
+    /// Observables in the model's units.
     #[serde(flatten)]
     pub observables: Observables,
     /// The same in SI, where the parameter is a quantity of a physical case.
@@ -312,7 +210,7 @@ pub struct BifurcationReport {
     pub physical: Option<PhysicalMotion>,
 }
 
-/// Loci of bifurcations in two parameters.
+/// Bifurcation curves in two parameters.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct Loci {
     /// The second parameter's key.
@@ -326,7 +224,7 @@ pub struct Loci {
     pub key: Key,
 }
 
-/// One locus.
+/// A bifurcation curve.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct CurveReport {
     /// fold, flip, neimark-sacker, grazing or crossing.
@@ -337,19 +235,19 @@ pub struct CurveReport {
     pub first: Vec<f64>,
     /// The second parameter along it.
     pub second: Vec<f64>,
-    /// Why it ends, at its first and last point.
+    /// Reasons of its ends, at the first and last point.
     pub ends: [String; 2],
     /// What it meets at its first and last point: grazing, codimension two, or cut where it could
     /// not be followed; nothing at the edge of the window.
     pub meets: [Option<&'static str>; 2],
 }
 
-/// Something that could not be followed.
+/// An orbit or branch that could not be followed.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct FailureReport {
     /// Where.
     pub parameter: f64,
-    /// Why.
+    /// Reason.
     pub reason: String,
 }
 
@@ -367,9 +265,10 @@ pub const fn kind_name(kind: BifurcationKind) -> &'static str {
 /// Branches on which given orbits lie, as these come: see [`branches_through`].
 pub(in crate::study) struct BranchesThrough<'a> {
     case: &'a Case,
+    range: Range,
     options: &'a BranchOptions,
     diagram: Diagram,
-    /// Those asked for so far.
+    /// Orbits given so far.
     given: Vec<(f64, PeriodicOrbit)>,
 }
 
@@ -380,11 +279,14 @@ impl<'a> BranchesThrough<'a> {
     /// As [`branch`].
     pub(in crate::study) fn new(
         case: &'a Case,
+        range: Range,
         options: &'a BranchOptions,
-    ) -> Result<Self, BranchError> {
-        check(case, options)?;
+    ) -> Result<Self, Error> {
+        range.check(case)?;
+        options.check_step()?;
         Ok(Self {
             case,
+            range,
             options,
             diagram: Diagram::default(),
             given: Vec::new(),
@@ -405,8 +307,8 @@ impl<'a> BranchesThrough<'a> {
                 self.given.push((value, orbit));
             }
         }
-        let family = self.case.family(self.options.key);
-        let how = self.options.diagram();
+        let family = self.case.family(self.range.key);
+        let how = self.range.diagram(self.options);
         let new = &self.given[known..];
         self.diagram.extend(&family, new, &how, control);
     }
@@ -420,24 +322,30 @@ impl<'a> BranchesThrough<'a> {
     pub(in crate::study) fn report(self, control: &Control<'_>) -> BranchReport {
         BranchReport {
             cancelled: control.is_cancelled(),
-            ..described(self.case, self.options, &self.diagram)
+            ..described(
+                self.case,
+                self.range,
+                self.options.observables,
+                &self.diagram,
+            )
         }
     }
 }
 
-/// Follows the branches on which given orbits lie, each with its value of the parameter,
-/// both ways over the whole range; `period`, `state` and `census` of the options do not
+/// Follows the branches on which given orbits lie, each with its value of the parameter, both ways
+/// over the whole range. Of the options only the step, the doublings and the largest multiplier
 /// matter.
 ///
 /// # Errors
 /// As [`branch`].
 pub fn branches_through(
     case: &Case,
+    range: Range,
     seeds: &[(f64, PeriodicOrbit)],
     options: &BranchOptions,
     control: &Control<'_>,
-) -> Result<BranchReport, BranchError> {
-    let mut branches = BranchesThrough::new(case, options)?;
+) -> Result<BranchReport, Error> {
+    let mut branches = BranchesThrough::new(case, range, options)?;
     branches.follow(seeds.iter().cloned(), control);
     Ok(branches.report(control))
 }
@@ -445,21 +353,36 @@ pub fn branches_through(
 /// Follows branches of `case`.
 ///
 /// # Errors
-/// [`BranchError`] when the options make no sense or there is nothing to follow.
+/// When the options are invalid for the case, or no orbit is found.
 pub fn branch(
     case: &Case,
     options: &BranchOptions,
     control: &Control<'_>,
-) -> Result<BranchReport, BranchError> {
-    check(case, options)?;
-    let family = case.family(options.key);
-    let continuation = options.continuation();
-    let seeds = match &options.census {
-        Some(census) => census_seeds(case, options, census, control)?,
-        None => vec![(options.from, first_orbit(case, options)?)],
+) -> Result<BranchReport, Error> {
+    let range = options.range(case)?;
+    let second = options.second_range(case)?;
+    range.check(case)?;
+    if let Some(second) = second {
+        second.check(case)?;
+    }
+    options.check_step()?;
+    if second.is_some_and(|second| second.key == range.key) {
+        return Err(Error::input(
+            format!(
+                "the second parameter must be another than {}",
+                range.key.path()
+            ),
+            "change {second} or {parameter}",
+        ));
+    }
+    let family = case.family(range.key);
+    let seeds = if options.diagram {
+        census_seeds(case, range, options, control)?
+    } else {
+        vec![(range.from, first_orbit(case, range, options)?)]
     };
-    let diagram = if options.doublings == 0 && options.census.is_none() {
-        let direction = if options.to > options.from {
+    let diagram = if options.doublings() == 0 && !options.diagram {
+        let direction = if range.to > range.from {
             Direction::Increasing
         } else {
             Direction::Decreasing
@@ -470,7 +393,7 @@ pub fn branch(
             *parameter,
             orbit,
             direction,
-            &continuation,
+            &range.continuation(options),
             control,
         )?;
         Diagram {
@@ -482,106 +405,84 @@ pub fn branch(
             failures: Vec::new(),
         }
     } else {
-        assemble_diagram(&family, &seeds, &options.diagram(), control)
+        assemble_diagram(&family, &seeds, &range.diagram(options), control)
     };
-    let mut report = described(case, options, &diagram);
-    if let Some((key, low, high)) = options.second {
+    let mut report = described(case, range, options.observables, &diagram);
+    if let Some(second) = second {
         report.loci = Some(loci(
             case,
-            options,
+            range,
             &diagram,
-            (key, low, high),
+            second,
             &mut report.failures,
             control,
         ));
     }
     report.cancelled = control.is_cancelled();
+    report.parameter_unit = case.parameter_unit(range.key);
     Ok(report)
 }
 
-fn check(case: &Case, options: &BranchOptions) -> Result<(), BranchError> {
-    let ranges = [(options.key, options.from, options.to)];
-    for (key, from, to) in ranges.into_iter().chain(options.second) {
-        let name = key.path();
-        if !(from.is_finite() && to.is_finite() && from != to) {
-            return Err(BranchError::Range { name, from, to });
-        }
-        for value in [from, to] {
-            case.with(key, value)
-                .model()
-                .map_err(|error| BranchError::Model { name, value, error })?;
-        }
-    }
-    if !(options.max_step > 0.0 && options.max_step <= 1.0) {
-        return Err(BranchError::Step {
-            given: options.max_step,
-        });
-    }
-    match options.second {
-        Some((key, ..)) if key == options.key => {
-            Err(BranchError::SameParameter { name: key.path() })
-        }
-        _ => Ok(()),
-    }
-}
-
-fn model_at(case: &Case, key: Key, value: f64) -> Result<Model, BranchError> {
-    let name = key.path();
-    case.with(key, value)
-        .model()
-        .map_err(|error| BranchError::Model { name, value, error })
-}
-
-fn first_orbit(case: &Case, options: &BranchOptions) -> Result<PeriodicOrbit, BranchError> {
-    let model = model_at(case, options.key, options.from)?;
-    let wanted = OrbitOptions {
+fn first_orbit(case: &Case, range: Range, options: &BranchOptions) -> Result<PeriodicOrbit, Error> {
+    let model = range.model(case, range.from)?;
+    let options = OrbitOptions {
         period: options.period,
         state: options.state.clone(),
         ..OrbitOptions::default()
     };
-    let failed = |error| BranchError::Start {
-        name: options.key.path(),
-        value: options.from,
-        error,
+    let failed = |error: Error| {
+        let message = format!(
+            "at {} = {}: {}",
+            range.key.path(),
+            range.from,
+            error.message()
+        );
+        match error.kind {
+            ErrorKind::BadInput => Error::input(message, "change {state} or {period}"),
+            kind => Error::new(kind, message).remedy(ELSEWHERE),
+        }
     };
-    let found = orbit(&model, &wanted).map_err(failed)?;
+    let found = orbit(&model, &options).map_err(failed)?;
     // Newton again, from where it is, for the orbit itself.
     nanotap_dynamics::close_orbit_from_points(
-        &mut Strobe::new(&model),
+        &mut ModelMap::new(&model),
         &found.states.concat(),
         found.period,
-        &wanted.shooting,
+        &ShootingOptions::default(),
     )
     .map_err(|error| failed(error.into()))
 }
+
+/// Remedy where the start has no orbit to follow.
+const ELSEWHERE: &str = "begin elsewhere with {from}, or give a {state} near an orbit";
 
 /// Stable orbits at several values of the parameter: those of a census at each, and those
 /// that the ones of the neighbouring values lead to, until no value gains another.
 fn census_seeds(
     case: &Case,
+    range: Range,
     options: &BranchOptions,
-    seeds: &SeedOptions,
     control: &Control<'_>,
-) -> Result<Vec<(f64, PeriodicOrbit)>, BranchError> {
-    let steps = seeds.values.max(2) - 1;
+) -> Result<Vec<(f64, PeriodicOrbit)>, Error> {
+    let steps = options.values.max(2) - 1;
     let values: Vec<f64> = (0..=steps)
         .map(|k| k as f64 / steps as f64)
-        .map(|t| options.from * (1.0 - t) + options.to * t)
+        .map(|t| range.from * (1.0 - t) + range.to * t)
         .collect();
-    // Where there is no model there is no map, and nobody asks for starts.
-    let starts = |k: usize, _: &Strobe| {
-        let model = model_at(case, options.key, values[k]).ok();
-        let drawn = model.and_then(|model| default_starts(&model, seeds.seed).ok());
+    // Where there is no model there is no map, and no starts are needed.
+    let starts = |k: usize, _: &ModelMap| {
+        let model = range.model(case, values[k]).ok();
+        let drawn = model.and_then(|model| default_starts(&model, options.seed).ok());
         drawn.unwrap_or_else(|| StartSet::given(Vec::new()))
     };
     let classify = ClassifyOptions::default();
-    let how = GlobalOptions {
+    let how = AttractorContinuationOptions {
         census: CensusOptions {
-            pilots: seeds.starts,
-            max_starts: seeds.starts,
-            max_periods: SEED_PERIODS * seeds.starts,
+            pilots: options.starts,
+            max_starts: options.starts,
+            max_periods: SEED_PERIODS * options.starts,
             classify: ClassifyOptions {
-                max_period: seeds.max_period,
+                max_period: SEED_MAX_PERIOD,
                 lyapunov: LyapunovOptions {
                     max_periods: SEED_PERIODS,
                     ..classify.lyapunov
@@ -591,8 +492,8 @@ fn census_seeds(
             ..CensusOptions::default()
         },
     };
-    let family = case.family(options.key);
-    let known = attractors_along(&family, &values, starts, &how, control);
+    let family = case.family(range.key);
+    let known = continue_attractors(&family, &values, starts, &how, control);
     let mut found = Vec::new();
     for (value, at) in values.iter().zip(known) {
         for each in at.attractors {
@@ -602,22 +503,34 @@ fn census_seeds(
         }
     }
     if found.is_empty() && !control.is_cancelled() {
-        return Err(BranchError::NoSeeds {
-            name: options.key.path(),
-            values: values.len(),
-        });
+        return Err(Error::numerics(format!(
+            "no stable orbit was found at any of {} values of {}, so there is nothing to follow",
+            values.len(),
+            range.key.path()
+        ))
+        .remedy(ELSEWHERE));
     }
     Ok(found)
 }
 
-fn described(case: &Case, options: &BranchOptions, diagram: &Diagram) -> BranchReport {
+fn described(
+    case: &Case,
+    range: Range,
+    observables: ObservableSet,
+    diagram: &Diagram,
+) -> BranchReport {
     // Branches that were followed are measured, also of work that was cancelled.
     let case = &case.with_grace();
-    let key = options.key;
+    let key = range.key;
+    let measured = Measured {
+        case,
+        range,
+        observables,
+    };
     let mut report = BranchReport {
         parameter: key.path(),
-        from: options.from,
-        to: options.to,
+        from: range.from,
+        to: range.to,
         branches: Vec::new(),
         points: Vec::new(),
         points_left_out: 0,
@@ -642,7 +555,7 @@ fn described(case: &Case, options: &BranchOptions, diagram: &Diagram) -> BranchR
     let kept: Vec<usize> = (0..branches.len())
         .filter(|&k| branches[k].branch.points.len() > 1)
         .filter(|&k| {
-            let span = (options.to - options.from).abs();
+            let span = (range.to - range.from).abs();
             !(0..k).any(|earlier| are_one(&branches[earlier].branch, &branches[k].branch, span))
         })
         .collect();
@@ -656,41 +569,16 @@ fn described(case: &Case, options: &BranchOptions, diagram: &Diagram) -> BranchR
         report
             .branches
             .push(summary(branch, parent, *depth, end(branch)));
-        // An orbit that grazes may be closed and yet not be measured: the rest stands.
-        let unmeasured = |parameter, what: &str, error: &BranchError| FailureReport {
-            parameter,
-            reason: format!("the {what} is left out, its motion cannot be measured: {error}"),
-        };
-        let points: Vec<_> = (branch.points.par_iter())
-            .with_max_len(1)
-            .filter(|_| !case.cancel().is_cancelled())
-            .map(|p| {
-                point(case, options, index, p)
-                    .map_err(|error| unmeasured(p.parameter, "point", &error))
-            })
-            .collect();
-        for point in points {
-            match point {
-                Ok(point) => report.points.push(point),
-                Err(_) if case.cancel().is_cancelled() => {}
-                Err(failure) => report.failures.push(failure),
-            }
-        }
-        let bifurcations: Vec<_> = (branch.bifurcations.par_iter())
-            .with_max_len(1)
-            .filter(|_| !case.cancel().is_cancelled())
-            .map(|b| {
-                bifurcation(case, options, index, b)
-                    .map_err(|error| unmeasured(b.parameter, kind_name(b.kind), &error))
-            })
-            .collect();
-        for bifurcation in bifurcations {
-            match bifurcation {
-                Ok(found) => report.bifurcations.push(found),
-                Err(_) if case.cancel().is_cancelled() => {}
-                Err(failure) => report.failures.push(failure),
-            }
-        }
+        let failures = &mut report.failures;
+        let points = measured.all(&branch.points, failures, |p| {
+            (p.parameter, "point", measured.point(index, p))
+        });
+        report.points.extend(points);
+        let bifurcations = measured.all(&branch.bifurcations, failures, |b| {
+            let found = measured.bifurcation(index, b);
+            (b.parameter, kind_name(b.kind), found)
+        });
+        report.bifurcations.extend(bifurcations);
         // What the user stopped is no failure of the branch.
         let stopped = matches!(branch.end, BranchEnd::Cancelled);
         if branch.end.is_failure() && !stopped {
@@ -707,7 +595,7 @@ fn described(case: &Case, options: &BranchOptions, diagram: &Diagram) -> BranchR
     report
 }
 
-/// Why a branch ends, in words.
+/// Reason of a branch's end, in words.
 fn end_of(case: &Case, key: Key, branch: &Branch) -> String {
     let shown = |value| case.shown(key, value);
     match branch.end {
@@ -765,101 +653,130 @@ fn summary(branch: &Branch, parent: Option<usize>, depth: usize, end: String) ->
     }
 }
 
-/// What an orbit looks like, in the model's units and, where physical quantities vary, in SI.
-fn seen(
-    case: &Case,
-    options: &BranchOptions,
-    parameter: f64,
-    orbit: &PeriodicOrbit,
-) -> Result<(Observables, Option<PhysicalMotion>), BranchError> {
-    let here = case.with(options.key, parameter);
-    let model = here.model().map_err(|error| BranchError::Model {
-        name: options.key.path(),
-        value: parameter,
-        error,
-    })?;
-    let start = orbit.states.first().map_or(&[][..], Vec::as_slice);
-    let observables = measure(&model, start, orbit.period, options.observables)?;
-    let physical = here
-        .physical()
-        .map(|view| PhysicalMotion::of(&observables, view));
-    Ok((observables, physical))
+/// Observables of the orbits of a branch.
+struct Measured<'a> {
+    case: &'a Case,
+    range: Range,
+    observables: ObservableSet,
 }
 
-fn point(
-    case: &Case,
-    options: &BranchOptions,
-    branch: usize,
-    p: &BranchPoint,
-) -> Result<PointReport, BranchError> {
-    let (observables, physical) = seen(case, options, p.parameter, &p.orbit)?;
-    Ok(PointReport {
-        branch,
-        period: p.orbit.period,
-        parameter: p.parameter,
-        state: p.orbit.states.first().cloned().unwrap_or_default(),
-        multipliers: pairs(&p.orbit.multipliers),
-        stable: p.orbit.is_stable(),
-        observables,
-        physical,
-    })
-}
+impl Measured<'_> {
+    /// The items of a branch that `one` measures, with the failures of the others: an orbit that
+    /// grazes may be closed and yet not be measured.
+    fn all<T: Sync, R: Send>(
+        &self,
+        items: &[T],
+        failures: &mut Vec<FailureReport>,
+        one: impl Fn(&T) -> (f64, &'static str, Result<R, Error>) + Sync,
+    ) -> Vec<R> {
+        let is_cancelled = || self.case.cancel().is_cancelled();
+        let found: Vec<_> = items
+            .par_iter()
+            .with_max_len(1)
+            .filter(|_| !is_cancelled())
+            .map(&one)
+            .collect();
+        let mut all = Vec::with_capacity(found.len());
+        for (parameter, what, found) in found {
+            match found {
+                Ok(found) => all.push(found),
+                Err(_) if is_cancelled() => {}
+                Err(error) => failures.push(FailureReport {
+                    parameter,
+                    reason: format!(
+                        "the {what} is left out, its motion cannot be measured: {}",
+                        error.message()
+                    ),
+                }),
+            }
+        }
+        all
+    }
 
-fn bifurcation(
-    case: &Case,
-    options: &BranchOptions,
-    branch: usize,
-    b: &Bifurcation,
-) -> Result<BifurcationReport, BranchError> {
-    let (observables, physical) = seen(case, options, b.parameter, &b.orbit)?;
-    let (angle, time) = match b.kind {
-        BifurcationKind::NeimarkSacker { angle } => (Some(angle.to_degrees()), None),
-        BifurcationKind::Grazing { time } => (None, Some(time)),
-        _ => (None, None),
-    };
-    Ok(BifurcationReport {
-        kind: kind_name(b.kind),
-        branch,
-        period: b.orbit.period,
-        parameter: b.parameter,
-        uncertainty: b.uncertainty,
-        state: b.orbit.states.first().cloned().unwrap_or_default(),
-        multipliers: pairs(&b.orbit.multipliers),
-        angle,
-        time,
-        observables,
-        physical,
-    })
+    /// Observables in the model's units and, of a physical case, in SI.
+    fn seen(
+        &self,
+        parameter: f64,
+        orbit: &PeriodicOrbit,
+    ) -> Result<(Observables, Option<PhysicalMotion>), Error> {
+        let here = self.case.with(self.range.key, parameter);
+        let model = self.range.model(self.case, parameter)?;
+        let start = orbit.states.first().map_or(&[][..], Vec::as_slice);
+        let observables = measure(&model, start, orbit.period, self.observables)?;
+        let physical = here
+            .physical()
+            .map(|view| PhysicalMotion::of(&observables, view));
+        Ok((observables, physical))
+    }
+
+    fn point(&self, branch: usize, p: &BranchPoint) -> Result<PointReport, Error> {
+        let (observables, physical) = self.seen(p.parameter, &p.orbit)?;
+        Ok(PointReport {
+            branch,
+            period: p.orbit.period,
+            parameter: p.parameter,
+            state: p.orbit.states.first().cloned().unwrap_or_default(),
+            multipliers: pairs(&p.orbit.multipliers),
+            stable: p.orbit.is_stable(),
+            observables,
+            physical,
+        })
+    }
+
+    fn bifurcation(&self, branch: usize, b: &Bifurcation) -> Result<BifurcationReport, Error> {
+        let (observables, physical) = self.seen(b.parameter, &b.orbit)?;
+        let (angle, time) = match b.kind {
+            BifurcationKind::NeimarkSacker { angle } => (Some(angle.to_degrees()), None),
+            BifurcationKind::Grazing { time } => (None, Some(time)),
+            _ => (None, None),
+        };
+        Ok(BifurcationReport {
+            kind: kind_name(b.kind),
+            branch,
+            period: b.orbit.period,
+            parameter: b.parameter,
+            uncertainty: b.uncertainty,
+            state: b.orbit.states.first().cloned().unwrap_or_default(),
+            multipliers: pairs(&b.orbit.multipliers),
+            angle,
+            time,
+            observables,
+            physical,
+        })
+    }
 }
 
 /// Periods over which Lyapunov exponents are measured at most where seeds are looked for:
 /// only what closes is followed.
 const SEED_PERIODS: usize = 1000;
+/// Longest period of seeds.
+const SEED_MAX_PERIOD: usize = 16;
 /// Points of each half of a locus at most.
 const LOCUS_POINTS: usize = 6000;
 
 /// Curves of all bifurcations, each once: one that lies on a curve already traced is left.
 fn loci(
     case: &Case,
-    options: &BranchOptions,
+    range: Range,
     diagram: &Diagram,
-    (key, low, high): (Key, f64, f64),
+    second: Range,
     failures: &mut Vec<FailureReport>,
     control: &Control<'_>,
 ) -> Loci {
     let family = PlaneFamily {
         case: case.clone(),
-        keys: [options.key, key],
+        keys: [range.key, second.key],
     };
     // What the second key is where a bifurcation was found: another at each where it follows
     // from the first (the free amplitude from the frequency).
-    let at = |b: &Bifurcation| case.with(options.key, b.parameter).get(key);
+    let at = |b: &Bifurcation| case.with(range.key, b.parameter).get(second.key);
     let bifurcations = || diagram.branches.iter().flat_map(|b| &b.branch.bifurcations);
-    let first = (options.from.min(options.to), options.from.max(options.to));
+    let ordered = |range: Range| (range.from.min(range.to), range.from.max(range.to));
+    let (first, key) = (ordered(range), second.key);
     // The values at which the bifurcations were found belong to the box.
     let second = bifurcations()
         .map(at)
-        .fold((low.min(high), low.max(high)), |(low, high), here| {
+        .fold(ordered(second), |(low, high), here| {
             (low.min(here), high.max(here))
         });
     let limits = CurveOptions {
@@ -920,102 +837,112 @@ fn crossings(curve: &CurveReport, second: f64) -> impl Iterator<Item = f64> {
         })
 }
 
-/// What the study of branches is asked for.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct BranchRequest {
-    /// The parameter, as the case file calls it (omega, alpha4, gap …); of a physical case also
-    /// a quantity of it (drive.frequency, gap.tip, sample.stiffness …)
-    #[schemars(extend("x-value" = "KEY", "x-required" = true))]
-    pub parameter: String,
-    /// Its value at the start; of a physical case also with a unit, as in "70 kHz"
-    #[schemars(extend("x-value" = "VALUE", "x-required" = true))]
-    pub from: Amount,
-    /// The other end of its range
-    #[schemars(extend("x-value" = "VALUE", "x-required" = true))]
-    pub to: Amount,
-    /// Period of the orbit at the start; without it, that of the motion to which a run converges
-    #[schemars(range(min = 1, max = MOST_PERIOD), extend("x-value" = "N"))]
-    pub period: Option<usize>,
-    /// State near which the orbit at the start is looked for: a1,…,aN,v1,…,vN
-    #[schemars(extend("x-value" = "A1,…"))]
-    pub state: Option<Vec<f64>>,
-    /// Also follow the doubled branches at flips, so many doublings deep
-    #[schemars(range(min = 0, max = MOST_DOUBLINGS), extend("x-value" = "DEPTH", "x-bare" = "1"))]
-    pub switch: Option<usize>,
-    /// Assemble the whole picture: every stable orbit of a census at several values, followed
-    /// both ways and through two doublings (or as {switch} says)
-    pub diagram: bool,
-    /// Of the {diagram}: values of the parameter at which a census is taken
-    #[schemars(range(min = 2, max = 10_000), extend("x-value" = "K"))]
-    pub values: usize,
-    /// Of the {diagram}: starts at each
-    #[schemars(range(min = 1, max = MOST_SEED_STARTS), extend("x-value" = "S"))]
-    pub starts: usize,
-    /// Of the {diagram}: seed of the starts
-    #[schemars(extend("x-value" = "K"))]
-    pub seed: u64,
-    /// A second parameter and its range, as in alpha4=5:40: the bifurcation curves are traced in
-    /// both
-    #[schemars(extend("x-value" = "KEY=LOW:HIGH"))]
-    pub second: Option<Interval>,
-    /// Longest step, as a part of the range
-    #[schemars(range(min = 0.0, max = 1.0), extend("x-value" = "PART"))]
-    pub max_step: f64,
-}
-
-impl Default for BranchRequest {
-    fn default() -> Self {
-        let seeds = SeedOptions::default();
-        Self {
-            parameter: String::new(),
-            from: Amount::default(),
-            to: Amount::default(),
-            period: None,
-            state: None,
-            switch: None,
-            diagram: false,
-            values: seeds.values,
-            starts: seeds.starts,
-            seed: seeds.seed,
-            second: None,
-            max_step: 0.01,
-        }
+options! {
+    /// Options of branches.
+    pub struct BranchOptions {
+        /// Parameter, by its name in the case file (omega, alpha4, gap …); for a physical case also
+        /// a quantity (drive.frequency, gap.tip, sample.stiffness …)
+        #[schemars(extend("x-value" = "KEY", "x-required" = true))]
+        pub parameter: String = String::new(),
+        /// Value of the parameter at the start; for a physical case also with a unit, as in "70
+        /// kHz"
+        #[schemars(extend("x-value" = "VALUE", "x-required" = true))]
+        pub from: Amount = Amount::default(),
+        /// Value of the parameter at the other end of the range
+        #[schemars(extend("x-value" = "VALUE", "x-required" = true))]
+        pub to: Amount = Amount::default(),
+        /// Period of the orbit at the start; default: that of the motion to which a run converges
+        #[schemars(range(min = 1, max = MAX_PERIOD), extend("x-value" = "N"))]
+        pub period: Option<usize> = None,
+        /// State near the orbit at the start: a1,…,aN,v1,…,vN
+        #[schemars(extend("x-value" = "A1,…"))]
+        pub state: Option<Vec<f64>> = None,
+        /// Also follow doubled branches at flips, up to this number of doublings
+        #[schemars(range(min = 0, max = MAX_DOUBLINGS), extend("x-value" = "DEPTH", "x-bare" = "1"))]
+        pub switch: Option<usize> = None,
+        /// Find the branches of all attractors: stable orbits from a census at several values,
+        /// followed in both directions and through two doublings (or {switch})
+        pub diagram: bool = false,
+        /// For {diagram}: number of parameter values with a census
+        #[schemars(range(min = 2, max = 10_000), extend("x-value" = "K"))]
+        pub values: usize = 65,
+        /// For {diagram}: initial states at each value
+        #[schemars(range(min = 1, max = MAX_SEED_STARTS), extend("x-value" = "S"))]
+        pub starts: usize = 16,
+        /// For {diagram}: seed of the initial states
+        #[schemars(extend("x-value" = "K"))]
+        pub seed: u64 = 1,
+        /// Second parameter and its range, as in alpha4=5:40, for bifurcation curves in both
+        #[schemars(extend("x-value" = "KEY=LOW:HIGH"))]
+        pub second: Option<Interval> = None,
+        /// Longest step, as a fraction of the range
+        #[schemars(range(min = 0.0, max = 1.0), extend("x-value" = "PART"))]
+        pub max_step: f64 = 0.01,
+        /// Observables of every orbit.
+        #[serde(skip)]
+        pub observables: ObservableSet = ObservableSet::COMMON,
+        /// Whether doubled branches end at their first orbit that is not stable.
+        #[serde(skip)]
+        pub stable_doublings: bool = false,
+        /// A branch is left where a disturbance grows by more than this in the orbit's period.
+        #[serde(skip)]
+        pub max_multiplier: f64 = ContinuationOptions::over(0.0, 1.0).max_multiplier,
+        /// Points after which a branch is cut.
+        #[serde(skip)]
+        pub max_points: usize = MAX_POINTS,
+        /// Whether grazings are located.
+        #[serde(skip)]
+        pub grazings: bool = true,
     }
 }
 
-impl BranchRequest {
-    /// How to follow.
+impl BranchOptions {
+    /// Default options for one parameter over a range, in the unit of the parameter.
+    pub fn over(key: Key, from: f64, to: f64) -> Self {
+        Self {
+            parameter: key.path().to_owned(),
+            from: Amount::of_key(key, from),
+            to: Amount::of_key(key, to),
+            ..Self::default()
+        }
+    }
+
+    /// The parameter and its range.
     ///
     /// # Errors
-    /// When a parameter or a value of it is none.
-    pub fn options(&self, case: &Case) -> Result<BranchOptions, Error> {
-        let (key, [from, to]) = key_and_ends(
-            case,
-            self.parameter.trim(),
-            [("from", &self.from), ("to", &self.to)],
-        )?;
-        let second = self.second.as_ref().map(|second| {
-            let ends = [("second", &second.low), ("second", &second.high)];
-            key_and_ends(case, &second.name, ends)
-        });
-        let census = self.diagram.then(|| SeedOptions {
-            values: self.values,
-            starts: self.starts,
-            seed: self.seed,
-            ..SeedOptions::default()
-        });
-        Ok(BranchOptions {
-            period: self.period,
-            state: self.state.clone(),
-            doublings: self.switch.unwrap_or(if self.diagram { 2 } else { 0 }),
-            census,
-            second: second
-                .transpose()?
-                .map(|(key, [low, high])| (key, low, high)),
-            max_step: self.max_step,
-            ..BranchOptions::over(key, from, to)
-        })
+    /// When the case has no such parameter, or a value is not valid for it.
+    pub fn range(&self, case: &Case) -> Result<Range, Error> {
+        let key = case.key(self.parameter.trim())?;
+        let [from, to] = values(case, key, [("from", &self.from), ("to", &self.to)])?;
+        Ok(Range { key, from, to })
+    }
+
+    fn second_range(&self, case: &Case) -> Result<Option<Range>, Error> {
+        let Some(second) = &self.second else {
+            return Ok(None);
+        };
+        let key = case.key(&second.name)?;
+        let ends = [("second", &second.low), ("second", &second.high)];
+        let [from, to] = values(case, key, ends)?;
+        Ok(Some(Range { key, from, to }))
+    }
+
+    /// Doublings to follow: 0 for the one branch alone.
+    fn doublings(&self) -> usize {
+        self.switch.unwrap_or(if self.diagram { 2 } else { 0 })
+    }
+
+    fn check_step(&self) -> Result<(), Error> {
+        if self.max_step > 0.0 && self.max_step <= 1.0 {
+            return Ok(());
+        }
+        Err(Error::input(
+            format!(
+                "expected a longest step between 0 and 1 of the range, got {}",
+                self.max_step
+            ),
+            "give a {max_step} of 0.01",
+        ))
     }
 }
 
@@ -1029,56 +956,15 @@ impl Study for BranchStudy {
         "Periodic orbits followed in a parameter, stable and unstable, with their bifurcations";
     const COUNTED: &'static str = "points";
     const PARTIAL: bool = true;
-    type Request = BranchRequest;
+    type Options = BranchOptions;
     type Report = BranchReport;
 
     fn compute(
         case: &Case,
-        request: &BranchRequest,
+        options: &BranchOptions,
         control: &Control<'_>,
     ) -> Result<BranchReport, Error> {
-        followed(case, &request.options(case)?, control)
-    }
-}
-
-/// The branches of a case, with what their parameter is in SI.
-///
-/// # Errors
-/// As [`branch`].
-pub fn followed(
-    case: &Case,
-    options: &BranchOptions,
-    control: &Control<'_>,
-) -> Result<BranchReport, Error> {
-    let report = branch(case, options, control)?;
-    Ok(BranchReport {
-        parameter_unit: case.parameter_unit(report.key),
-        ..report
-    })
-}
-
-impl From<BranchError> for crate::Error {
-    fn from(error: BranchError) -> Self {
-        match error {
-            BranchError::Range { .. } => Self::input(error.to_string(), "change {from} or {to}"),
-            BranchError::Step { .. } => Self::input(error.to_string(), "give a {max_step} of 0.01"),
-            BranchError::SameParameter { .. } => {
-                Self::input(error.to_string(), "change {second} or {parameter}")
-            }
-            BranchError::Model { .. } => Self::input(
-                error.to_string(),
-                "keep {from}, {to} and {second} where the model makes sense",
-            ),
-            BranchError::Start {
-                error: OrbitError::Start(_) | OrbitError::NoPeriod,
-                ..
-            } => Self::input(error.to_string(), "change {state} or {period}"),
-            BranchError::Start { .. } | BranchError::NoSeeds { .. } => {
-                Self::numerics(error.to_string())
-                    .remedy("begin elsewhere with {from}, or give a {state} near an orbit")
-            }
-            other => Self::numerics(other.to_string()),
-        }
+        branch(case, options, control)
     }
 }
 
@@ -1091,16 +977,17 @@ mod tests {
     fn a_point_that_cannot_be_measured_does_not_take_the_others_with_it() {
         let case = Case::from(Cantilever::paper());
         let options = BranchOptions::over(Key::Omega, 3.0, 3.01);
-        let family = case.family(options.key);
-        let seeds = [(3.0, first_orbit(&case, &options).unwrap())];
-        let mut diagram =
-            assemble_diagram(&family, &seeds, &options.diagram(), &Control::default());
-        let whole = described(&case, &options, &diagram);
+        let range = options.range(&case).unwrap();
+        let family = case.family(range.key);
+        let seeds = [(3.0, first_orbit(&case, range, &options).unwrap())];
+        let how = range.diagram(&options);
+        let mut diagram = assemble_diagram(&family, &seeds, &how, &Control::default());
+        let whole = described(&case, range, ObservableSet::COMMON, &diagram);
         assert!(whole.failures.is_empty() && whole.points.len() > 2);
         let branch = &mut diagram.branches[0].branch;
         branch.points[1].orbit.states[0][0] = f64::NAN;
         let parameter = branch.points[1].parameter;
-        let rest = described(&case, &options, &diagram);
+        let rest = described(&case, range, ObservableSet::COMMON, &diagram);
         assert_eq!(rest.points.len(), whole.points.len() - 1);
         assert_eq!(rest.failures.len(), 1);
         assert_eq!(rest.failures[0].parameter.to_bits(), parameter.to_bits());

@@ -1,77 +1,38 @@
 //! The same lever and drive on each of the samples: what difference the contact law makes.
 //!
-//! The samples share spring α4 and damper; the standard linear solid has the damper in series
-//! with an arm of a given stiffness, so that with an ever stiffer arm it becomes the
-//! Kelvin–Voigt surface. A moving surface is compared where the case has one. Compared are the periodic orbit of one period on each, stable or
-//! not, and how it goes on with the drive frequency.
+//! The samples share spring α4 and damper. Where a law has the damper in an arm, in series with a
+//! spring, the stiffness of the arm is given: with an ever stiffer arm such a solid becomes the
+//! Kelvin–Voigt surface. Laws whose numbers do not follow from spring, damper and arm are compared
+//! where the case has them. The periodic orbit of one period on each law is compared, stable or
+//! not, and its branch in the drive frequency.
 
-use nanotap_dynamics::{ClassifyOptions, Control, ShootingOptions, classify, close_orbit};
+use nanotap_dynamics::{
+    ClassifyOptions, ContinuationOptions, Control, ShootingOptions, classify, close_orbit,
+};
 use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 use serde_json::{Map, Value};
 
 use crate::Error;
 use crate::case::Case;
-use crate::case::physical::Physical;
-use crate::case::physical::force::SampleForce;
-use crate::case::{CaseError, Key};
+use crate::case::Key;
 use crate::model::Model;
 use crate::model::cantilever::Cantilever;
 use crate::model::contact::ContactLaw;
-use crate::model::contact::moving_surface::MovingSurface;
+use crate::model::model_map::ModelMap;
+use crate::model::parameter::Parameter;
 use crate::model::recording::Curve;
 use crate::model::sample_law::SampleLaw;
-use crate::model::strobe::Strobe;
 use crate::observe::Observables;
-use crate::study::branch::{BranchError, BranchOptions, BranchReport, branches_through};
-use crate::study::kind::{Study, cantilever};
-use crate::study::limits::MOST_PERIOD;
-use crate::study::orbit::{OrbitError, OrbitOptions, OrbitReport, orbit, spectral_radius};
+use crate::study::branch::{BranchOptions, BranchReport, Range, branches_through};
+use crate::study::limits::MAX_PERIOD;
+use crate::study::orbit::{OrbitOptions, OrbitReport, no_period, orbit, spectral_radius};
+use crate::study::request::options;
 use crate::study::simulate::{Classification, Named};
-use crate::study::value::Amount;
+use crate::study::value::{Amount, values};
+use crate::study::{Study, cantilever};
 
-/// How to compare.
-#[derive(Clone, Debug, PartialEq)]
-pub struct ComparisonOptions {
-    /// Period of the orbits.
-    pub period: usize,
-    /// Stiffness of the standard linear solid's arm; `None`: the case's own, or twice α4.
-    pub arm: Option<f64>,
-    /// Drive frequencies over which the orbits are followed; `None`: not at all.
-    pub frequencies: Option<(f64, f64)>,
-}
-
-impl Default for ComparisonOptions {
-    fn default() -> Self {
-        Self {
-            period: 1,
-            arm: None,
-            frequencies: None,
-        }
-    }
-}
-
-/// Why there is no comparison.
-#[derive(Clone, Debug, thiserror::Error)]
-pub enum ComparisonError {
-    /// The damper has no arm to stand in.
-    #[error("a relaxing arm of stiffness {arm} holds no damper: a positive, finite one is needed")]
-    Arm {
-        /// What was asked for, or twice α4.
-        arm: f64,
-    },
-    /// The case makes no sense.
-    #[error(transparent)]
-    Model(#[from] CaseError),
-    /// There is no such orbit.
-    #[error(transparent)]
-    Orbit(#[from] OrbitError),
-    /// The orbits cannot be followed.
-    #[error(transparent)]
-    Branch(#[from] BranchError),
-}
-
-/// The motion on one sample.
+/// The motion under one contact law.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct SampleMotion {
     /// The law.
@@ -79,11 +40,11 @@ pub struct SampleMotion {
     /// The case with this law.
     #[schemars(with = "Map<String, Value>")]
     pub case: Cantilever,
-    /// What a run from rest goes to.
+    /// Class of the motion that a run from rest reaches.
     pub from_rest: Classification,
-    /// Its period, if periodic.
+    /// Period in drive periods, if periodic.
     pub from_rest_period: Option<usize>,
-    /// The orbit of the asked period, if there is one.
+    /// The orbit of the requested period, if any.
     #[serde(flatten)]
     pub orbit: Option<OrbitLook>,
     /// Why there is none.
@@ -107,9 +68,9 @@ pub struct OrbitLook {
     pub state: Vec<f64>,
     /// Largest |multiplier|.
     pub spectral_radius: f64,
-    /// Whether it attracts.
+    /// Whether it is stable.
     pub stable: bool,
-    /// What can be read off it.
+    /// Observables in the model's units.
     #[serde(flatten)]
     pub observables: Observables,
     /// Indentation −V_T and force along the orbit.
@@ -117,7 +78,7 @@ pub struct OrbitLook {
     pub force_loop: Vec<[f64; 2]>,
 }
 
-/// The motions on all samples.
+/// The motions under all contact laws.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct Comparison {
     /// Drive frequency Ω.
@@ -128,101 +89,95 @@ pub struct Comparison {
     pub samples: Vec<SampleMotion>,
 }
 
-/// The case with each law, spring and damper the same; a moving surface only where it has one.
+/// The case with each law, spring and damper the same; see the module.
 ///
 /// # Errors
-/// [`ComparisonError::Arm`] when the arm's stiffness is not positive.
-pub fn cases(case: &Cantilever, arm: Option<f64>) -> Result<Vec<Cantilever>, ComparisonError> {
-    let is_solid = case.contact == ContactLaw::StandardLinearSolid;
-    let own = is_solid.then_some(case.relaxation_stiffness);
-    let arm = arm.or(own).unwrap_or(2.0 * case.alpha4);
+/// When the arm's stiffness is not positive.
+pub fn cases(case: &Cantilever, arm: Option<f64>) -> Result<Vec<Cantilever>, Error> {
+    let own = case.arm();
+    let arm = arm.or(own.map(|[stiffness, _]| stiffness));
+    let arm = arm.unwrap_or(2.0 * case.alpha4);
     if !(arm > 0.0 && arm.is_finite()) {
-        return Err(ComparisonError::Arm { arm });
+        return Err(Error::input(
+            format!(
+                "a relaxing arm of stiffness {arm} holds no damper: a positive, finite one is needed"
+            ),
+            "give {arm} a stiffness above 0",
+        ));
     }
-    let damper = if is_solid {
-        case.relaxation_stiffness * case.relaxation_time
-    } else {
-        case.alpha6
+    let damper = own.map_or(case.alpha6, |[_, damper]| damper);
+    let on = |law: ContactLaw| {
+        let numbers = match law.entry().like {
+            Some(like) => like(arm, damper),
+            // Numbers that do not follow from others, only a case that has them gives.
+            None if law == case.contact => case.own_numbers(),
+            None => return None,
+        };
+        let alpha6 = if law.has_damper() { damper } else { 0.0 };
+        Some(
+            case.clone()
+                .on(law, &numbers)
+                .with(Parameter::Alpha6, alpha6),
+        )
     };
-    // What a surface of its own would be, only a case that has one says.
-    let moves = case.contact == ContactLaw::MovingSurface;
-    Ok(ContactLaw::ALL
-        .into_iter()
-        .filter(|contact| moves || *contact != ContactLaw::MovingSurface)
-        .map(|contact| {
-            let solid = contact == ContactLaw::StandardLinearSolid;
-            Cantilever {
-                contact,
-                alpha6: if solid { 0.0 } else { damper },
-                relaxation_stiffness: if solid { arm } else { 0.0 },
-                relaxation_time: if solid { damper / arm } else { 0.0 },
-                surface: if contact == ContactLaw::MovingSurface {
-                    case.surface
-                } else {
-                    MovingSurface::NONE
-                },
-                ..case.clone()
-            }
-        })
-        .collect())
+    Ok(ContactLaw::ALL.into_iter().filter_map(on).collect())
 }
 
-/// Compares the samples under the lever and drive of `case`.
+/// Compares the motions of `case` under each contact law: its nonlinear law and the others that its
+/// quantities define, or else each piecewise-linear law. A law without an orbit of the period is
+/// not an error.
 ///
 /// # Errors
-/// [`ComparisonError`] when the case or the options make no sense; a law under which there
-/// is no such orbit is no error.
+/// When the case is not a cantilever, or the options are not valid for it.
 pub fn compare(
-    case: &Cantilever,
-    options: &ComparisonOptions,
+    case: &Case,
+    options: &ContactLawsOptions,
     control: &Control<'_>,
-) -> Result<Comparison, ComparisonError> {
+) -> Result<Comparison, Error> {
+    let lever = cantilever(case, ContactLawsStudy::NAME)?;
+    let frequencies = options.frequencies(case)?;
     if options.period == 0 {
-        return Err(OrbitError::NoPeriod.into());
+        return Err(no_period());
     }
-    let samples = cases(case, options.arm)?
+    let force = case.physical().and_then(|view| {
+        let force = view.sample.force.as_ref()?;
+        Some((force, &view.scales))
+    });
+    let levers = match force {
+        Some((force, scales)) => force
+            .others()
+            .into_iter()
+            .filter_map(|force| force.in_model(scales).ok())
+            .map(|law| Cantilever {
+                law: Some(law),
+                ..lever.clone()
+            })
+            .collect(),
+        None => cases(lever, options.arm)?,
+    };
+    let mut samples = levers
         .into_iter()
-        .map(|case| motion(case, options, control))
-        .collect::<Result<_, _>>()?;
+        .map(|lever| motion(lever, options.period, frequencies, control))
+        .collect::<Result<Vec<_>, Error>>()?;
+    if force.is_some() {
+        add_force_curves(&mut samples)?;
+    }
     Ok(Comparison {
-        omega: case.omega,
+        omega: lever.omega,
         period: options.period,
         samples,
     })
 }
 
-/// Compares the motions under the nonlinear law of `case` and under the others that its
-/// quantities say.
-///
-/// # Errors
-/// As [`compare`].
-pub fn compare_forces(
-    view: &Physical,
-    force: &SampleForce,
-    options: &ComparisonOptions,
-    control: &Control<'_>,
-) -> Result<Comparison, ComparisonError> {
-    if options.period == 0 {
-        return Err(OrbitError::NoPeriod.into());
-    }
-    let mut samples = Vec::new();
-    for force in force.others() {
-        let Ok(law) = force.in_model(&view.scales) else {
-            continue;
-        };
-        let case = Cantilever {
-            law: Some(law),
-            ..view.cantilever.clone()
-        };
-        samples.push(motion(case, options, control)?);
-    }
+/// Adds the force curves of nonlinear laws, over the gaps of all orbits.
+fn add_force_curves(samples: &mut [SampleMotion]) -> Result<(), Error> {
     let least = samples
         .iter()
         .filter_map(|s| s.orbit.as_ref())
         .map(|orbit| orbit.observables.gap_range[0])
         .fold(f64::INFINITY, f64::min);
-    for sample in &mut samples {
-        let model = Model::cantilever(&sample.case).map_err(CaseError::from)?;
+    for sample in samples {
+        let model = Model::cantilever(&sample.case)?;
         let Some(nonlinear) = &model.nonlinear else {
             continue;
         };
@@ -235,11 +190,7 @@ pub fn compare_forces(
         let up = (0..=CURVE_POINTS).map(|k| near + step * f64::from(k));
         sample.force_curve = nonlinear.force_curve(down.chain(up));
     }
-    Ok(Comparison {
-        omega: view.cantilever.omega,
-        period: options.period,
-        samples,
-    })
+    Ok(())
 }
 
 /// Points of a force curve each way.
@@ -249,24 +200,25 @@ const CURVE_REACH: f64 = 2.0;
 
 fn motion(
     case: Cantilever,
-    options: &ComparisonOptions,
+    period: usize,
+    frequencies: Option<(f64, f64)>,
     control: &Control<'_>,
-) -> Result<SampleMotion, ComparisonError> {
-    let model = Model::cantilever(&case).map_err(CaseError::from)?;
+) -> Result<SampleMotion, Error> {
+    let model = Model::cantilever(&case)?;
     let model = model.cancelled_by(&control.flag());
     let rest = vec![0.0; model.dimension()];
-    let mut map = Strobe::new(&model);
+    let mut map = ModelMap::new(&model);
     let named = Named::of(&classify(&mut map, &rest, &ClassifyOptions::default()).kind);
-    let asked = OrbitOptions {
-        period: Some(options.period),
+    let options = OrbitOptions {
+        period: Some(period),
         harmonics: 0,
         ..OrbitOptions::default()
     };
-    let (found, reason) = match orbit(&model, &asked) {
+    let (found, reason) = match orbit(&model, &options) {
         Ok(found) => (Some(found), None),
-        Err(error) => (None, Some(error.to_string())),
+        Err(error) => (None, Some(error.message())),
     };
-    let branch = match (&found, options.frequencies) {
+    let branch = match (&found, frequencies) {
         (Some(found), Some(range)) => Some(followed(&case, &mut map, found, range, control)?),
         _ => None,
     };
@@ -288,23 +240,29 @@ fn motion(
 /// The branch of an orbit in the drive frequency.
 fn followed(
     case: &Cantilever,
-    map: &mut Strobe,
+    map: &mut ModelMap,
     found: &OrbitReport,
     (from, to): (f64, f64),
     control: &Control<'_>,
-) -> Result<BranchReport, ComparisonError> {
-    let key = Key::Omega;
-    let options = BranchOptions::over(key, from, to);
+) -> Result<BranchReport, Error> {
     // Closed already: this only puts it in the form that branches begin with.
-    let seed = close_orbit(map, &found.state, found.period, &ShootingOptions::default())
-        .map_err(OrbitError::from)?;
+    let seed = close_orbit(map, &found.state, found.period, &ShootingOptions::default())?;
     let case = Case::from(case.clone()).cancelled_by(control);
-    Ok(branches_through(
+    let range = Range {
+        key: Key::Omega,
+        from,
+        to,
+    };
+    branches_through(
         &case,
+        range,
         &[(case.omega(), seed)],
-        &options,
+        &BranchOptions {
+            max_step: ContinuationOptions::over(from, to).max_step,
+            ..BranchOptions::default()
+        },
         control,
-    )?)
+    )
 }
 
 fn look(model: &Model, found: OrbitReport) -> OrbitLook {
@@ -335,62 +293,38 @@ fn force_loop(height: &Curve, force: &Curve) -> Vec<[f64; 2]> {
     points.collect()
 }
 
-/// What the comparison of contact laws is asked for.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct ContactLawsRequest {
-    /// Period of the orbits compared
-    #[schemars(range(min = 1, max = MOST_PERIOD), extend("x-value" = "N"))]
-    pub period: usize,
-    /// Stiffness of the standard linear solid's arm; without it, the case's, or twice alpha4
-    #[schemars(extend("x-value" = "K"))]
-    pub arm: Option<f64>,
-    /// Lowest drive frequency to which the orbits are followed
-    #[schemars(extend("x-value" = "OMEGA"))]
-    pub from: Option<Amount>,
-    /// Highest drive frequency to which the orbits are followed
-    #[schemars(extend("x-value" = "OMEGA"))]
-    pub to: Option<Amount>,
-}
-
-impl Default for ContactLawsRequest {
-    fn default() -> Self {
-        let options = ComparisonOptions::default();
-        Self {
-            period: options.period,
-            arm: options.arm,
-            from: None,
-            to: None,
-        }
+options! {
+    /// Options of the comparison of contact laws.
+    pub struct ContactLawsOptions {
+        /// Period of the compared orbits
+        #[schemars(range(min = 1, max = MAX_PERIOD), extend("x-value" = "N"))]
+        pub period: usize = 1,
+        /// Stiffness of the relaxing arm; default: that of the case, or twice alpha4
+        #[schemars(extend("x-value" = "K"))]
+        pub arm: Option<f64> = None,
+        /// Lowest drive frequency to which the orbits are followed
+        #[schemars(extend("x-value" = "OMEGA"))]
+        pub from: Option<Amount> = None,
+        /// Highest drive frequency to which the orbits are followed
+        #[schemars(extend("x-value" = "OMEGA"))]
+        pub to: Option<Amount> = None,
     }
 }
 
-impl ContactLawsRequest {
-    /// How to compare.
-    ///
-    /// # Errors
-    /// When a frequency is none, or only one end is given.
-    pub fn options(&self, case: &Case) -> Result<ComparisonOptions, Error> {
-        let key = Key::Omega;
-        let value = |option: &str, amount: &Amount| {
-            let read = case.value(key, amount.text());
-            read.map_err(|error| Error::from(error).at(option))
-        };
-        let frequencies = match (&self.from, &self.to) {
-            (Some(from), Some(to)) => Some((value("from", from)?, value("to", to)?)),
-            (None, None) => None,
-            _ => {
-                return Err(Error::input(
-                    "one end of the drive frequencies is missing",
-                    "give {from} and {to}, or neither",
-                ));
+impl ContactLawsOptions {
+    /// Drive frequencies over which the orbits are followed, if they are.
+    fn frequencies(&self, case: &Case) -> Result<Option<(f64, f64)>, Error> {
+        match (&self.from, &self.to) {
+            (Some(from), Some(to)) => {
+                let [from, to] = values(case, Key::Omega, [("from", from), ("to", to)])?;
+                Ok(Some((from, to)))
             }
-        };
-        Ok(ComparisonOptions {
-            period: self.period,
-            arm: self.arm,
-            frequencies,
-        })
+            (None, None) => Ok(None),
+            _ => Err(Error::input(
+                "one end of the drive frequencies is missing",
+                "give {from} and {to}, or neither",
+            )),
+        }
     }
 }
 
@@ -400,56 +334,30 @@ pub struct ContactLawsStudy;
 
 impl Study for ContactLawsStudy {
     const NAME: &'static str = "contact-laws";
-    const ABOUT: &'static str =
-        "The same lever and drive on every contact law: what difference the sample makes";
-    type Request = ContactLawsRequest;
+    const ABOUT: &'static str = "Compare contact laws under the same lever and drive";
+    type Options = ContactLawsOptions;
     type Report = Comparison;
 
     fn compute(
         case: &Case,
-        request: &ContactLawsRequest,
+        options: &ContactLawsOptions,
         control: &Control<'_>,
     ) -> Result<Comparison, Error> {
-        if let Some(view) = case.physical()
-            && let Some(force) = &view.sample.force
-        {
-            return Ok(compare_forces(
-                view,
-                force,
-                &request.options(case)?,
-                control,
-            )?);
-        }
-        let lever = cantilever(case, Self::NAME)?;
-        Ok(compare(lever, &request.options(case)?, control)?)
-    }
-}
-
-impl From<ComparisonError> for crate::Error {
-    fn from(error: ComparisonError) -> Self {
-        match error {
-            ComparisonError::Arm { .. } => {
-                Self::input(error.to_string(), "give {arm} a stiffness above 0")
-            }
-            ComparisonError::Model(error) => error.into(),
-            ComparisonError::Orbit(error) => error.into(),
-            ComparisonError::Branch(error) => error.into(),
-        }
+        compare(case, options, control)
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::model::parameter::Parameter;
 
     /// The loop's area is the energy that the sample takes, less what a surface loses while
     /// it recovers.
     #[test]
     fn loops_enclose_what_the_sample_takes_in_contact() {
         let case = Cantilever::paper().with(Parameter::Omega, 20.0);
-        let options = ComparisonOptions::default();
-        let found = compare(&case, &options, &Control::default()).unwrap();
+        let options = ContactLawsOptions::default();
+        let found = compare(&case.into(), &options, &Control::default()).unwrap();
         let mut loss = Vec::new();
         for sample in &found.samples {
             let orbit = sample.orbit.as_ref().unwrap();
@@ -479,8 +387,9 @@ mod tests {
     #[test]
     fn samples_share_spring_and_damper() {
         let all = cases(&Cantilever::paper(), None).unwrap();
-        assert_eq!(all[2].relaxation_stiffness, 40.0);
-        assert!((all[2].relaxation_stiffness * all[2].relaxation_time - 0.2).abs() < 1e-15);
+        let [arm, damper] = all[2].arm().unwrap();
+        assert_eq!(arm, 40.0);
+        assert!((damper - 0.2).abs() < 1e-15);
         // And from a solid back to the same three.
         assert_eq!(cases(&all[2], None).unwrap()[1].alpha6, all[1].alpha6);
         assert!(all.iter().all(|case| case.validate().is_ok()));

@@ -1,8 +1,8 @@
-//! Which modes matter: the same motion computed with N = 1 … K modes.
+//! Convergence of a motion with the number of modes N = 1 … K.
 
 use nanotap_dynamics::Control;
 use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 
 use crate::Error;
 use crate::case::Case;
@@ -10,13 +10,14 @@ use crate::model::beam::MAX_MODES;
 use crate::model::cantilever::Cantilever;
 use crate::model::{Model, ModelError};
 use crate::observe::time_series::with_modes;
-use crate::study::kind::{Study, cantilever};
-use crate::study::limits::MOST_PERIOD;
+use crate::study::limits::MAX_PERIOD;
 use crate::study::mode_share::ReadingsReport;
 use crate::study::orbit::{OrbitOptions, OrbitReport, orbit, spectral_radius};
+use crate::study::request::options;
 use crate::study::simulate::Classification;
+use crate::study::{Study, cantilever};
 
-/// A motion at each number of modes.
+/// The motion with each number of modes.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct Convergence {
     /// Numbers of modes N.
@@ -25,16 +26,15 @@ pub struct Convergence {
     /// the most modes, as a part of its amplitude; null where the motions differ in
     /// kind (another period, or none).
     pub difference: Vec<Option<f64>>,
-    /// What each is, one a number of modes.
+    /// Motion with each number of modes.
     pub motions: Vec<Motion>,
-    /// The least N from which on the difference stays below the tolerance.
+    /// Smallest N from which the difference stays below the tolerance.
     pub enough: Option<usize>,
     /// The tolerance.
     pub tolerance: f64,
     /// The verdict in words.
     pub verdict: String,
-    /// What an experimenter reads, how much each number of modes misses of it, and which modes
-    /// take part.
+    /// Instrument readings, their errors with each number of modes, and the share of each mode.
     #[serde(flatten)]
     pub readings: ReadingsReport,
     /// The orbits, for figures.
@@ -48,21 +48,21 @@ pub struct Convergence {
 /// The motion with one number of modes.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct Motion {
-    /// N.
+    /// Number of modes.
     pub modes: usize,
-    /// What it is.
+    /// Class of the motion.
     pub classification: Classification,
-    /// Its period.
+    /// Period in drive periods.
     pub period: Option<usize>,
-    /// Greatest tip displacement.
+    /// Largest tip deflection.
     pub tip_max: Option<f64>,
-    /// Least tip displacement.
+    /// Smallest tip deflection.
     pub tip_min: Option<f64>,
-    /// Part of the time in contact.
+    /// Contact time / period.
     pub contact_fraction: Option<f64>,
     /// Largest |multiplier|.
     pub spectral_radius: Option<f64>,
-    /// Why it is no orbit, if it is none.
+    /// Reason why it is not an orbit.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub reason: Option<String>,
 }
@@ -77,11 +77,10 @@ const COMPARED_POINTS: usize = 400;
 /// When the case makes no sense.
 pub fn convergence(
     case: &Cantilever,
-    largest: usize,
-    tolerance: f64,
-    options: &OrbitOptions,
+    options: &ConvergenceOptions,
     control: &Control<'_>,
 ) -> Result<Convergence, ModelError> {
+    let (largest, tolerance) = (options.largest, options.tolerance);
     let mut orbits: Vec<Option<OrbitReport>> = Vec::new();
     let mut motions = Vec::new();
     let models: Vec<Model> = (1..=largest)
@@ -92,8 +91,9 @@ pub fn convergence(
         .collect::<Result<_, _>>()?;
     for (modes, model) in (1..).zip(&models) {
         let guess = OrbitOptions {
+            period: options.period,
             state: carried(orbits.last(), modes),
-            ..options.clone()
+            ..OrbitOptions::default()
         };
         let found = orbit(model, &guess).or_else(|_| {
             orbit(
@@ -104,7 +104,7 @@ pub fn convergence(
                 },
             )
         });
-        motions.push(motion(modes, found.as_ref().map_err(ToString::to_string)));
+        motions.push(motion(modes, found.as_ref().map_err(Error::message)));
         orbits.push(found.ok());
     }
     let difference = differences(&orbits, &models);
@@ -125,7 +125,7 @@ pub fn convergence(
 }
 
 /// The state of the motion with one mode less, the new mode at rest: a guess near which
-/// the same motion is looked for. Only where a period was asked for or found.
+/// the same motion is looked for. Only where a period was given or found.
 fn carried(previous: Option<&Option<OrbitReport>>, modes: usize) -> Option<Vec<f64>> {
     let previous = previous?.as_ref()?;
     let memory = previous.state.len() - 2 * (modes - 1);
@@ -227,56 +227,39 @@ fn verdict(
     }
 }
 
-/// What the study of convergence is asked for.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct ConvergenceRequest {
-    /// Largest number of modes
-    #[schemars(range(min = 2, max = MAX_MODES), extend("x-value" = "K"))]
-    pub largest: usize,
-    /// Difference of the tip deflection, as a part of the amplitude, that is small enough
-    #[schemars(range(min = f64::MIN_POSITIVE), extend("x-value" = "D"))]
-    pub tolerance: f64,
-    /// Period of the orbit to compare; without it, the motion to which a run from rest converges
-    #[schemars(range(min = 1, max = MOST_PERIOD), extend("x-value" = "N"))]
-    pub period: Option<usize>,
-}
-
-impl Default for ConvergenceRequest {
-    fn default() -> Self {
-        Self {
-            largest: 10,
-            tolerance: 0.01,
-            period: None,
-        }
+options! {
+    /// Options of a convergence study.
+    pub struct ConvergenceOptions {
+        /// Largest number of modes
+        #[schemars(range(min = 2, max = MAX_MODES), extend("x-value" = "K"))]
+        pub largest: usize = 10,
+        /// Tolerance of the tip deflection, as a fraction of the amplitude
+        #[schemars(range(min = f64::MIN_POSITIVE), extend("x-value" = "D"))]
+        pub tolerance: f64 = 0.01,
+        /// Period of the orbit to compare; default: the motion to which a run from rest converges
+        #[schemars(range(min = 1, max = MAX_PERIOD), extend("x-value" = "N"))]
+        pub period: Option<usize> = None,
     }
 }
 
-/// How many modes are enough.
+/// Number of modes that is enough.
 #[derive(Clone, Copy, Debug)]
 pub struct ConvergenceStudy;
 
 impl Study for ConvergenceStudy {
     const NAME: &'static str = "convergence";
-    const ABOUT: &'static str = "The same motion with N = 1 … K modes: how many are enough";
-    type Request = ConvergenceRequest;
+    const ABOUT: &'static str = "Compare the motion with 1 to K modes: how many are enough";
+    type Options = ConvergenceOptions;
     type Report = Convergence;
 
     fn compute(
         case: &Case,
-        request: &ConvergenceRequest,
+        options: &ConvergenceOptions,
         control: &Control<'_>,
     ) -> Result<Convergence, Error> {
-        let options = OrbitOptions {
-            period: request.period,
-            ..OrbitOptions::default()
-        };
-        let (largest, tolerance) = (request.largest, request.tolerance);
         Ok(convergence(
             cantilever(case, Self::NAME)?,
-            largest,
-            tolerance,
-            &options,
+            options,
             control,
         )?)
     }

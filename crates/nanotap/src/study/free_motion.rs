@@ -7,12 +7,12 @@ use nanotap_flow::Complex;
 use crate::model::Model;
 use crate::observe::lag;
 
-/// The motion far from the sample.
+/// The free motion.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FreeMotion {
     /// Amplitude of the tip deflection at the drive's frequency, A₀.
     pub amplitude: f64,
-    /// Its phase behind the drive, degrees in (−180, 180].
+    /// Phase lag behind the drive, degrees in (−180, 180].
     pub phase: f64,
     /// How far the tip swings towards the sample, its base's motion included: contact begins
     /// at this distance. Of two tones the sum of both.

@@ -1,23 +1,22 @@
-//! Most of everything that can be asked for: beyond these a study would run for days or fill
-//! the memory, and whoever asks for more has almost always mistyped.
+//! Upper limits on options: beyond these a study would run for days or fill the memory.
 
-pub use crate::observe::time_series::MOST_ROWS;
+pub use crate::observe::time_series::MAX_ROWS;
 
 /// Longest period of an orbit, in drive periods.
-pub const MOST_PERIOD: usize = 10_000;
-/// Most drive periods of one run.
-pub const MOST_PERIODS: usize = 100_000_000;
-/// Most samples a drive period in a time series.
-pub const MOST_SAMPLES: usize = 1_000_000;
-/// Most points of a mode shape.
-pub const MOST_POINTS: usize = 1_000_000;
-/// Most distances of an approach curve: with all that is observed they fill a gigabyte.
-pub const MOST_DISTANCES: usize = 20_000;
-/// Most starts of each of the censuses that look for branches.
-pub const MOST_SEED_STARTS: usize = 100_000;
-/// Most numbers of the states that one run keeps: 400 MB.
-pub const MOST_STATE_NUMBERS: usize = 50_000_000;
-/// Most doublings that are followed: beyond, periods exceed [`MOST_PERIOD`].
-pub const MOST_DOUBLINGS: usize = 12;
-/// Most threads.
-pub const MOST_THREADS: usize = 1024;
+pub const MAX_PERIOD: usize = 10_000;
+/// Maximum number of drive periods of one run.
+pub const MAX_PERIODS: usize = 100_000_000;
+/// Maximum number of samples a drive period in a time series.
+pub const MAX_SAMPLES: usize = 1_000_000;
+/// Maximum number of points of a mode shape.
+pub const MAX_POINTS: usize = 1_000_000;
+/// Maximum number of distances of an approach curve: with all that is observed they fill a gigabyte.
+pub const MAX_DISTANCES: usize = 20_000;
+/// Maximum number of starts of each of the censuses that look for branches.
+pub const MAX_SEED_STARTS: usize = 100_000;
+/// Maximum number of numbers of the states that one run keeps: 400 MB.
+pub const MAX_STATE_NUMBERS: usize = 50_000_000;
+/// Maximum number of doublings that are followed: beyond, periods exceed [`MAX_PERIOD`].
+pub const MAX_DOUBLINGS: usize = 12;
+/// Maximum number of threads.
+pub const MAX_THREADS: usize = 1024;

@@ -1,11 +1,7 @@
 //! Lyapunov spectrum and Poincaré section of any motion.
 
-use std::sync::Arc;
-
-use nalgebra::{DMatrix, RowDVector};
-use nanotap_dynamics::{ClassifyOptions, StroboscopicMap, Tangency, classify, lyapunov_spectrum};
-use nanotap_flow::trajectory::Recorder;
-use nanotap_flow::{Flow, FlowError, Output, Trajectory};
+use nanotap_dynamics::{ClassifyOptions, StroboscopicMap as _, classify, lyapunov_spectrum};
+use nanotap_flow::FlowError;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -14,46 +10,15 @@ pub use nanotap_dynamics::LyapunovOptions as SpectrumOptions;
 use crate::Error;
 use crate::case::Case;
 use crate::control::Control;
-use crate::map::UNINTERRUPTED;
-use crate::model::recording::each_period;
-use crate::model::strobe::Strobe;
+use crate::model::model_map::ModelMap;
 use crate::model::{Model, MotionError};
 use crate::observe::begins_contact;
-use crate::study::kind::Study;
-use crate::study::limits::MOST_PERIODS;
-use crate::study::simulate::{Classification, Named, SimulateError, check_states, starting_state};
+use crate::study::Study;
+use crate::study::limits::MAX_PERIODS;
+use crate::study::request::options;
+use crate::study::simulate::{Classification, Named, check_periods, check_states, starting_state};
 
-/// How to measure.
-#[derive(Clone, Debug, PartialEq)]
-pub struct LyapunovOptions {
-    /// Drive periods thrown away first.
-    pub transient: usize,
-    /// The state at the start; `None`: rest.
-    pub state: Option<Vec<f64>>,
-    /// Drive periods averaged over.
-    pub periods: usize,
-    /// What the section is taken at.
-    pub section: Section,
-    /// Points of the section.
-    pub points: usize,
-    /// Budgets for naming the motion.
-    pub classify: ClassifyOptions,
-}
-
-impl Default for LyapunovOptions {
-    fn default() -> Self {
-        Self {
-            transient: 1000,
-            state: None,
-            periods: 20_000,
-            section: Section::Phase(0.0),
-            points: 5000,
-            classify: ClassifyOptions::default(),
-        }
-    }
-}
-
-/// Where a motion is cut.
+/// Poincaré section.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Section {
@@ -78,24 +43,24 @@ pub struct SectionPoint {
     pub state: Vec<f64>,
 }
 
-/// The spectrum and the section.
+/// Lyapunov spectrum and Poincaré section.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct LyapunovReport {
-    /// What the motion was found to be.
+    /// Class of a motion.
     pub classification: Classification,
-    /// Its period, if periodic.
+    /// Period in drive periods, if periodic.
     pub period: Option<usize>,
-    /// Why it was named so.
+    /// Evidence for the class, in words.
     pub evidence: String,
-    /// Drive periods thrown away first.
+    /// Drive periods of the discarded transient.
     pub transient: usize,
-    /// Drive periods averaged over.
+    /// Drive periods of the average.
     pub periods: usize,
     /// Exponents, natural logarithm per drive period, largest first.
     pub exponents: Vec<f64>,
-    /// One standard error of each.
+    /// Standard error of each.
     pub errors: Vec<f64>,
-    /// Their sum: how fast volumes of states shrink.
+    /// Sum of the exponents: contraction rate of volumes in state space.
     pub sum: f64,
     /// The same from the trace of the equations and the time in each regime, with twice the
     /// logarithm of the restitution at every impact, over the same periods: the check.
@@ -111,129 +76,20 @@ pub struct LyapunovReport {
     pub section_at: Section,
 }
 
-/// A map that goes no further once the work is to stop.
-#[derive(Clone)]
-struct Stoppable<'a> {
-    map: Strobe,
-    control: Control<'a>,
-}
-
-/// Why a period was not computed.
-#[derive(Debug, thiserror::Error)]
-enum Unfinished {
-    #[error("stopped")]
-    Stopped,
-    #[error(transparent)]
-    Flow(#[from] MotionError),
-}
-
-impl Stoppable<'_> {
-    fn goes_on(&self) -> Result<(), Unfinished> {
-        if self.control.is_cancelled() {
-            return Err(Unfinished::Stopped);
-        }
-        Ok(())
-    }
-}
-
-impl StroboscopicMap for Stoppable<'_> {
-    type Error = Unfinished;
-
-    fn dimension(&self) -> usize {
-        self.map.dimension()
-    }
-
-    fn period(&self) -> f64 {
-        self.map.period()
-    }
-
-    fn discrete_entries(&self) -> usize {
-        self.map.discrete_entries()
-    }
-
-    fn advance(&mut self, state: &mut [f64]) -> Result<(), Unfinished> {
-        self.goes_on()?;
-        Ok(self.map.advance(state)?)
-    }
-
-    fn advance_by(&mut self, state: &mut [f64], periods: usize) -> Result<(), Unfinished> {
-        let mut left = periods;
-        while left > 0 {
-            self.goes_on()?;
-            let next = left.min(UNINTERRUPTED);
-            self.map.advance_by(state, next)?;
-            left -= next;
-        }
-        Ok(())
-    }
-
-    fn advance_with_jacobian(
-        &mut self,
-        state: &mut [f64],
-        jacobian: &mut DMatrix<f64>,
-    ) -> Result<(), Unfinished> {
-        self.goes_on()?;
-        Ok(self.map.advance_with_jacobian(state, jacobian)?)
-    }
-
-    fn advance_with_jacobian_and_determinant(
-        &mut self,
-        state: &mut [f64],
-        jacobian: &mut DMatrix<f64>,
-    ) -> Result<Option<f64>, Unfinished> {
-        self.goes_on()?;
-        let map = &mut self.map;
-        Ok(map.advance_with_jacobian_and_determinant(state, jacobian)?)
-    }
-
-    fn log_determinant_bound(&self) -> f64 {
-        self.map.log_determinant_bound()
-    }
-
-    fn advance_with_tangencies(
-        &mut self,
-        state: &mut [f64],
-        tangencies: &mut Vec<Tangency>,
-    ) -> Result<(), Unfinished> {
-        self.goes_on()?;
-        Ok(self.map.advance_with_tangencies(state, tangencies)?)
-    }
-}
-
-impl From<Unfinished> for SimulateError {
-    fn from(error: Unfinished) -> Self {
-        match error {
-            Unfinished::Stopped => Self::Stopped,
-            Unfinished::Flow(error) => Self::Flow(error),
-        }
-    }
-}
-
-/// Measures the spectrum of `model`'s motion and cuts it.
+/// Computes the Lyapunov spectrum and a Poincaré section of the motion of `model`.
 ///
 /// # Errors
-/// When the start makes no sense, the flow fails, or the work was stopped.
+/// When the initial state is invalid, the flow fails, or the work was cancelled.
 pub fn lyapunov(
     model: &Model,
     options: &LyapunovOptions,
     control: &Control<'_>,
-) -> Result<LyapunovReport, SimulateError> {
+) -> Result<LyapunovReport, Error> {
     let mut state = starting_state(model, options.state.as_deref())?;
-    if options.periods == 0 {
-        return Err(SimulateError::NoPeriods);
-    }
+    check_periods(options.periods)?;
     check_states(model, options.points, "points")?;
-    let mut map = Stoppable {
-        map: Strobe::new(model),
-        control: *control,
-    };
-    let stopped = |error| {
-        if control.is_cancelled() {
-            SimulateError::Stopped
-        } else {
-            error
-        }
-    };
+    let model = &model.clone().cancelled_by(&control.flag());
+    let mut map = ModelMap::new(model);
     let defaults = SpectrumOptions::default();
     // The tangent vectors align themselves during the last periods of the transient.
     let alignment = defaults.alignment.min(options.transient);
@@ -247,15 +103,18 @@ pub fn lyapunov(
         ..defaults
     };
     let spectrum = lyapunov_spectrum(&mut map, &mut state, &fixed).map_err(|_| {
-        stopped(SimulateError::Flow(MotionError::Flow(
-            FlowError::NotFinite {
-                what: "the tangent vectors of the motion",
-            },
-        )))
+        if control.is_cancelled() {
+            return Error::stopped();
+        }
+        let what = "the tangent vectors of the motion";
+        FlowError::NotFinite { what }.into()
     })?;
-    let named = Named::of(&classify(&mut map, &start, &options.classify).kind);
-    map.goes_on()?;
-    let section = cut(model, &start, options.section, options.points, control)?;
+    let named = Named::of(&classify(&mut map, &start, &ClassifyOptions::default()).kind);
+    if control.is_cancelled() {
+        return Err(Error::stopped());
+    }
+    let section_at = options.section_at();
+    let section = section(model, &start, section_at, options.points)?;
     Ok(LyapunovReport {
         classification: named.classification,
         period: named.orbit.map(|o| o.period),
@@ -272,7 +131,7 @@ pub fn lyapunov(
         errors: spectrum.errors,
         mean: spectrum.strobe.mean_state().to_vec(),
         section,
-        section_at: options.section,
+        section_at,
     })
 }
 
@@ -287,20 +146,6 @@ pub fn section(
     at: Section,
     points: usize,
 ) -> Result<Vec<SectionPoint>, MotionError> {
-    match cut(model, start, at, points, &Control::default()) {
-        Ok(points) => Ok(points),
-        Err(Unfinished::Flow(error)) => Err(error),
-        Err(Unfinished::Stopped) => Ok(Vec::new()),
-    }
-}
-
-fn cut(
-    model: &Model,
-    start: &[f64],
-    at: Section,
-    points: usize,
-    control: &Control<'_>,
-) -> Result<Vec<SectionPoint>, Unfinished> {
     /// Periods watched for each point.
     const RAREST: usize = 8;
     let tip_rate = model.tip_rate();
@@ -318,82 +163,28 @@ fn cut(
         state,
     };
     let mut found = Vec::with_capacity(points);
-    if let Some(nonlinear) = &model.nonlinear {
-        let mut state = start.to_vec();
-        for _ in 0..points.saturating_mul(RAREST) {
-            if found.len() >= points {
-                break;
-            }
-            if control.is_cancelled() {
-                return Err(Unfinished::Stopped);
-            }
-            each_period(nonlinear, &mut state, 1, |_, recorded| {
-                let times: Vec<f64> = match at {
-                    Section::Phase(phase) => vec![phase.rem_euclid(1.0) * period],
-                    Section::Contact => recorded
-                        .switches()
-                        .iter()
-                        .filter(|s| !nonlinear.contact[s.from] && nonlinear.contact[s.to])
-                        .map(|s| s.time)
-                        .collect(),
-                };
-                found.extend(times.into_iter().filter_map(|time| {
-                    let sample = recorded.at(time)?;
-                    let mut state = sample.state.as_slice().to_vec();
-                    state.resize(model.dimension(), sample.branch as f64);
-                    Some(point(state, time))
-                }));
-            })?;
-        }
-        found.truncate(points);
-        return Ok(found);
-    }
-    let mut flow = Flow::new(Arc::clone(&model.system));
-    flow.start(start, 0.0).map_err(MotionError::from)?;
+    let mut record = model.recorder(start)?;
     for _ in 0..points.saturating_mul(RAREST) {
         if found.len() >= points {
             break;
         }
-        if control.is_cancelled() {
-            return Err(Unfinished::Stopped);
-        }
-        let mut recorder = Recorder::default();
-        flow.run_period(&mut recorder).map_err(MotionError::from)?;
-        let trajectory = recorder.finish(Arc::clone(&model.system));
+        let recorded = record(1)?;
         match at {
             Section::Phase(phase) => {
                 let time = phase.rem_euclid(1.0) * period;
-                found.extend(trajectory.state_at(time).map(|state| point(state, time)));
+                found.extend(recorded.state_at(time).map(|state| point(state, time)));
             }
             Section::Contact => {
-                for event in trajectory
-                    .events()
-                    .iter()
-                    .filter(|e| begins_contact(model, e.from, e.to))
-                {
-                    let state = state_before(&trajectory, event.time);
-                    found.extend(state.map(|state| point(state, event.time)));
+                let switches = recorded.switches().into_iter();
+                for switch in switches.filter(|e| begins_contact(model, e.from, e.to)) {
+                    let state = recorded.state_before(switch.time);
+                    found.extend(state.map(|state| point(state, switch.time)));
                 }
             }
         }
     }
     found.truncate(points);
     Ok(found)
-}
-
-/// The state just before a switch at `time`: an impact turns the velocity round.
-fn state_before(trajectory: &Trajectory, time: f64) -> Option<Vec<f64>> {
-    let system = trajectory.system();
-    let (n, tones) = (system.dimension(), system.drive().frequencies().len());
-    (0..n)
-        .map(|i| {
-            let mut row = RowDVector::zeros(n);
-            row[i] = 1.0;
-            let signal = trajectory.signal(&Output::linear(row, tones));
-            let piece = signal.pieces.iter().rev().find(|p| p.start < time)?;
-            Some(piece.signal.at((time - piece.start).min(piece.length)))
-        })
-        .collect()
 }
 
 /// Where a section is taken.
@@ -408,58 +199,37 @@ pub enum SectionKind {
 }
 
 /// Most points of a section: 300 MB with three modes.
-pub const MOST_SECTION_POINTS: usize = 2_000_000;
+pub const MAX_SECTION_POINTS: usize = 2_000_000;
 
-/// What the study of Lyapunov exponents is asked for.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct LyapunovRequest {
-    /// Drive periods averaged over
-    #[schemars(range(min = 1, max = MOST_PERIODS), extend("x-value" = "P"))]
-    pub periods: usize,
-    /// Drive periods discarded first
-    #[schemars(range(min = 0, max = MOST_PERIODS), extend("x-value" = "T"))]
-    pub transient: usize,
-    /// State at the start, drive phase 0: a1,…,aN,v1,…,vN (oscillator: x,v); without it, rest
-    #[schemars(extend("x-value" = "A1,…"))]
-    pub state: Option<Vec<f64>>,
-    /// Where the section is taken
-    pub section: SectionKind,
-    /// Drive phase of the section in degrees
-    #[schemars(extend("x-value" = "DEGREES"))]
-    pub phase: f64,
-    /// Points of the section
-    #[schemars(range(min = 0, max = MOST_SECTION_POINTS), extend("x-value" = "K"))]
-    pub points: usize,
-}
-
-impl Default for LyapunovRequest {
-    fn default() -> Self {
-        let options = LyapunovOptions::default();
-        Self {
-            periods: options.periods,
-            transient: options.transient,
-            state: options.state,
-            section: SectionKind::default(),
-            phase: 0.0,
-            points: options.points,
-        }
+options! {
+    /// Options of the Lyapunov spectrum.
+    pub struct LyapunovOptions {
+        /// Drive periods of the average
+        #[schemars(range(min = 1, max = MAX_PERIODS), extend("x-value" = "P"))]
+        pub periods: usize = 20_000,
+        /// Drive periods of the discarded transient
+        #[schemars(range(min = 0, max = MAX_PERIODS), extend("x-value" = "T"))]
+        pub transient: usize = 1000,
+        /// Initial state at drive phase 0: a1,…,aN,v1,…,vN (oscillator: x,v); default: rest
+        #[schemars(extend("x-value" = "A1,…"))]
+        pub state: Option<Vec<f64>> = None,
+        /// Poincaré section
+        pub section: SectionKind = SectionKind::default(),
+        /// Drive phase of the section in degrees
+        #[schemars(extend("x-value" = "DEGREES"))]
+        pub phase: f64 = 0.0,
+        /// Number of points of the section
+        #[schemars(range(min = 0, max = MAX_SECTION_POINTS), extend("x-value" = "K"))]
+        pub points: usize = 5000,
     }
 }
 
-impl LyapunovRequest {
-    /// How to measure.
-    pub fn options(&self) -> LyapunovOptions {
-        LyapunovOptions {
-            transient: self.transient,
-            state: self.state.clone(),
-            periods: self.periods,
-            section: match self.section {
-                SectionKind::Phase => Section::Phase((self.phase / 360.0).rem_euclid(1.0)),
-                SectionKind::Contact => Section::Contact,
-            },
-            points: self.points,
-            ..LyapunovOptions::default()
+impl LyapunovOptions {
+    /// Where the section is taken.
+    fn section_at(&self) -> Section {
+        match self.section {
+            SectionKind::Phase => Section::Phase((self.phase / 360.0).rem_euclid(1.0)),
+            SectionKind::Contact => Section::Contact,
         }
     }
 }
@@ -470,15 +240,16 @@ pub struct LyapunovStudy;
 
 impl Study for LyapunovStudy {
     const NAME: &'static str = "lyapunov";
-    const ABOUT: &'static str = "Lyapunov spectrum with error bars, and a Poincaré section";
-    type Request = LyapunovRequest;
+    const ABOUT: &'static str =
+        "Compute the Lyapunov spectrum with error bars, and a Poincaré section";
+    type Options = LyapunovOptions;
     type Report = LyapunovReport;
 
     fn compute(
         case: &Case,
-        request: &LyapunovRequest,
+        options: &LyapunovOptions,
         control: &Control<'_>,
     ) -> Result<LyapunovReport, Error> {
-        Ok(lyapunov(&case.model()?, &request.options(), control)?)
+        lyapunov(&case.model()?, options, control)
     }
 }

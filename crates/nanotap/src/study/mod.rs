@@ -1,34 +1,237 @@
-//! The studies: one room each, with its options, its run and its report.
+//! The studies, one module each: options, run, report. A study either reports in a document
+//! ([`Study`]) or computes a dataset ([`DatasetStudy`]).
 
 pub mod approach;
 pub mod attractors;
 pub mod averaged_orbits;
+#[cfg(feature = "dataset")]
 pub mod basin;
 pub mod branch;
 pub mod contact_laws;
 pub mod convergence;
+#[cfg(feature = "fit")]
 pub mod fit;
 mod free_motion;
+pub mod frequency_modulation;
 pub mod in_si;
-pub mod kind;
 pub mod limits;
 pub mod lyapunov;
 pub mod mode_share;
 pub mod modes;
 pub mod orbit;
 pub mod proof;
-pub mod recipe;
+#[cfg(feature = "fit")]
 pub mod reconstruct;
 pub mod registry;
 pub mod request;
+pub mod scan;
 pub mod setpoint;
+mod short_run;
 pub mod simulate;
 pub mod start_box;
+#[cfg(feature = "dataset")]
 pub mod sweep;
 pub mod threads;
 pub mod value;
+#[cfg(feature = "dataset")]
 pub mod window;
 
-pub use approach::frequency_modulation;
+#[cfg(feature = "dataset")]
+use std::fmt::Debug;
+
+use nanotap_dynamics::Control;
+use schemars::JsonSchema;
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+use serde_json::{Map, Value};
+
 pub use free_motion::FreeMotion;
 pub use simulate::fixed_step;
+
+use crate::Error;
+use crate::case::Case;
+use crate::case::document::CaseDocument;
+#[cfg(feature = "dataset")]
+use crate::dataset::{Schema, Store, StoreError, Work, WorkError};
+use crate::model::cantilever::Cantilever;
+use registry::StudyEntry;
+
+/// Every study.
+pub static STUDIES: &[StudyEntry] = &[
+    StudyEntry::of::<modes::ModesStudy>(),
+    StudyEntry::of::<simulate::SimulateStudy>(),
+    StudyEntry::of::<orbit::OrbitStudy>(),
+    StudyEntry::of::<attractors::AttractorsStudy>(),
+    StudyEntry::of::<branch::BranchStudy>(),
+    StudyEntry::of::<approach::ApproachStudy>(),
+    #[cfg(feature = "fm")]
+    StudyEntry::of::<frequency_modulation::FrequencyModulationStudy>(),
+    #[cfg(feature = "fit")]
+    StudyEntry::of::<fit::FitStudy>(),
+    #[cfg(feature = "fit")]
+    StudyEntry::of::<reconstruct::ReconstructStudy>(),
+    #[cfg(feature = "dataset")]
+    StudyEntry::dataset::<sweep::SweepStudy>(),
+    #[cfg(feature = "dataset")]
+    StudyEntry::dataset::<window::WindowStudy>(),
+    #[cfg(feature = "dataset")]
+    StudyEntry::dataset::<basin::BasinStudy>(),
+    StudyEntry::of::<lyapunov::LyapunovStudy>(),
+    StudyEntry::of::<convergence::ConvergenceStudy>(),
+    StudyEntry::of::<contact_laws::ContactLawsStudy>(),
+    StudyEntry::of::<scan::ScanStudy>(),
+];
+
+/// A study whose report is a document.
+pub trait Study {
+    /// Name in every front end.
+    const NAME: &'static str;
+    /// Help text of one line.
+    const ABOUT: &'static str;
+    /// Options: what front ends show, check and pass on as JSON.
+    type Options: Serialize + DeserializeOwned + JsonSchema;
+    /// Report.
+    type Report: Serialize + JsonSchema + 'static;
+
+    /// What its progress counts, in the plural.
+    const COUNTED: &'static str = "steps";
+    /// Whether it chooses the distance itself, so that none is solved for a setpoint.
+    const ANY_DISTANCE: bool = false;
+    /// Whether the report of cancelled work holds the finished part, and states that it is a part.
+    const PARTIAL: bool = false;
+
+    /// Computes the report of a `case` that `control` cancels: implements [`run`](Self::run).
+    ///
+    /// # Errors
+    /// When an option is not valid, or the computation fails.
+    fn compute(
+        case: &Case,
+        options: &Self::Options,
+        control: &Control<'_>,
+    ) -> Result<Self::Report, Error>;
+
+    /// Computes the report of `case`. Once `control` cancels the work it ends soon, with the
+    /// finished part where the report can hold it.
+    ///
+    /// # Errors
+    /// When an option is not valid, the computation fails, or it was cancelled.
+    fn run(
+        case: &Case,
+        options: &Self::Options,
+        control: &Control<'_>,
+    ) -> Result<Self::Report, Error> {
+        let report = Self::compute(&case.cancelled_by(control), options, control);
+        if control.is_cancelled() && !(Self::PARTIAL && report.is_ok()) {
+            return Err(Error::stopped());
+        }
+        report
+    }
+}
+
+/// A study whose report is a dataset, computed chunk by chunk.
+#[cfg(feature = "dataset")]
+pub trait DatasetStudy {
+    /// Name in every front end.
+    const NAME: &'static str;
+    /// Help text of one line.
+    const ABOUT: &'static str;
+    /// What its progress counts, in the plural.
+    const COUNTED: &'static str;
+    /// Options: what front ends show, check and pass on as JSON.
+    type Options: Serialize + DeserializeOwned + JsonSchema;
+    /// Summary of the finished dataset.
+    type Report: Serialize + JsonSchema;
+
+    /// Plans the dataset of a `case` that `control` cancels: implements [`plan`](Self::plan).
+    ///
+    /// # Errors
+    /// When an option is not valid, or a computation that the plan needs fails.
+    fn prepare(
+        case: &Case,
+        options: &Self::Options,
+        control: &Control<'_>,
+    ) -> Result<DatasetPlan, Error>;
+
+    /// Plans the dataset of `case`.
+    ///
+    /// # Errors
+    /// When an option is not valid, a computation that the plan needs fails, or it was cancelled.
+    fn plan(
+        case: &Case,
+        options: &Self::Options,
+        control: &Control<'_>,
+    ) -> Result<DatasetPlan, Error> {
+        let plan = Self::prepare(&case.cancelled_by(control), options, control);
+        if control.is_cancelled() {
+            return Err(Error::stopped());
+        }
+        plan
+    }
+
+    /// Summarises a finished dataset.
+    ///
+    /// # Errors
+    /// When a chunk is missing or damaged.
+    fn report(store: &Store) -> Result<Self::Report, StoreError>;
+}
+
+/// The checked computation of a dataset: its chunks are pure functions of it.
+#[cfg(feature = "dataset")]
+pub type DatasetPlan = Box<dyn Computation>;
+
+/// The computation of a dataset.
+#[cfg(feature = "dataset")]
+pub trait Computation: Debug + Send + Sync {
+    /// The dataset's schema.
+    fn schema(&self) -> &Schema;
+
+    /// Computes the missing chunks of `store`, which was made for the schema.
+    ///
+    /// # Errors
+    /// When the work was cancelled (finished chunks stay), or the store fails.
+    fn compute(&self, store: &Store, work: &Work<'_>) -> Result<(), WorkError>;
+
+    /// Computes the files of one chunk on this thread: the same bytes as [`compute`](Self::compute)
+    /// writes. `None` if cancelled, or if there is no such chunk.
+    fn chunk_files(&self, chunk: usize, control: &Control<'_>) -> Option<Vec<Vec<u8>>>;
+}
+
+/// A report with its case.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct Document<'a, R: Serialize> {
+    /// The report.
+    #[serde(flatten)]
+    pub report: &'a R,
+    /// The version of the program.
+    pub version: &'static str,
+    /// The case.
+    #[schemars(with = "Map<String, Value>")]
+    pub case: CaseDocument,
+}
+
+impl<'a, R: Serialize> Document<'a, R> {
+    /// The document of a report on `case`.
+    pub fn new(report: &'a R, case: &'a Case) -> Self {
+        Self {
+            report,
+            version: env!("CARGO_PKG_VERSION"),
+            case: CaseDocument::of(case),
+        }
+    }
+}
+
+/// The dimensionless cantilever of a case, for a study that needs one.
+///
+/// # Errors
+/// When it is an oscillator.
+pub fn cantilever<'a>(case: &'a Case, study: &str) -> Result<&'a Cantilever, Error> {
+    case.cantilever().ok_or_else(|| {
+        Error::input(
+            format!(
+                "{}: `{study}` needs a cantilever; this is an oscillator",
+                case.title()
+            ),
+            "an oscillator has one degree of freedom and no beam modes",
+        )
+    })
+}

@@ -16,7 +16,7 @@ pub struct Reading {
     pub first_harmonic: f64,
     /// Its phase, degrees behind the drive.
     pub phase: f64,
-    /// Energy that the sample takes in a drive period, E_dis.
+    /// Energy dissipated in the sample per drive period, E_dis.
     pub dissipation: f64,
     /// Greatest force, F_max.
     pub peak_force: f64,

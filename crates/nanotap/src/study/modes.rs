@@ -3,7 +3,7 @@
 
 use nalgebra::Complex;
 use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 
 use crate::Error;
 use crate::case::Case;
@@ -12,14 +12,15 @@ use crate::model::beam::Modes;
 use crate::model::cantilever::{Cantilever, CantileverError};
 use crate::model::exact_beam;
 use crate::model::galerkin::{Galerkin, Regime};
-use crate::model::spectrum::{self, Spectrum, SpectrumError, TipLoad};
-use crate::study::kind::{Study, cantilever};
-use crate::study::limits::MOST_POINTS;
+use crate::model::spectrum::{self, Spectrum, TipLoad};
+use crate::study::limits::MAX_POINTS;
+use crate::study::request::options;
+use crate::study::{Study, cantilever};
 
 /// The modes of a case. Frequencies are Ω of the undamped equations, ascending, N of each.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct ModeTable {
-    /// N.
+    /// Number of modes.
     pub modes: usize,
     /// By how much these modes together are stiffer than the beam against a constant force at
     /// the tip, as a part of its static stiffness k = 3EI/L³.
@@ -36,36 +37,25 @@ pub struct ModeTable {
     /// `None` where not every mode oscillates.
     pub quality: Option<Vec<f64>>,
     /// Eigenvalues [Re, Im ≥ 0] of the damped Galerkin equations in free flight, by
-    /// ascending size; `None` where they are too nearly defective to be told apart.
+    /// ascending size; `None` where they are too nearly defective to be separated.
     pub free_eigenvalues: Option<Vec<[f64; 2]>>,
     /// The same in contact.
     pub contact_eigenvalues: Option<Vec<[f64; 2]>>,
-}
-
-/// Why there is no mode table.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum ModeTableError {
-    /// The case is not valid.
-    #[error(transparent)]
-    Case(#[from] CantileverError),
-    /// The frequencies could not be computed.
-    #[error(transparent)]
-    Spectrum(#[from] SpectrumError),
 }
 
 impl ModeTable {
     /// The modes of `case`.
     ///
     /// # Errors
-    /// [`ModeTableError::Case`] if the case is not valid.
-    pub fn new(case: &Cantilever) -> Result<Self, ModeTableError> {
+    /// When the case is not valid.
+    pub fn new(case: &Cantilever) -> Result<Self, Error> {
         case.validate()?;
         let beam = Modes::new(case.modes).map_err(CantileverError::from)?;
         // Measured modes fill the matrices.
-        let dense = if case.higher_modes.is_empty() {
-            None
-        } else {
+        let dense = if case.has_measured_modes() {
             Some(Galerkin::new(case)?)
+        } else {
+            None
         };
         let galerkin = |regime| match &dense {
             Some(equations) => Ok(spectrum::dense_frequencies(equations, regime)),
@@ -112,18 +102,12 @@ pub fn damping_ratio([re, im]: [f64; 2]) -> f64 {
     if size == 0.0 { 0.0 } else { -re / size }
 }
 
-/// What the study of modes is asked for.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct ModesRequest {
-    /// Points along the beam in the table of mode shapes
-    #[schemars(range(min = 2, max = MOST_POINTS), extend("x-value" = "P"))]
-    pub points: usize,
-}
-
-impl Default for ModesRequest {
-    fn default() -> Self {
-        Self { points: 201 }
+options! {
+    /// Options of the mode table.
+    pub struct ModesOptions {
+        /// Points along the beam in the table of mode shapes
+        #[schemars(range(min = 2, max = MAX_POINTS), extend("x-value" = "P"))]
+        pub points: usize = 201,
     }
 }
 
@@ -133,21 +117,13 @@ pub struct ModesStudy;
 
 impl Study for ModesStudy {
     const NAME: &'static str = "modes";
-    const ABOUT: &'static str = "Mode shapes and frequencies, in free flight and in contact";
-    type Request = ModesRequest;
+    const ABOUT: &'static str =
+        "Compute mode shapes and frequencies, in free flight and in contact";
+    type Options = ModesOptions;
     type Report = ModeTable;
 
-    fn compute(case: &Case, _: &ModesRequest, _: &Control<'_>) -> Result<ModeTable, Error> {
-        Ok(ModeTable::new(cantilever(case, Self::NAME)?)?)
-    }
-}
-
-impl From<ModeTableError> for crate::Error {
-    fn from(error: ModeTableError) -> Self {
-        match error {
-            ModeTableError::Case(error) => error.into(),
-            ModeTableError::Spectrum(error) => Self::numerics(error.to_string()),
-        }
+    fn compute(case: &Case, _: &ModesOptions, _: &Control<'_>) -> Result<ModeTable, Error> {
+        ModeTable::new(cantilever(case, Self::NAME)?)
     }
 }
 
@@ -216,6 +192,7 @@ mod tests {
     #[test]
     fn bad_cases_are_refused() {
         let bad = Cantilever::paper().with(Parameter::Alpha1, -1.0);
-        assert!(matches!(ModeTable::new(&bad), Err(ModeTableError::Case(_))));
+        let error = ModeTable::new(&bad).unwrap_err();
+        assert_eq!(error.kind, crate::ErrorKind::BadInput);
     }
 }

@@ -1,110 +1,44 @@
-//! A periodic orbit by Newton, with its stability and what can be read off it.
+//! Periodic orbits by Newton's method, with stability and observables.
 
 use nanotap_arithmetic::ComplexFunctions as _;
 use std::collections::BTreeMap;
 
 use nalgebra::DVector;
 use nanotap_dynamics::{
-    ClassifyOptions, Complex, Control, MotionKind, OrbitSearch, PeriodicOrbit, ShootingError,
+    ClassifyOptions, Complex, Control, MotionKind, OrbitSearch, PeriodicOrbit, Scheduling as _,
     ShootingOptions, StroboscopicMap as _, check_size, classify, close_orbit,
     close_orbit_from_points, find_orbits,
 };
 use nanotap_flow::Trajectory;
 use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 
 use crate::Error;
 use crate::case::Case;
+use crate::model::model_map::ModelMap;
 use crate::model::recording::{NonlinearRecording, Recording};
-use crate::model::strobe::Strobe;
-use crate::model::{Forgetting, Model, MotionError};
+use crate::model::{MemoryReset, Model};
 use crate::observe::PhysicalMotion;
 use crate::observe::{
-    ContactEvent, Derivative, Kept, Observables, OutOfRange, Set, Spectrum, watch,
+    ContactEvent, Derivative, ObservableSet, Observables, OutOfRange, RecordOptions, Spectrum,
+    record,
 };
+use crate::study::Study;
 use crate::study::in_si::InSi;
-use crate::study::kind::Study;
-use crate::study::limits::{MOST_PERIOD, MOST_SAMPLES};
+use crate::study::limits::{MAX_PERIOD, MAX_SAMPLES};
 use crate::study::proof::{ProofReport, Prover};
-use crate::study::simulate::{Named, SimulateError, starting_state};
+use crate::study::request::options;
+use crate::study::simulate::{Named, starting_state};
 use crate::study::start_box::default_box;
 
-/// How to look for an orbit.
-#[derive(Clone, Debug, PartialEq)]
-pub struct OrbitOptions {
-    /// Its period; `None`: the one where the run settles.
-    pub period: Option<usize>,
-    /// Where to start; `None`: where a run from rest settles.
-    pub state: Option<Vec<f64>>,
-    /// Harmonics of the drive frequency reported.
-    pub harmonics: usize,
-    /// What is measured.
-    pub observables: Set,
-    /// Budgets of the run from rest.
-    pub classify: ClassifyOptions,
-    /// Newton's budgets.
-    pub shooting: ShootingOptions,
-}
-
-impl Default for OrbitOptions {
-    fn default() -> Self {
-        Self {
-            period: None,
-            state: None,
-            harmonics: 20,
-            observables: Set::ALL,
-            classify: ClassifyOptions::default(),
-            shooting: ShootingOptions::default(),
-        }
-    }
-}
-
-/// Why no orbit was found.
-#[derive(Clone, Debug, thiserror::Error)]
-pub enum OrbitError {
-    /// A period of 0.
-    #[error("a period of at least 1 is needed, 0 was given")]
-    NoPeriod,
-    /// More harmonics than anything has.
-    #[error("{harmonics} harmonics are too many; {MOST_HARMONICS} at most")]
-    TooManyHarmonics {
-        /// How many were asked for.
-        harmonics: usize,
-    },
-    /// The start makes no sense.
-    #[error(transparent)]
-    Start(#[from] SimulateError),
-    /// The flow failed.
-    #[error(transparent)]
-    Flow(#[from] MotionError),
-    /// Newton found nothing.
-    #[error(transparent)]
-    Newton(#[from] ShootingError),
-    /// There may be none.
-    #[error(
-        "no orbit of period {period} was found, neither near the motion nor from starts all over the box \
-         of states"
-    )]
-    NotFound {
-        /// The period asked for.
-        period: usize,
-    },
-    /// The run settles on something that is not periodic.
-    #[error("the run from this start is not periodic ({evidence})")]
-    NotPeriodic {
-        /// What it is.
-        evidence: String,
-    },
-}
-
-/// A periodic orbit and everything that is known about it.
+/// A periodic orbit with its stability and observables.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct OrbitReport {
     /// Minimal period in drive periods.
     pub period: usize,
     /// State at drive phase 0.
     pub state: Vec<f64>,
-    /// States at phase 0 of all its periods.
+    /// States at drive phase 0 of all its periods.
     pub states: Vec<Vec<f64>>,
     /// Largest entry of Pⁿ(x) − x.
     pub residual: f64,
@@ -123,19 +57,19 @@ pub struct OrbitReport {
     pub determinant_defect: f64,
     /// Contacts begun and ended.
     pub events: Vec<ContactEvent>,
-    /// What can be read off it.
+    /// Observables in the model's units.
     #[serde(flatten)]
     pub observables: Observables,
     /// Harmonics, distortion and phase.
     #[serde(flatten)]
     pub spectrum: Spectrum,
-    /// Derivatives by the keys that were asked for.
+    /// Derivatives by the requested keys.
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub derivatives: BTreeMap<&'static str, Derivative>,
-    /// What of the range of a nonlinear force law it leaves.
+    /// Excursions beyond the range of a nonlinear force law.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub out_of_range: Vec<OutOfRange>,
-    /// What was proved of it, if that was asked for.
+    /// The proof, if requested.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub proof: Option<ProofReport>,
     /// Its full length, for figures.
@@ -167,54 +101,70 @@ pub fn spectral_radius(multipliers: &[[f64; 2]]) -> f64 {
 }
 
 /// Most harmonics of the drive frequency that are reported.
-pub const MOST_HARMONICS: usize = 100_000;
+pub const MAX_HARMONICS: usize = 100_000;
 
 /// Finds a periodic orbit of `model`.
 ///
 /// # Errors
-/// When none is found, with the reason.
-pub fn orbit(model: &Model, options: &OrbitOptions) -> Result<OrbitReport, OrbitError> {
+/// When no orbit is found, with the reason.
+pub fn orbit(model: &Model, options: &OrbitOptions) -> Result<OrbitReport, Error> {
     if options.period == Some(0) {
-        return Err(OrbitError::NoPeriod);
+        return Err(no_period());
     }
-    if options.harmonics > MOST_HARMONICS {
-        return Err(OrbitError::TooManyHarmonics {
-            harmonics: options.harmonics,
-        });
+    if options.harmonics > MAX_HARMONICS {
+        return Err(Error::input(
+            format!(
+                "{} harmonics are too many; {MAX_HARMONICS} at most",
+                options.harmonics
+            ),
+            "give fewer {harmonics}",
+        ));
     }
     check_size(model.dimension(), options.period.unwrap_or(1))?;
     let start = starting_state(model, options.state.as_deref())?;
-    let mut map = Strobe::new(model);
+    let mut map = ModelMap::new(model);
     let found = match (options.period, &options.state) {
-        (Some(period), Some(_)) => close_orbit(&mut map, &start, period, &options.shooting)?,
-        (period, _) => settled(model, &mut map, &start, period, options)?,
+        (Some(period), Some(_)) => {
+            close_orbit(&mut map, &start, period, &ShootingOptions::default())?
+        }
+        (period, _) => settled(model, &mut map, &start, period)?,
     };
-    report_on(model, &found, options.harmonics, options.observables)
+    let observables = options.observables.unwrap_or(ObservableSet::ALL);
+    report_on(model, &found, options.harmonics, observables)
+}
+
+/// The error of a period of 0.
+pub(in crate::study) fn no_period() -> Error {
+    Error::input(
+        "a period of at least 1 is needed, 0 was given",
+        "give {period} 1 or more",
+    )
 }
 
 /// The orbit where a run from `start` settles, or one of the asked period: near its end, or
 /// anywhere.
 fn settled(
     model: &Model,
-    map: &mut Strobe,
+    map: &mut ModelMap,
     start: &[f64],
     period: Option<usize>,
-    options: &OrbitOptions,
-) -> Result<PeriodicOrbit, OrbitError> {
-    let end = classify(map, start, &options.classify);
+) -> Result<PeriodicOrbit, Error> {
+    let end = classify(map, start, &ClassifyOptions::default());
     if let MotionKind::Periodic(orbit) | MotionKind::TransientChaos { orbit, .. } = &end.kind
         && period.is_none_or(|p| p % orbit.period == 0)
     {
         return Ok(orbit.clone());
     }
     match period {
-        None => Err(OrbitError::NotPeriodic {
-            evidence: Named::of(&end.kind).evidence,
-        }),
-        Some(period) => near_recurrence(map, &end.state, period, &options.shooting)
+        None => Err(Error::numerics(format!(
+            "the run from this start is not periodic ({})",
+            Named::of(&end.kind).evidence
+        ))
+        .remedy("give the {period} of an orbit to look for")),
+        Some(period) => near_recurrence(map, &end.state, period)
             .ok()
             .filter(|orbit| orbit.period == period)
-            .map_or_else(|| searched(model, map, period, options), Ok),
+            .map_or_else(|| searched(model, map, period), Ok),
     }
 }
 
@@ -225,12 +175,7 @@ const SEARCHED_PERIODS: usize = 256;
 
 /// An orbit of just this period, the least unstable one that Newton finds from starts all
 /// over the default box; failing that, what it finds from where the run ended.
-fn searched(
-    model: &Model,
-    map: &mut Strobe,
-    period: usize,
-    options: &OrbitOptions,
-) -> Result<PeriodicOrbit, OrbitError> {
+fn searched(model: &Model, map: &mut ModelMap, period: usize) -> Result<PeriodicOrbit, Error> {
     let count = SEARCHED_STARTS / if map.is_costly() { 4 } else { 1 };
     let starts = default_box(model)
         .map(|b| b.starts(1, count))
@@ -238,7 +183,6 @@ fn searched(
     let search = OrbitSearch {
         max_period: period,
         run: SEARCHED_PERIODS.max(8 * period),
-        shooting: options.shooting.clone(),
         ..OrbitSearch::default()
     };
     let control = Control {
@@ -249,7 +193,13 @@ fn searched(
     found
         .into_iter()
         .find(|orbit| orbit.period == period)
-        .ok_or(OrbitError::NotFound { period })
+        .ok_or_else(|| {
+            Error::numerics(format!(
+                "no orbit of period {period} was found, neither near the motion nor from starts \
+                 all over the box of states"
+            ))
+            .remedy("give a {state} near one")
+        })
 }
 
 /// States looked at for a near return.
@@ -259,11 +209,11 @@ const RECURRENCE_TRIES: usize = 12;
 
 /// Closes an orbit of the given period from the nearest returns of a motion that does not repeat.
 fn near_recurrence(
-    map: &mut Strobe,
+    map: &mut ModelMap,
     state: &[f64],
     period: usize,
-    shooting: &ShootingOptions,
-) -> Result<PeriodicOrbit, OrbitError> {
+) -> Result<PeriodicOrbit, Error> {
+    let shooting = ShootingOptions::default();
     let mut states = vec![state.to_vec()];
     for k in 0..RECURRENCE_PERIODS + period {
         let mut next = states[k].clone();
@@ -281,7 +231,7 @@ fn near_recurrence(
     let mut smaller = None;
     for &k in order.iter().take(RECURRENCE_TRIES) {
         let points: Vec<f64> = states[k..k + period].concat();
-        match close_orbit_from_points(map, &points, period, shooting) {
+        match close_orbit_from_points(map, &points, period, &shooting) {
             Ok(orbit) if orbit.period == period => return Ok(orbit),
             Ok(orbit) => smaller = Some(orbit),
             Err(error) => last = Some(error),
@@ -290,7 +240,7 @@ fn near_recurrence(
     match (smaller, last) {
         (Some(orbit), _) => Ok(orbit),
         (None, Some(error)) => Err(error.into()),
-        (None, None) => Err(OrbitError::NoPeriod),
+        (None, None) => Err(no_period()),
     }
 }
 
@@ -302,26 +252,26 @@ pub fn report(
     model: &Model,
     orbit: &PeriodicOrbit,
     harmonics: usize,
-) -> Result<OrbitReport, OrbitError> {
-    report_on(model, orbit, harmonics, Set::ALL)
+) -> Result<OrbitReport, Error> {
+    report_on(model, orbit, harmonics, ObservableSet::ALL)
 }
 
 fn report_on(
     model: &Model,
     orbit: &PeriodicOrbit,
     harmonics: usize,
-    observables: Set,
-) -> Result<OrbitReport, OrbitError> {
+    observables: ObservableSet,
+) -> Result<OrbitReport, Error> {
     let start = orbit.states.first().cloned().unwrap_or_default();
-    let kept = Kept {
+    let kept = RecordOptions {
         recorded: orbit.period,
         events: true,
-        ..Kept::default()
+        ..RecordOptions::default()
     };
     let observed = OutOfRange::observed_with(model, observables);
-    let seen = watch(model, &start, orbit.period, observed, kept)?;
+    let seen = record(model, &start, orbit.period, observed, kept)?;
     let determinant_defect = match &seen.recording {
-        Recording::Exact(trajectory) => determinant_defect(model, orbit, trajectory),
+        Recording::PiecewiseLinear(trajectory) => determinant_defect(model, orbit, trajectory),
         Recording::Nonlinear(recording) => nonlinear_defect(orbit, recording),
     };
     let agrees = determinant_defect <= allowed_defect(orbit);
@@ -389,15 +339,15 @@ fn nonlinear_defect(orbit: &PeriodicOrbit, recording: &NonlinearRecording) -> f6
 /// How far the multipliers are from Liouville's formula.
 fn determinant_defect(model: &Model, orbit: &PeriodicOrbit, trajectory: &Trajectory) -> f64 {
     let expected = log_determinant(model, trajectory);
-    match &model.forgetting {
-        Some(forgetting) if !trajectory.events().is_empty() => {
+    match &model.memory_reset {
+        Some(memory_reset) if !trajectory.events().is_empty() => {
             // One direction is lost, and its multiplier is zero.
             let kept = &orbit.multipliers[..orbit.multipliers.len().saturating_sub(1)];
             let found: f64 = kept
                 .iter()
                 .map(|m| nanotap_arithmetic::ln(m.modulus()))
                 .sum();
-            (found - expected - log_remembered(model, forgetting, trajectory)).abs()
+            (found - expected - log_remembered(model, memory_reset, trajectory)).abs()
         }
         // Both vanish where the motion sticks.
         _ if orbit.log_determinant == expected => 0.0,
@@ -411,15 +361,16 @@ fn determinant_defect(model: &Model, orbit: &PeriodicOrbit, trajectory: &Traject
 /// tip's row, a contact, a flight and the next contact's beginning map the beam's state by
 /// S Φ + κ e^{rt} pᵀ, κ the kick per change of memory. By the lemma on determinants its
 /// determinant is that of S Φ times 1 + e^{rt} pᵀ Φ⁻¹ κ, since S⁻¹κ = κ.
-fn log_remembered(model: &Model, forgetting: &Forgetting, trajectory: &Trajectory) -> f64 {
+fn log_remembered(model: &Model, memory_reset: &MemoryReset, trajectory: &Trajectory) -> f64 {
     let flight = &model.system.regimes()[0];
     let basis = flight.basis();
     let tip = &model.height.row;
     let back = |length: f64| {
         if !basis.clusters.is_empty() {
-            return nanotap_arithmetic::matrix_exp(&(flight.matrix() * -length)) * &forgetting.kick;
+            return nanotap_arithmetic::matrix_exp(&(flight.matrix() * -length))
+                * &memory_reset.kick;
         }
-        let kicked = &basis.left * forgetting.kick.map(|v| Complex::new(v, 0.0));
+        let kicked = &basis.left * memory_reset.kick.map(|v| Complex::new(v, 0.0));
         let turned = kicked.zip_map(
             &DVector::from_column_slice(&basis.eigenvalues),
             |q, rate| q * (rate * -length).exponential(),
@@ -427,7 +378,7 @@ fn log_remembered(model: &Model, forgetting: &Forgetting, trajectory: &Trajector
         (&basis.right * turned).map(|z| z.re)
     };
     let factor = |length: f64| {
-        1.0 + nanotap_arithmetic::exp(forgetting.rate * length) * (tip * back(length))[0]
+        1.0 + nanotap_arithmetic::exp(memory_reset.rate * length) * (tip * back(length))[0]
     };
     flights(model, trajectory)
         .map(|length| nanotap_arithmetic::ln(factor(length).abs()))
@@ -464,7 +415,7 @@ fn log_determinant(model: &Model, trajectory: &Trajectory) -> f64 {
         return f64::NEG_INFINITY;
     }
     // A memory that is forgotten is left out, and its jump with it.
-    let forgets = model.forgetting.as_ref();
+    let forgets = model.memory_reset.as_ref();
     let forgotten = match forgets {
         Some(f) if !trajectory.events().is_empty() => f.rate * trajectory.end(),
         _ => 0.0,
@@ -494,58 +445,30 @@ fn log_determinant(model: &Model, trajectory: &Trajectory) -> f64 {
     flow + impacts
 }
 
-/// What the study of an orbit is asked for.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct OrbitRequest {
-    /// Its period in drive periods; without it, that of the motion to which a run converges
-    #[schemars(range(min = 1, max = MOST_PERIOD), extend("x-value" = "N"))]
-    pub period: Option<usize>,
-    /// State to look near, at drive phase 0: a1,…,aN,v1,…,vN (oscillator: x,v)
-    #[schemars(extend("x-value" = "A1,…"))]
-    pub state: Option<Vec<f64>>,
-    /// Harmonics of the drive frequency to report
-    #[schemars(range(min = 0, max = MOST_HARMONICS), extend("x-value" = "H"))]
-    pub harmonics: usize,
-    /// Observables to measure; without it, every one that there is, the beam's clearance included
-    #[schemars(extend("x-value" = "NAME,…"))]
-    pub observables: Option<Set>,
-    /// Samples a drive period in the time series
-    #[schemars(range(min = 1, max = MOST_SAMPLES), extend("x-value" = "S"))]
-    pub resolution: usize,
-    /// Keys of the case by which to differentiate the orbit and all that is observed of it;
-    /// what stays is what stays in a sweep
-    #[schemars(extend("x-value" = "KEY,…"))]
-    pub derivatives: Vec<String>,
-    /// Prove in interval arithmetic that it exists, is alone, and is stable or not
-    pub prove: bool,
-}
-
-impl Default for OrbitRequest {
-    fn default() -> Self {
-        let options = OrbitOptions::default();
-        Self {
-            period: options.period,
-            state: options.state,
-            harmonics: options.harmonics,
-            observables: None,
-            resolution: 200,
-            derivatives: Vec::new(),
-            prove: false,
-        }
-    }
-}
-
-impl OrbitRequest {
-    /// How to look for the orbit.
-    pub fn options(&self) -> OrbitOptions {
-        OrbitOptions {
-            period: self.period,
-            state: self.state.clone(),
-            harmonics: self.harmonics,
-            observables: self.observables.unwrap_or(Set::ALL),
-            ..OrbitOptions::default()
-        }
+options! {
+    /// Options of a periodic orbit.
+    pub struct OrbitOptions {
+        /// Period in drive periods; default: that of the motion to which a run converges
+        #[schemars(range(min = 1, max = MAX_PERIOD), extend("x-value" = "N"))]
+        pub period: Option<usize> = None,
+        /// State near the orbit, at drive phase 0: a1,…,aN,v1,…,vN (oscillator: x,v)
+        #[schemars(extend("x-value" = "A1,…"))]
+        pub state: Option<Vec<f64>> = None,
+        /// Number of reported harmonics of the drive frequency
+        #[schemars(range(min = 0, max = MAX_HARMONICS), extend("x-value" = "H"))]
+        pub harmonics: usize = 20,
+        /// Observables to measure; default: all, including the clearance of the beam
+        #[schemars(extend("x-value" = "NAME,…"))]
+        pub observables: Option<ObservableSet> = None,
+        /// Samples per drive period in the time series
+        #[schemars(range(min = 1, max = MAX_SAMPLES), extend("x-value" = "S"))]
+        pub resolution: usize = 200,
+        /// Keys of the case for derivatives of the orbit and its observables; the same quantities
+        /// stay constant as in a sweep
+        #[schemars(extend("x-value" = "KEY,…"))]
+        pub derivatives: Vec<String> = Vec::new(),
+        /// Prove existence, local uniqueness and stability by interval arithmetic
+        pub prove: bool = false,
     }
 }
 
@@ -555,35 +478,29 @@ pub struct OrbitStudy;
 
 impl Study for OrbitStudy {
     const NAME: &'static str = "orbit";
-    const ABOUT: &'static str = "A periodic orbit by Newton, stable or not";
-    type Request = OrbitRequest;
+    const ABOUT: &'static str = "Compute a periodic orbit by Newton's method, stable or not";
+    type Options = OrbitOptions;
     type Report = InSi<OrbitReport>;
 
     fn compute(
         case: &Case,
-        request: &OrbitRequest,
+        options: &OrbitOptions,
         _: &Control<'_>,
     ) -> Result<InSi<OrbitReport>, Error> {
-        let keys = request.derivatives.iter();
+        let keys = options.derivatives.iter();
         let keys = keys
             .map(|name| case.key(name))
             .collect::<Result<Vec<_>, _>>()?;
         let model = case.model()?;
-        let options = request.options();
-        let mut found = orbit(&model, &options)?;
+        let observables = options.observables.unwrap_or(ObservableSet::ALL);
+        let mut found = orbit(&model, options)?;
         for key in keys {
             let at = (found.state.as_slice(), found.period);
-            let derivative = Derivative::of(
-                case,
-                &model,
-                key,
-                at,
-                &found.observables,
-                options.observables,
-            )?;
+            let derivative =
+                Derivative::of(case, &model, key, at, &found.observables, observables)?;
             found.derivatives.insert(key.path(), derivative);
         }
-        if request.prove {
+        if options.prove {
             found.prove(&Prover::new(case));
         }
         let physical = case.physical().map(|resolved| {
@@ -593,26 +510,5 @@ impl Study for OrbitStudy {
             motion: found,
             physical,
         })
-    }
-}
-
-impl From<OrbitError> for crate::Error {
-    fn from(error: OrbitError) -> Self {
-        match error {
-            OrbitError::NoPeriod => Self::input(error.to_string(), "give {period} 1 or more"),
-            OrbitError::TooManyHarmonics { .. } => {
-                Self::input(error.to_string(), "give fewer {harmonics}")
-            }
-            OrbitError::Newton(ShootingError::TooLarge { .. }) => {
-                Self::input(error.to_string(), "give a shorter {period} or fewer modes")
-            }
-            OrbitError::Start(error) => error.into(),
-            OrbitError::NotFound { .. } => {
-                Self::numerics(error.to_string()).remedy("give a {state} near one")
-            }
-            OrbitError::NotPeriodic { .. } => Self::numerics(error.to_string())
-                .remedy("give the {period} of an orbit to look for"),
-            other => Self::numerics(other.to_string()),
-        }
     }
 }

@@ -1,8 +1,7 @@
 //! Every study by name, from JSON to JSON: what the front ends iterate over.
 //!
-//! A case and the JSON of a request go in, with who is told of the progress and what stops the
-//! work; the JSON of a document comes out. What may be asked for, and what comes out, is in the
-//! entry's schemas.
+//! Input: a case, the options as JSON, a function called with the progress, a flag that cancels the
+//! work. Output: a document as JSON. The entry has the schemas of options and document.
 //!
 //! ```
 //! use std::sync::atomic::{AtomicUsize, Ordering};
@@ -31,9 +30,9 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! A sweep, a window and basins leave a dataset: [`StudyEntry::recipe`] gives what computes it
+//! A sweep, a window and basins leave a dataset: [`StudyEntry::plan`] gives what computes it
 //! chunk by chunk. A figure is drawn from the report itself, by the study's function in
-//! [`figure`](crate::figure).
+//! `figure`.
 
 use nanotap_dynamics::Control;
 use schemars::Schema;
@@ -41,27 +40,28 @@ use serde_json::Value;
 
 use crate::Error;
 use crate::case::Case;
-pub use crate::study::kind::{DatasetStudy, Document, Study};
-use crate::study::recipe::Recipe;
 use crate::study::request::{answer_schema, read, schema};
 use crate::study::setpoint::at_setpoint;
+#[cfg(feature = "dataset")]
+pub use crate::study::{DatasetPlan, DatasetStudy};
+pub use crate::study::{Document, STUDIES, Study};
 
-/// A study without its types.
+/// An entry of the registry: a study from JSON to JSON.
 #[derive(Clone, Copy, Debug)]
 pub struct StudyEntry {
-    /// What every front end calls it.
+    /// Name in every front end.
     pub name: &'static str,
-    /// What it finds out, in a line.
+    /// Help text of one line.
     pub about: &'static str,
-    /// The JSON schema of its request.
+    /// JSON schema of the options.
     pub request: fn() -> Schema,
-    /// The JSON schema of its document, or of what its dataset comes to.
+    /// JSON schema of the document, or of the summary of the dataset.
     pub report: fn() -> Schema,
-    /// What its progress counts.
+    /// What its progress counts, in the plural.
     pub counted: &'static str,
-    /// Whether the report of work that was stopped holds what is finished.
+    /// Whether the report of cancelled work holds the finished part.
     pub partial: bool,
-    /// Whether it chooses the distance itself.
+    /// Whether it chooses the distance itself, so that none is solved for a setpoint.
     pub any_distance: bool,
     /// Runs it.
     pub run: Run,
@@ -73,21 +73,22 @@ pub enum Run {
     /// To the JSON of its document.
     Document(fn(&Case, Value, &Control<'_>) -> Result<String, Error>),
     /// To what is to be computed into a dataset.
-    Dataset(fn(&Case, Value, &Control<'_>) -> Result<Recipe, Error>),
+    #[cfg(feature = "dataset")]
+    Dataset(fn(&Case, Value, &Control<'_>) -> Result<DatasetPlan, Error>),
 }
 
 impl StudyEntry {
-    const fn of<S: Study>() -> Self {
+    pub(super) const fn of<S: Study>() -> Self {
         Self {
             name: S::NAME,
             about: S::ABOUT,
-            request: schema::<S::Request>,
+            request: schema::<S::Options>,
             report: answer_schema::<Document<'static, S::Report>>,
             counted: S::COUNTED,
             partial: S::PARTIAL,
             any_distance: S::ANY_DISTANCE,
             run: Run::Document(|case, request, control| {
-                let request = read::<S::Request>(request)?;
+                let request = read::<S::Options>(request)?;
                 let case = if S::ANY_DISTANCE {
                     case.clone()
                 } else {
@@ -99,18 +100,19 @@ impl StudyEntry {
         }
     }
 
-    const fn dataset<S: DatasetStudy>() -> Self {
+    #[cfg(feature = "dataset")]
+    pub(super) const fn dataset<S: DatasetStudy>() -> Self {
         Self {
             name: S::NAME,
             about: S::ABOUT,
-            request: schema::<S::Request>,
+            request: schema::<S::Options>,
             report: answer_schema::<S::Report>,
             counted: S::COUNTED,
             partial: true,
             any_distance: false,
             run: Run::Dataset(|case, request, control| {
-                let request = read::<S::Request>(request)?;
-                S::recipe(&at_setpoint(case.clone(), control)?.0, &request, control)
+                let request = read::<S::Options>(request)?;
+                S::plan(&at_setpoint(case.clone(), control)?.0, &request, control)
             }),
         }
     }
@@ -127,9 +129,10 @@ impl StudyEntry {
     ) -> Result<String, Error> {
         match self.run {
             Run::Document(run) => run(case, request, control),
+            #[cfg(feature = "dataset")]
             Run::Dataset(_) => Err(Error::input(
                 format!("{} leaves a dataset, not a document", self.name),
-                "compute its recipe into a folder",
+                "compute its plan into a folder",
             )),
         }
     }
@@ -138,14 +141,15 @@ impl StudyEntry {
     ///
     /// # Errors
     /// Those of the study; and when its report is a document.
-    pub fn recipe(
+    #[cfg(feature = "dataset")]
+    pub fn plan(
         &self,
         case: &Case,
         request: Value,
         control: &Control<'_>,
-    ) -> Result<Recipe, Error> {
+    ) -> Result<DatasetPlan, Error> {
         match self.run {
-            Run::Dataset(recipe) => recipe(case, request, control),
+            Run::Dataset(plan) => plan(case, request, control),
             Run::Document(_) => Err(Error::input(
                 format!("{} leaves a document, not a dataset", self.name),
                 "take its document",
@@ -153,24 +157,6 @@ impl StudyEntry {
         }
     }
 }
-
-/// Every study.
-pub static STUDIES: &[StudyEntry] = &[
-    StudyEntry::of::<super::modes::ModesStudy>(),
-    StudyEntry::of::<super::simulate::SimulateStudy>(),
-    StudyEntry::of::<super::orbit::OrbitStudy>(),
-    StudyEntry::of::<super::attractors::AttractorsStudy>(),
-    StudyEntry::of::<super::branch::BranchStudy>(),
-    StudyEntry::of::<super::approach::ApproachStudy>(),
-    StudyEntry::of::<super::fit::FitStudy>(),
-    StudyEntry::of::<super::reconstruct::ReconstructStudy>(),
-    StudyEntry::dataset::<super::sweep::SweepStudy>(),
-    StudyEntry::dataset::<super::window::WindowStudy>(),
-    StudyEntry::dataset::<super::basin::BasinStudy>(),
-    StudyEntry::of::<super::lyapunov::LyapunovStudy>(),
-    StudyEntry::of::<super::convergence::ConvergenceStudy>(),
-    StudyEntry::of::<super::contact_laws::ContactLawsStudy>(),
-];
 
 /// The study that is called `name`.
 pub fn study(name: &str) -> Option<&'static StudyEntry> {

@@ -1,11 +1,11 @@
-//! What a study is asked for: a plain struct whose fields, with their documentation, defaults
+//! The options of a study: a plain struct whose fields, with their documentation, defaults
 //! and ranges, are declared once. Every front end reads the declaration from its JSON schema:
 //! the terminal makes flags of it, Python keyword arguments, and both give back JSON, which
 //! [`read`] checks and turns into the struct.
 //!
-//! Beside JSON schema's own words a property may have `x-value` (what the terminal calls a
+//! In addition to JSON schema's words a property may have `x-value` (what the terminal calls a
 //! value in its help), `x-bare` (the value of a flag that is given without one) and
-//! `x-required`; of one with `x-own` the terminal has an option of its own.
+//! `x-required`; for one with `x-own` the terminal has a hand-written option.
 
 use std::borrow::Cow;
 use std::collections::BTreeMap;
@@ -20,6 +20,33 @@ use crate::Error;
 use crate::case::near_name::near_name;
 use crate::number::shortest;
 
+/// Declares the options of a study: each field with its documentation, its schema and its default.
+macro_rules! options {
+    (
+        $(#[$about:meta])*
+        pub struct $name:ident {
+            $($(#[$of_field:meta])* pub $field:ident: $type:ty = $default:expr,)*
+        }
+    ) => {
+        $(#[$about])*
+        #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+        #[derive(schemars::JsonSchema)]
+        #[serde(default, deny_unknown_fields)]
+        pub struct $name {
+            $($(#[$of_field])* pub $field: $type,)*
+        }
+
+        impl Default for $name {
+            fn default() -> Self {
+                Self {
+                    $($field: $default,)*
+                }
+            }
+        }
+    };
+}
+pub(crate) use options;
+
 /// The JSON schema of what a study answers: what recurs stands under `$defs`.
 pub fn answer_schema<T: JsonSchema>() -> Schema {
     let settings = SchemaSettings::draft2020_12().for_serialize();
@@ -30,6 +57,10 @@ pub fn answer_schema<T: JsonSchema>() -> Schema {
 pub fn schema<T: JsonSchema>() -> Schema {
     let settings = SchemaSettings::draft2020_12().with(|s| s.inline_subschemas = true);
     let mut schema = settings.into_generator().into_root_schema_for::<T>();
+    // The title is part of what the terminal prints.
+    if let Some(name) = T::schema_name().strip_suffix("Options") {
+        schema.insert("title".into(), format!("{name}Request").into());
+    }
     let required: Vec<Value> = properties(&schema)
         .filter(Property::is_required)
         .map(|property| property.name.into())
@@ -283,7 +314,7 @@ pub fn read<R: JsonSchema + DeserializeOwned>(given: Value) -> Result<R, Error> 
                 Some(near) => format!("did you mean {{{near}}}?"),
                 None => format!("there are {}", known.join(", ")),
             };
-            return Err(Error::option(name, "there is no such option", remedy));
+            return Err(Error::option(name, "unknown option", remedy));
         };
         property.check(value)?;
     }
@@ -411,7 +442,7 @@ mod tests {
             ),
             (
                 json!({"cuont": 2}),
-                "cuont: there is no such option; did you mean count?",
+                "cuont: unknown option; did you mean count?",
             ),
             (
                 json!({"way": "left"}),

@@ -1,4 +1,4 @@
-//! The distance at which the amplitude has its setpoint: what the feedback loop finds.
+//! The distance at which the amplitude reaches its setpoint, as a feedback loop finds it.
 //!
 //! The feedback comes from far and slowly: the lever follows its branch of stable orbits, and
 //! jumps where that ends (see [`approach`](super::approach)). It stops at the first distance at
@@ -21,71 +21,17 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use super::FreeMotion;
-use super::approach::distance_sweep::{DistanceSweep, Motion, Piece, is_same};
-use super::approach::{ApproachError, MAX_MULTIPLIER, SETPOINT_PERIODS};
+use super::approach::distance_sweep::{DistanceSweep, Motion, Piece, budget_text, is_same};
+use super::approach::{MAX_MULTIPLIER, SETPOINT_PERIODS, no_drive};
+use crate::case::Case;
 use crate::case::document::CaseDocument;
 use crate::case::physical::{Kind, Remark};
-use crate::case::{Case, CaseError};
-use crate::model::strobe::Strobe;
+use crate::model::model_map::ModelMap;
 use crate::observe::table::shown_phase;
-use crate::observe::{Observables, OutOfRange, PhysicalMotion, Set, measure};
+use crate::observe::{ObservableSet, Observables, OutOfRange, PhysicalMotion, measure};
+use crate::{Error, ErrorKind};
 
-/// Why no distance was chosen.
-#[derive(Clone, Debug, thiserror::Error)]
-pub enum SetpointError {
-    /// The case has no setpoint.
-    #[error("the case has no setpoint: give drive.setpoint, as in setpoint = 0.8")]
-    None,
-    /// There is no curve.
-    #[error(transparent)]
-    Approach(#[from] ApproachError),
-    /// The amplitude never falls so far.
-    #[error(
-        "the setpoint A/A0 = {ratio} is not reached on the way to the sample's own position \
-         (gap.tip = 0), where A/A0 is {least:.3}; raise drive.setpoint, or give gap.tip"
-    )]
-    NotReached {
-        /// The setpoint.
-        ratio: f64,
-        /// The least amplitude on the way, over A₀.
-        least: f64,
-    },
-    /// The amplitude jumps past the setpoint.
-    #[error(
-        "on approach the amplitude jumps past the setpoint A/A0 = {ratio}: from {before:.3} to \
-         {after:.3} of A0 between gap.tip = {from} and {to}; change drive.setpoint, or give gap.tip"
-    )]
-    Jump {
-        /// The setpoint.
-        ratio: f64,
-        /// Amplitude before the jump, over A₀.
-        before: f64,
-        /// Amplitude after it.
-        after: f64,
-        /// Distance before it.
-        from: String,
-        /// Distance after it.
-        to: String,
-    },
-    /// The motion has no one amplitude there.
-    #[error(
-        "on approach the motion is {what} at gap.tip = {at}, before the setpoint A/A0 = {ratio} \
-         is reached: it has no amplitude to hold; change drive.setpoint, or give gap.tip"
-    )]
-    NotPeriodic {
-        /// What it is.
-        what: &'static str,
-        /// Where.
-        at: String,
-        /// The setpoint.
-        ratio: f64,
-    },
-    /// The work was stopped.
-    #[error("stopped before the setpoint was solved for")]
-    Cancelled,
-}
-
-/// One distance at which an orbit has the setpoint amplitude.
+/// A distance at which an orbit has the setpoint amplitude.
 #[derive(Clone, Debug, Serialize)]
 pub struct SetpointSolution {
     /// The distance, in the model's unit of length.
@@ -94,15 +40,15 @@ pub struct SetpointSolution {
     pub zc: f64,
     /// Period of the orbit.
     pub period: usize,
-    /// Whether it attracts.
+    /// Whether it is stable.
     pub stable: bool,
     /// Largest |multiplier|.
     pub spectral_radius: f64,
-    /// Whether the approach stops here.
+    /// Whether the approach stops at this distance.
     pub reached: bool,
     /// State at drive phase 0.
     pub state: Vec<f64>,
-    /// What it looks like.
+    /// Observables in the model's units.
     #[serde(flatten)]
     pub observables: Observables,
     /// The same in SI.
@@ -112,32 +58,35 @@ pub struct SetpointSolution {
 /// Another stable orbit at the chosen distance.
 #[derive(Clone, Debug, Serialize)]
 pub struct SetpointState {
-    /// Its period.
+    /// Period in drive periods.
     pub period: usize,
     /// Largest |multiplier|.
     pub spectral_radius: f64,
     /// State at drive phase 0.
     pub state: Vec<f64>,
-    /// What it looks like.
+    /// Observables in the model's units.
     #[serde(flatten)]
     pub observables: Observables,
     /// The same in SI.
     pub physical: PhysicalMotion,
 }
 
-/// The setpoint solved for the distance.
+/// Solution of a setpoint for the distance.
 #[derive(Clone, Debug, Serialize)]
 pub struct SetpointReport {
     /// A_set/A₀.
     pub ratio: f64,
     /// A_set in m.
     pub amplitude: f64,
-    /// All distances at which an orbit has this amplitude, the farthest first.
+    /// All distances at which an orbit has this amplitude, from far to near.
     pub solutions: Vec<SetpointSolution>,
-    /// Which of them the approach reaches.
+    /// Index of the one that the approach reaches.
     pub chosen: usize,
     /// Other stable orbits at the distance that the approach reaches.
     pub other_states: Vec<SetpointState>,
+    /// Why other states may be missing, if the search for them ended at its budget.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub budget: Option<String>,
 }
 
 impl SetpointReport {
@@ -146,7 +95,7 @@ impl SetpointReport {
         self.solutions.get(self.chosen).map_or(f64::NAN, |s| s.zc)
     }
 
-    /// What was solved, in a sentence.
+    /// The solution, in a sentence.
     pub fn remark(&self) -> Remark {
         let others = self.solutions.len() - 1;
         let stable = self
@@ -186,8 +135,12 @@ impl SetpointReport {
                 also.join(", or at ")
             )
         };
+        let budget = self.budget.as_ref();
+        let cut = budget.map_or_else(String::new, |reason| {
+            format!("; other states may be missing: {reason}")
+        });
         Remark::note(format!(
-            "the setpoint A = {} (A/A0 = {}) is reached on approach at gap.tip = {}{more}{bistable}",
+            "the setpoint A = {} (A/A0 = {}) is reached on approach at gap.tip = {}{more}{bistable}{cut}",
             Kind::Length.format(self.amplitude),
             Kind::Number.format(self.ratio),
             Kind::Length.format(self.zc()),
@@ -198,13 +151,19 @@ impl SetpointReport {
 /// Solves the setpoint of a physical case for the distance.
 ///
 /// # Errors
-/// [`SetpointError`] when there is none to solve, or none is reached on approach.
-pub fn solve_setpoint(case: &Case, control: &Control<'_>) -> Result<SetpointReport, SetpointError> {
-    let view = case.physical().ok_or(SetpointError::None)?;
-    let ratio = view.setpoint.ok_or(SetpointError::None)?;
-    let free = FreeMotion::of(&case.model().map_err(ApproachError::Model)?);
+/// When there is none to solve, or none is reached on approach.
+pub fn solve_setpoint(case: &Case, control: &Control<'_>) -> Result<SetpointReport, Error> {
+    let none = || {
+        Error::input(
+            "the case has no setpoint: give drive.setpoint, as in setpoint = 0.8",
+            "give drive.setpoint",
+        )
+    };
+    let view = case.physical().ok_or_else(none)?;
+    let ratio = view.setpoint.ok_or_else(none)?;
+    let free = FreeMotion::of(&case.model()?);
     if !(free.reach > 0.0 && free.reach.is_finite()) {
-        return Err(ApproachError::NoDrive.into());
+        return Err(no_drive());
     }
     let target = ratio * free.amplitude;
     let mut search = Search {
@@ -216,27 +175,40 @@ pub fn solve_setpoint(case: &Case, control: &Control<'_>) -> Result<SetpointRepo
         least: f64::INFINITY,
         found: None,
     };
-    let failed = |error: CaseError| SetpointError::Approach(error.into());
     let range = (0.0, FARTHER * free.reach);
-    let mut sweep =
-        DistanceSweep::new(case, range, free.reach, SETPOINT_PERIODS, control).map_err(failed)?;
-    let place = sweep.free().map_err(failed)?;
-    let (_, place) = sweep.way(place, 0.0, |sweep, piece| search.ends_in(sweep, piece));
+    let mut sweep = DistanceSweep::new(case, range, free.reach, SETPOINT_PERIODS, control)?;
+    let place = sweep.free()?;
+    // A motion that does not close ends the search.
+    sweep.stops_on_grid = true;
+    let (pieces, place) = sweep.way(place, 0.0, |sweep, piece| search.ends_in(sweep, piece));
+    sweep.stops_on_grid = false;
     if control.is_cancelled() {
-        return Err(SetpointError::Cancelled);
+        return Err(cancelled());
+    }
+    if let Some(steps) = sweep.spent_budget() {
+        return Err(Error::numerics(format!(
+            "the setpoint A/A0 = {ratio} was not reached: {}, to gap.tip = {}; give gap.tip, or raise \
+             drive.setpoint",
+            budget_text(steps),
+            search.shown(pieces.last().map_or(range.1, |piece| piece.to))
+        )));
     }
     let reached = search.found.take().unwrap_or_else(|| {
-        Err(SetpointError::NotReached {
-            ratio,
-            least: search.least / free.amplitude,
-        })
+        Err(Error::numerics(format!(
+            "the setpoint A/A0 = {ratio} is not reached on the way to the sample's own position \
+             (gap.tip = 0), where A/A0 is {:.3}; raise drive.setpoint, or give gap.tip",
+            search.least / free.amplitude
+        )))
     })?;
     // What a lever shows at this distance that comes from near.
+    sweep.allow_steps(OTHERS_STEPS);
     let (_, place) = sweep.way(place, 0.0, |_, _| false);
     sweep.way(place, reached.gap, |_, _| false);
+    let budget = sweep.spent_budget().map(budget_text);
+    sweep.allow_steps(u64::MAX);
     let (mut solutions, other_states) = search.others(&sweep, &reached, control);
     if control.is_cancelled() {
-        return Err(SetpointError::Cancelled);
+        return Err(cancelled());
     }
     solutions.push(reached);
     solutions.sort_by(|a, b| b.gap.total_cmp(&a.gap));
@@ -247,6 +219,7 @@ pub fn solve_setpoint(case: &Case, control: &Control<'_>) -> Result<SetpointRepo
         solutions,
         chosen,
         other_states,
+        budget,
     })
 }
 
@@ -258,15 +231,22 @@ pub fn solve_setpoint(case: &Case, control: &Control<'_>) -> Result<SetpointRepo
 pub fn at_setpoint(
     case: Case,
     control: &Control<'_>,
-) -> Result<(Case, Option<SetpointReport>), SetpointError> {
+) -> Result<(Case, Option<SetpointReport>), Error> {
     if !case.leaves_distance_to_setpoint() {
         return Ok((case, None));
     }
     let report = solve_setpoint(&case.cancelled_by(control), control)?;
     let state = report.solutions.get(report.chosen).map(|s| s.state.clone());
-    let there = case.at_distance(report.zc(), report.remark(), state.unwrap_or_default());
-    let there = there.map_err(|error| ApproachError::Model(Box::new(error).into()))?;
+    let there = case.at_distance(report.zc(), report.remark(), state.unwrap_or_default())?;
     Ok((there, Some(report)))
+}
+
+/// The error of a search that was cancelled.
+fn cancelled() -> Error {
+    Error::new(
+        ErrorKind::Stopped,
+        "stopped before the setpoint was solved for",
+    )
 }
 
 /// A case as a document, with how its setpoint was solved for the distance.
@@ -278,7 +258,7 @@ pub struct SolvedCase {
     /// How its setpoint was solved, if it was.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub setpoint_solved: Option<SetpointReport>,
-    /// What of the range of a nonlinear force law the undriven lever leaves where it rests.
+    /// Excursions of the rest position beyond the range of a nonlinear force law.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub out_of_range: Vec<OutOfRange>,
 }
@@ -295,6 +275,12 @@ impl SolvedCase {
     }
 }
 
+/// Steps of the approximate flow after which other states at the setpoint are looked for no longer,
+/// and which their branches may take.
+const OTHERS_STEPS: u64 = 20_000_000;
+/// Points to which each of these branches may always be followed.
+const MIN_POINTS: usize = 16;
+
 /// How much farther than the free tip swings the way begins.
 const FARTHER: f64 = 2.0;
 
@@ -308,7 +294,7 @@ struct Search<'a> {
     /// The distance and the amplitude last passed.
     before: Option<(f64, f64)>,
     least: f64,
-    found: Option<Result<SetpointSolution, SetpointError>>,
+    found: Option<Result<SetpointSolution, Error>>,
 }
 
 /// An orbit of a branch and its amplitude.
@@ -323,13 +309,14 @@ struct Sample<'a> {
 fn amplitude(sweep: &DistanceSweep<'_>, gap: f64, orbit: &PeriodicOrbit) -> f64 {
     let start = orbit.states.first().map_or(&[][..], Vec::as_slice);
     let model = sweep.model(gap).ok();
-    let seen = model.and_then(|m| measure(&m, start, orbit.period, Set::FIRST_HARMONIC).ok());
+    let seen =
+        model.and_then(|m| measure(&m, start, orbit.period, ObservableSet::FIRST_HARMONIC).ok());
     seen.map_or(f64::NAN, |seen| seen.first_harmonic)
 }
 
 impl Search<'_> {
     /// The distance in words.
-    fn told(&self, gap: f64) -> String {
+    fn shown(&self, gap: f64) -> String {
         self.case.physical().map_or_else(
             || gap.to_string(),
             |view| Kind::Length.format(gap * view.scales.length),
@@ -341,16 +328,18 @@ impl Search<'_> {
         let stretch = match &piece.motion {
             Motion::Periodic(stretch) => *stretch,
             Motion::OnGrid(_) => {
-                let met = sweep.motion_at(piece, piece.entered);
-                let what = match met.orbit {
+                let motion = sweep.motion_at(piece, piece.entered);
+                let what = match motion.orbit {
                     Some(_) => "of a long period",
-                    None => met.classification.name(),
+                    None => motion.classification.name(),
                 };
-                self.found = Some(Err(SetpointError::NotPeriodic {
-                    what,
-                    at: self.told(piece.from),
-                    ratio: self.ratio,
-                }));
+                self.found = Some(Err(Error::numerics(format!(
+                    "on approach the motion is {what} at gap.tip = {}, before the setpoint A/A0 = \
+                     {} is reached: it has no amplitude to hold; change drive.setpoint, or give \
+                     gap.tip",
+                    self.shown(piece.from),
+                    self.ratio
+                ))));
                 return true;
             }
         };
@@ -382,19 +371,23 @@ impl Search<'_> {
             self.least = self.least.min(amplitude);
             if amplitude <= self.target {
                 let jumped = |(from, above): (f64, f64)| {
-                    Err(SetpointError::Jump {
-                        ratio: self.ratio,
-                        before: above / self.free.amplitude,
-                        after: amplitude / self.free.amplitude,
-                        from: self.told(from),
-                        to: self.told(*gap),
-                    })
+                    Err(Error::numerics(format!(
+                        "on approach the amplitude jumps past the setpoint A/A0 = {}: from {:.3} \
+                         to {:.3} of A0 between gap.tip = {} and {}; change drive.setpoint, or \
+                         give gap.tip",
+                        self.ratio,
+                        above / self.free.amplitude,
+                        amplitude / self.free.amplitude,
+                        self.shown(from),
+                        self.shown(*gap)
+                    )))
                 };
                 let crossed = before.as_ref().map(|last| {
-                    self.crossing(last, &here).map(|found| SetpointSolution {
-                        reached: true,
-                        ..found
-                    })
+                    self.crossing(sweep, last, &here)
+                        .map(|found| SetpointSolution {
+                            reached: true,
+                            ..found
+                        })
                 });
                 self.found = match (crossed, self.before) {
                     (Some(Some(found)), _) => Some(Ok(found)),
@@ -438,10 +431,14 @@ impl Search<'_> {
         let states = others
             .filter_map(|(gap, orbit)| self.state(*gap, orbit))
             .collect();
+        let over = ContinuationOptions::over(0.0, sweep.farthest());
+        let max_points = sweep.points_in(OTHERS_STEPS) / seeds.len().max(1);
         let options = DiagramOptions {
             continuation: ContinuationOptions {
+                max_points: max_points.max(MIN_POINTS).min(over.max_points),
+                grazings: false,
                 max_multiplier: MAX_MULTIPLIER,
-                ..ContinuationOptions::over(0.0, sweep.farthest())
+                ..over
             },
             doublings: 0,
             stable_doublings: false,
@@ -467,7 +464,7 @@ impl Search<'_> {
                     amplitude: both[k],
                 });
                 if (a.amplitude > self.target) != (b.amplitude > self.target)
-                    && let Some(solution) = self.crossing(&a, &b)
+                    && let Some(solution) = self.crossing(sweep, &a, &b)
                 {
                     let near = 1e-9 * self.free.reach.max(solution.gap.abs());
                     let known = |s: &SetpointSolution| {
@@ -489,7 +486,7 @@ impl Search<'_> {
         let view = self.case.physical()?;
         let model = self.case.with(self.case.gap_key(), gap).model().ok()?;
         let state = orbit.states.first()?.clone();
-        let observables = measure(&model, &state, orbit.period, Set::COMMON).ok()?;
+        let observables = measure(&model, &state, orbit.period, ObservableSet::COMMON).ok()?;
         Some(SetpointState {
             period: orbit.period,
             spectral_radius: orbit.spectral_radius(),
@@ -505,7 +502,12 @@ const STEPS: usize = 60;
 
 impl Search<'_> {
     /// The orbit between two of a branch that has the target amplitude.
-    fn crossing(&self, a: &Sample<'_>, b: &Sample<'_>) -> Option<SetpointSolution> {
+    fn crossing(
+        &self,
+        sweep: &DistanceSweep<'_>,
+        a: &Sample<'_>,
+        b: &Sample<'_>,
+    ) -> Option<SetpointSolution> {
         let view = self.case.physical()?;
         let target = self.target;
         let (mut low, mut high) = ((0.0, a.amplitude), (1.0, b.amplitude));
@@ -519,7 +521,7 @@ impl Search<'_> {
             } else {
                 0.5 * (low.0 + high.0)
             };
-            let (gap, orbit, observables) = self.orbit_between(a, b, t)?;
+            let (gap, orbit, observables) = orbit_between(sweep, a, b, t)?;
             let value = observables.first_harmonic;
             closed = Some((gap, orbit, observables));
             if (value - target).abs() <= 1e-12 * target.abs() || high.0 - low.0 < 1e-14 {
@@ -548,35 +550,24 @@ impl Search<'_> {
             observables,
         })
     }
-
-    /// The orbit at a share `t` of the way from one orbit of a branch to the next.
-    fn orbit_between(
-        &self,
-        a: &Sample<'_>,
-        b: &Sample<'_>,
-        t: f64,
-    ) -> Option<(f64, PeriodicOrbit, Observables)> {
-        let gap = a.gap + t * (b.gap - a.gap);
-        let model = self.case.with(self.case.gap_key(), gap).model().ok()?;
-        let mut map = Strobe::new(&model);
-        let [from, to] = [a, b].map(|sample| sample.orbit.states.concat());
-        let points: Vec<f64> = from.iter().zip(&to).map(|(x, y)| x + t * (y - x)).collect();
-        let period = a.orbit.period;
-        let options = ShootingOptions::default();
-        let orbit = close_orbit_from_points(&mut map, &points, period, &options).ok()?;
-        let start = orbit.states.first()?;
-        let observables = measure(&model, start, orbit.period, Set::COMMON).ok()?;
-        (orbit.period == period).then_some((gap, orbit, observables))
-    }
 }
 
-impl From<SetpointError> for crate::Error {
-    fn from(error: SetpointError) -> Self {
-        match error {
-            SetpointError::Approach(error) => error.into(),
-            SetpointError::Cancelled => Self::new(crate::ErrorKind::Stopped, error.to_string()),
-            SetpointError::None => Self::input(error.to_string(), "give drive.setpoint"),
-            other => Self::numerics(other.to_string()),
-        }
-    }
+/// The orbit at a share `t` of the way from one orbit of a branch to the next.
+fn orbit_between(
+    sweep: &DistanceSweep<'_>,
+    a: &Sample<'_>,
+    b: &Sample<'_>,
+    t: f64,
+) -> Option<(f64, PeriodicOrbit, Observables)> {
+    let gap = a.gap + t * (b.gap - a.gap);
+    let model = sweep.model(gap).ok()?;
+    let mut map = ModelMap::new(&model);
+    let [from, to] = [a, b].map(|sample| sample.orbit.states.concat());
+    let points: Vec<f64> = from.iter().zip(&to).map(|(x, y)| x + t * (y - x)).collect();
+    let period = a.orbit.period;
+    let options = ShootingOptions::default();
+    let orbit = close_orbit_from_points(&mut map, &points, period, &options).ok()?;
+    let start = orbit.states.first()?;
+    let observables = measure(&model, start, orbit.period, ObservableSet::COMMON).ok()?;
+    (orbit.period == period).then_some((gap, orbit, observables))
 }

@@ -1,4 +1,4 @@
-//! The box of initial states that a census or a basin looks at when nobody says another.
+//! The default box of initial states of a census or a basin.
 //!
 //! It is derived from the linear response, so that it fits motions of any size, from the
 //! paper's (of order 1) to an experiment's (1e-6 of the beam's height). With
@@ -22,6 +22,7 @@ use nanotap_arithmetic::ComplexFunctions as _;
 use nanotap_dynamics::{StartBox, StartBoxError, StartSet};
 use nanotap_flow::Regime;
 
+use crate::Error;
 use crate::model::Model;
 use crate::observe::time_series::state_names;
 
@@ -136,64 +137,31 @@ fn widening(swing: f64, damping: f64, omega: f64) -> f64 {
     (2.0 * gain.sqrt()).clamp(WIDENING.0, WIDENING.1)
 }
 
-/// A side of the box that somebody gave makes no sense.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum SideError {
-    /// No coordinate of that name.
-    #[error("no coordinate `{given}` here; there are {known}")]
-    Unknown {
-        /// What was given.
-        given: String,
-        /// What there is.
-        known: String,
-    },
-    /// It does not run upwards.
-    #[error("{name} runs from {low} to {high}; it must run upwards, between finite numbers")]
-    Downwards {
-        /// The coordinate.
-        name: String,
-        /// Its lower end, as it was given.
-        low: f64,
-        /// Its upper end.
-        high: f64,
-    },
-    /// It makes no box.
-    #[error(transparent)]
-    Box(#[from] StartBoxError),
-}
-
 /// The default box with some sides replaced: coordinate (`a1`, `v2`, `x` …), lower and
 /// upper end. A side of no length holds its coordinate fixed.
 ///
 /// # Errors
-/// [`SideError`] for an unknown coordinate or an interval that runs downwards.
-pub fn box_with(model: &Model, sides: &[(String, f64, f64)]) -> Result<StartBox, SideError> {
-    let default = default_box(model)?;
+/// For an unknown coordinate or an interval that runs downwards.
+pub fn box_with(model: &Model, sides: &[(String, f64, f64)]) -> Result<StartBox, Error> {
+    let wrong = |message: String| Error::option("box", message, "name coordinates, as in a1=-1:1");
+    let default = default_box(model).map_err(|error| wrong(error.to_string()))?;
     let (mut lower, mut upper) = (default.lower().to_vec(), default.upper().to_vec());
     let names = state_names(model);
     for (name, low, high) in sides {
         let Some(index) = names.iter().position(|n| n == name) else {
-            return Err(SideError::Unknown {
-                given: name.clone(),
-                known: names.join(", "),
-            });
+            return Err(wrong(format!(
+                "no coordinate `{name}` here; there are {}",
+                names.join(", ")
+            )));
         };
         if !(low <= high && (high - low).is_finite()) {
-            return Err(SideError::Downwards {
-                name: name.clone(),
-                low: *low,
-                high: *high,
-            });
+            return Err(wrong(format!(
+                "{name} runs from {low} to {high}; it must run upwards, between finite numbers"
+            )));
         }
         (lower[index], upper[index]) = (*low, *high);
     }
-    Ok(StartBox::new(lower, upper)?)
-}
-
-impl From<SideError> for crate::Error {
-    fn from(error: SideError) -> Self {
-        Self::option("box", error.to_string(), "name coordinates, as in a1=-1:1")
-    }
+    StartBox::new(lower, upper).map_err(|error| wrong(error.to_string()))
 }
 
 #[cfg(test)]
@@ -246,13 +214,12 @@ mod tests {
         .unwrap();
         assert_eq!((sides.lower()[4], sides.upper()[4]), (-0.5, 0.25));
         assert_eq!((sides.lower()[0], sides.upper()[0]), (0.1, 0.1));
-        assert!(matches!(
-            box_with(&model, &[("a4".into(), 0.0, 1.0)]),
-            Err(SideError::Unknown { .. })
-        ));
-        assert!(matches!(
-            box_with(&model, &[("a1".into(), 1.0, 0.0)]),
-            Err(SideError::Downwards { .. })
-        ));
+        for (side, words) in [
+            (("a4".into(), 0.0, 1.0), "no coordinate `a4`"),
+            (("a1".into(), 1.0, 0.0), "must run upwards"),
+        ] {
+            let error = box_with(&model, &[side]).unwrap_err();
+            assert!(error.message().contains(words), "{error}");
+        }
     }
 }

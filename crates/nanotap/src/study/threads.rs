@@ -1,24 +1,24 @@
 //! How many threads work on a study. The result is the same for any number.
 
 use crate::Error;
-use crate::study::limits::MOST_THREADS;
+use crate::study::limits::MAX_THREADS;
 
-/// The number of threads, if it can be had; `None`: one a core.
+/// The number of threads, if it is available; `None`: one per core.
 ///
 /// # Errors
 /// When there are none, or more than any machine has.
 pub fn checked(threads: Option<usize>) -> Result<Option<usize>, Error> {
     match threads {
-        Some(number) if !(1..=MOST_THREADS).contains(&number) => Err(Error::option(
+        Some(number) if !(1..=MAX_THREADS).contains(&number) => Err(Error::option(
             "threads",
             format!("{number} cannot work"),
-            format!("give a whole number from 1 to {MOST_THREADS}"),
+            format!("give a whole number from 1 to {MAX_THREADS}"),
         )),
         other => Ok(other),
     }
 }
 
-/// Does `work` on so many threads; `None`: one a core.
+/// Runs `work` on this number of threads; `None`: one per core.
 ///
 /// # Errors
 /// As [`checked`], and when the threads cannot be started.

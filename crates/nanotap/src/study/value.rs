@@ -11,10 +11,30 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use serde_json::Value;
 
 use crate::Error;
+use crate::case::quantity::Kind;
 use crate::case::{Case, Key};
 
 /// Most fixed steps a drive period.
-const MOST_STEPS: u64 = 10_000_000;
+const MAX_STEPS: u64 = 10_000_000;
+
+/// Declares the JSON schema of a value, written where it is used.
+macro_rules! inline_schema {
+    ($type:ident, $($schema:tt)+) => {
+        impl JsonSchema for $type {
+            fn inline_schema() -> bool {
+                true
+            }
+
+            fn schema_name() -> Cow<'static, str> {
+                stringify!($type).into()
+            }
+
+            fn json_schema(_: &mut SchemaGenerator) -> Schema {
+                json_schema!($($schema)+)
+            }
+        }
+    };
+}
 
 /// A value of a parameter: a number of the model, or a text with its unit, `"70 kHz"`.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
@@ -25,6 +45,15 @@ impl Amount {
     /// As it was written; a number in the fewest digits that give it back.
     pub fn text(&self) -> &str {
         &self.0
+    }
+
+    /// A value of `key`, in the unit of the key.
+    pub fn of_key(key: Key, value: f64) -> Self {
+        match key.kind() {
+            Kind::Number => value.into(),
+            kind if key.is_physical() => Self(format!("{value} {}", kind.si_unit())),
+            _ => value.into(),
+        }
     }
 
     fn of(value: &Value) -> Option<Self> {
@@ -65,37 +94,38 @@ impl<'de> Deserialize<'de> for Amount {
     }
 }
 
-impl JsonSchema for Amount {
-    fn inline_schema() -> bool {
-        true
-    }
+inline_schema!(Amount, {"type": ["number", "string"]});
 
-    fn schema_name() -> Cow<'static, str> {
-        "Amount".into()
-    }
-
-    fn json_schema(_: &mut SchemaGenerator) -> Schema {
-        json_schema!({"type": ["number", "string"]})
-    }
-}
-
-/// The parameter that is called `name`, and values of it, each behind the option that gives it.
+/// Values of a parameter, each with the name of the option that gives it.
 ///
 /// # Errors
-/// When there is no such parameter, or a value is none.
-pub(crate) fn key_and_ends<const N: usize>(
+/// When a value is not valid for the parameter.
+pub(crate) fn values<const N: usize>(
     case: &Case,
-    name: &str,
+    key: Key,
     given: [(&str, &Amount); N],
-) -> Result<(Key, [f64; N]), Error> {
-    let key = case.key(name)?;
+) -> Result<[f64; N], Error> {
     let mut values = [0.0; N];
     for (value, (option, amount)) in values.iter_mut().zip(given) {
-        *value = case
-            .value(key, amount.text())
-            .map_err(|error| Error::from(error).at(option))?;
+        let read = case.value(key, amount.text());
+        *value = read.map_err(|error| Error::from(error).at(option))?;
     }
-    Ok((key, values))
+    Ok(values)
+}
+
+/// A value of a parameter, if it is given, with the name of the option that gives it.
+///
+/// # Errors
+/// When it is not valid for the parameter.
+pub(crate) fn value(
+    case: &Case,
+    key: Key,
+    option: &str,
+    amount: Option<&Amount>,
+) -> Result<Option<f64>, Error> {
+    amount
+        .map(|amount| values(case, key, [(option, amount)]).map(|[value]| value))
+        .transpose()
 }
 
 /// A name with two ends, `alpha4=5:40`.
@@ -110,9 +140,19 @@ pub struct Interval {
 }
 
 impl Interval {
+    /// `key` from `low` to `high`, in the unit of the key.
+    pub fn of_key(key: Key, low: f64, high: f64) -> Self {
+        Self {
+            name: key.path().to_owned(),
+            low: Amount::of_key(key, low),
+            high: Amount::of_key(key, high),
+        }
+    }
+
     fn parse(text: &str) -> Result<Self, String> {
-        let wrong =
-            || format!("`{text}` is no name with two ends; write it as in a1=-1:1 or alpha4=5:40");
+        let wrong = || {
+            format!("expected NAME=LOW:HIGH, got `{text}`; write it as in a1=-1:1 or alpha4=5:40")
+        };
         let (name, range) = text.split_once('=').ok_or_else(wrong)?;
         let (low, high) = range.split_once(':').ok_or_else(wrong)?;
         let end = |end: &str| Amount::of(&end.into()).ok_or_else(wrong);
@@ -128,7 +168,8 @@ impl Interval {
     }
 
     fn pair(name: &str, ends: &Value) -> Result<Self, String> {
-        let wrong = || format!("{name}: {ends} are no two ends; write a lower and an upper one");
+        let wrong =
+            || format!("{name}: expected LOW:HIGH, got {ends}; write a lower and an upper end");
         match ends.as_array().map(Vec::as_slice) {
             Some([low, high]) => Ok(Self {
                 name: name.to_owned(),
@@ -144,6 +185,17 @@ impl Interval {
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Intervals(pub Vec<Interval>);
 
+impl<S: Into<String>> FromIterator<(S, f64, f64)> for Intervals {
+    fn from_iter<I: IntoIterator<Item = (S, f64, f64)>>(intervals: I) -> Self {
+        let interval = |(name, low, high): (S, f64, f64)| Interval {
+            name: name.into(),
+            low: low.into(),
+            high: high.into(),
+        };
+        Self(intervals.into_iter().map(interval).collect())
+    }
+}
+
 impl Serialize for Intervals {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         serializer.collect_seq(
@@ -158,7 +210,7 @@ impl<'de> Deserialize<'de> for Intervals {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         let value = Value::deserialize(deserializer)?;
         let text = |value: &Value| {
-            let wrong = || format!("{value} is no text as in a1=-1:1");
+            let wrong = || format!("expected a text such as a1=-1:1, got {value}");
             Interval::parse(value.as_str().ok_or_else(wrong)?)
         };
         let intervals: Result<Vec<Interval>, String> = match &value {
@@ -173,23 +225,11 @@ impl<'de> Deserialize<'de> for Intervals {
     }
 }
 
-impl JsonSchema for Intervals {
-    fn inline_schema() -> bool {
-        true
-    }
-
-    fn schema_name() -> Cow<'static, str> {
-        "Intervals".into()
-    }
-
-    fn json_schema(_: &mut SchemaGenerator) -> Schema {
-        json_schema!({
-            "type": ["array", "object", "string"],
-            "items": {"type": "string"},
-            "additionalProperties": {"type": "array", "minItems": 2, "maxItems": 2},
-        })
-    }
-}
+inline_schema!(Intervals, {
+    "type": ["array", "object", "string"],
+    "items": {"type": "string"},
+    "additionalProperties": {"type": "array", "minItems": 2, "maxItems": 2},
+});
 
 impl Intervals {
     /// Each with its ends as plain numbers, for entries of a state.
@@ -201,7 +241,7 @@ impl Intervals {
             let value = end.text().parse::<f64>().ok().filter(|v| v.is_finite());
             value.ok_or_else(|| {
                 Error::input(
-                    format!("{}: `{end}` is no finite number", interval.name),
+                    format!("{}: `{end}` is not a finite number", interval.name),
                     "write a side as in a1=-1:1",
                 )
             })
@@ -237,24 +277,12 @@ impl<'de> Deserialize<'de> for Interval {
     }
 }
 
-impl JsonSchema for Interval {
-    fn inline_schema() -> bool {
-        true
-    }
-
-    fn schema_name() -> Cow<'static, str> {
-        "Interval".into()
-    }
-
-    fn json_schema(_: &mut SchemaGenerator) -> Schema {
-        json_schema!({
-            "type": ["string", "object"],
-            "minProperties": 1,
-            "maxProperties": 1,
-            "additionalProperties": {"type": "array", "minItems": 2, "maxItems": 2},
-        })
-    }
-}
+inline_schema!(Interval, {
+    "type": ["string", "object"],
+    "minProperties": 1,
+    "maxProperties": 1,
+    "additionalProperties": {"type": "array", "minItems": 2, "maxItems": 2},
+});
 
 /// Parameters with their values, each as in `omega=2:4:400`; or `{"omega": [2, 2.5, 4]}`, which
 /// is `omega=2,2.5,4`.
@@ -301,23 +329,11 @@ impl<'de> Deserialize<'de> for Axes {
     }
 }
 
-impl JsonSchema for Axes {
-    fn inline_schema() -> bool {
-        true
-    }
-
-    fn schema_name() -> Cow<'static, str> {
-        "Axes".into()
-    }
-
-    fn json_schema(_: &mut SchemaGenerator) -> Schema {
-        json_schema!({
-            "type": ["array", "string", "object"],
-            "items": {"type": "string"},
-            "additionalProperties": {"type": "array", "items": {"type": ["number", "string"]}},
-        })
-    }
-}
+inline_schema!(Axes, {
+    "type": ["array", "string", "object"],
+    "items": {"type": "string"},
+    "additionalProperties": {"type": "array", "items": {"type": ["number", "string"]}},
+});
 
 /// Fixed steps a drive period in each regime, free flight and contact: `200`, or `[200, 400]`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -334,14 +350,14 @@ impl<'de> Deserialize<'de> for Steps {
         let value = Value::deserialize(deserializer)?;
         let wrong = || {
             D::Error::custom(format!(
-                "{value} are no steps a drive period: one number from 1 to {MOST_STEPS}, or those in \
+                "{value} are no steps a drive period: one number from 1 to {MAX_STEPS}, or those in \
                  free flight and in contact, as in 200,400"
             ))
         };
         let step = |value: &Value| {
             let steps = value
                 .as_u64()
-                .filter(|steps| (1..=MOST_STEPS).contains(steps));
+                .filter(|steps| (1..=MAX_STEPS).contains(steps));
             steps.map(|steps| steps as u32).ok_or_else(wrong)
         };
         match &value {
@@ -355,25 +371,12 @@ impl<'de> Deserialize<'de> for Steps {
     }
 }
 
-impl JsonSchema for Steps {
-    fn inline_schema() -> bool {
-        true
-    }
-
-    fn schema_name() -> Cow<'static, str> {
-        "Steps".into()
-    }
-
-    fn json_schema(_: &mut SchemaGenerator) -> Schema {
-        let steps = json_schema!({"type": "integer", "minimum": 1, "maximum": MOST_STEPS});
-        json_schema!({
-            "type": ["integer", "array"],
-            "minimum": 1,
-            "maximum": MOST_STEPS,
-            "items": steps,
-        })
-    }
-}
+inline_schema!(Steps, {
+    "type": ["integer", "array"],
+    "minimum": 1,
+    "maximum": MAX_STEPS,
+    "items": {"type": "integer", "minimum": 1, "maximum": MAX_STEPS},
+});
 
 #[cfg(test)]
 mod tests {

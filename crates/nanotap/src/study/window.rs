@@ -1,7 +1,7 @@
 //! The operating window: where, over two parameters, the lever taps with one motion and no
 //! other, and where a second state, subharmonics or chaos threaten.
 //!
-//! Every point is a census of its own: motions from rest, from the linear responses and from
+//! Every point has a census: motions from rest, from the linear responses and from
 //! seeded starts of every size, each named as in a [sweep](crate::study::sweep), whose datasets,
 //! chunks and resumption serve here too. Then come the states of a lever that is moved slowly,
 //! coming from far and from the nearest distance ([`approach`](crate::study::approach)), and the
@@ -11,20 +11,20 @@
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 
-use nanotap_dynamics::Control;
+use nanotap_dynamics::{Control, SameMotion};
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 
 use crate::Error;
 use crate::case::Case;
-use crate::dataset::{Store, StoreError, Values};
-use crate::study::attractors::MOST_STARTS;
-use crate::study::kind::DatasetStudy;
-use crate::study::limits::MOST_PERIOD;
-use crate::study::recipe::Recipe;
+use crate::dataset::{Store, StoreError};
+use crate::study::attractors::MAX_STARTS;
+use crate::study::limits::MAX_PERIOD;
+use crate::study::request::options;
 use crate::study::simulate::Classification;
-use crate::study::sweep::{FromNeighbour, Starts, Sweep, SweepRequest, class_of, from_neighbours};
+use crate::study::sweep::{FromNeighbour, Starts, Sweep, SweepOptions, class_of, from_neighbours};
 use crate::study::value::Axes;
+use crate::study::{DatasetPlan, DatasetStudy};
 
 /// What there is at one point, from the safest to the least.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -148,46 +148,31 @@ impl Window {
     pub fn of(store: &Store) -> Result<Self, StoreError> {
         store.require_all()?;
         let schema = store.schema();
-        let wrong = || StoreError::NotAStore {
-            path: store.path().into(),
-            what: "it is no sweep over two parameters".into(),
-        };
         if schema.grid.axes.len() != 3 {
-            return Err(wrong());
+            return Err(StoreError::NotAStore {
+                path: store.path().into(),
+                what: "not a sweep over two parameters".into(),
+            });
         }
         let [rows, columns] = [0, 1].map(|axis| schema.grid.axes[axis].length);
-        let index = |name| schema.index_of(name).ok_or_else(wrong);
-        let variables = [
-            index("classification")?,
-            index("period")?,
-            index("first_harmonic")?,
-            index("tip_max")?,
-            index("contact_fraction")?,
-        ];
         let mut seen: Vec<Vec<Seen>> = (0..rows * columns).map(|_| Vec::new()).collect();
-        for chunk in 0..store.chunks() {
-            let block = schema.grid.block(chunk);
-            let read = |k: usize| store.read_chunk(&block, variables[k]);
-            let (
-                Values::Code(classes),
-                Values::Whole(periods),
-                Values::Real(amplitudes),
-                Values::Real(maxima),
-                Values::Real(contacts),
-            ) = (read(0)?, read(1)?, read(2)?, read(3)?, read(4)?)
-            else {
-                return Err(wrong());
-            };
-            for (flat, entry) in block.entries().enumerate() {
-                seen[entry[0] * columns + entry[1]].push(Seen {
-                    class: class_of(classes[flat]),
-                    period: periods[flat],
-                    amplitude: amplitudes[flat],
-                    maximum: maxima[flat],
-                    contact: contacts[flat],
-                });
-            }
-        }
+        let variables = [
+            "classification",
+            "period",
+            "first_harmonic",
+            "tip_max",
+            "contact_fraction",
+        ];
+        store.each(variables, |entry, row| {
+            let [class, period, amplitude, maximum, contact] = row;
+            seen[entry[0] * columns + entry[1]].push(Seen {
+                class: class_of(class as u8),
+                period: period as i32,
+                amplitude,
+                maximum,
+                contact,
+            });
+        })?;
         for motion in from_neighbours(store)? {
             let point = motion.at[1] * columns + motion.at[0];
             if let Some(seen) = seen.get_mut(point) {
@@ -218,7 +203,7 @@ impl Window {
         })
     }
 
-    /// The same, kept beside the dataset in `window.json`.
+    /// The same, stored with the dataset in `window.json`.
     ///
     /// # Errors
     /// As [`Window::of`], and when the file system refuses.
@@ -229,9 +214,6 @@ impl Window {
         Ok(window)
     }
 }
-
-/// Relative difference beyond which two orbits are two.
-const DIFFERENT: f64 = 1e-6;
 
 /// What the motions of one point come to. What is there counts before what could not be named.
 fn condition(motions: &[Seen]) -> Condition {
@@ -248,8 +230,8 @@ fn condition(motions: &[Seen]) -> Condition {
     }
     let orbits: Vec<&Seen> = motions.iter().filter(|m| m.period == 1).collect();
     let differ = |a: &Seen, b: &Seen| {
-        let apart = |x: f64, y: f64| (x - y).abs() > DIFFERENT * x.abs().max(y.abs());
-        apart(a.amplitude, b.amplitude) || apart(a.maximum, b.maximum)
+        let same = SameMotion::numbers;
+        !same(a.amplitude, b.amplitude) || !same(a.maximum, b.maximum)
     };
     if orbits
         .first()
@@ -265,37 +247,26 @@ fn condition(motions: &[Seen]) -> Condition {
     }
 }
 
-/// What an operating window is asked for.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct WindowRequest {
-    /// A parameter and its values, as in gap.tip=5nm:25nm:41, drive.free_amplitude=10nm:60nm:26,
-    /// omega=2:4:81, or any that ascend, omega=2,2.5,4; twice, the first is the horizontal axis
-    #[schemars(extend("x-value" = "KEY=VALUES", "x-required" = true))]
-    pub over: Axes,
-    /// Starts of the census at each point: rest, the linear responses, and draws of every size
-    #[schemars(range(min = 1, max = MOST_STARTS), extend("x-value" = "S"))]
-    pub starts: usize,
-    /// Seed of the starts
-    #[schemars(extend("x-value" = "K"))]
-    pub seed: u64,
-    /// Longest period looked for
-    #[schemars(range(min = 1, max = MOST_PERIOD), extend("x-value" = "N"))]
-    pub max_period: usize,
-}
-
-impl Default for WindowRequest {
-    fn default() -> Self {
-        Self {
-            over: Axes::default(),
-            starts: 16,
-            seed: 1,
-            max_period: 32,
-        }
+options! {
+    /// Options of an operating window.
+    pub struct WindowOptions {
+        /// Parameter and its values, as in gap.tip=5nm:25nm:41, drive.free_amplitude=10nm:60nm:26,
+        /// omega=2:4:81, or ascending values omega=2,2.5,4; twice, first the horizontal axis
+        #[schemars(extend("x-value" = "KEY=VALUES", "x-required" = true))]
+        pub over: Axes = Axes::default(),
+        /// Initial states at each point: rest, the linear responses, and samples at all amplitudes
+        #[schemars(range(min = 1, max = MAX_STARTS), extend("x-value" = "S"))]
+        pub starts: usize = 16,
+        /// Seed of the initial states
+        #[schemars(extend("x-value" = "K"))]
+        pub seed: u64 = 1,
+        /// Longest period of orbits, in drive periods
+        #[schemars(range(min = 1, max = MAX_PERIOD), extend("x-value" = "N"))]
+        pub max_period: usize = 32,
     }
 }
 
-impl WindowRequest {
+impl WindowOptions {
     /// The census at each point as a sweep.
     ///
     /// # Errors
@@ -308,17 +279,15 @@ impl WindowRequest {
                 "give {over} twice, as in {over} gap.tip=5nm:25nm:41 {over} drive.frequency=320kHz:340kHz:41",
             ));
         }
-        let request = SweepRequest {
+        let options = SweepOptions {
             over: self.over.clone(),
-            starts: Some(self.starts),
-            seed: self.seed,
             // What a motion is counts, not its course.
             periods: 1,
             max_period: self.max_period,
-            ..SweepRequest::default()
+            ..SweepOptions::default()
         };
         let (count, seed) = (self.starts, self.seed);
-        Ok(request.sweep(case)?.from(Starts::Spread { count, seed })?)
+        Sweep::from(case, options, Starts::Spread { count, seed })
     }
 }
 
@@ -332,11 +301,15 @@ impl DatasetStudy for WindowStudy {
                                  one motion, and where a second state, subharmonics or chaos \
                                  threaten";
     const COUNTED: &'static str = "values";
-    type Request = WindowRequest;
+    type Options = WindowOptions;
     type Report = Window;
 
-    fn plan(case: &Case, request: &WindowRequest, _: &Control<'_>) -> Result<Recipe, Error> {
-        Ok(Box::new(request.sweep(case)?))
+    fn prepare(
+        case: &Case,
+        options: &WindowOptions,
+        _: &Control<'_>,
+    ) -> Result<DatasetPlan, Error> {
+        Ok(Box::new(options.sweep(case)?))
     }
 
     fn report(store: &Store) -> Result<Window, StoreError> {

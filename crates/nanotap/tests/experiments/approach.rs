@@ -4,7 +4,7 @@ use nanotap::case::Case;
 use nanotap::case::file::Source;
 use nanotap::control::Control;
 use nanotap::model::cantilever::Cantilever;
-use nanotap::model::strobe::Strobe;
+use nanotap::model::model_map::ModelMap;
 use nanotap::study::approach::{
     ApproachOptions, ApproachPoint, ApproachReport, Way, approach, states_near,
 };
@@ -44,11 +44,11 @@ fn curve(studied: &Case, options: &ApproachOptions) -> ApproachReport {
     approach(studied, options, &Control::default()).unwrap()
 }
 
-/// The free motion stays until its tip touches at its reach; on the way back the tapping motion
-/// stays until its fold, which lies beyond. Between the two both attract, and their difference is
-/// the hysteresis.
+/// The free motion persists until the tip reaches the surface; on retract the tapping motion
+/// persists until its fold, at a larger distance. Between the two both are stable, and their
+/// difference is the hysteresis.
 #[test]
-fn a_stiff_lever_of_high_q_jumps_where_its_branches_end() {
+fn a_stiff_lever_of_high_q_jumps_at_the_ends_of_its_branches() {
     let lever = studied(STIFF, &[]);
     let report = curve(&lever, &ApproachOptions::default());
     assert!(report.returned);
@@ -82,7 +82,7 @@ fn a_stiff_lever_of_high_q_jumps_where_its_branches_end() {
         jumps,
         [(Way::Approach, interval.near), (Way::Retract, interval.far)]
     );
-    // Every motion that was met lies on a branch that was followed: between two points of it.
+    // Every motion lies on a followed branch, between two of its points.
     let stable = |gap: f64, amplitude: f64| {
         branches.points.windows(2).any(|pair| {
             let (a, b) = (&pair[0], &pair[1]);
@@ -98,9 +98,9 @@ fn a_stiff_lever_of_high_q_jumps_where_its_branches_end() {
     }
 }
 
-/// Also where nothing closes, as at Ω = 6.
+/// Also where no orbit is found, as at Ω = 6.
 #[test]
-fn a_curve_is_the_same_on_any_number_of_threads() {
+fn a_curve_does_not_depend_on_the_number_of_threads() {
     let unclosed = Case::from(Cantilever {
         omega: 6.0,
         ..Cantilever::paper()
@@ -126,10 +126,10 @@ fn a_curve_is_the_same_on_any_number_of_threads() {
     assert!((2..24).contains(&count), "{count}");
 }
 
-/// A few rows of a slow curve are where runs go that are moved by a thousandth of the free amplitude
-/// every two decay times.
+/// A few rows of a slow curve agree with runs whose distance changes by a thousandth of the free
+/// amplitude every two decay times.
 #[test]
-fn a_coarse_curve_follows_the_motion_that_a_slow_run_comes_to() {
+fn a_coarse_curve_agrees_with_a_slow_run() {
     let case = studied(STIFF, &["cantilever.Q=200"]);
     let options = ApproachOptions {
         points: 9,
@@ -149,9 +149,9 @@ fn a_coarse_curve_follows_the_motion_that_a_slow_run_comes_to() {
             let share = k as f64 / steps;
             let gap = at * (1.0 - share) + p.gap * share;
             model = case.with(case.gap_key(), gap).model().unwrap();
-            Strobe::new(&model).advance_by(&mut here, 120).unwrap();
+            ModelMap::new(&model).advance_by(&mut here, 120).unwrap();
         }
-        let mut map = Strobe::new(&model);
+        let mut map = ModelMap::new(&model);
         map.advance_by(&mut here, 4000).unwrap();
         let run = SimulateOptions {
             state: Some(here.clone()),
@@ -175,7 +175,7 @@ fn a_coarse_curve_follows_the_motion_that_a_slow_run_comes_to() {
     }
 }
 
-/// The lever of `findings/mica-setpoint.toml`: on mica in air, in the attractive state from far.
+/// A lever on mica in air, in the attractive state from far.
 pub(crate) const MICA: &str = "\
 [model]
 modes = 1
@@ -191,17 +191,17 @@ frequency = \"300 kHz\"
 free_amplitude = \"10 nm\"
 ";
 
-/// A slow lever stays in the attractive state down to 4 nm and back, however finely the curve is
-/// written: a sweep in steps of 5 pm and two ramps agree. From 0 on it comes back in the repulsive
-/// state, up to the fold at 10.03 nm.
+/// A slow lever stays in the attractive state down to 4 nm and back, for any spacing of the rows: a
+/// sweep in steps of 5 pm and two ramps agree. From 0 it returns in the repulsive state, up to the
+/// fold at 10.03 nm.
 #[test]
-fn hysteresis_does_not_depend_on_the_distances_that_are_written() {
+fn hysteresis_does_not_depend_on_the_spacing_of_rows() {
     let case = studied(MICA, &["gap.tip=7.127 nm"]);
     let nm = 1e-9 / case.physical().unwrap().scales.length;
     for points in [40, 80, 160] {
         let options = ApproachOptions {
-            from: Some(12.0 * nm),
-            to: Some(4.0 * nm),
+            from: Some((12.0 * nm).into()),
+            to: Some((4.0 * nm).into()),
             points,
             branches: false,
             ..ApproachOptions::default()
@@ -230,7 +230,7 @@ fn hysteresis_does_not_depend_on_the_distances_that_are_written() {
     assert_eq!(states.len(), 2);
 }
 
-/// Under Lennard-Jones a step of the distance may lead into the wall; branches do not.
+/// Under Lennard-Jones a step of the distance may lead into the repulsive wall; branches do not.
 #[test]
 fn a_curve_under_lennard_jones_is_never_undecided() {
     let text = MICA
@@ -258,8 +258,8 @@ fn a_curve_under_lennard_jones_is_never_undecided() {
     }
 }
 
-/// The slower a lever of low quality factor is moved, the nearer it is to the curve on which it
-/// always settles: an error in proportion to the speed.
+/// The slower a lever of low quality factor is moved, the closer it is to the quasi-static curve:
+/// the error is proportional to the speed.
 #[test]
 fn a_slow_ramp_is_the_quasi_static_curve() {
     let case = studied(STIFF, &["cantilever.Q=20"]);
@@ -276,7 +276,7 @@ fn a_slow_ramp_is_the_quasi_static_curve() {
         let ramp = curve(
             &case,
             &ApproachOptions {
-                speed: Some(speed),
+                speed: Some(speed.into()),
                 ..options.clone()
             },
         );
@@ -296,7 +296,7 @@ fn a_slow_ramp_is_the_quasi_static_curve() {
         "{errors:?}"
     );
     let fast = ApproachOptions {
-        speed: Some(settled.from / period),
+        speed: Some((settled.from / period).into()),
         ..options.clone()
     };
     let error = approach(&case, &fast, &Control::default()).unwrap_err();
@@ -306,10 +306,10 @@ fn a_slow_ramp_is_the_quasi_static_curve() {
     );
 }
 
-/// Steps of the distance throw the lever onto a period 3 that coexists; moved slowly it stays with
-/// period 1 both ways, since no orbit of that branch loses its stability.
+/// Steps of the distance bring the lever to a coexisting period 3. Moved slowly it stays with
+/// period 1 in both directions, since no orbit of that branch loses stability.
 #[test]
-fn a_lever_stays_on_its_branch_as_long_as_that_is_stable() {
+fn a_lever_stays_on_its_branch_while_that_is_stable() {
     let case = Cantilever {
         modes: 1,
         alpha1: 0.018,
@@ -331,9 +331,9 @@ fn a_lever_stays_on_its_branch_as_long_as_that_is_stable() {
     assert!(branches.points.iter().all(|p| p.stable));
 }
 
-/// SI columns are the model's columns times the units of the case.
+/// SI columns are the model's columns multiplied by the units of the case.
 #[test]
-fn a_physical_curve_is_told_in_si() {
+fn a_physical_curve_is_reported_in_si() {
     let lever = studied(STIFF, &[]);
     let options = ApproachOptions {
         points: 12,
@@ -365,11 +365,11 @@ fn a_physical_curve_is_told_in_si() {
     }
 }
 
-/// In the paper's case at Ω = 2.6 the motion is one chaotic band for a range of distances
-/// that includes 0 (see the report of `nanotap paper`): it is named so and described by a
+/// In the paper's case at Ω = 2.6 the motion is one chaotic band for a range of distances that
+/// includes 0 (see the report of `nanotap paper`): it is reported as chaotic and described by a
 /// recording.
 #[test]
-fn what_is_chaotic_is_called_so() {
+fn chaotic_motions_are_reported_as_chaotic() {
     let paper = Case::from(Cantilever::paper());
     let options = ApproachOptions {
         points: 4,
@@ -385,9 +385,9 @@ fn what_is_chaotic_is_called_so() {
     assert_eq!(report.table.len(), 8);
 }
 
-/// What makes no curve is refused.
+/// Invalid requests are refused.
 #[test]
-fn senseless_curves_are_refused() {
+fn invalid_curves_are_refused() {
     let lever = studied(STIFF, &[]);
     let refused = |options: ApproachOptions, words: &str| {
         let error = approach(&lever, &options, &Control::default()).unwrap_err();
@@ -403,13 +403,6 @@ fn senseless_curves_are_refused() {
     );
     refused(
         ApproachOptions {
-            periods: 0,
-            ..plain()
-        },
-        "at least one period",
-    );
-    refused(
-        ApproachOptions {
             max_period: 0,
             ..plain()
         },
@@ -422,8 +415,8 @@ fn senseless_curves_are_refused() {
         (f64::INFINITY, 0.0),
     ] {
         let options = ApproachOptions {
-            from: Some(from),
-            to: Some(to),
+            from: Some(from.into()),
+            to: Some(to.into()),
             ..plain()
         };
         refused(options, "from far to near");
@@ -433,9 +426,9 @@ fn senseless_curves_are_refused() {
     assert!(error.to_string().contains("does not move"), "{error}");
 }
 
-/// A tip 12 nm high on a sample so soft that it sinks in: the beam itself would touch.
+/// A tip 12 nm high on a very soft sample: the beam would touch the sample.
 #[test]
-fn a_beam_that_would_touch_is_seen() {
+fn contact_of_the_beam_is_detected() {
     let high = curve(
         &studied(STIFF, &[]),
         &ApproachOptions {
@@ -444,7 +437,7 @@ fn a_beam_that_would_touch_is_seen() {
             ..ApproachOptions::default()
         },
     );
-    // A tip of 12.5 um, the catalogue's for this lever.
+    // A tip of 12.5 µm, as in the catalogue for this lever.
     assert!(high.beam_clearance.unwrap() > 0.9);
     let soft = STIFF.replace(
         "material = \"polystyrene\"\nloss_tangent = 0.1",

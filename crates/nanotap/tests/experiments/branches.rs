@@ -1,9 +1,9 @@
-//! Branches whose bifurcations an independent program found, and diagrams that hold what a
+//! Branches with bifurcations known from an independent program, and diagrams with motions that a
 //! census at one value misses.
 
 use nanotap::case::Case;
 use nanotap::control::Control;
-use nanotap::study::branch::{BranchOptions, BranchReport, SeedOptions, branch};
+use nanotap::study::branch::{BranchOptions, BranchReport, branch};
 
 use crate::approach::{STIFF, studied};
 
@@ -17,7 +17,7 @@ fn of_kind(report: &BranchReport, kind: &str) -> Vec<f64> {
     found.map(|b| b.parameter).collect()
 }
 
-/// The orbit grows a hundredfold through the resonance; the folds are those of a Taylor
+/// The orbit grows by a factor of a hundred through the resonance; the folds are those of a Taylor
 /// integrator of order 22 with its own continuation, to 1 Hz.
 #[test]
 fn a_branch_through_a_resonance_finds_both_of_its_folds() {
@@ -34,7 +34,7 @@ fn a_branch_through_a_resonance_finds_both_of_its_folds() {
     }
 }
 
-/// Flip at Ω = 5.1385, of the same independent program.
+/// Flip at Ω = 5.1385, from the same independent program.
 #[test]
 fn a_smooth_branch_is_followed_to_its_end() {
     let case = studied(
@@ -49,9 +49,9 @@ fn a_smooth_branch_is_followed_to_its_end() {
     assert!(flips.iter().any(|f| (f - 5.1385).abs() < 5e-5), "{flips:?}");
 }
 
-/// With the drive's amplitude all motion ends: the orbit shrinks with α2, to nothing.
+/// The orbit shrinks in proportion to the drive amplitude α2, down to a point.
 #[test]
-fn a_branch_ends_where_the_drive_does() {
+fn a_branch_ends_at_zero_drive() {
     for gap in [0.0, 0.01] {
         let set = format!("alpha5={gap}");
         let case = studied(&paper(3.0, 1), &[set.as_str()]);
@@ -71,14 +71,14 @@ fn paper(omega: f64, modes: usize) -> String {
     )
 }
 
-/// A stable period 3 lives in a window of Ω a tenth wide, 3.109 … 3.180 (a sweep from
-/// many starts finds it): the diagram holds it, with the fold and the flip that bound it.
+/// A stable period 3 exists in a window of Ω with width 0.07, 3.109 … 3.180 (known from a sweep
+/// with many starts): the diagram contains it, with the fold and the flip that bound it.
 #[test]
-fn a_diagram_holds_the_period_3_that_few_starts_meet() {
+fn a_diagram_contains_a_period_3_with_a_small_basin() {
     let case = studied(&paper(3.0, 3), &[]);
     let options = BranchOptions {
-        doublings: 1,
-        census: Some(SeedOptions::default()),
+        switch: Some(1),
+        diagram: true,
         ..BranchOptions::over(case.key("omega").unwrap(), 2.4, 3.2)
     };
     let report = branch(&case, &options, &Control::default()).unwrap();

@@ -1,5 +1,4 @@
-//! Whatever is typed, a study answers or refuses: no panic, and nothing is allocated by a number
-//! that nobody checked.
+//! For any input a study gives a result or an error: no panic, and no allocation of unchecked size.
 
 use nanotap::case::Case;
 use nanotap::control::{CancelFlag, Control};
@@ -18,7 +17,7 @@ const PAPER: [&str; 7] = [
     "omega=2.6",
 ];
 
-/// Runs a study, stopped before its first step; its words if it refuses.
+/// Runs a study, cancelled before its first step; returns the error message if it refuses.
 fn run(study: &StudyEntry, case: &Case, request: Value) -> Result<(), String> {
     let stop = CancelFlag::new();
     stop.cancel();
@@ -33,14 +32,14 @@ fn run(study: &StudyEntry, case: &Case, request: Value) -> Result<(), String> {
     .map_err(|error| error.to_string())
 }
 
-/// Every count has a largest value, and an error that names it.
+/// Every count has a largest value, which the error message names.
 #[test]
-fn every_count_has_a_limit_that_its_refusal_names() {
+fn every_count_has_a_limit_that_its_error_names() {
     let case = Case::parse(None, &PAPER.map(str::to_owned)).unwrap();
     for study in STUDIES {
         let schema = (study.request)();
         for property in properties(&schema).filter(|p| p.allows("integer") && !p.allows("number")) {
-            // A seed is a name, not a number of things.
+            // A seed is not a count.
             if property.name == "seed" {
                 continue;
             }
@@ -59,7 +58,7 @@ fn every_count_has_a_limit_that_its_refusal_names() {
     }
 }
 
-/// A number of any size, most of them of none that makes sense.
+/// A number of any size, in most cases an invalid one.
 fn number() -> impl Strategy<Value = f64> {
     prop_oneof![
         12 => (-9.0..3.0_f64).prop_map(|digits| 10_f64.powf(digits)),
@@ -70,7 +69,7 @@ fn number() -> impl Strategy<Value = f64> {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(32))]
 
-    /// The numbers of a case, of any size: a run of few periods, a table of modes, an orbit.
+    /// Numbers of a case of any size: a run of few periods, a table of modes, an orbit.
     #[test]
     fn no_number_of_a_case_breaks_a_study(
         modes in 1..7_usize,
@@ -79,7 +78,8 @@ proptest! {
         contact in prop::sample::select(vec!["", "kelvin-voigt", "moving-surface"]),
         state in prop::option::of(number()),
     ) {
-        // What decays or turns a million times in a drive period is computed, but takes long.
+        // A motion that decays or oscillates a million times per drive period takes too long to
+        // compute here.
         prop_assume!(!(1e-300..0.5).contains(&omega) && numbers[2] < 1.0);
         let mut words = vec![format!("modes={modes}"), format!("omega={omega:e}")];
         for (k, value) in numbers.iter().enumerate() {
@@ -99,7 +99,7 @@ proptest! {
             ("attractors", json!({"starts": 1, "max_period": 2})),
         ];
         for (name, request) in requests {
-            // Refused or not; it comes back.
+            // A result or an error, but it returns.
             let _ = run(study(name).unwrap(), &case, request);
         }
     }

@@ -1,12 +1,12 @@
-//! Fits of data that the model itself made, with noise: what was put in must come out.
+//! Fits of simulated data with noise: the true parameters must be recovered.
 
 use nanotap::case::Case;
 use nanotap::case::file::Source;
 use nanotap::control::Control;
-use nanotap::model::strobe::Strobe;
-use nanotap::observe::{Set, measure};
+use nanotap::model::model_map::ModelMap;
+use nanotap::observe::{ObservableSet, measure};
 use nanotap::study::approach::{ApproachOptions, Way, approach};
-use nanotap::study::fit::{Entry, FitReport, FitRequest, FittedParameter, Table, fit, residuals};
+use nanotap::study::fit::{Entry, FitOptions, FitReport, FittedParameter, Table, fit, residuals};
 use nanotap::study::orbit::{OrbitOptions, orbit};
 use nanotap_dynamics::{ClassifyOptions, MotionKind, classify};
 
@@ -46,8 +46,8 @@ impl Noise {
 fn curve(case: &Case, from: f64, to: f64, points: usize) -> Vec<(f64, f64, f64, Way)> {
     let length = case.physical().unwrap().scales.length;
     let options = ApproachOptions {
-        from: Some(from * 1e-9 / length),
-        to: Some(to * 1e-9 / length),
+        from: Some((from * 1e-9 / length).into()),
+        to: Some((to * 1e-9 / length).into()),
         points,
         branches: false,
         ..ApproachOptions::default()
@@ -61,7 +61,7 @@ fn curve(case: &Case, from: f64, to: f64, points: usize) -> Vec<(f64, f64, f64, 
     report.table.iter().map(row).collect()
 }
 
-/// The same as a table, with noise of these sizes, which the table gives if `stated`.
+/// The same as a table, with noise of these sizes, which the table states if `stated`.
 fn measured(
     curve: &[(f64, f64, f64, Way)],
     noise: &mut Noise,
@@ -99,23 +99,23 @@ fn measured(
     }
 }
 
-fn request(tables: Vec<Table>, free: &[&str]) -> FitRequest {
-    FitRequest {
+fn request(tables: Vec<Table>, free: &[&str]) -> FitOptions {
+    FitOptions {
         data: tables,
         free: free.iter().map(|name| (*name).to_owned()).collect(),
-        ..FitRequest::default()
+        ..FitOptions::default()
     }
 }
 
-fn fitted(case: &Case, request: &FitRequest) -> FitReport {
+fn fitted(case: &Case, request: &FitOptions) -> FitReport {
     fit(case, request, &Control::default()).unwrap()
 }
 
 const FREE: [&str; 3] = ["sample.stiffness", "sample.loss_tangent", "gap.offset"];
 const TRUE: [f64; 3] = [30.0, 0.1, 0.0];
 
-/// How many of the 95 % intervals of `repetitions` fits hold the true values; `table` makes one
-/// repetition's.
+/// Number of the 95 % intervals of `repetitions` fits that contain the true values; `table` creates
+/// the data of one repetition.
 fn covered(
     repetitions: u64,
     start: &Case,
@@ -124,7 +124,7 @@ fn covered(
 ) -> [usize; 3] {
     let one = |repetition: u64| {
         let table = table(&mut Noise(1000 + repetition));
-        let asked = FitRequest {
+        let asked = FitOptions {
             jumps,
             ..request(vec![table], &FREE)
         };
@@ -141,7 +141,7 @@ fn covered(
     all.fold([0; 3], |sum, one| std::array::from_fn(|k| sum[k] + one[k]))
 }
 
-/// Of rows on one branch.
+/// With rows on one branch.
 fn covered_tapping(repetitions: u64, stated: bool) -> [usize; 3] {
     let truth = case(LEVER, &[]);
     let start = case(
@@ -154,8 +154,8 @@ fn covered_tapping(repetitions: u64, stated: bool) -> [usize; 3] {
     })
 }
 
-/// Rows on both branches, there and back, 0.8 nm apart from a place that the noise says: neither
-/// jump stands in the middle between its rows.
+/// Rows on both branches, approach and retract, 0.8 nm apart, from a random offset: the jumps are
+/// not in the middle between two rows.
 fn both_branches(dense: &[(f64, f64, f64, Way)], noise: &mut Noise) -> Table {
     const APART: usize = 40;
     let mut rows = Vec::new();
@@ -167,12 +167,12 @@ fn both_branches(dense: &[(f64, f64, f64, Way)], noise: &mut Noise) -> Table {
     measured(&rows, noise, [0.1, 0.5], true)
 }
 
-/// What they are taken from.
+/// The curve from which the rows are taken.
 fn densely() -> Vec<(f64, f64, f64, Way)> {
     curve(&case(LEVER, &[]), 25.0, 12.0, 651)
 }
 
-/// Of such rows, at another place in each repetition.
+/// With such rows, at another offset in each repetition.
 fn covered_with_jumps(repetitions: u64, jumps: bool) -> [usize; 3] {
     let start = case(LEVER, &["sample.stiffness=24 N/m"]);
     let dense = densely();
@@ -181,11 +181,11 @@ fn covered_with_jumps(repetitions: u64, jumps: bool) -> [usize; 3] {
     })
 }
 
-/// Between a soft sample at the true distance and one like a wall 0.7 nm further away lies a flat
-/// valley with two minima. Of this repetition the fit ended in the wrong one, with chi2 = 76.5;
-/// held at the true distance it gives 67.07.
+/// Between a soft sample at the true distance and a nearly rigid one 0.7 nm further away there is a
+/// flat valley with two minima. In this repetition the fit ended in the wrong one, with chi2 =
+/// 76.5; at the true distance chi2 is 67.07.
 #[test]
-fn a_fit_goes_on_from_where_its_profile_finds_a_lower_chi2() {
+fn a_fit_continues_from_a_lower_chi2_of_its_profile() {
     let start = case(LEVER, &["sample.stiffness=24 N/m"]);
     let table = both_branches(&densely(), &mut Noise(1015));
     let report = fitted(&start, &request(vec![table], &FREE));
@@ -198,18 +198,18 @@ fn a_fit_goes_on_from_where_its_profile_finds_a_lower_chi2() {
 }
 
 #[test]
-fn intervals_hold_the_true_values_as_often_as_they_say() {
-    // Of 40 with 95 %, fewer than 33 are found once in 10⁴ (binomial).
+fn intervals_contain_the_true_values_at_the_stated_rate() {
+    // Of 40 intervals at 95 %, fewer than 33 contain it once in 10⁴ repetitions (binomial).
     for held in covered_tapping(40, true) {
         assert!(held >= 33, "{held} of 40");
     }
 }
 
-/// In the narrow, bent valley between stiffness and distance: with steps of the Jacobian at the best
-/// values alone 86 of 100 intervals of the distance held it.
+/// In the narrow, curved valley between stiffness and distance: with the Jacobian of the best
+/// values alone, 86 of 100 intervals of the distance contained the true value.
 #[test]
-fn intervals_hold_the_true_values_where_chi2_has_a_bent_valley() {
-    // Of 12 with 95 %, fewer than 8 are found once in 5000 (binomial).
+fn intervals_contain_the_true_values_in_a_curved_valley() {
+    // Of 12 intervals at 95 %, fewer than 8 contain it once in 5000 repetitions (binomial).
     for held in covered_with_jumps(12, false) {
         assert!(held >= 8, "{held} of 12");
     }
@@ -217,7 +217,7 @@ fn intervals_hold_the_true_values_where_chi2_has_a_bent_valley() {
 
 #[test]
 #[ignore = "400 fits, four times: some 20 minutes"]
-fn intervals_hold_the_true_values_in_95_of_100_repetitions() {
+fn intervals_contain_the_true_values_in_95_of_100_repetitions() {
     for kind in [true, false] {
         let stated = covered_tapping(400, kind);
         println!("one branch, errors stated {kind}: {stated:?} of 400");
@@ -230,11 +230,11 @@ fn intervals_hold_the_true_values_in_95_of_100_repetitions() {
 }
 
 #[test]
-fn rows_lie_on_the_branch_that_the_data_are_on() {
+fn rows_are_assigned_to_the_branch_of_the_data() {
     let truth = case(LEVER, &[]);
     let curve = curve(&truth, 25.0, 10.0, 31);
     let table = measured(&curve, &mut Noise(7), [0.05, 0.2], true);
-    // A start whose tapping branch ends elsewhere.
+    // Initial parameters for which the tapping branch ends elsewhere.
     let start = case(
         LEVER,
         &["sample.stiffness=15 N/m", "sample.loss_tangent=0.15"],
@@ -250,7 +250,8 @@ fn rows_lie_on_the_branch_that_the_data_are_on() {
         let found = rows.filter(|r| r.at > above - 0.3e-9 && r.at < above + 0.3e-9);
         found.map(|r| r.branch.unwrap()).next().unwrap()
     };
-    // At 22 nm the lever swings freely on approach and taps on retract (docs/cases/approach-curve.md).
+    // At 22 nm the lever oscillates freely on approach and taps on retract
+    // (docs/cases/approach-curve.md).
     let [free, tapping] = [Way::Approach, Way::Retract].map(|way| branch(way, 22e-9));
     assert_ne!(free, tapping);
     assert_eq!(branch(Way::Approach, 15e-9), tapping);
@@ -264,12 +265,12 @@ fn rows_lie_on_the_branch_that_the_data_are_on() {
     }
 }
 
-/// Rows at 19.98 and 23.16 nm stand a hundredth of a nanometre before the ends of the free branch
-/// (on approach, between 19.98 and 19.96 nm) and of the tapping one (on retract, between 23.16 and
-/// 23.18 nm: 0.02 nm apart, `approach` tells so). With parameters that are not quite those behind
-/// the data a branch ends before its row, which must not be left to the other branch for that.
+/// The rows at 19.98 and 23.16 nm are 0.01 nm before the ends of the free branch (on approach,
+/// between 19.98 and 19.96 nm) and of the tapping one (on retract, between 23.16 and 23.18 nm,
+/// according to `approach`). With slightly different parameters a branch ends before its row, which
+/// must not be assigned to the other branch then.
 #[test]
-fn a_row_at_the_end_of_its_branch_does_not_bend_the_fit() {
+fn a_row_at_the_end_of_its_branch_does_not_bias_the_fit() {
     let truth = case(LEVER, &[]);
     let curve = curve(&truth, 24.75, 12.03, 25);
     let start = case(LEVER, &["sample.stiffness=24 N/m"]);
@@ -289,13 +290,13 @@ fn a_row_at_the_end_of_its_branch_does_not_bend_the_fit() {
 }
 
 #[test]
-fn the_place_of_a_jump_is_a_datum() {
+fn the_location_of_a_jump_is_a_datum() {
     let truth = case(LEVER, &[]);
     let curve = curve(&truth, 25.0, 12.0, 53);
     let table = measured(&curve, &mut Noise(17), [0.1, 0.5], true);
     let start = case(LEVER, &["sample.stiffness=24 N/m"]);
     let with = request(vec![table], &FREE);
-    let without = FitRequest {
+    let without = FitOptions {
         jumps: false,
         ..with.clone()
     };
@@ -326,8 +327,8 @@ fn the_place_of_a_jump_is_a_datum() {
 }
 
 #[test]
-fn a_free_amplitude_is_found_from_resonance_curves() {
-    // From below the resonance, where the lever swings freely.
+fn a_free_amplitude_is_fitted_to_resonance_curves() {
+    // From below the resonance, where the lever oscillates freely.
     let truth = case(LEVER, &["drive.free_amplitude=22 nm", "cantilever.Q=380"]);
     let rows = [0.990, 0.993, 0.995, 0.996, 0.9965];
     let frequencies: Vec<f64> = rows.iter().map(|ratio| ratio * 330e3).collect();
@@ -369,11 +370,11 @@ fn a_free_amplitude_is_found_from_resonance_curves() {
     }
 }
 
-/// Amplitude and phase against the drive's frequency 15 nm above the sample, swept up and down: the
-/// lever swings freely where it is far from resonance, taps between, and does both over 1.6 kHz
-/// (docs/cases/frequency-sweep.md).
+/// Amplitude and phase against the drive frequency 15 nm above the sample, swept up and down: the
+/// lever oscillates freely far from resonance and taps near it; over 1.6 kHz both motions are
+/// stable (docs/cases/frequency-sweep.md).
 #[test]
-fn a_resonance_curve_is_fitted_with_both_its_branches() {
+fn a_resonance_curve_is_fitted_with_both_branches() {
     let truth = case(LEVER, &[]);
     let key = truth.key("drive.frequency").unwrap();
     let frequencies: Vec<f64> = (0..19).map(|k| 327e3 + 500.0 * f64::from(k)).collect();
@@ -393,9 +394,9 @@ fn a_resonance_curve_is_fitted_with_both_its_branches() {
     for (frequency, direction) in frequencies.iter().map(|f| (*f, "up")).chain(down) {
         let there = truth.with(key, frequency);
         let model = there.model().unwrap();
-        // Where the motion goes from that at the frequency before, as in a slow sweep.
+        // Each motion starts from the one at the previous frequency, as in a slow sweep.
         let end = classify(
-            &mut Strobe::new(&model),
+            &mut ModelMap::new(&model),
             &state,
             &ClassifyOptions::default(),
         );
@@ -403,7 +404,7 @@ fn a_resonance_curve_is_fitted_with_both_its_branches() {
             panic!("{frequency}: {:?}", end.kind)
         };
         state.clone_from(&found.states[0]);
-        let seen = measure(&model, &state, found.period, Set::ALL).unwrap();
+        let seen = measure(&model, &state, found.period, ObservableSet::ALL).unwrap();
         let seen = seen.in_si(&there.physical().unwrap().scales);
         let row = [
             Entry::Number(1e-3 * frequency),
@@ -429,7 +430,7 @@ fn a_resonance_curve_is_fitted_with_both_its_branches() {
     let free = ["sample.stiffness", "sample.loss_tangent", "cantilever.Q"];
     let report = fitted(
         &start,
-        &FitRequest {
+        &FitOptions {
             profile: false,
             ..request(vec![table], &free)
         },
@@ -455,8 +456,8 @@ fn a_resonance_curve_is_fitted_with_both_its_branches() {
 }
 
 #[test]
-fn data_on_one_branch_are_not_taken_for_the_other() {
-    // The retract curve alone: from 22 nm on a run from rest would not touch.
+fn data_on_one_branch_are_not_assigned_to_the_other() {
+    // The retract curve alone: from 22 nm on, a run from rest would not touch the sample.
     let truth = case(LEVER, &[]);
     let mut curve = curve(&truth, 22.5, 10.0, 26);
     curve.retain(|row| row.3 == Way::Retract);
@@ -469,7 +470,7 @@ fn data_on_one_branch_are_not_taken_for_the_other() {
             .iter()
             .all(|r| r.branch == report.rows[0].branch)
     );
-    // The same distances on the branch that swings freely do not fit any sample.
+    // The same distances on the free branch do not fit any sample.
     let free: Vec<_> = curve
         .iter()
         .map(|row| (row.0, 20.0, 128.8, row.3))
@@ -480,8 +481,8 @@ fn data_on_one_branch_are_not_taken_for_the_other() {
 }
 
 #[test]
-fn a_branch_that_no_way_along_the_curve_meets_is_found_from_the_data() {
-    // Beyond the fold of the free motion's branch, which a run from rest stays on at every row.
+fn a_branch_that_the_curve_does_not_reach_is_found_from_the_data() {
+    // Beyond the fold of the free branch, on which a run from rest stays at every row.
     let truth = case(LEVER, &[]);
     let mut curve = curve(&truth, 22.5, 10.0, 51);
     curve.retain(|row| row.3 == Way::Retract && row.0 > 20.5);
@@ -514,7 +515,7 @@ fn harmonics_are_columns() {
         let at = case(LEVER, &[&format!("gap.tip={distance} nm")]);
         let model = at.model().unwrap();
         let found = orbit(&model, &OrbitOptions::default()).unwrap();
-        // The spectrum is computed in another way.
+        // The spectrum is computed by another method.
         let length = at.physical().unwrap().scales.length * 1e12;
         let [second, third] = [&found.spectrum.harmonics[1], &found.spectrum.harmonics[2]];
         let row = [
@@ -541,8 +542,9 @@ fn harmonics_are_columns() {
 }
 
 #[test]
-fn what_only_stands_as_one_number_is_named() {
-    // Hertz's stiffness at an indentation: K1 = 2 E* √(R δ), so that E and δ are one number.
+fn undetermined_combinations_are_named() {
+    // Hertz's stiffness at an indentation: K1 = 2 E* √(R δ), so only this combination of E and δ is
+    // determined.
     let text = LEVER.replace(
         "stiffness = \"30 N/m\"",
         "modulus = \"4 GPa\"\npoisson = 0.33\nindentation = \"1 nm\"",
@@ -561,7 +563,7 @@ fn what_only_stands_as_one_number_is_named() {
     let named = &report.undetermined[0];
     assert_eq!(named.keys.len(), 2);
     assert!(named.words.contains("sample.modulus") && named.words.contains("sample.indentation"));
-    // E changes K1 as δ^½ does.
+    // E changes K1 like δ^½.
     let of = |key: &str| {
         let at = named.keys.iter().position(|k| k == key).unwrap();
         named.direction[at]
@@ -572,10 +574,10 @@ fn what_only_stands_as_one_number_is_named() {
     assert!(report.parameters[2].standard_error.is_some());
 }
 
-/// Derivatives of the residuals against differences of fourth order.
+/// Compares derivatives of the residuals with differences of fourth order.
 fn derivatives_are_right(
     case: &Case,
-    request: &FitRequest,
+    request: &FitOptions,
     at: &[f64],
     steps: &[f64],
     within: f64,
@@ -673,7 +675,7 @@ fn another_law_is_recognised() {
 }
 
 #[test]
-fn curves_share_a_sample_and_have_distances_of_their_own() {
+fn curves_share_a_sample_with_separate_distances() {
     let truth = case(LEVER, &[]);
     let [mut near, mut far] = [curve(&truth, 18.0, 5.0, 10), curve(&truth, 17.0, 6.0, 10)];
     for row in &mut near {
@@ -688,7 +690,7 @@ fn curves_share_a_sample_and_have_distances_of_their_own() {
         table.name = format!("curve {k}");
         table
     });
-    let request = FitRequest {
+    let request = FitOptions {
         per_curve: vec!["gap.offset".to_owned()],
         ..request(tables.collect(), &["sample.stiffness"])
     };
@@ -707,7 +709,7 @@ fn curves_share_a_sample_and_have_distances_of_their_own() {
 }
 
 #[test]
-fn bad_tables_are_refused_with_their_place() {
+fn invalid_tables_are_refused_with_their_place() {
     let truth = case(LEVER, &[]);
     let refused = |text: &str| {
         let table = Table::parse("curve.csv", text);
@@ -758,8 +760,8 @@ fn bad_tables_are_refused_with_their_place() {
             "distance (nm),phase,phase error (deg)\n1,9,-1\n",
             &["line 2", "column 3"],
         ),
-        ("distance (nm)\n1\n", &["nothing measured"]),
-        ("phase\n1\n", &["where"]),
+        ("distance (nm)\n1\n", &["measured quantity"]),
+        ("phase\n1\n", &["positions"]),
         ("distance (nm),phase\n10,9\n", &["cannot determine"]),
     ] {
         let message = refused(text);
@@ -767,25 +769,26 @@ fn bad_tables_are_refused_with_their_place() {
             assert!(message.contains(word), "{text:?}: {message}");
         }
     }
-    // Semicolons, comments, missing values and brackets are understood.
+    // Semicolons, comments, missing values and brackets are accepted.
     let text = "# measured\n distance [nm]; amplitude [nm] ; phase\n10;;12\n11;10;\n";
     let table = Table::parse("curve.csv", text).unwrap();
     assert_eq!(table.columns[1].1, [Entry::Missing, Entry::Number(10.0)]);
 }
 
-/// A lever over a sample that pulls and presses.
+/// A lever over a sample with attraction and repulsion.
 const PULLING: &str = "[model]\nmodes = 1\n[cantilever]\nk = \"40 N/m\"\nf0 = \"325 kHz\"\nQ = 50\n\
      [tip]\nradius = \"20 nm\"\n[sample]\nlaw = \"dmt\"\nmodulus = \"2 GPa\"\npoisson = 0.3\n\
      hamaker = \"1.5e-19 J\"\n[drive]\nactuation = \"tip\"\nfrequency_ratio = 1\n\
      free_amplitude = \"20 nm\"\n[gap]\ntip = \"15 nm\"\n";
 
 #[test]
-fn of_several_laws_the_one_behind_the_data_is_chosen() {
+fn the_law_of_the_data_is_chosen_among_several() {
     let truth = case(PULLING, &[]);
     let mut curve = curve(&truth, 18.0, 6.0, 13);
     curve.retain(|row| row.3 == Way::Approach);
     let table = measured(&curve, &mut Noise(31), [0.01, 0.05], true);
-    // From the law without attraction: what the others need begins between its bounds.
+    // Starting from the law without attraction: parameters of the other laws start between their
+    // bounds.
     let start = case(
         &PULLING
             .replace("dmt", "hertz")
@@ -793,7 +796,7 @@ fn of_several_laws_the_one_behind_the_data_is_chosen() {
         &["sample.modulus=3 GPa"],
     );
     let bounds = serde_json::from_str(r#"{"sample.hamaker": ["4e-20 J", "4e-19 J"]}"#).unwrap();
-    let request = FitRequest {
+    let request = FitOptions {
         laws: vec!["hertz, dmt".to_owned(), "thin-sphere".to_owned()],
         bounds,
         ..request(vec![table], &["sample.modulus", "sample.hamaker"])
@@ -802,15 +805,15 @@ fn of_several_laws_the_one_behind_the_data_is_chosen() {
     assert!(report.fits, "{:?}", report.reason);
     assert_eq!(report.law.as_deref(), Some("dmt"));
     let of = |law: &str| report.laws.iter().find(|l| l.law == law).unwrap();
-    // Hertz has nothing that pulls, so that one parameter is its own.
+    // Hertz has no attraction, so that one parameter belongs to it alone.
     assert_eq!(of("hertz").parameters.len(), 1);
     assert!(of("hertz").above_best.unwrap() > 100.0 && !of("hertz").fits);
     assert_eq!(of("dmt").above_best, Some(0.0));
     assert!(of("dmt").weight.unwrap() > 0.999);
-    // Of a thin layer the case says neither thickness nor anything about it.
+    // The case does not state the thickness of a layer.
     let missing = of("thin-sphere").reason.as_ref().unwrap();
     assert!(missing.contains("thickness"), "{missing}");
-    // −2 ln L of both criteria is the same: they differ in the price of a parameter.
+    // −2 ln L is the same in both criteria: they differ in the penalty of a parameter.
     let count = (report.degrees_of_freedom + report.parameters.len()) as f64;
     let prices = (count.ln() - 2.0) * report.parameters.len() as f64;
     assert!((report.bic - report.aic - prices).abs() < 1e-9 * report.aic.abs());
@@ -829,7 +832,7 @@ fn of_several_laws_the_one_behind_the_data_is_chosen() {
 }
 
 #[test]
-fn laws_are_refused_in_words() {
+fn invalid_laws_are_refused() {
     let start = case(PULLING, &[]);
     let table = || Table::parse("a.csv", "distance (nm),phase\n10,90\n12,95\n14,100\n").unwrap();
     for (laws, free, word) in [
@@ -837,7 +840,7 @@ fn laws_are_refused_in_words() {
         ("hertz,hertz", "sample.modulus", "twice"),
         ("hertz,dmt", "sample.viscosity", "sample.viscosity"),
     ] {
-        let request = FitRequest {
+        let request = FitOptions {
             laws: vec![laws.to_owned()],
             ..request(vec![table()], &[free])
         };
@@ -845,7 +848,7 @@ fn laws_are_refused_in_words() {
         assert!(refused.to_string().contains(word), "{refused}");
     }
     let plain = Case::parse(None, &["alpha1=0.1".to_owned(), "omega=3".to_owned()]);
-    let request = FitRequest {
+    let request = FitOptions {
         laws: vec!["hertz".to_owned()],
         ..request(
             vec![Table::parse("a.csv", "alpha5,phase\n0,90\n0.1,95\n0.2,97\n").unwrap()],
@@ -862,10 +865,10 @@ fn laws_are_refused_in_words() {
 }
 
 /// A table with the columns that `approach --out` writes: the observables in the model's units and
-/// in SI, and rows of motions that neither way met. Those are left out and counted, and the
-/// stiffness comes back as from the curve itself.
+/// in SI, and rows of motions on neither branch. These are left out and counted, and the stiffness
+/// is the same as from the curve itself.
 #[test]
-fn a_curve_that_approach_wrote_is_fitted_as_it_is() {
+fn a_table_of_approach_is_fitted_unchanged() {
     let lever = case(LEVER, &[]);
     let length = lever.physical().unwrap().scales.length;
     let met = curve(&lever, 25.0, 12.0, 14);
@@ -902,7 +905,7 @@ fn a_curve_that_approach_wrote_is_fitted_as_it_is() {
     for point in &met {
         add(*point, point.3.name());
     }
-    // An orbit of one way, where the other one has been.
+    // An orbit of one direction, at a distance of the other one.
     for point in &met[3..6] {
         add(*point, "neither");
     }
@@ -922,11 +925,11 @@ fn a_curve_that_approach_wrote_is_fitted_as_it_is() {
     let counted = report
         .remarks
         .iter()
-        .any(|r| r.starts_with("3 rows of neither way"));
+        .any(|r| r.starts_with("3 rows of neither direction"));
     assert!(counted, "{:?}", report.remarks);
 }
 
-/// A lever whose frequency a loop follows, over a sample that pulls and presses.
+/// A lever under frequency modulation, over a sample with attraction and repulsion.
 const FOLLOWED: &str = "[model]\nmodes = 1\n[cantilever]\nk = \"40 N/m\"\nf0 = \"100 kHz\"\n\
      Q = 2000\n[tip]\nradius = \"10 nm\"\n[sample]\nlaw = \"dmt+exponential-damping\"\n\
      modulus = \"3 GPa\"\npoisson = 0.3\nhamaker = \"2e-19 J\"\ndamping = \"1e-7 N s/m\"\n\
@@ -934,16 +937,17 @@ const FOLLOWED: &str = "[model]\nmodes = 1\n[cantilever]\nk = \"40 N/m\"\nf0 = \
      actuation = \"tip\"\nfrequency = \"100 kHz\"\nfree_amplitude = \"10 nm\"\n[gap]\n\
      tip = \"11 nm\"\n";
 
-/// What `approach` under frequency modulation writes of the way there, with noise of the shift (Hz) and of the
-/// drive's ratio.
+/// The approach curve of `approach` under frequency modulation, with noise of the shift (Hz) and of
+/// the drive ratio.
 fn modulated(case: &Case, range: [f64; 2], points: usize, noise: Option<u64>) -> Table {
     let length = case.physical().unwrap().scales.length;
     let options = ApproachOptions {
-        from: Some(range[0] * 1e-9 / length),
-        to: Some(range[1] * 1e-9 / length),
+        from: Some((range[0] * 1e-9 / length).into()),
+        to: Some((range[1] * 1e-9 / length).into()),
         points,
         branches: false,
-        phase: Some(90.0),
+        fm: true,
+        phase: 90.0,
         ..ApproachOptions::default()
     };
     let report = approach(case, &options, &Control::default()).unwrap();
@@ -990,7 +994,7 @@ fn modulated(case: &Case, range: [f64; 2], points: usize, noise: Option<u64>) ->
 }
 
 #[test]
-fn a_curve_under_frequency_modulation_is_fitted_as_it_is() {
+fn a_curve_under_frequency_modulation_is_fitted_unchanged() {
     let truth = case(FOLLOWED, &[]);
     let table = modulated(&truth, [12.0, 9.9], 12, Some(51));
     let start = case(
@@ -1003,7 +1007,7 @@ fn a_curve_under_frequency_modulation_is_fitted_as_it_is() {
         "sample.damping",
         "gap.offset",
     ];
-    let asked = FitRequest {
+    let asked = FitOptions {
         profile: false,
         ..request(vec![table], &free)
     };
@@ -1012,7 +1016,7 @@ fn a_curve_under_frequency_modulation_is_fitted_as_it_is() {
     let names: Vec<&str> = report.columns.iter().map(|c| c.name.as_str()).collect();
     assert_eq!(names, ["frequency_shift", "drive_ratio"]);
     assert!(report.rows.iter().all(|row| row.branch == Some(0)));
-    // The noise that was put in, known from 12 values to 1/√24 of itself.
+    // The noise that was added, determined from 12 values to a relative error of 1/√24.
     for (column, noise) in report.columns.iter().zip([0.5, 2e-3]) {
         let error = column.standard_error;
         assert!(
@@ -1038,11 +1042,11 @@ fn derivatives_of_a_curve_under_frequency_modulation_are_exact() {
         "drive_ratio",
         "drive_dissipation",
     ];
-    let with_columns = |request: FitRequest| FitRequest {
+    let with_columns = |request: FitOptions| FitOptions {
         columns: columns.map(str::to_owned).to_vec(),
         ..request
     };
-    // A linear contact, whose derivatives are closed forms throughout.
+    // A linear contact, for which all derivatives are in closed form.
     let linear = case(
         &LEVER.replace("free_amplitude = \"20 nm\"", "free_amplitude = \"10 nm\""),
         &[],
@@ -1063,7 +1067,7 @@ fn derivatives_of_a_curve_under_frequency_modulation_are_exact() {
     let at = [29.0, 0.11, 41.0, 331e3, 390.0, 10.3e-9, 1e-10, 2.0, 1.1];
     let steps = [0.03, 1e-4, 0.04, 30.0, 0.4, 1e-12, 1e-12, 0.1, 1e-3];
     derivatives_are_right(&linear, &asked, &at, &steps, 1e-5);
-    // Under a nonlinear law; by a key that changes the modes what is observed beside the orbit is
+    // Under a nonlinear law; for keys that change the modes, observables other than the orbit are
     // differenced.
     let pulling = case(FOLLOWED, &[]);
     let table = modulated(&pulling, [12.0, 9.9], 3, None);
@@ -1096,13 +1100,13 @@ fn curves_of_amplitude_and_of_frequency_shifts_do_not_mix() {
         ],
         lines: Vec::new(),
     };
-    let mut beside = shifts.clone();
-    beside
+    let mut mixed = shifts.clone();
+    mixed
         .columns
         .push(("mean_deflection (pm)".to_owned(), numbers([0.1, 0.2, 0.3])));
     for (tables, named) in [
         (vec![shifts, amplitudes], "amplitude"),
-        (vec![beside], "mean_deflection"),
+        (vec![mixed], "mean_deflection"),
     ] {
         let asked = request(tables, &["sample.modulus"]);
         let refused = fit(&truth, &asked, &Control::default()).unwrap_err();

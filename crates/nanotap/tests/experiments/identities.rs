@@ -1,17 +1,18 @@
-//! What is known of tapping from elsewhere: A(zc), and sin φ against amplitude and dissipation.
+//! Known relations of tapping mode: A(zc), and sin φ against amplitude and dissipation.
 
 use std::f64::consts::PI;
 
 use nanotap::control::Control;
+use nanotap::model::parameter::Parameter;
 use nanotap::study::approach::{ApproachOptions, Way, approach};
 use nanotap::study::setpoint::solve_setpoint;
 
 use crate::approach::{STIFF, studied};
 
-/// Deviation of sin φ from (f/f0)(A/A0) + Q E_dis/(π k A A0), A0 the free amplitude at f0
-/// (Cleveland et al. 1998; A0 follows from the free amplitude and phase at f by the same
-/// identity without contact), with every tapping motion on the way to the sample.
-fn greatest_deviation(set: &[&str]) -> f64 {
+/// Deviation of sin φ from (f/f0)(A/A0) + Q E_dis/(π k A A0), with A0 the free amplitude at f0
+/// (Cleveland et al. 1998; A0 follows from the free amplitude and phase at f by the same identity
+/// without contact), over all tapping motions on the approach.
+fn largest_deviation(set: &[&str]) -> f64 {
     let lever = studied(STIFF, set);
     let resolved = lever.physical().unwrap();
     let (k, f0, q) = (
@@ -19,12 +20,12 @@ fn greatest_deviation(set: &[&str]) -> f64 {
         resolved.lever.f0,
         resolved.lever.quality_factor,
     );
-    let ratio = resolved.parameters.drive_frequency / f0;
+    let ratio = resolved.parameters.get(Parameter::Omega) / f0;
     let at_resonance = ratio * resolved.free_amplitude / resolved.free_phase.to_radians().sin();
     let options = ApproachOptions {
         points: 25,
         branches: false,
-        to: Some(2e-9 / resolved.scales.length),
+        to: Some((2e-9 / resolved.scales.length).into()),
         ..ApproachOptions::default()
     };
     let curve = approach(&lever, &options, &Control::default()).unwrap();
@@ -44,23 +45,23 @@ fn greatest_deviation(set: &[&str]) -> f64 {
     worst
 }
 
-/// The identity is of a single mode with one harmonic, driven by a force. The multi-mode lever
-/// on a shaken base keeps it to within 0.0018 of sin φ at Q = 400: the base's own motion (A0/Q)
-/// does work on the sample and turns the force that drives the mode by 1/Q, the mode's stiffness
-/// is 1.03 k (β₁⁴/12), and harmonics dissipate too. With one mode it is 0.0016, at Q = 100
-/// 0.014.
+/// The identity holds for a single mode with one harmonic, driven by a force. For the multi-mode
+/// lever on a moving base it holds to within 0.0018 of sin φ at Q = 400: the motion of the base
+/// (A0/Q) does work on the sample and rotates the driving force of the mode by 1/Q, the mode's
+/// stiffness is 1.03 k (β₁⁴/12), and harmonics dissipate too. With one mode the deviation is
+/// 0.0016, at Q = 100 it is 0.014.
 #[test]
-fn phase_amplitude_and_dissipation_obey_the_identity_as_far_as_it_goes() {
-    let three = greatest_deviation(&["modes=3"]);
-    let one = greatest_deviation(&["modes=1"]);
-    let damped = greatest_deviation(&["cantilever.Q=100", "modes=3"]);
+fn phase_amplitude_and_dissipation_obey_the_identity_within_its_limits() {
+    let three = largest_deviation(&["modes=3"]);
+    let one = largest_deviation(&["modes=1"]);
+    let damped = largest_deviation(&["cantilever.Q=100", "modes=3"]);
     assert!(three < 0.003 && one < 0.003, "{three} {one}");
     assert!(damped > 3.0 * three && damped < 0.02, "{damped}");
 }
 
-/// On a hard sample the amplitude follows the distance: A(zc) has slope 1 to within what the
-/// indentation changes (0.96 … 1.01 was found), and A lies above zc by no more than the
-/// indentation and the mean deflection.
+/// On a hard sample the amplitude follows the distance: the slope of A(zc) is 1 up to the change of
+/// the indentation (0.96 … 1.01), and A exceeds zc by at most the indentation and the mean
+/// deflection.
 #[test]
 fn the_amplitude_follows_the_distance() {
     let lever = studied(STIFF, &["drive.frequency_ratio=1"]);
@@ -79,8 +80,8 @@ fn the_amplitude_follows_the_distance() {
         .collect();
     assert!(tapping.len() > 10);
     for (zc, p) in &tapping {
-        // The lowest point of the tip is −(zc + indentation); half of it and the highest one
-        // is the amplitude, the base's 50 pm aside.
+        // The lowest point of the tip is −(zc + indentation). The amplitude is half the difference
+        // from the highest point, apart from the base's 50 pm.
         let lowest = -p.tip_min;
         assert!((lowest - zc - p.indentation).abs() < 0.06e-9, "{zc} {p:?}");
         assert!(p.first_harmonic - zc < p.indentation + 0.3e-9 && p.first_harmonic > *zc);
@@ -91,7 +92,7 @@ fn the_amplitude_follows_the_distance() {
     }
 }
 
-/// The setpoint on the approach curve and by Newton are one.
+/// The setpoint on the approach curve agrees with that found by Newton.
 #[test]
 fn the_setpoint_lies_on_the_approach_curve() {
     let text = STIFF.replace("[gap]\ntip = \"15 nm\"\n", "");
@@ -99,8 +100,8 @@ fn the_setpoint_lies_on_the_approach_curve() {
     let report = solve_setpoint(&lever, &Control::default()).unwrap();
     let scale = lever.physical().unwrap().scales.length;
     let options = ApproachOptions {
-        from: Some((report.zc() + 1e-12) / scale),
-        to: Some((report.zc() - 1e-12) / scale),
+        from: Some(((report.zc() + 1e-12) / scale).into()),
+        to: Some(((report.zc() - 1e-12) / scale).into()),
         points: 3,
         branches: false,
         ..ApproachOptions::default()

@@ -1,11 +1,10 @@
-//! Which modes matter.
+//! Importance of the modes.
 
 use nanotap::control::Control;
 use nanotap::model::cantilever::Cantilever;
-use nanotap::study::convergence::convergence;
-use nanotap::study::orbit::OrbitOptions;
+use nanotap::study::convergence::{ConvergenceOptions, convergence};
 
-/// Far from the sample each mode is a damped oscillator by itself: its energy, and its part in
+/// Far from the sample each mode is an independent damped oscillator: its energy, and its share of
 /// the tip's motion, follow from a_j = (Ω² − iα3Ω) I_j α2/(β_j⁴ − Ω² + iα3Ω) (no tip mass).
 #[test]
 fn shares_of_a_free_lever_are_the_closed_form() {
@@ -17,9 +16,10 @@ fn shares_of_a_free_lever_are_the_closed_form() {
     };
     let found = convergence(
         &case,
-        4,
-        0.01,
-        &OrbitOptions::default(),
+        &ConvergenceOptions {
+            largest: 4,
+            ..ConvergenceOptions::default()
+        },
         &Control::default(),
     )
     .unwrap();
@@ -48,24 +48,25 @@ fn shares_of_a_free_lever_are_the_closed_form() {
         assert!((share.tip - expected).abs() < 1e-9, "{share:?} {expected}");
         assert!(share.force.is_none());
     }
-    // Near its second resonance (Ω₂ = 22.03) the lever moves in its second mode.
+    // Near its second resonance (Ω₂ = 22.03) the lever oscillates in its second mode.
     assert!(shares[1].energy > 0.9);
 }
 
-/// Shares sum to one, and "enough" is what the differences say.
+/// Shares sum to one, and "enough" follows from the differences.
 #[test]
-fn enough_is_the_least_number_from_which_on_all_readings_stay() {
+fn enough_is_the_smallest_number_with_small_differences_from_there_on() {
     let case = Cantilever {
         alpha1: 0.0,
         omega: 20.0,
         ..Cantilever::paper()
     };
-    let options = OrbitOptions {
-        period: Some(1),
-        ..OrbitOptions::default()
-    };
     let tolerance = 0.05;
-    let found = convergence(&case, 6, tolerance, &options, &Control::default()).unwrap();
+    let options = ConvergenceOptions {
+        largest: 6,
+        tolerance,
+        period: Some(1),
+    };
+    let found = convergence(&case, &options, &Control::default()).unwrap();
     let report = &found.readings;
     let sum = |of: fn(&nanotap::study::mode_share::ModeShare) -> f64| -> f64 {
         report.mode_shares.iter().map(of).sum()
@@ -88,7 +89,7 @@ fn enough_is_the_least_number_from_which_on_all_readings_stay() {
         }
         None => assert!(!within(5)),
     }
-    // The reference differs from itself by nothing.
+    // 0 vs 0: the relative difference is 0.
     let last = report.reading_differences[5].unwrap();
     assert_eq!(
         (last.first_harmonic, last.phase, last.peak_force),
@@ -96,14 +97,15 @@ fn enough_is_the_least_number_from_which_on_all_readings_stay() {
     );
 }
 
-/// What is chaotic has no single reading: the verdict says so.
+/// A chaotic motion has no single value: the verdict reports this.
 #[test]
-fn a_motion_that_is_no_orbit_is_left_undecided() {
+fn a_motion_without_an_orbit_is_undecided() {
     let found = convergence(
         &Cantilever::paper(),
-        3,
-        0.01,
-        &OrbitOptions::default(),
+        &ConvergenceOptions {
+            largest: 3,
+            ..ConvergenceOptions::default()
+        },
         &Control::default(),
     )
     .unwrap();

@@ -1,4 +1,4 @@
-//! Quantities of a physical case that vary.
+//! Variation of quantities of a physical case.
 
 use nanotap::case::{Case, Key};
 use nanotap::control::Control;
@@ -13,8 +13,8 @@ fn varied(lever: &Case, key: &str, text: &str) -> (Key, f64) {
     (key, lever.value(key, text).unwrap())
 }
 
-/// A value set is the value that a case file would set; and what the drive was said by its
-/// free amplitude stays what it was at the case's own frequency.
+/// A value that is set is the same as in a case file. The drive that follows from the free
+/// amplitude is that at the case's own frequency.
 #[test]
 fn a_quantity_set_is_the_case_with_that_quantity() {
     let lever = studied(STIFF, &[]);
@@ -46,8 +46,8 @@ fn a_quantity_set_is_the_case_with_that_quantity() {
                 "{set}: {parameter} {a} {b}"
             );
         }
-        // In units of g0, which stays; the free amplitude is what the case file says unless
-        // the lever itself changes.
+        // In units of g0, which is constant; the free amplitude is that of the case file unless the
+        // lever itself changes.
         if set.starts_with("cantilever") {
             assert_eq!(found.alpha2.to_bits(), base.cantilever.alpha2.to_bits());
         } else {
@@ -68,10 +68,10 @@ fn a_quantity_set_is_the_case_with_that_quantity() {
     );
 }
 
-/// The derivative of the map with respect to a quantity, through all that it changes, against
-/// central differences of the map itself.
+/// The derivative of the map with respect to a quantity, including everything that depends on it,
+/// compared with central differences of the map.
 #[test]
-fn derivatives_go_through_everything_that_a_quantity_changes() {
+fn derivatives_include_everything_that_depends_on_a_quantity() {
     let lever = studied(STIFF, &[]);
     for (name, text) in [
         ("drive.frequency", "330.5 kHz"),
@@ -97,8 +97,8 @@ fn derivatives_go_through_everything_that_a_quantity_changes() {
             state
         };
         let (low, high) = (at(value - step), at(value + step));
-        // What changes nothing (f0, where the drive is said in units of it) is known to the
-        // rounding of the states.
+        // The derivative by a quantity without effect (f0, if the drive is relative to it) is zero
+        // to the rounding of the states.
         let floor = 1e-3 * 1.2e-3 / value;
         let size = found.iter().fold(floor, |s: f64, v| s.max(v.abs()));
         for k in 0..4 {
@@ -111,7 +111,7 @@ fn derivatives_go_through_everything_that_a_quantity_changes() {
     }
 }
 
-/// A fold met along `gap.tip` in metres is the one met along α5, times g0.
+/// A fold along `gap.tip` in metres is the one along α5, times g0.
 #[test]
 fn a_branch_in_metres_is_the_branch_in_the_models_units() {
     let lever = studied(STIFF, &[]);
@@ -139,7 +139,7 @@ fn a_branch_in_metres_is_the_branch_in_the_models_units() {
 }
 
 #[test]
-fn what_cannot_vary_is_refused_by_name() {
+fn keys_that_cannot_vary_are_refused_by_name() {
     let lever = studied(STIFF, &[]);
     for (name, words) in [
         ("drive.frequenzy", "did you mean `drive.frequency`"),
@@ -156,10 +156,13 @@ fn what_cannot_vary_is_refused_by_name() {
         error.contains("expected a frequency") && error.contains("a length"),
         "{error}"
     );
-    // Numbers of the equations vary beside quantities, as numbers.
+    // Numbers of the equations may vary together with quantities.
     let both = lever.with(key, 340e3).with(Key::Alpha4, 3.0);
     assert_eq!(both.get(Key::Alpha4), 3.0);
-    assert_eq!(both.physical().unwrap().parameters.drive_frequency, 340e3);
+    assert_eq!(
+        both.physical().unwrap().parameters.get(Parameter::Omega),
+        340e3
+    );
     let none = lever.with(key, -1.0).model().unwrap_err().to_string();
     assert!(
         none.contains("drive.frequency") && none.contains("above zero"),
@@ -167,9 +170,9 @@ fn what_cannot_vary_is_refused_by_name() {
     );
 }
 
-/// A varied value and the numbers that were held, set beside the case file, are the same case.
+/// A varied value together with the constant numbers, set on the case file, gives the same case.
 #[test]
-fn what_was_held_makes_a_point_again() {
+fn constant_numbers_reproduce_a_point() {
     let lever = studied(STIFF, &[]);
     for (name, text) in [
         ("drive.frequency", "340 kHz"),
@@ -180,7 +183,7 @@ fn what_was_held_makes_a_point_again() {
         let (key, value) = varied(&lever, name, text);
         let found = lever.with(key, value);
         let mut words = vec![format!("{name}={text}")];
-        for (held, value) in lever.held(key) {
+        for (held, value) in lever.implied_constants(key) {
             words.push(format!("{held}={}", held.kind().format_exact(value)));
         }
         let words: Vec<&str> = words.iter().map(String::as_str).collect();

@@ -206,10 +206,10 @@ fn frequency_shifts_give_the_force_of_the_law() {
     let case = Case::parse(None, &words.map(str::to_owned)).unwrap();
     let scales = case.physical().unwrap().scales;
     let options = ApproachOptions {
-        from: Some(16e-9 / scales.length),
-        to: Some(9e-9 / scales.length),
+        from: Some((16e-9 / scales.length).into()),
+        to: Some((9e-9 / scales.length).into()),
         points: 80,
-        phase: Some(90.0),
+        fm: true,
         branches: false,
         ..ApproachOptions::default()
     };

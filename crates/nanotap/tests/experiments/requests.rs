@@ -1,5 +1,5 @@
-//! Requests as a browser or a script may send them: whatever stands in them, every study refuses
-//! what is no request with a reason that names it.
+//! Requests as a browser or a script may send them: every study refuses an invalid request with a
+//! reason that names it.
 
 use nanotap::case::Case;
 use nanotap::control::{CancelFlag, Control};
@@ -8,7 +8,7 @@ use nanotap::{Error, ErrorKind};
 use proptest::prelude::*;
 use serde_json::{Value, json};
 
-/// What is nobody's sensible value, whatever the option.
+/// Values that are invalid for every option.
 fn hostile() -> impl Strategy<Value = Value> {
     prop::sample::select(vec![
         json!(-1),
@@ -30,7 +30,7 @@ fn hostile() -> impl Strategy<Value = Value> {
 }
 
 fn run(at: usize, request: Value) -> Result<(), Error> {
-    // What takes long is stopped before it begins.
+    // Long computations are cancelled before they start.
     let stop = CancelFlag::new();
     stop.cancel();
     let control = Control {
@@ -67,7 +67,7 @@ proptest! {
     }
 
     #[test]
-    fn what_is_no_request_is_refused(at in 0..STUDIES.len(), value in hostile()) {
+    fn invalid_requests_are_refused(at in 0..STUDIES.len(), value in hostile()) {
         let error = run(at, value).unwrap_err();
         prop_assert_eq!(error.kind, ErrorKind::BadInput);
     }

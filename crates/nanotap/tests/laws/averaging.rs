@@ -1,14 +1,14 @@
 //! Orbits from averaging, and the approximate map, on reference cases.
 //!
-//! `tests/reference/census` has cases and the orbits to expect, each closed by the exact flow,
-//! from a census with an independent program.
+//! `tests/reference/census` contains cases and their orbits, closed by the exact flow, from a
+//! census with an independent program.
 
 use nanotap::case::Case;
 use nanotap::case::file::Source;
 use nanotap::model::Model;
-use nanotap::model::strobe::Strobe;
-use nanotap::study::averaged_orbits::{averaged_distances, averaged_orbits};
-use nanotap_dynamics::StroboscopicMap;
+use nanotap::model::model_map::ModelMap;
+use nanotap::study::averaged_orbits::averaged_orbits;
+use nanotap_dynamics::{Scheduling as _, StroboscopicMap};
 use std::path::Path;
 
 /// The cases of the folder with their expected orbits.
@@ -70,11 +70,11 @@ fn averaging_finds_every_period_1_orbit() {
     }
 }
 
-/// The approximate map returns to each orbit within its error.
+/// Starting on an orbit, the approximate map stays on it within its error.
 #[test]
-fn the_coarse_map_keeps_orbits() {
+fn the_approximate_map_preserves_orbits() {
     for (name, model, expected) in cases() {
-        let mut exact = Strobe::new(&model);
+        let mut exact = ModelMap::new(&model);
         let mut coarse = exact.coarse().unwrap();
         assert!(coarse.coarse().is_none());
         for expected in expected["orbits"].as_array().unwrap() {
@@ -88,21 +88,5 @@ fn the_coarse_map_keeps_orbits() {
             let off = pairs.fold(0.0, |m: f64, (a, b)| m.max((a - b).abs())) / scale;
             assert!(off < 1e-4, "{name}: {off:.1e}");
         }
-    }
-}
-
-/// `c01`, whose free amplitude is 20 nm, at a setpoint of 0.9: Newton's method in the distance, by
-/// the independent program of the cases, gives 18.220, 17.653 and 17.465 nm.
-#[test]
-fn averaging_finds_every_distance_of_a_setpoint() {
-    let (_, model, _) = cases().swap_remove(0);
-    let unit = model.height.constant / 18.0;
-    let found: Vec<f64> = averaged_distances(&model, 18.0 * unit)
-        .iter()
-        .map(|(gap, _)| gap / unit)
-        .collect();
-    assert_eq!(found.len(), 3, "{found:?}");
-    for (found, expected) in found.iter().zip([18.220, 17.653, 17.465]) {
-        assert!((found - expected).abs() < 0.05, "{found} {expected}");
     }
 }

@@ -1,32 +1,32 @@
-//! Default censuses against motions that independent programs found.
+//! Default censuses, compared with motions that independent programs found.
 
 use nanotap::case::Case;
 use nanotap::control::Control;
 use nanotap::study::attractors::{
-    Attractors, AttractorsOptions, AttractorsRequest, AttractorsStudy, EndReport, attractors,
+    Attractors, AttractorsOptions, AttractorsStudy, EndReport, attractors,
 };
 use nanotap::study::registry::Study as _;
 use serde_json::Value;
 
 use crate::averaging::{cases, numbers};
 
-/// Relative distance of two orbits that are one.
-const SAME: f64 = 1e-6;
+/// Largest relative distance between equal orbits.
+const ORBIT_TOLERANCE: f64 = 1e-6;
 
 fn has_orbit(found: &Attractors, expected: &Value) -> bool {
     let state = numbers(&expected["state"]);
     let scale = state.iter().fold(0.0, |m: f64, x| m.max(x.abs()));
     let is_there = |other: &Vec<f64>| {
         let apart = state.iter().zip(other).map(|(a, b)| (a - b).abs());
-        apart.fold(0.0, f64::max) < SAME * scale
+        apart.fold(0.0, f64::max) < ORBIT_TOLERANCE * scale
     };
     let mut orbits = found.attractors.iter().filter_map(|a| a.orbit.as_ref());
     orbits.any(|orbit| expected["period"] == orbit.period && orbit.states.iter().any(is_there))
 }
 
-/// Every stable orbit of the reference cases is found, also the attractive state of c08, whose basin
-/// holds less than 0.1 % of the starts, and the periods 8 and 18 of c06. Left out are the cases whose
-/// census takes more than a second; averaging alone finds their orbits.
+/// Every stable orbit of the reference cases is found, including the attractive state of c08, whose
+/// basin contains less than 0.1 % of the starts, and the periods 8 and 18 of c06. Cases whose
+/// census takes more than a second are left out; averaging alone finds their orbits.
 #[test]
 fn nonlinear_censuses_find_the_expected_orbits() {
     for (name, model, expected) in cases() {
@@ -54,8 +54,8 @@ fn nonlinear_censuses_find_the_expected_orbits() {
 }
 
 /// Default censuses of random piecewise-linear cases (`tests/reference/census_linear.json`): every
-/// motion was confirmed by an independent program. Left out are those that take more than half a
-/// second.
+/// motion was confirmed by an independent program. Cases that take more than half a second are left
+/// out.
 #[test]
 fn piecewise_linear_censuses_find_the_expected_motions() {
     let text = include_str!("../reference/census_linear.json");
@@ -67,8 +67,8 @@ fn piecewise_linear_censuses_find_the_expected_motions() {
         let keys = case["set"].as_object().unwrap().iter();
         let keys: Vec<String> = keys.map(|(key, value)| format!("{key}={value}")).collect();
         let case_of_keys = Case::parse(None, &keys).unwrap();
-        let request = AttractorsRequest::default();
-        let found = AttractorsStudy::run(&case_of_keys, &request, &Control::default()).unwrap();
+        let options = AttractorsOptions::default();
+        let found = AttractorsStudy::run(&case_of_keys, &options, &Control::default()).unwrap();
         assert!(found.followed_at.is_none());
         let motions = case["motions"].as_array().unwrap();
         assert!(found.attractors.len() >= motions.len(), "{number}");

@@ -1,8 +1,8 @@
-//! The reference levers of one mode, as case files state them.
+//! The reference levers with one mode, as case files.
 
 use nanotap::case::Case;
 
-/// The modal stiffness over the static one, β₁⁴/12 of a clamped-free beam.
+/// Modal stiffness over static stiffness, β₁⁴/12 for a clamped-free beam.
 pub(crate) const MODAL: f64 = 12.362_363_368_400_15 / 12.0;
 /// Joules in an electronvolt.
 pub(crate) const EV: f64 = 1.602_176_634e-19;

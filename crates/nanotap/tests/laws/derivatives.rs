@@ -1,25 +1,25 @@
-//! Derivatives of the map under nonlinear laws, by state and by quantities of the case, against
-//! fourth-order central differences.
+//! Derivatives of the map under nonlinear laws with respect to the state and to quantities of the
+//! case, compared with fourth-order central differences.
 
 use nalgebra::DMatrix;
 use nanotap::case::{Case, Key};
-use nanotap::model::strobe::Strobe;
+use nanotap::model::model_map::ModelMap;
 use nanotap_dynamics::StroboscopicMap;
 
 use crate::common::{DMT, air};
 
-/// Largest difference over the largest entry of the column.
+/// Largest difference relative to the largest entry of the column.
 pub(crate) fn worst(case: &Case, keys: &[Key], state: &[f64]) -> f64 {
     let model = case.model().unwrap();
     let tangents = keys.iter().map(|k| case.tangent(&model, *k).unwrap());
     let n = model.dimension();
     let (mut jacobian, mut derivatives) = (DMatrix::zeros(n, n), DMatrix::zeros(n, keys.len()));
-    Strobe::with_tangents(&model, tangents.collect())
+    ModelMap::with_tangents(&model, tangents.collect())
         .advance_with_derivatives(&mut state.to_vec(), &mut jacobian, &mut derivatives)
         .unwrap();
     let advanced = |case: &Case, state: &[f64]| {
         let mut end = state.to_vec();
-        let mut map = Strobe::new(&case.model().unwrap());
+        let mut map = ModelMap::new(&case.model().unwrap());
         map.advance(&mut end).unwrap();
         end
     };

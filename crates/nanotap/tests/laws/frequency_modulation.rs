@@ -2,16 +2,16 @@
 
 use nanotap::case::{Case, Key};
 use nanotap::control::Control;
-use nanotap::study::approach::{
-    ApproachOptions, ApproachPoint, ApproachReport, ApproachRequest, Way, approach,
+use nanotap::study::approach::{ApproachOptions, ApproachPoint, ApproachReport, Way, approach};
+use nanotap::study::frequency_modulation::{
+    Driven, FreeOscillation, FrequencyModulationOptions, Held, Modulated, frequency_modulation,
 };
-use nanotap::study::frequency_modulation::{Driven, FreeOscillation, Held, Modulated};
 use nanotap::study::orbit::{OrbitOptions, OrbitReport, orbit};
 use nanotap::study::request::read;
 
 use crate::common::{DMT, HERTZ, MODAL, air, lever};
 
-/// The lever of the reference: 40 N/m, a tip of 10 nm under van der Waals' force.
+/// The lever of the reference: 40 N/m, a tip of 10 nm under van der Waals attraction.
 fn reference(q: f64, amplitude: f64, gap: f64) -> Case {
     let sample = [
         "sample.law=van-der-waals",
@@ -24,14 +24,14 @@ fn reference(q: f64, amplitude: f64, gap: f64) -> Case {
 /// A curve between distances in nm.
 fn modulated(case: &Case, (from, to): (f64, f64), points: usize) -> ApproachReport {
     let unit = 1e-9 / case.physical().unwrap().scales.length;
-    let options = ApproachOptions {
-        from: Some(from * unit),
-        to: Some(to * unit),
+    let options = FrequencyModulationOptions {
+        from: Some((from * unit).into()),
+        to: Some((to * unit).into()),
         points,
-        phase: Some(90.0),
-        ..ApproachOptions::default()
+        phase: 90.0,
+        ..FrequencyModulationOptions::default()
     };
-    approach(case, &options, &Control::default()).unwrap()
+    frequency_modulation(case, &options, &Control::default()).unwrap()
 }
 
 fn nearest(report: &ApproachReport) -> (&ApproachPoint, Modulated) {
@@ -40,7 +40,7 @@ fn nearest(report: &ApproachReport) -> (&ApproachPoint, Modulated) {
     (point, point.modulation.unwrap())
 }
 
-/// The orbit study on the drive that was found, from the orbit's state.
+/// The orbit study with the drive that was found, from the orbit's state.
 fn again(case: &Case, point: &ApproachPoint) -> OrbitReport {
     let found = point.modulation.unwrap();
     let case = case
@@ -56,10 +56,10 @@ fn again(case: &Case, point: &ApproachPoint) -> OrbitReport {
     orbit(&case.model().unwrap(), &options).unwrap()
 }
 
-/// The lever of mass, spring and van der Waals' force alone: released 10 nm towards the sample
-/// from a distance of 11 nm it has the period of the energy integral, −8.661882e-5 of the
-/// frequency (by quadrature to 30 digits; its swing is 9.99960316 nm). The two formulas are for
-/// an amplitude of 10 nm.
+/// The lever of mass, spring and van der Waals attraction alone: released 10 nm towards the sample
+/// from a distance of 11 nm, its frequency shift follows from the energy integral, −8.661882e-5 of
+/// the frequency (quadrature with 30 digits; its amplitude is 9.99960316 nm). The two formulas are
+/// for an amplitude of 10 nm.
 #[test]
 fn shifts_under_van_der_waals_are_those_of_the_reference() {
     let near = |value: f64, reference: f64| (value / reference - 1.0).abs();
@@ -73,7 +73,7 @@ fn shifts_under_van_der_waals_are_those_of_the_reference() {
         let (found, swing) = at(q, 10.0);
         assert!(near(found.first_order_shift.unwrap(), -8.659440e-5) < 1e-6);
         assert!(near(found.giessibl_shift.unwrap(), -9.316950e-5) < 1e-6);
-        // The amplitude with which the tip comes just as near.
+        // The amplitude with the same closest distance.
         let (_, other) = at(q, 9.9996);
         let amplitude = 10.0 + (-10.0 - swing) * (9.9996 - 10.0) / (other - swing);
         let (found, swing) = at(q, amplitude);
@@ -86,11 +86,11 @@ fn shifts_under_van_der_waals_are_those_of_the_reference() {
     }
 }
 
-/// A conservative force takes nothing, and the drive makes up for the lever's own damping alone:
-/// as the frequency where there are no harmonics, in all what the energy balance of the same
-/// orbit, found again by its drive, says.
+/// A conservative force dissipates nothing, and the drive compensates only the lever's own damping:
+/// in proportion to the frequency without harmonics, and in total as in the energy balance of the
+/// same orbit, found again from its drive.
 #[test]
-fn a_conservative_law_takes_no_drive() {
+fn a_conservative_law_needs_no_additional_drive() {
     let case = air(10.0, 11.0, &DMT);
     let report = modulated(&case, (12.0, 9.5), 6);
     let free = report.modulation.as_ref().unwrap();
@@ -101,9 +101,9 @@ fn a_conservative_law_takes_no_drive() {
         let found = point.modulation.unwrap();
         assert_eq!(point.observables.unwrap().dissipation, 0.0);
         let balance = again(&case, point).observables.energy_balance;
-        let told = free.free_loss * found.drive_ratio;
-        assert!((balance.drive_work / told - 1.0).abs() < 1e-9);
-        assert!((balance.beam_damping / told - 1.0).abs() < 1e-9);
+        let reported = free.free_loss * found.drive_ratio;
+        assert!((balance.drive_work / reported - 1.0).abs() < 1e-9);
+        assert!((balance.beam_damping / reported - 1.0).abs() < 1e-9);
         if point.observables.unwrap().contact_fraction == 0.0 {
             let harmonics = found.drive_ratio - 1.0 - found.relative_shift;
             assert!(
@@ -117,7 +117,7 @@ fn a_conservative_law_takes_no_drive() {
     assert_eq!(signs, [true, true]);
 }
 
-/// Σ n² A_n²/A₁² over n ≥ 2: what harmonics add to the damping of one mode.
+/// Σ n² A_n²/A₁² over n ≥ 2: the contribution of harmonics to the damping of one mode.
 fn harmonics(orbit: &OrbitReport) -> f64 {
     let harmonics = orbit.spectrum.harmonics.iter();
     let first = orbit.observables.first_harmonic;
@@ -125,11 +125,11 @@ fn harmonics(orbit: &OrbitReport) -> f64 {
     parts.map(|h| (h.order * h.tip / first).powi(2)).sum()
 }
 
-/// With one mode, driven at its tip, the energy that the sample takes is what the drive gives,
-/// E₀ F/F₀, less the damping of all harmonics, E₀ (f/f₀) (1 + Σ n² A_n²/A₁²): of the orbit found
-/// again by its frequency and drive.
+/// With one mode, driven at its tip, the energy dissipated in the sample is the energy of the
+/// drive, E₀ F/F₀, less the damping of all harmonics, E₀ (f/f₀) (1 + Σ n² A_n²/A₁²): compared with
+/// the orbit found again from its frequency and drive.
 #[test]
-fn the_drive_tells_what_a_viscous_sample_takes() {
+fn the_drive_gives_the_dissipation_of_a_viscous_sample() {
     let mut sample = HERTZ.to_vec();
     sample[0] = "sample.law=voigt-sphere-pulling";
     sample.push("sample.viscosity=2 Pa s");
@@ -146,26 +146,26 @@ fn the_drive_tells_what_a_viscous_sample_takes() {
         assert!((amplitude - 1.0).abs() < 1e-9, "{amplitude}");
         let taken = orbit.observables.dissipation;
         let balance = orbit.observables.energy_balance;
-        let told = free.free_loss * found.drive_ratio - balance.beam_damping;
+        let reported = free.free_loss * found.drive_ratio - balance.beam_damping;
         assert!(
-            (told - taken).abs() < 1e-9 * free.free_loss,
-            "{told} {taken}"
+            (reported - taken).abs() < 1e-9 * free.free_loss,
+            "{reported} {taken}"
         );
         let damping = (1.0 + found.relative_shift) * (1.0 + harmonics(&orbit));
-        let told = free.free_loss * (found.drive_ratio - damping);
+        let reported = free.free_loss * (found.drive_ratio - damping);
         assert!(
-            (told - taken).abs() < 1e-7 * free.free_loss,
-            "{told} {taken}"
+            (reported - taken).abs() < 1e-7 * free.free_loss,
+            "{reported} {taken}"
         );
         most = most.max(taken / free.free_loss);
     }
     assert!(most > 0.3, "{most}");
 }
 
-/// Linear contact in the exact engine, driven at the base and at the tip, several modes: the
-/// orbit has the amplitude and the phase that were asked for.
+/// Linear contact in the exact engine, driven at the base and at the tip, several modes: the orbit
+/// has the requested amplitude and phase.
 #[test]
-fn orbits_have_the_amplitude_and_the_phase_that_are_held() {
+fn orbits_have_the_requested_amplitude_and_phase() {
     for actuation in ["base", "tip", "distributed"] {
         let words = [
             "cantilever.k=2 N/m",
@@ -182,20 +182,20 @@ fn orbits_have_the_amplitude_and_the_phase_that_are_held() {
         words.push(format!("drive.actuation={actuation}"));
         let case = Case::parse(None, &words).unwrap();
         for phase in [60.0, 90.0, 110.0] {
-            let options = ApproachOptions {
+            let options = FrequencyModulationOptions {
                 points: 6,
-                to: Some(10e-9 / case.physical().unwrap().scales.length),
-                phase: Some(phase),
-                ..ApproachOptions::default()
+                to: Some((10e-9 / case.physical().unwrap().scales.length).into()),
+                phase,
+                ..FrequencyModulationOptions::default()
             };
-            let report = approach(&case, &options, &Control::default()).unwrap();
+            let report = frequency_modulation(&case, &options, &Control::default()).unwrap();
             let free = report.modulation.as_ref().unwrap();
             assert!(
                 free.ended.is_empty(),
                 "{actuation} {phase}: {:?}",
                 free.ended
             );
-            // Nothing is met at first.
+            // No contact at the beginning.
             let first = report.table[0].modulation.unwrap();
             assert!(first.relative_shift.abs() < 1e-12);
             assert!((first.drive_ratio - 1.0).abs() < 1e-9);
@@ -212,11 +212,11 @@ fn orbits_have_the_amplitude_and_the_phase_that_are_held() {
     }
 }
 
-/// Laws that remember on which branch they are: what the sample takes in a period is the area of
-/// the loop of its static force, by a sum over the distance, whatever the amplitude; the drive
-/// tells it; and the shift is that of the force averaged along both ways.
+/// Laws with hysteresis: the dissipation per period is the area of the loop of the static force, by
+/// a sum over the distance, for any amplitude. The drive gives the same value, and the shift is
+/// that of the force averaged over both directions.
 #[test]
-fn a_law_that_jumps_takes_the_area_of_its_loop() {
+fn a_hysteretic_law_dissipates_the_area_of_its_loop() {
     let [_, modulus, poisson, ..] = DMT;
     let jkr = [
         "sample.law=jkr",
@@ -273,20 +273,20 @@ fn a_law_that_jumps_takes_the_area_of_its_loop() {
 /// about z = D + A is in closed form Δf/f₀ = −HR/(6k (z² − A²)^{3/2}). At small amplitudes that is
 /// −k_ts/2k with the force's slope at z, at large ones the power law A^{−3/2} of Giessibl.
 #[test]
-fn the_shift_against_the_amplitude_at_one_least_distance() {
+fn the_shift_against_the_amplitude_at_a_fixed_closest_distance() {
     let case = reference(1e6, 10.0, 11.0);
     let scales = case.physical().unwrap().scales;
     let unit = 1e-9 / scales.length;
     let (stiffness, strength, closest) = (40.0, 2e-19 * 10e-9 / 6.0, 1e-9);
-    let options = ApproachOptions {
-        from: Some(401.0 * unit),
-        to: Some(1.02 * unit),
-        closest: Some(unit),
+    let options = FrequencyModulationOptions {
+        from: Some((401.0 * unit).into()),
+        to: Some((1.02 * unit).into()),
+        closest: Some(unit.into()),
         points: 30,
-        phase: Some(90.0),
-        ..ApproachOptions::default()
+        phase: 90.0,
+        ..FrequencyModulationOptions::default()
     };
-    let report = approach(&case, &options, &Control::default()).unwrap();
+    let report = frequency_modulation(&case, &options, &Control::default()).unwrap();
     let kept = report.modulation.as_ref().unwrap();
     assert!(kept.ended.is_empty() && kept.jumps.is_empty(), "{kept:?}");
     assert!(report.returned && report.hysteresis.is_empty());
@@ -303,10 +303,11 @@ fn the_shift_against_the_amplitude_at_one_least_distance() {
         let average = -strength / stiffness / (root * root.sqrt());
         let first = found.first_order_shift.unwrap();
         assert!((first / average - 1.0).abs() < 1e-6, "{first} {average}");
-        // The mean force bends the lever towards the sample, by 0.8 % of D at the least amplitude.
+        // The mean force bends the lever towards the sample, by 0.8 % of D at the smallest
+        // amplitude.
         let bent = point.physical.as_ref().unwrap().observables.mean_deflection;
         let root = (closest + bent) * (closest + bent + 2.0 * amplitude);
-        // f² and not f is linear in the stiffness; harmonics are left out.
+        // f², not f, is linear in the stiffness; harmonics are neglected.
         let shift = found.relative_shift * (1.0 + 0.5 * found.relative_shift);
         let share = -shift * stiffness / strength * root * root.sqrt();
         assert!((share - 1.0).abs() < 1e-3, "{amplitude}: {share}");
@@ -319,7 +320,8 @@ fn the_shift_against_the_amplitude_at_one_least_distance() {
     let (amplitude, shift) = at(0);
     let large = -strength / (stiffness * (2.0 * closest * amplitude).powf(1.5));
     assert!((shift / large - 1.0).abs() < 0.003, "{shift} {large}");
-    // The slope of the force where the bent lever rests, 2HR/(6z³), over twice the stiffness.
+    // The slope of the force at the rest position of the bent lever, 2HR/(6z³), over twice the
+    // stiffness.
     let (amplitude, shift) = at(29);
     let place = closest + amplitude;
     let bent = strength / (stiffness * place * place);
@@ -327,34 +329,36 @@ fn the_shift_against_the_amplitude_at_one_least_distance() {
     let small = (1.0 + slope / stiffness).sqrt() - 1.0;
     assert!((shift / small - 1.0).abs() < 0.002, "{shift} {small}");
     let refused = serde_json::json!({"closest": "1 nm"});
-    let refused: ApproachRequest = read(refused).unwrap();
-    let refused = refused.options(&case).unwrap_err().to_string();
+    let refused: ApproachOptions = read(refused).unwrap();
+    let refused = approach(&case, &refused, &Control::default())
+        .unwrap_err()
+        .to_string();
     assert!(refused.contains("add fm"), "{refused}");
-    let none = ApproachOptions {
-        to: Some(0.5 * unit),
+    let none = FrequencyModulationOptions {
+        to: Some((0.5 * unit).into()),
         ..options
     };
-    let refused = approach(&case, &none, &Control::default()).unwrap_err();
+    let refused = frequency_modulation(&case, &none, &Control::default()).unwrap_err();
     assert!(refused.to_string().contains("no amplitude"), "{refused}");
 }
 
-/// A shift that the attraction gives is met twice on approach, outside and inside of the deepest
-/// one, and twice on the way back at the same distances; a deeper one nowhere.
+/// A shift due to attraction occurs twice on approach, outside and inside of the minimum, and twice
+/// on retract at the same distances; a lower shift does not occur.
 #[test]
-fn a_shift_tells_its_distances() {
+fn a_shift_has_its_distances() {
     let case = air(10.0, 11.0, &DMT);
     let scales = case.physical().unwrap().scales;
     let unit = 1e-9 / scales.length;
     let at = |shift: f64| {
-        let options = ApproachOptions {
-            from: Some(12.0 * unit),
-            to: Some(9.5 * unit),
+        let options = FrequencyModulationOptions {
+            from: Some((12.0 * unit).into()),
+            to: Some((9.5 * unit).into()),
             points: 12,
-            phase: Some(90.0),
-            shift: Some(shift / scales.frequency),
-            ..ApproachOptions::default()
+            phase: 90.0,
+            shift: Some((shift / scales.frequency).into()),
+            ..FrequencyModulationOptions::default()
         };
-        let report = approach(&case, &options, &Control::default()).unwrap();
+        let report = frequency_modulation(&case, &options, &Control::default()).unwrap();
         report.modulation.unwrap().setpoints.unwrap()
     };
     let found = at(-50.0);
@@ -367,19 +371,19 @@ fn a_shift_tells_its_distances() {
     }
     assert!(found[0].gap > found[1].gap);
     assert!(at(-5e4).is_empty());
-    // The motion there is the orbit study's under the drive that is told.
+    // The motion there is that of the orbit study with the reported drive.
     let (one, drive) = (&found[1], found[1].modulation_si.unwrap());
-    let (seen, told) = (again(&case, one).observables, one.observables.unwrap());
-    assert!(told.peak_force > 0.0);
-    assert!((seen.peak_force / told.peak_force - 1.0).abs() < 1e-6);
-    assert!((seen.first_harmonic / told.first_harmonic - 1.0).abs() < 1e-8);
+    let (seen, reported) = (again(&case, one).observables, one.observables.unwrap());
+    assert!(reported.peak_force > 0.0);
+    assert!((seen.peak_force / reported.peak_force - 1.0).abs() < 1e-6);
+    assert!((seen.first_harmonic / reported.first_harmonic - 1.0).abs() < 1e-8);
     let force = drive.drive_strength / scales.force;
     assert!((force / one.modulation.unwrap().drive_strength - 1.0).abs() < 1e-14);
 }
 
-/// The base of a lever of low quality moves as far as a tenth of the deflection and more: the tip
-/// comes nearer than it is deflected, and base and deflection answer a force in one ratio no
-/// longer. A hundredth of the attraction leaves a hundredth of what is of second order.
+/// The base of a lever of low quality moves by a tenth of the deflection or more: the tip comes
+/// nearer than its deflection, and the ratio of base motion to deflection depends on the force.
+/// With a hundredth of the attraction, second-order terms are a hundredth.
 #[test]
 fn the_first_order_takes_a_driven_base_into_account() {
     for phase in [70.0, 90.0] {
@@ -392,14 +396,14 @@ fn the_first_order_takes_a_driven_base_into_account() {
             ];
             let case = lever((40.0, 5.0, "100 kHz"), (10.0, 11.5), &sample);
             let unit = 1e-9 / case.physical().unwrap().scales.length;
-            let options = ApproachOptions {
-                from: Some(12.0 * unit),
-                to: Some(11.5 * unit),
+            let options = FrequencyModulationOptions {
+                from: Some((12.0 * unit).into()),
+                to: Some((11.5 * unit).into()),
                 points: 2,
-                phase: Some(phase),
-                ..ApproachOptions::default()
+                phase,
+                ..FrequencyModulationOptions::default()
             };
-            let report = approach(&case, &options, &Control::default()).unwrap();
+            let report = frequency_modulation(&case, &options, &Control::default()).unwrap();
             let (_, found) = nearest(&report);
             found.relative_shift / found.first_order_shift.unwrap() - 1.0
         };
@@ -409,8 +413,8 @@ fn the_first_order_takes_a_driven_base_into_account() {
     }
 }
 
-/// Whether a neck is there at drive phase 0 changes by a leap along the curve, at which none of its
-/// orbits is lost.
+/// Whether a neck exists at drive phase 0 changes discontinuously along the curve; no orbit is lost
+/// there.
 #[test]
 fn a_neck_at_drive_phase_0_loses_no_orbit() {
     let neck = [
@@ -423,25 +427,28 @@ fn a_neck_at_drive_phase_0_loses_no_orbit() {
         "sample.work_of_adhesion=168.764 mJ/m^2",
     ];
     let case = lever((2.8 * MODAL, 10.6016, "75 kHz"), (30.0, 20.0), &neck);
-    let options = ApproachOptions {
-        to: Some(-10e-9 / case.physical().unwrap().scales.length),
+    let options = FrequencyModulationOptions {
+        to: Some((-10e-9 / case.physical().unwrap().scales.length).into()),
         points: 20,
-        phase: Some(68.7),
-        ..ApproachOptions::default()
+        phase: 68.7,
+        ..FrequencyModulationOptions::default()
     };
-    let report = approach(&case, &options, &Control::default()).unwrap();
-    let told = report.modulation.as_ref().unwrap();
-    assert!(told.ended.is_empty() && told.jumps.is_empty(), "{told:?}");
+    let report = frequency_modulation(&case, &options, &Control::default()).unwrap();
+    let reported = report.modulation.as_ref().unwrap();
+    assert!(
+        reported.ended.is_empty() && reported.jumps.is_empty(),
+        "{reported:?}"
+    );
     assert!(report.returned && report.hysteresis.is_empty());
     let necks = |p: &&ApproachPoint| p.orbit.as_ref().unwrap().states[0].last() == Some(&1.0);
     let count = report.table.iter().filter(necks).count();
     assert!(count > 0 && count < report.table.len(), "{count}");
 }
 
-/// The force that Sader and Jarvis find from the shifts is the law's to the 5 % that their
-/// kernel is good to.
+/// The force of Sader and Jarvis from the shifts agrees with the law to 5 %, the accuracy of their
+/// kernel.
 #[test]
-fn the_force_comes_back_from_the_shifts() {
+fn the_force_is_recovered_from_the_shifts() {
     let case = reference(1e6, 10.0, 11.0);
     let report = modulated(&case, (20.0, 10.6), 120);
     let mut compared = 0;
@@ -457,9 +464,9 @@ fn the_force_comes_back_from_the_shifts() {
     assert!(compared > 20, "{compared}");
 }
 
-/// The free lever: no orbit without amplitude, none with a phase that a lever never has.
+/// The free lever has no orbit with amplitude zero, and none with an impossible phase.
 #[test]
-fn what_cannot_be_held_is_refused() {
+fn impossible_amplitudes_and_phases_are_refused() {
     let case = air(10.0, 11.0, &DMT);
     for (amplitude, phase) in [(0.0, 90.0), (f64::NAN, 90.0), (1e-3, 0.0), (1e-3, 200.0)] {
         let held = Held { amplitude, phase };
@@ -475,15 +482,18 @@ fn what_cannot_be_held_is_refused() {
         phase: 90.0,
     };
     let request = serde_json::json!({"shift": "-50 Hz"});
-    let request: ApproachRequest = read(request).unwrap();
-    let refused = request.options(&case).unwrap_err().to_string();
+    let request: ApproachOptions = read(request).unwrap();
+    let refused = approach(&case, &request, &Control::default())
+        .unwrap_err()
+        .to_string();
     assert!(refused.contains("add fm"), "{refused}");
     let free = FreeOscillation::of(&case, held).unwrap();
-    // One mode at its tip lags by 90° at its own frequency, and the mode is the spring.
+    // One mode driven at its tip lags by 90° at its own frequency, and the modal stiffness is the
+    // spring.
     assert!((free.frequency / case.omega() - 1.0).abs() < 1e-12);
     let stiffness = free.stiffness * case.physical().unwrap().scales.stiffness;
     assert!((stiffness / 0.9 - 1.0).abs() < 1e-9, "{stiffness}");
-    // A viscous force loses π c ω A² = πkA²/Q in a period.
+    // A viscous force dissipates π c ω A² = πkA²/Q per period.
     let loss = std::f64::consts::PI * free.stiffness * 1e-6 / 200.0;
     assert!((free.loss / loss - 1.0).abs() < 1e-9);
 }

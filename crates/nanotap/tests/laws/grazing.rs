@@ -1,17 +1,18 @@
-//! Branches that end where an orbit grazes a switch of a law that remembers.
+//! Branches that end where an orbit grazes a switch of a law with memory.
 
 use nanotap::case::file::Source;
 use nanotap::case::{Case, Key};
 use nanotap::control::Control;
 use nanotap::map::Map;
 use nanotap::study::branch::{BranchOptions, branch};
+use nanotap::study::value::Interval;
 
-/// Over a water bridge a period-3 motion forms one in two periods of three. It ends upwards where
-/// the tip begins to reach the film on the sample in the third, and downwards where it no longer
-/// does in one of the others: either way an orbit turns just where the bridge forms, at twice the
-/// film's thickness of 0.3 nm.
+/// Over a water bridge a period-3 motion forms a bridge in two of three periods. The branch ends
+/// upwards where the tip begins to reach the film on the sample in the third period, and downwards
+/// where it no longer reaches it in one of the others. At either end a minimum of the gap equals
+/// the distance at which the bridge forms, twice the film's thickness of 0.3 nm.
 #[test]
-fn a_branch_over_a_bridge_ends_where_its_orbit_turns_as_the_bridge_forms() {
+fn a_branch_over_a_bridge_ends_where_its_orbit_grazes_the_bridge() {
     let text = include_str!("../../../../docs/cases/capillary-bridge.toml");
     let source = Source {
         name: "capillary-bridge.toml".into(),
@@ -50,11 +51,11 @@ fn a_branch_over_a_bridge_ends_where_its_orbit_turns_as_the_bridge_forms() {
     }
 }
 
-/// On a soft sample that pulls as JKR says, the tip snaps in just at drive phase 0 somewhere on
-/// the branch between the two folds of the bistable region: no end, and no bifurcation. Seeds on
-/// both stable parts are then on one branch.
+/// On a soft sample under JKR, the tip snaps in exactly at drive phase 0 somewhere on the branch
+/// between the two folds of the bistable region: neither an end nor a bifurcation. Seeds on both
+/// stable parts are on one branch.
 #[test]
-fn a_branch_goes_on_where_a_neck_forms_at_drive_phase_0() {
+fn a_branch_continues_where_a_neck_forms_at_drive_phase_0() {
     let words = [
         "modes=1",
         "cantilever.k=2.8 N/m",
@@ -75,20 +76,20 @@ fn a_branch_goes_on_where_a_neck_forms_at_drive_phase_0() {
     let key = Key::find("gap.tip").unwrap();
     let frequency = Key::find("drive.frequency").unwrap();
     let options = BranchOptions {
-        second: Some((frequency, 74.8e3, 75.2e3)),
+        second: Some(Interval::of_key(frequency, 74.8e3, 75.2e3)),
         ..BranchOptions::over(key, 18.5e-9, 22e-9)
     };
     let up = branch(&case, &options, &Control::default()).unwrap();
     assert!(up.failures.is_empty(), "{:?}", up.failures);
     let kinds: Vec<&str> = up.bifurcations.iter().map(|b| b.kind).collect();
-    // Up to the fold, back along the saddles, which lose their neck at that phase, and out of the
+    // Up to the fold, back along the saddles, whose neck vanishes at that phase, and out of the
     // range at its lower end.
     assert_eq!(kinds, ["fold"]);
     assert!((up.bifurcations[0].parameter - 19.1140744e-9).abs() < 1e-16);
     let memory = |k: usize| up.points[k].state[2];
     assert_eq!([memory(0), memory(up.points.len() - 1)], [1.0, 0.0]);
     assert_eq!(up.branches[0].range[0], 18.5e-9);
-    // The fold's curve crosses that place, too.
+    // The curve of folds crosses that point, too.
     let curves = up.loci.unwrap().curves;
     assert_eq!(curves.len(), 1);
     assert_eq!(curves[0].ends, ["leaves the window"; 2]);

@@ -1,4 +1,4 @@
-//! Nonlinear force laws from the case file to what is observed.
+//! Nonlinear force laws from the case file to the observables.
 
 #![allow(
     clippy::disallowed_methods,

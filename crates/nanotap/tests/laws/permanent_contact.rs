@@ -1,10 +1,10 @@
-//! A contact that never ends: the motion is smooth, and perturbations of the fast modes are not.
+//! Permanent contact: the motion is smooth, but perturbations of the fast modes are not.
 
 use nanotap::case::Case;
 use nanotap::study::orbit::{OrbitOptions, orbit};
 
-/// Without a mass at the tip the damping is the same for every mode, and a conservative force leaves
-/// all multipliers the modulus e^(−α₃T/2).
+/// Without a tip mass the damping is the same for every mode, and a conservative force gives all
+/// multipliers the modulus e^(−α₃T/2).
 #[test]
 fn all_multipliers_have_one_modulus() {
     for (modes, q) in [(3, 200.0), (5, 2.0), (10, 20.0)] {
@@ -43,8 +43,8 @@ fn all_multipliers_have_one_modulus() {
     }
 }
 
-/// A damping that grows without bound in the contact lets the tip creep ever more slowly into the
-/// sample: what takes too many steps ends with that reason.
+/// Unbounded damping in the contact makes the tip creep ever more slowly into the sample: a period
+/// with too many steps is an error with that reason.
 #[test]
 fn a_period_of_too_many_steps_ends_with_a_reason() {
     let words = [

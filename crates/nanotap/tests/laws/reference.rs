@@ -7,12 +7,10 @@ use nanotap::study::attractors::{AttractorsOptions, attractors};
 use nanotap::study::branch::{BranchOptions, branch};
 use nanotap::study::orbit::{OrbitOptions, OrbitReport, orbit};
 
-use nanotap_dynamics::StartBox;
-
 use crate::common::{DMT, EV, HERTZ, air, lever};
 
-/// The orbit of `case` near amplitude `a` (nm) and phase `phase` (degrees): with one mode the
-/// drive at the tip is α sin ωt, so that z = A sin(ωt − φ).
+/// The orbit of `case` near amplitude `a` (nm) and phase `phase` (degrees): with one mode the drive
+/// at the tip is α sin ωt, so that z = A sin(ωt − φ).
 fn near(case: &Case, a: f64, phase: f64) -> OrbitReport {
     let view = case.physical().unwrap();
     let model = case.model().unwrap();
@@ -131,7 +129,7 @@ fn dmt_with_van_der_waals() {
         assert_eq!(seen.dissipation, 0.0);
         assert!(found.determinant_defect < 1e-9);
         assert!(seen.energy_balance.residual.abs() < 1e-10);
-        // The adhesion of the contact is the least force where there is contact.
+        // The adhesion of the contact is the minimum of the force in contact.
         if contact > 0.0 {
             assert!(seen.least_force * 1e9 < -0.8753194916 + 1e-9);
         }
@@ -164,12 +162,12 @@ fn the_repulsive_branch_ends_in_a_fold() {
         1e-5,
         "amplitude at the fold",
     );
-    // At a fold the phase depends on the distance like a root: of the reference's last digit
-    // of zc hangs the fourth of φ.
+    // At a fold the phase depends on the distance like a square root: the fourth digit of φ depends
+    // on the last digit of zc in the reference.
     digits(seen.phase, 90.6398, 1e-3, "phase at the fold");
 }
 
-/// From starts of the size of the free swing; a start that cannot be followed is undecided.
+/// Starts of the size of the free oscillation; a start that cannot be followed is undecided.
 #[test]
 fn a_census_finds_the_two_stable_orbits() {
     let case = air(20.0, 18.0, &DMT);
@@ -179,7 +177,9 @@ fn a_census_finds_the_two_stable_orbits() {
     let speed = size * model.frequency();
     let options = AttractorsOptions {
         starts: Some(16),
-        start_box: Some(StartBox::new(vec![-size, -speed], vec![size, speed]).unwrap()),
+        sides: [("a1", -size, size), ("v1", -speed, speed)]
+            .into_iter()
+            .collect(),
         ..AttractorsOptions::default()
     };
     let found = attractors(&model, &options, &Control::default()).unwrap();
@@ -224,9 +224,9 @@ fn kelvin_voigt_in_liquid() {
     }
 }
 
-/// A damping that stops the tip and lets it creep through a contact. What the iteration leaves of
-/// the forces is no reason for short steps: 20,240 were taken in some of these periods once, and
-/// eight minutes over an orbit.
+/// Damping that stops the tip and lets it creep through a contact. The iteration error of the
+/// forces is no reason for short steps: some of these periods once took 20,240 steps, and an orbit
+/// eight minutes.
 #[test]
 fn strong_damping_near_the_sample_needs_few_steps() {
     let case = air(

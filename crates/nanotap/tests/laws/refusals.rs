@@ -1,4 +1,4 @@
-//! What a case with a nonlinear law may not say.
+//! Invalid cases with a nonlinear law.
 
 use nanotap::case::Case;
 
@@ -19,7 +19,7 @@ fn refused(words: &[&str]) -> String {
 }
 
 #[test]
-fn adhesion_is_said_once() {
+fn adhesion_is_stated_once() {
     let twice: Vec<&str> = DMT
         .into_iter()
         .chain(["sample.adhesion_force=1 nN"])
@@ -38,7 +38,7 @@ fn adhesion_is_said_once() {
 }
 
 #[test]
-fn what_a_law_does_not_take_is_refused() {
+fn keys_that_a_law_does_not_use_are_refused() {
     let said = refused(&[
         "sample.law=hertz",
         "sample.modulus=1 GPa",
@@ -58,7 +58,7 @@ fn what_a_law_does_not_take_is_refused() {
 
 /// F = HR/(6a0²) = 2πRw of DMT, 3/2 πRw of JKR.
 #[test]
-fn the_three_ways_to_say_adhesion_agree() {
+fn the_three_ways_to_state_adhesion_agree() {
     let lever = crate::common::air;
     let of = |words: &[&str]| {
         let case = lever(20.0, 18.0, words);
@@ -84,10 +84,10 @@ fn the_three_ways_to_say_adhesion_agree() {
     }
 }
 
-/// Of soft rubber the tip sinks in by more than its radius, of a thin film χ = √(Rδ)/h passes 1:
-/// the motion says so, with the number.
+/// On soft rubber the indentation exceeds the tip radius; on a thin film χ = √(Rδ)/h exceeds 1: the
+/// motion reports this, with the number.
 #[test]
-fn a_motion_says_what_range_of_its_law_it_leaves() {
+fn a_motion_reports_that_it_leaves_the_range_of_its_law() {
     use nanotap::study::orbit::{OrbitOptions, orbit};
     let beyond = |words: &[&str]| {
         let case = crate::common::air(15.0, 7.5, words);
@@ -123,7 +123,7 @@ fn a_motion_says_what_range_of_its_law_it_leaves() {
 }
 
 #[test]
-fn a_tip_below_the_size_of_atoms_is_warned_of() {
+fn a_tip_below_atomic_size_has_a_warning() {
     let mut words = DMT.to_vec();
     words.push("tip.radius=0.16 nm");
     let case = crate::common::air(20.0, 18.0, &words);
@@ -138,9 +138,9 @@ fn a_tip_below_the_size_of_atoms_is_warned_of() {
     );
 }
 
-/// A lever softer than the attraction at rest snaps in: of H R/(6d²) the gradient passes the
-/// lever's stiffness at d³ = HR/(3k). Outside there are two states of rest and the unstable one
-/// between, near the sample only contact.
+/// A lever softer than the attraction at rest snaps in: the gradient of H R/(6d²) exceeds the
+/// lever's stiffness at d³ = HR/(3k). Outside there are two stable rest positions and an unstable
+/// one between them; near the sample there is only contact.
 #[test]
 fn the_static_snap_in_is_found() {
     use nanotap::case::document::equilibria;
@@ -160,7 +160,8 @@ fn the_static_snap_in_is_found() {
         let case = crate::common::lever((k, 200.0, "20 kHz"), (1.0, 3.0), &DMT);
         case.physical().unwrap().scales.length
     };
-    // The unstable state is nearer than where the gradient is the lever's stiffness.
+    // The unstable rest position is nearer than the distance where the gradient equals the lever's
+    // stiffness.
     assert!(far[0].gap * scale > snap && far[1].gap * scale < snap);
     // k (d − rest) = F(d).
     for state in &far[..2] {

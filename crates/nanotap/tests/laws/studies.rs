@@ -1,25 +1,25 @@
-//! Setpoints, windows and derivatives of what is observed, under nonlinear laws.
+//! Setpoints, windows and derivatives of observables under nonlinear laws.
 
 use nanotap::case::{Case, Key};
 use nanotap::control::Control;
 use nanotap::dataset::{Share, Store, Work};
-use nanotap::observe::{Derivative, Observables, Set, Value, measure};
-use nanotap::study::FreeMotion;
+use nanotap::observe::{Derivative, ObservableSet, Observables, Value, measure};
 use nanotap::study::orbit::{OrbitOptions, orbit};
 use nanotap::study::setpoint::solve_setpoint;
 use nanotap::study::value::Axes;
-use nanotap::study::window::{Condition, Window, WindowRequest};
+use nanotap::study::window::{Condition, Window, WindowOptions};
+use nanotap::study::{Computation as _, FreeMotion};
 
 use crate::common::{DMT, EV, lever};
 
-/// A lever that settles in a few tens of periods.
+/// A lever whose transient lasts a few tens of periods.
 fn quick(amplitude: f64, gap: f64, sample: &[&str]) -> Case {
     lever((0.9, 30.0, "100 kHz"), (amplitude, gap), sample)
 }
 
-/// Where an orbit has the setpoint's amplitude, it is run again and has it.
+/// An orbit at a solution of the setpoint is run again and has the setpoint's amplitude.
 #[test]
-fn a_setpoint_is_met_at_its_distances() {
+fn a_setpoint_is_reached_at_its_distances() {
     let mut text = Vec::new();
     let given = quick(20.0, 18.0, &DMT);
     for line in given.to_toml().lines() {
@@ -48,24 +48,24 @@ fn a_setpoint_is_met_at_its_distances() {
         assert!((seen.first_harmonic / 18.2e-9 - 1.0).abs() < 1e-9);
         phases.push(seen.phase);
     }
-    // The state that taps lags by less than at resonance.
+    // The tapping state lags by less than at resonance.
     assert!(phases.iter().any(|phase| *phase < 85.0), "{phases:?}");
 }
 
-/// Where the free swing does not reach the attraction there is one motion without contact, near
-/// the sample one that taps; each condition is that of the orbits themselves.
+/// Where the free oscillation does not reach the attraction there is one motion without contact,
+/// near the sample one that taps; each condition agrees with the orbits.
 #[test]
-fn a_window_over_a_sample_that_attracts() {
+fn a_window_over_an_attractive_sample() {
     let case = quick(10.0, 9.0, &DMT);
-    let request = WindowRequest {
+    let options = WindowOptions {
         over: Axes(vec![
             "drive.frequency=99kHz:101kHz:2".to_owned(),
             "gap.tip=5nm:14nm:4".to_owned(),
         ]),
         starts: 4,
-        ..WindowRequest::default()
+        ..WindowOptions::default()
     };
-    let sweep = request.sweep(&case).unwrap();
+    let sweep = options.sweep(&case).unwrap();
     let folder = std::env::temp_dir().join(format!("nanotap-window-{}", std::process::id()));
     std::fs::create_dir_all(&folder).unwrap();
     let store = Store::create_or_resume(&folder.join("window"), sweep.schema().clone()).unwrap();
@@ -76,7 +76,7 @@ fn a_window_over_a_sample_that_attracts() {
     };
     sweep.compute(&store, &how).unwrap();
     let window = Window::of(&store).unwrap();
-    let [frequency, gap] = [0, 1].map(|k| sweep.options().over[k].key);
+    let [frequency, gap] = [0, 1].map(|k| sweep.over()[k].key);
     let mut seen = Vec::new();
     for (row, &y) in window.conditions.iter().zip(&window.y) {
         for (condition, &x) in row.iter().zip(&window.x) {
@@ -105,14 +105,14 @@ fn observed(case: &Case, start: &[f64]) -> (Vec<f64>, Observables) {
         ..OrbitOptions::default()
     };
     let found = orbit(&model, &options).unwrap();
-    let seen = measure(&model, &found.state, 1, Set::ALL).unwrap();
+    let seen = measure(&model, &found.state, 1, ObservableSet::ALL).unwrap();
     (found.state, seen)
 }
 
-/// A neck of adhesion that comes to last over the moment of drive phase 0: the orbit is the one of
-/// before, with another memory.
+/// A neck of adhesion that begins to exist at drive phase 0: the orbit is the previous one, with
+/// another memory.
 #[test]
-fn an_orbit_is_followed_where_its_neck_comes_to_be_there_at_the_strobe() {
+fn an_orbit_is_followed_where_its_neck_appears_at_the_strobe() {
     let at = |gap: f64| {
         let jkr = [
             "tip.radius=10 nm",
@@ -136,9 +136,9 @@ fn an_orbit_is_followed_where_its_neck_comes_to_be_there_at_the_strobe() {
     assert!((grown - 1.004).abs() < 1e-3, "{grown}");
 }
 
-/// By differences of fourth order, to 1e-6 of each one's size.
+/// Compared with differences of fourth order, to 1e-6 of each value.
 #[test]
-fn derivatives_of_what_is_observed() {
+fn derivatives_of_observables() {
     let dmt = quick(20.0, 15.0, &DMT);
     let voigt = [
         "sample.law=voigt-sphere",
@@ -177,7 +177,7 @@ fn derivatives_of_what_is_observed() {
         for key in keys {
             let model = case.model().unwrap();
             let at = (state.as_slice(), 1);
-            let exact = Derivative::of(&case, &model, key, at, &seen, Set::ALL).unwrap();
+            let exact = Derivative::of(&case, &model, key, at, &seen, ObservableSet::ALL).unwrap();
             let value = case.get(key);
             // A resonance is narrow.
             let part = if key == Key::DriveFrequency {
@@ -199,8 +199,8 @@ fn derivatives_of_what_is_observed() {
                 let [a, b, c, d] = moved.map(|of| number(&of).unwrap());
                 let slope = (a - 8.0 * b + 8.0 * c - d) / (12.0 * h);
                 let scale = change.abs().max(here.abs() / value.abs());
-                // Higher harmonics are thousands of times smaller than the motion, whose own error
-                // differences of theirs show.
+                // Higher harmonics are thousands of times smaller than the motion; their
+                // differences show the error of the motion.
                 let faint =
                     observable.name.contains("_harmonic") && observable.name != "first_harmonic";
                 let bound = if faint { 1e-4 } else { 1e-6 };
@@ -216,7 +216,7 @@ fn derivatives_of_what_is_observed() {
     assert!(compared > 100, "{compared}");
 }
 
-/// One repetition or three of them: means, harmonics, extrema and times change alike.
+/// Over one repetition or three: means, harmonics, extrema and times have the same derivatives.
 #[test]
 fn derivatives_over_several_repetitions() {
     let case = quick(20.0, 15.0, &DMT);
@@ -226,7 +226,7 @@ fn derivatives_over_several_repetitions() {
     for key in [Key::SampleModulus, Key::DriveFrequency] {
         let of = |periods| {
             let at = (state.as_slice(), periods);
-            Derivative::of(&case, &model, key, at, &seen, Set::COMMON).unwrap()
+            Derivative::of(&case, &model, key, at, &seen, ObservableSet::COMMON).unwrap()
         };
         let (one, three) = (of(1), of(3));
         let mut compared = 0;
@@ -246,10 +246,10 @@ fn derivatives_over_several_repetitions() {
     }
 }
 
-/// A bridge that forms at 2h and ruptures at d_r takes 4πγRh ln((1 + d_r/h)/3): its force acts on
-/// the way out alone.
+/// A bridge that forms at 2h and ruptures at d_r dissipates 4πγRh ln((1 + d_r/h)/3): its force acts
+/// on retract only.
 #[test]
-fn what_a_capillary_bridge_takes() {
+fn dissipation_of_a_capillary_bridge() {
     let words = [
         "sample.law=hertz + capillary",
         "sample.modulus=3 GPa",

@@ -1,4 +1,4 @@
-//! A force curve given by rows: motion, derivatives, files, refusals.
+//! Force tables: motion, derivatives, files, errors.
 
 use std::path::PathBuf;
 
@@ -8,7 +8,7 @@ use nanotap::study::orbit::{OrbitOptions, OrbitReport, orbit};
 use crate::common::{DMT, air};
 use crate::derivatives::worst;
 
-/// Rows in nm and nN as a word beside a case file.
+/// Rows in nm and nN as a word for `--set`.
 fn table(rows: impl IntoIterator<Item = (f64, f64)>) -> String {
     let rows = rows.into_iter().map(|(d, f)| format!("[{d:?}, {f:?}]"));
     let rows: Vec<String> = rows.collect();
@@ -54,9 +54,9 @@ fn two_straight_lines_are_the_linear_contact() {
     }
 }
 
-/// The repulsive orbit of DMT contact with van der Waals attraction (A = 18.52532864 nm,
-/// φ = 67.86119340° by scalar Volterra collocation): a polyline's error falls with the square of
-/// the spacing of its rows.
+/// The repulsive orbit of DMT contact with van der Waals attraction (A = 18.52532864 nm, φ =
+/// 67.86119340° by scalar Volterra collocation): the error of a polyline decreases with the square
+/// of the spacing of its rows.
 #[test]
 fn rows_of_a_smooth_law_converge_to_its_orbit() {
     let smooth = air(20.0, 18.0, &DMT);
@@ -70,7 +70,7 @@ fn rows_of_a_smooth_law_converge_to_its_orbit() {
     let errors: Vec<f64> = [60, 120, 240]
         .into_iter()
         .map(|count| {
-            // Evenly in the root of the distance from a0, where the law is bent.
+            // Evenly in the root of the distance from a0, where the law is curved.
             let rows = (-count..=count).map(|k| {
                 let s = f64::from(k) / f64::from(count);
                 let gap = 0.169 + if k < 0 { -3.0 * s * s } else { 45.0 * s * s };
@@ -123,7 +123,7 @@ fn derivatives_by_the_factors_of_a_table_and_by_the_lever() {
     assert!(worst < 1e-6, "{worst}");
 }
 
-/// A folder of this test's own.
+/// A folder for one test.
 fn folder(name: &str) -> PathBuf {
     let path = std::env::temp_dir().join(format!("nanotap-table-{name}-{}", std::process::id()));
     std::fs::create_dir_all(&path).unwrap();
@@ -139,12 +139,12 @@ fn loaded(path: &std::path::Path, words: &[&str]) -> Result<Case, String> {
 }
 
 #[test]
-fn a_curve_is_read_beside_its_case_file_and_never_again() {
+fn a_table_is_read_once_relative_to_its_case_file() {
     let folder = folder("read");
     let (case, curve) = (folder.join("lever.toml"), folder.join("curve.csv"));
     let text = format!("[sample]\nlaw = \"table\"\ntable = \"curve.csv\"\n{LEVER}");
     std::fs::write(&case, &text).unwrap();
-    // From far away inwards, in other units.
+    // From large to small distances, in other units.
     let rows = "# measured\ndistance [nm]; force [pN]\n5;0\n0;-500\n-1;4000\n";
     std::fs::write(&curve, rows).unwrap();
     let read = loaded(&case, &[]).unwrap();
@@ -156,14 +156,14 @@ fn a_curve_is_read_beside_its_case_file_and_never_again() {
     for (found, expected) in points(&read).iter().zip(expected) {
         assert!((found.0 - expected.0).abs() < 1e-24 && (found.1 - expected.1).abs() < 1e-24);
     }
-    // A word names it from where the command runs.
+    // A path in `--set` is relative to the folder of the command.
     let word = format!("sample.table={}", curve.display());
     assert_eq!(points(&loaded(&case, &[&word]).unwrap()), points(&read));
-    // Written out it holds the rows themselves.
+    // A written case contains the rows themselves.
     std::fs::write(&case, read.to_toml()).unwrap();
     std::fs::remove_file(&curve).unwrap();
     assert_eq!(points(&loaded(&case, &[]).unwrap()), points(&read));
-    // A text alone opens nothing.
+    // A text alone does not open files.
     let source = nanotap::case::file::Source {
         name: "lever.toml".into(),
         text,
@@ -176,7 +176,7 @@ fn a_curve_is_read_beside_its_case_file_and_never_again() {
 }
 
 #[test]
-fn what_is_no_function_of_the_gap_is_refused_with_its_place() {
+fn tables_that_are_not_functions_are_refused_with_their_place() {
     let folder = folder("refused");
     let (case, curve) = (folder.join("lever.toml"), folder.join("curve.csv"));
     let text = format!("[sample]\nlaw = \"table\"\ntable = \"curve.csv\"\n{LEVER}");
@@ -192,11 +192,11 @@ fn what_is_no_function_of_the_gap_is_refused_with_its_place() {
     refused(&rows("1,0\n"), &["at least two rows"]);
     refused(&rows("0,1\n1,0\n0.5,0\n"), &["row 3", "turns back"]);
     refused(&rows("0,1\n1,0.5\n1,0\n"), &["row 3", "would jump"]);
-    refused(&rows("0,1\n1,nan\n"), &["line 3", "there is no number"]);
+    refused(&rows("0,1\n1,nan\n"), &["line 3", "missing number"]);
     refused(&rows("0,1\n1,inf\n"), &["row 2", "not finite"]);
     refused(
         &rows("0,1\n1,x\n"),
-        &["line 3", "column 2", "`x` is no number"],
+        &["line 3", "column 2", "`x` is not a number"],
     );
     refused(&rows("0,1\n1\n"), &["line 3", "1 fields"]);
     refused("gap,force (nN)\n0,1\n1,0\n", &["`gap`", "unit"]);
@@ -245,7 +245,7 @@ fn what_is_no_function_of_the_gap_is_refused_with_its_place() {
     assert!(said(&["sample.law=table", "sample.table=3"]).contains("not opened"));
 }
 
-/// A table may have what depends on the rate beside it.
+/// A table may be combined with a rate-dependent law.
 #[test]
 fn a_table_may_be_damped() {
     let rows = table([(-1.0, 20.0), (0.0, 0.0), (5.0, 0.0)]);

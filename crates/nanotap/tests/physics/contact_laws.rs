@@ -1,12 +1,11 @@
-//! What must hold of every contact law.
+//! Properties of every contact law.
 
 use nanotap::case::Case;
 use nanotap::model::Model;
 use nanotap::model::cantilever::Cantilever;
 use nanotap::model::contact::ContactLaw;
-use nanotap::model::contact::moving_surface::MovingSurface;
 use nanotap::model::parameter::Parameter;
-use nanotap::observe::{Set, measure};
+use nanotap::observe::{ObservableSet, measure};
 use nanotap::study::orbit::{OrbitOptions, orbit};
 use nanotap_flow::Trajectory;
 use proptest::prelude::*;
@@ -16,32 +15,28 @@ use crate::located_runge_kutta::Independent;
 
 /// The paper's case on a sample of a law, with the paper's spring and damper.
 pub(crate) fn on(law: ContactLaw, omega: f64) -> Cantilever {
-    let case = Cantilever {
-        contact: law,
-        omega,
-        ..Cantilever::paper()
-    };
+    let case = Cantilever::paper().with(Parameter::Omega, omega);
     match law {
-        ContactLaw::SpringDamper | ContactLaw::KelvinVoigt => case,
-        ContactLaw::StandardLinearSolid => Cantilever {
-            alpha6: 0.0,
-            relaxation_stiffness: 40.0,
-            relaxation_time: 0.05,
-            ..case
-        },
-        ContactLaw::MovingSurface => Cantilever {
-            surface: MovingSurface {
-                stiffness: 60.0,
-                damping: 8.0,
-                adhesion: 0.4,
-            },
-            ..case
-        },
+        ContactLaw::SpringDamper | ContactLaw::KelvinVoigt => case.on(law, &[]),
+        ContactLaw::StandardLinearSolid => case.with(Parameter::Alpha6, 0.0).on(law, &[40.0, 0.05]),
+        ContactLaw::MovingSurface => case.on(law, &[60.0, 8.0, 0.4]),
     }
 }
 
-/// States, contacts, peak force and the energy that the sample takes, in flight as well,
-/// against an independent integration.
+/// The numbers that only the law of a case has.
+pub(crate) fn own_numbers(case: &Cantilever) -> Vec<f64> {
+    Parameter::of_law(case.contact)
+        .map(|own| case.get(own))
+        .collect()
+}
+
+/// The parameter of this name.
+pub(crate) fn parameter(name: &str) -> Parameter {
+    Parameter::find(name).unwrap()
+}
+
+/// States, contacts, peak force and dissipated energy, in flight as well, compared with an
+/// independent integration.
 #[test]
 fn every_law_agrees_with_located_runge_kutta() {
     for law in ContactLaw::ALL {
@@ -65,7 +60,7 @@ fn every_law_agrees_with_located_runge_kutta() {
                     independent.beam
                 );
             }
-            let seen = measure(&model, &state, 5, Set::ALL).unwrap();
+            let seen = measure(&model, &state, 5, ObservableSet::ALL).unwrap();
             let contacts = (seen.contacts_per_period * 5.0).round() as usize;
             assert_eq!(contacts, independent.contacts, "{law} {omega}");
             let lost = seen.energy_balance.sample_damping;
@@ -74,7 +69,7 @@ fn every_law_agrees_with_located_runge_kutta() {
                 "{law} {omega}: {lost} {}",
                 independent.dissipated
             );
-            // The integration sees forces at its steps only.
+            // The integration evaluates forces at its steps only.
             assert!((seen.peak_force / independent.force[1] - 1.0).abs() < 1e-2);
             let pulls = independent.force[0] < -1e-6;
             assert_eq!(
@@ -90,8 +85,9 @@ fn every_law_agrees_with_located_runge_kutta() {
     }
 }
 
-/// Jacobians and the derivatives to every parameter against differences of fourth order;
-/// states in flight over a surface that recovers, in contact, and parting at once.
+/// Jacobians and the derivatives with respect to every parameter compared with differences of
+/// fourth order; states in flight over a recovering surface, in contact, and at immediate
+/// separation.
 #[test]
 fn derivatives_of_every_law() {
     for law in ContactLaw::ALL {
@@ -107,7 +103,7 @@ fn derivatives_of_every_law() {
                 state = advance(&subject, &state);
             }
             let mut starts = vec![state.clone()];
-            // Deep in the sample, resting and moving out.
+            // Deep in the sample, at rest and moving outwards.
             for speed in [0.0, 3.0] {
                 let mut state = vec![0.0; model.dimension()];
                 (state[0], state[modes]) = (-0.1, speed);
@@ -121,9 +117,9 @@ fn derivatives_of_every_law() {
     }
 }
 
-/// A periodic motion closes its energy balance and its volumes to rounding.
+/// A periodic motion balances its energy and its volumes to rounding.
 #[test]
-fn orbits_of_every_law_close_their_balances() {
+fn orbits_of_every_law_balance_energy_and_volume() {
     for law in ContactLaw::ALL {
         for (omega, modes) in [(20.0, 3), (2.6, 3), (20.0, 6)] {
             let model = Model::cantilever(&on(law, omega).with_modes(modes)).unwrap();
@@ -147,8 +143,8 @@ fn orbits_of_every_law_close_their_balances() {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(48))]
 
-    /// Anything anywhere: the run goes on, the sample never gives energy, a surface that
-    /// recovers never pulls, and only contact ends contact.
+    /// For random parameters and states: the run continues, the sample never supplies energy, a
+    /// recovering surface never pulls, and only contact ends contact.
     #[test]
     fn samples_are_passive(
         law in 0..4_usize, modes in 1..5_usize, omega in 0.5..25.0_f64,
@@ -157,18 +153,14 @@ proptest! {
     ) {
         let law = ContactLaw::ALL[law];
         let mut case = Cantilever { modes, omega, alpha4: stiffness, alpha5: gap, ..Cantilever::paper() };
-        case.contact = law;
-        if law == ContactLaw::StandardLinearSolid {
-            case.alpha6 = 0.0;
-            case.relaxation_stiffness = 3.0 * damping;
-            case.relaxation_time = 0.1 * damping;
-        } else {
-            case.alpha6 = damping;
-        }
-        if law == ContactLaw::MovingSurface {
-            let adhesion = 3.0 * gap.max(0.0);
-            case.surface = MovingSurface { stiffness: 1.0 + 0.5 * stiffness, damping, adhesion };
-        }
+        case.alpha6 = if law == ContactLaw::StandardLinearSolid { 0.0 } else { damping };
+        case = case.on(law, &match law {
+            ContactLaw::StandardLinearSolid => vec![3.0 * damping, 0.1 * damping],
+            ContactLaw::MovingSurface => {
+                vec![1.0 + 0.5 * stiffness, damping, 3.0 * gap.max(0.0)]
+            }
+            _ => Vec::new(),
+        });
         let model = Model::cantilever(&case).unwrap();
         let mut state = vec![0.0; model.dimension()];
         (state[0], state[modes]) = (a, v);
@@ -176,17 +168,17 @@ proptest! {
             state[2 * modes] = memory;
         }
         let run = Trajectory::record(&model.system, &state, 8).unwrap();
-        let seen = measure(&model, &state, 8, Set::ALL).unwrap();
+        let seen = measure(&model, &state, 8, ObservableSet::ALL).unwrap();
         prop_assert!(seen.energy_balance.sample_damping >= 0.0);
         if ![ContactLaw::SpringDamper, ContactLaw::MovingSurface].contains(&law) {
             let scale = seen.peak_force.max(stiffness * (a.abs() + memory.abs())) + 1e-3;
-            // A start in the sample may be given that pulls for no time at all.
+            // A start in the sample may be one that pulls, for zero time.
             prop_assert!(seen.least_force >= -1e-10 * scale, "{}", seen.least_force);
         }
         for pair in run.events().windows(2) {
             prop_assert!(pair[0].to == pair[1].from);
         }
-        // The map at each period's start finds the regime that the run was in.
+        // The map at the start of each period finds the regime of the run.
         for k in 0..8 {
             let t = f64::from(k) * model.period();
             let segment = run.segment_at(t).unwrap();
@@ -209,11 +201,9 @@ fn without_a_damper_every_law_is_the_papers_spring() {
         contact: ContactLaw::KelvinVoigt,
         ..spring.clone()
     };
-    let solid = Cantilever {
-        contact: ContactLaw::StandardLinearSolid,
-        relaxation_stiffness: 30.0,
-        ..spring.clone()
-    };
+    let solid = spring
+        .clone()
+        .on(ContactLaw::StandardLinearSolid, &[30.0, 0.0]);
     let [expected, recovered, relaxed] = [spring, recovers, solid].map(|case| {
         let subject = Case::from(case);
         let mut state = vec![0.0; subject.model().unwrap().dimension()];
@@ -226,7 +216,7 @@ fn without_a_damper_every_law_is_the_papers_spring() {
     assert_eq!((recovered[6], relaxed[6]), (0.0, 0.0));
 }
 
-/// A law's further parameters can be varied like the paper's.
+/// Further parameters of a law can be varied like the paper's.
 #[test]
 fn a_case_has_the_parameters_of_its_law() {
     let of = |law| Case::from(on(law, 2.6));
@@ -235,7 +225,7 @@ fn a_case_has_the_parameters_of_its_law() {
     let solid = names(ContactLaw::StandardLinearSolid);
     assert!(solid.contains(&"relaxation_time") && !solid.contains(&"alpha6"));
     assert!(of(ContactLaw::SpringDamper).key("relaxation_time").is_err());
-    let wrong = Cantilever::paper().with(Parameter::RelaxationTime, 0.1);
+    let wrong = Cantilever::paper().with(parameter("relaxation_time"), 0.1);
     let refused = Model::cantilever(&wrong).unwrap_err().to_string();
     assert!(refused.contains("standard-linear-solid"), "{refused}");
 }

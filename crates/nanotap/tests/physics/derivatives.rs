@@ -1,37 +1,37 @@
-//! Derivatives of the stroboscopic map against central differences, and the 3/2 power
-//! at grazing.
+//! Derivatives of the stroboscopic map compared with central differences, and the 3/2 power at
+//! grazing.
 
 use nalgebra::DMatrix;
 use nanotap::case::{Case, Key};
 use nanotap::model::Model;
 use nanotap::model::cantilever::Cantilever;
+use nanotap::model::model_map::ModelMap;
 use nanotap::model::oscillator::{Oscillator, Stop};
-use nanotap::model::strobe::Strobe;
 use nanotap_dynamics::StroboscopicMap;
 
 pub(crate) fn advance(subject: &Case, state: &[f64]) -> Vec<f64> {
     let mut x = state.to_vec();
-    Strobe::new(&subject.model().unwrap())
+    ModelMap::new(&subject.model().unwrap())
         .advance(&mut x)
         .unwrap();
     x
 }
 
-/// The state after a period, and the switches on the way.
+/// The state after a period, and the number of switches.
 fn counted(subject: &Case, state: &[f64]) -> (Vec<f64>, usize) {
     let system = subject.model().unwrap().system;
     let run = nanotap_flow::Trajectory::record(&system, state, 1).unwrap();
     (advance(subject, state), run.events().len())
 }
 
-/// Largest relative difference between the exact derivative and a fourth-order central
-/// difference, over the Jacobian and every parameter; `None` where a contact begins or ends
-/// within the differences: there the map bends or jumps, and they are none of its derivatives.
+/// Largest relative difference between the exact derivative and a fourth-order central difference,
+/// over the Jacobian and every parameter; `None` if a contact begins or ends within the
+/// differences, where the map has a kink or jump.
 pub(crate) fn worst(subject: &Case, state: &[f64]) -> Option<f64> {
     worst_over(subject, state, 1e-5)
 }
 
-/// The same with differences over `step` in the state, and in a parameter as much of its value.
+/// The same with differences over `step` in the state, and the same fraction of a parameter.
 pub(crate) fn worst_over(subject: &Case, state: &[f64], step: f64) -> Option<f64> {
     let model = subject.model().unwrap();
     let keys: Vec<Key> = subject.keys();
@@ -41,7 +41,7 @@ pub(crate) fn worst_over(subject: &Case, state: &[f64], step: f64) -> Option<f64
         .collect();
     let n = state.len();
     let (mut jacobian, mut derivatives) = (DMatrix::zeros(n, n), DMatrix::zeros(n, keys.len()));
-    Strobe::with_tangents(&model, tangents)
+    ModelMap::with_tangents(&model, tangents)
         .advance_with_derivatives(&mut state.to_vec(), &mut jacobian, &mut derivatives)
         .unwrap();
     let switches = counted(subject, state).1;
@@ -71,7 +71,7 @@ pub(crate) fn worst_over(subject: &Case, state: &[f64], step: f64) -> Option<f64
     }
     for (p, key) in keys.iter().enumerate() {
         let value = subject.get(*key);
-        // One-sided parameters are tested away from their bound.
+        // Parameters with a bound are tested away from it.
         let moved = |h: f64| counted(&subject.with(*key, value + h), state);
         compare(
             derivatives.column(p).as_slice(),
@@ -120,8 +120,8 @@ fn oscillators_with_soft_and_rigid_stops() {
     }
 }
 
-/// Critically damped contact: no basis of eigenvectors, so the matrix exponential of the
-/// augmented system stands in for the sensitivities.
+/// Critically damped contact: without a basis of eigenvectors, the matrix exponential of the
+/// augmented system gives the sensitivities.
 #[test]
 fn critically_damped_contact() {
     // m = 1, k + k₁ = 16, c + c₁ = 8: a double eigenvalue −4.
@@ -147,12 +147,11 @@ fn critically_damped_contact() {
     assert!(error < 1e-6, "{error:e}");
 }
 
-/// Near grazing |P − P_free| scales as the penetration to the power 3/2: over five
-/// decades of penetration the local slope stays near 1.5.
+/// Near grazing |P − P_free| scales as the penetration to the power 3/2: over five decades of
+/// penetration the local slope stays near 1.5.
 #[test]
 fn grazing_is_of_the_three_halves_type() {
-    // A lever that just misses: the gap's least value over the run is the knob, set by
-    // α5; state and drive stay.
+    // A lever that just misses: α5 sets the least gap over the run; state and drive are fixed.
     let free = Cantilever {
         alpha5: 1.0,
         ..Cantilever {

@@ -1,12 +1,12 @@
-//! Random beams against an independent integrator: one to twenty modes, every regime of damping,
-//! gaps of both signs, contact stiffness from 1e-3 to 1e6, every piecewise-linear contact law.
+//! Random beams compared with an independent integrator: one to twenty modes, every regime of
+//! damping, gaps of both signs, contact stiffness from 1e-3 to 1e6, every piecewise-linear contact
+//! law.
 
 use std::f64::consts::TAU;
 
 use nanotap::model::Model;
 use nanotap::model::cantilever::Cantilever;
 use nanotap::model::contact::ContactLaw;
-use nanotap::model::contact::moving_surface::MovingSurface;
 use nanotap_flow::{System, Trajectory};
 
 use crate::taylor;
@@ -20,14 +20,14 @@ impl Random {
         0.5 * (self.next() + 1.0)
     }
 
-    /// Between two bounds, evenly in the logarithm.
+    /// Between two bounds, uniform in the logarithm.
     fn log(&mut self, low: f64, high: f64) -> f64 {
         low * (high / low).powf(self.part())
     }
 }
 
-/// None, light, heavy, or that with which one of the first two modes of the bare beam is critical
-/// (α3 = 2 Ω_j, Ω₁ = 3.51601526850015, Ω₂ = 22.0344915646668) but for at most a few digits.
+/// None, light, heavy, or close to critical damping of one of the first two modes of the bare beam
+/// (α3 = 2 Ω_j, Ω₁ = 3.51601526850015, Ω₂ = 22.0344915646668) to a few digits.
 fn damping(random: &mut Random) -> f64 {
     let kind = random.part();
     if kind < 0.15 {
@@ -48,7 +48,7 @@ fn beam(random: &mut Random, number: usize) -> Cantilever {
     let contact = ContactLaw::ALL[number % ContactLaw::ALL.len()];
     let solid = contact == ContactLaw::StandardLinearSolid;
     let alpha4 = random.log(1e-3, 1e6);
-    Cantilever {
+    let mut case = Cantilever {
         modes: 1 + (20.0 * random.part().powi(2)) as usize,
         alpha1: if random.next() > 0.0 {
             random.log(1e-3, 1.0)
@@ -65,27 +65,27 @@ fn beam(random: &mut Random, number: usize) -> Cantilever {
             alpha4.sqrt() * random.log(0.05, 1.0)
         },
         omega: random.log(0.5, 60.0),
-        relaxation_stiffness: if solid {
-            alpha4 * random.log(0.1, 10.0)
-        } else {
-            0.0
-        },
-        relaxation_time: if solid { random.log(1e-2, 1.0) } else { 0.0 },
-        contact,
-        surface: if contact == ContactLaw::MovingSurface {
-            MovingSurface {
-                stiffness: alpha4 * random.log(0.1, 10.0),
-                damping: alpha4.sqrt() * random.log(0.05, 1.0),
-                adhesion: alpha4 * random.log(1e-4, 1e-1),
-            }
-        } else {
-            MovingSurface::NONE
-        },
         ..Cantilever::paper()
-    }
+    };
+    case = case.on(
+        contact,
+        &match contact {
+            ContactLaw::StandardLinearSolid => {
+                vec![alpha4 * random.log(0.1, 10.0), random.log(1e-2, 1.0)]
+            }
+            ContactLaw::MovingSurface => vec![
+                alpha4 * random.log(0.1, 10.0),
+                alpha4.sqrt() * random.log(0.05, 1.0),
+                alpha4 * random.log(1e-4, 1e-1),
+            ],
+            _ => Vec::new(),
+        },
+    );
+    case
 }
 
-/// Deflections as large as the gap, fast modes less; the sample at rest and the tip above it.
+/// Deflections of the size of the gap, less for fast modes; the sample at rest and the tip above
+/// it.
 fn start(random: &mut Random, model: &Model, modes: usize) -> Vec<f64> {
     let mut x = vec![0.0; model.dimension()];
     loop {
@@ -123,27 +123,26 @@ fn fastest(system: &System) -> f64 {
     rates.chain(tones).fold(0.0, f64::max)
 }
 
-/// Times the fastest rate that a run takes at most.
-const MOST_STEPS: f64 = 1e4;
+/// Largest product of the fastest rate and the duration of a run.
+const MAX_STEPS: f64 = 1e4;
 
-/// How far the state at the end of a period is off, positions and velocities by their own size,
-/// over how much the period stretches what is off at its start. `None` where a touch is so light
-/// that rounding decides.
+/// Error of the state at the end of a period, positions and velocities relative to their sizes,
+/// over the growth of errors in the period. `None` if rounding decides about a very light contact.
 fn error(random: &mut Random, case: &Cantilever) -> Option<(f64, usize)> {
     let model = Model::cantilever(case).unwrap();
     let x = start(random, &model, case.modes);
     let exact = Trajectory::record(&model.system, &x, 1).unwrap();
     let regime = exact.segments()[0].regime;
     let rate = fastest(&model.system);
-    // A period, or as much of it as the series does in a moment.
-    let until = (TAU / case.omega).min(MOST_STEPS / rate);
+    // A period, or the part of it that the series computes quickly.
+    let until = (TAU / case.omega).min(MAX_STEPS / rate);
     let taylor = taylor::run(&model.system, &x, regime, rate, until)?;
-    // The same from a state that is off by 1e-8 of its size: what a period makes of that.
+    // The same from a state with a relative error of 1e-8: the growth of errors.
     let scale = x.iter().map(|v| v.abs()).fold(0.0, f64::max);
-    let beside: Vec<f64> = x.iter().map(|v| v + 1e-8 * scale * random.next()).collect();
-    let beside = taylor::run(&model.system, &beside, regime, rate, until)?;
+    let perturbed: Vec<f64> = x.iter().map(|v| v + 1e-8 * scale * random.next()).collect();
+    let perturbed = taylor::run(&model.system, &perturbed, regime, rate, until)?;
     let switches = taylor.switches.len();
-    if beside.switches.len() != switches {
+    if perturbed.switches.len() != switches {
         return None;
     }
     let end = exact.state_at(until).unwrap();
@@ -160,7 +159,7 @@ fn error(random: &mut Random, case: &Cantilever) -> Option<(f64, usize)> {
             .into_iter()
             .fold(0.0, f64::max)
     };
-    let stretched = (apart(beside.state.as_slice()) / 1e-8).max(1.0);
+    let stretched = (apart(perturbed.state.as_slice()) / 1e-8).max(1.0);
     let times = exact.events().iter().map(|event| event.time);
     let times: Vec<f64> = times.filter(|time| *time <= until).collect();
     assert_eq!(
@@ -172,7 +171,7 @@ fn error(random: &mut Random, case: &Cantilever) -> Option<(f64, usize)> {
     Some((apart(&end) / stretched, switches))
 }
 
-/// Runs `count` cases, and says what came of them.
+/// Runs `count` cases and prints a summary.
 fn check(count: usize, mut random: Random) {
     let (mut worst, mut touched, mut left) = (0.0_f64, 0, 0);
     for number in 0..count {

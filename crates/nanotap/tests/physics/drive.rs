@@ -1,4 +1,4 @@
-//! Drives through the base and on the lever itself, with one tone and two.
+//! Base and direct actuation, with one tone and with two.
 
 use nanotap::case::Case;
 use nanotap::case::physical::free_response::response_at;
@@ -7,17 +7,17 @@ use nanotap::model::cantilever::Cantilever;
 use nanotap::model::contact::ContactLaw;
 use nanotap::model::drive_form::Actuation;
 use nanotap::model::parameter::Parameter;
-use nanotap::observe::{Set, Spectrum, measure};
+use nanotap::observe::{ObservableSet, Spectrum, measure};
 use nanotap::study::orbit::{OrbitOptions, orbit};
 use nanotap_arithmetic::ComplexFunctions as _;
 use nanotap_flow::{Complex, Flow};
 
-use crate::contact_laws::on;
+use crate::contact_laws::{on, own_numbers};
 use crate::derivatives::{advance, worst};
 
-/// Two tones, the second at 25/4 of the first, on the lever as said.
+/// Two tones, the second at 25/4 of the first, with this actuation.
 fn two_tones(actuation: Actuation) -> Cantilever {
-    Cantilever {
+    let case = Cantilever {
         actuation,
         alpha2: if actuation == Actuation::Base {
             0.1
@@ -25,18 +25,19 @@ fn two_tones(actuation: Actuation) -> Cantilever {
             0.6
         },
         tone2_ratio: Some("25/4".parse().unwrap()),
-        tone2_amplitude: if actuation == Actuation::Base {
-            0.01
-        } else {
-            0.4
-        },
-        tone2_phase: 35.0,
         omega: 3.1,
         ..Cantilever::paper()
-    }
+    };
+    let amplitude = if actuation == Actuation::Base {
+        0.01
+    } else {
+        0.4
+    };
+    case.with(Parameter::Tone2Amplitude, amplitude)
+        .with(Parameter::Tone2Phase, 35.0)
 }
 
-/// Far from the sample the motion is the sum of both tones' responses, each with the
+/// Far from the sample the motion is the sum of the responses to both tones, each with the
 /// amplitude and phase of its closed form.
 #[test]
 fn tones_superpose_in_free_flight() {
@@ -52,7 +53,7 @@ fn tones_superpose_in_free_flight() {
         let tones = [
             (case.alpha2, case.omega, o.first_harmonic, o.phase),
             (
-                case.tone2_amplitude,
+                case.get(Parameter::Tone2Amplitude),
                 6.25 * case.omega,
                 o.tone2_response.unwrap(),
                 o.tone2_lag.unwrap(),
@@ -67,7 +68,7 @@ fn tones_superpose_in_free_flight() {
             let off = (phase + z.argument().to_degrees()).rem_euclid(360.0);
             assert!(off.min(360.0 - off) < 1e-8, "{actuation}: {off}");
         }
-        // All of the motion is in these two.
+        // There is no other motion.
         let power = 0.5 * (o.first_harmonic.powi(2) + o.tone2_response.unwrap().powi(2));
         assert!((o.rms_deflection.powi(2) / power - 1.0).abs() < 1e-10);
         let spectrum = Spectrum::of(&model, &found.trajectory, 1, 8);
@@ -84,8 +85,8 @@ fn tones_superpose_in_free_flight() {
     }
 }
 
-/// Slowly pushed, a beam bends by L³/3EI per force at its tip and L³/8EI per force spread
-/// evenly; slowly moved, it follows its base.
+/// Under a slow force a beam deflects by L³/3EI per unit force at its tip and L³/8EI per unit of
+/// evenly distributed force; under slow motion it follows its base.
 #[test]
 fn slow_drives_are_static() {
     let slow = |actuation| Cantilever {
@@ -106,8 +107,8 @@ fn slow_drives_are_static() {
     }
 }
 
-/// With contacts, every way of driving and both tones: derivatives to all parameters, the
-/// second tone's among them, and a closed energy balance.
+/// With contacts, every actuation and both tones: derivatives with respect to all parameters,
+/// including those of the second tone, and a closed energy balance.
 #[test]
 fn every_drive_has_its_derivatives_and_balances_its_energy() {
     for actuation in Actuation::ALL {
@@ -115,19 +116,15 @@ fn every_drive_has_its_derivatives_and_balances_its_energy() {
             let sample = on(law, 3.1);
             let case = Cantilever {
                 modes: 2,
-                contact: law,
                 alpha5: 0.03,
                 alpha6: sample.alpha6,
-                relaxation_stiffness: sample.relaxation_stiffness,
-                relaxation_time: sample.relaxation_time,
-                surface: sample.surface,
-                ..two_tones(actuation)
+                ..two_tones(actuation).on(law, &own_numbers(&sample))
             };
             let subject = Case::from(case);
             let model = subject.model().unwrap();
             let mut state = vec![0.0; model.dimension()];
             state[0] = 0.1;
-            let seen = measure(&model, &state, 3, Set::ALL).unwrap();
+            let seen = measure(&model, &state, 3, ObservableSet::ALL).unwrap();
             assert!(
                 seen.energy_balance.residual.abs() < 1e-11,
                 "{actuation} {law}"
@@ -137,15 +134,15 @@ fn every_drive_has_its_derivatives_and_balances_its_energy() {
                 continue;
             }
             state = advance(&subject, &state);
-            // Differences over four drive periods of a stiff spring: their own rounding.
+            // Differences over four drive periods of a stiff spring have their own rounding.
             let error = worst(&subject, &state).unwrap();
             assert!(error < 1e-4, "{actuation}: {error:e}");
         }
     }
 }
 
-/// After one period of the first tone a second one at 3/2 of its frequency has gone half a
-/// turn further: the same motion as with its phase half a turn on.
+/// After one period of the first tone a second tone at 3/2 of its frequency has advanced by an
+/// additional half turn: the same motion as with its phase shifted by half a turn.
 #[test]
 fn phases_and_times_agree() {
     let case = Cantilever {
@@ -163,21 +160,21 @@ fn phases_and_times_agree() {
         (end, flow.switches())
     };
     let start = [0.05, 0.01, 0.0, -0.2, 0.1, 0.0];
-    let turned = case
-        .clone()
-        .with(Parameter::Tone2Phase, case.tone2_phase + 180.0);
+    let turned = case.clone().with(
+        Parameter::Tone2Phase,
+        case.get(Parameter::Tone2Phase) + 180.0,
+    );
     let (later, switches) = run(&case, &start, first);
     let (now, _) = run(&turned, &start, 0.0);
     assert!(switches > 0);
     for (a, b) in later.iter().zip(&now) {
         assert!((a - b).abs() < 1e-12, "{later:?} {now:?}");
     }
-    // A second tone of no strength is none, but for the length of the period.
+    // A second tone of amplitude zero has no effect, except on the length of the period.
     let silent = case.clone().with(Parameter::Tone2Amplitude, 0.0);
     let single = Cantilever {
         tone2_ratio: None,
-        tone2_phase: 0.0,
-        ..silent.clone()
+        ..silent.clone().with(Parameter::Tone2Phase, 0.0)
     };
     let (a, b) = (run(&silent, &start, 0.0).0, run(&single, &start, 0.0).0);
     assert!(a.iter().zip(&b).all(|(a, b)| (a - b).abs() < 1e-13));

@@ -1,9 +1,9 @@
-//! Known orbits and invariants. Numbers without another source are those of the
-//! project's model notes, found there by an independent program.
+//! Known orbits and invariants. Numbers without a stated source are reference values of an
+//! independent program.
 
 use nanotap::model::Model;
 use nanotap::model::cantilever::{Cantilever, CosineTerm};
-use nanotap::observe::{Set, measure};
+use nanotap::observe::{ObservableSet, measure};
 use nanotap::study::orbit::{OrbitOptions, OrbitReport, orbit};
 use nanotap_flow::Trajectory;
 use proptest::prelude::*;
@@ -69,8 +69,8 @@ fn period_one_at_omega_4_1() {
     assert!((modulus(report.multipliers[0]) - 0.895782).abs() < 1e-6);
 }
 
-/// N = 3, Ω = 20, α1 = 0.1: one period-1, W in [−0.41706, 1.75832] by sampling a period
-/// (the true maximum lies 2e-5 higher, between two of those samples).
+/// N = 3, Ω = 20, α1 = 0.1: one period-1 orbit, W in [−0.41706, 1.75832] by sampling of a period
+/// (the true maximum is 2e-5 higher, between two of those samples).
 #[test]
 fn period_one_at_omega_20() {
     let report = settled(&at(20.0));
@@ -81,8 +81,8 @@ fn period_one_at_omega_20() {
         "{}",
         report.observables.tip_max
     );
-    // Extrema come from roots of the rate: no dense sample exceeds them, and the densest
-    // comes as near as its spacing allows.
+    // Extrema are roots of the rate: no dense sample exceeds them, and the densest is as close as
+    // its spacing allows.
     let model = Model::cantilever(&at(20.0)).unwrap();
     let tip = report.trajectory.curve(&model.tip);
     let samples = 20_000;
@@ -118,8 +118,8 @@ fn unstable_period_one_at_omega_2_6() {
     assert!((report.multipliers[0][0] + 1.392).abs() < 1e-3 && report.multipliers[0][1] == 0.0);
 }
 
-/// Undamped bilinear frequency at α5 = 0: 2ω₁ω₂/(ω₁ + ω₂) = 4.351246 for N = 1,
-/// α1 = 0.1, α4 = 20. A drive of amplitude 1e-9 leaves a free oscillation of it.
+/// Undamped bilinear frequency at α5 = 0: 2ω₁ω₂/(ω₁ + ω₂) = 4.351246 for N = 1, α1 = 0.1, α4 = 20.
+/// With a drive of amplitude 1e-9 it is a free oscillation.
 #[test]
 fn bilinear_frequency_of_one_mode() {
     let case = Cantilever {
@@ -141,8 +141,8 @@ fn bilinear_frequency_of_one_mode() {
     assert!((frequency - 4.351246).abs() < 1e-6, "{frequency}");
 }
 
-/// A lever that never meets the sample moves as the base-excited free beam: tip over
-/// base amplitude 2.878087 at Ω = 2.6 without tip mass, up to the modes left out.
+/// A lever without contact moves like the base-excited free beam: tip over base amplitude 2.878087
+/// at Ω = 2.6 without tip mass, up to the neglected modes.
 #[test]
 fn free_lever_moves_as_the_exact_beam() {
     let case = Cantilever {
@@ -163,12 +163,12 @@ fn free_lever_moves_as_the_exact_beam() {
     );
     let report = report.unwrap();
     assert_eq!(report.events.len(), 0);
-    // W is relative to the base: the tip's absolute amplitude is one base amplitude more.
+    // W is relative to the base: the absolute motion of the tip includes the base's motion.
     let gain = report.observables.amplitude / case.alpha2 + 1.0;
     assert!((gain - 2.878087).abs() < 1e-5, "{gain}");
 }
 
-/// The printed Eq. (14) is another drive: the motion differs, its balance closes.
+/// The printed Eq. (14) is a different drive: the motion differs, but its energy balances.
 #[test]
 fn printed_cosine_term_balances_its_energy_too() {
     let case = Cantilever {
@@ -183,9 +183,8 @@ fn printed_cosine_term_balances_its_energy_too() {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(24))]
 
-    /// Whatever the parameters: energy balances over any run, the determinant of the
-    /// map follows Liouville's formula, and with α5 = 0 doubling α2 and the state
-    /// doubles everything.
+    /// For random parameters: energy balances over any run, the determinant of the map follows
+    /// Liouville's formula, and with α5 = 0 doubling α2 and the state doubles everything.
     #[test]
     fn invariants_hold_for_random_cases(
         modes in 1usize..8,
@@ -199,7 +198,7 @@ proptest! {
         let model = Model::cantilever(&case).unwrap();
         let start = vec![0.0; 2 * modes];
         let run = Trajectory::record(&model.system, &start, 12).unwrap();
-        let seen = measure(&model, &start, 12, Set::ALL).unwrap();
+        let seen = measure(&model, &start, 12, ObservableSet::ALL).unwrap();
         prop_assert!(seen.energy_balance.residual.abs() < 1e-11, "{:?}", seen.energy_balance);
 
         let doubled = Model::cantilever(&Cantilever { alpha2: 2.0 * case.alpha2, ..case.clone() }).unwrap();
@@ -225,9 +224,8 @@ proptest! {
     }
 }
 
-/// The clearance of a long run looks closely at the lowest few of its segments only; it
-/// must be the least of the clearances of its single periods, where every segment is
-/// looked at closely.
+/// The clearance of a long run examines only the lowest few of its segments closely. It must be the
+/// least of the clearances of its single periods, where every segment is examined closely.
 #[test]
 fn clearance_of_a_long_run_is_the_least_of_its_periods() {
     for (omega, modes) in [(2.6, 3), (20.0, 5)] {
@@ -239,7 +237,7 @@ fn clearance_of_a_long_run_is_the_least_of_its_periods() {
         let model = Model::cantilever(&case).unwrap();
         let seen = |state: &[f64], periods: usize| {
             let run = Trajectory::record(&model.system, state, periods).unwrap();
-            let seen = measure(&model, state, periods, Set::ALL).unwrap();
+            let seen = measure(&model, state, periods, ObservableSet::ALL).unwrap();
             (
                 seen.beam_clearance.unwrap(),
                 run.state_at(run.end()).unwrap(),
@@ -257,10 +255,10 @@ fn clearance_of_a_long_run_is_the_least_of_its_periods() {
     }
 }
 
-/// The clearance of one period from `state` beside the least height of `places` places, each over
-/// the whole period.
+/// The clearance of one period from `state`, and the least height of `places` places over the whole
+/// period.
 fn clearance_and_least_height(model: &Model, state: &[f64], places: usize) -> (f64, f64) {
-    let seen = measure(model, state, 1, Set::ALL).unwrap();
+    let seen = measure(model, state, 1, ObservableSet::ALL).unwrap();
     let run = Trajectory::record(&model.system, state, 1).unwrap();
     let beam = model.beam.as_ref().unwrap();
     let least = (0..=places)
@@ -272,8 +270,8 @@ fn clearance_and_least_height(model: &Model, state: &[f64], places: usize) -> (f
     (seen.beam_clearance.unwrap(), least)
 }
 
-/// Two places compete here; the lower, at ξ = 0.328, has the higher neighbours on the coarse grid
-/// of places. Heights by 20,000 places.
+/// Two places compete here; the lower one, at ξ = 0.328, has the higher neighbours on the coarse
+/// grid of places. Heights at 20,000 places.
 #[test]
 fn clearance_is_that_of_the_lower_of_two_valleys() {
     let case = Cantilever {
@@ -297,7 +295,7 @@ fn clearance_is_that_of_the_lower_of_two_valleys() {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(24))]
 
-    /// No place of the beam is ever lower than the clearance, and one is as low.
+    /// No place of the beam is ever lower than the clearance, and one is equal to it.
     #[test]
     fn the_clearance_is_the_least_of_many_heights(
         modes in 1usize..6,

@@ -5,9 +5,10 @@ use nalgebra::Complex;
 use nanotap::case::{Case, Key};
 use nanotap::control::Control;
 use nanotap::model::oscillator::{Oscillator, Stop};
-use nanotap::observe::{Set, measure};
+use nanotap::observe::{ObservableSet, measure};
 use nanotap::study::branch::{BranchOptions, BranchReport, branch};
 use nanotap::study::orbit::{OrbitOptions, OrbitReport, orbit};
+use nanotap::study::value::Interval;
 use nanotap_flow::Trajectory;
 
 fn rigid(omega: f64, restitution: f64) -> Oscillator {
@@ -22,10 +23,10 @@ fn rigid(omega: f64, restitution: f64) -> Oscillator {
     }
 }
 
-/// ẍ + x = cos ωt, gap 0, restitution 0.8, ω = 2.5: one impact a period at speed
-/// 0.6453521784 (project's model notes).
+/// ẍ + x = cos ωt, gap 0, restitution 0.8, ω = 2.5: one impact per period at speed 0.6453521784
+/// (reference value).
 #[test]
-fn one_impact_orbit_hits_at_the_known_speed() {
+fn the_one_impact_orbit_has_the_known_impact_speed() {
     let model = rigid(2.5, 0.8).model().unwrap();
     let report = orbit(
         &model,
@@ -48,7 +49,7 @@ fn one_impact_orbit_hits_at_the_known_speed() {
 /// at forcing amplitude 0.1 exactly, at ω = 0.8 at 0.368782: the linear response's
 /// amplitude reaches the wall.
 #[test]
-fn linear_response_grazes_where_coco_says() {
+fn the_linear_response_grazes_as_in_coco() {
     for (omega, amplitude, tolerance) in [(1.0, 0.1, 1e-12), (0.8, 0.368782, 1e-6)] {
         let mut oscillator = Oscillator {
             damping: 0.1,
@@ -58,7 +59,7 @@ fn linear_response_grazes_where_coco_says() {
         };
         let touches = |forcing: f64, oscillator: &mut Oscillator| {
             oscillator.forcing = forcing;
-            // The free response's own amplitude, as the flow sees it.
+            // The amplitude of the free response in the flow.
             let model = Oscillator {
                 gap: 1e3,
                 ..*oscillator
@@ -97,9 +98,9 @@ fn linear_response_grazes_where_coco_says() {
     }
 }
 
-/// A ball on a floor (a weak spring stretched far presses with an almost constant force
-/// g): flights shrink by r each and the chatter ends after 2v₀/g/(1 − r) less the first
-/// flight's share, in sticking.
+/// A ball on a floor (a weak spring with a large extension presses with an almost constant force
+/// g): each flight is shorter by the factor r, and the chatter ends after 2v₀/g/(1 − r), less the
+/// share of the first flight, in sticking.
 #[test]
 fn chatter_ends_in_closed_form() {
     let (g, v0, r) = (0.7, 0.4, 0.8);
@@ -120,7 +121,7 @@ fn chatter_ends_in_closed_form() {
     assert_eq!(flow.regime(), 1, "it sticks");
     let mut x = [1.0, 1.0];
     flow.state(&mut x);
-    // At 7e5 a unit in the last place is 1e-10, and a bounce adds some.
+    // At 7e5 a unit in the last place is 1e-10, and every bounce adds to it.
     assert!((x[0] - ball.gap).abs() < 1e-7 && x[1] == 0.0, "{x:?}");
     let run = recorder.finish(model.system.clone());
     let stuck = run.events().iter().find(|e| e.to == 1).unwrap();
@@ -152,7 +153,7 @@ fn sticking_ends_when_the_force_changes_sign() {
         (releases[0] - quarter).abs() < 1e-10,
         "{releases:?} {quarter}"
     );
-    let seen = measure(&model, &[0.0, 0.0], 3, Set::ALL).unwrap();
+    let seen = measure(&model, &[0.0, 0.0], 3, ObservableSet::ALL).unwrap();
     assert!(seen.tip_max <= 1e-12);
     assert!(
         seen.energy_balance.residual.abs() < 1e-9,
@@ -161,8 +162,8 @@ fn sticking_ends_when_the_force_changes_sign() {
     );
 }
 
-/// The soft stop with κ → ∞ and the damper that gives the same restitution tends to the
-/// rigid one: r = exp(−ζπ/√(1 − ζ²)) for a contact of half a damped cycle.
+/// The soft stop with κ → ∞ and the damper of the same restitution converges to the rigid one: r =
+/// exp(−ζπ/√(1 − ζ²)) for a contact of half a damped cycle.
 #[test]
 fn stiff_soft_stop_tends_to_the_rigid_one() {
     let r: f64 = 0.8;
@@ -201,16 +202,16 @@ fn stiff_soft_stop_tends_to_the_rigid_one() {
     assert!(previous < 1e-3);
 }
 
-/// However the drive period falls on the impacts, a run can be cut at any of its periods
-/// and go on: an impact a rounding error before or after the cut leaves a state on the
-/// wall, or behind it by rounding, and that is where it is. At ω = 1.26, where the
-/// doubled motion of gap 0 and r = 0.8 comes to impact at the drive's own phase 0.
+/// For any position of the impacts in the drive period, a run can be divided at any of its periods
+/// and continued: an impact within rounding of the division gives a state on the wall, or behind it
+/// by rounding, which counts as on the wall. At ω = 1.26 the doubled motion of gap 0 and r = 0.8
+/// impacts at drive phase 0.
 #[test]
-fn runs_that_impact_at_phase_zero_go_on() {
-    use nanotap::model::strobe::Strobe;
+fn runs_that_impact_at_phase_zero_continue() {
+    use nanotap::model::model_map::ModelMap;
     use nanotap_dynamics::StroboscopicMap;
     let model = rigid(1.26, 0.8).model().unwrap();
-    let mut map = Strobe::new(&model);
+    let mut map = ModelMap::new(&model);
     for state in [
         [0.0, -0.5],
         [0.0, 0.5],
@@ -224,7 +225,7 @@ fn runs_that_impact_at_phase_zero_go_on() {
             .unwrap_or_else(|error| panic!("{state:?}: {error}"));
         assert!(x[0] <= 1e-15 && x[1].is_finite());
     }
-    // Behind the wall by more than rounding is no state at all.
+    // A state behind the wall by more than rounding is invalid.
     assert!(map.advance(&mut [1e-9, 0.5]).is_err());
 }
 
@@ -247,11 +248,11 @@ fn settled(oscillator: Oscillator) -> OrbitReport {
     orbit(&oscillator.model().unwrap(), &options).unwrap()
 }
 
-/// The impulses of a rigid stop are part of the force. Fourier's coefficients of
-/// m ẍ + c ẋ + k x = F cos ωt − N are (k − m j²ω² + i c j ω) x_j = F δ_j1 − N_j for every harmonic j,
-/// so that ⟨N⟩ = −k ⟨x⟩ (0.4858 of the first orbit), bouncing, chattering to rest or stuck. The
-/// virial of impacts is their impulse times the position of the stop; the stop takes what the drive
-/// delivers and the damper leaves.
+/// The impulses of a rigid stop are part of the force. The Fourier coefficients of m ẍ + c ẋ + k x
+/// = F cos ωt − N are (k − m j²ω² + i c j ω) x_j = F δ_j1 − N_j for every harmonic j, so that ⟨N⟩ =
+/// −k ⟨x⟩ (0.4858 for the first orbit), for bouncing, chatter or sticking. The virial of impacts is
+/// their impulse times the position of the stop; the stop dissipates the difference between the
+/// energies of drive and damper.
 #[test]
 fn impulses_count_in_every_observable_of_the_force() {
     let sticks = Oscillator {
@@ -315,10 +316,10 @@ fn impulses_count_in_every_observable_of_the_force() {
     assert!((bounces.mean_force - impulse).abs() < 1e-12);
 }
 
-/// Pressed by a spring behind which the stop stands, the mass starts and rests on the stop, and
-/// every neighbour returns to it: both multipliers are 0.
+/// Pressed against the stop by a spring, the mass starts and rests on the stop, and every
+/// neighbouring motion returns to it: both multipliers are 0.
 #[test]
-fn a_mass_rests_on_a_stop_before_it() {
+fn a_mass_rests_on_a_stop_before_its_rest_position() {
     let oscillator = Oscillator {
         gap: -0.5,
         ..walled(0.3, 1.3)
@@ -346,10 +347,10 @@ fn followed(oscillator: Oscillator, options: &BranchOptions) -> BranchReport {
 }
 
 /// The linear response touches the wall where F = √((k − mω²)² + c²ω²) · gap. The free orbit ends
-/// there from below, that with impacts from above, however the two lie to each other (a fold is
-/// beside the grazing at resonance), and the curve of the grazing is known over the whole window.
+/// there from below, the impacting one from above, whatever their relative position (a fold is near
+/// the grazing at resonance), and the curve of grazings covers the whole window.
 #[test]
-fn grazing_is_named_from_both_sides_and_followed_in_two_parameters() {
+fn grazing_is_found_from_both_sides_and_followed_in_two_parameters() {
     for (from, to) in [(0.05, 1.0), (1.0, 0.01)] {
         let report = followed(
             walled(from, 1.0),
@@ -381,7 +382,7 @@ fn grazing_is_named_from_both_sides_and_followed_in_two_parameters() {
             1.0,
         ));
         let options = BranchOptions {
-            second: Some((second, low, high)),
+            second: Some(Interval::of_key(second, low, high)),
             ..BranchOptions::over(first, from, to)
         };
         let report = branch(&base, &options, &Control::default()).unwrap();
@@ -412,9 +413,9 @@ fn grazing_is_named_from_both_sides_and_followed_in_two_parameters() {
 }
 
 /// A cascade of doublings at gap 0: over the narrow range Ω = 2.72 … 2.74 the flip of period 16 is
-/// found at 2.731834122, and runs at 2.7316 and 2.7319 settle on periods 16 and 32. Over a range that
-/// is 37 times as wide every doubled branch still begins at its flip and shows its own; the
-/// distances shrink towards Feigenbaum's 4.669.
+/// found at 2.731834122, and runs at 2.7316 and 2.7319 converge to periods 16 and 32. Over a range
+/// 37 times as wide every doubled branch still begins at its flip and has its own flip; the ratio
+/// of the distances tends to Feigenbaum's 4.669.
 #[test]
 fn a_cascade_is_followed_to_its_end() {
     let cascade = Oscillator {
@@ -422,7 +423,7 @@ fn a_cascade_is_followed_to_its_end() {
         ..rigid(2.0, 0.8)
     };
     let options = BranchOptions {
-        doublings: 6,
+        switch: Some(6),
         max_step: 0.01,
         ..BranchOptions::over(Key::OscillatorOmega, 2.0, 2.74)
     };
@@ -457,8 +458,8 @@ fn a_cascade_is_followed_to_its_end() {
 }
 
 /// A mass that chatters to rest on the stop in every period is one motion whatever the rounding of
-/// its impacts, with multipliers 0, and its branch over the gap is one without grazings of flights
-/// that end in rounding.
+/// its impacts, with multipliers 0, and its branch over the gap has no grazings of flights that end
+/// in rounding.
 #[test]
 fn chatter_to_rest_is_one_motion() {
     let chatter = Oscillator {
@@ -476,7 +477,7 @@ fn chatter_to_rest_is_one_motion() {
     let (a, b) = (end([-0.4, 0.0]), end([-1.0, 0.3]));
     assert_eq!(a.state, b.state);
     assert!(a.multipliers.iter().all(|m| *m == [0.0, 0.0]));
-    // Flights shrink by 0.8 each until 1e-8 of a second is left of them.
+    // Flights become shorter by the factor 0.8 each, down to 1e-8 of a second.
     let impacts = a.observables.contacts_per_period;
     assert!((50.0..150.0).contains(&impacts), "{impacts}");
     let report = followed(

@@ -1,10 +1,10 @@
-//! The surface of spring and damper that recovers by itself.
+//! The viscoelastic surface of spring and damper.
 
 use nanotap::model::Model;
 use nanotap::model::cantilever::Cantilever;
 use nanotap::model::contact::ContactLaw;
+use nanotap::model::model_map::ModelMap;
 use nanotap::model::parameter::Parameter;
-use nanotap::model::strobe::Strobe;
 use nanotap::observe::begins_contact;
 use nanotap_dynamics::StroboscopicMap as _;
 use nanotap_flow::{Flow, Trajectory};
@@ -24,12 +24,12 @@ fn run(case: &Cantilever, periods: usize) -> (Model, Trajectory) {
     (model, run)
 }
 
-/// Contact begins with the force −α6 ġ and ends with force, gap and the gap's rate all
-/// zero; from there the surface recovers as e^{−α4 t/α6} until the tip meets it again.
+/// Contact begins with the force −α6 ġ and ends with force, gap and rate of the gap zero; from then
+/// on the surface recovers as e^{−α4 t/α6} until the next contact.
 #[test]
-fn contact_begins_with_the_damper_and_ends_without_force() {
+fn contact_begins_with_the_damper_force_and_ends_at_zero_force() {
     let case = Cantilever {
-        // Slow enough that the tip comes back before the surface has.
+        // Slow enough that the tip returns before the surface has recovered.
         alpha6: 8.0,
         ..on(ContactLaw::KelvinVoigt, 20.0)
     };
@@ -63,8 +63,7 @@ fn contact_begins_with_the_damper_and_ends_without_force() {
     assert!(met_early > 3, "the surface is met before it has recovered");
 }
 
-/// The gap opens as ½ (−ḟ/α6) t²: no contact is seen again at once, however soft or stiff
-/// the damper.
+/// The gap opens as ½ (−ḟ/α6) t²: no contact follows at once, for any damper.
 #[test]
 fn the_gap_opens_quadratically() {
     for damping in [1e-4, 1e-2, 0.2, 5.0, 300.0] {
@@ -90,7 +89,7 @@ fn the_gap_opens_quadratically() {
     }
 }
 
-/// As the damper vanishes the law becomes the paper's, whose damper vanishes too.
+/// As the damper vanishes the law tends to the paper's, whose damper vanishes too.
 #[test]
 fn a_vanishing_damper_leaves_the_spring() {
     let elastic = on(ContactLaw::SpringDamper, 20.0).with(Parameter::Alpha6, 0.0);
@@ -114,7 +113,7 @@ fn a_vanishing_damper_leaves_the_spring() {
     assert!(last < 1e-5);
 }
 
-/// A surface with a damper and no spring keeps the dent; one with neither is not there.
+/// A surface with a damper and no spring keeps the indentation; one with neither has no effect.
 #[test]
 fn limits_of_the_surface() {
     let dent = on(ContactLaw::KelvinVoigt, 20.0).with(Parameter::Alpha4, 0.0);
@@ -136,14 +135,14 @@ fn limits_of_the_surface() {
     assert_eq!((least.value, most.value), (0.0, 0.0));
 }
 
-/// Where tip and surface part, gap and rate vanish together at every frequency: that is no
-/// grazing. The orbit of one contact a period that the paper's lever has here grazes nowhere.
+/// Where tip and surface separate, gap and rate vanish together at every frequency; this is not a
+/// grazing. The orbit with one contact per period that the paper's lever has here does not graze.
 #[test]
-fn parting_is_no_grazing() {
+fn separation_is_not_a_grazing() {
     for k in 0..40 {
         let omega = 19.5 + 0.02 * f64::from(k);
         let model = Model::cantilever(&on(ContactLaw::KelvinVoigt, omega)).unwrap();
-        let mut map = Strobe::new(&model);
+        let mut map = ModelMap::new(&model);
         let mut state = vec![0.0; model.dimension()];
         for _ in 0..40 {
             map.advance(&mut state).unwrap();

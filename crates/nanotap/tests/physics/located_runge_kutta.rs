@@ -1,13 +1,16 @@
-//! An independent integration of a beam on any of the samples: Runge–Kutta of fourth order
-//! in small steps, switches located by bisection of the step, the equations written down
-//! from the samples' mechanics and not from the product's regimes.
+//! An independent integration of a beam on any of the samples: Runge–Kutta of fourth order in small
+//! steps, switches located by bisection of the step, with equations derived from the mechanics of
+//! the samples and not from the product's regimes.
 
 use nalgebra::DVector;
 use nanotap::model::cantilever::Cantilever;
 use nanotap::model::contact::ContactLaw;
 use nanotap::model::galerkin::Galerkin;
 
-/// The beam and where its sample is.
+use crate::contact_laws::parameter;
+use crate::moving_surface::MovingSurface;
+
+/// State of the beam and the sample.
 #[derive(Clone)]
 pub(crate) struct Motion {
     /// Displacements and velocities of the modes.
@@ -16,7 +19,7 @@ pub(crate) struct Motion {
     pub(crate) surface: f64,
     pub(crate) damper: f64,
     pub(crate) touching: bool,
-    /// What the sample took, and the greatest and the least force.
+    /// The energy dissipated in the sample, and the largest and the smallest force.
     pub(crate) dissipated: f64,
     pub(crate) force: [f64; 2],
     pub(crate) contacts: usize,
@@ -30,6 +33,11 @@ pub(crate) struct Independent {
 
 /// Rates of (beam, surface, damper, dissipated energy).
 type Rates = (DVector<f64>, [f64; 3]);
+
+/// Stiffness and relaxation time of a standard linear solid's arm.
+fn arm(case: &Cantilever) -> [f64; 2] {
+    ["relaxation_stiffness", "relaxation_time"].map(|of| case.get(parameter(of)))
+}
 
 impl Independent {
     pub(crate) fn new(case: &Cantilever) -> Self {
@@ -51,24 +59,22 @@ impl Independent {
         ]
     }
 
-    /// Force of the touched sample on the tip at height `h` and speed `v`.
+    /// Force of the sample in contact on the tip at height `h` and speed `v`.
     fn pressed(&self, h: f64, v: f64, m: &Motion) -> f64 {
         let (c, damper) = (&self.case, m.damper);
         match c.contact {
             ContactLaw::SpringDamper | ContactLaw::KelvinVoigt => -c.alpha4 * h - c.alpha6 * v,
-            ContactLaw::StandardLinearSolid => {
-                -c.alpha4 * h + c.relaxation_stiffness * (-h - damper)
-            }
+            ContactLaw::StandardLinearSolid => -c.alpha4 * h + arm(c)[0] * (-h - damper),
             ContactLaw::MovingSurface => {
                 let rate = v - self.surface_speed(h, v, m);
-                -c.surface.adhesion - c.alpha4 * (h - m.surface) - c.alpha6 * rate
+                -MovingSurface::of(c).adhesion - c.alpha4 * (h - m.surface) - c.alpha6 * rate
             }
         }
     }
 
-    /// Speed of a moving surface, at which the two dampers and springs balance.
+    /// Speed of a surface in contact, from the balance of the two dampers and springs.
     fn surface_speed(&self, h: f64, v: f64, m: &Motion) -> f64 {
-        let (c, own) = (&self.case, self.case.surface);
+        let (c, own) = (&self.case, MovingSurface::of(&self.case));
         let springs = -own.stiffness * m.surface;
         if m.touching {
             let held = own.adhesion + c.alpha4 * (h - m.surface) + c.alpha6 * v;
@@ -86,7 +92,8 @@ impl Independent {
             ContactLaw::KelvinVoigt | ContactLaw::MovingSurface => m.surface,
             // α4 u + k (u + w) = 0
             ContactLaw::StandardLinearSolid => {
-                -c.relaxation_stiffness * m.damper / (c.alpha4 + c.relaxation_stiffness)
+                let [stiffness, _] = arm(c);
+                -stiffness * m.damper / (c.alpha4 + stiffness)
             }
         }
     }
@@ -122,14 +129,15 @@ impl Independent {
             }
             ContactLaw::StandardLinearSolid => {
                 let at = if m.touching { h } else { self.free_surface(m) };
-                let speed = (-at - m.damper) / c.relaxation_time;
-                let viscosity = c.relaxation_stiffness * c.relaxation_time;
+                let [stiffness, time] = arm(c);
+                let speed = (-at - m.damper) / time;
+                let viscosity = stiffness * time;
                 (0.0, speed, viscosity * speed * speed)
             }
             ContactLaw::MovingSurface => {
                 let speed = self.surface_speed(h, v, m);
                 let rate = if m.touching { v - speed } else { 0.0 };
-                let lost = c.surface.damping * speed * speed + c.alpha6 * rate * rate;
+                let lost = MovingSurface::of(c).damping * speed * speed + c.alpha6 * rate * rate;
                 (speed, 0.0, lost)
             }
         };
@@ -208,7 +216,7 @@ impl Independent {
                 if m.touching && self.case.contact != ContactLaw::MovingSurface {
                     m.surface = height;
                 }
-                // A small step on, where the guard that is zero here has become positive.
+                // A small step later the guard that is zero here is positive.
                 let on = left.min(1e-4 * h);
                 m = self.step(t, &m, on);
                 (t, left) = (t + on, left - on);

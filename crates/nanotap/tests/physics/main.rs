@@ -1,5 +1,5 @@
-//! The physics and the mathematics of nanotap against references, closed forms and
-//! independent methods.
+//! Physics and mathematics of nanotap, compared with references, closed forms and independent
+//! methods.
 
 #![allow(
     clippy::disallowed_methods,

@@ -1,14 +1,14 @@
-//! The map as a stranger uses it: one state and many, derivatives over several periods, the
-//! motion between strobes, refusals.
+//! The map as a library user sees it: one state and many, derivatives over several periods, the
+//! motion between strobes, errors.
 
 use nanotap::case::{Case, Key};
 use nanotap::control::Control;
 use nanotap::map::{Map, MapError};
 use nanotap::model::Model;
 use nanotap::model::cantilever::Cantilever;
+use nanotap::model::model_map::ModelMap;
 use nanotap::model::oscillator::{Oscillator, Stop};
-use nanotap::model::strobe::Strobe;
-use nanotap_dynamics::StroboscopicMap;
+use nanotap_dynamics::{Scheduling as _, StroboscopicMap};
 
 fn regular() -> Map {
     let case = Cantilever {
@@ -25,7 +25,7 @@ fn largest(a: &[f64], b: &[f64]) -> f64 {
 }
 
 #[test]
-fn many_states_go_as_each_alone_and_stop_when_told() {
+fn many_states_agree_with_single_ones_and_can_be_cancelled() {
     let map = regular();
     let mut states: Vec<f64> = (0..20 * 6)
         .map(|k| 0.05 * (f64::from(k) * 1.7).sin())
@@ -47,17 +47,17 @@ fn many_states_go_as_each_alone_and_stop_when_told() {
     map.apply_all(&mut states, 1500, &Control::default())
         .unwrap();
     assert!(largest(&states, &alone) < 1e-12);
-    // Who is beside a state changes nothing.
+    // A result does not depend on the other states.
     for half in in_halves.chunks_mut(10 * 6) {
         map.apply_all(half, 1500, &Control::default()).unwrap();
     }
     assert_eq!(states, in_halves);
 }
 
-/// With one contact, with a stop that resets the state, and under a nonlinear law: whether many are
-/// advanced side by side or one after the other, each passes the states that it passes alone.
+/// With one contact, with a stop that resets the state, and under a nonlinear law: each of many
+/// states passes through the same states as alone, in batches or in sequence.
 #[test]
-fn many_states_pass_through_those_that_each_passes_alone() {
+fn strobe_states_of_many_motions_agree_with_single_ones() {
     let stop = Oscillator {
         mass: 1.0,
         stiffness: 1.0,
@@ -88,8 +88,8 @@ fn many_states_pass_through_those_that_each_passes_alone() {
         (hertz.model().unwrap(), false),
     ];
     for (model, side_by_side) in models {
-        let mut map = Strobe::new(&model);
-        assert_eq!(map.side_by_side() > 1, side_by_side);
+        let mut map = ModelMap::new(&model);
+        assert_eq!(map.batch_size() > 1, side_by_side);
         let d = map.dimension();
         let numbers = 0..u32::try_from(10 * d).unwrap();
         let starts: Vec<f64> = numbers.map(|k| 0.05 * (f64::from(k) * 1.7).sin()).collect();
@@ -132,7 +132,7 @@ fn derivatives_over_several_periods() {
 }
 
 #[test]
-fn a_motion_is_one_wherever_it_is_cut() {
+fn a_motion_does_not_depend_on_its_division() {
     let map = regular();
     let start = map.apply(&[0.0; 6], 40).unwrap();
     let period = map.period();

@@ -1,21 +1,22 @@
-//! Which motions there are, and where they change: the analysis joined to the model.
+//! Motions and bifurcations of the model.
 
+use nanotap::ErrorKind;
 use nanotap::case::{Case, Key, PlaneFamily};
 use nanotap::control::Control;
 use nanotap::model::Model;
 use nanotap::model::cantilever::Cantilever;
 use nanotap::model::contact::ContactLaw;
+use nanotap::model::model_map::ModelMap;
 use nanotap::model::oscillator::{Oscillator, Stop};
 use nanotap::model::parameter::Parameter;
-use nanotap::model::strobe::Strobe;
 use nanotap::study::attractors::{AttractorsOptions, attractors};
 use nanotap::study::branch::{BranchOptions, branch};
 use nanotap::study::lyapunov::{LyapunovOptions, Section, lyapunov, section};
 use nanotap::study::orbit::{OrbitOptions, orbit};
-use nanotap::study::simulate::{Classification, SimulateError, SimulateOptions, simulate};
+use nanotap::study::simulate::{Classification, SimulateOptions, simulate};
 use nanotap::study::start_box::default_box;
 use nanotap_dynamics::{
-    AttractorKind, CensusOptions, DMatrix, StartOutcome, StroboscopicMap as _,
+    AttractorKind, CensusOptions, DMatrix, Scheduling as _, StartOutcome, StroboscopicMap as _,
     TwoParameterFamily as _, census,
 };
 
@@ -43,8 +44,8 @@ fn flips(subject: &Case, options: &BranchOptions) -> Vec<f64> {
         .collect()
 }
 
-/// Reference: the period-1 orbit doubles at Ω = 2.9137224181 and 2.5050406984. From either
-/// side, and with the period asked for or found.
+/// Reference: the period-1 orbit doubles at Ω = 2.9137224181 and 2.5050406984, from either side,
+/// with the period given or found.
 #[test]
 fn the_period_1_orbit_doubles_at_the_same_points_from_either_side() {
     let subject = Case::from(at(3.0));
@@ -61,10 +62,9 @@ fn the_period_1_orbit_doubles_at_the_same_points_from_either_side() {
     }
 }
 
-/// Reference: the restitution model (gap 0, r = 0.8) flips at ω = 1.2606766 and 2.6533477.
-/// A soft stop of growing stiffness (damped to the same restitution) comes near the
-/// second: the contact of half a sine lasts π√(m/k), and what a flip at finite stiffness
-/// is off by falls with it.
+/// Reference: the restitution model (gap 0, r = 0.8) flips at ω = 1.2606766 and 2.6533477. A soft
+/// stop of increasing stiffness (with the same restitution) approaches the second value: the
+/// contact of half a sine lasts π√(m/k), and the error of the flip decreases with it.
 #[test]
 fn the_rigid_stop_is_the_limit_of_stiff_ones() {
     let rigid = Oscillator {
@@ -81,7 +81,7 @@ fn the_rigid_stop_is_the_limit_of_stiff_ones() {
     assert!((limit[0] - 2.653_347_7).abs() < 1e-7, "{limit:?}");
     let low = flips(&Case::from(rigid), &over(key, 2.0, 1.1));
     assert!((low[0] - 1.260_676_6).abs() < 1e-7, "{low:?}");
-    // r = e^{−πζ/√(1 − ζ²)} of the contact's own half swing.
+    // r = e^{−πζ/√(1 − ζ²)} of half an oscillation in contact.
     let ratio = -0.8f64.ln() / std::f64::consts::PI;
     let zeta = ratio / (1.0 + ratio * ratio).sqrt();
     let errors: Vec<f64> = [1e4, 1.6e5]
@@ -96,7 +96,7 @@ fn the_rigid_stop_is_the_limit_of_stiff_ones() {
             (found[0] - limit[0]).abs()
         })
         .collect();
-    // Sixteen times stiffer, four times shorter contacts.
+    // Sixteen times the stiffness, a quarter of the contact time.
     assert!(errors[0] < 0.1 && errors[1] < errors[0] / 3.0, "{errors:?}");
 }
 
@@ -123,14 +123,13 @@ fn the_census_at_high_frequency_is_complete() {
     assert_eq!((one.attractors.len(), one.undecided.len()), (1, 0));
     let observables = &one.attractors[0].orbit.as_ref().unwrap().observables;
     assert!((observables.tip_min + 0.41706).abs() < 5e-6);
-    // The exact top, which 50,000 samples a period reach too, is 2.3e-5 above the
-    // reference's.
+    // The exact maximum, which 50,000 samples per period give too, is 2.3e-5 above the reference's.
     assert!(
         (observables.tip_max - 1.75832).abs() < 3e-5,
         "{}",
         observables.tip_max
     );
-    // The box that nobody gave holds the motions it is to find.
+    // The default box contains the motions.
     let sides = &two.sides;
     for state in &two.attractors[0].orbit.as_ref().unwrap().states {
         for (value, side) in state.iter().zip(sides) {
@@ -142,20 +141,20 @@ fn the_census_at_high_frequency_is_complete() {
     }
 }
 
-/// Every start of a census goes where a long run from it goes: with a period 1 and a period 4 at one
-/// frequency, and with the two states in attraction and repulsion, whose attractive one a tip
-/// nears from afar before it touches. Under the nonlinear law of the latter, starts are followed on
-/// the coarse map, and a long run on that map decides. The basins are finely interwoven: the error of
-/// the coarse map leads single starts elsewhere, as any other small difference does, but not more of
-/// them to one motion than to the other.
+/// Every start of a census goes to the motion of a long run from it: with a period 1 and a period 4
+/// at one frequency, and with the attractive and the repulsive state, where the tip reaches the
+/// attractive one from afar before it touches. Under the nonlinear law of the latter, starts are
+/// followed on the approximate map, and a long run on that map decides. The basins are finely
+/// interwoven: the error of the approximate map leads single starts elsewhere, as any small
+/// difference does, but without a preferred direction.
 #[test]
-fn every_start_goes_where_a_long_run_from_it_does() {
+fn every_start_goes_to_the_motion_of_a_long_run() {
     let bistable = stated(include_str!("../../../../docs/cases/bistable-lever.toml"));
     let paper = Model::cantilever(&at(20.0).with(Parameter::Alpha1, 0.0)).unwrap();
     let lever = bistable.model().unwrap();
     for (model, count, long) in [(paper, 128, 1500), (lever, 64, 3000)] {
         let starts = default_box(&model).unwrap().starts(1, count);
-        let map = Strobe::new(&model);
+        let map = ModelMap::new(&model);
         let found = census(
             &map,
             &starts,
@@ -163,7 +162,7 @@ fn every_start_goes_where_a_long_run_from_it_does() {
             &Control::default(),
         );
         assert_eq!(found.attractors.len(), 2);
-        let destination = |map: &Strobe, start: &[f64], tolerance: f64| {
+        let destination = |map: &ModelMap, start: &[f64], tolerance: f64| {
             let (mut map, mut state) = (map.clone(), start.to_vec());
             for _ in 0..long {
                 map.advance(&mut state).unwrap();
@@ -180,7 +179,7 @@ fn every_start_goes_where_a_long_run_from_it_does() {
                 panic!("start {k}: {outcome:?}");
             };
             if let Some(coarse) = &coarse {
-                // Within the error of the coarse map.
+                // Within the error of the approximate map.
                 assert_eq!(Some(*index), destination(coarse, start, 1e-3), "start {k}");
             }
             let exact = destination(&map, start, 1e-6);
@@ -196,10 +195,10 @@ fn every_start_goes_where_a_long_run_from_it_does() {
     }
 }
 
-/// Near Ω = 6 the largest exponent is of order 1e-4 per period: a test of honesty. It is
-/// called a torus or left undecided, never periodic of some long period, never chaos.
+/// Near Ω = 6 the largest exponent is of order 1e-4 per period. The motion must be reported as a
+/// torus or as undecided, never as periodic or chaotic.
 #[test]
-fn a_torus_is_not_taken_for_something_else() {
+fn a_torus_is_not_reported_as_anything_else() {
     let model = Model::cantilever(&at(6.0)).unwrap();
     let run = simulate(
         &model,
@@ -220,8 +219,8 @@ fn a_torus_is_not_taken_for_something_else() {
     assert!(run.lyapunov.unwrap()[0].abs() < 5e-4, "{}", run.evidence);
 }
 
-/// The sum of all exponents is the mean rate at which volumes shrink, known from the
-/// trace of the equations and the time in contact.
+/// The sum of all exponents is the mean rate at which volumes contract, known from the trace of the
+/// equations and the contact time.
 #[test]
 fn exponents_sum_to_the_trace() {
     // On a periodic orbit, to rounding; both stops.
@@ -276,10 +275,10 @@ fn exponents_sum_to_the_trace() {
     );
 }
 
-/// Work that is to stop before it begins ends with that and no numbers, whatever of it is left: the
-/// transient, the average, the section.
+/// A computation that is cancelled before it starts ends with that error and no numbers, whichever
+/// part remains: the transient, the average, the section.
 #[test]
-fn exponents_stop_when_they_are_to() {
+fn a_cancelled_spectrum_is_an_error() {
     let model = Model::cantilever(&at(3.0)).unwrap();
     let stop = nanotap::control::CancelFlag::new();
     stop.cancel();
@@ -295,22 +294,19 @@ fn exponents_stop_when_they_are_to() {
             ..LyapunovOptions::default()
         };
         let stopped = lyapunov(&model, &options, &control);
-        assert!(matches!(stopped, Err(SimulateError::Stopped)));
+        assert_eq!(stopped.unwrap_err().kind, ErrorKind::Stopped);
     }
 }
 
-/// The memory of a standard linear solid fades by e^{−t/τ} with τ far below a drive period: its
-/// exponent is what the trace leaves, however far below rounding the multiplier is.
+/// The memory of a standard linear solid decays as e^{−t/τ} with τ far below a drive period: its
+/// exponent is the remainder of the trace, however far below rounding the multiplier is.
 #[test]
-fn the_last_exponent_of_a_standard_linear_solid_is_what_the_trace_leaves() {
+fn the_last_exponent_of_a_standard_linear_solid_follows_from_the_trace() {
     for time in [0.02, 0.005, 0.001] {
         let case = Cantilever {
             modes: 2,
             alpha6: 0.0,
-            contact: ContactLaw::StandardLinearSolid,
-            relaxation_stiffness: 20.0,
-            relaxation_time: time,
-            ..at(2.6)
+            ..at(2.6).on(ContactLaw::StandardLinearSolid, &[20.0, time])
         };
         let options = LyapunovOptions {
             periods: 200,
@@ -334,10 +330,10 @@ fn the_last_exponent_of_a_standard_linear_solid_is_what_the_trace_leaves() {
     }
 }
 
-/// One mode contracts area, so that no torus can be: what looked like one is an orbit of
-/// period 336, stable by its multipliers.
+/// One mode contracts areas, so there is no torus: this motion is an orbit of period 336, stable by
+/// its multipliers.
 #[test]
-fn a_long_period_of_one_mode_is_no_torus() {
+fn a_long_period_of_one_mode_is_not_a_torus() {
     let case = Cantilever {
         modes: 1,
         alpha1: 0.099,
@@ -348,7 +344,7 @@ fn a_long_period_of_one_mode_is_no_torus() {
         ..at(8.9)
     };
     let model = Model::cantilever(&case).unwrap();
-    // Beside a point of it.
+    // Near one of its points.
     let options = SimulateOptions {
         state: Some(vec![-0.19771, -0.124605]),
         ..SimulateOptions::default()
@@ -362,8 +358,8 @@ fn a_long_period_of_one_mode_is_no_torus() {
     );
 }
 
-/// A section at any phase is the motion itself there: the phase map of one is the image
-/// of the other.
+/// A section at any phase consists of points of the motion: the map between two phases takes one
+/// section to the other.
 #[test]
 fn sections_are_of_the_motion() {
     let model = Model::cantilever(&at(2.6)).unwrap();
@@ -388,7 +384,7 @@ fn sections_are_of_the_motion() {
     assert_eq!(sides.dimension(), 6);
 }
 
-/// Derivatives to both parameters of a plane against central differences.
+/// Derivatives with respect to both parameters of a plane compared with central differences.
 #[test]
 fn a_plane_of_parameters_has_the_derivatives_of_its_map() {
     let keys = [Key::Omega, Key::Alpha4];
@@ -435,11 +431,11 @@ fn a_plane_of_parameters_has_the_derivatives_of_its_map() {
     }
 }
 
-/// Of a motion that decays slowly a run shows the orbit that it goes to, not the decay: at
-/// Ω = 2000 contact begins only when the tip has sunk to where the orbit is (its largest
-/// multiplier is 0.99977), 31 % of the time.
+/// For a slowly decaying motion a run shows the orbit to which it converges, not the transient: at
+/// Ω = 2000 contact begins only when the tip has reached the orbit (its largest multiplier is
+/// 0.99977), for 31 % of the time.
 #[test]
-fn what_is_called_periodic_is_the_orbit() {
+fn a_periodic_run_shows_its_orbit() {
     let model = Model::cantilever(&at(2000.0)).unwrap();
     let run = simulate(&model, &SimulateOptions::default()).unwrap();
     let closed = orbit(&model, &OrbitOptions::default()).unwrap();
@@ -449,9 +445,9 @@ fn what_is_called_periodic_is_the_orbit() {
     assert!((shown.contact_fraction - expected.contact_fraction).abs() < 1e-6);
     assert!((shown.first_harmonic / expected.first_harmonic - 1.0).abs() < 1e-6);
     assert!(run.distance_to_orbit.unwrap() < 1e-6);
-    // It would take this long: the multiplier to the power of it is near rounding.
+    // The transient would take this long: the multiplier to its power is near rounding.
     assert!(run.transient > 50_000, "{}", run.transient);
-    // A transient that is asked for is what is run, and is called what it is.
+    // A requested transient is run, and the result is labelled accordingly.
     let options = SimulateOptions {
         transient: Some(3000),
         ..SimulateOptions::default()
@@ -460,9 +456,9 @@ fn what_is_called_periodic_is_the_orbit() {
     assert!(early.distance_to_orbit.unwrap() > 0.01);
 }
 
-/// A census without options finds motions whose basins lie in a hundredth of the resonant
-/// response. The periods were found by an independent Taylor integrator of order 22 from starts
-/// in a box 100 times smaller than the resonant one.
+/// A census without options finds motions whose basins are within a hundredth of the resonant
+/// response. The periods were found by an independent Taylor integrator of order 22 from starts in
+/// a box 100 times smaller than the resonant one.
 #[test]
 fn a_census_finds_motions_in_a_hundredth_of_the_box() {
     let case = |numbers: [f64; 7]| {

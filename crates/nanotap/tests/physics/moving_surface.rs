@@ -1,5 +1,5 @@
-//! The moving surface with adhesion: against an integration by Taylor series that shares nothing
-//! with the engine, limits, similarity, and what a force that jumps does to orbits.
+//! The moving surface with adhesion: compared with an independent integration by Taylor series,
+//! limits, similarity, and the effect of a discontinuous force on orbits.
 
 use nalgebra::{DMatrix, DVector};
 use nanotap::case::document::equilibria;
@@ -7,27 +7,49 @@ use nanotap::case::{Case, Key};
 use nanotap::model::Model;
 use nanotap::model::cantilever::Cantilever;
 use nanotap::model::contact::ContactLaw;
-use nanotap::model::contact::moving_surface::MovingSurface;
 use nanotap::model::galerkin::Galerkin;
+use nanotap::model::model_map::ModelMap;
 use nanotap::model::parameter::Parameter;
-use nanotap::model::strobe::Strobe;
 use nanotap::study::branch::{BranchOptions, BranchReport, branch};
 use nanotap::study::orbit::{OrbitOptions, orbit};
 use nanotap_dynamics::{Control, StroboscopicMap};
 use proptest::prelude::*;
 
+use crate::contact_laws::parameter;
 use crate::derivatives::{advance, worst, worst_over};
 use crate::{stated, taylor};
 
 /// A lever on a moving surface, driven as in the paper.
 fn lever(modes: usize, omega: f64, surface: MovingSurface) -> Cantilever {
-    Cantilever {
+    let case = Cantilever {
         modes,
         omega,
         alpha5: 0.05,
-        contact: ContactLaw::MovingSurface,
-        surface,
         ..Cantilever::paper()
+    };
+    case.on(ContactLaw::MovingSurface, &surface.numbers())
+}
+
+/// The numbers that only this law has.
+#[derive(Clone, Copy)]
+pub(crate) struct MovingSurface {
+    pub(crate) stiffness: f64,
+    pub(crate) damping: f64,
+    pub(crate) adhesion: f64,
+}
+
+impl MovingSurface {
+    pub(crate) fn of(case: &Cantilever) -> Self {
+        let of = |name| case.get(parameter(name));
+        Self {
+            stiffness: of("surface_stiffness"),
+            damping: of("surface_damping"),
+            adhesion: of("adhesion_force"),
+        }
+    }
+
+    fn numbers(self) -> [f64; 3] {
+        [self.stiffness, self.damping, self.adhesion]
     }
 }
 
@@ -37,9 +59,9 @@ const SURFACE: MovingSurface = MovingSurface {
     adhesion: 0.4,
 };
 
-/// The equations ẏ = B y in flight and in contact, y = (a, ȧ, s, sin Ωτ, cos Ωτ, 1), written
-/// down from the mechanics, with the row of the gap; solved by Taylor series of order 24 in steps
-/// whose switches are zeros of the gap's series.
+/// The equations ẏ = B y in flight and in contact, y = (a, ȧ, s, sin Ωτ, cos Ωτ, 1), derived from
+/// the mechanics, with the row of the gap; solved by Taylor series of order 24 with switches at
+/// zeros of the series of the gap.
 struct Taylor {
     flight: DMatrix<f64>,
     contact: DMatrix<f64>,
@@ -84,7 +106,7 @@ impl Taylor {
         let mut rate = DVector::zeros(size);
         rate.rows_mut(n, n).copy_from(&p);
         rate[cosine] = case.alpha2 * case.omega;
-        let own = case.surface;
+        let own = MovingSurface::of(case);
         let mut gap = height;
         gap[2 * n] -= 1.0;
         // In contact η_s ṡ + k_s s = F + k_v g + η_v (V̇ − ṡ) = −f.
@@ -102,8 +124,8 @@ impl Taylor {
         rows += push;
         flight[(2 * n, 2 * n)] = -own.stiffness / own.damping;
         let fastest = flight.norm().max(contact.norm());
-        // ‖B‖ is far above the spectral radius √‖K‖ of a stiff beam. The surface's own rate in
-        // contact, (k_s + k_v)/(η_s + η_v), may be above it.
+        // ‖B‖ is far above the spectral radius √‖K‖ of a stiff beam. The rate of the surface in
+        // contact, (k_s + k_v)/(η_s + η_v), may be larger.
         let rates = [
             fastest.sqrt(),
             own.stiffness / own.damping,
@@ -127,8 +149,8 @@ impl Taylor {
         terms
     }
 
-    /// One period from `state` at drive phase 0; `None` where a touch is so light that rounding
-    /// decides.
+    /// One period from `state` at drive phase 0; `None` if rounding decides about a very light
+    /// contact.
     fn period(&self, state: &[f64]) -> Option<Vec<f64>> {
         let size = self.gap.len();
         let mut y = DVector::zeros(size);
@@ -145,7 +167,7 @@ impl Taylor {
             };
             let length = self.step.min(self.period - t);
             let series = Self::series(matrix, &y);
-            // The gap's coefficients in parts of the step.
+            // The coefficients of the gap as fractions of the step.
             let mut power = if touching { -1.0 } else { 1.0 };
             let along: Vec<f64> = series
                 .iter()
@@ -170,11 +192,11 @@ impl Taylor {
     }
 }
 
-/// Three periods from a deflection, a velocity and a place of the surface, each from where the
-/// independent one before came to: errors grow where motions part.
+/// Three periods from a deflection, a velocity and a position of the surface, each from the final
+/// state of the independent integration: errors grow where motions diverge.
 fn agrees_with_taylor_series(case: &Cantilever, start: [f64; 3]) -> Result<(), TestCaseError> {
     let modes = case.modes;
-    let mut map = Strobe::new(&Model::cantilever(case).unwrap());
+    let mut map = ModelMap::new(&Model::cantilever(case).unwrap());
     let independent = Taylor::new(case);
     let mut state = vec![0.0; 2 * modes + 1];
     [state[0], state[modes], state[2 * modes]] = start;
@@ -191,9 +213,9 @@ fn agrees_with_taylor_series(case: &Cantilever, start: [f64; 3]) -> Result<(), T
     Ok(())
 }
 
-/// A surface that is much slower on its own than under the tip, which a random case had.
+/// A surface that is much slower in flight than in contact, which a random case had.
 #[test]
-fn a_surface_that_the_tip_makes_fast_agrees_with_taylor_series() {
+fn a_surface_that_is_fast_in_contact_agrees_with_taylor_series() {
     let surface = MovingSurface {
         stiffness: 1.0,
         damping: 0.5,
@@ -209,10 +231,10 @@ fn a_surface_that_the_tip_makes_fast_agrees_with_taylor_series() {
     agrees_with_taylor_series(&case, start).unwrap();
 }
 
-/// Just beside a touch that does not come the derivatives are those of what does come; a random
-/// case had differences that reached over it.
+/// Near a contact that does not occur the derivatives are those without it; a random case had
+/// differences that included it.
 #[test]
-fn derivatives_beside_a_touch_are_those_without_it() {
+fn derivatives_near_a_missed_contact_are_those_without_it() {
     let surface = MovingSurface {
         damping: 2.131293070042266,
         adhesion: 0.2833583176635725,
@@ -233,7 +255,7 @@ fn derivatives_beside_a_touch_are_those_without_it() {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(32))]
 
-    /// Levers of one to ten modes over any surface, from any state, against Taylor series.
+    /// Levers with one to ten modes over any surface, from any state, compared with Taylor series.
     #[test]
     fn motions_agree_with_taylor_series(
         modes in 1..=10_usize, omega in 3.0..25.0_f64,
@@ -252,7 +274,8 @@ proptest! {
         agrees_with_taylor_series(&case, [a, v, s])?;
     }
 
-    /// Jacobians and derivatives to every key, with contacts under way, against differences.
+    /// Jacobians and derivatives with respect to every key, with contacts, compared with
+    /// differences.
     #[test]
     fn derivatives_agree_with_differences(
         modes in 1..5_usize, omega in 3.0..25.0_f64, adhesion in 0.1..1.0_f64,
@@ -262,28 +285,27 @@ proptest! {
         let case = Cantilever { alpha6: damping.max(0.05), ..lever(modes, omega, surface) };
         let mut state = vec![0.0; 2 * modes + 1];
         (state[0], state[modes]) = (0.05, v);
-        // A switch near a grazing or near the period's end bends the map within the difference.
+        // A switch near a grazing or near the end of the period gives a kink within the difference.
         let run = nanotap_flow::Trajectory::record(
             &Model::cantilever(&case).unwrap().system, &state, 1,
         ).unwrap();
         prop_assume!(!run.events().is_empty());
         prop_assume!(run.events().iter().all(|e| e.rate.abs() > 0.3
             && run.end() - e.time > 0.01 && e.time > 0.01));
-        // Where contacts are short it is the difference that errs, by up to some 1e-6.
+        // For short contacts the error is that of the difference, up to about 1e-6.
         let error = worst(&Case::from(case), &state);
         prop_assume!(error.is_some());
         prop_assert!(error.unwrap() < 1e-4, "{error:?}");
     }
 
-    /// Lengths ten times as large are forces ten times as large: the same motion.
+    /// Ten times the lengths and forces give the same motion.
     #[test]
     fn the_motion_scales_with_lengths_and_forces(factor in 0.01..100.0_f64, v in -1.0..1.0_f64) {
         let case = lever(3, 20.0, SURFACE);
         let scaled = Cantilever {
             alpha2: factor * case.alpha2,
             alpha5: factor * case.alpha5,
-            surface: MovingSurface { adhesion: factor * SURFACE.adhesion, ..SURFACE },
-            ..case.clone()
+            ..case.clone().with(parameter("adhesion_force"), factor * SURFACE.adhesion)
         };
         let start = [0.05, 0.0, 0.0, v, 0.0, 0.0, 0.0];
         let large = start.map(|x| factor * x);
@@ -293,10 +315,10 @@ proptest! {
         }
     }
 
-    /// Whatever is given, a case is a model or is refused with the name of a key, and a model runs
-    /// or says why not.
+    /// Any numbers give a model or an error with the name of a key, and a model runs or fails with
+    /// a reason.
     #[test]
-    fn any_numbers_are_run_or_refused(
+    fn any_numbers_run_or_are_refused(
         numbers in prop::array::uniform5(prop_oneof![
             3 => 1e-6..1e3_f64,
             1 => prop_oneof![Just(0.0), Just(-1.0), Just(1e9), Just(2e9), Just(1e-300), Just(f64::NAN), Just(f64::INFINITY)],
@@ -317,7 +339,7 @@ proptest! {
             Ok(model) => {
                 prop_assert!(stiffness > 0.0 && damping >= 1e-15 && adhesion >= 0.0);
                 let mut state = vec![0.1, 0.0, v, 0.0, s];
-                if Strobe::new(&model).advance(&mut state).is_ok() {
+                if ModelMap::new(&model).advance(&mut state).is_ok() {
                     prop_assert!(state.iter().all(|x| x.is_finite()), "{state:?}");
                 }
             }
@@ -325,8 +347,8 @@ proptest! {
     }
 }
 
-/// Ever stiffer and faster, the surface no longer moves: the paper's sample, whose pull the tip
-/// feels besides; to first order in 1/k_s.
+/// In the limit of large stiffness and speed the surface does not move: the paper's sample with an
+/// additional adhesion, to first order in 1/k_s.
 #[test]
 fn a_stiff_surface_is_the_papers_sample() {
     let paper = Cantilever {
@@ -357,9 +379,8 @@ fn a_stiff_surface_is_the_papers_sample() {
     assert!(far[2] < 1e-3, "{far:?}");
 }
 
-/// The volume of states changes by ġ⁺/ġ⁻ at every switch, which the product of the multipliers,
-/// computed from the Jacobian alone, must show; work is what the
-/// dampers take.
+/// The volume of states changes by ġ⁺/ġ⁻ at every switch, as the product of the multipliers,
+/// computed from the Jacobian alone, must show; the dissipated energy is that of the dampers.
 #[test]
 fn orbits_keep_their_volumes_and_energies() {
     let mut contacts = 0.0;
@@ -388,19 +409,19 @@ fn orbits_keep_their_volumes_and_energies() {
             "{:e}",
             found.determinant_defect
         );
-        let mut map = Strobe::new(&model);
+        let mut map = ModelMap::new(&model);
         let mut jacobian = DMatrix::zeros(7, 7);
         let mut state = found.state.clone();
-        let told = map.advance_with_jacobian_and_determinant(&mut state, &mut jacobian);
+        let reported = map.advance_with_jacobian_and_determinant(&mut state, &mut jacobian);
         let plain = jacobian.determinant().abs().ln();
-        assert!((told.unwrap().unwrap() - plain).abs() < 1e-8 * plain.abs());
+        assert!((reported.unwrap().unwrap() - plain).abs() < 1e-8 * plain.abs());
         assert_eq!(map.log_determinant_bound(), f64::INFINITY);
     }
     assert!(contacts > 2.0);
 }
 
-/// A soft touch is pulled in by a force that does not begin at zero: the map departs from free
-/// flight by the square root of the depth, not by its power 3/2.
+/// At a slight contact the tip is pulled in by a force that does not begin at zero: the map departs
+/// from free flight by the square root of the depth, not by its power 3/2.
 #[test]
 fn grazing_is_of_the_square_root_type() {
     let far = Cantilever {
@@ -422,7 +443,7 @@ fn grazing_is_of_the_square_root_type() {
     for (missed, free) in after(-1e-9).iter().zip(&unhindered) {
         assert!((missed - free).abs() < 1e-13);
     }
-    // What a touch leaves behind even at depth zero.
+    // The effect of a contact even at depth zero.
     let touched = after(1e-15);
     let jump = (touched[0] - unhindered[0]).abs();
     assert!(jump > 1e-4, "{jump}");
@@ -438,9 +459,9 @@ fn grazing_is_of_the_square_root_type() {
     }
 }
 
-/// The lever of docs/cases/moving-surface.md. Backing off, its orbit jumps between two folds and
-/// then ends where it only grazes, with a multiplier beyond bounds; from far away the free orbit
-/// ends where the tip reaches the surface, as far as its free swing reaches.
+/// The lever of docs/cases/moving-surface.md. On retract its orbit jumps between two folds and then
+/// ends at a grazing, with an unbounded multiplier. From large distances the free orbit ends where
+/// the tip reaches the surface.
 #[test]
 fn branches_end_where_their_orbits_graze() {
     let case = stated(include_str!("../../../../docs/cases/moving-surface.toml"));
@@ -467,15 +488,15 @@ fn branches_end_where_their_orbits_graze() {
 
     let at = grazes(&followed(40e-9, 25e-9));
     let view = case.physical().unwrap();
-    // The base moves by the drive's amplitude, 90° behind which the tip swings.
-    let base = view.parameters.drive_amplitude * view.free_phase.to_radians().cos();
+    // The base moves by the drive's amplitude; the tip lags by 90°.
+    let base = view.parameters.get(Parameter::Alpha2) * view.free_phase.to_radians().cos();
     assert!((at - view.free_amplitude - base).abs() < 1e-13, "{at:e}");
 }
 
-/// At rest the springs of lever, contact and surface are in series: the tip hangs free above the
-/// sample, or is held by the adhesion as long as F (1/k + 1/k_s) is more than the gap.
+/// At rest the springs of lever, contact and surface are in series: the tip is free above the
+/// sample, or is held by the adhesion while F (1/k + 1/k_s) exceeds the gap.
 #[test]
-fn the_tip_rests_where_the_springs_in_series_say() {
+fn the_rest_position_follows_from_springs_in_series() {
     for (gap, adhesion, count) in [(0.05, 0.4, 2), (0.05, 0.02, 1), (-0.05, 0.4, 1)] {
         let surface = MovingSurface {
             adhesion,
@@ -510,21 +531,21 @@ fn the_tip_rests_where_the_springs_in_series_say() {
     }
 }
 
-/// Numbers that make no such surface are refused by their names, and another law's are.
+/// Invalid numbers of a surface are refused by their names, and so are those of another law.
 #[test]
-fn what_is_no_moving_surface_is_refused() {
+fn invalid_moving_surfaces_are_refused() {
     let refused = |case: Cantilever| Model::cantilever(&case).unwrap_err().to_string();
-    for (parameter, value) in [
-        (Parameter::SurfaceStiffness, 0.0),
-        (Parameter::SurfaceStiffness, -1.0),
-        (Parameter::SurfaceDamping, 0.0),
-        (Parameter::AdhesionForce, -0.1),
-        (Parameter::AdhesionForce, f64::NAN),
+    for (number, value) in [
+        (parameter("surface_stiffness"), 0.0),
+        (parameter("surface_stiffness"), -1.0),
+        (parameter("surface_damping"), 0.0),
+        (parameter("adhesion_force"), -0.1),
+        (parameter("adhesion_force"), f64::NAN),
     ] {
-        let words = refused(lever(2, 3.0, SURFACE).with(parameter, value));
-        assert!(words.contains(parameter.name()), "{words}");
+        let words = refused(lever(2, 3.0, SURFACE).with(number, value));
+        assert!(words.contains(number.name()), "{words}");
     }
-    let words = refused(Cantilever::paper().with(Parameter::AdhesionForce, 0.1));
+    let words = refused(Cantilever::paper().with(parameter("adhesion_force"), 0.1));
     assert!(words.contains("moving-surface"), "{words}");
     let case = Case::from(lever(2, 3.0, SURFACE));
     let keys: Vec<&str> = case.keys().iter().map(|key| key.name()).collect();
@@ -537,5 +558,5 @@ fn what_is_no_moving_surface_is_refused() {
         assert!(keys.contains(&key), "{key}");
     }
     assert!(!keys.contains(&"relaxation_time"));
-    assert_eq!(case.get(Key::AdhesionForce), 0.4);
+    assert_eq!(case.get(Key::of(parameter("adhesion_force"))), 0.4);
 }

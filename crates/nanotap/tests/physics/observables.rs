@@ -1,4 +1,4 @@
-//! What an experimenter reads off a motion, against closed forms.
+//! Observables of a motion, compared with closed forms.
 
 use nanotap_arithmetic::ComplexFunctions as _;
 use std::f64::consts::TAU;
@@ -28,8 +28,8 @@ fn near(found: f64, expected: f64, relative: f64) {
     );
 }
 
-/// Far from the sample, amplitude and phase are those of the closed form, below, at and
-/// above resonance, with and without a tip mass.
+/// Far from the sample, amplitude and phase are those of the closed form, below, at and above
+/// resonance, with and without a tip mass.
 #[test]
 fn free_amplitude_and_phase_are_the_closed_form() {
     for alpha1 in [0.0, 0.1] {
@@ -55,8 +55,8 @@ fn free_amplitude_and_phase_are_the_closed_form() {
     }
 }
 
-/// A lever of high Q lags by 90° at its resonance. Driven through the base the tip's mode
-/// also feels the base's own motion, so that the lag differs from 90° by terms of order 1/Q.
+/// A lever of high Q lags by 90° at its resonance. Driven through the base, the tip's mode is also
+/// affected by the motion of the base, so that the lag differs from 90° by terms of order 1/Q.
 #[test]
 fn the_phase_is_90_degrees_at_the_free_resonance() {
     for q in [50.0, 200.0, 1000.0] {
@@ -78,7 +78,7 @@ fn the_phase_is_90_degrees_at_the_free_resonance() {
     }
 }
 
-/// A tip pressed in for good moves linearly: force, virial and dissipation follow from the
+/// A tip in permanent contact moves linearly: force, virial and dissipation follow from the
 /// amplitudes, F = −(α4 V + α6 V̇) with V = W + α2 sin Ωτ + α5.
 #[test]
 fn virial_and_dissipation_of_a_permanent_contact() {
@@ -119,12 +119,12 @@ fn virial_and_dissipation_of_a_permanent_contact() {
     );
 }
 
-/// A beam on a moving base, at the Q of a lever in water, moves as its differential equation
-/// says: v'''' = β⁴ v with β⁴ = Ω² − iα3Ω, v = 1 and v' = 0 at the clamp, v'' = v''' = 0 at the
-/// tip, which moves by (cos β + cosh β)/(1 + cos β cosh β) times the base. The deflection is that
-/// less the base.
+/// A beam on a moving base, at the Q of a lever in water, follows its differential equation: v''''
+/// = β⁴ v with β⁴ = Ω² − iα3Ω, v = 1 and v' = 0 at the clamp, v'' = v''' = 0 at the tip, which
+/// moves by (cos β + cosh β)/(1 + cos β cosh β) times the base. The deflection is that less the
+/// base.
 #[test]
-fn the_tip_on_a_moving_base_moves_as_the_beam_does() {
+fn the_tip_on_a_moving_base_moves_like_the_beam() {
     let resonance = 3.516_015_268_5;
     for (quality, omega) in [(3.35, resonance), (3.35, 1.0), (2.0, 9.0), (50.0, 2.6)] {
         let case = Cantilever {
@@ -152,9 +152,9 @@ fn the_tip_on_a_moving_base_moves_as_the_beam_does() {
     }
 }
 
-/// With the base at rest the tip moves as it is deflected.
+/// With the base at rest the tip's motion equals its deflection.
 #[test]
-fn only_a_moving_base_moves_the_tip_beside_its_deflection() {
+fn tip_motion_equals_deflection_without_base_motion() {
     let case = Cantilever {
         actuation: nanotap::model::drive_form::Actuation::Tip,
         alpha5: 100.0,
@@ -163,10 +163,10 @@ fn only_a_moving_base_moves_the_tip_beside_its_deflection() {
     assert_eq!(period_1(&case).1.observables.tip_motion, None);
 }
 
-/// What one mode on a moving base gives a contact with a damper, from the deflection alone. At ω₀
-/// the equation m z̈ + (mω₀/Q) ż + kz = F − γ(m ÿ + (mω₀/Q) ẏ), γ = φ(1)∫φ, times ż + ẏ gives
-/// E = (πk/Q)(A₀A₁ sin φ' − Σn²Aₙ² − Y Re(z₁ − z₀)), with z₀ the free deflection, φ' the lag
-/// behind z₀ and 90° more, and Y the base's amplitude.
+/// Dissipation in a damped contact with one mode on a moving base, from the deflection alone. At ω₀
+/// the equation m z̈ + (mω₀/Q) ż + kz = F − γ(m ÿ + (mω₀/Q) ẏ), γ = φ(1)∫φ, times ż + ẏ gives E =
+/// (πk/Q)(A₀A₁ sin φ' − Σn²Aₙ² − Y Re(z₁ − z₀)), with z₀ the free deflection, φ' the lag behind z₀
+/// plus 90°, and Y the base's amplitude.
 #[test]
 fn dissipation_on_a_moving_base_from_the_deflection() {
     let resonance = 1.875_104_068_711_961_f64.powi(2);
@@ -203,10 +203,10 @@ fn dissipation_on_a_moving_base_from_the_deflection() {
     }
 }
 
-/// An optical lever is calibrated by a static force at the tip: a beam so bent reads its own
-/// deflection. Here the base moves so slowly that only the sample's force bends the beam.
+/// An optical lever is calibrated by a static force at the tip: for a beam bent in this way it
+/// reads the deflection. Here the base moves so slowly that only the sample's force bends the beam.
 #[test]
-fn an_optical_lever_reads_a_static_deflection_as_it_is() {
+fn an_optical_lever_reads_a_static_deflection_correctly() {
     let case = Cantilever {
         modes: 40,
         alpha1: 0.0,
@@ -225,9 +225,9 @@ fn an_optical_lever_reads_a_static_deflection_as_it_is() {
     assert!(turn.min(360.0 - turn) < 0.01, "{phase} {}", o.phase);
 }
 
-/// A run's observables over many blocks are those of one orbit.
+/// The observables of a run over many blocks are those of one orbit.
 #[test]
-fn a_long_run_reads_what_its_orbit_reads() {
+fn a_long_run_has_the_observables_of_its_orbit() {
     use nanotap::study::simulate::{SimulateOptions, simulate};
     let case = Cantilever {
         omega: 20.0,

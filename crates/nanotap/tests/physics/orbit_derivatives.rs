@@ -1,14 +1,13 @@
-//! Derivatives of orbits and of everything observed of them, by the implicit function theorem,
-//! against central differences of fourth order.
+//! Derivatives of orbits and their observables, by the implicit function theorem, compared with
+//! central differences of fourth order.
 
 use nanotap::case::{Case, Key};
 use nanotap::model::cantilever::Cantilever;
 use nanotap::model::contact::ContactLaw;
-use nanotap::model::contact::moving_surface::MovingSurface;
 use nanotap::model::drive_form::Actuation;
+use nanotap::model::model_map::ModelMap;
 use nanotap::model::oscillator::{Oscillator, Stop};
-use nanotap::model::strobe::Strobe;
-use nanotap::observe::{Derivative, Observable, Observables, Set, Value, measure};
+use nanotap::observe::{Derivative, Observable, ObservableSet, Observables, Value, measure};
 use nanotap::study::orbit::{OrbitOptions, orbit};
 use nanotap_dynamics::{ShootingOptions, close_orbit};
 
@@ -24,13 +23,13 @@ fn numbers(value: Value) -> Vec<f64> {
     }
 }
 
-/// The orbit near `start`: its state and what is observed of it.
+/// The orbit near `start`: its state and its observables.
 fn observed(case: &Case, start: &[f64], period: usize) -> (Vec<f64>, Observables) {
     let model = case.model().unwrap();
-    let mut map = Strobe::new(&model);
+    let mut map = ModelMap::new(&model);
     let found = close_orbit(&mut map, start, period, &ShootingOptions::default()).unwrap();
     assert_eq!(found.period, period);
-    let seen = measure(&model, &found.states[0], period, Set::ALL).unwrap();
+    let seen = measure(&model, &found.states[0], period, ObservableSet::ALL).unwrap();
     (found.states[0].clone(), seen)
 }
 
@@ -40,7 +39,7 @@ fn compare(case: &Case, start: &[f64], period: usize, key: Key, step: f64) {
     let (state, seen) = observed(case, start, period);
     let model = case.model().unwrap();
     let at = (state.as_slice(), period);
-    let exact = Derivative::of(case, &model, key, at, &seen, Set::ALL).unwrap();
+    let exact = Derivative::of(case, &model, key, at, &seen, ObservableSet::ALL).unwrap();
     let value = case.get(key);
     let size = if value == 0.0 { 0.02 } else { value.abs() };
     let h = step * size;
@@ -56,10 +55,10 @@ fn compare(case: &Case, start: &[f64], period: usize, key: Key, step: f64) {
         let [a, b, c, d] = [of(0), of(1), of(2), of(3)];
         (a - 8.0 * b + 8.0 * c - d) / (12.0 * h)
     };
-    // The numbers of one observable share a scale.
+    // The numbers of one observable have a common scale.
     let check = |name: &str, exact: &[f64], slopes: &[f64], values: &[f64]| {
         let largest = |of: &[f64]| of.iter().fold(0.0, |m: f64, v| m.max(v.abs()));
-        // An angle near zero is known no better than any other.
+        // An angle near zero has the same absolute error as others.
         let angle = if name.ends_with("phase") {
             1f64.to_degrees()
         } else {
@@ -68,7 +67,7 @@ fn compare(case: &Case, start: &[f64], period: usize, key: Key, step: f64) {
         let scale = largest(exact).max(largest(values).max(angle) / size);
         for (exact, slope) in exact.iter().zip(slopes) {
             assert!(
-                // A rigid stop is indented by nothing but rounding.
+                // The indentation of a rigid stop is rounding.
                 (exact - slope).abs() <= 1e-6 * scale + 1e-13,
                 "d {name} / d {}: {exact:e}, by differences {slope:e}",
                 key.path()
@@ -92,7 +91,7 @@ fn compare(case: &Case, start: &[f64], period: usize, key: Key, step: f64) {
             check(observable.name, &exact, &slopes, &values);
         }
     };
-    // What jumps has no derivative; everything else has.
+    // Discontinuous values have no derivative; all others have.
     let absent = [
         "contacts_per_period",
         "beam_clearance_xi",
@@ -147,32 +146,25 @@ fn of_an_orbit_of_two_periods() {
 }
 
 #[test]
-fn of_surfaces_with_a_memory() {
+fn of_surfaces_with_memory() {
     let kelvin_voigt = Cantilever {
         omega: 3.0,
         contact: ContactLaw::KelvinVoigt,
         ..Cantilever::paper()
     };
     let solid = Cantilever {
-        contact: ContactLaw::StandardLinearSolid,
         alpha6: 0.0,
-        relaxation_stiffness: 8.0,
-        relaxation_time: 0.05,
-        ..kelvin_voigt.clone()
+        ..kelvin_voigt
+            .clone()
+            .on(ContactLaw::StandardLinearSolid, &[8.0, 0.05])
     };
-    let moving = Cantilever {
-        contact: ContactLaw::MovingSurface,
-        surface: MovingSurface {
-            stiffness: 60.0,
-            damping: 8.0,
-            adhesion: 0.4,
-        },
-        ..kelvin_voigt.clone()
-    };
+    let moving = kelvin_voigt
+        .clone()
+        .on(ContactLaw::MovingSurface, &[60.0, 8.0, 0.4]);
     for (case, step) in [(kelvin_voigt, 5e-4), (solid, 1e-4), (moving, 2e-4)] {
         let case = Case::from(case);
         let mut keys = case.keys();
-        // A solid takes no damper beside it.
+        // A standard linear solid has no additional damper.
         keys.retain(|key| case.get(*key) != 0.0 || *key != Key::Alpha6);
         compare_all(&case, &keys, step);
     }

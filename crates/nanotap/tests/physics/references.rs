@@ -3,7 +3,7 @@
 
 use nanotap::model::Model;
 use nanotap::model::cantilever::Cantilever;
-use nanotap::model::strobe::Strobe;
+use nanotap::model::model_map::ModelMap;
 use nanotap_dynamics::StroboscopicMap;
 use nanotap_flow::Trajectory;
 use serde_json::Value;
@@ -42,7 +42,7 @@ fn errors(name: &str) -> (f64, f64) {
     let model = Model::cantilever(&case_of(&reference)).unwrap();
     let trajectory = Trajectory::record(&model.system, &vec![0.0; model.dimension()], 20).unwrap();
     let mut worst_state: f64 = 0.0;
-    let mut map = Strobe::new(&model);
+    let mut map = ModelMap::new(&model);
     let mut state = vec![0.0; model.dimension()];
     for k in 1..=20 {
         map.advance(&mut state).unwrap();
@@ -73,7 +73,7 @@ fn errors(name: &str) -> (f64, f64) {
     (worst_state, worst_time)
 }
 
-/// Chaotic: errors grow by 240 in 20 periods. Asked for: 1e-9 and 1e-11.
+/// Chaotic: errors grow by 240 in 20 periods. Required: 1e-9 and 1e-11.
 #[test]
 fn chaotic_run_at_omega_2_6() {
     let (state, time) = errors("W1_Om2.6_N3");
@@ -91,7 +91,7 @@ fn undamped_runs_of_eq_24() {
     }
 }
 
-/// Regular motion for 200 periods and 400 switches at Ω = 3.5. Asked for: 1e-10.
+/// Regular motion for 200 periods and 400 switches at Ω = 3.5. Required: 1e-10.
 #[test]
 fn regular_run_of_200_periods() {
     let reference = reference("regular_Om3.5_long200");
@@ -101,7 +101,7 @@ fn regular_run_of_200_periods() {
     };
     let model = Model::cantilever(&case).unwrap();
     let trajectory = Trajectory::record(&model.system, &[0.0; 6], 200).unwrap();
-    let mut map = Strobe::new(&model);
+    let mut map = ModelMap::new(&model);
     let mut state = vec![0.0; 6];
     for k in 1..=200 {
         map.advance(&mut state).unwrap();

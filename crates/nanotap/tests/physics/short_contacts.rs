@@ -5,13 +5,12 @@ use nanotap::model::cantilever::Cantilever;
 use nanotap_flow::trajectory::Recorder;
 use nanotap_flow::{Flow, Trajectory};
 
-/// A contact made as short as wanted: α5 is chosen so that the lowest point of an
-/// otherwise free period dips below the sample by the depth whose contact lasts a given
-/// part of a period, down to 1e-8. In free flight the motion does not depend on α5, so
-/// the depth that double precision really gives is known from the same closed form
-/// evaluated in twice double precision: where it is a dip by more than one rounding error the contact must be found,
-/// with the duration that depth and curvature say, and where it is a near miss there
-/// must be none.
+/// Contacts of any short duration: α5 is chosen so that the lowest point of an otherwise free
+/// period is below the sample by the depth whose contact lasts a given fraction of a period, down
+/// to 1e-8. In free flight the motion does not depend on α5, so the depth that double precision
+/// gives is known from the same closed form in twice double precision. A depth above one rounding
+/// error must give a contact, with the duration that follows from depth and curvature; a near miss
+/// must give none.
 #[test]
 fn contacts_down_to_1e_minus_8_of_a_period_are_all_found() {
     let (mut touches, mut misses, mut evaluations, mut worst) = (0_u32, 0_u32, 0_u64, 0.0_f64);
@@ -63,7 +62,7 @@ fn contacts_down_to_1e_minus_8_of_a_period_are_all_found() {
             let run = recorder.finish(near.system.clone());
             let found = run.events().windows(2).find(|e| e[0].to == 1);
             if dip.abs() <= rounding {
-                // Its amplitudes rounded another way, the same motion touches or misses.
+                // With its amplitudes rounded differently, the same motion touches or misses.
                 continue;
             }
             if dip <= 0.0 {
@@ -80,10 +79,9 @@ fn contacts_down_to_1e_minus_8_of_a_period_are_all_found() {
             let duration = found[1].time - found[0].time;
             shortest = shortest.min(duration / period);
             let expected = (8.0 * dip / curvature).sqrt();
-            // Times are doubles: near 1e-8 of a period the difference of two keeps eight digits.
-            // The contact's own pull and the next order are of the size of the angle that the
-            // fastest mode turns through; the depth itself is known to rounding; and times
-            // are doubles, so near 1e-8 of a period their difference keeps seven digits.
+            // Times are doubles: near 1e-8 of a period the difference of two keeps seven digits.
+            // The force of the contact and the next order are of the size of the phase of the
+            // fastest mode; the depth itself is known to rounding.
             let angle = gap.pieces[0].signal.fastest() * part * period;
             let allowed = (2.0 * angle).max(rounding / dip).max(1e-6);
             let error = (duration / expected - 1.0).abs() / allowed;
@@ -92,18 +90,18 @@ fn contacts_down_to_1e_minus_8_of_a_period_are_all_found() {
     }
     println!(
         "{touches} short contacts found, none missed, the shortest {shortest:.1e} of a period; {misses} near \
-         misses told apart; {:.1} evaluations a period",
+         misses distinguished; {:.1} evaluations per period",
         evaluations as f64 / f64::from(touches + misses)
     );
     assert!(touches > 2000 && shortest < 2e-8, "{touches} {shortest:e}");
     assert!(worst < 1.0, "{worst}");
 }
 
-/// The gap itself tuned to within rounding of grazing, by bisection on the starting
-/// state: at the last representable state that touches, the contact is found, and its
-/// duration is of the order of the square root of rounding.
+/// The gap is brought within rounding of grazing by bisection on the initial state: at the last
+/// representable state with a contact, the contact is found, and its duration is of the order of
+/// the square root of rounding.
 #[test]
-fn the_shortest_contacts_that_doubles_can_tell_are_found() {
+fn the_shortest_representable_contacts_are_found() {
     let mut shortest: f64 = 1.0;
     for i in 0..40_u32 {
         let omega = 2.0 + 0.37 * f64::from(i);

@@ -1,24 +1,24 @@
 //! An independent integration of a piecewise-linear system: Taylor series of high order from step
-//! to step, switches as first roots of the guards' polynomials, isolated in Bernstein's form.
-//! No eigenvalues, no exponentials, no tables.
+//! to step, switches as first roots of the guards' polynomials, isolated in Bernstein form. It uses
+//! no eigenvalues, exponentials or tables.
 
 use nalgebra::DVector;
 use nanotap_flow::{Complex, HarmonicVector, Output, System};
 
-/// Order of the series: with steps of at most [`LONGEST`] over the fastest rate the rest is
+/// Order of the series: with steps of at most [`MAX_STEP`] over the fastest rate the remainder is
 /// 2³¹/31! = 3e-25 of the state.
 const ORDER: usize = 30;
-const LONGEST: f64 = 2.0;
+const MAX_STEP: f64 = 2.0;
 
-/// Where a run came to.
+/// Final state of a run.
 pub(crate) struct End {
     pub(crate) state: DVector<f64>,
     /// Times of its switches.
     pub(crate) switches: Vec<f64>,
 }
 
-/// Runs `system` from the state `x` in `regime` at time 0 up to `end`; `fastest` is a bound on
-/// the rates of its modes. `None` where a guard touches zero so lightly that rounding decides.
+/// Runs `system` from the state `x` in `regime` at time 0 to `end`; `fastest` is a bound on the
+/// rates of its modes. `None` if rounding decides about a very light contact.
 pub(crate) fn run(
     system: &System,
     x: &[f64],
@@ -29,12 +29,12 @@ pub(crate) fn run(
     let mut state = DVector::from_column_slice(x);
     let (mut time, mut switches, mut switched) = (0.0, Vec::new(), false);
     while time < end {
-        let step = (LONGEST / fastest).min(end - time);
+        let step = (MAX_STEP / fastest).min(end - time);
         let series = series(system, regime, &state, time, step);
         let mut first: Option<(f64, usize)> = None;
         for (k, transition) in system.transitions()[regime].iter().enumerate() {
             let guard = guard(system, &transition.guard, &series, time, step);
-            // What rounding of the state makes of the guard.
+            // Effect of the rounding of the state on the guard.
             let row = transition.guard.row.transpose();
             let noise = 1e-13 * (row.abs().dot(&state.abs()) + transition.guard.constant.abs());
             let root = first_root(&guard, noise, switched)?;
@@ -95,7 +95,7 @@ fn turned(system: &System, time: f64) -> Vec<Complex> {
         .collect()
 }
 
-/// From the coefficient of sⁿ of e^{iω(t + s step)} to the next.
+/// From the coefficient of sⁿ of e^{iω(t + s step)} to the next one.
 fn next_power(system: &System, tones: &mut [Complex], n: usize, step: f64) {
     for (tone, omega) in tones.iter_mut().zip(system.drive().frequencies()) {
         *tone *= Complex::new(0.0, omega * step / (n + 1) as f64);
@@ -134,9 +134,9 @@ fn horner(coefficients: &[f64], s: f64) -> f64 {
     coefficients.iter().rev().fold(0.0, |sum, c| sum * s + c)
 }
 
-/// The first s in [0, 1] at which the polynomial falls below zero, infinity if none; `None` where
-/// it cannot be told from touching. Just after a switch powers that rounding alone has left are
-/// no part of it.
+/// The first s in [0, 1] at which the polynomial falls below zero; infinity if there is none;
+/// `None` if it cannot be distinguished from a touch. Just after a switch, powers that consist of
+/// rounding only are ignored.
 pub(crate) fn first_root(coefficients: &[f64], noise: f64, switched: bool) -> Option<f64> {
     let size = coefficients.iter().map(|c| c.abs()).sum::<f64>();
     if size == 0.0 {
@@ -184,8 +184,8 @@ pub(crate) fn first_root(coefficients: &[f64], noise: f64, switched: bool) -> Op
     })
 }
 
-/// An interval that holds the first root alone, of a polynomial given by its Bernstein
-/// coefficients over `low … high` that begins above zero.
+/// An interval that contains the first root only, of a polynomial given by its Bernstein
+/// coefficients over `low … high` that is positive at `low`.
 #[allow(clippy::option_option, reason = "no root, and no answer")]
 fn isolated(bernstein: &[f64], low: f64, high: f64, noise: f64) -> Option<Option<(f64, f64)>> {
     if bernstein.iter().all(|b| *b > 0.0) {
@@ -200,7 +200,7 @@ fn isolated(bernstein: &[f64], low: f64, high: f64, noise: f64) -> Option<Option
     if high - low < 1e-8 {
         return None;
     }
-    // De Casteljau's halves.
+    // The two halves by de Casteljau's algorithm.
     let (mut left, mut right) = (Vec::new(), Vec::new());
     let mut row = bernstein.to_vec();
     while let (Some(first), Some(last)) = (row.first().copied(), row.last().copied()) {
@@ -212,7 +212,7 @@ fn isolated(bernstein: &[f64], low: f64, high: f64, noise: f64) -> Option<Option
     let middle = 0.5 * (low + high);
     match isolated(&left, low, middle, noise)? {
         Some(found) => Some(Some(found)),
-        // A root at the middle itself is the right half's.
+        // A root at the middle belongs to the right half.
         None => isolated(&right, middle, high, noise),
     }
 }

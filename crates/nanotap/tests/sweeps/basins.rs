@@ -1,11 +1,13 @@
 //! Basins on slices.
 
+use nanotap::ErrorKind;
 use nanotap::case::Case;
 use nanotap::dataset::{Share, Store, Values, Work};
 use nanotap::figure::basin::figure;
 use nanotap::model::cantilever::Cantilever;
-use nanotap::model::strobe::Strobe;
-use nanotap::study::basin::{Basin, BasinError, BasinOptions, SliceRange, shares};
+use nanotap::model::model_map::ModelMap;
+use nanotap::study::Computation as _;
+use nanotap::study::basin::{Basin, BasinOptions, SliceRange, shares};
 use nanotap_dynamics::{CancelFlag, ClassifyOptions, Control, MotionKind, classify};
 
 use crate::folder::{Folder, assert_same};
@@ -19,11 +21,9 @@ fn bistable() -> Case {
 }
 
 fn slice(nx: usize, ny: usize) -> BasinOptions {
-    let x = SliceRange::parse(&format!("a1=-1:1:{nx}")).unwrap();
-    let y = SliceRange::parse(&format!("v1=-4:4:{ny}")).unwrap();
     BasinOptions {
         starts: 24,
-        ..BasinOptions::new(x, y)
+        ..BasinOptions::over(&format!("a1=-1:1:{nx}"), &format!("v1=-4:4:{ny}"))
     }
 }
 
@@ -49,8 +49,8 @@ fn computed(
     store
 }
 
-/// Ω = 20, α1 = 0: a period-1 and a period-4 coexist. Every point's label must be where a
-/// plain run from that very state settles.
+/// Ω = 20, α1 = 0: a period-1 and a period-4 motion coexist. The label of every point must be the
+/// motion to which a plain run from its state converges.
 #[test]
 fn chunks_computed_elsewhere_are_the_same_bytes() {
     let folder = Folder::new();
@@ -67,7 +67,7 @@ fn chunks_computed_elsewhere_are_the_same_bytes() {
 }
 
 #[test]
-fn labels_are_where_runs_settle() {
+fn labels_agree_with_plain_runs() {
     let folder = Folder::new();
     let store = computed(&bistable(), &slice(14, 12), &folder.join("a"), 2);
     let found = shares(&store).unwrap();
@@ -84,7 +84,7 @@ fn labels_are_where_runs_settle() {
         "{found:?}"
     );
 
-    let mut map = Strobe::new(&bistable().model().unwrap());
+    let mut map = ModelMap::new(&bistable().model().unwrap());
     let (mut checked, mut wrong) = (0, 0);
     for chunk in 0..store.chunks() {
         let block = store.schema().grid.block(chunk);
@@ -117,7 +117,7 @@ fn labels_are_where_runs_settle() {
 }
 
 #[test]
-fn bytes_do_not_depend_on_threads_or_stops() {
+fn bytes_do_not_depend_on_threads_or_interruptions() {
     let folder = Folder::new();
     let (subject, options) = (bistable(), slice(9, 40));
     let whole = folder.join("whole");
@@ -152,7 +152,7 @@ fn bytes_do_not_depend_on_threads_or_stops() {
     assert_same(&whole, &path);
 }
 
-/// States that were given stand for the census, and are checked like any start.
+/// Given states replace the census, and are checked like any start.
 #[test]
 fn attractors_can_be_given() {
     let folder = Folder::new();
@@ -182,7 +182,7 @@ fn attractors_can_be_given() {
 }
 
 #[test]
-fn bad_slices_are_refused() {
+fn invalid_slices_are_refused() {
     for given in [
         "",
         "a1",
@@ -201,9 +201,8 @@ fn bad_slices_are_refused() {
         let error = SliceRange::parse(given).unwrap_err();
         assert!(error.to_string().contains(&format!("`{given}`")), "{error}");
     }
-    let range = |text| SliceRange::parse(text).unwrap();
     let refused = |x, y, change: &dyn Fn(&mut BasinOptions)| {
-        let mut options = BasinOptions::new(range(x), range(y));
+        let mut options = BasinOptions::over(x, y);
         change(&mut options);
         Basin::new(&bistable(), &options, &Control::default())
             .unwrap_err()
@@ -243,6 +242,6 @@ fn bad_slices_are_refused() {
         cancel: Some(&cancel),
         progress: None,
     };
-    let stopped = Basin::new(&bistable(), &slice(5, 5), &control);
-    assert!(matches!(stopped, Err(BasinError::Cancelled)));
+    let stopped = Basin::new(&bistable(), &slice(5, 5), &control).unwrap_err();
+    assert_eq!(stopped.kind, ErrorKind::Stopped);
 }

@@ -1,5 +1,5 @@
-//! Headers and chunks that somebody or something has changed: whatever stands in them, a dataset
-//! opens, is refused with a reason, or reads as what is left of it.
+//! Damaged headers and chunks: a dataset opens, is refused with a reason, or reads as far as it is
+//! intact.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -8,21 +8,21 @@ use std::sync::{Mutex, MutexGuard, OnceLock, PoisonError};
 use nanotap::case::Case;
 use nanotap::dataset::{Share, Store, Work, table};
 use nanotap::model::cantilever::Cantilever;
-use nanotap::study::sweep::{Over, Sweep, SweepOptions, summary};
+use nanotap::study::Computation as _;
+use nanotap::study::sweep::{Summary, Sweep, SweepOptions};
 use nanotap_dynamics::Control;
 use proptest::prelude::*;
 use serde_json::{Value, json};
 
 use crate::folder::{Folder, bytes};
 
-/// Two frequencies, a run each.
+/// Two frequencies with one run each.
 fn small(path: &Path) {
     let subject = Case::from(Cantilever {
         modes: 1,
         ..Cantilever::paper()
     });
-    let over = vec![Over::parse("omega=18:20:2", &subject).unwrap()];
-    let sweep = Sweep::new(subject, SweepOptions::new(over)).unwrap();
+    let sweep = Sweep::new(&subject, SweepOptions::over(["omega=18:20:2"])).unwrap();
     let store = Store::create_or_resume(path, sweep.schema().clone()).unwrap();
     let work = Work {
         share: Share::WHOLE,
@@ -44,11 +44,34 @@ fn read(path: &Path) {
             let _ = store.read_chunk(&block, variable);
         }
     }
-    let _ = summary(&store);
+    let _ = Summary::of(&store);
     let _ = table::csv(&store, |_| Ok::<(), nanotap::dataset::StoreError>(()));
 }
 
-/// What somebody may write in place of a value.
+/// A store is not written through a symbolic link in it: the link's target stays as it was.
+#[cfg(unix)]
+#[test]
+fn links_inside_a_store_are_refused() {
+    let folder = Folder::new();
+    let store = folder.join("links.zarr");
+    small(&store);
+    let target = folder.join("elsewhere");
+    std::fs::write(&target, "untouched").unwrap();
+    let chunk = store.join("period").join("0.0");
+    let chunk = if chunk.exists() {
+        chunk
+    } else {
+        store.join("period").join("0")
+    };
+    std::fs::remove_file(&chunk).unwrap();
+    std::os::unix::fs::symlink(&target, &chunk).unwrap();
+    let schema = Store::open(&store).unwrap().schema().clone();
+    let refused = Store::create_or_resume(&store, schema).unwrap_err();
+    assert!(refused.to_string().contains("symbolic link"), "{refused}");
+    assert_eq!(std::fs::read_to_string(&target).unwrap(), "untouched");
+}
+
+/// Values that may replace a value of a header.
 fn hostile() -> impl Strategy<Value = Value> {
     prop::sample::select(vec![
         json!(null),
@@ -72,8 +95,7 @@ fn hostile() -> impl Strategy<Value = Value> {
     ])
 }
 
-/// Puts `put` in place of the value that comes `at` many values after the first; `None` takes a
-/// whole entry away.
+/// Replaces the value at position `at` by `put`; `None` removes the entry.
 fn change(value: &mut Value, at: &mut usize, put: Option<&Value>) -> bool {
     if *at == 0 {
         *value = put.cloned().unwrap_or_default();
@@ -94,7 +116,7 @@ fn change(value: &mut Value, at: &mut usize, put: Option<&Value>) -> bool {
     }
 }
 
-/// A whole dataset, made once a process.
+/// An intact dataset, created once per process.
 fn whole() -> &'static (Folder, BTreeMap<PathBuf, Vec<u8>>) {
     static WHOLE: OnceLock<(Folder, BTreeMap<PathBuf, Vec<u8>>)> = OnceLock::new();
     WHOLE.get_or_init(|| {
@@ -105,16 +127,16 @@ fn whole() -> &'static (Folder, BTreeMap<PathBuf, Vec<u8>>) {
     })
 }
 
-/// Tests that run beside each other in one process have one folder.
-fn alone() -> MutexGuard<'static, ()> {
+/// Tests of one process that share a folder run in sequence.
+fn folder_lock() -> MutexGuard<'static, ()> {
     static TURN: Mutex<()> = Mutex::new(());
     TURN.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Reads it with one file changed by `damage`, and puts the file back.
+/// Reads the dataset with one file changed by `damage`, and restores the file.
 fn damaged(file: &Path, damage: impl FnOnce(Vec<u8>) -> Vec<u8>) {
     let (folder, files) = whole();
-    let _turn = alone();
+    let _turn = folder_lock();
     let path = folder.join("data");
     let content = &files[file];
     std::fs::write(path.join(file), damage(content.clone())).unwrap();
@@ -156,14 +178,14 @@ proptest! {
     }
 }
 
-/// An untouched one is read: what the others meet is no mistake of theirs.
+/// An intact dataset is read: failures of the others are due to their damage.
 #[test]
-fn the_whole_one_is_read() {
+fn an_intact_dataset_is_read() {
     let (folder, files) = whole();
-    let _turn = alone();
+    let _turn = folder_lock();
     let path = folder.join("data");
     let store = Store::open(&path).unwrap();
     store.require_all().unwrap();
-    assert_eq!(summary(&store).unwrap().runs % 2, 0);
+    assert_eq!(Summary::of(&store).unwrap().runs % 2, 0);
     assert!(files.contains_key(Path::new(".zmetadata")));
 }

@@ -1,4 +1,4 @@
-//! Stores: resuming, threads, shares, merging, refusals.
+//! Stores: resuming, threads, shares, merging, errors.
 
 use std::path::Path;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -6,27 +6,24 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use nanotap::case::Case;
 use nanotap::dataset::{Share, Store, StoreError, Values, Work, WorkError, merge, table};
 use nanotap::model::cantilever::Cantilever;
-use nanotap::study::sweep::{Follow, Over, Starts, Sweep, SweepOptions, summary};
+use nanotap::study::Computation as _;
+use nanotap::study::sweep::{Follow, Summary, Sweep, SweepOptions};
 use nanotap_dynamics::{CancelFlag, Control};
 
 use crate::folder::{Folder, assert_same, bytes};
 
-/// 24 values of Ω × 3 starts, cut into 24 chunks.
+/// 24 values of Ω × 3 starts, in 24 chunks.
 fn sweep(follow: Follow) -> Sweep {
     let subject = Case::from(Cantilever::paper());
-    let over = vec![Over::parse("omega=2.8:3.2:24", &subject).unwrap()];
     let options = SweepOptions {
-        starts: Starts::Seeded {
-            count: 3,
-            seed: 7,
-            sides: Vec::new(),
-        },
+        starts: Some(3),
+        seed: 7,
         follow,
         periods: 8,
-        strobe: 3,
-        ..SweepOptions::new(over)
+        strobe: Some(3),
+        ..SweepOptions::over(["omega=2.8:3.2:24"])
     };
-    Sweep::new(subject, options).unwrap()
+    Sweep::new(&subject, options).unwrap()
 }
 
 fn how(threads: usize) -> Work<'static> {
@@ -68,7 +65,7 @@ fn chunks_computed_elsewhere_are_the_same_bytes() {
         let store = Store::create_or_resume(&there, sweep.schema().clone()).unwrap();
         for chunk in (0..store.chunks()).rev() {
             let files = sweep.chunk_files(chunk, &nowhere).unwrap();
-            // What was cut short on its way, or belongs elsewhere, is refused.
+            // Incomplete chunks and chunks of other datasets are refused.
             let mut short = files.clone();
             short[3].truncate(5);
             for wrong in [&short[..], &files[1..]] {
@@ -79,7 +76,7 @@ fn chunks_computed_elsewhere_are_the_same_bytes() {
             store.take_files(chunk, &files).unwrap();
         }
         assert_eq!(store.missing(), 0);
-        // Nothing is left to compute but what the values show their neighbours.
+        // Only the continuation to neighbouring values is left to compute.
         computed(&sweep, &there, 1);
         assert_same(&here, &there);
         assert!(sweep.chunk_files(store.chunks(), &nowhere).is_none());
@@ -96,13 +93,13 @@ fn chunks_computed_elsewhere_are_the_same_bytes() {
 }
 
 #[test]
-fn stopped_damaged_and_killed_work_resumes_to_the_same_bytes() {
+fn interrupted_damaged_and_killed_work_resumes_to_the_same_bytes() {
     let folder = Folder::new();
     let sweep = sweep(Follow::Off);
     let whole = folder.join("whole");
     computed(&sweep, &whole, 2);
 
-    // Stopped on the way.
+    // Interrupted.
     let path = folder.join("resumed");
     let store = Store::create_or_resume(&path, sweep.schema().clone()).unwrap();
     let (cancel, last) = (CancelFlag::new(), AtomicUsize::new(0));
@@ -123,7 +120,7 @@ fn stopped_damaged_and_killed_work_resumes_to_the_same_bytes() {
     };
     assert!(finished >= 8 && finished < total, "{finished} of {total}");
     assert!(matches!(
-        summary(&store),
+        Summary::of(&store),
         Err(StoreError::Unfinished { .. })
     ));
 
@@ -136,7 +133,7 @@ fn stopped_damaged_and_killed_work_resumes_to_the_same_bytes() {
     std::fs::write(path.join("period_max/2.0.0"), b"x").unwrap();
     let zeros = vec![0; std::fs::read(path.join("tip_max/3.0")).unwrap().len()];
     std::fs::write(path.join("tip_max/3.0"), zeros).unwrap();
-    // Half a day old; what is young may be another process's.
+    // Half a day old; a younger one may belong to another process.
     let long_ago = std::time::SystemTime::now() - std::time::Duration::from_secs(43_200);
     for half in ["tip_max/.5.0.123.tmp", ".chunks/.9.123.tmp"] {
         let file = std::fs::File::create(path.join(half)).unwrap();
@@ -147,13 +144,13 @@ fn stopped_damaged_and_killed_work_resumes_to_the_same_bytes() {
     sweep.compute(&store, &how(2)).unwrap();
     assert_same(&whole, &path);
 
-    // Killed while the store was being made.
+    // Killed while the store was being created.
     let bare = folder.join("bare");
     std::fs::create_dir_all(bare.join("period")).unwrap();
     std::fs::copy(whole.join(".zgroup"), bare.join(".zgroup")).unwrap();
     computed(&sweep, &bare, 2);
     assert_same(&whole, &bare);
-    // Nothing is left to do, and nothing changes.
+    // Nothing is left to compute, and nothing changes.
     computed(&sweep, &bare, 2);
     assert_same(&whole, &bare);
 }
@@ -191,14 +188,14 @@ fn shares_of_several_machines_merge_to_the_bytes_of_one() {
     computed(&sweep, &merged, 1);
     assert_same(&whole, &merged);
 
-    // Or all on one store, on a shared disk.
+    // Or all in one store, on a shared disk.
     let common = folder.join("common");
     for share in ["2/3", "3/3", "1/3"] {
         shared(&common, share);
     }
     assert_same(&whole, &common);
 
-    // A damaged chunk is not taken over.
+    // A damaged chunk is not merged.
     std::fs::write(parts[0].join("period/0.0"), b"x").unwrap();
     let holed = merge(&parts, &folder.join("holed")).unwrap();
     assert_eq!(holed.missing, [0]);
@@ -210,27 +207,24 @@ fn stores_of_other_cases_are_refused_with_what_differs() {
     let path = folder.join("store");
     let sweep = sweep(Follow::Off);
     Store::create_or_resume(&path, sweep.schema().clone()).unwrap();
-    let other = |case: Cantilever, starts: Starts| {
+    let other = |case: Cantilever, starts, seed| {
         let options = SweepOptions {
-            starts,
+            starts: Some(starts),
+            seed,
             ..sweep.options().clone()
         };
-        let other = Sweep::new(Case::from(case), options).unwrap();
+        let other = Sweep::new(&Case::from(case), options).unwrap();
         Store::create_or_resume(&path, other.schema().clone())
             .unwrap_err()
             .to_string()
-    };
-    let seeded = |seed| Starts::Seeded {
-        count: 3,
-        seed,
-        sides: Vec::new(),
     };
     let message = other(
         Cantilever {
             alpha4: 25.0,
             ..Cantilever::paper()
         },
-        seeded(7),
+        3,
+        7,
     );
     assert!(
         message.contains("case.alpha4: 20.0 there, 25.0 here"),
@@ -240,24 +234,17 @@ fn stores_of_other_cases_are_refused_with_what_differs() {
         !message.contains("alpha6") && !message.contains("seed"),
         "{message}"
     );
-    let message = other(Cantilever::paper(), seeded(8));
+    let message = other(Cantilever::paper(), 3, 8);
     assert!(message.contains("seed: 7 there, 8 here"), "{message}");
-    let message = other(
-        Cantilever::paper(),
-        Starts::Seeded {
-            count: 4,
-            seed: 7,
-            sides: Vec::new(),
-        },
-    );
+    let message = other(Cantilever::paper(), 4, 7);
     assert!(
         message.contains("sweep.starts.count: 3 there, 4 here"),
         "{message}"
     );
 
-    // The case's own value of the parameter that varies does not matter.
+    // The case's own value of the varied parameter does not matter.
     let same = Sweep::new(
-        Case::from(Cantilever {
+        &Case::from(Cantilever {
             omega: 9.0,
             ..Cantilever::paper()
         }),
@@ -265,13 +252,13 @@ fn stores_of_other_cases_are_refused_with_what_differs() {
     );
     Store::create_or_resume(&path, same.unwrap().schema().clone()).unwrap();
 
-    // Merging what does not belong together.
+    // Merging datasets that do not belong together.
     let second = folder.join("second");
     let options = SweepOptions {
         periods: 9,
         ..sweep.options().clone()
     };
-    let longer = Sweep::new(Case::from(Cantilever::paper()), options).unwrap();
+    let longer = Sweep::new(&Case::from(Cantilever::paper()), options).unwrap();
     Store::create_or_resume(&second, longer.schema().clone()).unwrap();
     let message = merge(&[path.clone(), second], &folder.join("m"))
         .unwrap_err()
@@ -283,7 +270,7 @@ fn stores_of_other_cases_are_refused_with_what_differs() {
 }
 
 #[test]
-fn what_is_no_store_is_left_alone() {
+fn other_folders_are_left_unchanged() {
     let folder = Folder::new();
     let sweep = sweep(Follow::Off);
     let file = folder.join("file");
@@ -300,13 +287,13 @@ fn what_is_no_store_is_left_alone() {
         Store::open(&folder.join("nowhere"))
             .unwrap_err()
             .to_string()
-            .contains("not there")
+            .contains("does not exist")
     );
     assert_eq!(bytes(&strange).len(), 1);
 }
 
 #[test]
-fn an_opened_store_is_the_one_that_was_made() {
+fn an_opened_store_equals_the_created_one() {
     let folder = Folder::new();
     let path = folder.join("store");
     let sweep = sweep(Follow::Both);
@@ -341,7 +328,7 @@ fn an_opened_store_is_the_one_that_was_made() {
         (row[0], row[2], row[3], row[4]),
         ("2.8", "up", "periodic", "2")
     );
-    // The value that the table shows is the one in the store.
+    // The value in the table is the one in the store.
     let block = store.schema().grid.block(0);
     let place = store.schema().index_of("tip_max").unwrap();
     let Values::Real(tips) = store.read_chunk(&block, place).unwrap() else {

@@ -1,4 +1,4 @@
-//! Folders of tests, and what is in them.
+//! Folders of tests and their files.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};

@@ -1,12 +1,13 @@
-//! What one value of a sweep shows, its neighbours know.
+//! Continuation of orbits between neighbouring values of a sweep.
 
 use nanotap::case::Case;
 use nanotap::case::file::Source;
 use nanotap::dataset::{Share, Store, Work};
+use nanotap::study::Computation as _;
 use nanotap::study::FreeMotion;
-use nanotap::study::sweep::{SweepRequest, from_neighbours};
+use nanotap::study::sweep::{Sweep, SweepOptions, from_neighbours};
 use nanotap::study::value::Axes;
-use nanotap::study::window::{Condition, Window, WindowRequest};
+use nanotap::study::window::{Condition, Window, WindowOptions};
 use nanotap_dynamics::Control;
 
 use crate::folder::Folder;
@@ -27,30 +28,30 @@ fn how() -> Work<'static> {
     }
 }
 
-/// A lever of 42 N/m, 330 kHz and Q = 400 on polystyrene, 325 … 335 kHz, gaps of
-/// 2 … 25 nm. Where the free motion does not reach the sample it exists and is stable, so no
-/// such point may be called one motion that taps.
+/// A lever of 42 N/m, 330 kHz and Q = 400 on polystyrene, 325 … 335 kHz, gaps of 2 … 25 nm. Where
+/// the free motion does not reach the sample it exists and is stable, so no such point may be
+/// reported as one tapping motion.
 #[test]
-fn no_window_calls_a_bistable_point_safe() {
+fn no_window_reports_a_bistable_point_as_safe() {
     let lever = case(
         "[model]\nmodes = 2\n[cantilever]\nlever = \"PPP-NCHR\"\nQ = 400\n\
          [tip]\nradius = \"10 nm\"\n\
          [sample]\nmaterial = \"polystyrene\"\nloss_tangent = 0.1\n\
          [drive]\nfrequency_ratio = 1.001\nfree_amplitude = \"20 nm\"\n[gap]\ntip = \"15 nm\"\n",
     );
-    let request = WindowRequest {
+    let options = WindowOptions {
         over: Axes(vec![
             "drive.frequency=325kHz:335kHz:7".to_owned(),
             "gap.tip=2nm:25nm:12".to_owned(),
         ]),
-        ..WindowRequest::default()
+        ..WindowOptions::default()
     };
-    let sweep = request.sweep(&lever).unwrap();
+    let sweep = options.sweep(&lever).unwrap();
     let folder = Folder::new();
     let store = Store::create_or_resume(&folder.join("window"), sweep.schema().clone()).unwrap();
     sweep.compute(&store, &how()).unwrap();
     let window = Window::of(&store).unwrap();
-    let [frequency, gap] = [0, 1].map(|k| sweep.options().over[k].key);
+    let [frequency, gap] = [0, 1].map(|k| sweep.over()[k].key);
     let mut safe = 0;
     for (row, &y) in window.conditions.iter().zip(&window.y) {
         for (condition, &x) in row.iter().zip(&window.x) {
@@ -66,21 +67,20 @@ fn no_window_calls_a_bistable_point_safe() {
     assert!(safe > 10, "{safe} points are safe");
 }
 
-/// Stable orbits of period 3 lie between Ω = 3.109 and 3.180 beside chaos and period 1; of
-/// two starts a value few meet them, and yet every value in between has one.
+/// Stable orbits of period 3 exist between Ω = 3.109 and 3.180 in addition to chaos and period 1.
+/// With two starts per value few reach them, and yet every value in between has one.
 #[test]
-fn a_sweep_hands_on_what_one_value_found() {
+fn a_sweep_continues_orbits_to_neighbouring_values() {
     let paper = case(
         "[model]\nmodes = 3\nalpha1 = 0.1\nalpha2 = 0.1\nalpha3 = 0.1\nalpha4 = 20.0\n\
          alpha5 = 0.0\nalpha6 = 0.2\nomega = 3.0\n",
     );
-    let request = SweepRequest {
-        over: Axes(vec!["omega=3.115:3.175:13".to_owned()]),
+    let options = SweepOptions {
         starts: Some(12),
         periods: 3,
-        ..SweepRequest::default()
+        ..SweepOptions::over(["omega=3.115:3.175:13"])
     };
-    let sweep = request.sweep(&paper).unwrap();
+    let sweep = Sweep::new(&paper, options).unwrap();
     let folder = Folder::new();
     let store = Store::create_or_resume(&folder.join("sweep"), sweep.schema().clone()).unwrap();
     sweep.compute(&store, &how()).unwrap();
@@ -94,6 +94,6 @@ fn a_sweep_hands_on_what_one_value_found() {
     let known = |k: usize| met[k] || more.iter().any(|m| m.at == [k] && m.period == 3);
     assert!(met.contains(&true) && met.contains(&false), "{met:?}");
     assert!((0..13).all(known), "{met:?}");
-    // A motion that a start met is not listed again.
+    // A motion that a start reached is not listed again.
     assert!(more.iter().all(|m| m.period != 3 || !met[m.at[0]]));
 }

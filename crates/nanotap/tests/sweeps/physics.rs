@@ -1,19 +1,18 @@
-//! What sweeps find, against what is known of the model.
+//! Results of sweeps, compared with known motions of the model.
 
 use nanotap::case::Case;
 use nanotap::dataset::{Share, Store, Values, Work};
 use nanotap::figure::sweep::figure;
 use nanotap::model::cantilever::Cantilever;
 use nanotap::model::oscillator::{Oscillator, Stop};
+use nanotap::study::Computation as _;
 use nanotap::study::orbit::OrbitOptions;
-use nanotap::study::sweep::{
-    Follow, Over, Starts, Summary, Sweep, SweepError, SweepOptions, summary,
-};
+use nanotap::study::sweep::{Follow, Summary, Sweep, SweepOptions};
 use nanotap_dynamics::Control;
 
 use crate::folder::Folder;
 
-/// A finished sweep, its table at hand.
+/// A finished sweep with its table.
 struct Swept {
     _folder: Folder,
     store: Store,
@@ -21,17 +20,12 @@ struct Swept {
 
 impl Swept {
     fn of(subject: &Case, over: &[&str], change: impl FnOnce(&mut SweepOptions)) -> Self {
-        let over = over
-            .iter()
-            .map(|o| Over::parse(o, subject).unwrap())
-            .collect();
         let mut options = SweepOptions {
             periods: 20,
-            strobe: 20,
-            ..SweepOptions::new(over)
+            ..SweepOptions::over(over.iter().copied())
         };
         change(&mut options);
-        let sweep = Sweep::new(subject.clone(), options).unwrap();
+        let sweep = Sweep::new(subject, options).unwrap();
         let folder = Folder::new();
         let store = Store::create_or_resume(&folder.join("s"), sweep.schema().clone()).unwrap();
         let control = Control::default();
@@ -73,7 +67,7 @@ impl Swept {
         self.all(name).into_iter().map(|(_, v)| v).collect()
     }
 
-    /// What a variable with further dimensions holds at one entry.
+    /// The values of a variable with further dimensions at one entry.
     fn row(&self, name: &str, entry: &[usize]) -> Vec<f64> {
         let schema = self.store.schema();
         let place = schema.index_of(name).unwrap();
@@ -91,7 +85,7 @@ impl Swept {
     }
 
     fn summary(&self) -> Summary {
-        summary(&self.store).unwrap()
+        Summary::of(&self.store).unwrap()
     }
 }
 
@@ -103,25 +97,17 @@ fn paper(omega: f64, alpha1: f64) -> Case {
     })
 }
 
-fn seeded(count: usize) -> Starts {
-    Starts::Seeded {
-        count,
-        seed: 1,
-        sides: Vec::new(),
-    }
-}
-
-/// Period 1 doubles at Ω = 2.9137224181 (the project's list of numbers, N = 3, Eq. 26):
-/// just below the sweep must show period 2, just above period 1.
+/// Period 1 doubles at Ω = 2.9137224181 (reference list, N = 3, Eq. 26): just below it the sweep
+/// must show period 2, just above it period 1.
 #[test]
-fn the_doubling_is_where_it_is_known_to_be() {
+fn the_doubling_is_at_the_reference_value() {
     let swept = Swept::of(&paper(3.0, 0.1), &["omega=2.88:2.94:13"], |_| {});
     let omegas: Vec<f64> = (0..13).map(|k| 2.88 + 0.06 * f64::from(k) / 12.0).collect();
     for (omega, period) in omegas.iter().zip(swept.column("period")) {
         let expected = if *omega < 2.913_722_418_1 { 2.0 } else { 1.0 };
         assert_eq!(period, expected, "{omega}");
     }
-    // A multiplier goes out of the circle there: the closer, the weaker the stability.
+    // A multiplier leaves the unit circle there: the closer, the weaker the stability.
     let multipliers = swept.column("multiplier");
     assert!(multipliers.iter().all(|m| *m < 1.0));
     // The exponent of an orbit is that of its multipliers.
@@ -134,9 +120,9 @@ fn the_doubling_is_where_it_is_known_to_be() {
     }
 }
 
-/// At Ω = 3 the orbit's |μ| = 0.868606 (MODEL's numbers); its recording repeats.
+/// At Ω = 3 the orbit's |μ| = 0.868606 (reference value); its recording repeats.
 #[test]
-fn the_orbit_at_three_is_recorded_as_it_is() {
+fn the_orbit_at_three_is_recorded() {
     let swept = Swept::of(&paper(3.0, 0.1), &["omega=3:3:1"], |_| {});
     assert_eq!(swept.summary().periods.get(&1), Some(&1));
     assert!((swept.column("multiplier")[0] - 0.868_606).abs() < 1e-6);
@@ -164,9 +150,9 @@ fn the_orbit_at_three_is_recorded_as_it_is() {
 /// At Ω = 20, α1 = 0 a period-1 (W up to 0.7357) and a period-4 (W up to 3.0047)
 /// coexist; at α1 = 0.1 there is only a period-1 with W in [−0.41706, 1.75832].
 #[test]
-fn seeded_starts_find_what_coexists() {
+fn seeded_starts_find_coexisting_motions() {
     let subject = paper(20.0, 0.0);
-    let swept = Swept::of(&subject, &["alpha1=0:0.1:2"], |o| o.starts = seeded(12));
+    let swept = Swept::of(&subject, &["alpha1=0:0.1:2"], |o| o.starts = Some(12));
     let summary = swept.summary();
     assert_eq!(summary.counts["periodic"], 24, "{summary:?}");
     let (periods, tops, bottoms) = (
@@ -190,11 +176,11 @@ fn seeded_starts_find_what_coexists() {
     assert!(seen.contains(&(0, 1)) && seen.contains(&(0, 4)), "{seen:?}");
 }
 
-/// Ω = 2.6: chaos with a largest exponent of about 0.253 ± 0.01 a period.
+/// Ω = 2.6: chaos with a largest exponent of about 0.253 ± 0.01 per period.
 #[test]
-fn chaos_is_called_so_with_its_exponent() {
+fn chaos_is_reported_with_its_exponent() {
     let swept = Swept::of(&paper(2.6, 0.1), &["omega=2.6:2.6:1"], |o| {
-        o.starts = seeded(4);
+        o.starts = Some(4);
     });
     assert_eq!(swept.summary().counts["chaotic"], 4);
     let (values, errors) = (swept.column("lyapunov"), swept.column("lyapunov_error"));
@@ -208,13 +194,13 @@ fn chaos_is_called_so_with_its_exponent() {
     assert!(swept.column("multiplier").iter().all(|m| m.is_nan()));
 }
 
-/// A fixed transient records the run itself: it must be what a plain run shows.
+/// A fixed transient records the run itself: the result must be that of a plain run.
 #[test]
-fn a_given_transient_is_run_as_given() {
+fn a_given_transient_is_run_unchanged() {
     let subject = paper(2.6, 0.1);
     let swept = Swept::of(&subject, &["omega=2.6:2.6:1"], |o| {
         o.transient = Some(7);
-        o.starts = Starts::Given(vec![0.1, 0.0, 0.0, -0.2, 0.0, 0.0]);
+        o.state = Some(vec![0.1, 0.0, 0.0, -0.2, 0.0, 0.0]);
     });
     let model = subject.model().unwrap();
     let run = nanotap::study::simulate::simulate(
@@ -236,15 +222,16 @@ fn a_given_transient_is_run_as_given() {
     assert!((swept.column("tip_max")[0] - run.observables.tip_max).abs() < 1e-9);
 }
 
-/// At Ω = 20, α1 = 0 rest leads to one attractor; followed from the other's basin the
-/// other must stay, value after value: up and down show different motions.
+/// At Ω = 20, α1 = 0 a run from rest goes to one attractor. Followed from the basin of the other
+/// one, the other motion must persist from value to value: sweeps up and down show different
+/// motions.
 #[test]
-fn following_keeps_to_its_motion() {
+fn following_stays_on_its_motion() {
     let subject = paper(20.0, 0.0);
     // A state that leads to the period-4 orbit, from the seeded starts.
     let seeds = Swept::of(&subject, &["alpha1=0:0:1"], |o| {
-        o.starts = seeded(12);
-        o.strobe = 1;
+        o.starts = Some(12);
+        o.strobe = Some(1);
     });
     let on_four = seeds
         .column("period")
@@ -254,10 +241,10 @@ fn following_keeps_to_its_motion() {
     let state = seeds.row("strobe", &[0, on_four]);
     let both = Swept::of(&subject, &["alpha2=0.1:0.12:5"], |o| {
         o.follow = Follow::Both;
-        o.starts = Starts::Given(state);
+        o.state = Some(state);
     });
-    // α5 = 0: the model is homogeneous, so the motion scales with α2 and stays period 4
-    // wherever the start leads there; upwards it is followed from its own orbit.
+    // α5 = 0: the model is homogeneous, so the motion scales with α2 and remains period 4 if the
+    // start leads there; upwards it is followed from its own orbit.
     let periods = both.all("period");
     let up: Vec<f64> = periods
         .iter()
@@ -277,8 +264,8 @@ fn following_keeps_to_its_motion() {
     }
 }
 
-/// Modes can be swept, alone or beside another parameter; states of fewer modes are
-/// padded in their own columns.
+/// Modes can be swept, alone or with another parameter; states of fewer modes are padded in their
+/// own columns.
 #[test]
 fn the_number_of_modes_can_vary() {
     let swept = Swept::of(&paper(3.0, 0.1), &["modes=1:3:3", "omega=3:3.1:2"], |_| {});
@@ -287,7 +274,7 @@ fn the_number_of_modes_can_vary() {
     let first = &strobe[..6];
     assert!(first[0].is_finite() && first[3].is_finite());
     assert!([1, 2, 4, 5].iter().all(|k| first[*k].is_nan()));
-    // Three modes at Ω = 3 are MODEL's state.
+    // The reference state of three modes at Ω = 3.
     let last = swept.all("tip_max");
     assert!(last.iter().all(|(_, top)| top.is_finite()));
     assert!(
@@ -297,7 +284,7 @@ fn the_number_of_modes_can_vary() {
             .unwrap()
             .contains("period 1")
     );
-    // Following carries a state over to more modes and back.
+    // Following converts a state to more modes and back.
     let followed = Swept::of(&paper(3.0, 0.1), &["modes=1:3:3"], |o| {
         o.follow = Follow::Both;
     });
@@ -306,7 +293,7 @@ fn the_number_of_modes_can_vary() {
 
 /// The restitution model (gap 0, r = 0.8, ẍ + x = cos ωt) flips at ω = 2.6533477.
 #[test]
-fn the_impact_oscillator_flips_where_it_should() {
+fn the_impact_oscillator_flips_at_the_reference_value() {
     let oscillator = Oscillator {
         mass: 1.0,
         stiffness: 1.0,
@@ -336,74 +323,52 @@ fn pictures_are_drawn() {
 }
 
 #[test]
-fn impossible_sweeps_are_refused_before_anything_is_computed() {
+fn invalid_sweeps_are_refused_before_any_computation() {
     let subject = paper(2.6, 0.1);
-    let over = |text: &str| Over::parse(text, &subject).unwrap();
-    let refused = |over: Vec<Over>, change: &dyn Fn(&mut SweepOptions)| -> String {
-        let mut options = SweepOptions::new(over);
+    let refused = |over: &[&str], change: &dyn Fn(&mut SweepOptions)| -> String {
+        let mut options = SweepOptions::over(over.iter().copied());
         change(&mut options);
-        Sweep::new(subject.clone(), options)
-            .unwrap_err()
-            .to_string()
+        Sweep::new(&subject, options).unwrap_err().to_string()
     };
-    let omega = || vec![over("omega=2:4:10")];
+    let omega = || &["omega=2:4:10"];
     let keep = |_: &mut SweepOptions| {};
     for (message, word) in [
-        (refused(vec![], &keep), "one or two"),
+        (refused(&[], &keep), "one or two"),
+        (refused(&["omega=2:3:2", "omega=3:4:2"], &keep), "twice"),
         (
-            refused(vec![over("omega=2:3:2"), over("omega=3:4:2")], &keep),
-            "twice",
-        ),
-        (
-            refused(
-                vec![
-                    over("omega=2:3:2"),
-                    over("alpha1=0:1:2"),
-                    over("alpha2=0:1:2"),
-                ],
-                &keep,
-            ),
+            refused(&["omega=2:3:2", "alpha1=0:1:2", "alpha2=0:1:2"], &keep),
             "one or two",
         ),
-        (refused(vec![over("alpha4=-5:5:3")], &keep), "alpha4 = -5"),
-        (refused(vec![over("omega=0:4:3")], &keep), "`omega` = 0"),
+        (refused(&["alpha4=-5:5:3"], &keep), "alpha4 = -5"),
+        (refused(&["omega=0:4:3"], &keep), "`omega` = 0"),
         (refused(omega(), &|o| o.periods = 0), "0 periods"),
         (refused(omega(), &|o| o.max_period = 0), "longest period"),
-        (refused(omega(), &|o| o.starts = seeded(0)), "0 starts"),
+        (refused(omega(), &|o| o.starts = Some(0)), "0 starts"),
         (
-            refused(omega(), &|o| o.starts = Starts::Given(vec![0.0; 5])),
+            refused(omega(), &|o| o.state = Some(vec![0.0; 5])),
             "5 numbers where 6",
         ),
         (
-            refused(omega(), &|o| o.starts = Starts::Given(vec![f64::NAN; 6])),
+            refused(omega(), &|o| o.state = Some(vec![f64::NAN; 6])),
             "finite",
         ),
         (
             refused(omega(), &|o| {
-                let sides = vec![("a4".into(), 0.0, 1.0)];
-                o.starts = Starts::Seeded {
-                    count: 2,
-                    seed: 1,
-                    sides,
-                };
+                o.starts = Some(2);
+                o.sides = [("a4", 0.0, 1.0)].into_iter().collect();
             }),
             "a1, a2, a3",
         ),
         (
-            refused(vec![over("modes=1:3:3")], &|o| {
-                o.starts = Starts::Given(vec![0.0; 6]);
+            refused(&["modes=1:3:3"], &|o| {
+                o.state = Some(vec![0.0; 6]);
             }),
             "number of modes",
         ),
         (refused(omega(), &|o| o.periods = 1 << 40), "too many"),
+        (refused(omega(), &|o| o.periods = 90_000_000), "GiB"),
         (
-            refused(omega(), &|o| {
-                (o.periods, o.strobe) = (90_000_000, 90_000_000);
-            }),
-            "GiB",
-        ),
-        (
-            refused(vec![over("omega=2:4:100000")], &|o| {
+            refused(&["omega=2:4:100000"], &|o| {
                 o.follow = Follow::Up;
                 o.periods = 10_000;
             }),
@@ -412,12 +377,37 @@ fn impossible_sweeps_are_refused_before_anything_is_computed() {
     ] {
         assert!(message.contains(word), "{word}: {message}");
     }
-    let many = Sweep::new(
-        subject.clone(),
-        SweepOptions {
-            starts: seeded(usize::MAX),
-            ..SweepOptions::new(omega())
+    let many = refused(omega(), &|o| o.starts = Some(usize::MAX));
+    assert!(many.contains("too many"), "{many}");
+}
+
+/// Pressed onto a rigid stop by more than the drive takes off, k·|gap| > F, a mass rests on it, and
+/// else it bounces: at each gap of a sweep as alone, at gaps below and above zero.
+#[test]
+fn a_sweep_passes_from_rest_on_a_stop_to_impacts() {
+    let oscillator = |gap: f64| Oscillator {
+        mass: 1.0,
+        stiffness: 1.0,
+        damping: 0.1,
+        forcing: 0.6,
+        omega: 1.3,
+        gap,
+        stop: Stop::Rigid { restitution: 0.8 },
+    };
+    let swept = Swept::of(
+        &Case::from(oscillator(-1.0)),
+        &["gap=-1:0.5:4"],
+        |options| {
+            options.periods = 400;
         },
     );
-    assert!(matches!(many, Err(SweepError::TooMuch { .. })));
+    let amplitudes = swept.column("first_harmonic");
+    for (k, found) in amplitudes.into_iter().enumerate() {
+        let gap = -1.0 + 0.5 * k as f64;
+        let case = Case::from(oscillator(gap));
+        let alone = nanotap::study::orbit::orbit(&case.model().unwrap(), &OrbitOptions::default());
+        let alone = alone.unwrap().observables.first_harmonic;
+        assert!((found - alone).abs() < 1e-9, "{gap}: {found} {alone}");
+        assert_eq!(found == 0.0, gap <= -0.6, "{gap}");
+    }
 }

@@ -24,7 +24,7 @@ pub(super) fn page() -> String {
         } else {
             code(observable.si_name)
         };
-        let recorded = nanotap::observe::Set::COMMON.contains(observable);
+        let recorded = nanotap::observe::ObservableSet::COMMON.contains(observable);
         text += &row(&[
             code(observable.name),
             si_name,

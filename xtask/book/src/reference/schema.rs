@@ -72,17 +72,16 @@ pub(crate) fn range(schema: &Value) -> String {
             bound(&schema["maximum"])
         );
     }
-    let mut words = Vec::new();
-    for (name, sign) in [("minimum", "≥"), ("exclusiveMinimum", ">")] {
-        if !schema[name].is_null() {
-            words.push(format!("{sign} {}", bound(&schema[name])));
-        }
-    }
-    for (name, sign) in [("maximum", "≤"), ("exclusiveMaximum", "<")] {
-        if !schema[name].is_null() {
-            words.push(format!("{sign} {}", bound(&schema[name])));
-        }
-    }
+    let bounds = [
+        ("minimum", "≥"),
+        ("exclusiveMinimum", ">"),
+        ("maximum", "≤"),
+        ("exclusiveMaximum", "<"),
+    ];
+    let given = bounds.iter().filter(|(name, _)| !schema[*name].is_null());
+    let words: Vec<String> = given
+        .map(|(name, sign)| format!("{sign} {}", bound(&schema[*name])))
+        .collect();
     words.join(", ")
 }
 

@@ -1,5 +1,5 @@
-//! A case as written: tables of keys and values, each knowing where it stands,
-//! from a TOML file and from `key=value` words set beside it.
+//! A case as written: tables of keys and values with their places, from a TOML file and from
+//! `key=value` overrides.
 
 use std::ops::Range;
 
@@ -8,6 +8,7 @@ use toml::de::{DeTable, DeValue};
 use crate::case::force_table::table_of;
 use crate::case::table::Table;
 
+use super::json;
 use super::problem::{CaseFileError, Place, Problem, Source};
 
 /// A value as written.
@@ -21,12 +22,13 @@ pub enum Value {
     Text(String),
     /// An array of rows of one length.
     Rows(Table),
-    /// What no key takes: a boolean, a date, another array, a table. Its name, with article.
+    /// A type that no key accepts: a boolean, a date, another array, a table. Its name, with
+    /// article.
     Other(&'static str),
 }
 
 impl Value {
-    /// What it is, with article.
+    /// Name of the type, with article.
     pub const fn noun(&self) -> &'static str {
         match self {
             Self::Integer(_) | Self::Number(_) => "a number",
@@ -37,13 +39,13 @@ impl Value {
     }
 }
 
-/// In place of a value it takes the key away.
+/// Removes the key, in place of a value.
 const NOTHING: Value = Value::Other("nothing");
 
 /// One `key = value`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Entry {
-    /// The table that it stands in; empty at the top of a file.
+    /// The table that contains it; empty at the top of a file.
     pub table: String,
     /// The key, without its table.
     pub key: String,
@@ -51,14 +53,14 @@ pub struct Entry {
     pub value: Value,
     /// The value as written, for messages.
     pub written: String,
-    /// Where the key stands.
+    /// Place of the key.
     pub key_place: Place,
-    /// Where the value stands.
+    /// Place of the value.
     pub value_place: Place,
 }
 
 impl Entry {
-    /// The value as text; `None` where it is neither text nor a number.
+    /// The value as text; `None` if it is neither text nor a number.
     pub fn text(&self) -> Option<String> {
         match &self.value {
             Value::Text(text) => Some(text.clone()),
@@ -68,12 +70,12 @@ impl Entry {
         }
     }
 
-    /// Does it take its key away?
+    /// True if it removes its key.
     pub fn is_nothing(&self) -> bool {
         self.value == NOTHING
     }
 
-    /// Was it set beside the file?
+    /// True if it is an override.
     pub fn is_override(&self) -> bool {
         matches!(self.key_place, Place::Override(_))
     }
@@ -84,26 +86,31 @@ impl Entry {
 pub struct Header {
     /// The name between the brackets.
     pub name: String,
-    /// Where the name stands.
+    /// Place of the name.
     pub place: Place,
 }
 
-/// Everything that was written, in the order of writing, nothing judged yet.
+/// Everything that was written, in order, before validation.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Document {
-    /// The file, where there is one.
+    /// The file, if there is one.
     pub source: Option<Source>,
     /// Its tables.
     pub headers: Vec<Header>,
-    /// Its entries, then those set beside it.
+    /// The entries of the file, then the overrides.
     pub entries: Vec<Entry>,
+    /// The table `[scan]`, options of a study.
+    pub scan: Option<serde_json::Map<String, serde_json::Value>>,
 }
+
+/// The table of a case file that is options of the study of the same name.
+const SCAN: &str = "scan";
 
 impl Document {
     /// Reads a TOML text.
     ///
     /// # Errors
-    /// The text is not TOML; points at the place.
+    /// If the text is not TOML; points to the place.
     pub fn parse(source: Source) -> Result<Self, CaseFileError> {
         let mut document = Self::default();
         let (table, errors) = DeTable::parse_recoverable(&source.text);
@@ -117,7 +124,9 @@ impl Document {
         for (key, value) in table.get_ref() {
             let name: &str = key.get_ref();
             let place = Place::Span(key.span());
-            if let DeValue::Table(inner) = value.get_ref() {
+            if let (SCAN, DeValue::Table(inner)) = (name, value.get_ref()) {
+                document.scan = Some(json::table(inner));
+            } else if let DeValue::Table(inner) = value.get_ref() {
                 document.headers.push(Header {
                     name: name.to_owned(),
                     place,
@@ -142,12 +151,12 @@ impl Document {
         Ok(document)
     }
 
-    /// Adds a `key=value` set beside the file; a key without a table belongs to
-    /// `[model]`, and a value that is not TOML is text: `sample.stiffness=20 N/m`. No value
-    /// (`sample.modulus=`) takes the key away.
+    /// Adds a `key=value` override. A key without a table belongs to `[model]`, and a value that is
+    /// not TOML is text: `sample.stiffness=20 N/m`. An empty value (`sample.modulus=`) removes the
+    /// key.
     ///
     /// # Errors
-    /// There is no `=` or no key.
+    /// If there is no `=` or no key.
     pub fn set(&mut self, written: &str) -> Result<(), Problem> {
         let place = Place::Override(written.to_owned());
         let shape = "write a key and a value, as in omega=2.6";
@@ -158,6 +167,19 @@ impl Document {
         let (table, key) = name.split_once('.').unwrap_or(("model", name));
         if key.is_empty() || table.is_empty() {
             return Err(Problem::new(place, "no key before the `=`").help(shape));
+        }
+        if table.trim() == SCAN {
+            let read = DeValue::parse(value).map_or_else(
+                |_| {
+                    value
+                        .parse()
+                        .map_or_else(|_| value.into(), |x: f64| x.into())
+                },
+                |value| json::json(value.get_ref()),
+            );
+            let options = self.scan.get_or_insert_default();
+            json::put(options, key, (!value.is_empty()).then_some(read));
+            return Ok(());
         }
         let read = |value: &str| {
             DeValue::parse(value).map_or_else(
@@ -207,7 +229,7 @@ fn judge(value: &DeValue<'_>) -> Value {
     match value {
         DeValue::Integer(integer) => i64::from_str_radix(integer.as_str(), integer.radix())
             .map_or_else(
-                // Too long for a machine integer, it is still a number.
+                // Too long for a machine integer, but still a number.
                 |_| Value::Number(integer.as_str().parse().unwrap_or(f64::INFINITY)),
                 Value::Integer,
             ),
@@ -220,7 +242,7 @@ fn judge(value: &DeValue<'_>) -> Value {
     }
 }
 
-/// A value short enough to stand inside a sentence.
+/// A value shortened for use in a sentence.
 fn shortened(written: &str) -> String {
     const LONGEST: usize = 40;
     let line = written.lines().next().unwrap_or_default();
@@ -231,7 +253,7 @@ fn shortened(written: &str) -> String {
     format!("{start}…")
 }
 
-/// The TOML reader's own words, its place brought inside the text.
+/// The message of the TOML parser, with its place inside the text.
 fn not_toml(error: &toml::de::Error, text: &str) -> Problem {
     let boundary = |offset: usize| {
         let mut offset = offset.min(text.len());
@@ -246,8 +268,8 @@ fn not_toml(error: &toml::de::Error, text: &str) -> Problem {
     });
     let message = error.message().trim().replace('\n', ", ");
     if message.contains("duplicate key") {
-        return Problem::new(place, "the same key stands here twice")
-            .label("written before")
+        return Problem::new(place, "duplicate key")
+            .label("first given here")
             .help("keep one of the two");
     }
     Problem::new(place, format!("not TOML: {message}"))
@@ -304,7 +326,7 @@ mod tests {
         };
         let error = Document::parse(source).unwrap_err();
         assert!(
-            error.to_string().starts_with("c.toml:3:1: the same key"),
+            error.to_string().starts_with("c.toml:3:1: duplicate key"),
             "{error}"
         );
     }

@@ -8,11 +8,12 @@
 //! most `modes` and `cosine_term`. The keys are those of the table in
 //! [`key`](crate::case::key).
 //!
-//! Nothing is guessed: unknown keys, values of the wrong kind or out of range, missing
-//! and repeated keys are all reported at once, each with its place and a remedy. What is set
-//! beside a file replaces there what says the same in another way.
+//! Nothing is guessed: unknown keys, values of the wrong type or out of range, missing and repeated
+//! keys are all reported at once, each with its place and a remedy. An override also replaces
+//! alternatives of its key in the file.
 
 mod document;
+mod json;
 mod problem;
 mod reader;
 mod refusal;
@@ -22,18 +23,18 @@ use std::path::Path;
 
 pub use document::{Document, Entry, Header};
 pub use problem::{CaseFileError, Place, Problem, SHOWN, Source};
-pub(crate) use reader::{Described, cosine_term, modes, parse, word};
+pub(crate) use reader::{Described, modes, parse_with_scan, word};
 
 use toml::de::{DeTable, DeValue};
 
 use super::force_table::{ForceTable, file_named};
-use super::{Case, Kind, Value, What};
+use super::{Case, CaseKind, Kind, Value};
 use crate::case::key::Key;
 use crate::model::cantilever::{Cantilever, CosineTerm};
 use crate::model::contact::ContactLaw;
 use crate::model::drive_form::Actuation;
 
-/// No case file comes near; a larger file is something else.
+/// Case files are much smaller.
 const LARGEST_FILE: u64 = 1 << 20;
 
 /// A dimensionless cantilever as a case file, every key written out.
@@ -67,13 +68,13 @@ pub fn to_toml(case: &Cantilever) -> String {
 }
 
 impl Case {
-    /// The case as a file that is read back as the same: every number of the equations, or what
-    /// was stated in physical quantities.
+    /// The case as a file that is read back as the same case: all numbers of the equations, or the
+    /// stated physical quantities.
     pub fn to_toml(&self) -> String {
         use std::fmt::Write as _;
         let quantities = match &self.what {
-            What::Cantilever(cantilever) => return to_toml(cantilever),
-            What::Oscillator(oscillator) => {
+            CaseKind::Cantilever(cantilever) => return to_toml(cantilever),
+            CaseKind::Oscillator(oscillator) => {
                 let mut text = format!("[model]\nkind = \"{}\"\n", self.model_kind().name());
                 for (key, value) in self
                     .keys()
@@ -84,7 +85,7 @@ impl Case {
                 }
                 return text;
             }
-            What::Quantities(quantities) => quantities,
+            CaseKind::Quantities(quantities) => quantities,
         };
         let mut text = String::new();
         let mut section = None;
@@ -103,11 +104,11 @@ impl Case {
     }
 }
 
-/// Reads the text of a case file. A force curve that it names, by a path relative to it, stands
-/// in the text as an array: nothing else of a case is ever read from disk.
+/// Reads the text of a case file. A force table that it names, by a path relative to the case file,
+/// becomes an array in the text: nothing else of a case is read from disk.
 ///
 /// # Errors
-/// When there is none, it cannot be read or is no text, or its force curve is none.
+/// If the file or its force table does not exist, cannot be read or is invalid.
 pub fn read(path: &Path) -> Result<Source, CaseFileError> {
     let source = text_of(path)?;
     let Some((span, name)) = table_named(&source.text) else {
@@ -122,11 +123,10 @@ pub fn read(path: &Path) -> Result<Source, CaseFileError> {
     Ok(Source { text, ..source })
 }
 
-/// The `key=value` words of a command line, with the rows of the force curve that one of them
-/// names in place of its name.
+/// Replaces the name of a force table in the `key=value` words of a command line by its rows.
 ///
 /// # Errors
-/// When it is no force curve.
+/// If it is not a force table.
 pub fn with_tables(words: &[String]) -> Result<Vec<String>, CaseFileError> {
     let key = Key::SampleTable.path();
     let word = |word: &String| {
@@ -147,7 +147,7 @@ pub fn with_tables(words: &[String]) -> Result<Vec<String>, CaseFileError> {
     words.iter().map(word).collect()
 }
 
-/// The force curve in a file, named at `place`.
+/// Reads the force table in a file, named at `place`.
 fn table(path: &Path, place: Place) -> Result<ForceTable, Problem> {
     ForceTable::read(path).map_err(|error| {
         let help = if error.remedy.is_empty() {
@@ -161,7 +161,7 @@ fn table(path: &Path, place: Place) -> Result<ForceTable, Problem> {
     })
 }
 
-/// The file that the text of a case names as its force curve, and where.
+/// The file that the text of a case names as its force table, and its place.
 fn table_named(text: &str) -> Option<(std::ops::Range<usize>, String)> {
     let (tables, _) = DeTable::parse_recoverable(text);
     let section = tables.get_ref().get(Key::SampleTable.section().name())?;
@@ -175,6 +175,23 @@ fn table_named(text: &str) -> Option<(std::ops::Range<usize>, String)> {
     Some((value.span(), file_named(name)?.to_owned()))
 }
 
+/// The text of a file of at most so many bytes.
+///
+/// # Errors
+/// When it cannot be read, is longer, or is not text.
+pub(crate) fn text_within(path: &Path, limit: u64) -> Result<String, crate::Error> {
+    let name = path.display();
+    let mut bytes = Vec::new();
+    std::fs::File::open(path)
+        .and_then(|file| file.take(limit + 1).read_to_end(&mut bytes))
+        .map_err(|error| crate::Error::files(format!("{name}: cannot be read: {error}")))?;
+    let refuse = |what: String| crate::Error::input(format!("{name}: {what}"), "name a CSV file");
+    if bytes.len() as u64 > limit {
+        return Err(refuse(format!("longer than {limit} bytes")));
+    }
+    String::from_utf8(bytes).map_err(|_| refuse("not text in UTF-8".into()))
+}
+
 fn text_of(path: &Path) -> Result<Source, CaseFileError> {
     let name = path.display().to_string();
     let refuse = |why: String, help: &str| {
@@ -185,14 +202,14 @@ fn text_of(path: &Path) -> Result<Source, CaseFileError> {
     };
     let what = "name a TOML file with a case in it";
     if path.is_dir() {
-        return Err(refuse("this is a folder".into(), what));
+        return Err(refuse("is a folder".into(), what));
     }
     let mut bytes = Vec::new();
     let read = std::fs::File::open(path)
         .and_then(|file| file.take(LARGEST_FILE + 1).read_to_end(&mut bytes));
     match read {
         Err(error) if error.kind() == std::io::ErrorKind::NotFound => {
-            return Err(refuse("there is no such file".into(), what));
+            return Err(refuse("no such file".into(), what));
         }
         Err(error) => return Err(refuse(format!("cannot be read: {error}"), what)),
         Ok(_) if bytes.len() as u64 > LARGEST_FILE => {

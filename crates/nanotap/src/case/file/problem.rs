@@ -1,15 +1,15 @@
-//! What is wrong with a case, where it stands and what would be right.
+//! Problems of a case: what is wrong, where, and the remedy.
 //!
-//! The terminal draws these with the line of the file beneath them; Python raises
-//! them with the words of their `Display`.
+//! The terminal shows them with the line of the file; Python raises them with the text of their
+//! `Display`.
 
 use std::fmt;
 use std::ops::Range;
 
-/// A text that problems point into.
+/// A text to which problems point.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Source {
-    /// What the reader calls it: the path as it was given.
+    /// Name for messages: the path as given.
     pub name: String,
     /// The whole text.
     pub text: String,
@@ -25,19 +25,19 @@ impl Source {
     }
 }
 
-/// Where a problem lies.
+/// Place of a problem.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Place {
     /// These bytes of the case file.
     Span(Range<usize>),
-    /// A `key=value` that was set beside the file, as it was written.
+    /// A `key=value` override, as written.
     Override(String),
     /// The case as a whole.
     Whole,
 }
 
 impl Place {
-    /// Where it stands in the order of reading.
+    /// Position in the order of reading.
     pub(super) fn offset(&self) -> usize {
         match self {
             Self::Span(span) => span.start,
@@ -46,20 +46,20 @@ impl Place {
     }
 }
 
-/// One thing that is wrong.
+/// A problem of a case.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Problem {
-    /// Where it stands.
+    /// Its place.
     pub place: Place,
     /// What is wrong, with the key and the value as written.
     pub message: String,
-    /// A few words to stand under the place itself; may be empty.
+    /// A short label under the place; may be empty.
     pub label: String,
-    /// What would be right.
+    /// The remedy.
     pub help: Option<String>,
-    /// The key that it is about, as `section.key` of a physical case.
+    /// The key concerned, as `section.key` for a physical case.
     pub key: Option<&'static str>,
-    /// `key=value` words that would do, after the help.
+    /// `key=value` words that solve the problem, shown after the help.
     pub words: Vec<String>,
 }
 
@@ -76,28 +76,28 @@ impl Problem {
         }
     }
 
-    /// The same about a key.
+    /// Sets the key concerned.
     #[must_use]
     pub const fn key(mut self, key: Option<&'static str>) -> Self {
         self.key = key;
         self
     }
 
-    /// The same, with `key=value` words that would do after the help.
+    /// Sets `key=value` words that solve the problem.
     #[must_use]
     pub fn words(mut self, words: Vec<String>) -> Self {
         self.words = words;
         self
     }
 
-    /// The same, with words that stand under the place.
+    /// Sets the label under the place.
     #[must_use]
     pub fn label(mut self, label: impl Into<String>) -> Self {
         self.label = label.into();
         self
     }
 
-    /// The same, saying what would be right.
+    /// Sets the remedy.
     #[must_use]
     pub fn help(mut self, help: impl Into<String>) -> Self {
         self.help = Some(help.into());
@@ -105,22 +105,21 @@ impl Problem {
     }
 }
 
-/// Most problems that are shown of one case: whoever mends these sees the others next.
+/// Largest number of problems that are shown for one case.
 pub const SHOWN: usize = 20;
 
-/// A case that cannot be used: what is wrong with it, in the order in which it stands in
-/// the file.
+/// A case that cannot be used: its problems, in the order of the file.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct CaseFileError {
-    /// The case file, where there is one and it could be read.
+    /// The case file, if it exists and could be read.
     pub source: Option<Source>,
     /// From one to [`SHOWN`] problems.
     pub problems: Vec<Problem>,
-    /// How many more there are.
+    /// Number of further problems.
     pub more: usize,
 }
 
-/// Problems as they are found; of those beyond [`SHOWN`] only the number is kept.
+/// Problems in the order of discovery; those beyond [`SHOWN`] are only counted.
 #[derive(Debug, Default)]
 pub(super) struct Problems {
     pub(super) found: Vec<Problem>,
@@ -128,7 +127,7 @@ pub(super) struct Problems {
 }
 
 impl Problems {
-    /// Adds one, worked out only where it will be shown.
+    /// Adds a problem, which is created only if it will be shown.
     pub(super) fn add(&mut self, problem: impl FnOnce() -> Problem) {
         if self.found.len() < SHOWN {
             self.found.push(problem());
@@ -152,7 +151,7 @@ impl CaseFileError {
         }
     }
 
-    /// All of `problems`, sorted by where they stand.
+    /// An error with all `problems`, sorted by place.
     pub fn all(source: Option<Source>, mut problems: Vec<Problem>) -> Self {
         let more = problems.len().saturating_sub(SHOWN);
         problems.sort_by_key(|problem| match &problem.place {
@@ -168,7 +167,7 @@ impl CaseFileError {
         }
     }
 
-    /// Those that were collected.
+    /// An error with the collected problems.
     pub(super) fn of(source: Option<Source>, problems: Problems) -> Self {
         let error = Self::all(source, problems.found);
         Self {
@@ -212,10 +211,10 @@ impl std::error::Error for CaseFileError {}
 
 impl From<CaseFileError> for crate::Error {
     fn from(error: CaseFileError) -> Self {
-        use crate::error::{ErrorPlace, ErrorProblem, SourceText};
+        use crate::error::{ErrorPlace, ErrorProblem, SourceText, cut};
         let place = |place| match place {
             Place::Span(span) => ErrorPlace::Span(span),
-            Place::Override(written) => ErrorPlace::Override(written),
+            Place::Override(written) => ErrorPlace::Override(cut(written)),
             Place::Whole => ErrorPlace::Whole,
         };
         let in_file = error.source.is_some();
@@ -229,7 +228,7 @@ impl From<CaseFileError> for crate::Error {
             .into_iter()
             .map(|problem| ErrorProblem {
                 place: place(problem.place),
-                message: problem.message,
+                message: cut(problem.message),
                 label: problem.label,
                 remedy: problem.help.map(|help| remedy(help, &problem.words)),
             })

@@ -1,4 +1,4 @@
-//! What a document says, key by key, and what that describes.
+//! Interpretation of a document, key by key.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -16,7 +16,8 @@ use crate::model::drive_form::Actuation;
 use crate::model::oscillator::{Oscillator, OscillatorParameter, Stop};
 use crate::model::parameter::Parameter;
 
-/// What a case file and the words beside it describe.
+/// The content of a case file and its overrides.
+#[expect(clippy::large_enum_variant, reason = "cases are few")]
 #[derive(Debug)]
 pub(crate) enum Described {
     /// A dimensionless cantilever, every number checked.
@@ -27,18 +28,23 @@ pub(crate) enum Described {
     Physical(Stated),
 }
 
-/// The entries that count, by key.
+/// The effective entries by key.
 type Known<'a> = BTreeMap<Key, &'a Entry>;
 
-/// Reads a text, if there is one, and puts the `key=value` words of `overrides` in place of
-/// what it says.
+/// A case and its table `[scan]`, if it has one.
+pub(crate) type DescribedWithScan = (
+    Described,
+    Option<serde_json::Map<String, serde_json::Value>>,
+);
+
+/// Reads a text, if there is one, with the `key=value` words of `overrides`.
 ///
 /// # Errors
-/// Everything that is wrong with the text and the words, each with its place.
-pub(crate) fn parse(
+/// All problems of the text and the words, each with its place.
+pub(crate) fn parse_with_scan(
     source: Option<Source>,
     overrides: &[String],
-) -> Result<Described, CaseFileError> {
+) -> Result<DescribedWithScan, CaseFileError> {
     let mut document = source.map_or_else(|| Ok(Document::default()), Document::parse)?;
     let mut problems = Problems::default();
     for written in overrides {
@@ -47,12 +53,12 @@ pub(crate) fn parse(
         }
     }
     match described(&document, &mut problems) {
-        Some(described) if problems.is_empty() => Ok(described),
+        Some(described) if problems.is_empty() => Ok((described, document.scan)),
         _ => Err(CaseFileError::of(document.source, problems)),
     }
 }
 
-/// What `document` describes, as far as its problems let it be built.
+/// The content of `document`, if its problems allow.
 fn described(document: &Document, problems: &mut Problems) -> Option<Described> {
     refusal::misplaced(document, problems);
     let all_placed = problems.is_empty();
@@ -107,8 +113,8 @@ fn kind_of(document: &Document, problems: &mut Problems) -> ModelKind {
     })
 }
 
-/// The entries by key. What is set beside the file replaces what the file says, the same or
-/// in another way; one key by two of its names is refused.
+/// The entries by key. Overrides replace the entries of the file and alternatives of their keys;
+/// one key under two names is refused.
 fn known<'a>(document: &'a Document, kind: ModelKind, problems: &mut Problems) -> Known<'a> {
     let mut known = Known::new();
     for entry in &document.entries {
@@ -143,23 +149,23 @@ fn known<'a>(document: &'a Document, kind: ModelKind, problems: &mut Problems) -
         let Some(before) = known.insert(key, entry) else {
             continue;
         };
-        let beside = before.is_override() && before.key != entry.key;
-        if beside || !entry.is_override() {
+        let overrides = before.is_override() && before.key != entry.key;
+        if overrides || !entry.is_override() {
             problems.add(|| refusal::same_key(before, entry));
         }
     }
     known
 }
 
-/// What the file says and a key that was set beside it takes the place of, unless it was taken
-/// away by its own name.
+/// Entries of the file that an override of another key replaces, unless they were removed by their
+/// own name.
 fn replaced(document: &Document, known: &Known<'_>) -> Vec<Replaced> {
     let set = known.iter().filter(|(_, entry)| entry.is_override());
     let others = set.flat_map(|(&by, _)| by.alternatives().map(move |(key, _)| (by, key)));
     let mut found: Vec<Replaced> = Vec::new();
     for (by, key) in others {
         let named = |entry: &&Entry| entry.table == key.section().name() && entry.key == key.name();
-        // The last that is said of a key counts.
+        // The last entry of a key counts.
         let entry = document.entries.iter().rev().find(named);
         if let Some(entry) = entry
             && !entry.is_override()
@@ -173,7 +179,7 @@ fn replaced(document: &Document, known: &Known<'_>) -> Vec<Replaced> {
     found
 }
 
-/// The values of `known`, each checked by itself, and where they were said.
+/// The values of `known`, each checked separately, with their places.
 fn stated(document: &Document, known: &Known<'_>, problems: &mut Problems) -> Stated {
     let mut stated = Stated::default();
     let mut origin = Origin {
@@ -266,7 +272,7 @@ fn physical_value(key: Key, entry: &Entry) -> Result<Value, Problem> {
 }
 
 impl Key {
-    /// What is wrong with a value of a physical key, by itself.
+    /// The reason why a value of a physical key is invalid, if it is.
     pub(crate) fn objection(self, value: &Value) -> Option<&'static str> {
         let Value::Number(number, kind) = value else {
             return None;
@@ -283,7 +289,7 @@ impl Key {
     }
 }
 
-/// The variant that a stated word names; the default where none is stated.
+/// The variant that a stated word names; the default if none is stated.
 pub(crate) fn word<T: core::default::Default + std::str::FromStr>(
     stated: &Stated,
     key: Key,
@@ -291,14 +297,6 @@ pub(crate) fn word<T: core::default::Default + std::str::FromStr>(
     match stated.get(key) {
         Some(Value::Word(word)) => word.parse().ok(),
         _ => Some(T::default()),
-    }
-}
-
-/// Which form of Eq. (14) is stated.
-pub(crate) fn cosine_term(stated: &Stated) -> CosineTerm {
-    match stated.get(Key::CosineTerm) {
-        Some(Value::Word(word)) if *word == CosineTerm::Printed.name() => CosineTerm::Printed,
-        _ => CosineTerm::Corrected,
     }
 }
 
@@ -321,7 +319,7 @@ fn cantilever(
         alpha5: 0.0,
         contact: law,
         actuation: word::<Actuation>(stated, Key::Actuation)?,
-        cosine_term: cosine_term(stated),
+        cosine_term: word(stated, Key::CosineTerm)?,
         tone2_ratio: match stated.get(Key::Tone2Ratio) {
             Some(Value::Ratio(ratio)) => Some(*ratio),
             _ => None,

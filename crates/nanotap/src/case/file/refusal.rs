@@ -1,4 +1,4 @@
-//! What is wrong with a case file, in words that say what would be right.
+//! Error messages of case files, with remedies.
 
 use std::collections::BTreeMap;
 
@@ -9,7 +9,7 @@ use crate::case::near_name::near_name;
 use crate::case::stated::quoted;
 use crate::model::contact::ContactLaw;
 
-/// Refuses keys outside any table, and tables that there are not.
+/// Refuses keys outside tables, and unknown tables.
 pub(super) fn misplaced(document: &Document, problems: &mut Problems) {
     let names = Section::ALL.map(Section::name);
     let unknown_table = |name: &str, place: &Place, shown: &str| {
@@ -36,9 +36,9 @@ pub(super) fn misplaced(document: &Document, problems: &mut Problems) {
         .collect();
     if let Some(first) = homeless.first() {
         let others = match homeless.len() - 1 {
-            0 => String::from("stands"),
-            1 => String::from("and one more key stand"),
-            more => format!("and {more} more keys stand"),
+            0 => String::from("is"),
+            1 => String::from("and one more key are"),
+            more => format!("and {more} more keys are"),
         };
         let problem = Problem::new(
             first.key_place.clone(),
@@ -59,7 +59,7 @@ pub(super) fn misplaced(document: &Document, problems: &mut Problems) {
     }
 }
 
-/// A word that is none of the `allowed` ones.
+/// A word that is not one of the `allowed` ones.
 pub(super) fn not_among(entry: &Entry, text: &str, allowed: &[&'static str]) -> Problem {
     let list = quoted(allowed);
     let problem = Problem::new(
@@ -123,7 +123,7 @@ pub(super) fn unknown_physical_key(section: Section, entry: &Entry) -> Problem {
     }
 }
 
-/// A physical case may say how it is modelled, not what the dimensionless numbers are.
+/// A physical case may state modelling options, but not dimensionless numbers.
 pub(super) fn mixed(
     section: Section,
     kind: ModelKind,
@@ -167,7 +167,7 @@ pub(super) fn mixed(
     });
 }
 
-/// Refuses the same said in two ways.
+/// Refuses alternatives that are stated together.
 pub(super) fn twice(known: &BTreeMap<Key, &Entry>, problems: &mut Problems) {
     for (&key, entry) in known {
         for (other, reason) in key.alternatives() {
@@ -181,14 +181,14 @@ pub(super) fn twice(known: &BTreeMap<Key, &Entry>, problems: &mut Problems) {
     }
 }
 
-/// The problem of keys that are not there, all in one.
+/// One problem for all missing keys.
 pub(super) fn missing(
     document: &Document,
     kind: ModelKind,
     law: ContactLaw,
     known: &BTreeMap<Key, &Entry>,
 ) -> Option<Problem> {
-    // A key that was misspelt is not missing.
+    // A misspelt key is not missing.
     let meant: Vec<Key> = document
         .entries
         .iter()
@@ -214,13 +214,13 @@ pub(super) fn missing(
     let names: Vec<&str> = missing.iter().map(|key| key.name()).collect();
     let list = names.join(", ");
     let message = if document.source.is_some() && document.entries.is_empty() {
-        format!("an empty case: it lacks {list}")
+        format!("empty case: missing {list}")
     } else if document.source.is_some() {
         format!("the case lacks {list}")
     } else if document.entries.is_empty() {
         "no case was given".to_owned()
     } else {
-        format!("without a case file the keys must say all that has no default; it lacks {list}")
+        format!("no case file: set every required key; missing: {list}")
     };
     let help = if document.source.is_some() {
         "write them under [model], for example"
@@ -236,7 +236,7 @@ pub(super) fn missing(
     Some(problem)
 }
 
-/// The number of an entry of `[model]`, or the problem that it is none.
+/// The number of an entry of `[model]`, or the problem that it is not a number.
 pub(super) fn number(entry: &Entry) -> Result<f64, Problem> {
     let refuse = |what: String| Problem::new(entry.value_place.clone(), what).label("not a number");
     let Entry { key, written, .. } = entry;
@@ -292,13 +292,13 @@ pub(super) fn count(entry: &Entry, most: usize) -> Result<usize, Problem> {
     })
 }
 
-/// A value that its key does not allow.
+/// A value outside the range of its key.
 pub(super) fn out_of_range(entry: &Entry, reason: &str) -> Problem {
     let message = format!("`{}` = {}: {reason}", entry.key, entry.written);
     Problem::new(entry.value_place.clone(), message).label("out of range")
 }
 
-/// The printed cosine term beside a drive that is not through the base.
+/// The printed cosine term without base actuation.
 pub(super) fn printed_term(entry: &Entry) -> Problem {
     Problem::new(
         entry.value_place.clone(),

@@ -1,20 +1,24 @@
-//! The keys of a case, each declared here and nowhere else: its names, what it takes, which
-//! values are allowed, its default, and what it is. Parsing, refusals, sweeps and branches,
-//! units in messages, `nanotap case`, Python's keyword arguments and the JSON schema read
-//! this table.
+//! The keys of a case, each declared once: names, type, allowed values, default, meaning. Parsing,
+//! messages, sweeps and branches, units, `nanotap case`, Python's keyword arguments, the JSON
+//! schema and the explorer's controls read this table.
 //!
-//! A new dimensionless number is an entry here and a field of the equations; a new physical
-//! quantity is an entry here and the line of the mapping that reads it.
+//! Keys of a cantilever's numbers come from the table of
+//! [parameters](crate::model::parameter), keys of a contact law from the law's file. A new
+//! physical quantity is an entry here, and the line of the mapping that reads it.
 
-use super::{Alternatives, Default, Entry, Means, ModelKind, Range, Section, Takes};
+use std::sync::LazyLock;
+
+use super::{
+    Alternatives, Default, Entry, Key, Laws, Means, ModelKind, Range, Section, Takes, kind_of,
+};
 use crate::case::DEFAULT_MODES;
 use crate::case::quantity::Kind;
 use crate::model::beam::MAX_MODES;
 use crate::model::cantilever::CosineTerm;
-use crate::model::contact::ContactLaw;
+use crate::model::contact::{ContactLaw, OWN_KEYS};
 use crate::model::drive_form::Actuation;
 use crate::model::oscillator::OscillatorParameter as Of;
-use crate::model::parameter::Parameter;
+use crate::model::parameter::{Parameter, SampleKey};
 
 const CANTILEVER: &[ModelKind] = &[ModelKind::Cantilever];
 const SOFT: &[ModelKind] = &[ModelKind::VibroImpact];
@@ -33,19 +37,43 @@ const PLAIN: Entry = Entry {
     models: &[],
     means: Means::Nothing,
     feeds: None,
+    laws: Laws::All,
+    law_parameter: None,
     meaning: "",
 };
 
-/// A parameter of the cantilever.
-const fn number(parameter: Parameter, symbol: &'static str, meaning: &'static str) -> Entry {
+/// The key of a parameter of the cantilever.
+fn number(parameter: Parameter) -> Entry {
+    let entry = parameter.entry();
     Entry {
-        name: parameter.name(),
-        symbol,
+        name: entry.name,
+        alias: entry.alias,
+        symbol: entry.symbol,
+        default: match entry.default {
+            None => Default::None,
+            Some(value) => Default::Number(value),
+        },
+        example: entry.example,
         models: CANTILEVER,
         means: Means::Cantilever(parameter),
-        meaning,
+        meaning: entry.meaning,
         ..PLAIN
     }
+}
+
+/// The key of `[sample]` for a number that belongs to one contact law.
+fn of_law(parameter: Parameter) -> Option<Entry> {
+    let entry = parameter.entry();
+    let Some(SampleKey::Own { meaning, zero }) = entry.stated_by else {
+        return None;
+    };
+    let range = if zero { R::NOT_NEGATIVE } else { R::POSITIVE };
+    let kind = kind_of(entry.unit, Actuation::Base);
+    Some(
+        quantity(Sample, entry.name, kind, range, meaning)
+            .feeds(parameter)
+            .under(Laws::Some),
+    )
 }
 
 /// A parameter of an oscillator.
@@ -100,7 +128,7 @@ const fn quantity(
     }
 }
 
-/// Something of a physical case that is no quantity.
+/// An entry of a physical case that is not a quantity.
 const fn other(section: Section, name: &'static str, takes: Takes, meaning: &'static str) -> Entry {
     Entry {
         section,
@@ -112,13 +140,6 @@ const fn other(section: Section, name: &'static str, takes: Takes, meaning: &'st
 }
 
 impl Entry {
-    const fn also(self, alias: &'static str) -> Self {
-        Self {
-            alias: Some(alias),
-            ..self
-        }
-    }
-
     const fn or(self, value: f64) -> Self {
         Self {
             default: Default::Number(value),
@@ -133,6 +154,17 @@ impl Entry {
     const fn feeds(self, parameter: Parameter) -> Self {
         Self {
             feeds: Some(parameter),
+            ..self
+        }
+    }
+
+    const fn under(self, laws: Laws) -> Self {
+        Self { laws, ..self }
+    }
+
+    const fn called(self, law_parameter: &'static str) -> Self {
+        Self {
+            law_parameter: Some(law_parameter),
             ..self
         }
     }
@@ -170,93 +202,58 @@ macro_rules! words {
 }
 
 macro_rules! keys {
-    ($($key:ident = $entry:expr;)*) => {
-        /// A key of a case.
-        #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-        #[expect(missing_docs, reason = "what each is stands in its entry")]
-        pub enum Key { $($key),* }
-
-        pub(super) static TABLE: &[Entry] = &[$($entry),*];
-
+    ($($group:ident from $first:expr => { $($key:ident = $entry:expr;)* })*) => {
+        #[expect(non_upper_case_globals, reason = "named as the variants of an enum")]
+        #[expect(missing_docs, reason = "each entry has a meaning")]
         impl Key {
-            /// Every key, in the order of the table.
-            pub fn all() -> impl Iterator<Item = Self> + Clone {
-                const ALL: &[Key] = &[$(Key::$key),*];
-                ALL.iter().copied()
-            }
+            $($(pub const $key: Self = Self(($first + $group::$key as usize) as u8);)*)*
         }
+        $(
+            enum $group { $($key),* }
+            impl $group {
+                const ENTRIES: &[Entry] = &[$($entry),*];
+            }
+        )*
     };
 }
 
+#[expect(non_upper_case_globals, reason = "named as the variants of an enum")]
+#[expect(missing_docs, reason = "each parameter has a meaning")]
+impl Key {
+    pub const Alpha1: Self = Self::of(Parameter::Alpha1);
+    pub const Alpha2: Self = Self::of(Parameter::Alpha2);
+    pub const Alpha3: Self = Self::of(Parameter::Alpha3);
+    pub const Alpha4: Self = Self::of(Parameter::Alpha4);
+    pub const Alpha5: Self = Self::of(Parameter::Alpha5);
+    pub const Alpha6: Self = Self::of(Parameter::Alpha6);
+    pub const Omega: Self = Self::of(Parameter::Omega);
+}
+
+/// Index of the first key after those of contact laws.
+const AFTER_LAWS: usize = Parameter::COUNT + Before::ENTRIES.len() + OWN_KEYS;
+
+pub(super) static TABLE: LazyLock<Vec<Entry>> = LazyLock::new(|| {
+    let numbers = Parameter::every().map(number);
+    let before = numbers.chain(Before::ENTRIES.iter().copied());
+    let of_laws = before.chain(Parameter::every().filter_map(of_law));
+    of_laws.chain(After::ENTRIES.iter().copied()).collect()
+});
+
 use Kind::{
     Angle, ChargeDensity, Damping, Density, Energy, Force, Frequency, Length, Mass, Number,
-    Pressure, Repulsion, Stiffness, Time, Viscosity, Voltage,
+    Pressure, Repulsion, Stiffness, Viscosity, Voltage,
 };
 use Range as R;
 use Section::{Cantilever, Drive, Gap, Sample, Tip};
 
 keys! {
-    Alpha1 = number(Parameter::Alpha1, "α₁", "tip mass over beam mass, M/(mL)")
-        .also("tip_mass_ratio").such_as(0.1);
-    Alpha2 = number(Parameter::Alpha2, "α₂", "drive amplitude over beam gap, f/g0")
-        .also("drive_amplitude").such_as(0.1);
-    Alpha3 = number(Parameter::Alpha3, "α₃", "viscous damping of the beam, C·√(L⁴/(m·EI))")
-        .also("beam_damping").such_as(0.1);
-    Alpha4 = number(Parameter::Alpha4, "α₄", "contact stiffness over bending stiffness, K1·L³/(EI)")
-        .also("contact_stiffness").such_as(20.0);
-    Alpha5 = number(Parameter::Alpha5, "α₅", "tip gap over beam gap, g1/g0 (negative: pressed in at rest)")
-        .also("gap").or(0.0);
-    Alpha6 = number(Parameter::Alpha6, "α₆", "viscous damping of the contact, (C1/L)·√(L⁴/(m·EI))")
-        .also("contact_damping").such_as(0.2);
-    Omega = number(Parameter::Omega, "Ω", "drive frequency, ω·√(mL⁴/(EI))")
-        .also("drive_frequency").such_as(2.6);
-    RelaxationStiffness = number(
-        Parameter::RelaxationStiffness, "kₘ",
-        "stiffness of the relaxing arm over bending stiffness, km·L³/(EI)",
-    ).such_as(20.0);
-    RelaxationTime = number(
-        Parameter::RelaxationTime, "τₘ", "time in which the arm's force decays, over √(mL⁴/(EI))",
-    ).such_as(0.1);
-    SurfaceStiffness = number(
-        Parameter::SurfaceStiffness, "kₛ", "a moving surface's own stiffness over bending stiffness, ks·L³/(EI)",
-    ).such_as(10.0);
-    SurfaceDamping = number(
-        Parameter::SurfaceDamping, "ηₛ", "a moving surface's own damping, (ηs/L)·√(L⁴/(m·EI))",
-    ).such_as(1.0);
-    AdhesionForce = number(
-        Parameter::AdhesionForce, "F", "force that pulls a touching tip to a moving surface, F·L³/(EI·g0)",
-    ).or(0.0);
-    Tone2Amplitude = number(
-        Parameter::Tone2Amplitude, "A₂", "amplitude of the second tone, measured as alpha2",
-    ).also("second_tone_amplitude").or(0.0);
-    Tone2Phase = number(Parameter::Tone2Phase, "θ₂", "phase of the second tone in degrees")
-        .also("second_tone_phase").or(0.0);
-
-    Mode2Frequency = number(
-        Parameter::Mode2Frequency, "Ω₂", "measured frequency of the second free mode, as omega (0: the beam's own)",
-    ).or(0.0);
-    Mode3Frequency = number(
-        Parameter::Mode3Frequency, "Ω₃", "measured frequency of the third free mode, as omega (0: the beam's own)",
-    ).or(0.0);
-    Mode2Quality = number(
-        Parameter::Mode2Quality, "Q₂", "measured quality factor of the second free mode (0: as beam_damping has it)",
-    ).or(0.0);
-    Mode3Quality = number(
-        Parameter::Mode3Quality, "Q₃", "measured quality factor of the third free mode (0: as beam_damping has it)",
-    ).or(0.0);
-    Mode2Stiffness = number(
-        Parameter::Mode2Stiffness, "k₂", "measured stiffness of the second free mode at the tip, k2·L³/(EI) (0: the beam's own)",
-    ).or(0.0);
-    Mode3Stiffness = number(
-        Parameter::Mode3Stiffness, "k₃", "measured stiffness of the third free mode at the tip, k3·L³/(EI) (0: the beam's own)",
-    ).or(0.0);
-
+Before from Parameter::COUNT => {
     Mass = oscillator(Of::Mass, "m", OSCILLATORS, "mass").or(1.0);
     Stiffness = oscillator(Of::Stiffness, "k", OSCILLATORS, "spring");
     Damping = oscillator(Of::Damping, "c", OSCILLATORS, "damper").such_as(0.0);
     Forcing = oscillator(Of::Forcing, "F", OSCILLATORS, "amplitude of the force F cos ωt");
     OscillatorOmega = oscillator(Of::Omega, "ω", OSCILLATORS, "frequency of the force").such_as(2.5);
-    OscillatorGap = oscillator(Of::Gap, "gap", OSCILLATORS, "where the stop stands; contact at x ≥ gap")
+    OscillatorGap = oscillator(Of::Gap, "gap", OSCILLATORS, "position of the stop; contact at x ≥ gap")
         .such_as(0.0);
     StopStiffness = oscillator(Of::ContactStiffness, "k₁", SOFT, "spring of the stop").such_as(20.0);
     StopDamping = oscillator(Of::ContactDamping, "c₁", SOFT, "damper of the stop").such_as(0.2);
@@ -318,14 +315,14 @@ keys! {
     TipShape = other(Tip, "shape", Takes::Word(&["cone", "pyramid", "sphere"]), "a solid tip, whose mass follows from its density")
         .feeds(Parameter::Alpha1);
     TipHeight = quantity(Tip, "height", Length, R::POSITIVE, "height of the tip: what separates the beam from the sample when it touches");
-    TipHalfAngle = quantity(Tip, "half_angle", Angle, FLANK, "angle between the tip's axis and its flank");
+    TipHalfAngle = quantity(Tip, "half_angle", Angle, FLANK, "angle between the tip's axis and its flank").called("half_angle");
     TipDensity = quantity(Tip, "density", Density, R::POSITIVE, "density of the tip");
-    TipRadius = quantity(Tip, "radius", Length, R::POSITIVE, "radius of curvature of the apex");
+    TipRadius = quantity(Tip, "radius", Length, R::POSITIVE, "radius of curvature of the apex").called("radius");
     TipMaterial = other(Tip, "material", Takes::MaterialName, "a material of the catalogue");
-    TipModulus = quantity(Tip, "modulus", Pressure, R::POSITIVE, "Young's modulus of the tip");
-    TipPoisson = quantity(Tip, "poisson", Number, POISSON, "Poisson's ratio of the tip");
+    TipModulus = quantity(Tip, "modulus", Pressure, R::POSITIVE, "Young's modulus of the tip").called("tip_modulus");
+    TipPoisson = quantity(Tip, "poisson", Number, POISSON, "Poisson's ratio of the tip").called("tip_poisson");
 
-    TipCharge = quantity(Tip, "charge", ChargeDensity, R::ANY, "surface charge density of the tip (dlvo)");
+    TipCharge = quantity(Tip, "charge", ChargeDensity, R::ANY, "surface charge density of the tip (dlvo)").under(Laws::Nonlinear).called("tip_charge");
 
     SampleLaw = other(
         Sample, "law", Takes::Law,
@@ -334,57 +331,46 @@ keys! {
     SampleTable = other(
         Sample, "table", Takes::Table,
         "force curve of sample.law = \"table\": rows of gap and force, or a CSV file of them",
-    );
-    SampleGapFactor = quantity(Sample, "gap_factor", Number, R::POSITIVE, "factor by which a table's gaps are stretched").or(1.0);
-    SampleForceFactor = quantity(Sample, "force_factor", Number, R::NOT_NEGATIVE, "factor of a table's forces").or(1.0);
-    SampleMaterial = other(Sample, "material", Takes::MaterialName, "a material of the catalogue");
+    ).under(Laws::Nonlinear);
+    SampleGapFactor = quantity(Sample, "gap_factor", Number, R::POSITIVE, "factor by which a table's gaps are stretched").or(1.0).under(Laws::Nonlinear);
+    SampleForceFactor = quantity(Sample, "force_factor", Number, R::NOT_NEGATIVE, "factor of a table's forces").or(1.0).under(Laws::Nonlinear);
+    SampleMaterial = other(Sample, "material", Takes::MaterialName, "a material of the catalogue").under(Laws::Some);
     SampleStiffness = quantity(Sample, "stiffness", Stiffness, R::NOT_NEGATIVE, "contact stiffness K1")
-        .feeds(Parameter::Alpha4);
+        .feeds(Parameter::Alpha4).under(Laws::Some);
     SampleDamping = quantity(Sample, "damping", Damping, R::NOT_NEGATIVE, "contact damping C1")
-        .feeds(Parameter::Alpha6);
+        .feeds(Parameter::Alpha6).under(Laws::Some);
     SampleLossTangent = quantity(Sample, "loss_tangent", Number, R::NOT_NEGATIVE, "C1 ω/K1 at the drive frequency")
-        .feeds(Parameter::Alpha6);
-    SampleRelaxationStiffness = quantity(
-        Sample, "relaxation_stiffness", Stiffness, R::NOT_NEGATIVE,
-        "stiffness of a standard linear solid's relaxing arm",
-    ).feeds(Parameter::RelaxationStiffness);
-    SampleRelaxationTime = quantity(
-        Sample, "relaxation_time", Time, R::NOT_NEGATIVE, "time in which the arm's force decays",
-    ).feeds(Parameter::RelaxationTime);
-    SampleSurfaceStiffness = quantity(
-        Sample, "surface_stiffness", Stiffness, R::POSITIVE, "a moving surface's own stiffness",
-    ).feeds(Parameter::SurfaceStiffness);
-    SampleSurfaceDamping = quantity(
-        Sample, "surface_damping", Damping, R::POSITIVE, "a moving surface's own damping",
-    ).feeds(Parameter::SurfaceDamping);
+        .feeds(Parameter::Alpha6).under(Laws::Some);
+}
+After from AFTER_LAWS => {
     SampleModulus = quantity(Sample, "modulus", Pressure, R::POSITIVE, "Young's modulus of the sample")
-        .feeds(Parameter::Alpha4);
-    SamplePoisson = quantity(Sample, "poisson", Number, POISSON, "Poisson's ratio of the sample");
+        .feeds(Parameter::Alpha4).under(Laws::Some);
+    SamplePoisson = quantity(Sample, "poisson", Number, POISSON, "Poisson's ratio of the sample").under(Laws::Some);
     SampleIndentation = quantity(
         Sample, "indentation", Length, R::POSITIVE, "indentation at which Hertz's stiffness is taken",
-    ).feeds(Parameter::Alpha4);
+    ).feeds(Parameter::Alpha4).under(Laws::Some);
 
-    SampleHamaker = quantity(Sample, "hamaker", Energy, R::ANY, "Hamaker constant of tip, medium and sample");
-    SampleWorkOfAdhesion = quantity(Sample, "work_of_adhesion", Stiffness, R::NOT_NEGATIVE, "work of adhesion, an energy an area");
+    SampleHamaker = quantity(Sample, "hamaker", Energy, R::ANY, "Hamaker constant of tip, medium and sample").under(Laws::Nonlinear).called("attraction");
+    SampleWorkOfAdhesion = quantity(Sample, "work_of_adhesion", Stiffness, R::NOT_NEGATIVE, "work of adhesion, an energy an area").under(Laws::Nonlinear);
     SampleWorkOfRetraction = quantity(
         Sample, "work_of_retraction", Stiffness, R::NOT_NEGATIVE, "work of adhesion on retraction (adhesion-hysteresis)",
-    );
+    ).under(Laws::Nonlinear);
     SampleAdhesionForce = quantity(Sample, "adhesion_force", Force, R::NOT_NEGATIVE, "force that pulls the tip off")
-        .feeds(Parameter::AdhesionForce);
+        .under(Laws::Nonlinear);
     SampleIntermolecularDistance = quantity(
         Sample, "intermolecular_distance", Length, R::POSITIVE, "intermolecular distance a0, the gap at which contact begins",
-    );
-    SampleViscosity = quantity(Sample, "viscosity", Viscosity, R::NOT_NEGATIVE, "viscosity of the sample");
-    SampleThickness = quantity(Sample, "thickness", Length, R::POSITIVE, "thickness of a thin sample on its support");
-    SampleDecayLength = quantity(Sample, "decay_length", Length, R::POSITIVE, "distance in which exponential damping decays");
-    SampleSurfaceTension = quantity(Sample, "surface_tension", Stiffness, R::POSITIVE, "surface tension of the liquid (capillary)");
-    SampleFilmThickness = quantity(Sample, "film_thickness", Length, R::POSITIVE, "thickness of the adsorbed film (capillary)");
-    SampleSurfaceEnergy = quantity(Sample, "surface_energy", Stiffness, R::POSITIVE, "surface energy of the solid (capillary)");
-    SampleVoltage = quantity(Sample, "voltage", Voltage, R::ANY, "voltage between tip and sample (electrostatic)");
-    SamplePermittivity = quantity(Sample, "permittivity", Number, R::POSITIVE, "permittivity of the medium over that of free space");
-    SampleDebyeLength = quantity(Sample, "debye_length", Length, R::POSITIVE, "Debye length of the electrolyte (dlvo)");
-    SampleCharge = quantity(Sample, "charge", ChargeDensity, R::ANY, "surface charge density of the sample (dlvo)");
-    SampleRepulsion = quantity(Sample, "repulsion", Repulsion, R::NOT_NEGATIVE, "constant of the repulsion (lennard-jones)");
+    ).under(Laws::Nonlinear).called("contact_distance");
+    SampleViscosity = quantity(Sample, "viscosity", Viscosity, R::NOT_NEGATIVE, "viscosity of the sample").under(Laws::Nonlinear);
+    SampleThickness = quantity(Sample, "thickness", Length, R::POSITIVE, "thickness of a thin sample on its support").under(Laws::Nonlinear);
+    SampleDecayLength = quantity(Sample, "decay_length", Length, R::POSITIVE, "distance in which exponential damping decays").under(Laws::Nonlinear);
+    SampleSurfaceTension = quantity(Sample, "surface_tension", Stiffness, R::POSITIVE, "surface tension of the liquid (capillary)").under(Laws::Nonlinear);
+    SampleFilmThickness = quantity(Sample, "film_thickness", Length, R::POSITIVE, "thickness of the adsorbed film (capillary)").under(Laws::Nonlinear);
+    SampleSurfaceEnergy = quantity(Sample, "surface_energy", Stiffness, R::POSITIVE, "surface energy of the solid (capillary)").under(Laws::Nonlinear);
+    SampleVoltage = quantity(Sample, "voltage", Voltage, R::ANY, "voltage between tip and sample (electrostatic)").under(Laws::Nonlinear);
+    SamplePermittivity = quantity(Sample, "permittivity", Number, R::POSITIVE, "permittivity of the medium over that of free space").under(Laws::Nonlinear);
+    SampleDebyeLength = quantity(Sample, "debye_length", Length, R::POSITIVE, "Debye length of the electrolyte (dlvo)").under(Laws::Nonlinear);
+    SampleCharge = quantity(Sample, "charge", ChargeDensity, R::ANY, "surface charge density of the sample (dlvo)").under(Laws::Nonlinear).called("sample_charge");
+    SampleRepulsion = quantity(Sample, "repulsion", Repulsion, R::NOT_NEGATIVE, "constant of the repulsion (lennard-jones)").under(Laws::Nonlinear);
 
     DriveFrequency = quantity(Drive, "frequency", Frequency, R::POSITIVE, "frequency of the drive")
         .feeds(Parameter::Omega);
@@ -418,8 +404,9 @@ keys! {
         .feeds(Parameter::Alpha5);
     GapBeam = quantity(Gap, "beam", Length, R::POSITIVE, "gap between beam and sample at rest, g0, the unit of length");
 }
+}
 
-/// Quantities that say the same in different ways.
+/// Alternative quantities.
 pub(super) static ALTERNATIVES: &[Alternatives] = &[
     Alternatives {
         ways: &[&[Key::LeverQ], &[Key::FluidDensity, Key::FluidViscosity]],

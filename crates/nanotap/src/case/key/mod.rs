@@ -1,7 +1,6 @@
-//! A key of a case: what it is called, what it takes, and which keys say the same.
+//! Keys of a case: names, types and alternatives.
 //!
-//! The entries themselves stand in `keys`, once. Whatever reads, checks,
-//! varies, explains or documents a key asks here.
+//! The entries are in `keys`; parsing, checks, sweeps, help and documentation use them.
 
 mod keys;
 
@@ -14,54 +13,38 @@ use serde::{Serialize, Serializer};
 
 use super::near_name::near_name;
 use super::quantity::Kind;
-use crate::model::cantilever;
 use crate::model::contact::ContactLaw;
-use crate::model::oscillator::{self, OscillatorParameter};
-use crate::model::parameter::Parameter;
-pub use keys::Key;
+use crate::model::drive_form::Actuation;
+use crate::model::oscillator::OscillatorParameter;
+use crate::model::parameter::{Applies, Parameter, Unit};
+use crate::model::words::words;
 use keys::{ALTERNATIVES, TABLE};
 
-/// A table of a case file.
+/// A key of a case: an index into the table of keys.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub enum Section {
-    /// `[model]`: dimensionless numbers.
-    Model,
-    /// `[cantilever]`
-    Cantilever,
-    /// `[tip]`
-    Tip,
-    /// `[sample]`
-    Sample,
-    /// `[drive]`
-    Drive,
-    /// `[gap]`
-    Gap,
+pub struct Key(u8);
+
+words! {
+    /// A table of a case file.
+    #[derive(PartialOrd, Ord)]
+    Section {
+        /// `[model]`: dimensionless numbers.
+        Model = "model",
+        /// `[cantilever]`
+        Cantilever = "cantilever",
+        /// `[tip]`
+        Tip = "tip",
+        /// `[sample]`
+        Sample = "sample",
+        /// `[drive]`
+        Drive = "drive",
+        /// `[gap]`
+        Gap = "gap",
+    }
 }
 
 impl Section {
-    /// Every section.
-    pub const ALL: [Self; 6] = [
-        Self::Model,
-        Self::Cantilever,
-        Self::Tip,
-        Self::Sample,
-        Self::Drive,
-        Self::Gap,
-    ];
-
-    /// Its name, without brackets.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Model => "model",
-            Self::Cantilever => "cantilever",
-            Self::Tip => "tip",
-            Self::Sample => "sample",
-            Self::Drive => "drive",
-            Self::Gap => "gap",
-        }
-    }
-
-    /// The section of this name.
+    /// The section with this name.
     pub fn find(name: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|section| section.name() == name)
     }
@@ -77,44 +60,32 @@ impl Section {
     }
 }
 
-/// What `[model]` describes, by its key `kind`.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
-pub enum ModelKind {
-    /// The cantilever.
-    #[default]
-    Cantilever,
-    /// An oscillator with a soft stop.
-    VibroImpact,
-    /// An oscillator with a rigid stop.
-    Impact,
+words! {
+    /// Kind of model, from the key `kind` of `[model]`.
+    ModelKind {
+        /// The cantilever.
+        Cantilever = "cantilever",
+        /// An oscillator with a soft stop.
+        VibroImpact = "vibro_impact",
+        /// An oscillator with a rigid stop.
+        Impact = "impact",
+    }
 }
 
 impl ModelKind {
-    /// Every kind.
-    pub const ALL: [Self; 3] = [Self::Cantilever, Self::VibroImpact, Self::Impact];
-
-    /// The word of the key `kind`.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Cantilever => "cantilever",
-            Self::VibroImpact => "vibro_impact",
-            Self::Impact => "impact",
-        }
-    }
-
-    /// The keys that `[model]` takes for it, numbers first.
+    /// The keys of `[model]` for this kind, numbers first.
     pub fn keys(self) -> impl Iterator<Item = Key> + Clone {
         Key::all().filter(move |key| key.entry().models.contains(&self))
     }
 
-    /// Every name of its keys, aliases too.
+    /// All names of its keys, including aliases.
     pub fn names(self) -> impl Iterator<Item = &'static str> + Clone {
         let names = self.keys().map(Key::name);
         names.chain(self.keys().filter_map(Key::alias))
     }
 
-    /// The key that is called `word`. Of a cantilever's numbers case does not matter, nor do
-    /// hyphens and blanks in place of underscores, and their symbols are names too.
+    /// The key called `word`. For the numbers of a cantilever case is ignored, hyphens and spaces
+    /// are accepted in place of underscores, and their symbols are names too.
     pub fn key(self, word: &str) -> Option<Key> {
         let exact = |key: &Key| key.name() == word || key.alias() == Some(word);
         if let Some(key) = self.keys().find(exact) {
@@ -131,13 +102,13 @@ impl ModelKind {
         })
     }
 
-    /// The name of a key that `word` was probably meant to be.
+    /// The most similar name of a key, for suggestions.
     pub fn near(self, word: &str) -> Option<&'static str> {
         near_name(word, self.names())
     }
 }
 
-/// α₄ as it is typed: α4.
+/// Replaces subscripts: α₄ becomes α4.
 fn without_subscripts(symbol: &str) -> String {
     symbol
         .chars()
@@ -149,7 +120,7 @@ fn without_subscripts(symbol: &str) -> String {
         .collect()
 }
 
-/// What a key takes.
+/// Type of a key's value.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Takes {
     /// A quantity of this kind; in `[model]` a plain number.
@@ -172,18 +143,18 @@ pub enum Takes {
     Table,
 }
 
-/// The values that a number may have.
+/// Range of a number.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Range {
-    /// Least value.
+    /// Smallest value.
     pub low: f64,
-    /// Greatest value.
+    /// Largest value.
     pub high: f64,
-    /// Whether the least value itself is excluded.
+    /// Whether the smallest value is excluded.
     pub above: bool,
-    /// Whether the greatest value itself is excluded.
+    /// Whether the largest value is excluded.
     pub below: bool,
-    /// What is said of a value outside.
+    /// Error message for a value outside the range.
     pub reason: &'static str,
 }
 
@@ -210,7 +181,7 @@ impl Range {
         ..Self::ANY
     };
 
-    /// Whether it has `value`.
+    /// True if the range contains `value`.
     pub fn contains(&self, value: f64) -> bool {
         let high = if self.above {
             value > self.low
@@ -226,10 +197,10 @@ impl Range {
     }
 }
 
-/// What a key has when nothing is said.
+/// Default value of a key.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Default {
-    /// It must be said, or follows from others.
+    /// It must be stated, or follows from other keys.
     None,
     /// This number.
     Number(f64),
@@ -237,7 +208,7 @@ pub enum Default {
     Word(&'static str),
 }
 
-/// The number of the equations that a dimensionless key is.
+/// The number of the equations that a key sets.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Means {
     /// None: a physical quantity, a word.
@@ -248,45 +219,76 @@ pub enum Means {
     Oscillator(OscillatorParameter),
 }
 
-/// What is known of a key.
+/// Entry of the table of keys.
 #[derive(Clone, Copy, Debug)]
 pub struct Entry {
-    /// The table of the case file that it stands in.
+    /// Its table in the case file.
     pub section: Section,
-    /// Its name there.
+    /// Name in its table.
     pub name: &'static str,
-    /// A second name.
+    /// Second name.
     pub alias: Option<&'static str>,
-    /// How a formula or an axis writes it; empty for its path.
+    /// Symbol in formulas and on axes; if empty, its path.
     pub symbol: &'static str,
-    /// What it takes.
+    /// Type of its value.
     pub takes: Takes,
-    /// The values that are allowed.
+    /// Range of its value.
     pub range: Range,
-    /// What it has when nothing is said.
+    /// Default value.
     pub default: Default,
-    /// A value to show.
+    /// Example value.
     pub example: f64,
-    /// Which kinds of `[model]` take it.
+    /// Kinds of `[model]` to which it belongs.
     pub models: &'static [ModelKind],
-    /// The number of the equations that it is.
+    /// The number of the equations that it sets.
     pub means: Means,
-    /// The parameter that becomes impossible when a physical quantity is: named in refusals.
+    /// The dimensionless parameter that it determines, named in error messages.
     pub feeds: Option<Parameter>,
-    /// What it is, in one line.
+    /// Contact laws to which a quantity of tip or sample belongs.
+    pub laws: Laws,
+    /// The parameter of nonlinear laws that it states, if its name differs.
+    pub law_parameter: Option<&'static str>,
+    /// Description in one line.
     pub meaning: &'static str,
 }
 
-/// Quantities that each say the same in another way: at most one of the ways is stated.
+/// Contact laws to which a key belongs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Laws {
+    /// Every law, or none: it does not describe the contact.
+    All,
+    /// Some laws, linear ones among them.
+    Some,
+    /// Some nonlinear laws.
+    Nonlinear,
+}
+
+/// The kind of quantity with this unit, for this actuation.
+pub const fn kind_of(unit: Unit, actuation: Actuation) -> Kind {
+    match unit {
+        Unit::Number => Kind::Number,
+        Unit::Mass => Kind::Mass,
+        Unit::Time => Kind::Time,
+        Unit::Frequency => Kind::Frequency,
+        Unit::Stiffness => Kind::Stiffness,
+        Unit::Damping => Kind::Damping,
+        Unit::Force => Kind::Force,
+        Unit::Drive if !matches!(actuation, Actuation::Base) => Kind::Force,
+        Unit::Length | Unit::Drive => Kind::Length,
+        Unit::Degrees => Kind::Angle,
+    }
+}
+
+/// Alternatives, of which at most one may be stated.
 #[derive(Debug)]
 pub struct Alternatives {
-    /// The ways, each one or more keys that go together.
+    /// The alternatives, each with one or more keys that belong together.
     pub ways: &'static [&'static [Key]],
-    /// Why not two.
+    /// Why two exclude each other.
     pub reason: &'static str,
 }
 
-/// Names with their tables, `cantilever.k`, of every key.
+/// Paths of all keys, such as `cantilever.k`.
 static PATHS: LazyLock<Vec<String>> = LazyLock::new(|| {
     let path = |entry: &Entry| match entry.section {
         Section::Model => entry.name.to_owned(),
@@ -296,9 +298,14 @@ static PATHS: LazyLock<Vec<String>> = LazyLock::new(|| {
 });
 
 impl Key {
-    /// What is known of it.
+    /// All keys, in the order of the table.
+    pub fn all() -> impl Iterator<Item = Self> + Clone {
+        (0..TABLE.len() as u8).map(Self)
+    }
+
+    /// Entry of the table.
     pub fn entry(self) -> &'static Entry {
-        &TABLE[self as usize]
+        &TABLE[usize::from(self.0)]
     }
 
     /// Its table.
@@ -306,22 +313,22 @@ impl Key {
         self.entry().section
     }
 
-    /// Its name in its table: `k`.
+    /// Name in its table: `k`.
     pub fn name(self) -> &'static str {
         self.entry().name
     }
 
-    /// Its name in the whole case: `alpha1`, `cantilever.k`.
+    /// Path in the case: `alpha1`, `cantilever.k`.
     pub fn path(self) -> &'static str {
-        &PATHS[self as usize]
+        &PATHS[usize::from(self.0)]
     }
 
-    /// Its second name.
+    /// Second name.
     pub fn alias(self) -> Option<&'static str> {
         self.entry().alias
     }
 
-    /// How a figure's axis writes it.
+    /// Symbol on the axis of a figure.
     pub fn symbol(self) -> &'static str {
         match self.entry().symbol {
             "" => self.path(),
@@ -329,12 +336,12 @@ impl Key {
         }
     }
 
-    /// What it is, in one line.
+    /// Description in one line.
     pub fn meaning(self) -> &'static str {
         self.entry().meaning
     }
 
-    /// What its values measure; a number where they measure nothing.
+    /// Kind of quantity of its values; a number if they are not quantities.
     pub fn kind(self) -> Kind {
         match self.entry().takes {
             Takes::Quantity(kind) => kind,
@@ -342,12 +349,12 @@ impl Key {
         }
     }
 
-    /// Whether it is a quantity of a physical case.
+    /// True if it is a quantity of a physical case.
     pub fn is_physical(self) -> bool {
         self.section().is_physical()
     }
 
-    /// The cantilever's parameter that it is.
+    /// The parameter of the cantilever that it sets.
     pub fn parameter(self) -> Option<Parameter> {
         match self.entry().means {
             Means::Cantilever(parameter) => Some(parameter),
@@ -355,7 +362,7 @@ impl Key {
         }
     }
 
-    /// The oscillator's parameter that it is.
+    /// The parameter of the oscillator that it sets.
     pub fn oscillator_parameter(self) -> Option<OscillatorParameter> {
         match self.entry().means {
             Means::Oscillator(parameter) => Some(parameter),
@@ -364,10 +371,32 @@ impl Key {
     }
 
     /// The key of a parameter of the cantilever.
-    pub fn of(parameter: Parameter) -> Self {
-        let is = |key: &Self| key.entry().means == Means::Cantilever(parameter);
-        // A test sees that every parameter has its key.
-        Self::all().find(is).unwrap_or(Self::Alpha1)
+    pub const fn of(parameter: Parameter) -> Self {
+        // The table begins with the parameters.
+        Self(parameter.index() as u8)
+    }
+
+    /// The key that states a parameter of nonlinear laws.
+    pub(crate) fn of_law_parameter(name: &str) -> Option<Self> {
+        let is = |key: &Self| match key.entry().law_parameter {
+            Some(other) if other == name => true,
+            _ => key.section() == Section::Sample && key.name() == name,
+        };
+        Self::all().find(is)
+    }
+
+    /// The key of `[sample]` that states a number of a linear contact law.
+    pub(crate) fn stating(number: Parameter) -> Option<Self> {
+        Section::Sample
+            .keys()
+            .find(|key| key.name() == number.name())
+    }
+
+    /// The number of a linear contact law that it states, of a key of `[sample]`.
+    pub(crate) fn law_number(self) -> Option<Parameter> {
+        let stated = |of: &Parameter| of.entry().stated_by.is_some() && of.name() == self.name();
+        let number = Parameter::every().find(stated);
+        number.filter(|_| self.section() == Section::Sample)
     }
 
     /// The key of a parameter of an oscillator.
@@ -376,12 +405,12 @@ impl Key {
         Self::all().find(is).unwrap_or(Self::Mass)
     }
 
-    /// The values that are allowed.
+    /// Range of its value.
     pub fn range(self) -> Range {
         let (low, high) = match self.entry().means {
             Means::Nothing => return self.entry().range,
-            Means::Cantilever(parameter) => cantilever::range(parameter),
-            Means::Oscillator(parameter) => oscillator::range(parameter),
+            Means::Cantilever(parameter) => parameter.entry().range,
+            Means::Oscillator(parameter) => parameter.range(),
         };
         Range {
             low,
@@ -392,14 +421,14 @@ impl Key {
         }
     }
 
-    /// The physical key that is called `section.name`.
+    /// The physical key with the path `section.name`.
     pub fn find(path: &str) -> Option<Self> {
         let (section, name) = path.split_once('.')?;
         let section = Section::find(section).filter(|section| section.is_physical())?;
         section.keys().find(|key| key.name() == name)
     }
 
-    /// Why its values cannot vary along a range, where they cannot.
+    /// The reason why it cannot vary, if it cannot.
     pub fn cannot_vary(self) -> Option<&'static str> {
         match self.entry().takes {
             Takes::Quantity(_) => None,
@@ -416,7 +445,7 @@ impl Key {
         }
     }
 
-    /// The keys that say the same in another way, and why no two of the ways go together.
+    /// Its alternatives, and the reason why they exclude each other.
     pub fn alternatives(self) -> impl Iterator<Item = (Self, &'static str)> {
         ALTERNATIVES
             .iter()
@@ -427,14 +456,14 @@ impl Key {
             })
     }
 
-    /// Its value where it need not be written, with a sample of this law.
+    /// Its default value with a sample of this law.
     pub(crate) fn default_under(self, law: ContactLaw) -> Option<f64> {
-        let solid = law == ContactLaw::StandardLinearSolid;
-        let moves = law == ContactLaw::MovingSurface;
-        match (self, self.entry().default) {
-            (Self::Alpha6, _) if solid => Some(0.0),
-            (Self::RelaxationStiffness | Self::RelaxationTime, _) if !solid => Some(0.0),
-            (Self::SurfaceStiffness | Self::SurfaceDamping, _) if !moves => Some(0.0),
+        match (
+            self.parameter().map(|of| of.entry().applies),
+            self.entry().default,
+        ) {
+            (Some(Applies::Damper), _) if !law.has_damper() => Some(0.0),
+            (Some(Applies::Law(other)), _) if other != law => Some(0.0),
             (_, Default::Number(value)) => Some(value),
             _ => None,
         }
@@ -563,5 +592,60 @@ mod tests {
     fn a_range_has_its_ends_or_not() {
         assert!(!Range::POSITIVE.contains(0.0) && Range::NOT_NEGATIVE.contains(0.0));
         assert!(!Range::ANY.contains(f64::NAN) && !Range::ANY.contains(f64::INFINITY));
+    }
+
+    /// The entry of a number of a contact law is all that files, messages, mapping, documents and
+    /// schema need.
+    #[test]
+    fn a_number_of_a_contact_law_is_one_entry() {
+        let schema = crate::case::schema::schema().to_value();
+        for law in ContactLaw::ALL {
+            let numbers: Vec<Parameter> = Parameter::of_law(law).collect();
+            let mut words = vec![
+                "cantilever.k=2 N/m".to_owned(),
+                "cantilever.f0=70 kHz".to_owned(),
+                "cantilever.Q=200".to_owned(),
+                format!("sample.law={law}"),
+                "sample.stiffness=5 N/m".to_owned(),
+                "drive.frequency=70 kHz".to_owned(),
+                "drive.free_amplitude=10 nm".to_owned(),
+                "gap.tip=8 nm".to_owned(),
+            ];
+            for &number in &numbers {
+                let key = Key::stating(number).unwrap();
+                words.push(format!("{key}={}", key.kind().example()));
+            }
+            let case = crate::case::Case::parse(None, &words).unwrap();
+            let view = case.physical().unwrap();
+            let document = crate::case::document::CaseDocument::of(&case);
+            let document = serde_json::to_value(document).unwrap();
+            for &number in &numbers {
+                let (name, key) = (number.name(), Key::stating(number).unwrap());
+                let expected = key.kind().parse(key.kind().example()).unwrap();
+                assert_eq!(case.get(key), expected, "{key}");
+                assert!(
+                    (document["physical"][name].as_f64().unwrap() / expected - 1.0).abs() < 1e-14
+                );
+                assert_eq!(document[name].as_f64().unwrap(), case.get(Key::of(number)));
+                let row = view
+                    .mapping()
+                    .into_iter()
+                    .find(|row| row.parameter == number);
+                assert!(!row.unwrap().formula.is_empty(), "{key}");
+                for (table, key) in [("model", Key::of(number)), ("sample", key)] {
+                    let described = &schema["properties"][table]["properties"][name];
+                    assert_eq!(described["description"], key.meaning(), "{key}");
+                    assert_eq!(case.key(key.path()).ok(), Some(key), "{key}");
+                }
+                assert!(case.to_toml().contains(&format!("\n{name} = ")), "{key}");
+                // Any other law refuses it by name.
+                let other = words.iter().filter(|word| !word.starts_with("sample.law"));
+                let other: Vec<String> = other.cloned().collect();
+                let refused = crate::case::Case::parse(None, &other)
+                    .unwrap_err()
+                    .to_string();
+                assert!(refused.contains(law.name()), "{refused}");
+            }
+        }
     }
 }

@@ -1,5 +1,5 @@
-//! Real levers and materials by name, from `catalogue.toml` beside this file and from files
-//! of the user's own in the same format:
+//! Levers and materials by name, from `catalogue.toml` in this folder and from users' files in the
+//! same format:
 //!
 //! ```toml
 //! [lever."my lever"]
@@ -15,6 +15,7 @@
 //! ```
 
 use std::collections::BTreeMap;
+use std::fmt;
 use std::path::Path;
 use std::sync::{Arc, LazyLock};
 
@@ -25,14 +26,15 @@ use super::elastic::Elastic;
 use super::error::PhysicalError;
 use crate::case::key::Key;
 use crate::case::near_name::near_names;
-use crate::case::quantity::{Kind, QuantityError};
+use crate::case::quantity::Kind;
 
-/// A lever as its box describes it. No quality factor: that depends on what surrounds it.
+/// A lever as in its data sheet. The quality factor is not included, because it depends on the
+/// medium.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Lever {
     /// Its name.
     pub name: String,
-    /// Other names it answers to.
+    /// Alternative names.
     pub aliases: Vec<String>,
     /// Spring constant in N/m.
     pub k: f64,
@@ -45,7 +47,7 @@ pub struct Lever {
     pub tip_radius: Option<f64>,
     /// Height of the tip in m.
     pub tip_height: Option<f64>,
-    /// Where the numbers come from.
+    /// Source of the numbers.
     pub source: String,
 }
 
@@ -54,61 +56,34 @@ pub struct Lever {
 pub struct Material {
     /// Its name.
     pub name: String,
-    /// Other names it answers to.
+    /// Alternative names.
     pub aliases: Vec<String>,
     /// Young's modulus and Poisson's ratio.
     #[serde(flatten)]
     pub elastic: Elastic,
-    /// Density in kg/m³, where a tip may be made of it.
+    /// Density in kg/m³, if tips are made of it.
     pub density: Option<f64>,
-    /// Where the numbers come from.
+    /// Source of the numbers.
     pub source: String,
 }
 
-/// Why a catalogue cannot be read.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-pub enum CatalogueError {
-    /// The file cannot be opened.
-    #[error("catalogue {origin}: {reason}")]
-    File {
-        /// The file.
-        origin: String,
-        /// What the system says.
-        reason: String,
-    },
-    /// Not the TOML it should be; the reason names line and column.
-    #[error("catalogue {origin}: {reason}")]
-    Format {
-        /// The file.
-        origin: String,
-        /// What is wrong.
-        reason: String,
-    },
-    /// A quantity that cannot be read.
-    #[error("catalogue {origin}, {entry}.{key}: {source}")]
-    Quantity {
-        /// The file.
-        origin: String,
-        /// The lever or material.
-        entry: String,
-        /// The key.
-        key: &'static str,
-        /// What is wrong.
-        source: Box<QuantityError>,
-    },
-    /// A quantity with an impossible value, or dimensions given in part.
-    #[error("catalogue {origin}, {entry}.{key}: {reason}")]
-    Impossible {
-        /// The file.
-        origin: String,
-        /// The lever or material.
-        entry: String,
-        /// The key.
-        key: &'static str,
-        /// What is wrong.
-        reason: &'static str,
-    },
+/// A catalogue that cannot be read.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("catalogue {origin}: {reason}")]
+pub struct CatalogueError {
+    /// The file, with the entry and key at fault, if any.
+    pub origin: String,
+    /// What is wrong.
+    pub reason: String,
+}
+
+impl CatalogueError {
+    fn new(origin: impl Into<String>, reason: impl fmt::Display) -> Self {
+        Self {
+            origin: origin.into(),
+            reason: reason.to_string(),
+        }
+    }
 }
 
 #[derive(Deserialize)]
@@ -155,7 +130,7 @@ pub struct Catalogue {
 }
 
 impl Catalogue {
-    /// The levers and materials that come with the program.
+    /// The built-in levers and materials.
     ///
     /// # Errors
     /// None as shipped (a test reads them all); [`CatalogueError`] if the file in the source
@@ -166,7 +141,7 @@ impl Catalogue {
         Ok(catalogue)
     }
 
-    /// The same, read once.
+    /// The built-in catalogue, parsed once.
     pub fn shared() -> Arc<Self> {
         static BUILTIN: LazyLock<Arc<Catalogue>> =
             LazyLock::new(|| Arc::new(Catalogue::builtin().unwrap_or_default()));
@@ -179,22 +154,19 @@ impl Catalogue {
     /// # Errors
     /// [`CatalogueError`] names the entry and key at fault; nothing is added then.
     pub fn extend(&mut self, text: &str, origin: &str) -> Result<(), CatalogueError> {
-        let file: File = toml::from_str(text).map_err(|error| CatalogueError::Format {
-            origin: origin.to_owned(),
-            reason: error.to_string().trim_end().to_owned(),
-        })?;
-        let levers = file
-            .lever
-            .into_iter()
-            .map(|(name, text)| Ok((folded(&name), text.read(name, origin)?)))
-            .collect::<Result<Vec<_>, CatalogueError>>()?;
-        let materials = file
-            .material
-            .into_iter()
-            .map(|(name, text)| Ok((folded(&name), text.read(name, origin)?)))
-            .collect::<Result<Vec<_>, CatalogueError>>()?;
-        self.levers.extend(levers);
-        self.materials.extend(materials);
+        let file: File = toml::from_str(text)
+            .map_err(|error| CatalogueError::new(origin, error.to_string().trim_end()))?;
+        let mut added = Self::default();
+        for (name, text) in file.lever {
+            let lever = text.read(name, origin)?;
+            added.levers.insert(folded(&lever.name), lever);
+        }
+        for (name, text) in file.material {
+            let material = text.read(name, origin)?;
+            added.materials.insert(folded(&material.name), material);
+        }
+        self.levers.extend(added.levers);
+        self.materials.extend(added.materials);
         Ok(())
     }
 
@@ -204,10 +176,8 @@ impl Catalogue {
     /// [`CatalogueError`] if the file cannot be opened or read.
     pub fn extend_from_file(&mut self, path: &Path) -> Result<(), CatalogueError> {
         let origin = path.display().to_string();
-        let text = std::fs::read_to_string(path).map_err(|error| CatalogueError::File {
-            origin: origin.clone(),
-            reason: error.to_string(),
-        })?;
+        let text =
+            std::fs::read_to_string(path).map_err(|error| CatalogueError::new(&*origin, error))?;
         self.extend(&text, &origin)
     }
 
@@ -221,48 +191,42 @@ impl Catalogue {
         self.materials.values()
     }
 
-    /// The lever that answers to `name`; `key` is what asked for it.
+    /// The lever called `name`; `key` is named in errors.
     ///
     /// # Errors
     /// [`PhysicalError::UnknownName`] with the nearest name.
     pub fn lever(&self, key: Key, name: &str) -> Result<&Lever, PhysicalError> {
-        let wanted = folded(name);
-        self.levers
-            .get(&wanted)
-            .or_else(|| self.levers().find(|lever| answers(&lever.aliases, &wanted)))
-            .ok_or_else(|| {
-                unknown(
-                    key,
-                    name,
-                    "lever",
-                    self.levers().map(|lever| (&lever.name, &lever.aliases)),
-                )
-            })
+        find(&self.levers, name, |lever| &lever.aliases).ok_or_else(|| {
+            let all = self.levers().map(|lever| (&lever.name, &lever.aliases));
+            unknown(key, name, "lever", all)
+        })
     }
 
-    /// The material that answers to `name`; `key` is what asked for it.
+    /// The material called `name`; `key` is named in errors.
     ///
     /// # Errors
     /// [`PhysicalError::UnknownName`] with the nearest name.
     pub fn material(&self, key: Key, name: &str) -> Result<&Material, PhysicalError> {
-        let wanted = folded(name);
-        self.materials
-            .get(&wanted)
-            .or_else(|| {
-                self.materials()
-                    .find(|material| answers(&material.aliases, &wanted))
-            })
-            .ok_or_else(|| {
-                let names = self
-                    .materials()
-                    .map(|material| (&material.name, &material.aliases));
-                unknown(key, name, "material", names)
-            })
+        find(&self.materials, name, |material| &material.aliases).ok_or_else(|| {
+            let all = self
+                .materials()
+                .map(|material| (&material.name, &material.aliases));
+            unknown(key, name, "material", all)
+        })
     }
 }
 
-fn answers(aliases: &[String], wanted: &str) -> bool {
-    aliases.iter().any(|alias| folded(alias) == wanted)
+/// The entry with a name or alias.
+fn find<'a, T>(
+    entries: &'a BTreeMap<String, T>,
+    name: &str,
+    aliases: impl Fn(&T) -> &Vec<String>,
+) -> Option<&'a T> {
+    let wanted = folded(name);
+    let answers = |entry: &&T| aliases(entry).iter().any(|alias| folded(alias) == wanted);
+    entries
+        .get(&wanted)
+        .or_else(|| entries.values().find(answers))
 }
 
 fn unknown<'a>(
@@ -290,7 +254,7 @@ fn unknown<'a>(
     }
 }
 
-/// A name as it is compared: lower case, letters and digits only.
+/// The form of a name for comparison: lower case, letters and digits only.
 fn folded(name: &str) -> String {
     name.chars()
         .filter(|c| !matches!(c, ' ' | '-' | '_'))
@@ -305,38 +269,25 @@ struct EntryReader<'a> {
 }
 
 impl EntryReader<'_> {
-    fn positive(&self, key: &'static str, text: &str, kind: Kind) -> Result<f64, CatalogueError> {
-        let value = kind
-            .parse(text)
-            .map_err(|source| CatalogueError::Quantity {
-                origin: self.origin.to_owned(),
-                entry: self.entry.to_owned(),
-                key,
-                source: Box::new(source),
-            })?;
-        if value > 0.0 {
-            Ok(value)
-        } else {
-            Err(self.impossible(key, "it must be above zero"))
+    fn positive(&self, key: &str, text: &str, kind: Kind) -> Result<f64, CatalogueError> {
+        match kind.parse(text) {
+            Ok(value) if value > 0.0 => Ok(value),
+            Ok(_) => Err(self.impossible(key, "it must be above zero")),
+            Err(error) => Err(self.impossible(key, error)),
         }
     }
 
     fn optional(
         &self,
-        key: &'static str,
+        key: &str,
         text: Option<&str>,
         kind: Kind,
     ) -> Result<Option<f64>, CatalogueError> {
         text.map(|text| self.positive(key, text, kind)).transpose()
     }
 
-    fn impossible(&self, key: &'static str, reason: &'static str) -> CatalogueError {
-        CatalogueError::Impossible {
-            origin: self.origin.to_owned(),
-            entry: self.entry.to_owned(),
-            key,
-            reason,
-        }
+    fn impossible(&self, key: &str, reason: impl fmt::Display) -> CatalogueError {
+        CatalogueError::new(format!("{}, {}.{key}", self.origin, self.entry), reason)
     }
 }
 

@@ -12,7 +12,7 @@ pub struct Elastic {
 }
 
 impl Elastic {
-    /// E/(1 − ν²): what presses back on a rigid indenter, in Pa.
+    /// E/(1 − ν²): the modulus for a rigid indenter, in Pa.
     pub fn plane_strain_modulus(self) -> f64 {
         self.modulus / (1.0 - self.poisson * self.poisson)
     }

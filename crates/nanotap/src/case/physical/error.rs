@@ -1,9 +1,9 @@
-//! Why a physical case is refused.
+//! Errors of physical cases.
 
 use crate::case::key::Key;
 use crate::model::cantilever::CantileverError;
 
-/// A physical case that describes nothing possible.
+/// Why a physical case is invalid.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum PhysicalError {
@@ -17,15 +17,15 @@ pub enum PhysicalError {
         /// What is wrong and what would be right.
         reason: String,
     },
-    /// A quantity that cannot be done without.
+    /// A missing quantity.
     #[error("{key} is missing: {reason}")]
     Missing {
         /// The key.
         key: Key,
-        /// What it is needed for, and what else would do.
+        /// What it is needed for, and the alternatives.
         reason: String,
     },
-    /// A lever or a material that the catalogue does not have.
+    /// A lever or material that is not in the catalogue.
     #[error("{key} = \"{name}\": no such {what} in the catalogue; {suggestion}")]
     UnknownName {
         /// The key.
@@ -37,8 +37,7 @@ pub enum PhysicalError {
         /// The nearest name, or all of them.
         suggestion: String,
     },
-    /// A dimensionless parameter beyond what the model takes, with the quantity that it comes
-    /// from.
+    /// A dimensionless parameter outside its range, with the quantity that causes it.
     #[error("{}{error}", match .key {
         Some((key, value)) => format!("{key} = {value} makes "),
         None => "this physical case gives ".to_owned(),
@@ -79,7 +78,7 @@ impl PhysicalError {
         }
     }
 
-    /// The key that the user should look at, if it is one.
+    /// The key to correct, if it is a single one.
     pub fn key(&self) -> Option<Key> {
         match self {
             Self::Impossible { key, .. }

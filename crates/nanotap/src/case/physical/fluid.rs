@@ -18,7 +18,7 @@ use crate::case::quantity::Kind;
 /// Reynolds numbers for which the fit holds.
 const REYNOLDS: [f64; 2] = [1e-6, 1e4];
 
-/// What surrounds a lever; SI units.
+/// The fluid around a lever; SI units.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Fluid {
     /// Density ρ.
@@ -28,7 +28,7 @@ pub struct Fluid {
 }
 
 impl Fluid {
-    /// What `[cantilever]` says of it.
+    /// Reads the fluid of `[cantilever]`.
     pub(crate) fn read(reader: Reader<'_>) -> Result<Option<Self>, PhysicalError> {
         let [density, viscosity] = [Key::FluidDensity, Key::FluidViscosity];
         let missing = |key| PhysicalError::missing(key, "a fluid has a density and a viscosity");

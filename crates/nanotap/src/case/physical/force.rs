@@ -1,4 +1,4 @@
-//! A nonlinear force law of the sample, from the quantities that a case states.
+//! The nonlinear force law of a sample, from stated quantities.
 
 use std::f64::consts::PI;
 use std::sync::Arc;
@@ -13,59 +13,21 @@ use super::reader::Reader;
 use super::remark::Remark;
 use super::tip::Tip;
 use crate::case::force_table::ForceTable;
-use crate::case::key::Key;
+use crate::case::key::{Key, Laws};
 use crate::case::quantity::Kind;
 use crate::model::contact::ContactLaw;
+use crate::model::parameter::Applies;
 use crate::model::sample_law::SampleLaw;
 
 /// Permittivity of free space, F/m.
 const VACUUM: f64 = 8.854_187_812_8e-12;
-
-/// The keys that only nonlinear laws take.
-const OF_LAWS: [Key; 20] = [
-    Key::SampleTable,
-    Key::SampleGapFactor,
-    Key::SampleForceFactor,
-    Key::SampleHamaker,
-    Key::SampleWorkOfAdhesion,
-    Key::SampleWorkOfRetraction,
-    Key::SampleAdhesionForce,
-    Key::SampleIntermolecularDistance,
-    Key::SampleViscosity,
-    Key::SampleThickness,
-    Key::SampleDecayLength,
-    Key::SampleSurfaceTension,
-    Key::SampleFilmThickness,
-    Key::SampleSurfaceEnergy,
-    Key::SampleVoltage,
-    Key::SamplePermittivity,
-    Key::SampleDebyeLength,
-    Key::SampleCharge,
-    Key::TipCharge,
-    Key::SampleRepulsion,
-];
-
-/// Keys of a linear sample that a nonlinear law may take too, or not.
-const OF_SAMPLES: [Key; 11] = [
-    Key::SampleMaterial,
-    Key::SampleModulus,
-    Key::SamplePoisson,
-    Key::SampleStiffness,
-    Key::SampleDamping,
-    Key::SampleLossTangent,
-    Key::SampleIndentation,
-    Key::SampleRelaxationStiffness,
-    Key::SampleRelaxationTime,
-    Key::SampleSurfaceStiffness,
-    Key::SampleSurfaceDamping,
-];
 
 /// A law, or a sum of laws, with its parameters in SI.
 #[derive(Debug, Clone)]
 pub struct SampleForce {
     /// The laws.
     pub terms: Vec<&'static TableLaw>,
-    /// Their parameters, one term after the other.
+    /// Their parameters, term by term.
     pub values: Vec<f64>,
     /// The rows of a table, in m and N.
     pub table: Option<ForceTable>,
@@ -77,12 +39,17 @@ impl PartialEq for SampleForce {
     }
 }
 
-/// The keys that some contact law takes and another does not.
-pub(crate) fn keys_of_contacts() -> impl Iterator<Item = Key> {
-    OF_LAWS.into_iter().chain(OF_SAMPLES)
+/// The keys that belong to nonlinear laws only, or to some laws.
+fn keys_of(laws: Laws) -> impl Iterator<Item = Key> {
+    Key::all().filter(move |key| key.entry().laws == laws)
 }
 
-/// Whether nonlinear laws take a key of [`keys_of_contacts`].
+/// The keys that belong to some contact laws only.
+pub(crate) fn keys_of_contacts() -> impl Iterator<Item = Key> {
+    keys_of(Laws::Nonlinear).chain(keys_of(Laws::Some))
+}
+
+/// True if these nonlinear laws have a key of [`keys_of_contacts`].
 pub(crate) fn takes(terms: &[&'static TableLaw], key: Key) -> bool {
     let mut parameters = terms.iter().flat_map(|term| term.entry.parameters);
     parameters.clone().any(|p| key_of(p) == key)
@@ -91,19 +58,18 @@ pub(crate) fn takes(terms: &[&'static TableLaw], key: Key) -> bool {
         || ADHESION.contains(&key) && adhesion_of(terms).is_some()
 }
 
-/// Whether a linear contact takes a key of [`keys_of_contacts`].
+/// True if a linear contact has a key of [`keys_of_contacts`].
 pub(crate) fn linear_takes(law: ContactLaw, key: Key) -> bool {
-    let solid = law == ContactLaw::StandardLinearSolid;
-    let moves = law == ContactLaw::MovingSurface;
+    if let Some(number) = key.law_number() {
+        return number.entry().applies == Applies::Law(law);
+    }
     match key {
-        Key::SampleSurfaceStiffness | Key::SampleSurfaceDamping | Key::SampleAdhesionForce => moves,
-        Key::SampleDamping | Key::SampleLossTangent => !solid,
-        Key::SampleRelaxationStiffness | Key::SampleRelaxationTime => solid,
-        _ => OF_SAMPLES.contains(&key),
+        Key::SampleDamping | Key::SampleLossTangent => law.has_damper(),
+        _ => key.entry().laws == Laws::Some,
     }
 }
 
-/// The nonlinear laws that take a key, in brackets; empty where there are none.
+/// The nonlinear laws with a key, in brackets; empty if there are none.
 fn laws_with(key: Key) -> String {
     let with = |law: &&'static TableLaw| takes(std::slice::from_ref(law), key);
     let names: Vec<&str> = laws::all().filter(with).map(|law| law.entry.name).collect();
@@ -115,35 +81,8 @@ fn laws_with(key: Key) -> String {
 
 /// The key that states a parameter of a law.
 fn key_of(parameter: &ParameterEntry) -> Key {
-    match parameter.name {
-        "modulus" => Key::SampleModulus,
-        "poisson" => Key::SamplePoisson,
-        "tip_modulus" => Key::TipModulus,
-        "tip_poisson" => Key::TipPoisson,
-        "radius" => Key::TipRadius,
-        "half_angle" => Key::TipHalfAngle,
-        "contact_distance" => Key::SampleIntermolecularDistance,
-        "work_of_adhesion" => Key::SampleWorkOfAdhesion,
-        "work_of_retraction" => Key::SampleWorkOfRetraction,
-        "viscosity" => Key::SampleViscosity,
-        "thickness" => Key::SampleThickness,
-        "damping" => Key::SampleDamping,
-        "stiffness" => Key::SampleStiffness,
-        "decay_length" => Key::SampleDecayLength,
-        "surface_tension" => Key::SampleSurfaceTension,
-        "film_thickness" => Key::SampleFilmThickness,
-        "surface_energy" => Key::SampleSurfaceEnergy,
-        "voltage" => Key::SampleVoltage,
-        "permittivity" => Key::SamplePermittivity,
-        "debye_length" => Key::SampleDebyeLength,
-        "sample_charge" => Key::SampleCharge,
-        "tip_charge" => Key::TipCharge,
-        "repulsion" => Key::SampleRepulsion,
-        "gap_factor" => Key::SampleGapFactor,
-        "force_factor" => Key::SampleForceFactor,
-        // A test sees that there is no other.
-        _ => Key::SampleHamaker,
-    }
+    // A test sees that every parameter has its key.
+    Key::of_law_parameter(parameter.name).unwrap_or(Key::SampleLaw)
 }
 
 /// The factor from SI to the key's own unit.
@@ -155,16 +94,17 @@ fn unit(key: Key) -> f64 {
 }
 
 impl SampleForce {
-    /// What `[sample]` says, if its law is nonlinear.
+    /// Reads `[sample]` if its law is nonlinear.
     pub(crate) fn read(reader: Reader<'_>, tip: &Tip) -> Result<Option<Self>, PhysicalError> {
         let Some(name) = reader.name(Key::SampleLaw) else {
             let law = crate::case::file::word(reader.stated, Key::SampleLaw).unwrap_or_default();
             let strange = |key: &Key| reader.has(*key) && !linear_takes(law, *key);
-            return OF_LAWS.into_iter().find(strange).map_or(Ok(None), |key| {
-                let reason = if key == Key::SampleAdhesionForce {
-                    "it belongs to a law with adhesion, as sample.law = \"dmt\" or \
-                     \"moving-surface\""
-                        .into()
+            return keys_of(Laws::Nonlinear).find(strange).map_or(Ok(None), |key| {
+                let reason = if let Some(number) = key.law_number() {
+                    let others = ContactLaw::ALL.map(|law| (law, Applies::Law(law)));
+                    let other = others.iter().find(|(_, of)| number.entry().applies == *of);
+                    let other = other.map_or("", |(law, _)| law.name());
+                    format!("it belongs to a law with adhesion, as sample.law = \"dmt\" or \"{other}\"")
                 } else {
                     format!("it belongs to a nonlinear force law{}", laws_with(key))
                 };
@@ -188,7 +128,7 @@ impl SampleForce {
                 }
             }
             let reason = format!(
-                "it is no part of sample.law = \"{name}\", which takes {}{}",
+                "it is not a parameter of sample.law = \"{name}\", which takes {}{}",
                 keys.join(", "),
                 laws_with(key)
             );
@@ -221,7 +161,7 @@ impl SampleForce {
         Ok(Some(force))
     }
 
-    /// The value of a parameter: stated, following from another, or the law's default.
+    /// The value of a parameter: stated, derived, or the default of the law.
     fn value(
         &self,
         reader: Reader<'_>,
@@ -262,7 +202,7 @@ impl SampleForce {
         })
     }
 
-    /// Hamaker constant or work of adhesion from whichever of the three was stated.
+    /// Hamaker constant or work of adhesion, from the stated one of three quantities.
     fn adhesion(
         &self,
         reader: Reader<'_>,
@@ -294,8 +234,7 @@ impl SampleForce {
         }))
     }
 
-    /// The same contact under other laws, as far as what is known of it says their parameters:
-    /// these laws first.
+    /// The same contact under other laws whose parameters are known; the present laws come first.
     pub fn others(&self) -> Vec<Self> {
         let known = |key: Key| self.get(key).map(|value| value * unit(key));
         let distance = known(Key::SampleIntermolecularDistance).unwrap_or(DISTANCE);
@@ -370,7 +309,7 @@ impl SampleForce {
         })
     }
 
-    /// What had to be assumed of the law, and what puts it in doubt.
+    /// Assumptions and warnings about the law.
     pub(crate) fn remarks(&self, reader: Reader<'_>, tip: &Tip) -> Vec<Remark> {
         let mut remarks = Vec::new();
         let has = |name: &str| self.parameters().any(|(p, _, _)| p.name == name);
@@ -431,7 +370,7 @@ impl SampleForce {
     }
 }
 
-/// The ways to say how strongly tip and sample attract.
+/// Alternatives for the strength of the adhesion.
 const ADHESION: [Key; 3] = [
     Key::SampleHamaker,
     Key::SampleWorkOfAdhesion,
@@ -476,8 +415,7 @@ mod tests {
     fn every_parameter_of_every_law_has_its_key() {
         for law in all() {
             for p in law.entry.parameters {
-                let hamaker = ["hamaker", "attraction"].contains(&p.name);
-                assert_eq!(key_of(p) == Key::SampleHamaker, hamaker, "{}", p.name);
+                assert!(Key::of_law_parameter(p.name).is_some(), "{}", p.name);
             }
         }
     }

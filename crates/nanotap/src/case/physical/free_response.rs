@@ -1,4 +1,4 @@
-//! What the tip does far from the sample, in closed form.
+//! Response of the tip far from the sample, in closed form.
 
 use nalgebra::Complex;
 
@@ -6,6 +6,7 @@ use crate::model::beam::Modes;
 use crate::model::cantilever::{Cantilever, CantileverError, CosineTerm, Reason};
 use crate::model::drive_form::Actuation;
 use crate::model::galerkin::{Galerkin, Regime};
+use crate::model::parameter::Parameter;
 
 /// Complex amplitude of the tip's deflection per amplitude of the drive at its frequency Ω:
 /// see [`response_at`].
@@ -40,7 +41,7 @@ pub fn response_at(case: &Cantilever, frequency: f64) -> Result<Complex<f64>, Ca
         value: error.given as f64,
         reason: Reason::Modes,
     })?;
-    if !case.higher_modes.is_empty() {
+    if case.has_measured_modes() {
         return response_with_measured_modes(case, frequency);
     }
     let square = frequency * frequency;
@@ -69,14 +70,16 @@ fn response_with_measured_modes(
     case: &Cantilever,
     frequency: f64,
 ) -> Result<Complex<f64>, CantileverError> {
-    let free = Galerkin::new(&Cantilever {
+    let free = Cantilever {
         alpha2: 1.0,
         omega: frequency,
         tone2_ratio: None,
-        tone2_amplitude: 0.0,
-        tone2_phase: 0.0,
         ..case.clone()
-    })?;
+    };
+    let free = free
+        .with(Parameter::Tone2Amplitude, 0.0)
+        .with(Parameter::Tone2Phase, 0.0);
+    let free = Galerkin::new(&free)?;
     let r = Regime::Free.index();
     let impedance = free.stiffness[r].map(Complex::from)
         - free.mass.map(|m| Complex::from(m * frequency * frequency))

@@ -1,4 +1,4 @@
-//! Physical units: what stands on the lever's box and on the sample's label, as α1 … α6 and Ω.
+//! Physical units: quantities of data sheets, mapped to α1 … α6 and Ω.
 //!
 //! The quantities that a case states, with levers and materials of the [`Catalogue`] by name,
 //! are mapped to a dimensionless [`Cantilever`](crate::model::cantilever::Cantilever) and the
@@ -56,7 +56,7 @@ mod view;
 pub use catalogue::{Catalogue, CatalogueError};
 pub use error::PhysicalError;
 pub use lever::{BeamGeometry, Lever, LeverData};
-pub use mapping::{MappingRow, PhysicalParameters, Scales};
+pub use mapping::{MappingRow, Scales};
 pub use remark::{Remark, Severity};
 pub use view::Physical;
 

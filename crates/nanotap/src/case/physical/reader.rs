@@ -1,4 +1,4 @@
-//! What a physical case states, one quantity at a time.
+//! Access to the stated quantities of a physical case.
 
 use super::catalogue::{Catalogue, Lever, Material};
 use super::elastic::Elastic;
@@ -8,7 +8,7 @@ use crate::case::key::Key;
 use crate::case::stated::{Stated, Value};
 use crate::model::drive_form::FrequencyRatio;
 
-/// The stated values, and the catalogue that their names are from.
+/// The stated values, and the catalogue for their names.
 #[derive(Clone, Copy)]
 pub(crate) struct Reader<'a> {
     pub(crate) stated: &'a Stated,
@@ -30,6 +30,15 @@ impl<'a> Reader<'a> {
             None => Ok(self.stated.number(key)),
             Some(reason) => Err(self.impossible(key, reason)),
         }
+    }
+
+    /// The first of these keys that is stated, with its quantity in SI, within its range.
+    pub(crate) fn first(self, keys: &[Key]) -> Result<Option<(Key, f64)>, PhysicalError> {
+        let mut found = None;
+        for &key in keys {
+            found = found.or(self.number(key)?.map(|value| (key, value)));
+        }
+        Ok(found)
     }
 
     /// A word.
@@ -63,25 +72,25 @@ impl<'a> Reader<'a> {
         }
     }
 
-    /// The lever of the catalogue that is named.
+    /// The named lever of the catalogue.
     pub(crate) fn lever(self) -> Result<Option<&'a Lever>, PhysicalError> {
         let key = Key::LeverName;
         let find = |name| self.catalogue.lever(key, name);
         self.name(key).map(find).transpose()
     }
 
-    /// The material of the catalogue that is named.
+    /// The named material of the catalogue.
     pub(crate) fn material(self, key: Key) -> Result<Option<&'a Material>, PhysicalError> {
         let find = |name| self.catalogue.material(key, name);
         self.name(key).map(find).transpose()
     }
 
-    /// The error that a stated value cannot be.
+    /// The error for an impossible stated value.
     pub(crate) fn impossible(self, key: Key, reason: impl Into<String>) -> PhysicalError {
         PhysicalError::impossible(key, self.stated.written(key), reason)
     }
 
-    /// The stated modulus and Poisson's ratio, with a catalogue's material for what is not.
+    /// The stated modulus and Poisson's ratio, completed from a material of the catalogue.
     pub(crate) fn elastic(
         self,
         [modulus_key, poisson_key]: [Key; 2],
@@ -98,7 +107,7 @@ impl<'a> Reader<'a> {
             (None, None) => Ok(None),
             (Some(_), None) => Err(PhysicalError::missing(
                 poisson_key,
-                "a contact needs Poisson's ratio beside the modulus (0.3 to 0.5 for polymers)",
+                "a contact needs Poisson's ratio in addition to the modulus (0.3 to 0.5 for polymers)",
             )),
             (None, Some(_)) => Err(PhysicalError::missing(
                 modulus_key,

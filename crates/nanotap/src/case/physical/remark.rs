@@ -1,20 +1,20 @@
-//! What the user should know about a resolved case, beside its numbers.
+//! Remarks about a resolved case.
 
 use std::fmt;
 
 use serde::Serialize;
 
-/// How much a remark matters.
+/// Severity of a remark.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Severity {
     /// An assumption made or a quantity inferred.
     Note,
-    /// The model may not describe what is meant.
+    /// The model may not describe the intended system.
     Warning,
 }
 
-/// One remark, a sentence in plain words.
+/// A remark about a case.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Remark {
     /// Note or warning.
@@ -32,7 +32,7 @@ impl Remark {
         }
     }
 
-    /// The model may not describe what is meant.
+    /// The model may not describe the intended system.
     pub fn warning(text: impl Into<String>) -> Self {
         Self {
             severity: Severity::Warning,

@@ -1,4 +1,4 @@
-//! What had to be assumed in mapping a case, and what puts it in doubt.
+//! Assumptions and warnings about the mapping of a case.
 
 use super::reader::Reader;
 use super::remark::Remark;
@@ -7,6 +7,7 @@ use crate::case::key::Key;
 use crate::case::quantity::Kind;
 use crate::model::drive_form::Actuation;
 use crate::model::exact_beam;
+use crate::model::parameter::Parameter;
 
 impl Physical {
     /// All remarks, in the order in which the case is read.
@@ -29,7 +30,7 @@ impl Physical {
             && let Ok(beam) = exact_beam::frequencies(self.cantilever.alpha1, 0.0, 2)
         {
             remarks.push(Remark::note(format!(
-                "f2 stands beside the tip's mass: the second mode has this frequency, {} of the \
+                "f2 and the tip mass are both given: the second mode has the frequency f2, {} of the \
                  uniform beam's",
                 Kind::Number.format_digits(f2 * beam[0] / (self.lever.f0 * beam[1]), 4)
             )));
@@ -40,7 +41,7 @@ impl Physical {
             remarks.push(Remark::note(format!(
                 "gap.tip is not given: {}, the setpoint amplitude, until the setpoint is \
                  solved for",
-                Kind::Length.format(self.parameters.tip_gap)
+                Kind::Length.format(self.parameters.get(Parameter::Alpha5))
             )));
         }
         if !reader.has(Key::GapBeam) && self.tip.height.is_none() {
@@ -60,7 +61,10 @@ impl Physical {
     fn clearance_remarks(&self) -> Vec<Remark> {
         let mut remarks = Vec::new();
         let base = match self.cantilever.actuation {
-            Actuation::Base => self.parameters.drive_amplitude + self.parameters.tone2_amplitude,
+            Actuation::Base => {
+                self.parameters.get(Parameter::Alpha2)
+                    + self.parameters.get(Parameter::Tone2Amplitude)
+            }
             Actuation::Tip | Actuation::Distributed => 0.0,
         };
         if base >= self.scales.length {
@@ -72,7 +76,7 @@ impl Physical {
             )));
         }
         let softness = (self.lever.k / self.sample.stiffness).sqrt().min(1.0);
-        let static_depth = (-self.parameters.tip_gap).max(0.0) * self.lever.k
+        let static_depth = (-self.parameters.get(Parameter::Alpha5)).max(0.0) * self.lever.k
             / (self.lever.k + self.sample.stiffness);
         let depth = (self.free_amplitude + base) * softness + static_depth;
         if depth >= self.tip_height {

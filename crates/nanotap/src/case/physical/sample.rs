@@ -10,10 +10,11 @@ use super::force::SampleForce;
 use super::reader::Reader;
 use super::remark::Remark;
 use super::tip::Tip;
-use crate::case::key::Key;
+use crate::case::key::{Key, Laws};
 use crate::case::quantity::Kind;
 use crate::model::contact::ContactLaw;
-use crate::model::contact::moving_surface::MovingSurface;
+use crate::model::contact::entry::Damper;
+use crate::model::parameter::Parameter;
 
 /// E* of two solids in contact, 1/E* = (1 − ν₁²)/E₁ + (1 − ν₂²)/E₂, in Pa; without a tip's
 /// constants the tip is rigid.
@@ -51,17 +52,17 @@ impl Hertz {
     }
 }
 
-/// Part of Hertz's stiffness by which it may differ where the tip in fact gets to.
+/// Largest relative deviation of Hertz's stiffness at the actual indentation.
 const STIFFNESS_IN_DOUBT: f64 = 0.25;
 
-/// A stiffness that was taken at another indentation than the motion's.
+/// A stiffness linearised at an indentation that differs from that of the motion.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
 pub struct HertzMismatch {
-    /// Indentation at which the stiffness was taken, m.
+    /// Indentation of the linearisation, m.
     pub assumed_indentation: f64,
-    /// That stiffness, N/m.
+    /// Stiffness at that indentation, N/m.
     pub assumed_stiffness: f64,
-    /// Stiffness at the greatest depth of the motion, N/m.
+    /// Stiffness at the largest indentation of the motion, N/m.
     pub stiffness: f64,
 }
 
@@ -84,7 +85,7 @@ impl Hertz {
     }
 }
 
-/// How much a sample dissipates.
+/// Damping of a sample.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum SampleDamping {
     /// Damper C₁ in N s/m.
@@ -93,31 +94,27 @@ pub enum SampleDamping {
     LossTangent(f64),
 }
 
-/// The sample as the case file has it, with the tip that touches it.
+/// The sample of a case file, with the tip.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Sample {
     /// Contact stiffness K₁ in N/m.
     pub stiffness: f64,
-    /// The contact it comes from, if it is Hertz's.
+    /// The Hertz contact from which it follows, if any.
     pub hertz: Option<Hertz>,
-    /// Its damping; none given counts as zero.
+    /// Damping; zero if not stated.
     pub damping: Option<SampleDamping>,
-    /// How it answers the tip.
+    /// Contact law.
     pub law: ContactLaw,
-    /// Stiffness of a standard linear solid's relaxing arm in N/m; 0 of other samples.
-    pub relaxation_stiffness: f64,
-    /// Its relaxation time in s.
-    pub relaxation_time: f64,
-    /// What a moving surface has of its own, in N/m, N s/m and N.
-    pub surface: MovingSurface,
-    /// Its elastic constants, where they are known.
+    /// Further parameters of the law, in SI.
+    pub numbers: Vec<f64>,
+    /// Elastic constants, if known.
     pub elastic: Option<Elastic>,
-    /// A nonlinear force law in place of all these.
+    /// A nonlinear force law in place of the above.
     pub force: Option<SampleForce>,
 }
 
 impl Sample {
-    /// What `[sample]` says.
+    /// Reads `[sample]`.
     pub(crate) fn read(reader: Reader<'_>, tip: &Tip) -> Result<Self, PhysicalError> {
         if let Some(force) = SampleForce::read(reader, tip)? {
             return Ok(Self {
@@ -125,9 +122,7 @@ impl Sample {
                 hertz: None,
                 damping: None,
                 law: ContactLaw::default(),
-                relaxation_stiffness: 0.0,
-                relaxation_time: 0.0,
-                surface: MovingSurface::NONE,
+                numbers: Vec::new(),
                 elastic: None,
                 force: Some(force),
             });
@@ -145,21 +140,18 @@ impl Sample {
             .map(SampleDamping::Damper)
             .or(tangent.map(SampleDamping::LossTangent));
         let law = crate::case::file::word(reader.stated, Key::SampleLaw).unwrap_or_default();
-        let [relaxation_stiffness, relaxation_time] = read_relaxation(reader, law)?;
         Ok(Self {
             stiffness,
             hertz,
             damping,
             law,
-            relaxation_stiffness,
-            relaxation_time,
-            surface: read_surface(reader, law)?,
+            numbers: read_numbers(reader, law)?,
             elastic,
             force: None,
         })
     }
 
-    /// What had to be assumed of the sample, and what puts it in doubt.
+    /// Assumptions and warnings about the sample.
     pub(crate) fn remarks(&self, reader: Reader<'_>, tip: &Tip) -> Vec<Remark> {
         if let Some(force) = &self.force {
             return force.remarks(reader, tip);
@@ -195,12 +187,8 @@ impl Sample {
                 Some(_) => "the tip's own compliance is included",
             }));
         }
-        if self.damping.is_none() && self.law != ContactLaw::StandardLinearSolid {
-            remarks.push(Remark::note(if self.law == ContactLaw::MovingSurface {
-                "sample.damping is not given: only the surface's own motion dissipates"
-            } else {
-                "sample.damping is not given: the contact dissipates nothing"
-            }));
+        if let (None, Damper::Contact { none }) = (self.damping, self.law.entry().damper) {
+            remarks.push(Remark::note(none));
         }
         remarks
     }
@@ -215,58 +203,30 @@ impl Sample {
     }
 }
 
-/// What a moving surface has of its own, and no other linear sample.
-fn read_surface(reader: Reader<'_>, law: ContactLaw) -> Result<MovingSurface, PhysicalError> {
-    let own = [Key::SampleSurfaceStiffness, Key::SampleSurfaceDamping];
-    if law != ContactLaw::MovingSurface {
-        let given = own.into_iter().find(|key| reader.has(*key));
-        return given.map_or(Ok(MovingSurface::NONE), |key| {
-            Err(reader.impossible(key, "it belongs to sample.law = \"moving-surface\""))
-        });
+/// The further parameters of `law`, in SI; those of other laws must not be stated.
+fn read_numbers(reader: Reader<'_>, law: ContactLaw) -> Result<Vec<f64>, PhysicalError> {
+    let refuse = |keys: &[Key], reason: &str| {
+        let given = keys.iter().find(|key| reader.has(**key));
+        given.map_or(Ok(()), |key| Err(reader.impossible(*key, reason)))
+    };
+    let mut numbers = Vec::new();
+    for other in ContactLaw::ALL {
+        let own = Parameter::of_law(other).filter_map(Key::stating);
+        if other != law {
+            let alone: Vec<Key> = own.filter(|key| key.entry().laws == Laws::Some).collect();
+            refuse(&alone, &format!("it belongs to sample.law = \"{other}\""))?;
+            continue;
+        }
+        let entry = law.entry();
+        if let Damper::InArm { not_damping, .. } = entry.damper {
+            refuse(&[Key::SampleDamping, Key::SampleLossTangent], not_damping)?;
+        }
+        for (key, number) in own.zip(entry.numbers) {
+            let value = reader.number(key)?.or(number.default);
+            numbers.push(value.ok_or_else(|| PhysicalError::missing(key, entry.needs))?);
+        }
     }
-    let needed = |key: Key| {
-        reader.number(key)?.ok_or_else(|| {
-            PhysicalError::missing(
-                key,
-                "a moving surface has a spring and a damper of its own, as in \
-                 surface_stiffness = \"2 N/m\" and surface_damping = \"1e-6 N s/m\"",
-            )
-        })
-    };
-    Ok(MovingSurface {
-        stiffness: needed(own[0])?,
-        damping: needed(own[1])?,
-        adhesion: reader.number(Key::SampleAdhesionForce)?.unwrap_or(0.0),
-    })
-}
-
-/// Stiffness and time of the relaxing arm, which the standard linear solid has in place of
-/// a damper and no other law has.
-fn read_relaxation(reader: Reader<'_>, law: ContactLaw) -> Result<[f64; 2], PhysicalError> {
-    let arm = [Key::SampleRelaxationStiffness, Key::SampleRelaxationTime];
-    let refuse = |keys: [Key; 2], reason: &str| {
-        let given = keys.into_iter().find(|key| reader.has(*key));
-        given.map_or(Ok(()), |key| Err(reader.impossible(key, reason)))
-    };
-    if law != ContactLaw::StandardLinearSolid {
-        refuse(arm, "it belongs to sample.law = \"standard-linear-solid\"")?;
-        return Ok([0.0; 2]);
-    }
-    refuse(
-        [Key::SampleDamping, Key::SampleLossTangent],
-        "a standard linear solid has its damper in the relaxing arm: give \
-         sample.relaxation_stiffness and sample.relaxation_time",
-    )?;
-    let needed = |key: Key| {
-        reader.number(key)?.ok_or_else(|| {
-            PhysicalError::missing(
-                key,
-                "a standard linear solid has a relaxing arm of this stiffness, as in \
-                 relaxation_stiffness = \"50 N/m\", and time, as in relaxation_time = \"0.5 us\"",
-            )
-        })
-    };
-    Ok([needed(arm[0])?, needed(arm[1])?])
+    Ok(numbers)
 }
 
 fn read_hertz(reader: Reader<'_>, tip: &Tip) -> Result<(Hertz, Elastic), PhysicalError> {

@@ -14,10 +14,9 @@ use crate::case::file::{CaseFileError, Place};
 use crate::case::key::{Key, Section};
 use crate::model::beam::Modes;
 use crate::model::cantilever::Cantilever;
-use crate::model::contact::moving_surface::MovingSurface;
 use crate::model::exact_beam;
 use crate::model::galerkin::Galerkin;
-use crate::model::higher_modes::HigherModes;
+use crate::model::parameter::{Numbers, Parameter};
 
 /// A case that was read, with what was remarked.
 #[derive(Debug)]
@@ -407,22 +406,10 @@ fn units_are_those_of_the_beam_equation() {
     let length = SILICON_BEAM.length;
     let m = density * SILICON_BEAM.width * SILICON_BEAM.thickness;
     let ei = modulus * SILICON_BEAM.width * SILICON_BEAM.thickness.powi(3) / 12.0;
-    let physical = PhysicalParameters {
-        tip_mass: 3e-12,
-        drive_amplitude: 5e-9,
-        beam_damping: 2e-8,
-        contact_stiffness: 17.0,
-        tip_gap: 20e-9,
-        contact_damping: 3e-7,
-        drive_frequency: 65.7e3,
-        relaxation_stiffness: 0.0,
-        relaxation_time: 0.0,
-        surface: MovingSurface::NONE,
-        tone2_amplitude: 0.0,
-        tone2_phase: 0.0,
-        higher_modes: HigherModes::NONE,
-    };
-    let case = physical.to_case(&scales, &Cantilever::paper());
+    let values = [3e-12, 5e-9, 2e-8, 17.0, 20e-9, 3e-7, 65.7e3];
+    let all = Parameter::ALL.into_iter().zip(values);
+    let physical = all.fold(Numbers::ZERO, |all, (of, value)| all.with(of, value));
+    let case = scales.case(&physical, &Cantilever::paper());
     // Eqs. (5) and (7) of the paper, with the mass per length put back under the root.
     let time = (m * length.powi(4) / ei).sqrt();
     let root = (length.powi(4) / (m * ei)).sqrt();
@@ -481,9 +468,8 @@ proptest! {
             omega,
             ..Cantilever::paper()
         };
-        let physical = PhysicalParameters::from_case(&case, &scales);
-        let back = physical.to_case(&scales, &Cantilever::paper());
-        for parameter in crate::model::parameter::Parameter::ALL {
+        let back = scales.case(&scales.quantities(&case), &Cantilever::paper());
+        for parameter in Parameter::ALL {
             prop_assert!((back.get(parameter) / case.get(parameter) - 1.0).abs() < 1e-13);
         }
     }
@@ -579,12 +565,12 @@ fn at_resonance_the_free_amplitude_lags_by_a_quarter_turn() {
     close(resolved.free_amplitude, 20e-9, 1e-14);
     // A mode participation of φ₁(1)∫φ₁ = 1.5660 (bare beam): A₀ = 1.566 Q f.
     close(
-        resolved.parameters.drive_amplitude,
+        resolved.parameters.get(Parameter::Alpha2),
         20e-9 / (1.566 * 1000.0),
         1e-3,
     );
     // The base amplitude that was found gives back the free amplitude.
-    let base = format!("{:e} m", resolved.parameters.drive_amplitude);
+    let base = format!("{:e} m", resolved.parameters.get(Parameter::Alpha2));
     let mut entries: Vec<(&str, &str, &str)> = changed(&[
         ("cantilever", "Q", "1000"),
         ("tip", "mass", ""),
@@ -759,14 +745,14 @@ fn tip_shapes_have_their_textbook_volumes() {
     ]))
     .unwrap();
     let expected = 2330.0 * 4.0 / 3.0 * 1e-15 * 25.0_f64.to_radians().tan().powi(2);
-    close(resolved.parameters.tip_mass, expected, 1e-12);
+    close(resolved.parameters.get(Parameter::Alpha1), expected, 1e-12);
 }
 
 #[test]
 fn the_example_of_the_documentation_resolves() {
     let resolved = resolve(&changed(&[("gap", "beam", "")])).unwrap();
     close(resolved.cantilever.alpha4, 60.0 / 2.8, 1e-14);
-    close(resolved.parameters.tip_mass, 3e-12, 1e-12);
+    close(resolved.parameters.get(Parameter::Alpha1), 3e-12, 1e-12);
     close(resolved.cantilever.alpha2, 10e-9 / 10e-6, 1e-14);
     assert!(
         resolved
@@ -801,7 +787,7 @@ fn setpoint_is_a_ratio_or_an_amplitude() {
         changes.push(("drive", "setpoint", text));
         let resolved = resolve(&changed(&changes)).unwrap();
         close(resolved.setpoint.unwrap(), expected, 1e-14);
-        close(resolved.parameters.tip_gap, 16e-9, 1e-13);
+        close(resolved.parameters.get(Parameter::Alpha5), 16e-9, 1e-13);
     }
     for text in ["0", "1", "-0.5", "20 nm", "30 nm", "-3 nm", "5 kHz"] {
         let mut changes = drive.to_vec();
@@ -1062,7 +1048,7 @@ fn a_force_on_the_lever_gives_its_free_amplitude() {
             ("drive", "free_amplitude", "20 nm"),
         ]))
         .unwrap();
-        let force = resolved.parameters.drive_amplitude;
+        let force = resolved.parameters.get(Parameter::Alpha2);
         close(3.0 * weight / 12.3624 * force * 1000.0 / 2.8, 20e-9, 1e-3);
         assert!((resolved.free_phase - 90.0).abs() < 0.5);
         assert!(resolved.phase_reference().contains(name));
@@ -1084,7 +1070,7 @@ fn a_force_on_the_lever_gives_its_free_amplitude() {
     }
 }
 
-/// Both tones have the free amplitudes that were asked for, by the closed form of each.
+/// Both tones have the requested free amplitudes, by the closed form of each.
 #[test]
 fn a_second_tone_has_its_own_free_amplitude() {
     let resolved = resolve(&changed(&[
@@ -1098,10 +1084,14 @@ fn a_second_tone_has_its_own_free_amplitude() {
     let case = &resolved.cantilever;
     let ratio = case.tone2_ratio.unwrap();
     assert_eq!(ratio.to_string(), "25/4");
-    close(case.tone2_phase, 30.0, 1e-12);
+    close(case.get(Parameter::Tone2Phase), 30.0, 1e-12);
     for (amplitude, frequency, expected) in [
         (case.alpha2, case.omega, 20e-9),
-        (case.tone2_amplitude, 6.25 * case.omega, 0.5e-9),
+        (
+            case.get(Parameter::Tone2Amplitude),
+            6.25 * case.omega,
+            0.5e-9,
+        ),
     ] {
         let z = super::free_response::response_at(case, frequency).unwrap();
         close(
@@ -1123,16 +1113,9 @@ fn samples_have_their_laws() {
         ("sample", "relaxation_time", "0.5 us"),
     ]))
     .unwrap();
-    close(
-        solid.cantilever.relaxation_stiffness,
-        3.0 * 50.0 / 2.8,
-        1e-13,
-    );
-    close(
-        solid.cantilever.relaxation_time,
-        0.5e-6 / solid.scales.time,
-        1e-13,
-    );
+    let numbers = solid.cantilever.own_numbers();
+    close(numbers[0], 3.0 * 50.0 / 2.8, 1e-13);
+    close(numbers[1], 0.5e-6 / solid.scales.time, 1e-13);
     assert_eq!(solid.cantilever.alpha6, 0.0);
     assert!(
         !solid
@@ -1148,7 +1131,10 @@ fn samples_have_their_laws() {
 #[test]
 fn laws_and_drives_are_refused_with_what_would_be_right() {
     let cases: [(&[Entry], &str); 12] = [
-        (&[("sample", "law", "hertz")], "it is no part of sample.law"),
+        (
+            &[("sample", "law", "hertz")],
+            "it is not a parameter of sample.law",
+        ),
         (
             &[("sample", "thickness", "50 nm")],
             "it belongs to a nonlinear force law (laws with it: thin-sphere, thin-cone, \
@@ -1201,7 +1187,7 @@ fn laws_and_drives_are_refused_with_what_would_be_right() {
 }
 
 /// A silicon lever of 200 µm × 30 µm × 2 µm in water: ω = ω_vac (1 + πρb/(4ρ_c h) Γ_r)^(−1/2) and
-/// Q = (4ρ_c h/(πρb) + Γ_r)/Γ_i, Sader's Eqs. (30) and (31), solved beside with SciPy's Bessel
+/// Q = (4ρ_c h/(πρb) + Γ_r)/Γ_i, Sader's Eqs. (30) and (31), solved separately with SciPy's Bessel
 /// functions; with damping the resonance curve peaks a little off.
 #[test]
 fn a_fluid_slows_and_damps_a_lever() {
@@ -1239,19 +1225,17 @@ fn a_fluid_slows_and_damps_a_lever() {
     assert!((lever.k / 1.2675 - 1.0).abs() < 1e-12);
     // The higher modes by the same equations, each at its own frequency; a mode bends with the
     // beam's own stiffness, β⁴EI/(4L³) at the tip.
-    let modes = case.physical().unwrap().parameters.higher_modes;
-    let expected = HigherModes {
-        frequency: [160_762.630_080_171_63, 464_217.702_512_056_8],
-        quality: [7.127_590_690_153_069_5, 10.974_220_674_266_789],
-        stiffness: [51.282_925_205_474_81, 402.066_449_387_596_9],
-    };
-    let found = [modes.frequency, modes.quality, modes.stiffness];
-    let expected = [expected.frequency, expected.quality, expected.stiffness];
-    for (found, expected) in found
-        .into_iter()
-        .flatten()
-        .zip(expected.into_iter().flatten())
-    {
+    let modes = case.physical().unwrap().parameters;
+    let expected = [
+        160_762.630_080_171_63,
+        464_217.702_512_056_8,
+        7.127_590_690_153_069_5,
+        10.974_220_674_266_789,
+        51.282_925_205_474_81,
+        402.066_449_387_596_9,
+    ];
+    for (parameter, expected) in Parameter::MEASURED.into_iter().zip(expected) {
+        let found = modes.get(parameter);
         assert!((found / expected - 1.0).abs() < 1e-9, "{found} {expected}");
     }
     // What was measured in the fluid stands.
@@ -1262,10 +1246,11 @@ fn a_fluid_slows_and_damps_a_lever() {
         "cantilever.k3=300 N/m",
     ];
     let case = Case::parse(None, &words(&measured)).unwrap();
-    let found = case.physical().unwrap().parameters.higher_modes;
-    assert!((found.quality[0] - 5.0).abs() < 1e-12);
-    assert!((found.stiffness[1] - 300.0).abs() < 1e-9);
-    assert_eq!(found.quality[1].to_bits(), modes.quality[1].to_bits());
+    let found = case.physical().unwrap().parameters;
+    assert!((found.get(Parameter::Mode2Quality) - 5.0).abs() < 1e-12);
+    assert!((found.get(Parameter::Mode3Stiffness) - 300.0).abs() < 1e-9);
+    let third = |of: &Numbers| of.get(Parameter::Mode3Quality).to_bits();
+    assert_eq!(third(&found), third(&modes));
     let said: Vec<String> = case.remarks().into_iter().map(|r| r.text).collect();
     assert!(
         said.iter()
@@ -1292,7 +1277,7 @@ fn a_fluid_slows_and_damps_a_lever() {
     let case = Case::parse(None, &words(&vacuum)).unwrap();
     let with = case.cantilever().unwrap();
     let without = Cantilever {
-        higher_modes: HigherModes::NONE,
+        further: Numbers::ZERO,
         ..with.clone()
     };
     let [with, without] = [with, &without].map(|case| Galerkin::new(case).unwrap());

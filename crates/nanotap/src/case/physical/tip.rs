@@ -46,7 +46,7 @@ impl TipShape {
     }
 }
 
-/// How the mass at the end of the beam is known.
+/// Determination of the mass at the end of the beam.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum TipMass {
     /// In kg.
@@ -57,10 +57,10 @@ pub enum TipMass {
     SecondMode(f64),
 }
 
-/// The tip as the case file has it.
+/// The tip of a case file.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Tip {
-    /// Its mass; none given counts as zero.
+    /// Mass; zero if not stated.
     pub mass: Option<TipMass>,
     /// Radius of curvature of the apex in m.
     pub radius: Option<f64>,
@@ -71,7 +71,7 @@ pub struct Tip {
 }
 
 impl Tip {
-    /// What `[tip]` says; a lever from the catalogue lends its tip's radius and height.
+    /// Reads `[tip]`, completed with radius and height of a catalogue lever.
     pub(crate) fn read(
         reader: Reader<'_>,
         lever: Option<&CatalogueLever>,

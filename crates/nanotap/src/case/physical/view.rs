@@ -1,30 +1,28 @@
-//! A case as an experimenter states it, mapped to the model: the view in SI.
+//! A physical case mapped to the model: the view in SI.
 
 use nanotap_arithmetic::ComplexFunctions as _;
 use std::f64::consts::TAU;
 
 use nalgebra::Complex;
 
-use super::drive::{Drive, DriveFrequency, DriveStrength, FIRST, SECOND, Setpoint};
+use super::drive::{Drive, FIRST, Given, SECOND};
 use super::error::PhysicalError;
 use super::free_response::{free_response, response_at};
 use super::lever::{Lever, LeverData};
-use super::mapping::{MappingRow, PhysicalParameters, Scales, mapping_table};
+use super::mapping::{MappingRow, Scales, mapping_table};
 use super::reader::Reader;
 use super::sample::Sample;
 use super::tip::Tip;
-use crate::case::file::{cosine_term, modes};
-use crate::case::key::{Key, ModelKind};
+use crate::case::file::{modes, word};
+use crate::case::key::{Key, Laws, ModelKind};
 use crate::case::quantity::Kind;
 use crate::case::stated::{Stated, Value};
 use crate::model::cantilever::Cantilever;
-use crate::model::contact::ContactLaw;
 use crate::model::drive_form::Actuation;
 use crate::model::exact_beam;
-use crate::model::higher_modes::HigherModes;
-use crate::model::parameter::Parameter;
+use crate::model::parameter::{Numbers, Parameter, Unit};
 
-/// Height of the tip where nothing tells it; tips of silicon levers are 10 to 15 µm high.
+/// Default height of the tip; tips of silicon levers are 10 to 15 µm high.
 pub(super) const USUAL_TIP_HEIGHT: f64 = 10e-6;
 
 /// A physical case with its dimensionless parameters and the units between the two.
@@ -38,8 +36,8 @@ pub struct Physical {
     pub lever: Lever,
     /// The sample.
     pub sample: Sample,
-    /// The physical quantities behind α1 … α6 and Ω.
-    pub parameters: PhysicalParameters,
+    /// The physical quantities of the dimensionless numbers, in SI.
+    pub parameters: Numbers,
     /// Free amplitude A₀ of the tip's deflection at the drive frequency, in m.
     pub free_amplitude: f64,
     /// Free amplitude of the second tone, in m, if there is one.
@@ -51,15 +49,15 @@ pub struct Physical {
     pub setpoint: Option<f64>,
     /// Height of the tip, g₀ − g₁, in m.
     pub tip_height: f64,
-    /// What was known of the lever.
+    /// Data of the lever.
     pub(super) data: LeverData,
     /// The tip.
     pub(super) tip: Tip,
 }
 
 impl Physical {
-    /// What the stated quantities come to. Where neither lever nor tip nor modes changed, the
-    /// `lever` that they gave before is taken.
+    /// Maps the stated quantities. If lever, tip and modes are unchanged, the previous `lever` is
+    /// used.
     ///
     /// # Errors
     /// [`PhysicalError`] if the quantities contradict each other or describe something
@@ -68,7 +66,7 @@ impl Physical {
         mapped(reader, lever).map_err(|error| named(reader, error))
     }
 
-    /// The same with dimensionless numbers put in place of those that were mapped.
+    /// The same view with some dimensionless numbers replaced.
     pub(crate) fn with_numbers(
         mut self,
         numbers: &[(Parameter, f64)],
@@ -77,16 +75,16 @@ impl Physical {
             self.cantilever = self.cantilever.with(parameter, value);
         }
         self.cantilever.validate()?;
-        self.parameters = PhysicalParameters::from_case(&self.cantilever, &self.scales);
+        self.parameters = self.scales.quantities(&self.cantilever);
         let response = free_response(&self.cantilever)?;
         self.free_amplitude = self.cantilever.alpha2 * response.modulus() * self.scales.length;
         self.free_phase = -response.argument().to_degrees();
         if let Some(ratio) = self.cantilever.tone2_ratio {
             let second = response_at(&self.cantilever, ratio.value() * self.cantilever.omega)?;
-            let amplitude = self.cantilever.tone2_amplitude * second.modulus();
+            let amplitude = self.cantilever.get(Parameter::Tone2Amplitude) * second.modulus();
             self.second_free_amplitude = Some(amplitude * self.scales.length);
         }
-        self.tip_height = self.scales.length - self.parameters.tip_gap;
+        self.tip_height = self.scales.length - self.parameters.get(Parameter::Alpha5);
         Ok(self)
     }
 
@@ -95,7 +93,7 @@ impl Physical {
         mapping_table(&self.cantilever, &self.scales)
     }
 
-    /// What phases are counted from.
+    /// Reference of phases.
     pub const fn phase_reference(&self) -> &'static str {
         match self.cantilever.actuation {
             Actuation::Base => "displacement of the clamped end",
@@ -104,12 +102,12 @@ impl Physical {
         }
     }
 
-    /// Whether a fluid tells mass and damping.
+    /// True if a fluid determines mass and damping.
     pub const fn is_in_fluid(&self) -> bool {
         self.data.fluid.is_some()
     }
 
-    /// The key of the drive's own strength: of the base's motion, or of the force.
+    /// Key of the drive strength: the motion of the base, or the force.
     pub(crate) fn strength_key(&self, keys: [Key; 3]) -> Key {
         match self.cantilever.actuation {
             Actuation::Base => keys[0],
@@ -117,15 +115,26 @@ impl Physical {
         }
     }
 
-    /// The value of a quantity in SI, stated or following from what is; `None` where nothing
-    /// tells it.
+    /// The value of a quantity in SI, stated or derived; `None` if it is unknown.
     pub(crate) fn value(&self, key: Key) -> Option<f64> {
-        let (parameters, second) = (&self.parameters, self.cantilever.tone2_ratio);
-        let damping = parameters.contact_damping;
-        if let Some(force) = &self.sample.force
-            && let Some(value) = force.get(key)
-        {
-            return Some(value);
+        let second = self.cantilever.tone2_ratio;
+        let quantity = |parameter| self.parameters.get(parameter);
+        if let Some(force) = &self.sample.force {
+            if let Some(value) = force.get(key) {
+                return Some(value);
+            }
+            let spring = [
+                Key::SampleStiffness,
+                Key::SampleDamping,
+                Key::SampleLossTangent,
+            ];
+            if spring.contains(&key) || key.law_number().is_some() {
+                return None;
+            }
+        }
+        if let Some(number) = key.law_number() {
+            let known = key.entry().laws == Laws::Some || self.cantilever.has(number);
+            return known.then(|| quantity(number));
         }
         Some(match key {
             Key::LeverK => self.lever.k,
@@ -134,51 +143,34 @@ impl Physical {
             Key::LeverLength => self.data.geometry?.length,
             Key::LeverWidth => self.data.geometry?.width,
             Key::LeverThickness => self.data.geometry?.thickness,
-            Key::TipMass => parameters.tip_mass,
+            Key::TipMass => quantity(Parameter::Alpha1),
             Key::TipMassRatio => self.lever.tip_mass_ratio,
             Key::TipRadius => self.tip.radius?,
             Key::TipHeight => self.tip_height,
             Key::TipModulus => self.tip.elastic?.modulus,
             Key::TipPoisson => self.tip.elastic?.poisson,
-            Key::SampleStiffness
-            | Key::SampleDamping
-            | Key::SampleLossTangent
-            | Key::SampleRelaxationStiffness
-            | Key::SampleRelaxationTime
-            | Key::SampleSurfaceStiffness
-            | Key::SampleSurfaceDamping
-                if self.sample.force.is_some() =>
-            {
-                return None;
-            }
-            Key::SampleStiffness => parameters.contact_stiffness,
-            Key::SampleDamping => damping,
+            Key::SampleStiffness => quantity(Parameter::Alpha4),
+            Key::SampleDamping => quantity(Parameter::Alpha6),
             Key::SampleLossTangent => {
-                damping * TAU * parameters.drive_frequency / parameters.contact_stiffness
-            }
-            Key::SampleRelaxationStiffness => parameters.relaxation_stiffness,
-            Key::SampleRelaxationTime => parameters.relaxation_time,
-            Key::SampleSurfaceStiffness => parameters.surface.stiffness,
-            Key::SampleSurfaceDamping => parameters.surface.damping,
-            Key::SampleAdhesionForce if self.cantilever.contact == ContactLaw::MovingSurface => {
-                parameters.surface.adhesion
+                quantity(Parameter::Alpha6) * TAU * quantity(Parameter::Omega)
+                    / quantity(Parameter::Alpha4)
             }
             Key::SampleModulus => self.sample.elastic?.modulus,
             Key::SamplePoisson => self.sample.elastic?.poisson,
             Key::SampleIndentation => self.sample.hertz?.indentation,
-            Key::DriveFrequency => parameters.drive_frequency,
-            Key::DriveFrequencyRatio => parameters.drive_frequency / self.lever.f0,
+            Key::DriveFrequency => quantity(Parameter::Omega),
+            Key::DriveFrequencyRatio => quantity(Parameter::Omega) / self.lever.f0,
             Key::DriveAmplitude | Key::DriveForce if key == self.strength_key(FIRST) => {
-                parameters.drive_amplitude
+                quantity(Parameter::Alpha2)
             }
             Key::DriveFreeAmplitude => self.free_amplitude,
-            Key::SecondFrequency => second?.value() * parameters.drive_frequency,
+            Key::SecondFrequency => second?.value() * quantity(Parameter::Omega),
             Key::SecondAmplitude | Key::SecondForce if key == self.strength_key(SECOND) => {
-                second.map(|_| parameters.tone2_amplitude)?
+                second.map(|_| quantity(Parameter::Tone2Amplitude))?
             }
             Key::SecondFreeAmplitude => self.second_free_amplitude?,
-            Key::SecondPhase => second.map(|_| parameters.tone2_phase)?,
-            Key::GapTip => parameters.tip_gap,
+            Key::SecondPhase => second.map(|_| quantity(Parameter::Tone2Phase))?,
+            Key::GapTip => quantity(Parameter::Alpha5),
             Key::GapBeam => self.scales.length,
             _ => return None,
         })
@@ -187,17 +179,23 @@ impl Physical {
     /// What stays while a quantity varies, said as numbers of their own. An experimenter who
     /// turns one knob leaves the others: the drive keeps its own amplitude (a piezo its
     /// voltage, not the lever's answer to it), the second tone its place among the harmonics
-    /// of the first, the sample its place, and the unit of length g₀ stays so that all values
-    /// are told in one.
-    pub(crate) fn held(&self, stated: &Stated) -> Stated {
+    /// of the first, the sample its place, and the unit of length g₀ stays so that all values have
+    /// the same unit.
+    pub(crate) fn implied_constants(&self, stated: &Stated) -> Stated {
         let mut held = stated.clone();
         held.set(Key::GapBeam, self.scales.length);
-        held.set(Key::GapTip, self.parameters.tip_gap);
+        held.set(Key::GapTip, self.parameters.get(Parameter::Alpha5));
         if stated.has(Key::DriveFreeAmplitude) {
-            held.set(self.strength_key(FIRST), self.parameters.drive_amplitude);
+            held.set(
+                self.strength_key(FIRST),
+                self.parameters.get(Parameter::Alpha2),
+            );
         }
         if stated.has(Key::SecondFreeAmplitude) {
-            held.set(self.strength_key(SECOND), self.parameters.tone2_amplitude);
+            held.set(
+                self.strength_key(SECOND),
+                self.parameters.get(Parameter::Tone2Amplitude),
+            );
         }
         if let (Some(ratio), true) = (
             self.cantilever.tone2_ratio,
@@ -210,7 +208,7 @@ impl Physical {
     }
 }
 
-/// Names the stated key behind a parameter that the model does not take.
+/// Names the stated key that causes an invalid parameter.
 fn named(reader: Reader<'_>, error: PhysicalError) -> PhysicalError {
     let PhysicalError::Model { key: None, error } = error else {
         return error;
@@ -218,7 +216,10 @@ fn named(reader: Reader<'_>, error: PhysicalError) -> PhysicalError {
     let parameter = ModelKind::Cantilever
         .key(error.key)
         .and_then(Key::parameter);
-    let feeds = |key: &Key| key.entry().feeds.is_some() && key.entry().feeds == parameter;
+    let feeds = |key: &Key| {
+        let fed = key.entry().feeds.or_else(|| key.law_number());
+        fed.is_some() && fed == parameter
+    };
     let stated = Key::all().find(|key| feeds(key) && reader.has(*key));
     PhysicalError::Model {
         key: stated.map(|key| (key, reader.stated.written(key))),
@@ -234,16 +235,16 @@ fn mapped(reader: Reader<'_>, known: Option<Lever>) -> Result<Physical, Physical
     let drive = Drive::read(reader)?;
     let lever = known.map_or_else(|| Lever::resolve(&data), Ok)?;
     let frequency = match drive.frequency {
-        DriveFrequency::Absolute(frequency) => frequency,
-        DriveFrequency::Ratio(ratio) => ratio * lever.f0,
+        (Key::DriveFrequencyRatio, ratio) => ratio * lever.f0,
+        (_, frequency) => frequency,
     };
-    let ratio = drive.second.map(|s| s.frequency.ratio(frequency));
+    let ratio = drive.second.map(|second| second.ratio(frequency));
     let like = Cantilever {
         modes: modes(reader.stated),
-        cosine_term: cosine_term(reader.stated),
+        cosine_term: word(reader.stated, Key::CosineTerm).unwrap_or_default(),
         contact: sample.law,
         actuation: drive.actuation,
-        tone2_ratio: ratio.transpose()?,
+        tone2_ratio: ratio.transpose()?.flatten(),
         ..Cantilever::paper()
     };
     // The free response does not depend on g0, so any length serves as unit here: g0 = 1 m,
@@ -252,20 +253,23 @@ fn mapped(reader: Reader<'_>, known: Option<Lever>) -> Result<Physical, Physical
     let measured = match (data.fluid, data.geometry) {
         (Some(fluid), Some(beam)) => {
             let loaded = fluid.higher_modes(&lever, beam.width, beam.length, like.modes)?;
-            measured.or(loaded)
+            let missing = Parameter::MEASURED.into_iter();
+            let missing = missing.filter(|of| measured.get(*of) == 0.0);
+            missing.fold(measured, |all, of| all.with(of, loaded.get(of)))
         }
         _ => measured,
     };
     let time = lever.time_unit();
-    let higher_modes = HigherModes {
-        frequency: measured.frequency.map(|frequency| TAU * frequency * time),
-        stiffness: measured.stiffness.map(|k| 3.0 * k / lever.k),
-        ..measured
-    };
-    let free = Cantilever {
-        higher_modes,
-        ..free_case(&lever, frequency, &like)
-    };
+    let mut free = free_case(&lever, frequency, &like);
+    for parameter in Parameter::MEASURED {
+        let value = measured.get(parameter);
+        let number = match parameter.entry().unit {
+            Unit::Frequency => TAU * value * time,
+            Unit::Stiffness => 3.0 * value / lever.k,
+            _ => value,
+        };
+        free = free.with(parameter, number);
+    }
     let unit = Scales::new(&lever, 1.0).of(Parameter::Alpha2, like.actuation);
     let response = free_response(&free)?;
     let strength =
@@ -282,7 +286,7 @@ fn mapped(reader: Reader<'_>, known: Option<Lever>) -> Result<Physical, Physical
     let setpoint = setpoint_ratio(reader, &drive, free_amplitude)?;
     let tip_gap = match (reader.number(Key::GapTip)?, setpoint) {
         (Some(gap), _) => gap,
-        // Until the setpoint is solved for.
+        // Before the setpoint is solved for.
         (None, Some(ratio)) => ratio * free_amplitude,
         (None, None) => {
             return Err(PhysicalError::missing(
@@ -305,22 +309,22 @@ fn mapped(reader: Reader<'_>, known: Option<Lever>) -> Result<Physical, Physical
         ));
     }
     let scales = Scales::new(&lever, beam_gap);
-    let parameters = PhysicalParameters {
-        tip_mass: lever.tip_mass(),
-        drive_amplitude: base,
-        beam_damping: lever.damping() * scales.damping,
-        contact_stiffness: sample.stiffness,
-        tip_gap,
-        contact_damping: sample.damper(TAU * frequency),
-        drive_frequency: frequency,
-        relaxation_stiffness: sample.relaxation_stiffness,
-        relaxation_time: sample.relaxation_time,
-        surface: sample.surface,
-        tone2_amplitude: second.map_or(0.0, |(_, (applied, _))| applied),
-        tone2_phase: second.map_or(0.0, |(phase, _)| phase),
-        higher_modes: measured,
-    };
-    let mut cantilever = parameters.to_case(&scales, &like);
+    let mut parameters = measured
+        .with(Parameter::Alpha1, lever.tip_mass())
+        .with(Parameter::Alpha2, base)
+        .with(Parameter::Alpha3, lever.damping() * scales.damping)
+        .with(Parameter::Alpha4, sample.stiffness)
+        .with(Parameter::Alpha5, tip_gap)
+        .with(Parameter::Alpha6, sample.damper(TAU * frequency))
+        .with(Parameter::Omega, frequency);
+    for (parameter, number) in Parameter::of_law(sample.law).zip(&sample.numbers) {
+        parameters.set(parameter, *number);
+    }
+    if let Some((phase, (applied, _))) = second {
+        parameters.set(Parameter::Tone2Amplitude, applied);
+        parameters.set(Parameter::Tone2Phase, phase);
+    }
+    let mut cantilever = scales.case(&parameters, &like);
     cantilever.validate()?;
     if let Some(force) = &sample.force {
         cantilever.law = Some(force.in_model(&scales)?);
@@ -341,13 +345,9 @@ fn mapped(reader: Reader<'_>, known: Option<Lever>) -> Result<Physical, Physical
     })
 }
 
-/// What was measured of the second and third mode. A second resonance without a tip's mass
-/// tells that mass, and is the beam's own with it.
-fn measured_modes(
-    reader: Reader<'_>,
-    tip: &Tip,
-    lever: &Lever,
-) -> Result<HigherModes, PhysicalError> {
+/// Measured data of the second and third mode, in SI; 0 if there are none. Without a stated tip
+/// mass the second resonance determines it.
+fn measured_modes(reader: Reader<'_>, tip: &Tip, lever: &Lever) -> Result<Numbers, PhysicalError> {
     let number = |key| reader.number(key).map(Option::unwrap_or_default);
     let beam = exact_beam::frequencies(lever.tip_mass_ratio, 0.0, 3)?;
     let frequency = |key, k: usize| {
@@ -365,17 +365,17 @@ fn measured_modes(
         }
         Ok(given)
     };
-    Ok(HigherModes {
-        frequency: [
-            tip.mass.map_or(Ok(0.0), |_| frequency(Key::LeverF2, 1))?,
-            frequency(Key::LeverF3, 2)?,
-        ],
-        quality: [number(Key::LeverQ2)?, number(Key::LeverQ3)?],
-        stiffness: [number(Key::LeverK2)?, number(Key::LeverK3)?],
-    })
+    let second = tip.mass.map_or(Ok(0.0), |_| frequency(Key::LeverF2, 1))?;
+    Ok(Numbers::ZERO
+        .with(Parameter::Mode2Frequency, second)
+        .with(Parameter::Mode3Frequency, frequency(Key::LeverF3, 2)?)
+        .with(Parameter::Mode2Quality, number(Key::LeverQ2)?)
+        .with(Parameter::Mode3Quality, number(Key::LeverQ3)?)
+        .with(Parameter::Mode2Stiffness, number(Key::LeverK2)?)
+        .with(Parameter::Mode3Stiffness, number(Key::LeverK3)?))
 }
 
-/// The lever alone, driven with unit amplitude.
+/// The lever without sample, driven with unit amplitude.
 fn free_case(lever: &Lever, frequency: f64, like: &Cantilever) -> Cantilever {
     Cantilever {
         modes: like.modes,
@@ -399,30 +399,32 @@ fn setpoint_ratio(
 ) -> Result<Option<f64>, PhysicalError> {
     match drive.setpoint {
         None => Ok(None),
-        Some(Setpoint::Ratio(ratio)) => Ok(Some(ratio)),
-        Some(Setpoint::Amplitude(amplitude)) if amplitude < free_amplitude => {
+        Some((Kind::Length, amplitude)) if amplitude < free_amplitude => {
             Ok(Some(amplitude / free_amplitude))
         }
-        Some(Setpoint::Amplitude(_)) => Err(reader.impossible(
+        Some((Kind::Length, _)) => Err(reader.impossible(
             Key::DriveSetpoint,
             format!(
                 "it must be below the free amplitude, {}",
                 Kind::Length.format(free_amplitude)
             ),
         )),
+        Some((_, ratio)) => Ok(Some(ratio)),
     }
 }
 
-/// Amplitude of the drive and of the free tip, one from the other by the `gain` from the
-/// first to the second, both in SI.
-fn applied(strength: DriveStrength, gain: f64, key: Key) -> Result<(f64, f64), PhysicalError> {
-    match strength {
-        DriveStrength::Applied(applied) => Ok((applied, applied * gain)),
-        DriveStrength::Free(free) if (free / gain).is_finite() => Ok((free / gain, free)),
-        DriveStrength::Free(free) => Err(PhysicalError::impossible(
-            key,
-            Kind::Length.format(free),
-            "the lever does not move at this drive frequency",
-        )),
+/// Amplitudes of the drive and of the free tip in SI, one from the other by the `gain` between
+/// them.
+fn applied((stated, value): Given, gain: f64, free: Key) -> Result<(f64, f64), PhysicalError> {
+    if stated != free {
+        return Ok((value, value * gain));
     }
+    if (value / gain).is_finite() {
+        return Ok((value / gain, value));
+    }
+    Err(PhysicalError::impossible(
+        free,
+        Kind::Length.format(value),
+        "the lever does not move at this drive frequency",
+    ))
 }

@@ -36,10 +36,7 @@ pub(super) fn engineering(
     let figures: String = mantissa.chars().filter(char::is_ascii_digit).collect();
     let figures = figures.trim_end_matches('0');
     let step = exponent.div_euclid(3) * 3;
-    let prefix = PREFIXES
-        .iter()
-        .find(|(letter, power)| *power == step && *letter != 'u' && *letter != '\u{3bc}')
-        .map(|(letter, _)| letter.to_string());
+    let prefix = prefix_of(step);
     let (number, prefix) = match (prefixed, prefix) {
         (true, Some(prefix)) => (place_point(figures, exponent - step), prefix),
         // Plain decimals while they are short, powers of ten beyond.
@@ -50,6 +47,18 @@ pub(super) fn engineering(
         ),
     };
     join(&format!("{sign}{number}"), &prefix)
+}
+
+/// The SI prefix of a power of ten, empty for 0.
+pub(crate) fn prefix_of(power: i32) -> Option<String> {
+    if power == 0 {
+        return Some(String::new());
+    }
+    let is = |(letter, other): &&(char, i32)| *other == power && !matches!(letter, 'u' | '\u{3bc}');
+    PREFIXES
+        .iter()
+        .find(is)
+        .map(|(letter, _)| letter.to_string())
 }
 
 /// The decimal d.ddd × 10^`exponent` written out, from its figures.

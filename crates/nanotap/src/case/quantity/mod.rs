@@ -1,4 +1,5 @@
-//! Numbers with units as people type them: `"2.8 N/m"`, `"75 kHz"`, `"30 µm"`, `"1e-3 N s/m"`.
+//! Parsing and formatting of quantities with units: `"2.8 N/m"`, `"75 kHz"`, `"30 µm"`, `"1e-3 N
+//! s/m"`.
 //!
 //! A value is read into SI under a dimension check and written back with an engineering
 //! prefix. Decimal prefixes are folded into the number's own exponent before it is converted
@@ -20,6 +21,7 @@ use std::str::FromStr;
 use serde::Serialize;
 
 use format::engineering;
+pub(crate) use format::prefix_of;
 use parser::read;
 
 /// Elementary charge in coulomb, hence joules in one electronvolt; exact in the SI of 2019.
@@ -27,8 +29,8 @@ pub const JOULES_PER_ELECTRONVOLT: f64 = 1.602_176_634e-19;
 
 /// Exponents of the base units kilogram, metre, second, radian and coulomb.
 ///
-/// The radian counts as a unit of its own here, so that an angular frequency in rad/s cannot
-/// be taken for a frequency in Hz, a factor 2π apart.
+/// The radian counts as a base unit here, so that an angular frequency in rad/s cannot be confused
+/// with a frequency in Hz, a factor of 2π.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Dimension {
     /// Exponent of the kilogram.
@@ -102,181 +104,91 @@ impl fmt::Display for Dimension {
     }
 }
 
-/// What a quantity measures: fixes its dimension, its words in messages and its display unit.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Kind {
+/// The table of kinds: dimension, noun with its article, an example, and the unit shown with the
+/// power of ten that it is away from SI and whether it takes a prefix.
+macro_rules! kinds {
+    ($($(#[$doc:meta])* $kind:ident: $dimension:expr, $noun:expr, $example:expr, $unit:expr;)*) => {
+        /// What a quantity measures: fixes its dimension, its words in messages and its display unit.
+        #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize)]
+        #[serde(rename_all = "snake_case")]
+        pub enum Kind { $($(#[$doc])* $kind),* }
+
+        impl Kind {
+            /// Every kind, in the order in which a dimension is named.
+            pub const ALL: [Self; [$(stringify!($kind)),*].len()] = [$(Self::$kind),*];
+
+            /// Its exponents of kg, m, s, rad and C.
+            pub const fn dimension(self) -> Dimension {
+                match self { $(Self::$kind => $dimension),* }
+            }
+
+            /// With its article, for messages: "a force per length".
+            pub const fn noun(self) -> &'static str {
+                match self { $(Self::$kind => $noun),* }
+            }
+
+            /// A text that would be right, for messages.
+            pub const fn example(self) -> &'static str {
+                match self { $(Self::$kind => $example),* }
+            }
+
+            /// Unit shown, power of ten that it is away from SI, and whether it takes a prefix.
+            const fn display_unit(self) -> (&'static str, i32, bool) {
+                match self { $(Self::$kind => $unit),* }
+            }
+        }
+    };
+}
+
+kinds! {
     /// A plain number: quality factor, Poisson's ratio, setpoint ratio. Percent allowed.
-    Number,
+    Number: Dimension::NONE, "a number without a unit", "200", ("", 0, false);
     /// Metre.
-    Length,
+    Length: Dimension::new(0, 1, 0, 0), "a length", "30 um", ("m", 0, true);
     /// Kilogram.
-    Mass,
+    Mass: Dimension::new(1, 0, 0, 0), "a mass", "3 ng", ("g", -3, true);
     /// Second.
-    Time,
+    Time: Dimension::new(0, 0, 1, 0), "a time", "12 us", ("s", 0, true);
     /// Kilogram per cubic metre.
-    Density,
+    Density: Dimension::new(1, -3, 0, 0), "a mass per volume", "2330 kg/m^3", ("kg/m^3", 0, false);
     /// Hertz: cycles, not radians, per second.
-    Frequency,
+    Frequency: Dimension::new(0, 0, -1, 0), "a frequency", "75 kHz", ("Hz", 0, true);
     /// Radian per second.
-    AngularFrequency,
+    AngularFrequency: Dimension::new(0, 0, -1, 1), "an angular frequency", "4.7e5 rad/s", ("rad/s", 0, false);
     /// Newton.
-    Force,
+    Force: Dimension::new(1, 1, -2, 0), "a force", "4.2 nN", ("N", 0, true);
     /// Newton per metre.
-    Stiffness,
+    Stiffness: Dimension::new(1, 0, -2, 0), "a force per length", "2.8 N/m", ("N/m", 0, true);
     /// Pascal.
-    Pressure,
+    Pressure: Dimension::new(1, -1, -2, 0), "a pressure", "4 GPa", ("Pa", 0, true);
     /// Newton second per metre.
-    Damping,
+    Damping: Dimension::new(1, 0, -1, 0), "a force per velocity", "1e-6 N s/m", ("N s/m", 0, true);
     /// Joule.
-    Energy,
+    Energy: Dimension::new(1, 2, -2, 0), "an energy", "12 eV", ("J", 0, true);
     /// Watt.
-    Power,
+    Power: Dimension::new(1, 2, -3, 0), "a power", "1 pW", ("W", 0, true);
     /// Metre per second.
-    Velocity,
+    Velocity: Dimension::new(0, 1, -1, 0), "a velocity", "2 mm/s", ("m/s", 0, true);
     /// Radian; shown in degrees.
-    Angle,
+    Angle: Dimension::new(0, 0, 0, 1), "an angle", "25 deg", ("rad", 0, false);
     /// Pascal second.
-    Viscosity,
+    Viscosity: Dimension::new(1, -1, -1, 0), "a viscosity", "2 Pa s", ("Pa s", 0, true);
     /// Volt.
-    Voltage,
+    Voltage: Dimension::new(1, 2, -2, 0).charged(-1), "a voltage", "0.5 V", ("V", 0, true);
     /// Coulomb per square metre.
-    ChargeDensity,
+    ChargeDensity: Dimension::new(0, -2, 0, 0).charged(1), "a charge per area", "-2.5 mC/m^2", ("C/m^2", 0, true);
     /// Joule times metre to the sixth: what repels in a Lennard-Jones law.
-    Repulsion,
+    Repulsion: Dimension::new(1, 8, -2, 0), "an energy times a length to the sixth", "1e-76 J m^6", ("J m^6", 0, false);
 }
 
 impl Kind {
-    /// Every kind, in the order in which a dimension is named.
-    pub const ALL: [Self; 19] = [
-        Self::Number,
-        Self::Length,
-        Self::Mass,
-        Self::Time,
-        Self::Density,
-        Self::Frequency,
-        Self::AngularFrequency,
-        Self::Force,
-        Self::Stiffness,
-        Self::Pressure,
-        Self::Damping,
-        Self::Energy,
-        Self::Power,
-        Self::Velocity,
-        Self::Angle,
-        Self::Viscosity,
-        Self::Voltage,
-        Self::ChargeDensity,
-        Self::Repulsion,
-    ];
-
-    /// Its exponents of kg, m, s and rad.
-    pub const fn dimension(self) -> Dimension {
-        match self {
-            Self::Number => Dimension::NONE,
-            Self::Length => Dimension::new(0, 1, 0, 0),
-            Self::Mass => Dimension::new(1, 0, 0, 0),
-            Self::Time => Dimension::new(0, 0, 1, 0),
-            Self::Density => Dimension::new(1, -3, 0, 0),
-            Self::Frequency => Dimension::new(0, 0, -1, 0),
-            Self::AngularFrequency => Dimension::new(0, 0, -1, 1),
-            Self::Force => Dimension::new(1, 1, -2, 0),
-            Self::Stiffness => Dimension::new(1, 0, -2, 0),
-            Self::Pressure => Dimension::new(1, -1, -2, 0),
-            Self::Damping => Dimension::new(1, 0, -1, 0),
-            Self::Energy => Dimension::new(1, 2, -2, 0),
-            Self::Power => Dimension::new(1, 2, -3, 0),
-            Self::Velocity => Dimension::new(0, 1, -1, 0),
-            Self::Angle => Dimension::new(0, 0, 0, 1),
-            Self::Viscosity => Dimension::new(1, -1, -1, 0),
-            Self::Voltage => Dimension::new(1, 2, -2, 0).charged(-1),
-            Self::ChargeDensity => Dimension::new(0, -2, 0, 0).charged(1),
-            Self::Repulsion => Dimension::new(1, 8, -2, 0),
-        }
-    }
-
-    /// With its article, for messages: "a force per length".
-    pub const fn noun(self) -> &'static str {
-        match self {
-            Self::Number => "a number without a unit",
-            Self::Length => "a length",
-            Self::Mass => "a mass",
-            Self::Time => "a time",
-            Self::Density => "a mass per volume",
-            Self::Frequency => "a frequency",
-            Self::AngularFrequency => "an angular frequency",
-            Self::Force => "a force",
-            Self::Stiffness => "a force per length",
-            Self::Pressure => "a pressure",
-            Self::Damping => "a force per velocity",
-            Self::Energy => "an energy",
-            Self::Power => "a power",
-            Self::Velocity => "a velocity",
-            Self::Angle => "an angle",
-            Self::Viscosity => "a viscosity",
-            Self::Voltage => "a voltage",
-            Self::ChargeDensity => "a charge per area",
-            Self::Repulsion => "an energy times a length to the sixth",
-        }
-    }
-
-    /// A text that would be right, for messages.
-    pub const fn example(self) -> &'static str {
-        match self {
-            Self::Number => "200",
-            Self::Length => "30 um",
-            Self::Mass => "3 ng",
-            Self::Time => "12 us",
-            Self::Density => "2330 kg/m^3",
-            Self::Frequency => "75 kHz",
-            Self::AngularFrequency => "4.7e5 rad/s",
-            Self::Force => "4.2 nN",
-            Self::Stiffness => "2.8 N/m",
-            Self::Pressure => "4 GPa",
-            Self::Damping => "1e-6 N s/m",
-            Self::Energy => "12 eV",
-            Self::Power => "1 pW",
-            Self::Velocity => "2 mm/s",
-            Self::Angle => "25 deg",
-            Self::Viscosity => "2 Pa s",
-            Self::Voltage => "0.5 V",
-            Self::ChargeDensity => "-2.5 mC/m^2",
-            Self::Repulsion => "1e-76 J m^6",
-        }
-    }
-
-    /// SI unit in which [`Kind::parse`] answers.
+    /// SI unit of the result of [`Kind::parse`].
     pub const fn si_unit(self) -> &'static str {
         match self {
             Self::Number => "1",
             Self::Mass => "kg",
             Self::Angle => "rad",
             other => other.display_unit().0,
-        }
-    }
-
-    /// Unit shown, power of ten that it is away from SI, and whether it takes a prefix.
-    const fn display_unit(self) -> (&'static str, i32, bool) {
-        match self {
-            Self::Number => ("", 0, false),
-            Self::Length => ("m", 0, true),
-            Self::Mass => ("g", -3, true),
-            Self::Time => ("s", 0, true),
-            Self::Density => ("kg/m^3", 0, false),
-            Self::Frequency => ("Hz", 0, true),
-            Self::AngularFrequency => ("rad/s", 0, false),
-            Self::Force => ("N", 0, true),
-            Self::Stiffness => ("N/m", 0, true),
-            Self::Pressure => ("Pa", 0, true),
-            Self::Damping => ("N s/m", 0, true),
-            Self::Energy => ("J", 0, true),
-            Self::Power => ("W", 0, true),
-            Self::Velocity => ("m/s", 0, true),
-            Self::Angle => ("rad", 0, false),
-            Self::Viscosity => ("Pa s", 0, true),
-            Self::Voltage => ("V", 0, true),
-            Self::ChargeDensity => ("C/m^2", 0, true),
-            Self::Repulsion => ("J m^6", 0, false),
         }
     }
 
@@ -293,10 +205,9 @@ impl Kind {
         if quantity.value == 0.0 && quantity.dimension == Dimension::NONE {
             return Ok(0.0);
         }
-        Err(QuantityError::WrongDimension {
-            expected: self,
-            text: text.trim().to_owned(),
-            got: quantity.dimension,
+        Err(QuantityError {
+            reason: format!(" ({})", quantity.dimension),
+            ..QuantityError::new(Some(self), text.trim(), "")
         })
     }
 
@@ -347,60 +258,29 @@ impl FromStr for Quantity {
     }
 }
 
-/// Why a text is not the quantity that was asked for.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-pub enum QuantityError {
-    /// The text does not begin with a finite decimal number.
-    #[error("{}got \"{text}\": {reason}", wanted(*expected))]
-    NotANumber {
-        /// What was asked for, if known.
-        expected: Option<Kind>,
-        /// The text.
-        text: String,
-        /// What is wrong with it.
-        reason: &'static str,
-    },
-    /// The unit is not one of those known here.
-    #[error("{}got \"{text}\": unknown unit \"{unit}\"{}", wanted(*expected), offer(nearest))]
-    UnknownUnit {
-        /// What was asked for, if known.
-        expected: Option<Kind>,
-        /// The text.
-        text: String,
-        /// The part of it that is no unit.
-        unit: String,
-        /// Known units that look like it, nearest first.
-        nearest: Vec<String>,
-    },
-    /// The units are put together in a way that has no single meaning.
-    #[error("{}got \"{text}\": {reason}", wanted(*expected))]
-    Malformed {
-        /// What was asked for, if known.
-        expected: Option<Kind>,
-        /// The text.
-        text: String,
-        /// What is wrong with it.
-        reason: String,
-    },
-    /// A quantity, but of another kind.
-    #[error("expected {} such as \"{}\", got \"{text}\" ({got})", expected.noun(), expected.example())]
-    WrongDimension {
-        /// What was asked for.
-        expected: Kind,
-        /// The text.
-        text: String,
-        /// What it is.
-        got: Dimension,
-    },
-    /// Too large or too small for a double.
-    #[error("{}got \"{text}\": too large or too small for a double", wanted(*expected))]
-    OutOfRange {
-        /// What was asked for, if known.
-        expected: Option<Kind>,
-        /// The text.
-        text: String,
-    },
+/// A text that is not the expected quantity.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("{}got \"{text}\"{reason}", wanted(*expected))]
+pub struct QuantityError {
+    /// The expected kind, if known.
+    pub expected: Option<Kind>,
+    /// The text.
+    pub text: String,
+    /// What is wrong with it, with its punctuation.
+    reason: String,
+    /// Known units that look like an unknown one, nearest first.
+    pub nearest: Vec<String>,
+}
+
+impl QuantityError {
+    fn new(expected: Option<Kind>, text: &str, reason: impl fmt::Display) -> Self {
+        Self {
+            expected,
+            text: text.to_owned(),
+            reason: format!(": {reason}"),
+            nearest: Vec::new(),
+        }
+    }
 }
 
 fn wanted(expected: Option<Kind>) -> String {

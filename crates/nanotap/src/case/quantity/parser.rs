@@ -1,7 +1,7 @@
 //! Reads a number with its unit.
 
 use super::units::{Scale, find_unit, nearest_units};
-use super::{Kind, Quantity, QuantityError};
+use super::{Kind, Quantity, QuantityError, offer};
 
 /// Units that a product may be written of are few and powers small: bounds keep hostile text
 /// from overflowing an exponent or the stack.
@@ -12,17 +12,11 @@ const MAX_FACTORS: usize = 16;
 pub(super) fn read(text: &str, expected: Option<Kind>) -> Result<Quantity, QuantityError> {
     let trimmed = text.trim().replace('\u{2212}', "-");
     let (mantissa, exponent, rest) =
-        split_number(&trimmed).map_err(|reason| QuantityError::NotANumber {
-            expected,
-            text: trimmed.clone(),
-            reason,
-        })?;
+        split_number(&trimmed).map_err(|reason| QuantityError::new(expected, &trimmed, reason))?;
     let scale = UnitParser::parse(rest, &trimmed, expected)?;
     let power = exponent.saturating_add(scale.decimal);
-    let out_of_range = || QuantityError::OutOfRange {
-        expected,
-        text: trimmed.clone(),
-    };
+    let out_of_range =
+        || QuantityError::new(expected, &trimmed, "too large or too small for a double");
     let value = format!("{mantissa}e{power}")
         .parse::<f64>()
         .map_err(|_| out_of_range())?
@@ -108,7 +102,7 @@ enum Token {
 }
 
 /// Reads `N s/m`, `N·s·m^-1`, `kg/(m s^2)`, `kg m⁻³`: factors joined by a space, `·` or `*`,
-/// a slash, powers. A product after a slash must stand in parentheses.
+/// a slash, powers. A product after a slash must be in parentheses.
 struct UnitParser<'a> {
     tokens: Vec<Token>,
     at: usize,
@@ -137,12 +131,8 @@ impl<'a> UnitParser<'a> {
         Ok(scale)
     }
 
-    fn malformed(&self, reason: impl Into<String>) -> QuantityError {
-        QuantityError::Malformed {
-            expected: self.expected,
-            text: self.text.to_owned(),
-            reason: reason.into(),
-        }
+    fn malformed(&self, reason: impl std::fmt::Display) -> QuantityError {
+        QuantityError::new(self.expected, self.text, reason)
     }
 
     fn tokenize(&self, units: &str) -> Result<Vec<Token>, QuantityError> {
@@ -278,7 +268,7 @@ impl<'a> UnitParser<'a> {
                 inner
             }
             Some(Token::Integer(_)) => {
-                return Err(self.malformed("a second number stands where a unit was expected"));
+                return Err(self.malformed("a second number where a unit was expected"));
             }
             _ => return Err(self.malformed("a unit is missing")),
         };
@@ -294,11 +284,13 @@ impl<'a> UnitParser<'a> {
     }
 
     fn lookup(&self, symbol: &str) -> Result<Scale, QuantityError> {
-        find_unit(symbol).ok_or_else(|| QuantityError::UnknownUnit {
-            expected: self.expected,
-            text: self.text.to_owned(),
-            unit: symbol.to_owned(),
-            nearest: nearest_units(symbol, self.expected),
+        find_unit(symbol).ok_or_else(|| {
+            let nearest = nearest_units(symbol, self.expected);
+            let offer = offer(&nearest);
+            QuantityError {
+                nearest,
+                ..self.malformed(format_args!("unknown unit \"{symbol}\"{offer}"))
+            }
         })
     }
 }

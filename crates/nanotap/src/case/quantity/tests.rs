@@ -74,7 +74,7 @@ fn says_what_was_expected_and_what_was_given() {
 #[test]
 fn offers_the_nearest_unit_and_never_guesses_a_prefix() {
     let nearest = |kind: Kind, text: &str| match kind.parse(text) {
-        Err(QuantityError::UnknownUnit { nearest, .. }) => nearest,
+        Err(QuantityError { nearest, .. }) => nearest,
         other => panic!("{text}: {other:?}"),
     };
     assert_eq!(nearest(Kind::Frequency, "75 Khz"), ["kHz"]);

@@ -1,19 +1,21 @@
-//! A contact law in numbers.
+//! A contact law as equations: two regimes, free surface and contact, with any number of internal
+//! variables of the surface.
 
 use nanotap_flow::Onset;
 
 use super::dual::Dual;
 
-/// `height · V_T + rate · V̇_T + memory · s + constant`.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(crate) struct Combination {
+/// `height · V_T + rate · V̇_T + Σ internal_k · s_k + constant`.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(crate) struct LinearForm {
     pub(crate) height: Dual,
     pub(crate) rate: Dual,
-    pub(crate) memory: Dual,
+    /// Factors of the internal variables; missing ones are 0.
+    pub(crate) internal: Vec<Dual>,
     pub(crate) constant: Dual,
 }
 
-impl Combination {
+impl LinearForm {
     pub(crate) fn height(factor: Dual) -> Self {
         Self {
             height: factor,
@@ -28,9 +30,12 @@ impl Combination {
         }
     }
 
-    pub(crate) fn memory(factor: Dual) -> Self {
+    /// `factor · s_k`.
+    pub(crate) fn internal(k: usize, factor: Dual) -> Self {
+        let mut internal = vec![Dual::default(); k + 1];
+        internal[k] = factor;
         Self {
-            memory: factor,
+            internal,
             ..Self::default()
         }
     }
@@ -42,82 +47,91 @@ impl Combination {
         }
     }
 
-    pub(crate) fn plus(self, other: Self) -> Self {
+    pub(crate) fn plus(&self, other: &Self) -> Self {
+        let (longer, shorter) = if self.internal.len() < other.internal.len() {
+            (&other.internal, &self.internal)
+        } else {
+            (&self.internal, &other.internal)
+        };
+        let mut internal = longer.clone();
+        for (sum, more) in internal.iter_mut().zip(shorter) {
+            *sum = *sum + *more;
+        }
         Self {
             height: self.height + other.height,
             rate: self.rate + other.rate,
-            memory: self.memory + other.memory,
+            internal,
             constant: self.constant + other.constant,
         }
     }
 
-    pub(crate) fn times(self, factor: Dual) -> Self {
+    pub(crate) fn times(&self, factor: Dual) -> Self {
         Self {
             height: self.height * factor,
             rate: self.rate * factor,
-            memory: self.memory * factor,
+            internal: self.internal.iter().map(|&by| by * factor).collect(),
             constant: self.constant * factor,
         }
     }
-}
 
-/// `weight · combination²`.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Square {
-    pub(crate) weight: f64,
-    pub(crate) of: Combination,
+    /// Whether it is a multiple of `s_k`.
+    pub(crate) fn is_internal(&self, k: usize) -> bool {
+        let others = self.internal.iter().enumerate().filter(|(j, _)| *j != k);
+        let zero = |dual: &Dual| dual.value == 0.0;
+        others.map(|(_, by)| by).all(zero) && zero(&self.height) && zero(&self.rate)
+    }
 }
 
 /// `weight · one · other`.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Bilinear {
     pub(crate) weight: f64,
-    pub(crate) one: Combination,
-    pub(crate) other: Combination,
+    pub(crate) one: LinearForm,
+    pub(crate) other: LinearForm,
 }
 
-impl From<Square> for Bilinear {
-    fn from(square: Square) -> Self {
+impl Bilinear {
+    /// `weight · form²`.
+    pub(crate) fn square(weight: f64, form: &LinearForm) -> Self {
         Self {
-            weight: square.weight,
-            one: square.of,
-            other: square.of,
+            weight,
+            one: form.clone(),
+            other: form.clone(),
         }
     }
 }
 
-/// What the sample does while the tip is away, or while it touches.
+/// How the sample responds in one regime.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub(crate) struct Answer {
+pub(crate) struct SampleResponse {
     /// Force on the tip.
-    pub(crate) force: Combination,
-    /// ṡ of a surface with a memory.
-    pub(crate) memory_rate: Combination,
-    /// Power that the sample takes.
-    pub(crate) dissipated: Vec<Square>,
-    /// Energy that it stores.
+    pub(crate) force: LinearForm,
+    /// ṡ_k of each internal variable.
+    pub(crate) rates: Vec<LinearForm>,
+    /// Dissipated power.
+    pub(crate) dissipated: Vec<Bilinear>,
+    /// Stored energy.
     pub(crate) stored: Vec<Bilinear>,
 }
 
-/// A contact law.
+/// The equations of a contact law.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Law {
-    /// Whether the surface has a memory `s`.
-    pub(crate) has_memory: bool,
-    /// The tip's height over the free surface; contact begins where it falls to zero.
-    pub(crate) gap: Combination,
+    /// Number of internal variables of the surface.
+    pub(crate) internal: usize,
+    /// Height of the tip above the free surface; contact begins where it falls to zero.
+    pub(crate) gap: LinearForm,
     /// Contact ends where this falls to zero.
-    pub(crate) hold: Combination,
-    /// What `s` becomes when contact ends, if it jumps.
-    pub(crate) left: Option<Combination>,
-    /// What is known of the guards when contact begins and ends, if they are not each
-    /// other's negatives.
+    pub(crate) release_guard: LinearForm,
+    /// Internal variables after contact ends, if they jump.
+    pub(crate) release_reset: Option<Vec<LinearForm>>,
+    /// How the guards start when contact begins and ends, if they are not each other's negatives.
     pub(crate) onsets: Option<[Onset; 2]>,
-    /// In flight.
-    pub(crate) flight: Answer,
-    /// In contact.
-    pub(crate) contact: Answer,
-    /// Whether in contact the beam moves as one with spring α4 and damper α6 at its tip, its
-    /// memory apart, so that its spectrum is known.
+    /// Response in flight.
+    pub(crate) flight: SampleResponse,
+    /// Response in contact.
+    pub(crate) contact: SampleResponse,
+    /// Whether in contact the beam moves as one with spring α4 and damper α6 at its tip, apart
+    /// from the internal variables, so that its spectrum is known.
     pub(crate) plain_contact: bool,
 }

@@ -1,52 +1,64 @@
 //! The paper's sample: a spring α4 and a damper α6 that act where V_T ≤ 0.
 //!
 //! The force is −(α4 V_T + α6 V̇_T) until V_T = 0, so that the damper pulls on a tip that
-//! leaves: an adhesion that nobody put in.
+//! leaves: an adhesion that is an artefact of the law.
 
 use super::dual::Dual;
-use super::law::{Answer, Combination, Law, Square};
+use super::entry::{Damper, Entry, any};
+use super::law::{Bilinear, Law, LinearForm, SampleResponse};
+
+/// Its entry.
+pub(super) static ENTRY: Entry = Entry {
+    name: "spring-damper",
+    meaning: "spring and damper where the tip is below the surface",
+    formula: "−(K1 h + C1 dh/dt) at heights h < 0, none above",
+    damper: Damper::Contact {
+        none: "sample.damping is not given: the contact dissipates nothing",
+    },
+    numbers: &[],
+    needs: "",
+    attracts: false,
+    objection: any,
+    like: Some(|_, _| Vec::new()),
+    law: |numbers| law(numbers.stiffness, numbers.damping),
+};
 
 /// The law.
 pub(super) fn law(stiffness: Dual, damping: Dual) -> Law {
     let one = Dual::constant(1.0);
     Law {
-        has_memory: false,
-        gap: Combination::height(one),
-        hold: Combination::height(-one),
-        left: None,
+        internal: 0,
+        gap: LinearForm::height(one),
+        release_guard: LinearForm::height(-one),
+        release_reset: None,
         onsets: None,
-        flight: Answer::default(),
-        contact: Answer {
+        flight: SampleResponse::default(),
+        contact: SampleResponse {
             force: force(stiffness, damping),
-            memory_rate: Combination::default(),
-            dissipated: vec![Square {
-                weight: damping.value,
-                of: Combination::rate(one),
-            }],
-            stored: vec![
-                Square {
-                    weight: 0.5 * stiffness.value,
-                    of: Combination::height(one),
-                }
-                .into(),
-            ],
+            rates: Vec::new(),
+            dissipated: vec![Bilinear::square(damping.value, &LinearForm::rate(one))],
+            stored: vec![Bilinear::square(
+                0.5 * stiffness.value,
+                &LinearForm::height(one),
+            )],
         },
         plain_contact: true,
     }
 }
 
 /// −(α4 V_T + α6 V̇_T).
-pub(super) fn force(stiffness: Dual, damping: Dual) -> Combination {
-    Combination::height(-stiffness).plus(Combination::rate(-damping))
+pub(super) fn force(stiffness: Dual, damping: Dual) -> LinearForm {
+    LinearForm::height(-stiffness).plus(&LinearForm::rate(-damping))
 }
 
-/// The same sample with a memory that nothing depends on and that fades: what a surface
-/// becomes that recovers at once.
-pub(super) fn without_memory(stiffness: Dual, damping: Dual) -> Law {
-    let fades = Combination::memory(Dual::constant(-1.0));
+/// The same sample with internal variables that decay and affect nothing: the limit of a surface
+/// that recovers at once.
+pub(super) fn with_idle_variables(stiffness: Dual, damping: Dual, count: usize) -> Law {
+    let decays = |k| LinearForm::internal(k, Dual::constant(-1.0));
+    let rates: Vec<LinearForm> = (0..count).map(decays).collect();
     let mut law = law(stiffness, damping);
-    law.has_memory = true;
-    law.flight.memory_rate = fades;
-    law.contact.memory_rate = fades;
+    law.internal = count;
+    law.flight.rates.clone_from(&rates);
+    law.contact.rates = rates;
     law
 }

@@ -1,4 +1,4 @@
-//! The standard linear solid: a spring α4 beside an arm of a spring k_m and a damper k_m τ_m
+//! The standard linear solid: a spring α4 parallel to an arm of a spring k_m and a damper k_m τ_m
 //! in series (Zener's model in Maxwell's form), as a surface that recovers by itself.
 //!
 //! With δ the indentation of the surface and w the elongation of the damper, the arm pushes
@@ -6,7 +6,7 @@
 //! δ = −V_T. The free surface, f = 0, has δ = k_m w/(α4 + k_m) and recovers as
 //! ẇ = −α4 w/((α4 + k_m) τ_m): slower than the force relaxes.
 //!
-//! The memory is `s = w`, which never jumps. The tip's height over the free surface is
+//! The internal variable is `s = w`, which never jumps. The tip's height over the free surface is
 //! g = V_T + k_m w/(α4 + k_m), and in contact f = −(α4 + k_m) g: force and gap vanish
 //! together, and the field is continuous at the switch.
 //!
@@ -14,51 +14,79 @@
 //! (instantaneous); k_m → ∞ at constant k_m τ_m is the Kelvin–Voigt surface of damper k_m τ_m.
 
 use super::dual::Dual;
-use super::law::{Answer, Combination, Law, Square};
+use super::entry::{Damper, Entry, any};
+use super::law::{Bilinear, Law, LinearForm, SampleResponse};
 use super::spring_damper;
+use crate::model::parameter::{ParameterEntry, SampleKey, Unit};
+
+/// Its entry.
+pub(super) static ENTRY: Entry = Entry {
+    name: "standard-linear-solid",
+    meaning: "spring in parallel with a relaxing arm, as a surface that recovers",
+    formula: "−K1 h + Fm, Fm + τm dFm/dt = −km τm dh/dt, while this pushes, then none",
+    damper: Damper::InArm {
+        not_alpha6: "must be 0 with contact = \"standard-linear-solid\", whose damper is its \
+                     arm's: relaxation_stiffness times relaxation_time",
+        not_damping: "a standard linear solid has its damper in the relaxing arm: give \
+                      sample.relaxation_stiffness and sample.relaxation_time",
+        arm: |own| [own[0], own[0] * own[1]],
+    },
+    numbers: &[
+        ParameterEntry::new("relaxation_stiffness", "kₘ", "stiffness of the relaxing arm over bending stiffness, km·L³/(EI)")
+            .such_as(20.0).always_written()
+            .of(Unit::Stiffness, "stiffness of the relaxing arm km", "km L^3/(EI) = 3 km/k")
+            .stated_by(SampleKey::Own { meaning: "stiffness of a standard linear solid's relaxing arm", zero: true }),
+        ParameterEntry::new("relaxation_time", "τₘ", "time in which the arm's force decays, over √(mL⁴/(EI))")
+            .such_as(0.1).always_written()
+            .of(Unit::Time, "relaxation time of the arm", "time/T")
+            .stated_by(SampleKey::Own { meaning: "time in which the arm's force decays", zero: true }),
+    ],
+    needs: "a standard linear solid has a relaxing arm of this stiffness, as in \
+            relaxation_stiffness = \"50 N/m\", and time, as in relaxation_time = \"0.5 us\"",
+    attracts: false,
+    objection: any,
+    like: Some(|arm, damper| vec![arm, damper / arm]),
+    law: |numbers| law(numbers.stiffness, numbers.own[0], numbers.own[1]),
+};
 
 /// The law.
-pub(super) fn law(stiffness: Dual, arm: Dual, time: Dual) -> Law {
+fn law(stiffness: Dual, arm: Dual, time: Dual) -> Law {
     let instantaneous = stiffness + arm;
     // An arm that relaxes at once is a damper of no size; with no spring at all there is
     // no surface to recover.
     if time.value <= 0.0 || instantaneous.value <= 0.0 {
-        return spring_damper::without_memory(stiffness, arm * time);
+        return spring_damper::with_idle_variables(stiffness, arm * time, 1);
     }
     let one = Dual::constant(1.0);
-    let gap = Combination::height(one).plus(Combination::memory(arm / instantaneous));
-    // The elongation of the arm's spring, δ − w.
-    let free = Combination::memory(-stiffness / instantaneous);
-    let held = Combination::height(-one).plus(Combination::memory(-one));
-    let answer = |force, elongation: Combination, indentation| Answer {
+    let elongation = |factor| LinearForm::internal(0, factor);
+    let recovered = elongation(arm / instantaneous);
+    let gap = LinearForm::height(one).plus(&recovered);
+    let response = |force, of_spring: &LinearForm, indentation: &LinearForm| SampleResponse {
         force,
-        memory_rate: elongation.times(one / time),
-        dissipated: vec![Square {
-            weight: arm.value / time.value,
-            of: elongation,
-        }],
+        rates: vec![of_spring.times(one / time)],
+        dissipated: vec![Bilinear::square(arm.value / time.value, of_spring)],
         stored: vec![
-            Square {
-                weight: 0.5 * stiffness.value,
-                of: indentation,
-            }
-            .into(),
-            Square {
-                weight: 0.5 * arm.value,
-                of: elongation,
-            }
-            .into(),
+            Bilinear::square(0.5 * stiffness.value, indentation),
+            Bilinear::square(0.5 * arm.value, of_spring),
         ],
     };
-    let recovered = Combination::memory(arm / instantaneous);
+    // The elongation of the arm's spring is δ − w.
+    let (free, held) = (
+        elongation(-stiffness / instantaneous),
+        LinearForm::height(-one).plus(&elongation(-one)),
+    );
     Law {
-        has_memory: true,
-        gap,
-        hold: gap.times(-one),
-        left: None,
+        internal: 1,
+        release_guard: gap.times(-one),
+        release_reset: None,
         onsets: None,
-        flight: answer(Combination::default(), free, recovered),
-        contact: answer(gap.times(-instantaneous), held, Combination::height(-one)),
+        flight: response(LinearForm::default(), &free, &recovered),
+        contact: response(
+            gap.times(-instantaneous),
+            &held,
+            &LinearForm::height(-one),
+        ),
+        gap,
         plain_contact: false,
     }
 }

@@ -59,7 +59,7 @@ pub enum SpectrumError {
         /// What [`Spectrum::separation`] would be.
         separation: f64,
     },
-    /// The eigenvalues could not be told apart, or the load is not a valid one.
+    /// The eigenvalues could not be distinguished, or the load is not valid.
     #[error(
         "the eigenvalues could not be separated: some (nearly) coincide, or mass, damping or \
          stiffness are not finite numbers ≥ 0. Use a method that needs no eigenvectors"

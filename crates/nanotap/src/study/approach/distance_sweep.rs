@@ -1,4 +1,4 @@
-//! A motion followed along the distance, so slowly that it always settles.
+//! Quasi-static motion of the lever along the distance.
 //!
 //! A lever that is brought near slowly stays on its branch of stable orbits until that ends: at
 //! a fold, at a bifurcation that destabilises it, where it grazes and does not go on, or where
@@ -8,30 +8,34 @@
 //! motion that does not close is followed on a grid of distances that depends on the case alone,
 //! until an orbit is found there, whose branch is then continued back to its beginning as well.
 //!
+//! Under a nonlinear law the work is counted in steps of the approximate flow, and ends at a budget
+//! ([`SWEEP_STEPS`]): what was followed by then is kept, with the reason why it goes no further.
+//!
 //! Fails: what a motion that does not close meets within a step of the grid is not seen, and
 //! where it ends by a jump the place is known to a step of the grid.
 
 use std::fmt;
 
 use nanotap_dynamics::{
-    Bifurcation, BifurcationKind, Branch, BranchEnd, BranchPoint, ClassifyOptions,
+    Bifurcation, BifurcationKind, Branch, BranchEnd, BranchPoint, CancelFlag, ClassifyOptions,
     ContinuationOptions, Control, Direction, LyapunovOptions, MotionKind, PeriodicOrbit,
-    ShootingOptions, StroboscopicMap as _, UndecidedReason, classify, close_orbit,
+    Scheduling as _, ShootingOptions, UndecidedReason, classify, close_orbit,
     close_orbit_from_points, continue_orbit, switch_at_flip,
 };
 
 use crate::case::{Case, CaseError, Family};
 use crate::model::Model;
-use crate::model::strobe::Strobe;
+use crate::model::model_map::ModelMap;
+use crate::number::shortest;
 use crate::study::branch::kind_name;
+use crate::study::short_run::short_run;
 use crate::study::simulate::{Classification, Named};
-use crate::study::sweep::SweepOptions;
 
 use super::BEYOND;
 
 /// Steps of the grid on which motions without a branch are followed, in the scale of distances.
 const GRID: f64 = 100.0;
-/// Longest period of orbits whose branches are followed.
+/// Longest period of continued orbits, drive periods.
 const LONGEST_BRANCH: usize = 8;
 /// Distance between places, in the scale of distances, that are one.
 const SAME_PLACE: f64 = 1e-7;
@@ -57,12 +61,15 @@ const ROW_TRANSIENT: usize = 128;
 const DECAY_TIMES: f64 = 30.0;
 const MAX_TRANSIENT: usize = 1 << 15;
 
-/// Why a piece of a way ends.
+/// Steps of the approximate flow after which a motion is not followed further along the distance.
+pub(in crate::study) const SWEEP_STEPS: u64 = 40_000_000;
+
+/// Reason why a piece of a path ends.
 #[derive(Clone, Debug)]
 pub(in crate::study) enum End {
     /// The range of distances ends.
     Range,
-    /// The orbits are stable no longer; with the first that is not.
+    /// The orbits lose stability; holds the first unstable one.
     Bifurcation {
         at: Box<Bifurcation>,
         unstable: Option<Box<PeriodicOrbit>>,
@@ -73,6 +80,8 @@ pub(in crate::study) enum End {
     Closes,
     /// The branch could not be followed further.
     Lost(String),
+    /// The budget of steps was spent.
+    Budget(u64),
 }
 
 impl fmt::Display for End {
@@ -83,8 +92,18 @@ impl fmt::Display for End {
             Self::Meeting { period } => write!(f, "meets period {period}"),
             Self::Closes => f.write_str("becomes periodic"),
             Self::Lost(reason) => f.write_str(reason),
+            Self::Budget(steps) => f.write_str(&budget_text(*steps)),
         }
     }
+}
+
+/// In words that a budget of steps was spent.
+pub(in crate::study) fn budget_text(steps: u64) -> String {
+    let millions = steps as f64 / 1e6;
+    format!(
+        "the lever was followed up to the budget of {} million steps",
+        shortest(millions)
+    )
 }
 
 /// A stretch of a branch on which all orbits are stable, by ascending distance.
@@ -106,9 +125,9 @@ impl Stretch {
     }
 }
 
-/// A motion as it was found.
+/// A motion and the state that starts it.
 #[derive(Clone, Debug)]
-pub(in crate::study) struct Met {
+pub(in crate::study) struct FoundMotion {
     pub(in crate::study) classification: Classification,
     pub(in crate::study) evidence: String,
     pub(in crate::study) orbit: Option<PeriodicOrbit>,
@@ -116,18 +135,18 @@ pub(in crate::study) struct Met {
     /// Whether the motion from the start could not be computed.
     failed: bool,
     /// Whether it was only looked for an orbit.
-    glimpsed: bool,
+    only_searched: bool,
 }
 
-impl Met {
-    pub(in crate::study) fn on(orbit: PeriodicOrbit) -> Self {
+impl FoundMotion {
+    pub(in crate::study) fn periodic(orbit: PeriodicOrbit) -> Self {
         Self {
             classification: Classification::Periodic,
             evidence: String::new(),
             state: orbit.states.first().cloned().unwrap_or_default(),
             orbit: Some(orbit),
             failed: false,
-            glimpsed: false,
+            only_searched: false,
         }
     }
 
@@ -138,12 +157,12 @@ impl Met {
             orbit: None,
             state: state.to_vec(),
             failed: true,
-            glimpsed: false,
+            only_searched: false,
         }
     }
 
     /// Where the motion at the next distance starts: rest, where this one ran off.
-    fn onwards(&self) -> Vec<f64> {
+    fn next_start(&self) -> Vec<f64> {
         match self.classification {
             Classification::Unbounded => vec![0.0; self.state.len()],
             _ => self.state.clone(),
@@ -151,14 +170,14 @@ impl Met {
     }
 }
 
-/// What the lever does along a piece of its way.
+/// Motion of the lever along a piece of its path.
 #[derive(Clone, Debug)]
 pub(in crate::study) enum Motion {
     /// The stable orbits of a stretch, by its index.
     Periodic(usize),
     /// A motion without a branch that is followed, as it was found at distances in the order of
     /// the way: none that closes, or one of a long period.
-    OnGrid(Vec<(f64, Met)>),
+    OnGrid(Vec<(f64, FoundMotion)>),
 }
 
 /// A piece of a way.
@@ -170,7 +189,7 @@ pub(in crate::study) struct Piece {
     pub(in crate::study) motion: Motion,
     /// Where the motion was first seen.
     pub(in crate::study) entered: f64,
-    /// Why it ends.
+    /// Reason of its end.
     pub(in crate::study) end: End,
     /// Whether the lever jumps there.
     pub(in crate::study) jumps: bool,
@@ -184,41 +203,46 @@ impl Piece {
     }
 }
 
-/// Where the lever is.
+/// The lever's motion at a distance.
 #[derive(Clone, Debug)]
 pub(in crate::study) enum Place {
     On { stretch: usize, gap: f64 },
-    Off { gap: f64, met: Met },
+    Off { gap: f64, motion: FoundMotion },
 }
 
 /// Motions followed along the distance.
 pub(in crate::study) struct DistanceSweep<'a> {
-    case: &'a Case,
+    /// With the flag of the present budget.
+    case: Case,
     family: Family,
     /// The least and the greatest distance.
     range: (f64, f64),
     /// The unit in which small differences of distances are measured.
     scale: f64,
     classify: ClassifyOptions,
-    control: Control<'a>,
+    control: &'a Control<'a>,
+    /// What cancels the work: the caller, or the budget of a case under a nonlinear law.
+    flag: CancelFlag,
+    budget: Option<u64>,
+    /// Steps and points of the stretches that were continued.
+    continued: (u64, usize),
+    /// Whether a motion that does not close is followed no further.
+    pub(in crate::study) stops_on_grid: bool,
     pub(in crate::study) stretches: Vec<Stretch>,
 }
 
 impl<'a> DistanceSweep<'a> {
     /// Of a case between two distances. `reach` is how far the free tip swings.
     pub(in crate::study) fn new(
-        case: &'a Case,
+        case: &Case,
         (near, far): (f64, f64),
         reach: f64,
         max_period: usize,
-        control: &Control<'a>,
+        control: &'a Control<'a>,
     ) -> Result<Self, CaseError> {
         let swings = reach > 0.0 && reach.is_finite();
         let far = if swings { far.max(BEYOND * reach) } else { far };
-        let sweep = SweepOptions {
-            max_period,
-            ..SweepOptions::new(Vec::new())
-        };
+        let short = short_run(max_period);
         let model = case.with(case.gap_key(), far).model()?;
         // The slowest decay of the free lever, by its trace.
         let rate = model.system.regimes().first().map_or(0.0, |free| {
@@ -227,8 +251,8 @@ impl<'a> DistanceSweep<'a> {
         });
         let decays = (DECAY_TIMES / rate).min(MAX_TRANSIENT as f64);
         let decays = if decays.is_nan() { 0 } else { decays as usize };
-        Ok(Self {
-            case,
+        let mut sweep = Self {
+            case: case.clone(),
             family: case.family(case.gap_key()),
             range: (near, far),
             scale: if swings { reach } else { far - near },
@@ -237,17 +261,55 @@ impl<'a> DistanceSweep<'a> {
                 max_transient: decays.max(2048).next_power_of_two(),
                 lyapunov: LyapunovOptions {
                     max_periods: 1000,
-                    ..sweep.classify().lyapunov
+                    ..short.lyapunov
                 },
                 birkhoff_periods: 1024,
-                ..sweep.classify()
+                ..short
             },
-            control: Control {
-                progress: None,
-                ..*control
-            },
+            control,
+            flag: CancelFlag::default(),
+            budget: None,
+            continued: (0, 0),
+            stops_on_grid: false,
             stretches: Vec::new(),
-        })
+        };
+        sweep.allow(model.nonlinear.is_some().then_some(SWEEP_STEPS));
+        Ok(sweep)
+    }
+
+    /// Allows so many steps from here on, of a case under a nonlinear law; none of another is
+    /// counted.
+    pub(in crate::study) fn allow_steps(&mut self, steps: u64) {
+        self.allow(self.budget.map(|_| steps));
+    }
+
+    fn allow(&mut self, budget: Option<u64>) {
+        let flag = self.control.cancel.unwrap_or(self.case.cancel()).clone();
+        self.flag = budget.map_or_else(|| flag.clone(), |steps| flag.with_budget(steps));
+        self.budget = budget;
+        self.case = self.case.with_flag(&self.flag);
+        self.family = self.case.family(self.case.gap_key());
+    }
+
+    /// What cancels the work: the caller, or the budget.
+    pub(in crate::study) fn limited(&self) -> Control<'_> {
+        Control {
+            cancel: Some(&self.flag),
+            progress: None,
+        }
+    }
+
+    /// The budget, if it is spent.
+    pub(in crate::study) fn spent_budget(&self) -> Option<u64> {
+        self.budget.filter(|_| self.flag.is_spent())
+    }
+
+    /// Points of branches for which so many steps suffice, by the average so far; no end of them
+    /// where steps are not counted.
+    pub(in crate::study) fn points_in(&self, steps: u64) -> usize {
+        let (taken, points) = self.continued;
+        let points = steps.saturating_mul(points as u64).checked_div(taken);
+        points.map_or(usize::MAX, |points| points as usize)
     }
 
     /// The greatest distance: that of the free motion, or beyond.
@@ -271,7 +333,7 @@ impl<'a> DistanceSweep<'a> {
         if let Some(response) = response.filter(|x| x.iter().all(|v| v.is_finite())) {
             let shared = start.len().min(response.len());
             start[..shared].copy_from_slice(&response[..shared]);
-            let mut map = Strobe::new(&model);
+            let mut map = ModelMap::new(&model);
             let closed = close_orbit(&mut map, &start, 1, &ShootingOptions::default());
             if let Ok(orbit) = closed
                 && orbit.is_stable()
@@ -284,41 +346,46 @@ impl<'a> DistanceSweep<'a> {
         Ok(self.arrive(gap, &start))
     }
 
-    /// Where a run from a state at a distance goes.
+    /// Where a run from a state at a distance goes. Under a nonlinear law a motion that does not close
+    /// on the approximate map is classified exactly only where it is reported.
     fn arrive(&mut self, gap: f64, start: &[f64]) -> Place {
-        let met = self.met(gap, start, self.classify.max_transient);
-        self.place(gap, met)
+        let searched = self.budget.map(|_| {
+            let options = self.classify.clone();
+            self.search_orbit(gap, start, &options)
+        });
+        let is_confirmed = |motion: &FoundMotion| {
+            let is_periodic = motion.classification == Classification::Periodic;
+            !motion.failed && is_periodic == motion.orbit.is_some()
+        };
+        let motion = searched
+            .filter(is_confirmed)
+            .unwrap_or_else(|| self.run_from(gap, start, self.classify.max_transient));
+        self.place(gap, motion)
     }
 
     /// The place of a motion: on its branch, where that is followed.
-    fn place(&mut self, gap: f64, met: Met) -> Place {
-        match met.orbit {
+    fn place(&mut self, gap: f64, motion: FoundMotion) -> Place {
+        match motion.orbit {
             Some(orbit) if orbit.period <= LONGEST_BRANCH => self.on(gap, orbit),
-            _ => Place::Off { gap, met },
+            _ => Place::Off { gap, motion },
         }
     }
 
     /// What a run from a state at a distance goes to.
-    fn met(&self, gap: f64, start: &[f64], max_transient: usize) -> Met {
+    fn run_from(&self, gap: f64, start: &[f64], max_transient: usize) -> FoundMotion {
         let options = ClassifyOptions {
             max_transient,
             ..self.classify.clone()
         };
         match self.model(gap) {
-            Ok(model) => named(&mut Strobe::new(&model), start, &options),
-            Err(error) => Met::undecided(error.to_string(), start),
+            Ok(model) => named(&mut ModelMap::new(&model), start, &options),
+            Err(error) => FoundMotion::undecided(error.to_string(), start),
         }
     }
 
-    /// As [`met`](Self::met), on the approximate map where there is one, and no further than to
-    /// see whether an orbit closes.
-    fn glimpse(&self, gap: f64, start: &[f64]) -> Met {
-        let model = match self.model(gap) {
-            Ok(model) => model,
-            Err(error) => return Met::undecided(error.to_string(), start),
-        };
-        let mut map = Strobe::new(&model);
-        let options = ClassifyOptions {
+    /// Options that only show whether an orbit closes.
+    fn search_options(&self) -> ClassifyOptions {
+        ClassifyOptions {
             max_transient: GRID_TRANSIENT,
             long_period: self.classify.max_period,
             lyapunov: LyapunovOptions {
@@ -329,23 +396,32 @@ impl<'a> DistanceSweep<'a> {
             },
             birkhoff_periods: 1,
             ..self.classify.clone()
+        }
+    }
+
+    /// As [`run_from`](Self::run_from), on the approximate map where there is one; an orbit is that of
+    /// the exact map.
+    fn search_orbit(&self, gap: f64, start: &[f64], options: &ClassifyOptions) -> FoundMotion {
+        let model = match self.model(gap) {
+            Ok(model) => model,
+            Err(error) => return FoundMotion::undecided(error.to_string(), start),
         };
-        let mut met = named(
-            &mut map.coarse().unwrap_or_else(|| map.clone()),
-            start,
-            &options,
-        );
-        if let Some(near) = met.orbit.take() {
+        let mut map = ModelMap::new(&model);
+        let mut motion = match map.coarse() {
+            Some(mut coarse) => named(&mut coarse, start, &options.on_coarse_map()),
+            None => named(&mut map.clone(), start, options),
+        };
+        if let Some(near) = motion.orbit.take() {
             let (points, period) = (near.states.concat(), near.period);
             let closed =
                 close_orbit_from_points(&mut map, &points, period, &ShootingOptions::default());
-            met.orbit = closed.ok().filter(|orbit| {
+            motion.orbit = closed.ok().filter(|orbit| {
                 orbit.is_stable() && orbit.distance_to(&near).1 <= CONTINUOUS * near.scale()
             });
         }
-        Met {
-            glimpsed: true,
-            ..met
+        FoundMotion {
+            only_searched: true,
+            ..motion
         }
     }
 
@@ -358,7 +434,11 @@ impl<'a> DistanceSweep<'a> {
                 && (self.orbit_at(k, gap)).is_some_and(|own| is_same(&own, &orbit))
         });
         let stretch = known.unwrap_or_else(|| {
-            self.stretches.push(self.continued(gap, orbit));
+            let before = self.flag.spent();
+            let stretch = self.continued(gap, orbit);
+            self.continued.0 += self.flag.spent() - before;
+            self.continued.1 += stretch.points.len();
+            self.stretches.push(stretch);
             self.stretches.len() - 1
         });
         Place::On { stretch, gap }
@@ -373,7 +453,7 @@ impl<'a> DistanceSweep<'a> {
                     .and_then(|o| o.states.first().cloned())
                     .unwrap_or_default()
             }
-            Place::Off { met, .. } => met.state.clone(),
+            Place::Off { motion, .. } => motion.state.clone(),
         }
     }
 
@@ -381,6 +461,8 @@ impl<'a> DistanceSweep<'a> {
         let (near, far) = self.range;
         ContinuationOptions {
             until_unstable: true,
+            // Those of piecewise-linear systems take little time and end branches.
+            grazings: self.budget.is_none(),
             max_points: MAX_POINTS,
             parameter_scale: Some(self.scale),
             ..ContinuationOptions::over(near, far)
@@ -394,10 +476,16 @@ impl<'a> DistanceSweep<'a> {
         direction: Direction,
     ) -> (Vec<BranchPoint>, (f64, End)) {
         let options = self.options();
-        match continue_orbit(&self.family, gap, orbit, direction, &options, &self.control) {
-            Ok(branch) => stable_part(branch),
-            Err(error) => (Vec::new(), (gap, End::Lost(error.to_string()))),
+        let control = self.limited();
+        let (points, mut end) =
+            match continue_orbit(&self.family, gap, orbit, direction, &options, &control) {
+                Ok(branch) => stable_part(branch),
+                Err(error) => (Vec::new(), (gap, End::Lost(error.to_string()))),
+            };
+        if let Some(steps) = self.spent_budget() {
+            end.1 = End::Budget(steps);
         }
+        (points, end)
     }
 
     /// The stretch of stable orbits through one.
@@ -436,8 +524,8 @@ impl<'a> DistanceSweep<'a> {
         }
         let points = &stretch.points;
         let above = points.partition_point(|p| p.parameter < gap);
-        let beside = [above.checked_sub(1), Some(above)];
-        let [below, above] = beside.map(|k| k.and_then(|k| points.get(k)));
+        let neighbours = [above.checked_sub(1), Some(above)];
+        let [below, above] = neighbours.map(|k| k.and_then(|k| points.get(k)));
         if let (Some(a), Some(b)) = (below, above) {
             let t = (gap - a.parameter) / (b.parameter - a.parameter);
             let [from, to] = [a, b].map(|p| p.orbit.states.concat());
@@ -448,7 +536,7 @@ impl<'a> DistanceSweep<'a> {
                 .fold(0.0, |m: f64, (x, y)| m.max((x - y).abs()));
             let model = self.model(gap).ok()?;
             let options = ShootingOptions::default();
-            let mut map = Strobe::new(&model);
+            let mut map = ModelMap::new(&model);
             let closed = close_orbit_from_points(&mut map, &between, stretch.period, &options);
             if let Ok(orbit) = closed
                 && orbit.period == stretch.period
@@ -482,19 +570,26 @@ impl<'a> DistanceSweep<'a> {
             Direction::Decreasing
         };
         let (at, orbit) = (nearest.parameter, &nearest.orbit);
-        let branch =
-            continue_orbit(&self.family, at, orbit, direction, &options, &self.control).ok()?;
+        let branch = continue_orbit(
+            &self.family,
+            at,
+            orbit,
+            direction,
+            &options,
+            &self.limited(),
+        )
+        .ok()?;
         let last = branch.points.into_iter().next_back()?;
         let arrived = matches!(branch.end, BranchEnd::RangeEnd) && last.orbit.is_stable();
         arrived.then_some(last.orbit)
     }
 
     /// The motion of a piece at a distance.
-    pub(in crate::study) fn motion_at(&self, piece: &Piece, gap: f64) -> Met {
-        let beside = match &piece.motion {
+    pub(in crate::study) fn motion_at(&self, piece: &Piece, gap: f64) -> FoundMotion {
+        let nearby = match &piece.motion {
             Motion::Periodic(stretch) => {
                 if let Some(orbit) = self.orbit_at(*stretch, gap) {
-                    return Met::on(orbit);
+                    return FoundMotion::periodic(orbit);
                 }
                 let nearest = self.stretches[*stretch].points.iter().min_by(|a, b| {
                     let apart = |p: &BranchPoint| (p.parameter - gap).abs();
@@ -503,16 +598,16 @@ impl<'a> DistanceSweep<'a> {
                 nearest.and_then(|p| p.orbit.states.first().cloned())
             }
             Motion::OnGrid(found) => {
-                let here = |(at, met): &&(f64, Met)| *at == gap && !met.glimpsed;
-                if let Some((_, met)) = found.iter().find(here) {
-                    return met.clone();
+                let here = |(at, motion): &&(f64, FoundMotion)| *at == gap && !motion.only_searched;
+                if let Some((_, motion)) = found.iter().find(here) {
+                    return motion.clone();
                 }
                 let passed = |at: f64| (at - piece.from).abs() <= (gap - piece.from).abs();
                 let last = found.iter().rfind(|(at, _)| passed(*at)).or(found.first());
-                last.map(|(_, met)| met.onwards())
+                last.map(|(_, motion)| motion.next_start())
             }
         };
-        self.met(gap, &beside.unwrap_or_default(), ROW_TRANSIENT)
+        self.run_from(gap, &nearby.unwrap_or_default(), ROW_TRANSIENT)
     }
 
     /// The pieces of the way from a place to a distance, until one is `enough`.
@@ -524,10 +619,14 @@ impl<'a> DistanceSweep<'a> {
     ) -> (Vec<Piece>, Place) {
         let mut pieces: Vec<Piece> = Vec::new();
         loop {
-            let (mut piece, next) = self.piece(place.clone(), to);
+            let (mut piece, mut next) = self.piece(place.clone(), to);
             // A jump takes no distance.
             piece.from = pieces.last().map_or(piece.from, |last| last.to);
-            let done = enough(self, &piece) || self.control.is_cancelled();
+            if let Some(steps) = self.spent_budget() {
+                (piece.end, piece.jumps) = (End::Budget(steps), false);
+                next.get_or_insert(place.clone());
+            }
+            let done = enough(self, &piece) || self.flag.is_cancelled();
             pieces.push(piece);
             match next {
                 Some(next) if !done && pieces.len() < MAX_PIECES => place = next,
@@ -537,7 +636,7 @@ impl<'a> DistanceSweep<'a> {
                     let end = match last {
                         Some((Motion::Periodic(stretch), gap)) => Place::On { stretch, gap },
                         Some((Motion::OnGrid(mut found), gap)) => match found.pop() {
-                            Some((_, met)) => Place::Off { gap, met },
+                            Some((_, motion)) => Place::Off { gap, motion },
                             None => place,
                         },
                         None => place,
@@ -576,16 +675,17 @@ impl<'a> DistanceSweep<'a> {
                 let stuck = (at - gap).abs() <= 1e-9 * self.scale;
                 let next = match next {
                     Place::On { stretch: same, gap } if same == stretch && stuck => {
-                        let met = self
-                            .orbit_at(same, gap)
-                            .map_or_else(|| Met::undecided(end.to_string(), &[]), Met::on);
-                        Place::Off { gap, met }
+                        let motion = self.orbit_at(same, gap).map_or_else(
+                            || FoundMotion::undecided(end.to_string(), &[]),
+                            FoundMotion::periodic,
+                        );
+                        Place::Off { gap, motion }
                     }
                     next => next,
                 };
                 (piece(at, end, jumps), Some(next))
             }
-            Place::Off { gap, met } => self.on_grid(gap, met, to),
+            Place::Off { gap, motion } => self.on_grid(gap, motion, to),
         }
     }
 
@@ -616,12 +716,12 @@ impl<'a> DistanceSweep<'a> {
                 (Some(found.orbit), unstable, tries)
             }
             End::Meeting { period } => {
-                let met = (0..self.stretches.len()).find(|&k| {
+                let motion = (0..self.stretches.len()).find(|&k| {
                     let other = &self.stretches[k];
                     let near = |(gap, _): &(f64, End)| (gap - at).abs() <= SAME_PLACE * scale;
                     other.period == period && other.ends.iter().any(near)
                 });
-                if let Some(stretch) = met {
+                if let Some(stretch) = motion {
                     return (Place::On { stretch, gap: at }, false);
                 }
                 (last, None, &[BEYOND_END][..])
@@ -629,25 +729,25 @@ impl<'a> DistanceSweep<'a> {
             _ => (last, None, &[BEYOND_END][..]),
         };
         let Some(orbit) = orbit else {
-            let met = Met::undecided(NO_ORBIT.to_owned(), &[]);
-            return (Place::Off { gap: at, met }, true);
+            let motion = FoundMotion::undecided(NO_ORBIT.to_owned(), &[]);
+            return (Place::Off { gap: at, motion }, true);
         };
         let mut next = None;
         for &(step, push) in tries {
             let gap = at + side * step * scale;
             let gap = if (gap - to) * side > 0.0 { to } else { gap };
             let place = self.arrive(gap, &pushed(&orbit, unstable.as_deref(), push));
-            let settled = !matches!(&place, Place::Off { met, .. }
-                if met.classification == Classification::Undecided);
+            let settled = !matches!(&place, Place::Off { motion, .. }
+                if motion.classification == Classification::Undecided);
             next = Some(place);
             if settled {
                 break;
             }
         }
-        let met = || Met::undecided(NO_ORBIT.to_owned(), &[]);
+        let motion = || FoundMotion::undecided(NO_ORBIT.to_owned(), &[]);
         let next = next.unwrap_or_else(|| Place::Off {
             gap: at,
-            met: met(),
+            motion: motion(),
         });
         let jumps = !self.goes_on(&orbit, &next);
         (next, jumps)
@@ -659,9 +759,9 @@ impl<'a> DistanceSweep<'a> {
         match place {
             Place::On { stretch, gap } => (self.orbit_at(*stretch, *gap))
                 .is_some_and(|next| next.states.iter().all(|state| near(state))),
-            Place::Off { met, .. } => match &met.orbit {
+            Place::Off { motion, .. } => match &motion.orbit {
                 Some(next) => next.states.iter().all(|state| near(state)),
-                None => near(&met.state),
+                None => near(&motion.state),
             },
         }
     }
@@ -683,7 +783,7 @@ impl<'a> DistanceSweep<'a> {
         if known.is_some() {
             return known;
         }
-        let branch = switch_at_flip(&self.family, flip, &self.options(), &self.control).ok()?;
+        let branch = switch_at_flip(&self.family, flip, &self.options(), &self.limited()).ok()?;
         let (mut points, end) = stable_part(branch);
         let side = sign(direction);
         let first = points.first()?;
@@ -715,7 +815,7 @@ impl<'a> DistanceSweep<'a> {
 
     /// A motion without a branch that is followed, from grid distance to grid distance until it
     /// has one.
-    fn on_grid(&mut self, from: f64, met: Met, to: f64) -> (Piece, Option<Place>) {
+    fn on_grid(&mut self, from: f64, motion: FoundMotion, to: f64) -> (Piece, Option<Place>) {
         let side = sign(direction(from, to));
         let step = self.scale / GRID;
         let mut piece = Piece {
@@ -727,10 +827,18 @@ impl<'a> DistanceSweep<'a> {
             jumps: false,
             uncertainty: 0.0,
         };
-        let mut found = vec![(from, met)];
+        let mut found = vec![(from, motion)];
         let mut onwards = None;
         while let Some((gap, before)) = found.last().cloned() {
-            if (gap - to) * side >= 0.0 || self.control.is_cancelled() {
+            if (gap - to) * side >= 0.0 {
+                break;
+            }
+            if self.stops_on_grid || self.flag.is_cancelled() {
+                piece.to = gap;
+                onwards = Some(Place::Off {
+                    gap,
+                    motion: before,
+                });
                 break;
             }
             // The next multiple of a step, beyond rounding.
@@ -738,17 +846,18 @@ impl<'a> DistanceSweep<'a> {
             if (next - to) * side > 0.0 {
                 next = to;
             }
-            let start = before.onwards();
-            let mut met = self.glimpse(next, &start);
+            let start = before.next_start();
+            let options = self.search_options();
+            let mut motion = self.search_orbit(next, &start, &options);
             for _ in 0..HALVINGS {
-                if !met.failed {
+                if !motion.failed {
                     break;
                 }
                 next = 0.5 * (gap + next);
-                met = self.glimpse(next, &start);
+                motion = self.search_orbit(next, &start, &options);
             }
-            let Place::On { stretch, .. } = self.place(next, met.clone()) else {
-                found.push((next, met));
+            let Place::On { stretch, .. } = self.place(next, motion.clone()) else {
+                found.push((next, motion));
                 continue;
             };
             let direction = direction(from, to);
@@ -777,10 +886,10 @@ impl<'a> DistanceSweep<'a> {
 }
 
 /// What a run of a map goes to.
-fn named(map: &mut Strobe, start: &[f64], options: &ClassifyOptions) -> Met {
+fn named(map: &mut ModelMap, start: &[f64], options: &ClassifyOptions) -> FoundMotion {
     let classified = classify(map, start, options);
     let named = Named::of(&classified.kind);
-    Met {
+    FoundMotion {
         classification: named.classification,
         evidence: named.evidence,
         orbit: named.orbit,
@@ -791,7 +900,7 @@ fn named(map: &mut Strobe, start: &[f64], options: &ClassifyOptions) -> Met {
                 ..
             }
         ),
-        glimpsed: false,
+        only_searched: false,
         state: classified.state,
     }
 }
@@ -799,11 +908,9 @@ fn named(map: &mut Strobe, start: &[f64], options: &ClassifyOptions) -> Met {
 /// Why nothing is known beyond an end.
 const NO_ORBIT: &str = "the branch that ends here has no orbit to start from";
 
-/// Part of an orbit's size within which two stable orbits at one distance are one.
-const SAME_ORBIT: f64 = 1e-9;
-
+/// Whether two orbits at one distance are the same.
 pub(in crate::study) fn is_same(a: &PeriodicOrbit, b: &PeriodicOrbit) -> bool {
-    a.is_same_as(b) || a.distance_to(b).1 <= SAME_ORBIT * a.scale()
+    a.is_same_as(b)
 }
 
 /// Whether a motion goes over into another at an end without a jump.
@@ -816,7 +923,7 @@ const fn is_continuous(end: &End) -> bool {
                 | BifurcationKind::Crossing
         ),
         End::Meeting { .. } => true,
-        End::Range | End::Closes | End::Lost(_) => false,
+        End::Range | End::Closes | End::Lost(_) | End::Budget(_) => false,
     }
 }
 

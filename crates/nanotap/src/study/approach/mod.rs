@@ -16,86 +16,32 @@
 //! length stays that of the case: the beam's own gap changes with the tip's, but only whether
 //! the beam touches depends on it.
 //!
-//! With [`ApproachOptions::phase`] amplitude and phase are held by frequency and strength of the
-//! drive, as in frequency modulation: see [`frequency_modulation`].
-//! Orbits are then continued from distance to distance.
-//!
 //! Limits: branches that no motion of approach or retract lies on are not found.
 
 pub(in crate::study) mod distance_sweep;
-pub mod frequency_modulation;
 pub(in crate::study) mod quasistatic;
 mod ramp;
 
-use nanotap_dynamics::{Control, PeriodicOrbit};
+use nanotap_dynamics::{ContinuationOptions, Control, PeriodicOrbit};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::Error;
 use crate::case::physical::Kind;
-use crate::case::{Case, CaseError, Key, ParameterUnit};
-use crate::model::{Model, MotionError};
-use crate::observe::{Clearance, Observables, PhysicalMotion, Set, measure};
-use crate::study::FreeMotion;
-use crate::study::branch::{BranchError, BranchOptions, BranchReport};
-use crate::study::kind::Study;
-use crate::study::limits::{MOST_DISTANCES, MOST_DOUBLINGS, MOST_PERIOD};
-use crate::study::simulate::Classification;
-use crate::study::value::Amount;
-use distance_sweep::Met;
-use frequency_modulation::{
-    HeldError, Modulated, ModulatedInSi, ModulationReport, modulated_approach,
+use crate::case::{Case, ParameterUnit};
+use crate::model::Model;
+use crate::observe::{Clearance, ObservableSet, Observables, PhysicalMotion, measure};
+use crate::study::branch::{BranchOptions, BranchReport};
+use crate::study::frequency_modulation::{
+    FrequencyModulationOptions, Modulated, ModulatedInSi, ModulationReport, frequency_modulation,
 };
+use crate::study::limits::{MAX_DISTANCES, MAX_DOUBLINGS, MAX_PERIOD};
+use crate::study::request::options;
+use crate::study::simulate::Classification;
+use crate::study::value::{Amount, value};
+use crate::study::{FreeMotion, Study};
+use distance_sweep::FoundMotion;
 pub use quasistatic::{states_at, states_near};
-
-/// How to approach. Distances are in the model's unit of length.
-#[derive(Clone, Debug, PartialEq)]
-pub struct ApproachOptions {
-    /// Where to begin, far away; `None`: 1.25 times the tip's free reach.
-    pub from: Option<f64>,
-    /// Where to turn back; `None`: 0, where the sample stands at the tip's rest position.
-    pub to: Option<f64>,
-    /// Distances each way, both ends included.
-    pub points: usize,
-    /// Whether branches are continued through the periodic motions found.
-    pub branches: bool,
-    /// Doublings of these that are followed.
-    pub doublings: usize,
-    /// Longest period looked for.
-    pub max_period: usize,
-    /// Periods recorded of a motion that is not periodic.
-    pub periods: usize,
-    /// Speed with which the distance changes, in the model's unit of length a unit of time;
-    /// `None`: so slowly that the lever always settles.
-    pub speed: Option<f64>,
-    /// The phase in degrees that is held together with the case's free amplitude, by frequency
-    /// and strength of the drive; `None`: the drive stays as it is.
-    pub phase: Option<f64>,
-    /// The frequency shift, in the model's unit, whose distances are to be found where amplitude
-    /// and phase are held.
-    pub shift: Option<f64>,
-    /// The least distance of the oscillation that is kept where amplitude and phase are held: the
-    /// amplitude then changes with the distance.
-    pub closest: Option<f64>,
-}
-
-impl Default for ApproachOptions {
-    fn default() -> Self {
-        Self {
-            from: None,
-            to: None,
-            points: 80,
-            branches: true,
-            doublings: 1,
-            max_period: 32,
-            periods: 256,
-            speed: None,
-            phase: None,
-            shift: None,
-            closest: None,
-        }
-    }
-}
 
 /// Where the default curve begins, in units of the tip's free reach: far enough to see the
 /// free motion, and branches that reach beyond it.
@@ -104,89 +50,7 @@ const BEYOND: f64 = 1.25;
 /// Where a curve at a kept least distance ends, as a part of the amplitude with which it begins.
 const LEAST_AMPLITUDE: f64 = 0.02;
 
-/// Why there is no curve.
-#[derive(Clone, Debug, thiserror::Error)]
-pub enum ApproachError {
-    /// Fewer than two distances.
-    #[error("{given} distances make no curve: at least 2 are needed")]
-    Points {
-        /// What was given.
-        given: usize,
-    },
-    /// Distances that are none, or the wrong way round.
-    #[error(
-        "an approach goes from far to near: it cannot go from {from} to {to}; the first distance \
-         must be the greater, both finite"
-    )]
-    Range {
-        /// Where it was to begin.
-        from: f64,
-        /// Where it was to end.
-        to: f64,
-    },
-    /// No amplitude is left.
-    #[error(
-        "an oscillation that comes as near as {closest} has no amplitude at the distance {to}: the \
-         last distance must be the greater"
-    )]
-    Closest {
-        /// The least distance that was to be kept.
-        closest: f64,
-        /// Where the curve was to end.
-        to: f64,
-    },
-    /// Nothing moves.
-    #[error(
-        "the drive does not move the tip, so that no distance says where the curve should \
-         begin; give it"
-    )]
-    NoDrive,
-    /// Nothing to record.
-    #[error("at least one period must be recorded of motions that are not periodic")]
-    NoPeriods,
-    /// A speed that is none.
-    #[error("the distance cannot change at a speed of {given}: a finite one above zero is needed")]
-    Speed {
-        /// What was given.
-        given: f64,
-    },
-    /// A speed that takes too long.
-    #[error(
-        "at this speed the lever takes {needed:.3e} drive periods there and back; {most} are \
-         followed at most"
-    )]
-    Slow {
-        /// Drive periods there and back.
-        needed: f64,
-        /// The most that are followed.
-        most: usize,
-    },
-    /// A speed that leaves no period for a distance.
-    #[error("at this speed less than a drive period passes between two written distances")]
-    Fast,
-    /// The flow failed.
-    #[error("at the distance {gap}: {error}")]
-    Flow {
-        /// Where.
-        gap: f64,
-        /// Why.
-        error: MotionError,
-    },
-    /// A longest period of 0.
-    #[error("no motion has the longest period 0: at least 1 is needed")]
-    NoPeriod,
-    /// The case makes no sense.
-    #[error(transparent)]
-    Model(#[from] CaseError),
-    /// The branches could not be followed.
-    #[error(transparent)]
-    Branch(#[from] BranchError),
-    /// No orbit has the amplitude and phase that are to be held.
-    #[error(transparent)]
-    Held(#[from] HeldError),
-}
-
-/// Which way the sample moves.
+/// Direction of the sample.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Way {
@@ -199,7 +63,7 @@ pub enum Way {
 }
 
 impl Way {
-    /// The word for it.
+    /// Name in documents.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Approach => "approach",
@@ -209,32 +73,32 @@ impl Way {
     }
 }
 
-/// The motion at one distance on one way.
+/// The motion at one distance in one direction.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct ApproachPoint {
-    /// Which way.
+    /// Direction.
     pub way: Way,
     /// The distance, in the model's unit of length.
     pub gap: f64,
     /// The distance in m, of a physical case.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub zc: Option<f64>,
-    /// What the motion is.
+    /// Class of the motion.
     pub classification: Classification,
-    /// Its minimal period, if periodic.
+    /// Minimal period in drive periods, if periodic.
     pub period: Option<usize>,
     /// Largest |multiplier|, if periodic.
     pub spectral_radius: Option<f64>,
-    /// What it looks like; nothing if undecided or unbounded.
+    /// Observables in the model's units; none if undecided or unbounded.
     #[serde(flatten)]
     pub observables: Option<Observables>,
     /// The same in SI, of a physical case.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub physical: Option<PhysicalMotion>,
-    /// Why it is undecided, if it is.
+    /// Reason why it is undecided.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub reason: Option<String>,
-    /// What frequency modulation tells, where amplitude and phase are held.
+    /// Results of frequency modulation, where amplitude and phase are kept.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub modulation: Option<Modulated>,
     /// The same in SI, of a physical case.
@@ -245,24 +109,53 @@ pub struct ApproachPoint {
     pub orbit: Option<PeriodicOrbit>,
 }
 
+impl ApproachPoint {
+    /// A motion of `case` on a way at a distance.
+    pub(in crate::study) fn new(
+        case: &Case,
+        (way, gap): (Way, f64),
+        classification: Classification,
+        observables: Option<&Observables>,
+        orbit: Option<PeriodicOrbit>,
+    ) -> Self {
+        let view = case.physical();
+        Self {
+            way,
+            gap,
+            zc: view.map(|view| gap * view.scales.length),
+            classification,
+            period: orbit.as_ref().map(|orbit| orbit.period),
+            spectral_radius: orbit.as_ref().map(PeriodicOrbit::spectral_radius),
+            physical: observables
+                .zip(view)
+                .map(|(seen, view)| PhysicalMotion::of(seen, view)),
+            observables: observables.copied(),
+            reason: None,
+            modulation: None,
+            modulation_si: None,
+            orbit,
+        }
+    }
+}
+
 /// A jump of a slowly moved lever from one motion to another.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct StateJump {
-    /// Which way.
+    /// Direction.
     pub way: Way,
-    /// Where, in the model's unit of length.
+    /// Distance, in the model's unit of length.
     pub gap: f64,
-    /// The same in m, of a physical case.
+    /// Distance in m, for a physical case.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub zc: Option<f64>,
-    /// How well that is known, in the model's unit of length.
+    /// Uncertainty of the distance, in the model's unit of length.
     pub uncertainty: f64,
     /// What ends the motion before it: fold, flip, neimark-sacker, grazing, crossing, or a
     /// sentence.
     pub reason: String,
-    /// The motion before it, at its end.
+    /// The motion before the jump, at its end.
     pub before: ApproachPoint,
-    /// The motion after it.
+    /// The motion after the jump.
     pub after: ApproachPoint,
 }
 
@@ -273,8 +166,8 @@ pub struct Hysteresis {
     pub near: f64,
     /// Farthest distance.
     pub far: f64,
-    /// Greatest difference of the amplitude at the drive's frequency within it; of the relative
-    /// frequency shift where the amplitude is held.
+    /// Largest difference of the amplitude at the drive frequency in it; of the relative frequency
+    /// shift where the amplitude is kept.
     pub difference: f64,
 }
 
@@ -283,19 +176,19 @@ pub struct Hysteresis {
 pub struct ApproachReport {
     /// The key of the distance in a case file.
     pub parameter: &'static str,
-    /// Where the approach begins.
+    /// First distance of the approach.
     pub from: f64,
-    /// Where it turns back.
+    /// Distance at which the approach turns back.
     pub to: f64,
     /// Free amplitude A₀ at the drive's frequency.
     pub free_amplitude: f64,
-    /// Free phase, degrees behind the drive.
+    /// Free phase lag, degrees.
     pub free_phase: f64,
     /// Distance at which the free motion begins to touch.
     pub free_reach: f64,
     /// The motions at the requested distances: those of the approach, then those of the retract.
     pub table: Vec<ApproachPoint>,
-    /// Where the lever changes from one motion to another by a jump, in the order of the way.
+    /// Jumps of the lever from one motion to another, in order.
     pub jumps: Vec<StateJump>,
     /// Stable orbits of the same distances on neither way, that lie on stretches of stable orbits
     /// on which a way is at other distances, by descending distance.
@@ -303,41 +196,58 @@ pub struct ApproachReport {
     /// Least height of the beam above the sample in the motion at the nearest distance, in the
     /// model's unit of length: where it is not above zero, another part than the tip touches.
     pub beam_clearance: Option<f64>,
-    /// Where the two ways differ, its ends as exact as those of the branches.
+    /// Intervals in which approach and retract differ, with ends as exact as those of the branches.
     pub hysteresis: Vec<Hysteresis>,
-    /// Whether the way back ends in the motion with which the way there began; if not, it
-    /// begins too near.
+    /// Whether the retract ends in the motion with which the approach began; if not, the approach
+    /// began too near.
     pub returned: bool,
     /// Branches through the periodic motions.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub branches: Option<BranchReport>,
     /// Whether the work was stopped before it was done.
     pub cancelled: bool,
-    /// Of a physical case: what a distance is to be multiplied with for SI.
+    /// Budgets of steps that were spent, with what is missing for that reason.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub limits: Vec<String>,
+    /// For a physical case, the factor from distances to m.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub parameter_unit: Option<ParameterUnit>,
-    /// Frequency modulation, where amplitude and phase are held.
+    /// Frequency modulation, where amplitude and phase are kept.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub modulation: Option<ModulationReport>,
 }
 
-/// Brings the sample near and takes it away.
+/// Computes an approach and retract curve.
 ///
 /// # Errors
-/// [`ApproachError`] when the options make no sense for the case.
+/// When the options are invalid for the case.
 pub fn approach(
     case: &Case,
     options: &ApproachOptions,
     control: &Control<'_>,
-) -> Result<ApproachReport, ApproachError> {
-    if let Some(phase) = options.phase {
-        return modulated_approach(case, options, phase, control);
+) -> Result<ApproachReport, Error> {
+    options.check()?;
+    if options.fm {
+        return frequency_modulation(case, &options.modulation(), control);
     }
     let key = case.gap_key();
+    let distance = |option, given: &Option<_>| value(case, key, option, given.as_ref());
+    let speed = options.speed.as_ref();
+    let speed = speed.map(|amount| speed_of(case, amount)).transpose()?;
+    let distances = Distances {
+        from: distance("from", &options.from)?,
+        to: distance("to", &options.to)?,
+        points: options.points,
+        closest: None,
+    };
     let free = FreeMotion::of(&case.model()?);
-    let distances = distances(&free, options)?;
+    let distances = distances.values(&free)?;
     let (from, to) = (distances[0], distances[distances.len() - 1]);
-    let curve = Curve { case, options };
+    let curve = Curve {
+        case,
+        options,
+        speed,
+    };
     let found = quasistatic::found(&curve, &free, &distances, control)?;
     Ok(ApproachReport {
         parameter: key.path(),
@@ -348,120 +258,152 @@ pub fn approach(
         free_reach: free.reach,
         beam_clearance: beam_clearance(case, &found.table),
         hysteresis: found.hysteresis,
-        returned: returned(&found.table, options.speed, free.amplitude),
+        returned: returned(&found.table, speed, free.amplitude),
         table: found.table,
         jumps: found.jumps,
         coexisting: found.coexisting,
         branches: found.branches,
         cancelled: control.is_cancelled(),
+        limits: found.limits,
         parameter_unit: case.parameter_unit(key),
         modulation: None,
     })
 }
 
-/// The distances from far to near.
-pub(in crate::study) fn distances(
-    free: &FreeMotion,
-    options: &ApproachOptions,
-) -> Result<Vec<f64>, ApproachError> {
-    if options.points < 2 {
-        return Err(ApproachError::Points {
-            given: options.points,
-        });
-    }
-    if options.periods == 0 {
-        return Err(ApproachError::NoPeriods);
-    }
-    if options.max_period == 0 {
-        return Err(ApproachError::NoPeriod);
-    }
-    if let Some(given) = options.speed
-        && !(given > 0.0 && given.is_finite())
-    {
-        return Err(ApproachError::Speed { given });
-    }
-    if options.from.is_none() && !(free.reach > 0.0 && free.reach.is_finite()) {
-        return Err(ApproachError::NoDrive);
-    }
-    let from = options.from.unwrap_or(BEYOND * free.reach);
-    let to = match (options.to, options.closest) {
-        (Some(to), _) => to,
-        (None, Some(closest)) => closest + LEAST_AMPLITUDE * (from - closest),
-        (None, None) => from.min(0.0),
-    };
-    if !(from.is_finite() && to.is_finite() && from > to) {
-        return Err(ApproachError::Range { from, to });
-    }
-    if let Some(closest) = options.closest
-        && (to <= closest || !closest.is_finite())
-    {
-        return Err(ApproachError::Closest { closest, to });
-    }
-    let last = (options.points - 1) as f64;
-    // Amplitudes at a kept least distance stand in equal ratios.
-    let between = |share: f64| match options.closest {
-        Some(closest) if share > 0.0 && share < 1.0 => {
-            let ratio = (to - closest) / (from - closest);
-            closest + (from - closest) * nanotap_arithmetic::powf(ratio, share)
-        }
-        // Both ends exactly.
-        _ => from * (1.0 - share) + to * share,
-    };
-    Ok((0..options.points)
-        .map(|k| between(k as f64 / last))
-        .collect())
+/// The distances of a curve, in the model's unit of length.
+pub(in crate::study) struct Distances {
+    /// The first; `None`: 1.25 times the tip's free reach.
+    pub(in crate::study) from: Option<f64>,
+    /// The last; `None`: 0, where the sample is at the tip's rest position.
+    pub(in crate::study) to: Option<f64>,
+    /// Number of distances.
+    pub(in crate::study) points: usize,
+    /// Least distance of the oscillation, if it is kept constant.
+    pub(in crate::study) closest: Option<f64>,
 }
 
-/// How a curve is written.
+impl Distances {
+    /// The distances from far to near.
+    ///
+    /// # Errors
+    /// When there are fewer than two, or they do not descend.
+    pub(in crate::study) fn values(&self, free: &FreeMotion) -> Result<Vec<f64>, Error> {
+        let closest = self.closest;
+        if self.points < 2 {
+            return Err(Error::input(
+                format!(
+                    "{} distances make no curve: at least 2 are needed",
+                    self.points
+                ),
+                "give {points} 80",
+            ));
+        }
+        if self.from.is_none() && !(free.reach > 0.0 && free.reach.is_finite()) {
+            return Err(no_drive());
+        }
+        let from = self.from.unwrap_or(BEYOND * free.reach);
+        let to = match (self.to, closest) {
+            (Some(to), _) => to,
+            (None, Some(closest)) => closest + LEAST_AMPLITUDE * (from - closest),
+            (None, None) => from.min(0.0),
+        };
+        if !(from.is_finite() && to.is_finite() && from > to) {
+            return Err(Error::input(
+                format!(
+                    "an approach goes from far to near: it cannot go from {from} to {to}; the \
+                     first distance must be the greater, both finite"
+                ),
+                "change {from} or {to}",
+            ));
+        }
+        if let Some(closest) = closest
+            && (to <= closest || !closest.is_finite())
+        {
+            return Err(Error::input(
+                format!(
+                    "an oscillation that comes as near as {closest} has no amplitude at the \
+                     distance {to}: the last distance must be the greater"
+                ),
+                "change {to} or {closest}",
+            ));
+        }
+        let last = (self.points - 1) as f64;
+        // Amplitudes at a fixed least distance are in equal ratios.
+        let between = |share: f64| match closest {
+            Some(closest) if share > 0.0 && share < 1.0 => {
+                let ratio = (to - closest) / (from - closest);
+                closest + (from - closest) * nanotap_arithmetic::powf(ratio, share)
+            }
+            // Both ends exactly.
+            _ => from * (1.0 - share) + to * share,
+        };
+        Ok((0..self.points).map(|k| between(k as f64 / last)).collect())
+    }
+}
+
+/// The error of a drive that does not move the tip.
+pub(in crate::study) fn no_drive() -> Error {
+    Error::input(
+        "the drive does not move the tip, so that no distance says where the curve should begin; \
+         give it",
+        "give {from}",
+    )
+}
+
+/// Distances and speed of a curve.
 struct Curve<'a> {
     case: &'a Case,
     options: &'a ApproachOptions,
+    /// In the model's unit of length a unit of time; `None`: so slow that the lever settles.
+    speed: Option<f64>,
 }
+
+/// Drive periods recorded of a motion that is not periodic.
+const RECORDED_PERIODS: usize = 256;
 
 impl Curve<'_> {
     /// A motion as a line of the table.
-    fn observed(&self, way: Way, gap: f64, model: &Model, met: Met) -> ApproachPoint {
-        let seen = match (&met.orbit, met.classification) {
+    fn observed(&self, way: Way, gap: f64, model: &Model, motion: FoundMotion) -> ApproachPoint {
+        let seen = match (&motion.orbit, motion.classification) {
             (Some(orbit), _) => {
                 let start = orbit.states.first().map_or(&[][..], Vec::as_slice);
-                measure(model, start, orbit.period, Set::COMMON).map(Some)
+                measure(model, start, orbit.period, ObservableSet::COMMON).map(Some)
             }
             (None, Classification::Undecided | Classification::Unbounded) => Ok(None),
-            (None, _) => measure(model, &met.state, self.options.periods, Set::COMMON).map(Some),
+            (None, _) => measure(
+                model,
+                &motion.state,
+                RECORDED_PERIODS,
+                ObservableSet::COMMON,
+            )
+            .map(Some),
         };
         let (classification, observables, reason) = match seen {
-            Ok(Some(seen)) => (met.classification, Some(seen), None),
-            Ok(None) => (met.classification, None, Some(met.evidence)),
+            Ok(Some(seen)) => (motion.classification, Some(seen), None),
+            Ok(None) => (motion.classification, None, Some(motion.evidence)),
             Err(error) => (Classification::Undecided, None, Some(error.to_string())),
         };
-        let view = self.case.physical();
         ApproachPoint {
-            way,
-            gap,
-            zc: view.map(|view| gap * view.scales.length),
-            classification,
-            period: met.orbit.as_ref().map(|orbit| orbit.period),
-            spectral_radius: met.orbit.as_ref().map(PeriodicOrbit::spectral_radius),
-            physical: observables
-                .as_ref()
-                .zip(view)
-                .map(|(seen, view)| PhysicalMotion::of(seen, view)),
-            observables,
             reason,
-            modulation: None,
-            modulation_si: None,
-            orbit: met.orbit,
+            ..ApproachPoint::new(
+                self.case,
+                (way, gap),
+                classification,
+                observables.as_ref(),
+                motion.orbit,
+            )
         }
     }
 }
 
-/// How branches are followed.
-fn branching(key: Key, (from, to): (f64, f64), options: &ApproachOptions) -> BranchOptions {
+/// Options of the continuation.
+fn branching(options: &ApproachOptions) -> BranchOptions {
     BranchOptions {
-        doublings: options.doublings,
+        switch: Some(options.switch),
         stable_doublings: true,
         max_multiplier: MAX_MULTIPLIER,
-        ..BranchOptions::over(key, from, to)
+        max_step: ContinuationOptions::over(0.0, 1.0).max_step,
+        ..BranchOptions::default()
     }
 }
 
@@ -547,126 +489,109 @@ fn difference(a: &ApproachPoint, b: &ApproachPoint, free_amplitude: f64) -> Opti
     differ.then_some(amplitudes)
 }
 
-/// What an approach curve is asked for.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct ApproachRequest {
-    /// Distance at which to begin, in units of the case ("30 nm") or as alpha5; without it, 1.25
-    /// times what the free tip swings towards the sample
-    #[schemars(extend("x-value" = "DISTANCE"))]
-    pub from: Option<Amount>,
-    /// Distance at which to turn back; without it, 0
-    #[schemars(extend("x-value" = "DISTANCE"))]
-    pub to: Option<Amount>,
-    /// Distances each way
-    #[schemars(range(min = 2, max = MOST_DISTANCES), extend("x-value" = "P"))]
-    pub points: usize,
-    /// Also continue the branches that coexist, stable and unstable
-    #[schemars(extend("x-no" = "Only follow the motion: continue no branches"))]
-    pub branches: bool,
-    /// Doublings of branches to follow, as far as their orbits are stable
-    #[schemars(range(min = 0, max = MOST_DOUBLINGS), extend("x-value" = "DEPTH"))]
-    pub switch: usize,
-    /// Longest period looked for
-    #[schemars(range(min = 1, max = MOST_PERIOD), extend("x-value" = "N"))]
-    pub max_period: usize,
-    /// Speed of the approach and of the retraction, in units of the case ("500 nm/s") or as alpha5
-    /// a unit of time: the distance changes each drive period and the lever does not settle;
-    /// without it, both are so slow that it always does
-    #[schemars(extend("x-value" = "SPEED"))]
-    pub speed: Option<Amount>,
-    /// Frequency modulation: hold amplitude (the case's free amplitude) and phase by frequency and
-    /// strength of the drive, and tell the frequency shift
-    pub fm: bool,
-    /// Phase behind the drive that frequency modulation holds, in degrees
-    #[schemars(range(min = 0, max = 180), extend("x-value" = "DEGREES"))]
-    pub phase: f64,
-    /// Frequency shift of frequency modulation whose distances are to be found, in units of the
-    /// case ("-50 Hz") or as omega
-    #[schemars(extend("x-value" = "SHIFT"))]
-    pub shift: Option<Amount>,
-    /// Least distance of the oscillation that frequency modulation keeps, in units of the case
-    /// ("1 nm") or as alpha5: the amplitude then changes with the distance
-    #[schemars(extend("x-value" = "DISTANCE"))]
-    pub closest: Option<Amount>,
-}
-
-impl Default for ApproachRequest {
-    fn default() -> Self {
-        let options = ApproachOptions::default();
-        Self {
-            from: None,
-            to: None,
-            points: options.points,
-            branches: options.branches,
-            switch: options.doublings,
-            max_period: options.max_period,
-            speed: None,
-            fm: false,
-            phase: 90.0,
-            shift: None,
-            closest: None,
-        }
+options! {
+    /// Options of an approach curve.
+    pub struct ApproachOptions {
+        /// First distance, in units of the case ("30 nm") or as alpha5; default: 1.25 times the
+        /// free swing of the tip towards the sample
+        #[schemars(extend("x-value" = "DISTANCE"))]
+        pub from: Option<Amount> = None,
+        /// Last distance of the approach; default: 0
+        #[schemars(extend("x-value" = "DISTANCE"))]
+        pub to: Option<Amount> = None,
+        /// Number of distances in each direction. Under a nonlinear law the lever is followed for at
+        /// most 40 million steps of the approximate flow, and as many are taken for the rows; a step
+        /// of the exact flow counts as 100
+        #[schemars(range(min = 2, max = MAX_DISTANCES), extend("x-value" = "P"))]
+        pub points: usize = 80,
+        /// Also continue coexisting branches, stable and unstable
+        #[schemars(extend("x-no" = "Only follow the motion: continue no branches"))]
+        pub branches: bool = true,
+        /// Number of period doublings to follow, as far as their orbits are stable
+        #[schemars(range(min = 0, max = MAX_DOUBLINGS), extend("x-value" = "DEPTH"))]
+        pub switch: usize = 1,
+        /// Longest period of orbits, in drive periods
+        #[schemars(range(min = 1, max = MAX_PERIOD), extend("x-value" = "N"))]
+        pub max_period: usize = 32,
+        /// Speed of approach and retract, in units of the case ("500 nm/s") or as alpha5 per unit
+        /// of time: the distance changes each drive period; default: quasi-static
+        #[schemars(extend("x-value" = "SPEED"))]
+        pub speed: Option<Amount> = None,
+        /// Frequency modulation: keep the amplitude (the free amplitude of the case) and phase
+        /// constant by frequency and strength of the drive, and report the frequency shift
+        pub fm: bool = false,
+        /// Phase lag kept by frequency modulation, in degrees
+        #[schemars(range(min = 0, max = 180), extend("x-value" = "DEGREES"))]
+        pub phase: f64 = 90.0,
+        /// Frequency shift whose distances to find under frequency modulation, in units of the case
+        /// ("-50 Hz") or as omega
+        #[schemars(extend("x-value" = "SHIFT"))]
+        pub shift: Option<Amount> = None,
+        /// Least distance of the oscillation kept by frequency modulation, in units of the case ("1
+        /// nm") or as alpha5: the amplitude then changes with the distance
+        #[schemars(extend("x-value" = "DISTANCE"))]
+        pub closest: Option<Amount> = None,
     }
 }
 
-impl ApproachRequest {
-    /// How to approach, in the model's unit of length.
-    ///
-    /// # Errors
-    /// When a distance is none.
-    pub fn options(&self, case: &Case) -> Result<ApproachOptions, Error> {
-        let key = case.gap_key();
-        let distance = |option: &str, given: &Option<Amount>| {
-            let read = |amount: &Amount| case.value(key, amount.text());
-            let read = given.as_ref().map(read).transpose();
-            read.map_err(|error| Error::from(error).at(option))
-        };
-        let [frequency, _] = case.drive_keys();
-        let read = |amount: &Amount| case.value(frequency, amount.text());
-        let shift = self.shift.as_ref().map(read).transpose();
+impl ApproachOptions {
+    fn check(&self) -> Result<(), Error> {
+        let refused = |option, message, remedy| Err(Error::option(option, message, remedy));
         if self.shift.is_some() && !self.fm {
-            return Err(Error::option(
+            return refused(
                 "shift",
                 "the frequency does not shift where the drive holds it",
                 "add {fm}, which holds amplitude and phase instead",
-            ));
+            );
         }
         if self.closest.is_some() && !self.fm {
-            return Err(Error::option(
+            return refused(
                 "closest",
                 "the least distance cannot be kept where nothing holds the amplitude",
                 "add {fm}, which holds amplitude and phase",
-            ));
+            );
         }
         if self.speed.is_some() && self.fm {
-            return Err(Error::option(
+            return refused(
                 "speed",
                 "frequency modulation follows orbits, at no finite speed",
                 "leave away {fm} or {speed}",
+            );
+        }
+        if self.max_period == 0 {
+            return Err(Error::input(
+                "no motion has the longest period 0: at least 1 is needed",
+                "give a {max_period} of 1 or more",
             ));
         }
-        let speed = self.speed.as_ref().map(|amount| speed_of(case, amount));
-        Ok(ApproachOptions {
-            speed: speed.transpose()?,
-            closest: distance("closest", &self.closest)?,
-            shift: shift.map_err(|error| Error::from(error).at("shift"))?,
-            from: distance("from", &self.from)?,
-            to: distance("to", &self.to)?,
+        Ok(())
+    }
+
+    /// Those of frequency modulation.
+    fn modulation(&self) -> FrequencyModulationOptions {
+        FrequencyModulationOptions {
+            from: self.from.clone(),
+            to: self.to.clone(),
             points: self.points,
-            branches: self.branches,
-            doublings: self.switch,
-            max_period: self.max_period,
-            phase: self.fm.then_some(self.phase),
-            ..ApproachOptions::default()
-        })
+            phase: self.phase,
+            shift: self.shift.clone(),
+            closest: self.closest.clone(),
+        }
     }
 }
 
 /// A speed in the model's unit of length a unit of time, as it is given of a case.
 fn speed_of(case: &Case, amount: &Amount) -> Result<f64, Error> {
     if let Ok(speed) = amount.text().parse::<f64>() {
-        return Ok(speed);
+        if speed > 0.0 && speed.is_finite() {
+            return Ok(speed);
+        }
+        return Err(Error::input(
+            format!(
+                "the distance cannot change at a speed of {speed}: a finite one above zero is needed"
+            ),
+            "change {speed}",
+        ));
     }
     let refused = |error: String| Error::option("speed", error, "write it as in \"500 nm/s\"");
     let speed = Kind::Velocity.parse(amount.text());
@@ -688,37 +613,14 @@ impl Study for ApproachStudy {
     const COUNTED: &'static str = "distances";
     const ANY_DISTANCE: bool = true;
     const PARTIAL: bool = true;
-    type Request = ApproachRequest;
+    type Options = ApproachOptions;
     type Report = ApproachReport;
 
     fn compute(
         case: &Case,
-        request: &ApproachRequest,
+        options: &ApproachOptions,
         control: &Control<'_>,
     ) -> Result<ApproachReport, Error> {
-        Ok(approach(case, &request.options(case)?, control)?)
-    }
-}
-
-impl From<ApproachError> for crate::Error {
-    fn from(error: ApproachError) -> Self {
-        let input = |remedy| Self::input(error.to_string(), remedy);
-        match &error {
-            ApproachError::Points { .. } => input("give {points} 80"),
-            ApproachError::Range { .. } => input("change {from} or {to}"),
-            ApproachError::Closest { .. } => input("change {to} or {closest}"),
-            ApproachError::NoDrive => input("give {from}"),
-            ApproachError::NoPeriod => input("give a {max_period} of 1 or more"),
-            ApproachError::NoPeriods => input("give 1 or more {periods}"),
-            ApproachError::Speed { .. } => input("change {speed}"),
-            ApproachError::Slow { .. } => {
-                input("raise {speed}, or leave it away: the lever then settles at each distance")
-            }
-            ApproachError::Fast => input("lower {speed} or {points}"),
-            ApproachError::Flow { .. } => Self::numerics(error.to_string()),
-            ApproachError::Model(error) => error.clone().into(),
-            ApproachError::Branch(error) => error.clone().into(),
-            ApproachError::Held(error) => error.clone().into(),
-        }
+        approach(case, options, control)
     }
 }

@@ -5,14 +5,15 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use nanotap_dynamics::{Control, PeriodicOrbit};
 use rayon::prelude::*;
 
-use super::distance_sweep::{DistanceSweep, End, Met, Motion, Piece, Place, is_same};
-use super::ramp::ramp;
-use super::{
-    ApproachError, ApproachPoint, Curve, Hysteresis, StateJump, Way, branching, difference,
+use super::distance_sweep::{
+    DistanceSweep, End, FoundMotion, Motion, Piece, Place, budget_text, is_same,
 };
+use super::ramp::ramp;
+use super::{ApproachPoint, Curve, Hysteresis, StateJump, Way, branching, difference};
+use crate::Error;
 use crate::case::{Case, CaseError};
 use crate::study::FreeMotion;
-use crate::study::branch::{BranchReport, BranchesThrough};
+use crate::study::branch::{BranchReport, BranchesThrough, Range};
 use crate::study::simulate::Classification;
 
 /// What is reported of a curve.
@@ -22,7 +23,22 @@ pub(super) struct Found {
     pub(super) coexisting: Vec<ApproachPoint>,
     pub(super) hysteresis: Vec<Hysteresis>,
     pub(super) branches: Option<BranchReport>,
+    /// Why less was followed than there is.
+    pub(super) limits: Vec<String>,
 }
+
+/// Steps of the approximate flow after which no more rows are measured, and which branches may take.
+const ROW_STEPS: u64 = 40_000_000;
+const BRANCH_STEPS: u64 = 20_000_000;
+/// Points that the branches through a curve have all together, mostly; where steps suffice for fewer,
+/// grazings are not located.
+const USUAL_POINTS: usize = 1000;
+/// Points to which each branch may always be followed.
+const MIN_POINTS: usize = 16;
+/// Steps after which no more states are looked for from which a census starts.
+const SEED_STEPS: u64 = 20_000_000;
+/// Rows that are measured before it is seen whether the budget is spent.
+const ROWS_AT_ONCE: usize = 16;
 
 /// Both ways of a slowly moved lever.
 pub(in crate::study) struct Ways {
@@ -64,12 +80,12 @@ pub(super) fn found(
     free: &FreeMotion,
     distances: &[f64],
     control: &Control<'_>,
-) -> Result<Found, ApproachError> {
+) -> Result<Found, Error> {
     let (case, options) = (curve.case, curve.options);
     let (from, to) = (distances[0], distances[distances.len() - 1]);
     let range = (to, from);
     let mut sweep = DistanceSweep::new(case, range, free.reach, options.max_period, control)?;
-    let (ways, first) = if options.speed.is_none() {
+    let (ways, first) = if curve.speed.is_none() {
         Ways::of(&mut sweep, from, to)?
     } else {
         let mut place = sweep.free()?;
@@ -82,45 +98,75 @@ pub(super) fn found(
         };
         (none, place)
     };
+    let not_followed = sweep.spent_budget().map(budget_text);
+    sweep.allow_steps(ROW_STEPS);
     let written = Written {
         curve,
         sweep: &sweep,
         ways: &ways,
         distances,
+        not_followed: not_followed.as_deref().unwrap_or(NOT_FOLLOWED),
     };
-    let table = match options.speed {
+    let jumps = written.jumps()?;
+    let table = match curve.speed {
         Some(speed) => ramp(curve, speed, distances, &sweep.state(&first), control)?,
         None => written.table(control)?,
     };
-    let coexisting = match options.speed {
+    let coexisting = match curve.speed {
         None => written.coexisting(&table)?,
         Some(_) => Vec::new(),
     };
+    let hysteresis = written.hysteresis(free.amplitude)?;
+    let not_measured = sweep.spent_budget().map(Written::not_measured);
+    let (branches, cut) = branches(curve, &mut sweep, range, control)?;
+    let limits = [not_followed, not_measured, cut].into_iter().flatten();
     Ok(Found {
-        jumps: written.jumps()?,
-        hysteresis: written.hysteresis(free.amplitude)?,
-        branches: branches(curve, &sweep, range, control)?,
+        jumps,
+        hysteresis,
+        branches,
         table,
         coexisting,
+        limits: limits.collect(),
     })
 }
 
-/// The branches through every stretch of stable orbits.
+/// The branches through every stretch of stable orbits, and why they are cut, if they are.
 fn branches(
     curve: &Curve<'_>,
-    sweep: &DistanceSweep<'_>,
+    sweep: &mut DistanceSweep<'_>,
     (near, far): (f64, f64),
     control: &Control<'_>,
-) -> Result<Option<BranchReport>, ApproachError> {
+) -> Result<(Option<BranchReport>, Option<String>), Error> {
     if !curve.options.branches {
-        return Ok(None);
+        return Ok((None, None));
     }
+    let points = sweep.points_in(BRANCH_STEPS);
+    sweep.allow_steps(ROW_STEPS);
     let quiet = Control {
         progress: None,
         ..*control
     };
-    let how = branching(curve.case.gap_key(), (far, near), curve.options);
-    let mut branches = BranchesThrough::new(curve.case, &how)?;
+    let mut how = branching(curve.options);
+    let cut = points < USUAL_POINTS;
+    if cut {
+        // Two ways from each seed.
+        let each = points / (2 * sweep.stretches.len()).max(1);
+        how.max_points = each.max(MIN_POINTS);
+        how.grazings = false;
+    }
+    let cut = cut.then(|| {
+        let points = how.max_points;
+        format!(
+            "branches were followed for {points} points each way, and without their grazings: an \
+             orbit takes too many steps for more"
+        )
+    });
+    let range = Range {
+        key: curve.case.gap_key(),
+        from: far,
+        to: near,
+    };
+    let mut branches = BranchesThrough::new(curve.case, range, &how)?;
     // A doubled branch is followed from its flip, as deep as the options say.
     let is_doubled = |k: &usize| {
         let ends = sweep.stretches[*k].ends.iter();
@@ -145,8 +191,11 @@ fn branches(
         });
     branches.follow(seeds.collect::<Vec<_>>(), &quiet);
     let any = !branches.is_empty() && !control.is_cancelled();
-    Ok(any.then(|| branches.report(&quiet)))
+    Ok((any.then(|| branches.report(&quiet)), cut.filter(|_| any)))
 }
+
+/// A row of the approach and one of the retraction, as far as they were reached.
+type RowPair = (Option<ApproachPoint>, Option<ApproachPoint>);
 
 /// A followed curve and the distances at which it is written.
 struct Written<'a> {
@@ -154,6 +203,8 @@ struct Written<'a> {
     sweep: &'a DistanceSweep<'a>,
     ways: &'a Ways,
     distances: &'a [f64],
+    /// Why the lever was not followed to every distance.
+    not_followed: &'a str,
 }
 
 /// Distances of an interval at which the two ways are compared, its ends included; fewer where a
@@ -162,36 +213,75 @@ const COMPARED: usize = 9;
 const COMPARED_ON_GRID: usize = 3;
 
 impl Written<'_> {
-    fn row(&self, way: Way, gap: f64, met: Met) -> Result<ApproachPoint, CaseError> {
+    fn row(&self, way: Way, gap: f64, motion: FoundMotion) -> Result<ApproachPoint, CaseError> {
         let model = self.sweep.model(gap)?;
-        Ok(self.curve.observed(way, gap, &model, met))
+        Ok(self.curve.observed(way, gap, &model, motion))
     }
 
     /// The rows at the written distances, there and back: up to the first that was not reached,
     /// where the work was stopped.
     fn table(&self, control: &Control<'_>) -> Result<Vec<ApproachPoint>, CaseError> {
-        let count = self.distances.len();
         let done = AtomicUsize::new(0);
-        let told = || {
+        let mut rows = Vec::with_capacity(self.distances.len());
+        // Which rows fail at the end of the budget depends on threads: all that are measured
+        // together are then undecided.
+        for distances in self.distances.chunks(ROWS_AT_ONCE) {
+            let measured = self.rows(distances, &done, control)?;
+            match self.sweep.spent_budget() {
+                None => rows.extend(measured),
+                Some(steps) => {
+                    let unmeasured = |way: Way, gap: f64| {
+                        let motion = FoundMotion::undecided(Self::not_measured(steps), &[]);
+                        self.row(way, gap, motion).map(Some)
+                    };
+                    for &gap in distances {
+                        rows.push((
+                            unmeasured(Way::Approach, gap)?,
+                            unmeasured(Way::Retract, gap)?,
+                        ));
+                    }
+                }
+            }
+        }
+        let (there, mut back): (Vec<_>, Vec<_>) = rows.into_iter().unzip();
+        back.reverse();
+        Ok(there.into_iter().chain(back).map_while(|row| row).collect())
+    }
+
+    /// In words that the budget for the rows was spent.
+    fn not_measured(steps: u64) -> String {
+        let millions = steps / 1_000_000;
+        format!("the rows were measured up to the budget of {millions} million steps")
+    }
+
+    /// The rows at some distances, there and back; none that were not reached, where the work was
+    /// stopped.
+    fn rows(
+        &self,
+        distances: &[f64],
+        done: &AtomicUsize,
+        control: &Control<'_>,
+    ) -> Result<Vec<RowPair>, CaseError> {
+        let count = self.distances.len();
+        let report = || {
             if let Some(progress) = control.progress {
                 progress(done.fetch_add(1, Ordering::Relaxed) + 1, 2 * count);
             }
         };
-        let rows: Result<Vec<_>, CaseError> = self
-            .distances
+        distances
             .par_iter()
             .with_max_len(1)
             .map(|&gap| {
                 let on = |pieces: &[Piece]| pieces.iter().find(|p| p.holds(gap)).cloned();
                 let of = |way: Way, piece: Option<Piece>| match piece {
                     Some(piece) if !control.is_cancelled() => {
-                        let met = self.sweep.motion_at(&piece, gap);
-                        self.row(way, gap, met).map(Some)
+                        let motion = self.sweep.motion_at(&piece, gap);
+                        self.row(way, gap, motion).map(Some)
                     }
                     _ if control.is_cancelled() => Ok(None),
                     _ => {
-                        let met = Met::undecided(NOT_FOLLOWED.to_owned(), &[]);
-                        self.row(way, gap, met).map(Some)
+                        let motion = FoundMotion::undecided(self.not_followed.to_owned(), &[]);
+                        self.row(way, gap, motion).map(Some)
                     }
                 };
                 let [there, back] = self.ways.each().map(|(_, pieces)| on(pieces));
@@ -200,7 +290,7 @@ impl Written<'_> {
                     _ => false,
                 };
                 let there = of(Way::Approach, there)?;
-                told();
+                report();
                 let back = if same {
                     let same = there.clone();
                     same.map(|row| ApproachPoint {
@@ -210,13 +300,10 @@ impl Written<'_> {
                 } else {
                     of(Way::Retract, back)?
                 };
-                told();
+                report();
                 Ok((there, back))
             })
-            .collect();
-        let (there, mut back): (Vec<_>, Vec<_>) = rows?.into_iter().unzip();
-        back.reverse();
-        Ok(there.into_iter().chain(back).map_while(|row| row).collect())
+            .collect()
     }
 
     /// Orbits of stretches on which neither way is at a distance.
@@ -245,11 +332,14 @@ impl Written<'_> {
                 }
                 let found = found.into_iter();
                 found
-                    .map(|orbit| self.row(Way::Neither, gap, Met::on(orbit)))
+                    .map(|orbit| self.row(Way::Neither, gap, FoundMotion::periodic(orbit)))
                     .collect()
             })
             .collect();
-        Ok(rows?.into_iter().flatten().collect())
+        let rows = rows?.into_iter().flatten();
+        // What was found before the budget was spent depends on threads.
+        let complete = self.sweep.spent_budget().is_none();
+        Ok(rows.filter(|_| complete).collect())
     }
 
     fn jumps(&self) -> Result<Vec<StateJump>, CaseError> {
@@ -294,7 +384,8 @@ impl Written<'_> {
             })
             .collect();
         let mut found: Vec<Hysteresis> = Vec::new();
-        for (pair, difference) in intervals? {
+        let complete = self.sweep.spent_budget().is_none();
+        for (pair, difference) in intervals?.into_iter().filter(|_| complete) {
             let Some(difference) = difference else {
                 continue;
             };
@@ -393,7 +484,9 @@ pub fn states_at(
     }
     let far = far.max(super::BEYOND * free.reach);
     let mut sweep = DistanceSweep::new(case, (near, far), free.reach, max_period, control)?;
+    sweep.allow_steps(SEED_STEPS);
     Ways::of(&mut sweep, far, near)?;
+    sweep.allow_steps(SEED_STEPS);
     Ok(distances
         .iter()
         .map(|&gap| {

@@ -1,13 +1,14 @@
 //! The curve at a finite speed: the distance changes each drive period, by the period's length
 //! times the speed, and the lever is given no time to settle.
 
-use nanotap_dynamics::{Control, StroboscopicMap as _};
+use nanotap_dynamics::Control;
 
 use super::quasistatic::MOVING;
-use super::{ApproachError, ApproachPoint, Curve, Way};
-use crate::model::strobe::Strobe;
+use super::{ApproachPoint, Curve, Way};
+use crate::Error;
+use crate::case::MovingGap;
 use crate::model::{Model, MotionError};
-use crate::observe::{PhysicalMotion, Set, measure};
+use crate::observe::{ObservableSet, measure};
 
 /// Most drive periods there and back.
 const MAX_PERIODS: usize = 2_000_000;
@@ -20,17 +21,20 @@ pub(super) fn ramp(
     distances: &[f64],
     start: &[f64],
     control: &Control<'_>,
-) -> Result<Vec<ApproachPoint>, ApproachError> {
+) -> Result<Vec<ApproachPoint>, Error> {
     let case = curve.case;
-    let model = |gap: f64| case.with(case.gap_key(), gap).model();
-    let step = speed * model(distances[0])?.system.drive().period();
+    let mut lever = MovingGap::new(&case.with(case.gap_key(), distances[0]))?;
+    let step = speed * lever.period();
     let span = distances[0] - distances[distances.len() - 1];
     let needed = 2.0 * span / step;
     if needed.is_nan() || needed > MAX_PERIODS as f64 {
-        return Err(ApproachError::Slow {
-            needed,
-            most: MAX_PERIODS,
-        });
+        return Err(Error::input(
+            format!(
+                "at this speed the lever takes {needed:.3e} drive periods there and back; \
+                 {MAX_PERIODS} are followed at most"
+            ),
+            "raise {speed}, or leave it away: the lever then settles at each distance",
+        ));
     }
     let there = distances.iter().map(|&gap| (Way::Approach, gap));
     let back = distances.iter().rev().map(|&gap| (Way::Retract, gap));
@@ -41,7 +45,10 @@ pub(super) fn ramp(
         .windows(2)
         .any(|pair| whole(pair[0]) == whole(pair[1]))
     {
-        return Err(ApproachError::Fast);
+        return Err(Error::input(
+            "at this speed less than a drive period passes between two written distances",
+            "lower {speed} or {points}",
+        ));
     }
     let mut state = start.to_vec();
     let mut before = distances[0];
@@ -60,12 +67,14 @@ pub(super) fn ramp(
         for k in 1..=periods {
             let share = k as f64 / periods as f64;
             let at = before * (1.0 - share) + gap * share;
-            let here = model(at)?;
-            let failed = |error| ApproachError::Flow { gap: at, error };
+            let failed =
+                |error: MotionError| Error::numerics(format!("at the distance {at}: {error}"));
+            lever.set(at).map_err(failed)?;
             if k == periods {
-                table.push(row(curve, way, gap, &here, &state).map_err(failed)?);
+                let here = lever.model().map_err(failed)?;
+                table.push(row(curve, way, gap, here, &state).map_err(failed)?);
             }
-            Strobe::new(&here).advance(&mut state).map_err(failed)?;
+            lever.advance(&mut state).map_err(failed)?;
             if control.is_cancelled() {
                 break;
             }
@@ -85,20 +94,12 @@ fn row(
     model: &Model,
     state: &[f64],
 ) -> Result<ApproachPoint, MotionError> {
-    let seen = measure(model, state, 1, Set::COMMON)?;
-    let view = curve.case.physical();
-    Ok(ApproachPoint {
-        way,
-        gap,
-        zc: view.map(|view| gap * view.scales.length),
-        classification: MOVING,
-        period: None,
-        spectral_radius: None,
-        physical: view.map(|view| PhysicalMotion::of(&seen, view)),
-        observables: Some(seen),
-        reason: None,
-        modulation: None,
-        modulation_si: None,
-        orbit: None,
-    })
+    let seen = measure(model, state, 1, ObservableSet::COMMON)?;
+    Ok(ApproachPoint::new(
+        curve.case,
+        (way, gap),
+        MOVING,
+        Some(&seen),
+        None,
+    ))
 }

@@ -1,16 +1,16 @@
-//! The orbits at the places of a curve, branch by branch, and which branch the data are on.
+//! The orbits at the rows of a curve, branch by branch, and the branch of each row.
 //!
-//! A motion is followed along the curve as the instrument saw it: from each row's orbit Newton
-//! closes the next one's, in halves of the way where it must; where that fails the branch has
-//! ended, and the motion goes on from where it is to the next attractor. The same is done from
-//! the curve's end to its beginning, which finds the other side of a hysteresis. With other
-//! parameters than those behind the data the motion may stay on a branch that the data have left,
-//! both ways; where no orbit found swings as was measured, one is looked for where it would, and
-//! followed both ways. Orbits of one period that continue each other are one branch. Of the branches, each row gets one by the
-//! least sum of squared residuals and of a price for every change of branch (the shortest path
-//! through the table of rows and branches, found row by row).
+//! A motion is followed along the curve as in the measurement: Newton finds the orbit of each row
+//! from that of the previous one, in smaller steps if necessary. If that fails, the branch has
+//! ended, and the motion continues to the next attractor. The same is done from the end of the
+//! curve to its beginning, which finds the other side of a hysteresis. With wrong parameters the
+//! motion may stay on one branch in both directions while the data are on another. Where none of
+//! the orbits resembles the measured motion, an orbit near it is searched for and followed in both
+//! directions. Orbits of one period that continue each other form a branch. Each row is assigned to
+//! a branch so that the sum of squared residuals and of a penalty for every change of branch is
+//! minimal (the shortest path through the table of rows and branches, row by row).
 //!
-//! Fails by omission: branches that none of these meets.
+//! Fails by omission: branches that none of these searches finds.
 
 use nanotap_dynamics::{
     ClassifyOptions, LyapunovOptions, MotionKind, PeriodicOrbit, ShootingOptions,
@@ -19,7 +19,7 @@ use nanotap_dynamics::{
 
 use crate::case::Case;
 use crate::model::Model;
-use crate::model::strobe::Strobe;
+use crate::model::model_map::ModelMap;
 
 /// An orbit at a row.
 #[derive(Clone, Debug)]
@@ -31,58 +31,59 @@ pub(super) struct Candidate {
 /// The orbits at each row.
 pub(super) type Rows = Vec<Vec<Candidate>>;
 
-/// A curve whose rows' cases are known.
-pub(super) struct Along<'a> {
-    /// The case at each row, and at places between.
+/// A curve with the cases of its rows.
+pub(super) struct RowCases<'a> {
+    /// Returns the case at a row, and at positions between rows.
     pub(super) at: &'a dyn Fn(&[f64]) -> Option<Case>,
-    /// Where the rows are.
+    /// The positions of the rows.
     pub(super) places: &'a [Vec<f64>],
-    /// A state at drive phase 0 that swings as was measured at a row, if amplitude and phase were.
+    /// Returns a state at drive phase 0 with the measured amplitude and phase of a row, if both
+    /// were measured.
     pub(super) measured: &'a dyn Fn(usize, &Model) -> Option<Vec<f64>>,
-    /// Longest period looked for.
+    /// Longest period of the orbits in drive periods.
     pub(super) max_period: usize,
 }
 
-/// Distance of two orbits, in parts of their size, that do not continue each other in one step.
-const FAR: f64 = 0.3;
-/// Drive periods of a motion that has not repeated after the transient, until it is looked at for
-/// the last time.
-const LAST_LOOK: usize = 64;
-/// Halvings of the way from one row to the next.
-const HALVINGS: usize = 4;
-/// Distance of an orbit from the state that was measured, in parts of that, beyond which it is
-/// another motion.
-const UNLIKE: f64 = 0.2;
-/// Runs from states that were measured, of which none need find anything.
-const RUNS: usize = 6;
+/// Largest distance of orbits that continue each other in one step, as a fraction of their size.
+const MAX_CONTINUATION_DISTANCE: f64 = 0.3;
+/// Number of drive periods after the transient at which a motion that has not repeated is examined
+/// for the last time.
+const LAST_CHECK_PERIODS: usize = 64;
+/// Largest number of halvings of the step from one row to the next.
+const MAX_HALVINGS: usize = 4;
+/// Largest distance of an orbit from the measured state, as a fraction of that state, at which the
+/// two are the same motion.
+const MAX_MOTION_DISTANCE: f64 = 0.2;
+/// Largest number of runs from measured states.
+const MAX_RUNS: usize = 6;
 
-impl Along<'_> {
-    /// The orbits at every row.
+impl RowCases<'_> {
+    /// Finds the orbits at every row.
     pub(super) fn discover(&self) -> Rows {
         let mut rows: Rows = vec![Vec::new(); self.places.len()];
         let mut branches = 0;
         let count = self.places.len();
-        self.pass(&mut rows, &mut branches, (0..count).collect(), None);
+        self.follow_motion(&mut rows, &mut branches, (0..count).collect(), None);
         let last = rows.last().and_then(|row| row.first()).cloned();
-        self.pass(
+        self.follow_motion(
             &mut rows,
             &mut branches,
             (0..count).rev().collect(),
             last.as_ref(),
         );
-        self.as_measured(&mut rows, &mut branches);
+        self.add_measured_motions(&mut rows, &mut branches);
         rows
     }
 
-    /// The orbits at every row that continue those found beside other parameters; `None` where one
-    /// of them has no continuation.
+    /// Continues the orbits found for other parameters to every row; `None` if one of them has no
+    /// continuation.
     pub(super) fn continued_from(&self, before: &Rows) -> Option<Rows> {
         let row = |(place, candidates): (&Vec<f64>, &Vec<Candidate>)| {
             let model = (self.at)(place)?.model().ok()?;
-            let mut map = Strobe::new(&model);
+            let mut map = ModelMap::new(&model);
             let one = |candidate: &Candidate| {
-                let orbit = continued(&mut map, &candidate.orbit)?;
-                let near = orbit.distance_to(&candidate.orbit).1 <= FAR * candidate.orbit.scale();
+                let orbit = newton_continuation(&mut map, &candidate.orbit)?;
+                let near = orbit.is_near(&candidate.orbit, MAX_CONTINUATION_DISTANCE);
                 (orbit.is_stable() && near).then_some(Candidate {
                     branch: candidate.branch,
                     orbit,
@@ -93,20 +94,20 @@ impl Along<'_> {
         self.places.iter().zip(before).map(row).collect()
     }
 
-    /// Adds the branches of motions that swing as was measured where no orbit does so far.
-    fn as_measured(&self, rows: &mut Rows, branches: &mut usize) {
+    /// Adds the branches of motions near the measured one at rows where no orbit is near it.
+    fn add_measured_motions(&self, rows: &mut Rows, branches: &mut usize) {
         let count = rows.len();
-        // Rows that fail are neighbours: the next one tried is some way off.
-        let apart = count / (2 * RUNS) + 1;
+        // Rows that fail are usually neighbours: the next one tried is some distance away.
+        let apart = count / (2 * MAX_RUNS) + 1;
         let (mut runs, mut row) = (0, 0);
-        while row < count && runs < RUNS {
-            let Some(state) = self.unlike(row, &rows[row]) else {
+        while row < count && runs < MAX_RUNS {
+            let Some(state) = self.unmatched_state(row, &rows[row]) else {
                 row += 1;
                 continue;
             };
             runs += 1;
-            let found = self.settled(row, Some(&state));
-            let new = found.filter(|o| !rows[row].iter().any(|known| same(&known.orbit, o)));
+            let found = self.settle(row, Some(&state));
+            let new = found.filter(|o| !rows[row].iter().any(|known| known.orbit.is_same_as(o)));
             let Some(orbit) = new else {
                 row += apart;
                 continue;
@@ -117,16 +118,16 @@ impl Along<'_> {
             rows[row].push(candidate.clone());
             let on: Vec<usize> = (row..count).collect();
             let back: Vec<usize> = (0..=row).rev().collect();
-            self.along(rows, &candidate, &on);
-            self.along(rows, &candidate, &back);
+            self.follow_branch(rows, &candidate, &on);
+            self.follow_branch(rows, &candidate, &back);
         }
     }
 
-    /// The state that was measured at a row, where none of the orbits there is like it.
-    fn unlike(&self, row: usize, known: &[Candidate]) -> Option<Vec<f64>> {
+    /// The measured state at a row, if no known orbit is near it.
+    fn unmatched_state(&self, row: usize, known: &[Candidate]) -> Option<Vec<f64>> {
         let model = (self.at)(&self.places[row])?.model().ok()?;
         let state = (self.measured)(row, &model)?;
-        // Rates in parts of the drive's.
+        // Velocities relative to those of the drive.
         let modes = (state.len() - model.memory) / 2;
         let weight = |k: usize| match k / modes {
             0 => 1.0,
@@ -141,20 +142,22 @@ impl Along<'_> {
         let like = |candidate: &Candidate| {
             let states = candidate.orbit.states.iter();
             let mut distances = states.map(|at| length(&|k| at[k] - state[k]));
-            distances.any(|distance| distance <= UNLIKE * size)
+            distances.any(|distance| distance <= MAX_MOTION_DISTANCE * size)
         };
         (!known.iter().any(like)).then_some(state)
     }
 
-    /// Follows a new branch over the rows in this order, the first of which has its orbit.
-    fn along(&self, rows: &mut Rows, candidate: &Candidate, order: &[usize]) {
+    /// Follows a new branch over the rows in this order, from the orbit of the first one.
+    fn follow_branch(&self, rows: &mut Rows, candidate: &Candidate, order: &[usize]) {
         let mut last = candidate.orbit.clone();
         for pair in order.windows(2) {
             let [a, b] = [pair[0], pair[1]].map(|k| self.places[k].as_slice());
-            let Some(orbit) = self.follow(a, b, &last, HALVINGS) else {
+            let Some(orbit) = self.follow(a, b, &last, MAX_HALVINGS) else {
                 return;
             };
-            let known = rows[pair[1]].iter().any(|known| same(&known.orbit, &orbit));
+            let known = rows[pair[1]]
+                .iter()
+                .any(|known| known.orbit.is_same_as(&orbit));
             if known {
                 return;
             }
@@ -167,7 +170,7 @@ impl Along<'_> {
     }
 
     /// Follows the motion over the rows in this order.
-    fn pass(
+    fn follow_motion(
         &self,
         rows: &mut Rows,
         branches: &mut usize,
@@ -180,11 +183,11 @@ impl Along<'_> {
         for row in order {
             let continued = last.as_ref().and_then(|(before, candidate)| {
                 let [a, b] = [*before, row].map(|k| self.places[k].as_slice());
-                let orbit = self.follow(a, b, &candidate.orbit, HALVINGS)?;
+                let orbit = self.follow(a, b, &candidate.orbit, MAX_HALVINGS)?;
                 Some((orbit, Some(candidate.branch)))
             });
             let found = continued.or_else(|| {
-                let orbit = self.settled(row, state.as_deref())?;
+                let orbit = self.settle(row, state.as_deref())?;
                 Some((orbit, None))
             });
             let Some((orbit, branch)) = found else {
@@ -192,11 +195,13 @@ impl Along<'_> {
                 continue;
             };
             state = orbit.states.first().cloned();
-            let known = rows[row].iter().find(|known| same(&known.orbit, &orbit));
+            let known = rows[row]
+                .iter()
+                .find(|known| known.orbit.is_same_as(&orbit));
             let candidate = if let Some(known) = known {
                 known.clone()
             } else {
-                let branch = branch.or_else(|| self.known(rows, row, &orbit));
+                let branch = branch.or_else(|| self.branch_of(rows, row, &orbit));
                 let branch = branch.unwrap_or_else(|| {
                     *branches += 1;
                     *branches - 1
@@ -209,9 +214,9 @@ impl Along<'_> {
         }
     }
 
-    /// The branch of an orbit that was found anew: that of an orbit at the nearest row with any,
-    /// if that continues to this one.
-    fn known(&self, rows: &Rows, row: usize, orbit: &PeriodicOrbit) -> Option<usize> {
+    /// The branch of a newly found orbit: that of an orbit at the nearest row with any, if it
+    /// continues to this one.
+    fn branch_of(&self, rows: &Rows, row: usize, orbit: &PeriodicOrbit) -> Option<usize> {
         let here = &self.places[row];
         let away = |k: &usize| {
             let place = self.places[*k].iter().zip(here);
@@ -221,13 +226,13 @@ impl Along<'_> {
         let near = others.min_by(|a, b| away(a).total_cmp(&away(b)))?;
         let mut there = rows[near].iter();
         let continues = there.find(|candidate| {
-            let found = self.follow(&self.places[near], here, &candidate.orbit, HALVINGS);
-            found.is_some_and(|found| same(&found, orbit))
+            let found = self.follow(&self.places[near], here, &candidate.orbit, MAX_HALVINGS);
+            found.is_some_and(|found| found.is_same_as(orbit))
         });
         continues.map(|candidate| candidate.branch)
     }
 
-    /// The orbit at `to` that continues the one at `from`, if it attracts.
+    /// The orbit at `to` that continues the one at `from`, if it is stable.
     fn follow(
         &self,
         from: &[f64],
@@ -237,10 +242,10 @@ impl Along<'_> {
     ) -> Option<PeriodicOrbit> {
         let closed = (self.at)(to).and_then(|case| {
             let model = case.model().ok()?;
-            continued(&mut Strobe::new(&model), orbit)
+            newton_continuation(&mut ModelMap::new(&model), orbit)
         });
         // Beyond a fold Newton may find an orbit of another branch.
-        let near = |found: &PeriodicOrbit| found.distance_to(orbit).1 <= FAR * orbit.scale();
+        let near = |found: &PeriodicOrbit| found.is_near(orbit, MAX_CONTINUATION_DISTANCE);
         let closed = closed.filter(|found| found.is_stable() && near(found));
         if closed.is_some() || halvings == 0 {
             return closed;
@@ -250,44 +255,47 @@ impl Along<'_> {
         self.follow(&middle, to, &half, halvings - 1)
     }
 
-    /// Where the motion at a row goes from a state, or from rest.
-    fn settled(&self, row: usize, state: Option<&[f64]>) -> Option<PeriodicOrbit> {
+    /// The orbit that the motion at a row reaches from a state, or from rest.
+    fn settle(&self, row: usize, state: Option<&[f64]>) -> Option<PeriodicOrbit> {
         let model = (self.at)(&self.places[row])?.model().ok()?;
-        settled(&model, state, self.max_period)
+        settle(&model, state, self.max_period)
     }
 }
 
-/// The orbit of up to `max_period` drive periods at which the motion from a state, or from rest,
-/// comes to repeat.
-pub(super) fn settled(
+/// The orbit of up to `max_period` drive periods that the motion from a state, or from rest,
+/// reaches.
+pub(super) fn settle(
     model: &Model,
     state: Option<&[f64]>,
     max_period: usize,
 ) -> Option<PeriodicOrbit> {
     let rest = vec![0.0; model.dimension()];
-    // Only whether it comes to repeat matters: exponents of a motion that does not would take
-    // longer than all the rest of a fit.
+    // Only periodic motions matter: computing the exponents of other motions would take longer than
+    // the rest of the fit.
     let options = ClassifyOptions {
         max_period,
         long_period: max_period,
         lyapunov: LyapunovOptions {
             alignment: 0,
-            min_periods: LAST_LOOK,
-            max_periods: LAST_LOOK,
+            min_periods: LAST_CHECK_PERIODS,
+            max_periods: LAST_CHECK_PERIODS,
             ..LyapunovOptions::default()
         },
         birkhoff_periods: 0,
         ..ClassifyOptions::default()
     };
-    let end = classify(&mut Strobe::new(model), state.unwrap_or(&rest), &options);
+    let end = classify(&mut ModelMap::new(model), state.unwrap_or(&rest), &options);
     match end.kind {
         MotionKind::Periodic(orbit) | MotionKind::TransientChaos { orbit, .. } => Some(orbit),
         _ => None,
     }
 }
 
-/// The orbit of this map that Newton finds from another's, of the same period.
-pub(super) fn continued(map: &mut Strobe, orbit: &PeriodicOrbit) -> Option<PeriodicOrbit> {
+/// The orbit of this map that Newton finds from another orbit of the same period.
+pub(super) fn newton_continuation(
+    map: &mut ModelMap,
+    orbit: &PeriodicOrbit,
+) -> Option<PeriodicOrbit> {
     if orbit.dimension() != map.dimension() {
         return None;
     }
@@ -297,16 +305,11 @@ pub(super) fn continued(map: &mut Strobe, orbit: &PeriodicOrbit) -> Option<Perio
         .filter(|found| found.period == orbit.period)
 }
 
-/// Whether two orbits are one: rounding is far below, and two branches far above.
-fn same(a: &PeriodicOrbit, b: &PeriodicOrbit) -> bool {
-    a.is_same_as(b) || a.distance_to(b).1 <= 1e-7 * a.scale()
-}
-
-/// Least cost up to a candidate, and the row and candidate before it.
+/// Lowest cost of a path to a candidate, and the row and candidate before it.
 type Reached = (f64, Option<(usize, usize)>);
 
-/// The branch of each row: the path of least cost, each change of branch at `price`; `costs`
-/// has one a candidate. `None` where a row has no orbit.
+/// The branch of each row: the path of lowest cost, with a penalty of `price` for each change of
+/// branch. `costs` has one entry per candidate. `None` where a row has no orbit.
 pub(super) fn path(rows: &Rows, costs: &[Vec<f64>], price: f64) -> Vec<Option<usize>> {
     let mut best: Vec<Vec<Reached>> = Vec::new();
     let mut last: Option<usize> = None;
@@ -349,11 +352,16 @@ pub(super) fn path(rows: &Rows, costs: &[Vec<f64>], price: f64) -> Vec<Option<us
     chosen
 }
 
-/// Takes the last row before and the first row after each change of branch away from the other
-/// branch, if it is there only because its own has no orbit there: with parameters that are not
-/// yet those behind the data a branch ends too early, and a row that is left to the other one
-/// would bend everything towards it. `costs` as for [`path`]; `dear` is more than noise costs.
-pub(super) fn leave_ends(rows: &Rows, costs: &[Vec<f64>], dear: f64, chosen: &mut [Option<usize>]) {
+/// Removes the last row before and the first row after each change of branch from the other branch,
+/// if it is assigned to that branch only because its own has no orbit there. With slightly wrong
+/// parameters a branch ends too early, and a row assigned to the other branch would bias the fit.
+/// `costs` as in [`path`]; `max_noise_cost` is more than the cost of noise.
+pub(super) fn release_branch_ends(
+    rows: &Rows,
+    costs: &[Vec<f64>],
+    max_noise_cost: f64,
+    chosen: &mut [Option<usize>],
+) {
     let branch = |chosen: &[Option<usize>], row: usize| {
         chosen[row].map(|candidate| rows[row][candidate].branch)
     };
@@ -365,7 +373,8 @@ pub(super) fn leave_ends(rows: &Rows, costs: &[Vec<f64>], dear: f64, chosen: &mu
             continue;
         }
         for (here, other) in [(row - 1, b), (row, a)] {
-            let is_dear = before[here].is_some_and(|candidate| costs[here][candidate] > dear);
+            let is_dear =
+                before[here].is_some_and(|candidate| costs[here][candidate] > max_noise_cost);
             let has_other = rows[here].iter().any(|candidate| candidate.branch == other);
             if is_dear && !has_other {
                 chosen[here] = None;

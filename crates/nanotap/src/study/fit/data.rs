@@ -1,17 +1,18 @@
 //! Measured curves: tables whose columns are quantities of the case and observables.
 //!
-//! A column is called by a key of the case (`gap.tip (nm)`, `drive.frequency (kHz)`, `alpha5`),
-//! which its rows then set, or by an observable, by either of its names (`phase`, `E_dis (eV)`).
-//! What experimenters say is understood: `distance` and `zc` are the gap between tip and sample,
-//! `frequency` is that of the drive, and `amplitude` is what a lock-in amplifier reads, unless
-//! the table has that under a name of its own (then it is, as everywhere, half of peak to peak).
-//! `NAME error (unit)` holds standard errors, `direction` which way the abscissa went, `curve`
-//! to which curve a row belongs.
+//! A column is named by a key of the case (`gap.tip (nm)`, `drive.frequency (kHz)`, `alpha5`),
+//! whose value its rows set, or by an observable, with either of its names (`phase`, `E_dis (eV)`).
+//! Experimenters' names are accepted: `distance` and `zc` are the gap between tip and sample,
+//! `frequency` is that of the drive, and `amplitude` is what a lock-in amplifier reads, unless the
+//! table has another column for that (then it is half of peak to peak, as elsewhere). `NAME error
+//! (unit)` contains standard errors, `direction` the direction of the abscissa, `curve` the curve
+//! to which a row belongs.
 //!
-//! A table that `approach` wrote is read as it is. It has most observables twice, in the model's
-//! units and in SI: of a physical case those in SI count, and amplitude and phase alone unless
-//! others are named, and of a curve under frequency modulation its shift and the drive's ratio. What its rows of neither way show is no part of either curve; they are left
-//! out and counted.
+//! A table written by `approach` is read without changes. It has most observables twice, in the
+//! model's units and in SI. Of a physical case the columns in SI count, and only amplitude and
+//! phase unless others are named; of a curve under frequency modulation, its shift and the drive
+//! ratio. Rows of motions in neither direction do not belong to either curve; they are left out and
+//! counted.
 
 use crate::Error;
 use crate::case::near_name::near_name;
@@ -22,93 +23,93 @@ use crate::study::approach::Way;
 use super::quantity::Quantity;
 use crate::case::table::{Entry, Header, Table};
 
-/// All curves, and what their columns are.
+/// All curves, and the meaning of their columns.
 #[derive(Clone, Debug)]
 pub struct Data {
     /// The curves.
     pub curves: Vec<Curve>,
-    /// What was measured, every observable once.
+    /// The measured quantities, each once.
     pub columns: Vec<Column>,
-    /// The keys that rows set, the one that varies along the curves first.
-    pub swept: Vec<Swept>,
-    /// Rows that belong to neither way and are left out.
+    /// The keys that rows set, first the one that varies along the curves.
+    pub swept: Vec<SweptKey>,
+    /// Number of rows that belong to neither direction and are left out.
     pub left_out: usize,
 }
 
-/// An observable that was measured.
+/// A measured quantity.
 #[derive(Clone, Debug)]
 pub struct Column {
-    /// What it is.
+    /// The quantity.
     pub quantity: Quantity,
-    /// What the data call it.
+    /// Name of the column in the data.
     pub name: String,
-    /// The unit that the data give it; empty for none.
+    /// Unit in the data; empty if there is none.
     pub unit: String,
-    /// A unit of the data in SI, of a dimensionless case in the model's own.
+    /// Factor from the unit of the data to SI, or to the model's unit for a dimensionless case.
     pub factor: f64,
-    /// Root mean square of the values about their mean: what size of residual is none.
+    /// Standard deviation of the values: the scale of residuals without a model.
     pub spread: f64,
 }
 
 /// A key that rows set.
 #[derive(Clone, Debug)]
-pub struct Swept {
+pub struct SweptKey {
     /// The key.
     pub key: Key,
-    /// What the data call it.
+    /// Name of the column in the data.
     pub name: String,
-    /// The unit that the data give it; empty for none.
+    /// Unit in the data; empty if there is none.
     pub unit: String,
-    /// A unit of the data in that of the key.
+    /// Factor from the unit of the data to that of the key.
     pub factor: f64,
 }
 
-/// Rows that were measured one after another.
+/// Rows that were measured in sequence.
 #[derive(Clone, Debug)]
 pub struct Curve {
-    /// Its name.
+    /// Name of the curve.
     pub name: String,
-    /// Its rows, in the order in which they were measured.
+    /// The rows, in order of measurement.
     pub rows: Vec<Row>,
 }
 
-/// What was measured at one place.
+/// The values measured at one position.
 #[derive(Clone, Debug)]
 pub struct Row {
-    /// The swept keys, in their own units.
+    /// Values of the swept keys, in the units of the keys.
     pub at: Vec<f64>,
-    /// The measured values, a place a column, in SI or the model's units; phases in degrees.
+    /// The measured values, one per column, in SI or the model's units; phases in degrees.
     pub values: Vec<Option<f64>>,
-    /// Their standard errors, where they are given.
+    /// Their standard errors, if given.
     pub errors: Vec<Option<f64>>,
-    /// Which way the abscissa went, where the data say so.
+    /// Direction of the abscissa, if given.
     pub way: Option<Way>,
-    /// Where it stands: the line of its file, or the row from 1.
+    /// Line in the file, or number of the row from 1.
     pub line: u64,
 }
 
 impl Data {
-    /// How many numbers were measured.
+    /// Number of measured values.
     pub fn count(&self) -> usize {
         self.rows().flat_map(|row| &row.values).flatten().count()
     }
 
-    /// Whether it was measured under frequency modulation.
+    /// True if the data were measured under frequency modulation.
     pub fn is_modulated(&self) -> bool {
         self.columns
             .iter()
             .any(|column| column.quantity.modulated().is_some())
     }
 
-    /// The rows of all curves, one curve after the other.
+    /// The rows of all curves, curve by curve.
     pub fn rows(&self) -> impl Iterator<Item = &Row> {
         self.curves.iter().flat_map(|curve| &curve.rows)
     }
 
-    /// What `tables` hold; `only` names the columns that count, all if it is empty.
+    /// Reads the data in `tables`; `only` names the columns to use, all if it is empty.
     ///
     /// # Errors
-    /// When a column or an entry is not understood, with its place.
+    /// If a column or an entry is invalid, with its position.
     pub fn read(case: &Case, tables: &[Table], only: &[String]) -> Result<Self, Error> {
         let mut data = Self {
             curves: Vec::new(),
@@ -122,30 +123,30 @@ impl Data {
         if data.columns.is_empty() {
             return Err(Error::option(
                 "data",
-                "nothing measured is among the columns",
+                "no column is a measured quantity",
                 "name them as in: distance (nm), amplitude (nm), phase (deg)",
             ));
         }
         if data.swept.is_empty() {
             return Err(Error::option(
                 "data",
-                "no column says where the values were measured",
+                "no column gives the positions of the measured values",
                 "give `distance (nm)`, or another key of the case such as `drive.frequency (kHz)`",
             ));
         }
-        let besides = data
+        let observed = data
             .columns
             .iter()
             .find(|c| c.quantity.observable().is_some());
-        if let (true, Some(besides)) = (data.is_modulated(), besides) {
+        if let (true, Some(observed)) = (data.is_modulated(), observed) {
             return Err(Error::option(
                 "data",
                 format!(
-                    "`{}` stands beside a curve under frequency modulation, which holds amplitude \
+                    "`{}` cannot be combined with a curve under frequency modulation, which holds amplitude \
                      and phase",
-                    besides.name
+                    observed.name
                 ),
-                "name the {columns} that count: frequency_shift, drive_ratio",
+                "select {columns}: frequency_shift, drive_ratio",
             ));
         }
         data.finish();
@@ -193,17 +194,17 @@ impl Data {
             if let Some(before) = roles.iter().position(|known| known.is_same(&role)) {
                 return Err(Error::input(
                     format!(
-                        "{}: column {} `{}` says the same",
+                        "{}: column {} `{}` is the same quantity",
                         table.place(None, index),
                         before + 1,
                         table.columns[before].0
                     ),
-                    "name the columns that count, with {columns}",
+                    "select columns with {columns}",
                 ));
             }
             roles.push(role);
         }
-        // Each role at its place among the columns of all tables.
+        // Index of each column among the columns of all tables.
         let places: Vec<usize> = roles
             .iter()
             .zip(&headers)
@@ -245,7 +246,7 @@ impl Data {
             Role::Set(key, factor) => {
                 let known = self.swept.iter().position(|swept| swept.key == *key);
                 known.unwrap_or_else(|| {
-                    self.swept.push(Swept {
+                    self.swept.push(SweptKey {
                         key: *key,
                         name: header.name.clone(),
                         unit: header.unit.clone(),
@@ -298,7 +299,7 @@ impl Data {
                 (Role::Way, Entry::Text(word)) => {
                     row.way = way(word);
                     if row.way.is_none() {
-                        return refuse(format!("`{word}` is no direction"), DIRECTIONS);
+                        return refuse(format!("`{word}` is not a direction"), DIRECTIONS);
                     }
                     None
                 }
@@ -311,12 +312,12 @@ impl Data {
                     None
                 }
                 (Role::Way, Entry::Number(number)) => {
-                    return refuse(format!("{number} is no direction"), DIRECTIONS);
+                    return refuse(format!("{number} is not a direction"), DIRECTIONS);
                 }
                 (_, Entry::Text(text)) => {
                     return refuse(
-                        format!("`{text}` is no number"),
-                        "write numbers with a point, and leave empty what is not known",
+                        format!("`{text}` is not a number"),
+                        "write numbers with a decimal point, and leave missing values empty",
                     );
                 }
                 (_, Entry::Number(number)) if !number.is_finite() => {
@@ -331,8 +332,8 @@ impl Data {
                 Role::Error(quantity, factor) => {
                     if number <= 0.0 {
                         return refuse(
-                            format!("{number} is no standard error"),
-                            "it must be above zero; leave it empty where it is not known",
+                            format!("{number} is not a standard error"),
+                            "it must be above zero; leave it empty if it is unknown",
                         );
                     }
                     let at = self.columns.iter().position(|c| c.quantity == *quantity);
@@ -349,9 +350,9 @@ impl Data {
                 match column {
                     Some(column) => {
                         let place = table.place(Some(index), column);
-                        format!("{place}: where the row was measured is missing")
+                        format!("{place}: the position of the row is missing")
                     }
-                    None => format!("{} does not say {key}, as the others do", table.name),
+                    None => format!("{} does not give {key}, as the other tables do", table.name),
                 },
                 "give it in every row of every table",
             ));
@@ -359,7 +360,7 @@ impl Data {
         Ok((curve, row))
     }
 
-    /// Rows in the order of measurement, what varies first, sizes of the columns.
+    /// Sorts rows by time of measurement, and determines the swept key and the spread of columns.
     fn finish(&mut self) {
         for (index, column) in self.columns.iter_mut().enumerate() {
             let rows = self.curves.iter().flat_map(|curve| &curve.rows);
@@ -386,12 +387,12 @@ impl Data {
         for curve in &mut self.curves {
             for row in &mut curve.rows {
                 row.at = order.iter().map(|k| row.at[*k]).collect();
-                // Tables read before one with a further column.
+                // Rows of tables that were read before one with a further column.
                 row.values.resize(count, None);
                 row.errors.resize(count, None);
             }
             if curve.rows.iter().all(|row| row.way.is_some()) {
-                // Approach goes to smaller distances, a sweep upwards to greater values.
+                // Approach goes to smaller distances, a sweep upwards to larger values.
                 curve.rows.sort_by(|a, b| {
                     let first = |row: &Row| row.way == Some(Way::Retract);
                     let up = first(a) == to_distance;
@@ -404,14 +405,14 @@ impl Data {
     }
 }
 
-/// Whether a key is the distance between tip and sample.
+/// True if a key is the distance between tip and sample.
 pub(crate) fn is_distance(key: Key) -> bool {
     matches!(key, Key::GapTip | Key::Alpha5 | Key::OscillatorGap)
 }
 
-const DIRECTIONS: &str = "write approach or retract, of other sweeps up or down";
+const DIRECTIONS: &str = "write approach or retract; for other sweeps, up or down";
 
-/// Which way a word says: a sweep upwards comes first, as an approach does.
+/// Parses a direction: an upward sweep comes first, as an approach does.
 fn way(word: &str) -> Option<Way> {
     match word.to_lowercase().as_str() {
         "approach" | "extend" | "trace" | "up" => Some(Way::Approach),
@@ -421,7 +422,7 @@ fn way(word: &str) -> Option<Way> {
     }
 }
 
-/// Whether a table is one that `approach` wrote.
+/// True if a table was written by `approach`.
 fn of_approach(headers: &[Header]) -> bool {
     let names: Vec<&str> = headers.iter().map(|h| h.name.as_str()).take(5).collect();
     matches!(
@@ -430,7 +431,7 @@ fn of_approach(headers: &[Header]) -> bool {
     )
 }
 
-/// Whether a column of such a table counts: see the module's documentation.
+/// True if a column of such a table is used: see the module's documentation.
 fn counts_of_approach(headers: &[Header], index: usize, case: &Case, only: &[String]) -> bool {
     let header = &headers[index];
     let physical = case.is_physical();
@@ -463,7 +464,7 @@ fn counts_of_approach(headers: &[Header], index: usize, case: &Case, only: &[Str
     wanted && first.is_some_and(|first| std::ptr::eq(first, header))
 }
 
-/// What a column is, with the size of its unit.
+/// Meaning of a column, with the size of its unit.
 #[derive(Clone, Copy, Debug)]
 enum Role {
     Set(Key, f64),
@@ -505,8 +506,8 @@ impl Header {
             return match column.role(case, own_amplitude)? {
                 Role::Measured(quantity, factor) => Ok(Role::Error(quantity, factor)),
                 _ => Err(Error::input(
-                    format!("errors are taken of what was measured, and `{of}` is set"),
-                    "leave the column away",
+                    format!("`{of}` is set, not measured, and has no standard error"),
+                    "omit the column",
                 )),
             };
         }
@@ -530,11 +531,11 @@ impl Header {
                 .parse(&format!("1 {unit}"))
                 .map_err(|error| Error::input(error.to_string(), "change the unit in brackets")),
             (_, None, unit) => Err(Error::input(
-                format!("`{unit}` is no unit here"),
+                format!("`{unit}` is not a unit of this quantity"),
                 if case.is_physical() {
-                    "it has none: leave the brackets away"
+                    "it has no unit: omit the brackets"
                 } else {
-                    "a dimensionless case has its own units: leave the brackets away, or give a \
+                    "a dimensionless case has its own units: omit the brackets, or give a \
                      case in physical quantities"
                 },
             )),
@@ -548,7 +549,7 @@ impl Header {
     }
 }
 
-/// The key of the case that a word means.
+/// The key of the case that a name means.
 pub(super) fn set(name: &str, case: &Case) -> Result<Key, Error> {
     let plain = name.to_lowercase().replace([' ', '-'], "_");
     let physical = case.is_physical();
@@ -572,8 +573,8 @@ pub(super) fn set(name: &str, case: &Case) -> Result<Key, Error> {
         Error::input(
             format!("`{name}` is neither an observable nor a key of the case"),
             match near {
-                Some(near) => format!("did you mean `{near}`? or name the {{columns}} that count"),
-                None => "name the {columns} that count".to_owned(),
+                Some(near) => format!("did you mean `{near}`? or select {{columns}}"),
+                None => "select {columns}".to_owned(),
             },
         )
     })

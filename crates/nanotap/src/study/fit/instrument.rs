@@ -192,8 +192,8 @@ fn written(name: &str, unit: &str) -> String {
 /// The number that a text begins with, and the rest.
 fn leading_number(text: &str) -> Option<(f64, &str)> {
     let ends = text.char_indices().map(|(at, _)| at).chain([text.len()]);
-    let numbers = ends.filter_map(|end| Some((text[..end].parse::<f64>().ok()?, &text[end..])));
-    numbers.filter(|(number, _)| number.is_finite()).last()
+    let mut numbers = ends.filter_map(|end| Some((text[..end].parse::<f64>().ok()?, &text[end..])));
+    numbers.rfind(|(number, _)| number.is_finite())
 }
 
 /// Factor and offset of a rule that is linear in x: a sum of two terms, one of them in x.
@@ -222,17 +222,14 @@ fn linear(rule: &str) -> Option<(f64, f64)> {
             rest = after;
         } else {
             let (number, after) = leading_number(unsigned)?;
-            match after.strip_prefix("*x") {
-                Some(after) => {
-                    factor.is_none().then_some(())?;
-                    factor = Some(sign * number);
-                    rest = after;
-                }
-                None => {
-                    offset.is_none().then_some(())?;
-                    offset = Some(sign * number);
-                    rest = after;
-                }
+            if let Some(after) = after.strip_prefix("*x") {
+                factor.is_none().then_some(())?;
+                factor = Some(sign * number);
+                rest = after;
+            } else {
+                offset.is_none().then_some(())?;
+                offset = Some(sign * number);
+                rest = after;
             }
         }
         (rest.is_empty() || rest.starts_with(['+', '-'])).then_some(())?;
@@ -307,7 +304,9 @@ fn guess(case: &Case, table: &mut Table, foreign: bool, remarks: &mut Vec<String
     }
     let mut notes: Vec<String> = Vec::new();
     if is_reversed(&distance, &amplitude) {
-        distance.iter_mut().for_each(|z| *z = -*z);
+        for z in &mut distance {
+            *z = -*z;
+        }
         notes.push(
             "the distance is counted the other way, so that the amplitude grows with it".to_owned(),
         );
@@ -317,7 +316,9 @@ fn guess(case: &Case, table: &mut Table, foreign: bool, remarks: &mut Vec<String
         let length = Header::of(&table.columns[places.distance].0).unit;
         match tapping_line(&distance, &amplitude) {
             Some(line) if line.is_reliable => {
-                amplitude.iter_mut().for_each(|a| *a /= line.slope);
+                for a in &mut amplitude {
+                    *a /= line.slope;
+                }
                 table.columns[places.amplitude].0 = written(&header.name, &length);
                 notes.push(format!(
                     "the amplitude's sensitivity is taken from the slope in contact, {:.4} {length}/{}: \
@@ -351,7 +352,9 @@ fn guess(case: &Case, table: &mut Table, foreign: bool, remarks: &mut Vec<String
     if foreign && let Some(line) = tapping_line(&distance, &amplitude) {
         let offset = free.amplitude - line.knee(free.amplitude);
         if offset.abs() > 2.0 * free.amplitude {
-            distance.iter_mut().for_each(|z| *z += offset);
+            for z in &mut distance {
+                *z += offset;
+            }
             let unit = Header::of(&table.columns[places.distance].0).unit;
             notes.push(format!(
                 "the distance is counted from where the amplitude begins to fall: {offset:.5} {unit} was \
@@ -502,7 +505,7 @@ fn tapping_line(distance: &[f64], amplitude: &[f64]) -> Option<Line> {
             .collect();
     }
     let least = amplitude.iter().copied().fold(f64::INFINITY, f64::min);
-    (slope > 0.0 && slope.is_finite()).then(|| Line {
+    (slope > 0.0 && slope.is_finite()).then_some(Line {
         slope,
         offset: level - slope * centre,
         is_reliable: rows.len() >= 8 && least < 0.65 * free,

@@ -1,17 +1,19 @@
-//! Where the data jump from one branch to another: the place of a fold as a datum.
+//! Jumps of the data from one branch to another: the location of a fold as a datum.
 //!
-//! Between two neighbouring rows on different branches lies the end of the first row's branch. If
-//! that is a fold (two orbits meet and vanish), its place λ is known from the model: the branch
-//! is followed there by continuation. What was measured is the middle between the rows, with the
-//! standard error of a place that is anywhere between them, their distance over √12.
+//! Between two neighbouring rows on different branches the branch of the first row ends. If it ends
+//! in a fold, the location λ of the fold is known from the model, by continuation of the branch.
+//! The measured value is the middle between the rows. Its standard error is that of a uniform
+//! distribution between them, their distance over √12.
 //!
-//! At a fold w (DPⁿ − 1) = 0 for a vector w, so that of Pⁿ(x; λ, θ) = x, differentiated along
-//! the folds, w leaves w·∂Pⁿ/∂λ dλ + w·∂Pⁿ/∂θ dθ = 0: the derivative of the place is exact too.
+//! At a fold w (DPⁿ − 1) = 0 for a vector w. Differentiating Pⁿ(x; λ, θ) = x along the folds and
+//! multiplying by w gives w·∂Pⁿ/∂λ dλ + w·∂Pⁿ/∂θ dθ = 0: the derivative of the location is exact
+//! too.
 //!
-//! Over a sample so hard that the fold is the grazing to rounding, that place is taken.
+//! On a very hard sample the fold coincides with the grazing to rounding; the location of the
+//! grazing is then used.
 //!
-//! Fails by omission: jumps where a branch loses its stability in another way, and those at
-//! which the data, not the model, are on no branch.
+//! Fails by omission: jumps where a branch loses stability in another way, and jumps at which the
+//! data, but not the model, leave a branch.
 
 use nalgebra::SymmetricEigen;
 use nanotap_dynamics::{
@@ -22,30 +24,30 @@ use nanotap_dynamics::{
 use crate::case::{Case, Family, Key};
 use crate::map::Map;
 
-use super::data::Swept;
+use super::data::SweptKey;
 
-/// Two neighbouring rows of a curve that lie on different branches.
+/// Two neighbouring rows of a curve on different branches.
 #[derive(Clone, Debug)]
 pub(super) struct Jump {
-    /// The curve.
+    /// Index of the curve.
     pub(super) curve: usize,
     /// The rows, counted over all curves.
     pub(super) rows: [usize; 2],
-    /// The first row of the run on the branch that ends.
+    /// The first row of the sequence on the branch that ends.
     pub(super) first: usize,
-    /// Between these places, offsets not included.
+    /// Positions of the rows, without offsets.
     pub(super) between: [f64; 2],
-    /// How far the branch is followed beyond, at most.
+    /// Largest distance beyond the jump over which the branch is followed.
     pub(super) reach: f64,
 }
 
 impl Jump {
-    /// What was measured.
+    /// The measured location.
     pub(super) fn at(&self) -> f64 {
         0.5 * (self.between[0] + self.between[1])
     }
 
-    /// Its standard error.
+    /// Standard error of the measured location.
     pub(super) fn error(&self) -> f64 {
         (self.between[1] - self.between[0]).abs() / 12f64.sqrt()
     }
@@ -54,24 +56,24 @@ impl Jump {
 /// The end of a branch.
 #[derive(Clone, Debug)]
 pub(super) struct Fold {
-    /// Its place as the model has it, offsets included.
+    /// Location of the fold in the model, with offsets.
     pub(super) at: f64,
-    /// The branch does not end here with these parameters: it is the fold of before.
+    /// True if the branch does not end here for these parameters; the fold is then the previous one.
     pub(super) lost: bool,
-    /// The case, and the orbit in it.
+    /// The case, and the orbit at the fold.
     case: Case,
     orbit: PeriodicOrbit,
 }
 
-/// Points of a branch on the way to its fold.
+/// Largest number of points of a branch up to its fold.
 const POINTS: usize = 60;
 
 impl Fold {
-    /// Where the branch of an orbit at a place ends towards the jump; `base` is the case with
-    /// whatever else the row sets.
+    /// The fold of the branch through an orbit, in the direction of the jump; `base` is the case
+    /// with the other values that the row sets.
     pub(super) fn beyond(
         base: &Case,
-        swept: &Swept,
+        swept: &SweptKey,
         (at, orbit): (f64, &PeriodicOrbit),
         (jump, offset): (&Jump, f64),
     ) -> Option<Self> {
@@ -108,8 +110,8 @@ impl Fold {
         };
         let grazing = branch.bifurcations.last().cloned();
         let mut bifurcations = branch.bifurcations.into_iter();
-        // Over a stiff sample the fold is so near to the grazing that the branch's turn is not
-        // seen, only that a multiplier passes +1, or nothing beyond the grazing at all.
+        // On a stiff sample the fold is so close to the grazing that the turn of the branch is not
+        // resolved: a multiplier passes +1, or the branch ends at the grazing.
         match bifurcations.find(|b| stability(&b.kind)) {
             Some(first) => {
                 let ends = matches!(
@@ -129,7 +131,7 @@ impl Fold {
         }
     }
 
-    /// The same where it is no more.
+    /// The same fold, marked as lost.
     pub(super) fn of_before(&self) -> Self {
         Self {
             lost: true,
@@ -137,7 +139,7 @@ impl Fold {
         }
     }
 
-    /// How its place changes with `keys` of the case.
+    /// Derivatives of the location with respect to `keys` of the case.
     pub(super) fn derivatives(&self, swept: Key, keys: &[Key]) -> Option<Vec<f64>> {
         let map = Map::new(&self.case).ok()?;
         let mut all = vec![swept];
@@ -164,7 +166,7 @@ impl Fold {
 mod tests {
     use super::*;
     use crate::case::file::Source;
-    use crate::model::strobe::Strobe;
+    use crate::model::model_map::ModelMap;
     use nanotap_dynamics::{ClassifyOptions, MotionKind, classify};
 
     fn lever(overrides: &[&str]) -> Case {
@@ -179,18 +181,22 @@ mod tests {
         Case::parse(Some(source), &words).unwrap()
     }
 
-    /// Where the motion at a distance (nm) ends as the sample is moved, with a jump between two
-    /// others.
+    /// The end of the motion at a distance (nm) when the sample is moved, with a jump between two
+    /// other distances.
     fn end_between(case: &Case, at: f64, between: [f64; 2]) -> Option<Fold> {
         let at = 1e-9 * at;
         let case = case.with(Key::GapTip, at);
         let model = case.model().unwrap();
         let rest = vec![0.0; model.dimension()];
-        let end = classify(&mut Strobe::new(&model), &rest, &ClassifyOptions::default());
+        let end = classify(
+            &mut ModelMap::new(&model),
+            &rest,
+            &ClassifyOptions::default(),
+        );
         let MotionKind::Periodic(orbit) = end.kind else {
             panic!("{end:?}")
         };
-        let swept = Swept {
+        let swept = SweptKey {
             key: Key::GapTip,
             name: "distance".into(),
             unit: "nm".into(),
@@ -206,13 +212,13 @@ mod tests {
         Fold::beyond(&case, &swept, (at, &orbit), (&jump, 0.0))
     }
 
-    /// Where the tapping motion ends as the sample is moved away.
+    /// The end of the tapping motion when the sample is moved away.
     fn end(case: &Case) -> Fold {
         end_between(case, 15.0, [15.0, 16.0]).unwrap()
     }
 
-    /// The free lever swings by 20 nm about a base that moves by 20 nm/Q: it touches at 19.974 nm,
-    /// and over a hard sample its motion ends there, within a picometre.
+    /// The amplitude of the free lever is 20 nm on a base that moves by 20 nm/Q: it reaches the
+    /// sample at 19.974 nm, and on a hard sample its motion ends there, within a picometre.
     #[test]
     fn free_motion_ends_over_samples_of_any_stiffness() {
         for stiffness in ["30 N/m", "300 N/m", "2 kN/m", "20 kN/m", "200 kN/m"] {

@@ -1,20 +1,20 @@
-//! The same data under several contact laws.
+//! Fits of the same data under several contact laws.
 
 use super::report::{ComparedLaw, FitReport};
-use super::{FitRequest, fit_one, names};
+use super::{FitOptions, fit_one, names};
 use crate::Error;
 use crate::case::under_law::LawName;
 use crate::case::{Case, Key};
 use crate::control::Control;
 
-/// Difference of Akaike's criterion from which on the worse of two laws has next to no support
+/// Difference of Akaike's criterion above which the worse of two laws has essentially no support
 /// (Burnham & Anderson, Model Selection and Multimodel Inference, 2nd ed. 2002, Sect. 2.6).
 const DECIDED: f64 = 10.0;
 
-/// Fits each law of the request; the report is that of the best, with all of them in `laws`.
+/// Fits each law of the request. The report is that of the best law, with all laws in `laws`.
 pub(super) fn compare(
     case: &Case,
-    request: &FitRequest,
+    request: &FitOptions,
     control: &Control<'_>,
 ) -> Result<FitReport, Error> {
     let laws = names(&request.laws)
@@ -25,7 +25,7 @@ pub(super) fn compare(
     if let Some(twice) = (1..laws.len()).find(|k| laws[..*k].contains(&laws[*k])) {
         return Err(Error::option(
             "laws",
-            format!("{} stands there twice", laws[twice].text()),
+            format!("{} is listed twice", laws[twice].text()),
             "name each law once",
         ));
     }
@@ -34,8 +34,8 @@ pub(super) fn compare(
             if !laws.iter().any(|law| takes(law, &name)) {
                 return Err(Error::option(
                     option,
-                    format!("none of these laws takes {name}"),
-                    "free what at least one of them has",
+                    format!("none of these laws has the parameter {name}"),
+                    "free parameters of at least one of them",
                 ));
             }
         }
@@ -51,7 +51,7 @@ pub(super) fn compare(
                 let all = names(given).into_iter();
                 all.filter(|name| takes(law, name)).collect()
             };
-            let mut request = FitRequest {
+            let mut request = FitOptions {
                 laws: Vec::new(),
                 free: of_law(&request.free),
                 per_curve: of_law(&request.per_curve),
@@ -60,7 +60,7 @@ pub(super) fn compare(
             request.bounds.0.retain(|bound| takes(law, &bound.name));
             fit_one(&case, &request, control)
         });
-        // A law whose fit was stopped before it found anything is not judged.
+        // A law whose fit was cancelled without a result is not judged.
         if fitted.is_ok() || !control.is_cancelled() {
             found.push((law.text(), fitted));
         }
@@ -74,7 +74,7 @@ pub(super) fn compare(
     let Some(best) = best else {
         return Err(Error::new(
             crate::ErrorKind::Stopped,
-            "stopped before anything was fitted",
+            "stopped before the first fit was finished",
         ));
     };
     let compared = table(&found);
@@ -87,13 +87,13 @@ pub(super) fn compare(
     Ok(report)
 }
 
-/// Whether a parameter can be free under a law: what is no key of the sample always can.
+/// True if a parameter can be free under a law; keys outside the sample always can.
 fn takes(law: &LawName, name: &str) -> bool {
     Key::find(name).is_none_or(|key| law.takes(key))
 }
 
-/// Where keys begin that the case does not state: in the middle of their bounds.
-fn middles(request: &FitRequest) -> Vec<(Key, f64)> {
+/// Initial values of keys that the case does not state: the middle of their bounds.
+fn middles(request: &FitOptions) -> Vec<(Key, f64)> {
     let middle = |bound: &crate::study::value::Interval| {
         let key = Key::find(&bound.name)?;
         let read = |text: &str| key.kind().parse(text).ok();
@@ -105,7 +105,7 @@ fn middles(request: &FitRequest) -> Vec<(Key, f64)> {
     request.bounds.0.iter().filter_map(middle).collect()
 }
 
-/// The middle of two bounds, of positive ones that of their logarithms.
+/// The middle of two bounds; of positive ones, the geometric mean.
 pub(super) fn between(low: f64, high: f64) -> f64 {
     if low > 0.0 {
         (low * high).sqrt()
@@ -157,7 +157,7 @@ fn table(found: &[(String, Result<FitReport, Error>)]) -> Vec<ComparedLaw> {
     found.iter().map(row).collect()
 }
 
-/// What is to be kept in mind of the choice.
+/// Cautions about the choice of a law.
 fn cautions(best: &str, laws: &[ComparedLaw]) -> Vec<String> {
     let mut cautions = Vec::new();
     let near: Vec<&str> = laws
@@ -167,7 +167,7 @@ fn cautions(best: &str, laws: &[ComparedLaw]) -> Vec<String> {
         .collect();
     if !near.is_empty() {
         cautions.push(format!(
-            "the data hardly tell {best} from {}: Akaike's criterion differs by less than {DECIDED}",
+            "the data hardly distinguish {best} from {}: Akaike's criterion differs by less than {DECIDED}",
             near.join(" and ")
         ));
     }
@@ -175,7 +175,7 @@ fn cautions(best: &str, laws: &[ComparedLaw]) -> Vec<String> {
     let by_bic = known.min_by(|a, b| a.bic.unwrap_or(0.0).total_cmp(&b.bic.unwrap_or(0.0)));
     if let Some(other) = by_bic.filter(|law| law.law != best) {
         cautions.push(format!(
-            "Schwarz's criterion, which counts parameters more, prefers {}",
+            "Schwarz's criterion, with a larger penalty for parameters, prefers {}",
             other.law
         ));
     }

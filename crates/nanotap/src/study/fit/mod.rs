@@ -1,23 +1,23 @@
-//! Parameters from measured curves: what stiffness, damping, distance and calibration make the
-//! model say what was measured.
+//! Parameters from measured curves: stiffness, damping, distance and calibration for which the
+//! model reproduces the data.
 //!
-//! Each row of the data is a place (a distance, a drive frequency, any key of the case) at which
-//! a periodic orbit was observed. Which of the coexisting orbits it is follows from the curve
-//! itself (`branches.rs`); how what is observed changes with every free parameter is known exactly,
-//! by the implicit function theorem ([`Derivative`](crate::observe::Derivative)), and Levenberg
-//! and Marquardt's method does the rest (`solve.rs`).
+//! Each row of the data is a position (a distance, a drive frequency, any key of the case) at which
+//! a periodic orbit was observed. The curve determines which of the coexisting orbits it is
+//! (`branches.rs`). The derivatives of the observables with respect to every free parameter are
+//! exact, by the implicit function theorem ([`Derivative`](crate::observe::Derivative)), and the
+//! Levenberg–Marquardt method finds the minimum (`solve.rs`).
 //!
-//! First comes a rough fit: residuals count in parts of the columns' spread and, where they are
-//! large, by their logarithm, from the case's own values and, as long as nothing describes the
-//! data, from others. Then the branches are found again and the fit is repeated in standard
-//! errors, until the branches stay. Standard errors that are not given are those of the
+//! The first fit is rough: residuals are relative to the spread of their column, large ones count
+//! by their logarithm, and the fit starts from the values of the case and, if these do not describe
+//! the data, from others. Then the branches are assigned again and the fit is repeated in standard
+//! errors, until the branches no longer change. Unknown standard errors are estimated from the
 //! residuals.
 //!
-//! A curve under frequency modulation is one of orbits at held amplitude and phase, with frequency
-//! and strength of the drive as unknowns (`problem/held.rs`).
+//! A curve under frequency modulation consists of orbits with given amplitude and phase; frequency
+//! and strength of the drive are unknowns (`problem/held.rs`).
 //!
-//! Fails by stopping in a local minimum (of which `fits` warns), and where the data lie on a
-//! motion that is not periodic.
+//! Fails by stopping in a local minimum (`fits` is false then, as a warning), and where the data
+//! belong to a motion that is not periodic.
 
 mod branches;
 mod data;
@@ -35,12 +35,10 @@ mod solve;
 mod statistics;
 
 use nanotap_dynamics::Control;
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
 
-pub use crate::case::table::{Entry, MOST_ROWS, Table};
+pub use crate::case::table::{Entry, MAX_ROWS, Table};
 pub(crate) use data::is_distance;
-pub use data::{Column, Curve, Data, Row, Swept};
+pub use data::{Column, Curve, Data, Row, SweptKey};
 pub use quantity::Quantity;
 pub use report::{
     ComparedLaw, CurveCase, FitReport, FittedColumn, FittedJump, FittedParameter, FittedRow,
@@ -55,74 +53,56 @@ use solve::LeastSquares as _;
 
 use crate::Error;
 use crate::case::Case;
-use crate::study::kind::Study;
+use crate::study::Study;
+use crate::study::request::options;
 use crate::study::setpoint::at_setpoint;
 use crate::study::value::Intervals;
 
-/// Most starts of a fit.
-const MOST_STARTS: usize = 1000;
-/// Longest period of the orbits.
-const MOST_PERIOD: usize = 64;
+/// Largest number of initial values of a fit.
+const MAX_STARTS: usize = 1000;
+/// Longest period of the orbits in drive periods.
+const MAX_PERIOD: usize = 64;
 
-/// What a fit is asked for.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct FitRequest {
-    /// Measured curves: tables whose columns are named as in `distance (nm)`, `amplitude (nm)`,
-    /// `phase (deg)`
-    #[schemars(extend("x-own" = true))]
-    pub data: Vec<Table>,
-    /// Parameters to find: keys of the case, gap.offset, and NAME.offset or NAME.scale of a column
-    #[schemars(extend("x-value" = "KEY,…"))]
-    pub free: Vec<String>,
-    /// Parameters to find, one value a curve
-    #[schemars(extend("x-value" = "KEY,…"))]
-    pub per_curve: Vec<String>,
-    /// Bounds of parameters, as in sample.stiffness="1 N/m:100 N/m"
-    #[schemars(extend("x-value" = "KEY=LOW:HIGH"))]
-    pub bounds: Intervals,
-    /// Columns of the data that count; without it, all
-    #[schemars(extend("x-value" = "NAME,…"))]
-    pub columns: Vec<String>,
-    /// Contact laws to compare, as in hertz,dmt; without it, the case's own
-    #[schemars(extend("x-value" = "LAW,…"))]
-    pub laws: Vec<String>,
-    /// Starts to try as long as nothing describes the data
-    #[schemars(range(min = 1, max = MOST_STARTS), extend("x-value" = "S"))]
-    pub starts: usize,
-    /// Seed of the further starts
-    #[schemars(extend("x-value" = "K"))]
-    pub seed: u64,
-    /// Longest period of the orbits looked for
-    #[schemars(range(min = 1, max = MOST_PERIOD), extend("x-value" = "N"))]
-    pub max_period: usize,
-    /// The place at which the data jump from a branch that ends in a fold counts too
-    #[schemars(extend("x-no" = "Only the rows count, not the places of jumps"))]
-    pub jumps: bool,
-    /// Phase behind the drive that the loop held, in degrees, of curves of a frequency shift
-    #[schemars(range(min = 0, max = 180), extend("x-value" = "DEGREES"))]
-    pub phase: f64,
-    /// Intervals by the profile of the likelihood
-    #[schemars(extend("x-no" = "Intervals from the standard errors alone"))]
-    pub profile: bool,
-}
-
-impl Default for FitRequest {
-    fn default() -> Self {
-        Self {
-            data: Vec::new(),
-            free: Vec::new(),
-            per_curve: Vec::new(),
-            bounds: Intervals::default(),
-            columns: Vec::new(),
-            laws: Vec::new(),
-            starts: 8,
-            seed: 0,
-            max_period: 4,
-            jumps: true,
-            phase: 90.0,
-            profile: true,
-        }
+options! {
+    /// Options of a fit.
+    pub struct FitOptions {
+        /// Measured curves: tables whose columns are named as in `distance (nm)`, `amplitude (nm)`,
+        /// `phase (deg)`
+        #[schemars(extend("x-own" = true))]
+        pub data: Vec<Table> = Vec::new(),
+        /// Parameters to find: keys of the case, gap.offset, and NAME.offset or NAME.scale of a column
+        #[schemars(extend("x-value" = "KEY,…"))]
+        pub free: Vec<String> = Vec::new(),
+        /// Parameters to find with one value per curve
+        #[schemars(extend("x-value" = "KEY,…"))]
+        pub per_curve: Vec<String> = Vec::new(),
+        /// Bounds of parameters, as in sample.stiffness="1 N/m:100 N/m"
+        #[schemars(extend("x-value" = "KEY=LOW:HIGH"))]
+        pub bounds: Intervals = Intervals::default(),
+        /// Columns of the data to use; default: all
+        #[schemars(extend("x-value" = "NAME,…"))]
+        pub columns: Vec<String> = Vec::new(),
+        /// Contact laws to compare, as in hertz,dmt; default: the law of the case
+        #[schemars(extend("x-value" = "LAW,…"))]
+        pub laws: Vec<String> = Vec::new(),
+        /// Initial values to try until the data are described
+        #[schemars(range(min = 1, max = MAX_STARTS), extend("x-value" = "S"))]
+        pub starts: usize = 8,
+        /// Seed of the further initial values
+        #[schemars(extend("x-value" = "K"))]
+        pub seed: u64 = 0,
+        /// Longest period of the orbits, in drive periods
+        #[schemars(range(min = 1, max = MAX_PERIOD), extend("x-value" = "N"))]
+        pub max_period: usize = 4,
+        /// Use the locations of jumps at folds as data
+        #[schemars(extend("x-no" = "Only the rows count, not the places of jumps"))]
+        pub jumps: bool = true,
+        /// Phase lag that the loop maintains, in degrees, for curves of a frequency shift
+        #[schemars(range(min = 0, max = 180), extend("x-value" = "DEGREES"))]
+        pub phase: f64 = 90.0,
+        /// Intervals from the profile of the likelihood
+        #[schemars(extend("x-no" = "Intervals from the standard errors alone"))]
+        pub profile: bool = true,
     }
 }
 
@@ -132,27 +112,27 @@ pub struct FitStudy;
 
 impl Study for FitStudy {
     const NAME: &'static str = "fit";
-    const ABOUT: &'static str = "Parameters of lever and sample from measured curves";
+    const ABOUT: &'static str = "Fit parameters of lever and sample to measured curves";
     const COUNTED: &'static str = "starts";
     const ANY_DISTANCE: bool = true;
     const PARTIAL: bool = true;
-    type Request = FitRequest;
+    type Options = FitOptions;
     type Report = FitReport;
 
     fn compute(
         case: &Case,
-        request: &FitRequest,
+        request: &FitOptions,
         control: &Control<'_>,
     ) -> Result<FitReport, Error> {
         fit(case, request, control)
     }
 }
 
-/// Finds the free parameters, under each of the laws that are to be compared.
+/// Finds the free parameters, for each of the laws to compare.
 ///
 /// # Errors
-/// When the data or the parameters are not understood, or no orbit is found where the data are.
-pub fn fit(case: &Case, request: &FitRequest, control: &Control<'_>) -> Result<FitReport, Error> {
+/// If the data or the parameters are invalid, or no orbit is found for the data.
+pub fn fit(case: &Case, request: &FitOptions, control: &Control<'_>) -> Result<FitReport, Error> {
     if names(&request.laws).is_empty() {
         fit_one(case, request, control)
     } else {
@@ -160,8 +140,8 @@ pub fn fit(case: &Case, request: &FitRequest, control: &Control<'_>) -> Result<F
     }
 }
 
-/// The same under the law that the case has.
-fn fit_one(case: &Case, request: &FitRequest, control: &Control<'_>) -> Result<FitReport, Error> {
+/// Finds the free parameters under the law of the case.
+fn fit_one(case: &Case, request: &FitOptions, control: &Control<'_>) -> Result<FitReport, Error> {
     #[expect(
         clippy::redundant_closure_for_method_calls,
         reason = "the method itself is not general enough in its lifetime"
@@ -169,19 +149,19 @@ fn fit_one(case: &Case, request: &FitRequest, control: &Control<'_>) -> Result<F
     with_search(case, request, control, |search| search.run())
 }
 
-/// Does `work` on the data and parameters of a request.
+/// Calls `work` with the data and parameters of a request.
 fn with_search<R>(
     case: &Case,
-    request: &FitRequest,
+    request: &FitOptions,
     control: &Control<'_>,
     work: impl FnOnce(&Search<'_>) -> Result<R, Error>,
 ) -> Result<R, Error> {
     if request.data.is_empty() {
-        return Err(Error::option("data", "there are no data", "give a table"));
+        return Err(Error::option("data", "no data were given", "give a table"));
     }
     let data = Data::read(case, &request.data, &names(&request.columns))?;
     let sets_distance = data.swept.iter().any(|s| data::is_distance(s.key));
-    // Which distance the case has does not matter where the rows set it.
+    // The distance of the case is irrelevant if the rows set it.
     let case = if sets_distance {
         case.clone()
     } else {
@@ -210,24 +190,23 @@ fn with_search<R>(
     })
 }
 
-/// Residuals of measured curves at some values of the free parameters, for solvers of one's own.
+/// Residuals of measured curves for given values of the free parameters, for users' solvers.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Residuals {
-    /// Model less measured value in standard errors, a column of the data after the other in
-    /// each row; 0 where nothing was measured. Where the data give no standard error it is 3 % of
-    /// the column's spread.
+    /// Model minus measured value in standard errors, row by row and column by column; 0 for
+    /// missing values. Without a standard error in the data, it is 3 % of the spread of the column.
     pub residuals: Vec<f64>,
-    /// Their exact derivatives, a column a parameter in the order of `free` and `per_curve`.
+    /// Exact derivatives, one column per parameter in the order of `free` and `per_curve`.
     pub jacobian: nalgebra::DMatrix<f64>,
 }
 
-/// The residuals at `values` of the free parameters, on the branches that the data are on.
+/// Computes the residuals at `values` of the free parameters, on the branches of the data.
 ///
 /// # Errors
-/// As [`fit`], and when there are not as many values as parameters or no derivatives there.
+/// As [`fit`], and if the number of values is wrong or the residuals have no derivatives.
 pub fn residuals(
     case: &Case,
-    request: &FitRequest,
+    request: &FitOptions,
     values: &[f64],
     control: &Control<'_>,
 ) -> Result<Residuals, Error> {
@@ -235,8 +214,8 @@ pub fn residuals(
         let count = search.problem.parameters.len();
         if values.len() != count {
             return Err(Error::input(
-                format!("{} values for {count} parameters", values.len()),
-                "give one a parameter",
+                format!("got {} values for {count} parameters", values.len()),
+                "give one value per parameter",
             ));
         }
         let problem = search.weighted(search.rough_noise(), None);
@@ -251,7 +230,7 @@ pub fn residuals(
     })
 }
 
-/// Names, of which several may stand in one text.
+/// Names, of which one text may contain several.
 fn names(given: &[String]) -> Vec<String> {
     let parts = given.iter().flat_map(|text| text.split(','));
     let names = parts.map(str::trim).filter(|name| !name.is_empty());

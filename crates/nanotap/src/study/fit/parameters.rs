@@ -1,8 +1,8 @@
-//! What a fit may change: keys of the case, and what is not quite known of the instrument.
+//! Free parameters of a fit: keys of the case, and corrections of the instrument.
 //!
-//! `X.offset` is added to the values of a column X: to where its rows were measured, or to what
-//! the model says was measured. `X.scale` multiplies what the model says. `gap.offset` is that
-//! of the distance.
+//! `X.offset` is added to the values of a column X: to the positions of its rows, or to the model's
+//! values of an observable. `X.scale` multiplies the model's values. `gap.offset` is the offset of
+//! the distance.
 
 use crate::Error;
 use crate::case::{Case, Key};
@@ -17,28 +17,28 @@ use super::quantity::Quantity;
 pub(super) enum Target {
     /// A key of the case.
     Key(Key),
-    /// What is added to a swept key, by its place.
+    /// Offset of a swept key, by its index.
     Place(usize),
-    /// What is added to an observable, by its column.
+    /// Offset of an observable, by its column.
     Offset(usize),
-    /// What multiplies an observable, by its column.
+    /// Factor of an observable, by its column.
     Scale(usize),
 }
 
 /// A free parameter.
 #[derive(Clone, Debug)]
 pub(super) struct Parameter {
-    /// Its name: `sample.stiffness`, `gap.offset`.
+    /// Name: `sample.stiffness`, `gap.offset`.
     pub(super) name: String,
     /// What it changes.
     pub(super) target: Target,
-    /// The curve that it belongs to; `None`: all.
+    /// Index of its curve; `None`: all curves.
     pub(super) curve: Option<usize>,
-    /// Where the fit begins.
+    /// Initial value.
     pub(super) start: f64,
     /// Its bounds.
     pub(super) bounds: (f64, f64),
-    /// Over which size it may be elsewhere.
+    /// Scale of the range of initial values.
     pub(super) size: f64,
 }
 
@@ -64,7 +64,8 @@ impl Parameter {
         self.curve.is_none_or(|own| own == curve)
     }
 
-    /// The derivatives of a row's values by an offset or a scale of a column; zero of others.
+    /// Derivatives of a row's values by an offset or a scale of a column; zero for other
+    /// parameters.
     pub(super) fn direct(&self, values: &[f64]) -> Vec<f64> {
         let mut by = vec![0.0; values.len()];
         match self.target {
@@ -76,7 +77,7 @@ impl Parameter {
     }
 }
 
-/// The unit of a key in SI, `1` for none.
+/// Unit of a key in SI, `1` if there is none.
 pub(super) fn unit_of(key: Key) -> &'static str {
     if key.is_physical() {
         key.kind().si_unit()
@@ -85,7 +86,7 @@ pub(super) fn unit_of(key: Key) -> &'static str {
     }
 }
 
-/// The parameters called `free` and, one a curve, `per_curve`.
+/// Creates the parameters called `free` and, one per curve, `per_curve`.
 pub(super) fn parameters(
     case: &Case,
     data: &Data,
@@ -96,7 +97,7 @@ pub(super) fn parameters(
     if free.is_empty() && per_curve.is_empty() {
         return Err(Error::option(
             "free",
-            "nothing is free",
+            "no parameter is free",
             "name keys of the case, as in sample.stiffness,gap.offset",
         ));
     }
@@ -112,7 +113,7 @@ pub(super) fn parameters(
             {
                 return Err(Error::option(
                     option,
-                    format!("{name} is free twice"),
+                    format!("{name} is listed twice"),
                     "name each parameter once",
                 ));
             }
@@ -136,7 +137,7 @@ pub(super) fn parameters(
         return Err(Error::option(
             "bounds",
             format!("{} is not free", unknown.name),
-            "bound what is named in {free} or {per_curve}",
+            "bounds need a parameter in {free} or {per_curve}",
         ));
     }
     let count = data.count();
@@ -165,13 +166,13 @@ fn parameter(
         return nuisance(case, data, name, of, what);
     }
     let key = case.key(name)?;
-    let same = |swept: &&data::Swept| {
+    let same = |swept: &&data::SweptKey| {
         swept.key == key || key.alternatives().any(|(other, _)| other == swept.key)
     };
     if let Some(swept) = data.swept.iter().find(same) {
         return Err(Error::input(
-            format!("{name} is what the column `{}` sets", swept.name),
-            format!("free {}.offset for an error of it", swept.name),
+            format!("{name} is set by the column `{}`", swept.name),
+            format!("free {}.offset to allow for an error", swept.name),
         ));
     }
     let mut start = case.get(key);
@@ -183,12 +184,12 @@ fn parameter(
     }
     if !start.is_finite() {
         return Err(Error::input(
-            format!("the case does not say where {name} begins"),
+            format!("{name} has no initial value in the case"),
             "give it a value in the case, or {bounds}",
         ));
     }
     let range = key.range();
-    // The range's own ends may be excluded.
+    // The ends of the valid range may be excluded.
     let inside = |end: f64, excluded: bool, to: f64| {
         if excluded && end.is_finite() {
             end + to * f64::EPSILON.max(1e-9 * start.abs())
@@ -226,7 +227,7 @@ fn nuisance(
     let swept = || {
         let key = data::set(of, case).ok()?;
         let same =
-            |swept: &data::Swept| swept.key == key || is_distance(swept.key) && is_distance(key);
+            |swept: &data::SweptKey| swept.key == key || is_distance(swept.key) && is_distance(key);
         data.swept.iter().position(same)
     };
     let (target, start, size, bounds) = match (column, what) {
@@ -252,7 +253,7 @@ fn nuisance(
                     .chain(data.swept.iter().map(|s| s.name.as_str()))
                     .collect();
                 return Err(Error::input(
-                    format!("{name}: `{of}` is no column that has one"),
+                    format!("{name}: `{of}` is not a column with this correction"),
                     format!("there are {}", names.join(", ")),
                 ));
             }
@@ -268,7 +269,7 @@ fn nuisance(
     })
 }
 
-/// Sets the bounds of a parameter, and brings its start between them.
+/// Sets the bounds of a parameter and moves its initial value between them.
 fn bound(
     case: &Case,
     data: &Data,
@@ -297,7 +298,7 @@ fn bound(
     if !(low < high && low <= most && high >= least) {
         return Err(Error::input(
             format!(
-                "{}: nothing lies between {} and {}",
+                "{}: the bounds {} and {} are not in ascending order",
                 parameter.name, ends[0], ends[1]
             ),
             "give the lower bound first",
@@ -312,5 +313,5 @@ fn bound(
 }
 
 fn no_number(amount: &Amount) -> Error {
-    Error::input(format!("`{amount}` is no number"), "give a number")
+    Error::input(format!("`{amount}` is not a number"), "give a number")
 }

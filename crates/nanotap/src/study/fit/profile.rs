@@ -1,4 +1,4 @@
-//! 95 % intervals by the profile of the likelihood: where the least chi2 with one parameter held
+//! 95 % intervals from the profile of the likelihood: where the least chi2 with one parameter fixed
 //! exceeds the least of all by the square of Student's (or the normal) quantile.
 
 use super::problem::{Point, Problem};
@@ -7,25 +7,25 @@ use super::solve::{
 };
 use super::statistics::Information;
 
-/// Looks at the profile on each side.
-const LOOKS: usize = 6;
-/// Steps of the other parameters at each look.
-const STEPS: usize = 4;
-/// What a step must promise of chi2 to be taken.
-const FLAT: f64 = 1e-3;
-/// How well the quantile is met, in standard errors.
-const CLOSE: f64 = 0.01;
+/// Largest number of evaluations of the profile on each side.
+const MAX_EVALUATIONS: usize = 6;
+/// Largest number of steps of the other parameters per evaluation.
+const MAX_STEPS: usize = 4;
+/// Smallest predicted gain of chi2 for which a step is taken.
+const MIN_GAIN: f64 = 1e-3;
+/// Accuracy of the quantile, in standard errors.
+const QUANTILE_TOLERANCE: f64 = 0.01;
 
-/// What the profiles tell.
+/// Result of the profiles.
 pub(super) enum Profile {
-    /// The interval of each parameter; no end where it is not determined, or beyond a bound.
+    /// The interval of each parameter; an end is missing if it is undetermined or beyond a bound.
     Intervals(Vec<[Option<f64>; 2]>),
-    /// Parameters at which chi2 is less than at the best values: those are a local minimum.
+    /// Parameters with a smaller chi2 than the best values, which are therefore a local minimum.
     Lower(Vec<f64>),
 }
 
-/// The intervals of half-width `width` in standard errors, unless chi2 is lower by more than
-/// `deeper` beside them.
+/// Computes the intervals of half-width `width` in standard errors, unless chi2 nearby is lower by
+/// more than `deeper`.
 pub(super) fn profile(
     problem: &Problem<'_>,
     best: &Solution<Point>,
@@ -65,17 +65,16 @@ enum End {
     Lower(Vec<f64>),
 }
 
-/// Where chi2 is least with one parameter held.
-struct Least {
+/// The minimum of chi2 with one parameter fixed.
+struct ConstrainedMinimum {
     x: Vec<f64>,
     point: Point,
     chi2: f64,
 }
 
-/// Where the profile of a parameter reaches the quantile on one side: of the root of what chi2
-/// gained, which is straight where the model is linear, by regula falsi from the standard error.
-/// Each look begins where the one before it ended inside the interval, as the others went from the
-/// best values to there.
+/// The value of a parameter at which its profile reaches the quantile on one side. Regula falsi on
+/// the square root of the gain of chi2, which is linear for a linear model, starting from the
+/// standard error. Each evaluation starts from the end of the last one inside the interval.
 fn end(
     problem: &Problem<'_>,
     best: &Solution<Point>,
@@ -87,11 +86,11 @@ fn end(
     let bounds: Vec<(f64, f64)> = problem.parameters.iter().map(|p| p.bounds).collect();
     let (low, high) = bounds[k];
     let at = |t: f64| stepped(best.x[k], side * t * error, low);
-    // What chi2 gained and where, so many standard errors from the best value.
-    let mut inner: (f64, f64, Option<Least>) = (0.0, 0.0, None);
+    // Gain of chi2 and the minimum, at this many standard errors from the best value.
+    let mut inner: (f64, f64, Option<ConstrainedMinimum>) = (0.0, 0.0, None);
     let mut outer: Option<(f64, f64)> = None;
     let mut t = width;
-    for _ in 0..LOOKS {
+    for _ in 0..MAX_EVALUATIONS {
         let value = at(t);
         if value < low || value > high {
             return End::None;
@@ -108,7 +107,7 @@ fn end(
                     let gone = step_between(best.x[j], from[j], bounds[j].0);
                     gone * t / inner.0
                 } else {
-                    // Where it would be if the model were linear.
+                    // Its value for a linear model.
                     side * t * error * information.covariance[(j, k)]
                         / information.covariance[(k, k)]
                 };
@@ -123,11 +122,11 @@ fn end(
         {
             return End::Lower(found.x.clone());
         }
-        // Where a branch ends the profile has a wall.
+        // At the end of a branch the profile is discontinuous.
         let gained = found.as_ref().map_or(f64::INFINITY, |found| {
             (found.chi2 - best.cost).max(0.0).sqrt()
         });
-        if (gained - width).abs() < CLOSE {
+        if (gained - width).abs() < QUANTILE_TOLERANCE {
             return End::At(value);
         }
         if gained < width {
@@ -152,74 +151,73 @@ fn end(
     }
 }
 
-/// The least chi2 with parameter `k` held, from a point near it; `None` where rows have no orbit
-/// that had one.
+/// The least chi2 with parameter `k` fixed, from a nearby point; `None` if rows lose their orbits.
 ///
-/// By steps with the Jacobian at the best values, which is good near by; where these do not end in
-/// a minimum, because the valley of chi2 bends, by a fit of the others.
+/// It uses steps with the Jacobian at the best values, which is accurate nearby. If these do not
+/// end in a minimum, because the valley of chi2 is curved, the other parameters are fitted.
 fn least(
     problem: &Problem<'_>,
     x: Vec<f64>,
     point: Point,
     best: &Solution<Point>,
     k: usize,
-) -> Option<Least> {
+) -> Option<ConstrainedMinimum> {
     let lost = |point: &Point| point.iter().filter(|row| row.lost).count();
     let most = lost(&best.point);
     if lost(&point) > most {
         return None;
     }
-    let Steps { x, point, least } = few_steps(problem, x, point, best, k)?;
+    let StepResult { x, point, least } = few_steps(problem, x, point, best, k)?;
     if let Some(chi2) = least {
-        return Some(Least { x, point, chi2 });
+        return Some(ConstrainedMinimum { x, point, chi2 });
     }
     let held = x[k];
     let parameters = problem.parameters.iter().enumerate();
     let bounds: Vec<(f64, f64)> = parameters
         .map(|(j, p)| if j == k { (held, held) } else { p.bounds })
         .collect();
-    let solution = minimise(problem, x, point, &bounds, FLAT)?;
-    (lost(&solution.point) <= most).then_some(Least {
+    let solution = minimise(problem, x, point, &bounds, MIN_GAIN)?;
+    (lost(&solution.point) <= most).then_some(ConstrainedMinimum {
         x: solution.x,
         point: solution.point,
         chi2: solution.cost,
     })
 }
 
-/// Where a few steps led.
-struct Steps {
+/// Result of a few steps.
+struct StepResult {
     x: Vec<f64>,
     point: Point,
-    /// chi2 there, if no further step promises to make it less.
+    /// chi2 after them, if no further step promises to reduce it.
     least: Option<f64>,
 }
 
-/// As far as a few steps with a Jacobian of near by come.
+/// Takes a few steps with the Jacobian of a nearby point.
 fn few_steps(
     problem: &Problem<'_>,
     mut x: Vec<f64>,
     mut point: Point,
     best: &Solution<Point>,
     k: usize,
-) -> Option<Steps> {
+) -> Option<StepResult> {
     let others = best.jacobian.clone().remove_column(k);
     let mut residuals = problem.residuals(&x, &point);
     let mut cost = residuals.norm_squared();
     if others.ncols() == 0 {
         let least = Some(cost);
-        return Some(Steps { x, point, least });
+        return Some(StepResult { x, point, least });
     }
-    // What the data do not determine stays where it is.
+    // Combinations that the data do not determine are not changed.
     let mut normal = others.tr_mul(&others);
     for j in 0..normal.ncols() {
         normal[(j, j)] = (1.0 + 1e-10) * normal[(j, j)] + f64::MIN_POSITIVE;
     }
     let factor = normal.lu();
     let mut least = None;
-    for _ in 0..STEPS {
+    for _ in 0..MAX_STEPS {
         let step = factor.solve(&others.tr_mul(&residuals))?;
         let promised = cost - (&residuals - &others * &step).norm_squared();
-        if promised.is_nan() || promised <= FLAT {
+        if promised.is_nan() || promised <= MIN_GAIN {
             least = Some(cost);
             break;
         }
@@ -239,5 +237,5 @@ fn few_steps(
         (x, point, cost) = (next, at, then.norm_squared());
         residuals = then;
     }
-    Some(Steps { x, point, least })
+    Some(StepResult { x, point, least })
 }

@@ -1,21 +1,21 @@
-//! What a column of measured values is: an observable of the motion, or what a loop of frequency
-//! modulation tells.
+//! The quantity in a column of measured values: an observable of the motion, or a reading of a
+//! frequency modulation loop.
 
 use crate::case::physical::Kind;
 use crate::observe::{Dimension, OBSERVABLES, Observable};
 use crate::study::frequency_modulation::{COLUMNS, ModulatedColumn};
 
-/// What was measured.
+/// A measured quantity.
 #[derive(Clone, Copy, Debug)]
 pub enum Quantity {
     /// An observable.
     Observed(&'static Observable),
-    /// A number of frequency modulation.
+    /// A reading of frequency modulation.
     Modulated(&'static ModulatedColumn),
 }
 
-/// What an instrument under frequency modulation records; the other columns of the study are
-/// formulas that stand beside it.
+/// Quantities that an instrument under frequency modulation records; the other columns of the study
+/// are derived from them.
 const RECORDED: [&str; 4] = [
     "frequency_shift",
     "relative_shift",
@@ -24,7 +24,7 @@ const RECORDED: [&str; 4] = [
 ];
 
 impl Quantity {
-    /// What a word means; `own_amplitude` where another column is what a lock-in amplifier reads.
+    /// Parses a name; `own_amplitude` if another column is the reading of a lock-in amplifier.
     pub(super) fn named(name: &str, own_amplitude: bool) -> Option<Self> {
         let plain = name.replace([' ', '-'], "_");
         let name = match plain.as_str() {
@@ -51,7 +51,7 @@ impl Quantity {
         }
     }
 
-    /// Its name in SI.
+    /// Name in SI.
     pub(super) const fn si_name(self) -> &'static str {
         match self {
             Self::Observed(observable) => observable.si_name,
@@ -67,7 +67,7 @@ impl Quantity {
         }
     }
 
-    /// The number of frequency modulation, if it is one.
+    /// The reading of frequency modulation, if it is one.
     pub const fn modulated(self) -> Option<&'static ModulatedColumn> {
         match self {
             Self::Observed(_) => None,
@@ -81,7 +81,7 @@ impl Quantity {
         observable.is_some_and(|o| o.dimension == Dimension::Angle)
     }
 
-    /// What it measures, with a unit; `None` where it is the same in the model and in SI.
+    /// Kind of quantity, if it has a unit; `None` if it is the same in the model and in SI.
     pub const fn kind(self) -> Option<Kind> {
         match self {
             Self::Observed(observable) => observable.dimension.kind(),
@@ -89,7 +89,7 @@ impl Quantity {
         }
     }
 
-    /// Its unit in SI, or in a dimensionless case's own units.
+    /// Unit in SI, or in the units of a dimensionless case.
     pub const fn unit(self, physical: bool) -> &'static str {
         match (self, self.kind()) {
             (Self::Observed(o), Some(_)) if !physical => o.dimension.model_unit(),

@@ -1,11 +1,11 @@
-//! From the best values to the report.
+//! Construction of the report from the best values.
 
 use std::collections::BTreeMap;
 
 use crate::case::Case;
 
-use super::MOST_PERIOD;
-use super::branches::settled;
+use super::MAX_PERIOD;
+use super::branches::settle;
 use super::data::Data;
 use super::jumps::Jump;
 use super::parameters::{self, Parameter};
@@ -15,30 +15,30 @@ use super::report::{
     CurveCase, FitReport, FittedColumn, FittedJump, FittedParameter, FittedRow, OtherOrbit,
     Reading, Undetermined,
 };
-use super::search::{Found, Search, UNLIKELY, branches_of};
+use super::search::{Found, MIN_PROBABILITY, Search, branches_of};
 use super::statistics::{self, Information, information, persistence, student};
 
-/// What chi2 may be lower beside the best values.
-const DEEPER: f64 = 0.1;
-/// Times that a fit goes on from where its profile found a lower chi2.
-const DEEPER_ROUNDS: usize = 4;
-/// Rows of which a remark speaks singly.
-const SAID: usize = 8;
+/// Smallest reduction of chi2 near the best values that counts.
+const MIN_REDUCTION: f64 = 0.1;
+/// Largest number of times that a fit continues from a lower chi2 of its profile.
+const MAX_CONTINUATIONS: usize = 4;
+/// Largest number of rows that a remark lists.
+const MAX_LISTED_ROWS: usize = 8;
 
 impl Search<'_> {
-    /// The problem in the standard errors, and with the jumps, of what was found.
+    /// The problem with the standard errors and the jumps of a result.
     fn problem_of(&self, found: &Found) -> Problem<'_> {
         let mut problem = self.weighted(found.noise.clone(), None);
         problem.jumps.clone_from(&found.jumps);
         problem
     }
 
-    /// The criteria of Akaike and of Schwarz; standard errors that were estimated count as
-    /// parameters, and values of rows without an orbit as missed by their column's spread.
+    /// The criteria of Akaike and of Schwarz. Estimated standard errors count as parameters, and
+    /// values of rows without an orbit as residuals of their column's spread.
     fn criteria(&self, found: &Found) -> [f64; 2] {
         let rows = self.problem.data.rows();
         let point = &found.solution.point;
-        // Another law may have no fold to compare: the jumps are left out.
+        // Another law may have no fold: the jumps are left out.
         let mut deviance = found.solution.cost - self.squared_jumps(found);
         let mut estimated = vec![false; found.noise.len()];
         for (row, point) in rows.zip(point.iter()) {
@@ -59,7 +59,7 @@ impl Search<'_> {
         [2.0, nanotap_arithmetic::ln(count)].map(|price| deviance + price * parameters)
     }
 
-    /// All that was found, from so many starts.
+    /// Creates the report of a result from this many initial values.
     pub(super) fn report(&self, found: Found, starts: usize) -> FitReport {
         let (found, intervals) = self.with_intervals(found);
         let found = &found;
@@ -139,7 +139,7 @@ impl Search<'_> {
         }
     }
 
-    /// What the Jacobian at the best values says of the parameters.
+    /// Information about the parameters from the Jacobian at the best values.
     fn information(&self, found: &Found) -> Information {
         let parameters = self.problem.parameters.iter();
         let sizes: Vec<f64> = parameters
@@ -152,10 +152,10 @@ impl Search<'_> {
         information(&found.solution.jacobian, &sizes)
     }
 
-    /// The intervals of the parameters. Where chi2 is found to be lower beside the best values than
-    /// there, the fit goes on from that place.
+    /// The intervals of the parameters. If chi2 is lower near the best values, the fit continues
+    /// from there.
     fn with_intervals(&self, mut found: Found) -> (Found, Vec<[Option<f64>; 2]>) {
-        let mut rounds = DEEPER_ROUNDS;
+        let mut rounds = MAX_CONTINUATIONS;
         loop {
             let information = self.information(&found);
             let width = if self.all_given() {
@@ -166,7 +166,11 @@ impl Search<'_> {
             let profiled = self.request.profile && !self.control.is_cancelled();
             let profiled = profiled.then(|| {
                 let problem = self.problem_of(&found);
-                let deeper = if rounds > 0 { DEEPER } else { f64::INFINITY };
+                let deeper = if rounds > 0 {
+                    MIN_REDUCTION
+                } else {
+                    f64::INFINITY
+                };
                 profile(&problem, &found.solution, &information, width, deeper)
             });
             let Some(profiled) = profiled.filter(|_| !self.control.is_cancelled()) else {
@@ -190,13 +194,13 @@ impl Search<'_> {
         }
     }
 
-    /// Whether a fit describes as much of the data better than another.
+    /// True if one fit describes as much of the data better than another.
     fn is_better(&self, this: &Found, other: &Found) -> bool {
         let deviance = |of: &Found| self.criteria(of)[0] + self.squared_jumps(of);
         this.jumps.len() >= other.jumps.len() && deviance(this) < deviance(other)
     }
 
-    /// What the places of jumps add to chi2.
+    /// Contribution of the jumps to chi2.
     fn squared_jumps(&self, found: &Found) -> f64 {
         let problem = self.problem_of(found);
         let (x, point) = (&found.solution.x, &found.solution.point);
@@ -227,7 +231,7 @@ impl Search<'_> {
             .collect()
     }
 
-    /// Which rows have no orbit, and how the lever moves there instead.
+    /// Lists the rows without an orbit, and the motion of the lever there.
     fn without_orbit(&self, found: &Found) -> String {
         let (problem, x) = (&self.problem, &found.solution.x);
         let rows = problem.rows();
@@ -235,31 +239,39 @@ impl Search<'_> {
         let lost: Vec<_> = rows.iter().zip(points).filter(|(_, p)| p.lost).collect();
         let lines: Vec<String> = lost
             .iter()
-            .take(SAID)
+            .take(MAX_LISTED_ROWS)
             .map(|(r, _)| r.1.line.to_string())
             .collect();
-        let lines = lines.join(", ") + if lost.len() > SAID { ", …" } else { "" };
+        let lines = lines.join(", ")
+            + if lost.len() > MAX_LISTED_ROWS {
+                ", …"
+            } else {
+                ""
+            };
         if problem.held.is_some() {
             return format!(
-                "{} of {} rows have no orbit with the amplitude and phase that are held and do not \
+                "{} of {} rows have no orbit with the given amplitude and phase and do not \
                  count: lines {lines}",
                 lost.len(),
                 rows.len()
             );
         }
         let cases = problem.cases(x);
-        let longer = lost.iter().take(SAID).filter_map(|((curve, row), _)| {
-            let case = problem.case_at(&cases[*curve], &problem.place(x, *curve, row));
-            let orbit = settled(&case.model().ok()?, None, MOST_PERIOD)?;
-            (orbit.period > problem.max_period).then_some(orbit.period)
-        });
+        let longer = lost
+            .iter()
+            .take(MAX_LISTED_ROWS)
+            .filter_map(|((curve, row), _)| {
+                let case = problem.case_at(&cases[*curve], &problem.place(x, *curve, row));
+                let orbit = settle(&case.model().ok()?, None, MAX_PERIOD)?;
+                (orbit.period > problem.max_period).then_some(orbit.period)
+            });
         let longer: Vec<usize> = longer.collect();
         let said = match longer.iter().max() {
             None => String::new(),
             Some(most) => {
                 let periods: Vec<String> = longer.iter().map(usize::to_string).collect();
                 format!(
-                    "; from rest the motion comes to repeat there after {} periods, which a \
+                    "; from rest the motion there repeats after {} periods, which a \
                      max_period of {most} takes",
                     periods.join(", ")
                 )
@@ -274,7 +286,7 @@ impl Search<'_> {
         )
     }
 
-    /// Why the model does not describe the data, and what else puts the result in doubt.
+    /// Determines why the model does not describe the data, and adds other warnings.
     fn judge(
         &self,
         found: &Found,
@@ -287,7 +299,7 @@ impl Search<'_> {
         let mut remarks = Vec::new();
         if data.left_out > 0 {
             remarks.push(format!(
-                "{} rows of neither way are left out: which motion a curve shows is told by its \
+                "{} rows of neither direction are left out: the motion of a curve follows from its \
                  own rows",
                 data.left_out
             ));
@@ -314,7 +326,7 @@ impl Search<'_> {
                 ));
             }
         }
-        let unlikely = p_value.filter(|p| *p < UNLIKELY).map(|_| {
+        let unlikely = p_value.filter(|p| *p < MIN_PROBABILITY).map(|_| {
             format!(
                 "chi2 = {:.4e} with {} degrees of freedom: the residuals are larger than the \
                  standard errors that the data give",
@@ -329,7 +341,7 @@ impl Search<'_> {
         let reason = if 2 * lost > point.len() {
             Some("more than half of the rows have no periodic orbit".to_owned())
         } else if nothing {
-            Some("the residuals are as large as the data vary".to_owned())
+            Some("the residuals are as large as the variation of the data".to_owned())
         } else {
             unlikely
         };
@@ -337,7 +349,7 @@ impl Search<'_> {
     }
 }
 
-/// The rows with what the model says.
+/// The rows with the model's values.
 fn rows(problem: &Problem<'_>, found: &Found) -> Vec<FittedRow> {
     let data = problem.data;
     let x = &found.solution.x;
@@ -369,7 +381,7 @@ fn rows(problem: &Problem<'_>, found: &Found) -> Vec<FittedRow> {
         .collect()
 }
 
-/// The jumps of the data with the folds behind them.
+/// The jumps of the data with their folds.
 fn jumps(problem: &Problem<'_>, found: &Found) -> Vec<FittedJump> {
     let (x, point) = (&found.solution.x, &found.solution.point);
     let rows = problem.rows();
@@ -389,7 +401,7 @@ fn jumps(problem: &Problem<'_>, found: &Found) -> Vec<FittedJump> {
     found.jumps.iter().enumerate().filter_map(jump).collect()
 }
 
-/// What the orbits say that the data are not on.
+/// The values of the orbits on which the data are not.
 fn others(problem: &Problem<'_>, found: &Found) -> Vec<OtherOrbit> {
     let data = problem.data;
     let x = &found.solution.x;
@@ -399,10 +411,10 @@ fn others(problem: &Problem<'_>, found: &Found) -> Vec<OtherOrbit> {
     for (curve, rows) in found.candidates.iter().enumerate() {
         for (row, candidates) in rows.iter().enumerate() {
             let at = problem.place(x, curve, &data.curves[curve].rows[row]);
-            let besides = candidates
+            let others_here = candidates
                 .iter()
                 .filter(|c| c.branch != chosen[first + row]);
-            for candidate in besides {
+            for candidate in others_here {
                 let values = problem.values(x, curve, &at, candidate);
                 let Some(values) = values else { continue };
                 let columns = data.columns.iter().zip(values).enumerate();
@@ -422,7 +434,7 @@ fn others(problem: &Problem<'_>, found: &Found) -> Vec<OtherOrbit> {
     others
 }
 
-/// What the data do not determine, in words.
+/// Descriptions of what the data do not determine.
 fn undetermined(
     information: &Information,
     parameters: &[Parameter],
@@ -453,7 +465,7 @@ fn undetermined(
             let changes: Vec<String> = parts.iter().map(change).collect();
             let names: Vec<String> = parts.iter().map(|k| name(*k)).collect();
             format!(
-                "the data do not tell {} apart: changing {} leaves what was measured as it is",
+                "the data do not separate {}: changing {} does not change the measured values",
                 names.join(" and "),
                 changes.join(" and ")
             )

@@ -1,7 +1,7 @@
-//! The search for the best values: a rough fit that finds the branches, a fine one in standard
-//! errors, other starts where nothing describes the data.
+//! Search for the best values: a rough fit that finds the branches, a fine one in standard errors,
+//! and other initial values if the data are not described.
 
-use super::FitRequest;
+use super::FitOptions;
 use super::branches::Rows;
 use super::data::Data;
 use super::jumps::Jump;
@@ -12,14 +12,14 @@ use super::statistics::{exceeding, persistence};
 use crate::Error;
 use crate::control::Control;
 
-/// A fit at work.
+/// State of the search.
 pub(super) struct Search<'a> {
     pub(super) problem: Problem<'a>,
-    pub(super) request: &'a FitRequest,
+    pub(super) request: &'a FitOptions,
     pub(super) control: &'a Control<'a>,
 }
 
-/// A fit whose branches are known.
+/// A fit with known branches.
 pub(super) struct Found {
     pub(super) solution: Solution<Point>,
     pub(super) noise: Vec<f64>,
@@ -28,24 +28,24 @@ pub(super) struct Found {
     pub(super) steps: usize,
 }
 
-/// Part of a column's spread that a rough fit takes for a standard error.
-const ROUGH: f64 = 0.03;
-/// Rough standard errors beyond which a residual counts by its logarithm.
-const FAR: f64 = 3.0;
-/// Mean squared rough residual above which nothing describes the data.
-const POOR: f64 = 1.0;
-/// Residuals of a column from which on their signs tell noise from a misfit.
-const TELLING: usize = 12;
-/// Mean squared residual, in parts of the column's spread, that is not the column itself.
-const SMALL: f64 = 0.1;
-/// Correlation of neighbouring residuals, in standard errors, of what is noise.
-const INDEPENDENT: f64 = 2.0;
+/// Standard error of a rough fit, as a fraction of a column's spread.
+const ROUGH_ERROR: f64 = 0.03;
+/// Rough standard errors above which a residual counts by its logarithm.
+const ROBUST_LIMIT: f64 = 3.0;
+/// Mean squared rough residual above which the data are not described.
+const MAX_MISFIT: f64 = 1.0;
+/// Number of residuals of a column from which on their signs distinguish noise from a misfit.
+const MIN_RESIDUALS: usize = 12;
+/// Largest mean squared residual of a description, relative to the column's spread.
+const SMALL_MISFIT: f64 = 0.1;
+/// Largest correlation of neighbouring residuals of noise, in standard errors.
+const MAX_CORRELATION: f64 = 2.0;
 /// Probability of chi2 below which the model does not describe the data.
-pub(super) const UNLIKELY: f64 = 1e-6;
-/// Relative difference of two misfits that are one.
-const SAME: f64 = 1e-3;
-/// Times that branches are looked for again.
-const ROUNDS: usize = 6;
+pub(super) const MIN_PROBABILITY: f64 = 1e-6;
+/// Relative difference below which two misfits are equal.
+const MISFIT_TOLERANCE: f64 = 1e-3;
+/// Largest number of times that branches are assigned again.
+const MAX_ROUNDS: usize = 6;
 
 impl<'a> Search<'a> {
     pub(super) fn run(&self) -> Result<FitReport, Error> {
@@ -68,8 +68,9 @@ impl<'a> Search<'a> {
             if least.is_none_or(|least| misfit < least) {
                 best = Some(found);
             }
-            // Two starts that end in one minimum are enough to take it for the least.
-            if good || least.is_some_and(|least| (misfit - least).abs() <= SAME * least) {
+            // Two initial values that lead to the same minimum are enough to accept it.
+            if good || least.is_some_and(|least| (misfit - least).abs() <= MISFIT_TOLERANCE * least)
+            {
                 break;
             }
         }
@@ -77,11 +78,11 @@ impl<'a> Search<'a> {
             if self.control.is_cancelled() {
                 Error::new(
                     crate::ErrorKind::Stopped,
-                    "stopped before anything was fitted",
+                    "stopped before the first fit was finished",
                 )
             } else {
                 Error::numerics(format!(
-                    "no periodic orbit was found where the data are, from {tried} start(s)"
+                    "no periodic orbit was found for the data, from {tried} initial value(s)"
                 ))
                 .remedy("change the case, or give {bounds} and more {starts}")
             }
@@ -89,7 +90,7 @@ impl<'a> Search<'a> {
         Ok(self.report(best, tried))
     }
 
-    /// The case's own values, then others within the bounds, or within a factor of four.
+    /// Initial values: those of the case, then others within the bounds or a factor of four.
     fn starts(&self) -> Vec<Vec<f64>> {
         let mut state = self.request.seed ^ 0x9e37_79b9_7f4a_7c15;
         // SplitMix64 (Steele, Lea, Flood 2014).
@@ -140,23 +141,23 @@ impl<'a> Search<'a> {
         self.problem.parameters.iter().map(|p| p.bounds).collect()
     }
 
-    /// Standard errors as long as nothing is known of them.
+    /// Standard errors before any are known.
     pub(super) fn rough_noise(&self) -> Vec<f64> {
         let columns = self.problem.data.columns.iter();
         columns
-            .map(|c| ROUGH * c.spread.max(f64::MIN_POSITIVE))
+            .map(|c| ROUGH_ERROR * c.spread.max(f64::MIN_POSITIVE))
             .collect()
     }
 
-    /// From a start to where branches and parameters are about right.
+    /// Fits from initial values until branches and parameters are approximately right.
     fn rough(&self, mut x: Vec<f64>) -> Vec<f64> {
-        let mut problem = self.weighted(self.rough_noise(), Some(FAR));
-        // Given errors are smaller by far; they count in the end.
+        let mut problem = self.weighted(self.rough_noise(), Some(ROBUST_LIMIT));
+        // Given errors are much smaller; they are used in the end.
         let plain = plain_errors(problem.data);
         problem.data = &plain;
         let mut before: Option<Vec<usize>> = None;
         let mut known: Option<Vec<Rows>> = None;
-        for _ in 0..ROUNDS {
+        for _ in 0..MAX_ROUNDS {
             if self.control.is_cancelled() {
                 break;
             }
@@ -179,17 +180,17 @@ impl<'a> Search<'a> {
         x
     }
 
-    /// From there to the minimum in standard errors.
+    /// Continues the fit to the minimum in standard errors.
     pub(super) fn fine(&self, mut x: Vec<f64>) -> Option<Found> {
         let mut noise = self.rough_noise();
         let mut found: Option<Found> = None;
         let mut steps = 0;
-        for _ in 0..ROUNDS {
+        for _ in 0..MAX_ROUNDS {
             if self.control.is_cancelled() {
                 break;
             }
             let problem = self.weighted(noise.clone(), None);
-            // The parameters move little from here on.
+            // The parameters change little from here on.
             let known = found.as_ref().map(|found| found.candidates.as_slice());
             let (mut point, candidates) = problem.discover(&x, known);
             if self.control.is_cancelled() {
@@ -234,8 +235,8 @@ impl<'a> Search<'a> {
         found
     }
 
-    /// Standard error of a value in each column, from its residuals. A column without them has
-    /// none at all.
+    /// Standard error of a value in each column, from its residuals; zero for a column without
+    /// residuals.
     fn noise(&self, x: &[f64], point: &Point) -> Vec<f64> {
         let count = self.problem.data.count() as f64;
         let freedom = 1.0 - self.problem.parameters.len() as f64 / count;
@@ -253,7 +254,7 @@ impl<'a> Search<'a> {
             .collect()
     }
 
-    /// Model less measured values of a column, row by row where both are known.
+    /// Model minus measured values of a column, for rows with both.
     pub(super) fn differences(&self, x: &[f64], point: &Point, column: usize) -> Vec<f64> {
         let curves = self.problem.data.curves.iter().enumerate();
         let rows = curves.flat_map(|(curve, of)| of.rows.iter().map(move |row| (curve, row)));
@@ -266,7 +267,7 @@ impl<'a> Search<'a> {
             .collect()
     }
 
-    /// Mean squared residual in parts of the columns' spread; rows without an orbit count whole.
+    /// Mean squared residual relative to the spreads; rows without an orbit count fully.
     fn misfit(&self, found: &Found) -> f64 {
         let data = self.problem.data;
         let (mut sum, mut count) = (0.0, 0);
@@ -280,14 +281,14 @@ impl<'a> Search<'a> {
         (sum + lost as f64) / data.count() as f64
     }
 
-    /// Whether all standard errors were given.
+    /// True if all standard errors were given.
     pub(super) fn all_given(&self) -> bool {
         let rows = self.problem.data.rows();
         let mut values = rows.flat_map(|row| row.values.iter().zip(&row.errors));
         values.all(|(value, error)| value.is_none() || error.is_some())
     }
 
-    /// Values measured where there is an orbit, and jumps, less parameters.
+    /// Number of measured values with an orbit, and of jumps, minus parameters.
     pub(super) fn freedom(&self, found: &Found) -> usize {
         let (x, point) = (&found.solution.x, &found.solution.point);
         let columns = 0..self.problem.data.columns.len();
@@ -297,14 +298,14 @@ impl<'a> Search<'a> {
             .max(1)
     }
 
-    /// Whether the model describes the data: what is left is small, or noise.
+    /// True if the model describes the data: the residuals are small, or noise.
     fn describes(&self, found: &Found) -> bool {
-        (self.misfit(found) < POOR * ROUGH * ROUGH || self.leaves_noise(found))
-            && (!self.all_given() || self.probability(found) > UNLIKELY)
+        (self.misfit(found) < MAX_MISFIT * ROUGH_ERROR * ROUGH_ERROR || self.leaves_noise(found))
+            && (!self.all_given() || self.probability(found) > MIN_PROBABILITY)
     }
 
-    /// Whether the residuals are smaller than the data vary, keep no sign from row to row and have
-    /// none among them that stands out, as far as there are enough of them to tell.
+    /// True if the residuals are smaller than the spread, do not keep their sign from row to row,
+    /// and have no outlier, as far as there are enough of them.
     fn leaves_noise(&self, found: &Found) -> bool {
         let (x, point) = (&found.solution.x, &found.solution.point);
         let lost = point.iter().any(|row| row.lost);
@@ -319,10 +320,10 @@ impl<'a> Search<'a> {
                 let count = left.len() as f64;
                 // The largest of n normal deviates is about √(2 ln n).
                 let usual = (2.0 * nanotap_arithmetic::ln(count)).sqrt() + 0.5;
-                left.len() >= TELLING
+                left.len() >= MIN_RESIDUALS
                     && largest < usual * (squares / count).sqrt()
-                    && squares < SMALL * count
-                    && persistence(&left) < INDEPENDENT
+                    && squares < SMALL_MISFIT * count
+                    && persistence(&left) < MAX_CORRELATION
             })
     }
 

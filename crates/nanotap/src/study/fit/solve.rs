@@ -1,32 +1,33 @@
-//! Least squares within bounds, by Levenberg and Marquardt's method.
+//! Least squares within bounds, by the Levenberg–Marquardt method.
 //!
-//! minimise ½|r(x)|² over low ≤ x ≤ high. A step solves (JᵀJ + λD²) p = −Jᵀr for the parameters
-//! that no bound holds, D the largest column norms seen (Moré 1978), λ as Nielsen has it
-//! (IMM-REP-1999-05); steps end at the bounds. What cannot be zero goes by its logarithm, so that
-//! a stiffness changes by orders of magnitude in few steps and never its sign. The kept crate `levenberg-marquardt` knows no
-//! bounds and stands on another version of nalgebra.
+//! Minimises ½|r(x)|² over low ≤ x ≤ high. A step solves (JᵀJ + λD²) p = −Jᵀr for the parameters
+//! that are not held by a bound, with D the largest column norms so far (Moré 1978) and λ by
+//! Nielsen (IMM-REP-1999-05); steps end at the bounds. Parameters that cannot be zero are varied by
+//! their logarithm, so that a stiffness changes by orders of magnitude in few steps and never
+//! changes its sign. The crate `levenberg-marquardt` has no bounds and needs another version of
+//! nalgebra.
 //!
-//! Fails by stopping in a local minimum: that is what several starts are for.
+//! Fails by stopping in a local minimum, which several initial values avoid.
 
 use nalgebra::{DMatrix, DVector};
 
-/// What is to be made small.
+/// A function to be minimised.
 pub(super) trait LeastSquares {
     /// The model at some parameters, as far as derivatives need it.
     type Point;
 
-    /// The model at `x`; `None` where there is none. `from` is a point already evaluated,
-    /// at its parameters.
+    /// Evaluates the model at `x`; `None` if it does not exist. `from` is a known point and its
+    /// parameters.
     fn point(&self, x: &[f64], from: (&[f64], &Self::Point)) -> Option<Self::Point>;
 
     /// The residuals.
     fn residuals(&self, x: &[f64], point: &Self::Point) -> DVector<f64>;
 
-    /// Their derivatives, a column a parameter; `None` where they have none.
+    /// Derivatives of the residuals, one column per parameter; `None` if they do not exist.
     fn jacobian(&self, x: &[f64], point: &mut Self::Point) -> Option<DMatrix<f64>>;
 }
 
-/// Where it ended.
+/// Result of a minimisation.
 pub(super) struct Solution<P> {
     pub(super) x: Vec<f64>,
     pub(super) point: P,
@@ -37,21 +38,21 @@ pub(super) struct Solution<P> {
     pub(super) iterations: usize,
 }
 
-/// Most steps, taken or refused.
-const MOST_STEPS: usize = 60;
-/// Damping at which no step is left.
-const MOST_DAMPING: f64 = 1e16;
-/// Change of a logarithm in one step, at most.
-const MOST_FOLD: f64 = 2.0;
-/// A value that changes the residuals, in standard errors, by less than this is nothing.
-const NOTHING: f64 = 1e-3;
+/// Largest number of steps, accepted or rejected.
+const MAX_STEPS: usize = 60;
+/// Largest damping.
+const MAX_DAMPING: f64 = 1e16;
+/// Largest change of a logarithm in one step.
+const MAX_LOG_CHANGE: f64 = 2.0;
+/// Change of the residuals, in standard errors, below which a value counts as zero.
+const NEGLIGIBLE: f64 = 1e-3;
 
-/// Whether a value goes by its logarithm: one that is positive and cannot be negative.
+/// True if a value is varied by its logarithm: it is positive and cannot be negative.
 fn by_logarithm(x: f64, low: f64) -> bool {
     low >= 0.0 && x > 0.0
 }
 
-/// Where a step leads from `x`, whose lower bound is `low`.
+/// The value after a step from `x`, whose lower bound is `low`.
 pub(super) fn stepped(x: f64, step: f64, low: f64) -> f64 {
     if by_logarithm(x, low) {
         x * nanotap_arithmetic::exp(step / x)
@@ -60,7 +61,7 @@ pub(super) fn stepped(x: f64, step: f64, low: f64) -> f64 {
     }
 }
 
-/// The step that leads from `x` to another value.
+/// The step from `x` to another value.
 pub(super) fn step_between(x: f64, to: f64, low: f64) -> f64 {
     if by_logarithm(x, low) {
         x * nanotap_arithmetic::ln(to / x)
@@ -69,17 +70,17 @@ pub(super) fn step_between(x: f64, to: f64, low: f64) -> f64 {
     }
 }
 
-/// Where a step leads that ends at the bounds.
+/// The value after a step that ends at the bounds.
 pub(super) fn moved(x: f64, step: f64, (low, high): (f64, f64)) -> f64 {
     let most = if by_logarithm(x, low) {
-        MOST_FOLD * x
+        MAX_LOG_CHANGE * x
     } else {
         f64::INFINITY
     };
     stepped(x, step.clamp(-most, most), low).clamp(low, high)
 }
 
-/// The slope of a step at `x` in parts of its slope at `from`, which is the same by the logarithm.
+/// The slope of a step at `x` relative to its slope at `from`, which is the same for logarithms.
 pub(super) fn slope_kept(from: f64, x: f64, low: f64) -> f64 {
     if by_logarithm(x, low) && from > 0.0 {
         x / from
@@ -88,8 +89,8 @@ pub(super) fn slope_kept(from: f64, x: f64, low: f64) -> f64 {
     }
 }
 
-/// Minimises from `x` until a step promises less than
-/// `enough` of |r|², or a part of 1e−10 of it.
+/// Minimises from `x` until a step promises less than `enough` of |r|², or a fraction of 1e−10 of
+/// it.
 pub(super) fn minimise<L: LeastSquares>(
     problem: &L,
     x: Vec<f64>,
@@ -114,7 +115,7 @@ pub(super) fn minimise<L: LeastSquares>(
     })
 }
 
-/// With what is as good as nothing at its bound: a logarithm never comes to zero.
+/// Sets negligible values to their bound: a logarithm never reaches zero.
 fn without_nothing<L: LeastSquares>(
     problem: &L,
     found: &Solution<L::Point>,
@@ -123,7 +124,7 @@ fn without_nothing<L: LeastSquares>(
     let Solution { x, jacobian, .. } = found;
     let is_nothing = |j: usize| {
         let shows = x[j] * jacobian.column(j).norm();
-        bounds[j].0 == 0.0 && x[j] > 0.0 && shows < NOTHING
+        bounds[j].0 == 0.0 && x[j] > 0.0 && shows < NEGLIGIBLE
     };
     if !(0..x.len()).any(is_nothing) {
         return None;
@@ -134,7 +135,7 @@ fn without_nothing<L: LeastSquares>(
     let mut point = problem.point(&bare, (x, &found.point))?;
     let residuals = problem.residuals(&bare, &point);
     let cost = residuals.norm_squared();
-    if cost > found.cost + NOTHING * NOTHING {
+    if cost > found.cost + NEGLIGIBLE * NEGLIGIBLE {
         return None;
     }
     let jacobian = problem.jacobian(&bare, &mut point)?;
@@ -148,7 +149,7 @@ fn without_nothing<L: LeastSquares>(
     })
 }
 
-/// Levenberg and Marquardt's steps from a point.
+/// Levenberg–Marquardt steps from a point.
 fn descend<L: LeastSquares>(
     problem: &L,
     from: Solution<L::Point>,
@@ -166,9 +167,9 @@ fn descend<L: LeastSquares>(
     let count = x.len();
     let mut scale = DVector::from_element(count, 0.0);
     let (mut damping, mut growth) = (1e-3, 2.0);
-    for _ in 0..MOST_STEPS {
+    for _ in 0..MAX_STEPS {
         let cost = residuals.norm_squared();
-        // In units of which a step is one of the logarithm.
+        // Units in which a step is one of the logarithm.
         let unit = |j: usize| {
             if by_logarithm(x[j], bounds[j].0) {
                 x[j]
@@ -182,7 +183,7 @@ fn descend<L: LeastSquares>(
             scale[j] = slopes.column(j).norm().max(scale[j]);
         }
         let gradient = slopes.tr_mul(&residuals);
-        // A bound holds a parameter that would leave it; so does what nothing depends on.
+        // Parameters at a bound that would leave it are fixed; so are those without an effect.
         let free: Vec<usize> = (0..count)
             .filter(|&j| {
                 let (low, high) = bounds[j];
@@ -208,13 +209,13 @@ fn descend<L: LeastSquares>(
         let linear = &residuals + &slopes * &taken;
         let promised = cost - linear.norm_squared();
         if promised <= enough.max(1e-10 * cost) || taken.iter().all(|t| *t == 0.0) {
-            // A step that ended at a bound, or at the most by which a logarithm may change, may
-            // promise less than a shorter one.
+            // A step that ended at a bound, or at the largest change of a logarithm, may promise
+            // less than a shorter one.
             let whole = free
                 .iter()
                 .zip(step.iter())
                 .all(|(&j, step)| (taken[j] - step).abs() <= 1e-9 * step.abs());
-            if whole || damping > MOST_DAMPING {
+            if whole || damping > MAX_DAMPING {
                 break;
             }
             damping *= growth;
@@ -238,7 +239,7 @@ fn descend<L: LeastSquares>(
         } else {
             damping *= growth;
             growth *= 2.0;
-            if damping > MOST_DAMPING {
+            if damping > MAX_DAMPING {
                 break;
             }
         }

@@ -173,7 +173,7 @@ fn ln_gamma(mut a: f64) -> f64 {
 }
 
 /// How far the residuals of a curve keep their sign from one row to the next: √n r₁, r₁ the
-/// autocorrelation of neighbours. Of independent noise it is of order 1.
+/// autocorrelation of neighbours. It is of order 1 for independent noise.
 pub(super) fn persistence(residuals: &[f64]) -> f64 {
     let squares: f64 = residuals.iter().map(|r| r * r).sum();
     let neighbours: f64 = residuals.windows(2).map(|w| w[0] * w[1]).sum();

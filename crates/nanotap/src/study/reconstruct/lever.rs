@@ -13,8 +13,8 @@ use crate::case::physical::Scales;
 use crate::case::physical::free_response::{free_response, response_at};
 use crate::model::cantilever::Cantilever;
 use crate::model::drive_form::Actuation;
+use crate::study::cantilever;
 use crate::study::frequency_modulation::{FreeOscillation, Held};
-use crate::study::kind::cantilever;
 
 /// The lever of a case, in SI or, of a dimensionless case, in the model's units.
 #[derive(Clone, Debug)]

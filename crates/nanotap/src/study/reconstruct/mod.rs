@@ -115,7 +115,7 @@ impl Study for ReconstructStudy {
     const ABOUT: &'static str = "Force and dissipation against distance from a measured curve";
     const COUNTED: &'static str = "passes";
     const ANY_DISTANCE: bool = true;
-    type Request = ReconstructOptions;
+    type Options = ReconstructOptions;
     type Report = ReconstructReport;
 
     fn compute(

@@ -1,89 +1,31 @@
-//! The paper's own method beside the exact flow: fourth-order Runge–Kutta with a fixed
+//! The paper's method, to compare with the exact flow: fourth-order Runge–Kutta with a fixed
 //! step in each regime, switching on the grid.
 //!
-//! It is there to show what it does wrong. Its contacts begin and end up to a step late,
+//! Its contacts begin and end up to a step late,
 //! which acts like a small force that differs from period to period: what looks like a
 //! subharmonic of a high period can be a product of the step. Therefore the period read off its
-//! strobe points is called apparent, and what the exact flow makes of the same motion
-//! stands beside it.
+//! strobe points is called apparent, and is reported
+//! with the verdict of the exact flow on the same motion.
 
 use std::collections::VecDeque;
 use std::time::Instant;
 
-use nanotap_dynamics::{ClassifyOptions, classify};
+use nanotap_dynamics::classify;
 use nanotap_flow::fixed_step::FixedStep;
-pub use nanotap_flow::fixed_step::Switching;
+use nanotap_flow::fixed_step::Switching;
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use crate::model::strobe::Strobe;
-use crate::model::{FlowError, Model, MotionError};
+use crate::Error;
+use crate::model::model_map::ModelMap;
+use crate::model::{FlowError, Model};
 use crate::study::simulate::{
-    Classification, Named, SimulateError, SimulateOptions, check_states, is_none, starting_state,
+    Classification, Grid, Named, SimulateOptions, check_periods, check_states, is_none,
+    starting_state,
 };
 
-/// How to run.
-#[derive(Clone, Debug, PartialEq)]
-pub struct FixedStepOptions {
-    /// Drive periods recorded.
-    pub periods: usize,
-    /// Drive periods thrown away first.
-    pub transient: usize,
-    /// The state at the start; `None`: rest.
-    pub state: Option<Vec<f64>>,
-    /// How many of the last states at drive phase 0 to keep.
-    pub strobe: usize,
-    /// How many of the events to list, the first ones.
-    pub events: usize,
-    /// Steps a drive period in each regime: free flight, contact.
-    pub steps: [u32; 2],
-    /// Where within a step the regime is looked at.
-    pub switching: Switching,
-    /// Budgets for naming what the exact flow does.
-    pub classify: ClassifyOptions,
-}
-
-impl Default for FixedStepOptions {
-    fn default() -> Self {
-        Self {
-            periods: 128,
-            transient: 500,
-            state: None,
-            strobe: 1,
-            events: SimulateOptions::default().events,
-            steps: [200, 200],
-            switching: Switching::EveryStep,
-            classify: ClassifyOptions::default(),
-        }
-    }
-}
-
-/// Why there was no such run.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum FixedStepError {
-    /// As for the exact flow.
-    #[error(transparent)]
-    Simulate(#[from] SimulateError),
-    /// Jumps of the state are beyond it.
-    #[error(
-        "fixed steps know no jumps of the state: neither rigid impacts nor a Kelvin–Voigt surface, which is \
-         left without force, can be run this way"
-    )]
-    Rigid,
-    /// A nonlinear law has no regimes.
-    #[error(
-        "under a nonlinear force law there are no linear regimes for the fixed-step method to run"
-    )]
-    Nonlinear,
-    /// The numbers overflowed.
-    #[error(
-        "the fixed-step run grew beyond the range of double precision in period {period}: take more steps"
-    )]
-    Overflow {
-        /// In which drive period.
-        period: usize,
-    },
-}
+/// Drive periods discarded first, unless the options say otherwise.
+const TRANSIENT: usize = 500;
 
 /// A switch, where the grid noticed it.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
@@ -105,7 +47,7 @@ pub struct FixedStepRun {
     pub switching: &'static str,
     /// Drive periods recorded.
     pub periods: usize,
-    /// Drive periods thrown away first.
+    /// Drive periods of the discarded transient.
     pub transient: usize,
     /// The state at the end of the transient.
     pub start: Vec<f64>,
@@ -122,18 +64,18 @@ pub struct FixedStepRun {
     pub tip_min: f64,
     /// Half of peak to peak.
     pub amplitude: f64,
-    /// Part of the steps in contact, weighted with their length.
+    /// Contact time / period, from the lengths of the steps.
     pub contact_fraction: f64,
-    /// States at the end of each of the last periods asked for.
+    /// States at the end of each of the last requested periods.
     pub strobe: Vec<Vec<f64>>,
     /// Switches noticed, the first of them.
     pub events: Vec<GridEvent>,
-    /// How many more there were than are listed.
+    /// Number of events that are not listed.
     #[serde(skip_serializing_if = "is_none")]
     pub events_left_out: usize,
-    /// Speed, drive periods a second.
+    /// Speed, drive periods per second.
     pub periods_per_second: f64,
-    /// What the exact flow does from the last state.
+    /// The exact flow from the last state.
     pub exact: ExactVerdict,
     /// Time, tip displacement and its rate, for figures: the first recorded periods.
     #[serde(skip)]
@@ -143,18 +85,18 @@ pub struct FixedStepRun {
     pub strobe_curve: Vec<[f64; 2]>,
 }
 
-/// What the exact flow makes of a motion.
+/// Classification by the exact flow.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct ExactVerdict {
-    /// Its class.
+    /// Class.
     pub classification: Classification,
-    /// Its period.
+    /// Period in drive periods.
     pub period: Option<usize>,
-    /// Why.
+    /// Reason.
     pub evidence: String,
 }
 
-/// Nearness, as a part of the motion's size, at which the eye takes a run as periodic.
+/// Return distance, relative to the motion's size, below which a run looks periodic.
 pub const APPARENT_CLOSURE: f64 = 1e-6;
 /// Longest apparent period looked for.
 const LONGEST_APPARENT: usize = 64;
@@ -166,17 +108,21 @@ const CURVE_POINTS: usize = 2_000_000;
 ///
 /// # Errors
 /// When the start does not fit, the stop is rigid, or the run overflows.
-pub fn fixed_step_run(
-    model: &Model,
-    options: &FixedStepOptions,
-) -> Result<FixedStepRun, FixedStepError> {
+pub fn fixed_step_run(model: &Model, options: &SimulateOptions) -> Result<FixedStepRun, Error> {
     let state = starting_state(model, options.state.as_deref())?;
-    if options.periods == 0 {
-        return Err(SimulateError::NoPeriods.into());
-    }
+    let transient = options.transient.unwrap_or(TRANSIENT);
+    let refused = |message| {
+        Err(Error::input(
+            message,
+            "leave {method} out: the exact flow runs it",
+        ))
+    };
+    check_periods(options.periods)?;
     check_states(model, options.strobe.min(options.periods), "strobe")?;
     if model.nonlinear.is_some() {
-        return Err(FixedStepError::Nonlinear);
+        return refused(
+            "under a nonlinear force law there are no linear regimes for the fixed-step method to run",
+        );
     }
     if model
         .system
@@ -185,17 +131,28 @@ pub fn fixed_step_run(
         .flatten()
         .any(|e| e.reset.is_some())
     {
-        return Err(FixedStepError::Rigid);
+        return refused(
+            "fixed steps know no jumps of the state: neither rigid impacts nor a Kelvin–Voigt \
+             surface, which is left without force, can be run this way",
+        );
     }
-    let mut run = FixedStep::new(&model.system, &state, &options.steps, options.switching)
-        .map_err(|error| SimulateError::Flow(error.into()))?;
+    let steps = options.steps.0;
+    let (switching, switching_name) = match options.switching {
+        Grid::Step => (Switching::EveryStep, "every_step"),
+        Grid::Stage => (Switching::EveryStage, "every_stage"),
+    };
+    let run = FixedStep::new(&model.system, &state, &steps, switching);
+    let mut run = run.map_err(|error| match error {
+        FlowError::Shape { .. } => Error::input(error.to_string(), "give 1 or more {steps}"),
+        error => error.into(),
+    })?;
     let clock = Instant::now();
-    for period in 0..options.transient {
+    for period in 0..transient {
         run.run_period(|_, _| {});
         check(model, run.state(), period)?;
     }
     let start = run.state().to_vec();
-    let mut grid = Grid::new(model, &start, options.events);
+    let mut grid = Observed::new(model, &start, options.events);
     // As many of the last states as are listed or compared.
     let kept = options.strobe.max(2 * LONGEST_APPARENT);
     let mut strobes: VecDeque<Vec<f64>> = VecDeque::new();
@@ -204,7 +161,7 @@ pub fn fixed_step_run(
     let at = |o: &nanotap_flow::Output, x: &[f64]| o.at(model.system.drive(), x, 0.0);
     for period in 0..options.periods {
         run.run_period(|phase, x| grid.see(period, phase, x));
-        check(model, run.state(), options.transient + period)?;
+        check(model, run.state(), transient + period)?;
         strobe_curve.push([at(&model.tip, run.state()), at(&rate, run.state())]);
         if strobes.len() == kept {
             strobes.pop_front();
@@ -215,16 +172,13 @@ pub fn fixed_step_run(
     let mut strobes = Vec::from(strobes);
     let (apparent_period, closure) = apparent_period(&strobes);
     let last = strobes.last().cloned().unwrap_or_default();
-    let named = Named::of(&classify(&mut Strobe::new(model), &last, &options.classify).kind);
+    let named = Named::of(&classify(&mut ModelMap::new(model), &last, &options.classify()).kind);
     Ok(FixedStepRun {
         method: "rk4",
-        steps: options.steps,
-        switching: match options.switching {
-            Switching::EveryStep => "every_step",
-            Switching::EveryStage => "every_stage",
-        },
+        steps,
+        switching: switching_name,
         periods: options.periods,
-        transient: options.transient,
+        transient,
         start,
         apparent_period,
         closure,
@@ -237,7 +191,7 @@ pub fn fixed_step_run(
         strobe: strobes.split_off(strobes.len().saturating_sub(options.strobe)),
         events: grid.events,
         events_left_out: grid.events_left_out,
-        periods_per_second: (options.transient + options.periods) as f64 / seconds,
+        periods_per_second: (transient + options.periods) as f64 / seconds,
         exact: ExactVerdict {
             classification: named.classification,
             period: named.orbit.map(|o| o.period),
@@ -248,19 +202,22 @@ pub fn fixed_step_run(
 }
 
 /// An error once the work is cancelled, or where the state is not finite after a period.
-fn check(model: &Model, state: &[f64], period: usize) -> Result<(), FixedStepError> {
+fn check(model: &Model, state: &[f64], period: usize) -> Result<(), Error> {
     if model.system.cancel().is_cancelled() {
-        return Err(SimulateError::Stopped.into());
+        return Err(Error::stopped());
     }
     if state.iter().all(|v| v.is_finite()) {
         Ok(())
     } else {
-        Err(FixedStepError::Overflow { period })
+        Err(Error::numerics(format!(
+            "the fixed-step run grew beyond the range of double precision in period {period}: take \
+             more steps"
+        )))
     }
 }
 
 /// What is read off the grid.
-struct Grid<'a> {
+struct Observed<'a> {
     model: &'a Model,
     rate: nanotap_flow::Output,
     low: f64,
@@ -275,7 +232,7 @@ struct Grid<'a> {
     curve: Vec<[f64; 3]>,
 }
 
-impl<'a> Grid<'a> {
+impl<'a> Observed<'a> {
     fn new(model: &'a Model, start: &[f64], most_events: usize) -> Self {
         let drive = model.system.drive();
         let tip = model.tip.at(drive, start, 0.0);
@@ -354,27 +311,13 @@ fn apparent_period(strobes: &[Vec<f64>]) -> (Option<usize>, f64) {
     (None, nearest)
 }
 
-impl From<FixedStepError> for crate::Error {
-    fn from(error: FixedStepError) -> Self {
-        match error {
-            FixedStepError::Simulate(SimulateError::Flow(MotionError::Flow(
-                FlowError::Shape { .. },
-            ))) => Self::input(error.to_string(), "give 1 or more {steps}"),
-            FixedStepError::Simulate(error) => error.into(),
-            FixedStepError::Rigid | FixedStepError::Nonlinear => Self::input(
-                error.to_string(),
-                "leave {method} out: the exact flow runs it",
-            ),
-            FixedStepError::Overflow { .. } => Self::numerics(error.to_string()),
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::ErrorKind;
     use crate::model::cantilever::Cantilever;
     use crate::model::parameter::Parameter;
+    use crate::study::value::Steps;
 
     /// Without contact the method is of fourth order and finds the forced response.
     #[test]
@@ -385,9 +328,10 @@ mod tests {
             .with(Parameter::Alpha3, 1.0);
         let model = Model::cantilever(&case).unwrap();
         let run = |steps| {
-            let options = FixedStepOptions {
-                steps: [steps; 2],
-                transient: 60,
+            let options = SimulateOptions {
+                periods: 128,
+                steps: Steps([steps; 2]),
+                transient: Some(60),
                 ..Default::default()
             };
             fixed_step_run(&model, &options).unwrap()
@@ -416,10 +360,10 @@ mod tests {
             crate::study::orbit::orbit(&model, &crate::study::orbit::OrbitOptions::default())
                 .unwrap();
         let steps = 4000;
-        let options = FixedStepOptions {
-            steps: [steps; 2],
+        let options = SimulateOptions {
+            steps: Steps([steps; 2]),
             state: Some(exact.state.clone()),
-            transient: 0,
+            transient: Some(0),
             periods: 2,
             ..Default::default()
         };
@@ -433,22 +377,15 @@ mod tests {
     #[test]
     fn what_it_cannot_do_is_refused() {
         let model = Model::cantilever(&Cantilever::paper()).unwrap();
-        let few = FixedStepOptions {
-            steps: [3, 3],
-            transient: 2000,
-            ..Default::default()
+        let refused = |steps| {
+            let options = SimulateOptions {
+                steps: Steps(steps),
+                transient: Some(2000),
+                ..Default::default()
+            };
+            fixed_step_run(&model, &options).unwrap_err()
         };
-        assert!(matches!(
-            fixed_step_run(&model, &few),
-            Err(FixedStepError::Overflow { .. })
-        ));
-        let none = FixedStepOptions {
-            steps: [0, 10],
-            ..Default::default()
-        };
-        assert!(matches!(
-            fixed_step_run(&model, &none),
-            Err(FixedStepError::Simulate(_))
-        ));
+        assert!(refused([3, 3]).message().contains("take more steps"));
+        assert_eq!(refused([0, 10]).kind, ErrorKind::BadInput);
     }
 }

@@ -1,133 +1,51 @@
-//! One run: the transient thrown away, the motion recorded, observed and named.
+//! Simulation of a motion: the transient is discarded, the rest recorded, measured and classified.
 
 pub mod fixed_step;
 
 use std::time::Instant;
 
 pub use nanotap_dynamics::ClassifyOptions;
-use nanotap_dynamics::{LyapunovSpectrum, MotionKind, PeriodicOrbit, StroboscopicMap, classify};
+use nanotap_dynamics::{
+    LyapunovSpectrum, MotionKind, PeriodicOrbit, StroboscopicMap, Torus, classify,
+};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::Error;
 use crate::case::Case;
 use crate::control::Control;
+use crate::model::model_map::ModelMap;
 use crate::model::recording::Recording;
-use crate::model::strobe::Strobe;
 use crate::model::{Model, MotionError};
 use crate::observe::PhysicalMotion;
-use crate::observe::{ContactEvent, Kept, Observables, OutOfRange, Set, watch};
+use crate::observe::{ContactEvent, ObservableSet, Observables, OutOfRange, RecordOptions, record};
+use crate::study::Study;
 use crate::study::in_si::InSi;
-use crate::study::kind::Study;
-use crate::study::limits::{MOST_PERIOD, MOST_PERIODS, MOST_SAMPLES, MOST_STATE_NUMBERS};
+use crate::study::limits::{MAX_PERIOD, MAX_PERIODS, MAX_SAMPLES, MAX_STATE_NUMBERS};
+use crate::study::request::options;
 use crate::study::value::Steps;
-use fixed_step::{FixedStepOptions, FixedStepRun, Switching, fixed_step_run};
-
-/// How to run.
-#[derive(Clone, Debug, PartialEq)]
-pub struct SimulateOptions {
-    /// Drive periods recorded.
-    pub periods: usize,
-    /// Drive periods thrown away first; `None`: as many as the motion is measured to need.
-    pub transient: Option<usize>,
-    /// The state at the start; `None`: rest.
-    pub state: Option<Vec<f64>>,
-    /// How many of the last states at drive phase 0 to keep.
-    pub strobe: usize,
-    /// How many of the events to list, the first ones.
-    pub events: usize,
-    /// What is measured.
-    pub observables: Set,
-    /// Budgets for naming the motion.
-    pub classify: ClassifyOptions,
-}
-
-impl Default for SimulateOptions {
-    fn default() -> Self {
-        Self {
-            periods: 50,
-            transient: None,
-            state: None,
-            strobe: 1,
-            events: LISTED_EVENTS,
-            observables: Set::ALL,
-            classify: ClassifyOptions::default(),
-        }
-    }
-}
-
-/// Why a run failed.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum SimulateError {
-    /// The starting state has the wrong length.
-    #[error("the state has {found} numbers where {expected} are needed: {layout}")]
-    State {
-        /// Its length.
-        found: usize,
-        /// The dimension of the model.
-        expected: usize,
-        /// What the numbers are.
-        layout: &'static str,
-    },
-    /// A number of the starting state is none.
-    #[error("number {number} of the state is {value}; a finite number is needed")]
-    StateValue {
-        /// Which, from 1.
-        number: usize,
-        /// What was given.
-        value: f64,
-    },
-    /// The starting state lies behind a rigid stop.
-    #[error("the state's x = {x} lies behind the rigid stop at {stop}")]
-    BehindStop {
-        /// Its displacement.
-        x: f64,
-        /// Where the stop stands.
-        stop: f64,
-    },
-    /// Nothing to record.
-    #[error("at least one period must be recorded, 0 were asked for")]
-    NoPeriods,
-    /// More states to keep than fit into memory.
-    #[error("{states} states of {dimension} numbers are too many to keep; {limit} at most")]
-    TooManyStates {
-        /// States to keep.
-        states: usize,
-        /// Dimension of the model.
-        dimension: usize,
-        /// Most that are kept.
-        limit: usize,
-        /// The option that says how many.
-        option: &'static str,
-    },
-    /// The flow failed.
-    #[error(transparent)]
-    Flow(#[from] MotionError),
-    /// The work was stopped.
-    #[error("stopped before the end")]
-    Stopped,
-}
+use fixed_step::{FixedStepRun, fixed_step_run};
 
 /// What a motion was found to be.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Classification {
-    /// It goes to a stable periodic orbit, closed by Newton.
+    /// Converges to a stable periodic orbit, closed by Newton's method.
     Periodic,
-    /// It fills a torus.
+    /// Quasi-periodic: on a torus.
     QuasiPeriodic,
-    /// It is chaotic for as long as it was watched.
+    /// Chaotic during the whole run.
     Chaotic,
-    /// It leaves every bound.
+    /// Unbounded.
     Unbounded,
-    /// It is observed before it has settled, as where the distance changes at a finite speed.
+    /// Measured during a transient, as where the distance changes at a finite speed.
     Transient,
-    /// None of these could be shown.
+    /// Undecided.
     Undecided,
 }
 
 impl Classification {
-    /// The word for it.
+    /// Name in documents.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Periodic => "periodic",
@@ -145,11 +63,11 @@ impl Classification {
 pub struct Simulation {
     /// Drive periods recorded.
     pub periods: usize,
-    /// Drive periods thrown away first.
+    /// Drive periods of the discarded transient.
     pub transient: usize,
     /// The state at the end of the transient, where the recording starts.
     pub start: Vec<f64>,
-    /// What the motion was found to be, followed on from the end of the transient.
+    /// Class of the motion, followed on from the end of the transient.
     pub classification: Classification,
     /// Its minimal period in drive periods, if periodic.
     pub period: Option<usize>,
@@ -162,24 +80,24 @@ pub struct Simulation {
     /// the orbit's size: what is recorded is the orbit only where this is rounding.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub distance_to_orbit: Option<f64>,
-    /// States at the end of each of the last periods asked for.
+    /// States at the end of each of the last requested periods.
     pub strobe: Vec<Vec<f64>>,
-    /// Contacts begun and ended, the first of them.
+    /// Contacts begun and ended, up to a limit.
     pub events: Vec<ContactEvent>,
-    /// How many more there were than are listed.
+    /// Number of events that are not listed.
     #[serde(skip_serializing_if = "is_none")]
     pub events_left_out: usize,
-    /// What can be read off the recorded stretch.
+    /// Observables of the recorded part.
     #[serde(flatten)]
     pub observables: Observables,
-    /// What of the range of a nonlinear force law it leaves.
+    /// Excursions beyond the range of a nonlinear force law.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub out_of_range: Vec<OutOfRange>,
-    /// Speed of the propagation alone, drive periods a second.
+    /// Speed of the propagation alone, drive periods per second.
     pub periods_per_second: f64,
     /// Evaluations of the gap a drive period; of the force under a nonlinear law.
     pub evaluations_per_period: f64,
-    /// The stable orbit it goes to, if periodic.
+    /// The stable orbit to which the motion converges, if periodic.
     #[serde(skip)]
     pub orbit: Option<PeriodicOrbit>,
     /// The first recorded periods, for figures and time series.
@@ -187,7 +105,7 @@ pub struct Simulation {
     pub trajectory: Recording,
 }
 
-/// Events that are listed unless more are asked for: their JSON stays below 10 MB.
+/// Events listed by default: their JSON stays below 10 MB.
 const LISTED_EVENTS: usize = 50_000;
 
 /// Whether a count may be left out of a document.
@@ -205,31 +123,31 @@ const ARRIVED: f64 = 1e-11;
 ///
 /// # Errors
 /// When the state does not fit or the flow fails.
-pub fn simulate(model: &Model, options: &SimulateOptions) -> Result<Simulation, SimulateError> {
+pub fn simulate(model: &Model, options: &SimulateOptions) -> Result<Simulation, Error> {
     let mut state = starting_state(model, options.state.as_deref())?;
-    if options.periods == 0 {
-        return Err(SimulateError::NoPeriods);
-    }
+    check_periods(options.periods)?;
     check_states(model, options.strobe.min(options.periods), "strobe")?;
-    let mut map = Strobe::new(model);
+    let how = options.classify();
+    let mut map = ModelMap::new(model);
     let transient = if let Some(transient) = options.transient {
         map.advance_by(&mut state, transient)?;
         transient
     } else {
-        measured_transient(&mut map, &mut state, &options.classify)
+        measured_transient(&mut map, &mut state, &how)
     };
     let (periods_per_second, evaluations_per_period) = speed(model, &state, options.periods)?;
-    let kept = Kept {
+    let kept = RecordOptions {
         recorded: SHOWN,
         states: options.strobe,
         events: true,
         each_period: false,
     };
-    let observed = OutOfRange::observed_with(model, options.observables);
-    let mut record = watch(model, &state, options.periods, observed, kept)?;
+    let observed =
+        OutOfRange::observed_with(model, options.observables.unwrap_or(ObservableSet::ALL));
+    let mut record = record(model, &state, options.periods, observed, kept)?;
     let events_left_out = record.events.len().saturating_sub(options.events);
     record.events.truncate(options.events);
-    let named = Named::of(&classify(&mut map, &state, &options.classify).kind);
+    let named = Named::of(&classify(&mut map, &state, &how).kind);
     Ok(Simulation {
         periods: options.periods,
         transient,
@@ -254,24 +172,30 @@ pub fn simulate(model: &Model, options: &SimulateOptions) -> Result<Simulation, 
     })
 }
 
-/// Refuses to keep more states than fit into memory.
-///
-/// # Errors
-/// [`SimulateError::TooManyStates`].
+/// Refuses a run without a recorded period.
+pub(in crate::study) fn check_periods(periods: usize) -> Result<(), Error> {
+    if periods == 0 {
+        return Err(Error::input(
+            "expected at least one recorded period, got 0",
+            "give 1 or more {periods}",
+        ));
+    }
+    Ok(())
+}
+
+/// Refuses to keep more states than fit into memory; `option` is the option that says how many.
 pub(in crate::study) fn check_states(
     model: &Model,
     states: usize,
     option: &'static str,
-) -> Result<(), SimulateError> {
+) -> Result<(), Error> {
     let dimension = model.dimension();
-    let limit = MOST_STATE_NUMBERS / dimension;
+    let limit = MAX_STATE_NUMBERS / dimension;
     if states > limit {
-        return Err(SimulateError::TooManyStates {
-            states,
-            dimension,
-            limit,
-            option,
-        });
+        return Err(Error::input(
+            format!("{states} states of {dimension} numbers are too many to keep; {limit} at most"),
+            format!("give fewer {{{option}}}"),
+        ));
     }
     Ok(())
 }
@@ -280,8 +204,9 @@ pub(in crate::study) fn check_states(
 /// with a memory is relaxed where the state does not say otherwise.
 ///
 /// # Errors
-/// [`SimulateError::State`] when its length does not fit.
-pub fn starting_state(model: &Model, state: Option<&[f64]>) -> Result<Vec<f64>, SimulateError> {
+/// When its length does not fit, a number is not finite, or it lies behind a rigid stop.
+pub fn starting_state(model: &Model, state: Option<&[f64]>) -> Result<Vec<f64>, Error> {
+    let refused = |message| Err(Error::input(message, "count the numbers of {state}"));
     let n = model.dimension();
     let Some(state) = state else {
         return Ok(model.start.clone().unwrap_or_else(|| model.rest()));
@@ -298,22 +223,27 @@ pub fn starting_state(model: &Model, state: Option<&[f64]>) -> Result<Vec<f64>, 
         } else {
             "x, then its rate"
         };
-        return Err(SimulateError::State {
-            found: state.len(),
-            expected: n,
-            layout,
-        });
+        return refused(format!(
+            "the state has {} numbers where {n} are needed: {layout}",
+            state.len()
+        ));
     }
     if let Some((k, &value)) = state.iter().enumerate().find(|(_, v)| !v.is_finite()) {
-        return Err(SimulateError::StateValue {
-            number: k + 1,
-            value,
-        });
+        return refused(format!(
+            "number {} of the state is {value}; a finite number is needed",
+            k + 1
+        ));
     }
     if let Some(stop) = model.rigid_stop.map(|stop| stop.tip)
         && state[0] > stop + BEHIND_STOP * stop.abs().max(state[0].abs())
     {
-        return Err(SimulateError::BehindStop { x: state[0], stop });
+        return Err(Error::input(
+            format!(
+                "the state's x = {} lies behind the rigid stop at {stop}",
+                state[0]
+            ),
+            "give a {state} in front of the stop",
+        ));
     }
     Ok(state)
 }
@@ -324,7 +254,7 @@ const BEHIND_STOP: f64 = 1e-9;
 /// Runs until the motion has been named. If it goes to a periodic orbit, the state becomes
 /// the orbit's own and the rest of the decay, which the multipliers tell, counts as waited
 /// for: near a multiplier of modulus one it takes longer than anyone would run.
-fn measured_transient(map: &mut Strobe, state: &mut [f64], options: &ClassifyOptions) -> usize {
+fn measured_transient(map: &mut ModelMap, state: &mut [f64], options: &ClassifyOptions) -> usize {
     let classified = classify(map, state, options);
     state.copy_from_slice(&classified.state);
     let (MotionKind::Periodic(orbit) | MotionKind::TransientChaos { orbit, .. }) = &classified.kind
@@ -347,7 +277,7 @@ fn measured_transient(map: &mut Strobe, state: &mut [f64], options: &ClassifyOpt
 /// periods: a long run is not made longer by them.
 fn speed(model: &Model, state: &[f64], periods: usize) -> Result<(f64, f64), MotionError> {
     let periods = periods.min(SHOWN);
-    let mut map = Strobe::new(model);
+    let mut map = ModelMap::new(model);
     let mut state = state.to_vec();
     let clock = Instant::now();
     map.advance_by(&mut state, periods)?;
@@ -371,6 +301,26 @@ pub(crate) fn largest_exponent(spectrum: &LyapunovSpectrum) -> String {
     )
 }
 
+/// Why a motion is periodic, in words.
+pub(crate) fn orbit_evidence(orbit: &PeriodicOrbit) -> String {
+    format!(
+        "Newton closed a period-{} orbit (residual {:.1e}); largest |multiplier| {:.6}",
+        orbit.period,
+        orbit.residual,
+        orbit.spectral_radius()
+    )
+}
+
+/// Why a motion is quasi-periodic, in words.
+pub(crate) fn torus_evidence(torus: &Torus) -> String {
+    format!(
+        "{}; Birkhoff averages agree to {:.1} digits; nearest return {:.1e}",
+        largest_exponent(&torus.spectrum),
+        torus.birkhoff_digits,
+        torus.nearest_return
+    )
+}
+
 /// A verdict in the words of the output.
 #[derive(Clone, Debug)]
 pub struct Named {
@@ -387,15 +337,7 @@ pub struct Named {
 impl Named {
     /// Names a verdict.
     pub fn of(verdict: &MotionKind) -> Self {
-        let exponent = largest_exponent;
-        let periodic = |orbit: &PeriodicOrbit| {
-            format!(
-                "Newton closed a period-{} orbit (residual {:.1e}); largest |multiplier| {:.6}",
-                orbit.period,
-                orbit.residual,
-                orbit.spectral_radius()
-            )
-        };
+        let (exponent, periodic) = (largest_exponent, orbit_evidence);
         let (classification, orbit, spectrum, evidence) = match verdict {
             MotionKind::Periodic(orbit) => {
                 (Classification::Periodic, Some(orbit), None, periodic(orbit))
@@ -418,12 +360,7 @@ impl Named {
                 Classification::QuasiPeriodic,
                 None,
                 Some(&torus.spectrum),
-                format!(
-                    "{}; Birkhoff averages agree to {:.1} digits; nearest return {:.1e}",
-                    exponent(&torus.spectrum),
-                    torus.birkhoff_digits,
-                    torus.nearest_return
-                ),
+                torus_evidence(torus),
             ),
             MotionKind::Chaotic(chaos) => (
                 Classification::Chaotic,
@@ -480,100 +417,50 @@ pub enum Grid {
     Stage,
 }
 
-/// What one run is asked for.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct SimulateRequest {
-    /// Drive periods recorded
-    #[schemars(range(min = 1, max = MOST_RECORDED), extend("x-value" = "P"))]
-    pub periods: usize,
-    /// Drive periods discarded first; without it, as many as the motion is measured to need; 0:
-    /// from the start
-    #[schemars(range(min = 0, max = MOST_PERIODS), extend("x-value" = "T"))]
-    pub transient: Option<usize>,
-    /// State at the start, drive phase 0: a1,…,aN,v1,…,vN (oscillator: x,v); without it, rest
-    #[schemars(extend("x-value" = "A1,…"))]
-    pub state: Option<Vec<f64>>,
-    /// How many of the last states at drive phase 0 to keep
-    #[schemars(range(min = 0, max = MOST_LISTED), extend("x-value" = "K"))]
-    pub strobe: usize,
-    /// How many contacts and releases to list at most, the first ones
-    #[schemars(range(min = 0, max = MOST_LISTED), extend("x-value" = "K"))]
-    pub events: usize,
-    /// Longest period looked for
-    #[schemars(range(min = 1, max = MOST_PERIOD), extend("x-value" = "N"))]
-    pub max_period: usize,
-    /// Observables to measure; without it, every one that there is, the beam's clearance included
-    #[schemars(extend("x-value" = "NAME,…"))]
-    pub observables: Option<Set>,
-    /// Samples a drive period in the time series
-    #[schemars(range(min = 1, max = MOST_SAMPLES), extend("x-value" = "S"))]
-    pub resolution: usize,
-    /// How the motion is computed
-    pub method: Method,
-    /// Of rk4: steps a drive period, in free flight and (after a comma) in contact
-    #[schemars(extend("x-value" = "FREE,CONTACT"))]
-    pub steps: Steps,
-    /// Of rk4: where within a step the regime is looked at
-    pub switching: Grid,
+options! {
+    /// Options of one run.
+    pub struct SimulateOptions {
+        /// Number of recorded drive periods
+        #[schemars(range(min = 1, max = MAX_RECORDED), extend("x-value" = "P"))]
+        pub periods: usize = 50,
+        /// Drive periods of the discarded transient; default: until the motion has settled; 0: none
+        #[schemars(range(min = 0, max = MAX_PERIODS), extend("x-value" = "T"))]
+        pub transient: Option<usize> = None,
+        /// Initial state at drive phase 0: a1,…,aN,v1,…,vN (oscillator: x,v); default: rest
+        #[schemars(extend("x-value" = "A1,…"))]
+        pub state: Option<Vec<f64>> = None,
+        /// Number of last states at drive phase 0 to keep
+        #[schemars(range(min = 0, max = MAX_LISTED), extend("x-value" = "K"))]
+        pub strobe: usize = 1,
+        /// Maximum number of listed contacts and releases
+        #[schemars(range(min = 0, max = MAX_LISTED), extend("x-value" = "K"))]
+        pub events: usize = LISTED_EVENTS,
+        /// Longest period of orbits, in drive periods
+        #[schemars(range(min = 1, max = MAX_PERIOD), extend("x-value" = "N"))]
+        pub max_period: usize = ClassifyOptions::default().max_period,
+        /// Observables to measure; default: all, including the clearance of the beam
+        #[schemars(extend("x-value" = "NAME,…"))]
+        pub observables: Option<ObservableSet> = None,
+        /// Samples per drive period in the time series
+        #[schemars(range(min = 1, max = MAX_SAMPLES), extend("x-value" = "S"))]
+        pub resolution: usize = 200,
+        /// Method of computation
+        pub method: Method = Method::default(),
+        /// For rk4: steps per drive period, in free flight and (after a comma) in contact
+        #[schemars(extend("x-value" = "FREE,CONTACT"))]
+        pub steps: Steps = Steps::default(),
+        /// For rk4: where within a step the regime is checked
+        pub switching: Grid = Grid::default(),
+    }
 }
 
 /// Most drive periods recorded: their events fill some hundred megabytes.
-pub const MOST_RECORDED: usize = 2_000_000;
+pub const MAX_RECORDED: usize = 2_000_000;
 /// Most events, and states at drive phase 0, that are listed.
-const MOST_LISTED: usize = 1_000_000;
+const MAX_LISTED: usize = 1_000_000;
 
-impl Default for SimulateRequest {
-    fn default() -> Self {
-        let options = SimulateOptions::default();
-        Self {
-            periods: options.periods,
-            transient: options.transient,
-            state: options.state,
-            strobe: options.strobe,
-            events: options.events,
-            max_period: options.classify.max_period,
-            observables: None,
-            resolution: 200,
-            method: Method::default(),
-            steps: Steps::default(),
-            switching: Grid::default(),
-        }
-    }
-}
-
-impl SimulateRequest {
-    /// How to run exactly.
-    pub fn options(&self) -> SimulateOptions {
-        SimulateOptions {
-            periods: self.periods,
-            transient: self.transient,
-            state: self.state.clone(),
-            strobe: self.strobe,
-            events: self.events,
-            observables: self.observables.unwrap_or(Set::ALL),
-            classify: self.classify(),
-        }
-    }
-
-    /// How to run with fixed steps.
-    pub fn fixed_step_options(&self) -> FixedStepOptions {
-        let default = FixedStepOptions::default();
-        FixedStepOptions {
-            periods: self.periods,
-            transient: self.transient.unwrap_or(default.transient),
-            state: self.state.clone(),
-            strobe: self.strobe,
-            events: self.events,
-            steps: self.steps.0,
-            switching: match self.switching {
-                Grid::Step => Switching::EveryStep,
-                Grid::Stage => Switching::EveryStage,
-            },
-            classify: self.classify(),
-        }
-    }
-
+impl SimulateOptions {
+    /// Budgets for naming the motion.
     fn classify(&self) -> ClassifyOptions {
         ClassifyOptions {
             max_period: self.max_period,
@@ -582,59 +469,40 @@ impl SimulateRequest {
     }
 }
 
-/// What one run came to.
+/// Result of a simulation.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
 #[serde(untagged)]
 pub enum SimulateReport {
-    /// By the exact flow.
+    /// From the exact flow.
     Exact(Box<InSi<Simulation>>),
-    /// By fixed steps.
+    /// From fixed time steps.
     FixedStep(Box<FixedStepRun>),
 }
 
-/// One run.
+/// Simulates a motion.
 #[derive(Clone, Copy, Debug)]
 pub struct SimulateStudy;
 
 impl Study for SimulateStudy {
     const NAME: &'static str = "simulate";
-    const ABOUT: &'static str = "One run: its steady state, or how it gets there";
-    type Request = SimulateRequest;
+    const ABOUT: &'static str = "Simulate a motion: its steady state or its transient";
+    type Options = SimulateOptions;
     type Report = SimulateReport;
 
     fn compute(
         case: &Case,
-        request: &SimulateRequest,
+        options: &SimulateOptions,
         _: &Control<'_>,
     ) -> Result<SimulateReport, Error> {
         let model = case.model()?;
-        if request.method == Method::Rk4 {
-            let run = fixed_step_run(&model, &request.fixed_step_options())?;
+        if options.method == Method::Rk4 {
+            let run = fixed_step_run(&model, options)?;
             return Ok(SimulateReport::FixedStep(Box::new(run)));
         }
-        let motion = simulate(&model, &request.options())?;
+        let motion = simulate(&model, options)?;
         let physical = case
             .physical()
             .map(|resolved| PhysicalMotion::alone(&motion.observables, None, resolved));
         Ok(SimulateReport::Exact(Box::new(InSi { motion, physical })))
-    }
-}
-
-impl From<SimulateError> for crate::Error {
-    fn from(error: SimulateError) -> Self {
-        match error {
-            SimulateError::State { .. } | SimulateError::StateValue { .. } => {
-                Self::input(error.to_string(), "count the numbers of {state}")
-            }
-            SimulateError::BehindStop { .. } => {
-                Self::input(error.to_string(), "give a {state} in front of the stop")
-            }
-            SimulateError::TooManyStates { option, .. } => {
-                Self::input(error.to_string(), format!("give fewer {{{option}}}"))
-            }
-            SimulateError::NoPeriods => Self::input(error.to_string(), "give 1 or more {periods}"),
-            SimulateError::Flow(error) => error.into(),
-            SimulateError::Stopped => Self::new(crate::ErrorKind::Stopped, error.to_string()),
-        }
     }
 }

@@ -2,23 +2,24 @@
 
 use serde_json::{Value, json};
 
-use super::SweepOptions;
-use super::error::{SweepError, check_size};
+use super::check::{check_size, model};
 use super::follow::Follow;
 use super::over::Over;
 use super::run::{Outcome, Starts};
+use super::{Runs, SweepOptions};
+use crate::Error;
 use crate::case::Case;
 use crate::case::physical::Kind as QuantityKind;
 use crate::dataset::schema::Kind;
 use crate::dataset::{Axis, Coordinate, Grid, Schema, Values, Variable, attributes};
-use crate::observe::{Dimension, Observable, Set};
+use crate::observe::{Dimension, Observable, ObservableSet};
 use crate::study::simulate::Classification;
 
 /// Chunks that a large sweep is cut into at least: enough for a job array, few enough
 /// for a file system.
 const CHUNKS: usize = 64;
 /// Most runs of a chunk: what a kill loses at most.
-const MOST_RUNS: usize = 4096;
+const MAX_RUNS: usize = 4096;
 /// Bytes that a chunk should not exceed.
 const CHUNK_BYTES: usize = 16 << 20;
 
@@ -30,6 +31,12 @@ pub(super) const CLASSES: [Classification; 5] = [
     Classification::Unbounded,
     Classification::Undecided,
 ];
+
+/// The classification of a code; none of a missing one.
+pub(crate) fn class_of(code: u8) -> Option<Classification> {
+    let index = usize::from(code).checked_sub(1)?;
+    CLASSES.get(index).copied()
+}
 
 /// The code of a classification.
 fn code(classification: Classification) -> u8 {
@@ -47,16 +54,21 @@ pub(super) const STATE: &str = "state";
 pub(super) const START: &str = "start";
 
 /// What the dataset of a sweep holds.
-pub(super) fn schema(case: &Case, options: &SweepOptions) -> Result<Schema, SweepError> {
-    let lanes = options.starts.count() * options.follow.directions().len().max(1);
-    let states = state_names(case, options)?;
+pub(super) fn schema(runs: &Runs) -> Result<Schema, Error> {
+    let Runs {
+        case,
+        options,
+        over,
+        starts,
+    } = runs;
+    let lanes = starts.count() * options.follow.directions().len().max(1);
+    let states = state_names(case, over)?;
     let si = case.physical().is_some();
     let variables = variables(options, states.len(), si);
     let bytes: usize = variables.iter().map(|v| v.stride() * v.kind.size()).sum();
-    let x = &options.over[0];
-    let (along_x, along_starts) = cut(options, lanes, bytes);
-    let mut axes: Vec<Axis> = options
-        .over
+    let x = &over[0];
+    let (along_x, along_starts) = cut(runs, lanes, bytes);
+    let mut axes: Vec<Axis> = over
         .iter()
         .skip(1)
         .map(|over| Axis::new(over.key.path(), over.count, 1))
@@ -68,38 +80,30 @@ pub(super) fn schema(case: &Case, options: &SweepOptions) -> Result<Schema, Swee
     Ok(Schema {
         grid,
         variables,
-        coordinates: coordinates(options, lanes, states),
-        attributes: attributes(case, options),
+        coordinates: coordinates(runs, lanes, states),
+        attributes: attributes(runs),
     })
 }
 
 /// Values of the first parameter, and starts, in one chunk.
-fn cut(options: &SweepOptions, lanes: usize, bytes: usize) -> (usize, usize) {
-    if options.follow != Follow::Off {
-        return (options.over[0].count, 1);
+fn cut(runs: &Runs, lanes: usize, bytes: usize) -> (usize, usize) {
+    if runs.options.follow != Follow::Off {
+        return (runs.over[0].count, 1);
     }
-    let runs = options
-        .over
-        .iter()
-        .map(|over| over.count)
-        .product::<usize>()
-        * lanes;
-    let most = (CHUNK_BYTES / bytes.max(1)).clamp(1, MOST_RUNS);
+    let counts = runs.over.iter().map(|over| over.count);
+    let runs = counts.product::<usize>() * lanes;
+    let most = (CHUNK_BYTES / bytes.max(1)).clamp(1, MAX_RUNS);
     let target = runs.div_ceil(CHUNKS).clamp(1, most);
     let starts = lanes.min(target);
     ((target / starts).max(1), starts)
 }
 
 /// The names of the entries of a state, of the longest one that occurs.
-fn state_names(case: &Case, options: &SweepOptions) -> Result<Vec<String>, SweepError> {
-    let last = options
-        .over
+fn state_names(case: &Case, over: &[Over]) -> Result<Vec<String>, Error> {
+    let last = over
         .iter()
         .fold(case.clone(), |s, over| over.apply(&s, over.count - 1));
-    let model = last.model().map_err(|source| SweepError::Model {
-        place: "the last values".into(),
-        source,
-    })?;
+    let model = model(&last, "the last values")?;
     Ok(crate::observe::time_series::state_names(&model))
 }
 
@@ -116,7 +120,7 @@ fn variables(options: &SweepOptions, states: usize, si: bool) -> Vec<Variable> {
     let real = |name, long_name, units| Variable::new(name, Kind::Real, long_name, units);
     let names: Vec<&str> = CLASSES.iter().map(|c| c.name()).collect();
     let flags: Vec<usize> = (0..=CLASSES.len()).collect();
-    let strobe = options.strobe.min(options.periods);
+    let strobe = options.strobe();
     let mut variables = vec![
         Variable::new("classification", Kind::Code, "what the motion is", "1")
             .attribute("flag_values", json!(flags))
@@ -135,7 +139,7 @@ fn variables(options: &SweepOptions, states: usize, si: bool) -> Vec<Variable> {
         ),
     ];
     variables.extend(
-        Set::COMMON
+        ObservableSet::COMMON
             .iter()
             .map(|o| real(o.name, o.words, unit(o.dimension))),
     );
@@ -153,13 +157,13 @@ fn variables(options: &SweepOptions, states: usize, si: bool) -> Vec<Variable> {
         ),
         real(
             "period_max",
-            "greatest tip deflection of each recorded drive period",
+            "largest tip deflection of each recorded drive period",
             length,
         )
         .along(PERIODS, options.periods),
         real(
             "period_min",
-            "least tip deflection of each recorded drive period",
+            "smallest tip deflection of each recorded drive period",
             length,
         )
         .along(PERIODS, options.periods),
@@ -178,8 +182,9 @@ fn variables(options: &SweepOptions, states: usize, si: bool) -> Vec<Variable> {
     variables
 }
 
-fn coordinates(options: &SweepOptions, lanes: usize, states: Vec<String>) -> Vec<Coordinate> {
-    let mut coordinates: Vec<Coordinate> = options.over.iter().map(parameter).collect();
+fn coordinates(runs: &Runs, lanes: usize, states: Vec<String>) -> Vec<Coordinate> {
+    let options = &runs.options;
+    let mut coordinates: Vec<Coordinate> = runs.over.iter().map(parameter).collect();
     let whole = |from: usize, to: usize| Values::Whole((from..=to).map(|k| k as i32).collect());
     coordinates.push(Coordinate::of(
         START,
@@ -188,8 +193,7 @@ fn coordinates(options: &SweepOptions, lanes: usize, states: Vec<String>) -> Vec
         "1",
     ));
     if options.follow != Follow::Off {
-        let words =
-            (0..lanes).map(|lane| if options.lane(lane).1 { "up" } else { "down" }.to_owned());
+        let words = (0..lanes).map(|lane| if runs.lane(lane).1 { "up" } else { "down" }.to_owned());
         let mut direction = Coordinate::of(
             START,
             Values::Text(words.collect()),
@@ -205,7 +209,7 @@ fn coordinates(options: &SweepOptions, lanes: usize, states: Vec<String>) -> Vec
         "recorded drive period",
         "1",
     ));
-    let strobe = options.strobe.min(options.periods);
+    let strobe = options.strobe();
     if strobe > 0 {
         let ends = whole(options.periods - strobe + 1, options.periods);
         coordinates.push(Coordinate::of(
@@ -240,11 +244,12 @@ fn parameter(over: &Over) -> Coordinate {
     coordinate
 }
 
-fn attributes(case: &Case, options: &SweepOptions) -> crate::dataset::schema::Attributes {
-    let names: Vec<&str> = options.over.iter().map(|over| over.key.path()).collect();
+fn attributes(runs: &Runs) -> crate::dataset::schema::Attributes {
+    let options = &runs.options;
+    let names: Vec<&str> = runs.over.iter().map(|over| over.key.path()).collect();
     let title = format!("sweep over {}", names.join(" and "));
-    let mut all = attributes::of_case(&title, "sweep", case);
-    let starts = match &options.starts {
+    let mut all = attributes::of_case(&title, "sweep", &runs.case);
+    let starts = match &runs.starts {
         Starts::Rest => json!("rest"),
         Starts::Given(state) => json!({ "state": state }),
         Starts::Seeded { count, seed, sides } => {
@@ -257,11 +262,11 @@ fn attributes(case: &Case, options: &SweepOptions) -> crate::dataset::schema::At
         }
     };
     let recipe: Value = json!({
-        "over": options.over,
+        "over": runs.over,
         "starts": starts,
         "follow": options.follow,
         "periods": options.periods,
-        "strobe": options.strobe.min(options.periods),
+        "strobe": options.strobe(),
         "transient": options.transient,
         "max_period": options.max_period,
     });

@@ -4,7 +4,7 @@
 //! Starts are drawn; an attractor whose basin is small is met at some values and missed at
 //! others. So each stable orbit that the runs ended on is tried at the neighbouring values,
 //! both ways along every parameter, and what is new there at its neighbours in turn
-//! ([`nanotap_dynamics::orbits_shared`]). Where starts of all sizes are drawn at each value, the
+//! ([`nanotap_dynamics::share_orbits`]). Where starts of all sizes are drawn at each value, the
 //! states of a slowly moved lever there ([`states_near`]) are tried as well: one approach
 //! serves all distances of a line of values, and of many lines or values some are chosen, whose
 //! states neighbours lead to in turn. What that finds is stored with the dataset, in
@@ -15,19 +15,20 @@
 
 use nanotap_dynamics::{
     AttractorKind, Control, PeriodicOrbit, ShootingOptions, close_orbit, grid_neighbours,
-    orbits_shared,
+    share_orbits,
 };
 use rayon::prelude::*;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::run::is_on;
-use super::{Motions, Starts, Sweep};
+use super::{Runs, Starts};
 use crate::case::{Case, CaseError, Key};
-use crate::dataset::{Store, StoreError, Values, WorkError};
-use crate::model::strobe::Strobe;
-use crate::observe::{Set, measure};
+use crate::dataset::{Store, StoreError, WorkError};
+use crate::model::model_map::ModelMap;
+use crate::observe::{ObservableSet, measure};
 use crate::study::approach::{states_at, states_near};
+use crate::study::short_run::short_run;
 
 /// The file of a sweep's dataset that keeps them.
 const FILE: &str = "neighbours.json";
@@ -47,19 +48,19 @@ pub struct FromNeighbour {
     pub first_harmonic: f64,
     /// Greatest tip deflection.
     pub tip_max: f64,
-    /// Part of the time in contact.
+    /// Contact time / period.
     pub contact_fraction: f64,
 }
 
-impl Sweep {
+impl Runs {
     /// Tries the orbits of a finished dataset of this sweep at the neighbouring values, and
-    /// keeps beside it what no start had met there; nothing if that was done.
+    /// stores with it what no start had met there; nothing if that was done.
     pub(super) fn share(&self, store: &Store, control: &Control<'_>) -> Result<(), WorkError> {
         if store.read_beside(FILE)?.is_some() {
             return Ok(());
         }
         let found = match store.schema().index_of("strobe") {
-            Some(strobe) if self.options.over.iter().all(|o| o.key != Key::Modes) => {
+            Some(strobe) if self.over.iter().all(|o| o.key != Key::Modes) => {
                 self.gained(store, strobe, control)?
             }
             _ => Vec::new(),
@@ -77,20 +78,20 @@ impl Sweep {
         strobe: usize,
         control: &Control<'_>,
     ) -> Result<Vec<FromNeighbour>, StoreError> {
-        let shape: Vec<usize> = self.options.over.iter().map(|over| over.count).collect();
+        let shape: Vec<usize> = self.over.iter().map(|over| over.count).collect();
         let count: usize = shape.iter().product();
         let place = |k: usize| [k % shape[0], k / shape[0]];
         let case_at = |k: usize| -> Case {
-            let steps = self.options.over.iter().zip(place(k));
+            let steps = self.over.iter().zip(place(k));
             steps.fold(self.case.clone(), |case, (over, index)| {
                 over.apply(&case, index)
             })
         };
         let model_at = |k: usize| case_at(k).model();
-        let map_at = |k: usize| model_at(k).map(|m| Strobe::new(&m));
+        let map_at = |k: usize| model_at(k).map(|m| ModelMap::new(&m));
         let neighbours = grid_neighbours(&shape);
         let states = self.orbit_states(store, strobe, count)?;
-        let quasistatic = match self.options.starts {
+        let quasistatic = match self.starts {
             Starts::Spread { .. } => self.quasistatic(&shape, &case_at, control),
             _ => vec![Vec::new(); count],
         };
@@ -114,8 +115,8 @@ impl Sweep {
             .collect();
         let (own, known): (Vec<usize>, Vec<_>) = known.into_iter().unzip();
         let at = |k: usize| map_at(k).map_err(|error: CaseError| error.to_string());
-        let classify = self.options.classify();
-        let values = orbits_shared(known, at, neighbours, &classify, control);
+        let classify = short_run(self.options.max_period);
+        let values = share_orbits(known, at, neighbours, &classify, control);
         let mut found = Vec::new();
         for (k, value) in values.into_iter().enumerate() {
             let gained = value.attractors.into_iter().skip(own[k]);
@@ -127,7 +128,8 @@ impl Sweep {
                 let case = case_at(k);
                 let turn = if period == 0 { UNREPEATED } else { period };
                 let Ok(model) = case.model() else { continue };
-                let Ok(seen) = measure(&model, &attractor.state, turn, Set::COMMON) else {
+                let Ok(seen) = measure(&model, &attractor.state, turn, ObservableSet::COMMON)
+                else {
                     continue;
                 };
                 let seen = case
@@ -138,7 +140,7 @@ impl Sweep {
                     at: at.to_vec(),
                     values: at
                         .iter()
-                        .zip(&self.options.over)
+                        .zip(&self.over)
                         .map(|(&index, over)| over.value(index))
                         .collect(),
                     period,
@@ -165,7 +167,7 @@ impl Sweep {
             ..*control
         };
         let gap = self.case.gap_key();
-        let distances = self.options.over.iter();
+        let distances = self.over.iter();
         let distances = distances.map(|over| over.key == gap || over.key == Key::GapTip);
         let distances: Vec<bool> = distances.collect();
         let columns = shape[0];
@@ -224,20 +226,21 @@ impl Sweep {
         let columns = columns.map_or(stride, |c| c.values.len());
         let of_chunk = |chunk: usize| -> Result<Vec<(usize, OrbitState)>, StoreError> {
             let block = schema.grid.block(chunk);
-            let periods = Motions::read(store, chunk)?.periods;
-            let Values::Real(rows) = store.read_chunk(&block, strobe)? else {
-                return Ok(Vec::new());
+            let periods = match schema.index_of("period") {
+                Some(period) => store.read_chunk(&block, period)?.numbers(),
+                None => Vec::new(),
             };
+            let rows = store.read_chunk(&block, strobe)?.numbers();
             let mut found = Vec::new();
             for (flat, entry) in block.entries().enumerate() {
-                let period = usize::try_from(periods[flat]).unwrap_or(0);
+                let period = periods.get(flat).map_or(0, |period| *period as usize);
                 let end = (flat + 1) * stride;
                 let state = rows.get(end - columns..end).unwrap_or_default();
                 if period > 0 && state.iter().all(|v| v.is_finite()) {
                     let axis = self.axis();
                     let first = entry[axis];
                     let second = if axis > 0 { entry[0] } else { 0 };
-                    let width = self.options.over[0].count;
+                    let width = self.over[0].count;
                     found.push((second * width + first, (period, state.to_vec())));
                 }
             }
@@ -262,7 +265,7 @@ const LINES: usize = 16;
 const UNREPEATED: usize = 64;
 
 /// The stable orbits among the states that runs ended in, each once.
-fn closed(mut map: Strobe, states: &[OrbitState]) -> Vec<PeriodicOrbit> {
+fn closed(mut map: ModelMap, states: &[OrbitState]) -> Vec<PeriodicOrbit> {
     let mut orbits: Vec<PeriodicOrbit> = Vec::new();
     for (period, state) in states {
         let known = orbits.iter().filter(|o| o.period == *period);
@@ -279,7 +282,7 @@ fn closed(mut map: Strobe, states: &[OrbitState]) -> Vec<PeriodicOrbit> {
     orbits
 }
 
-/// What was kept beside a dataset; nothing where nothing was tried.
+/// The motions stored with a dataset; none where nothing was tried.
 ///
 /// # Errors
 /// When the file cannot be read or is damaged.

@@ -1,9 +1,13 @@
 //! A parameter and the values that it takes: `omega=2:4:400`, `omega=2,2.5,4`.
 
+use std::fmt;
+
 use serde::Serialize;
 
-use crate::case::{Case, Key, NoSuchKey, ValueOfKeyError};
+use crate::Error;
+use crate::case::{Case, Key, ValueOfKeyError};
 use crate::model::beam::MAX_MODES;
+use crate::study::value::Axes;
 
 /// Most values of one parameter.
 const MOST: usize = 1_000_000;
@@ -39,57 +43,14 @@ pub struct Over {
     pub listed: Vec<f64>,
 }
 
-/// Words that name no parameter with values.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum OverError {
-    /// Not of the form.
-    #[error(
-        "`{given}`: {what}; write it as in omega=2:4:400, omega=2:200:50:log, or omega=2,2.5,4"
-    )]
-    Form {
-        /// What was given.
-        given: String,
-        /// What is missing or too much.
-        what: &'static str,
-    },
-    /// An unknown parameter.
-    #[error("`{given}`: {source}")]
-    Key {
-        /// What was given.
-        given: String,
-        /// The name that is none.
-        source: NoSuchKey,
-    },
-    /// Something that is no number.
-    #[error("`{given}`: {which} `{value}` is no {wanted}")]
-    Number {
-        /// What was given.
-        given: String,
-        /// Which of the numbers.
-        which: &'static str,
-        /// Its text.
-        value: String,
-        /// What it should be.
-        wanted: &'static str,
-    },
-    /// Something that is no quantity.
-    #[error("`{given}`: {which}: {source}")]
-    Quantity {
-        /// What was given.
-        given: String,
-        /// Which of the values.
-        which: &'static str,
-        /// Why not.
-        source: Box<crate::case::quantity::QuantityError>,
-    },
-    /// Numbers that make no range.
-    #[error("`{given}`: {what}")]
-    Range {
-        /// What was given.
-        given: String,
-        /// What is wrong, and what would be right.
-        what: String,
-    },
+impl Axes {
+    /// The parameters with their values.
+    ///
+    /// # Errors
+    /// When a parameter or a value is not valid for the case.
+    pub fn parse(&self, case: &Case) -> Result<Vec<Over>, Error> {
+        self.0.iter().map(|axis| Over::parse(axis, case)).collect()
+    }
 }
 
 impl Over {
@@ -97,32 +58,26 @@ impl Over {
     /// `key=a,b,c`, for `case`; `model.` before the key may be left away.
     ///
     /// # Errors
-    /// [`OverError`] with what was given and what would be right.
-    pub fn parse(given: &str, case: &Case) -> Result<Self, OverError> {
-        let form = |what| OverError::Form {
-            given: given.into(),
-            what,
+    /// When it has another form, or parameter or values are not valid for the case.
+    pub fn parse(given: &str, case: &Case) -> Result<Self, Error> {
+        let wrong = |what: &dyn fmt::Display| wrong(given, what);
+        let form = |what: &str| {
+            wrong(&format_args!(
+                "{what}; write it as in omega=2:4:400, omega=2:200:50:log, or omega=2,2.5,4"
+            ))
         };
-        let (name, range) = given
-            .split_once('=')
-            .ok_or_else(|| form("there is no `=`"))?;
+        let (name, range) = given.split_once('=').ok_or_else(|| form("missing `=`"))?;
         let key = key(given, name.trim(), case)?;
         let number = |which, text: &str| {
-            let no_number = |value: &str| OverError::Number {
-                given: given.into(),
-                which,
-                value: value.into(),
-                wanted: "finite number",
-            };
+            let no_number =
+                |value: &str| wrong(&format_args!("{which} `{value}` is not a finite number"));
             match case.value(key, text) {
                 Ok(value) if value.is_finite() => Ok(value),
                 Ok(_) => Err(no_number(text)),
                 Err(ValueOfKeyError::NotANumber { text }) => Err(no_number(&text)),
-                Err(ValueOfKeyError::Quantity { error: source, .. }) => Err(OverError::Quantity {
-                    given: given.into(),
-                    which,
-                    source,
-                }),
+                Err(ValueOfKeyError::Quantity { error, .. }) => {
+                    Err(wrong(&format_args!("{which}: {error}")))
+                }
             }
         };
         let over = if range.contains(',') && !range.contains(':') {
@@ -136,20 +91,14 @@ impl Over {
                 key,
                 from: number("the first value", from)?,
                 to: number("the last value", to)?,
-                count: count.parse().map_err(|_| OverError::Number {
-                    given: given.into(),
-                    which: "the count",
-                    value: count.into(),
-                    wanted: "whole number",
+                count: count.parse().map_err(|_| {
+                    wrong(&format_args!("the count `{count}` is not a whole number"))
                 })?,
                 spacing,
                 listed: Vec::new(),
             }
         };
-        over.check().map_err(|what| OverError::Range {
-            given: given.into(),
-            what,
-        })?;
+        over.check().map_err(|what| wrong(&what))?;
         Ok(over)
     }
 
@@ -166,7 +115,7 @@ impl Over {
     }
 
     /// Whether the numbers make a range; the reason if not.
-    pub(super) fn check(&self) -> Result<(), String> {
+    fn check(&self) -> Result<(), String> {
         let Self {
             from, to, count, ..
         } = *self;
@@ -248,25 +197,21 @@ fn split(range: &str) -> Result<(&str, &str, &str, Spacing), &'static str> {
     Ok((from, to, count, spacing))
 }
 
-fn key(given: &str, name: &str, case: &Case) -> Result<Key, OverError> {
+fn key(given: &str, name: &str, case: &Case) -> Result<Key, Error> {
     let modes = Key::Modes.name();
     if name.strip_prefix("model.").unwrap_or(name) == modes && case.cantilever().is_some() {
         return Ok(Key::Modes);
     }
-    case.key(name).map_err(|source| OverError::Key {
-        given: given.into(),
-        source,
-    })
+    case.key(name).map_err(|error| wrong(given, &error))
 }
 
-impl From<OverError> for crate::Error {
-    fn from(error: OverError) -> Self {
-        Self::option(
-            "over",
-            error.to_string(),
-            "write omega=2:4:400: parameter, first value, last value, how many; or the values, omega=2,2.5,4",
-        )
-    }
+/// The error of an axis that is not valid.
+fn wrong(given: &str, what: &dyn fmt::Display) -> Error {
+    Error::option(
+        "over",
+        format!("`{given}`: {what}"),
+        "write omega=2:4:400: parameter, first value, last value, how many; or the values, omega=2,2.5,4",
+    )
 }
 
 #[cfg(test)]
@@ -317,7 +262,7 @@ mod tests {
             ("omega=2:4:-3", "whole number"),
             ("omega=2:4:2.5", "whole number"),
             ("omega=2:4:99999999", "from 1 to"),
-            ("omega=4:2:400", "{follow} down"),
+            ("omega=4:2:400", "follow down"),
             ("omega=2:2:400", "greater"),
             ("omega=2:4:1", "one value"),
             ("alpha5=-1:1:50:log", "above 0"),

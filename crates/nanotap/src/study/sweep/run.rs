@@ -1,19 +1,20 @@
 //! One run of a sweep, and the runs of one piece of work.
 
 use nanotap_dynamics::{
-    Classified, ClassifyOptions, LyapunovSpectrum, MotionKind, PeriodicOrbit, StroboscopicMap,
-    classify_beside,
+    Classified, ClassifyOptions, LyapunovSpectrum, MotionKind, PeriodicOrbit, Scheduling as _,
+    StroboscopicMap, classify_beside,
 };
 
-use super::{Sweep, SweepOptions};
+use super::{Runs, SweepOptions};
 use crate::case::Case;
 use crate::case::physical::Scales;
 use crate::dataset::Block;
 use crate::map::UNINTERRUPTED;
-use crate::model::strobe::Strobe;
+use crate::model::model_map::ModelMap;
 use crate::model::{Model, MotionError};
 use crate::observe::time_series::with_modes;
-use crate::observe::{Kept, Observables, Set, Watched, Watcher};
+use crate::observe::{ObservableSet, Observables, RecordOptions, Recorded, Recorder};
+use crate::study::short_run::short_run;
 use crate::study::simulate::{Classification, Named};
 use crate::study::start_box::{box_with, default_starts};
 
@@ -26,7 +27,7 @@ pub enum Starts {
     Given(Vec<f64>),
     /// In seeded quasi-random states.
     Seeded {
-        /// How many.
+        /// Count.
         count: usize,
         /// Their seed.
         seed: u64,
@@ -37,7 +38,7 @@ pub enum Starts {
     /// Rest, the linear responses, and draws of every size
     /// ([`default_starts`](crate::study::start_box::default_starts)).
     Spread {
-        /// How many.
+        /// Count.
         count: usize,
         /// Seed of the draws.
         seed: u64,
@@ -69,13 +70,13 @@ impl Starts {
     }
 }
 
-/// What one run came to.
+/// Result of a simulation.
 #[derive(Clone, Debug)]
 pub(super) struct Outcome {
     pub(super) classification: Classification,
     /// Minimal period, 0 if it is not periodic.
     pub(super) period: usize,
-    /// Periods thrown away.
+    /// Periods discarded.
     pub(super) transient: usize,
     pub(super) observables: Observables,
     /// Largest modulus of a multiplier of the orbit.
@@ -124,16 +125,16 @@ impl Outcome {
 /// The runs from every start of `block` at its `item`-th value of the first parameter;
 /// `None` when it was stopped.
 pub(super) fn at_value(
-    sweep: &Sweep,
+    runs: &Runs,
     block: &Block,
     item: usize,
     cancelled: &impl Fn() -> bool,
 ) -> Option<Vec<Outcome>> {
-    let axis = sweep.axis();
+    let axis = runs.axis();
     let mut entry: Vec<usize> = block.ranges.iter().map(|r| r.start).collect();
     entry[axis] += item;
     let starts = block.ranges[axis + 1].clone();
-    let case = sweep.subject_at(&entry);
+    let case = runs.case_at(&entry);
     let Ok(model) = case.model() else {
         // Driven at an undamped resonance: there is no bounded motion to name.
         return Some(vec![
@@ -141,9 +142,9 @@ pub(super) fn at_value(
             starts.len()
         ]);
     };
-    let mut runner = Runner::new(&case, &model, &sweep.options);
-    let states = starts.map(|start| sweep.options.starts.state(start, &model));
-    if let Some(transient) = sweep.options.transient {
+    let mut runner = Runner::new(&case, &model, &runs.options);
+    let states = starts.map(|start| runs.starts.state(start, &model));
+    if let Some(transient) = runs.options.transient {
         return runner.all_after(&states.collect::<Vec<_>>(), transient, cancelled);
     }
     states
@@ -154,15 +155,15 @@ pub(super) fn at_value(
 /// The runs along a line of the first parameter, each from the last state of the one
 /// before; `None` when it was stopped.
 pub(super) fn along_line(
-    sweep: &Sweep,
+    runs: &Runs,
     block: &Block,
     cancelled: &impl Fn() -> bool,
 ) -> Option<Vec<Outcome>> {
-    let axis = sweep.axis();
+    let axis = runs.axis();
     let mut entry: Vec<usize> = block.ranges.iter().map(|r| r.start).collect();
     let line = block.ranges[axis].clone();
     let lane = block.ranges[axis + 1].start;
-    let (start, up) = sweep.options.lane(lane);
+    let (start, up) = runs.lane(lane);
     let order: Vec<usize> = if up {
         line.clone().collect()
     } else {
@@ -175,13 +176,13 @@ pub(super) fn along_line(
             return None;
         }
         entry[axis] = index;
-        let case = sweep.subject_at(&entry);
+        let case = runs.case_at(&entry);
         let Ok(model) = case.model() else {
             outcomes[index] = Some(Outcome::unknown(Classification::Undecided, 0));
             continue;
         };
         let state = last.take().map_or_else(
-            || sweep.options.starts.state(start, &model),
+            || runs.starts.state(start, &model),
             |state| {
                 let modes = (model.dimension() - model.memory) / 2;
                 let mut state = with_modes(&state, model.memory, modes);
@@ -189,7 +190,7 @@ pub(super) fn along_line(
                 state
             },
         );
-        let (outcome, end) = Runner::new(&case, &model, &sweep.options).run(&state);
+        let (outcome, end) = Runner::new(&case, &model, &runs.options).run(&state);
         outcomes[index] = Some(outcome);
         // A motion that ran off is not followed; the next value starts anew.
         last = end;
@@ -197,11 +198,11 @@ pub(super) fn along_line(
     outcomes.into_iter().collect()
 }
 
-impl SweepOptions {
+impl Runs {
     /// The start and the direction (true is up) of a lane.
     pub(super) fn lane(&self, lane: usize) -> (usize, bool) {
         let starts = self.starts.count();
-        let directions = self.follow.directions();
+        let directions = self.options.follow.directions();
         (
             lane % starts,
             directions.get(lane / starts).copied().unwrap_or(true),
@@ -213,13 +214,13 @@ impl SweepOptions {
 struct Runner<'a> {
     options: &'a SweepOptions,
     classify: ClassifyOptions,
-    map: Strobe,
+    map: ModelMap,
     /// Stable orbits that starts went to.
     known: Vec<PeriodicOrbit>,
     /// Exponents of chaotic motions that starts went to.
     chaos: Vec<LyapunovSpectrum>,
     /// What every motion is measured with.
-    watcher: Result<Watcher<'a>, MotionError>,
+    recorder: Result<Recorder<'a>, MotionError>,
     /// Units to tell observables in, where physical quantities vary.
     scales: Option<Scales>,
 }
@@ -229,11 +230,11 @@ impl<'a> Runner<'a> {
         Self {
             scales: case.physical().map(|view| view.scales),
             options,
-            classify: options.classify(),
-            map: Strobe::new(model),
+            classify: short_run(options.max_period),
+            map: ModelMap::new(model),
             known: Vec::new(),
             chaos: Vec::new(),
-            watcher: Watcher::new(model, Set::COMMON),
+            recorder: Recorder::new(model, ObservableSet::COMMON),
         }
     }
 
@@ -269,7 +270,7 @@ impl<'a> Runner<'a> {
         cancelled: &impl Fn() -> bool,
     ) -> Option<Vec<Outcome>> {
         let mut outcomes = Vec::with_capacity(starts.len());
-        for starts in starts.chunks(self.map.side_by_side()) {
+        for starts in starts.chunks(self.map.batch_size()) {
             let mut states = starts.concat();
             let mut failures = vec![None; starts.len()];
             for done in (0..transient).step_by(UNINTERRUPTED) {
@@ -346,9 +347,14 @@ impl<'a> Runner<'a> {
         classified
     }
 
-    fn watch(&self, from: &[f64], periods: usize, kept: Kept) -> Result<Watched, MotionError> {
-        let watcher = self.watcher.as_ref().map_err(Clone::clone)?;
-        watcher.watch(from, periods, kept)
+    fn watch(
+        &self,
+        from: &[f64],
+        periods: usize,
+        kept: RecordOptions,
+    ) -> Result<Recorded, MotionError> {
+        let recorder = self.recorder.as_ref().map_err(Clone::clone)?;
+        recorder.record(from, periods, kept)
     }
 
     /// Records the motion from `from`; with `period`, one turn of that orbit stands for
@@ -361,12 +367,12 @@ impl<'a> Runner<'a> {
     ) -> (Outcome, Option<Vec<f64>>) {
         let periods = self.options.periods;
         let turn = period.unwrap_or(periods);
-        let kept = Kept {
+        let kept = RecordOptions {
             states: turn,
             each_period: true,
-            ..Kept::default()
+            ..RecordOptions::default()
         };
-        let Watched {
+        let Recorded {
             observables,
             states,
             lows,
@@ -381,7 +387,7 @@ impl<'a> Runner<'a> {
         let length = scales.map_or(1.0, |scales| scales.length);
         outcome.highs = (0..periods).map(|k| length * highs[k % turn]).collect();
         outcome.lows = (0..periods).map(|k| length * lows[k % turn]).collect();
-        let first = periods - self.options.strobe.min(periods);
+        let first = periods - self.options.strobe();
         outcome.strobe = (first..periods).map(|k| states[k % turn].clone()).collect();
         let end = states[(periods - 1) % turn].clone();
         (outcome, Some(end))

@@ -5,8 +5,7 @@ use std::collections::BTreeMap;
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::dataset::CLASSES;
-use super::motions::{Motions, class_of};
+use super::dataset::{CLASSES, class_of};
 use super::{FromNeighbour, from_neighbours};
 use crate::dataset::{Store, StoreError};
 
@@ -26,25 +25,25 @@ pub struct Summary {
 
 impl Summary {
     /// Counts the runs of a finished dataset.
-    pub(super) fn of(store: &Store) -> Result<Self, StoreError> {
+    ///
+    /// # Errors
+    /// When a chunk is missing or damaged.
+    pub fn of(store: &Store) -> Result<Self, StoreError> {
         store.require_all()?;
         let mut summary = Self {
             from_neighbours: from_neighbours(store)?,
             ..Self::default()
         };
         summary.counts.extend(CLASSES.iter().map(|c| (c.name(), 0)));
-        for chunk in 0..store.chunks() {
-            let Motions { codes, periods } = Motions::read(store, chunk)?;
-            summary.runs += codes.len();
-            for (code, period) in codes.into_iter().zip(periods) {
-                if let Some(class) = class_of(code) {
-                    *summary.counts.entry(class.name()).or_default() += 1;
-                }
-                if period > 0 {
-                    *summary.periods.entry(period).or_default() += 1;
-                }
+        store.each(["classification", "period"], |_, [code, period]| {
+            summary.runs += 1;
+            if let Some(class) = class_of(code as u8) {
+                *summary.counts.entry(class.name()).or_default() += 1;
             }
-        }
+            if period > 0.0 {
+                *summary.periods.entry(period as i32).or_default() += 1;
+            }
+        })?;
         Ok(summary)
     }
 }

@@ -7,10 +7,10 @@ use crate::case::physical::error::PhysicalError;
 use crate::case::physical::fluid::Fluid;
 use crate::case::physical::remark::Remark;
 use crate::case::quantity::Kind;
-use crate::model::higher_modes::HigherModes;
+use crate::model::parameter::{Numbers, Parameter};
 
-/// Steps to the resonance in the fluid; each gains about a digit.
-const MOST_ITERATIONS: usize = 60;
+/// Largest number of iterations for the resonance in the fluid; each gains about a digit.
+const MAX_ITERATIONS: usize = 60;
 
 impl Fluid {
     /// The same lever of this width in the fluid. `lever` is that in vacuum; its stiffness and
@@ -25,7 +25,7 @@ impl Fluid {
         let unit = PI / 4.0 * self.density * width * width * length;
         let mut found = *lever;
         // The added mass falls slowly with the frequency, so that this contracts.
-        for _ in 0..MOST_ITERATIONS {
+        for _ in 0..MAX_ITERATIONS {
             let last = found.f0;
             let gamma = self.on_lever(width, last)?;
             found.beam_mass = lever.beam_mass + unit * gamma.re;
@@ -52,13 +52,13 @@ impl Fluid {
         width: f64,
         length: f64,
         count: usize,
-    ) -> Result<HigherModes, PhysicalError> {
+    ) -> Result<Numbers, PhysicalError> {
         let unit = PI / 4.0 * self.density * width * width * length;
         let dry = lever.beam_mass - unit * self.on_lever(width, lever.f0)?.re;
-        let mut found = HigherModes::NONE;
+        let mut found = Numbers::ZERO;
         for k in 1..count.min(3) {
             let (mut frequency, _) = lever.mode(k, lever.beam_mass)?;
-            for _ in 0..MOST_ITERATIONS {
+            for _ in 0..MAX_ITERATIONS {
                 let Ok(gamma) = self.on_lever(width, frequency) else {
                     return Ok(found);
                 };
@@ -75,14 +75,20 @@ impl Fluid {
             let (_, share) = lever.mode(k, mass)?;
             // The beam's ∫φ² and the tip's φ(1)², of a mode that is 1 at the tip.
             let modal = mass / share + lever.tip_mass();
-            found.frequency[k - 1] = frequency;
-            found.quality[k - 1] = modal * share / (unit * gamma.im);
-            found.stiffness[k - 1] = modal * (TAU * frequency).powi(2);
+            let numbers = [
+                frequency,
+                modal * share / (unit * gamma.im),
+                modal * (TAU * frequency).powi(2),
+            ];
+            let of_mode = Parameter::MEASURED.into_iter().skip(k - 1).step_by(2);
+            for (parameter, number) in of_mode.zip(numbers) {
+                found.set(parameter, number);
+            }
         }
         Ok(found)
     }
 
-    /// What follows from it.
+    /// Note about the fluid.
     pub(crate) fn remark(self, lever: &Lever, width: f64) -> Remark {
         Remark::note(format!(
             "in a fluid of {} and {} the lever resonates at {} with Q = {} (Re = {}; Sader 1998), a \

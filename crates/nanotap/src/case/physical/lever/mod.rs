@@ -24,7 +24,7 @@ use crate::case::physical::tip::TipMass;
 use crate::case::quantity::Kind;
 use crate::model::exact_beam;
 
-/// What is known of a lever; SI units.
+/// Data of a lever; SI units.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LeverData {
     /// Static spring constant at the tip, k.
@@ -33,7 +33,7 @@ pub struct LeverData {
     pub f0: Option<f64>,
     /// Quality factor of the first free resonance, Q.
     pub quality_factor: Option<f64>,
-    /// The fluid around it, which tells Q; f₀ and f₂ are then those in vacuum.
+    /// The fluid around it, which determines Q; f₀ and f₂ are then those in vacuum.
     pub fluid: Option<Fluid>,
     /// Dimensions.
     pub geometry: Option<BeamGeometry>,
@@ -59,7 +59,7 @@ impl LeverData {
     }
 }
 
-/// A lever with all that the model needs; SI units.
+/// A complete lever; SI units.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Lever {
     /// Static spring constant at the tip, k = 3EI/L³, in N/m.
@@ -84,7 +84,7 @@ pub struct Lever {
 const LARGEST_RATIO: f64 = 1e6;
 
 impl Lever {
-    /// The lever that the data describe.
+    /// Determines the lever from the data.
     ///
     /// # Errors
     /// [`PhysicalError`] if the data do not determine a lever or describe an impossible one;
@@ -183,8 +183,8 @@ impl Lever {
         omega * (1.0 + self.tip_mass_ratio * share) / self.quality_factor
     }
 
-    /// Frequency in Hz and φ(1)²/∫φ² of the free mode `k`, 0 the first, where the beam and what
-    /// goes with it have `beam_mass` in kg beside the tip's mass.
+    /// Frequency in Hz and φ(1)²/∫φ² of the free mode `k` (0 is the first) for a beam of mass
+    /// `beam_mass` in kg, including added mass, and the tip's mass.
     pub(super) fn mode(&self, k: usize, beam_mass: f64) -> Result<(f64, f64), PhysicalError> {
         let ratio = bounded(self.tip_mass() / beam_mass)?;
         let omega = exact_beam::frequencies(ratio, 0.0, k + 1)?[k];
@@ -192,7 +192,7 @@ impl Lever {
         Ok((omega / (TAU * time), tip_share(omega.sqrt(), ratio)))
     }
 
-    /// What had to be assumed of the lever, and what puts it in doubt.
+    /// Assumptions and warnings about the lever.
     pub(crate) fn remarks(&self, data: &LeverData) -> Vec<Remark> {
         let mut remarks = Vec::new();
         if let (Some(measured), Some(computed)) = (data.k, data.bending()) {
@@ -343,8 +343,8 @@ fn bounded(ratio: f64) -> Result<f64, PhysicalError> {
     ))
 }
 
-/// α1 from the measured f₂/f₁, which grows with α1 from that of the bare beam, 6.2669: at
-/// first with its square, so that light tips are not told from none.
+/// α1 from the measured f₂/f₁, which grows with α1 from that of the bare beam, 6.2669: at first
+/// with its square, so that light tips cannot be distinguished from none.
 fn ratio_from_second_mode(f2: f64, f0: f64) -> Result<f64, PhysicalError> {
     let measured = f2 / f0;
     let bare = frequency_ratio(0.0)?;
@@ -470,8 +470,7 @@ fn tip_share(beta: f64, ratio: f64) -> f64 {
 }
 
 impl LeverData {
-    /// What `[cantilever]` and `[tip]` say; what they do not comes from a lever of the
-    /// catalogue.
+    /// Reads `[cantilever]` and `[tip]`; other data come from a lever of the catalogue.
     pub(crate) fn read(
         reader: Reader<'_>,
         lever: Option<&super::catalogue::Lever>,

@@ -1,13 +1,13 @@
-//! Curves under frequency modulation: at every row the orbit that has the amplitude and phase
-//! that the loop held, with the drive's frequency and strength as unknowns beside its state.
+//! Curves under frequency modulation: at every row the orbit with the amplitude and phase that the
+//! loop maintains, with frequency and strength of the drive as unknowns in addition to its state.
 //!
-//! What such an instrument records is the frequency less that of the free lever, and the drive
-//! over the free lever's. Both change with a parameter as the equations of orbit, amplitude and
-//! phase say by the implicit function theorem ([`Held::changes`]), those of the free lever too.
-//! Units that follow from a parameter change with it.
+//! Such an instrument records the frequency relative to the free lever, and the drive relative to
+//! that of the free lever. The derivatives of both with respect to a parameter follow from the
+//! equations for orbit, amplitude and phase by the implicit function theorem ([`Held::changes`]),
+//! including those of the free lever. Units that depend on a parameter change with it.
 //!
-//! Fails by omission: where the curve has several orbits at a distance, the one is taken that
-//! continues the row before.
+//! Fails by omission: if the curve has several orbits at a distance, the one that continues the
+//! previous row is used.
 
 use std::sync::{Arc, OnceLock};
 
@@ -26,16 +26,16 @@ use crate::study::fit::parameters::Target;
 use crate::study::frequency_modulation::walk::{HeldWalk, Stepped};
 use crate::study::frequency_modulation::{Driven, FreeOscillation, Held, HeldOrbit, Modulated};
 
-/// What a loop held.
+/// Settings of a loop.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::study::fit) struct Loop {
-    /// Amplitude at the drive's frequency, in m, or in a dimensionless case's own unit.
+    /// Amplitude at the drive frequency, in m, or in the unit of a dimensionless case.
     amplitude: f64,
-    /// Phase behind the drive, degrees.
+    /// Phase lag in degrees.
     phase: f64,
 }
 
-/// An orbit with what was held.
+/// An orbit with the settings of the loop.
 #[derive(Clone, Debug)]
 pub(in crate::study::fit) struct HeldRow {
     driven: Driven,
@@ -49,17 +49,17 @@ struct Free {
     case: Case,
     held: Held,
     oscillation: FreeOscillation,
-    /// Its frequency, strength and loss in SI.
+    /// Frequency, strength and loss in SI.
     frequency: f64,
     strength: f64,
     loss: f64,
-    /// How it changes with the keys that were asked for first: many rows ask for the same.
+    /// Derivatives by the keys that were requested first: many rows request the same.
     known: OnceLock<FreeChanges>,
 }
 
 type FreeChange = ([f64; 2], Option<f64>);
 
-/// How the free lever changes with keys of the case.
+/// Derivatives of the free lever by keys of the case.
 #[derive(Clone, Debug)]
 struct FreeChanges {
     keys: Vec<Key>,
@@ -67,7 +67,7 @@ struct FreeChanges {
     by: Option<Vec<FreeChange>>,
 }
 
-/// Sizes of the model's units in SI; 1 of a dimensionless case.
+/// Sizes of the model's units in SI; 1 for a dimensionless case.
 #[derive(Clone, Copy, Debug)]
 struct Sizes {
     length: f64,
@@ -100,7 +100,7 @@ impl Sizes {
         }
     }
 
-    /// How they change with a key.
+    /// Derivatives of the units by a key.
     fn by(case: &Case, key: Key) -> Option<Self> {
         let Some((low, high, width)) = case.scales_beside(key).ok()? else {
             return Some(Self {
@@ -121,7 +121,7 @@ impl Sizes {
     }
 }
 
-/// How far beyond the first row the free oscillation is put, if Newton needs a way there.
+/// Distance beyond the first row at which the free oscillation is started, if Newton needs a path.
 const BEYOND: f64 = 8.0;
 
 impl Loop {
@@ -134,7 +134,7 @@ impl Loop {
         }
         .check()?;
         let sizes = Sizes::of(case).unwrap_or(Sizes::OWN);
-        // Whether the free lever can be held so is a matter of the case, not of a row.
+        // Whether the free lever can have these settings depends on the case, not on a row.
         FreeOscillation::of(case, held)?;
         Ok(Self {
             amplitude: held.amplitude * sizes.length,
@@ -142,7 +142,7 @@ impl Loop {
         })
     }
 
-    /// What is held at a row: its own amplitude, the free one, or that of the case.
+    /// Settings at a row: its own amplitude, the free one, or that of the case.
     fn at(self, problem: &Problem<'_>, x: &[f64], at: &[f64], case: &Case) -> Option<Held> {
         let key = Key::DriveFreeAmplitude;
         let swept = problem.data.swept.iter().position(|s| s.key == key);
@@ -161,7 +161,7 @@ impl Loop {
         })
     }
 
-    /// What the free lever does beside a row.
+    /// The free lever at a row.
     fn free(case: &Case, held: Held) -> Option<Free> {
         let oscillation = FreeOscillation::of(case, held).ok()?;
         let sizes = Sizes::of(case)?;
@@ -176,8 +176,8 @@ impl Loop {
         })
     }
 
-    /// A row's place without the distance: where rows have it in common, the free lever is one.
-    fn besides_distance(problem: &Problem<'_>, at: &[f64]) -> Vec<f64> {
+    /// The position of a row without the distance: rows with the same one share a free lever.
+    fn without_distance(problem: &Problem<'_>, at: &[f64]) -> Vec<f64> {
         let swept = problem.data.swept.iter().zip(at);
         swept
             .filter(|(swept, _)| !is_distance(swept.key))
@@ -185,8 +185,8 @@ impl Loop {
             .collect()
     }
 
-    /// The orbits at all rows, each continued from the row before, the first of a curve from
-    /// far away.
+    /// Finds the orbits at all rows, each continued from the previous row, the first of a curve
+    /// from a large distance.
     pub(in crate::study::fit) fn discover(
         self,
         problem: &Problem<'_>,
@@ -216,15 +216,15 @@ impl Loop {
             let at = problem.place(x, curve, row);
             let case = problem.case_at(base, &at);
             let held = self.at(problem, x, &at, &case)?;
-            let besides = Self::besides_distance(problem, &at);
-            let known = free.take().filter(|(of, _)| *of == besides);
+            let rest = Self::without_distance(problem, &at);
+            let known = free.take().filter(|(of, _)| *of == rest);
             let of_row = match known {
                 Some((_, known)) => known,
                 None => Arc::new(Self::free(&case, held)?),
             };
-            free = Some((besides.clone(), Arc::clone(&of_row)));
+            free = Some((rest.clone(), Arc::clone(&of_row)));
             let gap = case.get(case.gap_key());
-            let from = last.as_ref().filter(|(of, ..)| *of == besides);
+            let from = last.as_ref().filter(|(of, ..)| *of == rest);
             let (far, start) = match from {
                 Some((_, before, driven)) => (*before, driven.clone()),
                 None => (
@@ -235,7 +235,7 @@ impl Loop {
             let mut walk = HeldWalk::new(&case, held, start, far);
             let Stepped { orbit, breaks } = walk.step(gap, &Control::default()).ok()?;
             branch += breaks.len();
-            last = Some((besides, gap, orbit.driven()));
+            last = Some((rest, gap, orbit.driven()));
             Self::seen(problem, &case, &of_row, orbit, branch)
         };
         let rows = problem.data.curves[curve].rows.iter();
@@ -243,7 +243,7 @@ impl Loop {
             .collect()
     }
 
-    /// What was found at a row.
+    /// The result at a row.
     fn seen(
         problem: &Problem<'_>,
         case: &Case,
@@ -252,9 +252,9 @@ impl Loop {
         branch: usize,
     ) -> Option<RowPoint> {
         let driven = orbit.driven();
-        let told = told(case, free, &driven)?;
+        let found = modulated(case, free, &driven)?;
         let columns = problem.data.columns.iter();
-        let values = columns.map(|column| (column.quantity.modulated()?.of)(&told));
+        let values = columns.map(|column| (column.quantity.modulated()?.of)(&found));
         Some(RowPoint {
             orbit: Some(orbit.orbit),
             lost: false,
@@ -269,8 +269,7 @@ impl Loop {
         })
     }
 
-    /// The orbits at other parameters, from a point already evaluated, to first order where they
-    /// go.
+    /// Predicts the orbits at other parameters from a known point, to first order.
     pub(in crate::study::fit) fn follow(
         self,
         problem: &Problem<'_>,
@@ -304,7 +303,7 @@ impl Loop {
         }
     }
 
-    /// The free lever beside every row.
+    /// The free lever of every row.
     fn frees(self, problem: &Problem<'_>, x: &[f64], bases: &[Case]) -> Vec<Option<Arc<Free>>> {
         let mut known: Option<(usize, Vec<f64>, Option<Arc<Free>>)> = None;
         let mut all = Vec::new();
@@ -314,22 +313,22 @@ impl Loop {
                 continue;
             }
             let at = problem.place(x, curve, row);
-            let besides = Self::besides_distance(problem, &at);
+            let rest = Self::without_distance(problem, &at);
             let same = known
                 .take()
-                .filter(|(of, place, _)| *of == curve && *place == besides);
+                .filter(|(of, place, _)| *of == curve && *place == rest);
             let (_, _, free) = known.insert(same.unwrap_or_else(|| {
                 let case = problem.case_at(&bases[curve], &at);
                 let held = self.at(problem, x, &at, &case);
                 let free = held.and_then(|held| Self::free(&case, held));
-                (curve, besides, free.map(Arc::new))
+                (curve, rest, free.map(Arc::new))
             }));
             all.push(free.clone());
         }
         all
     }
 
-    /// The derivatives of drive and state, and of what was measured, by every parameter.
+    /// Derivatives of drive and state, and of the measured values, by every parameter.
     pub(in crate::study::fit) fn derivatives(
         problem: &Problem<'_>,
         x: &[f64],
@@ -348,7 +347,7 @@ impl Loop {
             }
             let mut by = of.direct(&point.values);
             for (key, weight) in effects {
-                let (driven, told) = &by_key[keys.iter().position(|other| other == key)?];
+                let (driven, found) = &by_key[keys.iter().position(|other| other == key)?];
                 let drive = [driven.frequency, driven.strength];
                 let changes = drive.iter().chain(&driven.state);
                 state
@@ -356,7 +355,7 @@ impl Loop {
                     .zip(changes)
                     .for_each(|(sum, part)| *sum += weight * part);
                 for (column, of) in columns.iter().enumerate() {
-                    let number = (of.quantity.modulated()?.of)(told)?;
+                    let number = (of.quantity.modulated()?.of)(found)?;
                     let zero = problem.read(x, curve, column, 0.0);
                     let scale = problem.read(x, curve, column, 1.0) - zero;
                     by[column] += weight * scale * number;
@@ -368,7 +367,7 @@ impl Loop {
     }
 }
 
-/// The keys that change with any parameter.
+/// The keys that depend on any parameter.
 fn keys_of(effects: &[Effects]) -> Vec<Key> {
     let mut keys: Vec<Key> = effects.iter().flatten().map(|(key, _)| *key).collect();
     keys.sort_unstable();
@@ -376,30 +375,17 @@ fn keys_of(effects: &[Effects]) -> Vec<Key> {
     keys
 }
 
-/// What a loop tells of a drive, in SI.
-fn told(case: &Case, free: &Free, driven: &Driven) -> Option<Modulated> {
+/// The readings of a loop for a drive, in SI.
+fn modulated(case: &Case, free: &Free, driven: &Driven) -> Option<Modulated> {
     let sizes = Sizes::of(case)?;
     let frequency = driven.frequency * sizes.frequency;
     let strength = driven.strength * sizes.strength;
-    let relative = (frequency - free.frequency) / free.frequency;
-    let ratio = strength / free.strength;
-    Some(Modulated {
-        drive_frequency: frequency,
-        drive_strength: strength,
-        frequency_shift: frequency - free.frequency,
-        relative_shift: relative,
-        drive_ratio: ratio,
-        drive_dissipation: free.loss * (ratio - 1.0 - relative),
-        closest: f64::NAN,
-        first_order_shift: None,
-        giessibl_shift: None,
-        static_force: None,
-        sader_jarvis_force: None,
-    })
+    let of_free = [free.frequency, free.strength, free.loss];
+    Some(Modulated::of_drive([frequency, strength], of_free))
 }
 
 impl HeldRow {
-    /// How drive and state, and what the loop tells, change with keys of the case.
+    /// Derivatives of drive, state and readings by keys of the case.
     fn by(&self, keys: &[Key]) -> Option<Vec<(Driven, Modulated)>> {
         let (case, free) = (&self.case, &*self.free);
         let held = Held {
@@ -410,7 +396,7 @@ impl HeldRow {
         let at_row = amplitudes(case, held, keys)?;
         let changes = held.changes(case, self.driven.clone(), &at_row).ok()?;
         let of_free = free.changes(keys)?;
-        let told_here = told(case, free, &self.driven)?;
+        let here_now = modulated(case, free, &self.driven)?;
         let (sizes, free_sizes) = (Sizes::of(case)?, Sizes::of(&free.case)?);
         let one = |((key, change), (by, loss)): ((&Key, Driven), FreeChange)| {
             let (here, there) = (Sizes::by(case, *key)?, Sizes::by(&free.case, *key)?);
@@ -422,26 +408,26 @@ impl HeldRow {
                 by[0] * free_sizes.frequency + oscillation.frequency * there.frequency;
             let free_strength = by[1] * free_sizes.strength + oscillation.strength * there.strength;
             let shift = frequency - free_frequency;
-            let relative = (shift - told_here.relative_shift * free_frequency) / free.frequency;
-            let ratio = (strength - told_here.drive_ratio * free_strength) / free.strength;
-            let rest = told_here.drive_ratio - 1.0 - told_here.relative_shift;
+            let relative = (shift - here_now.relative_shift * free_frequency) / free.frequency;
+            let ratio = (strength - here_now.drive_ratio * free_strength) / free.strength;
+            let rest = here_now.drive_ratio - 1.0 - here_now.relative_shift;
             let loss = if rest == 0.0 { 0.0 } else { loss? };
-            let told = Modulated {
+            let found = Modulated {
                 drive_frequency: frequency,
                 drive_strength: strength,
                 frequency_shift: shift,
                 relative_shift: relative,
                 drive_ratio: ratio,
                 drive_dissipation: loss * rest + free.loss * (ratio - relative),
-                ..told_here
+                ..here_now
             };
-            Some((change, told))
+            Some((change, found))
         };
         keys.iter().zip(changes).zip(of_free).map(one).collect()
     }
 }
 
-/// Each key with what the amplitude that is held, in the model's unit, changes by.
+/// Each key with the derivative of the controlled amplitude, in the model's unit.
 fn amplitudes(case: &Case, held: Held, keys: &[Key]) -> Option<Vec<(Key, f64)>> {
     let length = Sizes::of(case)?.length;
     let one = |key: &Key| {
@@ -457,7 +443,7 @@ fn amplitudes(case: &Case, held: Held, keys: &[Key]) -> Option<Vec<(Key, f64)>> 
 }
 
 impl Free {
-    /// How it changes with keys of the case.
+    /// Derivatives of the free lever by keys of the case.
     fn changes(&self, keys: &[Key]) -> Option<Vec<FreeChange>> {
         let all = || FreeChanges {
             keys: keys.to_vec(),
@@ -478,13 +464,13 @@ impl Free {
         Some(keys.iter().zip(of.ok()?).map(one).collect())
     }
 
-    /// How its loss, in SI, changes with a key: a chain of closed forms, whose central difference
-    /// is good to ten digits.
+    /// Derivative of the loss, in SI, by a key: a sequence of closed forms, whose central
+    /// difference is accurate to ten digits.
     fn loss_by(&self, key: Key) -> Option<f64> {
         let value = self.case.get(key);
         let step = 1e-5 * if value == 0.0 { 1.0 } else { value.abs() };
         let amplitude = self.held.amplitude * Sizes::of(&self.case)?.length;
-        let beside = |side: f64| {
+        let at_side = |side: f64| {
             let case = self.case.with(key, value + side * step);
             let amplitude = if key == Key::DriveFreeAmplitude {
                 amplitude + side * step
@@ -497,12 +483,12 @@ impl Free {
             };
             Some(Loop::free(&case, held)?.loss)
         };
-        Some((beside(1.0)? - beside(-1.0)?) / (2.0 * step))
+        Some((at_side(1.0)? - at_side(-1.0)?) / (2.0 * step))
     }
 }
 
 impl Driven {
-    /// Moves on by so much of the change of frequency, strength and state.
+    /// Adds `by` times the change of frequency, strength and state.
     fn add(&mut self, by: f64, change: &[f64]) {
         let [frequency, strength, state @ ..] = change else {
             return;

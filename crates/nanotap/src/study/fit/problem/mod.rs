@@ -11,31 +11,33 @@ use rayon::prelude::*;
 
 use crate::case::{Case, Key};
 use crate::model::Model;
-use crate::model::strobe::Strobe;
-use crate::observe::{Derivative, Observables, Set, measure};
+use crate::model::model_map::ModelMap;
+use crate::observe::{Derivative, ObservableSet, Observables, measure};
 
-use crate::study::fit::branches::{Along, Candidate, Rows, continued, leave_ends, path};
+use crate::study::fit::branches::{
+    Candidate, RowCases, Rows, newton_continuation, path, release_branch_ends,
+};
 use crate::study::fit::data::{Column, Data, Row};
 use crate::study::fit::jumps::{Fold, Jump};
 use crate::study::fit::parameters::{Parameter, Target};
 use crate::study::fit::solve::LeastSquares;
 use held::{HeldRow, Loop};
 
-/// Measured curves, a case and what of it is free.
+/// Measured curves, a case, and its free parameters.
 #[derive(Clone)]
 pub(super) struct Problem<'a> {
     pub(super) case: &'a Case,
     pub(super) data: &'a Data,
     pub(super) parameters: &'a [Parameter],
     pub(super) max_period: usize,
-    /// Standard errors of a column's values, where the rows give none.
+    /// Standard errors of the values of each column, for rows that give none.
     pub(super) noise: Vec<f64>,
-    /// Residuals beyond this many standard errors count by their logarithm only (Cauchy's
-    /// loss), so that rows on a branch that is not theirs yet do not lead astray.
+    /// Residuals beyond this many standard errors count by their logarithm only (Cauchy's loss), so
+    /// that rows on the wrong branch do not mislead the fit.
     pub(super) robust: Option<f64>,
-    /// Jumps whose folds count beside the rows.
+    /// Jumps whose folds are data in addition to the rows.
     pub(super) jumps: Vec<Jump>,
-    /// What a loop of frequency modulation held.
+    /// Settings of a loop of frequency modulation.
     pub(super) held: Option<Loop>,
 }
 
@@ -45,27 +47,27 @@ pub(super) type Effects = Vec<(Key, f64)>;
 /// The model at one row.
 #[derive(Clone, Debug)]
 pub(super) struct RowPoint {
-    /// The orbit; where it is lost, the last one that was known.
+    /// The orbit; if it is lost, the last known one.
     pub(super) orbit: Option<PeriodicOrbit>,
-    /// Whether the orbit has no continuation here: what it says is that of before.
+    /// True if the orbit has no continuation here; its values are then the previous ones.
     pub(super) lost: bool,
     /// Its branch.
     pub(super) branch: usize,
-    /// What the model says was measured, a place a column, without scales and offsets.
+    /// The model's values, one per column, without scales and offsets.
     pub(super) values: Vec<f64>,
-    /// All that is observed of it.
+    /// All observables of the orbit.
     pub(super) observables: Option<Box<Observables>>,
-    /// Derivative of the state by every parameter, under frequency modulation of drive and state;
-    /// empty until it was asked for.
+    /// Derivatives of the state by every parameter; under frequency modulation, of drive and state.
+    /// Empty until requested.
     pub(super) states: Vec<Vec<f64>>,
-    /// The case and its model; none where the orbit is lost.
+    /// The case and its model; `None` if the orbit is lost.
     pub(super) at: Option<Arc<(Case, Model)>>,
-    /// The orbit under frequency modulation; where it is lost, the last one that was known.
+    /// The orbit under frequency modulation; if it is lost, the last known one.
     pub(super) held: Option<Box<HeldRow>>,
 }
 
 impl RowPoint {
-    /// Where no orbit was found.
+    /// A row without an orbit.
     pub(super) fn nothing(columns: usize) -> Self {
         Self {
             orbit: None,
@@ -79,7 +81,7 @@ impl RowPoint {
         }
     }
 
-    /// The same without an orbit that continues it.
+    /// The same row without a continuation of its orbit.
     pub(super) fn without_orbit(&self) -> Self {
         Self {
             lost: true,
@@ -91,11 +93,11 @@ impl RowPoint {
     }
 }
 
-/// The model at all rows, curve after curve, and at the folds of the jumps.
+/// The model at all rows, curve by curve, and at the folds of the jumps.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Point {
     pub(super) rows: Vec<RowPoint>,
-    /// One a jump; `None` where there is no fold.
+    /// One per jump; `None` if there is no fold.
     pub(super) folds: Vec<Option<Fold>>,
 }
 
@@ -108,20 +110,20 @@ impl Deref for Point {
 }
 
 impl Problem<'_> {
-    /// What was computed of the rows; `None` once the work is cancelled: orbits that were being
-    /// looked for meanwhile may be missing.
+    /// Returns the computed rows; `None` once the computation is cancelled, because orbits may be
+    /// missing then.
     pub(super) fn finished<T>(&self, computed: T) -> Option<T> {
         (!self.case.cancel().is_cancelled()).then_some(computed)
     }
 
-    /// What is observed.
-    fn set(&self) -> Set {
+    /// The requested observables.
+    fn set(&self) -> ObservableSet {
         let columns = self.data.columns.iter();
         let observed = columns.filter_map(|column| column.quantity.observable());
-        observed.fold(Set::NONE, Set::with)
+        observed.fold(ObservableSet::NONE, ObservableSet::with)
     }
 
-    /// The curves' cases at some parameters.
+    /// The cases of the curves for given parameters.
     pub(super) fn cases(&self, x: &[f64]) -> Vec<Case> {
         let of = |curve: usize| {
             let mut case = self.case.clone();
@@ -131,7 +133,7 @@ impl Problem<'_> {
                 }
             }
             match self.held_strength() {
-                // As it is at the case's own frequency, while the rows set others.
+                // The strength at the frequency of the case, while the rows set other frequencies.
                 Some(strength) => {
                     let value = case.get(strength);
                     case.with(strength, value)
@@ -142,8 +144,8 @@ impl Problem<'_> {
         (0..self.data.curves.len()).map(of).collect()
     }
 
-    /// The key of the drive's own strength, where that follows from a free amplitude which is a
-    /// parameter and the rows set the frequency.
+    /// The key of the drive strength, if it follows from a free amplitude that is a parameter and
+    /// the rows set the frequency.
     fn held_strength(&self) -> Option<Key> {
         let free = Target::Key(Key::DriveFreeAmplitude);
         let sets_frequency = self.data.swept.iter().any(|s| s.key == Key::DriveFrequency);
@@ -156,8 +158,8 @@ impl Problem<'_> {
             .find(known)
     }
 
-    /// What of the case changes with each parameter in each curve: keys, each with its
-    /// derivative by the parameter.
+    /// Effects of each parameter in each curve: keys of the case, each with its derivative by the
+    /// parameter.
     pub(super) fn effects(&self, x: &[f64]) -> Vec<Vec<Effects>> {
         let plain = |parameter: &Parameter| match parameter.target {
             Target::Key(key) => vec![(key, 1.0)],
@@ -170,7 +172,8 @@ impl Problem<'_> {
         let Some(strength) = self.held_strength() else {
             return all;
         };
-        // The mapping is a chain of closed forms: a central difference is good to ten digits.
+        // The mapping is a sequence of closed forms: a central difference is accurate to ten
+        // digits.
         for (k, parameter) in self.parameters.iter().enumerate() {
             let Target::Key(key) = parameter.target else {
                 continue;
@@ -181,12 +184,12 @@ impl Problem<'_> {
                 } else {
                     x[k].abs()
                 };
-            let beside = |side: f64| {
+            let at_side = |side: f64| {
                 let mut x = x.to_vec();
                 x[k] += side * step;
                 self.cases(&x)
             };
-            let (low, high) = (beside(-1.0), beside(1.0));
+            let (low, high) = (at_side(-1.0), at_side(1.0));
             for (curve, effects) in all.iter_mut().enumerate() {
                 let slope = (high[curve].get(strength) - low[curve].get(strength)) / (2.0 * step);
                 if key == Key::DriveFreeAmplitude {
@@ -199,7 +202,7 @@ impl Problem<'_> {
         all
     }
 
-    /// Where a row of a curve stands, offsets included.
+    /// Position of a row of a curve, with offsets.
     pub(super) fn place(&self, x: &[f64], curve: usize, row: &Row) -> Vec<f64> {
         let mut at = row.at.clone();
         for (parameter, value) in self.parameters.iter().zip(x) {
@@ -210,7 +213,7 @@ impl Problem<'_> {
         at
     }
 
-    /// The case at a place.
+    /// The case at a position.
     pub(super) fn case_at(&self, base: &Case, at: &[f64]) -> Case {
         let swept = self.data.swept.iter().zip(at);
         swept.fold(base.clone(), |case, (swept, value)| {
@@ -226,7 +229,7 @@ impl Problem<'_> {
             .collect()
     }
 
-    /// What an orbit at a row comes to.
+    /// The result for an orbit at a row.
     fn seen(
         &self,
         at: Arc<(Case, Model)>,
@@ -254,7 +257,7 @@ impl Problem<'_> {
         })
     }
 
-    /// What the model says of an orbit at a place, a number a column.
+    /// The model's values of an orbit at a position, one per column.
     pub(super) fn values(
         &self,
         x: &[f64],
@@ -273,7 +276,7 @@ impl Problem<'_> {
         Some(seen.values)
     }
 
-    /// What the instrument would read in a column where the model says `value`.
+    /// The reading of the instrument in a column for the model's `value`.
     pub(super) fn read(&self, x: &[f64], curve: usize, column: usize, value: f64) -> f64 {
         let (mut scale, mut offset) = (1.0, 0.0);
         for (parameter, value) in self.parameters.iter().zip(x) {
@@ -291,7 +294,7 @@ impl Problem<'_> {
         row.errors[column].unwrap_or(self.noise[column])
     }
 
-    /// Model less measured value; `None` where nothing was measured.
+    /// Model minus measured value; `None` if nothing was measured.
     pub(super) fn difference(
         &self,
         x: &[f64],
@@ -308,7 +311,7 @@ impl Problem<'_> {
         })
     }
 
-    /// The residual that counts, and its derivative by the plain one.
+    /// The residual with Cauchy's loss, and its derivative by the plain residual.
     fn counted(&self, residual: f64) -> (f64, f64) {
         let Some(c) = self.robust else {
             return (residual, 1.0);
@@ -321,11 +324,11 @@ impl Problem<'_> {
         (c * root.copysign(t), t.abs() / ((1.0 + t * t) * root))
     }
 
-    /// The orbits at all rows, and of these the ones that the data are on; `None` where the
-    /// parameters make no sense.
+    /// Finds the orbits at all rows, and selects those of the data; `None` if the parameters are
+    /// invalid.
     ///
-    /// `before` are orbits at parameters not far off, whose branches were all there was: where
-    /// each of them continues here, no others are looked for.
+    /// `before` are all orbits at similar parameters: if each of them continues here, no others are
+    /// searched for.
     pub(super) fn discover(&self, x: &[f64], before: Option<&[Rows]>) -> (Point, Vec<Rows>) {
         if let Some(held) = self.held {
             return held.discover(self, x);
@@ -345,7 +348,7 @@ impl Problem<'_> {
                 };
                 let measured =
                     |row: usize, model: &Model| self.measured(x, curve, &of.rows[row], model);
-                let along = Along {
+                let along = RowCases {
                     at: &at,
                     measured: &measured,
                     places: &places,
@@ -364,8 +367,8 @@ impl Problem<'_> {
         (point, rows)
     }
 
-    /// A state at drive phase 0 whose first mode swings as was measured at a row, free of scales
-    /// and offsets: W = A sin(Ωτ − φ).
+    /// A state at drive phase 0 whose first mode has the measured amplitude and phase of a row,
+    /// without scales and offsets: W = A sin(Ωτ − φ).
     fn measured(&self, x: &[f64], curve: usize, row: &Row, model: &Model) -> Option<Vec<f64>> {
         let known = |names: [&str; 2]| {
             let columns = &self.data.columns;
@@ -389,12 +392,12 @@ impl Problem<'_> {
         state.iter().all(|v| v.is_finite()).then_some(state)
     }
 
-    /// Where the data jump: neighbouring rows on different branches, both of which describe
+    /// Finds the jumps of the data: neighbouring rows on different branches, both of which describe
     /// their rows, the first ending in a fold. The folds are added to `point`.
     pub(super) fn find_jumps(&mut self, x: &[f64], point: &mut Point) {
         self.jumps.clear();
         point.folds.clear();
-        // Where a loop holds amplitude and phase, other folds end a branch.
+        // Other folds end a branch if a loop controls amplitude and phase.
         if self.held.is_some() {
             return;
         }
@@ -404,7 +407,7 @@ impl Problem<'_> {
             (0..self.data.columns.len()).all(|column| {
                 let value = point[k].values[column];
                 let difference = self.difference(x, curve, row, column, value);
-                difference.is_none_or(|d| d.abs() < NEAR * self.error(row, column))
+                difference.is_none_or(|d| d.abs() < MAX_JUMP_RESIDUAL * self.error(row, column))
             })
         };
         let bases = self.cases(x);
@@ -435,7 +438,7 @@ impl Problem<'_> {
                 rows: [before, k],
                 first: run,
                 between,
-                reach: REACH * (high - low),
+                reach: FOLD_REACH * (high - low),
             });
         }
         let folds = jumps
@@ -449,7 +452,7 @@ impl Problem<'_> {
             .unzip();
     }
 
-    /// Where the branch before a jump ends.
+    /// The fold at the end of the branch before a jump.
     fn fold(&self, x: &[f64], bases: &[Case], rows: &[RowPoint], jump: &Jump) -> Option<Fold> {
         let of = &self.data.curves[jump.curve].rows;
         let run = (jump.first..=jump.rows[0]).rev();
@@ -463,12 +466,12 @@ impl Problem<'_> {
         Fold::beyond(&base, &self.data.swept[0], (at[0], orbit), (jump, offset))
     }
 
-    /// The first row of a curve, counted over all.
+    /// Index of the first row of a curve among all rows.
     fn index_of(&self, curve: usize) -> usize {
         self.data.curves[..curve].iter().map(|c| c.rows.len()).sum()
     }
 
-    /// Model less measured place of a jump, in standard errors; 0 where there is no fold.
+    /// Model minus measured location of a jump, in standard errors; 0 if there is no fold.
     pub(super) fn jump_residual(&self, x: &[f64], point: &Point, index: usize) -> f64 {
         let (jump, fold) = (&self.jumps[index], &point.folds[index]);
         let offset: f64 = self
@@ -482,14 +485,14 @@ impl Problem<'_> {
             .map_or(0.0, |fold| (fold.at - offset - jump.at()) / jump.error())
     }
 
-    /// The derivatives of that residual.
+    /// Derivatives of the residual of a jump.
     fn jump_derivatives(&self, effects: &[Vec<Effects>], point: &Point, index: usize) -> Vec<f64> {
         let (jump, fold) = (&self.jumps[index], &point.folds[index]);
         let offset = |parameter: &Parameter| {
             let is_offset = parameter.target == Target::Place(0) && parameter.is_of(jump.curve);
             f64::from(u8::from(is_offset))
         };
-        // A place that does not move is read with its offset all the same.
+        // A location that does not change still has its offset.
         let still = || {
             let parameters = self.parameters.iter();
             parameters.map(|p| -offset(p) / jump.error()).collect()
@@ -522,7 +525,7 @@ impl Problem<'_> {
         self.parameters.iter().enumerate().map(slope).collect()
     }
 
-    /// Of each row the orbit that its data are on.
+    /// Selects the orbit of each row that belongs to the data.
     fn choose(
         &self,
         x: &[f64],
@@ -531,9 +534,9 @@ impl Problem<'_> {
         places: &[Vec<f64>],
         rows: &Rows,
     ) -> Point {
-        const PRICE: f64 = 20.0;
+        const BRANCH_CHANGE_COST: f64 = 20.0;
         // One residual of eight standard errors.
-        const DEAR: f64 = 18.0;
+        const MAX_NOISE_COST: f64 = 18.0;
         let measured = &self.data.curves[curve].rows;
         let seen: Vec<Vec<Option<RowPoint>>> = (0..rows.len())
             .into_par_iter()
@@ -565,8 +568,8 @@ impl Problem<'_> {
             .enumerate()
             .map(|(row, points)| points.iter().map(|point| cost(row, point)).collect())
             .collect();
-        let mut chosen = path(rows, &costs, PRICE);
-        leave_ends(rows, &costs, DEAR, &mut chosen);
+        let mut chosen = path(rows, &costs, BRANCH_CHANGE_COST);
+        release_branch_ends(rows, &costs, MAX_NOISE_COST, &mut chosen);
         let pick = |(row, chosen): (usize, Option<usize>)| {
             let found = chosen.and_then(|k| seen[row][k].clone());
             found.unwrap_or_else(|| RowPoint::nothing(self.data.columns.len()))
@@ -577,8 +580,8 @@ impl Problem<'_> {
         }
     }
 
-    /// The derivatives of the state and of what was measured by one parameter, whose `effects`
-    /// on the case are known.
+    /// Derivatives of the state and of the measured values by one parameter, with known `effects`
+    /// on the case.
     fn derivative(
         &self,
         x: &[f64],
@@ -619,10 +622,10 @@ impl Problem<'_> {
     }
 }
 
-/// Standard errors within which rows beside a jump must lie for it to count.
-const NEAR: f64 = 6.0;
-/// How far beyond the jump its fold is looked for, in lengths of the curve.
-const REACH: f64 = 0.5;
+/// Largest residual, in standard errors, of rows next to a jump that counts.
+const MAX_JUMP_RESIDUAL: f64 = 6.0;
+/// Largest distance of a fold beyond its jump, as a fraction of the length of the curve.
+const FOLD_REACH: f64 = 0.5;
 
 impl LeastSquares for Problem<'_> {
     type Point = Point;
@@ -645,7 +648,7 @@ impl LeastSquares for Problem<'_> {
                 self.finished(())?;
                 let case = self.case_at(&bases[*curve], &self.place(x, *curve, row));
                 let mut guess = before_point.orbit.clone()?;
-                // To first order where the orbit goes.
+                // Prediction of the orbit to first order.
                 if let ([only], false) = (guess.states.as_mut_slice(), before_point.lost) {
                     for (k, by) in before_point.states.iter().enumerate() {
                         let change = x[k] - before[k];
@@ -655,7 +658,7 @@ impl LeastSquares for Problem<'_> {
                     }
                 }
                 let model = case.model().ok()?;
-                let orbit = continued(&mut Strobe::new(&model), &guess)?;
+                let orbit = newton_continuation(&mut ModelMap::new(&model), &guess)?;
                 self.seen(Arc::new((case, model)), before_point.branch, orbit)
             };
             follow().unwrap_or_else(lost)

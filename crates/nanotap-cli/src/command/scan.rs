@@ -1,0 +1,183 @@
+//! `nanotap scan`: a line or an image under feedback.
+
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use nanotap::figure::scan::scan_figure;
+use nanotap::study::scan::report::LoopReport;
+use nanotap::study::scan::{
+    CHANNELS, Direction, LineStatistics, Method, ScanOptions, ScanReport, ScanStudy, pixels_csv,
+};
+
+use crate::arguments::{CaseArguments, PlotArgument};
+use crate::failure::Failure;
+use crate::given_case::GivenCase;
+use crate::output::Output;
+use crate::request::Request;
+use crate::table::{Align, Table};
+use crate::threads::ThreadsArgument;
+use crate::{file, motion, number, progress, style};
+
+/// A scan of a line or an image under the z feedback of an instrument: what a microscope would show
+/// of a sample that is known. The case file says how in its table [scan].
+#[derive(Args, Debug)]
+pub(crate) struct Arguments {
+    #[command(flatten)]
+    case: CaseArguments,
+
+    #[command(flatten)]
+    request: Request<ScanOptions>,
+
+    #[command(flatten)]
+    threads: ThreadsArgument,
+
+    /// Write the pixels (.csv), or every channel of the trace for Gwyddion (.gsf, NAME-CHANNEL.gsf)
+    #[arg(long, value_name = "PATH")]
+    out: Option<PathBuf>,
+
+    #[command(flatten)]
+    plot: PlotArgument,
+}
+
+pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure> {
+    let request = arguments.request.read()?;
+    let ending = match &arguments.out {
+        Some(path) => Some(file::claim(path, &["csv", "gsf"])?),
+        None => None,
+    };
+    if let (Some(path), Some("gsf")) = (&arguments.out, ending) {
+        for channel in CHANNELS {
+            file::claim(&of_channel(path, channel.name), &["gsf"])?;
+        }
+    }
+    arguments.plot.check()?;
+    let case = GivenCase::for_study(&arguments.case, true, output)?;
+    let report = progress::study::<ScanStudy>(&case, &request, &arguments.threads)?;
+    for warning in &report.warnings {
+        output.warning(warning);
+    }
+    if let Some(path) = &arguments.out {
+        if ending == Some("gsf") {
+            for channel in CHANNELS {
+                let bytes = report.field(&channel).to_gsf();
+                let bytes = bytes.map_err(nanotap::Error::from)?;
+                file::write(&of_channel(path, channel.name), &bytes)?;
+            }
+        } else {
+            file::write(path, pixels_csv(&report).as_bytes())?;
+        }
+    }
+    arguments.plot.draw(|| scan_figure(&report))?;
+    output.study(&case, &report, |report| text(&case, report))
+}
+
+/// `image-height.gsf` next to `image.gsf`.
+fn of_channel(path: &Path, channel: &str) -> PathBuf {
+    let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+    path.with_file_name(format!("{stem}-{channel}.gsf"))
+}
+
+fn nm(length: f64, digits: usize) -> String {
+    number::significant(1e9 * length, digits)
+}
+
+/// Rows of the table of lines.
+const SHOWN: usize = 20;
+
+fn text(case: &GivenCase, report: &ScanReport) -> String {
+    let method = match report.method {
+        Method::Exact => "every drive period exactly",
+        Method::Fast => "by an approximate flow",
+        Method::QuasiStatic => "a quasi-static preview",
+    };
+    let heading = format!(
+        "{}: scan of {} of {} nm at {} lines a second, {method}",
+        case.title(),
+        number::counted(report.trace.height.len(), "line", "lines"),
+        nm(report.size[0], 6),
+        number::significant(report.line_rate, 4),
+    );
+    let mut table = Table::new([
+        ("line", Align::Right),
+        ("", Align::Left),
+        ("height rms (nm)", Align::Point),
+        ("error rms (nm)", Align::Point),
+        ("tracking rms (nm)", Align::Point),
+        ("largest force (nN)", Align::Point),
+        ("parachuting (nm)", Align::Point),
+        ("overshoot (nm)", Align::Point),
+    ]);
+    for line in report.lines.iter().take(SHOWN) {
+        table.row(row(line));
+    }
+    let mut text = format!(
+        "{}\n\n{}\n{}",
+        style::bold(&heading),
+        motion::paragraph(&report.verdict),
+        table.render()
+    );
+    if report.lines.len() > SHOWN {
+        let _ = writeln!(text, "  … {} rows in all", report.lines.len());
+    }
+    if let Some(error) = &report.error {
+        text.push_str(&motion::paragraph(&format!(
+            "compared with exact periods on {} of {} drive periods: height within {} nm (rms {} \
+             nm), amplitude within {} nm (rms {} nm)",
+            error.periods,
+            report.total_periods,
+            nm(error.height_max, 2),
+            nm(error.height_rms, 2),
+            nm(error.amplitude_max, 2),
+            nm(error.amplitude_rms, 2),
+        )));
+    }
+    if let Some(feedback) = &report.feedback {
+        text.push_str(&motion::paragraph(&loop_text(feedback)));
+    }
+    text
+}
+
+fn row(line: &LineStatistics) -> [String; 8] {
+    let flights = line.parachuting.iter().map(|flight| flight.length);
+    [
+        line.line.to_string(),
+        match line.direction {
+            Direction::Trace => "trace".to_owned(),
+            Direction::Retrace => "retrace".to_owned(),
+        },
+        nm(line.height_rms, 4),
+        nm(line.error_rms, 4),
+        nm(line.tracking_rms, 4),
+        number::significant(1e9 * line.peak_force_max, 4),
+        nm(flights.fold(0.0, f64::max), 3),
+        nm(line.overshoot, 3),
+    ]
+}
+
+fn loop_text(feedback: &LoopReport) -> String {
+    let hertz = |frequency: Option<f64>| {
+        frequency.map_or_else(
+            || "none".to_owned(),
+            |f| format!("{} Hz", number::significant(f, 4)),
+        )
+    };
+    let gain = |gain: Option<f64>| {
+        gain.map_or_else(
+            || "none".to_owned(),
+            |gain| format!("{} 1/s", number::significant(gain, 4)),
+        )
+    };
+    format!(
+        "feedback loop at the setpoint: bandwidth {} (45° lag), {} (−3 dB), peaking {}; largest \
+         stable integral gain {}; a gain of {} would give {} (rule of thumb for the bandwidth: {} \
+         Hz)",
+        hertz(feedback.bandwidth_45),
+        hertz(feedback.bandwidth_3db),
+        number::significant(feedback.peaking, 3),
+        gain(feedback.largest_stable_gain),
+        gain(feedback.suggested_gain),
+        hertz(feedback.suggested_bandwidth),
+        number::significant(feedback.rule_of_thumb, 3),
+    )
+}

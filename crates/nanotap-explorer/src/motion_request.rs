@@ -1,0 +1,82 @@
+//! A motion as requested by the page, and its model.
+
+use nanotap::case::Case;
+use nanotap::model::Model;
+use serde::Deserialize;
+
+use crate::api_error::ApiError;
+use crate::figures::Views;
+use crate::preset::CaseSpec;
+
+/// Largest number of modes of a motion that follows a slider.
+const MAX_MODES: usize = 20;
+
+/// A motion as requested by the page.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct MotionRequest {
+    pub(crate) case: CaseSpec,
+    /// Initial state; empty: rest; `n:state`: an orbit of period n near the state.
+    #[serde(default)]
+    pub(crate) start: String,
+    /// Runge–Kutta steps per period of the motion for comparison; 0: none.
+    #[serde(default)]
+    pub(crate) steps: u32,
+    /// Visible ranges of the figures.
+    #[serde(default)]
+    pub(crate) views: Views,
+}
+
+/// Initial state of a motion, or guess for an orbit.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(crate) struct Start {
+    pub(crate) period: Option<usize>,
+    pub(crate) state: Option<Vec<f64>>,
+}
+
+impl Start {
+    pub(crate) fn parse(text: &str) -> Result<Self, ApiError> {
+        if text.is_empty() {
+            return Ok(Self::default());
+        }
+        let (period, state) = match text.split_once(':') {
+            Some((period, state)) => (Some(period), state),
+            None => (None, text),
+        };
+        let wrong = || {
+            ApiError::input(
+                format!("`{text}` is not a state"),
+                "numbers are needed, as in 0.1,-0.02,0.3",
+            )
+        };
+        Ok(Self {
+            period: period.map(|p| p.parse().map_err(|_| wrong())).transpose()?,
+            state: Some(
+                state
+                    .split(',')
+                    .map(|number| number.trim().parse().map_err(|_| wrong()))
+                    .collect::<Result<_, _>>()?,
+            ),
+        })
+    }
+
+    /// The text that [`parse`](Self::parse) reads.
+    pub(crate) fn text(period: Option<usize>, state: &[f64]) -> String {
+        let numbers: Vec<String> = state.iter().map(ToString::to_string).collect();
+        let prefix = period.map_or_else(String::new, |n| format!("{n}:"));
+        prefix + &numbers.join(",")
+    }
+}
+
+/// The model of a case that is small enough to follow a slider.
+pub(crate) fn model_of(case: &Case) -> Result<Model, ApiError> {
+    if let Some(cantilever) = case.cantilever()
+        && cantilever.modes > MAX_MODES
+    {
+        return Err(ApiError::input(
+            format!("modes = {} are too many for the explorer", cantilever.modes),
+            format!("{MAX_MODES} at most; the terminal takes more"),
+        ));
+    }
+    case.model().map_err(ApiError::of)
+}

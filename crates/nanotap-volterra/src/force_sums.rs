@@ -1,0 +1,188 @@
+//! Integrals of the law's force over a run, without a recording.
+
+use std::f64::consts::TAU;
+use std::sync::LazyLock;
+
+use crate::flow::{Flow, Observer, Switch};
+use crate::law::Exit;
+use crate::linear::add_product;
+use crate::quadrature::{derivative, gauss_legendre, series};
+use crate::step::{Solver, Step};
+use crate::system::System;
+use crate::{Complex, VolterraError};
+
+/// Nodes of the Gauss–Legendre rule of one step: exact for the polynomial of a step's force times
+/// the drive's phasor over a quarter of its period.
+const NODES: usize = 16;
+/// Newton steps from the largest force at the nodes to the peak.
+const REFINEMENTS: usize = 4;
+
+static RULE: LazyLock<(Vec<f64>, Vec<f64>)> = LazyLock::new(|| gauss_legendre(NODES));
+
+/// Integrals of the force `F` over a run, its peak, and the time in contact.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct ForceSums {
+    /// `∫ F dt`.
+    pub impulse: f64,
+    /// `∫ F e^{−iωt} dt`.
+    pub harmonic: Complex,
+    /// `∫ F ḋ dt`, 0 of a conservative law.
+    pub work: f64,
+    /// The largest force, at least 0.
+    pub peak: f64,
+    /// Time on branches on which tip and sample touch.
+    pub contact: f64,
+}
+
+/// Sums forces along a run.
+#[derive(Debug)]
+struct Summation {
+    sums: ForceSums,
+    /// Angular frequency of the harmonic.
+    omega: f64,
+    touches: Vec<bool>,
+    conservative: bool,
+    /// Work space: the gap's series, its derivative, that of the force.
+    gap: Vec<f64>,
+    gap_slope: Vec<f64>,
+    slope: Vec<f64>,
+    curvature: Vec<f64>,
+}
+
+impl Summation {
+    fn new(system: &System, omega: f64) -> Self {
+        let law = system.law();
+        let zeros = vec![0.0; system.kernel().nodes];
+        Self {
+            sums: ForceSums::default(),
+            omega,
+            touches: (0..law.branches()).map(|b| law.touches(b)).collect(),
+            conservative: law.conservative(),
+            gap: zeros.clone(),
+            gap_slope: zeros.clone(),
+            slope: zeros.clone(),
+            curvature: zeros,
+        }
+    }
+
+    /// Raises the peak to the largest force near `u` on a step.
+    fn raise_peak(&mut self, step: &Step, mut u: f64) {
+        derivative(&step.coefficients, &mut self.slope);
+        derivative(&self.slope, &mut self.curvature);
+        for _ in 0..REFINEMENTS {
+            let next = u - series(&self.slope, u) / series(&self.curvature, u);
+            if !(next >= 0.0 && next <= step.end) {
+                break;
+            }
+            u = next;
+        }
+        self.sums.peak = self.sums.peak.max(series(&step.coefficients, u));
+    }
+}
+
+impl Observer for Summation {
+    fn step(&mut self, system: &System, _: &mut Solver, step: &Step, _: &[f64]) {
+        if self.touches[step.branch] {
+            self.sums.contact += step.end_time() - step.start;
+        }
+        if system.vanishes(step.branch) {
+            return;
+        }
+        if !self.conservative {
+            self.gap.fill(0.0);
+            let values = &step.gap[..self.gap.len()];
+            add_product(&system.kernel().coefficients, values, &mut self.gap);
+            derivative(&self.gap, &mut self.gap_slope);
+        }
+        let (places, weights) = &*RULE;
+        let (mut largest, mut largest_at) = (f64::NEG_INFINITY, 0.0);
+        for (place, weight) in places.iter().zip(weights) {
+            let u = place * step.end;
+            let force = step.force_at(u);
+            if force > largest {
+                (largest, largest_at) = (force, u);
+            }
+            let weight = weight * step.end;
+            let by_time = weight * step.map.rate(step.length, u) * force;
+            let (sin, cos) = nanotap_arithmetic::sin_cos(self.omega * step.time(u));
+            self.sums.impulse += by_time;
+            self.sums.harmonic += Complex::new(cos, -sin) * by_time;
+            if !self.conservative {
+                self.sums.work += weight * force * series(&self.gap_slope, u);
+            }
+        }
+        for end in [0.0, step.end] {
+            self.sums.peak = self.sums.peak.max(step.force_at(end));
+        }
+        // Between nodes the force exceeds the largest of them by a few per cent at most.
+        if largest > 0.0 && 1.2 * largest > self.sums.peak {
+            self.raise_peak(step, largest_at);
+            self.sums.peak = self.sums.peak.max(largest);
+        }
+    }
+
+    fn switch(&mut self, _: &System, _: &Switch, _: &Exit, _: &[f64]) {}
+}
+
+impl Flow {
+    /// Runs to time `end` and sums the force, with its component at the angular frequency `omega`.
+    ///
+    /// # Errors
+    /// As [`Flow::run_until`].
+    pub fn run_with_force_sums(
+        &mut self,
+        end: f64,
+        omega: f64,
+    ) -> Result<ForceSums, VolterraError> {
+        let mut summation = Summation::new(self.system(), omega);
+        self.run(end, &mut summation)?;
+        Ok(summation.sums)
+    }
+}
+
+/// `∫₀¹ σʲ e^{−iθσ} dσ` for `j = 0, 1, 2` and `0 ≤ θ ≤ π/4`.
+fn turned_moments(theta: f64) -> [Complex; 3] {
+    debug_assert!(theta <= TAU / 8.0);
+    let mut term = Complex::new(1.0, 0.0);
+    let mut moments = [Complex::new(0.0, 0.0); 3];
+    for k in 0..9_u32 {
+        for (j, moment) in moments.iter_mut().enumerate() {
+            *moment += term / f64::from(k + j as u32 + 1);
+        }
+        term *= Complex::new(0.0, -theta / f64::from(k + 1));
+    }
+    moments
+}
+
+/// A step of the approximate flow: the force is a parabola through its start, middle and end.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct ParabolicStep {
+    pub(crate) length: f64,
+    pub(crate) forces: [f64; 3],
+    pub(crate) rates: [f64; 3],
+    /// `(cos ωt, sin ωt)` at the start.
+    pub(crate) phasor: [f64; 2],
+    pub(crate) touches: bool,
+}
+
+impl ForceSums {
+    /// Adds a step of the approximate flow under a tone of angular frequency `omega`.
+    pub(crate) fn add(&mut self, step: &ParabolicStep, omega: f64) {
+        let h = step.length;
+        if step.touches {
+            self.contact += h;
+        }
+        let [a, b, c] = step.forces;
+        if a == 0.0 && b == 0.0 && c == 0.0 {
+            return;
+        }
+        self.impulse += h * (a + 4.0 * b + c) / 6.0;
+        let [m0, m1, m2] = turned_moments(omega * h);
+        let [p, q, r] = [a, 4.0 * b - 3.0 * a - c, 2.0 * (a + c - 2.0 * b)];
+        let [cos, sin] = step.phasor;
+        self.harmonic += (m0 * p + m1 * q + m2 * r) * Complex::new(cos, -sin) * h;
+        let [ra, rb, rc] = step.rates;
+        self.work += h * (a * ra + 4.0 * b * rb + c * rc) / 6.0;
+        self.peak = self.peak.max(a).max(b).max(c);
+    }
+}

@@ -1,0 +1,79 @@
+//! Enums whose variants are words of a case file, each declared once.
+
+/// A text that is none of the words of an enum.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("`{given}` is not one of {}", known.join(", "))]
+pub struct UnknownWord {
+    /// The text.
+    pub given: String,
+    /// The words.
+    pub known: Vec<&'static str>,
+}
+
+/// A word as it is compared: case does not matter, nor do underscores and blanks for hyphens.
+pub(crate) fn plain(word: &str) -> String {
+    word.trim().to_lowercase().replace(['_', ' '], "-")
+}
+
+/// Declares an enum with the name of each variant: `ALL`, `name`, `Display`, `FromStr` and
+/// `Serialize`. The first variant is the default.
+macro_rules! words {
+    (
+        $(#[$meta:meta])*
+        $kind:ident {
+            $(#[$first_doc:meta])* $first:ident = $first_name:expr
+            $(, $(#[$doc:meta])* $variant:ident = $name:expr)* $(,)?
+        }
+    ) => {
+        $(#[$meta])*
+        #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+        pub enum $kind {
+            $(#[$first_doc])*
+            #[default]
+            $first,
+            $($(#[$doc])* $variant),*
+        }
+
+        impl $kind {
+            /// Every one.
+            pub const ALL: [Self; 1 + [$(stringify!($variant)),*].len()] =
+                [Self::$first, $(Self::$variant),*];
+
+            /// Name in case files.
+            pub const fn name(self) -> &'static str {
+                match self {
+                    Self::$first => $first_name,
+                    $(Self::$variant => $name),*
+                }
+            }
+        }
+
+        impl std::fmt::Display for $kind {
+            fn fmt(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+                formatter.pad(self.name())
+            }
+        }
+
+        impl std::str::FromStr for $kind {
+            type Err = $crate::model::words::UnknownWord;
+
+            fn from_str(given: &str) -> Result<Self, Self::Err> {
+                use $crate::model::words::plain;
+                let word = plain(given);
+                let is = |variant: &Self| plain(variant.name()) == word;
+                Self::ALL.into_iter().find(is).ok_or_else(|| Self::Err {
+                    given: given.to_owned(),
+                    known: Self::ALL.map(Self::name).to_vec(),
+                })
+            }
+        }
+
+        impl serde::Serialize for $kind {
+            fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+                serializer.serialize_str(self.name())
+            }
+        }
+    };
+}
+
+pub(crate) use words;

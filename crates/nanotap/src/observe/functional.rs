@@ -1,0 +1,134 @@
+//! The signals of a motion and the functionals from which observables are computed.
+
+use nanotap_flow::{Output, accumulate};
+
+use super::energy::PowerTerm;
+use super::measured::Measured;
+use super::table::{ObservableSet, Observables};
+use crate::model::Model;
+use crate::model::nonlinear::Nonlinear;
+
+/// A functional of signals.
+pub(super) type Functional = accumulate::Functional<Signal, Tone>;
+
+/// A scalar along a motion.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Signal {
+    /// Tip deflection W.
+    Tip,
+    /// Height V_T of the tip above the undeformed surface.
+    Height,
+    /// Its rate.
+    HeightRate,
+    /// Force of the sample on the tip.
+    Force,
+    /// Slope at the tip; 0 for an oscillator.
+    Slope,
+    /// A factor of a power.
+    Power(PowerTerm),
+}
+
+impl Signal {
+    /// The share of a nonlinear law's force in it, in addition to its output.
+    pub(super) fn force_part(self, nonlinear: &Nonlinear) -> f64 {
+        match self {
+            Self::Force => 1.0,
+            Self::Power(term) => term.force_part(nonlinear),
+            _ => 0.0,
+        }
+    }
+
+    /// The signal as outputs of the state, one per regime.
+    pub(super) fn outputs(self, model: &Model) -> Vec<Output> {
+        let same = |output: &Output| vec![output.clone(); model.system.regimes().len()];
+        match self {
+            Self::Tip => same(&model.tip),
+            Self::Height => same(&model.height),
+            Self::HeightRate => {
+                let drive = model.system.drive();
+                let rate =
+                    |r: &nanotap_flow::Regime| model.height.rate(r.matrix(), r.forcing(), drive);
+                model.system.regimes().iter().map(rate).collect()
+            }
+            Self::Force => model.force.clone(),
+            Self::Slope => same(
+                &model
+                    .beam
+                    .as_ref()
+                    .map_or_else(|| model.tip.scaled(0.0), |beam| beam.slope.clone()),
+            ),
+            Self::Power(term) => term.outputs(model),
+        }
+    }
+}
+
+/// A frequency of the drive.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Tone {
+    /// The drive frequency; with two tones, that of the first.
+    First,
+    /// The second tone's.
+    Second,
+    /// A multiple of the drive frequency.
+    Harmonic(u32),
+}
+
+impl Tone {
+    /// Its angular frequency.
+    pub(super) fn frequency(self, model: &Model) -> f64 {
+        match self {
+            Self::First => model.frequency(),
+            Self::Second => {
+                let second = model.system.drive().frequencies().get(1).copied();
+                second.unwrap_or_else(|| model.frequency())
+            }
+            Self::Harmonic(order) => f64::from(order) * model.frequency(),
+        }
+    }
+}
+
+/// The measurements that a set of observables requires.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Requirements {
+    pub(super) functionals: Vec<Functional>,
+    /// The signals of the functionals, each once.
+    pub(super) signals: Vec<Signal>,
+    /// Whether the least height of the beam is required.
+    pub(super) clearance: bool,
+    /// Whether the gain of stored energy is required.
+    pub(super) stored: bool,
+}
+
+impl Requirements {
+    /// The measurements that `set` requires.
+    pub(super) fn of(model: &Model, set: ObservableSet) -> Self {
+        let mut measured = Measured::<f64>::of(model, None);
+        Observables::read(set, &mut measured);
+        measured.required
+    }
+
+    /// Adds a functional if it is new.
+    pub(super) fn add(&mut self, functional: Functional) {
+        if self.functionals.contains(&functional) {
+            return;
+        }
+        self.functionals.push(functional);
+        functional.map(
+            |signal| {
+                if !self.signals.contains(&signal) {
+                    self.signals.push(signal);
+                }
+            },
+            |_| (),
+        );
+    }
+
+    /// The functionals, in order, with their signals as indices.
+    pub(super) fn numbered(&self, model: &Model) -> Vec<accumulate::Functional> {
+        // Every signal of a functional was added with it.
+        let number = |signal| self.signals.iter().position(|s| *s == signal).unwrap_or(0);
+        let all = self.functionals.iter();
+        all.map(|f| f.map(number, |tone| tone.frequency(model)))
+            .collect()
+    }
+}

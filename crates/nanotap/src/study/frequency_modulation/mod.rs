@@ -1,0 +1,360 @@
+//! Frequency modulation: a loop holds amplitude and phase of the tip's oscillation, by the
+//! frequency and the strength of the drive.
+//!
+//! What the instrument settles on is a periodic orbit whose frequency and drive strength are
+//! unknowns in addition to its state: [`HeldOrbit`]. How far the frequency is from that of the free lever
+//! at the same amplitude and phase ([`FreeOscillation`]) is the frequency shift; how much stronger
+//! the drive is than there, the excitation, tells what the sample takes.
+//!
+//! [`Averages`] are the usual approximations of the shift, and
+//! [`sader_jarvis`](average::sader_jarvis) gives the force back from a curve of shifts.
+
+#[cfg(feature = "fm")]
+pub mod average;
+#[cfg(feature = "fm")]
+mod curve;
+#[cfg(feature = "fm")]
+pub mod free;
+#[cfg(feature = "fm")]
+pub mod held;
+#[cfg(feature = "fm")]
+pub(crate) mod walk;
+
+#[cfg(feature = "fm")]
+pub use average::Averages;
+#[cfg(feature = "fm")]
+pub use curve::frequency_modulation;
+#[cfg(feature = "fm")]
+pub use free::FreeOscillation;
+#[cfg(feature = "fm")]
+pub use held::{Driven, Held, HeldOrbit};
+
+use nanotap_dynamics::Control;
+use schemars::JsonSchema;
+use serde::Serialize;
+
+use crate::Error;
+use crate::case::Case;
+use crate::case::physical::quantity::JOULES_PER_ELECTRONVOLT;
+use crate::case::physical::{Kind, Physical};
+use crate::model::parameter::Parameter;
+use crate::study::Study;
+use crate::study::approach::{ApproachPoint, ApproachReport, Way};
+use crate::study::limits::MAX_DISTANCES;
+use crate::study::request::options;
+use crate::study::value::Amount;
+
+/// Frequency modulation at one distance.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct Modulated {
+    /// Frequency of the drive, in the model's unit.
+    pub drive_frequency: f64,
+    /// Strength of the drive, in the model's unit.
+    pub drive_strength: f64,
+    /// Frequency shift Δf, in the model's unit.
+    pub frequency_shift: f64,
+    /// Frequency shift Δf over the free lever's frequency f₀.
+    pub relative_shift: f64,
+    /// Strength of the drive over that of the free lever: the excitation channel.
+    pub drive_ratio: f64,
+    /// Energy that the sample takes in a period, from the excitation,
+    /// E₀ (drive ratio − f/f₀) with what the free lever loses in a period, in the model's unit.
+    pub drive_dissipation: f64,
+    /// Least distance of a sinusoidal oscillation, a driven base's motion included, in the model's
+    /// unit of length.
+    pub closest: f64,
+    /// Δf/f₀ to first order in the law's static force, of which a rigid stop and a surface that
+    /// moves have none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub first_order_shift: Option<f64>,
+    /// Δf/f₀ by Giessibl's formula for an amplitude that is large against the force's range.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub giessibl_shift: Option<f64>,
+    /// The law's static force where the oscillation is closest, in the model's unit.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub static_force: Option<f64>,
+    /// The force there as Sader and Jarvis find it from the shifts of the curve.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub sader_jarvis_force: Option<f64>,
+}
+
+#[cfg(feature = "fm")]
+impl Modulated {
+    /// Of an orbit with the tip at rest at `gap`.
+    pub fn of(
+        orbit: &HeldOrbit,
+        free: &FreeOscillation,
+        averages: Option<&Averages>,
+        gap: f64,
+    ) -> Self {
+        let known = averages.map(|averages| averages.at(gap));
+        let own = [free.frequency, free.strength, free.loss];
+        Self {
+            closest: gap - free.reach,
+            first_order_shift: known.map(|k| k.first_order),
+            giessibl_shift: known.map(|k| k.giessibl),
+            static_force: known.map(|k| k.force),
+            ..Self::of_drive([orbit.frequency, orbit.strength], own)
+        }
+    }
+
+    /// Of a drive's frequency and strength, against those of the free lever and its loss.
+    pub(in crate::study) fn of_drive(
+        [frequency, strength]: [f64; 2],
+        [free_frequency, free_strength, free_loss]: [f64; 3],
+    ) -> Self {
+        let relative = (frequency - free_frequency) / free_frequency;
+        let ratio = strength / free_strength;
+        Self {
+            drive_frequency: frequency,
+            drive_strength: strength,
+            frequency_shift: frequency - free_frequency,
+            relative_shift: relative,
+            drive_ratio: ratio,
+            drive_dissipation: free_loss * (ratio - 1.0 - relative),
+            closest: f64::NAN,
+            first_order_shift: None,
+            giessibl_shift: None,
+            static_force: None,
+            sader_jarvis_force: None,
+        }
+    }
+}
+
+/// The same in SI.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct ModulatedInSi {
+    /// Frequency of the drive, Hz.
+    pub frequency: f64,
+    /// Strength of the drive: its force, N, or a driven base's amplitude, m.
+    pub drive_strength: f64,
+    /// Frequency shift Δf, Hz.
+    pub frequency_shift: f64,
+    /// Energy dissipated in the sample per period, from the excitation, J.
+    pub drive_dissipation: f64,
+    /// The same in eV.
+    #[serde(rename = "drive_dissipation_eV")]
+    pub drive_dissipation_ev: f64,
+    /// Least distance of a sinusoidal oscillation, m.
+    pub closest: f64,
+    /// The law's static force where the oscillation is closest, N.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub static_force: Option<f64>,
+    /// The force there as Sader and Jarvis find it, N.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub sader_jarvis_force: Option<f64>,
+}
+
+impl Modulated {
+    /// In SI.
+    pub fn in_si(&self, view: &Physical) -> ModulatedInSi {
+        let scales = &view.scales;
+        let strength = scales.of(Parameter::Alpha2, view.cantilever.actuation);
+        let energy = self.drive_dissipation * scales.energy;
+        ModulatedInSi {
+            frequency: self.drive_frequency * scales.frequency,
+            drive_strength: self.drive_strength * strength,
+            frequency_shift: self.frequency_shift * scales.frequency,
+            drive_dissipation: energy,
+            drive_dissipation_ev: energy / JOULES_PER_ELECTRONVOLT,
+            closest: self.closest * scales.length,
+            static_force: self.static_force.map(|force| force * scales.force),
+            sader_jarvis_force: self.sader_jarvis_force.map(|force| force * scales.force),
+        }
+    }
+}
+
+/// One of the numbers of frequency modulation, as a column of a table or an axis.
+#[derive(Clone, Copy, Debug)]
+pub struct ModulatedColumn {
+    /// Its name in tables.
+    pub name: &'static str,
+    /// The label of an axis.
+    pub label: &'static str,
+    /// What it measures; `None` of a ratio.
+    pub kind: Option<Kind>,
+    /// Its value in the model's unit.
+    pub of: fn(&Modulated) -> Option<f64>,
+}
+
+/// The columns.
+pub const COLUMNS: [ModulatedColumn; 8] = [
+    ModulatedColumn {
+        name: "frequency_shift",
+        label: "frequency shift $Δf$",
+        kind: Some(Kind::Frequency),
+        of: |m| Some(m.frequency_shift),
+    },
+    ModulatedColumn {
+        name: "relative_shift",
+        label: "relative shift $Δf/f_0$",
+        kind: None,
+        of: |m| Some(m.relative_shift),
+    },
+    ModulatedColumn {
+        name: "drive_ratio",
+        label: "drive over free drive",
+        kind: None,
+        of: |m| Some(m.drive_ratio),
+    },
+    ModulatedColumn {
+        name: "drive_dissipation",
+        label: "dissipation from the drive",
+        kind: Some(Kind::Energy),
+        of: |m| Some(m.drive_dissipation),
+    },
+    ModulatedColumn {
+        name: "first_order_shift",
+        label: "$Δf/f_0$ to first order",
+        kind: None,
+        of: |m| m.first_order_shift,
+    },
+    ModulatedColumn {
+        name: "giessibl_shift",
+        label: "$Δf/f_0$ for a large amplitude",
+        kind: None,
+        of: |m| m.giessibl_shift,
+    },
+    ModulatedColumn {
+        name: "static_force",
+        label: "force",
+        kind: Some(Kind::Force),
+        of: |m| m.static_force,
+    },
+    ModulatedColumn {
+        name: "sader_jarvis_force",
+        label: "force (Sader–Jarvis)",
+        kind: Some(Kind::Force),
+        of: |m| m.sader_jarvis_force,
+    },
+];
+
+/// Frequency modulation along a curve.
+#[derive(Clone, Debug, Serialize, JsonSchema)]
+pub struct ModulationReport {
+    /// The amplitude that is held, in the model's unit of length.
+    pub amplitude: f64,
+    /// Phase lag kept by the feedback, degrees.
+    pub phase: f64,
+    /// Frequency of the free lever at this phase, in the model's unit.
+    pub free_frequency: f64,
+    /// The same in Hz, of a physical case.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub free_frequency_hz: Option<f64>,
+    /// Strength of its drive, in the model's unit.
+    pub free_strength: f64,
+    /// Stiffness by which the frequency answers the sample: of the mode at the tip, where the base
+    /// is at rest, in the model's unit.
+    pub stiffness: f64,
+    /// What the free lever loses in a period at this amplitude, in the model's unit.
+    pub free_loss: f64,
+    /// The least distance that is kept, in the model's unit of length: amplitude and what belongs
+    /// to it are then those of the first distance.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub closest: Option<f64>,
+    /// What the multipliers are of.
+    pub multipliers: &'static str,
+    /// The distances at which the frequency shift has the asked value, on each way in the order
+    /// in which they are met, with the motion there: the first is where a loop that holds the shift
+    /// stops.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub setpoints: Option<Vec<ApproachPoint>>,
+    /// Where it changed by a jump.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub jumps: Vec<Jump>,
+    /// Where a way ended before its time, and why.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub ended: Vec<Ended>,
+}
+
+/// What the multipliers say under frequency modulation, in words.
+pub const OPEN_LOOP: &str = "multipliers are those of the orbit at constant frequency and \
+                             strength of the drive; under the loop stability is the loop's matter";
+
+/// A stretch over which no orbit that has the amplitude and phase could be followed, though there
+/// is one at its end.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct Jump {
+    /// Direction.
+    pub way: Way,
+    /// The last distance before it, in the model's unit of length.
+    pub from: f64,
+    /// The first behind it.
+    pub to: f64,
+}
+
+/// An early end of a curve.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct Ended {
+    /// Direction.
+    pub way: Way,
+    /// The last distance, in the model's unit of length.
+    pub gap: f64,
+    /// Reason of the end.
+    pub reason: String,
+}
+
+options! {
+    /// Options of a curve under frequency modulation.
+    pub struct FrequencyModulationOptions {
+        /// First distance, in units of the case ("30 nm") or as alpha5; default: 1.25 times the
+        /// free amplitude towards the sample
+        #[schemars(extend("x-value" = "DISTANCE"))]
+        pub from: Option<Amount> = None,
+        /// Last distance of the approach; default: 0
+        #[schemars(extend("x-value" = "DISTANCE"))]
+        pub to: Option<Amount> = None,
+        /// Number of distances in each direction
+        #[schemars(range(min = 2, max = MAX_DISTANCES), extend("x-value" = "P"))]
+        pub points: usize = 80,
+        /// Phase lag to keep, in degrees
+        #[schemars(range(min = 0, max = 180), extend("x-value" = "DEGREES"))]
+        pub phase: f64 = 90.0,
+        /// Frequency shift whose distances to find, in units of the case ("-50 Hz") or as omega
+        #[schemars(extend("x-value" = "SHIFT"))]
+        pub shift: Option<Amount> = None,
+        /// Least distance of the oscillation to keep, in units of the case ("1 nm") or as alpha5: the
+        /// amplitude then changes with the distance
+        #[schemars(extend("x-value" = "DISTANCE"))]
+        pub closest: Option<Amount> = None,
+    }
+}
+
+/// Stands for the curve of a build without the feature `fm`.
+///
+/// # Errors
+/// Always.
+#[cfg(not(feature = "fm"))]
+pub fn frequency_modulation(
+    _: &Case,
+    _: &FrequencyModulationOptions,
+    _: &Control<'_>,
+) -> Result<ApproachReport, Error> {
+    Err(Error::input(
+        "this program was built without frequency modulation",
+        "build it with the feature `fm`",
+    ))
+}
+
+/// Approach and retract curve under frequency modulation.
+#[derive(Clone, Copy, Debug)]
+pub struct FrequencyModulationStudy;
+
+impl Study for FrequencyModulationStudy {
+    const NAME: &'static str = "fm";
+    const ABOUT: &'static str = "Frequency shift and excitation against the distance to the sample, \
+                                 with amplitude and phase held";
+    const COUNTED: &'static str = "distances";
+    const ANY_DISTANCE: bool = true;
+    const PARTIAL: bool = true;
+    type Options = FrequencyModulationOptions;
+    type Report = ApproachReport;
+
+    fn compute(
+        case: &Case,
+        options: &FrequencyModulationOptions,
+        control: &Control<'_>,
+    ) -> Result<ApproachReport, Error> {
+        frequency_modulation(case, options, control)
+    }
+}

@@ -1,0 +1,96 @@
+//! Proofs of periodic orbits: a theorem about the orbit that Newton found, or the reason why there
+//! is none.
+//!
+//! A proof is about the model's dimensionless numbers, each standing for every decimal number
+//! that is read as it; see [`enclosed`](crate::model::enclosed) for the equations and nanotap-proof
+//! for the method. Without the feature `proof` no orbit is proved, and the report states why.
+
+#[cfg(feature = "proof")]
+mod prover;
+
+use schemars::JsonSchema;
+use serde::Serialize;
+
+#[cfg(feature = "proof")]
+pub use prover::{NotProved, Prover, candidate};
+
+/// Result of a proof about a periodic orbit.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct ProofReport {
+    /// Whether the orbit was proved to exist.
+    pub proved: bool,
+    /// The theorem, or the reason why there is none.
+    pub statement: String,
+    /// Enclosures, if the orbit is proved to exist.
+    #[serde(flatten)]
+    pub theorem: Option<TheoremReport>,
+}
+
+/// A theorem's numbers. An interval is its lower and its upper bound, both exact.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct TheoremReport {
+    /// Minimal period in drive periods.
+    pub period: usize,
+    /// State at drive phase 0, entry by entry.
+    pub state: Vec<[f64; 2]>,
+    /// When contact begins and ends.
+    pub switches: Vec<SwitchReport>,
+    /// Neighbourhood without another orbit of the same contacts.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub unique_within: Option<UniqueWithin>,
+    /// Discs that hold the multipliers.
+    pub multipliers: Vec<DiscReport>,
+    /// Proved stability: stable, unstable or undecided.
+    pub stability: &'static str,
+}
+
+/// A switch between flight and contact.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct SwitchReport {
+    /// Time from drive phase 0 on.
+    pub time: [f64; 2],
+    /// Whether contact begins or ends; an impact on a rigid stop begins one that lasts no time.
+    pub begins: bool,
+}
+
+/// No other orbit of the same period and contacts has every switch so near.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct UniqueWithin {
+    /// Difference of the time of every switch.
+    pub time: f64,
+    /// Difference of each entry of the state at every switch.
+    pub state: Vec<f64>,
+}
+
+/// A disc of complex numbers.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct DiscReport {
+    /// Its centre: real and imaginary part.
+    pub center: [f64; 2],
+    /// Its radius.
+    pub radius: f64,
+    /// How many multipliers it holds.
+    pub count: usize,
+}
+
+/// Stands for the prover of a build without the feature `proof`.
+#[cfg(not(feature = "proof"))]
+#[derive(Debug)]
+pub struct Prover;
+
+#[cfg(not(feature = "proof"))]
+impl Prover {
+    /// The prover of any case.
+    pub fn new(_: &crate::case::Case) -> Self {
+        Self
+    }
+
+    /// A report without a theorem.
+    pub fn report(&self, _: &crate::model::recording::Recording, _: usize) -> ProofReport {
+        ProofReport {
+            proved: false,
+            statement: "not proved: this program was built without the feature `proof`".into(),
+            theorem: None,
+        }
+    }
+}

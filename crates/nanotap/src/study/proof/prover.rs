@@ -1,0 +1,226 @@
+//! Proofs of the orbits of one case.
+
+use std::fmt::Write as _;
+
+use nanotap_flow::Trajectory;
+use nanotap_proof::{Candidate, Interval, ProofError, Stability, Switch, System, Theorem, prove};
+
+use crate::case::Case;
+use crate::model::cantilever::{Cantilever, CosineTerm};
+use crate::model::contact::ContactLaw;
+use crate::model::drive_form::Actuation;
+use crate::model::enclosed::{EnclosureError, enclosed, enclosed_oscillator};
+use crate::model::oscillator::{Oscillator, OscillatorParameter};
+use crate::model::recording::Recording;
+use crate::number::shortest;
+
+use super::{DiscReport, ProofReport, SwitchReport, TheoremReport, UniqueWithin};
+
+/// Reasons why an orbit is not proved.
+#[derive(Clone, Debug, thiserror::Error)]
+pub enum NotProved {
+    /// The case has no equations in intervals.
+    #[error(transparent)]
+    Equations(#[from] EnclosureError),
+    /// The test failed.
+    #[error(transparent)]
+    Test(#[from] ProofError),
+}
+
+/// Prover for the orbits of one case.
+#[derive(Debug)]
+pub struct Prover {
+    system: Result<System, EnclosureError>,
+    /// The numbers that a theorem is about.
+    about: String,
+}
+
+impl Prover {
+    /// Of a case.
+    pub fn new(case: &Case) -> Self {
+        let (system, about) = match (case.cantilever(), case.oscillator()) {
+            (Some(cantilever), _) => (enclosed(cantilever), about(cantilever)),
+            (None, Some(oscillator)) => (
+                enclosed_oscillator(oscillator),
+                about_oscillator(oscillator),
+            ),
+            (None, None) => (Err(EnclosureError::NotPiecewiseLinear), String::new()),
+        };
+        let system = system.map(|system| system.cancelled_by(case.cancel().clone()));
+        Self { system, about }
+    }
+
+    /// Proves one orbit of this period, of which `orbit` is the recording.
+    ///
+    /// # Errors
+    /// [`NotProved`] says why that was not possible.
+    pub fn theorem(&self, orbit: &Recording, period: usize) -> Result<Theorem, NotProved> {
+        let system = self.system.as_ref().map_err(Clone::clone)?;
+        let Recording::PiecewiseLinear(trajectory) = orbit else {
+            return Err(EnclosureError::NotPiecewiseLinear.into());
+        };
+        Ok(prove(system, &candidate(trajectory, period))?)
+    }
+
+    /// The same as a report.
+    pub fn report(&self, orbit: &Recording, period: usize) -> ProofReport {
+        match self.theorem(orbit, period) {
+            Ok(theorem) => ProofReport {
+                proved: true,
+                statement: statement(&theorem, &self.about),
+                theorem: Some(TheoremReport::of(&theorem)),
+            },
+            Err(reason) => ProofReport {
+                proved: false,
+                statement: format!("not proved: {reason}"),
+                theorem: None,
+            },
+        }
+    }
+}
+
+/// The switches of a recorded orbit, with the states after them.
+pub fn candidate(trajectory: &Trajectory, period: usize) -> Candidate {
+    let transitions = trajectory.system().transitions();
+    let switches = trajectory
+        .events()
+        .iter()
+        .map(|event| Switch {
+            time: event.time,
+            from: event.from,
+            transition: transitions[event.from]
+                .iter()
+                .position(|t| t.target == event.to)
+                .unwrap_or_default(),
+            state: trajectory.state_at(event.time).unwrap_or_default(),
+        })
+        .collect();
+    Candidate {
+        period,
+        regime: trajectory.segments().first().map_or(0, |s| s.regime),
+        switches,
+    }
+}
+
+/// What is proved of an orbit's stability, in a word.
+fn stability(theorem: &Theorem) -> &'static str {
+    match theorem.multipliers.stability() {
+        Stability::Stable => "stable",
+        Stability::Unstable => "unstable",
+        Stability::Undecided => "undecided",
+    }
+}
+
+/// The numbers of a case, and what of it is not as in the paper.
+fn about(case: &Cantilever) -> String {
+    let numbers: Vec<String> = case
+        .parameters()
+        .into_iter()
+        .map(|parameter| format!("{} = {}", parameter.name(), shortest(case.get(parameter))))
+        .collect();
+    let mut text = format!("N = {}, {}", case.modes, numbers.join(", "));
+    if let Some(ratio) = case.tone2_ratio {
+        let _ = write!(text, ", tone2_ratio = {ratio}");
+    }
+    if case.contact != ContactLaw::default() {
+        let _ = write!(text, ", contact = {}", case.contact);
+    }
+    if case.actuation != Actuation::default() {
+        let _ = write!(text, ", actuation = {}", case.actuation);
+    }
+    if case.cosine_term != CosineTerm::default() {
+        let _ = write!(text, ", cosine_term = {}", case.cosine_term.name());
+    }
+    text
+}
+
+/// The numbers of an oscillator.
+fn about_oscillator(oscillator: &Oscillator) -> String {
+    let numbers: Vec<String> = OscillatorParameter::ALL
+        .into_iter()
+        .filter_map(|p| Some(format!("{} = {}", p.name(), shortest(oscillator.get(p)?))))
+        .collect();
+    numbers.join(", ")
+}
+
+/// The theorem in words.
+fn statement(theorem: &Theorem, about: &str) -> String {
+    let radius = |interval: &Interval| interval.radius();
+    let largest = |all: &mut dyn Iterator<Item = f64>| all.fold(0.0, f64::max);
+    let state = largest(&mut theorem.states.iter().flatten().map(radius));
+    let mut text = format!(
+        "for {about}, each number standing for every decimal that is read as it, an orbit of minimal period {} \
+         exists; its states at drive phase 0 are known to {state:.1e}",
+        theorem.period
+    );
+    match &theorem.isolation {
+        Some(alone) => {
+            let time = largest(&mut theorem.switches.iter().map(|s| s.time.radius()));
+            let _ = write!(
+                text,
+                ", the times of its {} switches between flight and contact to {time:.1e}, and it switches nowhere \
+                 else; no other orbit of that period and that sequence of flights and contacts has all its \
+                 switches within {:.1e} of these times and in states as near as `unique_within` says",
+                theorem.switches.len(),
+                alone.time,
+            );
+        }
+        None => text.push_str(
+            ", and it never switches; no other orbit of that period stays in the same regime",
+        ),
+    }
+    let discs = &theorem.multipliers.discs;
+    let reach = largest(&mut discs.iter().map(|d| d.radius));
+    let _ = match theorem.multipliers.stability() {
+        Stability::Stable => write!(
+            text,
+            "; its multipliers, with an error below {reach:.1e}, are all inside the unit circle: it is asymptotically stable"
+        ),
+        Stability::Unstable => write!(
+            text,
+            "; of its multipliers, with an error below {reach:.1e}, at least one is outside the unit circle: it is unstable"
+        ),
+        Stability::Undecided if discs.is_empty() => {
+            write!(text, "; its multipliers could not be enclosed")
+        }
+        Stability::Undecided => write!(
+            text,
+            "; its multipliers have an error of up to {reach:.1e}, which leaves its stability open"
+        ),
+    };
+    text
+}
+
+impl TheoremReport {
+    fn of(theorem: &Theorem) -> Self {
+        let bounds = |x: &Interval| [x.lo(), x.hi()];
+        let first = theorem.states.first();
+        Self {
+            period: theorem.period,
+            state: first.map_or_else(Vec::new, |s| s.iter().map(bounds).collect()),
+            switches: theorem
+                .switches
+                .iter()
+                .map(|switch| SwitchReport {
+                    time: bounds(&switch.time),
+                    begins: switch.to != 0 || switch.from == switch.to,
+                })
+                .collect(),
+            unique_within: theorem.isolation.as_ref().map(|alone| UniqueWithin {
+                time: alone.time,
+                state: alone.state.clone(),
+            }),
+            multipliers: theorem
+                .multipliers
+                .discs
+                .iter()
+                .map(|disc| DiscReport {
+                    center: [disc.center.re, disc.center.im],
+                    radius: disc.radius,
+                    count: disc.count,
+                })
+                .collect(),
+            stability: stability(theorem),
+        }
+    }
+}

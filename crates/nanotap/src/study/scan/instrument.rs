@@ -1,0 +1,226 @@
+//! The instrument: lever, lock-in amplifier, controller and scanner, one drive period at a time.
+
+use nanotap_arithmetic::ComplexFunctions as _;
+use nanotap_flow::Complex;
+use serde::{Deserialize, Serialize};
+
+use super::feedback::{Controller, LockIn, Scanner};
+use super::lever::{Engine, Lever};
+use super::options::{Method, Mode};
+use super::plan::Plan;
+use super::quasi_static::SteadyLever;
+use crate::Error;
+
+/// Which force governs the motion of a drive period.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Interaction {
+    /// The force hardly changes the motion
+    Free,
+    /// The component of the force in phase with the deflection attracts
+    Attractive,
+    /// It repels
+    Repulsive,
+    /// The motion differs from period to period
+    Irregular,
+}
+
+/// One drive period of a scan, in SI.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Period {
+    pub(super) x: f64,
+    pub(super) surface: f64,
+    pub(super) z: f64,
+    pub(super) deflection: Complex,
+    pub(super) lock_in: Complex,
+    pub(super) error: f64,
+    pub(super) peak_force: f64,
+    pub(super) mean_deflection: f64,
+    pub(super) contact: f64,
+    pub(super) dissipation: f64,
+    pub(super) interaction: Interaction,
+}
+
+/// Part of the force that stops the lever below which a force does not count.
+const FREE: f64 = 0.02;
+
+/// The lever above every material, by a method.
+#[derive(Clone, Debug)]
+enum Levers {
+    Moving(Vec<Lever>),
+    Steady(Vec<SteadyLever>),
+}
+
+/// An instrument with its state.
+#[derive(Clone, Debug)]
+pub(super) struct Instrument<'a> {
+    plan: &'a Plan,
+    levers: Levers,
+    material: usize,
+    state: Vec<f64>,
+    lock_in: LockIn,
+    controller: Controller,
+    scanner: Scanner,
+    /// Amplitude of a force at the drive's frequency that alone moves the lever by the free
+    /// amplitude.
+    free_force: f64,
+}
+
+impl<'a> Instrument<'a> {
+    /// The instrument at the start of a scan, the lever in its free motion.
+    ///
+    /// # Errors
+    /// When a case has no model.
+    pub(super) fn new(plan: &'a Plan) -> Result<Self, Error> {
+        let engine = match plan.method {
+            Method::Fast => Engine::Fast,
+            Method::Exact | Method::QuasiStatic => Engine::Exact,
+        };
+        let levers: Result<Vec<Lever>, Error> = plan
+            .materials
+            .iter()
+            .map(|case| Lever::new(case, engine))
+            .collect();
+        let mut levers = levers?;
+        let first = &mut levers[0];
+        let (state, free, free_force) = (
+            first.free_start(),
+            first.free_deflection(),
+            first.free_force(),
+        );
+        let signal = free * plan.length_unit;
+        let gap = plan.z0 / plan.length_unit;
+        let levers = if plan.method == Method::QuasiStatic {
+            let steady = levers
+                .into_iter()
+                .map(|lever| SteadyLever::new(lever, gap, free.modulus()));
+            Levers::Steady(steady.collect())
+        } else {
+            Levers::Moving(levers)
+        };
+        Ok(Self {
+            plan,
+            levers,
+            material: 0,
+            state,
+            lock_in: LockIn::new(plan.lock_in_part(), plan.lock_in.1, signal),
+            controller: Controller::new(plan.gains, plan.z0),
+            scanner: Scanner::new(plan.z_scanner, plan.period, plan.z0),
+            free_force,
+        })
+    }
+
+    /// Whether every period is exact.
+    pub(super) fn is_exact(&self) -> bool {
+        match &self.levers {
+            Levers::Moving(levers) => levers.iter().all(Lever::is_exact),
+            Levers::Steady(_) => false,
+        }
+    }
+
+    /// The same instrument, whose periods are exact from now on.
+    ///
+    /// # Errors
+    /// When a case has no model.
+    pub(super) fn exact(&self) -> Result<Self, Error> {
+        let levers: Result<Vec<Lever>, Error> = self
+            .plan
+            .materials
+            .iter()
+            .map(|case| Lever::new(case, Engine::Exact))
+            .collect();
+        Ok(Self {
+            levers: Levers::Moving(levers?),
+            ..self.clone()
+        })
+    }
+
+    /// Goes on from where another instrument is, with its own levers.
+    pub(super) fn go_on_from(&mut self, other: &Self) {
+        self.material = other.material;
+        self.state.clone_from(&other.state);
+        self.lock_in.clone_from(&other.lock_in);
+        self.controller.clone_from(&other.controller);
+        self.scanner.clone_from(&other.scanner);
+    }
+
+    /// The exact lever above the present material, its state, and the gap of the next period, in
+    /// the model's units.
+    ///
+    /// # Errors
+    /// When the case has no model.
+    pub(super) fn exact_lever(&self) -> Result<(Lever, Vec<f64>), Error> {
+        let lever = Lever::new(&self.plan.materials[self.material], Engine::Exact)?;
+        Ok((lever, self.state.clone()))
+    }
+
+    /// Periods whose command was limited by the range of z.
+    pub(super) const fn at_range(&self) -> usize {
+        self.controller.at_range
+    }
+
+    /// Runs one period above a surface of this height and material.
+    ///
+    /// # Errors
+    /// When the flow fails.
+    pub(super) fn run_period(
+        &mut self,
+        x: f64,
+        surface: f64,
+        material: usize,
+    ) -> Result<Period, Error> {
+        let plan = self.plan;
+        let feeds_back = plan.mode == Mode::ConstantAmplitude;
+        let z = if feeds_back {
+            self.scanner.follow(self.controller.command())
+        } else {
+            plan.z0
+        };
+        let gap = (z - surface) / plan.length_unit;
+        let signals = match &mut self.levers {
+            Levers::Moving(levers) => {
+                let lever = &mut levers[material];
+                if material != self.material {
+                    lever.take_over(&mut self.state);
+                }
+                lever.advance(&mut self.state, gap)?
+            }
+            Levers::Steady(levers) => levers[material].at(gap)?,
+        };
+        self.material = material;
+        let deflection = signals.deflection * plan.length_unit;
+        let lock_in = self.lock_in.update(deflection);
+        let amplitude = lock_in.modulus();
+        let error = amplitude - plan.setpoint * plan.free_amplitude;
+        if feeds_back {
+            self.controller.update(plan.amplified(amplitude, error));
+        }
+        let in_phase = (signals.force * signals.deflection.conj()).re;
+        let interaction = if signals.force.modulus() < FREE * self.free_force {
+            Interaction::Free
+        } else if in_phase > 0.0 {
+            Interaction::Attractive
+        } else {
+            Interaction::Repulsive
+        };
+        Ok(Period {
+            x,
+            surface,
+            z,
+            deflection,
+            lock_in,
+            error,
+            peak_force: signals.peak_force * plan.force_unit,
+            mean_deflection: signals.mean_deflection * plan.length_unit,
+            contact: signals.contact,
+            dissipation: signals.dissipation * plan.energy_unit,
+            interaction,
+        })
+    }
+}
+
+/// Phase lag in degrees, in (−180, 180], of a deflection behind the drive's sine.
+pub(super) fn lag(deflection: Complex) -> f64 {
+    let turned = deflection * Complex::new(0.0, 1.0);
+    -nanotap_arithmetic::atan2(turned.im, turned.re).to_degrees()
+}

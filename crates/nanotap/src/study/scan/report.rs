@@ -1,0 +1,248 @@
+//! The report of a scan.
+
+use schemars::JsonSchema;
+use serde::Serialize;
+
+use super::instrument::Interaction;
+use super::options::{Method, Mode};
+
+/// Direction of a line.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Direction {
+    /// Rising positions
+    Trace,
+    /// Falling positions
+    Retrace,
+}
+
+/// Signals of a listed drive period, in SI.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct ListedPeriod {
+    /// Number of the period, from the start of settling.
+    pub k: usize,
+    /// Position along the line, m.
+    pub x: f64,
+    /// Height of the surface, m.
+    pub surface: f64,
+    /// Height of the lever's base, m.
+    pub z: f64,
+    /// Amplitude of the deflection at the drive's frequency, m.
+    pub amplitude: f64,
+    /// Its phase behind the drive, degrees.
+    pub phase: f64,
+    /// Amplitude at the output of the lock-in amplifier, m.
+    pub amplitude_lockin: f64,
+    /// Phase there, degrees.
+    pub phase_lockin: f64,
+    /// Amplitude at the output less the setpoint, m.
+    pub error: f64,
+    /// Largest force of the sample on the tip, N.
+    pub peak_force: f64,
+    /// Mean deflection, m.
+    pub mean_deflection: f64,
+    /// Time in contact over the period.
+    pub contact_fraction: f64,
+    /// Energy that the tip gives to the sample, J.
+    pub dissipation: f64,
+    /// Which force governs the motion.
+    pub state: Interaction,
+}
+
+/// A stretch on which the tip flies above the surface.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct Parachuting {
+    /// Its first drive period.
+    pub first_period: usize,
+    /// Drive periods.
+    pub periods: usize,
+    /// Its duration, s.
+    pub time: f64,
+    /// Its length along the line, m.
+    pub length: f64,
+}
+
+/// Statistics of a line in one direction, in SI.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct LineStatistics {
+    /// Number of the line, from 0.
+    pub line: usize,
+    /// Direction.
+    pub direction: Direction,
+    /// Position across the lines, m.
+    pub y: f64,
+    /// First drive period.
+    pub first_period: usize,
+    /// Mean height, m.
+    pub height_mean: f64,
+    /// Standard deviation of the height, m.
+    pub height_rms: f64,
+    /// Largest height, m.
+    pub height_max: f64,
+    /// Least height, m.
+    pub height_min: f64,
+    /// Root mean square of the amplitude error, m.
+    pub error_rms: f64,
+    /// Largest amplitude error, m.
+    pub error_max: f64,
+    /// Least amplitude error, m.
+    pub error_min: f64,
+    /// Largest force, N.
+    pub peak_force_max: f64,
+    /// Drive period of the largest force.
+    pub peak_force_max_period: usize,
+    /// Position of the largest force, m.
+    pub peak_force_max_x: f64,
+    /// Mean of the periods' largest forces, N.
+    pub peak_force_mean: f64,
+    /// Mean energy that the tip gives to the sample in a period, J.
+    pub dissipation_mean: f64,
+    /// Standard deviation of the height less that of the surface, m.
+    pub tracking_rms: f64,
+    /// How far the height exceeds the highest point of the surface, m.
+    pub overshoot: f64,
+    /// Stretches on which the tip flies above the surface.
+    pub parachuting: Vec<Parachuting>,
+}
+
+/// Channels of an image: a row a line, an entry a pixel; `null` where no period falls on a pixel.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, JsonSchema)]
+pub struct Channels {
+    /// Mean height of the surface itself, m.
+    pub surface: Vec<Vec<f64>>,
+    /// Mean height, m.
+    pub height: Vec<Vec<f64>>,
+    /// Mean amplitude error, m.
+    pub amplitude_error: Vec<Vec<f64>>,
+    /// Phase of the mean output of the lock-in amplifier, degrees.
+    pub phase: Vec<Vec<f64>>,
+    /// Mean of the periods' largest forces, N.
+    pub peak_force: Vec<Vec<f64>>,
+    /// Largest force, N.
+    pub peak_force_max: Vec<Vec<f64>>,
+    /// Mean energy that the tip gives to the sample in a period, J.
+    pub dissipation: Vec<Vec<f64>>,
+    /// Mean part of a period in contact.
+    pub contact_fraction: Vec<Vec<f64>>,
+    /// Mean deflection, m.
+    pub mean_deflection: Vec<Vec<f64>>,
+    /// Which force governs the motion.
+    pub state: Vec<Vec<Option<Interaction>>>,
+}
+
+/// A jump of the motion onto another branch.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct BranchChange {
+    /// Drive period.
+    pub k: usize,
+    /// Line.
+    pub line: usize,
+    /// Direction.
+    pub direction: Direction,
+    /// Position, m.
+    pub x: f64,
+    /// The force that governed the motion before.
+    pub from: Interaction,
+    /// The force that governs it from there on.
+    pub to: Interaction,
+    /// Change of the height less that of the surface, m.
+    pub height_change: f64,
+}
+
+/// How a fast scan compares with an exact one, on parts of the scan that both run.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct MethodError {
+    /// Drive periods compared.
+    pub periods: usize,
+    /// Largest difference of the height, m.
+    pub height_max: f64,
+    /// Root mean square of the difference of the height, m.
+    pub height_rms: f64,
+    /// Largest difference of the amplitude, m.
+    pub amplitude_max: f64,
+    /// Root mean square of the difference of the amplitude, m.
+    pub amplitude_rms: f64,
+}
+
+/// The feedback loop linearised at the setpoint, on the flat surface.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct LoopReport {
+    /// Distance at which the motion has the setpoint amplitude, m.
+    pub distance: f64,
+    /// Which force governs the motion there.
+    pub state: Interaction,
+    /// Slope of the amplitude over the distance.
+    pub slope: f64,
+    /// Periods in which a disturbance of the lever falls by the factor e.
+    pub lever_memory: f64,
+    /// Largest modulus of the multipliers of the whole loop; above 1 it oscillates.
+    pub spectral_radius: f64,
+    /// Integral gain at which the loop starts to oscillate, 1/s; `null` where none does so.
+    pub largest_stable_gain: Option<f64>,
+    /// Frequency in Hz at which the height lags the surface by 45°.
+    pub bandwidth_45: Option<f64>,
+    /// Frequency in Hz at which the height follows with 1/√2 of the surface's amplitude.
+    pub bandwidth_3db: Option<f64>,
+    /// Largest ratio of the height to the surface over all frequencies.
+    pub peaking: f64,
+    /// Rule of thumb for the bandwidth in Hz: 1/16 of the inverse of all delays.
+    pub rule_of_thumb: f64,
+    /// Integral gain in 1/s with the largest bandwidth for a peaking of at most 1.1.
+    pub suggested_gain: Option<f64>,
+    /// Bandwidth in Hz at 45° with the suggested gain.
+    pub suggested_bandwidth: Option<f64>,
+}
+
+/// A scan.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct ScanReport {
+    /// How the drive periods were computed.
+    pub method: Method,
+    /// What the feedback did.
+    pub mode: Mode,
+    /// Part of the drive periods that was computed exactly.
+    pub exact_share: f64,
+    /// Difference from an exact scan, where the method is not exact.
+    pub error: Option<MethodError>,
+    /// Extent along and across the lines, m.
+    pub size: [f64; 2],
+    /// Drive periods of a line in one direction.
+    pub periods_per_line: usize,
+    /// Drive periods in all.
+    pub total_periods: usize,
+    /// Lines a second, trace and retrace together.
+    pub line_rate: f64,
+    /// Speed of the tip, m/s.
+    pub speed: f64,
+    /// Free amplitude, m.
+    pub free_amplitude: f64,
+    /// Setpoint amplitude, m.
+    pub setpoint_amplitude: f64,
+    /// Height at the start, m.
+    pub z0: f64,
+    /// Integral gain, 1/s.
+    pub integral_gain: f64,
+    /// Whether each line settled anew, so that lines are independent.
+    pub independent_lines: bool,
+    /// Largest force, N.
+    pub peak_force_max: f64,
+    /// Listed drive periods.
+    pub periods: Vec<ListedPeriod>,
+    /// Statistics of lines.
+    pub lines: Vec<LineStatistics>,
+    /// Root mean square of the difference between the heights of trace and retrace, m.
+    pub trace_retrace_rms: Option<f64>,
+    /// Image of the trace.
+    pub trace: Channels,
+    /// Image of the retrace.
+    pub retrace: Option<Channels>,
+    /// Jumps of the motion onto another branch.
+    pub branch_changes: Vec<BranchChange>,
+    /// The feedback loop at the setpoint; `null` where no steady motion has it.
+    #[serde(rename = "loop")]
+    pub feedback: Option<LoopReport>,
+    /// Reasons to doubt the image.
+    pub warnings: Vec<String>,
+    /// What the image shows, in a sentence.
+    pub verdict: String,
+}

@@ -1,0 +1,117 @@
+//! Options of a sweep.
+
+use nanotap_dynamics::Control;
+
+use super::{Follow, Over, Starts, Summary, Sweep};
+use crate::Error;
+use crate::case::Case;
+use crate::dataset::{Store, StoreError};
+use crate::study::attractors::MAX_STARTS;
+use crate::study::limits::{MAX_PERIOD, MAX_PERIODS};
+use crate::study::request::options;
+use crate::study::value::{Axes, Intervals};
+use crate::study::{DatasetPlan, DatasetStudy};
+
+options! {
+    /// Options of a sweep.
+    pub struct SweepOptions {
+        /// Parameter and its values, as in omega=2:4:400 (first, last, count), alpha4=1:1000:50:log
+        /// in equal ratios, or ascending values omega=2,2.5,4; modes too; for a physical case also
+        /// drive.frequency=60kHz:80kHz:200; once or twice
+        #[schemars(extend("x-value" = "KEY=VALUES", "x-required" = true))]
+        pub over: Axes = Axes::default(),
+        /// Quasi-random initial states at each value, spread over a box; default: rest alone
+        #[schemars(range(min = 1, max = MAX_STARTS), extend("x-value" = "S"))]
+        pub starts: Option<usize> = None,
+        /// Seed of the initial states
+        #[schemars(extend("x-value" = "K"))]
+        pub seed: u64 = 1,
+        /// Sides of the box, as in a1=-1:1 or v2=-4:4; other sides follow from the linear response
+        /// to the drive
+        #[serde(rename = "box")]
+        #[schemars(extend("x-value" = "COORDINATE=LOW:HIGH"))]
+        pub sides: Intervals = Intervals::default(),
+        /// Start from this state at drive phase 0: a1,…,aN,v1,…,vN (oscillator: x,v)
+        #[schemars(extend("x-value" = "A1,…"))]
+        pub state: Option<Vec<f64>> = None,
+        /// Start each value from the last state of the previous one, along the first parameter: up,
+        /// down or both. An interrupted line is lost
+        #[schemars(extend("x-value" = "WAY"))]
+        pub follow: Follow = Follow::Off,
+        /// Number of recorded drive periods
+        #[schemars(range(min = 1, max = MAX_PERIODS), extend("x-value" = "P"))]
+        pub periods: usize = 100,
+        /// Number of last periods whose final states are kept; default: all recorded ones
+        #[schemars(range(min = 0, max = MAX_PERIODS), extend("x-value" = "K"))]
+        pub strobe: Option<usize> = None,
+        /// Drive periods of the discarded transient; default: until the motion has settled
+        #[schemars(range(min = 0, max = MAX_PERIODS), extend("x-value" = "T"))]
+        pub transient: Option<usize> = None,
+        /// Longest period of orbits, in drive periods
+        #[schemars(range(min = 1, max = MAX_PERIOD), extend("x-value" = "N"))]
+        pub max_period: usize = 64,
+    }
+}
+
+impl SweepOptions {
+    /// Default options for parameters with their values, each as in `omega=2:4:400`.
+    pub fn over<S: Into<String>>(axes: impl IntoIterator<Item = S>) -> Self {
+        Self {
+            over: Axes(axes.into_iter().map(Into::into).collect()),
+            ..Self::default()
+        }
+    }
+
+    /// Number of runs over these parameters.
+    pub fn runs(&self, over: &[Over]) -> usize {
+        let values = over.iter().map(|over| over.count).product::<usize>();
+        values * self.starts.unwrap_or(1) * self.follow.directions().len().max(1)
+    }
+
+    /// Where motions start.
+    pub(super) fn starts(&self) -> Result<Starts, Error> {
+        match (self.starts, &self.state) {
+            (Some(_), Some(_)) => Err(Error::input(
+                "starts and state: the starts are drawn, or given",
+                "leave {starts} or {state} out",
+            )),
+            (None, _) if self.sides != Intervals::default() => Err(Error::option(
+                "box",
+                "the sides are those of the starts",
+                "say how many with {starts}",
+            )),
+            (Some(count), None) => Ok(Starts::Seeded {
+                count,
+                seed: self.seed,
+                sides: self.sides.numbers()?,
+            }),
+            (None, Some(state)) => Ok(Starts::Given(state.clone())),
+            (None, None) => Ok(Starts::Rest),
+        }
+    }
+
+    /// States kept of each run.
+    pub(super) fn strobe(&self) -> usize {
+        self.strobe.unwrap_or(self.periods).min(self.periods)
+    }
+}
+
+/// Runs over one or two parameters.
+#[derive(Clone, Copy, Debug)]
+pub struct SweepStudy;
+
+impl DatasetStudy for SweepStudy {
+    const NAME: &'static str = "sweep";
+    const ABOUT: &'static str = "Sweep one or two parameters, from any number of initial states";
+    const COUNTED: &'static str = "values";
+    type Options = SweepOptions;
+    type Report = Summary;
+
+    fn prepare(case: &Case, options: &SweepOptions, _: &Control<'_>) -> Result<DatasetPlan, Error> {
+        Ok(Box::new(Sweep::new(case, options.clone())?))
+    }
+
+    fn report(store: &Store) -> Result<Summary, StoreError> {
+        Summary::of(store)
+    }
+}

@@ -1,0 +1,428 @@
+//! The study `scan` against an independent program, whose numbers are in `tests/scan/*.json`
+//! (80-bit arithmetic; lengths nm, forces nN, energies aJ, angles degrees).
+
+#![allow(
+    clippy::format_push_string,
+    reason = "case files are written piece by piece"
+)]
+
+use nanotap::case::Case;
+use nanotap::case::file::Source;
+use nanotap::control::Control;
+use nanotap::study::Study as _;
+use nanotap::study::scan::{Interaction, Method, ScanOptions, ScanReport, ScanStudy};
+use serde_json::{Value, json};
+
+const REFERENCE: &str = include_str!("scan/scan_reference.json");
+
+fn reference(name: &str) -> Value {
+    let all: Value = serde_json::from_str(REFERENCE).unwrap();
+    all["scans"][name].clone()
+}
+
+/// The case file of a reference scan, its scan as keys of `[scan]`.
+fn case_of(reference: &Value) -> Case {
+    let scan = &reference["scan"];
+    let nm = |value: &Value| format!("\"{} nm\"", value.as_f64().unwrap());
+    let mut text = reference["case_toml"][0].as_str().unwrap().to_owned();
+    text += &format!(
+        "\n[scan]\nsize = {}\nsettle = {}\nperiods = {}\npixels = 50\nsetpoint = {}\nz0 = {}\n\
+         lock_in = {{ time_constant = \"{} s\", order = {} }}\n",
+        nm(&scan["length"]),
+        scan["settle"],
+        scan["n"],
+        scan["setpoint"],
+        nm(&scan["z0"]),
+        scan["tau"],
+        scan["order"],
+    );
+    match scan["Ki"].as_f64() {
+        Some(gain) => text += &format!("integral_gain = {gain}\n"),
+        None => text += "mode = \"constant-height\"\n",
+    }
+    let mut features = Vec::new();
+    for feature in scan["feature"].as_array().into_iter().flatten() {
+        features.push(match feature[0].as_str().unwrap() {
+            "step" => format!(
+                "{{ step = {{ from = {}, to = {}, height = {} }} }}",
+                nm(&feature[1]),
+                nm(&feature[2]),
+                nm(&feature[3])
+            ),
+            "gauss" => format!(
+                "{{ gauss = {{ at = {}, width = {}, height = {} }} }}",
+                nm(&feature[1]),
+                nm(&feature[2]),
+                nm(&feature[3])
+            ),
+            other => panic!("{other}"),
+        });
+    }
+    text += &format!("surface = [{}]\n", features.join(", "));
+    for segment in scan["segment"].as_array().into_iter().flatten() {
+        text += &format!(
+            "[[scan.material]]\nfrom = {}\nto = {}\nhamaker = \"1e-20 J\"\n",
+            nm(&segment[0]),
+            nm(&segment[1])
+        );
+    }
+    let name = "reference.toml".to_owned();
+    Case::parse(Some(Source { name, text }), &[]).unwrap()
+}
+
+fn run(name: &str) -> (Value, ScanReport) {
+    let reference = reference(name);
+    let list: Vec<usize> = reference["values"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|row| row["k"].as_u64().unwrap() as usize)
+        .collect();
+    let options = ScanOptions {
+        list,
+        ..ScanOptions::default()
+    };
+    let report = ScanStudy::run(&case_of(&reference), &options, &Control::default()).unwrap();
+    (reference, report)
+}
+
+fn number(value: &Value) -> f64 {
+    value.as_f64().unwrap()
+}
+
+/// Within 1e-8 of the size, or of 1 where the value is smaller.
+#[track_caller]
+fn near(found: f64, expected: &Value, tolerance: f64, what: &str) {
+    let expected = number(expected);
+    let apart = (found - expected).abs() / expected.abs().max(1.0);
+    assert!(apart < tolerance, "{what}: {found} for {expected}");
+}
+
+fn compare(name: &str) {
+    let (reference, report) = run(name);
+    let rows = reference["values"].as_array().unwrap();
+    assert_eq!(rows.len(), report.periods.len());
+    for (row, found) in rows.iter().zip(&report.periods) {
+        let what = |signal: &str| format!("scan {name}, period {}, {signal}", row["k"]);
+        for (value, key, factor) in [
+            (found.x, "x", 1e9),
+            (found.surface, "h", 1e9),
+            (found.z, "z", 1e9),
+            (found.amplitude, "A", 1e9),
+            (found.phase, "phase", 1.0),
+            (found.amplitude_lockin, "A_lockin", 1e9),
+            (found.phase_lockin, "phase_lockin", 1.0),
+            (found.error, "error", 1e9),
+            (found.peak_force, "peak_nN", 1e9),
+            (found.mean_deflection, "mean_deflection", 1e9),
+            (found.contact_fraction, "contact_fraction", 1.0),
+        ] {
+            near(value * factor, &row[key], 1e-8, &what(key));
+        }
+        if row.get("E_dis_aJ").is_some() {
+            near(found.dissipation * 1e18, &row["E_dis_aJ"], 1e-8, &what("E"));
+        }
+    }
+    for (line, image, key) in [
+        (0, &report.trace, "trace"),
+        (1, report.retrace.as_ref().unwrap(), "retrace"),
+    ] {
+        let (expected, line) = (&reference["lines"][key], &report.lines[line]);
+        let what = |signal: &str| format!("scan {name}, {key}, {signal}");
+        for (value, key) in [
+            (line.height_mean, "z_mean"),
+            (line.height_rms, "z_rms"),
+            (line.height_max, "z_max"),
+            (line.height_min, "z_min"),
+            (line.error_rms, "error_rms"),
+            (line.error_max, "error_max"),
+            (line.error_min, "error_min"),
+            (line.peak_force_max, "peak_force_max_nN"),
+            (line.peak_force_mean, "peak_force_mean_nN"),
+            (line.tracking_rms, "tracking_rms"),
+        ] {
+            near(value * 1e9, &expected[key], 1e-8, &what(key));
+        }
+        let at = expected["peak_force_max_at_k"].as_u64().unwrap();
+        assert_eq!(line.peak_force_max_period as u64, at);
+        if let Some(flights) = expected["parachuting"].as_array() {
+            assert_eq!(flights.len(), line.parachuting.len(), "{}", what("flights"));
+            for (flight, found) in flights.iter().zip(&line.parachuting) {
+                assert_eq!(json!(found.first_period), flight["first_k"]);
+                assert_eq!(json!(found.periods), flight["periods"]);
+                near(found.length * 1e9, &flight["length_nm"], 1e-9, "length");
+            }
+        }
+        let pixels = &expected["pixels"];
+        for (values, key, factor) in [
+            (&image.height[0], "height", 1e9),
+            (&image.amplitude_error[0], "amplitude_error", 1e9),
+            (&image.phase[0], "phase", 1.0),
+            (&image.peak_force[0], "peak_force_mean_nN", 1e9),
+            (&image.peak_force_max[0], "peak_force_max_nN", 1e9),
+        ] {
+            let expected = pixels[key].as_array().unwrap();
+            assert_eq!(expected.len(), values.len());
+            for (pixel, (value, expected)) in values.iter().zip(expected).enumerate() {
+                near(
+                    value * factor,
+                    expected,
+                    1e-8,
+                    &what(&format!("{key} of pixel {pixel}")),
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn a_step_on_a_linear_sample_agrees() {
+    compare("a");
+}
+
+#[test]
+fn a_patch_of_another_material_under_dmt_agrees() {
+    compare("b");
+}
+
+#[test]
+fn a_particle_at_constant_height_agrees() {
+    compare("e");
+}
+
+fn parsed(text: &str, words: &[&str]) -> Case {
+    let words: Vec<String> = words.iter().map(|word| (*word).to_owned()).collect();
+    let name = "scan.toml".to_owned();
+    let text = text.to_owned();
+    Case::parse(Some(Source { name, text }), &words).unwrap()
+}
+
+fn scan(case: &Case, options: &ScanOptions) -> Result<ScanReport, String> {
+    ScanStudy::run(case, options, &Control::default()).map_err(|error| error.to_string())
+}
+
+const STEP: &str = include_str!("../../../docs/cases/scan-step.toml");
+const PATCH: &str = include_str!("../../../docs/cases/scan-patch.toml");
+const PARTICLE: &str = include_str!("../../../docs/cases/scan-particle.toml");
+
+/// Slope, memory and bandwidths of the independent program (SCAN.md), to the digits given there.
+#[test]
+fn the_loop_at_the_setpoint_agrees() {
+    let short = ["scan.periods=100", "scan.pixels=50"];
+    let of = |gain: f64| {
+        let report = scan(
+            &parsed(
+                STEP,
+                &[&short[..], &[&format!("scan.integral_gain={gain}")]].concat(),
+            ),
+            &ScanOptions::default(),
+        );
+        report.unwrap().feedback.unwrap()
+    };
+    let slow = of(1500.0);
+    assert!((slow.slope - 0.9928).abs() < 1e-4, "{}", slow.slope);
+    assert!(
+        (slow.lever_memory - 30.4).abs() < 0.1,
+        "{}",
+        slow.lever_memory
+    );
+    let bandwidth = slow.bandwidth_45.unwrap();
+    assert!((bandwidth - 229.8).abs() < 0.2, "{bandwidth}");
+    assert!((slow.rule_of_thumb - 346.0).abs() < 1.0);
+    let largest = slow.largest_stable_gain.unwrap();
+    assert!((largest / 2.98e4 - 1.0).abs() < 0.01, "{largest}");
+    let fast = of(8000.0);
+    let bandwidth = fast.bandwidth_45.unwrap();
+    assert!((bandwidth / 1108.0 - 1.0).abs() < 2e-3, "{bandwidth}");
+    assert!(fast.peaking < 1.01, "{}", fast.peaking);
+}
+
+/// At a constant height over a flat sample the lever comes to its orbit, whose observables are
+/// computed otherwise.
+#[test]
+fn a_flat_sample_gives_the_orbit_of_every_law() {
+    const LEVER: &str = "[cantilever]\nk = \"2 N/m\"\nf0 = \"70 kHz\"\nQ = 20\n\
+        [tip]\nradius = \"10 nm\"\n[gap]\nbeam = \"10 um\"\ntip = \"17 nm\"\n\
+        [drive]\nfrequency = \"70 kHz\"\nfree_amplitude = \"20 nm\"\n";
+    let linear = "stiffness = \"20 N/m\"\ndamping = \"1e-6 N s/m\"\n";
+    let soft = "modulus = \"50 MPa\"\npoisson = 0.3\n";
+    for (law, sample) in [
+        ("spring-damper", linear.to_owned()),
+        ("kelvin-voigt", format!("law = \"kelvin-voigt\"\n{linear}")),
+        (
+            "standard-linear-solid",
+            "law = \"standard-linear-solid\"\nstiffness = \"10 N/m\"\n\
+             relaxation_stiffness = \"20 N/m\"\nrelaxation_time = \"1 us\"\n"
+                .to_owned(),
+        ),
+        (
+            "moving-surface",
+            format!(
+                "law = \"moving-surface\"\n{linear}surface_stiffness = \"5 N/m\"\n\
+                 surface_damping = \"1e-6 N s/m\"\n"
+            ),
+        ),
+        ("hertz", format!("law = \"hertz\"\n{soft}")),
+        (
+            "jkr",
+            format!("law = \"jkr\"\n{soft}work_of_adhesion = \"0.005 J/m^2\"\n"),
+        ),
+    ] {
+        for modes in [1, 3] {
+            let text = format!("[model]\nmodes = {modes}\n{LEVER}[sample]\n{sample}");
+            let case = parsed(&text, &[]);
+            let simulate = nanotap::study::registry::study("simulate").unwrap();
+            let request = json!({"periods": 1, "transient": 2000});
+            let document = simulate.document(&case, request, &Control::default());
+            let document: Value = serde_json::from_str(&document.unwrap()).unwrap();
+            let motion = &document["physical"];
+            let flat = json!({
+                "size": "1 um", "periods": 2000, "settle": 2000, "pixels": 1, "retrace": false,
+                "setpoint": 0.8, "z0": "17 nm", "mode": "constant-height", "list": [3999],
+            });
+            let report = scan(&case, &serde_json::from_value(flat).unwrap()).unwrap();
+            let last = &report.periods[0];
+            let what = format!("{law}, {modes} modes: {last:?}, {motion}");
+            let agree = |found: f64, name: &str| {
+                let expected = number(&motion[name]);
+                let size = expected.abs().max(1e-3 * number(&motion["E_dis"]).abs());
+                assert!((found - expected).abs() < 2e-6 * size, "{name}: {what}");
+            };
+            agree(last.amplitude, "A");
+            agree(last.peak_force, "F_max");
+            if number(&motion["E_dis"]).abs() > 1e-21 {
+                agree(last.dissipation, "E_dis");
+            }
+            let contact = number(&document["contact_fraction"]);
+            assert!((last.contact_fraction - contact).abs() < 1e-7, "{what}");
+            let phase = number(&motion["phase"]);
+            assert!((last.phase - phase).abs() < 1e-4, "{what}");
+        }
+    }
+}
+
+#[test]
+fn independent_lines_are_the_same_on_any_number_of_threads() {
+    let case = parsed(
+        PARTICLE,
+        &["scan.lines=4", "scan.periods=300", "scan.pixels=20"],
+    );
+    let on = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads);
+        let run = || scan(&case, &ScanOptions::default()).unwrap();
+        pool.build().unwrap().install(run)
+    };
+    let one = on(1);
+    assert_eq!(one, on(3));
+    assert_eq!(one.trace.height.len(), 4);
+}
+
+#[test]
+fn a_fast_scan_states_its_error() {
+    let case = parsed(PATCH, &["scan.settle=500", "scan.periods=1500"]);
+    let exact = scan(&case, &ScanOptions::default()).unwrap();
+    let fast = ScanOptions {
+        method: Some(Method::Fast),
+        ..ScanOptions::default()
+    };
+    let fast = scan(&case, &fast).unwrap();
+    assert_eq!(exact.exact_share, 1.0);
+    assert!(fast.exact_share > 0.0 && fast.exact_share < 0.5);
+    let error = fast.error.unwrap();
+    assert!(error.height_max < 1e-3 * fast.free_amplitude, "{error:?}");
+    let heights = |report: &ScanReport| report.trace.height[0].clone();
+    for (a, b) in heights(&exact).iter().zip(heights(&fast)) {
+        assert!((a - b).abs() < 1e-3 * exact.free_amplitude, "{a} {b}");
+    }
+}
+
+#[test]
+fn a_preview_is_near_where_the_scan_is_slow() {
+    let case = parsed(STEP, &["scan.integral_gain=300"]);
+    let exact = scan(&case, &ScanOptions::default()).unwrap();
+    let preview = ScanOptions {
+        method: Some(Method::QuasiStatic),
+        ..ScanOptions::default()
+    };
+    let preview = scan(&case, &preview).unwrap();
+    assert_eq!(preview.exact_share, 0.0);
+    let apart = exact.lines[0].height_mean - preview.lines[0].height_mean;
+    assert!(apart.abs() < 0.5e-9, "{apart}");
+}
+
+/// The lever keeps the branch onto which a patch of another material threw it: a step of the
+/// height that is not of the surface.
+#[test]
+fn a_false_step_is_called_one() {
+    let report = scan(&parsed(PATCH, &[]), &ScanOptions::default()).unwrap();
+    let change = &report.branch_changes[0];
+    assert_eq!(report.branch_changes.len(), 1);
+    assert!((150e-9..165e-9).contains(&change.x), "{change:?}");
+    assert!(change.height_change < -0.1e-9, "{change:?}");
+    assert!(report.verdict.contains("attractive to the repulsive"));
+    let states = &report.trace.state[0];
+    assert_eq!(states[2], Some(Interaction::Attractive));
+    assert_eq!(states[40], Some(Interaction::Repulsive));
+}
+
+#[test]
+fn a_loop_that_oscillates_or_leaves_its_range_says_so() {
+    let warned = |words: &[&str], text: &str| {
+        let report = scan(&parsed(STEP, words), &ScanOptions::default()).unwrap();
+        let said = report
+            .warnings
+            .iter()
+            .any(|w| w.contains(text) && w.contains("the largest stable integral gain is"));
+        assert!(said, "{:?}", report.warnings);
+    };
+    warned(&["scan.integral_gain=40000"], "oscillates at the setpoint");
+    warned(
+        &["scan.z_range=[\"15 nm\", \"20 nm\"]"],
+        "at an end of its range",
+    );
+}
+
+#[test]
+fn wrong_scans_are_refused() {
+    for (words, text) in [
+        (&["scan.size=3 s"][..], "size"),
+        (&["scan.siz=3"], "siz"),
+        (&["scan.size=0"], "not positive"),
+        (&["scan.size=nan"], "size"),
+        (&["scan.setpoint=1.5"], "between 0 and 1"),
+        (&["scan.periods="], "line_rate"),
+        (&["scan.line_rate=1 Hz"], "say the same"),
+        (&["scan.periods=1000000000"], "out of range"),
+        (&["scan.lines=60000", "scan.pixels=60000"], "too many"),
+        (&["scan.list=[100000]"], "numbered from 0"),
+        (&["scan.profile=x.csv"], "names no other files"),
+        (&["scan.profile=[0, 1e-9, nan]"], "scan"),
+        (&["scan.integral_gain="], "integral_gain"),
+        (&["scan.z_range=[2e-8, 1e-8]"], "empty"),
+        (&["scan.dynamic_gain=2"], "go together"),
+        (&["scan.lock_in.order=9"], "out of range"),
+        (&["scan.dilate=1e-8"], "sampled"),
+        (
+            &["scan.material=[{ from = 0, to = 1e-7, hamakr = \"1e-20 J\" }]"],
+            "hamakr",
+        ),
+    ] {
+        let error = scan(&parsed(STEP, words), &ScanOptions::default());
+        let error = error.map(|report| report.verdict).unwrap_err();
+        assert!(error.contains(text), "{words:?}: {error}");
+    }
+}
+
+#[test]
+fn cancelled_work_ends_at_once() {
+    use nanotap::control::CancelFlag;
+    let flag = CancelFlag::new();
+    let stop = |_: usize, _: usize| flag.cancel();
+    let control = Control {
+        cancel: Some(&flag),
+        progress: Some(&stop),
+    };
+    let case = parsed(STEP, &["scan.periods=5000000"]);
+    let error = ScanStudy::run(&case, &ScanOptions::default(), &control).unwrap_err();
+    assert_eq!(error.kind, nanotap::ErrorKind::Stopped);
+}

@@ -238,10 +238,6 @@ impl StroboscopicMap for Counted {
         1.0
     }
 
-    fn cost(&self) -> u64 {
-        self.cost
-    }
-
     fn advance(&mut self, state: &mut [f64]) -> Result<(), Infallible> {
         self.cost += 100;
         self.map.advance(state)
@@ -254,6 +250,12 @@ impl StroboscopicMap for Counted {
     ) -> Result<(), Infallible> {
         self.cost += 100;
         self.map.advance_with_jacobian(state, jacobian)
+    }
+}
+
+impl nanotap_dynamics::Scheduling for Counted {
+    fn cost(&self) -> u64 {
+        self.cost
     }
 }
 
@@ -327,13 +329,6 @@ impl StroboscopicMap for FailsBeyond {
         1.0
     }
 
-    fn coarse(&self) -> Option<Self> {
-        (!self.is_coarse).then(|| Self {
-            is_coarse: true,
-            ..self.clone()
-        })
-    }
-
     fn advance(&mut self, state: &mut [f64]) -> Result<(), Self::Error> {
         if self.is_coarse && state[0].abs() > 0.8 {
             return Err(std::io::Error::other("too far"));
@@ -349,6 +344,15 @@ impl StroboscopicMap for FailsBeyond {
     ) -> Result<(), Self::Error> {
         let Ok(()) = self.map.advance_with_jacobian(state, jacobian);
         Ok(())
+    }
+}
+
+impl nanotap_dynamics::Scheduling for FailsBeyond {
+    fn coarse(&self) -> Option<Self> {
+        (!self.is_coarse).then(|| Self {
+            is_coarse: true,
+            ..self.clone()
+        })
     }
 }
 

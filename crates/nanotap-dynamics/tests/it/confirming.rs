@@ -259,12 +259,6 @@ impl StroboscopicMap for Counted {
     }
 }
 
-impl nanotap_dynamics::Scheduling for Counted {
-    fn cost(&self) -> u64 {
-        self.cost
-    }
-}
-
 /// Chaos at 3.9 takes thousands of periods to measure: a run of 20,000 steps at most is left
 /// undecided after 200 periods.
 #[test]
@@ -359,15 +353,6 @@ impl StroboscopicMap for FailsBeyond {
     ) -> Result<(), Self::Error> {
         let Ok(()) = self.map.advance_with_jacobian(state, jacobian);
         Ok(())
-    }
-}
-
-impl nanotap_dynamics::Scheduling for FailsBeyond {
-    fn coarse(&self) -> Option<Self> {
-        (!self.is_coarse).then(|| Self {
-            is_coarse: true,
-            ..self.clone()
-        })
     }
 }
 

@@ -27,8 +27,10 @@ pub(super) struct Found {
     pub(super) limits: Vec<String>,
 }
 
-/// Steps of the approximate flow after which no more rows are measured, and which branches may take.
+/// Steps of the approximate flow after which no more rows are measured, for every hundred distances,
+/// so that a longer table is measured as completely.
 const ROW_STEPS: u64 = 40_000_000;
+/// Steps that branches may take.
 const BRANCH_STEPS: u64 = 20_000_000;
 /// Points that the branches through a curve have all together, mostly; where steps suffice for fewer,
 /// grazings are not located.
@@ -99,7 +101,7 @@ pub(super) fn found(
         (none, place)
     };
     let not_followed = sweep.spent_budget().map(budget_text);
-    sweep.allow_steps(ROW_STEPS);
+    sweep.allow_steps(ROW_STEPS * (distances.len() as u64).div_ceil(100));
     let written = Written {
         curve,
         sweep: &sweep,
@@ -207,8 +209,8 @@ struct Written<'a> {
     not_followed: &'a str,
 }
 
-/// Distances of an interval at which the two ways are compared, its ends included; fewer where a
-/// motion has no branch and takes longer.
+/// Distances of an interval at which the two ways are compared, its ends included. Where a motion has
+/// no branch there are fewer, since it takes longer, and none at the ends, where another motion begins.
 const COMPARED: usize = 9;
 const COMPARED_ON_GRID: usize = 3;
 
@@ -417,15 +419,17 @@ impl Written<'_> {
             return Ok(None);
         };
         let on_grid = |piece: &Piece| matches!(piece.motion, Motion::OnGrid(_));
-        let compared = match (on_grid(&there), on_grid(&back)) {
+        let shares: Vec<f64> = match (on_grid(&there), on_grid(&back)) {
             (true, true) => return Ok(None),
             (false, false) if there.is_on_stretch_of(&back) => return Ok(None),
-            (false, false) => COMPARED,
-            _ => COMPARED_ON_GRID,
+            (false, false) => (0..COMPARED)
+                .map(|k| k as f64 / (COMPARED - 1) as f64)
+                .collect(),
+            _ => (0..COMPARED_ON_GRID)
+                .map(|k| (k as f64 + 0.5) / COMPARED_ON_GRID as f64)
+                .collect(),
         };
-        let gaps = (0..compared)
-            .map(|k| k as f64 / (compared - 1) as f64)
-            .map(|t| near * (1.0 - t) + far * t);
+        let gaps = shares.into_iter().map(|t| near * (1.0 - t) + far * t);
         let mut largest: Option<f64> = None;
         for gap in gaps {
             let row = |way, piece| self.row(way, gap, self.sweep.motion_at(piece, gap));

@@ -132,7 +132,7 @@ def test_what_is_no_number_is_a_type_error(value):
 
 
 def test_none_takes_a_key_away():
-    with pytest.raises(ValueError, match="lacks omega"):
+    with pytest.raises(ValueError, match="missing: omega"):
         nanotap.Case(**(GIVEN | {"omega": None}))
     case = nanotap.Case(**GIVEN)
     assert case.with_(alpha5=0.7).with_(gap=None).alpha5 == case.alpha5 == 0

@@ -6,7 +6,8 @@
 //! the environment picks the first: it is how tests run both.
 //!
 //! One motion has its terms in the lanes of a register ([`Simd`]). Eight motions in a batch have
-//! a lane each ([`Wide`]), in two registers of four ([`Twice`]).
+//! a lane each ([`Wide`]): in one register of eight (`Avx512`, unless `NANOTAP_ARITHMETIC=avx2`), or
+//! in two of four ([`Twice`]).
 //!
 //! [`functions`] has the exponentials, [`layout`] how lists lie in vectors, [`affine`] the
 //! change of coordinates at a switch, [`linear`] the same of a whole matrix.
@@ -30,6 +31,8 @@ macro_rules! instructions {
 pub(crate) mod affine;
 #[cfg(target_arch = "x86_64")]
 mod avx2;
+#[cfg(target_arch = "x86_64")]
+mod avx512;
 mod functions;
 pub(crate) mod layout;
 pub(crate) mod linear;
@@ -157,7 +160,7 @@ pub(crate) trait Work {
     fn run<S: Simd>(self) -> Self::Output;
 }
 
-/// The same for eight motions side by side.
+/// The same for eight motions in a batch.
 pub(crate) trait WideWork {
     /// The result.
     type Output;
@@ -179,9 +182,12 @@ pub(crate) fn dispatch<W: Work>(work: W) -> W::Output {
 /// The same for eight motions in a batch.
 pub(crate) fn dispatch_wide<W: WideWork>(work: W) -> W::Output {
     #[cfg(target_arch = "x86_64")]
-    if avx2_available() {
+    match (avx512_available(), avx2_available()) {
         // SAFETY: the machine has these instructions.
-        return unsafe { avx2::run_wide(work) };
+        (true, true) => return unsafe { avx512::run(work) },
+        // SAFETY: the machine has these instructions.
+        (false, true) => return unsafe { avx2::run_wide(work) },
+        (_, false) => {}
     }
     work.run::<Twice<Plain>>()
 }
@@ -189,24 +195,38 @@ pub(crate) fn dispatch_wide<W: WideWork>(work: W) -> W::Output {
 /// See [`crate::vector_instructions`].
 pub(crate) fn vector_instructions() -> &'static str {
     #[cfg(target_arch = "x86_64")]
-    if avx2_available() {
-        "AVX2"
-    } else {
-        "without AVX2: piecewise-linear cases take several times as long"
+    match (avx512_available(), avx2_available()) {
+        (true, true) => "AVX-512",
+        (false, true) => "AVX2",
+        (_, false) => "without AVX2: piecewise-linear cases take several times as long",
     }
     #[cfg(not(target_arch = "x86_64"))]
     "portable"
 }
 
-/// Whether this machine has fused multiply-add in vectors of four, and `NANOTAP_ARITHMETIC` in the
-/// environment is not `plain`.
+/// True if `NANOTAP_ARITHMETIC` in the environment is one of these, which exclude instructions.
+#[cfg(target_arch = "x86_64")]
+fn arithmetic_is(names: &[&str]) -> bool {
+    std::env::var("NANOTAP_ARITHMETIC").is_ok_and(|name| names.contains(&name.as_str()))
+}
+
+/// True if this machine has fused multiply-add in vectors of four, and it is not excluded.
 #[cfg(target_arch = "x86_64")]
 #[inline(always)]
 fn avx2_available() -> bool {
     static AVAILABLE: LazyLock<bool> = LazyLock::new(|| {
-        !std::env::var("NANOTAP_ARITHMETIC").is_ok_and(|path| path == "plain")
+        !arithmetic_is(&["plain"])
             && std::arch::is_x86_feature_detected!("avx2")
             && std::arch::is_x86_feature_detected!("fma")
+    });
+    *AVAILABLE
+}
+
+/// True if this machine has vectors of eight, and they are not excluded.
+#[cfg(target_arch = "x86_64")]
+fn avx512_available() -> bool {
+    static AVAILABLE: LazyLock<bool> = LazyLock::new(|| {
+        !arithmetic_is(&["plain", "avx2"]) && std::arch::is_x86_feature_detected!("avx512f")
     });
     *AVAILABLE
 }

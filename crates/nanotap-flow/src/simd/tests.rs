@@ -89,6 +89,9 @@ proptest! {
             prop_assert_eq!(&expected, &in_eight::<Twice<Avx2>>(&x, &y));
         }
         #[cfg(target_arch = "x86_64")]
+        if avx512_available() {
+            prop_assert_eq!(&expected, &in_eight::<avx512::Avx512>(&x, &y));
+        }
         let (_, rows) = expected.split_last().unwrap();
         for lane in 0..LANES {
             let (sine, cosine) = sin_cos::<Plain>(Plain::splat(y[lane]));

@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 
+use nanotap::study::fit::Table;
 use nanotap_figures::Figure;
 
 use crate::failure::Failure;
@@ -24,6 +25,24 @@ pub(crate) struct CaseArguments {
     /// Additional levers and materials (TOML); may be repeated
     #[arg(long, value_name = "FILE")]
     pub(crate) catalogue: Vec<PathBuf>,
+}
+
+/// Reads measured curves for `command`.
+pub(crate) fn measured(
+    first: &PathBuf,
+    also: &[PathBuf],
+    command: &str,
+) -> Result<Vec<Table>, Failure> {
+    let read = |path: &PathBuf| {
+        if path.extension().is_some_and(|ending| ending == "toml") {
+            return Err(Failure::input(
+                format!("{}: expected a data file, got a case file", path.display()),
+                format!("name the data first, then the case: nanotap {command} DATA CASE"),
+            ));
+        }
+        Table::read(path)
+    };
+    std::iter::once(first).chain(also).map(read).collect()
 }
 
 /// Where data go.

@@ -7,10 +7,10 @@ use clap::Args;
 use nanotap::case::Key;
 use nanotap::figure::fit::fit_figure;
 use nanotap::number::shortest;
-use nanotap::study::fit::{FitOptions, FitReport, FitStudy, FittedParameter, Table as Data};
+use nanotap::study::fit::{FitOptions, FitReport, FitStudy, FittedParameter};
 use serde::Serialize;
 
-use crate::arguments::{CaseArguments, PlotArgument};
+use crate::arguments::{CaseArguments, PlotArgument, measured};
 use crate::failure::Failure;
 use crate::given_case::GivenCase;
 use crate::output::Output;
@@ -64,18 +64,8 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
         Some(path) => Some(file::claim(path, &["toml", "csv"])?),
         None => None,
     };
-    if let Some(path) = &arguments.plot.plot {
-        file::claim(path, &["svg", "png", "pdf"])?;
-    }
-    for path in std::iter::once(&arguments.data).chain(&arguments.also) {
-        if path.extension().is_some_and(|ending| ending == "toml") {
-            return Err(Failure::input(
-                format!("{}: expected a data file, got a case file", path.display()),
-                "name the data first, then the case: nanotap fit DATA CASE",
-            ));
-        }
-        request.data.push(Data::read(path)?);
-    }
+    arguments.plot.check()?;
+    request.data = measured(&arguments.data, &arguments.also, "fit")?;
     let case = GivenCase::for_study(&arguments.case, true, output)?;
     let report = progress::study::<FitStudy>(&case, &request, &arguments.threads)?;
     if let (Some(path), Some(ending)) = (&arguments.out, ending) {

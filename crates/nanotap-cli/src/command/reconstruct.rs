@@ -6,12 +6,11 @@ use clap::Args;
 use nanotap::case::physical::Kind;
 use nanotap::case::quantity::format_electronvolts;
 use nanotap::figure::reconstruct::reconstruct_figure;
-use nanotap::study::fit::Table as Data;
 use nanotap::study::reconstruct::{
     ReconstructMethod, ReconstructOptions, ReconstructReport, ReconstructStudy,
 };
 
-use crate::arguments::{CaseArguments, OutArgument, PlotArgument};
+use crate::arguments::{CaseArguments, OutArgument, PlotArgument, measured};
 use crate::failure::Failure;
 use crate::given_case::GivenCase;
 use crate::output::Output;
@@ -55,18 +54,7 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     let mut options = arguments.request.read()?;
     arguments.out.check()?;
     arguments.plot.check()?;
-    for path in std::iter::once(&arguments.data).chain(&arguments.also) {
-        if path.extension().is_some_and(|ending| ending == "toml") {
-            return Err(Failure::input(
-                format!(
-                    "{}: expected measured data, got a case file",
-                    path.display()
-                ),
-                "name the data first, then the case: nanotap reconstruct DATA CASE",
-            ));
-        }
-        options.data.push(Data::read(path)?);
-    }
+    options.data = measured(&arguments.data, &arguments.also, "reconstruct")?;
     let case = GivenCase::for_study(&arguments.case, true, output)?;
     let report = progress::study::<ReconstructStudy>(&case, &options, &arguments.threads)?;
     arguments.out.write(|| report.csv())?;

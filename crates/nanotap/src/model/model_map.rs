@@ -333,6 +333,18 @@ impl ExactMap {
         }
     }
 
+    /// Does `run` from a state and puts in its place the one reached.
+    fn run<R>(
+        &mut self,
+        state: &mut [f64],
+        run: impl FnOnce(&mut Self) -> Result<R, FlowError>,
+    ) -> Result<R, MotionError> {
+        self.begin(state)?;
+        let result = run(self)?;
+        self.end(state);
+        Ok(result)
+    }
+
     /// Runs a period with `observer` and writes its Jacobian.
     fn run_with_jacobian<O: Observer>(
         &mut self,
@@ -402,17 +414,11 @@ impl EngineMap for ExactMap {
     }
 
     fn advance(&mut self, state: &mut [f64]) -> Result<(), MotionError> {
-        self.begin(state)?;
-        self.flow.run_period(&mut ())?;
-        self.end(state);
-        Ok(())
+        self.run(state, |map| map.flow.run_period(&mut ()))
     }
 
     fn advance_by(&mut self, state: &mut [f64], periods: usize) -> Result<(), MotionError> {
-        self.begin(state)?;
-        self.flow.run_periods(periods)?;
-        self.end(state);
-        Ok(())
+        self.run(state, |map| map.flow.run_periods(periods))
     }
 
     fn advance_with_jacobian(
@@ -420,10 +426,7 @@ impl EngineMap for ExactMap {
         state: &mut [f64],
         jacobian: &mut DMatrix<f64>,
     ) -> Result<(), MotionError> {
-        self.begin(state)?;
-        self.run_with_jacobian(&mut (), jacobian)?;
-        self.end(state);
-        Ok(())
+        self.run(state, |map| map.run_with_jacobian(&mut (), jacobian))
     }
 
     fn advance_with_derivatives(
@@ -432,11 +435,10 @@ impl EngineMap for ExactMap {
         jacobian: &mut DMatrix<f64>,
         derivatives: &mut DMatrix<f64>,
     ) -> Result<(), MotionError> {
-        self.begin(state)?;
-        self.flow
-            .run_period_with_sensitivities(&self.tangents, jacobian, derivatives)?;
-        self.end(state);
-        Ok(())
+        self.run(state, |map| {
+            map.flow
+                .run_period_with_sensitivities(&map.tangents, jacobian, derivatives)
+        })
     }
 
     fn advance_with_determinant(
@@ -444,12 +446,13 @@ impl EngineMap for ExactMap {
         state: &mut [f64],
         jacobian: &mut DMatrix<f64>,
     ) -> Result<Option<f64>, MotionError> {
-        self.begin(state)?;
-        let sticks = self.flow.system().sticks(self.flow.regime());
-        let mut sum = LogDeterminant(if sticks { f64::NAN } else { 0.0 });
-        self.run_with_jacobian(&mut sum, jacobian)?;
-        self.end(state);
-        Ok(Some(sum.0).filter(|log| !log.is_nan()))
+        let sum = self.run(state, |map| {
+            let sticks = map.flow.system().sticks(map.flow.regime());
+            let mut sum = LogDeterminant(if sticks { f64::NAN } else { 0.0 });
+            map.run_with_jacobian(&mut sum, jacobian)?;
+            Ok(sum.0)
+        })?;
+        Ok(Some(sum).filter(|log| !log.is_nan()))
     }
 
     fn log_determinant_bound(&self) -> f64 {

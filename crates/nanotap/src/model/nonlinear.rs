@@ -756,9 +756,7 @@ impl EngineMap for CoarseMap {
 
     fn move_gap(&mut self, gap: f64, _: &mut dyn FnMut(&mut f64)) -> Result<(), MotionError> {
         Arc::make_mut(&mut self.nonlinear).set_gap(gap)?;
-        if let Ok(coarse) = Coarse::new(&self.nonlinear.system, self.nonlinear.period) {
-            self.coarse = coarse;
-        }
+        self.coarse = Coarse::new(&self.nonlinear.system, self.nonlinear.period)?;
         Ok(())
     }
 

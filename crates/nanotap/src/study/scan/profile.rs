@@ -4,6 +4,7 @@ use std::f64::consts::TAU;
 
 use super::image::HeightImage;
 use super::options::{Feature, MAX_FEATURES, ProfileOptions};
+use super::table::centres;
 use crate::Error;
 use crate::case::Case;
 use crate::case::physical::Kind;
@@ -256,9 +257,8 @@ impl Samples {
     }
 
     fn evenly(heights: Vec<f64>, size: f64) -> Result<Self, Error> {
-        let step = size / heights.len().max(1) as f64;
-        let at = (0..heights.len()).map(|k| step * (k as f64 + 0.5));
-        Self::checked(at.collect(), heights, "profile", 1)
+        let at = centres(heights.len(), size);
+        Self::checked(at, heights, "profile", 1)
     }
 
     /// Heights, or positions and heights, of a CSV text: numbers in m, or in the units in
@@ -321,9 +321,7 @@ impl Samples {
         }
         let [one, two] = rows;
         if two.is_empty() {
-            let step = size / one.len().max(1) as f64;
-            let at = (0..one.len()).map(|k| step * (k as f64 + 0.5)).collect();
-            Self::checked(at, one, name, first)
+            Self::checked(centres(one.len(), size), one, name, first)
         } else {
             Self::checked(one, two, name, first)
         }

@@ -78,8 +78,8 @@ pub const CHANNELS: [Channel; 9] = [
     },
 ];
 
-/// Positions of the pixels along or across the lines, in m.
-fn centres(count: usize, size: f64) -> Vec<f64> {
+/// Centres of `count` pixels over a length, along or across the lines.
+pub(super) fn centres(count: usize, size: f64) -> Vec<f64> {
     let step = size / count.max(1) as f64;
     (0..count).map(|k| (k as f64 + 0.5) * step).collect()
 }

@@ -413,8 +413,8 @@ def approach(
     points : int
         Number of distances in each direction. Under a nonlinear law the lever is
         followed for at most 40 million steps of the approximate flow, and as many
-        are taken for every 100 rows; a step of the exact flow counts as 100 (2 to
-        20000).
+        are taken for every 100 distances; a step of the exact flow counts as 100 (2
+        to 20000).
     branches : bool
         Also continue coexisting branches, stable and unstable.
     switch : int

@@ -500,7 +500,7 @@ options! {
         #[schemars(extend("x-value" = "DISTANCE"))]
         pub to: Option<Amount> = None,
         /// Number of distances in each direction. Under a nonlinear law the lever is followed for at
-        /// most 40 million steps of the approximate flow, and as many are taken for every 100 rows; a step
+        /// most 40 million steps of the approximate flow, and as many are taken for every 100 distances; a step
         /// of the exact flow counts as 100
         #[schemars(range(min = 2, max = MAX_DISTANCES), extend("x-value" = "P"))]
         pub points: usize = 80,

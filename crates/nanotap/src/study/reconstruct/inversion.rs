@@ -137,12 +137,12 @@ impl Estimate {
         self.at = method.first_harmonic(self.values);
         for index in 0..2 {
             let step = 1e-2 * row.errors[index];
-            let beside = |side: f64| {
+            let shifted = |side: f64| {
                 let mut values = self.values;
                 values[index] += side * step;
                 method.first_harmonic(values)
             };
-            let (low, high) = (beside(-1.0), beside(1.0));
+            let (low, high) = (shifted(-1.0), shifted(1.0));
             let slope = |of: fn(&FirstHarmonic) -> f64| (of(&high) - of(&low)) / (2.0 * step);
             self.conservative_by[index] = slope(|h| h.conservative);
             self.work_by[index] = slope(|h| h.work);

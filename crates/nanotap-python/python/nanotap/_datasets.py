@@ -98,7 +98,27 @@ def open(path: Path) -> "xr.Dataset":
     ds: xr.Dataset = xr.open_zarr(name, chunks=chunks, consolidated=True)
     ds.attrs["path"] = name
     # It may be written elsewhere, where the compression of this store does not apply.
-    return ds.drop_encoding()
+    return _worded(ds.drop_encoding())
+
+
+def _worded(ds: "xr.Dataset") -> "xr.Dataset":
+    """`classification` in words, as in every other result, beside its codes in the store; empty
+    where a run is missing.
+    """
+    import xarray as xr
+
+    codes = ds.get("classification")
+    if codes is None:
+        return ds
+    meanings = codes.attrs["flag_meanings"].split()
+    words = np.array([word if word != "missing" else "" for word in meanings])
+    named = xr.apply_ufunc(
+        words.__getitem__, codes, dask="parallelized", output_dtypes=[words.dtype]
+    )
+    attrs = {key: codes.attrs[key] for key in ("long_name", "units")}
+    return ds.assign(
+        classification=named.assign_attrs(attrs), classification_code=codes
+    )
 
 
 def merge(sources: Iterable[Path], out: Path) -> Record:

@@ -168,6 +168,17 @@ PYTHON: dict[str, tuple[tuple[tuple[str, str, str, str], ...], str, str]] = {
             "DataFrame, and `law_table()`, the text for `sample.table`."
         ),
     ),
+    "scan": (
+        (THREADS, PROGRESS),
+        "xr.Dataset",
+        (
+            "`height`, `amplitude_error`, `phase`, `peak_force`, `dissipation`, `state` … over "
+            "`direction` (trace, retrace), `y` and `x`; the listed drive periods over `k` "
+            "(`period_z`, `period_amplitude` …). The attributes hold the `verdict`, the `warnings`, "
+            "and as JSON the statistics of the `lines`, the `branch_changes` and the analysis of "
+            "the feedback `loop`."
+        ),
+    ),
     "lyapunov": (
         (),
         "Lyapunov",

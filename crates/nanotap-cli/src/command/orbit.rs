@@ -153,7 +153,11 @@ fn text(
         "Newton residual {:.1e}; error estimate {:.1e}; {check}",
         orbit.residual, orbit.error
     )));
-    let _ = writeln!(text, "\n  {}", style::bold("state at drive phase 0"));
+    let heading = match units {
+        Units::Model => "state at drive phase 0",
+        Units::Si(_) => "state at drive phase 0, in units of g0 and g0/T",
+    };
+    let _ = writeln!(text, "\n  {}", style::bold(heading));
     let mut table = Table::new([("", Align::Left), ("", Align::Point)]);
     for (name, value) in time_series::state_names(model).iter().zip(&orbit.state) {
         table.row([name.clone(), number::significant(*value, 12)]);

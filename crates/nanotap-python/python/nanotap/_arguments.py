@@ -266,7 +266,7 @@ def _plain(name: str, value: Any, takes: _Option) -> Any:
         if isinstance(value, str | list) and "string" in kinds:
             return value
         return {side: list(ends) for side, *ends in _sides(name, value)}
-    if "array" in kinds and "integer" in kinds:
+    if "array" in kinds and "integer" in (takes.entries, *kinds):
         many = [value] if isinstance(value, int | np.integer) else list(value)
         return [whole(name, one) for one in many]
     if "array" in kinds and takes.entries in ("string", "array", "object"):

@@ -1112,7 +1112,7 @@ def scan(
     material: Any = None,
     threads: int | None = None,
     progress: Progress = None,
-) -> Record:
+) -> "xr.Dataset":
     """Scan of a line or an image under feedback, drive period by period.
 
     Parameters
@@ -1193,7 +1193,11 @@ def scan(
 
     Returns
     -------
-    The document, with the names of the terminal's JSON.
+    `height`, `amplitude_error`, `phase`, `peak_force`, `dissipation`, `state` …
+    over `direction` (trace, retrace), `y` and `x`; the listed drive periods over
+    `k` (`period_z`, `period_amplitude` …). The attributes hold the `verdict`, the
+    `warnings`, and as JSON the statistics of the `lines`, the `branch_changes` and
+    the analysis of the feedback `loop`.
 
     Raises
     ------
@@ -1203,4 +1207,4 @@ def scan(
         The computation failed.
     """
     options = _arguments.options("scan", locals())
-    return _studies.document("scan", case, options, threads, progress)
+    return _studies.scan(case, options, threads, progress)

@@ -255,6 +255,81 @@ def _approach_dataset(case: Case, report: dict[str, Any]) -> "xr.Dataset":
     return answered(case, ds)
 
 
+# Units of what a scan records.
+_SCANNED = {
+    "surface": ("height of the surface under the tip", "m"),
+    "height": ("height: the scanner's extension", "m"),
+    "amplitude_error": ("amplitude less setpoint", "m"),
+    "phase": ("phase lag", "degree"),
+    "peak_force": ("mean over the pixel of the largest force in each period", "N"),
+    "peak_force_max": ("largest force in the pixel", "N"),
+    "dissipation": ("energy dissipated in the sample in one drive period", "J"),
+    "contact_fraction": ("contact time / period", "1"),
+    "mean_deflection": ("time mean of the tip deflection", "m"),
+    "state": ("attractive, repulsive, free or irregular", "1"),
+}
+_LISTED = {
+    "x": "m",
+    "surface": "m",
+    "z": "m",
+    "amplitude": "m",
+    "phase": "degree",
+    "amplitude_lockin": "m",
+    "phase_lockin": "degree",
+    "peak_force": "N",
+    "dissipation": "J",
+}
+
+
+def scan(
+    case: Case, options: Mapping[str, Any], threads: int | None, progress: Progress
+) -> "xr.Dataset":
+    """Height, error, phase … over direction, line and pixel; the finished part if Ctrl-C stopped it."""
+    document, interrupted = _run("scan", case, options, threads, progress)
+    return _finished(_scan_dataset(case, document), interrupted)
+
+
+def _scan_dataset(case: Case, report: dict[str, Any]) -> "xr.Dataset":
+    import xarray as xr
+
+    ways = [way for way in ("trace", "retrace") if report.get(way)]
+    variables: dict[str, Any] = {}
+    for name in report[ways[0]] if ways else ():
+        rows = np.array([report[way][name] for way in ways])
+        if rows.dtype.kind == "O":
+            rows = rows.astype(float)
+        words_, unit = _SCANNED.get(name, (name, "1"))
+        attrs = {"long_name": words_, "units": unit}
+        variables[name] = (("direction", "y", "x"), rows, attrs)
+    length = report["size"][0]
+    pixels = variables["height"][1].shape[-1] if variables else 0
+    y = [line["y"] for line in report["lines"] if line["direction"] == "trace"]
+    metres = {"units": "m"}
+    coords: dict[str, Any] = {
+        "direction": words(ways),
+        "x": ("x", (np.arange(pixels) + 0.5) * length / max(pixels, 1), metres),
+        "y": ("y", np.array(y), metres),
+    }
+    for name in report["periods"][0] if report["periods"] else ():
+        listed = [
+            np.nan if row[name] is None else row[name] for row in report["periods"]
+        ]
+        if name == "k":
+            coords["k"] = ("k", np.array(listed), {"units": "drive periods"})
+        else:
+            attrs = {"units": _LISTED.get(name, "1")}
+            variables[f"period_{name}"] = ("k", np.array(listed), attrs)
+    ds = xr.Dataset(variables, coords)
+    ds.attrs.update(case_attributes(case, "scan"))
+    for name, value in report.items():
+        if name not in {"trace", "retrace", "periods"} and value is not None:
+            plain = isinstance(value, str | float) and not isinstance(value, bool)
+            # The scipy engine keeps an attribute `mode` of its own.
+            key = "scan_mode" if name == "mode" else name
+            ds.attrs[key] = value if plain else json.dumps(value)
+    return ds
+
+
 def lyapunov(case: Case, options: Mapping[str, Any]) -> Lyapunov:
     """The exponents, and the points of the section as a Dataset."""
     import xarray as xr

@@ -197,7 +197,7 @@ free_amplitude = \"10 nm\"
 #[test]
 fn hysteresis_does_not_depend_on_the_spacing_of_rows() {
     let case = studied(MICA, &["gap.tip=7.127 nm"]);
-    let nm = 1e-9 / case.physical().unwrap().scales.length;
+    let nm = 1e-9;
     for points in [40, 80, 160] {
         let options = ApproachOptions {
             from: Some((12.0 * nm).into()),
@@ -270,13 +270,14 @@ fn a_slow_ramp_is_the_quasi_static_curve() {
         ..ApproachOptions::default()
     };
     let settled = curve(&case, &options);
+    let velocity = case.physical().unwrap().scales.velocity;
     assert!(settled.jumps.is_empty() && settled.hysteresis.is_empty());
     let errors = [2000.0, 8000.0].map(|periods| {
         let speed = (settled.from - settled.to) / (periods * period);
         let ramp = curve(
             &case,
             &ApproachOptions {
-                speed: Some(speed.into()),
+                speed: Some((speed * velocity).into()),
                 ..options.clone()
             },
         );
@@ -296,7 +297,7 @@ fn a_slow_ramp_is_the_quasi_static_curve() {
         "{errors:?}"
     );
     let fast = ApproachOptions {
-        speed: Some((settled.from / period).into()),
+        speed: Some((velocity * settled.from / period).into()),
         ..options.clone()
     };
     let error = approach(&case, &fast, &Control::default()).unwrap_err();
@@ -408,18 +409,18 @@ fn invalid_curves_are_refused() {
         },
         "at least 1",
     );
-    for (from, to) in [
-        (0.0, 1.0),
-        (1.0, 1.0),
-        (f64::NAN, 0.0),
-        (f64::INFINITY, 0.0),
+    for (from, to, words) in [
+        (0.0, 1e-9, "from far to near"),
+        (1e-9, 1e-9, "from far to near"),
+        (f64::NAN, 0.0, "expected a length"),
+        (f64::INFINITY, 0.0, "expected a length"),
     ] {
         let options = ApproachOptions {
             from: Some(from.into()),
             to: Some(to.into()),
             ..plain()
         };
-        refused(options, "from far to near");
+        refused(options, words);
     }
     let still = studied(STIFF, &["drive.free_amplitude=0 nm"]);
     let error = approach(&still, &plain(), &Control::default()).unwrap_err();

@@ -199,9 +199,7 @@ impl Kind {
     /// the message says what was expected, with an example.
     pub fn parse(self, text: &str) -> Result<f64, QuantityError> {
         let quantity = read(text, Some(self))?;
-        let is_bare = text
-            .trim()
-            .ends_with(|last: char| last.is_ascii_digit() || last == '.');
+        let is_bare = text.trim().replace('\u{2212}', "-").parse::<f64>().is_ok();
         if quantity.dimension == self.dimension() || is_bare {
             return Ok(quantity.value);
         }

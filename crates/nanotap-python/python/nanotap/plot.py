@@ -469,7 +469,7 @@ def approach(ds: "xr.Dataset", **where: Unpack[Where]) -> "Figure":
         shift, force = "frequency_shift", "sader_jarvis_force"
         rows = (
             (shift, f"physical_{shift}", "frequency shift $Δf$", "Hz", 1.0),
-            ("drive_ratio", "drive_ratio", "drive over free drive", "", 1.0),
+            ("drive_ratio", "drive_ratio", "drive / free drive", "", 1.0),
             rows[2],
             (force, f"physical_{force}", "force (Sader–Jarvis)", "N", 1.0),
         )

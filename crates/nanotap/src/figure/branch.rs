@@ -24,16 +24,12 @@ pub struct ParameterAxis {
 }
 
 impl ParameterAxis {
-    /// The parameter by its symbol, in the model's own units.
+    /// The parameter in the model's own units.
     pub fn of(key: Key) -> Self {
-        let symbol = key.symbol();
-        // A word is no symbol.
-        let label = if symbol.chars().count() <= 2 {
-            format!("${symbol}$")
-        } else {
-            symbol.to_owned()
-        };
-        Self { label, factor: 1.0 }
+        Self {
+            label: key.axis_label(),
+            factor: 1.0,
+        }
     }
 
     /// The parameter of a case with values up to `size`, in SI where the case has it.
@@ -42,10 +38,9 @@ impl ParameterAxis {
             || Self::of(key),
             |unit| {
                 let (factor, name) = prefixed(unit.kind, unit.si, size);
-                // A quantity of a physical case is called by its path.
-                let quantity = unit.quantity.replace(['.', '_'], " ");
+                let quantity = Key::find(&unit.quantity).unwrap_or(key);
                 Self {
-                    label: format!("{quantity} ({name})"),
+                    label: format!("{} ({name})", quantity.axis_label()),
                     factor,
                 }
             },

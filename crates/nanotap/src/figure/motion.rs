@@ -122,6 +122,11 @@ impl<'a> View<'a> {
             portrait: self.portrait(portrait),
             strobe: self.strobe(strobes),
             endless: portrait > SHOWN_PERIODS,
+            portrait_label: if portrait < strobes as f64 {
+                format!("first {portrait} drive periods")
+            } else {
+                String::new()
+            },
         }
     }
 }
@@ -347,10 +352,11 @@ pub fn fixed_step_figure(model: &Model, run: &FixedStepRun, units: &Units) -> Fi
         length: length_unit,
         velocity: velocity_unit,
     };
-    let title = format!(
-        "RK4, {} and {} steps a period: {apparent}",
-        run.steps[0], run.steps[1]
-    );
+    let steps = match run.steps {
+        [flight, contact] if flight == contact => format!("{flight} steps per period"),
+        [flight, contact] => format!("{flight} steps per period, {contact} in contact"),
+    };
+    let title = format!("RK4, {steps}: {apparent}");
     Figure::new(1, 2)
         .width(DOUBLE_COLUMN)
         .height(66.0)

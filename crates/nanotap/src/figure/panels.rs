@@ -1,6 +1,8 @@
 //! Motions as they are drawn: curves in shown units, from a trajectory or from a dataset, and the
 //! panels that show them.
 
+use std::collections::BTreeSet;
+
 use nanotap_figures::{
     Axis, Band, Colour, DOUBLE_COLUMN, Dash, Figure, Legend, Line, Markers, Motion, Panel, Points,
     Rule, Shape, Stems,
@@ -69,6 +71,8 @@ pub struct MotionCurves {
     pub strobe: Vec<(f64, f64)>,
     /// Whether the motion does not repeat in what is drawn: thin lines and small dots then.
     pub endless: bool,
+    /// What the line in the phase plane shows, where it ends before the states at drive phase 0.
+    pub portrait_label: String,
 }
 
 impl MotionCurves {
@@ -85,7 +89,7 @@ impl MotionCurves {
     /// Time series with the contacts shaded and what the tip touches.
     pub(crate) fn time_panel(&self) -> Panel {
         let [surface, tip] = if self.axes.beam {
-            ["sample, as the base sees it", "tip"]
+            ["sample, relative to the base", "tip"]
         } else {
             ["stop", "mass"]
         };
@@ -111,6 +115,11 @@ impl MotionCurves {
         let line = Line::new(self.portrait.clone())
             .colour(Colour::BLUE)
             .width(if self.endless { 0.3 } else { 0.9 });
+        let line = if self.portrait_label.is_empty() {
+            line
+        } else {
+            line.label(&self.portrait_label)
+        };
         let panel = Panel::new(self.axes.tip(), self.axes.rate())
             .legend(Legend::Above)
             .with(line);
@@ -327,10 +336,22 @@ pub struct SectionCurves {
 }
 
 impl SectionCurves {
+    /// Number of points that differ: a periodic motion has as many as its period.
+    fn distinct_points(&self) -> usize {
+        let size = |of: fn(&(f64, f64)) -> f64| {
+            let sizes = self.points.iter().map(|p| of(p).abs());
+            1e-5 * sizes.fold(f64::MIN_POSITIVE, f64::max)
+        };
+        let (x, y) = (size(|p| p.0), size(|p| p.1));
+        let cell = |p: &(f64, f64)| ((p.0 / x).round() as i64, (p.1 / y).round() as i64);
+        self.points.iter().map(cell).collect::<BTreeSet<_>>().len()
+    }
+
     /// The section, and the exponents with their errors.
     pub fn figure(&self) -> Figure {
-        let diameter = match self.points.len() {
-            0..=500 => 0.8,
+        let diameter = match self.distinct_points() {
+            0..=64 => 1.6,
+            65..=500 => 0.8,
             501..=20_000 => 0.3,
             _ => 0.15,
         };

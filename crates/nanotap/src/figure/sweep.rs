@@ -8,6 +8,7 @@ use nanotap_figures::{
 };
 use serde::Deserialize;
 
+use crate::case::Key;
 use crate::case::physical::Kind;
 use crate::case::units::prefixed;
 use crate::dataset::{Coordinate, Store, StoreError, Values};
@@ -514,8 +515,8 @@ impl GridAxis {
         let kind = Kind::ALL
             .into_iter()
             .find(|kind| *kind != Kind::Number && kind.si_unit() == self.units);
-        // A quantity of a physical case is called by its path: drive.frequency.
-        let words = self.symbol.replace(['.', '_'], " ");
+        let key = Key::all().find(|key| key.symbol() == self.symbol);
+        let words = key.map_or_else(|| self.symbol.clone(), Key::axis_label);
         let (factor, label, unit) = match kind {
             Some(kind) => {
                 let size = self
@@ -525,8 +526,7 @@ impl GridAxis {
                 let (factor, unit) = prefixed(kind, 1.0, size);
                 (factor, words, unit.clone())
             }
-            None if self.symbol.contains('.') => (1.0, words, String::new()),
-            None => (1.0, format!("${}$", self.symbol), String::new()),
+            None => (1.0, words, String::new()),
         };
         GridScale {
             values: self.values.iter().map(|v| factor * v).collect(),

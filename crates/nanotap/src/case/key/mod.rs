@@ -336,6 +336,23 @@ impl Key {
         }
     }
 
+    /// Label of its axis, without the unit: `drive frequency $Ω$`, `distance $z_c$`.
+    pub fn axis_label(self) -> String {
+        if self == Self::GapTip {
+            return "distance $z_c$".to_owned();
+        }
+        let words = |name: &str| name.replace(['.', '_'], " ");
+        let symbol = self.entry().symbol;
+        let name = self.alias().unwrap_or(self.name());
+        if self.is_physical() || symbol.is_empty() {
+            words(self.path())
+        } else if name == "omega" {
+            format!("drive frequency ${symbol}$")
+        } else {
+            format!("{} ${symbol}$", words(name))
+        }
+    }
+
     /// Description in one line.
     pub fn meaning(self) -> &'static str {
         self.entry().meaning

@@ -117,6 +117,19 @@ class Case:
         source, _, catalogues = self._core.made_of
         return _again(type(self), source, self._keys | key_words(keys), catalogues)
 
+    def _varied(self, keys: Mapping[str, Value]) -> "Case":
+        """The same case with keys varied as studies vary them: what is not varied stays, the
+        drive's own amplitude too. It is made for one study and is not kept.
+        """
+        if not keys:
+            return self
+        texts = key_words(keys)
+        case = type(self).__new__(type(self))
+        case._keys = self._keys | texts
+        case._core = self._core.varied(list(texts), list(texts.values()))
+        case._read()
+        return case
+
     def _make(
         self,
         source: tuple[str, str] | None,

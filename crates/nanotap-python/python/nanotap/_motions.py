@@ -141,7 +141,7 @@ def _split(
             raise TypeError(message)
         one = isinstance(value, str | Mapping) or np.ndim(in_si(key, value)) == 0
         (fixed if one else varied)[key] = value
-    return _cased(case).with_(**fixed), varied
+    return _cased(case)._varied(fixed), varied
 
 
 def _columns(names: list[str], values: Floats) -> tuple[dict[str, Any], dict[str, Any]]:
@@ -311,9 +311,9 @@ def _over(
     rows = [array.values.ravel().tolist() for array in broadcast.values()]
     named = [dict(zip(broadcast, row, strict=True)) for row in zip(*rows, strict=True)]
     named = named or [{} for _ in range(first.size)]
-    # An error in a key is reported for its first value.
-    case.with_(**named[0])
     texts = [key_words(keys) for keys in named]
+    # An error in a key is reported for its first value.
+    case._varied(named[0])
     asked = requests if order is None else [requests[k] for k in order]
     most = _arguments.optional_count("threads", threads)
     noun = "orbits" if study == "orbit" else "runs"
@@ -348,7 +348,10 @@ def _over(
             variables["initial_state"] = (("start", "state"), states, attrs)
             coords["state"] = words(entries)
     # The value in the case of a parameter that varies does not matter.
-    attributes = case_attributes(case, noun) | {"over": json.dumps(list(varied))}
+    attributes = case_attributes(case, noun) | {
+        "over": json.dumps(list(varied)),
+        "held": case._core.held(list(texts[0])),
+    }
     ds = dataset(variables, coords, attributes)
     if interrupted:
         done = failures.count("")

@@ -357,9 +357,11 @@ def sweep(
 def basin(ds: "xr.Dataset", **where: Unpack[Where]) -> "Figure":
     """Basins: one colour per attractor, with the strobe points of the attractors."""
     y, x = (str(dim) for dim in ds.attractor.dims)
+    recipe = json.loads(ds.attrs["basin"])
     facts = {
         "x": x,
         "y": y,
+        "si": [recipe[side].get("si", 1.0) for side in ("x", "y")],
         "attractors": json.loads(ds.attrs["attractors"]),
         "entries": ds.attrs["state_entries"].split(),
     }

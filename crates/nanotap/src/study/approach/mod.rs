@@ -28,6 +28,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::Error;
 use crate::case::physical::Kind;
+use crate::case::units::{NumbersInSi, Units};
 use crate::case::{Case, ParameterUnit};
 use crate::model::Model;
 use crate::observe::{Clearance, ObservableSet, Observables, PhysicalMotion, measure};
@@ -38,7 +39,7 @@ use crate::study::frequency_modulation::{
 use crate::study::limits::{MAX_DISTANCES, MAX_DOUBLINGS, MAX_PERIOD};
 use crate::study::request::options;
 use crate::study::simulate::Classification;
-use crate::study::value::{Amount, value};
+use crate::study::value::{Amount, implied};
 use crate::study::{FreeMotion, Study};
 use distance_sweep::FoundMotion;
 pub use quasistatic::{states_at, states_near};
@@ -150,6 +151,9 @@ pub struct StateJump {
     pub zc: Option<f64>,
     /// Uncertainty of the distance, in the model's unit of length.
     pub uncertainty: f64,
+    /// Uncertainty of the distance in m, for a physical case.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub zc_uncertainty: Option<f64>,
     /// What ends the motion before it: fold, flip, neimark-sacker, grazing, crossing, or a
     /// sentence.
     pub reason: String,
@@ -160,7 +164,7 @@ pub struct StateJump {
 }
 
 /// An interval of distances in which approach and retract show different motions.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct Hysteresis {
     /// Nearest distance of the interval, in the model's unit of length.
     pub near: f64,
@@ -169,6 +173,29 @@ pub struct Hysteresis {
     /// Largest difference of the amplitude at the drive frequency in it; of the relative frequency
     /// shift where the amplitude is kept.
     pub difference: f64,
+    /// The lengths in SI, for a physical case.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub physical: Option<NumbersInSi>,
+}
+
+impl Hysteresis {
+    /// The same with its lengths in SI too.
+    fn in_si(self, units: &Units, keeps_amplitude: bool) -> Self {
+        let difference = if keeps_amplitude {
+            Kind::Number
+        } else {
+            Kind::Length
+        };
+        let ends = [
+            ("near", Kind::Length, self.near),
+            ("far", Kind::Length, self.far),
+        ];
+        let mut physical = units.in_si(ends);
+        if let Some(numbers) = &mut physical {
+            numbers.insert("difference", units.scaled(difference, self.difference));
+        }
+        Self { physical, ..self }
+    }
 }
 
 /// Approach and retract curves, with the branches behind them.
@@ -212,6 +239,9 @@ pub struct ApproachReport {
     /// For a physical case, the factor from distances to m.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub parameter_unit: Option<ParameterUnit>,
+    /// The lengths in SI, for a physical case.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub physical: Option<NumbersInSi>,
     /// Frequency modulation, where amplitude and phase are kept.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub modulation: Option<ModulationReport>,
@@ -248,7 +278,7 @@ pub fn approach(
         return frequency_modulation(case, &options.modulation(), control);
     }
     let key = case.gap_key();
-    let distance = |option, given: &Option<_>| value(case, key, option, given.as_ref());
+    let distance = |option, given: &Option<_>| implied(case, key, option, given.as_ref());
     let speed = options.speed.as_ref();
     let speed = speed.map(|amount| speed_of(case, amount)).transpose()?;
     let distances = Distances {
@@ -266,7 +296,7 @@ pub fn approach(
         speed,
     };
     let found = quasistatic::found(&curve, &free, &distances, control)?;
-    Ok(ApproachReport {
+    let report = ApproachReport {
         parameter: key.path(),
         from,
         to,
@@ -283,8 +313,28 @@ pub fn approach(
         cancelled: control.is_cancelled(),
         limits: found.limits,
         parameter_unit: case.parameter_unit(key),
+        physical: None,
         modulation: None,
-    })
+    };
+    Ok(report.in_si(&case.units()))
+}
+
+impl ApproachReport {
+    /// The same with its lengths in SI too.
+    pub(in crate::study) fn in_si(mut self, units: &Units) -> Self {
+        self.physical = units.in_si([
+            ("from", Kind::Length, self.from),
+            ("to", Kind::Length, self.to),
+            ("free_amplitude", Kind::Length, self.free_amplitude),
+            ("free_reach", Kind::Length, self.free_reach),
+        ]);
+        let keeps_amplitude = self.modulation.is_some();
+        let intervals = std::mem::take(&mut self.hysteresis).into_iter();
+        self.hysteresis = intervals
+            .map(|interval| interval.in_si(units, keeps_amplitude))
+            .collect();
+        self
+    }
 }
 
 /// The distances of a curve, in the model's unit of length.
@@ -456,6 +506,7 @@ pub(in crate::study) fn hysteresis(
                     near: there.gap,
                     far: there.gap,
                     difference,
+                    physical: None,
                 }),
             }
         }
@@ -599,24 +650,18 @@ impl ApproachOptions {
 
 /// A speed in the model's unit of length a unit of time, as it is given of a case.
 fn speed_of(case: &Case, amount: &Amount) -> Result<f64, Error> {
-    if let Ok(speed) = amount.text().parse::<f64>() {
-        if speed > 0.0 && speed.is_finite() {
-            return Ok(speed);
-        }
-        return Err(Error::input(
-            format!(
-                "the distance cannot change at a speed of {speed}: a finite one above zero is needed"
-            ),
-            "change {speed}",
-        ));
-    }
     let refused = |error: String| Error::option("speed", error, "write it as in \"500 nm/s\"");
-    let speed = Kind::Velocity.parse(amount.text());
-    let speed = speed.map_err(|error| refused(error.to_string()))?;
-    let view = case.physical().ok_or_else(|| {
-        refused("a dimensionless case has no unit of length: a plain number is needed".to_owned())
-    })?;
-    Ok(speed / view.scales.velocity)
+    let (read, unit) = match case.physical() {
+        Some(view) => (Kind::Velocity.parse(amount.text()), view.scales.velocity),
+        None => (Kind::Number.parse(amount.text()), 1.0),
+    };
+    let speed = read.map_err(|error| refused(error.to_string()))? / unit;
+    if speed > 0.0 && speed.is_finite() {
+        return Ok(speed);
+    }
+    Err(refused(format!(
+        "expected a finite speed above zero, got {amount}"
+    )))
 }
 
 /// An approach and retract curve.

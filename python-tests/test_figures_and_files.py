@@ -16,12 +16,12 @@ mpl.use("agg")
 
 @pytest.fixture(scope="module")
 def swept(regular):
-    return nanotap.sweep(regular, over={"omega": (2.5, 3.1, 31)}, starts=2, periods=12)
+    return nanotap.sweep(regular, over={"omega": nanotap.range(2.5, 3.1, 31)}, starts=2, periods=12)
 
 
 @pytest.fixture(scope="module")
 def mapped(regular):
-    over = {"omega": (2.5, 3.1, 7), "alpha4": (15, 25, 5)}
+    over = {"omega": nanotap.range(2.5, 3.1, 7), "alpha4": nanotap.range(15, 25, 5)}
     return nanotap.sweep(regular, over=over, periods=4)
 
 
@@ -105,7 +105,7 @@ def test_sweeps_are_drawn_in_the_terminals_colours(swept, mapped, regular):
         word = meanings[code]
         assert (f"period {period}" if word == "periodic" else word) in words
     follow = nanotap.sweep(
-        regular, over={"omega": (2.9, 3.0, 4)}, follow="both", periods=3
+        regular, over={"omega": nanotap.range(2.9, 3.0, 4)}, follow="both", periods=3
     )
     # Both directions are drawn in the same panels, each with its label.
     both = [
@@ -149,7 +149,7 @@ def test_figures_are_drawn_into_the_users_own_axes(swept, regular):
 def test_curves_are_the_terminals(regular, tmp_path):
     """One description: matplotlib draws everything where the terminal's SVG has it."""
     store = tmp_path / "s.zarr"
-    ds = nanotap.sweep(regular, over={"omega": (2.9, 3.0, 4)}, periods=3, out=store)
+    ds = nanotap.sweep(regular, over={"omega": nanotap.range(2.9, 3.0, 4)}, periods=3, out=store)
     svg = nanotap._nanotap.figure(store, "svg").decode()
     axes = plot.sweep(ds).axes[0]
     for cloud in axes.collections:
@@ -190,7 +190,7 @@ def test_the_shift_is_drawn_against_the_amplitude(physical):
 
 def test_the_terminals_own_picture_is_to_be_had(regular, tmp_path):
     out = tmp_path / "s.zarr"
-    nanotap.sweep(regular, over={"omega": (2.9, 3.0, 4)}, periods=3, out=out)
+    nanotap.sweep(regular, over={"omega": nanotap.range(2.9, 3.0, 4)}, periods=3, out=out)
     assert b"<svg" in nanotap._nanotap.figure(out, "svg")
     assert nanotap._nanotap.figure(out, "png").startswith(b"\x89PNG")
     with pytest.raises(ValueError, match="expected svg, png or pdf"):
@@ -285,7 +285,7 @@ def test_maps_are_fields_of_gwyddion(mapped, bistable, tmp_path):
         with pytest.raises(ValueError, match=words):
             export.gsf(mapped, path, **arguments)
     log = nanotap.sweep(
-        bistable, over={"omega": (19, 20, 2), "alpha4": (1, 100, 4, "log")}, periods=2
+        bistable, over={"omega": nanotap.range(19, 20, 2), "alpha4": nanotap.range(1, 100, 4, log=True)}, periods=2
     )
     with pytest.raises(ValueError, match="equal steps"):
         export.gsf(log, path)
@@ -307,7 +307,7 @@ def test_panels_are_chosen_and_drawn_into_given_axes(regular):
 
 
 def test_any_variable_is_drawn_over_one_parameter(regular):
-    sweep = nanotap.sweep(regular, over={"omega": (2.9, 3.1, 5)}, starts=2, periods=4)
+    sweep = nanotap.sweep(regular, over={"omega": nanotap.range(2.9, 3.1, 5)}, starts=2, periods=4)
     label = nanotap.plot.sweep(sweep, show="peak_force").axes[0].get_ylabel()
     assert "force" in label
     many = nanotap.orbit(regular, omega=np.linspace(2.9, 3.1, 4))

@@ -280,7 +280,7 @@ def test_physical_quantities_vary(physical):
     )
     low, high = float(ds["gap.tip"].min()), float(ds["gap.tip"].max())
     assert (low, high) == pytest.approx((18e-9, 19e-9), rel=1e-6)
-    swept = nanotap.sweep(physical, over={"gap.tip": ("17 nm", "19 nm", 3)}, periods=3)
+    swept = nanotap.sweep(physical, over={"gap.tip": nanotap.range("17 nm", "19 nm", 3)}, periods=3)
     middle = nanotap.orbit(physical.with_(**{"gap.tip": "18 nm"}))
     np.testing.assert_allclose(swept["gap.tip"], [17e-9, 18e-9, 19e-9], rtol=1e-9)
     # Over physical quantities, observables are in SI.
@@ -290,8 +290,8 @@ def test_physical_quantities_vary(physical):
     window = nanotap.window(
         physical,
         over={
-            "gap.tip": ("15 nm", "30 nm", 3),
-            "drive.frequency": ("65 kHz", "66 kHz", 2),
+            "gap.tip": nanotap.range("15 nm", "30 nm", 3),
+            "drive.frequency": nanotap.range("65 kHz", "66 kHz", 2),
         },
         starts=3,
     )

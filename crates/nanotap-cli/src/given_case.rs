@@ -152,9 +152,5 @@ pub(crate) fn case_of(arguments: &CaseArguments) -> Result<Case, Failure> {
     let case = Case::load(arguments.file.as_deref(), &arguments.set, &catalogue)?;
     let case = case.cancelled_by(&progress::control());
     let case = case.called(&title(arguments));
-    Ok(if arguments.model_units {
-        case.in_model_units()
-    } else {
-        case
-    })
+    Ok(case.in_model_units(arguments.model_units))
 }

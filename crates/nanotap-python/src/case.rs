@@ -75,6 +75,16 @@ impl CaseCore {
         })
     }
 
+    fn with_case(&self, case: Case) -> Self {
+        Self {
+            case: Arc::new(case),
+            source: self.source.clone(),
+            overrides: self.overrides.clone(),
+            catalogues: self.catalogues.clone(),
+            at_setpoint: OnceLock::new(),
+        }
+    }
+
     fn make(
         source: Option<Source>,
         overrides: Vec<String>,
@@ -146,6 +156,7 @@ impl Variants {
                 .chain(stated.iter().map(|(_, word)| word.clone()))
                 .collect();
             let case = Case::parse_with(self.source.clone(), &words, &self.catalogue)?;
+            let case = case.in_model_units(self.case.is_in_model_units());
             at_setpoint(case, control)?.0
         };
         Ok(numbers
@@ -184,13 +195,19 @@ impl CaseCore {
             .variants(py, &keys)?
             .with(&words, &Control::default())
             .map_err(Failure::from)?;
-        Ok(Self {
-            case: Arc::new(case),
-            source: self.source.clone(),
-            overrides: self.overrides.clone(),
-            catalogues: self.catalogues.clone(),
-            at_setpoint: OnceLock::new(),
-        })
+        Ok(self.with_case(case))
+    }
+
+    /// The same with results in the model's units, or in SI.
+    fn in_model_units(&self, model_units: bool) -> Self {
+        let case = self.case.as_ref().clone();
+        self.with_case(case.in_model_units(model_units))
+    }
+
+    /// Whether results of a physical case are in the model's units.
+    #[getter]
+    fn model_units(&self) -> bool {
+        self.case.is_in_model_units()
     }
 
     /// What stays while keys of these names vary although it was not stated, in SI, as JSON.
@@ -347,6 +364,14 @@ pub(crate) fn case_keys() -> Vec<(&'static str, Vec<KeyRow>)> {
     Section::ALL
         .map(|section| (section.name(), of(section)))
         .to_vec()
+}
+
+/// A quantity of a key, given by its path, in SI; of another key a plain number.
+#[pyfunction]
+pub(crate) fn in_si(key: &str, text: &str) -> PyResult<f64> {
+    let kind = Key::find(key).map_or(Kind::Number, Key::kind);
+    let read = kind.parse(text);
+    Ok(read.map_err(|error| Failure::input(format!("{key}: {error}")))?)
 }
 
 /// The built-in levers and materials: kind, name, source.

@@ -605,13 +605,19 @@ impl Case {
         Units::of(view.map(|view| &view.scales))
     }
 
-    /// The same case with results, and numbers without a unit, in the model's units.
+    /// The same case with results, and numbers without a unit, in the model's units if `model_units`,
+    /// otherwise in SI.
     #[must_use]
-    pub fn in_model_units(self) -> Self {
+    pub fn in_model_units(self, model_units: bool) -> Self {
         Self {
-            model_units: true,
+            model_units,
             ..self
         }
+    }
+
+    /// Whether results of a physical case are in the model's units.
+    pub const fn is_in_model_units(&self) -> bool {
+        self.model_units
     }
 
     /// SI unit of a key, for a physical case.

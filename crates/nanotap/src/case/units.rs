@@ -5,6 +5,9 @@ use std::collections::BTreeMap;
 use crate::case::physical::{Kind, Scales};
 use crate::case::quantity::{QuantityError, prefix_of};
 
+/// Largest deflection of a physical case that is believed, in metres.
+const MOST_DEFLECTION: f64 = 1e-3;
+
 /// Numbers in SI by name, where a report holds them in the model's units too.
 pub type NumbersInSi = BTreeMap<&'static str, f64>;
 
@@ -88,11 +91,20 @@ impl Units {
     ///
     /// # Errors
     /// With what was expected.
-    pub fn read_entry(&self, name: &str, text: &str) -> Result<f64, QuantityError> {
-        match self.of_entry(name) {
-            Some((kind, si)) => Ok(kind.parse(text)? / si),
-            None => Kind::Number.parse(text),
+    pub fn read_entry(&self, name: &str, text: &str) -> Result<f64, String> {
+        let words = |error: QuantityError| error.to_string();
+        let Some((kind, si)) = self.of_entry(name) else {
+            return Kind::Number.parse(text).map_err(words);
+        };
+        let value = kind.parse(text).map_err(words)?;
+        if kind == Kind::Length && value.abs() > MOST_DEFLECTION {
+            return Err(format!(
+                "expected a length below {}, got {}; write the unit, as in \"10 nm\"",
+                kind.format(MOST_DEFLECTION),
+                kind.format(value)
+            ));
         }
+        Ok(value / si)
     }
 
     /// A value of an entry of a state as text, with so many digits.

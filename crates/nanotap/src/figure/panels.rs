@@ -1,5 +1,4 @@
-//! Motions as they are drawn: curves in shown units, from a trajectory or from a dataset, and the
-//! panels that show them.
+//! Motions in the units of the figure, from a trajectory or from a dataset, and their panels.
 
 use std::collections::BTreeSet;
 
@@ -11,10 +10,10 @@ use serde::Deserialize;
 
 use crate::study::simulate::Classification;
 
-/// ModelMap points beyond which they are drawn as small dots.
+/// Number of strobe states beyond which they are drawn as small dots.
 const FEW_STROBES: usize = 200;
 
-/// What axes of motions are called, and their units.
+/// Names and units of the axes of motions.
 #[derive(Clone, Debug, Default, Deserialize)]
 #[serde(default)]
 pub struct MotionAxes {
@@ -57,11 +56,11 @@ pub(crate) fn time_axis() -> Axis {
 pub struct MotionCurves {
     /// The axes.
     pub axes: MotionAxes,
-    /// What the motion is.
+    /// Title: the class of the motion.
     pub title: String,
-    /// When there is contact, in drive periods.
+    /// Intervals of contact, in drive periods.
     pub contacts: Vec<(f64, f64)>,
-    /// What is touched, against time.
+    /// The surface or stop against time.
     pub surface: Vec<(f64, f64)>,
     /// The tip or mass against time.
     pub tip: Vec<(f64, f64)>,
@@ -69,9 +68,9 @@ pub struct MotionCurves {
     pub portrait: Vec<(f64, f64)>,
     /// Its states at drive phase 0.
     pub strobe: Vec<(f64, f64)>,
-    /// Whether the motion does not repeat in what is drawn: thin lines and small dots then.
+    /// Whether the drawn motion does not repeat: thin lines and small dots then.
     pub endless: bool,
-    /// What the line in the phase plane shows, where it ends before the states at drive phase 0.
+    /// Label of the line in the phase plane, if it shows fewer periods than the strobe states.
     pub portrait_label: String,
 }
 
@@ -86,7 +85,7 @@ impl MotionCurves {
             .with(self.portrait_panel())
     }
 
-    /// Time series with the contacts shaded and what the tip touches.
+    /// Time series with the contacts shaded, and the surface.
     pub(crate) fn time_panel(&self) -> Panel {
         let [surface, tip] = if self.axes.beam {
             ["sample, relative to the base", "tip"]
@@ -164,7 +163,7 @@ impl OrbitCurves {
 
     fn harmonics_panel(&self) -> Panel {
         let size = self.harmonics.iter().map(|p| p.1).fold(0.0, f64::max);
-        // What is smaller is rounding of what is largest.
+        // Smaller values are rounding of the largest one.
         let floor = 1e-8 * size;
         let stems = self.harmonics.iter().copied().filter(|p| p.1 > floor);
         let [frequency, symbol] = if self.motion.axes.beam {
@@ -186,7 +185,7 @@ impl OrbitCurves {
         Panel::new(axis, Axis::log(amplitude)).with(Stems::new(stems).colour(Colour::BLUE))
     }
 
-    /// The multipliers and the unit circle that they must lie in.
+    /// The multipliers and the unit circle.
     fn multipliers_panel(&self) -> Panel {
         let largest = self
             .multipliers
@@ -218,11 +217,11 @@ impl OrbitCurves {
     }
 }
 
-/// An attractor as it is drawn.
+/// Curves of an attractor.
 #[derive(Clone, Debug, Default, Deserialize)]
 #[serde(default)]
 pub struct AttractorCurve {
-    /// What it is called, and its share of the starts.
+    /// Name, with its share of the initial states.
     pub name: String,
     /// Name of its class of motions.
     pub classification: String,
@@ -247,7 +246,7 @@ impl AttractorCurve {
     }
 }
 
-/// What a class of motions without a period is, by its name.
+/// The motion of a class without a period, by its name.
 pub(crate) fn motion_of(classification: &str) -> Motion {
     [
         (Classification::QuasiPeriodic, Motion::QuasiPeriodic),

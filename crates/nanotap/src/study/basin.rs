@@ -94,7 +94,7 @@ impl SliceRange {
         let name = name.trim();
         let number = |text: &str| {
             let read = units.read_entry(name, text);
-            read.map_err(|error| refuse(error.to_string()))
+            read.map_err(refuse)
         };
         let (from, to) = (number(from)?, number(to)?);
         let count = count

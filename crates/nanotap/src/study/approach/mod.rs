@@ -29,7 +29,7 @@ use serde::{Deserialize, Serialize};
 use crate::Error;
 use crate::case::physical::Kind;
 use crate::case::units::{NumbersInSi, Units};
-use crate::case::{Case, ParameterUnit};
+use crate::case::{Case, Key, ParameterUnit};
 use crate::model::Model;
 use crate::observe::{Clearance, ObservableSet, Observables, PhysicalMotion, measure};
 use crate::study::branch::{BranchOptions, BranchReport};
@@ -295,7 +295,16 @@ pub fn approach(
         options,
         speed,
     };
-    let found = quasistatic::found(&curve, &free, &distances, control)?;
+    let mut found = quasistatic::found(&curve, &free, &distances, control)?;
+    if let Some(exact) = distances_in_si(case, options, [from, to])? {
+        // The distances that were asked for, not these in the model's units and back: curves of
+        // different levers have the same ones.
+        for row in &mut found.table {
+            if let Some(k) = distances.iter().position(|gap| *gap == row.gap) {
+                row.zc = Some(exact[k]);
+            }
+        }
+    }
     let report = ApproachReport {
         parameter: key.path(),
         from,
@@ -317,6 +326,32 @@ pub fn approach(
         modulation: None,
     };
     Ok(report.in_si(&case.units()))
+}
+
+/// The distances of a physical case in m, from the ends as they are given; `ends` are in the model's
+/// unit of length.
+fn distances_in_si(
+    case: &Case,
+    options: &ApproachOptions,
+    ends: [f64; 2],
+) -> Result<Option<Vec<f64>>, Error> {
+    let Some(unit) = case.units().si(Kind::Length) else {
+        return Ok(None);
+    };
+    let end = |option, given: &Option<Amount>, end: f64| match given {
+        Some(given) => Ok(implied(case, Key::GapTip, option, Some(given))?.unwrap_or(end * unit)),
+        None => Ok::<f64, Error>(end * unit),
+    };
+    let from = end("from", &options.from, ends[0])?;
+    let to = end("to", &options.to, ends[1])?;
+    let last = (options.points - 1) as f64;
+    let even = |k| even(from, to, k as f64 / last);
+    Ok(Some((0..options.points).map(even).collect()))
+}
+
+/// The number at a `share` of the way, exact at both ends.
+fn even(from: f64, to: f64, share: f64) -> f64 {
+    from * (1.0 - share) + to * share
 }
 
 impl ApproachReport {
@@ -401,8 +436,7 @@ impl Distances {
                 let ratio = (to - closest) / (from - closest);
                 closest + (from - closest) * nanotap_arithmetic::powf(ratio, share)
             }
-            // Both ends exactly.
-            _ => from * (1.0 - share) + to * share,
+            _ => even(from, to, share),
         };
         Ok((0..self.points).map(|k| between(k as f64 / last)).collect())
     }

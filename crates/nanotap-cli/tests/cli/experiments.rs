@@ -231,7 +231,7 @@ fn branches_run_over_quantities_of_the_case() {
     );
     let point = &json["points"][0];
     assert!(point["physical"]["A"].as_f64().unwrap() > 19e-9);
-    assert!(folder.read("b.svg").contains(">distance "));
+    assert!(folder.read("b.svg").contains("distance zc (nm)"));
     branch("24 nm", "10 kHz", &[]).refused(&["expected a length"]);
     branch("24", "10 nm", &[]).refused(&["expected a length"]);
     branch("24 Hz", "10 Hz", &[]).refused(&["gap.tip", "expected a length"]);

@@ -6,17 +6,22 @@ use std::path::Path;
 use crate::util::Folder;
 use crate::worked_cases::words;
 
-/// The README, and a folder with the case files that it shows: blocks that begin `# NAME.toml`.
-fn page() -> (String, Folder) {
+/// The text of the README.
+pub(crate) fn text() -> String {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../README.md");
-    let text = std::fs::read_to_string(path).unwrap();
-    let folder = Folder::new();
-    for block in text.split("```toml\n").skip(1) {
+    std::fs::read_to_string(path).unwrap()
+}
+
+/// Names and texts of the case files that the page shows: blocks that begin `# NAME.toml`.
+pub(crate) fn cases(page: &str) -> impl Iterator<Item = (&str, &str)> {
+    let blocks = page.split("```toml\n").skip(1);
+    blocks.map(|block| {
         let case = block.split("```").next().unwrap();
-        let name = case.lines().next().unwrap().trim_start_matches("# ");
-        folder.write(name, case);
-    }
-    (text, folder)
+        (
+            case.lines().next().unwrap().trim_start_matches("# "),
+            case,
+        )
+    })
 }
 
 /// Commands of `nanotap` with the lines that the page shows below each.
@@ -43,7 +48,11 @@ fn agrees(shown: &[&str], printed: &[&str]) -> bool {
 
 #[test]
 fn the_readme_shows_what_the_program_prints() {
-    let (text, folder) = page();
+    let text = text();
+    let folder = Folder::new();
+    for (name, case) in cases(&text) {
+        folder.write(name, case);
+    }
     let examples = examples(&text);
     assert_eq!(examples.len(), 3);
     for (command, shown) in examples {

@@ -450,8 +450,7 @@ def branch(
         )
     symbol = ds.attrs["parameter_symbol"]
     facts = {
-        # A key of a physical case has a name, a number of the equations a symbol.
-        "x_label": f"{name if '.' in name else f'${symbol}$'}{x_unit}",
+        "x_label": f"{_nanotap.axis_label(name, symbol)}{x_unit}",
         "y_label": _labelled(ds, show, y_unit),
         "points": _rows(
             branch=ds.branch,
@@ -480,7 +479,9 @@ def _curves(ds: "xr.Dataset", name: str) -> dict[str, Any]:
     ]
     first, second = ds[name].values, ds.locus_second.values
     return {
-        "y_label": f"${ds.attrs.get('second_symbol', ds.attrs['second'])}$",
+        "y_label": _nanotap.axis_label(
+            ds.attrs["second"], ds.attrs.get("second_symbol", ds.attrs["second"])
+        ),
         "x_range": [float(first.min()), float(first.max())],
         "y_range": [float(second.min()), float(second.max())],
         "curves": [

@@ -92,10 +92,12 @@ def test_shares_merge_to_the_same_bytes(regular, tmp_path):
     nanotap.sweep(regular, **call, out=tmp_path / "merged.zarr")
     assert_same(tmp_path / "whole.zarr", tmp_path / "merged.zarr")
     with pytest.raises(ValueError, match="other options: .*omega"):
-        nanotap.sweep(regular, over={"omega": nanotap.range(2, 3, 9)}, periods=4, out=shares[0])
+        nanotap.sweep(
+            regular, over={"omega": nanotap.range(2, 3, 9)}, periods=4, out=shares[0]
+        )
     with pytest.raises(ValueError, match="is not a dataset of nanotap"):
         nanotap.merge([tmp_path], tmp_path / "other.zarr")
-    with pytest.raises(ValueError, match="it does not exist"):
+    with pytest.raises(FileNotFoundError, match="nowhere.zarr"):
         nanotap.open(tmp_path / "nowhere.zarr")
 
 
@@ -136,7 +138,7 @@ def test_ctrl_c_keeps_what_is_finished(regular, tmp_path):
         nanotap.sweep(regular, **call, progress=progress)
     assert heard[-1][1] == total
     ds = stopped.value.result
-    finished = int((ds.classification > 0).sum())
+    finished = int((ds.classification != "").sum())
     assert 0 <= finished < total
     assert isinstance(stopped.value, KeyboardInterrupt)
 
@@ -189,7 +191,10 @@ def test_an_error_of_the_listener_is_the_callers(regular):
 
     with pytest.raises(LookupError, match="enough"):
         nanotap.sweep(
-            regular, over={"omega": nanotap.range(2.5, 3.5, 500)}, periods=5, progress=progress
+            regular,
+            over={"omega": nanotap.range(2.5, 3.5, 500)},
+            periods=5,
+            progress=progress,
         )
 
 
@@ -248,7 +253,7 @@ def test_a_cluster_makes_the_same_bytes_though_a_worker_is_killed(
     )
     assert killed
     assert_same(tmp_path / "here.zarr", tmp_path / "there.zarr")
-    assert (ds.classification > 0).all()
+    assert (ds.classification != "").all()
 
 
 def test_a_cluster_goes_on_where_it_stopped(cluster, regular, tmp_path):

@@ -60,7 +60,7 @@ fn an_approach_curve_has_approach_and_retract() {
     assert!(folds.iter().any(|b| b["kind"] == "fold"));
     let csv = folder.read("curve.csv");
     assert_eq!(csv.lines().count(), 43);
-    assert!(csv.starts_with("way,alpha5,") && csv.contains(",E_dis (eV),"));
+    assert!(csv.starts_with("way,zc (m),") && csv.contains(",E_dis (eV),"));
     assert!(folder.read("curve.svg").contains("<svg"));
     let text = folder
         .run(&["approach", "lever.toml", "--points", "9"])

@@ -17,10 +17,7 @@ pub(crate) fn cases(page: &str) -> impl Iterator<Item = (&str, &str)> {
     let blocks = page.split("```toml\n").skip(1);
     blocks.map(|block| {
         let case = block.split("```").next().unwrap();
-        (
-            case.lines().next().unwrap().trim_start_matches("# "),
-            case,
-        )
+        (case.lines().next().unwrap().trim_start_matches("# "), case)
     })
 }
 

@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from . import _nanotap
 from ._case import existing
-from ._quantity import Range, in_si, many, text
+from ._quantity import Range, in_si, many, si_unit, text, written
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -116,7 +116,7 @@ def _pair(name: str, value: Any) -> tuple[Any, Any]:
 
 def quantity(name: str, value: Any) -> str:
     """A number (of a physical key in SI), or a text with a unit, as the extension reads it."""
-    value = in_si(name, value)
+    value = in_si(name, value) if si_unit(name) else written(value)
     if isinstance(value, str):
         return value
     return text(name, number(name, value))
@@ -258,6 +258,8 @@ def _kinds(schema: Mapping[str, Any]) -> set[str]:
 def _plain(name: str, value: Any, takes: _Option) -> Any:
     """A value in JSON."""
     kinds = takes.kinds
+    if "string" in kinds:
+        value = written(value)
     if "boolean" in kinds:
         return bool(value)
     if "object" in kinds:

@@ -297,7 +297,9 @@ class Case:
                 tables.setdefault(table, []).append(f"{name} = {value}")
         lines = [f"  {table}: {', '.join(tables[table])}" for table in tables]
         units = ", results in the model's units" if self._core.model_units else ""
-        head = f"Case: a cantilever with {self.modes} mode{'s' * (self.modes != 1)}{units}"
+        head = (
+            f"Case: a cantilever with {self.modes} mode{'s' * (self.modes != 1)}{units}"
+        )
         return "\n".join([head, *lines])
 
     def _repr_html_(self) -> str:

@@ -34,6 +34,19 @@ def in_si(key: str, value: Any) -> Any:
     return value
 
 
+def written(value: Any) -> Any:
+    """A quantity of pint, astropy or unyt as a text with its unit; otherwise the value."""
+    if isinstance(value, str | int | float | list | tuple) or not hasattr(value, "to"):
+        return value
+    if hasattr(value, "magnitude"):
+        return f"{float(value.magnitude)!r} {value.units:~}"
+    if hasattr(value, "unit"):
+        return f"{float(value.value)!r} {value.unit}"
+    if hasattr(value, "units"):
+        return f"{float(value.value)!r} {value.units}"
+    return value
+
+
 class Range:
     """Evenly spaced values of a key, both ends included: `range(2, 4, 400)`.
 
@@ -56,9 +69,10 @@ class Range:
 
     def values(self, key: str) -> "np.typing.NDArray[np.float64]":
         """The values of `key`, of a physical key in SI."""
-        ends = (_number(key, in_si(key, end)) for end in (self.first, self.last))
-        space = np.geomspace if self.log else np.linspace
-        return space(*ends, self.count, dtype=np.float64)
+        first, last = (_number(key, in_si(key, end)) for end in (self.first, self.last))
+        if self.log:
+            return np.geomspace(first, last, self.count, dtype=np.float64)
+        return np.linspace(first, last, self.count, dtype=np.float64)
 
 
 def _number(key: str, value: Any) -> float:

@@ -94,9 +94,7 @@ class Fit(Record):
         """At most so many lines: warnings first, then parameters, correlations and goodness."""
         rows = self._table()
         widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-        lines = [
-            "  " + "  ".join(map(str.ljust, row, widths)).rstrip() for row in rows
-        ]
+        lines = ["  " + "  ".join(map(str.ljust, row, widths)).rstrip() for row in rows]
         fewest = 1 + len(lines)
         rest = self._goodness()[: max(most - fewest, 1)]
         return ["Fit", *lines, *rest]
@@ -138,7 +136,10 @@ class Fit(Record):
         names = list(self.best)
         table = self["correlations"]
         pairs_ = [
-            (abs(table[i][j]), f"  correlation of {names[i]} and {names[j]}: {table[i][j]:.3f}")
+            (
+                abs(table[i][j]),
+                f"  correlation of {names[i]} and {names[j]}: {table[i][j]:.3f}",
+            )
             for i in range(len(table))
             for j in range(i)
             if table[i][j] is not None

@@ -164,11 +164,11 @@ def _columns(
             columns[f"{prefix}spectral_radius"] = (dim, np.array(radius, dtype=float))
             longest = max((len(pairs) for pairs in values), default=0)
             # Real and imaginary parts: files of most formats hold no complex numbers.
-            table = np.full((len(rows), longest, 2), np.nan)
+            parts = np.full((len(rows), longest, 2), np.nan)
             for k, pairs in enumerate(values):
-                table[k, : len(pairs)] = pairs
+                parts[k, : len(pairs)] = pairs
             dims = (dim, "multiplier", "part")
-            columns[f"{prefix}multipliers"] = (dims, table)
+            columns[f"{prefix}multipliers"] = (dims, parts)
         elif all(isinstance(value, str) for value in values):
             columns[f"{prefix}{name}"] = (dim, np.array(values, dtype=str))
         elif all(
@@ -245,7 +245,8 @@ def _approach_dataset(case: Case, report: dict[str, Any]) -> "xr.Dataset":
     if unit:
         ds.attrs["parameter_unit"] = json.dumps(unit)
         ds.zc.attrs.update(long_name="distance to the sample", units="m")
-    ds[name].attrs.update(long_name="distance to the sample", units="g0")
+    # A dimensionless number, beside the distance in m.
+    ds[name].attrs.update(long_name="distance to the sample over g0", units="1")
     if "branch_parameter" in ds:
         ds["branch_parameter"].attrs["units"] = "g0"
     ds = describe(ds.drop_vars("branch_parameter_si", errors="ignore"))

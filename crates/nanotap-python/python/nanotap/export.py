@@ -51,16 +51,13 @@ def table(result: Any) -> pd.DataFrame:
 
 
 def _frame(ds: "xr.Dataset", dims: tuple[str, ...]) -> pd.DataFrame:
-    """The variables along `dims`; codes as text; states with one column per entry."""
+    """The variables along `dims` without codes; states with one column per entry."""
     chosen: dict[str, Any] = {}
     for key, variable in ds.data_vars.items():
         name = str(key)
         if variable.dims == dims:
-            meanings = variable.attrs.get("flag_meanings")
-            if meanings is not None:
-                words = np.array(meanings.split(), dtype=object)
-                variable = variable.copy(data=words[variable.values])
-            chosen[name] = variable
+            if "flag_meanings" not in variable.attrs:
+                chosen[name] = variable
         elif variable.dims == (*dims, "state") and name in {"states", "orbit_state"}:
             for entry in ds.state.values:
                 chosen[str(entry)] = variable.sel(state=entry, drop=True)

@@ -239,7 +239,10 @@ def attractors(found: Attractors, **where: Unpack[Where]) -> "Figure":
         assert series is not None
         shown.append((one, series))
     scales = (
-        (_scale(*(series.tip for _, series in shown)), _scale(*(s.tip_rate for _, s in shown)))
+        (
+            _scale(*(series.tip for _, series in shown)),
+            _scale(*(s.tip_rate for _, s in shown)),
+        )
         if shown
         else ((1.0, ""), (1.0, ""))
     )
@@ -408,7 +411,11 @@ def sweep(
     }
     columns = {f"axis{k}": ds[name].values for k, name in enumerate(names)}
     columns |= {
-        key: ds[key].transpose(*order).values for key in ("classification", "period")
+        name: ds[key].transpose(*order).values
+        for name, key in (
+            ("classification", "classification_code"),
+            ("period", "period"),
+        )
     }
     if len(names) == 1:
         columns["period_max"] = ds.period_max.transpose(*order, ...).values
@@ -446,7 +453,8 @@ def branch(
         marks = _rows(
             kind=ds.bifurcation_kind,
             x=x_scale * ds.bifurcation_parameter,
-            y=y_scale * ds.get(f"bifurcation_{show}", ds.bifurcation_parameter * np.nan),
+            y=y_scale
+            * ds.get(f"bifurcation_{show}", ds.bifurcation_parameter * np.nan),
         )
     symbol = ds.attrs["parameter_symbol"]
     facts = {
@@ -596,9 +604,7 @@ def approach(ds: "xr.Dataset", **where: Unpack[Where]) -> "Figure":
                 "branches": points(
                     "branch_", "branch_parameter", branch=1, period=1, stable=1
                 ),
-                "bifurcations": points(
-                    "bifurcation_", "bifurcation_parameter", kind=1
-                ),
+                "bifurcations": points("bifurcation_", "bifurcation_parameter", kind=1),
             }
         )
     symbol = "distance $z_c$" if in_si else "distance $α₅$"

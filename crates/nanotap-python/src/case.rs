@@ -347,15 +347,6 @@ fn text_of(path: &Path) -> Result<String, Failure> {
 /// A key of a case file: its name, its second name, and its SI unit (empty without a unit).
 type KeyRow = (&'static str, &'static str, &'static str);
 
-/// Label of the axis of a key, by its path and its symbol.
-#[pyfunction]
-pub(crate) fn axis_label(path: &str, symbol: &str) -> String {
-    let is = |key: &Key| key.path() == path && key.symbol() == symbol;
-    Key::all()
-        .find(is)
-        .map_or_else(|| path.to_owned(), Key::axis_label)
-}
-
 /// The keys of a case file by table.
 #[pyfunction]
 pub(crate) fn case_keys() -> Vec<(&'static str, Vec<KeyRow>)> {
@@ -381,6 +372,15 @@ pub(crate) fn in_si(key: &str, text: &str) -> PyResult<f64> {
     let kind = Key::find(key).map_or(Kind::Number, Key::kind);
     let read = kind.parse(text);
     Ok(read.map_err(|error| Failure::input(format!("{key}: {error}")))?)
+}
+
+/// Title of the axis of a key, given by its path and symbol; the path itself if it is not a key.
+#[pyfunction]
+pub(crate) fn label(path: &str, symbol: &str) -> String {
+    let is = |key: &Key| key.path() == path && key.symbol() == symbol;
+    Key::all()
+        .find(is)
+        .map_or_else(|| path.to_owned(), Key::label)
 }
 
 /// The built-in levers and materials: kind, name, source.

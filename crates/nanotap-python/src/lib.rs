@@ -38,10 +38,10 @@ fn _nanotap(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<dataset::Receiver>()?;
     for function in [
         wrap_pyfunction!(run_command_line, module)?,
-        wrap_pyfunction!(case::axis_label, module)?,
         wrap_pyfunction!(case::case_keys, module)?,
         wrap_pyfunction!(case::catalogue, module)?,
         wrap_pyfunction!(case::in_si, module)?,
+        wrap_pyfunction!(case::label, module)?,
         wrap_pyfunction!(motion::modes, module)?,
         wrap_pyfunction!(motion::simulate, module)?,
         wrap_pyfunction!(motion::orbit, module)?,

@@ -289,7 +289,7 @@ def _grid_axis(ds: "xr.Dataset", name: str) -> dict[str, Any]:
     said = ds[name].attrs
     units = str(said.get("units", ""))
     return {
-        "symbol": str(said.get("symbol", name)),
+        "label": str(said.get("label", said.get("long_name", name))),
         "units": units,
         "log": said.get("spacing") == "log",
     }
@@ -458,7 +458,7 @@ def branch(
         )
     symbol = ds.attrs["parameter_symbol"]
     facts = {
-        "x_label": f"{_nanotap.axis_label(name, symbol)}{x_unit}",
+        "x_label": _nanotap.label(name, symbol) + x_unit,
         "y_label": _labelled(ds, show, y_unit),
         "points": _rows(
             branch=ds.branch,
@@ -487,7 +487,7 @@ def _curves(ds: "xr.Dataset", name: str) -> dict[str, Any]:
     ]
     first, second = ds[name].values, ds.locus_second.values
     return {
-        "y_label": _nanotap.axis_label(
+        "y_label": _nanotap.label(
             ds.attrs["second"], ds.attrs.get("second_symbol", ds.attrs["second"])
         ),
         "x_range": [float(first.min()), float(first.max())],

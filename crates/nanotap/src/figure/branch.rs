@@ -9,6 +9,7 @@ use nanotap_figures::{
 };
 use serde::Deserialize;
 
+use crate::case::physical::Kind;
 use crate::case::units::{Units, prefixed};
 use crate::case::{Case, Key};
 pub use crate::figure::shown::Shown;
@@ -28,7 +29,7 @@ impl ParameterAxis {
     /// The parameter in the model's own units.
     pub fn of(key: Key) -> Self {
         Self {
-            label: key.axis_label(),
+            label: key.label(),
             factor: 1.0,
         }
     }
@@ -39,9 +40,17 @@ impl ParameterAxis {
             || Self::of(key),
             |unit| {
                 let (factor, name) = prefixed(unit.kind, unit.si, size);
-                let quantity = Key::find(&unit.quantity).unwrap_or(key);
+                let label = if key.is_physical() {
+                    key.label()
+                } else {
+                    unit.quantity.to_owned()
+                };
+                let unit = match unit.kind {
+                    Kind::Number => String::new(),
+                    _ => format!(" ({name})"),
+                };
                 Self {
-                    label: format!("{} ({name})", quantity.axis_label()),
+                    label: format!("{label}{unit}"),
                     factor,
                 }
             },

@@ -230,6 +230,8 @@ pub struct Entry {
     pub alias: Option<&'static str>,
     /// Symbol in formulas and on axes; if empty, its path.
     pub symbol: &'static str,
+    /// Words and symbol on the axis of a figure, of a quantity; if empty, its path in words.
+    pub label: &'static str,
     /// Type of its value.
     pub takes: Takes,
     /// Range of its value.
@@ -336,20 +338,28 @@ impl Key {
         }
     }
 
-    /// Label of its axis, without the unit: `drive frequency $Ω$`, `distance $z_c$`.
-    pub fn axis_label(self) -> String {
-        if self == Self::GapTip {
-            return "distance $z_c$".to_owned();
-        }
-        let words = |name: &str| name.replace(['.', '_'], " ");
-        let symbol = self.entry().symbol;
-        let name = self.alias().unwrap_or(self.name());
-        if self.is_physical() || symbol.is_empty() {
-            words(self.path())
-        } else if name == "omega" {
-            format!("drive frequency ${symbol}$")
-        } else {
-            format!("{} ${symbol}$", words(name))
+    /// Title of the axis of a figure, without the unit.
+    ///
+    /// ```
+    /// use nanotap::case::Key;
+    /// assert_eq!(Key::find("gap.tip").unwrap().label(), "distance $z_c$");
+    /// assert_eq!(Key::find("alpha4").unwrap().label(), "contact stiffness $α₄$");
+    /// assert_eq!(Key::find("sample.film_thickness").unwrap().label(), "sample film thickness");
+    /// ```
+    pub fn label(self) -> String {
+        let entry = self.entry();
+        match (entry.label, entry.symbol) {
+            ("", "") => self.path().replace(['.', '_'], " "),
+            // A word is not a symbol.
+            ("", word) if word.chars().count() > 2 => word.to_owned(),
+            ("", symbol) => {
+                let words = match self.alias().unwrap_or(entry.name) {
+                    "omega" => "drive_frequency",
+                    name => name,
+                };
+                format!("{} ${symbol}$", words.replace('_', " "))
+            }
+            (label, _) => label.to_owned(),
         }
     }
 

@@ -180,9 +180,9 @@ pub fn branch_figure(
 }
 
 /// Natural size of a quantity: for the dissipation the work of the peak force over the amplitude,
-/// compared with which rounding is negligible; unknown for others.
+/// compared with which rounding is negligible; unknown for others, and of exact zeros.
 pub(crate) fn natural_of(shown: Shown, largest: impl Fn(Shown) -> f64) -> Option<f64> {
-    if shown != Shown::named("dissipation")? {
+    if shown != Shown::named("dissipation")? || largest(shown) == 0.0 {
         return None;
     }
     Some(largest(Shown::named("first_harmonic")?) * largest(Shown::named("peak_force")?))

@@ -374,10 +374,13 @@ pub(crate) fn in_si(key: &str, text: &str) -> PyResult<f64> {
     Ok(read.map_err(|error| Failure::input(format!("{key}: {error}")))?)
 }
 
-/// Title of the axis of a key, given by its path; the name itself of what is no key.
+/// Title of the axis of a key, given by its path and symbol; the path itself if it is not a key.
 #[pyfunction]
-pub(crate) fn label(key: &str) -> String {
-    Key::find(key).map_or_else(|| key.to_owned(), Key::label)
+pub(crate) fn label(path: &str, symbol: &str) -> String {
+    let is = |key: &Key| key.path() == path && key.symbol() == symbol;
+    Key::all()
+        .find(is)
+        .map_or_else(|| path.to_owned(), Key::label)
 }
 
 /// The built-in levers and materials: kind, name, source.

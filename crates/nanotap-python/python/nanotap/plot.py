@@ -458,7 +458,7 @@ def branch(
         )
     symbol = ds.attrs["parameter_symbol"]
     facts = {
-        "x_label": (_nanotap.label(name) if "." in name else f"${symbol}$") + x_unit,
+        "x_label": _nanotap.label(name, symbol) + x_unit,
         "y_label": _labelled(ds, show, y_unit),
         "points": _rows(
             branch=ds.branch,
@@ -487,7 +487,9 @@ def _curves(ds: "xr.Dataset", name: str) -> dict[str, Any]:
     ]
     first, second = ds[name].values, ds.locus_second.values
     return {
-        "y_label": f"${ds.attrs.get('second_symbol', ds.attrs['second'])}$",
+        "y_label": _nanotap.label(
+            ds.attrs["second"], ds.attrs.get("second_symbol", ds.attrs["second"])
+        ),
         "x_range": [float(first.min()), float(first.max())],
         "y_range": [float(second.min()), float(second.max())],
         "curves": [
@@ -542,7 +544,7 @@ def approach(ds: "xr.Dataset", **where: Unpack[Where]) -> "Figure":
     if "modulation" in ds.attrs:
         rows = [
             ("frequency_shift", "frequency shift $Δf$"),
-            ("drive_ratio", "drive over free drive"),
+            ("drive_ratio", "drive / free drive"),
             rows[2],
             ("sader_jarvis_force", "force (Sader–Jarvis)"),
         ]

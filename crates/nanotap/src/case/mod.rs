@@ -35,6 +35,7 @@ pub mod units;
 
 use std::collections::BTreeMap;
 use std::path::Path;
+use std::str::FromStr;
 use std::sync::Arc;
 
 use nanotap_dynamics::{CancelFlag, Control};
@@ -107,6 +108,41 @@ pub type Held = BTreeMap<&'static str, f64>;
 impl From<Cantilever> for Case {
     fn from(cantilever: Cantilever) -> Self {
         Self::new(CaseKind::Cantilever(cantilever))
+    }
+}
+
+/// Parses the text of a case file, with the built-in levers and materials.
+///
+/// ```
+/// use nanotap::case::Case;
+///
+/// let case: Case = "
+///     [cantilever]
+///     k = '2.8 N/m'
+///     f0 = '75 kHz'
+///     Q = 200
+///     [sample]
+///     stiffness = '20 N/m'
+///     [drive]
+///     frequency = '75 kHz'
+///     free_amplitude = '20 nm'
+///     [gap]
+///     tip = '10 nm'
+/// ".parse()?;
+/// // α4 = 3 K1/k.
+/// let cantilever = case.cantilever().ok_or("a lever")?;
+/// assert!((cantilever.alpha4 - 3.0 * 20.0 / 2.8).abs() < 1e-12);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+impl FromStr for Case {
+    type Err = CaseFileError;
+
+    fn from_str(text: &str) -> Result<Self, CaseFileError> {
+        let source = Source {
+            name: "case".to_owned(),
+            text: text.to_owned(),
+        };
+        Self::parse(Some(source), &[])
     }
 }
 

@@ -1,4 +1,4 @@
-//! The figure of basins: a colour an attractor, and where the attractors themselves are.
+//! The figure of basins: one colour per attractor, with the positions of the attractors.
 
 use std::collections::BTreeSet;
 
@@ -14,7 +14,7 @@ use crate::dataset::{Store, StoreError};
 use crate::figure::panels::motion_of;
 use crate::study::basin::{FAILED, Known, UNBOUNDED, UNSETTLED, entries, known, labels};
 
-/// Where motions from the points of a slice of states go.
+/// The attractors that are reached from the points of a slice of states.
 #[derive(Clone, Debug, Deserialize)]
 pub struct BasinTable {
     /// The entry of the state that is drawn to the right.
@@ -35,7 +35,7 @@ pub struct BasinTable {
     /// The names of a state's entries.
     pub entries: Vec<String>,
     /// Number of the attractor that is reached from each point, row by row from the smallest y;
-    /// negative where there is none.
+    /// negative if none is.
     #[serde(default)]
     pub labels: Vec<i32>,
 }
@@ -81,7 +81,7 @@ impl BasinTable {
             return None;
         }
         let colours = Motion::colours(self.attractors.iter().map(motion));
-        // After the attractors' own categories come those of points without one.
+        // Categories of points without an attractor follow those of the attractors.
         let present: BTreeSet<i32> = self.labels.iter().copied().collect();
         let others: Vec<(i32, &str, Colour)> = [
             (UNSETTLED, "unsettled", Motion::Undecided.colour()),

@@ -297,6 +297,22 @@ const OUT_OF_BOUNDS: f64 = 1e6;
 
 /// Finds coexisting attractors by sampling initial states.
 ///
+/// ```
+/// use nanotap::case::Case;
+/// use nanotap::control::Control;
+/// use nanotap::model::cantilever::Cantilever;
+/// use nanotap::study::attractors::{AttractorsOptions, attractors};
+///
+/// let paper = Cantilever { alpha1: 0.0, omega: 20.0, ..Cantilever::paper() };
+/// let options = AttractorsOptions { starts: Some(64), ..AttractorsOptions::default() };
+/// let found = attractors(&Case::from(paper).model()?, &options, &Control::default())?;
+/// let mut periods: Vec<_> = found.attractors.iter().filter_map(|one| one.orbit.as_ref()).collect();
+/// periods.sort_by_key(|orbit| orbit.period);
+/// // Two orbits coexist, of periods 1 and 4.
+/// assert_eq!(periods.iter().map(|orbit| orbit.period).collect::<Vec<_>>(), [1, 4]);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+///
 /// # Errors
 /// When the options are invalid for the model, or an attractor cannot be measured.
 pub fn attractors(

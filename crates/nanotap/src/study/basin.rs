@@ -696,6 +696,29 @@ impl From<nanotap_dynamics::BasinError> for Error {
 }
 
 /// Basins of attraction.
+///
+/// ```
+/// use nanotap::case::Case;
+/// use nanotap::control::Control;
+/// use nanotap::dataset::{Share, Store, Work};
+/// use nanotap::model::cantilever::Cantilever;
+/// use nanotap::study::DatasetStudy as _;
+/// use nanotap::study::basin::{BasinOptions, BasinStudy};
+///
+/// let case = Case::from(Cantilever { alpha1: 0.0, omega: 20.0, ..Cantilever::paper() });
+/// let options = BasinOptions::over("a1=-1:1:8", "v1=-20:20:8");
+/// let plan = BasinStudy::plan(&case, &options, &Control::default())?;
+/// let folder = std::env::temp_dir().join(format!("nanotap-basin-{}", std::process::id()));
+/// let store = Store::create_or_resume(&folder, plan.schema().clone())?;
+/// let work = Work { share: Share::WHOLE, threads: 0, control: Control::default() };
+/// plan.compute(&store, &work)?;
+/// let shares = BasinStudy::report(&store)?;
+/// // Each of the two motions is reached from a part of the slice.
+/// assert_eq!(shares.points, 64);
+/// assert!(shares.attractors.iter().filter(|one| one.fraction > 0.1).count() == 2);
+/// # std::fs::remove_dir_all(&folder)?;
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Copy, Debug)]
 pub struct BasinStudy;
 

@@ -361,6 +361,22 @@ pub fn branches_through(
 
 /// Follows branches of `case`.
 ///
+/// ```
+/// use nanotap::case::{Case, Key};
+/// use nanotap::control::Control;
+/// use nanotap::model::cantilever::Cantilever;
+/// use nanotap::study::branch::{BranchOptions, branch};
+///
+/// let case = Case::from(Cantilever { omega: 3.2, ..Cantilever::paper() });
+/// let options = BranchOptions { period: Some(1), ..BranchOptions::over(Key::Omega, 3.2, 2.4) };
+/// let report = branch(&case, &options, &Control::default())?;
+/// let flips = report.bifurcations.iter().filter(|one| one.kind == "flip");
+/// let flips: Vec<f64> = flips.map(|one| one.parameter).collect();
+/// // The period doubles between these frequencies (docs/tutorials/dynamicist.md).
+/// assert!((flips[0] - 2.913722).abs() < 1e-4 && (flips[1] - 2.505041).abs() < 1e-4);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+///
 /// # Errors
 /// When the options are invalid for the case, or no orbit is found.
 pub fn branch(

@@ -131,6 +131,21 @@ pub fn cases(case: &Cantilever, arm: Option<f64>) -> Result<Vec<Cantilever>, Err
 /// quantities define, or else each piecewise-linear law. A law without an orbit of the period is
 /// not an error.
 ///
+/// ```
+/// use nanotap::case::Case;
+/// use nanotap::control::Control;
+/// use nanotap::model::cantilever::Cantilever;
+/// use nanotap::study::contact_laws::{ContactLawsOptions, compare};
+///
+/// let case = Case::from(Cantilever { alpha6: 2.0, omega: 20.0, ..Cantilever::paper() });
+/// let found = compare(&case, &ContactLawsOptions::default(), &Control::default())?;
+/// let looks = found.samples.iter().filter_map(|sample| sample.orbit.as_ref());
+/// let dissipation: Vec<f64> = looks.map(|look| look.observables.dissipation).collect();
+/// // Spring and damper dissipate twice as much as a Kelvin-Voigt surface (docs/cases/samples.md).
+/// assert!((dissipation[0] - 18.13).abs() < 0.02 && (dissipation[1] - 9.248).abs() < 0.01);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+///
 /// # Errors
 /// When the case is not a cantilever, or the options are not valid for it.
 pub fn compare(

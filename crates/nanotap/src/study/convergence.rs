@@ -78,6 +78,19 @@ const COMPARED_POINTS: usize = 400;
 /// The motion of `case` with 1 … `largest` modes: the orbit of the asked period (or
 /// where a run from rest settles).
 ///
+/// ```
+/// use nanotap::control::Control;
+/// use nanotap::model::cantilever::Cantilever;
+/// use nanotap::study::convergence::{ConvergenceOptions, convergence};
+///
+/// let case = Cantilever { omega: 4.1, ..Cantilever::paper() };
+/// let found = convergence(&case, &ConvergenceOptions::default(), &Control::default())?;
+/// // The paper: a single mode is not enough, even far below the second resonance.
+/// assert!(found.difference[0].is_some_and(|difference| difference > 0.1));
+/// assert_eq!(found.enough, Some(4));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+///
 /// # Errors
 /// When the case makes no sense.
 pub fn convergence(

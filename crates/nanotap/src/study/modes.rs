@@ -52,6 +52,16 @@ pub struct ModeTable {
 impl ModeTable {
     /// The modes of `case`.
     ///
+    /// ```
+    /// use nanotap::model::cantilever::Cantilever;
+    /// use nanotap::study::modes::ModeTable;
+    ///
+    /// let table = ModeTable::new(&Cantilever { alpha1: 0.0, ..Cantilever::paper() })?;
+    /// // The first frequency of a beam without a tip is 1.8751².
+    /// assert!((table.exact_free[0] - 3.516015).abs() < 1e-6);
+    /// # Ok::<(), nanotap::Error>(())
+    /// ```
+    ///
     /// # Errors
     /// When the case is not valid.
     pub fn new(case: &Cantilever) -> Result<Self, Error> {

@@ -343,15 +343,22 @@ impl Key {
     /// ```
     /// use nanotap::case::Key;
     /// assert_eq!(Key::find("gap.tip").unwrap().label(), "distance $z_c$");
+    /// assert_eq!(Key::find("alpha4").unwrap().label(), "contact stiffness $α₄$");
     /// assert_eq!(Key::find("sample.film_thickness").unwrap().label(), "sample film thickness");
     /// ```
     pub fn label(self) -> String {
         let entry = self.entry();
         match (entry.label, entry.symbol) {
             ("", "") => self.path().replace(['.', '_'], " "),
-            ("", symbol) if symbol.chars().count() <= 2 => format!("${symbol}$"),
-            // A word is no symbol.
-            ("", word) => word.to_owned(),
+            // A word is not a symbol.
+            ("", word) if word.chars().count() > 2 => word.to_owned(),
+            ("", symbol) => {
+                let words = match self.alias().unwrap_or(entry.name) {
+                    "omega" => "drive_frequency",
+                    name => name,
+                };
+                format!("{} ${symbol}$", words.replace('_', " "))
+            }
             (label, _) => label.to_owned(),
         }
     }

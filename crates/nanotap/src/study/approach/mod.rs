@@ -249,6 +249,23 @@ pub struct ApproachReport {
 
 /// Computes an approach and retract curve.
 ///
+/// ```
+/// use nanotap::case::Case;
+/// use nanotap::case::physical::Catalogue;
+/// use nanotap::control::Control;
+/// use nanotap::study::approach::{ApproachOptions, approach};
+/// use std::path::Path;
+///
+/// let file = Path::new("../../docs/cases/stiff-lever.toml");
+/// let case = Case::load(Some(file), &[], &Catalogue::shared())?;
+/// let curve = approach(&case, &ApproachOptions::default(), &Control::default())?;
+/// let to_metres = curve.parameter_unit.map_or(1.0, |unit| unit.si);
+/// let ends = [curve.hysteresis[0].near, curve.hysteresis[0].far].map(|zc| to_metres * zc);
+/// // Two motions exist between 19.97 nm and 23.17 nm (docs/cases/approach-curve.md).
+/// assert!((ends[0] - 19.974e-9).abs() < 2e-12 && (ends[1] - 23.170e-9).abs() < 2e-12);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+///
 /// # Errors
 /// When the options are invalid for the case.
 pub fn approach(

@@ -50,13 +50,13 @@ impl CancelFlag {
         }
     }
 
-    /// The same flag, seen as set also once so many steps are spent. It replaces the budget that the
-    /// flag had.
+    /// The same flag, seen as set also once so many steps are spent, counted from now. A smaller budget
+    /// that the flag has is the limit of the new one too.
     #[must_use]
     pub fn with_budget(&self, steps: u64) -> Self {
         Self {
             budget: Some(Arc::new(Budget {
-                limit: steps,
+                limit: self.budget().map_or(steps, |limit| limit.min(steps)),
                 spent: AtomicU64::new(0),
             })),
             ..self.clone()
@@ -69,6 +69,11 @@ impl CancelFlag {
         if let Some(budget) = &self.budget {
             budget.spent.fetch_add(steps, Ordering::Relaxed);
         }
+    }
+
+    /// Steps of the budget, if there is one.
+    pub fn budget(&self) -> Option<u64> {
+        self.budget.as_ref().map(|budget| budget.limit)
     }
 
     /// Steps spent of the budget; 0 without one.
@@ -144,7 +149,9 @@ mod tests {
         assert!(!limited.is_cancelled());
         limited.spend(1);
         assert!(limited.is_cancelled() && limited.is_spent() && limited.spent() == 11);
-        assert!(!flag.is_cancelled() && !limited.with_budget(10).is_cancelled());
+        assert!(!flag.is_cancelled() && !limited.with_budget(20).is_cancelled());
+        let limits = [5, 20].map(|steps| limited.with_budget(steps).budget());
+        assert_eq!((limits, flag.budget()), ([Some(5), Some(10)], None));
     }
 
     #[test]

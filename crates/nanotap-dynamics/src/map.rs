@@ -153,6 +153,14 @@ pub trait StroboscopicMap: Scheduling + Clone + Send + Sync {
     /// followed. A map without rigid stops does nothing.
     fn pass_touches(&mut self) {}
 
+    /// Of a state slightly behind a rigid stop, where no motion is: the state of the motion that has
+    /// just hit the stop, if this one moves on behind it, or is about to hit it, if this one comes from
+    /// there. So an orbit goes on where an impact passes drive phase 0 and its state there jumps.
+    fn across_impact(&self, state: &[f64]) -> Option<Vec<f64>> {
+        let _ = state;
+        None
+    }
+
     /// Appends all local extrema of the switching functions over the period that starts at `state`,
     /// in order of phase, and replaces `state` by `P(state)`. A smooth system leaves `tangencies`
     /// unchanged.

@@ -46,6 +46,8 @@ const RESOLVED: f64 = 1.5;
 const UNRESOLVED: f64 = 1e-4;
 /// The most steps tried in one oscillation of the fastest tone.
 const MAX_STEPS: u64 = 20_000;
+/// Evaluations of the force in an explicit step.
+const STEP_EVALUATIONS: u64 = 4;
 /// Steps counted towards a budget, and steps between looks at the flag that cancels the work.
 const POLL: u64 = 64;
 /// Switches at one instant after which the law is reported to switch endlessly.
@@ -150,6 +152,8 @@ struct Stages {
     /// Whether the second stage is at a third of the step, and its force unknown, as that of the
     /// last.
     implicit: bool,
+    /// Evaluations of the force and its slopes that it took.
+    evaluations: u64,
 }
 
 /// A step in which the force is a straight line in time through its values at a third and at the end
@@ -526,8 +530,8 @@ impl Tables {
             return [force.by_gap, force.by_rate];
         }
         let [low, high] = self.bounds[branch];
-        let force = law.force(branch, gap.clamp(low, high), rate);
-        [force.by_gap, force.by_rate]
+        self.table
+            .slopes(&self.system, branch, gap.clamp(low, high), rate)
     }
 
     fn guard(&self, guard: Guard, gap: f64, rate: f64) -> f64 {
@@ -644,7 +648,10 @@ impl Tables {
         let lasts = CONVERGED * TOLERANCE * unit * from.force.abs() <= self.converged;
         let mut forces = [if lasts { from.force } else { 0.0 }; 2];
         let mut change = f64::INFINITY;
+        stages.evaluations = 0;
         for _ in 0..MAX_ITERATIONS {
+            // Two forces and their slopes.
+            stages.evaluations += 4;
             let [third, end] = [at(0, forces), at(2, forces)];
             let residuals = [
                 self.force(branch, third[0], third[1]) - forces[0],
@@ -685,6 +692,7 @@ impl Tables {
             rates: [from.rate, third[1], middle[1], end[1]],
             forces: [from.force, mean, mean, forces[1]],
             implicit: true,
+            evaluations: stages.evaluations + 1,
         };
         // What the line misses of the force at the start, as far as the damping leaves it.
         let missed = from.force - 1.5 * forces[0] + 0.5 * forces[1];
@@ -743,6 +751,7 @@ impl Tables {
             rates: [from.rate, second[1], third[1], fourth[1]],
             forces: [k1, k2, k3, k4],
             implicit: false,
+            evaluations: 3,
         };
         level.length * self.mobility * ((k1 - k2 - k3 + k4).abs() + (k2 - k3).abs()) / 6.0
     }
@@ -1038,9 +1047,9 @@ impl Coarse {
         self.work.statistics
     }
 
-    /// Steps tried in the runs so far.
+    /// Evaluations of the force in the runs so far, in those of an explicit step.
     pub fn cost(&self) -> u64 {
-        self.work.statistics.steps + self.work.statistics.refused
+        self.work.cost()
     }
 
     /// Replaces `state` at drive phase 0 by the state so many periods later and returns the
@@ -1217,6 +1226,19 @@ impl Work {
 
     /// Runs one period from phase 0.
     fn period(&mut self, tables: &Tables) -> Result<(), VolterraError> {
+        let mut spent = self.cost();
+        let result = self.steps(tables, &mut spent);
+        tables.system.cancel().spend(self.cost() - spent);
+        result
+    }
+
+    /// Evaluations of the force so far, in those of an explicit step.
+    const fn cost(&self) -> u64 {
+        self.statistics.evaluations / STEP_EVALUATIONS
+    }
+
+    /// The steps of a period; `spent` is the cost that was counted towards the budget.
+    fn steps(&mut self, tables: &Tables, spent: &mut u64) -> Result<(), VolterraError> {
         self.rewind(tables);
         let end = tables.period;
         let allowed = TOLERANCE * tables.frequency * self.size;
@@ -1231,8 +1253,9 @@ impl Work {
         let mut tried = 0;
         while end - self.now.time > 1e-13 * end {
             if tried % POLL == 0 {
-                let cancel = tables.system.cancel();
-                cancel.spend(POLL.min(tried));
+                let (cancel, cost) = (tables.system.cancel(), self.cost());
+                cancel.spend(cost - *spent);
+                *spent = cost;
                 if cancel.is_cancelled() {
                     return Err(VolterraError::Cancelled);
                 }
@@ -1262,7 +1285,7 @@ impl Work {
                 };
                 let error =
                     tables.step_by(implicit, level, &self.now, &mut self.next, &mut self.stages);
-                self.statistics.evaluations += 3;
+                self.statistics.evaluations += self.stages.evaluations;
                 let mut refused = error > allowed || error.is_nan();
                 if !refused {
                     match search(
@@ -1349,7 +1372,6 @@ impl Work {
                 });
             }
         }
-        tables.system.cancel().spend((tried + POLL - 1) % POLL + 1);
         let y = self.now.modal.iter().flatten();
         if y.chain([&self.now.force]).any(|y| !y.is_finite()) {
             return Err(VolterraError::Diverged { time: end });
@@ -1398,7 +1420,7 @@ impl Work {
                 }
                 let (part, stages) = (&self.part, &mut self.stages);
                 tables.step_by(implicit, part, &self.now, &mut self.next, stages);
-                self.statistics.evaluations += 3;
+                self.statistics.evaluations += self.stages.evaluations;
                 let found = value(&self.next);
                 fell = found <= 0.5 * beyond;
                 if found.abs() <= 0.5 * beyond || high - low <= 1e-14 * tables.period {

@@ -286,6 +286,19 @@ impl Flow {
         end: f64,
         observer: &mut O,
     ) -> Result<(), VolterraError> {
+        let mut spent = self.cost();
+        let result = self.run_steps(end, observer, &mut spent);
+        self.system.cancel().spend(self.cost() - spent);
+        result
+    }
+
+    /// The steps to time `end`; `spent` is the cost that was counted towards the budget.
+    fn run_steps<O: Observer>(
+        &mut self,
+        end: f64,
+        observer: &mut O,
+        spent: &mut u64,
+    ) -> Result<(), VolterraError> {
         let system = self.system.clone();
         if !end.is_finite() {
             return Err(VolterraError::Value {
@@ -303,7 +316,8 @@ impl Flow {
                 self.commit_pending(&system, end, observer);
                 return Ok(());
             }
-            system.cancel().spend(STEP_COST);
+            system.cancel().spend(self.cost() - *spent);
+            *spent = self.cost();
             if system.cancel().is_cancelled() {
                 return Err(VolterraError::Cancelled);
             }

@@ -54,6 +54,16 @@ impl GapTable {
         let tabulated = curve.and_then(|curve| curve.at(gap, rate));
         tabulated.unwrap_or_else(|| system.law().value(branch, gap, rate))
     }
+
+    /// Its derivatives by gap and rate.
+    pub(crate) fn slopes(&self, system: &System, branch: usize, gap: f64, rate: f64) -> [f64; 2] {
+        let curve = self.curves.get(branch).and_then(Option::as_ref);
+        let tabulated = curve.and_then(|curve| curve.slopes_at(gap, rate));
+        tabulated.unwrap_or_else(|| {
+            let force = system.law().force(branch, gap, rate);
+            [force.by_gap, force.by_rate]
+        })
+    }
 }
 
 impl Curve {
@@ -142,19 +152,68 @@ impl Curve {
     /// The cubics through the four nearest values; `None` outside the table.
     #[inline]
     fn at(&self, gap: f64, rate: f64) -> Option<f64> {
+        let (k, t) = self.place(gap);
+        self.read(k, weights(t), rate)
+    }
+
+    /// The derivatives of these cubics by gap and rate; `None` also in the first interval, where the
+    /// root has none.
+    #[inline]
+    fn slopes_at(&self, gap: f64, rate: f64) -> Option<[f64; 2]> {
+        let (k, t) = self.place(gap);
+        if k == 0 {
+            return None;
+        }
+        let by_root = self.read(k, weights_of_slope(t), rate)?;
+        let root = (k as f64 + t) / self.density;
+        let by_rate = if self.by_rate.is_empty() {
+            0.0
+        } else {
+            read(&self.by_rate, k, weights(t))?
+        };
+        Some([by_root * self.side * self.density / (2.0 * root), by_rate])
+    }
+
+    /// The interval of a gap, and the place in it.
+    #[inline]
+    fn place(&self, gap: f64) -> (usize, f64) {
         let x = (self.side * (gap - self.level)).max(0.0).sqrt() * self.density;
         let k = x as usize;
-        let t = x - k as f64;
-        let (s, u, v) = (1.0 - t, 1.0 + t, 2.0 - t);
-        let weights = [-t * s * v, 3.0 * u * s * v, 3.0 * u * t * v, -u * t * s];
-        let read = |values: &[f64]| {
-            let near = values.get(k..k + 4)?.iter().zip(weights);
-            Some(near.map(|(value, weight)| value * weight).sum::<f64>() / 6.0)
-        };
-        let value = read(&self.values)?;
+        (k, x - k as f64)
+    }
+
+    /// The force by some weights of the four nearest values.
+    #[inline]
+    fn read(&self, k: usize, weights: [f64; 4], rate: f64) -> Option<f64> {
+        let value = read(&self.values, k, weights)?;
         if self.by_rate.is_empty() {
             return Some(value);
         }
-        Some(value + rate * read(&self.by_rate)?)
+        Some(value + rate * read(&self.by_rate, k, weights)?)
     }
+}
+
+#[inline]
+fn read(values: &[f64], k: usize, weights: [f64; 4]) -> Option<f64> {
+    let near = values.get(k..k + 4)?.iter().zip(weights);
+    Some(near.map(|(value, weight)| value * weight).sum::<f64>() / 6.0)
+}
+
+/// Six times the weights of the values at −1, 0, 1 and 2 in their cubic at `t`.
+#[inline]
+fn weights(t: f64) -> [f64; 4] {
+    let (s, u, v) = (1.0 - t, 1.0 + t, 2.0 - t);
+    [-t * s * v, 3.0 * u * s * v, 3.0 * u * t * v, -u * t * s]
+}
+
+/// Their derivatives.
+#[inline]
+fn weights_of_slope(t: f64) -> [f64; 4] {
+    let square = 3.0 * t * t;
+    [
+        -(2.0 - 6.0 * t + square),
+        3.0 * (square - 4.0 * t - 1.0),
+        3.0 * (2.0 + 2.0 * t - square),
+        square - 1.0,
+    ]
 }

@@ -284,6 +284,9 @@ fn text(case: &GivenCase, report: &ApproachReport) -> String {
     text
 }
 
+/// Uncertainty of a distance, in proportion to it, from which it is shown.
+const SHOWN_UNCERTAINTY: f64 = 1e-9;
+
 /// Where the lever jumps.
 fn jumps(report: &ApproachReport, shown: &dyn Fn(Kind, f64) -> String) -> String {
     if report.jumps.is_empty() {
@@ -311,10 +314,16 @@ fn jumps(report: &ApproachReport, shown: &dyn Fn(Kind, f64) -> String) -> String
             [motion_of(p), ratio, phase]
         };
         let ([what, ratio, phase], [then, later, after]) = (of(&jump.before), of(&jump.after));
+        let reason = if jump.uncertainty > SHOWN_UNCERTAINTY * jump.gap.abs() {
+            let within = shown(Kind::Length, jump.uncertainty);
+            format!("{} (within {within})", jump.reason)
+        } else {
+            jump.reason.clone()
+        };
         table.row([
             jump.way.name().to_owned(),
             shown(Kind::Length, jump.gap),
-            jump.reason.clone(),
+            reason,
             what,
             ratio,
             phase,

@@ -117,7 +117,7 @@ impl Default for CensusOptions {
             unseen: 0.002,
             max_starts: 5000,
             max_periods: 2_000_000,
-            max_steps: 80_000_000,
+            max_steps: 40_000_000,
         }
     }
 }

@@ -25,6 +25,8 @@ const MAX_TRIES: usize = 4;
 const MAX_RETRIES: usize = 64;
 /// The same where that fails too.
 const MAX_FAILED_RETRIES: usize = 4;
+/// Steps of a run on the map itself, in those of a start.
+const EXACT_RUN_STEPS: u64 = 8;
 /// Periods for which exponents are measured on the map itself at most.
 const MAX_EXACT_PERIODS: usize = 4000;
 
@@ -107,6 +109,8 @@ impl<'a, M: StroboscopicMap> Motions<'a, M> {
                 max_periods: longest,
                 ..options.lyapunov.clone()
             },
+            // A run that shows what a motion is serves all starts that come to it.
+            max_steps: options.max_steps.saturating_mul(EXACT_RUN_STEPS),
             ..options.clone()
         };
         Self {

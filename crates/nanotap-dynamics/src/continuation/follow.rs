@@ -11,7 +11,7 @@ use crate::continuation::solver::{BranchSolver, Node};
 use crate::continuation::step::{Rejected, angle, at_range_end, trial};
 use crate::continuation::{Branch, BranchEnd, BranchPoint, ContinuationError, ContinuationOptions};
 use crate::control::Control;
-use crate::map::MapFamily;
+use crate::map::{MapFamily, StroboscopicMap as _};
 use crate::orbit::PeriodicOrbit;
 
 /// Scaled step below which a branch that repeatedly converges to one of shorter period is taken to
@@ -156,6 +156,18 @@ fn step_by_step<'scope, 'a: 'scope, F: MapFamily + 'scope>(
             Err(why) => {
                 step *= 0.5;
                 if step < options.min_step {
+                    if let Some(next) = past_impact(solver, &node, options.range)
+                        && let Some(next_tests) = Tests::new(solver, &next, options.grazings)
+                    {
+                        arclength +=
+                            (next.parameter - node.parameter).abs() / solver.parameter_scale;
+                        branch
+                            .points
+                            .push(point(solver, &next, &next_tests, arclength)?);
+                        (node, tests, before) = (next, next_tests, None);
+                        step = options.initial_step;
+                        continue;
+                    }
                     if !options.grazings {
                         add_last_tangencies(solver, &mut branch);
                     }
@@ -280,6 +292,38 @@ fn step_by_step<'scope, 'a: 'scope, F: MapFamily + 'scope>(
         branch.end = BranchEnd::Cancelled;
     }
     Ok(branch)
+}
+
+/// Steps in scaled arclength beyond an impact at drive phase 0.
+const PAST_IMPACT: [f64; 4] = [1e-6, 1e-5, 1e-4, 1e-7];
+/// Largest distance of the orbit there from its prediction, in scaled arclength.
+const SAME_ORBIT: f64 = 1e-2;
+
+/// The next point of a branch of which an impact on a rigid stop falls on drive phase 0 just beyond
+/// `node`: the orbit goes on there, but its state at phase 0 jumps to the other side of the impact.
+fn past_impact<F: MapFamily>(
+    solver: &mut BranchSolver<'_, F>,
+    node: &Node,
+    (low, high): (f64, f64),
+) -> Option<Node> {
+    PAST_IMPACT.iter().find_map(|step| {
+        let (mut points, parameter) = node.ahead(*step);
+        if !(low..=high).contains(&parameter) {
+            return None;
+        }
+        let map = solver.family.at(parameter).ok()?;
+        let mut any = false;
+        for point in points.chunks_exact_mut(solver.d) {
+            if let Some(other) = map.across_impact(point) {
+                point.copy_from_slice(&other);
+                any = true;
+            }
+        }
+        let next = any.then(|| solver.at_parameter(&points, parameter, node.slope > 0.0));
+        let next = next?.ok()?;
+        let apart = solver.separation(next.solution(), (&points, parameter));
+        (apart <= SAME_ORBIT && next.slope * node.slope > 0.0).then_some(next)
+    })
 }
 
 /// Points before a dead end whose tangencies show whether it is a grazing.

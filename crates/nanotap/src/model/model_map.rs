@@ -15,7 +15,7 @@ use nanotap_flow::system::{Switch, Transition};
 use nanotap_flow::{Ensemble, Flow, FlowError, Output, System};
 
 use crate::model::nonlinear::NonlinearMap;
-use crate::model::{Model, MotionError, Tangent, TangentKind};
+use crate::model::{Model, MotionError, RigidStop, Tangent, TangentKind};
 
 /// The stroboscopic map as an engine computes it.
 pub(crate) trait EngineMap: Debug + Send + Sync {
@@ -92,6 +92,11 @@ pub(crate) trait EngineMap: Debug + Send + Sync {
     fn log_determinant_bound(&self) -> f64;
     /// [`StroboscopicMap::pass_touches`].
     fn pass_touches(&mut self) {}
+    /// [`StroboscopicMap::across_impact`].
+    fn across_impact(&self, state: &[f64]) -> Option<Vec<f64>> {
+        let _ = state;
+        None
+    }
     /// [`StroboscopicMap::advance_with_tangencies`].
     fn advance_with_tangencies(
         &mut self,
@@ -266,6 +271,10 @@ impl StroboscopicMap for ModelMap {
         self.0.pass_touches();
     }
 
+    fn across_impact(&self, state: &[f64]) -> Option<Vec<f64>> {
+        self.0.across_impact(state)
+    }
+
     fn advance_with_tangencies(
         &mut self,
         state: &mut [f64],
@@ -277,6 +286,9 @@ impl StroboscopicMap for ModelMap {
 
 /// The longest touch of a rigid stop that is passed through near a grazing, in drive periods.
 const LONGEST_TOUCH: f64 = 0.1;
+
+/// Time from drive phase 0, in drive periods, within which an impact is carried over it.
+const IMPACT_AT_STROBE: f64 = 1e-2;
 
 /// The maximum number of states that are advanced in a batch.
 const MAX_BATCH: usize = 64;
@@ -301,8 +313,8 @@ struct ExactMap {
     gap: Arc<Output>,
     /// Whether tip and surface part at equal speeds.
     parts_at_rest: bool,
-    /// Whether the sample is a rigid stop.
-    is_rigid: bool,
+    /// The rigid stop, if the sample is one.
+    stop: Option<RigidStop>,
     /// Derivatives of the system with respect to the parameters of a family.
     tangents: Arc<[SystemTangent]>,
 }
@@ -316,7 +328,7 @@ impl ExactMap {
             carried: Jacobian::default(),
             gap: Arc::new(model.gap.clone()),
             parts_at_rest: model.memory_reset.is_some(),
-            is_rigid: model.rigid_stop.is_some(),
+            stop: model.rigid_stop,
             tangents: tangents.into(),
         }
     }
@@ -489,6 +501,20 @@ impl EngineMap for ExactMap {
         self.flow.pass_touches(LONGEST_TOUCH * self.period());
     }
 
+    fn across_impact(&self, state: &[f64]) -> Option<Vec<f64>> {
+        let (stop, &[x, v]) = (self.stop?, state) else {
+            return None;
+        };
+        let behind = x - stop.tip;
+        let factor = if v > 0.0 {
+            stop.restitution
+        } else {
+            stop.restitution.recip()
+        };
+        let is_near = behind > 0.0 && behind <= IMPACT_AT_STROBE * v.abs() * self.period();
+        (is_near && factor.is_finite()).then(|| vec![stop.tip - factor * behind, -factor * v])
+    }
+
     fn advance_with_tangencies(
         &mut self,
         state: &mut [f64],
@@ -498,7 +524,7 @@ impl EngineMap for ExactMap {
         let mut collector = GapExtrema {
             gap: &self.gap,
             parts_at_rest: self.parts_at_rest,
-            is_rigid: self.is_rigid,
+            is_rigid: self.stop.is_some(),
             switched: false,
             tangencies,
         };

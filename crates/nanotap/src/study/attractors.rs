@@ -291,7 +291,7 @@ const HARMONICS: usize = 20;
 /// Drive periods over which a motion that does not repeat is observed.
 pub const OBSERVED_PERIODS: usize = 512;
 /// Steps of the approximate flow after which a start is left undecided.
-const MAX_START_STEPS: u64 = 10_000_000;
+const MAX_START_STEPS: u64 = 4_000_000;
 /// A state this many times larger than the box has left every bound.
 const OUT_OF_BOUNDS: f64 = 1e6;
 
@@ -595,7 +595,7 @@ options! {
         /// amplitudes, from the resonant response down to below the gap, until the share that may
         /// lead to undiscovered motions is below {unseen}, or 5000 initial states or 2,000,000
         /// drive periods (600,000 under a nonlinear law) are reached. Under a nonlinear law an initial
-        /// state is followed for at most 10 million steps of the approximate flow, and all together
+        /// state is followed for at most 4 million steps of the approximate flow, and all together
         /// for 80 million; a step of the exact flow counts as 100
         #[schemars(range(min = 1, max = MAX_STARTS), extend("x-value" = "S"))]
         pub starts: Option<usize> = None,

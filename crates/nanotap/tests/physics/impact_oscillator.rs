@@ -6,6 +6,7 @@ use nanotap::case::{Case, Key};
 use nanotap::control::Control;
 use nanotap::model::oscillator::{Oscillator, Stop};
 use nanotap::observe::{ObservableSet, measure};
+use nanotap::study::approach::{ApproachOptions, ApproachPoint, approach};
 use nanotap::study::branch::{BranchOptions, BranchReport, branch};
 use nanotap::study::orbit::{OrbitOptions, OrbitReport, orbit};
 use nanotap::study::value::Interval;
@@ -455,6 +456,62 @@ fn a_cascade_is_followed_to_its_end() {
         let here = orbit(&Oscillator { omega, ..cascade }.model().unwrap(), &options).unwrap();
         assert_eq!((here.period, here.stable), (period, true));
     }
+}
+
+/// The phase of the section does not matter: the doubled branch that begins at the flip Ω = 1.26067660
+/// and impacts at drive phase 0 at Ω = 1.2598998 goes on to its grazing, where runs from rest come to
+/// its orbits too. The same of an approach on which an impact passes phase 0.
+#[test]
+fn a_branch_goes_on_where_an_impact_passes_phase_zero() {
+    let cascade = |omega| rigid(omega, 0.8);
+    let options = BranchOptions {
+        switch: Some(1),
+        ..BranchOptions::over(Key::OscillatorOmega, 2.0, 1.2)
+    };
+    let report = followed(cascade(2.0), &options);
+    assert!(report.failures.is_empty(), "{:?}", report.failures);
+    let doubled = report.branches.iter().find(|b| b.period == 2).unwrap();
+    assert!(
+        doubled.complete && doubled.end.contains("grazes"),
+        "{}",
+        doubled.end
+    );
+    let points = report.points.iter().filter(|p| p.period == 2 && p.stable);
+    let (before, beyond): (Vec<_>, Vec<_>) = points.partition(|p| p.parameter > 1.2598997798);
+    assert!(before.len() > 2 && beyond.len() > 2);
+    for point in [before[before.len() / 2], beyond[beyond.len() / 2]] {
+        let model = cascade(point.parameter).model().unwrap();
+        let settled = orbit(&model, &OrbitOptions::default()).unwrap();
+        assert_eq!(settled.period, 2);
+        let [a, b] = [settled.observables, point.observables].map(|o| o.impact_speed);
+        assert!((a - b).abs() < 1e-9 * a, "{a} {b}");
+    }
+    let approach = approach(
+        &Case::from(walled(1.0, 1.0)),
+        &ApproachOptions::default(),
+        &Control::default(),
+    );
+    let approach = approach.unwrap();
+    let reasons: Vec<_> = approach.jumps.iter().map(|j| j.reason.as_str()).collect();
+    assert_eq!(reasons, ["grazing", "grazing", "fold"]);
+    assert!(approach.table.iter().all(|row| row.period == Some(1)));
+    let branches = approach.branches.unwrap();
+    assert!(branches.branches.iter().all(|b| b.complete));
+}
+
+/// An undamped oscillator behind a rigid stop is chaotic up to the distance 0, where the state of a
+/// greater distance is behind the stop: the approach puts it on the stop and ends.
+#[test]
+fn an_approach_of_an_undamped_oscillator_ends_at_its_stop() {
+    let options = ApproachOptions {
+        points: 10,
+        branches: false,
+        ..ApproachOptions::default()
+    };
+    let report = approach(&Case::from(rigid(2.7, 0.8)), &options, &Control::default()).unwrap();
+    assert_eq!(report.table.len(), 20);
+    let failed = |row: &&ApproachPoint| row.reason.as_ref().is_some_and(|r| r.contains("failed"));
+    assert_eq!(report.table.iter().find(failed).map(|row| row.gap), None);
 }
 
 /// A mass that chatters to rest on the stop in every period is one motion whatever the rounding of

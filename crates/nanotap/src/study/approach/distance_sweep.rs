@@ -11,8 +11,9 @@
 //! Under a nonlinear law the work is counted in steps of the approximate flow, and ends at a budget
 //! ([`SWEEP_STEPS`]): what was followed by then is kept, with the reason why it goes no further.
 //!
-//! Fails: what a motion that does not close meets within a step of the grid is not seen, and
-//! where it ends by a jump the place is known to a step of the grid.
+//! Fails: what a motion that does not close meets within a step of the grid is not seen. Where it ends
+//! by a jump, the place is bisected to a thousandth of such a step: chaos that ends lives for long near
+//! its end, so that the place depends on how long it is followed.
 
 use std::fmt;
 
@@ -49,6 +50,10 @@ const BEYOND_END: (f64, f64) = (1e-3, 0.01);
 const CONTINUOUS: f64 = 0.05;
 /// How often a grid step is halved where no motion can be followed over it.
 const HALVINGS: usize = 6;
+/// How often a step of the grid is halved over which a motion without a branch ends by a jump.
+const BISECTIONS: usize = 10;
+/// Smallest step that is halved, in steps of the grid.
+const MIN_GRID_STEP: f64 = 1e-3;
 /// Branches and stretches without an orbit after which a way is not followed further.
 const MAX_PIECES: usize = 200;
 /// Points after which a branch is not followed further.
@@ -99,11 +104,13 @@ impl fmt::Display for End {
 
 /// In words that a budget of steps was spent.
 pub(in crate::study) fn budget_text(steps: u64) -> String {
+    format!("the lever was followed {}", up_to_budget(steps))
+}
+
+/// The same of other work.
+pub(in crate::study) fn up_to_budget(steps: u64) -> String {
     let millions = steps as f64 / 1e6;
-    format!(
-        "the lever was followed up to the budget of {} million steps",
-        shortest(millions)
-    )
+    format!("up to the budget of {} million steps", shortest(millions))
 }
 
 /// A stretch of a branch on which all orbits are stable, by ascending distance.
@@ -286,7 +293,7 @@ impl<'a> DistanceSweep<'a> {
     fn allow(&mut self, budget: Option<u64>) {
         let flag = self.control.cancel.unwrap_or(self.case.cancel()).clone();
         self.flag = budget.map_or_else(|| flag.clone(), |steps| flag.with_budget(steps));
-        self.budget = budget;
+        self.budget = budget.and(self.flag.budget());
         self.case = self.case.with_flag(&self.flag);
         self.family = self.case.family(self.case.gap_key());
     }
@@ -378,7 +385,11 @@ impl<'a> DistanceSweep<'a> {
             ..self.classify.clone()
         };
         match self.model(gap) {
-            Ok(model) => named(&mut ModelMap::new(&model), start, &options),
+            Ok(model) => named(
+                &mut ModelMap::new(&model),
+                &reachable(&model, start),
+                &options,
+            ),
             Err(error) => FoundMotion::undecided(error.to_string(), start),
         }
     }
@@ -407,6 +418,7 @@ impl<'a> DistanceSweep<'a> {
             Err(error) => return FoundMotion::undecided(error.to_string(), start),
         };
         let mut map = ModelMap::new(&model);
+        let start = &reachable(&model, start);
         let mut motion = match map.coarse() {
             Some(mut coarse) => named(&mut coarse, start, &options.on_coarse_map()),
             None => named(&mut map.clone(), start, options),
@@ -766,6 +778,16 @@ impl<'a> DistanceSweep<'a> {
         }
     }
 
+    /// Whether a motion that is undecided, as where it settles slowly, is near the orbit of a place.
+    fn has_arrived(&self, motion: &FoundMotion, place: &Place) -> bool {
+        let Place::On { stretch, gap } = place else {
+            return false;
+        };
+        let orbit = self.orbit_at(*stretch, *gap);
+        motion.classification == Classification::Undecided
+            && orbit.is_some_and(|o| o.nearest(&motion.state).1 <= CONTINUOUS * o.scale())
+    }
+
     /// The stretch of doubled period that begins at a flip and goes on in a direction.
     fn doubled(&mut self, flip: &Bifurcation, direction: Direction) -> Option<usize> {
         let period = 2 * flip.orbit.period;
@@ -850,39 +872,65 @@ impl<'a> DistanceSweep<'a> {
             let options = self.search_options();
             let mut motion = self.search_orbit(next, &start, &options);
             for _ in 0..HALVINGS {
-                if !motion.failed {
+                if !motion.failed || (next - gap).abs() < MIN_GRID_STEP * step {
                     break;
                 }
                 next = 0.5 * (gap + next);
                 motion = self.search_orbit(next, &start, &options);
             }
-            let Place::On { stretch, .. } = self.place(next, motion.clone()) else {
+            let Place::On { mut stretch, .. } = self.place(next, motion.clone()) else {
                 found.push((next, motion));
                 continue;
             };
             let direction = direction(from, to);
             let (begins, how) = self.stretches[stretch].end(reversed(direction)).clone();
             let inside = (begins - gap) * side > 0.0 && (next - begins) * side >= 0.0;
-            let place = Place::On {
+            let mut place = Place::On {
                 stretch,
                 gap: if inside { begins } else { next },
             };
-            piece.jumps = !match &before.orbit {
+            let goes_on = match &before.orbit {
                 Some(orbit) => self.goes_on(orbit, &place),
-                None => is_continuous(&how),
+                None => inside && is_continuous(&how) || self.has_arrived(&before, &place),
             };
-            (piece.to, piece.end) = if inside {
-                (begins, how)
+            if inside && (goes_on || is_continuous(&how)) {
+                (piece.to, piece.end) = (begins, how);
             } else {
-                (next, End::Closes)
-            };
-            piece.uncertainty = if inside { 0.0 } else { (next - gap).abs() };
+                // The last motion found without a branch, and the first with one.
+                let mut last = gap;
+                for _ in 0..BISECTIONS {
+                    let between = 0.5 * (last + next);
+                    let start = found.last().map(|(_, motion)| motion.next_start());
+                    let start = start.unwrap_or_default();
+                    let motion = self.search_orbit(between, &start, &options);
+                    if motion.failed {
+                        break;
+                    }
+                    if let Place::On { stretch: other, .. } = self.place(between, motion.clone()) {
+                        (next, stretch) = (between, other);
+                    } else {
+                        last = between;
+                        found.push((between, motion));
+                    }
+                }
+                place = Place::On { stretch, gap: next };
+                (piece.to, piece.end) = (next, End::Closes);
+                piece.uncertainty = (next - last).abs();
+            }
+            piece.jumps = !goes_on;
             onwards = Some(place);
             break;
         }
         piece.motion = Motion::OnGrid(found);
         (piece, onwards)
     }
+}
+
+/// A state of a motion at another distance, on the stop where it would be behind it.
+fn reachable(model: &Model, state: &[f64]) -> Vec<f64> {
+    let mut state = state.to_vec();
+    model.stop_at_wall(&mut state);
+    state
 }
 
 /// What a run of a map goes to.

@@ -6,7 +6,7 @@ use nanotap_dynamics::{Control, PeriodicOrbit};
 use rayon::prelude::*;
 
 use super::distance_sweep::{
-    DistanceSweep, End, FoundMotion, Motion, Piece, Place, budget_text, is_same,
+    DistanceSweep, End, FoundMotion, Motion, Piece, Place, budget_text, is_same, up_to_budget,
 };
 use super::ramp::ramp;
 use super::{ApproachPoint, Curve, Hysteresis, StateJump, Way, branching, difference};
@@ -38,7 +38,7 @@ const USUAL_POINTS: usize = 1000;
 /// Points to which each branch may always be followed.
 const MIN_POINTS: usize = 16;
 /// Steps after which no more states are looked for from which a census starts.
-const SEED_STEPS: u64 = 20_000_000;
+const SEED_STEPS: u64 = 10_000_000;
 /// Rows that are measured before it is seen whether the budget is spent.
 const ROWS_AT_ONCE: usize = 16;
 
@@ -252,8 +252,7 @@ impl Written<'_> {
 
     /// In words that the budget for the rows was spent.
     fn not_measured(steps: u64) -> String {
-        let millions = steps / 1_000_000;
-        format!("the rows were measured up to the budget of {millions} million steps")
+        format!("the rows were measured {}", up_to_budget(steps))
     }
 
     /// The rows at some distances, there and back; none that were not reached, where the work was

@@ -6,6 +6,7 @@
 
 mod benches;
 mod book;
+mod figures;
 mod package;
 mod peers;
 mod process;

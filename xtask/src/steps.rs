@@ -5,7 +5,7 @@ use std::process::Command;
 use crate::process::{check, must, tests};
 use crate::tally::Tally;
 use crate::tools::{PYTHON, Workspace};
-use crate::{benches, book, package, peers, wheel};
+use crate::{benches, book, figures, package, peers, wheel};
 
 /// A task.
 pub(crate) struct Step {
@@ -114,6 +114,12 @@ pub(crate) static OTHER_TASKS: &[Step] = &[
         about: "build the documents as a site in target/book/site (--quick: a quick report on the paper)",
         takes_options: true,
         run: book::run,
+    },
+    Step {
+        name: "figures",
+        about: "draw the figures of the documents by the commands on their pages (--program PATH, parts of names)",
+        takes_options: true,
+        run: figures::run,
     },
     Step {
         name: "peers",

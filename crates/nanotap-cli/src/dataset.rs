@@ -6,7 +6,7 @@ use std::time::Instant;
 
 use clap::Args;
 use nanotap::case::Case;
-use nanotap::dataset::{Share, Store, StoreError, Work, WorkError, table};
+use nanotap::dataset::{Share, Store, StoreError, Work, WorkError, finish, table};
 use nanotap::study::{Computation, DatasetStudy};
 use nanotap_figures::Figure;
 use serde::Serialize;
@@ -114,8 +114,8 @@ impl DatasetArguments {
         }
         Ok(DatasetReport {
             path: destination.store,
-            chunks: store.chunks(),
-            finished: store.chunks() - missing,
+            chunks: plan.schema().grid.chunks(),
+            finished: plan.schema().grid.chunks() - missing,
             summary,
             seed,
             seconds: begun.elapsed().as_secs_f64(),
@@ -148,7 +148,7 @@ impl DatasetArguments {
             plan.compute(&store, &work)
         });
         match done {
-            Ok(()) => Ok(store),
+            Ok(()) => Ok(finish(store)?),
             Err(stopped @ (WorkError::Cancelled { .. } | WorkError::Neighbours)) => {
                 let words = format!(
                     "{stopped} in {}; run the same command again to go on",

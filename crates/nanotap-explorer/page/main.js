@@ -121,7 +121,7 @@ async function census() {
       const item = document.createElement("li");
       const button = document.createElement("button");
       button.type = "button";
-      button.textContent = `${one.words}, amplitude ${Number(one.amplitude.toPrecision(4))}`;
+      button.textContent = `${one.words}, amplitude ${one.shown}`;
       button.setAttribute("aria-pressed", String(one.start === state.start));
       button.addEventListener("click", () => {
         state.start = one.start;

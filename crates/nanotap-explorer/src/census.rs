@@ -4,6 +4,8 @@ use std::sync::Arc;
 
 use axum::Json;
 use axum::extract::State;
+use nanotap::case::physical::Kind;
+use nanotap::case::units::Units;
 use nanotap::control::Control;
 use nanotap::study::attractors::{Attractors, AttractorsOptions, AttractorsStudy};
 use nanotap::study::orbit::OrbitReport;
@@ -47,10 +49,11 @@ fn listed(app: &App, census: &Census, control: &Control<'_>) -> Result<Value, Ap
         ..AttractorsOptions::default()
     };
     let found = AttractorsStudy::run(&case, &request, control)?;
+    let units = case.units();
     let stable = found.attractors.iter().filter_map(|one| {
         let share = format!("{:.3} % of the starts", 100.0 * one.share.fraction);
         if let Some(orbit) = &one.orbit {
-            return Some(entry(orbit, None, &share));
+            return Some(entry(orbit, None, &share, &units));
         }
         let non_periodic = one.non_periodic.as_ref()?;
         let name = one.classification.name();
@@ -58,21 +61,31 @@ fn listed(app: &App, census: &Census, control: &Control<'_>) -> Result<Value, Ap
             "words": format!("{name}, {share}"),
             "start": Start::text(None, &non_periodic.state),
             "amplitude": non_periodic.observables.amplitude,
+            "shown": amplitude(non_periodic.observables.amplitude, &units),
         }))
     });
     let unstable = found.unstable.iter().flatten();
-    let unstable = unstable.map(|o| entry(&o.motion, Some(o.motion.period), "unstable"));
+    let unstable = unstable.map(|o| entry(&o.motion, Some(o.motion.period), "unstable", &units));
     let motions: Vec<Value> = stable.chain(unstable).collect();
     Ok(json!({ "motions": motions, "bound": bound(&found) }))
 }
 
-fn entry(orbit: &OrbitReport, period: Option<usize>, remark: &str) -> Value {
+/// An amplitude as text, of a physical case with its unit.
+fn amplitude(value: f64, units: &Units) -> String {
+    let (kind, unit) = units
+        .si(Kind::Length)
+        .map_or((Kind::Number, 1.0), |unit| (Kind::Length, unit));
+    kind.format_digits(unit * value, 4)
+}
+
+fn entry(orbit: &OrbitReport, period: Option<usize>, remark: &str, units: &Units) -> Value {
     json!({
         "words": format!("period {}, {remark}", orbit.period),
         "start": Start::text(period, &orbit.state),
         "period": orbit.period,
         "stable": orbit.stable,
         "amplitude": orbit.observables.amplitude,
+        "shown": amplitude(orbit.observables.amplitude, units),
     })
 }
 

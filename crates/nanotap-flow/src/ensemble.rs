@@ -1,15 +1,14 @@
 //! Many motions of one system, eight at a time: each has a lane of a vector register.
 //!
-//! Motions do not keep step: one flies while another presses, and no two switch at the same time.
-//! They need not. Those in the same regime are searched for their next switches together, whatever
-//! the drive phase, for time is counted from the last switch; then each goes its own way. What one
-//! motion alone waits for (divisions, the exponentials of a time that has just been found) is
-//! thereby done for eight.
+//! The motions are not synchronous: one may be in flight while another is in contact, and they switch
+//! at different times. Motions in the same regime are searched for their next switches together, at
+//! any drive phase, since time is counted from the last switch. Operations with long latency
+//! (divisions, the exponentials of a time that has just been found) are thereby done for eight at once.
 //!
-//! What eight share is the common case: a stretch that a table certifies, ended by a switch that a
-//! few evaluations settle. A lane in which it is not so (a grazing touch, a shallow dip, an end within
-//! the interval of a switch) goes on alone for this stretch, as [`Flow`](crate::Flow) does. What comes
-//! of a motion does not depend on the others in the batch.
+//! The lanes share the common case: a stretch that a table certifies, ended by a switch that a few
+//! evaluations locate. In any other case (a grazing touch, a shallow dip, an end within the interval of
+//! a switch) the lane follows this stretch alone, as [`Flow`](crate::Flow) does. The result of a motion
+//! does not depend on the others in the batch.
 
 use crate::motion::{BRIEF, Motion, count_period};
 use crate::regime::Kernel;
@@ -29,16 +28,16 @@ use crate::{FlowError, Regime};
 use std::collections::VecDeque;
 use std::sync::Arc;
 
-/// Evaluations of the guard near a switch before it is left to one motion alone.
+/// Evaluations of the guard near a switch before the lane is followed alone.
 const MAX_EVALUATIONS: usize = 3;
 
 /// The work space of many motions of a [`System`]. Cloning shares the system.
 #[derive(Clone, Debug)]
 pub struct Ensemble {
     system: Arc<System>,
-    /// Whether its motions can go side by side.
+    /// Whether its motions can be followed together.
     fits: bool,
-    /// For what a lane cannot do, and for starts and ends.
+    /// Follows single lanes, starts and ends.
     alone: Motion,
     members: Vec<Member>,
     /// Members that wait in each regime.
@@ -60,7 +59,7 @@ struct Strobe {
     now: Vec<Octet>,
 }
 
-/// How many stretches from switch to switch were passed side by side, and how many alone.
+/// Numbers of stretches from switch to switch that were followed together and alone.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Stretches {
     /// Eight at a time.
@@ -152,14 +151,13 @@ impl Ensemble {
         system.largest_angle() <= LARGEST_ANGLE && (0..system.regimes().len()).all(simple)
     }
 
-    /// How motions have gone so far, those of systems that fit.
+    /// Numbers of stretches so far, of systems whose motions can be followed together.
     pub fn stretches(&self) -> Stretches {
         self.stretches
     }
 
-    /// Replaces each of the states (row by row, of length `n`), which are at phase 0, by
-    /// that so many drive periods later. Of a motion that cannot be followed the state is left as it
-    /// was and the reason returned. `periods` says how many states there are.
+    /// Advances each state (row by row, of length `n`, at phase 0) by its number of drive periods in
+    /// `periods`. If a motion cannot be followed, its state is unchanged and the reason is returned.
     ///
     /// # Panics
     /// If there are not as many states as `periods`.

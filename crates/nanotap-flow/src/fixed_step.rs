@@ -1,9 +1,9 @@
 //! The paper's own method: fourth-order Runge–Kutta with a fixed step in each
-//! regime, switching on the grid. It is here to show what it does wrong.
+//! regime, switching on the grid, for comparison.
 //!
-//! The switch is noticed up to a step late, so the method is of first order
-//! whatever the order of the integrator, and the delay acts like a small random
-//! force: subharmonics appear that the system does not have.
+//! The switch is detected up to a step late, so the method is of first order with
+//! an integrator of any order, and the delay acts like a small random force:
+//! subharmonics appear that the system does not have.
 
 use crate::system::System;
 use crate::{Complex, Drive, FlowError, HarmonicVector, Regime};

@@ -35,8 +35,8 @@ impl Flow {
         Arc::make_mut(&mut self.system)
     }
 
-    /// Passes through rigid stops where the motion would come back within a time `longest` of
-    /// itself. Past a grazing the flow then goes on smoothly, as it would without the stop.
+    /// Ignores a rigid stop that the motion would leave by itself within a time `longest`. Beyond a
+    /// grazing the flow then continues smoothly, as without the stop.
     pub fn pass_touches(&mut self, longest: f64) {
         self.motion.longest_passed_touch = longest;
     }

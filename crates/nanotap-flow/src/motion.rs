@@ -37,13 +37,12 @@ pub(crate) struct Motion {
     pub(crate) longest_passed_touch: f64,
 }
 
-/// Switches in a row, hardly any time passing, before chatter is refused.
+/// Largest number of consecutive switches within [`BRIEF`] before chatter is refused.
 const STALLED_SWITCHES: u32 = 1000;
-/// What counts as hardly any time, as a part of the fastest time scale: what switches again
-/// and again so soon does not come to rest in between.
+/// Interval between switches that counts as chatter, as a part of the fastest time scale.
 pub(crate) const BRIEF: f64 = 1e-6;
-/// A touch shorter than this part of the fastest time scale is passed for as long as its rate and
-/// acceleration say.
+/// A touch shorter than this part of the fastest time scale lasts as long as its rate and
+/// acceleration determine.
 const SHORTEST_TOUCH: f64 = 1e-6;
 /// An impact sequence ends in sticking when its flights last less than this part
 /// of the fastest time scale: what is left of it is below rounding (second order).
@@ -601,8 +600,8 @@ impl Motion {
         pressed > 0.0 && -crossing.rate * fastest <= CHATTER_RESOLUTION * pressed
     }
 
-    /// Puts a motion that comes to rest on a rigid stop exactly on it: motions that stick are then
-    /// one, whatever rounding was before.
+    /// Puts a motion that comes to rest on a rigid stop exactly on it: all sticking motions are then
+    /// equal, without the rounding of their past.
     fn set_on_stop(&mut self, system: &System, guard: &Output, to: usize) {
         let (regime, drive) = (&system.regimes()[to], system.drive());
         let mut state = std::mem::take(&mut self.scratch);

@@ -52,7 +52,7 @@ pub struct SwitchView<'a> {
     pub switch: &'a Switch,
     /// The number of the transition taken out of `switch.from`.
     pub transition: usize,
-    /// Whether it ended chatter: the motion goes on in the sticking regime.
+    /// Whether it ended chatter: the motion continues in the sticking regime.
     pub stuck: bool,
     /// When it happens, within its drive period.
     pub phase: f64,

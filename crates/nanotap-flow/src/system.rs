@@ -20,9 +20,9 @@ pub struct Reset {
     pub offset: HarmonicVector,
 }
 
-/// Where impacts end that pile up (chatter): once an impact is so slow that the
-/// rest of the sequence moves the motion by less than rounding, `reset` (the
-/// perfectly inelastic impact) is applied and the motion goes on in `regime`.
+/// The end of chatter: once an impact is so slow that the rest of the sequence moves the motion by
+/// less than rounding, `reset` (the perfectly inelastic impact) is applied and the motion continues
+/// in `regime`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Sticking {
     /// The regime in which the guard stays at zero.
@@ -31,8 +31,8 @@ pub struct Sticking {
     pub reset: Reset,
 }
 
-/// What is known by definition of a guard of the next regime at a switch. Sums of
-/// exponentials know it to rounding only, which would make it cross at once or never.
+/// Exact initial value of a guard of the next regime at a switch. Sums of exponentials give it only
+/// to rounding, so that the guard would cross at once or never.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Onset {
     /// The guard of this transition starts with value and rate zero: two bodies part that no
@@ -40,7 +40,7 @@ pub enum Onset {
     /// value zero only.)
     AtRest(usize),
     /// The guard of transition `transition` starts at `factor` times the rate of the guard of the transition
-    /// taken: a damper is met. At a grazing touch that is zero.
+    /// taken: the tip reaches a damper. At a grazing touch that is zero.
     Proportional {
         /// Which transition of the next regime.
         transition: usize,
@@ -50,7 +50,7 @@ pub enum Onset {
 }
 
 impl Onset {
-    /// The transition of the next regime that it speaks of.
+    /// The transition of the next regime to which it refers.
     pub const fn transition(self) -> usize {
         match self {
             Self::AtRest(transition) | Self::Proportional { transition, .. } => transition,
@@ -58,8 +58,8 @@ impl Onset {
     }
 }
 
-/// A way out of a regime: when `guard` falls to zero, the motion goes on in
-/// `target`, after `reset` if there is one.
+/// An exit of a regime: when `guard` falls to zero, the motion continues in `target`, after `reset`
+/// if there is one.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Transition {
     /// Positive inside the regime.
@@ -221,7 +221,7 @@ impl Switch {
         self.rate_after.is_some_and(|after| after.constant != 0.0)
     }
 
-    /// Whether it leaves volumes as they are, whatever the rate.
+    /// Whether it preserves volumes at any rate.
     pub fn keeps_volume(&self) -> bool {
         self.rate_after == Some(RateAfter::SAME)
     }
@@ -482,8 +482,7 @@ impl System {
         out.find_map(|(from, out)| Some((from, out.iter().position(sticks)?)))
     }
 
-    /// Whether the motion sticks to a rigid stop in `regime`: whatever it was before, its state is
-    /// then that of the stop.
+    /// Whether the motion sticks to a rigid stop in `regime`: its state is then that of the stop.
     pub fn sticks(&self, regime: usize) -> bool {
         self.stop_of(regime).is_some()
     }

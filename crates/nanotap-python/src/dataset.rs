@@ -88,10 +88,7 @@ impl Recipe {
                 threads,
                 control: *control,
             };
-            match recipe.compute(&store, &work) {
-                Ok(()) | Err(WorkError::Cancelled { .. } | WorkError::Neighbours) => Ok(()),
-                Err(error) => Err(nanotap::Error::from(error).into()),
-            }
+            computed(&recipe, store, &work)
         })?;
         Ok(done.interrupted)
     }
@@ -163,10 +160,17 @@ impl Receiver {
             threads: 0,
             control: Control::default(),
         };
-        match self.recipe.compute(&self.store, &work) {
-            Ok(()) | Err(WorkError::Cancelled { .. } | WorkError::Neighbours) => Ok(()),
-            Err(error) => Err(Failure::from(nanotap::Error::from(error)).into()),
-        }
+        let store = Store::open(self.store.path()).map_err(Failure::from)?;
+        Ok(computed(&self.recipe, store, &work)?)
+    }
+}
+
+/// Computes what is missing, and joins the chunks of a dataset that is finished.
+fn computed(recipe: &registry::DatasetPlan, store: Store, work: &Work<'_>) -> Result<(), Failure> {
+    match recipe.compute(&store, work) {
+        Ok(()) => Ok(dataset::finish(store).map(drop)?),
+        Err(WorkError::Cancelled { .. } | WorkError::Neighbours) => Ok(()),
+        Err(error) => Err(nanotap::Error::from(error).into()),
     }
 }
 

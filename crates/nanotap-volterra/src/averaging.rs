@@ -3,14 +3,14 @@
 //! The gap is taken as `d̄ + A cos θ`, `θ = Ωt + φ`, with the frequency of the strongest tone. Over
 //! one oscillation the law gives a mean force `F̄` and the complex first harmonic `f`
 //! (`F ≈ F̄ + Re f e^{iθ}`), its memory included. With the gap's static compliance `c`, its
-//! receptance `H(Ω)`, and `G` the tone's part in the gap without the force, harmonic balance says
+//! receptance `H(Ω)`, and `G` the tone's part in the gap without the force, harmonic balance gives
 //!
 //! `d̄ = d₀ + c F̄`, `|A − H f| = |G|`, `e^{iφ} = G/(A − H f)`
 //!
 //! (Garcia and San Paulo, Phys. Rev. B 60, 4961, 1999, for one mode). The roots in `A` at a given
 //! distance `d₀` are the motions.
-//! Higher harmonics of the force enter the state by the modes' response to them. Wrong where the
-//! gap has strong harmonics: whatever is found here is a guess.
+//! Higher harmonics of the force enter the state by the modes' response to them. The result is
+//! wrong if the gap has strong harmonics: it is only a guess.
 
 use crate::gap_table::GapTable;
 use crate::law::Guard;

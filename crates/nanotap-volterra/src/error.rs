@@ -135,7 +135,7 @@ pub enum Refusal {
     /// The force could amplify an error beyond what the defect allows for.
     #[error("the force is so steep that another solution may lie close by")]
     Steep,
-    /// A guard is too close to zero to say whether the law switches.
+    /// A guard is too close to zero to decide whether the law switches.
     #[error("the law's switch cannot be bracketed")]
     Switch,
 }

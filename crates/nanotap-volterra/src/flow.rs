@@ -536,7 +536,7 @@ impl Flow {
         }
     }
 
-    /// Takes the step in `self.step` as it is.
+    /// Accepts the step in `self.step`.
     fn accept<O: Observer>(
         &mut self,
         system: &System,

@@ -64,7 +64,7 @@ impl Exit {
         }
     }
 
-    /// With the force before and after it coming up to the switch as said.
+    /// The same with the behaviour of the force before and after the switch.
     #[must_use]
     pub const fn with(mut self, before: Approach, after: Approach) -> Self {
         self.before = before;
@@ -157,12 +157,12 @@ pub trait ForceLaw: Debug + Send + Sync {
         branch > 0
     }
 
-    /// Whether gap and rate do not tell the branch: the law remembers.
+    /// Whether the law has a memory: gap and rate do not determine the branch.
     fn remembers(&self) -> bool {
         false
     }
 
-    /// Whether the force on a branch is zero whatever the gap does.
+    /// Whether the force on a branch is zero at any gap.
     fn vanishes(&self, branch: usize) -> bool {
         let _ = branch;
         false

@@ -5,7 +5,7 @@
 //! between them. The linear part is solved in closed form; unknown is one scalar, the force
 //! in time. The gap obeys a Volterra equation with the modes' Green's function `G`,
 //! `d(t) = d_free(t) + ∫ G(t − u) F(u) du`, and on a step `F` is a polynomial through
-//! Chebyshev nodes, so that Newton solves for the forces at the nodes whatever the number of
+//! Chebyshev nodes: Newton solves for the forces at the nodes, whose number does not depend on the
 //! modes. Where a contact begins or ends like a power of the root of time, the polynomial is
 //! one in the root of time, and a step that ends a contact moves its start until it ends
 //! exactly there. Jacobian and parameter derivatives come from one factorisation a step.
@@ -23,13 +23,12 @@
 //!
 //! *Within a step.* A step is accepted when the last two Chebyshev coefficients of the force
 //! and its *defect*, the difference between the polynomial and the law at points between the
-//! nodes, both stay below what moves the gap by [`Options::tolerance`](system::Options) over
-//! the step, or below rounding (a few `2⁻⁵²` of the force and of its slope times the gap, to
-//! which no step length can do better). The defect is what makes it the right solution where
-//! a collocation has several, near snap-in: the exact motion obeys the same Volterra equation
-//! without the defect, so by Gronwall's inequality the two differ by no more than
-//! `cosh √(2κ)` times what the defect moves, with `κ = max |∂F/∂d| ∫|G| + |∂F/∂ḋ| ∫|G'|`. A
-//! step with `κ > 8` is refused, whatever its residual. The slope of the force is sampled at
+//! nodes, both change the gap by less than [`Options::tolerance`](system::Options) over the step,
+//! or are below rounding (a few `2⁻⁵²` of the force and of its slope times the gap, which no step
+//! length can improve). The defect selects the right solution where collocation has several, near
+//! snap-in: the exact motion obeys the same Volterra equation without the defect, so by Gronwall's
+//! inequality the two differ by at most `cosh √(2κ)` times the change that the defect causes, with `κ = max |∂F/∂d| ∫|G| + |∂F/∂ḋ| ∫|G'|`. A
+//! step with `κ > 8` is refused, even with a small residual. The slope of the force is sampled at
 //! the nodes; between them it is as resolved as the force is.
 //!
 //! *Switches.* A guard is expanded in the step's polynomials, from its values at the nodes.
@@ -37,12 +36,12 @@
 //! of all other coefficients, their tail ten times over and twice the amplitude of modes too
 //! fast for the polynomial); otherwise its tail must be below 1e-11 of its size, and the
 //! first fall to zero is bracketed by bounds of the series' first two derivatives, so that
-//! nothing is left to sampling. A dip that touches zero only within 1e-9 of the step's length
-//! is a touch and no switch. That the series stands for the guard between the nodes holds to
-//! its tail, not by proof.
+//! nothing depends on sampling. A dip that touches zero only within 1e-9 of the step's length
+//! is a touch, not a switch. The series represents the guard between the nodes to within its
+//! tail; this is not proved.
 //!
-//! *Otherwise* the run ends with a [`VolterraError`] that says where and by what the last
-//! step was refused. The same initial state gives the same bits, whatever was run before.
+//! *Otherwise* the run ends with a [`VolterraError`] that states where and why the last step was
+//! refused. The same initial state gives the same bits, independent of earlier runs.
 //!
 //! # Example
 //!

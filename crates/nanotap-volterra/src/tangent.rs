@@ -15,7 +15,7 @@ use crate::system::{Response, System};
 use crate::{Complex, VolterraError};
 use nalgebra::{DMatrix, DVector};
 
-/// How a parameter changes a system: everything that is not named stays as it is.
+/// Change of a system with a parameter: quantities that are not named are constant.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Parameter {
     /// The change of each parameter of the law (empty: none).

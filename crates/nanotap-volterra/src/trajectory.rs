@@ -229,7 +229,7 @@ impl Trajectory {
         }
     }
 
-    /// Itself, if nothing had to be left out.
+    /// The trajectory itself, if it is complete.
     pub(crate) fn whole(self) -> Result<Self, VolterraError> {
         if self.overflow {
             return Err(VolterraError::TooLarge {

@@ -38,7 +38,7 @@ pub struct VariedOutput {
 }
 
 impl VariedOutput {
-    /// An output that is the same whatever changes.
+    /// An output without variation.
     pub const fn fixed(value: Output) -> Self {
         Self {
             value,
@@ -361,8 +361,8 @@ impl Variation {
             })
     }
 
-    /// An output just before every switch of the law for which `wanted` says so, by the branches
-    /// before and after it.
+    /// An output just before every switch of the law that `wanted` selects by the branches before and
+    /// after it.
     pub fn before_switches(
         &self,
         output: &VariedOutput,

@@ -17,6 +17,7 @@ use nanotap::study::simulate::Classification;
 use serde::Serialize;
 
 use crate::arguments::{CaseArguments, OutArgument, PlotArgument};
+use crate::command::branch::PointsArgument;
 use crate::failure::Failure;
 use crate::given_case::GivenCase;
 use crate::output::Output;
@@ -35,6 +36,8 @@ pub(crate) struct Arguments {
     #[command(flatten)]
     request: Request<ApproachOptions>,
 
+    #[command(flatten)]
+    points: PointsArgument,
     #[command(flatten)]
     threads: ThreadsArgument,
     #[command(flatten)]
@@ -57,7 +60,7 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     arguments.out.check()?;
     arguments.plot.check()?;
     let case = GivenCase::for_study(&arguments.case, true, output)?;
-    let report = progress::study::<ApproachStudy>(&case, &request, &arguments.threads)?;
+    let mut report = progress::study::<ApproachStudy>(&case, &request, &arguments.threads)?;
     if report.cancelled {
         output.warning("stopped before it was done");
     }
@@ -74,6 +77,9 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     arguments
         .plot
         .draw(|| approach_figure(&report, &case.units()))?;
+    if let Some(branches) = &mut report.branches {
+        arguments.points.shorten(branches, output);
+    }
     let written = Written {
         path: arguments.out.out.clone(),
         report: &report,
@@ -81,23 +87,19 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     output.study(&case, &written, |_| text(&case, &report))
 }
 
-/// A row a distance, there and back, then what coexists; of a physical case the SI columns
-/// follow.
+/// A row a distance, there and back, then what coexists.
 fn csv(report: &ApproachReport, units: &Units) -> String {
-    let physical = report.table.iter().any(|p| p.zc.is_some());
-    let mut header: Vec<String> = [
+    let si = matches!(units, Units::Si(_));
+    let distance = if si { "zc (m)" } else { report.parameter };
+    let first = [
         "way",
-        report.parameter,
+        distance,
         "classification",
         "period",
         "spectral_radius",
-    ]
-    .map(str::to_owned)
-    .to_vec();
-    header.extend(columns::columns(ObservableSet::COMMON, physical));
-    if physical {
-        header.push("zc (m)".to_owned());
-    }
+    ];
+    let mut header = first.map(str::to_owned).to_vec();
+    header.extend(columns::columns(ObservableSet::COMMON, si));
     if report.modulation.is_some() {
         header.extend(COLUMNS.iter().map(|column| match si_of(column, units) {
             Some((kind, _)) => format!("{} ({})", column.name, kind.si_unit()),
@@ -106,16 +108,12 @@ fn csv(report: &ApproachReport, units: &Units) -> String {
     }
     let mut csv = header.join(",") + "\n";
     for p in report.table.iter().chain(&report.coexisting) {
-        let si = physical.then_some(p.physical.as_ref());
         let mut row = vec![p.spectral_radius];
-        row.extend(columns::cells(
-            ObservableSet::COMMON,
-            p.observables.as_ref(),
-            si,
-        ));
-        if physical {
-            row.push(p.zc);
-        }
+        row.extend(if si {
+            columns::cells_in_si(ObservableSet::COMMON, p.physical.as_ref())
+        } else {
+            columns::cells(ObservableSet::COMMON, p.observables.as_ref())
+        });
         if report.modulation.is_some() {
             row.extend(COLUMNS.iter().map(|column| {
                 let unit = si_of(column, units).map_or(1.0, |(_, unit)| unit);
@@ -127,7 +125,7 @@ fn csv(report: &ApproachReport, units: &Units) -> String {
             csv,
             "{},{},{},{period}",
             p.way.name(),
-            shortest(p.gap),
+            shortest(p.zc.filter(|_| si).unwrap_or(p.gap)),
             p.classification.name()
         );
         for value in row {

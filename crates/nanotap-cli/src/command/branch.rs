@@ -5,6 +5,7 @@ use std::fmt::Write as _;
 use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use nanotap::case::physical::Kind;
+use nanotap::case::units::Units;
 use nanotap::figure::branch::{Shown, case_figure};
 use nanotap::number::shortest;
 use nanotap::observe::{ObservableSet, columns, time_series};
@@ -20,8 +21,8 @@ use crate::table::{Align, Table};
 use crate::threads::ThreadsArgument;
 use crate::{file, motion, number, progress, style};
 
-/// Bytes of points beyond which a document does not list all.
-const LONGEST_DOCUMENT: usize = 8_000_000;
+/// Bytes of points of branches beyond which a document does not list all.
+const LONGEST_DOCUMENT: usize = 900_000;
 
 /// Periodic orbits followed in a parameter, stable and unstable, with their bifurcations.
 #[derive(Args, Debug)]
@@ -36,10 +37,8 @@ pub(crate) struct Arguments {
     #[arg(long, value_name = "OBSERVABLE", value_parser = shown())]
     show: Option<Shown>,
 
-    /// List every point in the JSON document, whatever its length
-    #[arg(long)]
-    all_points: bool,
-
+    #[command(flatten)]
+    points: PointsArgument,
     #[command(flatten)]
     threads: ThreadsArgument,
     #[command(flatten)]
@@ -71,14 +70,13 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     let model = case.model()?;
     if let Some(path) = &arguments.out.out {
         let names = time_series::state_names(&model);
-        file::write(path, csv(&report, options.observables, &names).as_bytes())?;
+        let table = csv(&report, options.observables, &names, &case.units());
+        file::write(path, table.as_bytes())?;
     }
     arguments
         .plot
         .draw(|| case_figure(&case, &report, arguments.show))?;
-    if output.is_json() && !arguments.all_points {
-        shorten(&mut report, output);
-    }
+    arguments.points.shorten(&mut report, output);
     output.study(&case, &report, |report| text(&case, report))?;
     let cut = report.branches.iter().filter(|b| !b.complete).count();
     if cut > 0 && !report.cancelled {
@@ -88,7 +86,23 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     Ok(())
 }
 
-/// Leaves points out of a document that would be longer than [`LONGEST_DOCUMENT`].
+/// How many points of branches a document lists.
+#[derive(Args, Clone, Copy, Debug)]
+pub(crate) struct PointsArgument {
+    /// List every point of the branches in the JSON document, whatever its length
+    #[arg(long)]
+    all_points: bool,
+}
+
+impl PointsArgument {
+    /// Leaves points out of a document in which they would be longer than [`LONGEST_DOCUMENT`].
+    pub(crate) fn shorten(self, report: &mut BranchReport, output: &Output) {
+        if output.is_json() && !self.all_points {
+            shorten(report, output);
+        }
+    }
+}
+
 fn shorten(report: &mut BranchReport, output: &Output) {
     let point = report.points.first();
     let bytes = point
@@ -99,7 +113,7 @@ fn shorten(report: &mut BranchReport, output: &Output) {
     if step > 1 {
         report.thin(step);
         output.note(&format!(
-            "{} points between those in the document are left out: --all-points lists them, --out writes all of them",
+            "{} points of branches between those in the document are left out; --all-points lists them",
             report.points_left_out
         ));
     }
@@ -107,20 +121,26 @@ fn shorten(report: &mut BranchReport, output: &Output) {
 
 /// A row a point, branch by branch; `kind` is empty but for bifurcations, which follow the
 /// points of their branch.
-fn csv(report: &BranchReport, observed: ObservableSet, names: &[String]) -> String {
-    let physical = report.points.iter().any(|p| p.physical.is_some());
-    let mut header: Vec<String> = [
+fn csv(report: &BranchReport, observed: ObservableSet, names: &[String], units: &Units) -> String {
+    let si = matches!(units, Units::Si(_));
+    let key = report.key;
+    let parameter = match key.kind() {
+        kind if key.is_physical() && kind != Kind::Number => {
+            format!("{key} ({})", kind.si_unit())
+        }
+        _ => key.path().to_owned(),
+    };
+    let first = [
         "branch",
         "kind",
         "period",
-        report.parameter,
+        &parameter,
         "stable",
         "spectral_radius",
-    ]
-    .map(str::to_owned)
-    .to_vec();
-    header.extend(columns::columns(observed, physical));
-    header.extend_from_slice(names);
+    ];
+    let mut header = first.map(str::to_owned).to_vec();
+    header.extend(columns::columns(observed, si));
+    header.extend(names.iter().map(|name| units.state_column(name)));
     let mut csv = header.join(",") + "\n";
     let mut row = |branch: usize, kind: &str, p: &PointReport| {
         let _ = write!(
@@ -131,8 +151,11 @@ fn csv(report: &BranchReport, observed: ObservableSet, names: &[String]) -> Stri
             p.stable,
             shortest(spectral_radius(&p.multipliers)),
         );
-        let si = physical.then_some(p.physical.as_ref());
-        let cells = columns::cells(observed, Some(&p.observables), si);
+        let cells = if si {
+            columns::cells_in_si(observed, p.physical.as_ref())
+        } else {
+            columns::cells(observed, Some(&p.observables))
+        };
         for cell in cells.into_iter().chain(p.state.iter().copied().map(Some)) {
             let _ = write!(csv, ",{}", cell.map_or_else(String::new, shortest));
         }
@@ -147,6 +170,7 @@ fn csv(report: &BranchReport, observed: ObservableSet, names: &[String]) -> Stri
                 branch,
                 period: b.period,
                 parameter: b.parameter,
+                parameter_si: b.parameter_si,
                 state: b.state.clone(),
                 multipliers: b.multipliers.clone(),
                 stable: false,

@@ -2,6 +2,9 @@
 
 use std::fmt::Write as _;
 
+use nanotap::case::Key;
+use nanotap::case::physical::Kind;
+use nanotap::case::units::Units;
 use nanotap::figure::modes::shapes_figure;
 use nanotap::model::beam::Modes;
 use nanotap::model::parameter::Parameter;
@@ -46,9 +49,17 @@ fn shapes(beam: &Modes, points: usize) -> String {
 }
 
 fn text(case: &GivenCase, table: &ModeTable) -> String {
-    let parameter = |which| number::chosen(case.cantilever().map_or(f64::NAN, |c| c.get(which)));
+    let units = case.units();
+    let parameter = |which: Parameter| {
+        let key = Key::of(which);
+        let value = case.cantilever().map_or(f64::NAN, |c| c.get(which));
+        match units {
+            Units::Model => format!("{} = {}", key.symbol(), number::chosen(value)),
+            Units::Si(_) => case.shown(key, value),
+        }
+    };
     let mut text = style::bold(&format!(
-        "{}: {} of the cantilever, tip mass α₁ = {}",
+        "{}: {} of the cantilever, tip mass {}",
         case.title(),
         number::counted(table.modes, "mode", "modes"),
         parameter(Parameter::Alpha1),
@@ -62,7 +73,7 @@ fn text(case: &GivenCase, table: &ModeTable) -> String {
             &table.free_eigenvalues,
         ),
         (
-            format!("in contact, α₄ = {}", parameter(Parameter::Alpha4)),
+            format!("in contact, stiffness {}", parameter(Parameter::Alpha4)),
             &table.contact,
             &table.exact_contact,
             &table.contact_eigenvalues,
@@ -72,7 +83,7 @@ fn text(case: &GivenCase, table: &ModeTable) -> String {
         let _ = write!(
             text,
             "\n  {name}\n{}",
-            frequencies(galerkin, exact, eigenvalues.as_deref())
+            frequencies(galerkin, exact, eigenvalues.as_deref(), &units)
         );
     }
     text.push('\n');
@@ -101,26 +112,36 @@ fn text(case: &GivenCase, table: &ModeTable) -> String {
     text
 }
 
-fn frequencies(galerkin: &[f64], exact: &[f64], eigenvalues: Option<&[[f64; 2]]>) -> String {
+fn frequencies(
+    galerkin: &[f64],
+    exact: &[f64],
+    eigenvalues: Option<&[[f64; 2]]>,
+    units: &Units,
+) -> String {
+    let frequency = |value| number::quantity(units, Kind::Frequency, value, [7, 7]);
+    let [of_modes, of_beam, damped] = match units {
+        Units::Model => ["Ω Galerkin", "Ω exact", "Ω damped"],
+        Units::Si(_) => ["f Galerkin", "f exact", "f damped"],
+    };
     // Where each mode oscillates there is one eigenvalue a mode, shown in its row.
     let paired = eigenvalues.filter(|list| list.len() == galerkin.len());
     let mut table = Table::new([
         ("mode", Align::Right),
-        ("Ω Galerkin", Align::Point),
-        ("Ω exact", Align::Point),
+        (of_modes, Align::Point),
+        (of_beam, Align::Point),
         ("difference", Align::Point),
-        ("Ω damped", Align::Point),
+        (damped, Align::Point),
         ("damping ζ", Align::Point),
     ]);
     for (index, (galerkin, exact)) in galerkin.iter().zip(exact).enumerate() {
         let mut row = vec![
             (index + 1).to_string(),
-            number::significant(*galerkin, 7),
-            number::significant(*exact, 7),
+            frequency(*galerkin),
+            frequency(*exact),
             number::percent(galerkin / exact - 1.0),
         ];
         if let Some(eigenvalue) = paired.map(|list| list[index]) {
-            row.push(number::significant(eigenvalue[1], 7));
+            row.push(frequency(eigenvalue[1]));
             row.push(number::significant(damping_ratio(eigenvalue), 4));
         }
         table.row(row);

@@ -60,7 +60,7 @@ fn an_approach_curve_has_approach_and_retract() {
     assert!(folds.iter().any(|b| b["kind"] == "fold"));
     let csv = folder.read("curve.csv");
     assert_eq!(csv.lines().count(), 43);
-    assert!(csv.starts_with("way,alpha5,") && csv.contains(",E_dis (eV),"));
+    assert!(csv.starts_with("way,zc (m),") && csv.contains(",E_dis (eV),"));
     assert!(folder.read("curve.svg").contains("<svg"));
     let text = folder
         .run(&["approach", "lever.toml", "--points", "9"])
@@ -231,7 +231,7 @@ fn branches_run_over_quantities_of_the_case() {
     );
     let point = &json["points"][0];
     assert!(point["physical"]["A"].as_f64().unwrap() > 19e-9);
-    assert!(folder.read("b.svg").contains("gap tip (nm)"));
+    assert!(folder.read("b.svg").contains("distance zc (nm)"));
     branch("24 nm", "10 kHz", &[]).refused(&["expected a length"]);
     branch("24", "10 nm", &[]).refused(&["expected a length"]);
     branch("24 Hz", "10 Hz", &[]).refused(&["gap.tip", "expected a length"]);

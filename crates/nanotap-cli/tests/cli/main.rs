@@ -10,6 +10,7 @@ mod case;
 mod existing_motions;
 mod experiments;
 mod files;
+mod front_page;
 #[cfg(unix)]
 mod interruptions;
 #[cfg(unix)]

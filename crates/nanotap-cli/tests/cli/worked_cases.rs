@@ -1,5 +1,6 @@
-//! The worked cases, tutorials and theory of the documentation: every command in `docs/cases/*.md`,
-//! `docs/tutorials/*.md` and `docs/theory/*.md` is run as written, and every number is compared.
+//! The worked cases, tutorials, theory and gallery of the documentation: every command in
+//! `docs/cases/*.md`, `docs/tutorials/*.md`, `docs/theory/*.md` and `docs/gallery.md` is run as
+//! written, and every number is compared.
 //!
 //! A `console` block contains commands, one per line that begins with `$ nanotap`. The following
 //! table contains values of the JSON document of the last command: a JSON pointer, the value, and
@@ -17,7 +18,8 @@ fn documents() -> Vec<PathBuf> {
     let files = ["cases", "tutorials", "theory"]
         .map(|folder| std::fs::read_dir(docs.join(folder)).unwrap());
     let files = files.into_iter().flatten();
-    files.map(|entry| entry.unwrap().path()).collect()
+    let files = files.map(|entry| entry.unwrap().path());
+    files.chain([docs.join("gallery.md")]).collect()
 }
 
 /// A folder with the case files and data of the documentation.
@@ -29,11 +31,14 @@ fn with_cases() -> Folder {
             folder.write(&name, std::fs::read(&path).unwrap());
         }
     }
+    for (name, case) in crate::front_page::cases(&crate::front_page::text()) {
+        folder.write(name, case);
+    }
     folder
 }
 
 /// The words of a command line; quotes group words.
-fn words(line: &str) -> Vec<String> {
+pub(crate) fn words(line: &str) -> Vec<String> {
     let mut words = vec![String::new()];
     let mut quoted = false;
     for c in line.chars() {
@@ -136,6 +141,7 @@ fn every_document_has_a_test() {
             "fm-lever-on-polystyrene.md",
             "frequency-modulation.md",
             "frequency-sweep.md",
+            "gallery.md",
             "liquid.md",
             "measured-modes.md",
             "microscopist.md",
@@ -176,6 +182,7 @@ follows! {
     the_capillary_bridge: "capillary.md", 1 commands, 4 numbers;
     the_examples_of_dforce: "dforce.md", 4 commands, 13 numbers;
     the_fm_lever: "fm-lever-on-polystyrene.md", 3 commands, 9 numbers;
+    the_gallery: "gallery.md", 27 commands, 0 numbers;
     the_frequency_sweep: "frequency-sweep.md", 2 commands, 6 numbers;
     the_liquid: "liquid.md", 5 commands, 21 numbers;
     the_measured_modes: "measured-modes.md", 2 commands, 6 numbers;
@@ -185,7 +192,7 @@ follows! {
     the_reconstruction: "reconstruct.md", 1 commands, 0 numbers;
     the_scan: "scan.md", 4 commands, 19 numbers;
     the_force_table: "table.md", 2 commands, 6 numbers;
-    the_stiff_lever: "stiff-lever.md", 2 commands, 4 numbers;
+    the_stiff_lever: "stiff-lever.md", 3 commands, 4 numbers;
     the_tip_mass: "tip-mass.md", 3 commands, 6 numbers;
     the_tutorial_of_the_dynamicist: "dynamicist.md", 7 commands, 31 numbers;
     the_tutorial_of_the_microscopist: "microscopist.md", 6 commands, 22 numbers;

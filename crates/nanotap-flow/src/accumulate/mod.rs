@@ -1,7 +1,7 @@
 //! Exact observables of a motion, accumulated while it runs.
 //!
 //! A [`Request`] names outputs (scalars affine in the state, which may differ from regime to
-//! regime) and what is wanted of each: its least or greatest value, its integral, its
+//! regime) and the functionals of each: its least or greatest value, its integral, its
 //! Fourier coefficient at a frequency, the integral of its product with another. Nothing else
 //! is computed. A [`Plan`] is the request made ready for one [`System`](crate::System); it is immutable and
 //! may be shared. An [`Accumulator`] is an [`Observer`](crate::flow::Observer) that carries
@@ -37,16 +37,16 @@
 //! # Ok::<(), nanotap_flow::FlowError>(())
 //! ```
 //!
-//! What is always accumulated, since it costs nothing: the time in each regime, and of each
-//! pair of regimes how often the motion switched from one to the other, how often it only
-//! grazed, its greatest speed and the sum of the squares of its speeds there.
+//! Always accumulated, at no cost: the time in each regime and, for each pair of regimes, the
+//! number of switches from one to the other, the number of grazings, and the greatest speed and
+//! the sum of the squared speeds at these switches.
 //!
 //! # Contract
 //! - Integrals are closed forms of the modal amplitudes, one term for each mode (or pair of
 //!   modes), over every stretch between switches; there is no quadrature.
 //! - Extrema are those of the continuous motion, ends and switches included, to rounding:
-//!   every stretch of time is either proved not to exceed what was found before or holds a
-//!   zero of the rate that was found. None is taken from samples.
+//!   every stretch of time is either proved not to exceed the earlier extremum, or contains a
+//!   located zero of the rate. None is taken from samples.
 //! - An output that differs between regimes jumps at switches; both one-sided values count.
 //!   Where an output is identically zero in a regime, that zero counts as a value of it.
 //! - A request for the same thing twice returns the same number and costs nothing.

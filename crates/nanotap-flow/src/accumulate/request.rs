@@ -214,7 +214,7 @@ pub(super) struct RangePlan {
     pub(super) greatest: Option<usize>,
 }
 
-/// What a guard says of a channel's sign.
+/// Sign of a channel, as a guard determines it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Sign {
     NotNegative,

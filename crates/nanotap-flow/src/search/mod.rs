@@ -15,14 +15,14 @@
 //!
 //! Two places need more than double precision's plain sums. Near a tangency the
 //! sign of the extremum can drown in rounding: it is then found in twice double
-//! precision, so a dip of 1e-17 is seen for what it is. Right after a switch the
+//! precision, so that a dip of 1e-17 is resolved. Right after a switch the
 //! signal is zero *by definition* and the next zero may be arbitrarily close: the
 //! zero is divided out of the Taylor series, whose remainder is bounded, and the
 //! quotient is searched.
 //!
-//! What it cannot do: tell a triple zero (value, rate and curvature all zero
-//! within rounding) from a near miss; it then decides by the value in twice double
-//! precision at the points it visits and reports the crossing as grazing.
+//! Limit: a triple zero (value, rate and curvature all zero within rounding) cannot be
+//! distinguished from a near miss. The value in twice double precision at the visited points
+//! then decides, and the crossing is reported as grazing.
 //!
 //! Modules call downwards only: a tabulated guard is searched on its table (`on_table`), by a
 //! `walk` along the points of a `table`; what that cannot decide is left to certified steps
@@ -77,7 +77,7 @@ pub struct Crossing {
     pub rate: f64,
     /// Whether value and rate vanish together within rounding.
     pub grazing: bool,
-    /// Whether the rate is known better than the signal's own sum tells it.
+    /// Whether the rate is more accurate than the sum of the signal's terms.
     pub refined: bool,
 }
 

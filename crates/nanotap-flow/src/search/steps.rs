@@ -182,7 +182,7 @@ impl<S: Simd> Search<'_, S> {
         })
     }
 
-    /// The distance to a minimum whose depth plain sums cannot tell well from rounding.
+    /// The distance to a minimum whose depth is close to the rounding of plain sums.
     fn unresolved_tangency(&self, jet: &Jet) -> Option<f64> {
         if jet.rate >= 0.0 || jet.curvature <= 0.0 {
             return None;

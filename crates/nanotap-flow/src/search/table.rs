@@ -1,8 +1,8 @@
 //! Exponentials of a regime's slowest terms, tabulated at equidistant points.
 //!
 //! Terms too fast for the table are bounded by their amplitude. A coarse grid that follows only
-//! the slowest terms certifies most of a flight; where it cannot, the interval is looked at on a
-//! finer grid. [`walk`](super::walk) says what is concluded from the points.
+//! the slowest terms certifies most of a flight; otherwise the interval is searched on
+//! a finer grid. [`walk`](super::walk) draws the conclusions from the points.
 
 use super::interval::Interval;
 use crate::Complex;
@@ -89,7 +89,7 @@ impl Table {
         Self::following(FOLLOWED_FOR_EXTREMA, kernel, period)
     }
 
-    /// The table that follows so many terms at most.
+    /// The table of at most `most` terms.
     fn following(most: usize, kernel: &Kernel, period: f64) -> Option<Self> {
         if kernel.grows || kernel.fastest <= 0.0 {
             return None;
@@ -282,7 +282,7 @@ fn chord(rate: f64, step: f64) -> f64 {
 /// `e^{λ h p}` of a term for `p = 0, 1, …`, four points to a vector.
 type Column = Vec<ComplexVector>;
 
-/// Works out a column of so many vectors for each rate `λ`, with `step` as `h`.
+/// Computes a column of vectors for each rate `λ`, with `step` as `h`.
 struct Columns {
     rates: Vec<Complex>,
     step: f64,

@@ -12,7 +12,7 @@ pub(crate) struct AffineMap {
 }
 
 impl AffineMap {
-    /// An empty map to `rows` numbers, with room for so many columns.
+    /// An empty map to `rows` numbers with capacity for `columns` columns.
     pub(crate) fn with_capacity(rows: usize, columns: usize) -> Self {
         let vectors = layout::vectors_for(rows);
         Self {

@@ -2,16 +2,16 @@
 
 import json
 import os
-import shutil
 import tempfile
 from collections.abc import Iterable, Mapping
+from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from . import _arguments, _nanotap
 from ._arguments import Progress
-from ._case import Case, Path
+from ._case import Case, Path, missing
 from ._interrupt import Interrupted
 from ._motions import _cased
 from ._progress import bar
@@ -79,14 +79,12 @@ def open(path: Path) -> "xr.Dataset":
     Its chunks are read when needed, through dask if it is installed.
 
     Raises:
-        ValueError: it does not exist, or is not a dataset of nanotap.
+        FileNotFoundError: it does not exist.
+        ValueError: it is not a dataset of nanotap.
     """
-    import xarray as xr
-
     name = os.fspath(path)
-    if not os.path.isdir(name):
-        message = f"{name} is not a dataset of nanotap: it does not exist"
-        raise ValueError(message)
+    if not os.path.exists(name):
+        raise missing(name)
     if not os.path.isfile(os.path.join(name, ".zmetadata")):
         message = f"{name} is not a dataset of nanotap: it has no .zmetadata"
         raise ValueError(message)
@@ -95,9 +93,36 @@ def open(path: Path) -> "xr.Dataset":
         import dask.array as _  # noqa: F401
     except ImportError:
         chunks = None
+    return _opened(name, chunks)
+
+
+def _opened(name: str, chunks: Any) -> "xr.Dataset":
+    import xarray as xr
+
     ds: xr.Dataset = xr.open_zarr(name, chunks=chunks, consolidated=True)
     ds.attrs["path"] = name
-    return ds
+    # It may be written elsewhere, where the compression of this store does not apply.
+    return _worded(ds.drop_encoding())
+
+
+def _worded(ds: "xr.Dataset") -> "xr.Dataset":
+    """`classification` in words, as in every other result, beside its codes in the store; empty
+    where a run is missing.
+    """
+    import xarray as xr
+
+    codes = ds.get("classification")
+    if codes is None:
+        return ds
+    meanings = codes.attrs["flag_meanings"].split()
+    words = np.array([word if word != "missing" else "" for word in meanings])
+    named = xr.apply_ufunc(
+        words.__getitem__, codes, dask="parallelized", output_dtypes=[words.dtype]
+    )
+    attrs = {key: codes.attrs[key] for key in ("long_name", "units")}
+    return ds.assign(
+        classification=named.assign_attrs(attrs), classification_code=codes
+    )
 
 
 def merge(sources: Iterable[Path], out: Path) -> Record:
@@ -118,6 +143,9 @@ def merge(sources: Iterable[Path], out: Path) -> Record:
         raise TypeError(message)
     _ending(out, "out")
     names = [os.fspath(source) for source in sources]
+    for name in names:
+        if not os.path.exists(name):
+            raise missing(name)
     return Record(json.loads(_nanotap.merge(names, out)))
 
 
@@ -154,13 +182,19 @@ def window(
     shares = found["shares"]
     return ds.assign(
         condition=xr.DataArray(np.array(found["conditions"], dtype=str), dims=dims),
-        share=("kind_of_point", np.array(list(shares.values()))),
+        share=("kind_of_point", np.array(list(shares.values())), _SHARE),
     ).assign_coords(kind_of_point=np.array(list(shares), dtype=str))
+
+
+_SHARE = {"long_name": "part of all points", "units": "1"}
 
 
 def _path_of(ds: "xr.Dataset | Path") -> str:
     if isinstance(ds, str | os.PathLike):
-        return os.fspath(ds)
+        name = os.fspath(ds)
+        if not os.path.exists(name):
+            raise missing(name)
+        return name
     path = ds.attrs.get("path")
     if path is None:
         message = "the dataset is in memory only; compute it with out="
@@ -198,22 +232,49 @@ def _computed(
             message = f"stopped; the finished part is in {store}; the same call resumes"
             raise Interrupted(message, ds)
         return ds
-    folder = tempfile.mkdtemp(prefix="nanotap-")
-    try:
-        store = os.path.join(folder, "dataset.zarr")
-        stopped = _work(recipe, plan, noun, store, chunk, threads, client, progress)
-        ds = open(store).load()
-    finally:
-        shutil.rmtree(folder, ignore_errors=True)
-    del ds.attrs["path"]
-    # The data are in memory, so the store is no longer needed.
-    ds.close()
-    # It may be written elsewhere; the compression of the store no longer applies.
-    ds = ds.drop_encoding()
+    *faster, usual = _temporary_folders()
+    for parent in faster:
+        # It may be too small.
+        with suppress(OSError):
+            ds, stopped = _in_memory(
+                parent, recipe, plan, noun, chunk, threads, client, progress
+            )
+            break
+    else:
+        ds, stopped = _in_memory(
+            usual, recipe, plan, noun, chunk, threads, client, progress
+        )
     if stopped:
         message = "stopped; unfinished values are missing"
         raise Interrupted(message, ds)
     return ds
+
+
+def _temporary_folders() -> list[str | None]:
+    """Where a store is written that is read at once: in memory if the system has such a folder,
+    else where temporary files are (`None`)."""
+    memory = "/dev/shm"
+    return [memory, None] if os.access(memory, os.W_OK | os.X_OK) else [None]
+
+
+def _in_memory(
+    parent: str | None,
+    recipe: "_nanotap.Recipe",
+    plan: "Plan",
+    noun: str,
+    chunk: str,
+    threads: int | None,
+    client: "Client | None",
+    progress: Progress,
+) -> "tuple[xr.Dataset, bool]":
+    """The loaded Dataset of a store in a temporary folder, and whether it was stopped."""
+    with tempfile.TemporaryDirectory(prefix="nanotap-", dir=parent) as folder:
+        store = os.path.join(folder, "dataset.zarr")
+        stopped = _work(recipe, plan, noun, store, chunk, threads, client, progress)
+        ds = _opened(store, None).load()
+        ds.close()
+    del ds.attrs["path"]
+    return ds, stopped
 
 
 def _recipe(plan: "Plan", threads: int | None, progress: Progress) -> "_nanotap.Recipe":

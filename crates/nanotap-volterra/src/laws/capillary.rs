@@ -3,7 +3,7 @@
 //!
 //! `F = −4πγR/(1 + d/h)` between formation at `d = 2h` and rupture at
 //! `d = V^{1/3} − V^{2/3}/(5R)`, `V = 4πRh² + (4/3)πh³ + 2πr²h`, `r³ = 3πγ_sv R²/E*` (Zitzler,
-//! Herminghaus, Mugele, Phys. Rev. B 66, 2002). In contact the force stays as it is at `a0`.
+//! Herminghaus, Mugele, Phys. Rev. B 66, 2002). In contact the force is that at `a0`.
 //! Whether there is a bridge is a state.
 
 use crate::laws::elastic::reduced_modulus;

@@ -122,16 +122,16 @@ pub enum Part {
     Adhesion,
 }
 
-/// A law as the table of laws tells it.
+/// An entry of the table of laws.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Entry {
     /// The name in a case file.
     pub name: &'static str,
-    /// One line on what it is.
+    /// Description in one line.
     pub words: &'static str,
     /// The force as text.
     pub formula: &'static str,
-    /// Where it is from.
+    /// Reference.
     pub source: &'static str,
     /// The parameters, in the order of the formula's own.
     pub parameters: &'static [ParameterEntry],
@@ -141,7 +141,7 @@ pub struct Entry {
     pub conservative: bool,
 }
 
-/// A parameter as the table tells it.
+/// A parameter of the table of laws.
 pub const fn own(
     name: &'static str,
     words: &'static str,

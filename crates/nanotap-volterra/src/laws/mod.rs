@@ -1,8 +1,8 @@
 //! The table of contact laws. A law is one file: its formula and source, its branches, its
-//! stored energy, where it ceases to hold; its parameters are declared once, here, for
-//! whatever reads them.
+//! stored energy and range of validity. Its parameters are declared once, here, for all
+//! readers.
 //!
-//! Lengths, forces and all else may be in any consistent units; the defaults are SI.
+//! All quantities may be in any consistent units; the defaults are SI.
 
 pub mod capillary;
 pub mod dmt;

@@ -1,7 +1,6 @@
 //! A conservative force given by rows, linear between them: any measured or computed curve.
 //!
-//! Below the first gap the first piece goes on, above the last gap the force stays as it is
-//! there. Every piece is a branch; the law's potential is the integral of the polyline. Tip and
+//! Below the first gap the first piece is continued; above the last gap the force is constant. Every piece is a branch; the law's potential is the integral of the polyline. Tip and
 //! sample touch below the contact distance.
 
 use crate::error::VolterraError;
@@ -11,10 +10,10 @@ use crate::laws::{Make, TableLaw};
 use crate::system::MAX_BRANCHES;
 use std::sync::Arc;
 
-/// Most rows: each is a branch, and contact may begin between two of them.
+/// Largest number of rows: each is a branch, and contact may begin between two of them.
 pub const MAX_ROWS: usize = MAX_BRANCHES - 1;
 
-/// The law, with rows for the rest of what says it.
+/// The law; its rows are given in addition.
 pub static TABLE: TableLaw = TableLaw {
     entry: &Entry {
         name: "table",

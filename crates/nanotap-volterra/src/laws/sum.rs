@@ -41,7 +41,7 @@ impl Sum {
         })
     }
 
-    /// The exits of a branch, each with the exits of the terms that it stands for.
+    /// The exits of a branch, each with the corresponding exits of the terms.
     fn ways(&self, branch: usize) -> Vec<(Exit, Vec<(usize, usize)>)> {
         let mut ways: Vec<(Exit, Vec<(usize, usize)>)> = Vec::new();
         let mut stride = 1;

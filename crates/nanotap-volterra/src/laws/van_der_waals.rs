@@ -2,7 +2,7 @@
 //!
 //! Sphere `−H R/(6 d²)`, cone `−H tan²θ/(6 d)`, flat punch `−H R²/(6 d³)` (pairwise summation,
 //! Hamaker, Physica 4, 1937; Israelachvili, Intermolecular and Surface Forces). In contact
-//! (`d < a0`) the force stays as it is at `a0`.
+//! (`d < a0`) the force is that at `a0`.
 
 use crate::law::Approach;
 use crate::laws::elastic::{Shape, contact_ways};

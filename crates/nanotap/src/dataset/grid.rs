@@ -64,6 +64,18 @@ impl Block {
         (0..self.len()).map(|flat| self.entry(flat))
     }
 
+    /// The row-major index of an entry; `None` if it is in another chunk.
+    pub(super) fn position(&self, entry: &[usize]) -> Option<usize> {
+        entry
+            .iter()
+            .zip(&self.ranges)
+            .try_fold(0, |flat, (at, range)| {
+                range
+                    .contains(at)
+                    .then(|| flat * range.len() + (at - range.start))
+            })
+    }
+
     /// The entry at the row-major index `flat`.
     pub fn entry(&self, mut flat: usize) -> Vec<usize> {
         let mut entry = vec![0; self.ranges.len()];

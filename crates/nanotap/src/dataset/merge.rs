@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use super::error::StoreError;
+use super::schema::Schema;
 use super::store::{Store, mismatch, same};
 
 /// Result of a merge.
@@ -28,6 +29,11 @@ pub fn merge(sources: &[PathBuf], target: &Path) -> Result<Merged, StoreError> {
     let mut stores = Vec::with_capacity(sources.len());
     for source in sources {
         let store = Store::open(source)?;
+        if store.missing() == 0 && stores.iter().all(|first| alike(first, &store)) {
+            // It is the whole dataset, and may be divided into other chunks.
+            stores = vec![store];
+            break;
+        }
         if let Some(first) = stores.first() {
             let first: &Store = first;
             if !same(store.metadata(), first.metadata()) {
@@ -64,4 +70,13 @@ pub fn merge(sources: &[PathBuf], target: &Path) -> Result<Merged, StoreError> {
         copied,
         missing,
     })
+}
+
+/// Whether two stores hold the same dataset, however it is divided into chunks.
+fn alike(a: &Store, b: &Store) -> bool {
+    let (a, b) = (a.schema(), b.schema());
+    let lengths = |schema: &Schema| -> Vec<usize> {
+        schema.grid.axes.iter().map(|axis| axis.length).collect()
+    };
+    a.attributes == b.attributes && a.variables == b.variables && lengths(a) == lengths(b)
 }

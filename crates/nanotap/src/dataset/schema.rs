@@ -46,6 +46,18 @@ impl Values {
         }
     }
 
+    /// Copies `count` values from place `start` of `from`, which has the same type, to place `at`.
+    pub(super) fn copy_from(&mut self, at: usize, from: &Self, start: usize, count: usize) {
+        let (to, from_range) = (at..at + count, start..start + count);
+        match (self, from) {
+            (Self::Real(own), Self::Real(v)) => own[to].copy_from_slice(&v[from_range]),
+            (Self::Whole(own), Self::Whole(v)) => own[to].copy_from_slice(&v[from_range]),
+            (Self::Code(own), Self::Code(v)) => own[to].copy_from_slice(&v[from_range]),
+            (Self::Text(own), Self::Text(v)) => own[to].clone_from_slice(&v[from_range]),
+            _ => {}
+        }
+    }
+
     pub(crate) fn kind(&self) -> Kind {
         match self {
             Self::Real(_) => Kind::Real,
@@ -84,6 +96,16 @@ impl Kind {
             Self::Whole => 4,
             Self::Code => 1,
             Self::Text(length) => 4 * length,
+        }
+    }
+
+    /// So many missing values.
+    pub(super) fn missing(self, count: usize) -> Values {
+        match self {
+            Self::Real => Values::Real(vec![f64::NAN; count]),
+            Self::Whole => Values::Whole(vec![0; count]),
+            Self::Code => Values::Code(vec![0; count]),
+            Self::Text(_) => Values::Text(vec![String::new(); count]),
         }
     }
 }

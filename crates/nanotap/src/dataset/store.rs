@@ -10,6 +10,7 @@ use serde_json::{Map, Value, json};
 use super::attributes::differences;
 use super::error::StoreError;
 use super::grid::{Axis, Block, Grid};
+use super::pack;
 use super::schema::{Attributes, Coordinate, Kind, Schema, Values, Variable};
 use super::zarr;
 use crate::dataset::files::{self, is_temporary};
@@ -43,6 +44,15 @@ impl Store {
     pub fn create_or_resume(path: &Path, schema: Schema) -> Result<Self, StoreError> {
         let documents = documents(&schema);
         let metadata = consolidated(&documents);
+        pack::recover(path)?;
+        if let Some(packed) = pack::packed(&schema) {
+            let metadata = consolidated(&self::documents(&packed));
+            let there = fs::read_to_string(path.join(zarr::CONSOLIDATED));
+            if there.is_ok_and(|there| same(&there, &metadata)) {
+                refuse_links(path)?;
+                return Ok(Self::with(path, packed, metadata));
+            }
+        }
         match fs::metadata(path) {
             Err(error) if error.kind() == std::io::ErrorKind::NotFound => {}
             Err(error) => return Err(StoreError::io("look at", path)(error)),
@@ -76,6 +86,7 @@ impl Store {
     /// # Errors
     /// If it does not exist or is not a store of nanotap.
     pub fn open(path: &Path) -> Result<Self, StoreError> {
+        pack::recover(path)?;
         let document = path.join(zarr::CONSOLIDATED);
         let refuse = |what: &str| StoreError::NotAStore {
             path: path.into(),
@@ -212,7 +223,7 @@ impl Store {
         self.write_files(&self.schema.grid.block(chunk), files)
     }
 
-    fn write_files(&self, block: &Block, files: &[Vec<u8>]) -> Result<(), StoreError> {
+    pub(super) fn write_files(&self, block: &Block, files: &[Vec<u8>]) -> Result<(), StoreError> {
         let mut marker = String::new();
         for (variable, bytes) in self.schema.variables.iter().zip(files) {
             write_whole(&self.file(variable, block), bytes)?;
@@ -353,15 +364,23 @@ impl Store {
 /// If a column has the wrong length or type.
 pub fn chunk_files(schema: &Schema, block: &Block, columns: &[Values]) -> Vec<Vec<u8>> {
     assert_eq!(columns.len(), schema.variables.len());
-    let file = |(variable, column): (&Variable, &Values)| {
-        let stride = variable.stride();
-        assert_eq!(
-            (column.len(), column.kind()),
-            (block.len() * stride, variable.kind)
-        );
-        zarr::encode(&padded(&schema.grid, block, column, stride))
-    };
-    schema.variables.iter().zip(columns).map(file).collect()
+    let file = |(variable, column)| encoded(schema, block, column, variable);
+    columns
+        .iter()
+        .enumerate()
+        .map(|(variable, column)| file((variable, column)))
+        .collect()
+}
+
+/// The file of a chunk for a variable, by its index in the schema.
+pub(super) fn encoded(schema: &Schema, block: &Block, column: &Values, variable: usize) -> Vec<u8> {
+    let variable = &schema.variables[variable];
+    let stride = variable.stride();
+    assert_eq!(
+        (column.len(), column.kind()),
+        (block.len() * stride, variable.kind)
+    );
+    zarr::encode(&padded(&schema.grid, block, column, stride))
 }
 
 fn marker_line(name: &str, bytes: &[u8]) -> String {
@@ -370,27 +389,16 @@ fn marker_line(name: &str, bytes: &[u8]) -> String {
 
 /// A column in a full chunk; entries beyond the end of the axes are missing values.
 fn padded(grid: &Grid, block: &Block, column: &Values, stride: usize) -> Values {
-    let full = grid.chunk_entries() * stride;
-    match column {
-        Values::Real(v) => Values::Real(spread(grid, block, v, stride, vec![f64::NAN; full])),
-        Values::Whole(v) => Values::Whole(spread(grid, block, v, stride, vec![0; full])),
-        Values::Code(v) => Values::Code(spread(grid, block, v, stride, vec![0; full])),
-        Values::Text(v) => Values::Text(spread(grid, block, v, stride, vec![String::new(); full])),
+    let mut full = column.kind().missing(grid.chunk_entries() * stride);
+    for index in 0..block.len() {
+        full.copy_from(
+            grid.slot(block, index) * stride,
+            column,
+            index * stride,
+            stride,
+        );
     }
-}
-
-fn spread<T: Clone>(
-    grid: &Grid,
-    block: &Block,
-    from: &[T],
-    stride: usize,
-    mut to: Vec<T>,
-) -> Vec<T> {
-    for (index, values) in from.chunks_exact(stride.max(1)).enumerate() {
-        let slot = grid.slot(block, index) * stride;
-        to[slot..slot + stride].clone_from_slice(values);
-    }
-    to
+    full
 }
 
 fn unpadded<T: Clone>(grid: &Grid, block: &Block, full: &[T], stride: usize) -> Vec<T> {

@@ -14,13 +14,14 @@ use crate::observe::Observables;
 use crate::study::approach::{ApproachReport, Way};
 use crate::study::frequency_modulation::{COLUMNS, Modulated, ModulatedColumn};
 
-/// Amplitude, phase, dissipation and greatest force against the distance, under frequency
-/// modulation its shift, the drive, dissipation and the force that the shifts tell: what was met on the way there and back as marks in two colours, what coexists in a third, the branches as lines, dashed where unstable,
-/// with their bifurcations.
+/// Amplitude, phase, dissipation and peak force against the distance; under frequency modulation the
+/// frequency shift, drive, dissipation and the force by Sader and Jarvis. Motions on approach and
+/// retract are marks in two colours, coexisting ones in a third; branches are lines, dashed where
+/// unstable, with their bifurcations.
 pub fn approach_figure(report: &ApproachReport, units: &Units) -> Figure {
     const SHOWN: [&str; 4] = ["first_harmonic", "phase", "dissipation", "peak_force"];
     let (x_factor, x_unit) = units.axis(Kind::Length, report.from.abs().max(report.to.abs()));
-    // Where the least distance is kept, the amplitude grows with the distance.
+    // At a constant least distance the amplitude grows with the distance.
     let kept = report.modulation.as_ref().and_then(|m| {
         let closest = m.closest?;
         Some((closest, m.amplitude / (report.from - closest)))
@@ -34,7 +35,7 @@ pub fn approach_figure(report: &ApproachReport, units: &Units) -> Figure {
     } else {
         "distance $α₅$"
     };
-    // Amplitude and phase that are held are no news: frequency shift and drive stand for them.
+    // Amplitude and phase are constant: frequency shift and drive are drawn instead.
     let modulated = report.modulation.is_some();
     let of_drive = |names: &[&str]| -> Vec<ApproachPanel> {
         let columns = COLUMNS
@@ -65,7 +66,7 @@ pub fn approach_figure(report: &ApproachReport, units: &Units) -> Figure {
     curves.figure()
 }
 
-/// Curves of approach and retract as they are drawn, in the units shown.
+/// Curves of approach and retract in the units of the figure.
 #[derive(Clone, Debug, Deserialize)]
 pub struct ApproachCurves {
     /// Label of the distance.
@@ -75,7 +76,7 @@ pub struct ApproachCurves {
     /// Whether its values are in equal ratios, as amplitudes are.
     #[serde(default)]
     pub logarithmic: bool,
-    /// What is drawn against it.
+    /// One panel per quantity.
     pub panels: Vec<ApproachPanel>,
 }
 
@@ -85,19 +86,19 @@ pub struct ApproachCurves {
 pub struct ApproachPanel {
     /// Its label.
     pub label: String,
-    /// What size of it matters, where that is known: see [`Axis::natural`].
+    /// Its natural size, if known: see [`Axis::natural`].
     pub natural: Option<f64>,
     /// Whether it is a phase, in degrees.
     pub phase: bool,
-    /// What was met while the lever approached.
+    /// Points of the approach.
     pub approach: Vec<(f64, f64)>,
-    /// What was met while it was retracted.
+    /// Points of the retract.
     pub retract: Vec<(f64, f64)>,
-    /// What neither way met, but coexists.
+    /// Coexisting motions that are on neither way.
     pub coexisting: Vec<(f64, f64)>,
-    /// What else is known of it, as a line.
+    /// Another curve for comparison, as a line.
     pub compared: Vec<(f64, f64)>,
-    /// What that is.
+    /// Label of that curve.
     pub comparison: String,
     /// The branches.
     pub branches: Vec<BranchPoint>,
@@ -106,7 +107,7 @@ pub struct ApproachPanel {
 }
 
 impl ApproachCurves {
-    /// Draws what was met against an amplitude instead; panels without points go.
+    /// Replaces the distance by the amplitude `other(distance)` and removes panels without points.
     fn against(&mut self, other: impl Fn(f64) -> f64) {
         self.x_range = self.x_range.map(&other);
         self.logarithmic = true;
@@ -146,11 +147,11 @@ impl ApproachCurves {
     }
 }
 
-/// An approximation is drawn as far as it is no greater than this many times what was found.
+/// An approximation is drawn up to this multiple of the largest computed value.
 const BEYOND: f64 = 1.2;
 
 impl ApproachPanel {
-    /// What frequency modulation tells; the frequency shift with the first-order one as a line.
+    /// A column of frequency modulation; the frequency shift with the first-order one as a line.
     fn of_drive(
         report: &ApproachReport,
         column: &ModulatedColumn,
@@ -301,7 +302,7 @@ impl ApproachPanel {
     }
 }
 
-/// A curve; of a phase broken where it comes round.
+/// A curve; a phase is interrupted where it wraps around.
 fn unwrapped(phase: bool, curve: impl Iterator<Item = (f64, f64)>) -> Vec<(f64, f64)> {
     let mut points: Vec<(f64, f64)> = Vec::new();
     for (x, y) in curve {

@@ -11,11 +11,11 @@ use crate::model::recording::Recording;
 use crate::study::attractors::{AttractorReport, Attractors};
 use crate::study::lyapunov::{LyapunovReport, Section};
 
-/// Drive periods of a motion that does not repeat that are drawn.
+/// Drive periods that are drawn of a motion that does not repeat.
 const WANDERING_PERIODS: usize = 48;
-/// ModelMap points of such a motion.
+/// Strobe states that are drawn of such a motion.
 const STROBE_POINTS: usize = 3000;
-/// Attractors drawn at most: more cannot be distinguished.
+/// Largest number of attractors drawn: more cannot be distinguished.
 const MOST: usize = 8;
 
 /// Phase portraits and strobe points of every attractor, each in its own colour, and the

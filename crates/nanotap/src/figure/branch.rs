@@ -1,4 +1,5 @@
-//! Figures of branches, stable solid and unstable dashed, and of loci in two parameters.
+//! Figures of branches, stable solid and unstable dashed, and of bifurcation curves in two
+//! parameters.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -8,13 +9,14 @@ use nanotap_figures::{
 };
 use serde::Deserialize;
 
+use crate::case::physical::Kind;
 use crate::case::units::{Units, prefixed};
 use crate::case::{Case, Key};
 pub use crate::figure::shown::Shown;
 use crate::observe::{Observables, PhysicalMotion};
 use crate::study::branch::{BranchReport, PointReport};
 
-/// The parameter's axis: its label and what its values are multiplied with.
+/// The parameter's axis: its label and the factor of its values.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ParameterAxis {
     /// The label, with its unit.
@@ -24,28 +26,31 @@ pub struct ParameterAxis {
 }
 
 impl ParameterAxis {
-    /// The parameter by its symbol, in the model's own units.
+    /// The parameter in the model's own units.
     pub fn of(key: Key) -> Self {
-        let symbol = key.symbol();
-        // A word is no symbol.
-        let label = if symbol.chars().count() <= 2 {
-            format!("${symbol}$")
-        } else {
-            symbol.to_owned()
-        };
-        Self { label, factor: 1.0 }
+        Self {
+            label: key.label(),
+            factor: 1.0,
+        }
     }
 
-    /// The parameter of a case with values up to `size`, in SI where the case has it.
+    /// The parameter of a case with values up to `size`, in SI if the case is physical.
     pub fn of_case(case: &Case, key: Key, size: f64) -> Self {
         case.parameter_unit(key).map_or_else(
             || Self::of(key),
             |unit| {
                 let (factor, name) = prefixed(unit.kind, unit.si, size);
-                // A quantity of a physical case is called by its path.
-                let quantity = unit.quantity.replace(['.', '_'], " ");
+                let label = if key.is_physical() {
+                    key.label()
+                } else {
+                    unit.quantity.to_owned()
+                };
+                let unit = match unit.kind {
+                    Kind::Number => String::new(),
+                    _ => format!(" ({name})"),
+                };
                 Self {
-                    label: format!("{quantity} ({name})"),
+                    label: format!("{label}{unit}"),
                     factor,
                 }
             },
@@ -53,7 +58,7 @@ impl ParameterAxis {
     }
 }
 
-/// The figure of a case's branches: against the parameter, in SI where the case has it.
+/// The figure of a case's branches against the parameter, in SI if the case is physical.
 pub fn case_figure(case: &Case, report: &BranchReport, shown: Option<Shown>) -> Figure {
     let size = report.from.abs().max(report.to.abs());
     let (second, reach) = report.loci.as_ref().map_or((report.key, size), |loci| {
@@ -74,11 +79,11 @@ pub(crate) const MARKS: [(&str, Shape, Colour); 5] = [
     ("crossing", Shape::Cross, Colour::BLACK),
 ];
 
-/// Bifurcations beyond which marks are the smaller ones.
+/// Number of bifurcations beyond which marks are small.
 const MANY: usize = 12;
 
-/// The bifurcations of each kind as marks: of the first size, where there are many of the second,
-/// so that each hides little; grazings in parts of it.
+/// The bifurcations of each kind as marks of the first size, or of the second if there are many;
+/// marks of grazings are smaller by the factor `grazing`.
 pub(crate) fn with_marks(
     mut panel: Panel,
     bifurcations: &[BranchMark],
@@ -108,7 +113,7 @@ pub fn branch_figure(
     axes: &[ParameterAxis; 2],
     units: &Units,
 ) -> Figure {
-    // Where physical quantities vary, the model's units may vary with them: SI then.
+    // Model units may vary with physical quantities: SI then.
     let si = report.points.iter().any(|p| p.physical.is_some());
     let of = |shown: Shown,
               model: &Observables,
@@ -174,16 +179,16 @@ pub fn branch_figure(
     .figure()
 }
 
-/// What size of a quantity matters: of the dissipation the work of the greatest force over the
-/// amplitude, compared with which rounding is negligible; of others it is not known.
+/// Natural size of a quantity: for the dissipation the work of the peak force over the amplitude,
+/// compared with which rounding is negligible; unknown for others, and of exact zeros.
 pub(crate) fn natural_of(shown: Shown, largest: impl Fn(Shown) -> f64) -> Option<f64> {
-    if shown != Shown::named("dissipation")? {
+    if shown != Shown::named("dissipation")? || largest(shown) == 0.0 {
         return None;
     }
     Some(largest(Shown::named("first_harmonic")?) * largest(Shown::named("peak_force")?))
 }
 
-/// The size that chooses a unit: that of the data or, where these are rounding, what matters.
+/// The size that determines the unit: that of the data or, if these are rounding, the natural one.
 pub(crate) fn scale_of(size: f64, natural: Option<f64>) -> f64 {
     match natural {
         Some(natural) if size <= ROUNDING * natural => natural,
@@ -191,14 +196,14 @@ pub(crate) fn scale_of(size: f64, natural: Option<f64>) -> f64 {
     }
 }
 
-/// Branches as they are drawn, in the units shown.
+/// Branches in the units of the figure.
 #[derive(Clone, Debug, Deserialize)]
 pub struct BranchCurves {
     /// Label of the parameter's axis.
     pub x_label: String,
-    /// Label of what is drawn against it.
+    /// Label of the observable.
     pub y_label: String,
-    /// What size of it matters, where that is known: see [`Axis::natural`].
+    /// Natural size of the observable, if known: see [`Axis::natural`].
     #[serde(default)]
     pub natural: Option<f64>,
     /// The orbits, in the order in which they were followed.
@@ -216,11 +221,11 @@ pub struct BranchPoint {
     pub branch: usize,
     /// Its period.
     pub period: usize,
-    /// Whether it attracts.
+    /// Whether it is stable.
     pub stable: bool,
     /// The parameter.
     pub x: f64,
-    /// What is drawn.
+    /// The observable.
     pub y: f64,
 }
 
@@ -231,7 +236,7 @@ pub struct BranchMark {
     pub kind: String,
     /// The parameter.
     pub x: f64,
-    /// What is drawn.
+    /// The observable.
     pub y: f64,
 }
 
@@ -259,7 +264,7 @@ pub struct BifurcationCurve {
     pub x: Vec<f64>,
     /// The second parameter along the curve.
     pub y: Vec<f64>,
-    /// What it meets at its first and last point; empty at the edge of the window.
+    /// The events at its first and last point; empty at the edge of the window.
     #[serde(default)]
     pub meets: [String; 2],
 }
@@ -306,7 +311,7 @@ impl BranchCurves {
                 panel = panel.with(line);
             }
         }
-        // Only for the legend: periods that are nowhere stable, and what dashes mean.
+        // Only for the legend: periods that are nowhere stable, and the meaning of dashes.
         let nowhere = || Line::new([(f64::NAN, f64::NAN)]);
         for period in parts.keys().map(|part| part.0).collect::<BTreeSet<_>>() {
             if !named.contains(&period) {
@@ -370,7 +375,7 @@ impl BifurcationCurves {
     }
 }
 
-/// The marks of what curves end at.
+/// The marks of the events at which curves end.
 const ENDS: [(&str, Shape); 3] = [
     ("grazing", Shape::Circle),
     ("codimension two", Shape::Diamond),

@@ -1,4 +1,4 @@
-//! What tip and sample do to each other: height and force in time, and force against height.
+//! Height of the tip and force against time, and force against height.
 
 use nanotap_figures::{Axis, Band, Colour, DOUBLE_COLUMN, Figure, Legend, Line, Panel, Rule};
 

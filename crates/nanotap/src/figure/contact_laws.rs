@@ -1,5 +1,5 @@
-//! Figures of the same motion on different samples: loops of force and indentation, and what
-//! becomes of them with the drive frequency.
+//! Figures of the same motion under several contact laws: loops of force and indentation, and
+//! dissipation and amplitude against the drive frequency.
 
 use nanotap_figures::{Axis, DOUBLE_COLUMN, Dash, Figure, LINES, Legend, Line, Panel, Rule};
 
@@ -9,8 +9,8 @@ use crate::figure::branch::{Shown, runs};
 use crate::study::branch::PointReport;
 use crate::study::contact_laws::{Comparison, SampleMotion};
 
-/// Loops of force and indentation on each sample; where the orbits were followed, energy
-/// and amplitude against the drive frequency too, unstable dashed.
+/// Loops of force and indentation under each law; if branches were followed, also dissipation and
+/// amplitude against the drive frequency, dashed where unstable.
 pub fn sample_figure(comparison: &Comparison, units: &Units) -> Figure {
     let nonlinear = comparison.samples.iter().any(|s| !s.force_curve.is_empty());
     let loops = if nonlinear {
@@ -29,7 +29,7 @@ pub fn sample_figure(comparison: &Comparison, units: &Units) -> Figure {
         .with(followed_panel(comparison, "first_harmonic", units))
 }
 
-/// The largest size of some numbers.
+/// Largest absolute value.
 fn largest(values: impl Iterator<Item = f64>) -> f64 {
     values.fold(0.0, |m, v| m.max(v.abs()))
 }
@@ -63,7 +63,7 @@ fn loops_panel(comparison: &Comparison, units: &Units) -> Panel {
     let (length, length_unit) = units.axis(Kind::Length, deepest);
     let (force, force_unit) = units.axis(Kind::Force, strongest);
     let mut panel = Panel::new(
-        // Most of the flight is far off and says nothing.
+        // Most of the flight is beyond the range of the force.
         Axis::linear(format!("indentation $-V_T${length_unit}"))
             .range(-0.25 * length * deepest, 1.05 * length * deepest),
         Axis::linear(format!("force on the tip{force_unit}")),

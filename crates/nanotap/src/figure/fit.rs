@@ -1,4 +1,4 @@
-//! Measured curves, what the fitted model says, and the residuals as a picture.
+//! The figure of a fit: measured curves, the fitted model, and the residuals.
 
 use nanotap_figures::{
     Axis, Colour, DOUBLE_COLUMN, Figure, Legend, Line, Markers, Panel, Rule, category,
@@ -16,8 +16,8 @@ use crate::study::frequency_modulation::COLUMNS;
 /// Panels side by side.
 const ACROSS: usize = 3;
 
-/// Each measured quantity with the fit through it and the orbits that the data are not on, and
-/// beneath it the residuals in standard errors.
+/// Each measured quantity with the fit and the other stable orbits, and below it the residuals in
+/// standard errors.
 pub fn fit_figure(report: &FitReport) -> Figure {
     let across = report.columns.len().clamp(1, ACROSS);
     let blocks = report.columns.len().div_ceil(across).max(1);
@@ -46,16 +46,11 @@ pub fn fit_figure(report: &FitReport) -> Figure {
     figure
 }
 
-/// The axis of what was swept, and what its values are to be multiplied with.
+/// The axis of the swept quantity, and the factor of its values.
 fn swept(report: &FitReport) -> (Axis, f64) {
     let key = Key::all().find(|key| key.path() == report.swept);
     let size = report.rows.iter().map(|r| r.at.abs()).fold(0.0, f64::max);
-    let symbol = match key {
-        Some(Key::GapTip) => "distance $z_c$",
-        Some(Key::DriveFrequency) => "drive frequency $f$",
-        Some(key) => key.symbol(),
-        None => &report.swept,
-    };
+    let symbol = key.map_or_else(|| report.swept.clone(), Key::label);
     match key.filter(|key| key.is_physical()).map(Key::kind) {
         Some(kind) if kind != Kind::Number => {
             let (factor, unit) = prefixed(kind, 1.0, size);
@@ -65,7 +60,7 @@ fn swept(report: &FitReport) -> (Axis, f64) {
     }
 }
 
-/// Rows that are drawn alike: their name, colour, and which they are.
+/// Rows in one colour: name, colour and indices.
 fn groups(report: &FitReport) -> Vec<(String, Colour, Vec<&FittedRow>)> {
     let mut names: Vec<(String, Option<Way>)> = Vec::new();
     for row in &report.rows {

@@ -1,4 +1,4 @@
-//! The figures: of each study's report, a description that `nanotap-figures` draws.
+//! The figures: a description of each study's report, which `nanotap-figures` draws.
 
 pub mod approach;
 pub mod attractors;

@@ -17,18 +17,18 @@ use crate::study::fixed_step::FixedStepRun;
 use crate::study::orbit::OrbitReport;
 use crate::study::simulate::{Classification, Simulation};
 
-/// Points on a turn of the fastest mode.
+/// Points per oscillation of the fastest mode.
 const POINTS_PER_TURN: f64 = 16.0;
-/// Fewest points drawn of a drive period.
+/// Smallest number of points per drive period.
 const FEWEST_POINTS: f64 = 240.0;
-/// Most points drawn of a drive period; the modes beyond them leave no visible trace.
+/// Largest number of points per drive period; faster modes are not visible.
 const POINTS_PER_PERIOD: f64 = 3000.0;
 /// Drive periods of a motion that never repeats shown against time.
 const SHOWN_PERIODS: f64 = 16.0;
 /// Drive periods of such a motion shown in the phase portrait.
 const PORTRAIT_PERIODS: f64 = 64.0;
 
-/// A curve of a motion ready to draw, in shown units.
+/// Curves of a motion in the units of the figure.
 struct View<'a> {
     model: &'a Model,
     recording: &'a Recording,
@@ -56,7 +56,7 @@ impl<'a> View<'a> {
         }
     }
 
-    /// Instants that show every turn of every mode and every switch, up to `periods`.
+    /// Instants that resolve every oscillation of every mode and every switch, up to `periods`.
     fn instants(&self, periods: f64) -> Vec<f64> {
         instants(&self.tip, self.model.period(), periods)
     }
@@ -69,7 +69,7 @@ impl<'a> View<'a> {
             .collect()
     }
 
-    /// Piece by piece up to its very end: an impact turns the velocity round at one instant.
+    /// Each piece with both ends: an impact reverses the velocity at one instant.
     fn portrait(&self, periods: f64) -> Vec<(f64, f64)> {
         let end = periods * self.model.period();
         let mut points = Vec::new();
@@ -111,7 +111,8 @@ impl<'a> View<'a> {
         }
     }
 
-    /// So many periods against time, and of the phase portrait, and so many strobe points.
+    /// Drive periods shown against time, drive periods of the phase portrait, and number of strobe
+    /// states.
     fn curves(&self, title: String, shown: f64, portrait: f64, strobes: usize) -> MotionCurves {
         MotionCurves {
             axes: self.axes(),
@@ -122,11 +123,16 @@ impl<'a> View<'a> {
             portrait: self.portrait(portrait),
             strobe: self.strobe(strobes),
             endless: portrait > SHOWN_PERIODS,
+            portrait_label: if portrait < strobes as f64 {
+                format!("first {portrait} drive periods")
+            } else {
+                String::new()
+            },
         }
     }
 }
 
-/// Points that show every turn of every mode on a piece.
+/// Number of points that resolve every oscillation of every mode on a piece.
 pub(crate) fn points_on(curve: &Curve, piece: &CurvePiece, period: f64) -> usize {
     let turns = piece.length * curve.fastest(piece) / std::f64::consts::TAU;
     let share = piece.length / period;
@@ -179,7 +185,7 @@ pub fn portrait(model: &Model, recording: &Recording) -> Vec<(f64, f64)> {
     View::new(model, recording, &Units::Model).portrait(recording.end() / model.period())
 }
 
-/// What a motion is, in few words: "period 4", "chaotic".
+/// The class of a motion: "period 4", "chaotic".
 fn words(classification: Classification, period: Option<usize>) -> String {
     period.map_or_else(
         || classification.name().to_owned(),
@@ -227,7 +233,7 @@ pub fn orbit_figure(model: &Model, orbit: &OrbitReport, units: &Units) -> Figure
     .figure()
 }
 
-/// The same motion with every number of modes, and how far each is from the best.
+/// The same motion with every number of modes, and the difference of each from the best.
 pub fn convergence_figure(convergence: &Convergence, units: &Units) -> Figure {
     /// More lines cannot be distinguished; the first and the last matter.
     const MAX_LINES: usize = 5;
@@ -283,8 +289,8 @@ pub fn convergence_figure(convergence: &Convergence, units: &Units) -> Figure {
         ))
 }
 
-/// What the tip deflection still differs from that with the most modes, against their number;
-/// none where it is not known.
+/// Difference of the tip deflection from that with the most modes against the number of modes;
+/// unknown ones are left out.
 pub fn difference_panel(
     modes: &[usize],
     differences: &[Option<f64>],
@@ -347,10 +353,11 @@ pub fn fixed_step_figure(model: &Model, run: &FixedStepRun, units: &Units) -> Fi
         length: length_unit,
         velocity: velocity_unit,
     };
-    let title = format!(
-        "RK4, {} and {} steps a period: {apparent}",
-        run.steps[0], run.steps[1]
-    );
+    let steps = match run.steps {
+        [flight, contact] if flight == contact => format!("{flight} steps per period"),
+        [flight, contact] => format!("{flight} steps per period, {contact} in contact"),
+    };
+    let title = format!("RK4, {steps}: {apparent}");
     Figure::new(1, 2)
         .width(DOUBLE_COLUMN)
         .height(66.0)

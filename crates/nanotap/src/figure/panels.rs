@@ -1,5 +1,6 @@
-//! Motions as they are drawn: curves in shown units, from a trajectory or from a dataset, and the
-//! panels that show them.
+//! Motions in the units of the figure, from a trajectory or from a dataset, and their panels.
+
+use std::collections::BTreeSet;
 
 use nanotap_figures::{
     Axis, Band, Colour, DOUBLE_COLUMN, Dash, Figure, Legend, Line, Markers, Motion, Panel, Points,
@@ -9,10 +10,10 @@ use serde::Deserialize;
 
 use crate::study::simulate::Classification;
 
-/// ModelMap points beyond which they are drawn as small dots.
+/// Number of strobe states beyond which they are drawn as small dots.
 const FEW_STROBES: usize = 200;
 
-/// What axes of motions are called, and their units.
+/// Names and units of the axes of motions.
 #[derive(Clone, Debug, Default, Deserialize)]
 #[serde(default)]
 pub struct MotionAxes {
@@ -55,11 +56,11 @@ pub(crate) fn time_axis() -> Axis {
 pub struct MotionCurves {
     /// The axes.
     pub axes: MotionAxes,
-    /// What the motion is.
+    /// Title: the class of the motion.
     pub title: String,
-    /// When there is contact, in drive periods.
+    /// Intervals of contact, in drive periods.
     pub contacts: Vec<(f64, f64)>,
-    /// What is touched, against time.
+    /// The surface or stop against time.
     pub surface: Vec<(f64, f64)>,
     /// The tip or mass against time.
     pub tip: Vec<(f64, f64)>,
@@ -67,8 +68,10 @@ pub struct MotionCurves {
     pub portrait: Vec<(f64, f64)>,
     /// Its states at drive phase 0.
     pub strobe: Vec<(f64, f64)>,
-    /// Whether the motion does not repeat in what is drawn: thin lines and small dots then.
+    /// Whether the drawn motion does not repeat: thin lines and small dots then.
     pub endless: bool,
+    /// Label of the line in the phase plane, if it shows fewer periods than the strobe states.
+    pub portrait_label: String,
 }
 
 impl MotionCurves {
@@ -82,10 +85,10 @@ impl MotionCurves {
             .with(self.portrait_panel())
     }
 
-    /// Time series with the contacts shaded and what the tip touches.
+    /// Time series with the contacts shaded, and the surface.
     pub(crate) fn time_panel(&self) -> Panel {
         let [surface, tip] = if self.axes.beam {
-            ["sample, as the base sees it", "tip"]
+            ["sample, relative to the base", "tip"]
         } else {
             ["stop", "mass"]
         };
@@ -111,6 +114,11 @@ impl MotionCurves {
         let line = Line::new(self.portrait.clone())
             .colour(Colour::BLUE)
             .width(if self.endless { 0.3 } else { 0.9 });
+        let line = if self.portrait_label.is_empty() {
+            line
+        } else {
+            line.label(&self.portrait_label)
+        };
         let panel = Panel::new(self.axes.tip(), self.axes.rate())
             .legend(Legend::Above)
             .with(line);
@@ -155,7 +163,7 @@ impl OrbitCurves {
 
     fn harmonics_panel(&self) -> Panel {
         let size = self.harmonics.iter().map(|p| p.1).fold(0.0, f64::max);
-        // What is smaller is rounding of what is largest.
+        // Smaller values are rounding of the largest one.
         let floor = 1e-8 * size;
         let stems = self.harmonics.iter().copied().filter(|p| p.1 > floor);
         let [frequency, symbol] = if self.motion.axes.beam {
@@ -177,7 +185,7 @@ impl OrbitCurves {
         Panel::new(axis, Axis::log(amplitude)).with(Stems::new(stems).colour(Colour::BLUE))
     }
 
-    /// The multipliers and the unit circle that they must lie in.
+    /// The multipliers and the unit circle.
     fn multipliers_panel(&self) -> Panel {
         let largest = self
             .multipliers
@@ -209,11 +217,11 @@ impl OrbitCurves {
     }
 }
 
-/// An attractor as it is drawn.
+/// Curves of an attractor.
 #[derive(Clone, Debug, Default, Deserialize)]
 #[serde(default)]
 pub struct AttractorCurve {
-    /// What it is called, and its share of the starts.
+    /// Name, with its share of the initial states.
     pub name: String,
     /// Name of its class of motions.
     pub classification: String,
@@ -238,7 +246,7 @@ impl AttractorCurve {
     }
 }
 
-/// What a class of motions without a period is, by its name.
+/// The motion of a class without a period, by its name.
 pub(crate) fn motion_of(classification: &str) -> Motion {
     [
         (Classification::QuasiPeriodic, Motion::QuasiPeriodic),
@@ -327,10 +335,22 @@ pub struct SectionCurves {
 }
 
 impl SectionCurves {
+    /// Number of points that differ: a periodic motion has as many as its period.
+    fn distinct_points(&self) -> usize {
+        let size = |of: fn(&(f64, f64)) -> f64| {
+            let sizes = self.points.iter().map(|p| of(p).abs());
+            1e-5 * sizes.fold(f64::MIN_POSITIVE, f64::max)
+        };
+        let (x, y) = (size(|p| p.0), size(|p| p.1));
+        let cell = |p: &(f64, f64)| ((p.0 / x).round() as i64, (p.1 / y).round() as i64);
+        self.points.iter().map(cell).collect::<BTreeSet<_>>().len()
+    }
+
     /// The section, and the exponents with their errors.
     pub fn figure(&self) -> Figure {
-        let diameter = match self.points.len() {
-            0..=500 => 0.8,
+        let diameter = match self.distinct_points() {
+            0..=64 => 1.6,
+            65..=500 => 0.8,
             501..=20_000 => 0.3,
             _ => 0.15,
         };

@@ -1,5 +1,7 @@
 //! Reconstructed force and dissipation against distance.
 
+use std::ops::Range;
+
 use nanotap_figures::{
     Axis, Colour, DOUBLE_COLUMN, Dash, Figure, Legend, Line, Markers, Panel, Rule,
 };
@@ -39,12 +41,23 @@ fn largest<'a>(values: impl IntoIterator<Item = &'a f64>) -> f64 {
         .fold(0.0, |size: f64, value| size.max(value.abs()))
 }
 
+/// The rows of the table that are drawn: from the closest approach of a row of the data on.
+fn shown(report: &ReconstructReport) -> Range<usize> {
+    let closest = report.rows.iter().map(|row| row.closest);
+    let closest = closest.fold(f64::INFINITY, f64::min);
+    let end = report.shown_rows();
+    let nodes = &report.table.distance[..end];
+    let beyond = nodes.iter().take_while(|node| **node < closest).count();
+    beyond.min(end - 1)..end
+}
+
 /// Axis of the distance, its factor, and the distances shown.
 fn distance(report: &ReconstructReport) -> (Axis, f64, [f64; 2]) {
-    let nodes = &report.table.distance[..report.shown_rows()];
+    let nodes = &report.table.distance[shown(report)];
     let (factor, unit) = unit(report, Kind::Length, largest(nodes));
     let (low, high) = (nodes[0], nodes[nodes.len() - 1]);
-    let range = [low, high + 0.15 * (high - low)];
+    let margin = 0.15 * (high - low);
+    let range = [low - margin, high + margin];
     let axis = Axis::linear(format!("tip–sample distance $d${unit}"));
     (
         axis.range(factor * range[0], factor * range[1]),
@@ -74,7 +87,7 @@ fn force_panel(report: &ReconstructReport) -> Panel {
     let (axis, along, range) = distance(report);
     let inside = |x: f64| (range[0]..=range[1]).contains(&x);
     let curve = &report.table;
-    let shown = &curve.force[..report.shown_rows()];
+    let shown = &curve.force[shown(report)];
     let (factor, unit) = unit(report, Kind::Force, largest(shown));
     let mut panel = Panel::new(axis, Axis::linear(format!("force on the tip{unit}")))
         .legend(Legend::Above)

@@ -1,4 +1,4 @@
-//! The figure of a scan: line traces of one line, pictures of an image.
+//! The figure of a scan: curves of a single line, images of several lines.
 
 use nanotap_figures::{
     Axis, Band, Colour, DOUBLE_COLUMN, Dash, Figure, Heatmap, Legend, Line, ONE_AND_A_HALF_COLUMNS,

@@ -1,4 +1,4 @@
-//! What of a motion a figure shows along an axis.
+//! The quantity of a motion that a figure shows along an axis.
 
 use crate::case::Case;
 use crate::case::physical::Kind;
@@ -8,7 +8,8 @@ use crate::observe::table::shown_phase;
 use crate::observe::{Dimension, Observable, Observables};
 use crate::study::orbit::spectral_radius;
 
-/// What of an orbit is drawn: an observable that is one number, or what its multipliers say.
+/// The quantity of an orbit that is drawn: an observable that is one number, or the largest
+/// multiplier.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Shown {
     /// An observable.
@@ -29,7 +30,7 @@ impl Shown {
         Some(Self::Observable(observable))
     }
 
-    /// Every choice by name, and what it is.
+    /// Every choice: name and description.
     pub fn choices() -> impl Iterator<Item = (&'static str, &'static str)> {
         crate::observe::OBSERVABLES
             .iter()
@@ -38,8 +39,8 @@ impl Shown {
             .chain([(SPECTRAL_RADIUS, "largest modulus of a multiplier")])
     }
 
-    /// The default observable of a case's branches: the greatest displacement, but of an
-    /// oscillator with a wall that is where the wall stands.
+    /// The default observable of a case's branches: the largest displacement; the impact speed with a
+    /// rigid stop, at which the largest displacement is constant.
     pub fn usual(case: &Case) -> Self {
         let name = if case.has_rigid_stop() {
             "impact_speed"
@@ -57,7 +58,7 @@ impl Shown {
         }
     }
 
-    /// Its value; not a number where the motion has none.
+    /// Its value; NaN if the motion has none.
     pub(crate) fn of(self, observables: &Observables, multipliers: &[[f64; 2]]) -> f64 {
         match self {
             Self::SpectralRadius => spectral_radius(multipliers),
@@ -72,15 +73,15 @@ impl Shown {
         }
     }
 
-    /// Whether it is an angle, which comes round.
+    /// Whether it is an angle, which wraps around.
     pub(crate) fn is_phase(self) -> bool {
         self.observable()
             .is_some_and(|o| o.dimension == Dimension::Angle)
     }
 
-    /// The label of its axis, of a cantilever or an oscillator, for values up to `size`, and
-    /// what they are to be multiplied with. `si` says what a value of 1 is in SI, if that is
-    /// known. Energies are in electronvolts then.
+    /// Label of its axis for values up to `size`, and the factor of the values. `beam`: of a
+    /// cantilever, not of an oscillator. `si` gives the SI value of 1, if known; energies are then in
+    /// electronvolts.
     pub(crate) fn axis(
         self,
         beam: bool,
@@ -95,7 +96,7 @@ impl Shown {
             return (label, 1.0);
         };
         if kind == Kind::Energy {
-            // The joule's prefixes stand for the electronvolt's.
+            // The electronvolt has the prefixes of the joule.
             let (factor, unit) = prefixed(kind, si / JOULES_PER_ELECTRONVOLT, size);
             return (format!("{label} ({})", unit.replace('J', "eV")), factor);
         }

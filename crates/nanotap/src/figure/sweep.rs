@@ -1,4 +1,4 @@
-//! The figure of a sweep: a bifurcation diagram, or a map of what motions there are.
+//! The figure of a sweep: a bifurcation diagram, or a map of motions.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -17,16 +17,16 @@ use crate::observe::table::shown_phase;
 use crate::study::simulate::Classification;
 use crate::study::sweep::{FromNeighbour, class_of, from_neighbours};
 
-/// Categories of a map, and periods of a diagram, that get a colour of their own.
+/// Largest number of categories of a map, and of periods of a diagram, with separate colours.
 const MAX_CATEGORIES: usize = 12;
-/// What is beyond them.
+/// Colour of all others.
 const OTHERS: Colour = Colour::rgb(222, 222, 222);
 
 /// An axis of a sweep's grid.
 #[derive(Clone, Debug, Deserialize)]
 pub struct GridAxis {
-    /// The parameter's symbol, or its path in a physical case.
-    pub symbol: String,
+    /// What it is, without the unit.
+    pub label: String,
     /// SI unit; empty in the model's own units.
     #[serde(default)]
     pub units: String,
@@ -42,9 +42,9 @@ pub struct GridAxis {
 /// parameters, then the starts.
 #[derive(Clone, Debug, Deserialize)]
 pub struct SweepTable {
-    /// One parameter, or two of which the first is drawn upwards.
+    /// One parameter, or two; of two the first is the vertical axis.
     pub axes: Vec<GridAxis>,
-    /// Which way each start was followed (`up`, `down`); empty where it was not.
+    /// Direction in which each start was followed (`up`, `down`); empty if it was not.
     pub directions: Vec<String>,
     /// SI unit of the maxima; empty in the model's own units.
     #[serde(default)]
@@ -55,20 +55,20 @@ pub struct SweepTable {
     /// Period of each motion; 0 where it has none.
     #[serde(default)]
     pub period: Vec<i32>,
-    /// Maxima of the tip deflection in each of so many drive periods, motion by motion; none of a
+    /// Maxima of the tip deflection in each recorded drive period, motion by motion; empty for a
     /// sweep over two parameters.
     #[serde(default)]
     pub period_max: Vec<f64>,
-    /// Orbits that no start met, but that those of neighbouring values lead to.
+    /// Orbits that no start reached, continued from neighbouring values.
     #[serde(default)]
     pub neighbours: Vec<FromNeighbour>,
 }
 
-/// Direction and motion of a cloud of points; no motion: one too rare to be named.
+/// Direction and motion of a cloud of points; `None`: a motion too rare for the legend.
 type CloudOf<'a> = (&'a str, Option<Motion>);
 
 impl SweepTable {
-    /// What a finished dataset holds.
+    /// Reads a finished dataset.
     ///
     /// # Errors
     /// If chunks are missing or cannot be read.
@@ -122,7 +122,7 @@ impl SweepTable {
         Ok(table)
     }
 
-    /// The figure: of one parameter a bifurcation diagram, of two a map of motions. None if the
+    /// The figure: a bifurcation diagram of one parameter, a map of motions over two. `None` if the
     /// columns do not fill the grid.
     pub fn figure(&self) -> Option<Figure> {
         let points: usize = self.axes.iter().map(|axis| axis.values.len()).product();
@@ -141,13 +141,13 @@ impl SweepTable {
         }
     }
 
-    /// What a motion is, as far as its colour goes; none of one that is missing.
+    /// The motion, which determines its colour; `None` if it is missing.
     fn motion(&self, cell: usize) -> Option<Motion> {
         motion(self.classification[cell], self.period[cell])
     }
 
-    /// Per-period maxima of the tip deflection over one parameter, a colour a motion; where motions
-    /// were followed, both directions upon each other above that, a colour a direction.
+    /// Maxima of the tip deflection per period over one parameter, one colour per motion; if motions
+    /// were followed, above that both directions, one colour each.
     fn diagram(&self, x: &GridScale) -> Figure {
         let starts = self.directions.len();
         let cells = self.classification.len();
@@ -159,7 +159,7 @@ impl SweepTable {
         let mut frequent: Vec<Motion> = counts.keys().copied().collect();
         frequent.sort_by_key(|motion| std::cmp::Reverse(counts[motion]));
         frequent.truncate(MAX_CATEGORIES);
-        // None of what is too rare to be named.
+        // `None`: motions too rare for the legend.
         let mut clouds: BTreeMap<CloudOf<'_>, Vec<(f64, f64)>> = BTreeMap::new();
         for cell in 0..cells {
             let Some(motion) = self.motion(cell) else {
@@ -180,7 +180,7 @@ impl SweepTable {
                 .or_default();
             cloud.extend(row.iter().filter(|y| y.is_finite()).map(|y| (at, *y)));
         }
-        // Where motions are followed, hysteresis is what is to be seen.
+        // Followed motions show hysteresis.
         let drawn = self.directions.iter().all(String::is_empty);
         for orbit in self.neighbours.iter().filter(|_| drawn) {
             let (Some(&at), Some(motion)) = (x.values.get(orbit.at[0]), orbit.motion()) else {
@@ -208,7 +208,7 @@ impl SweepTable {
             by_direction.entry(direction).or_default().extend(&points);
             by_motion.entry(motion).or_default().extend(points);
         }
-        // Chaos is drawn first: it lies under what is periodic.
+        // Chaos is drawn first, below periodic motions.
         let motions = by_motion
             .iter()
             .rev()
@@ -222,7 +222,7 @@ impl SweepTable {
         if drawn {
             return Figure::new(1, 1).width(DOUBLE_COLUMN).with(motions);
         }
-        // "up" before "down", whose smaller marks lie upon it.
+        // "up" first: the smaller marks of "down" lie above.
         let directions = by_direction.iter().rev().map(|(direction, points)| {
             let (part, colour) = of_direction(direction);
             cloud(points, part)
@@ -236,7 +236,7 @@ impl SweepTable {
             .with(motions)
     }
 
-    /// What motions there are over two parameters.
+    /// Map of the motions over two parameters.
     fn map(&self, x: &GridScale, y: &GridScale) -> Panel {
         let starts = self.directions.len();
         let mut found: Vec<BTreeSet<Option<Motion>>> = (0..x.values.len() * y.values.len())
@@ -275,7 +275,7 @@ impl SweepTable {
             .map(|motions| Some(index.get(motions).copied().unwrap_or(named.len())))
             .collect();
         let mut layer = GridScale::map(x, y, &cells);
-        // Several motions at one place have a colour that none of those alone has.
+        // A set of several motions has a separate colour.
         let alone: BTreeSet<Motion> = named
             .iter()
             .filter(|motions| motions.len() == 1)
@@ -306,13 +306,13 @@ impl SweepTable {
 }
 
 impl FromNeighbour {
-    /// What it is, as far as its colour goes; none of what does not repeat.
+    /// The motion, which determines its colour; `None` if it does not repeat.
     fn motion(&self) -> Option<Motion> {
         (self.period > 0).then_some(Motion::Periodic(self.period))
     }
 }
 
-/// What a code and a period mean; none of what is missing.
+/// The motion of a code and a period; `None` if it is missing.
 pub(crate) fn motion(code: u8, period: i32) -> Option<Motion> {
     Some(match class_of(code)? {
         Classification::Periodic => Motion::Periodic(usize::try_from(period).unwrap_or(0)),
@@ -323,7 +323,7 @@ pub(crate) fn motion(code: u8, period: i32) -> Option<Motion> {
     })
 }
 
-/// Size and colour of the marks of a direction: those of "down" lie upon those of "up".
+/// Size and colour of the marks of a direction; those of "down" lie above those of "up".
 fn of_direction(direction: &str) -> (f64, Colour) {
     if direction == "down" {
         (1.0, Colour::VERMILLION)
@@ -332,7 +332,7 @@ fn of_direction(direction: &str) -> (f64, Colour) {
     }
 }
 
-/// What deflections are multiplied with, and their unit (empty in the model's own units).
+/// Factor and unit of deflections (empty in the model's own units).
 fn deflection(units: &str, values: impl Iterator<Item = f64>) -> (f64, String) {
     if units != "m" {
         return (1.0, String::new());
@@ -353,8 +353,8 @@ pub fn figure(store: &Store) -> Result<Figure, StoreError> {
     Ok(SweepTable::of(store)?.figure().unwrap_or_default())
 }
 
-/// Amplitude and phase at the drive's frequency over one parameter, a colour a direction of
-/// following: resonance curves; over two parameters maps of the motions and of what one measures.
+/// Amplitude and phase at the drive frequency over one parameter, one colour per direction
+/// (resonance curves); over two parameters maps of the motions and of the measured quantities.
 ///
 /// # Errors
 /// If chunks are missing or cannot be read.
@@ -401,11 +401,11 @@ pub fn response(store: &Store) -> Result<Figure, StoreError> {
                 Legend::Above
             });
         let mut named = BTreeSet::new();
-        // "up" before "down", whose smaller marks lie upon it.
+        // "up" first: the smaller marks of "down" lie above.
         for ((direction, _), mut curve) in curves.into_iter().rev() {
             curve.sort_by(|a, b| a.0.total_cmp(&b.0));
             let (part, colour) = of_direction(&direction);
-            // What was met is a list of motions: marks, so that a jump is not a line.
+            // Marks, so that a jump is not drawn as a line.
             let marks = curve.into_iter().map(|(at, y)| (at, factor * y));
             let mut layer = Points::new(marks).diameter(0.6 * part).colour(colour);
             if !direction.is_empty() && named.insert(direction.clone()) {
@@ -418,8 +418,8 @@ pub fn response(store: &Store) -> Result<Figure, StoreError> {
     Ok(figure)
 }
 
-/// Over two parameters a map of what motions there are, and what would be measured of the first
-/// start's: amplitude, phase, greatest force, dissipation and time in contact.
+/// Maps over two parameters: the motions, and amplitude, phase, peak force, dissipation and contact
+/// time of the first start's.
 fn maps(store: &Store) -> Result<Figure, StoreError> {
     const SHOWN: [&str; 5] = [
         "first_harmonic",
@@ -460,8 +460,8 @@ fn maps(store: &Store) -> Result<Figure, StoreError> {
     Ok(figure)
 }
 
-/// What is shown of the motions of the first start over two parameters, row by row, and whether
-/// it is in SI.
+/// A quantity of the motions of the first start over two parameters, row by row, and whether it is
+/// in SI.
 fn of_first_start(store: &Store, shown: Shown) -> Result<(Vec<f64>, bool), StoreError> {
     let schema = store.schema();
     let [rows, columns] = [0, 1].map(|axis| schema.grid.axes[axis].length);
@@ -502,45 +502,41 @@ impl GridAxis {
         let text = |c: &Coordinate, key: &str| Some(c.attributes.get(key)?.as_str()?.to_owned());
         let said = |key: &str| coordinate.and_then(|c| text(c, key));
         Self {
-            symbol: said("symbol").unwrap_or_else(|| name.clone()),
+            label: said("label").unwrap_or_else(|| name.replace(['.', '_'], " ")),
             units: said("units").unwrap_or_default(),
             log: said("spacing").as_deref() == Some("log"),
             values: schema.axis_values(axis),
         }
     }
 
-    /// How it is drawn.
+    /// Its values and label in the units of the figure.
     pub(crate) fn shown(&self) -> GridScale {
         let kind = Kind::ALL
             .into_iter()
             .find(|kind| *kind != Kind::Number && kind.si_unit() == self.units);
-        // A quantity of a physical case is called by its path: drive.frequency.
-        let words = self.symbol.replace(['.', '_'], " ");
-        let (factor, label, unit) = match kind {
+        let (factor, unit) = match kind {
             Some(kind) => {
                 let size = self
                     .values
                     .iter()
                     .fold(0.0, |size: f64, v| size.max(v.abs()));
-                let (factor, unit) = prefixed(kind, 1.0, size);
-                (factor, words, unit.clone())
+                prefixed(kind, 1.0, size)
             }
-            None if self.symbol.contains('.') => (1.0, words, String::new()),
-            None => (1.0, format!("${}$", self.symbol), String::new()),
+            None => (1.0, String::new()),
         };
         GridScale {
             values: self.values.iter().map(|v| factor * v).collect(),
-            label,
+            label: self.label.clone(),
             unit,
             log: self.log,
         }
     }
 }
 
-/// Cells along an axis whose values are not even.
+/// Number of cells along an axis with uneven values.
 const CELLS: usize = 800;
 
-/// The values of a parameter as they are shown.
+/// The values of a parameter in the units of the figure.
 pub(crate) struct GridScale {
     pub(crate) values: Vec<f64>,
     label: String,
@@ -559,7 +555,7 @@ impl GridScale {
         axis.unit(&self.unit).tight()
     }
 
-    /// A map of what there is at each point of a grid, row by row.
+    /// A map of the categories of a grid, row by row.
     pub(crate) fn map(x: &Self, y: &Self, points: &[Option<usize>]) -> CategoryMap {
         let (columns, rows) = (x.cells(), y.cells());
         let width = x.values.len();
@@ -591,8 +587,8 @@ impl GridScale {
         )
     }
 
-    /// The value of each cell: they themselves, or the nearest one to each of many even cells
-    /// where they are not even themselves.
+    /// Index of the value in each cell: one cell per value, or many even cells with the nearest value
+    /// if the values are uneven.
     fn cells(&self) -> Vec<usize> {
         let last = self.values.len() - 1;
         if !self.is_uneven() {
@@ -612,7 +608,7 @@ impl GridScale {
         (0..CELLS).map(nearest).collect()
     }
 
-    /// Whether the values go neither in equal steps nor, on a logarithmic axis, in equal ratios.
+    /// Whether the values have neither equal steps nor, on a logarithmic axis, equal ratios.
     fn is_uneven(&self) -> bool {
         let [from, to] = [self.values.first(), self.values.last()].map(Option::<&f64>::copied);
         let (Some(from), Some(to)) = (from, to) else {

@@ -1,4 +1,4 @@
-//! The figure of an operating window: what there is at each point.
+//! The figure of an operating window: the condition at each point.
 
 use nanotap_figures::{Colour, Figure, Legend, ONE_AND_A_HALF_COLUMNS, Panel};
 
@@ -20,7 +20,7 @@ const fn colour(condition: Condition) -> Colour {
 /// The map of a finished dataset, with the share of each condition in its legend.
 ///
 /// # Errors
-/// When a chunk is missing or damaged, or the dataset is no sweep over two parameters.
+/// When a chunk is missing or damaged, or the dataset is not a sweep over two parameters.
 pub fn figure(store: &Store) -> Result<Figure, StoreError> {
     let window = Window::of(store)?;
     let (y, x) = (

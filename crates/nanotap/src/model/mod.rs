@@ -60,12 +60,23 @@ pub enum ModelError {
     /// Its equations cannot be solved in closed form.
     #[error(transparent)]
     Flow(#[from] FlowError),
-    /// Its force law makes no sense, or its modes cannot be had.
+    /// Its force law makes no sense, or its modes cannot be computed.
     #[error(transparent)]
     Nonlinear(#[from] nanotap_volterra::VolterraError),
 }
 
 /// A piecewise-linear system with names for what it shows.
+///
+/// ```
+/// use nanotap::model::Model;
+/// use nanotap::model::cantilever::Cantilever;
+///
+/// let model = Model::cantilever(&Cantilever::paper())?;
+/// // Deflections and velocities of three modes.
+/// assert_eq!(model.dimension(), 6);
+/// assert!((model.period() - std::f64::consts::TAU / 2.6).abs() < 1e-15);
+/// # Ok::<(), nanotap::model::ModelError>(())
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Model {
     /// The system.

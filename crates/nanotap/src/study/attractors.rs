@@ -12,6 +12,7 @@ use serde::Serialize;
 use crate::Error;
 use crate::case::Case;
 use crate::case::physical::Physical;
+use crate::case::units::Units;
 use crate::model::Model;
 use crate::model::model_map::ModelMap;
 use crate::observe::time_series::state_names;
@@ -128,6 +129,20 @@ pub struct Side {
     pub lower: f64,
     /// Upper end.
     pub upper: f64,
+    /// The ends in SI, of a physical case.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub physical: Option<SideInSi>,
+}
+
+/// A side of the box of initial states in SI.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct SideInSi {
+    /// Lower end.
+    pub lower: f64,
+    /// Upper end.
+    pub upper: f64,
+    /// The unit, `m` or `m/s`.
+    pub unit: &'static str,
 }
 
 /// A fraction of the initial states.
@@ -202,6 +217,14 @@ impl Attractors {
                 (None, None) => None,
             };
         }
+        let units = Units::Si(view.scales);
+        for side in &mut self.sides {
+            side.physical = units.of_entry(&side.coordinate).map(|(kind, si)| SideInSi {
+                lower: si * side.lower,
+                upper: si * side.upper,
+                unit: kind.si_unit(),
+            });
+        }
         for orbit in self.unstable.iter_mut().flatten() {
             let (observables, spectrum) = (&orbit.motion.observables, &orbit.motion.spectrum);
             orbit.physical = Some(PhysicalMotion::alone(observables, Some(spectrum), view));
@@ -274,6 +297,22 @@ const OUT_OF_BOUNDS: f64 = 1e6;
 
 /// Finds coexisting attractors by sampling initial states.
 ///
+/// ```
+/// use nanotap::case::Case;
+/// use nanotap::control::Control;
+/// use nanotap::model::cantilever::Cantilever;
+/// use nanotap::study::attractors::{AttractorsOptions, attractors};
+///
+/// let paper = Cantilever { alpha1: 0.0, omega: 20.0, ..Cantilever::paper() };
+/// let options = AttractorsOptions { starts: Some(64), ..AttractorsOptions::default() };
+/// let found = attractors(&Case::from(paper).model()?, &options, &Control::default())?;
+/// let mut periods: Vec<_> = found.attractors.iter().filter_map(|one| one.orbit.as_ref()).collect();
+/// periods.sort_by_key(|orbit| orbit.period);
+/// // Two orbits coexist, of periods 1 and 4.
+/// assert_eq!(periods.iter().map(|orbit| orbit.period).collect::<Vec<_>>(), [1, 4]);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+///
 /// # Errors
 /// When the options are invalid for the model, or an attractor cannot be measured.
 pub fn attractors(
@@ -298,7 +337,7 @@ pub fn attractors(
         }
         _ => {}
     }
-    let start_box = box_with(model, &options.sides.numbers()?)?;
+    let start_box = box_with(model, &options.sides.of_entries(&Units::Model)?)?;
     let set = match starts {
         Some(count) => StartSet::given(start_box.starts_until(options.seed, count, control)),
         None => default_starts(model, options.seed)?,
@@ -327,6 +366,7 @@ pub fn attractors(
             coordinate,
             lower,
             upper,
+            physical: None,
         })
         .collect();
     described(model, &found, &set, (options, &budgets), sides, unstable)
@@ -618,6 +658,7 @@ impl Study for AttractorsStudy {
         });
         let options = AttractorsOptions {
             seeds: seeds.collect(),
+            sides: Intervals::from_iter(options.sides.of_entries(&case.units())?),
             ..options.clone()
         };
         let mut found = attractors(&model, &options, control)?;

@@ -78,6 +78,20 @@ pub struct LyapunovReport {
 
 /// Computes the Lyapunov spectrum and a Poincaré section of the motion of `model`.
 ///
+/// ```
+/// use nanotap::case::Case;
+/// use nanotap::control::Control;
+/// use nanotap::model::cantilever::Cantilever;
+/// use nanotap::study::lyapunov::{LyapunovOptions, lyapunov};
+///
+/// let model = Case::from(Cantilever::paper()).model()?;
+/// let options = LyapunovOptions { periods: 2000, ..LyapunovOptions::default() };
+/// let report = lyapunov(&model, &options, &Control::default())?;
+/// // Chaos at Ω = 2.6: the largest exponent is about 0.25 per drive period.
+/// assert!((report.exponents[0] - 0.25).abs() < 5.0 * report.errors[0]);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+///
 /// # Errors
 /// When the initial state is invalid, the flow fails, or the work was cancelled.
 pub fn lyapunov(

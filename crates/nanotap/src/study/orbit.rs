@@ -105,6 +105,19 @@ pub const MAX_HARMONICS: usize = 100_000;
 
 /// Finds a periodic orbit of `model`.
 ///
+/// ```
+/// use nanotap::case::Case;
+/// use nanotap::model::cantilever::Cantilever;
+/// use nanotap::study::orbit::{OrbitOptions, orbit, spectral_radius};
+///
+/// let model = Case::from(Cantilever { omega: 20.0, ..Cantilever::paper() }).model()?;
+/// let found = orbit(&model, &OrbitOptions::default())?;
+/// assert!(found.period == 1 && found.stable);
+/// // The largest multiplier, as `nanotap orbit` prints it.
+/// assert!((spectral_radius(&found.multipliers) - 0.978321).abs() < 1e-6);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+///
 /// # Errors
 /// When no orbit is found, with the reason.
 pub fn orbit(model: &Model, options: &OrbitOptions) -> Result<OrbitReport, Error> {

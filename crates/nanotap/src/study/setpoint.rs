@@ -150,6 +150,21 @@ impl SetpointReport {
 
 /// Solves the setpoint of a physical case for the distance.
 ///
+/// ```
+/// use nanotap::case::Case;
+/// use nanotap::case::physical::Catalogue;
+/// use nanotap::control::Control;
+/// use nanotap::study::setpoint::solve_setpoint;
+/// use std::path::Path;
+///
+/// let file = Path::new("../../docs/cases/stiff-lever.toml");
+/// let case = Case::load(Some(file), &[], &Catalogue::shared())?;
+/// let report = solve_setpoint(&case, &Control::default())?;
+/// // A = 0.8 A₀ at 15.20 nm (docs/cases/stiff-lever.md).
+/// assert!((report.zc() - 15.201e-9).abs() < 2e-12);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+///
 /// # Errors
 /// When there is none to solve, or none is reached on approach.
 pub fn solve_setpoint(case: &Case, control: &Control<'_>) -> Result<SetpointReport, Error> {

@@ -22,7 +22,9 @@ use crate::study::attractors::MAX_STARTS;
 use crate::study::limits::MAX_PERIOD;
 use crate::study::request::options;
 use crate::study::simulate::Classification;
-use crate::study::sweep::{FromNeighbour, Starts, Sweep, SweepOptions, class_of, from_neighbours};
+use crate::study::sweep::{
+    FromNeighbour, Starts, Sweep, SweepOptions, class_of, from_neighbours, held,
+};
 use crate::study::value::Axes;
 use crate::study::{DatasetPlan, DatasetStudy};
 
@@ -111,6 +113,9 @@ pub struct Window {
     pub conditions: Vec<Vec<Condition>>,
     /// Part of all points, by condition; every one is there.
     pub shares: BTreeMap<&'static str, f64>,
+    /// What stays while the parameters vary although it was not stated, in SI.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    pub held: BTreeMap<String, f64>,
 }
 
 /// One motion found from one start.
@@ -200,6 +205,7 @@ impl Window {
             y: schema.axis_values(0),
             conditions,
             shares,
+            held: held(store),
         })
     }
 
@@ -292,6 +298,29 @@ impl WindowOptions {
 }
 
 /// The operating window.
+///
+/// ```
+/// use nanotap::case::Case;
+/// use nanotap::control::Control;
+/// use nanotap::dataset::{Share, Store, Work};
+/// use nanotap::model::cantilever::Cantilever;
+/// use nanotap::study::DatasetStudy as _;
+/// use nanotap::study::window::{WindowOptions, WindowStudy};
+///
+/// let case = Case::from(Cantilever::paper());
+/// let over = serde_json::json!({"over": ["omega=2.95:3.05:2", "alpha4=19:20:2"], "starts": 4});
+/// let options: WindowOptions = serde_json::from_value(over)?;
+/// let plan = WindowStudy::plan(&case, &options, &Control::default())?;
+/// let folder = std::env::temp_dir().join(format!("nanotap-window-{}", std::process::id()));
+/// let store = Store::create_or_resume(&folder, plan.schema().clone())?;
+/// let work = Work { share: Share::WHOLE, threads: 0, control: Control::default() };
+/// plan.compute(&store, &work)?;
+/// let window = WindowStudy::report(&store)?;
+/// // One motion of period 1 is found at each of the four points.
+/// assert_eq!(window.shares["one-period-1"], 1.0);
+/// # std::fs::remove_dir_all(&folder)?;
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Copy, Debug)]
 pub struct WindowStudy;
 

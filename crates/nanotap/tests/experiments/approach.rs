@@ -72,7 +72,7 @@ fn a_stiff_lever_of_high_q_jumps_at_the_ends_of_its_branches() {
             assert!((sight.first_harmonic / report.free_amplitude - 1.0).abs() < 1e-9);
         }
     }
-    let [interval] = report.hysteresis[..] else {
+    let [interval] = &report.hysteresis[..] else {
         panic!("{:?}", report.hysteresis);
     };
     assert!((interval.near / report.free_reach - 1.0).abs() < 1e-4);
@@ -252,7 +252,7 @@ free_amplitude = \"10 nm\"
 #[test]
 fn hysteresis_does_not_depend_on_the_spacing_of_rows() {
     let case = studied(MICA, &["gap.tip=7.127 nm"]);
-    let nm = 1e-9 / case.physical().unwrap().scales.length;
+    let nm = 1e-9;
     for points in [40, 80, 160] {
         let options = ApproachOptions {
             from: Some((12.0 * nm).into()),
@@ -279,7 +279,7 @@ fn hysteresis_does_not_depend_on_the_spacing_of_rows() {
         )
     });
     assert_eq!(ends[0], ends[1]);
-    let farthest = ends[0].0[0];
+    let farthest = &ends[0].0[0];
     assert!((farthest.far / nm - 10.0286).abs() < 1e-3, "{farthest:?}");
     let states = states_near(&case.with(case.gap_key(), 6.0 * nm), 8, &Control::default()).unwrap();
     assert_eq!(states.len(), 2);
@@ -325,13 +325,14 @@ fn a_slow_ramp_is_the_quasi_static_curve() {
         ..ApproachOptions::default()
     };
     let settled = curve(&case, &options);
+    let velocity = case.physical().unwrap().scales.velocity;
     assert!(settled.jumps.is_empty() && settled.hysteresis.is_empty());
     let errors = [2000.0, 8000.0].map(|periods| {
         let speed = (settled.from - settled.to) / (periods * period);
         let ramp = curve(
             &case,
             &ApproachOptions {
-                speed: Some(speed.into()),
+                speed: Some((speed * velocity).into()),
                 ..options.clone()
             },
         );
@@ -351,7 +352,7 @@ fn a_slow_ramp_is_the_quasi_static_curve() {
         "{errors:?}"
     );
     let fast = ApproachOptions {
-        speed: Some((settled.from / period).into()),
+        speed: Some((velocity * settled.from / period).into()),
         ..options.clone()
     };
     let error = approach(&case, &fast, &Control::default()).unwrap_err();
@@ -463,18 +464,18 @@ fn invalid_curves_are_refused() {
         },
         "at least 1",
     );
-    for (from, to) in [
-        (0.0, 1.0),
-        (1.0, 1.0),
-        (f64::NAN, 0.0),
-        (f64::INFINITY, 0.0),
+    for (from, to, words) in [
+        (0.0, 1e-9, "from far to near"),
+        (1e-9, 1e-9, "from far to near"),
+        (f64::NAN, 0.0, "expected a length"),
+        (f64::INFINITY, 0.0, "expected a length"),
     ] {
         let options = ApproachOptions {
             from: Some(from.into()),
             to: Some(to.into()),
             ..plain()
         };
-        refused(options, "from far to near");
+        refused(options, words);
     }
     let still = studied(STIFF, &["drive.free_amplitude=0 nm"]);
     let error = approach(&still, &plain(), &Control::default()).unwrap_err();

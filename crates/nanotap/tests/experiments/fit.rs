@@ -44,10 +44,9 @@ impl Noise {
 
 /// Distance (nm), amplitude (nm), phase (deg) and direction of an approach curve, without noise.
 fn curve(case: &Case, from: f64, to: f64, points: usize) -> Vec<(f64, f64, f64, Way)> {
-    let length = case.physical().unwrap().scales.length;
     let options = ApproachOptions {
-        from: Some((from * 1e-9 / length).into()),
-        to: Some((to * 1e-9 / length).into()),
+        from: Some((from * 1e-9).into()),
+        to: Some((to * 1e-9).into()),
         points,
         branches: false,
         ..ApproachOptions::default()
@@ -940,10 +939,9 @@ const FOLLOWED: &str = "[model]\nmodes = 1\n[cantilever]\nk = \"40 N/m\"\nf0 = \
 /// The approach curve of `approach` under frequency modulation, with noise of the shift (Hz) and of
 /// the drive ratio.
 fn modulated(case: &Case, range: [f64; 2], points: usize, noise: Option<u64>) -> Table {
-    let length = case.physical().unwrap().scales.length;
     let options = ApproachOptions {
-        from: Some((range[0] * 1e-9 / length).into()),
-        to: Some((range[1] * 1e-9 / length).into()),
+        from: Some((range[0] * 1e-9).into()),
+        to: Some((range[1] * 1e-9).into()),
         points,
         branches: false,
         fm: true,

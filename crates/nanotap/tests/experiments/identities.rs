@@ -25,7 +25,7 @@ fn largest_deviation(set: &[&str]) -> f64 {
     let options = ApproachOptions {
         points: 25,
         branches: false,
-        to: Some((2e-9 / resolved.scales.length).into()),
+        to: Some((2e-9).into()),
         ..ApproachOptions::default()
     };
     let curve = approach(&lever, &options, &Control::default()).unwrap();
@@ -98,10 +98,9 @@ fn the_setpoint_lies_on_the_approach_curve() {
     let text = STIFF.replace("[gap]\ntip = \"15 nm\"\n", "");
     let lever = studied(&text, &["drive.setpoint=0.6", "drive.frequency_ratio=1"]);
     let report = solve_setpoint(&lever, &Control::default()).unwrap();
-    let scale = lever.physical().unwrap().scales.length;
     let options = ApproachOptions {
-        from: Some(((report.zc() + 1e-12) / scale).into()),
-        to: Some(((report.zc() - 1e-12) / scale).into()),
+        from: Some((report.zc() + 1e-12).into()),
+        to: Some((report.zc() - 1e-12).into()),
         points: 3,
         branches: false,
         ..ApproachOptions::default()

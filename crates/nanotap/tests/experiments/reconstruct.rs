@@ -206,8 +206,8 @@ fn frequency_shifts_give_the_force_of_the_law() {
     let case = Case::parse(None, &words.map(str::to_owned)).unwrap();
     let scales = case.physical().unwrap().scales;
     let options = ApproachOptions {
-        from: Some((16e-9 / scales.length).into()),
-        to: Some((9e-9 / scales.length).into()),
+        from: Some((16e-9).into()),
+        to: Some((9e-9).into()),
         points: 80,
         fm: true,
         branches: false,

@@ -23,7 +23,7 @@ fn reference(q: f64, amplitude: f64, gap: f64) -> Case {
 
 /// A curve between distances in nm.
 fn modulated(case: &Case, (from, to): (f64, f64), points: usize) -> ApproachReport {
-    let unit = 1e-9 / case.physical().unwrap().scales.length;
+    let unit = 1e-9;
     let options = FrequencyModulationOptions {
         from: Some((from * unit).into()),
         to: Some((to * unit).into()),
@@ -184,7 +184,7 @@ fn orbits_have_the_requested_amplitude_and_phase() {
         for phase in [60.0, 90.0, 110.0] {
             let options = FrequencyModulationOptions {
                 points: 6,
-                to: Some((10e-9 / case.physical().unwrap().scales.length).into()),
+                to: Some((10e-9).into()),
                 phase,
                 ..FrequencyModulationOptions::default()
             };
@@ -276,7 +276,7 @@ fn a_hysteretic_law_dissipates_the_area_of_its_loop() {
 fn the_shift_against_the_amplitude_at_a_fixed_closest_distance() {
     let case = reference(1e6, 10.0, 11.0);
     let scales = case.physical().unwrap().scales;
-    let unit = 1e-9 / scales.length;
+    let unit = 1e-9;
     let (stiffness, strength, closest) = (40.0, 2e-19 * 10e-9 / 6.0, 1e-9);
     let options = FrequencyModulationOptions {
         from: Some((401.0 * unit).into()),
@@ -347,15 +347,14 @@ fn the_shift_against_the_amplitude_at_a_fixed_closest_distance() {
 #[test]
 fn a_shift_has_its_distances() {
     let case = air(10.0, 11.0, &DMT);
-    let scales = case.physical().unwrap().scales;
-    let unit = 1e-9 / scales.length;
+    let unit = 1e-9;
     let at = |shift: f64| {
         let options = FrequencyModulationOptions {
             from: Some((12.0 * unit).into()),
             to: Some((9.5 * unit).into()),
             points: 12,
             phase: 90.0,
-            shift: Some((shift / scales.frequency).into()),
+            shift: Some(shift.into()),
             ..FrequencyModulationOptions::default()
         };
         let report = frequency_modulation(&case, &options, &Control::default()).unwrap();
@@ -377,7 +376,7 @@ fn a_shift_has_its_distances() {
     assert!(reported.peak_force > 0.0);
     assert!((seen.peak_force / reported.peak_force - 1.0).abs() < 1e-6);
     assert!((seen.first_harmonic / reported.first_harmonic - 1.0).abs() < 1e-8);
-    let force = drive.drive_strength / scales.force;
+    let force = drive.drive_strength / case.physical().unwrap().scales.force;
     assert!((force / one.modulation.unwrap().drive_strength - 1.0).abs() < 1e-14);
 }
 
@@ -395,7 +394,7 @@ fn the_first_order_takes_a_driven_base_into_account() {
                 "drive.actuation=base",
             ];
             let case = lever((40.0, 5.0, "100 kHz"), (10.0, 11.5), &sample);
-            let unit = 1e-9 / case.physical().unwrap().scales.length;
+            let unit = 1e-9;
             let options = FrequencyModulationOptions {
                 from: Some((12.0 * unit).into()),
                 to: Some((11.5 * unit).into()),
@@ -428,7 +427,7 @@ fn a_neck_at_drive_phase_0_loses_no_orbit() {
     ];
     let case = lever((2.8 * MODAL, 10.6016, "75 kHz"), (30.0, 20.0), &neck);
     let options = FrequencyModulationOptions {
-        to: Some((-10e-9 / case.physical().unwrap().scales.length).into()),
+        to: Some((-10e-9).into()),
         points: 20,
         phase: 68.7,
         ..FrequencyModulationOptions::default()

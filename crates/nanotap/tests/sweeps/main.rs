@@ -10,4 +10,5 @@ mod damaged;
 mod datasets;
 mod folder;
 mod neighbours;
+mod packing;
 mod physics;

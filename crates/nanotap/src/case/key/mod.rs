@@ -230,6 +230,8 @@ pub struct Entry {
     pub alias: Option<&'static str>,
     /// Symbol in formulas and on axes; if empty, its path.
     pub symbol: &'static str,
+    /// Words and symbol on the axis of a figure, of a quantity; if empty, its path in words.
+    pub label: &'static str,
     /// Type of its value.
     pub takes: Takes,
     /// Range of its value.
@@ -333,6 +335,31 @@ impl Key {
         match self.entry().symbol {
             "" => self.path(),
             symbol => symbol,
+        }
+    }
+
+    /// Title of the axis of a figure, without the unit.
+    ///
+    /// ```
+    /// use nanotap::case::Key;
+    /// assert_eq!(Key::find("gap.tip").unwrap().label(), "distance $z_c$");
+    /// assert_eq!(Key::find("alpha4").unwrap().label(), "contact stiffness $α₄$");
+    /// assert_eq!(Key::find("sample.film_thickness").unwrap().label(), "sample film thickness");
+    /// ```
+    pub fn label(self) -> String {
+        let entry = self.entry();
+        match (entry.label, entry.symbol) {
+            ("", "") => self.path().replace(['.', '_'], " "),
+            // A word is not a symbol.
+            ("", word) if word.chars().count() > 2 => word.to_owned(),
+            ("", symbol) => {
+                let words = match self.alias().unwrap_or(entry.name) {
+                    "omega" => "drive_frequency",
+                    name => name,
+                };
+                format!("{} ${symbol}$", words.replace('_', " "))
+            }
+            (label, _) => label.to_owned(),
         }
     }
 

@@ -130,6 +130,30 @@ impl Study for FitStudy {
 
 /// Finds the free parameters, for each of the laws to compare.
 ///
+/// ```
+/// use nanotap::case::Case;
+/// use nanotap::case::physical::Catalogue;
+/// use nanotap::case::table::Table;
+/// use nanotap::control::Control;
+/// use nanotap::study::fit::{FitOptions, fit};
+/// use std::path::Path;
+///
+/// let file = Path::new("../../docs/cases/stiff-lever.toml");
+/// let case = Case::load(Some(file), &[], &Catalogue::shared())?;
+/// let data = Table::read(Path::new("../../docs/cases/polystyrene-curve.csv"))?;
+/// let options = FitOptions {
+///     data: vec![data],
+///     free: ["sample.modulus", "gap.offset"].map(str::to_owned).to_vec(),
+///     profile: false,
+///     ..FitOptions::default()
+/// };
+/// let found = fit(&case, &options, &Control::default())?;
+/// // The curve was made with 4 GPa, and with distances 0.3 nm too large.
+/// let [modulus, offset] = [0, 1].map(|k| found.parameters[k].value);
+/// assert!((modulus - 4e9).abs() < 0.2e9 && (offset.abs() - 0.3e-9).abs() < 0.05e-9);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+///
 /// # Errors
 /// If the data or the parameters are invalid, or no orbit is found for the data.
 pub fn fit(case: &Case, request: &FitOptions, control: &Control<'_>) -> Result<FitReport, Error> {

@@ -193,7 +193,7 @@ pub const COLUMNS: [ModulatedColumn; 8] = [
     },
     ModulatedColumn {
         name: "drive_ratio",
-        label: "drive over free drive",
+        label: "drive / free drive",
         kind: None,
         of: |m| Some(m.drive_ratio),
     },
@@ -337,6 +337,29 @@ pub fn frequency_modulation(
 }
 
 /// Approach and retract curve under frequency modulation.
+///
+/// ```
+/// use nanotap::case::Case;
+/// use nanotap::case::physical::Catalogue;
+/// use nanotap::control::Control;
+/// use nanotap::study::Study as _;
+/// use nanotap::study::frequency_modulation::{FrequencyModulationOptions, FrequencyModulationStudy};
+/// use std::path::Path;
+///
+/// let file = Path::new("../../docs/cases/fm-lever.toml");
+/// let case = Case::load(Some(file), &[], &Catalogue::shared())?;
+/// let options = FrequencyModulationOptions {
+///     from: Some("14 nm".into()),
+///     to: Some("11 nm".into()),
+///     points: 4,
+///     ..FrequencyModulationOptions::default()
+/// };
+/// let curve = FrequencyModulationStudy::run(&case, &options, &Control::default())?;
+/// let nearest = curve.table.iter().filter_map(|point| point.modulation_si.as_ref()).nth(3);
+/// // 1 nm from the surface (docs/cases/frequency-modulation.md).
+/// assert!(nearest.is_some_and(|row| (row.frequency_shift + 8.664588).abs() < 1e-5));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Copy, Debug)]
 pub struct FrequencyModulationStudy;
 

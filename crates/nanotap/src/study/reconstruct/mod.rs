@@ -145,6 +145,24 @@ struct Prepared {
 
 /// Reconstructs force and dissipation.
 ///
+/// ```
+/// use nanotap::case::Case;
+/// use nanotap::case::physical::Catalogue;
+/// use nanotap::case::table::Table;
+/// use nanotap::control::Control;
+/// use nanotap::study::reconstruct::{ReconstructOptions, reconstruct};
+/// use std::path::Path;
+///
+/// let file = Path::new("../../docs/cases/stiff-lever.toml");
+/// let case = Case::load(Some(file), &[], &Catalogue::shared())?;
+/// let data = Table::read(Path::new("../../docs/cases/polystyrene-curve.csv"))?;
+/// let options = ReconstructOptions { data: vec![data], ..ReconstructOptions::default() };
+/// let found = reconstruct(&case, &options, &Control::default())?;
+/// // The sample is stiff: the tip indents it by less than 1.5 nm, at forces up to some 30 nN.
+/// assert!(found.closest > -1.5e-9 && found.table.force.iter().any(|force| *force > 10e-9));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+///
 /// # Errors
 /// When the data are not understood, too few rows feel the sample, no smooth force describes them,
 /// or the work is cancelled.

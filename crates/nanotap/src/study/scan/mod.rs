@@ -41,6 +41,22 @@ use recorder::LineRecord;
 use run::{Recorded, run};
 
 /// A scan under feedback.
+///
+/// ```
+/// use nanotap::case::Case;
+/// use nanotap::case::physical::Catalogue;
+/// use nanotap::control::Control;
+/// use nanotap::study::Study as _;
+/// use nanotap::study::scan::{ScanOptions, ScanStudy};
+/// use std::path::Path;
+///
+/// let file = Path::new("../../docs/cases/scan-step.toml");
+/// let case = Case::load(Some(file), &[], &Catalogue::shared())?;
+/// let report = ScanStudy::run(&case, &ScanOptions::default(), &Control::default())?;
+/// // Behind the plateau the tip flies for 367 drive periods (docs/cases/scan.md).
+/// assert_eq!(report.lines[0].parachuting[0].periods, 367);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Copy, Debug)]
 pub struct ScanStudy;
 

@@ -121,6 +121,19 @@ const ARRIVED: f64 = 1e-11;
 
 /// Runs `model`.
 ///
+/// ```
+/// use nanotap::case::Case;
+/// use nanotap::model::cantilever::Cantilever;
+/// use nanotap::study::simulate::{SimulateOptions, simulate};
+///
+/// let model = Case::from(Cantilever { omega: 3.0, ..Cantilever::paper() }).model()?;
+/// let run = simulate(&model, &SimulateOptions::default())?;
+/// assert_eq!(run.period, Some(1));
+/// // What is recorded is the orbit itself.
+/// assert!(run.distance_to_orbit.is_some_and(|distance| distance < 1e-10));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+///
 /// # Errors
 /// When the state does not fit or the flow fails.
 pub fn simulate(model: &Model, options: &SimulateOptions) -> Result<Simulation, Error> {

@@ -5,6 +5,7 @@ use nanotap_dynamics::Control;
 use super::{Follow, Over, Starts, Summary, Sweep};
 use crate::Error;
 use crate::case::Case;
+use crate::case::units::Units;
 use crate::dataset::{Store, StoreError};
 use crate::study::attractors::MAX_STARTS;
 use crate::study::limits::{MAX_PERIOD, MAX_PERIODS};
@@ -69,7 +70,7 @@ impl SweepOptions {
     }
 
     /// Where motions start.
-    pub(super) fn starts(&self) -> Result<Starts, Error> {
+    pub(super) fn starts(&self, units: &Units) -> Result<Starts, Error> {
         match (self.starts, &self.state) {
             (Some(_), Some(_)) => Err(Error::input(
                 "starts and state: the starts are drawn, or given",
@@ -83,7 +84,7 @@ impl SweepOptions {
             (Some(count), None) => Ok(Starts::Seeded {
                 count,
                 seed: self.seed,
-                sides: self.sides.numbers()?,
+                sides: self.sides.of_entries(units)?,
             }),
             (None, Some(state)) => Ok(Starts::Given(state.clone())),
             (None, None) => Ok(Starts::Rest),
@@ -97,6 +98,28 @@ impl SweepOptions {
 }
 
 /// Runs over one or two parameters.
+///
+/// ```
+/// use nanotap::case::Case;
+/// use nanotap::control::Control;
+/// use nanotap::dataset::{Share, Store, Work};
+/// use nanotap::model::cantilever::Cantilever;
+/// use nanotap::study::DatasetStudy as _;
+/// use nanotap::study::sweep::{SweepOptions, SweepStudy};
+///
+/// let case = Case::from(Cantilever::paper());
+/// let options = SweepOptions::over(["omega=2.5,3.0"]);
+/// let plan = SweepStudy::plan(&case, &options, &Control::default())?;
+/// let folder = std::env::temp_dir().join(format!("nanotap-sweep-{}", std::process::id()));
+/// let store = Store::create_or_resume(&folder, plan.schema().clone())?;
+/// let work = Work { share: Share::WHOLE, threads: 0, control: Control::default() };
+/// plan.compute(&store, &work)?;
+/// let summary = SweepStudy::report(&store)?;
+/// // At Ω = 3 the motion repeats every drive period.
+/// assert_eq!((summary.runs, summary.periods[&1] >= 1), (2, true));
+/// # std::fs::remove_dir_all(&folder)?;
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Copy, Debug)]
 pub struct SweepStudy;
 

@@ -1,0 +1,132 @@
+//! Finished datasets in few files: the same values, resumed, merged and recovered as before.
+
+use std::path::Path;
+
+use nanotap::case::Case;
+use nanotap::dataset::{Store, Values, Work, finish, merge};
+use nanotap::model::cantilever::Cantilever;
+use nanotap::study::Computation as _;
+use nanotap::study::sweep::{Summary, Sweep, SweepOptions};
+use nanotap_dynamics::Control;
+
+use crate::folder::{Folder, assert_same, bytes};
+
+/// 40 × 6 values × 2 starts: hundreds of chunk files, as of a large sweep.
+fn sweep() -> Sweep {
+    let options = SweepOptions {
+        starts: Some(2),
+        seed: 7,
+        periods: 3,
+        ..SweepOptions::over(["omega=2.8:3.2:40", "alpha4=18:22:6"])
+    };
+    Sweep::new(&Case::from(Cantilever::paper().with_modes(1)), options).unwrap()
+}
+
+fn share(of: &str) -> Work<'static> {
+    Work {
+        share: of.parse().unwrap(),
+        threads: 2,
+        control: Control::default(),
+    }
+}
+
+fn computed(sweep: &Sweep, path: &Path, of: &str) -> Store {
+    let store = Store::create_or_resume(path, sweep.schema().clone()).unwrap();
+    sweep.compute(&store, &share(of)).unwrap();
+    store
+}
+
+/// All values of every variable, by entry of the grid.
+fn values(store: &Store) -> Vec<Vec<(Vec<usize>, Values)>> {
+    let schema = store.schema();
+    let of = |variable: usize| {
+        let stride = schema.variables[variable].stride();
+        let mut all = Vec::new();
+        for chunk in 0..store.chunks() {
+            let block = schema.grid.block(chunk);
+            let read = store.read_chunk(&block, variable).unwrap().numbers();
+            for (entry, row) in block.entries().zip(read.chunks(stride)) {
+                all.push((entry, Values::Real(row.to_vec())));
+            }
+        }
+        all.sort_by(|a, b| a.0.cmp(&b.0));
+        all
+    };
+    (0..schema.variables.len()).map(of).collect()
+}
+
+#[test]
+fn a_finished_dataset_has_few_files_and_the_same_values() {
+    let folder = Folder::new();
+    let path = folder.join("s.zarr");
+    let sweep = sweep();
+    let store = computed(&sweep, &path, "1/1");
+    let (before, files) = (values(&store), bytes(&path).len());
+    let packed = finish(store).unwrap();
+    assert!(files > 500 && bytes(&path).len() < 120, "{files}");
+    assert_eq!(packed.missing(), 0);
+    // NaN is not equal to itself.
+    assert_eq!(format!("{:?}", values(&packed)), format!("{before:?}"));
+    assert_eq!(
+        Summary::of(&packed).unwrap(),
+        Summary::of(&Store::open(&path).unwrap()).unwrap()
+    );
+    // The same command again finds everything done, and leaves every byte.
+    let there = bytes(&path);
+    let again = finish(computed(&sweep, &path, "1/1")).unwrap();
+    assert_eq!((again.missing(), bytes(&path)), (0, there));
+}
+
+#[test]
+fn shares_that_are_merged_come_to_the_same_bytes() {
+    let folder = Folder::new();
+    let sweep = sweep();
+    let whole = folder.join("whole.zarr");
+    finish(computed(&sweep, &whole, "1/1")).unwrap();
+    let parts = ["1/2", "2/2"].map(|of| {
+        let path = folder.join(&format!("{}.zarr", &of[..1]));
+        let store = computed(&sweep, &path, of);
+        // A share stays in the chunks of work.
+        assert!(finish(store).unwrap().missing() > 0);
+        path
+    });
+    let merged = folder.join("merged.zarr");
+    assert!(merge(&parts, &merged).unwrap().missing.is_empty());
+    finish(computed(&sweep, &merged, "1/1")).unwrap();
+    assert_same(&whole, &merged);
+    // A whole dataset and a share of it are the whole.
+    let both = folder.join("both.zarr");
+    merge(&[parts[0].clone(), whole.clone()], &both).unwrap();
+    assert_same(&whole, &both);
+}
+
+/// A kill between the two renames leaves the dataset under another name; it is put back.
+#[test]
+fn what_a_kill_left_is_put_back() {
+    let folder = Folder::new();
+    let path = folder.join("s.zarr");
+    let sweep = sweep();
+    drop(computed(&sweep, &path, "1/1"));
+    let before = bytes(&path);
+    std::fs::rename(&path, folder.join(".s.zarr.old.tmp")).unwrap();
+    assert_eq!(Store::open(&path).unwrap().missing(), 0);
+    assert_eq!(bytes(&path), before);
+}
+
+/// A damaged chunk of a finished dataset is computed again.
+#[test]
+fn a_damaged_chunk_is_computed_again() {
+    let folder = Folder::new();
+    let path = folder.join("s.zarr");
+    let sweep = sweep();
+    finish(computed(&sweep, &path, "1/1")).unwrap();
+    let before = bytes(&path);
+    let file = path.join("tip_max").join("0.0.0");
+    assert!(file.exists());
+    std::fs::write(&file, b"damaged").unwrap();
+    let store = Store::create_or_resume(&path, sweep.schema().clone()).unwrap();
+    assert_eq!(store.missing(), 1);
+    sweep.compute(&store, &share("1/1")).unwrap();
+    finish(store).unwrap();
+    assert_eq!(bytes(&path), before);
+}

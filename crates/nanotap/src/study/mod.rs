@@ -18,6 +18,7 @@ pub mod limits;
 pub mod lyapunov;
 pub mod mode_share;
 pub mod modes;
+pub mod noise;
 pub mod orbit;
 pub mod proof;
 #[cfg(feature = "fit")]
@@ -79,6 +80,7 @@ pub static STUDIES: &[StudyEntry] = &[
     StudyEntry::of::<lyapunov::LyapunovStudy>(),
     StudyEntry::of::<convergence::ConvergenceStudy>(),
     StudyEntry::of::<contact_laws::ContactLawsStudy>(),
+    StudyEntry::of::<noise::NoiseStudy>(),
     StudyEntry::of::<scan::ScanStudy>(),
 ];
 

@@ -225,8 +225,10 @@ fn hysteresis_does_not_depend_on_the_spacing_of_rows() {
     });
     assert_eq!(ends[0], ends[1]);
     let farthest = &ends[0].0[0];
-    assert!((farthest.far / nm - 10.0286).abs() < 1e-3, "{farthest:?}");
-    let states = states_near(&case.with(case.gap_key(), 6.0 * nm), 8, &Control::default()).unwrap();
+    let far = farthest.physical.as_ref().unwrap()["far"];
+    assert!((far / nm - 10.0286).abs() < 1e-3, "{farthest:?}");
+    let near = case.with(case.key("gap.tip").unwrap(), 6.0 * nm);
+    let states = states_near(&near, 8, &Control::default()).unwrap();
     assert_eq!(states.len(), 2);
 }
 

@@ -363,6 +363,9 @@ impl ApproachReport {
             ("free_amplitude", Kind::Length, self.free_amplitude),
             ("free_reach", Kind::Length, self.free_reach),
         ]);
+        if let (Some(numbers), Some(height)) = (&mut self.physical, self.beam_clearance) {
+            numbers.insert("beam_clearance", units.scaled(Kind::Length, height));
+        }
         let keeps_amplitude = self.modulation.is_some();
         let intervals = std::mem::take(&mut self.hysteresis).into_iter();
         self.hysteresis = intervals

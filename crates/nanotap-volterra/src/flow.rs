@@ -13,8 +13,8 @@ use std::sync::Arc;
 
 /// Switches at one instant after which the law is reported to switch endlessly.
 const MOST_SWITCHES_AT_ONCE: usize = 64;
-/// What a step costs, in steps of the approximate flow.
-const STEP_COST: u64 = 100;
+/// What a factorisation costs, in steps of the approximate flow; an evaluation of the force costs one.
+const FACTORISATION_COST: u64 = 16;
 /// The first step of a run: a quarter of the longest.
 const FIRST_INDEX: usize = 4;
 /// A guard that is not certainly positive must be resolved to this fraction of its size.
@@ -91,6 +91,8 @@ pub struct Flow {
     /// Length numbers that were accepted last on each branch.
     hints: Vec<usize>,
     work: Work,
+    /// Cost of work that clones did.
+    added_cost: u64,
 }
 
 impl Clone for Flow {
@@ -111,6 +113,7 @@ impl Clone for Flow {
             reached: self.reached,
             hints: self.hints.clone(),
             work: self.work.clone(),
+            added_cost: self.added_cost,
         }
     }
 }
@@ -169,6 +172,7 @@ impl Flow {
                 scratch: Vec::new(),
                 modal: vec![0.0; system.dimension()],
             },
+            added_cost: 0,
             system,
         };
         let state = vec![0.0; flow.system.dimension()];
@@ -196,12 +200,12 @@ impl Flow {
     /// Cost of the runs so far, in steps of the approximate flow.
     pub fn cost(&self) -> u64 {
         let statistics = self.solver.statistics;
-        STEP_COST * (statistics.steps + statistics.refused)
+        statistics.evaluations + FACTORISATION_COST * statistics.factorisations + self.added_cost
     }
 
     /// Adds the cost of work that a clone did.
     pub fn add_cost(&mut self, cost: u64) {
-        self.solver.statistics.steps += cost / STEP_COST;
+        self.added_cost += cost;
     }
 
     /// The time reached.

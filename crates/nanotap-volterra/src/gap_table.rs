@@ -15,7 +15,7 @@ const ACCURACY: f64 = 1e-6;
 const REACH: f64 = 2.0;
 
 /// The force on one branch over `√|level − gap|`, in which it is analytic up to the level at
-/// which the branch ends. A force that is affine in the gap's rate has a second table.
+/// which the branch ends. A force may be affine in the gap's rate.
 #[derive(Clone, Debug)]
 struct Curve {
     level: f64,
@@ -23,10 +23,15 @@ struct Curve {
     side: f64,
     /// Intervals a unit of the root.
     density: f64,
-    /// At −1, 0, 1 … intervals.
-    values: Vec<f64>,
-    /// The derivative by the rate there; empty where the force is none of the rate.
-    by_rate: Vec<f64>,
+    values: Values,
+}
+
+/// A sixth of the force at −1, 0, 1 … intervals.
+#[derive(Clone, Debug)]
+enum Values {
+    OfGap(Vec<f64>),
+    /// At no rate, and its derivative by the rate.
+    OfRate(Vec<[f64; 2]>),
 }
 
 /// The force of a law, tabulated on the branches where the law solves an equation for it or has
@@ -109,26 +114,43 @@ impl Curve {
             let values = std::iter::once(before).chain((0..=INTERVALS + 1).map(value));
             values.collect::<Vec<f64>>()
         };
+        let forces = table(&|k| at(k, 0.0));
+        let by_rate = if rates {
+            table(&|k| (at(k, reach) - at(k, -reach)) / (2.0 * reach))
+        } else {
+            Vec::new()
+        };
+        if forces.iter().chain(&by_rate).any(|v| !v.is_finite()) {
+            return None;
+        }
+        let size = |values: &[f64]| values.iter().fold(0.0, |m: f64, v| m.max(v.abs()));
+        let sizes = [size(&forces), size(&by_rate)];
+        let values = if rates {
+            let pairs = forces.iter().zip(&by_rate);
+            Values::OfRate(pairs.map(|(a, b)| [a / 6.0, b / 6.0]).collect())
+        } else {
+            Values::OfGap(forces.iter().map(|v| v / 6.0).collect())
+        };
         let curve = Self {
             level,
             side,
             density,
-            values: table(&|k| at(k, 0.0)),
-            by_rate: if rates {
-                table(&|k| (at(k, reach) - at(k, -reach)) / (2.0 * reach))
-            } else {
-                Vec::new()
-            },
+            values,
         };
-        let mut all = curve.values.iter().chain(&curve.by_rate);
-        let finite = all.all(|v| v.is_finite());
-        (finite && curve.agrees_with(|gap, rate| law.value(branch, gap, rate))).then_some(curve)
+        let local =
+            |k: usize, rate: f64| forces[k].abs() + rate * by_rate.get(k).map_or(0.0, |v| v.abs());
+        let agrees = curve.agrees_with(sizes, local, |gap, rate| law.value(branch, gap, rate));
+        agrees.then_some(curve)
     }
 
-    /// Whether it is accurate between its points.
-    fn agrees_with(&self, force: impl Fn(f64, f64) -> f64) -> bool {
-        let size = |values: &[f64]| values.iter().fold(0.0, |m: f64, v| m.max(v.abs()));
-        let sizes = [size(&self.values), size(&self.by_rate)];
+    /// Whether it is accurate between its points: for the sizes of the force and of its derivative by
+    /// the rate, and the size of the force near an interval at a rate.
+    fn agrees_with(
+        &self,
+        sizes: [f64; 2],
+        size_near: impl Fn(usize, f64) -> f64,
+        force: impl Fn(f64, f64) -> f64,
+    ) -> bool {
         (1..CHECKS).all(|check| {
             let k = check * INTERVALS / CHECKS;
             let root = (k as f64 + 0.5) / self.density;
@@ -139,10 +161,7 @@ impl Curve {
                 0.0
             };
             let [found, expected] = [self.at(gap, rate), Some(force(gap, rate))];
-            let near = |k: usize| {
-                self.values[k].abs() + rate * self.by_rate.get(k).map_or(0.0, |v| v.abs())
-            };
-            let local = near(k).max(near(k + 1));
+            let local = size_near(k, rate).max(size_near(k + 1, rate));
             found
                 .zip(expected)
                 .is_some_and(|(a, b)| (a - b).abs() <= ACCURACY * local.max(1e-6 * sizes[0]))
@@ -165,12 +184,14 @@ impl Curve {
             return None;
         }
         let by_root = self.read(k, weights_of_slope(t), rate)?;
-        let root = (k as f64 + t) / self.density;
-        let by_rate = if self.by_rate.is_empty() {
-            0.0
-        } else {
-            read(&self.by_rate, k, weights(t))?
+        let by_rate = match &self.values {
+            Values::OfGap(_) => 0.0,
+            Values::OfRate(pairs) => {
+                let near = pairs.get(k..k + 4)?.iter().zip(weights(t));
+                near.map(|([_, by_rate], weight)| by_rate * weight).sum()
+            }
         };
+        let root = (k as f64 + t) / self.density;
         Some([by_root * self.side * self.density / (2.0 * root), by_rate])
     }
 
@@ -185,18 +206,17 @@ impl Curve {
     /// The force by some weights of the four nearest values.
     #[inline]
     fn read(&self, k: usize, weights: [f64; 4], rate: f64) -> Option<f64> {
-        let value = read(&self.values, k, weights)?;
-        if self.by_rate.is_empty() {
-            return Some(value);
+        match &self.values {
+            Values::OfGap(values) => {
+                let near = values.get(k..k + 4)?.iter().zip(weights);
+                Some(near.map(|(value, weight)| value * weight).sum())
+            }
+            Values::OfRate(pairs) => {
+                let near = pairs.get(k..k + 4)?.iter().zip(weights);
+                Some(near.map(|([a, b], weight)| (a + rate * b) * weight).sum())
+            }
         }
-        Some(value + rate * read(&self.by_rate, k, weights)?)
     }
-}
-
-#[inline]
-fn read(values: &[f64], k: usize, weights: [f64; 4]) -> Option<f64> {
-    let near = values.get(k..k + 4)?.iter().zip(weights);
-    Some(near.map(|(value, weight)| value * weight).sum::<f64>() / 6.0)
 }
 
 /// Six times the weights of the values at −1, 0, 1 and 2 in their cubic at `t`.

@@ -81,6 +81,8 @@ const MAX_COARSE_WAIT_PERIODS: usize = 2048;
 /// rounds in which they are: each takes as long as all before it.
 const WATCHED_TOGETHER: usize = 400_000;
 const WATCH_ROUNDS: u32 = 4;
+/// Steps of a census of which chaos is watched, in those after which no further batch is begun.
+const WATCHED_STEPS: u64 = 2;
 /// Escapes after which a lifetime is known well enough.
 const ENOUGH_ESCAPES: usize = 16;
 /// Pilots where orbits are known from seeds and periods are cheap.
@@ -117,7 +119,7 @@ impl Default for CensusOptions {
             unseen: 0.002,
             max_starts: 5000,
             max_periods: 2_000_000,
-            max_steps: 40_000_000,
+            max_steps: 60_000_000,
         }
     }
 }
@@ -711,7 +713,8 @@ impl<'a, M: StroboscopicMap> Work<'a, M> {
         let together = WATCHED_TOGETHER / chaotic.max(1);
         let mut budget = self.options.max_periods;
         if self.motions.is_coarse {
-            let steps = self.options.max_steps.saturating_sub(self.total_cost());
+            let steps = self.options.max_steps.saturating_mul(WATCHED_STEPS);
+            let steps = steps.saturating_sub(self.total_cost());
             let affordable = steps.saturating_mul(self.periods as u64) / self.cost.max(1);
             budget = budget.min(WATCHED_TOGETHER).min(affordable as usize);
         }

@@ -25,7 +25,8 @@ const MAX_TRIES: usize = 4;
 const MAX_RETRIES: usize = 64;
 /// The same where that fails too.
 const MAX_FAILED_RETRIES: usize = 4;
-/// Steps of a run on the map itself, in those of a start.
+/// Steps of all runs on the map itself together that show what a motion is, in those of a start: each
+/// serves all starts that come to the motion.
 const EXACT_RUN_STEPS: u64 = 8;
 /// Periods for which exponents are measured on the map itself at most.
 const MAX_EXACT_PERIODS: usize = 4000;
@@ -52,6 +53,8 @@ pub(super) struct Motions<'a, M> {
     /// Orbits of the map itself that were looked for on the followed one.
     paired: usize,
     exact_runs: usize,
+    /// Steps left for these.
+    exact_steps: u64,
     /// Starts on which the coarse map failed that were followed on the map itself.
     retries: usize,
     failed_retries: usize,
@@ -109,8 +112,6 @@ impl<'a, M: StroboscopicMap> Motions<'a, M> {
                 max_periods: longest,
                 ..options.lyapunov.clone()
             },
-            // A run that shows what a motion is serves all starts that come to it.
-            max_steps: options.max_steps.saturating_mul(EXACT_RUN_STEPS),
             ..options.clone()
         };
         Self {
@@ -126,6 +127,7 @@ impl<'a, M: StroboscopicMap> Motions<'a, M> {
             followed_orbits: Vec::new(),
             paired: 0,
             exact_runs: 0,
+            exact_steps: options.max_steps.saturating_mul(EXACT_RUN_STEPS),
             retries: 0,
             failed_retries: 0,
             spectra: Vec::new(),
@@ -167,7 +169,7 @@ impl<'a, M: StroboscopicMap> Motions<'a, M> {
         let may_retry = self.retries < MAX_RETRIES && self.failed_retries < MAX_FAILED_RETRIES;
         if !is_exact && is_map_failure(&found.kind) && may_retry {
             self.retries += 1;
-            let exact = self.classify_exactly(start, 0);
+            let exact = self.classify_exactly(start, 0, self.options.max_steps);
             self.failed_retries += usize::from(is_map_failure(&exact.kind));
             for orbit in std::mem::replace(&mut found, exact).met {
                 self.follow_orbit(orbit);
@@ -236,7 +238,7 @@ impl<'a, M: StroboscopicMap> Motions<'a, M> {
 
     /// Classifies the motion from a state on the map itself, as the end of a start that has run for
     /// so many periods.
-    fn classify_exactly(&mut self, state: &[f64], periods: usize) -> Classified {
+    fn classify_exactly(&mut self, state: &[f64], periods: usize, max_steps: u64) -> Classified {
         let chaos: Vec<_> = self
             .irregular
             .iter()
@@ -250,12 +252,30 @@ impl<'a, M: StroboscopicMap> Motions<'a, M> {
             cancel: self.cancel,
             ..KnownMotions::default()
         };
-        let mut found = classify_on(&mut self.exact, state, known, &self.budgets);
+        let budgets = ClassifyOptions {
+            max_steps,
+            ..self.budgets.clone()
+        };
+        let mut found = classify_on(&mut self.exact, state, known, &budgets);
         found.periods += periods;
         if let MotionKind::Chaotic(chaos) = &mut found.kind {
             chaos.watched(found.periods);
         }
         found
+    }
+
+    /// As [`classify_exactly`](Self::classify_exactly), of a motion that starts have come to; none where
+    /// the budget of these runs is spent.
+    fn confirm(&mut self, state: &[f64], periods: usize) -> Option<Classified> {
+        if self.exact_runs >= MAX_EXACT_RUNS || self.exact_steps == 0 {
+            return None;
+        }
+        self.exact_runs += 1;
+        let before = self.exact.cost();
+        let found = self.classify_exactly(state, periods, self.exact_steps);
+        let spent = self.exact.cost() - before;
+        self.exact_steps = self.exact_steps.saturating_sub(spent);
+        Some(found)
     }
 
     /// Index of an orbit of the coarse map, confirmed on the map itself if it is new.
@@ -270,9 +290,7 @@ impl<'a, M: StroboscopicMap> Motions<'a, M> {
                 return known;
             }
             Outcome::Orbit { index, periods: 0 }
-        } else if self.exact_runs < MAX_EXACT_RUNS {
-            self.exact_runs += 1;
-            let found = self.classify_exactly(&orbit.states[0], 0);
+        } else if let Some(found) = self.confirm(&orbit.states[0], 0) {
             self.outcome_on(found, true)
         } else {
             Outcome::Undecided(UndecidedReason::NotConfirmed)
@@ -335,11 +353,10 @@ impl<'a, M: StroboscopicMap> Motions<'a, M> {
                 .get_or_insert_with(|| found.clone());
             return found.outcome(state);
         }
-        let may_try = self.irregular[known].tries < MAX_TRIES && self.exact_runs < MAX_EXACT_RUNS;
-        if self.irregular[known].kind.is_none() && may_try {
+        let may_try =
+            self.irregular[known].kind.is_none() && self.irregular[known].tries < MAX_TRIES;
+        if may_try && let Some(found) = self.confirm(&state, periods) {
             self.irregular[known].tries += 1;
-            self.exact_runs += 1;
-            let found = self.classify_exactly(&state, periods);
             self.irregular[known].kind = match &found.kind {
                 MotionKind::Chaotic(chaos) => Some(IrregularKind::Chaos(chaos.clone())),
                 MotionKind::TransientChaos { spectrum, .. } => {

@@ -2,7 +2,7 @@
 
 use nanotap::case::Case;
 use nanotap::case::file::Source;
-use nanotap::control::Control;
+use nanotap::control::{CancelFlag, Control};
 use nanotap::model::cantilever::Cantilever;
 use nanotap::model::model_map::ModelMap;
 use nanotap::study::approach::{
@@ -124,6 +124,61 @@ fn a_curve_does_not_depend_on_the_number_of_threads() {
     let report = same(&unclosed, 12);
     let count = report.table.iter().filter(|p| p.period.is_none()).count();
     assert!((2..24).contains(&count), "{count}");
+}
+
+/// Budgets of steps that end work in its first part, then in a later one, and then not at all.
+pub(crate) fn budgets() -> impl Iterator<Item = u64> {
+    (0..11).map(|k| 20_000 << k)
+}
+
+/// What comes of work on one thread and on two that ends at a budget of steps.
+pub(crate) fn limited<R: Send>(steps: u64, work: impl Fn(&Control<'_>) -> R + Sync) -> [R; 2] {
+    [1, 2].map(|threads| {
+        let flag = CancelFlag::default().with_budget(steps);
+        let control = Control {
+            cancel: Some(&flag),
+            progress: None,
+        };
+        install(Some(threads), || work(&control)).unwrap()
+    })
+}
+
+/// A curve under a nonlinear law ends at its budget of steps: while the lever is followed, or while
+/// rows are measured. The report names the budget, and so does every row that is missing.
+#[test]
+fn a_curve_ends_at_its_budget_of_steps() {
+    let case = studied(MICA, &["gap.tip=7.127 nm"]);
+    let nm = 1e-9 / case.physical().unwrap().scales.length;
+    let options = ApproachOptions {
+        from: Some((12.0 * nm).into()),
+        to: Some((4.0 * nm).into()),
+        points: 300,
+        branches: false,
+        ..ApproachOptions::default()
+    };
+    let mut limits = Vec::new();
+    for steps in budgets() {
+        let [alone, together] =
+            limited(steps, |control| approach(&case, &options, control).unwrap());
+        let [a, b] = [&alone, &together].map(|report| serde_json::to_string(report).unwrap());
+        assert!(a == b, "{steps}");
+        assert!(!alone.cancelled && alone.table.len() == 600);
+        let missing = alone.table.iter().filter_map(|row| row.reason.as_ref());
+        let mut missing = missing.peekable();
+        assert_eq!(missing.peek().is_some(), !alone.limits.is_empty());
+        assert!(
+            missing.all(|reason| alone.limits.contains(reason)),
+            "{steps}"
+        );
+        limits.push(alone.limits);
+    }
+    assert_eq!(
+        limits[0][0],
+        "the lever was followed up to the budget of 0.02 million steps"
+    );
+    let rows = |limits: &&Vec<String>| limits.len() == 1 && limits[0].starts_with("the rows were");
+    assert!(limits.iter().find(rows).is_some(), "{limits:?}");
+    assert!(limits.last().unwrap().is_empty());
 }
 
 /// A few rows of a slow curve agree with runs whose distance changes by a thousandth of the free

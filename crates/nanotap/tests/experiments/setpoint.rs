@@ -8,7 +8,7 @@ use nanotap::study::orbit::{OrbitOptions, orbit};
 use nanotap::study::setpoint::{at_setpoint, solve_setpoint};
 use nanotap::study::simulate::{SimulateOptions, simulate};
 
-use crate::approach::{MICA, STIFF, studied};
+use crate::approach::{MICA, STIFF, budgets, limited, studied};
 
 /// Without `gap.tip`, the setpoint determines the distance.
 fn case_with(set: &[&str]) -> nanotap::case::Case {
@@ -149,4 +149,34 @@ setpoint=0.9
     let run = simulate(&model, &SimulateOptions::default()).unwrap();
     assert!((run.observables.phase - 115.8).abs() < 0.1);
     assert!(!solved.unwrap().other_states.is_empty());
+}
+
+/// The search ends at its budget of steps: it has not reached the setpoint, and says how far it came;
+/// or it has, and says that other states may be missing.
+#[test]
+fn a_search_ends_at_its_budget_of_steps() {
+    let case = studied(MICA, &["drive.setpoint=0.9"]);
+    let mut ends = Vec::new();
+    for steps in budgets() {
+        let [alone, together] = limited(steps, |control| {
+            solve_setpoint(&case, control).map(|report| (report.zc(), report.budget))
+        });
+        assert_eq!(alone, together, "{steps}");
+        ends.push(alone);
+    }
+    let refused = ends[0].as_ref().unwrap_err();
+    assert!(
+        refused
+            .message()
+            .contains("up to the budget of 0.02 million steps, to gap.tip =")
+    );
+    let (zc, whole) = ends.last().unwrap().as_ref().unwrap();
+    assert_eq!(*whole, None);
+    let cut = ends
+        .iter()
+        .flatten()
+        .find(|(_, budget)| budget.is_some())
+        .unwrap();
+    assert_eq!(cut.0.to_bits(), zc.to_bits());
+    assert!(cut.1.as_ref().unwrap().contains("up to the budget of"));
 }

@@ -67,7 +67,7 @@ const DECAY_TIMES: f64 = 30.0;
 const MAX_TRANSIENT: usize = 1 << 15;
 
 /// Steps of the approximate flow after which a motion is not followed further along the distance.
-pub(in crate::study) const SWEEP_STEPS: u64 = 40_000_000;
+pub(in crate::study) const SWEEP_STEPS: u64 = 30_000_000;
 
 /// Reason why a piece of a path ends.
 #[derive(Clone, Debug)]
@@ -430,6 +430,10 @@ impl<'a> DistanceSweep<'a> {
             motion.orbit = closed.ok().filter(|orbit| {
                 orbit.is_stable() && orbit.distance_to(&near).1 <= CONTINUOUS * near.scale()
             });
+        }
+        // An orbit of the approximate map alone shows nothing.
+        if motion.classification == Classification::Periodic && motion.orbit.is_none() {
+            motion = named(&mut map, start, options);
         }
         FoundMotion {
             only_searched: true,

@@ -12,12 +12,14 @@ pub mod convergence;
 #[cfg(feature = "fit")]
 pub mod fit;
 mod free_motion;
+pub mod force_curve;
 pub mod frequency_modulation;
 pub mod in_si;
 pub mod limits;
 pub mod lyapunov;
 pub mod mode_share;
 pub mod modes;
+mod moving_sample;
 pub mod orbit;
 pub mod proof;
 #[cfg(feature = "fit")]
@@ -80,6 +82,7 @@ pub static STUDIES: &[StudyEntry] = &[
     StudyEntry::of::<convergence::ConvergenceStudy>(),
     StudyEntry::of::<contact_laws::ContactLawsStudy>(),
     StudyEntry::of::<scan::ScanStudy>(),
+    StudyEntry::of::<force_curve::ForceCurveStudy>(),
 ];
 
 /// A study whose report is a document.

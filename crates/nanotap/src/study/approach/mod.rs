@@ -581,7 +581,7 @@ impl ApproachOptions {
 }
 
 /// A speed in the model's unit of length a unit of time, as it is given of a case.
-fn speed_of(case: &Case, amount: &Amount) -> Result<f64, Error> {
+pub(in crate::study) fn speed_of(case: &Case, amount: &Amount) -> Result<f64, Error> {
     if let Ok(speed) = amount.text().parse::<f64>() {
         if speed > 0.0 && speed.is_finite() {
             return Ok(speed);

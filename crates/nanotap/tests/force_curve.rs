@@ -2,6 +2,11 @@
 //! cantilever as oscillators, forces from their closed forms, the Runge–Kutta method of fourth order
 //! with fixed steps that end where the law changes.
 
+#![allow(
+    clippy::disallowed_methods,
+    reason = "a test compares numbers, not their last bits"
+)]
+
 use std::f64::consts::{PI, TAU};
 
 use nanotap::case::Case;
@@ -26,7 +31,7 @@ const WORK: f64 = 0.05;
 /// Zeros of 1 + cos β cosh β.
 const BETA: [f64; 3] = [
     1.875_104_068_711_961,
-    4.694_091_132_974_174_5,
+    4.694_091_132_974_174,
     7.854_757_438_237_613,
 ];
 
@@ -46,7 +51,7 @@ fn words(law: &str, modes: usize) -> Vec<String> {
     ]
     .map(str::to_owned)
     .to_vec();
-    words.push(format!("cantilever.modes={modes}"));
+    words.push(format!("modes={modes}"));
     let sample: &[&str] = match law {
         "dmt" => &["sample.modulus=1 GPa", "sample.hamaker=1e-19 J"],
         "jkr" => &["sample.modulus=1 GPa", "sample.work_of_adhesion=50 mJ/m^2"],
@@ -86,13 +91,22 @@ const DMT: Law = Law {
         0 => -HAMAKER * RADIUS / (6.0 * gap * gap),
         _ => hertz(CONTACT - gap) - HAMAKER * RADIUS / (6.0 * CONTACT * CONTACT),
     },
-    ends: |branch, gap, _| if branch == 0 { gap - CONTACT } else { CONTACT - gap },
+    ends: |branch, gap, _| {
+        if branch == 0 {
+            gap - CONTACT
+        } else {
+            CONTACT - gap
+        }
+    },
 };
 
 /// The contact radius by bisection on the stable part, above that at which the neck breaks.
 fn jkr_radius(indentation: f64) -> f64 {
     let depth = |a: f64| a * a / RADIUS - (TAU * WORK * a / reduced()).sqrt();
-    let (mut low, mut high) = ((PI * WORK * RADIUS * RADIUS / (8.0 * reduced())).cbrt(), RADIUS);
+    let (mut low, mut high) = (
+        (PI * WORK * RADIUS * RADIUS / (8.0 * reduced())).cbrt(),
+        RADIUS,
+    );
     for _ in 0..200 {
         let middle = 0.5 * (low + high);
         if depth(middle) < indentation {
@@ -116,7 +130,11 @@ const JKR: Law = Law {
     ends: |branch, gap, _| {
         let least = (PI * WORK * RADIUS * RADIUS / (8.0 * reduced())).cbrt();
         let breaks = CONTACT + 3.0 * least * least / RADIUS;
-        if branch == 0 { gap - CONTACT } else { breaks - gap }
+        if branch == 0 {
+            gap - CONTACT
+        } else {
+            breaks - gap
+        }
     },
 };
 
@@ -208,7 +226,11 @@ impl Lever {
                     next = self.step(time, branch, &state, length);
                 }
                 // Ends are met to the bit.
-                time = if end - time <= length { end } else { time + length };
+                time = if end - time <= length {
+                    end
+                } else {
+                    time + length
+                };
                 state = next;
                 if ends {
                     branch = 1 - branch;
@@ -278,7 +300,7 @@ fn ramps_agree_with_an_independent_integration() {
             path: ramp(8e-9, -2e-9, 2e-4),
             corner: 5e-5,
         };
-        let found = deviation(&report, &lever, 1.0 / F0 / 8000.0);
+        let found = deviation(&report, &lever, 1.0 / F0 / 16000.0);
         assert!(found < 1e-7, "{name}, {modes} modes: {found:e}");
     }
 }
@@ -298,7 +320,7 @@ fn a_cosine_agrees_with_an_independent_integration() {
             }),
             corner: f64::INFINITY,
         };
-        let found = deviation(&report, &lever, 1.0 / F0 / 8000.0);
+        let found = deviation(&report, &lever, 1.0 / F0 / 16000.0);
         assert!(found < 1e-7, "{name}: {found:e}");
     }
 }
@@ -322,13 +344,19 @@ fn the_energy_lost_is_the_area_of_the_curve() {
             let (lost, area) = (report.summary.energy_lost, area(&report));
             assert!(lost > 0.0);
             // The force jumps where the neck of JKR breaks.
-            assert!((lost - area).abs() < 1e-3 * lost, "{law}: {lost:e} {area:e}");
+            assert!(
+                (lost - area).abs() < 1e-3 * lost,
+                "{law}: {lost:e} {area:e}"
+            );
             let largest = report.points.iter().map(|p| p.force).fold(0.0, f64::max);
             let lowest = report.points.iter().map(|p| p.force).fold(0.0, f64::min);
             let summary = &report.summary;
             assert!((summary.peak_force / largest - 1.0).abs() < 1e-3);
             let least = summary.adhesion_force.max(summary.attraction);
-            assert!((least + lowest).abs() < 2e-2 * least, "{law}: {least:e} {lowest:e}");
+            assert!(
+                (least + lowest).abs() < 2e-3 * largest,
+                "{law}: {least:e} {lowest:e}"
+            );
         }
     }
 }
@@ -349,7 +377,11 @@ fn pull_off_at_rest_is_that_of_the_closed_forms() {
     let report = curve("jkr", 2, options);
     let pull_off = report.statics.pull_off.unwrap();
     let expected = 1.5 * PI * WORK * RADIUS;
-    assert!((-pull_off.force / expected - 1.0).abs() < 1e-10, "{}", pull_off.force / expected);
+    assert!(
+        (-pull_off.force / expected - 1.0).abs() < 1e-10,
+        "{}",
+        pull_off.force / expected
+    );
 }
 
 /// Static compliance of the first modes at the tip: Σ 1/(m ω²).
@@ -357,7 +389,10 @@ fn compliance(modes: usize) -> f64 {
     let omega = TAU * F0;
     let mass = BETA[0].powi(4) * (K / 3.0) / (omega * omega) / 4.0;
     let own = |beta: &f64| omega * (beta / BETA[0]).powi(2);
-    BETA.iter().take(modes).map(|beta| 1.0 / (mass * own(beta).powi(2))).sum()
+    BETA.iter()
+        .take(modes)
+        .map(|beta| 1.0 / (mass * own(beta).powi(2)))
+        .sum()
 }
 
 #[test]
@@ -387,23 +422,29 @@ fn the_snap_in_at_rest_is_the_fold_of_van_der_waals() {
 
 #[test]
 fn a_slow_curve_follows_the_branches_at_rest_between_the_jumps() {
-    let report = curve("jkr", 1, json!({"to": "-2 nm", "speed": "5 um/s", "points": 200}));
+    let options = json!({"to": "-2 nm", "speed": "1 um/s", "points": 200});
+    let report = curve("jkr", 1, options);
     let c = compliance(1);
-    let off = report.statics.jumps.iter().find(|jump| jump.way == Way::Retract);
+    let jumps = report.statics.jumps.iter();
+    let off = jumps.clone().find(|jump| jump.way == Way::Retract);
     let off = off.unwrap().before.distance;
     let mut compared = 0;
-    let held = report.points.iter().filter(|p| p.way == Way::Retract && p.distance < off - 1e-10);
+    // The ringing after the snap-in has decayed.
+    let held = report
+        .points
+        .iter()
+        .filter(|p| p.way == Way::Retract && p.distance > -1.5e-9 && p.distance < off - 2e-10);
     for point in held {
-        // The tip has settled; what is left is its own slow motion.
+        // What is left is the force of the lever's own damping, m γ v of v/(Q ω).
         let rest = point.separation - point.distance - c * point.force;
-        assert!(rest.abs() < 2e-14, "{rest:e}");
+        let damped = 1e-6 / (Q * TAU * F0);
+        assert!(rest.abs() < 2.0 * damped, "{rest:e} {damped:e}");
         compared += 1;
     }
-    assert!(compared > 100);
-    // Without inertia the lever would leave at the jump, by 1.5 π w R.
+    assert!(compared > 50);
     let expected = 1.5 * PI * WORK * RADIUS;
-    assert!((report.summary.adhesion_force / expected - 1.0).abs() < 1e-3);
-    assert!((report.summary.contact_end.unwrap() - off).abs() < 1e-10);
+    assert!((report.summary.adhesion_force / expected - 1.0).abs() < 1e-6);
+    assert!((report.summary.contact_end.unwrap() - off).abs() < 5e-11);
 }
 
 #[test]
@@ -423,9 +464,7 @@ fn fits_of_the_right_model_give_the_modulus_of_the_case() {
             fit.reduced_modulus / reduced()
         );
         assert!((fit.modulus.unwrap() / MODULUS - 1.0).abs() < 3e-4);
-        // Contact begins at the law's distance; Hertz' has none.
-        let begins = if law == "hertz" { 0.0 } else { CONTACT };
-        assert!((fit.contact_point - begins).abs() < 1e-12, "{law}: {}", fit.contact_point);
+        assert!((fit.contact_point - CONTACT).abs() < 1e-12);
         // Others are wrong where there is adhesion.
         if law != "hertz" {
             let hertz = &report.fits[0];
@@ -436,11 +475,11 @@ fn fits_of_the_right_model_give_the_modulus_of_the_case() {
 
 #[test]
 fn the_peak_force_is_that_requested_at_a_low_speed() {
-    let options = json!({"peak_force": "3 nN", "speed": "5 um/s", "points": 100});
+    let options = json!({"peak_force": "3 nN", "speed": "1 um/s", "points": 100});
     for law in ["dmt", "jkr", "hertz", "linear"] {
         let report = curve(law, 2, options.clone());
         let found = report.summary.peak_force;
-        assert!((found / 3e-9 - 1.0).abs() < 5e-3, "{law}: {found:e}");
+        assert!((found / 3e-9 - 1.0).abs() < 1e-3, "{law}: {found:e}");
     }
 }
 
@@ -455,7 +494,8 @@ fn a_driven_lever_keeps_its_amplitude_far_away_and_its_points_end_periods() {
     assert!(report.fits.is_empty());
     let first = &report.points[0];
     assert!((first.amplitude.unwrap() / 2e-9 - 1.0).abs() < 1e-2);
-    assert!((first.phase.unwrap() - 90.0).abs() < 2.0);
+    // Base excitation adds the base's own motion, 1/Q of the deflection.
+    assert!((first.phase.unwrap() - 90.0 - (1.0 / Q).to_degrees()).abs() < 0.5);
     let periods = first.time * F0;
     assert!((periods - periods.round()).abs() < 1e-9);
     assert!(report.from >= 30e-9 && report.from < 31e-9);
@@ -464,7 +504,11 @@ fn a_driven_lever_keeps_its_amplitude_far_away_and_its_points_end_periods() {
 
 #[test]
 fn the_table_has_every_point() {
-    let report = curve("dmt", 1, json!({"to": "-1 nm", "speed": "0.2 mm/s", "points": 20}));
+    let report = curve(
+        "dmt",
+        1,
+        json!({"to": "-1 nm", "speed": "0.2 mm/s", "points": 20}),
+    );
     let table = points_csv(&report);
     assert_eq!(table.lines().count(), 41);
     let last: Vec<&str> = table.lines().last().unwrap().split(',').collect();
@@ -483,7 +527,10 @@ fn impossible_curves_are_refused_with_the_reason() {
     for (options, reason) in [
         (json!({"to": "9 nm"}), "from far to near"),
         (json!({"to": "1 nm", "peak_force": "1 nN"}), "say the same"),
-        (json!({"speed": "1 um/s", "frequency": "1 kHz"}), "a ramp of a"),
+        (
+            json!({"speed": "1 um/s", "frequency": "1 kHz"}),
+            "a ramp of a",
+        ),
         (json!({"speed": "0 um/s"}), "speed"),
         (json!({"frequency": "-1 kHz"}), "positive"),
         (json!({"speed": "1e-6 um/s"}), "drive periods"),
@@ -495,7 +542,10 @@ fn impossible_curves_are_refused_with_the_reason() {
     }
     let oscillator = Case::parse(
         None,
-        &["oscillator.omega=2.5".to_owned(), "oscillator.gap=0.1".to_owned()],
+        &[
+            "oscillator.omega=2.5".to_owned(),
+            "oscillator.gap=0.1".to_owned(),
+        ],
     );
     if let Ok(oscillator) = oscillator {
         let options = ForceCurveOptions::default();

@@ -85,11 +85,7 @@ fn text(case: &GivenCase, report: &ForceCurveReport) -> String {
         summary.contact_end.map_or_else(none, length),
         "distance at which the tip last touches on the retract",
     );
-    row(
-        "peak force",
-        in_units(Kind::Force, summary.peak_force),
-        "",
-    );
+    row("peak force", in_units(Kind::Force, summary.peak_force), "");
     row(
         "adhesion force",
         in_units(Kind::Force, summary.adhesion_force),
@@ -137,7 +133,8 @@ fn text(case: &GivenCase, report: &ForceCurveReport) -> String {
             table.row([
                 fit.model.name().to_owned(),
                 in_units(Kind::Pressure, fit.reduced_modulus),
-                fit.modulus.map_or_else(none, |e| in_units(Kind::Pressure, e)),
+                fit.modulus
+                    .map_or_else(none, |e| in_units(Kind::Pressure, e)),
                 number::significant(1e12 * fit.residual, 3),
             ]);
         }
@@ -145,7 +142,9 @@ fn text(case: &GivenCase, report: &ForceCurveReport) -> String {
             table.row([
                 "of the case".to_owned(),
                 in_units(Kind::Pressure, reduced),
-                report.modulus.map_or_else(none, |e| in_units(Kind::Pressure, e)),
+                report
+                    .modulus
+                    .map_or_else(none, |e| in_units(Kind::Pressure, e)),
                 String::new(),
             ]);
         }

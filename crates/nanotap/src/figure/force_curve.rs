@@ -8,7 +8,10 @@ use crate::study::approach::Way;
 use crate::study::force_curve::{CurvePoint, ForceCurveReport, StaticPoint};
 
 /// The coordinates of a point of the curve and of a rest.
-type Coordinates = (fn(&CurvePoint) -> (f64, f64), fn(&StaticPoint) -> (f64, f64));
+type Coordinates = (
+    fn(&CurvePoint) -> (f64, f64),
+    fn(&StaticPoint) -> (f64, f64),
+);
 
 const FORCE: Coordinates = (
     |p| (1e9 * p.separation, 1e9 * p.force),
@@ -59,7 +62,12 @@ fn panel(report: &ForceCurveReport, (of, rest): Coordinates, x: &str, y: &str) -
     let ends = report.statics.jumps.iter().map(|jump| rest(&jump.before));
     let ends: Vec<(f64, f64)> = ends.collect();
     if !ends.is_empty() {
-        panel = panel.with(Markers::new(ends).colour(Colour::BLACK).open().label("jump at rest"));
+        panel = panel.with(
+            Markers::new(ends)
+                .colour(Colour::BLACK)
+                .open()
+                .label("jump at rest"),
+        );
     }
     panel
 }

@@ -11,8 +11,8 @@ pub mod contact_laws;
 pub mod convergence;
 #[cfg(feature = "fit")]
 pub mod fit;
-mod free_motion;
 pub mod force_curve;
+mod free_motion;
 pub mod frequency_modulation;
 pub mod in_si;
 pub mod limits;

@@ -84,11 +84,11 @@ impl Readout {
             turned -= a * *change;
             still += b * change;
         }
-        (self.from_start(turned), still / period)
+        (self.at_phase_zero(turned), still / period)
     }
 
     /// Complex amplitude, counted from drive phase 0, of a signal by its harmonic over the period.
-    pub(super) fn from_start(&self, harmonic: Complex) -> Complex {
+    pub(super) fn at_phase_zero(&self, harmonic: Complex) -> Complex {
         harmonic * (self.sign * 2.0 / self.period)
     }
 
@@ -122,6 +122,38 @@ fn force_column(model: &Model, n: usize) -> DVector<f64> {
     best.1
 }
 
+/// How the sample depends on the rate of the gap: as on that of the tip, by a mode's rate.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct TipRate {
+    /// Modes.
+    modes: usize,
+    /// Shape of the first mode at the tip.
+    shape: f64,
+}
+
+impl TipRate {
+    fn of(model: &Model) -> Self {
+        let modes = model.beam.as_ref().map_or(1, |beam| beam.modes.tip.len());
+        Self {
+            modes,
+            shape: model.height.row[0],
+        }
+    }
+
+    fn of_output(self, output: &Output) -> f64 {
+        output.row[self.modes] / self.shape
+    }
+
+    /// Of the equations in a regime: those of the beam itself are the same in flight.
+    fn of_matrix(self, matrix: &DMatrix<f64>, flight: &DMatrix<f64>) -> DVector<f64> {
+        let mut change = matrix.column(self.modes) / self.shape;
+        for row in 0..2 * self.modes {
+            change[row] -= flight[(row, self.modes)] / self.shape;
+        }
+        change
+    }
+}
+
 /// How a sample moves, as states after those of the model.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct SampleMotion {
@@ -138,25 +170,29 @@ impl SampleMotion {
         if self.omega.is_some() { 3 } else { 1 }
     }
 
-    /// Writes the change by a unit of `c` and of `s` into a matrix of `n` columns and the added.
-    fn add_columns(self, matrix: &mut DMatrix<f64>, n: usize, change: &DVector<f64>) {
-        let moving = 1 + usize::from(self.omega.is_some());
-        for column in n..n + moving {
-            let rows = change.len();
-            matrix.view_mut((0, column), (rows, 1)).copy_from(change);
+    /// Writes the changes by the gap and by its rate into a matrix of `n` columns and the added.
+    fn add_columns(self, matrix: &mut DMatrix<f64>, n: usize, [gap, rate]: [&DVector<f64>; 2]) {
+        let rows = gap.len();
+        matrix.view_mut((0, n), (rows, 1)).copy_from(gap);
+        if let Some(omega) = self.omega {
+            matrix.view_mut((0, n + 1), (rows, 1)).copy_from(gap);
+            matrix
+                .view_mut((0, n + 2), (rows, 1))
+                .copy_from(&(rate * omega));
         }
     }
 
-    /// An output of the system, which changes by so much with the gap.
-    pub(super) fn output(self, output: &Output, by_gap: f64) -> Output {
+    /// An output of the model's system, which changes by so much with the gap.
+    pub(super) fn output(self, model: &Model, output: &Output, by_gap: f64) -> Output {
         let n = output.row.len();
         let mut row = output
             .row
             .clone()
             .resize_horizontally(n + self.states(), 0.0);
         row[n] = by_gap;
-        if self.omega.is_some() {
+        if let Some(omega) = self.omega {
             row[n + 1] = by_gap;
+            row[n + 2] = omega * TipRate::of(model).of_output(output);
         }
         Output {
             row,
@@ -177,8 +213,14 @@ impl SampleMotion {
         }
     }
 
-    /// The basis of a regime with the added states, whose forcing changes with the gap by `change`.
-    fn basis(self, r: usize, regime: &Regime, change: &DVector<f64>) -> Result<SpectralBasis, Error> {
+    /// The basis of a regime with the added states, whose forcing changes so with the gap and with
+    /// its rate.
+    fn basis(
+        self,
+        r: usize,
+        regime: &Regime,
+        [change, by_rate]: [&DVector<f64>; 2],
+    ) -> Result<SpectralBasis, Error> {
         let n = change.len();
         let zero = Complex::new(0.0, 0.0);
         let forced = |drive: &Drive, forcing: HarmonicVector| {
@@ -207,7 +249,7 @@ impl SampleMotion {
             // x = Re(response q), s = Re q, u = Re(i q).
             let i = Complex::new(0.0, 1.0);
             let mut forcing = HarmonicVector::zeros(n, 1);
-            forcing.tones[0] = change.map(|v| Complex::new(v, 0.0));
+            forcing.tones[0] = change.zip_map(by_rate, |c, r| Complex::new(c, omega * r));
             let response = forced(&drive, forcing)?.response().tones[0].clone();
             eigenvalues.push(i * omega);
             right.view_mut((0, m + 1), (n, 1)).copy_from(&response);
@@ -245,9 +287,12 @@ pub(super) fn moved_system(
     let drive = system.drive().clone();
     let n = system.dimension();
     let rows = n + motion.states();
+    let rate = TipRate::of(model);
+    let flight = system.regimes()[0].matrix();
     let mut regimes = Vec::new();
     for (r, (regime, change)) in system.regimes().iter().zip(&by_gap.regimes).enumerate() {
-        let change = &change.forcing.constant;
+        let by_rate = rate.of_matrix(regime.matrix(), flight);
+        let change = [&change.forcing.constant, &by_rate];
         let mut matrix = regime.matrix().clone().resize(rows, rows, 0.0);
         motion.add_columns(&mut matrix, n, change);
         if let Some(omega) = motion.omega {
@@ -271,7 +316,9 @@ pub(super) fn moved_system(
                 let reset = transition.reset.as_ref().map(|reset| {
                     let mut matrix = reset.matrix.clone().resize(rows, rows, 0.0);
                     if let Some(change) = &by_gap.resets[r][e] {
-                        motion.add_columns(&mut matrix, n, &change.offset.constant);
+                        let identity = DMatrix::identity(n, n);
+                        let by_rate = rate.of_matrix(&reset.matrix, &identity);
+                        motion.add_columns(&mut matrix, n, [&change.offset.constant, &by_rate]);
                     }
                     for added in n..rows {
                         matrix[(added, added)] = 1.0;
@@ -282,7 +329,7 @@ pub(super) fn moved_system(
                     }
                 });
                 Transition {
-                    guard: motion.output(&transition.guard, by_gap.guards[r][e].constant),
+                    guard: motion.output(model, &transition.guard, by_gap.guards[r][e].constant),
                     reset,
                     ..transition.clone()
                 }
@@ -337,9 +384,9 @@ impl LinearSums {
         omega: Option<f64>,
     ) -> Self {
         let drive = moved.drive();
-        let height = motion.output(&model.height, 1.0);
+        let height = motion.output(model, &model.height, 1.0);
         let regimes = moved.regimes().iter().enumerate().map(|(r, regime)| {
-            let force = motion.output(&model.force[r], force_by_gap[r]);
+            let force = motion.output(model, &model.force[r], force_by_gap[r]);
             let acts = force.row.iter().any(|w| *w != 0.0) || force.constant != 0.0;
             let rate = height.rate(regime.matrix(), regime.forcing(), drive);
             let rates = regime.basis().eigenvalues.iter().copied();
@@ -474,7 +521,9 @@ impl Observer for LinearSums {
         });
         let (constant, fastest) = (outputs.force.constant, outputs.fastest);
         let moving = outputs.rate.constant;
-        let harmonic_turn = self.omega.map(|omega| exponential(Complex::new(0.0, omega * length)));
+        let harmonic_turn = self
+            .omega
+            .map(|omega| exponential(Complex::new(0.0, omega * length)));
         let harmonic_turn = harmonic_turn.unwrap_or(turn);
         let omega = self.omega.unwrap_or(drive.frequencies()[0]);
         let minus = Complex::new(0.0, -omega);
@@ -486,7 +535,11 @@ impl Observer for LinearSums {
             impulse += (a.force * own).re;
             work += constant * (a.speed * own).re + moving * (a.force * own).re;
             let direct = moment(a.rate + minus, length, a.end * harmonic_turn.conj());
-            let mirrored = moment(a.rate.conj() + minus, length, a.end.conj() * harmonic_turn.conj());
+            let mirrored = moment(
+                a.rate.conj() + minus,
+                length,
+                a.end.conj() * harmonic_turn.conj(),
+            );
             harmonic += (a.force * direct + a.force.conj() * mirrored) * 0.5;
             // ∫ Re(a e^{λs}) Re(b e^{μs}), the pairs (a, b) and (b, a) together.
             for b in &self.terms[k..] {
@@ -501,7 +554,9 @@ impl Observer for LinearSums {
             }
         }
         self.sums.impulse += impulse;
-        let start = self.omega.map(|omega| exponential(Complex::new(0.0, omega * segment.phase)));
+        let start = self
+            .omega
+            .map(|omega| exponential(Complex::new(0.0, omega * segment.phase)));
         self.sums.harmonic += harmonic * start.unwrap_or(phasor).conj();
         self.sums.work += work;
         self.widen(length, fastest, constant);

@@ -89,7 +89,9 @@ pub(super) fn fits(
             ContactModel::Hertz | ContactModel::Dmt => {
                 0.75 / (radius.sqrt() * nanotap_arithmetic::powf(scale, 1.5))
             }
-            ContactModel::Jkr => 3.0 * adhesion * radius / nanotap_arithmetic::powf(scale * radius, 1.5),
+            ContactModel::Jkr => {
+                3.0 * adhesion * radius / nanotap_arithmetic::powf(scale * radius, 1.5)
+            }
         };
         (scale > 0.0 && reduced_modulus.is_finite()).then(|| ContactFit {
             model,

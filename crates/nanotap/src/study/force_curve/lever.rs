@@ -88,8 +88,10 @@ impl Lever {
                 let forces = model.force.iter().zip(&by_gap);
                 Engine::Linear(Box::new(Linear {
                     sums: LinearSums::new(model, &system, &by_gap, motion, omega),
-                    height: motion.output(&model.height, 1.0),
-                    forces: forces.map(|(force, by)| motion.output(force, *by)).collect(),
+                    height: motion.output(model, &model.height, 1.0),
+                    forces: forces
+                        .map(|(force, by)| motion.output(model, force, *by))
+                        .collect(),
                     state: vec![0.0; model.dimension() + motion.states()],
                     flow: Flow::new(Arc::new(system)),
                     gap,

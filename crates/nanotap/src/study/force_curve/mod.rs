@@ -99,6 +99,6 @@ impl Study for ForceCurveStudy {
         let plan = path::Plan::new(case, options)?;
         let statics = statics::statics(&plan);
         let run = run::run(&plan, control)?;
-        Ok(report::report(&plan, statics, run))
+        Ok(report::report(&plan, &statics, &run))
     }
 }

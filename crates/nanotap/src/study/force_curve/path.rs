@@ -1,5 +1,6 @@
 //! How the distance changes with time: the checked options, in the model's units.
 
+use std::cmp::Ordering;
 use std::f64::consts::{PI, TAU};
 
 use super::statics::StaticCurve;
@@ -69,21 +70,17 @@ impl Path {
     /// The distance as `c + Re((s − i u) e^{iωt})`, with `t` counted from `time`: `[c, s, u]`. At the
     /// turn of a ramp, that of the retract.
     pub(super) fn at(&self, time: f64) -> [f64; 3] {
-        match self.speed {
-            Some(speed) => {
-                let (rest, sign) = match self.way(time) {
-                    Way::Approach => (self.from - speed * time, -1.0),
-                    _ => (self.to + speed * (time - self.turn), 1.0),
-                };
-                [rest, 0.0, sign * speed / self.omega]
-            }
-            None => {
-                let (sin, cos) = nanotap_arithmetic::sin_cos(self.omega * time);
-                let amplitude = 0.5 * (self.from - self.to);
-                let middle = 0.5 * (self.from + self.to);
-                [middle, amplitude * cos, -amplitude * sin]
-            }
+        if let Some(speed) = self.speed {
+            let (rest, sign) = match self.way(time) {
+                Way::Approach => (self.from - speed * time, -1.0),
+                _ => (self.to + speed * (time - self.turn), 1.0),
+            };
+            return [rest, 0.0, sign * speed / self.omega];
         }
+        let (sin, cos) = nanotap_arithmetic::sin_cos(self.omega * time);
+        let amplitude = 0.5 * (self.from - self.to);
+        let middle = 0.5 * (self.from + self.to);
+        [middle, amplitude * cos, -amplitude * sin]
     }
 
     /// The distance at a time.
@@ -93,7 +90,12 @@ impl Path {
     }
 }
 
-fn kind(given: Option<&Amount>, name: &str, kind: Kind, example: &str) -> Result<Option<f64>, Error> {
+fn kind(
+    given: Option<&Amount>,
+    name: &str,
+    kind: Kind,
+    example: &str,
+) -> Result<Option<f64>, Error> {
     let Some(amount) = given else {
         return Ok(None);
     };
@@ -104,7 +106,10 @@ fn kind(given: Option<&Amount>, name: &str, kind: Kind, example: &str) -> Result
     if value > 0.0 && value.is_finite() {
         return Ok(Some(value));
     }
-    Err(refused(format!("expected a positive value, got {}", amount.text())))
+    Err(refused(format!(
+        "expected a positive value, got {}",
+        amount.text()
+    )))
 }
 
 impl<'a> Plan<'a> {
@@ -143,7 +148,12 @@ impl<'a> Plan<'a> {
                 "leave out the second tone of the drive",
             ));
         }
-        let force = kind(options.peak_force.as_ref(), "peak_force", Kind::Force, "\"5 nN\"")?;
+        let force = kind(
+            options.peak_force.as_ref(),
+            "peak_force",
+            Kind::Force,
+            "\"5 nN\"",
+        )?;
         let near = distance("to", &options.to)?;
         if near.is_some() && force.is_some() {
             return Err(Error::option(
@@ -178,14 +188,19 @@ impl<'a> Plan<'a> {
                 "change {from} or {to}",
             ));
         }
-        if !(options.fit_from < options.fit_to) {
+        if options.fit_from.partial_cmp(&options.fit_to) != Some(Ordering::Less) {
             return Err(Error::option(
                 "fit_from",
                 "the fits have an empty range of forces",
                 "give a {fit_from} below {fit_to}",
             ));
         }
-        let frequency = kind(options.frequency.as_ref(), "frequency", Kind::Frequency, "\"2 kHz\"")?;
+        let frequency = kind(
+            options.frequency.as_ref(),
+            "frequency",
+            Kind::Frequency,
+            "\"2 kHz\"",
+        )?;
         let speed = match (&options.speed, frequency) {
             (Some(_), Some(_)) => {
                 return Err(Error::option(
@@ -207,7 +222,10 @@ impl<'a> Plan<'a> {
         if !(2..=super::MAX_DISTANCES).contains(&points) {
             return Err(Error::option(
                 "points",
-                format!("expected 2 to {} points, got {points}", super::MAX_DISTANCES),
+                format!(
+                    "expected 2 to {} points, got {points}",
+                    super::MAX_DISTANCES
+                ),
                 "change {points}",
             ));
         }
@@ -235,7 +253,7 @@ impl<'a> Plan<'a> {
             }
         }
         let stretches = count as f64 * (1.0 + step / period);
-        if !(stretches <= MAX_STRETCHES) {
+        if stretches.is_nan() || stretches > MAX_STRETCHES {
             return Err(Error::input(
                 format!(
                     "the curve takes {stretches:.3e} drive periods; {MAX_STRETCHES:.0e} are \

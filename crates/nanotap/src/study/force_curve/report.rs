@@ -11,8 +11,10 @@ use super::path::Plan;
 use super::run::Run;
 use super::statics::{Rest, StaticsFound};
 use crate::case::key::Key;
-use crate::case::physical::sample::{Elastic, reduced_modulus};
+use crate::case::physical::force::SampleForce;
+use crate::case::physical::sample::Elastic;
 use crate::number::shortest;
+use crate::observe::OutOfRange;
 
 /// How the distance changes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
@@ -155,21 +157,8 @@ pub struct ForceCurveReport {
 /// Part of a resonance frequency from which the inertia of a moving base matters.
 const FAST: f64 = 0.1;
 
-/// Elastic constants of sample and tip of a case, where its law has them.
-fn elastic(plan: &Plan<'_>) -> Option<(Elastic, Option<Elastic>)> {
-    let known = |key: Key| plan.view.sample.force.as_ref()?.get(key);
-    let solid = |modulus: Key, poisson: Key| {
-        Some(Elastic {
-            modulus: known(modulus).filter(|modulus| modulus.is_finite())?,
-            poisson: known(poisson)?,
-        })
-    };
-    let sample = solid(Key::SampleModulus, Key::SamplePoisson)?;
-    Some((sample, solid(Key::TipModulus, Key::TipPoisson)))
-}
-
 /// The report of a run.
-pub(super) fn report(plan: &Plan<'_>, statics: StaticsFound, run: Run) -> ForceCurveReport {
+pub(super) fn report(plan: &Plan<'_>, statics: &StaticsFound, run: &Run) -> ForceCurveReport {
     let scales = &plan.view.scales;
     let rest = |rest: &Rest| StaticPoint {
         distance: rest.distance * scales.length,
@@ -188,22 +177,29 @@ pub(super) fn report(plan: &Plan<'_>, statics: StaticsFound, run: Run) -> ForceC
             deflection: row.signals.deflection * scales.length,
             force: row.signals.force * scales.force,
             contact: row.signals.contact,
-            amplitude: row.oscillation.map(|[amplitude, _]| amplitude * scales.length),
+            amplitude: row
+                .oscillation
+                .map(|[amplitude, _]| amplitude * scales.length),
             phase: row.oscillation.map(|[_, phase]| phase),
         })
         .collect();
-    let (peak, adhesion) = (
-        run.peak_force * scales.force,
-        -run.lowest[1] * scales.force,
-    );
-    let elastic = elastic(plan);
-    let hertz = plan.view.sample.hertz;
+    let (peak, adhesion) = (run.peak_force * scales.force, -run.lowest[1] * scales.force);
+    let force = plan.view.sample.force.as_ref();
+    let hertz = plan.view.sample.hertz.map(|hertz| hertz.reduced_modulus);
+    let reduced_modulus = force.and_then(SampleForce::reduced_modulus).or(hertz);
+    let sample = force.and_then(|force| {
+        let [modulus, poisson] = [Key::SampleModulus, Key::SamplePoisson].map(|key| force.get(key));
+        Some(Elastic {
+            modulus: modulus?,
+            poisson: poisson?,
+        })
+    });
     let radius = plan.view.value(Key::TipRadius);
     let sample_modulus = |reduced: f64| {
-        let (sample, tip) = elastic?;
-        let tip = tip.map_or(0.0, |tip| 1.0 / reduced_modulus(tip, None));
+        let sample = sample?;
+        let tip = 1.0 / reduced_modulus? - 1.0 / sample.plane_strain_modulus();
         let own = 1.0 / (1.0 / reduced - tip);
-        (own > 0.0).then(|| own * (1.0 - sample.poisson * sample.poisson))
+        (own > 0.0).then_some(own * (1.0 - sample.poisson * sample.poisson))
     };
     let span = peak + adhesion;
     let [low, high] = plan.fit.map(|part| part * span - adhesion);
@@ -219,7 +215,8 @@ pub(super) fn report(plan: &Plan<'_>, statics: StaticsFound, run: Run) -> ForceC
         0.5 * (plan.path.from - plan.path.to) * plan.path.omega,
         |speed| speed,
     );
-    let mut warnings = Vec::new();
+    let violated = OutOfRange::within(&plan.model, run.least_gap);
+    let mut warnings: Vec<String> = violated.iter().map(ToString::to_string).collect();
     let frequency = plan.path.omega * scales.frequency;
     if plan.path.speed.is_none() && frequency > FAST * plan.view.lever.f0 {
         warnings.push(format!(
@@ -237,9 +234,8 @@ pub(super) fn report(plan: &Plan<'_>, statics: StaticsFound, run: Run) -> ForceC
         );
     }
     if fits.is_empty() && !plan.driven && radius.is_some() && peak > 0.0 {
-        warnings.push(
-            "too few points of the unloading part for a fit: give more {points}".to_owned(),
-        );
+        warnings
+            .push("too few points of the unloading part for a fit: give more {points}".to_owned());
     }
     ForceCurveReport {
         waveform: if plan.path.speed.is_some() {
@@ -264,10 +260,8 @@ pub(super) fn report(plan: &Plan<'_>, statics: StaticsFound, run: Run) -> ForceC
             energy_lost: run.energy_lost * scales.energy,
             dissipation: run.dissipation * scales.energy,
         },
-        reduced_modulus: elastic
-            .map(|(sample, tip)| reduced_modulus(sample, tip))
-            .or_else(|| hertz.map(|hertz| hertz.reduced_modulus)),
-        modulus: elastic.map(|(sample, _)| sample.modulus),
+        reduced_modulus,
+        modulus: sample.map(|sample| sample.modulus),
         fits,
         statics: Statics {
             branches: statics
@@ -297,9 +291,8 @@ pub(super) fn report(plan: &Plan<'_>, statics: StaticsFound, run: Run) -> ForceC
 
 /// A row a point, in SI.
 pub fn points_csv(report: &ForceCurveReport) -> String {
-    let mut csv = String::from(
-        "way,time (s),distance (m),separation (m),deflection (m),force (N),contact",
-    );
+    let mut csv =
+        String::from("way,time (s),distance (m),separation (m),deflection (m),force (N),contact");
     if report.driven {
         csv.push_str(",amplitude (m),phase (deg)");
     }

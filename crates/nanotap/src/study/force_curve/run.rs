@@ -1,8 +1,8 @@
 //! The run along the path: points, extrema and energies.
 
+use nanotap_arithmetic::ComplexFunctions as _;
 use nanotap_dynamics::Control;
 use nanotap_flow::Complex;
-use nanotap_arithmetic::ComplexFunctions as _;
 
 use super::Way;
 use super::lever::{Instant, Lever};

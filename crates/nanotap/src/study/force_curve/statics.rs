@@ -3,11 +3,11 @@
 
 use nalgebra::DVector;
 
+use super::Way;
 use crate::Error;
 use crate::case::Case;
-use crate::model::nonlinear::Nonlinear;
 use crate::model::Model;
-use super::Way;
+use crate::model::nonlinear::Nonlinear;
 use nanotap_volterra::Guard;
 use std::sync::Arc;
 
@@ -196,6 +196,8 @@ impl StaticCurve {
         let pieces = self.pieces(near, far);
         let mut jumps = Vec::new();
         let mut pull_off = None;
+        let rests = pieces.iter().flat_map(|piece| &piece.rests);
+        let largest = rests.map(|rest| rest.force.abs()).fold(0.0, f64::max);
         let farthest = |piece: &&Piece| piece.stable && self.at(piece, far).is_some();
         let start = pieces.iter().filter(farthest);
         let start = start.max_by(|a, b| a.rests[0].gap.total_cmp(&b.rests[0].gap));
@@ -209,7 +211,8 @@ impl StaticCurve {
                 pull_off = held
                     .map(|piece| piece.lowest)
                     .min_by(|a, b| a.force.total_cmp(&b.force))
-                    .filter(|rest| rest.force < 0.0);
+                    // Rounding where contact begins without a force is none.
+                    .filter(|rest| rest.force < -1e-12 * largest);
                 jumps.extend(back);
             }
         }
@@ -337,7 +340,9 @@ impl LinearRests {
     /// Whether the lever can rest in the regime at a distance.
     fn holds(&self, distance: f64) -> bool {
         let moved = distance - self.origin;
-        self.guards.iter().all(|[value, slope]| value + moved * slope > 0.0)
+        self.guards
+            .iter()
+            .all(|[value, slope]| value + moved * slope > 0.0)
     }
 
     fn rest(&self, distance: f64) -> Rest {
@@ -371,7 +376,11 @@ impl LinearRests {
             rests.reverse();
             cut.reverse();
         }
-        let lowest = if rests[0].force < rests[1].force { rests[0] } else { rests[1] };
+        let lowest = if rests[0].force < rests[1].force {
+            rests[0]
+        } else {
+            rests[1]
+        };
         Some(Piece {
             contact: self.contact,
             stable: self.stable,
@@ -415,12 +424,18 @@ impl LawRests {
                 high = middle;
             }
         }
-        if low.1.abs() < high.1.abs() { low.0 } else { high.0 }
+        if low.1.abs() < high.1.abs() {
+            low.0
+        } else {
+            high.0
+        }
     }
 
     fn pieces(&self, near: f64, far: f64) -> Vec<Piece> {
         let branches = 0..self.nonlinear.system.law().branches();
-        branches.flat_map(|branch| self.pieces_of(branch, near, far)).collect()
+        branches
+            .flat_map(|branch| self.pieces_of(branch, near, far))
+            .collect()
     }
 
     /// Separations at which a branch is looked at, falling.

@@ -255,7 +255,7 @@ impl Lever {
         Ok(PeriodSignals {
             deflection,
             mean_deflection,
-            force: self.readout.from_start(sums.harmonic),
+            force: self.readout.at_phase_zero(sums.harmonic),
             mean_force: sums.impulse / period,
             peak_force: sums.peak,
             contact: sums.contact / period,

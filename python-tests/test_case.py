@@ -149,9 +149,9 @@ def test_dimensions_are_named(physical):
     tables["drive"]["frequency"] = "65.7 nm"
     with pytest.raises(ValueError, match="frequency"):
         nanotap.Case(**tables)
-    with pytest.raises(ValueError, match="no such file"):
+    with pytest.raises(FileNotFoundError, match="nowhere.toml"):
         nanotap.Case.from_file("nowhere.toml")
-    with pytest.raises(ValueError, match="cannot be read"):
+    with pytest.raises(FileNotFoundError, match="nowhere.toml"):
         nanotap.Case(catalogue="nowhere.toml", **GIVEN)
     with pytest.raises(AttributeError, match="the case has no `omgea`"):
         _ = physical.omgea

@@ -71,7 +71,7 @@ def test_a_law_is_there_in_every_way(law):
     # Arrays give the same as single calls.
     distances = np.array([14e-9, 15e-9])
     many = nanotap.orbit(case, **{"gap.tip": distances})
-    assert many.amplitude.values[1] == pytest.approx(orbit.amplitude, rel=1e-9)
+    assert many.amplitude.values[1] == pytest.approx(orbit.physical.amplitude, rel=1e-9)
 
 
 @pytest.mark.parametrize("law", ["moving-surface", "dmt", "voigt-sphere"])

@@ -44,7 +44,7 @@ def test_python_writes_the_terminals_bytes(regular, tmp_path):
     for k, over in enumerate(
         (
             "omega=2.8:3.2:24",
-            {"omega": (2.8, 3.2, 24)},
+            {"omega": nanotap.range(2.8, 3.2, 24)},
             {"omega": np.linspace(2.8, 3.2, 24)},
         )
     ):
@@ -80,7 +80,7 @@ def test_any_values_that_ascend_are_an_axis(regular, tmp_path):
 
 
 def test_shares_merge_to_the_same_bytes(regular, tmp_path):
-    call = {"over": {"omega": (2.8, 3.2, 9)}, "periods": 4}
+    call = {"over": {"omega": nanotap.range(2.8, 3.2, 9)}, "periods": 4}
     nanotap.sweep(regular, **call, out=tmp_path / "whole.zarr")
     shares = [tmp_path / f"{i}.zarr" for i in (1, 2, 3)]
     for i, share in enumerate(shares):
@@ -92,16 +92,18 @@ def test_shares_merge_to_the_same_bytes(regular, tmp_path):
     nanotap.sweep(regular, **call, out=tmp_path / "merged.zarr")
     assert_same(tmp_path / "whole.zarr", tmp_path / "merged.zarr")
     with pytest.raises(ValueError, match="other options: .*omega"):
-        nanotap.sweep(regular, over={"omega": (2, 3, 9)}, periods=4, out=shares[0])
+        nanotap.sweep(
+            regular, over={"omega": nanotap.range(2, 3, 9)}, periods=4, out=shares[0]
+        )
     with pytest.raises(ValueError, match="is not a dataset of nanotap"):
         nanotap.merge([tmp_path], tmp_path / "other.zarr")
-    with pytest.raises(ValueError, match="it does not exist"):
+    with pytest.raises(FileNotFoundError, match="nowhere.zarr"):
         nanotap.open(tmp_path / "nowhere.zarr")
 
 
 def test_basins_from_what_was_found(bistable):
     found = nanotap.attractors(bistable, starts=32)
-    call = {"x": {"a1": (-1, 1, 12)}, "y": "v1=-20:20:9"}
+    call = {"x": {"a1": nanotap.range(-1, 1, 12)}, "y": "v1=-20:20:9"}
     ds = nanotap.basin(bistable, **call, attractors=found)
     assert ds.attractor.dims == ("v1", "a1")
     known = json.loads(ds.attrs["attractors"])
@@ -136,7 +138,7 @@ def test_ctrl_c_keeps_what_is_finished(regular, tmp_path):
         nanotap.sweep(regular, **call, progress=progress)
     assert heard[-1][1] == total
     ds = stopped.value.result
-    finished = int((ds.classification > 0).sum())
+    finished = int((ds.classification != "").sum())
     assert 0 <= finished < total
     assert isinstance(stopped.value, KeyboardInterrupt)
 
@@ -189,7 +191,10 @@ def test_an_error_of_the_listener_is_the_callers(regular):
 
     with pytest.raises(LookupError, match="enough"):
         nanotap.sweep(
-            regular, over={"omega": (2.5, 3.5, 500)}, periods=5, progress=progress
+            regular,
+            over={"omega": nanotap.range(2.5, 3.5, 500)},
+            periods=5,
+            progress=progress,
         )
 
 
@@ -233,7 +238,7 @@ def cluster():
 def test_a_cluster_makes_the_same_bytes_though_a_worker_is_killed(
     cluster, regular, tmp_path
 ):
-    call = {"over": {"omega": (2.4, 3.4, 128)}, "starts": 2, "periods": 20}
+    call = {"over": {"omega": nanotap.range(2.4, 3.4, 128)}, "starts": 2, "periods": 20}
     nanotap.sweep(regular, **call, out=tmp_path / "here.zarr")
     killed = []
 
@@ -248,11 +253,11 @@ def test_a_cluster_makes_the_same_bytes_though_a_worker_is_killed(
     )
     assert killed
     assert_same(tmp_path / "here.zarr", tmp_path / "there.zarr")
-    assert (ds.classification > 0).all()
+    assert (ds.classification != "").all()
 
 
 def test_a_cluster_goes_on_where_it_stopped(cluster, regular, tmp_path):
-    call = {"over": {"omega": (2.8, 3.2, 32)}, "periods": 4}
+    call = {"over": {"omega": nanotap.range(2.8, 3.2, 32)}, "periods": 4}
     out = tmp_path / "parts.zarr"
     nanotap.sweep(regular, **call, chunk="1/2", out=out)
     heard = []

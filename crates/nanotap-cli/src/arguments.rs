@@ -25,6 +25,10 @@ pub(crate) struct CaseArguments {
     /// Additional levers and materials (TOML); may be repeated
     #[arg(long, value_name = "FILE")]
     pub(crate) catalogue: Vec<PathBuf>,
+
+    /// Show a physical case in the model's units; numbers without a unit are then in them too
+    #[arg(long)]
+    pub(crate) model_units: bool,
 }
 
 /// Reads measured curves for `command`.

@@ -75,15 +75,14 @@ impl GivenCase {
 
     /// Prints the keys that stay constant while these keys vary, as the words that reproduce a point.
     pub(crate) fn note_constants(&self, keys: &[Key], output: &Output) {
-        let mut words: Vec<String> = Vec::new();
-        for key in keys {
-            for (held, value) in self.implied_constants(*key) {
-                let word = format!("--set {held}=\"{}\"", held.kind().format_exact(value));
-                if !keys.contains(&held) && !words.contains(&word) {
-                    words.push(word);
-                }
-            }
-        }
+        let words: Vec<String> = self
+            .held(keys)
+            .iter()
+            .filter_map(|(held, value)| {
+                let kind = self.key(held).ok()?.kind();
+                Some(format!("--set {held}=\"{}\"", kind.format_exact(*value)))
+            })
+            .collect();
         if !words.is_empty() {
             output.note(&format!(
                 "held while {} {}; with the same value the same point again: {}",
@@ -152,5 +151,6 @@ pub(crate) fn case_of(arguments: &CaseArguments) -> Result<Case, Failure> {
     let catalogue = catalogue(&arguments.catalogue)?;
     let case = Case::load(arguments.file.as_deref(), &arguments.set, &catalogue)?;
     let case = case.cancelled_by(&progress::control());
-    Ok(case.called(&title(arguments)))
+    let case = case.called(&title(arguments));
+    Ok(case.in_model_units(arguments.model_units))
 }

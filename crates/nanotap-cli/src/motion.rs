@@ -50,12 +50,7 @@ pub(crate) fn observed(
 }
 
 fn choice(o: &Observables, chosen: ObservableSet, units: &Units) -> String {
-    let mut table = Table::new([
-        ("", Align::Left),
-        ("", Align::Left),
-        ("", Align::Left),
-        ("", Align::Left),
-    ]);
+    let mut table = Table::new([("", Align::Left); 3]);
     let mut balance = String::new();
     for observable in chosen.iter() {
         let numbers = match (observable.of)(o) {
@@ -68,18 +63,12 @@ fn choice(o: &Observables, chosen: ObservableSet, units: &Units) -> String {
                 continue;
             }
         };
-        let shown = |show: &dyn Fn(f64) -> String| {
-            let all: Vec<String> = numbers.iter().map(|v| show(*v)).collect();
-            all.join(" … ")
-        };
-        let kind = observable.dimension.kind();
-        let si = kind.and_then(|kind| Some((kind, units.si(kind)?)));
+        let kind = observable.dimension.kind().unwrap_or(Kind::Number);
+        let shown = |value| number::quantity(units, kind, value, [6, 4]);
+        let shown: Vec<String> = numbers.into_iter().map(shown).collect();
         table.row([
             observable.name.to_owned(),
-            shown(&|v| number::significant(v, 6)),
-            si.map_or_else(String::new, |(kind, unit)| {
-                shown(&|v| kind.format(unit * v))
-            }),
+            shown.join(" … "),
             observable.words.to_owned(),
         ]);
     }
@@ -88,48 +77,23 @@ fn choice(o: &Observables, chosen: ObservableSet, units: &Units) -> String {
 
 /// Tip, gap, contact and force.
 fn observables(o: &Observables, units: &Units, beam: bool) -> String {
-    let si = |kind: Kind, value: f64| {
-        units
-            .si(kind)
-            .map_or_else(String::new, |u| kind.format(u * value))
-    };
-    let si_range = |kind: Kind, low: f64, high: f64| {
-        units.si(kind).map_or_else(String::new, |u| {
-            format!("{} … {}", kind.format(u * low), kind.format(u * high))
-        })
-    };
-    let range = |low: f64, high: f64| {
-        format!(
-            "{} … {}",
-            number::significant(low, 6),
-            number::significant(high, 6)
-        )
-    };
-    let mut table = Table::new([("", Align::Left); 4]);
-    let row = |name: &str, value: f64, digits, kind, note: &str| {
-        let number = number::significant(value, digits);
-        [name.to_owned(), number, si(kind, value), note.to_owned()]
+    let shown = |kind, value, digits| number::quantity(units, kind, value, [digits, 4]);
+    let range =
+        |kind, [low, high]: [f64; 2]| format!("{} … {}", shown(kind, low, 6), shown(kind, high, 6));
+    let mut table = Table::new([("", Align::Left); 3]);
+    let words = |name: &str, what: &str, note: &str| [name, what, note].map(str::to_owned);
+    let row = |name: &str, value, digits, kind, note: &str| {
+        words(name, &shown(kind, value, digits), note)
     };
     let length = |name, value, note: &str| row(name, value, 6, Kind::Length, note);
-    let words = |name: &str, what: &str, note: &str| {
-        [
-            name.to_owned(),
-            what.to_owned(),
-            String::new(),
-            note.to_owned(),
-        ]
-    };
-    let between = |name: &str, [low, high]: [f64; 2], note: String| {
-        let in_si = si_range(Kind::Length, low, high);
-        [name.to_owned(), range(low, high), in_si, note]
-    };
+    let between = |name, ends, note: &str| words(name, &range(Kind::Length, ends), note);
     let tip = if beam {
         "tip deflection W"
     } else {
         "displacement x"
     };
-    let mean = format!("mean {}", number::significant(o.mean_deflection, 4));
-    table.row(between(tip, [o.tip_min, o.tip_max], mean));
+    let mean = format!("mean {}", shown(Kind::Length, o.mean_deflection, 4));
+    table.row(between(tip, [o.tip_min, o.tip_max], &mean));
     table.row(length("amplitude", o.amplitude, "half of peak to peak"));
     let behind = lag(o.phase, "the drive", 4);
     table.row(length(
@@ -145,7 +109,7 @@ fn observables(o: &Observables, units: &Units, beam: bool) -> String {
         let behind = format!("{}, deflection and base", lag(phase, "the base", 4));
         table.row(length("the tip itself moves", amplitude, &behind));
     }
-    table.row(between("gap", o.gap_range, String::new()));
+    table.row(between("gap", o.gap_range, ""));
     if o.contacts_per_period > 0.0 || o.contact_fraction > 0.0 {
         let grazing = match o.grazing_contacts.unwrap_or(0) {
             0 => String::new(),
@@ -168,14 +132,9 @@ fn observables(o: &Observables, units: &Units, beam: bool) -> String {
         let speed = o.impact_speed;
         table.row(row("impact speed", speed, 5, Kind::Velocity, greatest));
         if o.contact_fraction > 0.0 {
-            let force = format!("up to {}", number::significant(o.peak_force, 6));
-            let mean = format!("mean {}", number::significant(o.mean_force, 4));
-            table.row([
-                "force on the tip",
-                &force,
-                &si(Kind::Force, o.peak_force),
-                &mean,
-            ]);
+            let force = format!("up to {}", shown(Kind::Force, o.peak_force, 6));
+            let mean = format!("mean {}", shown(Kind::Force, o.mean_force, 4));
+            table.row(words("force on the tip", &force, &mean));
             let depth = "largest depth below the surface at rest";
             table.row(row("indentation", o.indentation, 5, Kind::Length, depth));
         }
@@ -184,23 +143,13 @@ fn observables(o: &Observables, units: &Units, beam: bool) -> String {
     }
     // An attraction acts without contact too.
     if o.least_force < 0.0 {
-        table.row([
-            "pull of the sample",
-            &format!("up to {}", number::significant(-o.least_force, 6)),
-            &si(Kind::Force, -o.least_force),
-            "largest force on the tip towards the sample",
-        ]);
+        let pull = format!("up to {}", shown(Kind::Force, -o.least_force, 6));
+        let note = "largest force on the tip towards the sample";
+        table.row(words("pull of the sample", &pull, note));
     }
     if o.peak_force > 0.0 || o.least_force < 0.0 {
-        let electronvolts = |unit| format_electronvolts(unit * o.virial);
-        table.row([
-            "virial ⟨F·W⟩",
-            &number::significant(o.virial, 5),
-            &units
-                .si(Kind::Energy)
-                .map_or_else(String::new, electronvolts),
-            "mean of force times deflection",
-        ]);
+        let note = "mean of force times deflection";
+        table.row(row("virial ⟨F·W⟩", o.virial, 5, Kind::Energy, note));
     }
     if let Some((height, xi)) = o.beam_clearance.zip(o.beam_clearance_xi) {
         let place = if xi > 0.999 {
@@ -211,8 +160,8 @@ fn observables(o: &Observables, units: &Units, beam: bool) -> String {
         let least = format!("smallest height of the beam, {place}");
         table.row(row("beam clearance", height, 5, Kind::Length, &least));
     }
-    if let Some([low, high]) = o.slope_range {
-        table.row(words("slope at the tip", &range(low, high), ""));
+    if let Some(ends) = o.slope_range {
+        table.row(words("slope at the tip", &range(Kind::Number, ends), ""));
     }
     if let Some((amplitude, phase)) = o.optical_amplitude.zip(o.optical_phase) {
         let behind = lag(phase, "the drive", 4);
@@ -226,28 +175,29 @@ fn observables(o: &Observables, units: &Units, beam: bool) -> String {
 fn energy(o: &Observables, units: &Units) -> String {
     let balance = &o.energy_balance;
     let mut table = Table::new([("", Align::Left), ("", Align::Point), ("", Align::Left)]);
-    let mut row = |name: &str, value: f64, note: String| {
-        // Zero has no sign.
-        let value = value / o.periods + 0.0;
-        let si = units
-            .si(Kind::Energy)
-            .map_or_else(String::new, |u| Kind::Energy.format(u * value));
-        table.row([
-            name.to_owned(),
-            number::significant(value, 6),
-            format!("{si}{note}"),
-        ]);
+    // What is no more than rounding of the largest term is zero, without a sign.
+    let moved = balance.drive_work.abs().max(balance.beam_damping.abs());
+    let noise = moved * balance.residual.abs().max(1e-12);
+    let mut row = |name: &str, value: f64, in_electronvolts: bool| {
+        let value = if value.abs() <= noise {
+            0.0
+        } else {
+            value / o.periods
+        };
+        let joules = units.si(Kind::Energy).map(|unit| unit * value);
+        let shown = joules.map_or_else(
+            || number::significant(value, 6),
+            |joules| Kind::Energy.format(joules),
+        );
+        let note = joules
+            .filter(|_| in_electronvolts)
+            .map(format_electronvolts);
+        table.row([name.to_owned(), shown, note.unwrap_or_default()]);
     };
-    row("drive work", balance.drive_work, String::new());
-    row("beam damping", -balance.beam_damping, String::new());
-    let electronvolts = units.si(Kind::Energy).map_or_else(String::new, |u| {
-        format!(
-            " = {}",
-            format_electronvolts(u * -balance.sample_damping / o.periods + 0.0)
-        )
-    });
-    row("sample damping", -balance.sample_damping, electronvolts);
-    row("stored", -balance.stored, String::new());
+    row("drive work", balance.drive_work, false);
+    row("beam damping", -balance.beam_damping, false);
+    row("sample damping", -balance.sample_damping, true);
+    row("stored", -balance.stored, false);
     let mut text = format!(
         "  {}\n{}",
         style::bold("energy a drive period"),
@@ -270,15 +220,9 @@ pub(crate) fn spectrum(spectrum: &Spectrum, period: usize, units: &Units) -> Str
         lag(spectrum.phase, "the drive", 6),
         number::significant(100.0 * spectrum.thd, 4),
     );
-    let symbol = if matches!(units, Units::Si(_)) {
-        "tip (SI)"
-    } else {
-        ""
-    };
     let mut table = Table::new([
         ("order", Align::Point),
         ("tip", Align::Point),
-        (symbol, Align::Left),
         ("lag (°)", Align::Point),
         ("force", Align::Point),
         ("lag (°)", Align::Point),
@@ -298,9 +242,6 @@ pub(crate) fn spectrum(spectrum: &Spectrum, period: usize, units: &Units) -> Str
     };
     let shown = spectrum.harmonics.iter().filter(|h| h.tip >= least);
     for h in shown.take(count) {
-        let si = units
-            .si(Kind::Length)
-            .map_or_else(String::new, |u| Kind::Length.format(u * h.tip));
         // The lag of nothing is noise.
         let lag = |amplitude: f64, lag: f64| {
             if amplitude > 0.0 {
@@ -311,10 +252,9 @@ pub(crate) fn spectrum(spectrum: &Spectrum, period: usize, units: &Units) -> Str
         };
         table.row([
             number::chosen((h.order * 1e6).round() / 1e6),
-            number::significant(h.tip, 5),
-            si,
+            number::quantity(units, Kind::Length, h.tip, [5, 4]),
             lag(h.tip, h.tip_phase),
-            number::significant(h.force, 5),
+            number::quantity(units, Kind::Force, h.force, [5, 4]),
             lag(h.force, h.force_phase),
         ]);
     }

@@ -1,6 +1,5 @@
 //! Time series as CSV.
 
-use std::fmt::Write as _;
 use std::path::Path;
 
 use nanotap::case::physical::Kind;
@@ -11,8 +10,17 @@ use nanotap::observe::time_series;
 use crate::failure::Failure;
 use crate::{file, number};
 
-/// Writes `periods` drive periods from `start`, `resolution` rows each and the very end.
-/// Of a physical case, columns in SI follow the model's own.
+/// Columns of a physical case in SI: their heads without the unit, by index.
+const IN_SI: [(&str, Kind); 5] = [
+    ("time", Kind::Time),
+    ("tip", Kind::Length),
+    ("tip_rate", Kind::Velocity),
+    ("gap", Kind::Length),
+    ("force", Kind::Force),
+];
+
+/// Writes `periods` drive periods from `start`, `resolution` rows each and the very end. States are
+/// in the model's units.
 pub(crate) fn write(
     path: &Path,
     model: &Model,
@@ -21,29 +29,21 @@ pub(crate) fn write(
     resolution: usize,
     units: &Units,
 ) -> Result<(), Failure> {
-    let mut csv = time_series::columns(model).join(",");
-    // The columns that also exist in the model's units, by index.
-    let si: Vec<(usize, f64)> = [
-        ("time_s", 0, Kind::Time),
-        ("tip_m", 1, Kind::Length),
-        ("tip_rate_m_per_s", 2, Kind::Velocity),
-        ("gap_m", 3, Kind::Length),
-        ("force_N", 4, Kind::Force),
-    ]
-    .into_iter()
-    .filter_map(|(name, column, kind)| {
-        let unit = units.si(kind)?;
-        let _ = write!(csv, ",{name}");
-        Some((column, unit))
-    })
-    .collect();
-    csv.push('\n');
+    let names = time_series::columns(model).into_iter().enumerate();
+    let header = names.map(|(k, name)| match (units, IN_SI.get(k)) {
+        (Units::Si(_), Some((name, kind))) => units.column(name, *kind),
+        _ => units.state_column(&name),
+    });
+    let header: Vec<String> = header.collect();
     file::write_rows(path, |rows| {
-        rows.push(&csv)?;
+        rows.push(&(header.join(",") + "\n"))?;
         let mut failed = None;
         time_series::sample(model, start, periods, resolution, |row| {
-            let si = si.iter().map(|(column, unit)| row[*column] * unit);
-            let line = number::row(row.iter().copied().chain(si)) + "\n";
+            let scaled = row.iter().enumerate().map(|(k, value)| match IN_SI.get(k) {
+                Some((_, kind)) => units.scaled(*kind, *value),
+                None => *value,
+            });
+            let line = number::row(scaled) + "\n";
             if failed.is_none() {
                 failed = rows.push(&line).err();
             }

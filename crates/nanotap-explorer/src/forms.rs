@@ -44,12 +44,14 @@ pub(crate) fn forms(case: &Case, base: &Case, model: &Model) -> Value {
     };
     let names = state_names(model);
     let sides = default_box(model).ok();
+    let units = case.units();
     let entry = |which: &str, k: usize| {
         let side = sides
             .as_ref()
             .and_then(|sides| Some((*sides.lower().get(k)?, *sides.upper().get(k)?)))
             .unwrap_or((-1.0, 1.0));
-        let short = |v: f64| Kind::Number.format_digits(v, 3);
+        let name = names.get(k).map_or("", String::as_str);
+        let short = |v: f64| units.shown_entry(name, v, 3);
         vec![
             json!({ "name": format!("entry{which}"), "words": "coordinate", "choices": names, "value": names.get(k) }),
             json!({ "name": format!("from{which}"), "words": "from", "value": short(side.0) }),

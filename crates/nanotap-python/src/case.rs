@@ -8,6 +8,7 @@ use nanotap::case::file::{self, Source};
 use nanotap::case::key::{ModelKind, Section};
 use nanotap::case::physical::{Catalogue, Kind, Physical, Severity};
 use nanotap::case::{Case, Key};
+use nanotap::control::Control;
 use nanotap::observe::time_series::state_names;
 use nanotap::study::setpoint::{SetpointReport, SolvedCase, at_setpoint};
 use pyo3::prelude::*;
@@ -55,18 +56,33 @@ impl CaseCore {
         Ok(self.at_setpoint.get_or_init(|| (Arc::new(case), report)))
     }
 
-    /// The same case with other values of `keys`.
-    pub(crate) fn variants(&self, keys: &[String]) -> Result<Variants, Failure> {
-        let is_varied = |word: &String| {
-            let key = word.split('=').next().unwrap_or_default();
-            keys.iter().any(|varied| varied == key)
+    /// The case with keys that vary, of which one may be the distance itself.
+    pub(crate) fn variants(&self, py: Python<'_>, keys: &[String]) -> PyResult<Variants> {
+        let distance = [Key::GapTip, self.case.gap_key()];
+        let of_distance =
+            |name: &String| self.case.key(name).is_ok_and(|key| distance.contains(&key));
+        let start = if keys.iter().any(of_distance) {
+            self.at_any_distance()
+        } else {
+            self.studied(py)?
         };
-        let fixed = self.overrides.iter().filter(|word| !is_varied(word));
         Ok(Variants {
+            case: self.at_any_distance(),
+            start,
             source: self.source.clone(),
-            fixed: fixed.cloned().collect(),
+            overrides: self.overrides.clone(),
             catalogue: catalogue_of(&self.catalogues)?,
         })
+    }
+
+    fn with_case(&self, case: Case) -> Self {
+        Self {
+            case: Arc::new(case),
+            source: self.source.clone(),
+            overrides: self.overrides.clone(),
+            catalogues: self.catalogues.clone(),
+            at_setpoint: OnceLock::new(),
+        }
     }
 
     fn make(
@@ -95,22 +111,66 @@ fn catalogue_of(others: &[(String, String)]) -> Result<Arc<Catalogue>, Failure> 
     Ok(catalogue)
 }
 
-/// A case with keys that vary.
+/// A case with keys that vary, by the rule of every study: what is not varied stays, as
+/// [`Case::held`] says.
 pub(crate) struct Variants {
+    case: Arc<Case>,
+    /// The case from which numbers vary.
+    start: Arc<Case>,
     source: Option<Source>,
-    fixed: Vec<String>,
+    overrides: Vec<String>,
     catalogue: Arc<Catalogue>,
 }
 
 impl Variants {
     /// The case with these `key=value` words.
-    pub(crate) fn with(&self, words: &[String]) -> Result<Case, nanotap::Error> {
-        let all = [self.fixed.as_slice(), words].concat();
-        Ok(Case::parse_with(
-            self.source.clone(),
-            &all,
-            &self.catalogue,
-        )?)
+    pub(crate) fn with(
+        &self,
+        words: &[String],
+        control: &Control<'_>,
+    ) -> Result<Case, nanotap::Error> {
+        let mut stated = Vec::new();
+        let mut numbers = Vec::new();
+        for word in words {
+            let (name, text) = word.split_once('=').unwrap_or((word, ""));
+            let quoted: Option<String> = serde_json::from_str(text).ok();
+            let number = self.case.key(name).ok().and_then(|key| {
+                let value = self.case.value(key, quoted.as_deref().unwrap_or(text));
+                Some((key, value.ok()?))
+            });
+            match number {
+                // The distance follows from a setpoint anew, and a word or a table restates the case.
+                Some((key, value)) if key != Key::DriveSetpoint => numbers.push((key, value)),
+                _ => stated.push((name, word.clone())),
+            }
+        }
+        let case = if stated.is_empty() {
+            self.start.as_ref().clone()
+        } else {
+            let kept = self.overrides.iter().filter(|word| {
+                let name = word.split('=').next().unwrap_or_default();
+                stated.iter().all(|(other, _)| *other != name)
+            });
+            let words: Vec<String> = kept
+                .cloned()
+                .chain(stated.iter().map(|(_, word)| word.clone()))
+                .collect();
+            let case = Case::parse_with(self.source.clone(), &words, &self.catalogue)?;
+            let case = case.in_model_units(self.case.is_in_model_units());
+            at_setpoint(case, control)?.0
+        };
+        Ok(numbers
+            .iter()
+            .fold(case, |case, &(key, value)| case.with(key, value)))
+    }
+
+    /// What stays while keys of these names vary although it was not stated, in SI.
+    pub(crate) fn held(&self, names: &[String]) -> nanotap::case::Held {
+        let keys: Vec<Key> = names
+            .iter()
+            .filter_map(|name| self.case.key(name).ok())
+            .collect();
+        self.start.held(&keys)
     }
 }
 
@@ -127,6 +187,33 @@ impl CaseCore {
         let source = source.map(|(name, text)| Source { name, text });
         let overrides = file::with_tables(&overrides).map_err(Failure::from)?;
         Ok(Self::make(source, overrides, catalogues)?)
+    }
+
+    /// The same with other values of `keys`, as `key=value` words, by the rule of arrays.
+    fn varied(&self, py: Python<'_>, keys: Vec<String>, words: Vec<String>) -> PyResult<Self> {
+        let case = self
+            .variants(py, &keys)?
+            .with(&words, &Control::default())
+            .map_err(Failure::from)?;
+        Ok(self.with_case(case))
+    }
+
+    /// The same with results in the model's units, or in SI.
+    fn in_model_units(&self, model_units: bool) -> Self {
+        let case = self.case.as_ref().clone();
+        self.with_case(case.in_model_units(model_units))
+    }
+
+    /// Whether results of a physical case are in the model's units.
+    #[getter]
+    fn model_units(&self) -> bool {
+        self.case.is_in_model_units()
+    }
+
+    /// What stays while keys of these names vary although it was not stated, in SI, as JSON.
+    fn held(&self, py: Python<'_>, keys: Vec<String>) -> PyResult<String> {
+        let held = self.variants(py, &keys)?.held(&keys);
+        Ok(serde_json::to_string(&held).map_err(Failure::from)?)
     }
 
     /// The same from paths.
@@ -277,6 +364,14 @@ pub(crate) fn case_keys() -> Vec<(&'static str, Vec<KeyRow>)> {
     Section::ALL
         .map(|section| (section.name(), of(section)))
         .to_vec()
+}
+
+/// A quantity of a key, given by its path, in SI; of another key a plain number.
+#[pyfunction]
+pub(crate) fn in_si(key: &str, text: &str) -> PyResult<f64> {
+    let kind = Key::find(key).map_or(Kind::Number, Key::kind);
+    let read = kind.parse(text);
+    Ok(read.map_err(|error| Failure::input(format!("{key}: {error}")))?)
 }
 
 /// The built-in levers and materials: kind, name, source.

@@ -212,7 +212,7 @@ pub(crate) fn observe(
     threads: Option<usize>,
     progress: Option<Py<PyAny>>,
 ) -> PyResult<Found> {
-    let variants = case.variants(&keys)?;
+    let variants = case.variants(py, &keys)?;
     let requests = requests
         .iter()
         .map(|request| json(request))
@@ -235,7 +235,7 @@ pub(crate) fn observe(
                     progress: None,
                 };
                 let found = variants
-                    .with(words)
+                    .with(words, &alone)
                     .and_then(|case| Ok(at_setpoint(case, &alone)?.0))
                     .and_then(|case| report(&name, &case, request, &alone));
                 let found = match found {
@@ -262,7 +262,7 @@ pub(crate) fn observe(
             if let Ok(entries) = found
                 && !names.contains_key(&entries.dimension)
             {
-                let case = at_setpoint(variants.with(words)?, control)?.0;
+                let case = at_setpoint(variants.with(words, control)?, control)?.0;
                 names.insert(entries.dimension, state_names(&case.model()?));
             }
         }

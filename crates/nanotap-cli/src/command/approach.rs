@@ -81,23 +81,19 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     output.study(&case, &written, |_| text(&case, &report))
 }
 
-/// A row a distance, there and back, then what coexists; of a physical case the SI columns
-/// follow.
+/// A row a distance, there and back, then what coexists.
 fn csv(report: &ApproachReport, units: &Units) -> String {
-    let physical = report.table.iter().any(|p| p.zc.is_some());
-    let mut header: Vec<String> = [
+    let si = matches!(units, Units::Si(_));
+    let distance = if si { "zc (m)" } else { report.parameter };
+    let first = [
         "way",
-        report.parameter,
+        distance,
         "classification",
         "period",
         "spectral_radius",
-    ]
-    .map(str::to_owned)
-    .to_vec();
-    header.extend(columns::columns(ObservableSet::COMMON, physical));
-    if physical {
-        header.push("zc (m)".to_owned());
-    }
+    ];
+    let mut header = first.map(str::to_owned).to_vec();
+    header.extend(columns::columns(ObservableSet::COMMON, si));
     if report.modulation.is_some() {
         header.extend(COLUMNS.iter().map(|column| match si_of(column, units) {
             Some((kind, _)) => format!("{} ({})", column.name, kind.si_unit()),
@@ -106,16 +102,12 @@ fn csv(report: &ApproachReport, units: &Units) -> String {
     }
     let mut csv = header.join(",") + "\n";
     for p in report.table.iter().chain(&report.coexisting) {
-        let si = physical.then_some(p.physical.as_ref());
         let mut row = vec![p.spectral_radius];
-        row.extend(columns::cells(
-            ObservableSet::COMMON,
-            p.observables.as_ref(),
-            si,
-        ));
-        if physical {
-            row.push(p.zc);
-        }
+        row.extend(if si {
+            columns::cells_in_si(ObservableSet::COMMON, p.physical.as_ref())
+        } else {
+            columns::cells(ObservableSet::COMMON, p.observables.as_ref())
+        });
         if report.modulation.is_some() {
             row.extend(COLUMNS.iter().map(|column| {
                 let unit = si_of(column, units).map_or(1.0, |(_, unit)| unit);
@@ -127,7 +119,7 @@ fn csv(report: &ApproachReport, units: &Units) -> String {
             csv,
             "{},{},{},{period}",
             p.way.name(),
-            shortest(p.gap),
+            shortest(p.zc.filter(|_| si).unwrap_or(p.gap)),
             p.classification.name()
         );
         for value in row {

@@ -35,7 +35,10 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     let (request, case) = arguments.study.read(output)?;
     let model = case.model()?;
     let found = progress::study::<AttractorsStudy>(&case, &request, &arguments.threads)?;
-    arguments.study.out.write(|| csv(&model, &found))?;
+    arguments
+        .study
+        .out
+        .write(|| csv(&model, &found, &case.units()))?;
     arguments
         .study
         .plot
@@ -58,10 +61,12 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
 }
 
 /// A row a strobe point of each attractor (of one that does not repeat, one point).
-fn csv(model: &Model, found: &Attractors) -> String {
+fn csv(model: &Model, found: &Attractors, units: &Units) -> String {
+    let names = time_series::state_names(model);
+    let names: Vec<String> = names.iter().map(|name| units.state_column(name)).collect();
     let mut csv = format!(
         "attractor,classification,period,fraction,point,{}\n",
-        time_series::state_names(model).join(",")
+        names.join(",")
     );
     for (k, attractor) in found.attractors.iter().enumerate() {
         let period = attractor
@@ -202,8 +207,8 @@ fn text(case: &GivenCase, found: &Attractors) -> String {
             format!(
                 "{} {} … {}",
                 s.coordinate,
-                number::significant(s.lower, 3),
-                number::significant(s.upper, 3)
+                units.shown_entry(&s.coordinate, s.lower, 3),
+                units.shown_entry(&s.coordinate, s.upper, 3)
             )
         })
         .collect();

@@ -38,8 +38,8 @@ pub(crate) struct Arguments {
 pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure> {
     let mut options = arguments.request.read()?;
     options.attractors = arguments.attractors.as_deref().map(states).transpose()?;
-    let axes = options.axes()?;
     let case = GivenCase::of(&arguments.case, output)?;
+    let axes = options.axes(&case.units())?;
     let name = derived_name(
         arguments.case.file.as_deref(),
         &["basin", &axes[0].name, &axes[1].name],

@@ -5,6 +5,7 @@ use std::fmt::Write as _;
 use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use nanotap::case::physical::Kind;
+use nanotap::case::units::Units;
 use nanotap::figure::branch::{Shown, case_figure};
 use nanotap::number::shortest;
 use nanotap::observe::{ObservableSet, columns, time_series};
@@ -71,7 +72,8 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     let model = case.model()?;
     if let Some(path) = &arguments.out.out {
         let names = time_series::state_names(&model);
-        file::write(path, csv(&report, options.observables, &names).as_bytes())?;
+        let table = csv(&report, options.observables, &names, &case.units());
+        file::write(path, table.as_bytes())?;
     }
     arguments
         .plot
@@ -107,20 +109,26 @@ fn shorten(report: &mut BranchReport, output: &Output) {
 
 /// A row a point, branch by branch; `kind` is empty but for bifurcations, which follow the
 /// points of their branch.
-fn csv(report: &BranchReport, observed: ObservableSet, names: &[String]) -> String {
-    let physical = report.points.iter().any(|p| p.physical.is_some());
-    let mut header: Vec<String> = [
+fn csv(report: &BranchReport, observed: ObservableSet, names: &[String], units: &Units) -> String {
+    let si = matches!(units, Units::Si(_));
+    let key = report.key;
+    let parameter = match key.kind() {
+        kind if key.is_physical() && kind != Kind::Number => {
+            format!("{key} ({})", kind.si_unit())
+        }
+        _ => key.path().to_owned(),
+    };
+    let first = [
         "branch",
         "kind",
         "period",
-        report.parameter,
+        &parameter,
         "stable",
         "spectral_radius",
-    ]
-    .map(str::to_owned)
-    .to_vec();
-    header.extend(columns::columns(observed, physical));
-    header.extend_from_slice(names);
+    ];
+    let mut header = first.map(str::to_owned).to_vec();
+    header.extend(columns::columns(observed, si));
+    header.extend(names.iter().map(|name| units.state_column(name)));
     let mut csv = header.join(",") + "\n";
     let mut row = |branch: usize, kind: &str, p: &PointReport| {
         let _ = write!(
@@ -131,8 +139,11 @@ fn csv(report: &BranchReport, observed: ObservableSet, names: &[String]) -> Stri
             p.stable,
             shortest(spectral_radius(&p.multipliers)),
         );
-        let si = physical.then_some(p.physical.as_ref());
-        let cells = columns::cells(observed, Some(&p.observables), si);
+        let cells = if si {
+            columns::cells_in_si(observed, p.physical.as_ref())
+        } else {
+            columns::cells(observed, Some(&p.observables))
+        };
         for cell in cells.into_iter().chain(p.state.iter().copied().map(Some)) {
             let _ = write!(csv, ",{}", cell.map_or_else(String::new, shortest));
         }
@@ -147,6 +158,7 @@ fn csv(report: &BranchReport, observed: ObservableSet, names: &[String]) -> Stri
                 branch,
                 period: b.period,
                 parameter: b.parameter,
+                parameter_si: b.parameter_si,
                 state: b.state.clone(),
                 multipliers: b.multipliers.clone(),
                 stable: false,

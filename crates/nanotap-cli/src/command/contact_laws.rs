@@ -30,22 +30,15 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     output.study(&case, &result, |result| text(&case, result))
 }
 
-/// The loops, a row a point; of a physical case the SI columns follow.
+/// The loops, a row a point.
 fn csv(result: &Comparison, units: &Units) -> String {
     let shown = [("indentation", Kind::Length), ("force", Kind::Force)];
-    let si = shown.map(|(_, kind)| units.si(kind));
-    let mut csv = String::from("contact,indentation,force");
-    for (name, kind) in shown.iter().filter(|(_, kind)| units.si(*kind).is_some()) {
-        let _ = write!(csv, ",{name} ({})", kind.si_unit());
-    }
-    csv.push('\n');
+    let [indentation, force] = shown.map(|(name, kind)| units.column(name, kind));
+    let mut csv = format!("contact,{indentation},{force}\n");
     for sample in &result.samples {
         for point in sample.orbit.iter().flat_map(|o| &o.force_loop) {
-            let in_si = si
-                .iter()
-                .zip(point)
-                .filter_map(|(unit, v)| Some((*unit)? * v));
-            let row = number::row(point.iter().copied().chain(in_si));
+            let cells = shown.iter().zip(point);
+            let row = number::row(cells.map(|((_, kind), value)| units.scaled(*kind, *value)));
             let _ = writeln!(csv, "{},{row}", sample.contact);
         }
     }

@@ -3,6 +3,7 @@
 use std::fmt::Write as _;
 
 use nanotap::case::physical::Kind;
+use nanotap::case::units::Units;
 use nanotap::figure::motion::convergence_figure;
 use nanotap::observe::table::shown_phase;
 use nanotap::study::convergence::{Convergence, ConvergenceStudy};
@@ -21,16 +22,18 @@ pub(crate) type Arguments = StudyArguments<ConvergenceStudy>;
 pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure> {
     let (request, case) = arguments.read(output)?;
     let result = progress::study::<ConvergenceStudy>(&case, &request, &ThreadsArgument::default())?;
-    arguments.out.write(|| csv(&result))?;
+    arguments.out.write(|| csv(&result, &case.units()))?;
     arguments
         .plot
         .draw(|| convergence_figure(&result, &case.units()))?;
     output.study(&case, &result, |result| text(&case, result))
 }
 
-fn csv(result: &Convergence) -> String {
+fn csv(result: &Convergence, units: &Units) -> String {
+    let [tip_max, tip_min] = ["tip_max", "tip_min"].map(|name| units.column(name, Kind::Length));
     let mut csv =
-        String::from("modes,difference,period,tip_max,tip_min,contact_fraction,spectral_radius\n");
+        format!("modes,difference,period,{tip_max},{tip_min},contact_fraction,spectral_radius\n");
+    let length = |value: Option<f64>| value.map(|value| units.scaled(Kind::Length, value));
     let cell = |value: Option<f64>| value.map_or_else(String::new, |v| v.to_string());
     for (motion, difference) in result.motions.iter().zip(&result.difference) {
         let _ = writeln!(
@@ -39,8 +42,8 @@ fn csv(result: &Convergence) -> String {
             motion.modes,
             cell(*difference),
             motion.period.map_or_else(String::new, |n| n.to_string()),
-            cell(motion.tip_max),
-            cell(motion.tip_min),
+            cell(length(motion.tip_max)),
+            cell(length(motion.tip_min)),
             cell(motion.contact_fraction),
             cell(motion.spectral_radius),
         );

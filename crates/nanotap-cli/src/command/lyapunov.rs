@@ -1,5 +1,7 @@
 //! `nanotap lyapunov`: Lyapunov spectrum and Poincaré section of any motion.
 
+use nanotap::case::physical::Kind;
+use nanotap::case::units::Units;
 use nanotap::figure::attractors::section_figure;
 use nanotap::model::Model;
 use nanotap::observe::time_series;
@@ -27,7 +29,9 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     if wanted && report.section.is_empty() {
         output.warning("the section is empty: the motion begins no contact");
     }
-    arguments.out.write(|| csv(&model, &report))?;
+    arguments
+        .out
+        .write(|| csv(&model, &report, &case.units()))?;
     arguments
         .plot
         .draw(|| section_figure(&model, &report, &case.units()))?;
@@ -35,11 +39,21 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
 }
 
 /// A row a point of the section.
-fn csv(model: &Model, report: &LyapunovReport) -> String {
-    let names = time_series::state_names(model).join(",");
-    let mut csv = format!("phase_degrees,tip,tip_rate,gap_rate,{names}\n");
+fn csv(model: &Model, report: &LyapunovReport, units: &Units) -> String {
+    let shown = [
+        ("tip", Kind::Length),
+        ("tip_rate", Kind::Velocity),
+        ("gap_rate", Kind::Velocity),
+    ];
+    let mut header = vec!["phase_degrees".to_owned()];
+    header.extend(shown.iter().map(|(name, kind)| units.column(name, *kind)));
+    let names = time_series::state_names(model);
+    header.extend(names.iter().map(|name| units.state_column(name)));
+    let mut csv = header.join(",") + "\n";
     for p in &report.section {
-        let cells = [360.0 * p.phase, p.tip, p.tip_rate, p.gap_rate];
+        let speed = |value| units.scaled(Kind::Velocity, value);
+        let tip = units.scaled(Kind::Length, p.tip);
+        let cells = [360.0 * p.phase, tip, speed(p.tip_rate), speed(p.gap_rate)];
         csv.push_str(&number::row(cells.iter().chain(&p.state).copied()));
         csv.push('\n');
     }

@@ -3,9 +3,11 @@
 use std::fmt::Write as _;
 
 use clap::Args;
+use nanotap::case::physical::Kind;
+use nanotap::case::units::Units;
 use nanotap::figure::motion::orbit_figure;
 use nanotap::model::Model;
-use nanotap::observe::{ObservableSet, PhysicalMotion, time_series};
+use nanotap::observe::{ObservableSet, time_series};
 use nanotap::study::orbit::{MAX_DETERMINANT_DEFECT, OrbitOptions, OrbitReport, OrbitStudy};
 
 use crate::arguments::{CaseArguments, OutArgument, PlotArgument};
@@ -69,7 +71,7 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     if let Some(path) = &arguments.harmonics_out {
         file::write(
             path,
-            harmonics_csv(orbit, found.physical.as_ref()).as_bytes(),
+            harmonics_csv(orbit, &case.units(), case.omega()).as_bytes(),
         )?;
     }
     arguments
@@ -88,24 +90,37 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     })
 }
 
-/// A row a harmonic; of a physical case the SI columns follow.
-fn harmonics_csv(orbit: &OrbitReport, physical: Option<&PhysicalMotion>) -> String {
+/// A row a harmonic.
+fn harmonics_csv(orbit: &OrbitReport, units: &Units, omega: f64) -> String {
     let harmonics = &orbit.spectrum.harmonics;
-    let setting = physical.and_then(|motion| motion.setting.as_ref());
-    let in_si = setting.map_or(&[][..], |setting| &setting.harmonics);
-    let mut csv = String::from("order,tip,tip_lag_degrees,force,force_lag_degrees");
+    let si = matches!(units, Units::Si(_));
+    let mut header = vec!["order".to_owned()];
+    if si {
+        header.push("frequency (Hz)".to_owned());
+    }
+    header.extend([
+        units.column("tip", Kind::Length),
+        "tip_lag_degrees".to_owned(),
+        units.column("force", Kind::Force),
+        "force_lag_degrees".to_owned(),
+    ]);
     if harmonics.iter().any(|h| h.slope.is_some()) {
-        csv.push_str(",slope");
+        header.push("slope".to_owned());
     }
-    if !in_si.is_empty() {
-        csv.push_str(",frequency (Hz),tip (m),force (N)");
-    }
-    csv.push('\n');
-    for (k, h) in harmonics.iter().enumerate() {
-        let cells = [h.order, h.tip, h.tip_phase, h.force, h.force_phase];
-        let si = in_si.get(k).map(|h| [h.frequency, h.tip, h.force]);
-        let cells = cells.into_iter().chain(h.slope);
-        csv.push_str(&number::row(cells.chain(si.into_iter().flatten())));
+    let mut csv = header.join(",") + "\n";
+    for h in harmonics {
+        let mut cells = vec![h.order];
+        if si {
+            cells.push(units.scaled(Kind::Frequency, h.order * omega));
+        }
+        cells.extend([
+            units.scaled(Kind::Length, h.tip),
+            h.tip_phase,
+            units.scaled(Kind::Force, h.force),
+            h.force_phase,
+        ]);
+        cells.extend(h.slope);
+        csv.push_str(&number::row(cells));
         csv.push('\n');
     }
     csv

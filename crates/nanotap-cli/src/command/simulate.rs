@@ -41,7 +41,7 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
             motion::warn(seen, physical, &run.out_of_range, "", output);
         }
         SimulateReport::FixedStep(run) => {
-            arguments.out.write(|| curve(run))?;
+            arguments.out.write(|| curve(run, &units))?;
             arguments
                 .plot
                 .draw(|| fixed_step_figure(&model, run, &units))?;
@@ -126,10 +126,23 @@ fn text(
 }
 
 /// Time, tip displacement and its rate at every step.
-fn curve(run: &FixedStepRun) -> String {
-    let mut csv = String::from("tau,tip,tip_rate\n");
+fn curve(run: &FixedStepRun, units: &Units) -> String {
+    let time = match units {
+        Units::Model => "tau",
+        Units::Si(_) => "time",
+    };
+    let columns = [
+        (time, Kind::Time),
+        ("tip", Kind::Length),
+        ("tip_rate", Kind::Velocity),
+    ];
+    let header = columns.map(|(name, kind)| units.column(name, kind));
+    let mut csv = header.join(",") + "\n";
     for point in &run.curve {
-        csv.push_str(&number::row(*point));
+        let cells = columns.iter().zip(point);
+        csv.push_str(&number::row(
+            cells.map(|((_, kind), value)| units.scaled(*kind, *value)),
+        ));
         csv.push('\n');
     }
     csv

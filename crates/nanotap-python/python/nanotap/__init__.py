@@ -21,6 +21,7 @@ from ._datasets import merge, open
 from ._interrupt import Interrupted
 from ._map import Map, Motion, PeriodicOrbit
 from ._nanotap import __version__
+from ._quantity import Range as range  # noqa: F401 - not for `import *`
 from ._record import Record
 from ._results import (
     Attractor,

@@ -4,6 +4,7 @@ import json
 import math
 import operator
 import os
+import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import cache
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
@@ -12,7 +13,8 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _nanotap
-from ._quantity import in_si, many, text
+from ._case import existing
+from ._quantity import Range, in_si, many, si_unit, text, written
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -114,7 +116,7 @@ def _pair(name: str, value: Any) -> tuple[Any, Any]:
 
 def quantity(name: str, value: Any) -> str:
     """A number (of a physical key in SI), or a text with a unit, as the extension reads it."""
-    value = in_si(name, value)
+    value = in_si(name, value) if si_unit(name) else written(value)
     if isinstance(value, str):
         return value
     return text(name, number(name, value))
@@ -122,25 +124,21 @@ def quantity(name: str, value: Any) -> str:
 
 def axis(name: str, values: Any) -> str:
     """An axis as the terminal writes it: `omega=2:4:400`, `alpha4=1:1000:50:log`, `omega=2,2.5,4`."""
-    if isinstance(values, tuple):
-        if len(values) not in (3, 4):
-            message = (
-                f"{name}: expected first value, last value and count, as in (2, 4, 400)"
-            )
-            raise ValueError(message)
-        first, last, number_of, *spacing = values
+    if isinstance(values, tuple) and len(values) in (3, 4):
+        values = _from_tuple(values)
+    if isinstance(values, Range):
         words = [
-            quantity(name, first),
-            quantity(name, last),
-            str(count(name, number_of)),
+            quantity(name, values.first),
+            quantity(name, values.last),
+            str(count(name, values.count)),
         ]
-        return f"{name}={':'.join([*words, *map(str, spacing)])}"
+        return f"{name}={':'.join(words + ['log'] * values.log)}"
     values = many(name, values)
     if values.ndim == 1 and values.dtype.kind == "U":
         return f"{name}={','.join(values.tolist())}"
     array = real(values, name)
     if array.ndim != 1 or array.size == 0:
-        message = f"{name}: expected a row of values, as in numpy.linspace(2, 4, 400)"
+        message = f"{name}: expected a row of values, as in nanotap.range(2, 4, 400)"
         raise ValueError(message)
     first, last, size = float(array[0]), float(array[-1]), array.size
     if np.allclose(array, np.linspace(first, last, size), rtol=1e-12, atol=0):
@@ -154,6 +152,23 @@ def axis(name: str, values: Any) -> str:
     return f"{name}={','.join(text(name, value) for value in array.tolist())}"
 
 
+def _from_tuple(values: tuple[Any, ...]) -> "Range | tuple[Any, ...]":
+    """The range that a tuple `(first, last, count)` meant until version 0.2."""
+    first, last, number_of, *spacing = values
+    log = spacing == ["log"]
+    if isinstance(number_of, bool) or not isinstance(number_of, int | np.integer):
+        return values
+    if spacing and not log or number_of < 2:
+        return values
+    meant = Range(first, last, int(number_of), log=log)
+    warnings.warn(
+        f"{values} is taken for a range; write nanotap.{meant!r}: a tuple will be a list of values",
+        FutureWarning,
+        stacklevel=4,
+    )
+    return meant
+
+
 def axes(over: str | Sequence[str] | Mapping[str, Any]) -> list[str]:
     """The axes of a sweep."""
     if isinstance(over, str):
@@ -162,15 +177,21 @@ def axes(over: str | Sequence[str] | Mapping[str, Any]) -> list[str]:
         return [axis(str(name), values) for name, values in over.items()]
     if isinstance(over, Sequence) and all(isinstance(word, str) for word in over):
         return list(over)
-    message = 'over: name parameters and values, as in {"omega": (2, 4, 400)} or "omega=2:4:400"'
+    message = 'over: name parameters and values, as in {"omega": nanotap.range(2, 4, 400)} or "omega=2:4:400"'
     raise TypeError(message)
 
 
 def slice_axis(name: str, value: str | Mapping[str, Any]) -> str:
-    """One axis of a slice of states: `"a1=-1:1:200"` or `{"a1": (-1, 1, 200)}`."""
+    """One axis of a slice of states: `"a1=-1:1:200"` or `{"a1": range(-1, 1, 200)}`."""
+    if isinstance(value, Mapping):
+        # Here three values are always a range.
+        value = {
+            name: Range(*ends) if isinstance(ends, tuple) and len(ends) == 3 else ends
+            for name, ends in value.items()
+        }
     words = axes(value) if isinstance(value, str | Mapping) else []
     if len(words) != 1:
-        message = f'{name}: name one entry of the state, as in {{"a1": (-1, 1, 200)}} or "a1=-1:1:200"'
+        message = f'{name}: name one entry of the state, as in {{"a1": nanotap.range(-1, 1, 200)}} or "a1=-1:1:200"'
         raise TypeError(message)
     return words[0]
 
@@ -237,6 +258,8 @@ def _kinds(schema: Mapping[str, Any]) -> set[str]:
 def _plain(name: str, value: Any, takes: _Option) -> Any:
     """A value in JSON."""
     kinds = takes.kinds
+    if "string" in kinds:
+        value = written(value)
     if "boolean" in kinds:
         return bool(value)
     if "object" in kinds:
@@ -276,7 +299,7 @@ def names(name: str, value: Any) -> list[str]:
 def tables(data: Any) -> list[dict[str, Any]]:
     """Measured curves as tables: files, mappings of columns, data frames, datasets, or several."""
     if isinstance(data, str | os.PathLike):
-        table: dict[str, Any] = json.loads(_nanotap.table(os.fspath(data)))
+        table: dict[str, Any] = json.loads(_nanotap.table(existing(data)))
         return [table]
     if hasattr(data, "data_vars"):  # xarray
         return [{"columns": _of_dataset(data)}]

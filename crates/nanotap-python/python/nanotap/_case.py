@@ -1,5 +1,6 @@
 """The case: cantilever, sample and drive."""
 
+import errno
 import json
 import os
 from collections.abc import Iterable, Iterator, Mapping
@@ -66,24 +67,36 @@ class Case:
     _keys: dict[str, str]
     _document: Record
 
-    def __init__(self, *, catalogue: Path | Iterable[Path] = (), **keys: Value) -> None:
+    def __init__(
+        self,
+        *,
+        catalogue: Path | Iterable[Path] = (),
+        model_units: bool = False,
+        **keys: Value,
+    ) -> None:
         texts = [(os.fspath(path), _text(path)) for path in _paths(catalogue)]
-        self._make(None, key_words(keys), texts)
+        self._make(None, key_words(keys), texts, model_units)
 
     @classmethod
     def from_file(
-        cls, path: Path, *, catalogue: Path | Iterable[Path] = (), **keys: Value
+        cls,
+        path: Path,
+        *,
+        catalogue: Path | Iterable[Path] = (),
+        model_units: bool = False,
+        **keys: Value,
     ) -> "Case":
         """The case of a TOML file, with `keys` replacing its values.
 
-        `catalogue` names files with further levers and materials.
+        `catalogue` names files with further levers and materials; with `model_units` results of
+        a physical case are in the model's units.
         """
         case = cls.__new__(cls)
         case._keys = key_words(keys)
-        files = [os.fspath(path) for path in _paths(catalogue)]
+        files = [existing(path) for path in _paths(catalogue)]
         case._core = _nanotap.CaseCore.from_file(
-            os.fspath(path), list(case._keys.values()), files
-        )
+            existing(path), list(case._keys.values()), files
+        ).in_model_units(model_units)
         case._read()
         return case
 
@@ -93,7 +106,7 @@ class Case:
         if not isinstance(text, str):
             message = f"text: expected a TOML text, got {text!r}"
             raise TypeError(message)
-        return _again(cls, (name, text), key_words(keys), [])
+        return _again(cls, (name, text), key_words(keys), [], False)
 
     @classmethod
     def paper(cls, **keys: Value) -> "Case":
@@ -108,23 +121,44 @@ class Case:
             "alpha6": 0.2,
             "omega": 2.6,
         }
-        return _again(cls, None, key_words(own) | key_words(keys), [])
+        return _again(cls, None, key_words(own) | key_words(keys), [], False)
 
-    def with_(self, **keys: Value) -> "Case":
-        """The same case with some keys changed; `None` removes a key."""
-        if not keys:
+    def with_(self, *, model_units: bool | None = None, **keys: Value) -> "Case":
+        """The same case with some keys changed; `None` removes a key. Numbers that are not stated
+        follow: of a case with `free_amplitude` the drive follows a new frequency. In the
+        arguments of a study a key varies alone: there the drive's own amplitude stays.
+        """
+        if model_units is None:
+            model_units = self._core.model_units
+        if not keys and model_units == self._core.model_units:
             return self
         source, _, catalogues = self._core.made_of
-        return _again(type(self), source, self._keys | key_words(keys), catalogues)
+        texts = self._keys | key_words(keys, self.kind)
+        return _again(type(self), source, texts, catalogues, model_units)
+
+    def _varied(self, keys: Mapping[str, Value]) -> "Case":
+        """The same case with keys varied as studies vary them: what is not varied stays, the
+        drive's own amplitude too. It is made for one study and is not kept.
+        """
+        if not keys:
+            return self
+        texts = key_words(keys, self.kind)
+        case = type(self).__new__(type(self))
+        case._keys = self._keys | texts
+        case._core = self._core.varied(list(texts), list(texts.values()))
+        case._read()
+        return case
 
     def _make(
         self,
         source: tuple[str, str] | None,
         words: dict[str, str],
         catalogues: list[tuple[str, str]],
+        model_units: bool,
     ) -> None:
         self._keys = words
-        self._core = _nanotap.CaseCore(source, list(words.values()), catalogues)
+        core = _nanotap.CaseCore(source, list(words.values()), catalogues)
+        self._core = core.in_model_units(model_units)
         self._read()
 
     def _read(self) -> None:
@@ -208,7 +242,7 @@ class Case:
         if name.startswith("_"):
             raise AttributeError(name)
         try:
-            return self._document[_OTHER_NAMES.get(name, name)]
+            return self[name]
         except KeyError:
             message = f"the case has no `{name}`; it has {', '.join(self._document)}"
             raise AttributeError(message) from None
@@ -220,7 +254,8 @@ class Case:
         super().__setattr__(name, value)
 
     def __getitem__(self, name: str) -> Any:
-        return self._document[_OTHER_NAMES.get(name, name)]
+        own = name in self._document
+        return self._document[name if own else _OTHER_NAMES.get(name, name)]
 
     def __iter__(self) -> Iterator[str]:
         return iter(self._document)
@@ -231,16 +266,20 @@ class Case:
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, Case):
             return NotImplemented
-        return self._core.document == other._core.document
+        same_units = self._core.model_units == other._core.model_units
+        return same_units and self._core.document == other._core.document
 
     def __hash__(self) -> int:
         return hash(self._core.document)
 
     def __reduce__(self) -> tuple[Any, ...]:
         source, _, catalogues = self._core.made_of
-        return _again, (type(self), source, self._keys, catalogues)
+        flag = self._core.model_units
+        return _again, (type(self), source, self._keys, catalogues, flag)
 
     def __repr__(self) -> str:
+        if self.is_physical:
+            return self._physical_repr()
         shown = ", ".join(
             f"{key}={value!r}"
             for key, value in self._document.items()
@@ -248,6 +287,20 @@ class Case:
         )
         name = "Case" if self.kind == "cantilever" else f"Case[{self.kind}]"
         return f"{name}({shown})"
+
+    def _physical_repr(self) -> str:
+        """Lever, sample, drive and distance, as they were stated."""
+        tables: dict[str, list[str]] = {}
+        for key, value in json.loads(self._core.stated).items():
+            if "." in key:
+                table, name = key.split(".", 1)
+                tables.setdefault(table, []).append(f"{name} = {value}")
+        lines = [f"  {table}: {', '.join(tables[table])}" for table in tables]
+        units = ", results in the model's units" if self._core.model_units else ""
+        head = (
+            f"Case: a cantilever with {self.modes} mode{'s' * (self.modes != 1)}{units}"
+        )
+        return "\n".join([head, *lines])
 
     def _repr_html_(self) -> str:
         symbols = {name: symbol for name, symbol, _ in self._core.parameters}
@@ -287,9 +340,10 @@ def _again(
     source: tuple[str, str] | None,
     words: dict[str, str],
     catalogues: list[tuple[str, str]],
+    model_units: bool,
 ) -> Case:
     case = kind.__new__(kind)
-    case._make(source, words, catalogues)
+    case._make(source, words, catalogues, model_units)
     return case
 
 
@@ -297,17 +351,40 @@ def _paths(given: Path | Iterable[Path]) -> list[Path]:
     return [given] if isinstance(given, str | os.PathLike) else list(given)
 
 
+def missing(path: Path) -> FileNotFoundError:
+    """The error of a file or folder that does not exist."""
+    return FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT), os.fspath(path))
+
+
+def existing(path: Path) -> str:
+    """The name of a file.
+
+    Raises:
+        FileNotFoundError: it does not exist.
+    """
+    if not os.path.exists(path):
+        raise missing(path)
+    return os.fspath(path)
+
+
 def _text(path: Path) -> str:
     try:
         with open(path, encoding="utf-8") as file:
             return file.read()
-    except (OSError, UnicodeDecodeError) as error:
+    except UnicodeDecodeError as error:
         message = f"{os.fspath(path)}: cannot be read: {error}"
         raise ValueError(message) from None
 
 
-def key_words(keys: Mapping[str, Any]) -> dict[str, str]:
-    """`key=value` texts with the main name of each key."""
+def key_words(keys: Mapping[str, Any], kind: str = "cantilever") -> dict[str, str]:
+    """`key=value` texts with the main name of each key, for a case of this `kind` unless the keys
+    state another one.
+    """
+    table = keys.get("model")
+    stated = table.get("kind") if isinstance(table, Mapping) else None
+    kind = str(keys.get("kind") or keys.get("model.kind") or stated or kind)
+    # The second names are those of a cantilever's numbers; an oscillator has a gap of its own.
+    second_names = _OTHER_NAMES if kind == "cantilever" else {}
     words: dict[str, str] = {}
     typed: dict[str, str] = {}
     for key, value in keys.items():
@@ -319,7 +396,7 @@ def key_words(keys: Mapping[str, Any]) -> dict[str, str]:
                 words[name] = f"{name}={_written(name, quantity)}"
         else:
             name = key.removeprefix("model.")
-            name = _OTHER_NAMES.get(name, name)
+            name = second_names.get(name, name)
             if name in typed:
                 message = (
                     f"`{typed[name]}` and `{key}` are the same key; keep one of the two"

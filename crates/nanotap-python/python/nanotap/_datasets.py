@@ -11,7 +11,7 @@ import numpy as np
 
 from . import _arguments, _nanotap
 from ._arguments import Progress
-from ._case import Case, Path
+from ._case import Case, Path, missing
 from ._interrupt import Interrupted
 from ._motions import _cased
 from ._progress import bar
@@ -79,14 +79,14 @@ def open(path: Path) -> "xr.Dataset":
     Its chunks are read when needed, through dask if it is installed.
 
     Raises:
-        ValueError: it does not exist, or is not a dataset of nanotap.
+        FileNotFoundError: it does not exist.
+        ValueError: it is not a dataset of nanotap.
     """
     import xarray as xr
 
     name = os.fspath(path)
-    if not os.path.isdir(name):
-        message = f"{name} is not a dataset of nanotap: it does not exist"
-        raise ValueError(message)
+    if not os.path.exists(name):
+        raise missing(name)
     if not os.path.isfile(os.path.join(name, ".zmetadata")):
         message = f"{name} is not a dataset of nanotap: it has no .zmetadata"
         raise ValueError(message)
@@ -97,7 +97,28 @@ def open(path: Path) -> "xr.Dataset":
         chunks = None
     ds: xr.Dataset = xr.open_zarr(name, chunks=chunks, consolidated=True)
     ds.attrs["path"] = name
-    return ds
+    # It may be written elsewhere, where the compression of this store does not apply.
+    return _worded(ds.drop_encoding())
+
+
+def _worded(ds: "xr.Dataset") -> "xr.Dataset":
+    """`classification` in words, as in every other result, beside its codes in the store; empty
+    where a run is missing.
+    """
+    import xarray as xr
+
+    codes = ds.get("classification")
+    if codes is None:
+        return ds
+    meanings = codes.attrs["flag_meanings"].split()
+    words = np.array([word if word != "missing" else "" for word in meanings])
+    named = xr.apply_ufunc(
+        words.__getitem__, codes, dask="parallelized", output_dtypes=[words.dtype]
+    )
+    attrs = {key: codes.attrs[key] for key in ("long_name", "units")}
+    return ds.assign(
+        classification=named.assign_attrs(attrs), classification_code=codes
+    )
 
 
 def merge(sources: Iterable[Path], out: Path) -> Record:
@@ -118,6 +139,9 @@ def merge(sources: Iterable[Path], out: Path) -> Record:
         raise TypeError(message)
     _ending(out, "out")
     names = [os.fspath(source) for source in sources]
+    for name in names:
+        if not os.path.exists(name):
+            raise missing(name)
     return Record(json.loads(_nanotap.merge(names, out)))
 
 
@@ -154,13 +178,19 @@ def window(
     shares = found["shares"]
     return ds.assign(
         condition=xr.DataArray(np.array(found["conditions"], dtype=str), dims=dims),
-        share=("kind_of_point", np.array(list(shares.values()))),
+        share=("kind_of_point", np.array(list(shares.values())), _SHARE),
     ).assign_coords(kind_of_point=np.array(list(shares), dtype=str))
+
+
+_SHARE = {"long_name": "part of all points", "units": "1"}
 
 
 def _path_of(ds: "xr.Dataset | Path") -> str:
     if isinstance(ds, str | os.PathLike):
-        return os.fspath(ds)
+        name = os.fspath(ds)
+        if not os.path.exists(name):
+            raise missing(name)
+        return name
     path = ds.attrs.get("path")
     if path is None:
         message = "the dataset is in memory only; compute it with out="
@@ -208,8 +238,6 @@ def _computed(
     del ds.attrs["path"]
     # The data are in memory, so the store is no longer needed.
     ds.close()
-    # It may be written elsewhere; the compression of the store no longer applies.
-    ds = ds.drop_encoding()
     if stopped:
         message = "stopped; unfinished values are missing"
         raise Interrupted(message, ds)

@@ -178,7 +178,7 @@ class Map:
         return array
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class PeriodicOrbit:
     """A periodic orbit of a map, with its multipliers.
 
@@ -197,6 +197,21 @@ class PeriodicOrbit:
     stability: str
     residual: float
     error: float
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, PeriodicOrbit):
+            return NotImplemented
+        mine, others = ((o.states, o.multipliers) for o in (self, other))
+        same = (np.array_equal(a, b) for a, b in zip(mine, others, strict=True))
+        words = (self.period, self.stability, self.residual, self.error)
+        return all(same) and words == (
+            other.period,
+            other.stability,
+            other.residual,
+            other.error,
+        )
+
+    __hash__ = object.__hash__
 
     @property
     def state(self) -> Floats:

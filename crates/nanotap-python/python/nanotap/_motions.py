@@ -13,8 +13,9 @@ from ._case import Case, key_words
 from ._describe import case_attributes, dataset
 from ._interrupt import Interrupted
 from ._progress import bar
-from ._quantity import in_si, many, si_unit
+from ._quantity import Range, in_si, many, si_unit
 from ._results import Modes, Orbit
+from ._si import answered
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -95,7 +96,8 @@ def orbit(
     def series() -> "xr.Dataset":
         table = _nanotap.series(case._core, state, period, resolution)
         variables, coords = _columns(*table)
-        return dataset(variables, coords, case_attributes(case, "a periodic orbit"))
+        attributes = case_attributes(case, "a periodic orbit")
+        return answered(case, dataset(variables, coords, attributes))
 
     return Orbit.of(document, made_series=series)
 
@@ -140,8 +142,8 @@ def _split(
             message = f"{key}: unknown argument or key; did you mean {near[0]}?"
             raise TypeError(message)
         one = isinstance(value, str | Mapping) or np.ndim(in_si(key, value)) == 0
-        (fixed if one else varied)[key] = value
-    return _cased(case).with_(**fixed), varied
+        (varied if isinstance(value, Range) or not one else fixed)[key] = value
+    return _cased(case)._varied(fixed), varied
 
 
 def _columns(names: list[str], values: Floats) -> tuple[dict[str, Any], dict[str, Any]]:
@@ -194,7 +196,8 @@ def _run_dataset(
     recorded, coords = _recorded(document, entries)
     variables, attributes = _variables(document, entries)
     attributes = case_attributes(case, "one run") | attributes
-    return dataset(series | variables | recorded, times | coords, attributes)
+    found = dataset(series | variables | recorded, times | coords, attributes)
+    return answered(case, found)
 
 
 def _variables(
@@ -261,7 +264,8 @@ def _fixed_step(
         "exact_evidence": exact["evidence"],
     }
     times = {"tau": values[:, 0]}
-    return dataset(series | variables | recorded, coords | times, attributes)
+    found = dataset(series | variables | recorded, coords | times, attributes)
+    return answered(case, found)
 
 
 def _states(options: Mapping[str, Any]) -> Floats | None:
@@ -311,9 +315,9 @@ def _over(
     rows = [array.values.ravel().tolist() for array in broadcast.values()]
     named = [dict(zip(broadcast, row, strict=True)) for row in zip(*rows, strict=True)]
     named = named or [{} for _ in range(first.size)]
+    texts = [key_words(keys, case.kind) for keys in named]
     # An error in a key is reported for its first value.
-    case.with_(**named[0])
-    texts = [key_words(keys) for keys in named]
+    case._varied(named[0])
     asked = requests if order is None else [requests[k] for k in order]
     most = _arguments.optional_count("threads", threads)
     noun = "orbits" if study == "orbit" else "runs"
@@ -348,8 +352,11 @@ def _over(
             variables["initial_state"] = (("start", "state"), states, attrs)
             coords["state"] = words(entries)
     # The value in the case of a parameter that varies does not matter.
-    attributes = case_attributes(case, noun) | {"over": json.dumps(list(varied))}
-    ds = dataset(variables, coords, attributes)
+    attributes = case_attributes(case, noun) | {
+        "over": json.dumps(list(varied)),
+        "held": case._core.held(list(texts[0])),
+    }
+    ds = answered(case, dataset(variables, coords, attributes))
     if interrupted:
         done = failures.count("")
         message = f"stopped; {done} of {len(failures)} are finished"

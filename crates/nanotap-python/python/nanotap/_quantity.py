@@ -34,6 +34,51 @@ def in_si(key: str, value: Any) -> Any:
     return value
 
 
+def written(value: Any) -> Any:
+    """A quantity of pint, astropy or unyt as a text with its unit; otherwise the value."""
+    if isinstance(value, str | int | float | list | tuple) or not hasattr(value, "to"):
+        return value
+    if hasattr(value, "magnitude"):
+        return f"{float(value.magnitude)!r} {value.units:~}"
+    if hasattr(value, "unit"):
+        return f"{float(value.value)!r} {value.unit}"
+    if hasattr(value, "units"):
+        return f"{float(value.value)!r} {value.units}"
+    return value
+
+
+class Range:
+    """Evenly spaced values of a key, both ends included: `range(2, 4, 400)`.
+
+    >>> range("60 kHz", "80 kHz", 3).values("drive.frequency")
+    array([60000., 70000., 80000.])
+
+    Args:
+        first: The first value: a number, a text with a unit, or a quantity of a units package.
+        last: The last value.
+        count: Number of values.
+        log: Whether successive values have one ratio rather than one difference.
+    """
+
+    def __init__(self, first: Any, last: Any, count: int, *, log: bool = False) -> None:
+        self.first, self.last, self.count, self.log = first, last, count, log
+
+    def __repr__(self) -> str:
+        log = ", log=True" if self.log else ""
+        return f"range({self.first!r}, {self.last!r}, {self.count}{log})"
+
+    def values(self, key: str) -> "np.typing.NDArray[np.float64]":
+        """The values of `key`, of a physical key in SI."""
+        first, last = (_number(key, in_si(key, end)) for end in (self.first, self.last))
+        if self.log:
+            return np.geomspace(first, last, self.count, dtype=np.float64)
+        return np.linspace(first, last, self.count, dtype=np.float64)
+
+
+def _number(key: str, value: Any) -> float:
+    return _nanotap.in_si(key, value) if isinstance(value, str) else float(value)
+
+
 def text(key: str, value: float) -> str:
     """A number as text with the SI unit of the key."""
     return f"{value!r} {si_unit(key)}".rstrip()
@@ -41,6 +86,8 @@ def text(key: str, value: float) -> str:
 
 def many(key: str, value: Any) -> Any:
     """Values of a key, one per place: numbers in SI, or texts."""
+    if isinstance(value, Range):
+        return value.values(key)
     if isinstance(value, list | tuple) and any(hasattr(one, "to") for one in value):
         value = [in_si(key, one) for one in value]
     return np.asarray(in_si(key, value))

@@ -77,6 +77,76 @@ class Fit(Record):
         rows = [{c: law.get(c) for c in columns} for law in self.get("laws", ())]
         return pd.DataFrame(rows, columns=columns).set_index("law")
 
+    def __repr__(self) -> str:
+        return "\n".join(self._report())
+
+    def _repr_html_(self) -> str:
+        rows = "".join(
+            "<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in row) + "</tr>"
+            for row in self._table()
+        )
+        rest = escape("\n".join(self._goodness()))
+        names = ("parameter", "value", "standard error", "95 % interval", "began at")
+        head = "".join(f"<th>{name}</th>" for name in names)
+        return f"<table><caption>fit</caption><tr>{head}</tr>{rows}</table><pre>{rest}</pre>"
+
+    def _report(self, most: int = 25) -> list[str]:
+        """At most so many lines: warnings first, then parameters, correlations and goodness."""
+        rows = self._table()
+        widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+        lines = ["  " + "  ".join(map(str.ljust, row, widths)).rstrip() for row in rows]
+        fewest = 1 + len(lines)
+        rest = self._goodness()[: max(most - fewest, 1)]
+        return ["Fit", *lines, *rest]
+
+    def _table(self) -> list[list[str]]:
+        """One row per parameter: name, value, error, interval, start."""
+        undetermined = set(self["undetermined"])
+        return [
+            [
+                _of_curve(p),
+                _quantity(p["value"], p["unit"]),
+                "not determined"
+                if p["key"] in undetermined or p["standard_error"] is None
+                else f"± {_number(p['standard_error'])}",
+                ""
+                if p["interval"] is None
+                else " to ".join(_number(end) for end in p["interval"]),
+                f"began at {_number(p['start'])}"
+                + (", at a bound" if p["at_bound"] else ""),
+            ]
+            for p in self["parameters"]
+        ]
+
+    def _goodness(self) -> list[str]:
+        lines = [f"  warning: {remark}" for remark in self["remarks"]]
+        if not self["fits"]:
+            lines.insert(0, "  warning: the law does not describe the data")
+        if self["cancelled"]:
+            lines.insert(0, "  warning: stopped before it was finished")
+        freedom = self["degrees_of_freedom"]
+        lines.append(
+            f"  chi² = {_number(self['chi2'])} with {freedom:g} degrees of freedom, "
+            f"{len(self['rows'])} rows"
+        )
+        for column in self["columns"]:
+            how = "estimated from the residuals" if column["estimated"] else "stated"
+            size = _quantity(column["standard_error"], column["unit"])
+            lines.append(f"  standard error of {column['name']}: {size} ({how})")
+        names = list(self.best)
+        table = self["correlations"]
+        pairs_ = [
+            (
+                abs(table[i][j]),
+                f"  correlation of {names[i]} and {names[j]}: {table[i][j]:.3f}",
+            )
+            for i in range(len(table))
+            for j in range(i)
+            if table[i][j] is not None
+        ]
+        strong = sorted((pair for pair in pairs_ if pair[0] >= 0.1), reverse=True)
+        return lines + [text for _, text in strong]
+
     def __reduce__(self) -> tuple[Any, ...]:
         return Fit, (self.to_dict(),)
 
@@ -163,6 +233,13 @@ class Result:
     def __dir__(self) -> list[str]:
         return sorted({*super().__dir__(), *self.document})
 
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, type(self)):
+            return NotImplemented
+        return self.document == other.document
+
+    __hash__ = object.__hash__
+
     def to_dict(self) -> dict[str, Any]:
         """Everything as plain dictionaries and lists."""
         return self.document.to_dict()
@@ -170,6 +247,10 @@ class Result:
 
 def _number(value: float | None) -> str:
     return "?" if value is None else f"{value:.6g}"
+
+
+def _quantity(value: float | None, unit: str) -> str:
+    return _number(value) + ("" if unit in ("", "1") else f" {unit}")
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -357,16 +438,9 @@ class Orbit(_Observed, Result):
         return plot.orbit(self, **options)
 
     def __repr__(self) -> str:
-        # Of chosen observables these two need not be there.
-        low, high = (getattr(self, end, None) for end in ("tip_min", "tip_max"))
-        swing = (
-            ""
-            if low is None and high is None
-            else (f", W from {_number(low)} to {_number(high)}")
-        )
         return (
             f"Orbit(period={self.period}, {self.stability}, largest multiplier "
-            f"{_number(self.spectral_radius)}{swing})"
+            f"{_number(self.spectral_radius)}{_swing(self)})"
         )
 
     def _repr_html_(self) -> str:
@@ -389,6 +463,17 @@ class Orbit(_Observed, Result):
             for words, value, unit in rows
         )
         return f"<table><caption>periodic orbit</caption>{cells}</table>"
+
+
+def _swing(motion: "Orbit | Attractor") -> str:
+    """The range of the tip deflection, of a physical case in SI; chosen observables may lack it."""
+    physical = motion.document.get("physical")
+    unit = "" if physical is None else " m"
+    shown = motion.document if physical is None else physical
+    low, high = shown.get("tip_min"), shown.get("tip_max")
+    if low is None or high is None:
+        return ""
+    return f", W from {_number(low)} to {_number(high)}{unit}"
 
 
 def _orbit_again(document: Mapping[str, Any], series: "xr.Dataset | None") -> Orbit:
@@ -440,10 +525,8 @@ class Attractor(Result):
         return f"period {self.period}" if self.period else self.classification
 
     def __repr__(self) -> str:
-        return (
-            f"Attractor({self.name}, {100 * self.fraction:.1f} % of the starts, W from "
-            f"{_number(self.tip_min)} to {_number(self.tip_max)})"
-        )
+        share = f"{100 * self.fraction:.1f} % of the starts"
+        return f"Attractor({self.name}, {share}{_swing(self)})"
 
 
 class Attractors(Sequence[Attractor]):
@@ -463,6 +546,13 @@ class Attractors(Sequence[Attractor]):
 
     def __len__(self) -> int:
         return len(self._list)
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, Attractors):
+            return NotImplemented
+        return self.document == other.document
+
+    __hash__ = object.__hash__
 
     if not TYPE_CHECKING:
         # A checker of types knows the names that are declared, and finds misspelt ones.

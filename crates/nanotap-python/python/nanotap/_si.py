@@ -8,6 +8,8 @@ from ._describe import name_in_si
 if TYPE_CHECKING:
     import xarray as xr
 
+    from ._case import Case
+
 
 def _units(ds: "xr.Dataset") -> dict[str, tuple[float, str]]:
     """The model's units in SI."""
@@ -27,17 +29,31 @@ def _units(ds: "xr.Dataset") -> dict[str, tuple[float, str]]:
     }
 
 
+def answered(case: "Case", ds: "xr.Dataset") -> "xr.Dataset":
+    """A result of a case as its user sees it: of a physical case in SI unless it is in the model's
+    units.
+    """
+    return in_si(ds) if case.is_physical and not case._core.model_units else ds
+
+
+def _keeps_units(ds: "xr.Dataset", key: str) -> bool:
+    """Whether the model's units are those of one lever at one height while a key varies."""
+    numbers = key not in ds or ds[key].dtype.kind in "iuf"
+    return numbers and (key == "gap.tip" or key.startswith(("sample.", "drive.")))
+
+
 def in_si(ds: "xr.Dataset") -> "xr.Dataset":
-    """A result with its variables converted from the model's units to SI, as in sweeps of physical
-    cases: a run, an orbit's series, observables over arrays of parameters, approach curves,
-    branches. States, which have several units, stay in the model's units. So do variables without
-    a counterpart in SI if a physical quantity varies, and with it the model's units.
+    """A result of a case in the model's units (`model_units=True`), converted to SI. States, which
+    have several units, stay in the model's units. So do variables without a counterpart in SI if
+    a physical quantity varies, and with it the model's units.
 
     Raises:
         ValueError: the case is not physical.
     """
     units = _units(ds)
-    varies = any("." in key for key in json.loads(ds.attrs.get("over", "[]")))
+    varies = not all(
+        _keeps_units(ds, key) for key in json.loads(ds.attrs.get("over", "[]"))
+    )
     changed = {}
     for name, variable in ds.variables.items():
         si = f"physical_{name_in_si(str(name))}"

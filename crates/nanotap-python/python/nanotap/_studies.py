@@ -22,6 +22,7 @@ from ._results import (
     Paper,
     Reconstruction,
 )
+from ._si import answered
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -86,8 +87,18 @@ def _branch_dataset(case: Case, report: dict[str, Any]) -> "xr.Dataset":
         **_columns(points, "point", "", len(entries)),
         **_columns(bifurcations, "bifurcation", "bifurcation_", len(entries)),
     }
+    if not bifurcations:
+        # Without bifurcations the columns are there, and empty.
+        like = {"kind": "", "uncertainty": 0.0, **(points[0] if points else {})}
+        one = _columns([like], "bifurcation", "bifurcation_", len(entries))
+        one.pop("bifurcation_stable", None)
+        variables |= {key: (dims, values[:0]) for key, (dims, values) in one.items()}
     dims, values = variables.pop("parameter", ("point", np.empty(0)))
+    # A number of the equations has no unit here; `parameter_unit` tells its SI value.
+    for redundant in ("parameter_si", "bifurcation_parameter_si"):
+        variables.pop(redundant, None)
     coords: dict[str, Any] = {name: (dims, values), "state": words(entries)}
+    coords["part"] = words(("re", "im"))
     symbols = {key: symbol for key, symbol, _ in case._core.parameters}
     ds = xr.Dataset(variables, coords)
     loci = report.get("loci")
@@ -119,7 +130,15 @@ def _branch_dataset(case: Case, report: dict[str, Any]) -> "xr.Dataset":
     unit = report.get("parameter_unit")
     if unit:
         ds.attrs["parameter_unit"] = json.dumps(unit)
-    return describe(ds)
+        for of_parameter in (
+            name,
+            "bifurcation_parameter",
+            "bifurcation_uncertainty",
+        ):
+            ds[of_parameter].attrs["units"] = unit["unit"] if "." in name else "1"
+    if report.get("held"):
+        ds.attrs["held"] = json.dumps(report["held"])
+    return answered(case, describe(ds))
 
 
 def _joined(parts: Iterable[list[float]]) -> "np.typing.NDArray[np.float64]":
@@ -144,10 +163,12 @@ def _columns(
             ]
             columns[f"{prefix}spectral_radius"] = (dim, np.array(radius, dtype=float))
             longest = max((len(pairs) for pairs in values), default=0)
-            table = np.full((len(rows), longest), np.nan + 0j)
+            # Real and imaginary parts: files of most formats hold no complex numbers.
+            parts = np.full((len(rows), longest, 2), np.nan)
             for k, pairs in enumerate(values):
-                table[k, : len(pairs)] = [complex(*pair) for pair in pairs]
-            columns[f"{prefix}multipliers"] = ((dim, "multiplier"), table)
+                parts[k, : len(pairs)] = pairs
+            dims = (dim, "multiplier", "part")
+            columns[f"{prefix}multipliers"] = (dims, parts)
         elif all(isinstance(value, str) for value in values):
             columns[f"{prefix}{name}"] = (dim, np.array(values, dtype=str))
         elif all(
@@ -201,7 +222,9 @@ def _approach_dataset(case: Case, report: dict[str, Any]) -> "xr.Dataset":
     ds = xr.Dataset(variables, coords)
     if further:
         coords["state"] = words(entries)
-        ds = ds.assign(further).assign_coords(state=words(entries))
+        ds = ds.assign(further).assign_coords(
+            state=words(entries), part=words(("re", "im"))
+        )
     for entry in report["coexisting"]:
         physical = entry.pop("physical", None) or {}
         entry |= {f"physical_{key}": value for key, value in physical.items()}
@@ -222,8 +245,14 @@ def _approach_dataset(case: Case, report: dict[str, Any]) -> "xr.Dataset":
     if unit:
         ds.attrs["parameter_unit"] = json.dumps(unit)
         ds.zc.attrs.update(long_name="distance to the sample", units="m")
-    ds[name].attrs.update(long_name="distance to the sample", units="g0")
-    return describe(ds)
+    # A dimensionless number, beside the distance in m.
+    ds[name].attrs.update(long_name="distance to the sample over g0", units="1")
+    if "branch_parameter" in ds:
+        ds["branch_parameter"].attrs["units"] = "g0"
+    ds = describe(ds.drop_vars("branch_parameter_si", errors="ignore"))
+    if case.is_physical and not case._core.model_units:
+        ds = ds.swap_dims({name: "zc"})
+    return answered(case, ds)
 
 
 def lyapunov(case: Case, options: Mapping[str, Any]) -> Lyapunov:
@@ -248,8 +277,8 @@ def lyapunov(case: Case, options: Mapping[str, Any]) -> Lyapunov:
         case_attributes(case, "a Poincaré section"),
     )
     cut.phase.attrs.update(long_name="drive phase", units="degrees")
-    cut.gap_rate.attrs.update(long_name="rate of the gap", units="g0/sqrt(mL4/EI)")
-    return Lyapunov.of(_document(text), section=describe(cut))
+    cut.gap_rate.attrs.update(long_name="rate of the gap", units="g0 sqrt(EI/(m L^4))")
+    return Lyapunov.of(_document(text), section=answered(case, describe(cut)))
 
 
 def convergence(case: Case, options: Mapping[str, Any]) -> Convergence:

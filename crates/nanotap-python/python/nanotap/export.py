@@ -1,7 +1,7 @@
 """Files for other programs: CSV, Parquet, HDF5, and Gwyddion's simple fields.
 
 >>> import nanotap
->>> ds = nanotap.sweep(nanotap.Case.paper(), over={"omega": (2.9, 3.1, 3)}, periods=4)
+>>> ds = nanotap.sweep(nanotap.Case.paper(), over={"omega": nanotap.range(2.9, 3.1, 3)}, periods=4)
 >>> nanotap.export.table(ds).columns[0]
 'classification'
 """
@@ -51,16 +51,13 @@ def table(result: Any) -> pd.DataFrame:
 
 
 def _frame(ds: "xr.Dataset", dims: tuple[str, ...]) -> pd.DataFrame:
-    """The variables along `dims`; codes as text; states with one column per entry."""
+    """The variables along `dims` without codes; states with one column per entry."""
     chosen: dict[str, Any] = {}
     for key, variable in ds.data_vars.items():
         name = str(key)
         if variable.dims == dims:
-            meanings = variable.attrs.get("flag_meanings")
-            if meanings is not None:
-                words = np.array(meanings.split(), dtype=object)
-                variable = variable.copy(data=words[variable.values])
-            chosen[name] = variable
+            if "flag_meanings" not in variable.attrs:
+                chosen[name] = variable
         elif variable.dims == (*dims, "state") and name in {"states", "orbit_state"}:
             for entry in ds.state.values:
                 chosen[str(entry)] = variable.sel(state=entry, drop=True)
@@ -201,22 +198,14 @@ def _shared_unit(x: object, y: object) -> str:
 
 
 def netcdf(ds: "xr.Dataset", path: Path, **options: Any) -> None:
-    """A Dataset as netCDF; complex numbers, which it lacks, become `NAME_re` and `NAME_im`.
+    """A Dataset as netCDF, under a temporary name until it is complete.
 
     Args:
         ds: The Dataset.
         path: The file, with the extension .nc.
         **options: Options of `Dataset.to_netcdf`.
     """
-    plain = ds.copy()
-    for name, variable in ds.data_vars.items():
-        if variable.dtype.kind == "c":
-            plain = plain.drop_vars(name)
-            for part, values in (("re", variable.real), ("im", variable.imag)):
-                plain[f"{name}_{part}"] = values.assign_attrs(variable.attrs)
-        elif variable.dtype.kind == "b":
-            plain[name] = variable.astype("int8").assign_attrs(variable.attrs)
-    _written(path, lambda target: plain.to_netcdf(target, **options))
+    _written(path, lambda target: ds.to_netcdf(target, **options))
 
 
 def _written(path: Path, write: Callable[[str], object]) -> None:

@@ -14,6 +14,7 @@ import numpy as np
 
 from . import _nanotap, _signatures
 from ._case import Case
+from ._describe import name_in_si
 from ._figure import STYLE, Picture, draw, page
 from ._results import (
     Attractors,
@@ -106,7 +107,25 @@ def _case_of(ds: "xr.Dataset") -> dict[str, Any]:
 
 
 def _period_of(ds: "xr.Dataset") -> float:
-    return float(2 * np.pi / _case_of(ds)["omega"])
+    """The drive's period in the unit of the times."""
+    case = _case_of(ds)
+    period = float(2 * np.pi / case["omega"])
+    in_seconds = ds.tau.attrs.get("units") == "s"
+    return period * case["physical"]["time_unit"] if in_seconds else period
+
+
+def _scale(*variables: "xr.DataArray") -> tuple[float, str]:
+    """What multiplies variables of one unit where they are drawn, and the unit in brackets: with
+    the prefix that fits if it is one of SI.
+    """
+    unit = str(variables[0].attrs.get("units", "1"))
+    if unit not in _SI:
+        return 1.0, ""
+    return _prefixed(np.concatenate([np.ravel(v.values) for v in variables]), unit)
+
+
+# Units that take a prefix.
+_SI = {"m", "s", "N", "J", "W", "Hz", "Pa", "m/s", "N/m", "eV"}
 
 
 def _is_beam(ds: "xr.Dataset") -> bool:
@@ -114,12 +133,19 @@ def _is_beam(ds: "xr.Dataset") -> bool:
 
 
 def _motion(
-    ds: "xr.Dataset", title: str, periods: float, endless: bool = False
+    ds: "xr.Dataset",
+    title: str,
+    periods: float,
+    endless: bool = False,
+    scales: tuple[tuple[float, str], tuple[float, str]] | None = None,
 ) -> dict[str, Any]:
     """A time series as curves."""
     time = ds.tau.values / _period_of(ds)
     shown = time <= periods + 1e-9
-    tip, rate = ds.tip.values, ds.tip_rate.values
+    if scales is None:
+        scales = _scale(ds.tip), _scale(ds.tip_rate)
+    (length, length_unit), (speed, speed_unit) = scales
+    tip, rate = length * ds.tip.values, speed * ds.tip_rate.values
     contact = np.append(False, np.append(ds.contact.values[shown], False)).astype(int)
     begun, ended = (
         np.flatnonzero(np.diff(contact) == 1),
@@ -127,10 +153,14 @@ def _motion(
     )
     whole = (np.abs(time - np.round(time)) < 1e-9) & (time < time.max() - 0.5)
     return {
-        "axes": {"beam": _is_beam(ds)},
+        "axes": {
+            "beam": _is_beam(ds),
+            "length": length_unit,
+            "velocity": speed_unit,
+        },
         "title": title,
         "contacts": _points(time[begun], time[ended - 1]),
-        "surface": _points(time[shown], (tip - ds.gap.values)[shown])
+        "surface": _points(time[shown], (tip - length * ds.gap.values)[shown])
         if "gap" in ds
         else [],
         "tip": _points(time[shown], tip[shown]),
@@ -171,9 +201,15 @@ def orbit(orbit: Orbit, **where: Unpack[Where]) -> "Figure":
         raise ValueError(message)
     title = f"period {orbit.period}, {orbit.stability}"
     spectrum = orbit.spectrum().tip
+    # Harmonics are in the model's units, and the figure in those of the series.
+    size = np.abs(orbit.spectrum().tip).max()
+    in_si = ds.tip.attrs.get("units") == "m"
+    length = _case_of(ds)["physical"]["length_unit"] if in_si else 1.0
+    factor, unit = _prefixed(np.array([length * size]), "m") if in_si else (1.0, "")
     facts = {
         "motion": _motion(ds, title, orbit.period),
-        "harmonics": _points(spectrum.index, spectrum),
+        "harmonics": _points(spectrum.index, factor * length * spectrum),
+        "harmonics_unit": unit,
         "multipliers": _points(orbit.multipliers.real, orbit.multipliers.imag),
     }
     return _drawn("orbit", facts, where)
@@ -188,6 +224,7 @@ def attractors(found: Attractors, **where: Unpack[Where]) -> "Figure":
     """Phase portraits and strobe points of every attractor, in different colours."""
     case = found.case
     curves = []
+    shown = []
     for one in list(found)[:_MOST]:
         if one.period:
             series = _signatures.orbit(case, period=one.period, state=one.state).series
@@ -200,19 +237,41 @@ def attractors(found: Attractors, **where: Unpack[Where]) -> "Figure":
                 max_period=1,
             )
         assert series is not None
+        shown.append((one, series))
+    scales = (
+        (
+            _scale(*(series.tip for _, series in shown)),
+            _scale(*(s.tip_rate for _, s in shown)),
+        )
+        if shown
+        else ((1.0, ""), (1.0, ""))
+    )
+    for one, series in shown:
         curves.append(
             {
                 "name": f"{one.name} ({100 * one.fraction:.0f} %)",
                 "classification": one.classification,
                 "period": one.period,
-                **{k: _motion(series, "", 0.0)[k] for k in ("portrait", "strobe")},
+                **{
+                    k: _motion(series, "", 0.0, scales=scales)[k]
+                    for k in ("portrait", "strobe")
+                },
             }
         )
     unstable = [point for one in found.unstable for point in _tips(case, one.states)]
+    (length, length_unit), (speed, speed_unit) = scales
+    physical = json.loads(case._core.document_at_setpoint).get("physical")
+    if physical and length_unit:
+        length *= physical["length_unit"]
+        speed *= physical["length_unit"] / physical["time_unit"]
     facts = {
-        "axes": {"beam": case.kind == "cantilever"},
+        "axes": {
+            "beam": case.kind == "cantilever",
+            "length": length_unit,
+            "velocity": speed_unit,
+        },
         "attractors": curves,
-        "unstable": unstable,
+        "unstable": [[length * tip, speed * rate] for tip, rate in unstable],
     }
     return _drawn("attractors", facts, where)
 
@@ -236,13 +295,15 @@ def _grid_axis(ds: "xr.Dataset", name: str) -> dict[str, Any]:
     }
 
 
-def _labelled(ds: "xr.Dataset", name: str) -> str:
-    """The label of an axis."""
+def _labelled(ds: "xr.Dataset", name: str, shown: str = "") -> str:
+    """The label of an axis, with the unit in brackets in which it is shown."""
     if name in _LABELS:
-        return _LABELS[name]
+        return _LABELS[name] + shown
     said = ds[name].attrs
     words, unit = str(said.get("long_name", name)), str(said.get("units", "1"))
-    return words if unit == "1" else f"{words} ({unit})"
+    if shown or unit == "1":
+        return words + shown
+    return f"{words} ({unit})"
 
 
 def _over_one(
@@ -282,9 +343,12 @@ def _over_one(
             period=int(row["period"]),
             stable=bool(row["stable"]),
         )
+    (x_scale, x_unit), (y_scale, y_unit) = _scale(x), _scale(shown)
+    for row in rows:
+        row.update(x=x_scale * row["x"], y=y_scale * row["y"])
     facts = {
-        "x_label": _labelled(ds, name),
-        "y_label": _labelled(ds, show),
+        "x_label": _labelled(ds, name, x_unit),
+        "y_label": _labelled(ds, show, y_unit),
         "points": rows,
         "bifurcations": [],
         "curves": None,
@@ -347,7 +411,11 @@ def sweep(
     }
     columns = {f"axis{k}": ds[name].values for k, name in enumerate(names)}
     columns |= {
-        key: ds[key].transpose(*order).values for key in ("classification", "period")
+        name: ds[key].transpose(*order).values
+        for name, key in (
+            ("classification", "classification_code"),
+            ("period", "period"),
+        )
     }
     if len(names) == 1:
         columns["period_max"] = ds.period_max.transpose(*order, ...).values
@@ -357,9 +425,11 @@ def sweep(
 def basin(ds: "xr.Dataset", **where: Unpack[Where]) -> "Figure":
     """Basins: one colour per attractor, with the strobe points of the attractors."""
     y, x = (str(dim) for dim in ds.attractor.dims)
+    recipe = json.loads(ds.attrs["basin"])
     facts = {
         "x": x,
         "y": y,
+        "si": [recipe[side].get("si", 1.0) for side in ("x", "y")],
         "attractors": json.loads(ds.attrs["attractors"]),
         "entries": ds.attrs["state_entries"].split(),
     }
@@ -377,18 +447,26 @@ def branch(
         message = f"show: unknown variable `{show}`; available: {', '.join(known)}"
         raise ValueError(message)
     name = ds.attrs["parameter"]
+    (x_scale, x_unit), (y_scale, y_unit) = _scale(ds[name]), _scale(ds[show])
     marks: list[dict[str, Any]] = []
     if ds.sizes.get("bifurcation"):
         marks = _rows(
             kind=ds.bifurcation_kind,
-            x=ds.bifurcation_parameter,
-            y=ds.get(f"bifurcation_{show}", ds.bifurcation_parameter * np.nan),
+            x=x_scale * ds.bifurcation_parameter,
+            y=y_scale
+            * ds.get(f"bifurcation_{show}", ds.bifurcation_parameter * np.nan),
         )
+    symbol = ds.attrs["parameter_symbol"]
     facts = {
-        "x_label": f"${ds.attrs['parameter_symbol']}$",
-        "y_label": _labelled(ds, show),
+        # A key of a physical case has a name, a number of the equations a symbol.
+        "x_label": f"{name if '.' in name else f'${symbol}$'}{x_unit}",
+        "y_label": _labelled(ds, show, y_unit),
         "points": _rows(
-            branch=ds.branch, period=ds.period, stable=ds.stable, x=ds[name], y=ds[show]
+            branch=ds.branch,
+            period=ds.period,
+            stable=ds.stable,
+            x=x_scale * ds[name],
+            y=y_scale * ds[show],
         ),
         "bifurcations": marks,
         "curves": _curves(ds, name) if "locus_first" in ds else None,
@@ -454,121 +532,137 @@ def approach(ds: "xr.Dataset", **where: Unpack[Where]) -> "Figure":
     Under frequency modulation: frequency shift, drive, dissipated energy, and the force from
     the shifts.
     """
-    name = ds.attrs["parameter"]
-    physical = "physical_A" in ds
-    distance = ds.zc.values if physical else ds[name].values
-    factor, unit = _prefixed(distance, "m") if physical else (1.0, "")
-    electronvolts = 1.602176634e-19
-    rows: tuple[tuple[str, str, str, str, float], ...] = (
-        ("first_harmonic", "physical_A", "amplitude $A$", "m", 1.0),
-        ("phase", "physical_phase", "phase lag (°)", "", 1.0),
-        ("dissipation", "physical_E_dis", "dissipation $E_{dis}$", "eV", electronvolts),
-        ("peak_force", "physical_F_max", "peak force $F_{max}$", "N", 1.0),
-    )
+    distance = ds.zc if "zc" in ds.dims else ds[ds.attrs["parameter"]]
+    in_si = distance.name == "zc"
+    rows = [
+        ("first_harmonic", "amplitude $A$"),
+        ("phase", "phase lag (°)"),
+        ("dissipation", "dissipation $E_{dis}$"),
+        ("peak_force", "peak force $F_{max}$"),
+    ]
     if "modulation" in ds.attrs:
-        shift, force = "frequency_shift", "sader_jarvis_force"
-        rows = (
-            (shift, f"physical_{shift}", "frequency shift $Δf$", "Hz", 1.0),
-            ("drive_ratio", "drive_ratio", "drive over free drive", "", 1.0),
+        rows = [
+            ("frequency_shift", "frequency shift $Δf$"),
+            ("drive_ratio", "drive over free drive"),
             rows[2],
-            (force, f"physical_{force}", "force (Sader–Jarvis)", "N", 1.0),
-        )
+            ("sader_jarvis_force", "force (Sader–Jarvis)"),
+        ]
     # With a constant least distance the amplitude grows with the distance.
     kept = "closest" in json.loads(ds.attrs.get("modulation", "{}"))
     if kept:
         rows = rows[:3]
-        amplitude = ds.physical_A if physical else ds.first_harmonic
-        distance = amplitude.max("way").values
-        factor, unit = _prefixed(distance, "m") if physical else (1.0, "")
-    # Factor from the model's unit to the unit: the ratio at the largest value.
-    x_scale = factor * (float(ds.zc[-1] / ds[name][-1]) if physical else 1.0)
+        amplitude = ds.first_harmonic.max("way")
+        distance = amplitude.assign_attrs(ds.first_harmonic.attrs)
+    factor, unit = _scale(distance)
+    jumps = json.loads(ds.attrs.get("jumps", "[]"))
     panels = []
-    for plain, si, label, base, part in rows:
-        values = ds[plain].values
-        scale = 1.0
-        if physical and base:
-            k = np.nanargmax(np.abs(values))
-            scale = (
-                float(ds[si].values.flat[k] / values.flat[k]) / part
-                if values.flat[k]
-                else 1.0
-            )
+    for name, label in rows:
+        values = _in_electronvolts(ds[name])
         natural = None
-        if plain == "dissipation":
-            natural = scale * float(
-                np.nanmax(np.abs(ds.first_harmonic * ds.peak_force))
-            )
-        shown, named = (
-            _prefixed(scale * values, base, natural or 0.0)
-            if physical and base
-            else (1.0, "")
-        )
-        shown *= scale
+        if name == "dissipation":
+            # The work of the force over the amplitude: less is rounding.
+            work = float(np.nanmax(np.abs(ds.first_harmonic * ds.peak_force)))
+            natural = work / _ELECTRONVOLT if in_si else work
+        scale, named = _scale(values)
+        if natural and in_si:
+            scale, named = _prefixed(values.values, "eV", natural)
 
         def curve(
-            way: str, values: Any = ds[plain], by: float = shown, plain: str = plain
+            way: str,
+            values: "xr.DataArray" = values,
+            scale: float = scale,
+            name: str = name,
         ) -> list[list[float]]:
+            points = _points(
+                factor * distance.values, scale * values.sel(way=way).values
+            )
             # The ends of a jump belong to the curve.
-            ends = [
-                jump[end]
-                for jump in json.loads(ds.attrs.get("jumps", "[]"))
-                for end in ("before", "after")
-                if jump["way"] == way and jump[end].get(plain) is not None
-            ]
-            points = _points(factor * distance, by * values.sel(way=way).values)
-            return points + [[x_scale * end["gap"], by * end[plain]] for end in ends]
+            ends = (jump[end] for jump in jumps if jump["way"] == way for end in _ENDS)
+            at = (_point_of(end, name, in_si) for end in ends)
+            return points + [[factor * x, scale * y] for x, y in filter(None, at)]
 
-        def branches(
-            prefix: str, by: float = shown, plain: str = plain, **more: Any
+        def points(
+            prefix: str, x: str, name: str = name, scale: float = scale, **more: Any
         ) -> Any:
-            if f"{prefix}{plain}" not in ds:
+            if f"{prefix}{name}" not in ds:
                 return []
-            x, y = x_scale * ds[f"{prefix}parameter"], by * ds[f"{prefix}{plain}"]
-            return _rows(x=x, y=y, **{key: ds[f"{prefix}{key}"] for key in more})
+            y = scale * _in_electronvolts(ds[f"{prefix}{name}"])
+            return _rows(
+                x=factor * ds[x], y=y, **{key: ds[f"{prefix}{key}"] for key in more}
+            )
 
-        def coexisting(by: float = shown, plain: str = plain) -> Any:
-            name = f"coexisting_{plain}"
-            if name not in ds:
-                return []
-            return _points(x_scale * ds.coexisting_gap.values, by * ds[name].values)
-
+        at = "coexisting_zc" if in_si else "coexisting_gap"
         panels.append(
             {
                 "label": f"{label}{named}",
-                "natural": None if natural is None else natural * shown / scale,
-                "phase": plain == "phase",
+                "natural": None if natural is None else natural * scale,
+                "phase": name == "phase",
                 "approach": curve("approach"),
                 "retract": curve("retract"),
-                "coexisting": coexisting(),
-                "branches": branches("branch_", branch=1, period=1, stable=1),
-                "bifurcations": branches("bifurcation_", kind=1),
+                "coexisting": [[p["x"], p["y"]] for p in points("coexisting_", at)],
+                "branches": points(
+                    "branch_", "branch_parameter", branch=1, period=1, stable=1
+                ),
+                "bifurcations": points("bifurcation_", "bifurcation_parameter", kind=1),
             }
         )
-    symbol = (
-        "distance $z_c$" if physical else "distance $α₅$" if name == "alpha5" else name
-    )
+    symbol = "distance $z_c$" if in_si else "distance $α₅$"
     if kept:
         symbol = "amplitude $A$"
+    ends = factor * distance.values
     facts = {
         "x_label": f"{symbol}{unit}",
-        "x_range": [float(factor * distance.min()), float(factor * distance.max())],
+        "x_range": [float(ends.min()), float(ends.max())],
         "logarithmic": kept,
         "panels": panels,
     }
     return _drawn("approach", facts, where)
 
 
+_ELECTRONVOLT = 1.602176634e-19
+_ENDS = ("before", "after")
+
+
+def _in_electronvolts(values: "xr.DataArray") -> "xr.DataArray":
+    """Energies of one tap are told in electronvolts."""
+    if values.attrs.get("units") != "J":
+        return values
+    return (values / _ELECTRONVOLT).assign_attrs(values.attrs, units="eV")
+
+
+def _point_of(
+    motion: Mapping[str, Any], name: str, in_si: bool
+) -> tuple[float, float] | None:
+    """Distance of a motion, and what it shows."""
+    if not in_si:
+        value = motion.get(name)
+        return None if value is None else (motion["gap"], value)
+    physical = (motion.get("physical") or {}) | (motion.get("modulation_si") or {})
+    value = physical.get(name_in_si(name))
+    if value is None:
+        return None
+    if name == "dissipation":
+        value /= _ELECTRONVOLT
+    return motion["zc"], value
+
+
 def section(found: Lyapunov, **where: Unpack[Where]) -> "Figure":
     """A Poincaré section, and the exponents with their errors."""
     cut = found.section
+    (length, length_unit), (speed, speed_unit) = _scale(cut.tip), _scale(cut.tip_rate)
+    impact, impact_unit = _scale(cut.gap_rate)
     phases = np.unique(np.round(cut.phase.values, 9))
     if len(phases) <= 1:
         at: float | None = float(phases[0]) / 360 if len(phases) else 0.0
-        points = _points(cut.tip, cut.tip_rate)
+        points = _points(length * cut.tip, speed * cut.tip_rate)
     else:
-        at, points = None, _points(cut.phase, -cut.gap_rate)
+        at, points = None, _points(cut.phase, -impact * cut.gap_rate)
     facts = {
-        "axes": {"beam": _is_beam(cut)},
+        "axes": {
+            "beam": _is_beam(cut),
+            "length": length_unit,
+            "velocity": speed_unit if at is not None else impact_unit,
+        },
         "phase": at,
         "points": points,
         "exponents": found.exponents.tolist(),

@@ -120,13 +120,13 @@ impl ForceTable {
             };
             let (written, entries) = &table.columns[place];
             let unit = Header::of(written).unit;
-            let factor = kind.parse(&format!("1 {unit}")).map_err(|error| {
-                refuse(
-                    None,
-                    error.to_string(),
-                    format!("name it as in `{example}`"),
-                )
-            })?;
+            let named = || format!("name it as in `{example}`");
+            if unit.is_empty() {
+                return Err(refuse(None, "a column without a unit".to_owned(), named()));
+            }
+            let factor = kind
+                .parse(&format!("1 {unit}"))
+                .map_err(|error| refuse(None, error.to_string(), named()))?;
             let number = |(row, entry): (usize, &Entry)| {
                 let what = match entry {
                     Entry::Number(number) => return Ok(number * factor),

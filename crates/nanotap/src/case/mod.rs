@@ -13,7 +13,7 @@
 //!
 //! A value that *varies* in a study ([`Case::with`]: a sweep, a branch, a window) changes alone, as
 //! one control of an instrument does. Constant are the drive amplitude (the voltage of a piezo),
-//! the distance of the sample, g₀, and the ratio of a second tone to the first. [`Case::implied_constants`]
+//! the distance of the sample, g₀, and the ratio of a second tone to the first. [`Case::held`]
 //! lists these numbers; stated together with the varied value they give the same point.
 
 pub mod document;
@@ -33,6 +33,7 @@ pub mod table;
 pub(crate) mod under_law;
 pub mod units;
 
+use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -73,6 +74,8 @@ pub struct Case {
     folder: Option<Arc<Path>>,
     /// Flag that cancels the motions of its models.
     cancel: CancelFlag,
+    /// Whether results of a physical case are in the model's units.
+    model_units: bool,
 }
 
 /// Kind of a case, with its data.
@@ -98,6 +101,9 @@ pub struct ParameterUnit {
     pub kind: Kind,
 }
 
+/// Keys of a physical case that stay constant while others vary, with their values in SI.
+pub type Held = BTreeMap<&'static str, f64>;
+
 impl From<Cantilever> for Case {
     fn from(cantilever: Cantilever) -> Self {
         Self::new(CaseKind::Cantilever(cantilever))
@@ -118,6 +124,7 @@ impl Case {
             scan: None,
             folder: None,
             cancel: CancelFlag::default(),
+            model_units: false,
         }
     }
 
@@ -421,24 +428,29 @@ impl Case {
         }
     }
 
-    /// The numbers that stay constant while `key` varies, although they were not stated: stated
-    /// together with the value of `key` they give the same case. Empty if the stated values stay
+    /// The numbers that stay constant while `keys` vary, although they were not stated, in SI: stated
+    /// together with values of the keys they give the same case. Empty if the stated values stay
     /// constant.
-    pub fn implied_constants(&self, key: Key) -> Vec<(Key, f64)> {
+    pub fn held(&self, keys: &[Key]) -> Held {
         let CaseKind::Quantities(quantities) = &self.what else {
-            return Vec::new();
+            return Held::new();
         };
-        let (true, Ok(view)) = (key.is_physical(), &quantities.view) else {
-            return Vec::new();
+        let (true, Ok(view)) = (keys.iter().any(|key| key.is_physical()), &quantities.view) else {
+            return Held::new();
+        };
+        let replaced = |other: Key| {
+            let same =
+                |key: &Key| *key == other || key.alternatives().any(|(same, _)| same == other);
+            keys.iter().any(same)
         };
         let held = view.implied_constants(&quantities.stated);
         held.iter()
             .filter(|(other, value)| {
                 let same = quantities.stated.get(*other) == Some(*value);
                 let said = same && quantities.stated.said(*other).is_some();
-                !said && *other != key && !key.alternatives().any(|(same, _)| same == *other)
+                !said && !replaced(*other)
             })
-            .filter_map(|(other, _)| Some((other, held.number(other)?)))
+            .filter_map(|(other, _)| Some((other.path(), held.number(other)?)))
             .collect()
     }
 
@@ -553,7 +565,23 @@ impl Case {
 
     /// Units for display.
     pub fn units(&self) -> Units {
-        Units::of(self.physical().map(|view| &view.scales))
+        let view = self.physical().filter(|_| !self.model_units);
+        Units::of(view.map(|view| &view.scales))
+    }
+
+    /// The same case with results, and numbers without a unit, in the model's units if `model_units`,
+    /// otherwise in SI.
+    #[must_use]
+    pub fn in_model_units(self, model_units: bool) -> Self {
+        Self {
+            model_units,
+            ..self
+        }
+    }
+
+    /// Whether results of a physical case are in the model's units.
+    pub const fn is_in_model_units(&self) -> bool {
+        self.model_units
     }
 
     /// SI unit of a key, for a physical case.
@@ -568,6 +596,9 @@ impl Case {
                 kind: key.kind(),
             });
         };
+        if self.model_units {
+            return None;
+        }
         let rows = view.mapping();
         let row = rows.iter().find(|row| row.parameter == parameter)?;
         Some(ParameterUnit {
@@ -590,33 +621,47 @@ impl Case {
         )
     }
 
+    /// Parses a value of a key that an option implies, as `from` of an approach curve: of a
+    /// physical case a number without a unit is in SI.
+    ///
+    /// # Errors
+    /// If `text` is neither a number nor a quantity of the key's kind.
+    pub fn implied_value(&self, key: Key, text: &str) -> Result<f64, ValueOfKeyError> {
+        let unit = self.parameter_unit(key);
+        let (kind, si) = match &unit {
+            Some(unit) => (unit.kind, unit.si),
+            None if key.is_physical() => (key.kind(), 1.0),
+            None => {
+                return text
+                    .trim()
+                    .parse()
+                    .map_err(|_| ValueOfKeyError::NotANumber {
+                        text: text.to_owned(),
+                    });
+            }
+        };
+        let value = kind
+            .parse(text)
+            .map_err(|error| ValueOfKeyError::Quantity {
+                key,
+                text: text.to_owned(),
+                error: Box::new(error),
+            })?;
+        Ok(value / si)
+    }
+
     /// Parses a value of a key: a number of the dimensionless model, or for a physical case also a
     /// quantity with its unit.
     ///
     /// # Errors
     /// If `text` is neither.
     pub fn value(&self, key: Key, text: &str) -> Result<f64, ValueOfKeyError> {
-        let of_quantity = |error| ValueOfKeyError::Quantity {
-            key,
-            text: text.to_owned(),
-            error: Box::new(error),
-        };
-        if key.is_physical() {
-            return key.kind().parse(text).map_err(of_quantity);
-        }
-        if let Ok(value) = text.trim().parse::<f64>() {
+        if !key.is_physical()
+            && let Ok(value) = text.trim().parse::<f64>()
+        {
             return Ok(value);
         }
-        match self.parameter_unit(key) {
-            Some(unit) => unit
-                .kind
-                .parse(text)
-                .map(|si| si / unit.si)
-                .map_err(of_quantity),
-            None => Err(ValueOfKeyError::NotANumber {
-                text: text.to_owned(),
-            }),
-        }
+        self.implied_value(key, text)
     }
 
     /// Key of the tip–sample distance in the model's unit of length.

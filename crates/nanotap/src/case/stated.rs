@@ -211,7 +211,11 @@ impl Stated {
         for (other, _) in key.alternatives() {
             self.remove(other);
         }
-        self.put(key, Value::Number(value, key.kind()));
+        let value = Value::Number(value, key.kind());
+        if self.get(key) == Some(&value) {
+            return;
+        }
+        self.put(key, value);
         if !self.changed.contains(&key) {
             self.changed.push(key);
         }

@@ -1,7 +1,15 @@
 //! The units in which motions are shown: the model's own, or SI where the case has them.
 
+use std::collections::BTreeMap;
+
 use crate::case::physical::{Kind, Scales};
-use crate::case::quantity::prefix_of;
+use crate::case::quantity::{QuantityError, prefix_of};
+
+/// Largest deflection of a physical case that is believed, in metres.
+const MOST_DEFLECTION: f64 = 1e-3;
+
+/// Numbers in SI by name, where a report holds them in the model's units too.
+pub type NumbersInSi = BTreeMap<&'static str, f64>;
 
 /// What multiplies the model's numbers before they are shown.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -32,6 +40,77 @@ impl Units {
             Kind::Frequency => scales.frequency,
             _ => return None,
         })
+    }
+
+    /// A number of the model in these units.
+    pub fn scaled(&self, kind: Kind, value: f64) -> f64 {
+        self.si(kind).map_or(value, |unit| unit * value)
+    }
+
+    /// Named numbers of the model in SI; `None` in the model's own units.
+    pub fn in_si<const N: usize>(
+        &self,
+        numbers: [(&'static str, Kind, f64); N],
+    ) -> Option<NumbersInSi> {
+        let one = |(name, kind, value)| Some((name, self.si(kind)? * value));
+        numbers.into_iter().map(one).collect()
+    }
+
+    /// The head of a column with numbers of `kind`: the name, in SI with the unit in brackets.
+    pub fn column(&self, name: &str, kind: Kind) -> String {
+        match self.si(kind) {
+            Some(_) => format!("{name} ({})", kind.si_unit()),
+            None => name.to_owned(),
+        }
+    }
+
+    /// The head of a column with entries of states, which stay in the model's units: in SI these
+    /// stand in brackets, with the unit of length g₀ and that of time T.
+    pub fn state_column(&self, name: &str) -> String {
+        match self.of_entry(name) {
+            Some((Kind::Length, _)) => format!("{name} (g0)"),
+            Some(_) => format!("{name} (g0/T)"),
+            None => name.to_owned(),
+        }
+    }
+
+    /// The kind of an entry of a state and the SI value of its unit: an amplitude `a1` of a mode is a
+    /// length, its rate `v1` a velocity. `None` in the model's own units, and for the sample's
+    /// entries.
+    pub fn of_entry(&self, name: &str) -> Option<(Kind, f64)> {
+        let kind = match name.chars().next()? {
+            'a' => Kind::Length,
+            'v' => Kind::Velocity,
+            _ => return None,
+        };
+        Some((kind, self.si(kind)?))
+    }
+
+    /// Reads a value of an entry of a state, in the model's units; one without a unit is in SI where
+    /// the entry has an SI unit.
+    ///
+    /// # Errors
+    /// With what was expected.
+    pub fn read_entry(&self, name: &str, text: &str) -> Result<f64, String> {
+        let words = |error: QuantityError| error.to_string();
+        let Some((kind, si)) = self.of_entry(name) else {
+            return Kind::Number.parse(text).map_err(words);
+        };
+        let value = kind.parse(text).map_err(words)?;
+        if kind == Kind::Length && value.abs() > MOST_DEFLECTION {
+            return Err(format!(
+                "expected a length below {}, got {}; write the unit, as in \"10 nm\"",
+                kind.format(MOST_DEFLECTION),
+                kind.format(value)
+            ));
+        }
+        Ok(value / si)
+    }
+
+    /// A value of an entry of a state as text, with so many digits.
+    pub fn shown_entry(&self, name: &str, value: f64, digits: usize) -> String {
+        let (kind, si) = self.of_entry(name).unwrap_or((Kind::Number, 1.0));
+        kind.format_digits(si * value, digits)
     }
 
     /// For an axis that holds numbers of the model up to `size`: what they are to be

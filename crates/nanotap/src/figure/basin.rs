@@ -8,6 +8,8 @@ use nanotap_figures::{
 };
 use serde::Deserialize;
 
+use crate::case::physical::Kind;
+use crate::case::units::prefixed;
 use crate::dataset::{Store, StoreError};
 use crate::figure::panels::motion_of;
 use crate::study::basin::{FAILED, Known, UNBOUNDED, UNSETTLED, entries, known, labels};
@@ -25,6 +27,9 @@ pub struct BasinTable {
     /// Its values.
     #[serde(default)]
     pub y_values: Vec<f64>,
+    /// The SI values of the units of x and y in the model; 1 where the values have no unit.
+    #[serde(default = "no_units")]
+    pub si: [f64; 2],
     /// The attractors.
     pub attractors: Vec<Known>,
     /// The names of a state's entries.
@@ -44,7 +49,13 @@ pub fn figure(store: &Store) -> Result<Figure, StoreError> {
     let schema = store.schema();
     let axes = &schema.grid.axes;
     let columns = axes[1].length;
+    let recipe: serde_json::Value = schema
+        .attributes
+        .get("basin")
+        .and_then(|text| serde_json::from_str(text.as_str()?).ok())
+        .unwrap_or_default();
     let mut table = BasinTable {
+        si: ["x", "y"].map(|name| recipe[name]["si"].as_f64().unwrap_or(1.0)),
         x: axes[1].name.clone(),
         y: axes[0].name.clone(),
         x_values: schema.axis_values(1),
@@ -88,20 +99,18 @@ impl BasinTable {
                 .filter(|k| *k < known)
                 .or_else(other)
         });
-        let (across, upright) = (edges(&self.x_values), edges(&self.y_values));
-        let mut layer = CategoryMap::new(columns, rows, cells, across, upright);
+        let x = Side::new(&self.x, &self.x_values, self.si[0]);
+        let y = Side::new(&self.y, &self.y_values, self.si[1]);
+        let mut layer = CategoryMap::new(columns, rows, cells, x.ends, y.ends);
         for (attractor, colour) in self.attractors.iter().zip(&colours) {
             layer = layer.category_in(attractor.name(), *colour);
         }
         for (_, name, colour) in others {
             layer = layer.category_in(name, colour);
         }
-        let mut panel = Panel::new(
-            Axis::linear(symbol(&self.x)).tight(),
-            Axis::linear(symbol(&self.y)).tight(),
-        )
-        .with(layer)
-        .legend(Legend::Right);
+        let mut panel = Panel::new(Axis::linear(x.label).tight(), Axis::linear(y.label).tight())
+            .with(layer)
+            .legend(Legend::Right);
         let place = |name: &str| self.entries.iter().position(|n| n == name);
         if let (Some(kx), Some(ky)) = (place(&self.x), place(&self.y)) {
             let within = |v: f64, (low, high): (f64, f64)| low <= v && v <= high;
@@ -109,8 +118,8 @@ impl BasinTable {
                 let points: Vec<(f64, f64)> = attractor
                     .states
                     .iter()
-                    .filter_map(|s| Some((*s.get(kx)?, *s.get(ky)?)))
-                    .filter(|p| within(p.0, across) && within(p.1, upright))
+                    .filter_map(|s| Some((x.factor * s.get(kx)?, y.factor * s.get(ky)?)))
+                    .filter(|p| within(p.0, x.ends) && within(p.1, y.ends))
                     .collect();
                 panel = if attractor.period.is_some() {
                     panel.with(Markers::new(points).size(1.6).colour(colour).white_edge())
@@ -131,6 +140,44 @@ fn motion(attractor: &Known) -> Motion {
     attractor
         .period
         .map_or_else(|| motion_of(&attractor.classification), Motion::Periodic)
+}
+
+/// One side of the map.
+struct Side {
+    /// Where it begins and ends, in the unit of its label.
+    ends: (f64, f64),
+    /// What multiplies a number of the model.
+    factor: f64,
+    label: String,
+}
+
+impl Side {
+    /// The side of an entry of the state with its values, in SI if `si`, the SI value of the model's
+    /// unit, is not 1.
+    fn new(name: &str, values: &[f64], si: f64) -> Self {
+        let (low, high) = edges(values);
+        let kind = match name.chars().next() {
+            Some('a') if si != 1.0 => Kind::Length,
+            Some('v') if si != 1.0 => Kind::Velocity,
+            _ => {
+                return Self {
+                    ends: (low, high),
+                    factor: 1.0,
+                    label: symbol(name),
+                };
+            }
+        };
+        let (scale, unit) = prefixed(kind, 1.0, low.abs().max(high.abs()));
+        Self {
+            ends: (scale * low, scale * high),
+            factor: scale * si,
+            label: format!("{} ({unit})", symbol(name)),
+        }
+    }
+}
+
+fn no_units() -> [f64; 2] {
+    [1.0; 2]
 }
 
 /// The outer edges of cells around evenly spaced values.

@@ -28,6 +28,16 @@ words! {
     }
 }
 
+words! {
+    /// What of the drive stays while another key varies.
+    Hold {
+        /// Its own amplitude or force, as a piezo keeps its voltage.
+        Drive = "drive",
+        /// The free amplitude of the tip: the drive follows the key that varies.
+        FreeAmplitude = "free_amplitude",
+    }
+}
+
 impl Actuation {
     /// What it is, in a few words.
     pub const fn meaning(self) -> &'static str {

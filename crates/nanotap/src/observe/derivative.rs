@@ -30,7 +30,7 @@ use super::record::measure;
 use super::table::{OBSERVABLES, Observable, ObservableSet, Observables};
 use super::value::Value;
 use super::varied_motion::{Change, Varied, gather};
-use crate::case::{Case, CaseError, Key};
+use crate::case::{Case, CaseError, Held, Key};
 use crate::model::model_map::ModelMap;
 use crate::model::nonlinear::{self, Nonlinear};
 use crate::model::{Model, ModelTangent, MotionError, Tangent, TangentKind};
@@ -61,6 +61,8 @@ pub struct Derivative {
     pub state: Vec<f64>,
     /// Derivatives of observables in the model's units, without discontinuous ones.
     pub observables: Vec<(&'static Observable, Value)>,
+    /// What stays while the key changes although it was not stated, in SI.
+    pub held: Held,
     /// Derivatives of observables in SI, for a physical case.
     pub physical: Option<Vec<(&'static Observable, Value)>>,
 }
@@ -115,6 +117,7 @@ impl Derivative {
             .transpose()?;
         Ok(Self {
             unit: key.is_physical().then(|| key.kind().si_unit()),
+            held: case.held(&[key]),
             state: start,
             observables,
             physical,
@@ -160,6 +163,7 @@ impl Derivative {
         };
         Ok(Self {
             unit: key.is_physical().then(|| key.kind().si_unit()),
+            held: case.held(&[key]),
             state: start,
             observables: difference(&low.0, &high.0),
             physical: low.1.zip(high.1).map(|(low, high)| difference(&low, &high)),
@@ -186,6 +190,9 @@ impl Serialize for Derivative {
         let mut map = serializer.serialize_map(None)?;
         if let Some(unit) = self.unit {
             map.serialize_entry("unit", unit)?;
+        }
+        if !self.held.is_empty() {
+            map.serialize_entry("held", &self.held)?;
         }
         map.serialize_entry("state", &self.state)?;
         for (observable, change) in &self.observables {
@@ -225,7 +232,18 @@ impl JsonSchema for Derivative {
             "description": "Of the observables in SI",
             "properties": physical,
         });
-        for (name, schema) in [("unit", unit), ("state", state), ("physical", physical)] {
+        let held = json!({
+            "type": "object",
+            "additionalProperties": {"type": "number"},
+            "description": "What stays although it was not stated, in SI",
+        });
+        let others = [
+            ("unit", unit),
+            ("held", held),
+            ("state", state),
+            ("physical", physical),
+        ];
+        for (name, schema) in others {
             properties.insert(name.to_owned(), schema);
         }
         json_schema!({

@@ -79,6 +79,39 @@ const OTHER_ENTRIES: &[(&str, &str, &str)] = &[
     ("spectral_radius", "largest modulus of a multiplier", "1"),
     ("multiplier", "largest modulus of a multiplier", "1"),
     (
+        "multipliers",
+        "Floquet multipliers, real and imaginary parts",
+        "1",
+    ),
+    (
+        "determinant_defect",
+        "how far the product of the multipliers is from the trace formula, relative",
+        "1",
+    ),
+    (
+        "distance_to_orbit",
+        "distance of the last state from the orbit",
+        STATE,
+    ),
+    ("orbit_state", "state at drive phase 0", STATE),
+    ("initial_state", "initial state", STATE),
+    ("time", "time of a grazing, from the state", PERIODS),
+    (
+        "free_amplitude",
+        "free amplitude A0",
+        Dimension::Length.model_unit(),
+    ),
+    (
+        "free_reach",
+        "distance at which the free motion begins to touch",
+        Dimension::Length.model_unit(),
+    ),
+    (
+        "free_phase",
+        "free phase lag",
+        Dimension::Angle.model_unit(),
+    ),
+    (
         "periods_per_second",
         "speed of the propagation",
         "drive periods/s",

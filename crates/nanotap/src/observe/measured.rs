@@ -1,10 +1,9 @@
 //! Measurements of a motion, from which observables are computed.
 
-use super::above_rounding;
 use super::clearance::Clearance;
 use super::energy::{EnergyBalance, PowerTerm, balance};
 use super::functional::{Functional, Requirements, Signal, Tone};
-use super::number::{Number, Phasor};
+use super::number::{Number, Phasor, above_rounding};
 use super::table::{ObservableSet, Observables};
 use crate::model::Model;
 
@@ -137,6 +136,26 @@ impl<'a, D: Number> Measured<'a, D> {
         self.mean(Signal::Force) + self.gathered(|found| found.impacts.impulse) / self.duration()
     }
 
+    /// Time mean of the tip deflection, 0 if it is only rounding.
+    pub(super) fn mean_deflection(&mut self) -> D {
+        let reach = self.reach();
+        above_rounding(self.mean(Signal::Tip), reach)
+    }
+
+    /// Largest distance of the tip from its place at rest.
+    fn reach(&mut self) -> f64 {
+        let [low, high] = self.range(Signal::Tip);
+        low.value().abs().max(high.value().abs())
+    }
+
+    /// Time mean of force times tip deflection along the deflection, 0 if it is only rounding.
+    pub(super) fn virial(&mut self) -> D {
+        let virial = self.mean_virial() * self.along_tip();
+        let force = self.peak_force().value().max(-self.least_force().value());
+        let reach = self.reach();
+        above_rounding(virial, force * reach)
+    }
+
     /// Time mean of force times tip deflection, including impulses of a rigid stop.
     pub(super) fn mean_virial(&mut self) -> D {
         let impacts = self.gathered(|found| found.impacts.virial) / self.duration();
@@ -252,11 +271,7 @@ impl<'a, D: Number> Measured<'a, D> {
         } else {
             (self.peak_force().value(), self.indentation().value())
         };
-        if above_rounding(work.value(), force, depth) == 0.0 {
-            0.0.into()
-        } else {
-            work
-        }
+        above_rounding(work, force * depth)
     }
 
     /// Net work of the tip on the sample.

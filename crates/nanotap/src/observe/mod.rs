@@ -40,17 +40,6 @@ pub use value::Value;
 
 use crate::model::Model;
 
-/// `work` on a sample, or 0 if it is only the rounding of the energy stored and returned by the
-/// contact, force times indentation.
-fn above_rounding(work: f64, peak_force: f64, indentation: f64) -> f64 {
-    const ROUNDING: f64 = 1e-12;
-    if work.abs() <= ROUNDING * peak_force * indentation {
-        0.0
-    } else {
-        work
-    }
-}
-
 /// True if a switch begins a contact: from flight into contact, or an impact.
 pub fn begins_contact(model: &Model, from: usize, to: usize) -> bool {
     !model.touches(from) && (model.touches(to) || from == to)

@@ -230,7 +230,7 @@ observables! {
         |m| 0.5 * (m.greatest(Tip) - m.least(Tip));
     mean_deflection: f64, Length, common,
         "mean tip deflection", "time mean of the tip deflection",
-        |m| m.mean(Tip);
+        |m| m.mean_deflection();
     first_harmonic as "A": f64, Length, common,
         "amplitude $A$",
         "amplitude of the tip deflection at the drive frequency: what a lock-in amplifier reads",
@@ -250,7 +250,7 @@ observables! {
         |m| m.dissipation();
     virial: f64, Energy, common,
         "virial ⟨$F W$⟩", "time mean of force times tip deflection; sign: along the deflection",
-        |m| m.along_tip() * m.mean_virial();
+        |m| m.virial();
     contact_fraction: f64, Number, common,
         "contact time / period", "contact time / period",
         |m| m.contact_time() / m.duration();

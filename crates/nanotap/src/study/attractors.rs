@@ -12,6 +12,7 @@ use serde::Serialize;
 use crate::Error;
 use crate::case::Case;
 use crate::case::physical::Physical;
+use crate::case::units::Units;
 use crate::model::Model;
 use crate::model::model_map::ModelMap;
 use crate::observe::time_series::state_names;
@@ -128,6 +129,20 @@ pub struct Side {
     pub lower: f64,
     /// Upper end.
     pub upper: f64,
+    /// The ends in SI, of a physical case.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub physical: Option<SideInSi>,
+}
+
+/// A side of the box of initial states in SI.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct SideInSi {
+    /// Lower end.
+    pub lower: f64,
+    /// Upper end.
+    pub upper: f64,
+    /// The unit, `m` or `m/s`.
+    pub unit: &'static str,
 }
 
 /// A fraction of the initial states.
@@ -201,6 +216,14 @@ impl Attractors {
                 (None, Some(seen)) => Some(PhysicalMotion::alone(&seen.observables, None, view)),
                 (None, None) => None,
             };
+        }
+        let units = Units::Si(view.scales);
+        for side in &mut self.sides {
+            side.physical = units.of_entry(&side.coordinate).map(|(kind, si)| SideInSi {
+                lower: si * side.lower,
+                upper: si * side.upper,
+                unit: kind.si_unit(),
+            });
         }
         for orbit in self.unstable.iter_mut().flatten() {
             let (observables, spectrum) = (&orbit.motion.observables, &orbit.motion.spectrum);
@@ -298,7 +321,7 @@ pub fn attractors(
         }
         _ => {}
     }
-    let start_box = box_with(model, &options.sides.numbers()?)?;
+    let start_box = box_with(model, &options.sides.of_entries(&Units::Model)?)?;
     let set = match starts {
         Some(count) => StartSet::given(start_box.starts_until(options.seed, count, control)),
         None => default_starts(model, options.seed)?,
@@ -327,6 +350,7 @@ pub fn attractors(
             coordinate,
             lower,
             upper,
+            physical: None,
         })
         .collect();
     described(model, &found, &set, (options, &budgets), sides, unstable)
@@ -617,6 +641,7 @@ impl Study for AttractorsStudy {
         });
         let options = AttractorsOptions {
             seeds: seeds.collect(),
+            sides: Intervals::from_iter(options.sides.of_entries(&case.units())?),
             ..options.clone()
         };
         let mut found = attractors(&model, &options, control)?;

@@ -20,6 +20,7 @@ use serde_json::json;
 
 use crate::Error;
 use crate::case::Case;
+use crate::case::units::Units;
 use crate::dataset::schema::Kind;
 use crate::dataset::{
     Axis, Block, Coordinate, Grid, Schema, Store, StoreError, Values, Variable, Work, WorkError,
@@ -61,20 +62,22 @@ const ENTRIES: &str = "state_entries";
 pub struct SliceRange {
     /// The name of the entry of the state.
     pub name: String,
-    /// First value of the axis.
+    /// First value of the axis, in the model's units.
     pub from: f64,
-    /// Last value of the axis.
+    /// Last value of the axis, in the model's units.
     pub to: f64,
     /// Number of values, ends included.
     pub count: usize,
+    /// The SI value of the model's unit; 1 of a dimensionless case.
+    pub si: f64,
 }
 
 impl SliceRange {
-    /// Reads `name=from:to:count`.
+    /// Reads `name=from:to:count`; a value without a unit is in SI if `units` are.
     ///
     /// # Errors
     /// When the text has another form, or the range is empty or not finite.
-    pub fn parse(given: &str) -> Result<Self, Error> {
+    pub fn parse(given: &str, units: &Units) -> Result<Self, Error> {
         let refuse = |what: String| {
             Error::input(
                 format!("`{given}`: {what}"),
@@ -88,9 +91,10 @@ impl SliceRange {
         let [from, to, count] = parts.as_slice() else {
             return Err(form());
         };
-        let number = |text: &str| match text.parse::<f64>() {
-            Ok(value) if value.is_finite() => Ok(value),
-            _ => Err(refuse(format!("`{text}` is not a finite number"))),
+        let name = name.trim();
+        let number = |text: &str| {
+            let read = units.read_entry(name, text);
+            read.map_err(refuse)
         };
         let (from, to) = (number(from)?, number(to)?);
         let count = count
@@ -107,10 +111,11 @@ impl SliceRange {
             )));
         }
         Ok(Self {
-            name: name.trim().into(),
+            name: name.into(),
             from,
             to,
             count,
+            si: units.of_entry(name).map_or(1.0, |(_, si)| si),
         })
     }
 
@@ -179,7 +184,7 @@ impl Basin {
                 "give fewer {starts}",
             ));
         }
-        let [x, y] = &options.axes()?;
+        let [x, y] = &options.axes(&case.units())?;
         if x.count.saturating_mul(y.count) > MAX_POINTS {
             return Err(axes(format!(
                 "`{}`: {} by {} points; {MAX_POINTS} at most",
@@ -477,6 +482,7 @@ fn schema(
         "max_period": options.max_period,
     });
     all.insert("basin".into(), attributes::text(&recipe));
+    let units = case.units();
     let coordinate = |range: &SliceRange| {
         let axis = SliceAxis {
             coordinate: 0,
@@ -484,12 +490,13 @@ fn schema(
             to: range.to,
             count: range.count,
         };
-        let values = Values::Real((0..range.count).map(|k| axis.value(k)).collect());
+        let values = (0..range.count).map(|k| range.si * axis.value(k));
+        let unit = units.of_entry(&range.name);
         Coordinate::of(
             &range.name,
-            values,
+            Values::Real(values.collect()),
             "initial value of this entry of the state",
-            "model units",
+            unit.map_or("model units", |(kind, _)| kind.si_unit()),
         )
     };
     let comment = "index into the attribute `attractors` (JSON); -1: none within the periods, \
@@ -659,8 +666,9 @@ impl BasinOptions {
     ///
     /// # Errors
     /// When one is not valid.
-    pub fn axes(&self) -> Result<[SliceRange; 2], Error> {
-        let axis = |option, given: &str| SliceRange::parse(given).map_err(|error| error.at(option));
+    pub fn axes(&self, units: &Units) -> Result<[SliceRange; 2], Error> {
+        let axis =
+            |option, given: &str| SliceRange::parse(given, units).map_err(|error| error.at(option));
         Ok([axis("x", &self.x)?, axis("y", &self.y)?])
     }
 

@@ -11,7 +11,7 @@ use rayon::prelude::*;
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use crate::case::{Case, Key, ParameterUnit, PlaneFamily};
+use crate::case::{Case, Held, Key, ParameterUnit, PlaneFamily};
 use crate::model::Model;
 use crate::model::model_map::ModelMap;
 use crate::model::recording::Recording;
@@ -111,6 +111,9 @@ pub struct BranchReport {
     pub loci: Option<Loci>,
     /// Failures.
     pub failures: Vec<FailureReport>,
+    /// What stays while the parameter varies although it was not stated, in SI.
+    #[serde(skip_serializing_if = "Held::is_empty")]
+    pub held: Held,
     /// Whether the work was stopped before it was done.
     pub cancelled: bool,
     /// The parameter, for figures.
@@ -165,6 +168,9 @@ pub struct PointReport {
     pub period: usize,
     /// Value of the parameter.
     pub parameter: f64,
+    /// The same in SI, for a number of the equations of a physical case.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub parameter_si: Option<f64>,
     /// State at drive phase 0.
     pub state: Vec<f64>,
     /// Floquet multipliers, largest modulus first.
@@ -190,6 +196,9 @@ pub struct BifurcationReport {
     pub period: usize,
     /// Value of the parameter.
     pub parameter: f64,
+    /// The same in SI, for a number of the equations of a physical case.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub parameter_si: Option<f64>,
     /// Width of the final bracket of the parameter.
     pub uncertainty: f64,
     /// State at drive phase 0.
@@ -544,6 +553,7 @@ fn described(
                 reason: reason.clone(),
             })
             .collect(),
+        held: case.held(&[key]),
         cancelled: false,
         key,
         parameter_unit: None,
@@ -709,12 +719,18 @@ impl Measured<'_> {
         Ok((observables, physical))
     }
 
+    fn in_si(&self, parameter: f64) -> Option<f64> {
+        let unit = self.case.parameter_unit(self.range.key)?;
+        (!self.range.key.is_physical()).then_some(unit.si * parameter)
+    }
+
     fn point(&self, branch: usize, p: &BranchPoint) -> Result<PointReport, Error> {
         let (observables, physical) = self.seen(p.parameter, &p.orbit)?;
         Ok(PointReport {
             branch,
             period: p.orbit.period,
             parameter: p.parameter,
+            parameter_si: self.in_si(p.parameter),
             state: p.orbit.states.first().cloned().unwrap_or_default(),
             multipliers: pairs(&p.orbit.multipliers),
             stable: p.orbit.is_stable(),
@@ -735,6 +751,7 @@ impl Measured<'_> {
             branch,
             period: b.orbit.period,
             parameter: b.parameter,
+            parameter_si: self.in_si(b.parameter),
             uncertainty: b.uncertainty,
             state: b.orbit.states.first().cloned().unwrap_or_default(),
             multipliers: pairs(&b.orbit.multipliers),

@@ -24,12 +24,13 @@ use crate::model::parameter::Parameter;
 use crate::model::recording::Curve;
 use crate::model::sample_law::SampleLaw;
 use crate::observe::Observables;
+use crate::observe::PhysicalMotion;
 use crate::study::branch::{BranchOptions, BranchReport, Range, branches_through};
 use crate::study::limits::MAX_PERIOD;
 use crate::study::orbit::{OrbitOptions, OrbitReport, no_period, orbit, spectral_radius};
 use crate::study::request::options;
 use crate::study::simulate::{Classification, Named};
-use crate::study::value::{Amount, values};
+use crate::study::value::{Amount, implied};
 use crate::study::{Study, cantilever};
 
 /// The motion under one contact law.
@@ -47,6 +48,9 @@ pub struct SampleMotion {
     /// The orbit of the requested period, if any.
     #[serde(flatten)]
     pub orbit: Option<OrbitLook>,
+    /// Its observables in SI, for a physical case.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub physical: Option<PhysicalMotion>,
     /// Why there is none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub reason: Option<String>,
@@ -232,6 +236,7 @@ fn motion(
         from_rest: named.classification,
         from_rest_period: named.orbit.map(|o| o.period),
         orbit: found.map(|found| look(&model, found)),
+        physical: None,
         reason,
         branch,
     })
@@ -315,9 +320,10 @@ impl ContactLawsOptions {
     /// Drive frequencies over which the orbits are followed, if they are.
     fn frequencies(&self, case: &Case) -> Result<Option<(f64, f64)>, Error> {
         match (&self.from, &self.to) {
-            (Some(from), Some(to)) => {
-                let [from, to] = values(case, Key::Omega, [("from", from), ("to", to)])?;
-                Ok(Some((from, to)))
+            (Some(_), Some(_)) => {
+                let end =
+                    |option, amount: &Option<_>| implied(case, Key::Omega, option, amount.as_ref());
+                Ok(end("from", &self.from)?.zip(end("to", &self.to)?))
             }
             (None, None) => Ok(None),
             _ => Err(Error::input(
@@ -343,7 +349,13 @@ impl Study for ContactLawsStudy {
         options: &ContactLawsOptions,
         control: &Control<'_>,
     ) -> Result<Comparison, Error> {
-        compare(case, options, control)
+        let mut found = compare(case, options, control)?;
+        for sample in &mut found.samples {
+            let orbit = sample.orbit.as_ref().zip(case.physical());
+            sample.physical =
+                orbit.map(|(orbit, view)| PhysicalMotion::of(&orbit.observables, view));
+        }
+        Ok(found)
     }
 }
 

@@ -6,6 +6,8 @@ use serde::Serialize;
 
 use crate::Error;
 use crate::case::Case;
+use crate::case::physical::Kind;
+use crate::case::units::NumbersInSi;
 use crate::model::beam::MAX_MODES;
 use crate::model::cantilever::Cantilever;
 use crate::model::{Model, ModelError};
@@ -58,6 +60,9 @@ pub struct Motion {
     pub tip_max: Option<f64>,
     /// Smallest tip deflection.
     pub tip_min: Option<f64>,
+    /// The extrema of the tip deflection in SI, for a physical case.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub physical: Option<NumbersInSi>,
     /// Contact time / period.
     pub contact_fraction: Option<f64>,
     /// Largest |multiplier|.
@@ -140,6 +145,7 @@ fn motion(modes: usize, found: Result<&OrbitReport, String>) -> Motion {
             period: Some(o.period),
             tip_max: Some(o.observables.tip_max),
             tip_min: Some(o.observables.tip_min),
+            physical: None,
             contact_fraction: Some(o.observables.contact_fraction),
             spectral_radius: Some(spectral_radius(&o.multipliers)),
             reason: None,
@@ -150,6 +156,7 @@ fn motion(modes: usize, found: Result<&OrbitReport, String>) -> Motion {
             period: None,
             tip_max: None,
             tip_min: None,
+            physical: None,
             contact_fraction: None,
             spectral_radius: None,
             reason: Some(reason),
@@ -257,10 +264,24 @@ impl Study for ConvergenceStudy {
         options: &ConvergenceOptions,
         control: &Control<'_>,
     ) -> Result<Convergence, Error> {
-        Ok(convergence(
-            cantilever(case, Self::NAME)?,
-            options,
-            control,
-        )?)
+        let mut found = convergence(cantilever(case, Self::NAME)?, options, control)?;
+        let units = case.units();
+        for motion in &mut found.motions {
+            if let (Some(high), Some(low)) = (motion.tip_max, motion.tip_min) {
+                let ends = [
+                    ("tip_max", Kind::Length, high),
+                    ("tip_min", Kind::Length, low),
+                ];
+                motion.physical = units.in_si(ends);
+            }
+        }
+        for reading in found.readings.readings.iter_mut().flatten() {
+            reading.physical = units.in_si([
+                ("A", Kind::Length, reading.first_harmonic),
+                ("E_dis", Kind::Energy, reading.dissipation),
+                ("F_max", Kind::Force, reading.peak_force),
+            ]);
+        }
+        Ok(found)
     }
 }

@@ -5,12 +5,13 @@ use nanotap_flow::Output;
 use schemars::JsonSchema;
 use serde::Serialize;
 
+use crate::case::units::NumbersInSi;
 use crate::model::Model;
 use crate::model::recording::Recording;
 use crate::study::orbit::OrbitReport;
 
 /// What an experimenter reads off an orbit, in the model's units.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct Reading {
     /// Amplitude at the drive's frequency, A.
     pub first_harmonic: f64,
@@ -20,6 +21,9 @@ pub struct Reading {
     pub dissipation: f64,
     /// Greatest force, F_max.
     pub peak_force: f64,
+    /// The same in SI, for a physical case.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub physical: Option<NumbersInSi>,
 }
 
 /// Differences of a reading to that with the most modes.
@@ -118,6 +122,7 @@ fn reading(orbit: &OrbitReport) -> Reading {
         phase: o.phase,
         dissipation: o.dissipation,
         peak_force: o.peak_force,
+        physical: None,
     }
 }
 

@@ -1,12 +1,15 @@
 //! The frequencies of the lever, in free flight and with the tip in contact: those of the
 //! Galerkin equations, those of the beam without truncation, and what damping makes of them.
 
+use std::collections::BTreeMap;
+
 use nalgebra::Complex;
 use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::Error;
 use crate::case::Case;
+use crate::case::physical::Kind;
 use crate::control::Control;
 use crate::model::beam::Modes;
 use crate::model::cantilever::{Cantilever, CantileverError};
@@ -41,6 +44,9 @@ pub struct ModeTable {
     pub free_eigenvalues: Option<Vec<[f64; 2]>>,
     /// The same in contact.
     pub contact_eigenvalues: Option<Vec<[f64; 2]>>,
+    /// The frequencies in Hz, for a physical case.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub physical: Option<BTreeMap<&'static str, Vec<f64>>>,
 }
 
 impl ModeTable {
@@ -87,6 +93,7 @@ impl ModeTable {
             exact_contact: exact_beam::frequencies(case.alpha1, case.alpha4, case.modes)?,
             free_eigenvalues,
             contact_eigenvalues: eigenvalues(Regime::Contact),
+            physical: None,
         })
     }
 }
@@ -123,7 +130,18 @@ impl Study for ModesStudy {
     type Report = ModeTable;
 
     fn compute(case: &Case, _: &ModesOptions, _: &Control<'_>) -> Result<ModeTable, Error> {
-        ModeTable::new(cantilever(case, Self::NAME)?)
+        let mut table = ModeTable::new(cantilever(case, Self::NAME)?)?;
+        table.physical = case.units().si(Kind::Frequency).map(|unit| {
+            let frequencies = [
+                ("free", &table.free),
+                ("contact", &table.contact),
+                ("exact_free", &table.exact_free),
+                ("exact_contact", &table.exact_contact),
+            ];
+            let in_hertz = |all: &Vec<f64>| all.iter().map(|value| unit * value).collect();
+            frequencies.map(|(name, all)| (name, in_hertz(all))).into()
+        });
+        Ok(table)
     }
 }
 

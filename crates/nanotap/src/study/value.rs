@@ -12,6 +12,7 @@ use serde_json::Value;
 
 use crate::Error;
 use crate::case::quantity::Kind;
+use crate::case::units::Units;
 use crate::case::{Case, Key};
 
 /// Most fixed steps a drive period.
@@ -96,10 +97,10 @@ impl<'de> Deserialize<'de> for Amount {
 
 inline_schema!(Amount, {"type": ["number", "string"]});
 
-/// Values of a parameter, each with the name of the option that gives it.
+/// Values of a key that is given by name, each with the name of the option that gives it.
 ///
 /// # Errors
-/// When a value is not valid for the parameter.
+/// When a value is not valid for the key.
 pub(crate) fn values<const N: usize>(
     case: &Case,
     key: Key,
@@ -113,19 +114,20 @@ pub(crate) fn values<const N: usize>(
     Ok(values)
 }
 
-/// A value of a parameter, if it is given, with the name of the option that gives it.
+/// The value of an option, if it is given, which is one of `key`: of a physical case a number
+/// without a unit is in SI.
 ///
 /// # Errors
-/// When it is not valid for the parameter.
-pub(crate) fn value(
+/// When it is not valid for the key.
+pub(crate) fn implied(
     case: &Case,
     key: Key,
     option: &str,
     amount: Option<&Amount>,
 ) -> Result<Option<f64>, Error> {
-    amount
-        .map(|amount| values(case, key, [(option, amount)]).map(|[value]| value))
-        .transpose()
+    let read = |amount: &Amount| case.implied_value(key, amount.text());
+    let read = amount.map(read).transpose();
+    read.map_err(|error| Error::from(error).at(option))
 }
 
 /// A name with two ends, `alpha4=5:40`.
@@ -232,16 +234,16 @@ inline_schema!(Intervals, {
 });
 
 impl Intervals {
-    /// Each with its ends as plain numbers, for entries of a state.
+    /// Each with its ends in the model's units, for entries of a state.
     ///
     /// # Errors
-    /// When an end is not a finite number.
-    pub fn numbers(&self) -> Result<Vec<(String, f64, f64)>, Error> {
+    /// When an end is neither a finite number nor a quantity of the entry's kind.
+    pub fn of_entries(&self, units: &Units) -> Result<Vec<(String, f64, f64)>, Error> {
         let number = |interval: &Interval, end: &Amount| {
-            let value = end.text().parse::<f64>().ok().filter(|v| v.is_finite());
-            value.ok_or_else(|| {
+            let read = units.read_entry(&interval.name, end.text());
+            read.map_err(|error| {
                 Error::input(
-                    format!("{}: `{end}` is not a finite number", interval.name),
+                    format!("{}: {error}", interval.name),
                     "write a side as in a1=-1:1",
                 )
             })
@@ -394,7 +396,7 @@ mod tests {
             serde_json::from_value(serde_json::to_value(&typed).unwrap()).unwrap();
         assert_eq!(back, typed);
         assert_eq!(
-            typed.numbers().unwrap(),
+            typed.of_entries(&Units::Model).unwrap(),
             [("a1".to_owned(), -1.0, 1.0), ("v2".to_owned(), -4.0, 4.0)]
         );
     }
@@ -423,6 +425,6 @@ mod tests {
         }
         let quantities: Intervals =
             serde_json::from_value(json!({"drive.frequency": ["60 kHz", 7e4]})).unwrap();
-        assert!(quantities.numbers().is_err());
+        assert!(quantities.of_entries(&Units::Model).is_err());
     }
 }

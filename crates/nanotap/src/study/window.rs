@@ -22,7 +22,9 @@ use crate::study::attractors::MAX_STARTS;
 use crate::study::limits::MAX_PERIOD;
 use crate::study::request::options;
 use crate::study::simulate::Classification;
-use crate::study::sweep::{FromNeighbour, Starts, Sweep, SweepOptions, class_of, from_neighbours};
+use crate::study::sweep::{
+    FromNeighbour, Starts, Sweep, SweepOptions, class_of, from_neighbours, held,
+};
 use crate::study::value::Axes;
 use crate::study::{DatasetPlan, DatasetStudy};
 
@@ -111,6 +113,9 @@ pub struct Window {
     pub conditions: Vec<Vec<Condition>>,
     /// Part of all points, by condition; every one is there.
     pub shares: BTreeMap<&'static str, f64>,
+    /// What stays while the parameters vary although it was not stated, in SI.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    pub held: BTreeMap<String, f64>,
 }
 
 /// One motion found from one start.
@@ -200,6 +205,7 @@ impl Window {
             y: schema.axis_values(0),
             conditions,
             shares,
+            held: held(store),
         })
     }
 

@@ -72,7 +72,7 @@ fn a_stiff_lever_of_high_q_jumps_at_the_ends_of_its_branches() {
             assert!((sight.first_harmonic / report.free_amplitude - 1.0).abs() < 1e-9);
         }
     }
-    let [interval] = report.hysteresis[..] else {
+    let [interval] = &report.hysteresis[..] else {
         panic!("{:?}", report.hysteresis);
     };
     assert!((interval.near / report.free_reach - 1.0).abs() < 1e-4);
@@ -224,7 +224,7 @@ fn hysteresis_does_not_depend_on_the_spacing_of_rows() {
         )
     });
     assert_eq!(ends[0], ends[1]);
-    let farthest = ends[0].0[0];
+    let farthest = &ends[0].0[0];
     assert!((farthest.far / nm - 10.0286).abs() < 1e-3, "{farthest:?}");
     let states = states_near(&case.with(case.gap_key(), 6.0 * nm), 8, &Control::default()).unwrap();
     assert_eq!(states.len(), 2);

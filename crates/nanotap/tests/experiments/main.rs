@@ -15,3 +15,4 @@ mod physical_quantities;
 mod reconstruct;
 mod requests;
 mod setpoint;
+mod units;

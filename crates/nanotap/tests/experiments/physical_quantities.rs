@@ -183,8 +183,8 @@ fn constant_numbers_reproduce_a_point() {
         let (key, value) = varied(&lever, name, text);
         let found = lever.with(key, value);
         let mut words = vec![format!("{name}={text}")];
-        for (held, value) in lever.implied_constants(key) {
-            words.push(format!("{held}={}", held.kind().format_exact(value)));
+        for (held, value) in lever.held(&[key]) {
+            words.push(format!("{held}={value:e}"));
         }
         let words: Vec<&str> = words.iter().map(String::as_str).collect();
         let again = studied(STIFF, &words);

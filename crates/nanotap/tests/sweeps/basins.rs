@@ -2,6 +2,7 @@
 
 use nanotap::ErrorKind;
 use nanotap::case::Case;
+use nanotap::case::units::Units;
 use nanotap::dataset::{Share, Store, Values, Work};
 use nanotap::figure::basin::figure;
 use nanotap::model::cantilever::Cantilever;
@@ -198,7 +199,7 @@ fn invalid_slices_are_refused() {
         "a1=1:1:5",
         "a1=0:1:99999999",
     ] {
-        let error = SliceRange::parse(given).unwrap_err();
+        let error = SliceRange::parse(given, &Units::Model).unwrap_err();
         assert!(error.to_string().contains(&format!("`{given}`")), "{error}");
     }
     let refused = |x, y, change: &dyn Fn(&mut BasinOptions)| {

@@ -16,7 +16,7 @@ use crate::case::quantity::Kind;
 use crate::model::beam::MAX_MODES;
 use crate::model::cantilever::CosineTerm;
 use crate::model::contact::{ContactLaw, OWN_KEYS};
-use crate::model::drive_form::Actuation;
+use crate::model::drive_form::{Actuation, Hold};
 use crate::model::oscillator::OscillatorParameter as Of;
 use crate::model::parameter::{Parameter, SampleKey};
 
@@ -389,6 +389,10 @@ After from AFTER_LAWS => {
         "amplitude that the feedback holds: a fraction of A0, or a length; it tells the distance",
     ).feeds(Parameter::Alpha5);
     DriveActuation = other(Drive, "actuation", Takes::Word(words!(Actuation)), "where the drive acts");
+    DriveHold = other(
+        Drive, "hold", Takes::Word(words!(Hold)),
+        "what stays while another key varies: the drive's own amplitude or force (default), or the free amplitude",
+    );
     SecondFrequency = quantity(Drive, "second_frequency", Frequency, R::POSITIVE, "frequency of a second tone");
     SecondRatio = other(Drive, "second_ratio", Takes::FrequencyRatio, "frequency of a second tone over that of the first");
     SecondAmplitude = quantity(Drive, "second_amplitude", Length, R::NOT_NEGATIVE, "amplitude of the second tone's motion of the clamped end")

@@ -3,11 +3,15 @@
 use super::reader::Reader;
 use super::remark::Remark;
 use super::view::{Physical, USUAL_TIP_HEIGHT};
-use crate::case::key::Key;
+use crate::case::key::{Key, Section};
 use crate::case::quantity::Kind;
+use crate::case::stated::Value;
 use crate::model::drive_form::Actuation;
 use crate::model::exact_beam;
 use crate::model::parameter::Parameter;
+
+/// Largest gap or amplitude that is believed, in metres.
+const MOST_LENGTH: f64 = 1e-3;
 
 impl Physical {
     /// All remarks, in the order in which the case is read.
@@ -52,7 +56,25 @@ impl Physical {
             )));
         }
         remarks.extend(self.clearance_remarks());
+        remarks.extend(Self::length_remarks(reader));
         remarks
+    }
+
+    /// Gaps and amplitudes that are too large for any lever: most likely a number in nanometres
+    /// without its unit.
+    fn length_remarks(reader: Reader<'_>) -> impl Iterator<Item = Remark> {
+        let sections = [Section::Gap, Section::Drive];
+        let keys = Key::all().filter(move |key| sections.contains(&key.section()));
+        keys.filter_map(move |key| match reader.stated.get(key)? {
+            Value::Number(value, Kind::Length) if *value > MOST_LENGTH => {
+                let value = Kind::Length.format(*value);
+                let meant = value.replace(" m", " nm").replace(" mm", " nm");
+                Some(Remark::warning(format!(
+                    "{key} is {value}; did you mean {meant}?"
+                )))
+            }
+            _ => None,
+        })
     }
 
     /// Whether another part of the beam would touch. The trajectory decides in the end; what

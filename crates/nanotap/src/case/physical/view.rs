@@ -18,7 +18,7 @@ use crate::case::key::{Key, Laws, ModelKind};
 use crate::case::quantity::Kind;
 use crate::case::stated::{Stated, Value};
 use crate::model::cantilever::Cantilever;
-use crate::model::drive_form::Actuation;
+use crate::model::drive_form::{Actuation, Hold};
 use crate::model::exact_beam;
 use crate::model::parameter::{Numbers, Parameter, Unit};
 
@@ -178,24 +178,24 @@ impl Physical {
 
     /// What stays while a quantity varies, said as numbers of their own. An experimenter who
     /// turns one knob leaves the others: the drive keeps its own amplitude (a piezo its
-    /// voltage, not the lever's answer to it), the second tone its place among the harmonics
+    /// voltage, not the lever's answer to it) unless `drive.hold` says otherwise, the second tone its place among the harmonics
     /// of the first, the sample its place, and the unit of length g₀ stays so that all values have
     /// the same unit.
     pub(crate) fn implied_constants(&self, stated: &Stated) -> Stated {
         let mut held = stated.clone();
         held.set(Key::GapBeam, self.scales.length);
         held.set(Key::GapTip, self.parameters.get(Parameter::Alpha5));
-        if stated.has(Key::DriveFreeAmplitude) {
-            held.set(
-                self.strength_key(FIRST),
-                self.parameters.get(Parameter::Alpha2),
-            );
-        }
-        if stated.has(Key::SecondFreeAmplitude) {
-            held.set(
-                self.strength_key(SECOND),
-                self.parameters.get(Parameter::Tone2Amplitude),
-            );
+        let hold: Hold = word(stated, Key::DriveHold).unwrap_or_default();
+        for keys in [FIRST, SECOND] {
+            let [_, _, free] = keys;
+            let strength = self.strength_key(keys);
+            let (stays, follows) = match hold {
+                Hold::Drive => (strength, free),
+                Hold::FreeAmplitude => (free, strength),
+            };
+            if let (true, Some(value)) = (stated.has(follows), self.value(stays)) {
+                held.set(stays, value);
+            }
         }
         if let (Some(ratio), true) = (
             self.cantilever.tone2_ratio,

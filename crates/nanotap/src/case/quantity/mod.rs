@@ -192,18 +192,18 @@ impl Kind {
         }
     }
 
-    /// Reads a quantity of this kind, in SI. A bare `0` needs no unit.
+    /// Reads a quantity of this kind, in SI. A number without a unit is in SI.
     ///
     /// # Errors
     /// [`QuantityError`] if the text is no number with a known unit, or has another dimension;
     /// the message says what was expected, with an example.
     pub fn parse(self, text: &str) -> Result<f64, QuantityError> {
         let quantity = read(text, Some(self))?;
-        if quantity.dimension == self.dimension() {
+        let is_bare = text
+            .trim()
+            .ends_with(|last: char| last.is_ascii_digit() || last == '.');
+        if quantity.dimension == self.dimension() || is_bare {
             return Ok(quantity.value);
-        }
-        if quantity.value == 0.0 && quantity.dimension == Dimension::NONE {
-            return Ok(0.0);
         }
         Err(QuantityError {
             reason: format!(" ({})", quantity.dimension),

@@ -43,6 +43,8 @@ fn reads_what_stands_on_boxes_and_labels() {
         ("3eV", Kind::Energy, 3.0 * JOULES_PER_ELECTRONVOLT),
         ("180 deg", Kind::Angle, 180.0 * DEGREE),
         ("0", Kind::Length, 0.0),
+        ("3e-8", Kind::Length, 3e-8),
+        ("75e3", Kind::Frequency, 75e3),
         ("0 nm", Kind::Length, 0.0),
     ];
     for (text, kind, expected) in cases {
@@ -58,8 +60,8 @@ fn says_what_was_expected_and_what_was_given() {
         "expected a force per length such as \"2.8 N/m\", got \"75 kHz\" (a frequency)"
     );
     assert_eq!(
-        message(Kind::Length, "30"),
-        "expected a length such as \"30 um\", got \"30\" (a number without a unit)"
+        message(Kind::Length, "30 %"),
+        "expected a length such as \"30 um\", got \"30 %\" (a number without a unit)"
     );
     assert_eq!(
         message(Kind::Frequency, "4.7e5 rad/s"),

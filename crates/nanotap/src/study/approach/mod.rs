@@ -28,7 +28,8 @@ use serde::{Deserialize, Serialize};
 
 use crate::Error;
 use crate::case::physical::Kind;
-use crate::case::{Case, ParameterUnit};
+use crate::case::units::{NumbersInSi, Units};
+use crate::case::{Case, Key, ParameterUnit};
 use crate::model::Model;
 use crate::observe::{Clearance, ObservableSet, Observables, PhysicalMotion, measure};
 use crate::study::branch::{BranchOptions, BranchReport};
@@ -38,7 +39,7 @@ use crate::study::frequency_modulation::{
 use crate::study::limits::{MAX_DISTANCES, MAX_DOUBLINGS, MAX_PERIOD};
 use crate::study::request::options;
 use crate::study::simulate::Classification;
-use crate::study::value::{Amount, value};
+use crate::study::value::{Amount, implied};
 use crate::study::{FreeMotion, Study};
 use distance_sweep::FoundMotion;
 pub use quasistatic::{states_at, states_near};
@@ -150,6 +151,9 @@ pub struct StateJump {
     pub zc: Option<f64>,
     /// Uncertainty of the distance, in the model's unit of length.
     pub uncertainty: f64,
+    /// Uncertainty of the distance in m, for a physical case.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub zc_uncertainty: Option<f64>,
     /// What ends the motion before it: fold, flip, neimark-sacker, grazing, crossing, or a
     /// sentence.
     pub reason: String,
@@ -160,7 +164,7 @@ pub struct StateJump {
 }
 
 /// An interval of distances in which approach and retract show different motions.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct Hysteresis {
     /// Nearest distance of the interval, in the model's unit of length.
     pub near: f64,
@@ -169,6 +173,29 @@ pub struct Hysteresis {
     /// Largest difference of the amplitude at the drive frequency in it; of the relative frequency
     /// shift where the amplitude is kept.
     pub difference: f64,
+    /// The lengths in SI, for a physical case.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub physical: Option<NumbersInSi>,
+}
+
+impl Hysteresis {
+    /// The same with its lengths in SI too.
+    fn in_si(self, units: &Units, keeps_amplitude: bool) -> Self {
+        let difference = if keeps_amplitude {
+            Kind::Number
+        } else {
+            Kind::Length
+        };
+        let ends = [
+            ("near", Kind::Length, self.near),
+            ("far", Kind::Length, self.far),
+        ];
+        let mut physical = units.in_si(ends);
+        if let Some(numbers) = &mut physical {
+            numbers.insert("difference", units.scaled(difference, self.difference));
+        }
+        Self { physical, ..self }
+    }
 }
 
 /// Approach and retract curves, with the branches behind them.
@@ -212,6 +239,9 @@ pub struct ApproachReport {
     /// For a physical case, the factor from distances to m.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub parameter_unit: Option<ParameterUnit>,
+    /// The lengths in SI, for a physical case.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub physical: Option<NumbersInSi>,
     /// Frequency modulation, where amplitude and phase are kept.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub modulation: Option<ModulationReport>,
@@ -231,7 +261,7 @@ pub fn approach(
         return frequency_modulation(case, &options.modulation(), control);
     }
     let key = case.gap_key();
-    let distance = |option, given: &Option<_>| value(case, key, option, given.as_ref());
+    let distance = |option, given: &Option<_>| implied(case, key, option, given.as_ref());
     let speed = options.speed.as_ref();
     let speed = speed.map(|amount| speed_of(case, amount)).transpose()?;
     let distances = Distances {
@@ -248,8 +278,17 @@ pub fn approach(
         options,
         speed,
     };
-    let found = quasistatic::found(&curve, &free, &distances, control)?;
-    Ok(ApproachReport {
+    let mut found = quasistatic::found(&curve, &free, &distances, control)?;
+    if let Some(exact) = distances_in_si(case, options, [from, to])? {
+        // The distances that were asked for, not these in the model's units and back: curves of
+        // different levers have the same ones.
+        for row in &mut found.table {
+            if let Some(k) = distances.iter().position(|gap| *gap == row.gap) {
+                row.zc = Some(exact[k]);
+            }
+        }
+    }
+    let report = ApproachReport {
         parameter: key.path(),
         from,
         to,
@@ -266,8 +305,54 @@ pub fn approach(
         cancelled: control.is_cancelled(),
         limits: found.limits,
         parameter_unit: case.parameter_unit(key),
+        physical: None,
         modulation: None,
-    })
+    };
+    Ok(report.in_si(&case.units()))
+}
+
+/// The distances of a physical case in m, from the ends as they are given; `ends` are in the model's
+/// unit of length.
+fn distances_in_si(
+    case: &Case,
+    options: &ApproachOptions,
+    ends: [f64; 2],
+) -> Result<Option<Vec<f64>>, Error> {
+    let Some(unit) = case.units().si(Kind::Length) else {
+        return Ok(None);
+    };
+    let end = |option, given: &Option<Amount>, end: f64| match given {
+        Some(given) => Ok(implied(case, Key::GapTip, option, Some(given))?.unwrap_or(end * unit)),
+        None => Ok::<f64, Error>(end * unit),
+    };
+    let from = end("from", &options.from, ends[0])?;
+    let to = end("to", &options.to, ends[1])?;
+    let last = (options.points - 1) as f64;
+    let even = |k| even(from, to, k as f64 / last);
+    Ok(Some((0..options.points).map(even).collect()))
+}
+
+/// The number at a `share` of the way, exact at both ends.
+fn even(from: f64, to: f64, share: f64) -> f64 {
+    from * (1.0 - share) + to * share
+}
+
+impl ApproachReport {
+    /// The same with its lengths in SI too.
+    pub(in crate::study) fn in_si(mut self, units: &Units) -> Self {
+        self.physical = units.in_si([
+            ("from", Kind::Length, self.from),
+            ("to", Kind::Length, self.to),
+            ("free_amplitude", Kind::Length, self.free_amplitude),
+            ("free_reach", Kind::Length, self.free_reach),
+        ]);
+        let keeps_amplitude = self.modulation.is_some();
+        let intervals = std::mem::take(&mut self.hysteresis).into_iter();
+        self.hysteresis = intervals
+            .map(|interval| interval.in_si(units, keeps_amplitude))
+            .collect();
+        self
+    }
 }
 
 /// The distances of a curve, in the model's unit of length.
@@ -334,8 +419,7 @@ impl Distances {
                 let ratio = (to - closest) / (from - closest);
                 closest + (from - closest) * nanotap_arithmetic::powf(ratio, share)
             }
-            // Both ends exactly.
-            _ => from * (1.0 - share) + to * share,
+            _ => even(from, to, share),
         };
         Ok((0..self.points).map(|k| between(k as f64 / last)).collect())
     }
@@ -439,6 +523,7 @@ pub(in crate::study) fn hysteresis(
                     near: there.gap,
                     far: there.gap,
                     difference,
+                    physical: None,
                 }),
             }
         }
@@ -582,24 +667,18 @@ impl ApproachOptions {
 
 /// A speed in the model's unit of length a unit of time, as it is given of a case.
 pub(in crate::study) fn speed_of(case: &Case, amount: &Amount) -> Result<f64, Error> {
-    if let Ok(speed) = amount.text().parse::<f64>() {
-        if speed > 0.0 && speed.is_finite() {
-            return Ok(speed);
-        }
-        return Err(Error::input(
-            format!(
-                "the distance cannot change at a speed of {speed}: a finite one above zero is needed"
-            ),
-            "change {speed}",
-        ));
-    }
     let refused = |error: String| Error::option("speed", error, "write it as in \"500 nm/s\"");
-    let speed = Kind::Velocity.parse(amount.text());
-    let speed = speed.map_err(|error| refused(error.to_string()))?;
-    let view = case.physical().ok_or_else(|| {
-        refused("a dimensionless case has no unit of length: a plain number is needed".to_owned())
-    })?;
-    Ok(speed / view.scales.velocity)
+    let (read, unit) = match case.physical() {
+        Some(view) => (Kind::Velocity.parse(amount.text()), view.scales.velocity),
+        None => (Kind::Number.parse(amount.text()), 1.0),
+    };
+    let speed = read.map_err(|error| refused(error.to_string()))? / unit;
+    if speed > 0.0 && speed.is_finite() {
+        return Ok(speed);
+    }
+    Err(refused(format!(
+        "expected a finite speed above zero, got {amount}"
+    )))
 }
 
 /// An approach and retract curve.

@@ -355,6 +355,7 @@ impl Written<'_> {
                     gap: before.to,
                     zc: view.map(|view| before.to * view.scales.length),
                     uncertainty: before.uncertainty,
+                    zc_uncertainty: view.map(|view| before.uncertainty * view.scales.length),
                     reason: before.end.to_string(),
                     before: self.row(way, before.to, self.sweep.motion_at(before, before.to))?,
                     after: self.row(
@@ -400,6 +401,7 @@ impl Written<'_> {
                     near: pair[1],
                     far: pair[0],
                     difference,
+                    physical: None,
                 }),
             }
         }

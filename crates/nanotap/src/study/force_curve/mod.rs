@@ -43,7 +43,7 @@ use crate::study::value::Amount;
 options! {
     /// Options of a force curve.
     pub struct ForceCurveOptions {
-        /// First distance, as in "30 nm" or as alpha5; default: the distance of the case
+        /// First distance, as in "30 nm"; default: the distance of the case
         #[schemars(extend("x-value" = "DISTANCE"))]
         pub from: Option<Amount> = None,
         /// Distance at which the approach turns; default: as far behind the surface as a tenth of
@@ -54,7 +54,7 @@ options! {
         /// the lever at rest exerts it
         #[schemars(extend("x-value" = "FORCE"))]
         pub peak_force: Option<Amount> = None,
-        /// Speed of a ramp, as in "1 um/s" or as alpha5 per unit of time; default: 1 um/s
+        /// Speed of a ramp, as in "2 um/s"; default: 1 um/s
         #[schemars(extend("x-value" = "SPEED"))]
         pub speed: Option<Amount> = None,
         /// Frequency of a cosine in place of a ramp, as in "2 kHz"

@@ -10,7 +10,7 @@ use crate::case::Case;
 use crate::case::physical::{Kind, Physical};
 use crate::model::Model;
 use crate::study::approach::speed_of;
-use crate::study::value::{Amount, value};
+use crate::study::value::{Amount, implied};
 
 /// Most stretches of flow of a curve.
 const MAX_STRETCHES: f64 = 50e6;
@@ -128,7 +128,7 @@ impl<'a> Plan<'a> {
             )
         })?;
         let key = case.gap_key();
-        let distance = |option, given: &Option<_>| value(case, key, option, given.as_ref());
+        let distance = |option, given: &Option<_>| implied(case, key, option, given.as_ref());
         let from = match distance("from", &options.from)? {
             Some(from) => from,
             None if view.setpoint.is_none() => case.get(key),

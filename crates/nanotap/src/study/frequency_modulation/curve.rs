@@ -16,7 +16,7 @@ use crate::study::approach::{
     ApproachPoint, ApproachReport, Distances, Way, beam_clearance, hysteresis,
 };
 use crate::study::simulate::Classification;
-use crate::study::value::value;
+use crate::study::value::implied;
 use crate::{Error, ErrorKind};
 
 /// How far beyond the first distance the free oscillation is put, if Newton needs a way there.
@@ -42,10 +42,11 @@ fn curve(
     options: &FrequencyModulationOptions,
     control: &Control<'_>,
 ) -> Result<ApproachReport, Error> {
-    let distance = |option, given: &Option<_>| value(case, case.gap_key(), option, given.as_ref());
+    let distance =
+        |option, given: &Option<_>| implied(case, case.gap_key(), option, given.as_ref());
     let phase = options.phase;
     let closest = distance("closest", &options.closest)?;
-    let shift = value(case, case.drive_keys()[0], "shift", options.shift.as_ref())?;
+    let shift = implied(case, case.drive_keys()[0], "shift", options.shift.as_ref())?;
     let (from, to) = (
         distance("from", &options.from)?,
         distance("to", &options.to)?,
@@ -165,7 +166,7 @@ fn curve(
         curve.add_si(point);
     }
     let setpoints = shift.map(|shift| curve.setpoints(held, shift, &table, control));
-    Ok(ApproachReport {
+    let report = ApproachReport {
         jumps: Vec::new(),
         parameter: case.gap_key().path(),
         from,
@@ -182,6 +183,7 @@ fn curve(
         cancelled: control.is_cancelled(),
         limits: Vec::new(),
         parameter_unit: case.parameter_unit(case.gap_key()),
+        physical: None,
         modulation: Some(ModulationReport {
             amplitude: free.amplitude,
             phase,
@@ -198,7 +200,8 @@ fn curve(
             jumps,
             ended,
         }),
-    })
+    };
+    Ok(report.in_si(&case.units()))
 }
 
 /// Distances at which no orbit may be found before a way ends.

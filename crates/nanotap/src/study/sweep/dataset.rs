@@ -10,6 +10,7 @@ use super::{Runs, SweepOptions};
 use crate::Error;
 use crate::case::Case;
 use crate::case::physical::Kind as QuantityKind;
+use crate::case::units::Units;
 use crate::dataset::schema::Kind;
 use crate::dataset::{Axis, Coordinate, Grid, Schema, Values, Variable, attributes};
 use crate::observe::{Dimension, Observable, ObservableSet};
@@ -53,6 +54,9 @@ pub(super) const STATE: &str = "state";
 /// Name of the last axis of the grid.
 pub(super) const START: &str = "start";
 
+/// The attribute with what stays while the parameters vary.
+pub(super) const HELD: &str = "held";
+
 /// What the dataset of a sweep holds.
 pub(super) fn schema(runs: &Runs) -> Result<Schema, Error> {
     let Runs {
@@ -63,7 +67,7 @@ pub(super) fn schema(runs: &Runs) -> Result<Schema, Error> {
     } = runs;
     let lanes = starts.count() * options.follow.directions().len().max(1);
     let states = state_names(case, over)?;
-    let si = case.physical().is_some();
+    let si = matches!(case.units(), Units::Si(_));
     let variables = variables(options, states.len(), si);
     let bytes: usize = variables.iter().map(|v| v.stride() * v.kind.size()).sum();
     let x = &over[0];
@@ -271,6 +275,11 @@ fn attributes(runs: &Runs) -> crate::dataset::schema::Attributes {
         "max_period": options.max_period,
     });
     all.insert("sweep".into(), attributes::text(&recipe));
+    let keys: Vec<_> = runs.over.iter().map(|over| over.key).collect();
+    let held = runs.case.held(&keys);
+    if !held.is_empty() {
+        all.insert(HELD.into(), attributes::text(&held));
+    }
     all
 }
 

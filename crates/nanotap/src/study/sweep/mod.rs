@@ -40,6 +40,7 @@ pub use options::{SweepOptions, SweepStudy};
 pub use over::{Over, Spacing};
 pub use run::Starts;
 pub use summary::Summary;
+pub(crate) use summary::held;
 
 use nanotap_dynamics::Control;
 
@@ -71,7 +72,7 @@ impl Sweep {
     /// # Errors
     /// When a parameter or a start is not valid, or there is too much of something.
     pub fn new(case: &Case, options: SweepOptions) -> Result<Self, Error> {
-        let starts = options.starts()?;
+        let starts = options.starts(&case.units())?;
         Self::from(case, options, starts)
     }
 

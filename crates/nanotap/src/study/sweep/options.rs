@@ -5,6 +5,7 @@ use nanotap_dynamics::Control;
 use super::{Follow, Over, Starts, Summary, Sweep};
 use crate::Error;
 use crate::case::Case;
+use crate::case::units::Units;
 use crate::dataset::{Store, StoreError};
 use crate::study::attractors::MAX_STARTS;
 use crate::study::limits::{MAX_PERIOD, MAX_PERIODS};
@@ -69,7 +70,7 @@ impl SweepOptions {
     }
 
     /// Where motions start.
-    pub(super) fn starts(&self) -> Result<Starts, Error> {
+    pub(super) fn starts(&self, units: &Units) -> Result<Starts, Error> {
         match (self.starts, &self.state) {
             (Some(_), Some(_)) => Err(Error::input(
                 "starts and state: the starts are drawn, or given",
@@ -83,7 +84,7 @@ impl SweepOptions {
             (Some(count), None) => Ok(Starts::Seeded {
                 count,
                 seed: self.seed,
-                sides: self.sides.numbers()?,
+                sides: self.sides.of_entries(units)?,
             }),
             (None, Some(state)) => Ok(Starts::Given(state.clone())),
             (None, None) => Ok(Starts::Rest),

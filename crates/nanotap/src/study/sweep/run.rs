@@ -8,6 +8,7 @@ use nanotap_dynamics::{
 use super::{Runs, SweepOptions};
 use crate::case::Case;
 use crate::case::physical::Scales;
+use crate::case::units::Units;
 use crate::dataset::Block;
 use crate::map::UNINTERRUPTED;
 use crate::model::model_map::ModelMap;
@@ -228,7 +229,10 @@ struct Runner<'a> {
 impl<'a> Runner<'a> {
     fn new(case: &Case, model: &'a Model, options: &'a SweepOptions) -> Self {
         Self {
-            scales: case.physical().map(|view| view.scales),
+            scales: match case.units() {
+                Units::Si(scales) => Some(scales),
+                Units::Model => None,
+            },
             options,
             classify: short_run(options.max_period),
             map: ModelMap::new(model),

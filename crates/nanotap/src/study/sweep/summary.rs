@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::dataset::{CLASSES, class_of};
+use super::dataset::{CLASSES, HELD, class_of};
 use super::{FromNeighbour, from_neighbours};
 use crate::dataset::{Store, StoreError};
 
@@ -21,6 +21,16 @@ pub struct Summary {
     /// Motions that no run met, but that those of neighbouring values lead to.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub from_neighbours: Vec<FromNeighbour>,
+    /// What stays while the parameters vary although it was not stated, in SI.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    pub held: BTreeMap<String, f64>,
+}
+
+/// What stays while the parameters of a sweep vary, as its dataset states it.
+pub(crate) fn held(store: &Store) -> BTreeMap<String, f64> {
+    let text = store.schema().attributes.get(HELD);
+    text.and_then(|text| serde_json::from_str(text.as_str()?).ok())
+        .unwrap_or_default()
 }
 
 impl Summary {
@@ -32,6 +42,7 @@ impl Summary {
         store.require_all()?;
         let mut summary = Self {
             from_neighbours: from_neighbours(store)?,
+            held: held(store),
             ..Self::default()
         };
         summary.counts.extend(CLASSES.iter().map(|c| (c.name(), 0)));

@@ -1,11 +1,19 @@
 """Functions agree with the library's declarations: names, defaults and documentation."""
 
+import importlib.util
 import inspect
 import json
+from pathlib import Path
 
 import nanotap
 import pytest
 from nanotap import _nanotap
+
+_WRITER = Path(__file__).parents[1] / "crates" / "nanotap-python" / "signatures.py"
+_SPEC = importlib.util.spec_from_file_location("signatures", _WRITER)
+_MODULE = importlib.util.module_from_spec(_SPEC)
+_SPEC.loader.exec_module(_MODULE)
+in_python = _MODULE.in_python
 
 STUDIES = {
     name: (about, json.loads(schema)) for name, about, _, schema in _nanotap.studies()
@@ -22,7 +30,8 @@ def test_a_function_has_the_options_that_the_study_declares(name):
     for option, declared in schema["properties"].items():
         argument = parameters["from_" if option == "from" else option]
         words = " ".join(declared["description"].split())
-        assert words.replace("{", "`").replace("}", "`") in documentation
+        words = words.replace("{", "`").replace("}", "`")
+        assert in_python(words) in documentation
         if option in schema.get("required", ()):
             assert argument.default is inspect.Parameter.empty
         elif isinstance(declared.get("default"), int | float | str):
@@ -53,3 +62,22 @@ def test_absurd_sizes_are_refused_with_the_limit(regular, name, arguments, words
 def test_contact_laws_compares_the_samples(regular):
     found = nanotap.contact_laws(regular)
     assert len(found.samples) >= 2
+
+
+def test_examples_in_docstrings_hold():
+    """Every function of a study has an example, but those that need measured data or a scan."""
+    import doctest
+
+    from nanotap import _case, _map, _quantity, _signatures
+
+    finder, runner = doctest.DocTestFinder(recurse=True), doctest.DocTestRunner()
+    tested = set()
+    for module in (_signatures, _case, _map, _quantity):
+        globs = {**vars(module), "nanotap": nanotap}
+        for test in finder.find(module, globs=globs):
+            if test.examples:
+                tested.add(test.name.rsplit(".", 1)[-1])
+                runner.run(test)
+    assert runner.summarize().failed == 0
+    without = set(_signatures.__all__) - tested
+    assert without <= {"fit", "reconstruct", "scan", "fm", "force_curve"}, without

@@ -7,6 +7,7 @@ values of Python are stated here.
 """
 
 import json
+import re
 import subprocess
 import sys
 import textwrap
@@ -179,6 +180,70 @@ PYTHON: dict[str, tuple[tuple[tuple[str, str, str, str], ...], str, str]] = {
     ),
 }
 
+CASE = ">>> case = nanotap.Case.paper(omega=3)"
+
+# One call of each study with the answer, after `case = nanotap.Case.paper(omega=3)`; the tests run
+# them.
+EXAMPLES = {
+    "modes": """
+>>> nanotap.modes(case).free.round(3).tolist()
+[2.968, 19.385, 56.011]
+""",
+    "simulate": """
+>>> run = nanotap.simulate(case, periods=4)
+>>> run.classification.item(), run.tip.dims
+('periodic', ('tau',))
+""",
+    "orbit": """
+>>> nanotap.orbit(case)
+Orbit(period=1, stable, largest multiplier 0.868606, W from 0.0225061 to 0.127375)
+>>> nanotap.orbit(case, omega=[2.9, 3.0]).stable.values
+array([ True,  True])
+""",
+    "attractors": """
+>>> found = nanotap.attractors(case, starts=20, box={"a1": (-1, 1)}, progress=False)
+>>> [one.name for one in found]
+['period 1']
+""",
+    "branch": """
+>>> ds = nanotap.branch(case, parameter="omega", from_=3.2, to=2.9, progress=False)
+>>> ds.bifurcation_kind.values.tolist(), ds.bifurcation_parameter.values.round(6).tolist()
+(['flip'], [2.913722])
+""",
+    "approach": """
+>>> ds = nanotap.approach(case, points=3, branches=False, progress=False)
+>>> ds.first_harmonic.sel(way="approach").values.round(4)
+array([0.0149, 2.8522, 4.4282])
+""",
+    "sweep": """
+>>> ds = nanotap.sweep(case, over={"omega": nanotap.range(2.9, 3, 3)}, periods=2, progress=False)
+>>> ds.classification.values.ravel().tolist()
+['periodic', 'periodic', 'periodic']
+""",
+    "window": """
+>>> over = {"omega": [2.9, 3.0], "alpha4": nanotap.range(19, 20, 2)}
+>>> nanotap.window(case, over=over, starts=2, progress=False).condition.values.tolist()
+[['one-period-1', 'one-period-1'], ['subharmonic', 'one-period-1']]
+""",
+    "basin": """
+>>> sides = {"x": {"a1": nanotap.range(-1, 1, 2)}, "y": {"v1": nanotap.range(-1, 1, 2)}}
+>>> nanotap.basin(case, **sides, progress=False).attractor.values.tolist()
+[[0, 0], [0, 0]]
+""",
+    "lyapunov": """
+>>> nanotap.lyapunov(case).exponents[:2].round(4).tolist()
+[-0.1409, -0.141]
+""",
+    "convergence": """
+>>> nanotap.convergence(case, largest=4).enough
+3
+""",
+    "contact-laws": """
+>>> [sample.contact for sample in nanotap.contact_laws(case, progress=False).samples]
+['spring-damper', 'kelvin-voigt', 'standard-linear-solid']
+""",
+}
+
 # A study without additions: its document, with the names of the terminal's JSON.
 DOCUMENT = (
     (THREADS, PROGRESS),
@@ -293,7 +358,7 @@ def function(name: str, about: str, schema: dict[str, Any]) -> str:
     call += ", parameters)" if arrays else ")"
     body = "\n".join(
         [
-            docstring(about, documents, returns),
+            docstring(about, documents, returns, EXAMPLES.get(name, "")),
             f'    options = _arguments.options("{name}", locals())',
             call,
         ]
@@ -376,6 +441,7 @@ def documentation(declared: dict[str, Any]) -> str:
     text = " ".join(declared.get("description", "").split())
     for mark in "{}":
         text = text.replace(mark, "`")
+    text = in_python(text)
     low, high = declared.get("minimum"), declared.get("maximum")
     if high is not None and "integer" in kinds(declared):
         text += f" ({low or 0} to {high})"
@@ -387,7 +453,44 @@ def documentation(declared: dict[str, Any]) -> str:
     return "; ".join([text, *meanings]) + "."
 
 
-def docstring(about: str, documents: list[tuple[str, str, str]], returns: str) -> str:
+# A key with its values as the terminal takes them: ends with a count, ends, or a list.
+AT_THE_TERMINAL = re.compile(
+    r"(?P<key>[a-z][\w.]*)=(?:\"(?P<quoted>[^\"]*)\"|(?P<plain>[^\s;\"]*[^\s;,.)\"]))"
+)
+
+
+def in_python(text: str) -> str:
+    """Values of keys in the words of Python: `{"omega": range(2, 4, 400)}` for omega=2:4:400."""
+
+    def quantity(word: str) -> str:
+        try:
+            float(word)
+        except ValueError:
+            spaced = re.sub(r"(?<=\d)(?=[a-zA-Zµ])", " ", word)
+            return json.dumps(spaced, ensure_ascii=False)
+        return word
+
+    def value(match: re.Match[str]) -> str:
+        written = match["quoted"] if match["quoted"] is not None else match["plain"]
+        parts = written.split(":")
+        if len(parts) == 2:
+            ends = ", ".join(map(quantity, parts))
+            return f'{{"{match["key"]}": ({ends})}}'
+        if len(parts) in (3, 4):
+            first, last, count, *log = parts
+            spaced = ", log=True" if log else ""
+            ends = f"{quantity(first)}, {quantity(last)}, {count}{spaced}"
+            return f'{{"{match["key"]}": nanotap.range({ends})}}'
+        if "," in written:
+            return f'{{"{match["key"]}": [{", ".join(written.split(","))}]}}'
+        return match[0]
+
+    return AT_THE_TERMINAL.sub(value, text)
+
+
+def docstring(
+    about: str, documents: list[tuple[str, str, str]], returns: str, example: str
+) -> str:
     """In numpy's style."""
 
     def indented(text: str) -> str:
@@ -418,6 +521,10 @@ def docstring(about: str, documents: list[tuple[str, str, str]], returns: str) -
         "    RuntimeError",
         "        The computation failed.",
     ]
+    if example:
+        shown = example.strip().splitlines()
+        lines += ["", "    Examples", "    --------"]
+        lines += [f"    {line}".rstrip() for line in (CASE, *shown)]
     first = textwrap.fill(f"{about}.", 84, subsequent_indent="    ")
     return f'    """{first}\n\n' + "\n".join(lines) + '\n    """'
 

@@ -374,6 +374,12 @@ pub(crate) fn in_si(key: &str, text: &str) -> PyResult<f64> {
     Ok(read.map_err(|error| Failure::input(format!("{key}: {error}")))?)
 }
 
+/// Title of the axis of a key, given by its path; the name itself of what is no key.
+#[pyfunction]
+pub(crate) fn label(key: &str) -> String {
+    Key::find(key).map_or_else(|| key.to_owned(), Key::label)
+}
+
 /// The built-in levers and materials: kind, name, source.
 #[pyfunction]
 pub(crate) fn catalogue() -> PyResult<Vec<(&'static str, String, String)>> {

@@ -17,6 +17,7 @@ use nanotap::study::simulate::Classification;
 use serde::Serialize;
 
 use crate::arguments::{CaseArguments, OutArgument, PlotArgument};
+use crate::command::branch::PointsArgument;
 use crate::failure::Failure;
 use crate::given_case::GivenCase;
 use crate::output::Output;
@@ -35,6 +36,8 @@ pub(crate) struct Arguments {
     #[command(flatten)]
     request: Request<ApproachOptions>,
 
+    #[command(flatten)]
+    points: PointsArgument,
     #[command(flatten)]
     threads: ThreadsArgument,
     #[command(flatten)]
@@ -57,7 +60,7 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     arguments.out.check()?;
     arguments.plot.check()?;
     let case = GivenCase::for_study(&arguments.case, true, output)?;
-    let report = progress::study::<ApproachStudy>(&case, &request, &arguments.threads)?;
+    let mut report = progress::study::<ApproachStudy>(&case, &request, &arguments.threads)?;
     if report.cancelled {
         output.warning("stopped before it was done");
     }
@@ -74,6 +77,9 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     arguments
         .plot
         .draw(|| approach_figure(&report, &case.units()))?;
+    if let Some(branches) = &mut report.branches {
+        arguments.points.shorten(branches, output);
+    }
     let written = Written {
         path: arguments.out.out.clone(),
         report: &report,

@@ -21,8 +21,8 @@ use crate::table::{Align, Table};
 use crate::threads::ThreadsArgument;
 use crate::{file, motion, number, progress, style};
 
-/// Bytes of points beyond which a document does not list all.
-const LONGEST_DOCUMENT: usize = 8_000_000;
+/// Bytes of points of branches beyond which a document does not list all.
+const LONGEST_DOCUMENT: usize = 900_000;
 
 /// Periodic orbits followed in a parameter, stable and unstable, with their bifurcations.
 #[derive(Args, Debug)]
@@ -37,10 +37,8 @@ pub(crate) struct Arguments {
     #[arg(long, value_name = "OBSERVABLE", value_parser = shown())]
     show: Option<Shown>,
 
-    /// List every point in the JSON document, whatever its length
-    #[arg(long)]
-    all_points: bool,
-
+    #[command(flatten)]
+    points: PointsArgument,
     #[command(flatten)]
     threads: ThreadsArgument,
     #[command(flatten)]
@@ -78,9 +76,7 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     arguments
         .plot
         .draw(|| case_figure(&case, &report, arguments.show))?;
-    if output.is_json() && !arguments.all_points {
-        shorten(&mut report, output);
-    }
+    arguments.points.shorten(&mut report, output);
     output.study(&case, &report, |report| text(&case, report))?;
     let cut = report.branches.iter().filter(|b| !b.complete).count();
     if cut > 0 && !report.cancelled {
@@ -90,7 +86,23 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     Ok(())
 }
 
-/// Leaves points out of a document that would be longer than [`LONGEST_DOCUMENT`].
+/// How many points of branches a document lists.
+#[derive(Args, Clone, Copy, Debug)]
+pub(crate) struct PointsArgument {
+    /// List every point of the branches in the JSON document, whatever its length
+    #[arg(long)]
+    all_points: bool,
+}
+
+impl PointsArgument {
+    /// Leaves points out of a document in which they would be longer than [`LONGEST_DOCUMENT`].
+    pub(crate) fn shorten(self, report: &mut BranchReport, output: &Output) {
+        if output.is_json() && !self.all_points {
+            shorten(report, output);
+        }
+    }
+}
+
 fn shorten(report: &mut BranchReport, output: &Output) {
     let point = report.points.first();
     let bytes = point
@@ -101,7 +113,7 @@ fn shorten(report: &mut BranchReport, output: &Output) {
     if step > 1 {
         report.thin(step);
         output.note(&format!(
-            "{} points between those in the document are left out: --all-points lists them, --out writes all of them",
+            "{} points of branches between those in the document are left out; --all-points lists them",
             report.points_left_out
         ));
     }

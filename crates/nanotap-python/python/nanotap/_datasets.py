@@ -2,9 +2,9 @@
 
 import json
 import os
-import shutil
 import tempfile
 from collections.abc import Iterable, Mapping
+from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -82,8 +82,6 @@ def open(path: Path) -> "xr.Dataset":
         FileNotFoundError: it does not exist.
         ValueError: it is not a dataset of nanotap.
     """
-    import xarray as xr
-
     name = os.fspath(path)
     if not os.path.exists(name):
         raise missing(name)
@@ -95,6 +93,12 @@ def open(path: Path) -> "xr.Dataset":
         import dask.array as _  # noqa: F401
     except ImportError:
         chunks = None
+    return _opened(name, chunks)
+
+
+def _opened(name: str, chunks: Any) -> "xr.Dataset":
+    import xarray as xr
+
     ds: xr.Dataset = xr.open_zarr(name, chunks=chunks, consolidated=True)
     ds.attrs["path"] = name
     # It may be written elsewhere, where the compression of this store does not apply.
@@ -228,20 +232,49 @@ def _computed(
             message = f"stopped; the finished part is in {store}; the same call resumes"
             raise Interrupted(message, ds)
         return ds
-    folder = tempfile.mkdtemp(prefix="nanotap-")
-    try:
-        store = os.path.join(folder, "dataset.zarr")
-        stopped = _work(recipe, plan, noun, store, chunk, threads, client, progress)
-        ds = open(store).load()
-    finally:
-        shutil.rmtree(folder, ignore_errors=True)
-    del ds.attrs["path"]
-    # The data are in memory, so the store is no longer needed.
-    ds.close()
+    *faster, usual = _temporary_folders()
+    for parent in faster:
+        # It may be too small.
+        with suppress(OSError):
+            ds, stopped = _in_memory(
+                parent, recipe, plan, noun, chunk, threads, client, progress
+            )
+            break
+    else:
+        ds, stopped = _in_memory(
+            usual, recipe, plan, noun, chunk, threads, client, progress
+        )
     if stopped:
         message = "stopped; unfinished values are missing"
         raise Interrupted(message, ds)
     return ds
+
+
+def _temporary_folders() -> list[str | None]:
+    """Where a store is written that is read at once: in memory if the system has such a folder,
+    else where temporary files are (`None`)."""
+    memory = "/dev/shm"
+    return [memory, None] if os.access(memory, os.W_OK | os.X_OK) else [None]
+
+
+def _in_memory(
+    parent: str | None,
+    recipe: "_nanotap.Recipe",
+    plan: "Plan",
+    noun: str,
+    chunk: str,
+    threads: int | None,
+    client: "Client | None",
+    progress: Progress,
+) -> "tuple[xr.Dataset, bool]":
+    """The loaded Dataset of a store in a temporary folder, and whether it was stopped."""
+    with tempfile.TemporaryDirectory(prefix="nanotap-", dir=parent) as folder:
+        store = os.path.join(folder, "dataset.zarr")
+        stopped = _work(recipe, plan, noun, store, chunk, threads, client, progress)
+        ds = _opened(store, None).load()
+        ds.close()
+    del ds.attrs["path"]
+    return ds, stopped
 
 
 def _recipe(plan: "Plan", threads: int | None, progress: Progress) -> "_nanotap.Recipe":

@@ -50,7 +50,7 @@ def written(value: Any) -> Any:
 class Range:
     """Evenly spaced values of a key, both ends included: `range(2, 4, 400)`.
 
-    >>> range("60 kHz", "80 kHz", 3).values("drive.frequency")
+    >>> nanotap.range("60 kHz", "80 kHz", 3).values("drive.frequency")
     array([60000., 70000., 80000.])
 
     Args:

@@ -59,6 +59,12 @@ def modes(
         An argument is invalid; the message names it.
     RuntimeError
         The computation failed.
+
+    Examples
+    --------
+    >>> case = nanotap.Case.paper(omega=3)
+    >>> nanotap.modes(case).free.round(3).tolist()
+    [2.968, 19.385, 56.011]
     """
     options = _arguments.options("modes", locals())
     return _motions.modes(case, options)
@@ -142,6 +148,13 @@ def simulate(
         An argument is invalid; the message names it.
     RuntimeError
         The computation failed.
+
+    Examples
+    --------
+    >>> case = nanotap.Case.paper(omega=3)
+    >>> run = nanotap.simulate(case, periods=4)
+    >>> run.classification.item(), run.tip.dims
+    ('periodic', ('tau',))
     """
     options = _arguments.options("simulate", locals())
     return _motions.simulate(case, options, series, threads, progress, parameters)
@@ -232,6 +245,14 @@ def orbit(
         An argument is invalid; the message names it.
     RuntimeError
         The computation failed.
+
+    Examples
+    --------
+    >>> case = nanotap.Case.paper(omega=3)
+    >>> nanotap.orbit(case)
+    Orbit(period=1, stable, largest multiplier 0.868606, W from 0.0225061 to 0.127375)
+    >>> nanotap.orbit(case, omega=[2.9, 3.0]).stable.values
+    array([ True,  True])
     """
     options = _arguments.options("orbit", locals())
     return _motions.orbit(case, options, threads, progress, parameters)
@@ -271,9 +292,9 @@ def attractors(
     seed : int
         Seed of the initial states; results do not depend on the number of threads.
     box : Box
-        Sides of one box of initial states, as in a1=-1:1 or v2=-4:4; other sides
-        follow from the linear response to the drive. 256 initial states unless
-        `starts` is given.
+        Sides of one box of initial states, as in {"a1": (-1, 1)} or {"v2": (-4,
+        4)}; other sides follow from the linear response to the drive. 256 initial
+        states unless `starts` is given.
     max_period : int
         Longest period of orbits, in drive periods (1 to 10000).
     unstable : int
@@ -297,6 +318,13 @@ def attractors(
         An argument is invalid; the message names it.
     RuntimeError
         The computation failed.
+
+    Examples
+    --------
+    >>> case = nanotap.Case.paper(omega=3)
+    >>> found = nanotap.attractors(case, starts=20, box={"a1": (-1, 1)}, progress=False)
+    >>> [one.name for one in found]
+    ['period 1']
     """
     options = _arguments.options("attractors", locals())
     return _studies.attractors(case, options, threads, progress)
@@ -353,8 +381,8 @@ def branch(
     seed : int
         For `diagram`: seed of the initial states.
     second : Mapping[str, tuple[float | str, float | str]] | str | None
-        Second parameter and its range, as in alpha4=5:40, for bifurcation curves in
-        both.
+        Second parameter and its range, as in {"alpha4": (5, 40)}, for bifurcation
+        curves in both.
     max_step : float
         Longest step, as a fraction of the range.
     threads : int | None
@@ -377,6 +405,13 @@ def branch(
         An argument is invalid; the message names it.
     RuntimeError
         The computation failed.
+
+    Examples
+    --------
+    >>> case = nanotap.Case.paper(omega=3)
+    >>> ds = nanotap.branch(case, parameter="omega", from_=3.2, to=2.9, progress=False)
+    >>> ds.bifurcation_kind.values.tolist(), ds.bifurcation_parameter.values.round(6).tolist()
+    (['flip'], [2.913722])
     """
     options = _arguments.options("branch", locals())
     return _studies.branch(case, options, threads, progress)
@@ -461,6 +496,13 @@ def approach(
         An argument is invalid; the message names it.
     RuntimeError
         The computation failed.
+
+    Examples
+    --------
+    >>> case = nanotap.Case.paper(omega=3)
+    >>> ds = nanotap.approach(case, points=3, branches=False, progress=False)
+    >>> ds.first_harmonic.sel(way="approach").values.round(4)
+    array([0.0149, 2.8522, 4.4282])
     """
     options = _arguments.options("approach", locals())
     return _studies.approach(case, options, threads, progress)
@@ -552,7 +594,7 @@ def fit(
     per_curve : Sequence[str] | None
         Parameters to find with one value per curve.
     bounds : Mapping[str, tuple[float | str, float | str]] | str | None
-        Bounds of parameters, as in sample.stiffness="1 N/m:100 N/m".
+        Bounds of parameters, as in {"sample.stiffness": ("1 N/m", "100 N/m")}.
     columns : Sequence[str] | None
         Columns of the data to use; default: all.
     laws : Sequence[str] | None
@@ -685,18 +727,19 @@ def sweep(
     case : Case
         The case.
     over : str | Sequence[str] | Mapping[str, Any]
-        Parameter and its values, as in omega=2:4:400 (first, last, count),
-        alpha4=1:1000:50:log in equal ratios, or ascending values omega=2,2.5,4;
-        modes too; for a physical case also drive.frequency=60kHz:80kHz:200; once or
-        twice.
+        Parameter and its values, as in {"omega": nanotap.range(2, 4, 400)} (first,
+        last, count), {"alpha4": nanotap.range(1, 1000, 50, log=True)} in equal
+        ratios, or ascending values {"omega": [2, 2.5, 4]}; modes too; for a
+        physical case also {"drive.frequency": nanotap.range("60 kHz", "80 kHz",
+        200)}; once or twice.
     starts : int | None
         Quasi-random initial states at each value, spread over a box; default: rest
         alone (1 to 1000000).
     seed : int
         Seed of the initial states.
     box : Box
-        Sides of the box, as in a1=-1:1 or v2=-4:4; other sides follow from the
-        linear response to the drive.
+        Sides of the box, as in {"a1": (-1, 1)} or {"v2": (-4, 4)}; other sides
+        follow from the linear response to the drive.
     state : Any
         Start from this state at drive phase 0: a1,…,aN,v1,…,vN (oscillator: x,v).
     follow : Literal["off", "up", "down", "both"]
@@ -739,6 +782,13 @@ def sweep(
         An argument is invalid; the message names it.
     RuntimeError
         The computation failed.
+
+    Examples
+    --------
+    >>> case = nanotap.Case.paper(omega=3)
+    >>> ds = nanotap.sweep(case, over={"omega": nanotap.range(2.9, 3, 3)}, periods=2, progress=False)
+    >>> ds.classification.values.ravel().tolist()
+    ['periodic', 'periodic', 'periodic']
     """
     options = _arguments.options("sweep", locals())
     return _datasets.sweep(case, options, out, chunk, threads, client, progress)
@@ -763,9 +813,10 @@ def window(
     case : Case
         The case.
     over : str | Sequence[str] | Mapping[str, Any]
-        Parameter and its values, as in gap.tip=5nm:25nm:41,
-        drive.free_amplitude=10nm:60nm:26, omega=2:4:81, or ascending values
-        omega=2,2.5,4; twice, first the horizontal axis.
+        Parameter and its values, as in {"gap.tip": nanotap.range("5 nm", "25 nm",
+        41)}, {"drive.free_amplitude": nanotap.range("10 nm", "60 nm", 26)},
+        {"omega": nanotap.range(2, 4, 81)}, or ascending values {"omega": [2, 2.5,
+        4]}; twice, first the horizontal axis.
     starts : int
         Initial states at each point: rest, the linear responses, and samples at all
         amplitudes (1 to 1000000).
@@ -796,6 +847,13 @@ def window(
         An argument is invalid; the message names it.
     RuntimeError
         The computation failed.
+
+    Examples
+    --------
+    >>> case = nanotap.Case.paper(omega=3)
+    >>> over = {"omega": [2.9, 3.0], "alpha4": nanotap.range(19, 20, 2)}
+    >>> nanotap.window(case, over=over, starts=2, progress=False).condition.values.tolist()
+    [['one-period-1', 'one-period-1'], ['subharmonic', 'one-period-1']]
     """
     options = _arguments.options("window", locals())
     return _datasets.window(case, options, out, threads, client, progress)
@@ -824,8 +882,8 @@ def basin(
     case : Case
         The case.
     x : str | Mapping[str, Any]
-        Horizontal axis, as in a1=-1:1:200: entry of the state (a1…aN, v1…vN;
-        oscillator: x, v), first value, last value, count.
+        Horizontal axis, as in {"a1": nanotap.range(-1, 1, 200, log=True)} entry of
+        the state (a1…aN, v1…vN; oscillator: x, v), first value, last value, count.
     y : str | Mapping[str, Any]
         Vertical axis, in the same form.
     state : Any
@@ -865,6 +923,13 @@ def basin(
         An argument is invalid; the message names it.
     RuntimeError
         The computation failed.
+
+    Examples
+    --------
+    >>> case = nanotap.Case.paper(omega=3)
+    >>> sides = {"x": {"a1": nanotap.range(-1, 1, 2)}, "y": {"v1": nanotap.range(-1, 1, 2)}}
+    >>> nanotap.basin(case, **sides, progress=False).attractor.values.tolist()
+    [[0, 0], [0, 0]]
     """
     options = _arguments.options("basin", locals())
     return _datasets.basin(case, options, out, chunk, threads, client, progress)
@@ -910,6 +975,12 @@ def lyapunov(
         An argument is invalid; the message names it.
     RuntimeError
         The computation failed.
+
+    Examples
+    --------
+    >>> case = nanotap.Case.paper(omega=3)
+    >>> nanotap.lyapunov(case).exponents[:2].round(4).tolist()
+    [-0.1409, -0.141]
     """
     options = _arguments.options("lyapunov", locals())
     return _studies.lyapunov(case, options)
@@ -945,6 +1016,12 @@ def convergence(
         An argument is invalid; the message names it.
     RuntimeError
         The computation failed.
+
+    Examples
+    --------
+    >>> case = nanotap.Case.paper(omega=3)
+    >>> nanotap.convergence(case, largest=4).enough
+    3
     """
     options = _arguments.options("convergence", locals())
     return _studies.convergence(case, options)
@@ -989,6 +1066,12 @@ def contact_laws(
         An argument is invalid; the message names it.
     RuntimeError
         The computation failed.
+
+    Examples
+    --------
+    >>> case = nanotap.Case.paper(omega=3)
+    >>> [sample.contact for sample in nanotap.contact_laws(case, progress=False).samples]
+    ['spring-damper', 'kelvin-voigt', 'standard-linear-solid']
     """
     options = _arguments.options("contact-laws", locals())
     return _studies.document("contact-laws", case, options, threads, progress)

@@ -289,7 +289,7 @@ def _grid_axis(ds: "xr.Dataset", name: str) -> dict[str, Any]:
     said = ds[name].attrs
     units = str(said.get("units", ""))
     return {
-        "symbol": str(said.get("symbol", name)),
+        "label": str(said.get("label", said.get("long_name", name))),
         "units": units,
         "log": said.get("spacing") == "log",
     }
@@ -458,8 +458,7 @@ def branch(
         )
     symbol = ds.attrs["parameter_symbol"]
     facts = {
-        # A key of a physical case has a name, a number of the equations a symbol.
-        "x_label": f"{name if '.' in name else f'${symbol}$'}{x_unit}",
+        "x_label": (_nanotap.label(name) if "." in name else f"${symbol}$") + x_unit,
         "y_label": _labelled(ds, show, y_unit),
         "points": _rows(
             branch=ds.branch,

@@ -8,6 +8,7 @@ use nanotap_figures::{
 };
 use serde::Deserialize;
 
+use crate::case::physical::Kind;
 use crate::case::units::{Units, prefixed};
 use crate::case::{Case, Key};
 pub use crate::figure::shown::Shown;
@@ -26,14 +27,10 @@ pub struct ParameterAxis {
 impl ParameterAxis {
     /// The parameter by its symbol, in the model's own units.
     pub fn of(key: Key) -> Self {
-        let symbol = key.symbol();
-        // A word is no symbol.
-        let label = if symbol.chars().count() <= 2 {
-            format!("${symbol}$")
-        } else {
-            symbol.to_owned()
-        };
-        Self { label, factor: 1.0 }
+        Self {
+            label: key.label(),
+            factor: 1.0,
+        }
     }
 
     /// The parameter of a case with values up to `size`, in SI where the case has it.
@@ -42,10 +39,17 @@ impl ParameterAxis {
             || Self::of(key),
             |unit| {
                 let (factor, name) = prefixed(unit.kind, unit.si, size);
-                // A quantity of a physical case is called by its path.
-                let quantity = unit.quantity.replace(['.', '_'], " ");
+                let label = if key.is_physical() {
+                    key.label()
+                } else {
+                    unit.quantity.to_owned()
+                };
+                let unit = match unit.kind {
+                    Kind::Number => String::new(),
+                    _ => format!(" ({name})"),
+                };
                 Self {
-                    label: format!("{quantity} ({name})"),
+                    label: format!("{label}{unit}"),
                     factor,
                 }
             },

@@ -50,12 +50,7 @@ pub fn fit_figure(report: &FitReport) -> Figure {
 fn swept(report: &FitReport) -> (Axis, f64) {
     let key = Key::all().find(|key| key.path() == report.swept);
     let size = report.rows.iter().map(|r| r.at.abs()).fold(0.0, f64::max);
-    let symbol = match key {
-        Some(Key::GapTip) => "distance $z_c$",
-        Some(Key::DriveFrequency) => "drive frequency $f$",
-        Some(key) => key.symbol(),
-        None => &report.swept,
-    };
+    let symbol = key.map_or_else(|| report.swept.clone(), Key::label);
     match key.filter(|key| key.is_physical()).map(Key::kind) {
         Some(kind) if kind != Kind::Number => {
             let (factor, unit) = prefixed(kind, 1.0, size);

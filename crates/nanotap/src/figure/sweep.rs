@@ -25,8 +25,8 @@ const OTHERS: Colour = Colour::rgb(222, 222, 222);
 /// An axis of a sweep's grid.
 #[derive(Clone, Debug, Deserialize)]
 pub struct GridAxis {
-    /// The parameter's symbol, or its path in a physical case.
-    pub symbol: String,
+    /// What it is, without the unit.
+    pub label: String,
     /// SI unit; empty in the model's own units.
     #[serde(default)]
     pub units: String,
@@ -502,7 +502,7 @@ impl GridAxis {
         let text = |c: &Coordinate, key: &str| Some(c.attributes.get(key)?.as_str()?.to_owned());
         let said = |key: &str| coordinate.and_then(|c| text(c, key));
         Self {
-            symbol: said("symbol").unwrap_or_else(|| name.clone()),
+            label: said("label").unwrap_or_else(|| name.replace(['.', '_'], " ")),
             units: said("units").unwrap_or_default(),
             log: said("spacing").as_deref() == Some("log"),
             values: schema.axis_values(axis),
@@ -514,23 +514,19 @@ impl GridAxis {
         let kind = Kind::ALL
             .into_iter()
             .find(|kind| *kind != Kind::Number && kind.si_unit() == self.units);
-        // A quantity of a physical case is called by its path: drive.frequency.
-        let words = self.symbol.replace(['.', '_'], " ");
-        let (factor, label, unit) = match kind {
+        let (factor, unit) = match kind {
             Some(kind) => {
                 let size = self
                     .values
                     .iter()
                     .fold(0.0, |size: f64, v| size.max(v.abs()));
-                let (factor, unit) = prefixed(kind, 1.0, size);
-                (factor, words, unit.clone())
+                prefixed(kind, 1.0, size)
             }
-            None if self.symbol.contains('.') => (1.0, words, String::new()),
-            None => (1.0, format!("${}$", self.symbol), String::new()),
+            None => (1.0, String::new()),
         };
         GridScale {
             values: self.values.iter().map(|v| factor * v).collect(),
-            label,
+            label: self.label.clone(),
             unit,
             log: self.log,
         }

@@ -30,6 +30,7 @@ const PLAIN: Entry = Entry {
     name: "",
     alias: None,
     symbol: "",
+    label: "",
     takes: Takes::Quantity(Kind::Number),
     range: Range::ANY,
     default: Default::None,
@@ -149,6 +150,10 @@ impl Entry {
 
     const fn such_as(self, example: f64) -> Self {
         Self { example, ..self }
+    }
+
+    const fn label(self, label: &'static str) -> Self {
+        Self { label, ..self }
     }
 
     const fn feeds(self, parameter: Parameter) -> Self {
@@ -283,14 +288,17 @@ Before from Parameter::COUNT => {
     };
 
     LeverName = other(Cantilever, "lever", Takes::LeverName, "a lever of the catalogue, for what is not said");
-    LeverK = quantity(Cantilever, "k", Stiffness, R::POSITIVE, "static spring constant at the tip, 3EI/L³");
-    LeverF0 = quantity(Cantilever, "f0", Frequency, R::POSITIVE, "first free resonance, with the tip");
+    LeverK = quantity(Cantilever, "k", Stiffness, R::POSITIVE, "static spring constant at the tip, 3EI/L³")
+        .label("spring constant $k$");
+    LeverF0 = quantity(Cantilever, "f0", Frequency, R::POSITIVE, "first free resonance, with the tip")
+        .label("resonance frequency $f_0$");
     LeverF2 = quantity(Cantilever, "f2", Frequency, R::POSITIVE, "second free resonance; without a tip's mass it tells that mass")
         .feeds(Parameter::Mode2Frequency);
     LeverF3 = quantity(Cantilever, "f3", Frequency, R::POSITIVE, "third free resonance")
         .feeds(Parameter::Mode3Frequency);
     LeverQ = quantity(Cantilever, "Q", Number, R::POSITIVE, "quality factor of the first free resonance")
-        .feeds(Parameter::Alpha3);
+        .feeds(Parameter::Alpha3)
+        .label("quality factor $Q$");
     LeverQ2 = quantity(Cantilever, "Q2", Number, R::POSITIVE, "quality factor of the second free resonance")
         .feeds(Parameter::Mode2Quality);
     LeverQ3 = quantity(Cantilever, "Q3", Number, R::POSITIVE, "quality factor of the third free resonance")
@@ -317,7 +325,8 @@ Before from Parameter::COUNT => {
     TipHeight = quantity(Tip, "height", Length, R::POSITIVE, "height of the tip: what separates the beam from the sample when it touches");
     TipHalfAngle = quantity(Tip, "half_angle", Angle, FLANK, "angle between the tip's axis and its flank").called("half_angle");
     TipDensity = quantity(Tip, "density", Density, R::POSITIVE, "density of the tip");
-    TipRadius = quantity(Tip, "radius", Length, R::POSITIVE, "radius of curvature of the apex").called("radius");
+    TipRadius = quantity(Tip, "radius", Length, R::POSITIVE, "radius of curvature of the apex").called("radius")
+        .label("tip radius $R$");
     TipMaterial = other(Tip, "material", Takes::MaterialName, "a material of the catalogue");
     TipModulus = quantity(Tip, "modulus", Pressure, R::POSITIVE, "Young's modulus of the tip").called("tip_modulus");
     TipPoisson = quantity(Tip, "poisson", Number, POISSON, "Poisson's ratio of the tip").called("tip_poisson");
@@ -336,7 +345,8 @@ Before from Parameter::COUNT => {
     SampleForceFactor = quantity(Sample, "force_factor", Number, R::NOT_NEGATIVE, "factor of a table's forces").or(1.0).under(Laws::Nonlinear);
     SampleMaterial = other(Sample, "material", Takes::MaterialName, "a material of the catalogue").under(Laws::Some);
     SampleStiffness = quantity(Sample, "stiffness", Stiffness, R::NOT_NEGATIVE, "contact stiffness K1")
-        .feeds(Parameter::Alpha4).under(Laws::Some);
+        .feeds(Parameter::Alpha4).under(Laws::Some)
+        .label("sample stiffness");
     SampleDamping = quantity(Sample, "damping", Damping, R::NOT_NEGATIVE, "contact damping C1")
         .feeds(Parameter::Alpha6).under(Laws::Some);
     SampleLossTangent = quantity(Sample, "loss_tangent", Number, R::NOT_NEGATIVE, "C1 ω/K1 at the drive frequency")
@@ -344,23 +354,29 @@ Before from Parameter::COUNT => {
 }
 After from AFTER_LAWS => {
     SampleModulus = quantity(Sample, "modulus", Pressure, R::POSITIVE, "Young's modulus of the sample")
-        .feeds(Parameter::Alpha4).under(Laws::Some);
+        .feeds(Parameter::Alpha4).under(Laws::Some)
+        .label("sample modulus $E$");
     SamplePoisson = quantity(Sample, "poisson", Number, POISSON, "Poisson's ratio of the sample").under(Laws::Some);
     SampleIndentation = quantity(
         Sample, "indentation", Length, R::POSITIVE, "indentation at which Hertz's stiffness is taken",
     ).feeds(Parameter::Alpha4).under(Laws::Some);
 
-    SampleHamaker = quantity(Sample, "hamaker", Energy, R::ANY, "Hamaker constant of tip, medium and sample").under(Laws::Nonlinear).called("attraction");
-    SampleWorkOfAdhesion = quantity(Sample, "work_of_adhesion", Stiffness, R::NOT_NEGATIVE, "work of adhesion, an energy an area").under(Laws::Nonlinear);
+    SampleHamaker = quantity(Sample, "hamaker", Energy, R::ANY, "Hamaker constant of tip, medium and sample").under(Laws::Nonlinear).called("attraction")
+        .label("Hamaker constant $H$");
+    SampleWorkOfAdhesion = quantity(Sample, "work_of_adhesion", Stiffness, R::NOT_NEGATIVE, "work of adhesion, an energy an area").under(Laws::Nonlinear)
+        .label("work of adhesion $w$");
     SampleWorkOfRetraction = quantity(
         Sample, "work_of_retraction", Stiffness, R::NOT_NEGATIVE, "work of adhesion on retraction (adhesion-hysteresis)",
     ).under(Laws::Nonlinear);
     SampleAdhesionForce = quantity(Sample, "adhesion_force", Force, R::NOT_NEGATIVE, "force that pulls the tip off")
-        .under(Laws::Nonlinear);
+        .under(Laws::Nonlinear)
+        .label("adhesion force");
     SampleIntermolecularDistance = quantity(
         Sample, "intermolecular_distance", Length, R::POSITIVE, "intermolecular distance a0, the gap at which contact begins",
-    ).under(Laws::Nonlinear).called("contact_distance");
-    SampleViscosity = quantity(Sample, "viscosity", Viscosity, R::NOT_NEGATIVE, "viscosity of the sample").under(Laws::Nonlinear);
+    ).under(Laws::Nonlinear).called("contact_distance")
+        .label("intermolecular distance $a_0$");
+    SampleViscosity = quantity(Sample, "viscosity", Viscosity, R::NOT_NEGATIVE, "viscosity of the sample").under(Laws::Nonlinear)
+        .label("sample viscosity $η$");
     SampleThickness = quantity(Sample, "thickness", Length, R::POSITIVE, "thickness of a thin sample on its support").under(Laws::Nonlinear);
     SampleDecayLength = quantity(Sample, "decay_length", Length, R::POSITIVE, "distance in which exponential damping decays").under(Laws::Nonlinear);
     SampleSurfaceTension = quantity(Sample, "surface_tension", Stiffness, R::POSITIVE, "surface tension of the liquid (capillary)").under(Laws::Nonlinear);
@@ -373,21 +389,27 @@ After from AFTER_LAWS => {
     SampleRepulsion = quantity(Sample, "repulsion", Repulsion, R::NOT_NEGATIVE, "constant of the repulsion (lennard-jones)").under(Laws::Nonlinear);
 
     DriveFrequency = quantity(Drive, "frequency", Frequency, R::POSITIVE, "frequency of the drive")
-        .feeds(Parameter::Omega);
+        .feeds(Parameter::Omega)
+        .label("drive frequency $f$");
     DriveFrequencyRatio = quantity(Drive, "frequency_ratio", Number, R::POSITIVE, "frequency of the drive over f0")
-        .feeds(Parameter::Omega);
+        .feeds(Parameter::Omega)
+        .label("drive frequency $f/f_0$");
     DriveAmplitude = quantity(Drive, "amplitude", Length, R::NOT_NEGATIVE, "amplitude of the clamped end's motion")
-        .feeds(Parameter::Alpha2);
+        .feeds(Parameter::Alpha2)
+        .label("base amplitude");
     DriveForce = quantity(Drive, "force", Force, R::NOT_NEGATIVE, "amplitude of the force on the lever")
-        .feeds(Parameter::Alpha2);
+        .feeds(Parameter::Alpha2)
+        .label("drive force");
     DriveFreeAmplitude = quantity(
         Drive, "free_amplitude", Length, R::NOT_NEGATIVE,
         "amplitude of the tip's deflection far from the sample, A0",
-    ).feeds(Parameter::Alpha2);
+    ).feeds(Parameter::Alpha2)
+        .label("free amplitude $A_0$");
     DriveSetpoint = other(
         Drive, "setpoint", Takes::FractionOrLength,
         "amplitude that the feedback holds: a fraction of A0, or a length; it tells the distance",
-    ).feeds(Parameter::Alpha5);
+    ).feeds(Parameter::Alpha5)
+        .label("setpoint $A/A_0$");
     DriveActuation = other(Drive, "actuation", Takes::Word(words!(Actuation)), "where the drive acts");
     DriveHold = other(
         Drive, "hold", Takes::Word(words!(Hold)),
@@ -400,13 +422,16 @@ After from AFTER_LAWS => {
     SecondForce = quantity(Drive, "second_force", Force, R::NOT_NEGATIVE, "amplitude of the second tone's force on the lever")
         .feeds(Parameter::Tone2Amplitude);
     SecondFreeAmplitude = quantity(Drive, "second_free_amplitude", Length, R::NOT_NEGATIVE, "free amplitude of the tip at the second tone")
-        .feeds(Parameter::Tone2Amplitude);
+        .feeds(Parameter::Tone2Amplitude)
+        .label("free amplitude at the second tone");
     SecondPhase = quantity(Drive, "second_phase", Angle, R::ANY, "phase of the second tone")
         .feeds(Parameter::Tone2Phase);
 
     GapTip = quantity(Gap, "tip", Length, R::ANY, "gap between tip and sample at rest, g1; negative: pressed in")
-        .feeds(Parameter::Alpha5);
-    GapBeam = quantity(Gap, "beam", Length, R::POSITIVE, "gap between beam and sample at rest, g0, the unit of length");
+        .feeds(Parameter::Alpha5)
+        .label("distance $z_c$");
+    GapBeam = quantity(Gap, "beam", Length, R::POSITIVE, "gap between beam and sample at rest, g0, the unit of length")
+        .label("beam gap $g_0$");
 }
 }
 

@@ -230,6 +230,8 @@ pub struct Entry {
     pub alias: Option<&'static str>,
     /// Symbol in formulas and on axes; if empty, its path.
     pub symbol: &'static str,
+    /// Words and symbol on the axis of a figure, of a quantity; if empty, its path in words.
+    pub label: &'static str,
     /// Type of its value.
     pub takes: Takes,
     /// Range of its value.
@@ -333,6 +335,24 @@ impl Key {
         match self.entry().symbol {
             "" => self.path(),
             symbol => symbol,
+        }
+    }
+
+    /// Title of the axis of a figure, without the unit.
+    ///
+    /// ```
+    /// use nanotap::case::Key;
+    /// assert_eq!(Key::find("gap.tip").unwrap().label(), "distance $z_c$");
+    /// assert_eq!(Key::find("sample.film_thickness").unwrap().label(), "sample film thickness");
+    /// ```
+    pub fn label(self) -> String {
+        let entry = self.entry();
+        match (entry.label, entry.symbol) {
+            ("", "") => self.path().replace(['.', '_'], " "),
+            ("", symbol) if symbol.chars().count() <= 2 => format!("${symbol}$"),
+            // A word is no symbol.
+            ("", word) => word.to_owned(),
+            (label, _) => label.to_owned(),
         }
     }
 

@@ -244,6 +244,9 @@ fn parameter(over: &Over) -> Coordinate {
         .insert("symbol".into(), over.key.symbol().into());
     coordinate
         .attributes
+        .insert("label".into(), over.key.label().into());
+    coordinate
+        .attributes
         .insert("spacing".into(), json!(over.spacing));
     coordinate
 }

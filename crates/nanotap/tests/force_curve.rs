@@ -476,10 +476,12 @@ fn fits_of_the_right_model_give_the_modulus_of_the_case() {
 #[test]
 fn the_peak_force_is_that_requested_at_a_low_speed() {
     let options = json!({"peak_force": "3 nN", "speed": "1 um/s", "points": 100});
+    // The speed turns by 2 v, which makes the lever ring by up to 2 v/ω.
+    let rings = 2.0 * 1e-6 / (TAU * F0) * K;
     for law in ["dmt", "jkr", "hertz", "linear"] {
         let report = curve(law, 2, options.clone());
         let found = report.summary.peak_force;
-        assert!((found / 3e-9 - 1.0).abs() < 1e-3, "{law}: {found:e}");
+        assert!((found - 3e-9).abs() < rings, "{law}: {found:e}");
     }
 }
 
@@ -494,8 +496,9 @@ fn a_driven_lever_keeps_its_amplitude_far_away_and_its_points_end_periods() {
     assert!(report.fits.is_empty());
     let first = &report.points[0];
     assert!((first.amplitude.unwrap() / 2e-9 - 1.0).abs() < 1e-2);
-    // Base excitation adds the base's own motion, 1/Q of the deflection.
-    assert!((first.phase.unwrap() - 90.0 - (1.0 / Q).to_degrees()).abs() < 0.5);
+    let case = Case::parse(None, &words).unwrap();
+    let free = case.physical().unwrap().free_phase;
+    assert!((first.phase.unwrap() - free).abs() < 0.5, "{free}");
     let periods = first.time * F0;
     assert!((periods - periods.round()).abs() < 1e-9);
     assert!(report.from >= 30e-9 && report.from < 31e-9);

@@ -24,6 +24,7 @@ __all__ = [
     "convergence",
     "fit",
     "fm",
+    "force_curve",
     "lyapunov",
     "modes",
     "orbit",
@@ -1204,3 +1205,67 @@ def scan(
     """
     options = _arguments.options("scan", locals())
     return _studies.document("scan", case, options, threads, progress)
+
+def force_curve(
+    case: Case,
+    *,
+    from_: float | str | None = None,
+    to: float | str | None = None,
+    peak_force: float | str | None = None,
+    speed: float | str | None = None,
+    frequency: float | str | None = None,
+    points: int = 500,
+    settle: int | None = None,
+    fit_from: float = 0.2,
+    fit_to: float = 0.9,
+    threads: int | None = None,
+    progress: Progress = None,
+) -> Record:
+    """Force curve of approach and retract at a finite speed, with the static branches,
+    adhesion, work and fitted moduli.
+
+    Parameters
+    ----------
+    case : Case
+        The case.
+    from_ : float | str | None
+        First distance, as in "30 nm"; default: the distance of the case.
+    to : float | str | None
+        Distance at which the approach turns; default: as far behind the surface as
+        a tenth of `from`.
+    peak_force : float | str | None
+        Force at which the approach turns in place of `to`, as in "5 nN": the
+        distance at which the lever at rest exerts it.
+    speed : float | str | None
+        Speed of a ramp, as in "2 um/s"; default: 1 um/s.
+    frequency : float | str | None
+        Frequency of a cosine in place of a ramp, as in "2 kHz".
+    points : int
+        Number of points in each direction (2 to 20000).
+    settle : int | None
+        Drive periods at the first distance before the curve, of a driven lever;
+        default: 20 time constants of the lever (0 to 100000000).
+    fit_from : float
+        Lowest force of the fits, as a part of the span from the lowest force of the
+        retract to the peak.
+    fit_to : float
+        Highest force of the fits, likewise.
+    threads : int | None
+        Number of threads; default: one per core.
+    progress : Progress
+        Whether to show a bar, or a function that is called with the finished and
+        the total count.
+
+    Returns
+    -------
+    The document, with the names of the terminal's JSON.
+
+    Raises
+    ------
+    ValueError
+        An argument is invalid; the message names it.
+    RuntimeError
+        The computation failed.
+    """
+    options = _arguments.options("force-curve", locals())
+    return _studies.document("force-curve", case, options, threads, progress)

@@ -9,6 +9,7 @@ use super::lever::{Instant, Lever};
 use super::path::Plan;
 use crate::Error;
 use crate::model::MotionError;
+use crate::observe::lag;
 
 /// A point of the curve, in the model's units.
 #[derive(Clone, Copy, Debug)]
@@ -94,7 +95,12 @@ pub(super) fn run(plan: &Plan<'_>, control: &Control<'_>) -> Result<Run, Error> 
             // An end of a period that rounding alone keeps from the point is the point.
             let near = (next_period - end).abs() <= 1e-9 * period;
             let until = if near { end } else { end.min(next_period) };
-            let phase = (time - start).max(0.0);
+            // As is a start that rounding alone keeps from that of a period.
+            let phase = if time - start <= 1e-9 * period {
+                0.0
+            } else {
+                time - start
+            };
             let whole = near || until == next_period;
             let length = if whole { period - phase } else { until - time };
             let at = path.at(time);
@@ -133,7 +139,7 @@ pub(super) fn run(plan: &Plan<'_>, control: &Control<'_>) -> Result<Run, Error> 
             }
             if plan.driven && whole && phase == 0.0 {
                 let z = lever.amplitude(&sums);
-                oscillation = Some([z.modulus(), -z.argument().to_degrees()]);
+                oscillation = Some([z.modulus(), lag(z)]);
             }
             let here = lever.instant(if whole { 0.0 } else { phase + length });
             run.least_gap = run.least_gap.min(here.gap);

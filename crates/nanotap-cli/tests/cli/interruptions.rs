@@ -93,6 +93,7 @@ fn long_work(study: &str) -> Option<Vec<&'static str>> {
         "lyapunov" => vec!["case.toml", "--periods", "100000000"],
         "orbit" | "convergence" | "contact-laws" => vec!["case.toml", "--period", "10000"],
         "scan" => vec!["scan.toml"],
+        "force-curve" => vec!["soft.toml", "--speed", "1 nm/s"],
         other => panic!("say how long work of {other} is requested"),
     })
 }

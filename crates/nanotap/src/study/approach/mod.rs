@@ -686,7 +686,7 @@ impl ApproachOptions {
 }
 
 /// A speed in the model's unit of length a unit of time, as it is given of a case.
-fn speed_of(case: &Case, amount: &Amount) -> Result<f64, Error> {
+pub(in crate::study) fn speed_of(case: &Case, amount: &Amount) -> Result<f64, Error> {
     let refused = |error: String| Error::option("speed", error, "write it as in \"500 nm/s\"");
     let (read, unit) = match case.physical() {
         Some(view) => (Kind::Velocity.parse(amount.text()), view.scales.velocity),

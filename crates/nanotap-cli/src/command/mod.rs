@@ -15,6 +15,7 @@ mod generate;
 mod lyapunov;
 mod merge;
 mod modes;
+mod noise;
 mod orbit;
 mod paper;
 mod reconstruct;
@@ -116,6 +117,7 @@ pub(crate) enum Own {
     Approach(approach::Arguments),
     /// Compute a force curve at a finite speed, with its static branches
     ForceCurve(force_curve::Arguments),
+    Noise(noise::Arguments),
     /// Simulate a line or an image under feedback
     Scan(scan::Arguments),
     /// Fit parameters of lever and sample to measured curves
@@ -164,6 +166,7 @@ pub(crate) fn run(command: &Command, output: &Output) -> Result<(), Failure> {
         Own::Branch(arguments) => branch::run(arguments, output),
         Own::Approach(arguments) => approach::run(arguments, output),
         Own::ForceCurve(arguments) => force_curve::run(arguments, output),
+        Own::Noise(arguments) => noise::run(arguments, output),
         Own::Scan(arguments) => scan::run(arguments, output),
         Own::Fit(arguments) => fit::run(arguments, output),
         Own::Reconstruct(arguments) => reconstruct::run(arguments, output),

@@ -147,6 +147,7 @@ fn every_document_has_a_test() {
             "measured-modes.md",
             "microscopist.md",
             "moving-surface.md",
+            "noise.md",
             "nonlinear.md",
             "observables.md",
             "orbits.md",
@@ -192,6 +193,7 @@ follows! {
     the_samples: "samples.md", 5 commands, 30 numbers;
     the_reconstruction: "reconstruct.md", 1 commands, 0 numbers;
     the_force_curve: "force-curve.md", 3 commands, 23 numbers;
+    the_thermal_noise: "noise.md", 2 commands, 8 numbers;
     the_scan: "scan.md", 4 commands, 19 numbers;
     the_force_table: "table.md", 2 commands, 6 numbers;
     the_stiff_lever: "stiff-lever.md", 3 commands, 4 numbers;

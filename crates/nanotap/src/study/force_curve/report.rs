@@ -138,7 +138,15 @@ pub struct ForceCurveReport {
     pub driven: bool,
     /// Stretches of the exact flow.
     pub stretches: usize,
-    /// Results.
+    /// Adhesion force: minus the lowest force of the retract, N.
+    pub adhesion: f64,
+    /// Distance at which the tip first touches on the approach, m.
+    pub snap_in: Option<f64>,
+    /// Distance at which the tip last touches on the retract, m.
+    pub pull_off: Option<f64>,
+    /// Largest force, N.
+    pub peak_force: f64,
+    /// All results.
     pub summary: ForceCurveSummary,
     /// Reduced modulus E* of tip and sample of the case, Pa, if its law has one.
     pub reduced_modulus: Option<f64>,
@@ -149,6 +157,7 @@ pub struct ForceCurveReport {
     /// Branches of the lever at rest.
     pub statics: Statics,
     /// The points.
+    #[serde(rename = "table")]
     pub points: Vec<CurvePoint>,
     /// What puts the results in doubt.
     pub warnings: Vec<String>,
@@ -237,6 +246,8 @@ pub(super) fn report(plan: &Plan<'_>, statics: &StaticsFound, run: &Run) -> Forc
         warnings
             .push("too few points of the unloading part for a fit: give more {points}".to_owned());
     }
+    let distance = |z: Option<f64>| z.map(|z| z * scales.length);
+    let (snap_in, pull_off) = (distance(run.contact_begin), distance(run.contact_end));
     ForceCurveReport {
         waveform: if plan.path.speed.is_some() {
             Waveform::Ramp
@@ -249,9 +260,13 @@ pub(super) fn report(plan: &Plan<'_>, statics: &StaticsFound, run: &Run) -> Forc
         duration: plan.points as f64 * plan.step * scales.time,
         driven: plan.driven,
         stretches: run.stretches,
+        adhesion,
+        snap_in,
+        pull_off,
+        peak_force: peak,
         summary: ForceCurveSummary {
-            contact_begin: run.contact_begin.map(|z| z * scales.length),
-            contact_end: run.contact_end.map(|z| z * scales.length),
+            contact_begin: snap_in,
+            contact_end: pull_off,
             peak_force: peak,
             adhesion_force: adhesion,
             attraction: -run.lowest[0] * scales.force,

@@ -292,6 +292,8 @@ impl Thermal {
         let covariance = found.stationary()?;
         let last = covariance.nrows() - 2;
         let read = found.read;
+        // Without the ripple at twice the drive's frequency that the filter lets through.
+        let amplitude = orbit.observables.first_harmonic;
         let size = read.modulus();
         let along = DVector::from_vec(vec![read.re / size, read.im / size]);
         let across = DVector::from_vec(vec![-read.im / size, read.re / size]);
@@ -299,10 +301,10 @@ impl Thermal {
         let deviation = |way: &DVector<f64>| way.dot(&(block * way)).max(0.0).sqrt();
         Ok(Reading {
             period: orbit.period,
-            amplitude: size,
+            amplitude,
             amplitude_rms: deviation(&along),
             phase: orbit.observables.phase.to_radians(),
-            phase_rms: deviation(&across) / size,
+            phase_rms: deviation(&across) / amplitude,
         })
     }
 }

@@ -30,6 +30,8 @@ pub struct ForceSums {
     pub work: f64,
     /// The largest force, at least 0.
     pub peak: f64,
+    /// The lowest force, at most 0.
+    pub lowest: f64,
     /// Time on branches on which tip and sample touch.
     pub contact: f64,
 }
@@ -65,8 +67,8 @@ impl Summation {
         }
     }
 
-    /// Raises the peak to the largest force near `u` on a step.
-    fn raise_peak(&mut self, step: &Step, mut u: f64) {
+    /// Includes the extremum of the force near `u` on a step.
+    fn include_extremum(&mut self, step: &Step, mut u: f64) {
         derivative(&step.coefficients, &mut self.slope);
         derivative(&self.slope, &mut self.curvature);
         for _ in 0..REFINEMENTS {
@@ -76,7 +78,7 @@ impl Summation {
             }
             u = next;
         }
-        self.sums.peak = self.sums.peak.max(series(&step.coefficients, u));
+        self.sums.include(series(&step.coefficients, u));
     }
 }
 
@@ -96,11 +98,15 @@ impl Observer for Summation {
         }
         let (places, weights) = &*RULE;
         let (mut largest, mut largest_at) = (f64::NEG_INFINITY, 0.0);
+        let (mut lowest, mut lowest_at) = (f64::INFINITY, 0.0);
         for (place, weight) in places.iter().zip(weights) {
             let u = place * step.end;
             let force = step.force_at(u);
             if force > largest {
                 (largest, largest_at) = (force, u);
+            }
+            if force < lowest {
+                (lowest, lowest_at) = (force, u);
             }
             let weight = weight * step.end;
             let by_time = weight * step.map.rate(step.length, u) * force;
@@ -112,12 +118,16 @@ impl Observer for Summation {
             }
         }
         for end in [0.0, step.end] {
-            self.sums.peak = self.sums.peak.max(step.force_at(end));
+            self.sums.include(step.force_at(end));
         }
         // Between nodes the force exceeds the largest of them by a few per cent at most.
         if largest > 0.0 && 1.2 * largest > self.sums.peak {
-            self.raise_peak(step, largest_at);
-            self.sums.peak = self.sums.peak.max(largest);
+            self.include_extremum(step, largest_at);
+            self.sums.include(largest);
+        }
+        if lowest < 0.0 && 1.2 * lowest < self.sums.lowest {
+            self.include_extremum(step, lowest_at);
+            self.sums.include(lowest);
         }
     }
 
@@ -166,6 +176,12 @@ pub(crate) struct ParabolicStep {
 }
 
 impl ForceSums {
+    /// Widens the range between the lowest and the largest force to a force.
+    pub const fn include(&mut self, force: f64) {
+        self.peak = self.peak.max(force);
+        self.lowest = self.lowest.min(force);
+    }
+
     /// Adds a step of the approximate flow under a tone of angular frequency `omega`.
     pub(crate) fn add(&mut self, step: &ParabolicStep, omega: f64) {
         let h = step.length;
@@ -183,6 +199,8 @@ impl ForceSums {
         self.harmonic += (m0 * p + m1 * q + m2 * r) * Complex::new(cos, -sin) * h;
         let [ra, rb, rc] = step.rates;
         self.work += h * (a * ra + 4.0 * b * rb + c * rc) / 6.0;
-        self.peak = self.peak.max(a).max(b).max(c);
+        for force in [a, b, c] {
+            self.include(force);
+        }
     }
 }

@@ -174,12 +174,7 @@ impl System {
             .zip(&response.tones)
             .map(|(tone, y)| tone.gap + kernel.read(y))
             .collect();
-        let mut gap_sizes = [0.0; 2];
-        for (tone, amplitude) in drive.tones.iter().zip(&gap_tones) {
-            let size = amplitude.modulus();
-            gap_sizes[0] += size;
-            gap_sizes[1] += size * tone.frequency;
-        }
+        let gap_sizes = gap_sizes(&drive, &gap_tones);
         let needs_rate = law.depends_on_rate()
             || exits
                 .iter()
@@ -240,6 +235,28 @@ impl System {
         }
         self.gap_constant = offset + self.forced_gap;
         self.drive.offset = offset;
+        Ok(())
+    }
+
+    /// Changes what a tone adds to the gap; allocates nothing.
+    ///
+    /// # Errors
+    /// When there is no such tone, or the amplitude is not finite.
+    pub fn set_gap_tone(&mut self, number: usize, gap: Complex) -> Result<(), VolterraError> {
+        if !(gap.re.is_finite() && gap.im.is_finite()) {
+            return Err(not_finite("a tone's amplitude", gap.modulus()));
+        }
+        let found = self.drive.tones.len();
+        let Some(tone) = self.drive.tones.get_mut(number) else {
+            return Err(VolterraError::Shape {
+                what: "the tones",
+                found,
+                expected: number + 1,
+            });
+        };
+        tone.gap = gap;
+        self.gap_tones[number] = gap + self.kernel.read(&self.response.tones[number]);
+        self.gap_sizes = gap_sizes(&self.drive, &self.gap_tones);
         Ok(())
     }
 
@@ -394,6 +411,17 @@ impl System {
     pub(crate) fn response(&self) -> &Response {
         &self.response
     }
+}
+
+/// Sizes of the drive's part in the gap and in its rate.
+fn gap_sizes(drive: &Drive, gap_tones: &[Complex]) -> [f64; 2] {
+    let mut sizes = [0.0; 2];
+    for (tone, amplitude) in drive.tones.iter().zip(gap_tones) {
+        let size = amplitude.modulus();
+        sizes[0] += size;
+        sizes[1] += size * tone.frequency;
+    }
+    sizes
 }
 
 fn not_finite(what: &str, found: f64) -> VolterraError {

@@ -339,6 +339,11 @@ fn force_rows(table: &mut Table, force: &SampleForce) {
         };
         table.row(["", &value, parameter.words]);
     }
+    if let Some(tabor) = force.tabor_parameter() {
+        let value = number::significant(tabor, 3);
+        let words = "Tabor's parameter (R w²/(E*² a0³))^(1/3): below about 1 DMT, above it JKR";
+        table.row(["μ", &value, words]);
+    }
 }
 
 /// Every distance at which an orbit has the setpoint amplitude.

@@ -10,10 +10,12 @@ mod contact_laws;
 mod convergence;
 mod explore;
 mod fit;
+mod force_curve;
 mod generate;
 mod lyapunov;
 mod merge;
 mod modes;
+mod noise;
 mod orbit;
 mod paper;
 mod reconstruct;
@@ -113,6 +115,9 @@ pub(crate) enum Own {
     Branch(branch::Arguments),
     /// Compute amplitude, phase, force and energy against the distance, both ways
     Approach(approach::Arguments),
+    /// Compute a force curve at a finite speed, with its static branches
+    ForceCurve(force_curve::Arguments),
+    Noise(noise::Arguments),
     /// Simulate a line or an image under feedback
     Scan(scan::Arguments),
     /// Fit parameters of lever and sample to measured curves
@@ -160,6 +165,8 @@ pub(crate) fn run(command: &Command, output: &Output) -> Result<(), Failure> {
         Own::Attractors(arguments) => attractors::run(arguments, output),
         Own::Branch(arguments) => branch::run(arguments, output),
         Own::Approach(arguments) => approach::run(arguments, output),
+        Own::ForceCurve(arguments) => force_curve::run(arguments, output),
+        Own::Noise(arguments) => noise::run(arguments, output),
         Own::Scan(arguments) => scan::run(arguments, output),
         Own::Fit(arguments) => fit::run(arguments, output),
         Own::Reconstruct(arguments) => reconstruct::run(arguments, output),

@@ -58,7 +58,7 @@ setpoint = 0.9
 /// always fast.
 fn long_work(study: &str) -> Option<Vec<&'static str>> {
     Some(match study {
-        "modes" => return None,
+        "modes" | "noise" => return None,
         "simulate" => vec!["case.toml", "--transient", "100000000"],
         "attractors" => vec!["case.toml", "--starts", "1000000"],
         "branch" => vec![
@@ -93,6 +93,7 @@ fn long_work(study: &str) -> Option<Vec<&'static str>> {
         "lyapunov" => vec!["case.toml", "--periods", "100000000"],
         "orbit" | "convergence" | "contact-laws" => vec!["case.toml", "--period", "10000"],
         "scan" => vec!["scan.toml"],
+        "force-curve" => vec!["soft.toml", "--speed", "1 nm/s"],
         other => panic!("say how long work of {other} is requested"),
     })
 }

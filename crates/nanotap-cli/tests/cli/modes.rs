@@ -43,7 +43,7 @@ fn text_compares_galerkin_with_the_exact_beam() {
     assert_eq!((outcome.code, outcome.stderr.as_str()), (0, ""));
     for words in [
         "free flight",
-        "in contact, α₄ = 20",
+        "in contact, stiffness α₄ = 20",
         "Ω exact",
         "damping ζ",
         "7.790952",

@@ -327,7 +327,7 @@ fn a_physical_case_is_reported_in_si() {
             .lines()
             .next()
             .unwrap()
-            .ends_with("time_s,tip_m,tip_rate_m_per_s,gap_m,force_N")
+            .starts_with("time (s),tip (m),tip_rate (m/s),gap (m),force (N)")
     );
     assert!(folder.read("run.svg").contains("(nm)"));
 }

@@ -139,6 +139,7 @@ fn every_document_has_a_test() {
             "fit.md",
             "flow.md",
             "fm-lever-on-polystyrene.md",
+            "force-curve.md",
             "frequency-modulation.md",
             "frequency-sweep.md",
             "gallery.md",
@@ -146,6 +147,7 @@ fn every_document_has_a_test() {
             "measured-modes.md",
             "microscopist.md",
             "moving-surface.md",
+            "noise.md",
             "nonlinear.md",
             "observables.md",
             "orbits.md",
@@ -190,6 +192,8 @@ follows! {
     the_period_doubling: "period-doubling.md", 2 commands, 6 numbers;
     the_samples: "samples.md", 5 commands, 30 numbers;
     the_reconstruction: "reconstruct.md", 1 commands, 0 numbers;
+    the_force_curve: "force-curve.md", 3 commands, 23 numbers;
+    the_thermal_noise: "noise.md", 2 commands, 8 numbers;
     the_scan: "scan.md", 4 commands, 19 numbers;
     the_force_table: "table.md", 2 commands, 6 numbers;
     the_stiff_lever: "stiff-lever.md", 3 commands, 4 numbers;

@@ -24,8 +24,10 @@ __all__ = [
     "convergence",
     "fit",
     "fm",
+    "force_curve",
     "lyapunov",
     "modes",
+    "noise",
     "orbit",
     "reconstruct",
     "scan",
@@ -282,8 +284,9 @@ def attractors(
         until the share that may lead to undiscovered motions is below `unseen`, or
         5000 initial states or 2,000,000 drive periods (600,000 under a nonlinear
         law) are reached. Under a nonlinear law an initial state is followed for at
-        most 10 million steps of the approximate flow, and all together for 80
-        million; a step of the exact flow counts as 100 (1 to 1000000).
+        most 4 million steps of the approximate flow, and all together for 60
+        million, or 120 where chaos is watched; an evaluation of the force in the
+        exact flow counts as a step (1 to 1000000).
     unseen : float | None
         Share of initial states that may lead to undiscovered motions, with 95 %
         confidence, at which sampling ends. Default: 0.01 under a nonlinear law and
@@ -447,9 +450,9 @@ def approach(
         Last distance of the approach; default: 0.
     points : int
         Number of distances in each direction. Under a nonlinear law the lever is
-        followed for at most 40 million steps of the approximate flow, and as many
-        are taken for every 100 distances; a step of the exact flow counts as 100 (2
-        to 20000).
+        followed for at most 30 million steps of the approximate flow, and 25
+        million more are taken for every 100 distances; an evaluation of the force
+        in the exact flow counts as a step (2 to 20000).
     branches : bool
         Also continue coexisting branches, stable and unstable.
     switch : int
@@ -1076,6 +1079,49 @@ def contact_laws(
     options = _arguments.options("contact-laws", locals())
     return _studies.document("contact-laws", case, options, threads, progress)
 
+def noise(
+    case: Case,
+    *,
+    temperature: float = 295.0,
+    time_constant: float | str | None = None,
+    bandwidth: float | str | None = None,
+    threads: int | None = None,
+    progress: Progress = None,
+) -> Record:
+    """Compute thermal noise of amplitude and phase at a working point.
+
+    Parameters
+    ----------
+    case : Case
+        The case.
+    temperature : float
+        Temperature in kelvin.
+    time_constant : float | str | None
+        Time constant of the lock-in amplifier's first-order filter; default: 0.25
+        ms.
+    bandwidth : float | str | None
+        Noise bandwidth of the lock-in amplifier, 1 over four time constants, in
+        place of it.
+    threads : int | None
+        Number of threads; default: one per core.
+    progress : Progress
+        Whether to show a bar, or a function that is called with the finished and
+        the total count.
+
+    Returns
+    -------
+    The document, with the names of the terminal's JSON.
+
+    Raises
+    ------
+    ValueError
+        An argument is invalid; the message names it.
+    RuntimeError
+        The computation failed.
+    """
+    options = _arguments.options("noise", locals())
+    return _studies.document("noise", case, options, threads, progress)
+
 def scan(
     case: Case,
     *,
@@ -1208,3 +1254,67 @@ def scan(
     """
     options = _arguments.options("scan", locals())
     return _studies.scan(case, options, threads, progress)
+
+def force_curve(
+    case: Case,
+    *,
+    from_: float | str | None = None,
+    to: float | str | None = None,
+    peak_force: float | str | None = None,
+    speed: float | str | None = None,
+    frequency: float | str | None = None,
+    points: int = 500,
+    settle: int | None = None,
+    fit_from: float = 0.2,
+    fit_to: float = 0.9,
+    threads: int | None = None,
+    progress: Progress = None,
+) -> Record:
+    """Force curve of approach and retract at a finite speed, with the static branches,
+    adhesion, work and fitted moduli.
+
+    Parameters
+    ----------
+    case : Case
+        The case.
+    from_ : float | str | None
+        First distance, as in "30 nm"; default: the distance of the case.
+    to : float | str | None
+        Distance at which the approach turns; default: as far behind the surface as
+        a tenth of `from`.
+    peak_force : float | str | None
+        Force at which the approach turns in place of `to`, as in "5 nN": the
+        distance at which the lever at rest exerts it.
+    speed : float | str | None
+        Speed of a ramp, as in "2 um/s"; default: 1 um/s.
+    frequency : float | str | None
+        Frequency of a cosine in place of a ramp, as in "2 kHz".
+    points : int
+        Number of points in each direction (2 to 20000).
+    settle : int | None
+        Drive periods at the first distance before the curve, of a driven lever;
+        default: 20 time constants of the lever (0 to 100000000).
+    fit_from : float
+        Lowest force of the fits, as a part of the span from the lowest force of the
+        retract to the peak.
+    fit_to : float
+        Highest force of the fits, likewise.
+    threads : int | None
+        Number of threads; default: one per core.
+    progress : Progress
+        Whether to show a bar, or a function that is called with the finished and
+        the total count.
+
+    Returns
+    -------
+    The document, with the names of the terminal's JSON.
+
+    Raises
+    ------
+    ValueError
+        An argument is invalid; the message names it.
+    RuntimeError
+        The computation failed.
+    """
+    options = _arguments.options("force-curve", locals())
+    return _studies.document("force-curve", case, options, threads, progress)

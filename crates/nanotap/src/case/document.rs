@@ -6,6 +6,7 @@ use std::f64::consts::TAU;
 use serde::{Serialize, Serializer};
 
 use crate::case::Case;
+use crate::case::physical::force::SampleForce;
 use crate::case::physical::{MappingRow, Physical};
 use crate::model::cantilever::Cantilever;
 use crate::model::nonlinear::Equilibrium;
@@ -85,6 +86,9 @@ pub struct PhysicalSummary {
     /// Parameters of a nonlinear force law, in place of contact stiffness and damping.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub force_law: Vec<LawParameterDocument>,
+    /// Tabor's parameter of an elastic sphere with adhesion.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub tabor_parameter: Option<f64>,
     /// Gaps and forces of a tabulated law, m and N.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub force_table: Vec<(f64, f64)>,
@@ -158,6 +162,11 @@ impl PhysicalSummary {
                 })
                 .collect()
             }),
+            tabor_parameter: view
+                .sample
+                .force
+                .as_ref()
+                .and_then(SampleForce::tabor_parameter),
             force_table: view
                 .sample
                 .force

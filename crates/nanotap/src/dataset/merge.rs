@@ -26,21 +26,22 @@ pub struct Merged {
 /// # Errors
 /// If a source is not a store, if two do not belong together, or if the file system fails.
 pub fn merge(sources: &[PathBuf], target: &Path) -> Result<Merged, StoreError> {
-    let mut stores = Vec::with_capacity(sources.len());
-    for source in sources {
-        let store = Store::open(source)?;
-        if store.missing() == 0 && stores.iter().all(|first| alike(first, &store)) {
-            // It is the whole dataset, and may be divided into other chunks.
-            stores = vec![store];
-            break;
-        }
-        if let Some(first) = stores.first() {
-            let first: &Store = first;
-            if !same(store.metadata(), first.metadata()) {
-                return Err(mismatch(source, store.metadata(), first.metadata()));
+    let mut stores = sources
+        .iter()
+        .map(|source| Store::open(source))
+        .collect::<Result<Vec<_>, _>>()?;
+    let is_whole = |store: &Store| store.missing() == 0;
+    if let Some((first, others)) = stores.split_first() {
+        for other in others {
+            let divided = (is_whole(first) || is_whole(other)) && alike(first, other);
+            if !divided && !same(other.metadata(), first.metadata()) {
+                return Err(mismatch(other.path(), other.metadata(), first.metadata()));
             }
         }
-        stores.push(store);
+    }
+    // A whole dataset is all that is needed, and may be divided into other chunks.
+    if let Some(whole) = stores.iter().position(is_whole) {
+        stores = vec![stores.swap_remove(whole)];
     }
     let Some(first) = stores.first() else {
         let what = "no dataset to merge".into();
@@ -49,7 +50,11 @@ pub fn merge(sources: &[PathBuf], target: &Path) -> Result<Merged, StoreError> {
             what,
         });
     };
-    let merged = Store::create_or_resume(target, first.schema().clone())?;
+    let merged = if first.is_packed() {
+        Store::beside(target, first.schema().clone(), true)
+    } else {
+        Store::create_or_resume(target, first.schema().clone())?
+    };
     let mut copied = 0;
     for chunk in 0..merged.chunks() {
         if merged.is_finished(chunk) {
@@ -59,6 +64,9 @@ pub fn merge(sources: &[PathBuf], target: &Path) -> Result<Merged, StoreError> {
             merged.take_chunk(source, chunk)?;
             copied += 1;
         }
+    }
+    if merged.is_packed() {
+        merged.write_documents()?;
     }
     merged.tidy()?;
     let missing = (0..merged.chunks())

@@ -1,11 +1,17 @@
 //! Finished datasets in few files.
 //!
 //! While a dataset is computed, a chunk is the unit of work, so there are hundreds, each with a file
-//! for every variable. A finished dataset is written once more with chunks as large as memory allows:
-//! file systems and archives take few large files better than many small ones.
+//! for every variable. The chunks of a finished dataset are joined to chunks as large as memory
+//! allows: file systems and archives take few large files better than many small ones.
+//!
+//! Joined chunks have names of their own (Zarr's separator `/`), so that both divisions can stand side
+//! by side. The consolidated metadata, replaced by one rename, say which one counts; whatever is
+//! killed before or after, the dataset is whole. The files of the other division are removed last. A
+//! process that still works on the old division finds what it reads in the new one.
 
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::ops::Range;
+use std::path::Path;
 
 use super::error::StoreError;
 use super::grid::Block;
@@ -17,7 +23,7 @@ const FEW_FILES: usize = 100;
 /// Bytes that a chunk of one variable should not exceed.
 const CHUNK_BYTES: usize = 256 << 20;
 
-/// The same content with larger chunks; `None` if there are few files.
+/// The same content in larger chunks; `None` if there are few files.
 pub(super) fn packed(schema: &Schema) -> Option<Schema> {
     if schema.grid.chunks() * schema.variables.len() <= FEW_FILES {
         return None;
@@ -34,7 +40,7 @@ pub(super) fn packed(schema: &Schema) -> Option<Schema> {
     (packed.grid.chunks() < schema.grid.chunks()).then_some(packed)
 }
 
-/// Joins the chunks of a finished dataset in place. An unfinished one stays as it is.
+/// Joins the chunks of a finished dataset. An unfinished one stays as it is.
 ///
 /// # Errors
 /// If the file system fails, or a chunk is damaged; the dataset is then as it was.
@@ -42,82 +48,61 @@ pub fn finish(store: Store) -> Result<Store, StoreError> {
     let Some(schema) = packed(store.schema()).filter(|_| store.missing() == 0) else {
         return Ok(store);
     };
-    let path = store.path().to_owned();
-    let [new, old] = beside(&path);
-    remove(&new)?;
-    let target = Store::create_or_resume(&new, schema)?;
+    let there = Store::open(store.path())?;
+    if there.is_packed() {
+        // Another process was faster.
+        store.remove_chunks()?;
+        return Ok(there);
+    }
+    replaced(&store, schema, true)
+}
+
+/// The division into chunks of work of a dataset with damaged joined chunks, which are then missing.
+///
+/// # Errors
+/// If the file system fails.
+pub(super) fn unpack(store: &Store, schema: Schema) -> Result<Store, StoreError> {
+    replaced(store, schema, false)
+}
+
+/// Writes what a store holds in another division into chunks, which counts from then on.
+fn replaced(store: &Store, schema: Schema, packed: bool) -> Result<Store, StoreError> {
+    let target = Store::beside(store.path(), schema, packed);
     for chunk in 0..target.chunks() {
         let block = target.schema().grid.block(chunk);
+        if !parts(store, &block).all(|part| store.is_finished(part.chunk)) {
+            continue;
+        }
         let file = |variable| {
-            let column = column(&store, &block, variable)?;
+            let column = column(store, &block, variable)?;
             Ok(encoded(target.schema(), &block, &column, variable))
         };
         let files = (0..target.schema().variables.len()).map(file);
         target.write_files(&block, &files.collect::<Result<Vec<_>, StoreError>>()?)?;
     }
-    copy_documents(&path, &new)?;
-    drop((store, target));
-    remove(&old)?;
-    fs::rename(&path, &old).map_err(StoreError::io("rename", &path))?;
-    fs::rename(&new, &path).map_err(StoreError::io("rename", &new))?;
-    remove(&old)?;
-    Store::open(&path)
+    target.write_documents()?;
+    store.remove_chunks()?;
+    Ok(target)
 }
 
-/// Puts a dataset back whose chunks were being joined when the program was killed.
-///
-/// # Errors
-/// If the file system fails.
-pub(super) fn recover(path: &Path) -> Result<(), StoreError> {
-    let [_, old] = beside(path);
-    if !path.exists() && old.exists() {
-        fs::rename(&old, path).map_err(StoreError::io("rename", &old))?;
-    }
-    Ok(())
-}
-
-/// Names beside a dataset: of the one that is being written, and of the one that it replaces.
-fn beside(path: &Path) -> [PathBuf; 2] {
-    let name = path.file_name().unwrap_or_default().to_string_lossy();
-    ["new", "old"].map(|which| path.with_file_name(format!(".{name}.{which}.tmp")))
-}
-
-fn remove(folder: &Path) -> Result<(), StoreError> {
-    match fs::remove_dir_all(folder) {
-        Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
-            Err(StoreError::io("remove", folder)(error))
-        }
-        _ => Ok(()),
-    }
-}
-
-/// Copies the files next to the arrays that `to` does not have.
-fn copy_documents(from: &Path, to: &Path) -> Result<(), StoreError> {
-    let listing = fs::read_dir(from).map_err(StoreError::io("list", from))?;
-    for entry in listing.flatten().filter(|entry| entry.path().is_file()) {
-        let copy = to.join(entry.file_name());
-        if !copy.exists() {
-            fs::copy(entry.path(), &copy).map_err(StoreError::io("write", &copy))?;
-        }
-    }
-    Ok(())
+/// The chunks of a store that share entries with a block of another division.
+fn parts<'a>(store: &'a Store, block: &'a Block) -> impl Iterator<Item = Block> + 'a {
+    let apart = |(a, b): (&Range<usize>, &Range<usize>)| a.end <= b.start || b.end <= a.start;
+    let blocks = (0..store.chunks()).map(|chunk| store.schema().grid.block(chunk));
+    blocks.filter(move |part| !part.ranges.iter().zip(&block.ranges).any(apart))
 }
 
 /// The values of a variable for the entries of a block of another division into chunks.
-fn column(store: &Store, block: &Block, variable: usize) -> Result<Values, StoreError> {
+///
+/// # Errors
+/// If a chunk cannot be read or is damaged.
+pub(super) fn column(store: &Store, block: &Block, variable: usize) -> Result<Values, StoreError> {
     let schema = store.schema();
     let stride = schema.variables[variable].stride();
     let mut column = schema.variables[variable]
         .kind
         .missing(block.len() * stride);
-    for chunk in 0..store.chunks() {
-        let part = schema.grid.block(chunk);
-        let apart = |(a, b): (&std::ops::Range<usize>, &std::ops::Range<usize>)| {
-            a.end <= b.start || b.end <= a.start
-        };
-        if part.ranges.iter().zip(&block.ranges).any(apart) {
-            continue;
-        }
+    for part in parts(store, block) {
         let values = store.read_chunk(&part, variable)?;
         let (Some(own), Some(other)) = (part.ranges.last(), block.ranges.last()) else {
             continue;
@@ -137,4 +122,22 @@ fn column(store: &Store, block: &Block, variable: usize) -> Result<Values, Store
         }
     }
     Ok(column)
+}
+
+/// Removes a file or a folder that may not exist.
+///
+/// # Errors
+/// If the file system refuses.
+pub(super) fn remove(path: &Path) -> Result<(), StoreError> {
+    let removed = if path.is_dir() {
+        fs::remove_dir_all(path)
+    } else {
+        fs::remove_file(path)
+    };
+    match removed {
+        Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
+            Err(StoreError::io("remove", path)(error))
+        }
+        _ => Ok(()),
+    }
 }

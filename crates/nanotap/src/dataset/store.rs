@@ -18,6 +18,8 @@ use crate::dataset::files::{self, is_temporary};
 /// The folder of markers, one per finished chunk. Zarr readers look at the metadata only and ignore
 /// it.
 const MARKERS: &str = ".chunks";
+/// The same of joined chunks.
+const PACKED_MARKERS: &str = ".joined";
 /// The attribute with the chunks of each axis and the names of the computed arrays.
 const LAYOUT: &str = "chunk_layout";
 /// The attribute from which xarray knows coordinates that do not label a dimension.
@@ -32,6 +34,8 @@ pub struct Store {
     path: PathBuf,
     schema: Schema,
     metadata: String,
+    /// Whether the chunks of work were joined.
+    packed: bool,
     finished: Vec<AtomicBool>,
 }
 
@@ -42,15 +46,18 @@ impl Store {
     /// If the path is something else, if the store has other attributes, or if the file system
     /// fails.
     pub fn create_or_resume(path: &Path, schema: Schema) -> Result<Self, StoreError> {
-        let documents = documents(&schema);
+        let documents = documents(&schema, false);
         let metadata = consolidated(&documents);
-        pack::recover(path)?;
         if let Some(packed) = pack::packed(&schema) {
-            let metadata = consolidated(&self::documents(&packed));
+            let metadata = consolidated(&self::documents(&packed, true));
             let there = fs::read_to_string(path.join(zarr::CONSOLIDATED));
             if there.is_ok_and(|there| same(&there, &metadata)) {
                 refuse_links(path)?;
-                return Ok(Self::with(path, packed, metadata));
+                let store = Self::with(path, packed, metadata, true);
+                return match store.missing() {
+                    0 => Ok(store),
+                    _ => pack::unpack(&store, schema),
+                };
             }
         }
         match fs::metadata(path) {
@@ -67,18 +74,66 @@ impl Store {
                 refuse_strangers(path, &metadata, &documents)?;
             }
         }
-        for (name, document) in &documents {
-            write_if_other(&path.join(name), document.as_bytes())?;
+        let store = Self::with(path, schema, metadata, false);
+        make_folder(&path.join(MARKERS))?;
+        store.write_documents()?;
+        Ok(store)
+    }
+
+    /// The store of a schema at `path`, in whichever division into chunks, before it counts.
+    pub(super) fn beside(path: &Path, schema: Schema, packed: bool) -> Self {
+        let metadata = consolidated(&documents(&schema, packed));
+        Self::with(path, schema, metadata, packed)
+    }
+
+    /// Writes everything but the chunks of the variables. The division into chunks counts from then
+    /// on.
+    ///
+    /// # Errors
+    /// If the file system fails.
+    pub(super) fn write_documents(&self) -> Result<(), StoreError> {
+        for (name, document) in documents(&self.schema, self.packed) {
+            write_if_other(&self.path.join(name), document.as_bytes())?;
         }
-        for coordinate in &schema.coordinates {
+        for coordinate in &self.schema.coordinates {
             let name = zarr::chunk_name(&[], coordinate.dimensions.len());
-            let file = path.join(&coordinate.name).join(name);
+            let file = self.path.join(&coordinate.name).join(name);
             write_if_other(&file, &zarr::encode(&coordinate.values))?;
         }
-        make_folder(&path.join(MARKERS))?;
         // Written last, because a folder with this document counts as a store.
-        write_if_other(&path.join(zarr::CONSOLIDATED), metadata.as_bytes())?;
-        Ok(Self::with(path, schema, metadata))
+        write_if_other(
+            &self.path.join(zarr::CONSOLIDATED),
+            self.metadata.as_bytes(),
+        )
+    }
+
+    /// Whether the chunks of work were joined.
+    pub(super) const fn is_packed(&self) -> bool {
+        self.packed
+    }
+
+    /// Removes the files of this division into chunks.
+    ///
+    /// # Errors
+    /// If the file system refuses.
+    pub(super) fn remove_chunks(&self) -> Result<(), StoreError> {
+        for chunk in 0..self.chunks() {
+            let block = self.schema.grid.block(chunk);
+            for variable in &self.schema.variables {
+                pack::remove(&self.file(variable, &block))?;
+            }
+        }
+        if self.packed {
+            // The folders of their first numbers.
+            for variable in &self.schema.variables {
+                for number in 0..self.schema.grid.axes[0].chunks() {
+                    pack::remove(&self.path.join(&variable.name).join(number.to_string()))?;
+                }
+            }
+            pack::remove(&self.path.join(PACKED_MARKERS))
+        } else {
+            pack::remove(&self.path.join(MARKERS))
+        }
     }
 
     /// Opens an existing store.
@@ -86,7 +141,6 @@ impl Store {
     /// # Errors
     /// If it does not exist or is not a store of nanotap.
     pub fn open(path: &Path) -> Result<Self, StoreError> {
-        pack::recover(path)?;
         let document = path.join(zarr::CONSOLIDATED);
         let refuse = |what: &str| StoreError::NotAStore {
             path: path.into(),
@@ -113,15 +167,22 @@ impl Store {
         };
         let schema = schema_of(path, &parsed["metadata"])?
             .ok_or_else(|| refuse("its .zmetadata was not written by nanotap"))?;
-        Ok(Self::with(path, schema, metadata))
+        let first = schema
+            .variables
+            .first()
+            .map_or("", |variable| &variable.name);
+        let array = &parsed["metadata"][format!("{first}/{}", zarr::ARRAY)];
+        let packed = array[zarr::SEPARATOR] == "/";
+        Ok(Self::with(path, schema, metadata, packed))
     }
 
-    fn with(path: &Path, schema: Schema, metadata: String) -> Self {
+    fn with(path: &Path, schema: Schema, metadata: String, packed: bool) -> Self {
         let chunks = schema.grid.chunks();
         let mut store = Self {
             path: path.into(),
             schema,
             metadata,
+            packed,
             finished: Vec::new(),
         };
         store.finished = (0..chunks)
@@ -176,13 +237,18 @@ impl Store {
     }
 
     fn marker(&self, chunk: usize) -> PathBuf {
-        self.path.join(MARKERS).join(chunk.to_string())
+        let folder = if self.packed { PACKED_MARKERS } else { MARKERS };
+        self.path.join(folder).join(chunk.to_string())
     }
 
     fn file(&self, variable: &Variable, block: &Block) -> PathBuf {
-        self.path
-            .join(&variable.name)
-            .join(zarr::chunk_name(&block.place, variable.tail.len()))
+        let name = zarr::chunk_name(&block.place, variable.tail.len());
+        let array = self.path.join(&variable.name);
+        if self.packed {
+            array.join(name.replace('.', "/"))
+        } else {
+            array.join(name)
+        }
     }
 
     /// Writes a finished chunk. `columns` contains the values of each variable, in order, for the
@@ -255,9 +321,20 @@ impl Store {
     /// # Errors
     /// If the file cannot be read or is damaged.
     pub fn read_chunk(&self, block: &Block, variable: usize) -> Result<Values, StoreError> {
+        let index = variable;
         let variable = &self.schema.variables[variable];
         let path = self.file(variable, block);
-        let bytes = fs::read(&path).map_err(StoreError::io("read", &path))?;
+        let bytes = match fs::read(&path) {
+            Ok(bytes) => bytes,
+            Err(error) => {
+                // Another process may have joined the chunks.
+                let there = Self::open(&self.path)?;
+                if error.kind() == ErrorKind::NotFound && there.packed && !self.packed {
+                    return pack::column(&there, block, index);
+                }
+                return Err(StoreError::io("read", &path)(error));
+            }
+        };
         let (grid, stride) = (&self.schema.grid, variable.stride());
         let full = zarr::decode(&bytes, variable.kind, grid.chunk_entries() * stride)
             .map_err(|what| StoreError::Damaged { path, what })?;
@@ -346,7 +423,8 @@ impl Store {
         }
         let arrays = self.schema.variables.iter().map(|v| v.name.as_str());
         let coordinates = self.schema.coordinates.iter().map(|c| c.name.as_str());
-        for name in arrays.chain(coordinates).chain([MARKERS, ""]) {
+        let markers = if self.packed { PACKED_MARKERS } else { MARKERS };
+        for name in arrays.chain(coordinates).chain([markers, ""]) {
             let folder = self.path.join(name);
             let listing = fs::read_dir(&folder).map_err(StoreError::io("list", &folder))?;
             for file in listing.flatten().map(|entry| entry.path()) {
@@ -410,8 +488,9 @@ fn unpadded<T: Clone>(grid: &Grid, block: &Block, full: &[T], stride: usize) -> 
         .collect()
 }
 
-/// All metadata documents by their names in the store, except `.zmetadata`.
-fn documents(schema: &Schema) -> Vec<(String, String)> {
+/// All metadata documents by their names in the store, except `.zmetadata`; `packed` if the chunks of
+/// work were joined.
+fn documents(schema: &Schema, packed: bool) -> Vec<(String, String)> {
     let mut root = schema.attributes.clone();
     let axes: Vec<Value> = schema
         .grid
@@ -451,7 +530,7 @@ fn documents(schema: &Schema) -> Vec<(String, String)> {
         let name = &variable.name;
         all.push((
             format!("{name}/{}", zarr::ARRAY),
-            zarr::array(&shape, &chunks, variable.kind),
+            zarr::array(&shape, &chunks, variable.kind, packed),
         ));
         all.push((
             format!("{name}/{}", zarr::ATTRIBUTES),
@@ -468,7 +547,7 @@ fn documents(schema: &Schema) -> Vec<(String, String)> {
         let kind = coordinate.values.kind();
         all.push((
             format!("{name}/{}", zarr::ARRAY),
-            zarr::array(&shape, &shape, kind),
+            zarr::array(&shape, &shape, kind, false),
         ));
         all.push((
             format!("{name}/{}", zarr::ATTRIBUTES),
@@ -557,7 +636,7 @@ fn refuse_strangers(
     for entry in listing.flatten() {
         let name = entry.file_name().to_string_lossy().into_owned();
         let first = |document: &str| document.split('/').next() == Some(&name);
-        let ours = name == MARKERS
+        let ours = [MARKERS, PACKED_MARKERS].contains(&name.as_str())
             || is_temporary(&entry.path())
             || documents.iter().any(|(document, _)| first(document));
         if !ours {

@@ -15,21 +15,23 @@ pub(super) const GROUP: &str = ".zgroup";
 pub(super) const ATTRIBUTES: &str = ".zattrs";
 pub(super) const ARRAY: &str = ".zarray";
 pub(super) const CONSOLIDATED: &str = ".zmetadata";
+/// What stands between the numbers in the name of a chunk; a dot if nothing is said.
+pub(super) const SEPARATOR: &str = "dimension_separator";
 
 /// The `.zgroup` document.
 pub(super) fn group() -> Value {
     json!({ "zarr_format": 2 })
 }
 
-/// The `.zarray` document of an array.
-pub(super) fn array(shape: &[usize], chunks: &[usize], kind: Kind) -> Value {
+/// The `.zarray` document of an array, with chunks in folders if `nested`.
+pub(super) fn array(shape: &[usize], chunks: &[usize], kind: Kind, nested: bool) -> Value {
     // With a fill value xarray would convert integers to floats.
     let fill = if kind == Kind::Real {
         json!("NaN")
     } else {
         Value::Null
     };
-    json!({
+    let mut document = json!({
         "zarr_format": 2,
         "shape": shape,
         "chunks": chunks,
@@ -38,7 +40,11 @@ pub(super) fn array(shape: &[usize], chunks: &[usize], kind: Kind) -> Value {
         "fill_value": fill,
         "order": "C",
         "filters": null,
-    })
+    });
+    if nested {
+        document[SEPARATOR] = "/".into();
+    }
+    document
 }
 
 fn dtype(kind: Kind) -> String {

@@ -9,6 +9,7 @@ pub mod contact;
 pub mod contact_laws;
 #[cfg(feature = "fit")]
 pub mod fit;
+pub mod force_curve;
 pub mod modes;
 pub mod motion;
 pub mod panels;

@@ -271,7 +271,12 @@ impl<'a, D: Number> Measured<'a, D> {
         } else {
             (self.peak_force().value(), self.indentation().value())
         };
-        above_rounding(work, force * depth)
+        // The derivative of what does not depend on anything is no more than rounding either.
+        if above_rounding(work, force * depth).value() == 0.0 {
+            0.0.into()
+        } else {
+            work
+        }
     }
 
     /// Net work of the tip on the sample.

@@ -40,7 +40,7 @@ impl OutOfRange {
     }
 
     /// The limits violated at this least distance from the sample.
-    fn within(model: &Model, least_gap: f64) -> Vec<Self> {
+    pub(crate) fn within(model: &Model, least_gap: f64) -> Vec<Self> {
         let Some(nonlinear) = &model.nonlinear else {
             return Vec::new();
         };

@@ -11,6 +11,7 @@ pub mod contact_laws;
 pub mod convergence;
 #[cfg(feature = "fit")]
 pub mod fit;
+pub mod force_curve;
 mod free_motion;
 pub mod frequency_modulation;
 pub mod in_si;
@@ -18,6 +19,8 @@ pub mod limits;
 pub mod lyapunov;
 pub mod mode_share;
 pub mod modes;
+mod moving_sample;
+pub mod noise;
 pub mod orbit;
 pub mod proof;
 #[cfg(feature = "fit")]
@@ -79,7 +82,9 @@ pub static STUDIES: &[StudyEntry] = &[
     StudyEntry::of::<lyapunov::LyapunovStudy>(),
     StudyEntry::of::<convergence::ConvergenceStudy>(),
     StudyEntry::of::<contact_laws::ContactLawsStudy>(),
+    StudyEntry::of::<noise::NoiseStudy>(),
     StudyEntry::of::<scan::ScanStudy>(),
+    StudyEntry::of::<force_curve::ForceCurveStudy>(),
 ];
 
 /// A study whose report is a document.

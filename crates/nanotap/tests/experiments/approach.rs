@@ -148,7 +148,7 @@ pub(crate) fn limited<R: Send>(steps: u64, work: impl Fn(&Control<'_>) -> R + Sy
 #[test]
 fn a_curve_ends_at_its_budget_of_steps() {
     let case = studied(MICA, &["gap.tip=7.127 nm"]);
-    let nm = 1e-9 / case.physical().unwrap().scales.length;
+    let nm = 1e-9;
     let options = ApproachOptions {
         from: Some((12.0 * nm).into()),
         to: Some((4.0 * nm).into()),
@@ -280,8 +280,10 @@ fn hysteresis_does_not_depend_on_the_spacing_of_rows() {
     });
     assert_eq!(ends[0], ends[1]);
     let farthest = &ends[0].0[0];
-    assert!((farthest.far / nm - 10.0286).abs() < 1e-3, "{farthest:?}");
-    let states = states_near(&case.with(case.gap_key(), 6.0 * nm), 8, &Control::default()).unwrap();
+    let far = farthest.physical.as_ref().unwrap()["far"];
+    assert!((far / nm - 10.0286).abs() < 1e-3, "{farthest:?}");
+    let near = case.with(case.key("gap.tip").unwrap(), 6.0 * nm);
+    let states = states_near(&near, 8, &Control::default()).unwrap();
     assert_eq!(states.len(), 2);
 }
 

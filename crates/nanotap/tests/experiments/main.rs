@@ -11,6 +11,7 @@ mod extremes;
 mod fit;
 mod identities;
 mod modes_that_matter;
+mod noise;
 mod physical_quantities;
 mod reconstruct;
 mod requests;

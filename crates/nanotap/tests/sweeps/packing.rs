@@ -97,20 +97,66 @@ fn shares_that_are_merged_come_to_the_same_bytes() {
     // A whole dataset and a share of it are the whole.
     let both = folder.join("both.zarr");
     merge(&[parts[0].clone(), whole.clone()], &both).unwrap();
+    finish(computed(&sweep, &both, "1/1")).unwrap();
     assert_same(&whole, &both);
 }
 
-/// A kill between the two renames leaves the dataset under another name; it is put back.
+/// Whatever is killed while chunks are joined, the consolidated metadata say which division counts.
 #[test]
-fn what_a_kill_left_is_put_back() {
+fn what_a_kill_leaves_is_a_whole_dataset() {
+    let folder = Folder::new();
+    let (path, other) = (folder.join("s.zarr"), folder.join("o.zarr"));
+    let sweep = sweep();
+    let store = computed(&sweep, &path, "1/1");
+    let before = format!("{:?}", values(&store));
+    let old = bytes(&path);
+    finish(computed(&sweep, &other, "1/1")).unwrap();
+    // Joined chunks are written, the metadata of one array too, and nothing was removed.
+    for (name, content) in bytes(&other) {
+        let joined = name.components().count() > 2 || name.starts_with(".joined");
+        if joined || name == Path::new("phase").join(".zarray") {
+            let file = path.join(name);
+            std::fs::create_dir_all(file.parent().unwrap()).unwrap();
+            std::fs::write(file, content).unwrap();
+        }
+    }
+    let again = Store::create_or_resume(&path, sweep.schema().clone()).unwrap();
+    assert_eq!(again.missing(), 0);
+    assert_eq!(format!("{:?}", values(&again)), before);
+    finish(again).unwrap();
+    assert_same(&path, &other);
+    // Everything is joined, and the old chunks are still there.
+    for (name, content) in old {
+        let file = path.join(&name);
+        let chunk = name
+            .file_name()
+            .is_some_and(|n| n.to_string_lossy().contains("0.0"));
+        if chunk && !file.exists() {
+            std::fs::write(file, content).unwrap();
+        }
+    }
+    assert_eq!(
+        format!("{:?}", values(&Store::open(&path).unwrap())),
+        before
+    );
+}
+
+/// A process that still reads the chunks of work finds their values in the joined ones.
+#[test]
+fn another_process_reads_on() {
     let folder = Folder::new();
     let path = folder.join("s.zarr");
     let sweep = sweep();
-    drop(computed(&sweep, &path, "1/1"));
-    let before = bytes(&path);
-    std::fs::rename(&path, folder.join(".s.zarr.old.tmp")).unwrap();
-    assert_eq!(Store::open(&path).unwrap().missing(), 0);
-    assert_eq!(bytes(&path), before);
+    let (one, other) = (
+        computed(&sweep, &path, "1/1"),
+        computed(&sweep, &path, "1/1"),
+    );
+    let before = format!("{:?}", values(&one));
+    finish(one).unwrap();
+    assert_eq!(format!("{:?}", values(&other)), before);
+    let there = bytes(&path);
+    assert_eq!(finish(other).unwrap().missing(), 0);
+    assert_eq!(bytes(&path), there);
 }
 
 /// A damaged chunk of a finished dataset is computed again.
@@ -121,11 +167,12 @@ fn a_damaged_chunk_is_computed_again() {
     let sweep = sweep();
     finish(computed(&sweep, &path, "1/1")).unwrap();
     let before = bytes(&path);
-    let file = path.join("tip_max").join("0.0.0");
+    let file = path.join("tip_max").join("0/0/0");
     assert!(file.exists());
     std::fs::write(&file, b"damaged").unwrap();
     let store = Store::create_or_resume(&path, sweep.schema().clone()).unwrap();
-    assert_eq!(store.missing(), 1);
+    // The joined chunk held every chunk of work.
+    assert_eq!(store.missing(), store.chunks());
     sweep.compute(&store, &share("1/1")).unwrap();
     finish(store).unwrap();
     assert_eq!(bytes(&path), before);

@@ -7,10 +7,12 @@ use nanotap_volterra::laws::entry::{Dimension, ParameterEntry};
 use nanotap_volterra::laws::polyline::Rows;
 use nanotap_volterra::laws::{self, TableLaw};
 
+use super::elastic::Elastic;
 use super::error::PhysicalError;
 use super::mapping::Scales;
 use super::reader::Reader;
 use super::remark::Remark;
+use super::sample::reduced_modulus;
 use super::tip::Tip;
 use crate::case::force_table::ForceTable;
 use crate::case::key::{Key, Laws};
@@ -239,8 +241,7 @@ impl SampleForce {
         let known = |key: Key| self.get(key).map(|value| value * unit(key));
         let distance = known(Key::SampleIntermolecularDistance).unwrap_or(DISTANCE);
         let square = 12.0 * PI * distance * distance;
-        let work = known(Key::SampleWorkOfAdhesion)
-            .or_else(|| known(Key::SampleHamaker).map(|hamaker| hamaker / square));
+        let work = self.work_of_adhesion();
         let value = |parameter: &ParameterEntry| {
             let key = key_of(parameter);
             let adhesion = match key {
@@ -271,9 +272,57 @@ impl SampleForce {
         all
     }
 
+    /// Work of adhesion w in J/m², stated or H/(12π a0²), if the laws have an adhesion.
+    fn work_of_adhesion(&self) -> Option<f64> {
+        self.get(Key::SampleWorkOfAdhesion).or_else(|| {
+            let distance = self.get(Key::SampleIntermolecularDistance)?;
+            Some(self.get(Key::SampleHamaker)? / (12.0 * PI * distance * distance))
+        })
+    }
+
+    /// E* of sample and tip in Pa, if the laws have the modulus of a sample.
+    pub fn reduced_modulus(&self) -> Option<f64> {
+        let solid = |modulus: Key, poisson: Key| {
+            Some(Elastic {
+                modulus: self.get(modulus).filter(|modulus| modulus.is_finite())?,
+                poisson: self.get(poisson)?,
+            })
+        };
+        let sample = solid(Key::SampleModulus, Key::SamplePoisson)?;
+        let tip = solid(Key::TipModulus, Key::TipPoisson);
+        Some(reduced_modulus(sample, tip))
+    }
+
+    /// Tabor's parameter μ = (R w²/(E*² a0³))^(1/3) of an elastic sphere with adhesion: how far the
+    /// adhesion deforms the contact beyond its range (Tabor, J. Colloid Interface Sci. 58, 2
+    /// (1977)).
+    pub fn tabor_parameter(&self) -> Option<f64> {
+        let (radius, distance) = (
+            self.get(Key::TipRadius)?,
+            self.get(Key::SampleIntermolecularDistance)?,
+        );
+        let strain = self.work_of_adhesion()? / (self.reduced_modulus()? * distance);
+        Some(nanotap_arithmetic::cbrt(
+            radius / distance * strain * strain,
+        ))
+    }
+
     /// The laws' names.
     pub fn name(&self) -> String {
         self.names().join(" + ")
+    }
+
+    /// What is wrong with the laws' adhesion at a Tabor parameter: that of Derjaguin, Muller and
+    /// Toporov holds of stiff contacts, that of Johnson, Kendall and Roberts of soft ones.
+    fn better_adhesion(&self, tabor: f64) -> Option<&'static str> {
+        let has = |name: &str| self.names().contains(&name);
+        if has("jkr") {
+            return (tabor < TABOR_LIMIT)
+                .then_some("holds above about 1, where the contact is soft; \"dmt\" holds below");
+        }
+        let rigid = has("dmt") || has("van-der-waals");
+        (rigid && tabor > TABOR_LIMIT)
+            .then_some("holds below about 1, where the contact is stiff; \"jkr\" holds above")
     }
 
     fn rows(&self) -> Option<Arc<Rows>> {
@@ -354,6 +403,16 @@ impl SampleForce {
                  to include its own compliance",
             ));
         }
+        if let Some(tabor) = self.tabor_parameter()
+            && let Some(better) = self.better_adhesion(tabor)
+        {
+            remarks.push(Remark::warning(format!(
+                "Tabor's parameter is {}: sample.law = \"{}\" {better} (Tabor 1977; Greenwood, \
+                 Proc. R. Soc. A 453, 1277 (1997))",
+                Kind::Number.format_digits(tabor, 3),
+                self.names().join(" + "),
+            )));
+        }
         if let (Some(radius), Some(distance)) = (
             self.get(Key::TipRadius),
             self.get(Key::SampleIntermolecularDistance),
@@ -385,6 +444,8 @@ const COMPARED: [&str; 6] = [
     "voigt-sphere-pulling",
     "thin-sphere",
 ];
+/// Tabor's parameter between the limits of stiff and of soft contacts.
+const TABOR_LIMIT: f64 = 1.0;
 /// Intermolecular distance where none is given.
 const DISTANCE: f64 = 0.165e-9;
 

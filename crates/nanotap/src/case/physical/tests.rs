@@ -916,6 +916,53 @@ fn errors_name_the_key_and_what_would_be_right() {
     assert!(huge.to_string().contains("alpha4"), "{huge}");
 }
 
+/// Tabor's parameter of a tip of 10 nm, and whether the law is warned of.
+fn tabor(law: &str, sample: &[&str]) -> (f64, bool) {
+    let lever = [
+        "cantilever.k=2 N/m",
+        "cantilever.f0=70 kHz",
+        "cantilever.Q=200",
+        "tip.radius=10 nm",
+        "drive.frequency=70 kHz",
+        "drive.free_amplitude=10 nm",
+        "gap.tip=8 nm",
+    ];
+    let words = lever.iter().chain(sample).map(|word| (*word).to_owned());
+    let words: Vec<String> = words.chain([format!("sample.law={law}")]).collect();
+    let case = Case::parse(None, &words).unwrap();
+    let force = case.physical().unwrap().sample.force.as_ref().unwrap();
+    let remarks = case.remarks().into_iter();
+    let warned = remarks
+        .filter(|r| r.severity == Severity::Warning)
+        .any(|r| r.text.contains("Tabor"));
+    (force.tabor_parameter().unwrap(), warned)
+}
+
+#[test]
+fn tabors_parameter_tells_where_dmt_and_jkr_hold() {
+    // (R w² / (E*² a0³))^(1/3) with a0 = 0.165 nm: w = 50 mJ/m² on E* = 2 MPa / (1 − 1/4), and
+    // on 4 GPa / (1 − 0.33²).
+    let strain = |reduced: f64| 0.05 / (reduced * 0.165e-9);
+    let expected = |reduced: f64| nanotap_arithmetic::cbrt(10.0 / 0.165 * strain(reduced).powi(2));
+    let soft = ["sample.material=PDMS", "sample.work_of_adhesion=50 mJ/m^2"];
+    let stiff = [
+        "sample.material=polystyrene",
+        "sample.work_of_adhesion=50 mJ/m^2",
+    ];
+    for (law, sample, reduced, is_wrong) in [
+        ("dmt", &soft, 2e6 / 0.75, true),
+        ("jkr", &soft, 2e6 / 0.75, false),
+        ("dmt", &stiff, 4e9 / (1.0 - 0.33 * 0.33), false),
+        ("jkr", &stiff, 4e9 / (1.0 - 0.33 * 0.33), true),
+    ] {
+        let (found, warned) = tabor(law, sample);
+        assert!((found / expected(reduced) - 1.0).abs() < 1e-12, "{found}");
+        assert_eq!(warned, is_wrong, "{law}, {found}");
+    }
+    // 92 of silicone rubber: far on the side of JKR.
+    assert!((tabor("dmt", &soft).0 - 92.0).abs() < 1.0);
+}
+
 #[test]
 fn a_beam_that_would_touch_is_warned_of() {
     let warned = |changes: &[Entry], word: &str| {

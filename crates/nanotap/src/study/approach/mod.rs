@@ -363,6 +363,9 @@ impl ApproachReport {
             ("free_amplitude", Kind::Length, self.free_amplitude),
             ("free_reach", Kind::Length, self.free_reach),
         ]);
+        if let (Some(numbers), Some(height)) = (&mut self.physical, self.beam_clearance) {
+            numbers.insert("beam_clearance", units.scaled(Kind::Length, height));
+        }
         let keeps_amplitude = self.modulation.is_some();
         let intervals = std::mem::take(&mut self.hysteresis).into_iter();
         self.hysteresis = intervals
@@ -683,7 +686,7 @@ impl ApproachOptions {
 }
 
 /// A speed in the model's unit of length a unit of time, as it is given of a case.
-fn speed_of(case: &Case, amount: &Amount) -> Result<f64, Error> {
+pub(in crate::study) fn speed_of(case: &Case, amount: &Amount) -> Result<f64, Error> {
     let refused = |error: String| Error::option("speed", error, "write it as in \"500 nm/s\"");
     let (read, unit) = match case.physical() {
         Some(view) => (Kind::Velocity.parse(amount.text()), view.scales.velocity),

@@ -1,0 +1,76 @@
+//! `nanotap noise`: thermal noise at a working point.
+
+use clap::Args;
+use nanotap::case::physical::Kind;
+use nanotap::study::noise::{NoiseOptions, NoiseReport, NoiseStudy};
+
+use crate::arguments::CaseArguments;
+use crate::failure::Failure;
+use crate::given_case::GivenCase;
+use crate::output::Output;
+use crate::request::Request;
+use crate::table::{Align, Table};
+use crate::threads::ThreadsArgument;
+use crate::{motion, number, progress, style};
+
+/// Thermal noise of amplitude and phase at a working point, in a lock-in amplifier with a
+/// first-order filter.
+#[derive(Args, Debug)]
+pub(crate) struct Arguments {
+    #[command(flatten)]
+    case: CaseArguments,
+
+    #[command(flatten)]
+    request: Request<NoiseOptions>,
+}
+
+pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure> {
+    let request = arguments.request.read()?;
+    let case = GivenCase::of(&arguments.case, output)?;
+    let report = progress::study::<NoiseStudy>(&case, &request, &ThreadsArgument::default())?;
+    output.study(&case, &report, |report| text(&case, report))
+}
+
+fn text(case: &GivenCase, report: &NoiseReport) -> String {
+    let length = |value| Kind::Length.format_digits(value, 4);
+    let degrees = |value| format!("{}°", number::significant(value, 4));
+    let heading = format!(
+        "{}: {}, thermal noise at {} K",
+        case.title(),
+        case.summary(),
+        number::chosen(report.temperature)
+    );
+    let mut table = Table::new([
+        ("", Align::Left),
+        ("mean", Align::Left),
+        ("rms noise", Align::Left),
+        ("of the free lever", Align::Left),
+    ]);
+    table.row([
+        "amplitude A".to_owned(),
+        length(report.amplitude),
+        length(report.amplitude_rms),
+        length(report.free_amplitude_rms),
+    ]);
+    table.row([
+        "phase lag".to_owned(),
+        degrees(report.phase),
+        degrees(report.phase_rms),
+        degrees(report.free_phase_rms),
+    ]);
+    let filter = format!(
+        "In a lock-in amplifier with a first-order filter of {} (noise bandwidth {}). Without a drive the tip \
+         moves by {} rms. The noise of the free lever's phase is that of a force gradient of {}. Noise of \
+         detector and sample is not included.",
+        Kind::Time.format_digits(report.time_constant, 4),
+        Kind::Frequency.format_digits(report.bandwidth, 4),
+        length(report.thermal_rms),
+        Kind::Stiffness.format_digits(report.force_gradient_min, 4),
+    );
+    format!(
+        "{}\n\n{}\n{}",
+        style::bold(&heading),
+        table.render(),
+        motion::paragraph(&filter)
+    )
+}

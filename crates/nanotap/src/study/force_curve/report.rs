@@ -1,0 +1,337 @@
+//! The report of a force curve, in SI.
+
+use std::fmt::Write as _;
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::Way;
+use super::fits::{ContactFit, fits};
+use super::path::Plan;
+use super::run::Run;
+use super::statics::{Rest, StaticsFound};
+use crate::case::key::Key;
+use crate::case::physical::force::SampleForce;
+use crate::case::physical::sample::Elastic;
+use crate::number::shortest;
+use crate::observe::OutOfRange;
+
+/// How the distance changes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum Waveform {
+    /// At a constant speed there and back
+    Ramp,
+    /// As one period of a cosine
+    Cosine,
+}
+
+/// A point of the curve.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct CurvePoint {
+    /// Direction.
+    pub way: Way,
+    /// Time from the start, s.
+    pub time: f64,
+    /// Distance z between tip and undeformed surface with the lever at deflection 0, m.
+    pub distance: f64,
+    /// Separation of tip and undeformed surface, z + deflection, m; minus the indentation in contact.
+    pub separation: f64,
+    /// Deflection of the tip, positive away from the sample, m.
+    pub deflection: f64,
+    /// Force of the sample on the tip, positive if it repels, N.
+    pub force: f64,
+    /// Whether tip and sample touch.
+    pub contact: bool,
+    /// Amplitude of the deflection at the drive's frequency over the drive period before, m.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub amplitude: Option<f64>,
+    /// Its phase lag behind the drive, degrees.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub phase: Option<f64>,
+}
+
+/// The lever at rest.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct StaticPoint {
+    /// Distance, m.
+    pub distance: f64,
+    /// Separation, m.
+    pub separation: f64,
+    /// Deflection, m.
+    pub deflection: f64,
+    /// Force, N.
+    pub force: f64,
+}
+
+/// A branch on which the lever can rest.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct StaticBranch {
+    /// Whether tip and sample touch.
+    pub contact: bool,
+    /// Whether the rest is stable.
+    pub stable: bool,
+    /// Its points, by falling separation.
+    pub points: Vec<StaticPoint>,
+}
+
+/// A jump of the lever at rest from the end of a branch, a fold or the end of the law's branch.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct StaticJump {
+    /// Direction.
+    pub way: Way,
+    /// End of the branch.
+    pub before: StaticPoint,
+    /// Where the lever rests after the jump.
+    pub after: Option<StaticPoint>,
+}
+
+/// Branches of the lever at rest.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct Statics {
+    /// Branches between the ends of the curve.
+    pub branches: Vec<StaticBranch>,
+    /// Jumps of the lever moved without inertia, in order.
+    pub jumps: Vec<StaticJump>,
+    /// Lowest force in contact on the retract up to the first jump.
+    pub pull_off: Option<StaticPoint>,
+}
+
+/// What a force curve says.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct ForceCurveSummary {
+    /// Distance at which the tip first touches on the approach, m.
+    pub contact_begin: Option<f64>,
+    /// Distance at which the tip last touches on the retract, m.
+    pub contact_end: Option<f64>,
+    /// Largest force, N.
+    pub peak_force: f64,
+    /// Adhesion force: minus the lowest force of the retract, N.
+    pub adhesion_force: f64,
+    /// Minus the lowest force of the approach, N.
+    pub attraction: f64,
+    /// Indentation: minus the least separation at points and ends of drive periods, m.
+    pub indentation: f64,
+    /// Work of adhesion of the curve, −∫F dz over the parts of the retract where the sample
+    /// attracts, J.
+    pub adhesion_energy: f64,
+    /// Energy lost in the cycle, −∮F dz, J.
+    pub energy_lost: f64,
+    /// Part of it that the tip gives to the sample, J; the rest rings down in the lever.
+    pub dissipation: f64,
+}
+
+/// A force curve with its static branches.
+#[derive(Clone, Debug, Serialize, JsonSchema)]
+pub struct ForceCurveReport {
+    /// How the distance changes.
+    pub waveform: Waveform,
+    /// First distance, m.
+    pub from: f64,
+    /// Distance at which the approach turns, m.
+    pub to: f64,
+    /// Speed, of a cosine the largest, m/s.
+    pub speed: f64,
+    /// Duration of the cycle, s.
+    pub duration: f64,
+    /// Whether the lever is driven.
+    pub driven: bool,
+    /// Stretches of the exact flow.
+    pub stretches: usize,
+    /// Adhesion force: minus the lowest force of the retract, N.
+    pub adhesion: f64,
+    /// Distance at which the tip first touches on the approach, m.
+    pub snap_in: Option<f64>,
+    /// Distance at which the tip last touches on the retract, m.
+    pub pull_off: Option<f64>,
+    /// Largest force, N.
+    pub peak_force: f64,
+    /// All results.
+    pub summary: ForceCurveSummary,
+    /// Reduced modulus E* of tip and sample of the case, Pa, if its law has one.
+    pub reduced_modulus: Option<f64>,
+    /// Young's modulus of the sample of the case, Pa, if its law has one.
+    pub modulus: Option<f64>,
+    /// Fits of contact models to the unloading part.
+    pub fits: Vec<ContactFit>,
+    /// Branches of the lever at rest.
+    pub statics: Statics,
+    /// The points.
+    #[serde(rename = "table")]
+    pub points: Vec<CurvePoint>,
+    /// What puts the results in doubt.
+    pub warnings: Vec<String>,
+}
+
+/// Part of a resonance frequency from which the inertia of a moving base matters.
+const FAST: f64 = 0.1;
+
+/// The report of a run.
+pub(super) fn report(plan: &Plan<'_>, statics: &StaticsFound, run: &Run) -> ForceCurveReport {
+    let scales = &plan.view.scales;
+    let rest = |rest: &Rest| StaticPoint {
+        distance: rest.distance * scales.length,
+        separation: rest.gap * scales.length,
+        deflection: (rest.gap - rest.distance) * scales.length,
+        force: rest.force * scales.force,
+    };
+    let points: Vec<CurvePoint> = run
+        .rows
+        .iter()
+        .map(|row| CurvePoint {
+            way: row.way,
+            time: row.time * scales.time,
+            distance: row.distance * scales.length,
+            separation: row.signals.gap * scales.length,
+            deflection: row.signals.deflection * scales.length,
+            force: row.signals.force * scales.force,
+            contact: row.signals.contact,
+            amplitude: row
+                .oscillation
+                .map(|[amplitude, _]| amplitude * scales.length),
+            phase: row.oscillation.map(|[_, phase]| phase),
+        })
+        .collect();
+    let (peak, adhesion) = (run.peak_force * scales.force, -run.lowest[1] * scales.force);
+    let force = plan.view.sample.force.as_ref();
+    let hertz = plan.view.sample.hertz.map(|hertz| hertz.reduced_modulus);
+    let reduced_modulus = force.and_then(SampleForce::reduced_modulus).or(hertz);
+    let sample = force.and_then(|force| {
+        let [modulus, poisson] = [Key::SampleModulus, Key::SamplePoisson].map(|key| force.get(key));
+        Some(Elastic {
+            modulus: modulus?,
+            poisson: poisson?,
+        })
+    });
+    let radius = plan.view.value(Key::TipRadius);
+    let sample_modulus = |reduced: f64| {
+        let sample = sample?;
+        let tip = 1.0 / reduced_modulus? - 1.0 / sample.plane_strain_modulus();
+        let own = 1.0 / (1.0 / reduced - tip);
+        (own > 0.0).then_some(own * (1.0 - sample.poisson * sample.poisson))
+    };
+    let span = peak + adhesion;
+    let [low, high] = plan.fit.map(|part| part * span - adhesion);
+    let unloading = points.iter().filter(|point| {
+        point.way == Way::Retract && point.contact && (low..=high).contains(&point.force)
+    });
+    let unloading: Vec<(f64, f64)> = unloading.map(|p| (p.separation, p.force)).collect();
+    let fits = match radius {
+        Some(radius) if !plan.driven => fits(&unloading, radius, adhesion, sample_modulus),
+        _ => Vec::new(),
+    };
+    let speed = plan.path.speed.map_or(
+        0.5 * (plan.path.from - plan.path.to) * plan.path.omega,
+        |speed| speed,
+    );
+    let violated = OutOfRange::within(&plan.model, run.least_gap);
+    let mut warnings: Vec<String> = violated.iter().map(ToString::to_string).collect();
+    let frequency = plan.path.omega * scales.frequency;
+    if plan.path.speed.is_none() && frequency > FAST * plan.view.lever.f0 {
+        warnings.push(format!(
+            "the cosine's frequency is {:.2} of f0: the inertia of a moving base is left out, the \
+             sample moves instead",
+            frequency / plan.view.lever.f0
+        ));
+    }
+    let ends_in_contact = points.last().is_some_and(|point| point.contact);
+    if ends_in_contact {
+        warnings.push(
+            "the tip still touches at the end of the retract: the adhesion force and the energies \
+             are those of an open curve; give a larger {from}"
+                .to_owned(),
+        );
+    }
+    if fits.is_empty() && !plan.driven && radius.is_some() && peak > 0.0 {
+        warnings
+            .push("too few points of the unloading part for a fit: give more {points}".to_owned());
+    }
+    let distance = |z: Option<f64>| z.map(|z| z * scales.length);
+    let (snap_in, pull_off) = (distance(run.contact_begin), distance(run.contact_end));
+    ForceCurveReport {
+        waveform: if plan.path.speed.is_some() {
+            Waveform::Ramp
+        } else {
+            Waveform::Cosine
+        },
+        from: plan.path.from * scales.length,
+        to: plan.path.to * scales.length,
+        speed: speed * scales.velocity,
+        duration: plan.points as f64 * plan.step * scales.time,
+        driven: plan.driven,
+        stretches: run.stretches,
+        adhesion,
+        snap_in,
+        pull_off,
+        peak_force: peak,
+        summary: ForceCurveSummary {
+            contact_begin: snap_in,
+            contact_end: pull_off,
+            peak_force: peak,
+            adhesion_force: adhesion,
+            attraction: -run.lowest[0] * scales.force,
+            indentation: -run.least_gap * scales.length,
+            adhesion_energy: run.adhesion_energy * scales.energy,
+            energy_lost: run.energy_lost * scales.energy,
+            dissipation: run.dissipation * scales.energy,
+        },
+        reduced_modulus,
+        modulus: sample.map(|sample| sample.modulus),
+        fits,
+        statics: Statics {
+            branches: statics
+                .pieces
+                .iter()
+                .map(|piece| StaticBranch {
+                    contact: piece.contact,
+                    stable: piece.stable,
+                    points: piece.rests.iter().map(rest).collect(),
+                })
+                .collect(),
+            jumps: statics
+                .jumps
+                .iter()
+                .map(|jump| StaticJump {
+                    way: jump.way,
+                    before: rest(&jump.before),
+                    after: jump.after.as_ref().map(rest),
+                })
+                .collect(),
+            pull_off: statics.pull_off.as_ref().map(rest),
+        },
+        points,
+        warnings,
+    }
+}
+
+/// A row a point, in SI.
+pub fn points_csv(report: &ForceCurveReport) -> String {
+    let mut csv =
+        String::from("way,time (s),distance (m),separation (m),deflection (m),force (N),contact");
+    if report.driven {
+        csv.push_str(",amplitude (m),phase (deg)");
+    }
+    csv.push('\n');
+    for point in &report.points {
+        let values = [
+            point.time,
+            point.distance,
+            point.separation,
+            point.deflection,
+            point.force,
+        ];
+        csv.push_str(point.way.name());
+        for value in values {
+            // Writing to a string does not fail.
+            let _ = write!(csv, ",{}", shortest(value));
+        }
+        let _ = write!(csv, ",{}", u8::from(point.contact));
+        if report.driven {
+            for value in [point.amplitude, point.phase] {
+                let _ = write!(csv, ",{}", value.map(shortest).unwrap_or_default());
+            }
+        }
+        csv.push('\n');
+    }
+    csv
+}

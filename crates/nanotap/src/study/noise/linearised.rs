@@ -1,0 +1,243 @@
+//! Small disturbances of an orbit and of the lock-in amplifier that reads it, under a random force.
+//!
+//! Disturbances of the state are carried from one instant of the orbit to the next by central
+//! differences of the flow, contacts and their ends included. The lock-in amplifier forms
+//! `τ ż = 2 W e^{−iΩt} − z`; its real and imaginary part are two more states. Over the period the
+//! disturbance is multiplied by a matrix and gains a covariance; its stationary covariance P obeys
+//! `P = A P Aᵀ + Q`.
+
+use nalgebra::{Complex, DMatrix, DVector};
+use nanotap_flow::Flow;
+
+use super::Thermal;
+use crate::Error;
+use crate::control::Control;
+use crate::model::{Model, MotionError};
+use crate::study::orbit::OrbitReport;
+
+/// Instants in a drive period at least.
+const STEPS: usize = 128;
+/// Instants in a period of the fastest mode.
+const STEPS_OF_FASTEST: f64 = 32.0;
+/// Instants in a drive period at most.
+const MOST_STEPS: usize = 20_000;
+/// Size of a disturbance over that of the motion.
+const DISTURBANCE: f64 = 1e-5;
+/// Doublings of the time over which covariance is gathered: 2⁶⁰ periods.
+const DOUBLINGS: usize = 60;
+
+/// A lock-in amplifier with a first-order filter.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct LockIn {
+    /// Time constant in the model's unit of time.
+    pub(super) time_constant: f64,
+}
+
+/// One period of an orbit, linearised.
+pub(super) struct Linearised {
+    /// What multiplies a disturbance of the state, and of the lock-in amplifier's two parts.
+    factor: DMatrix<f64>,
+    /// The covariance that the period adds.
+    added: DMatrix<f64>,
+    /// What the lock-in amplifier reads without noise.
+    pub(super) read: Complex<f64>,
+}
+
+/// The flow of a model from any instant of the drive period.
+enum Stepper {
+    Linear(Flow),
+    /// With the branch of the law at the beginning of the step, where the law remembers it.
+    Nonlinear(Box<nanotap_volterra::Flow>),
+}
+
+impl Stepper {
+    fn new(model: &Model) -> Self {
+        match &model.nonlinear {
+            None => Self::Linear(Flow::new(model.system.clone())),
+            Some(nonlinear) => Self::Nonlinear(Box::new(nanotap_volterra::Flow::new(
+                nonlinear.system.clone(),
+            ))),
+        }
+    }
+
+    /// State and branch after a step from time `from` to `to` of a drive period; `whole` is its length.
+    fn step(
+        &mut self,
+        state: &[f64],
+        branch: Option<usize>,
+        [from, to, whole]: [f64; 3],
+    ) -> Result<(Vec<f64>, Option<usize>), MotionError> {
+        let mut after = state.to_vec();
+        match self {
+            Self::Linear(flow) => {
+                flow.start(state, from)?;
+                if to < whole {
+                    flow.run_until(to, &mut ())?;
+                } else {
+                    flow.run_period(&mut ())?;
+                }
+                flow.state(&mut after);
+                Ok((after, None))
+            }
+            Self::Nonlinear(flow) => {
+                match branch {
+                    Some(branch) => flow.start_on(state, from, branch)?,
+                    None => flow.start(state, from)?,
+                }
+                flow.run_until(to)?;
+                flow.state(&mut after);
+                Ok((after, branch.map(|_| flow.branch())))
+            }
+        }
+    }
+}
+
+impl Linearised {
+    /// Linearises the flow along an orbit.
+    pub(super) fn along(
+        model: &Model,
+        orbit: &OrbitReport,
+        thermal: &Thermal,
+        lock_in: LockIn,
+        control: &Control<'_>,
+    ) -> Result<Self, Error> {
+        let period = model.period();
+        let omega = model.frequency();
+        let diffusion = thermal.diffusion();
+        let modes = diffusion.nrows();
+        let (mut state, mut branch) = split(model, &orbit.state);
+        let n = state.len();
+        let steps = steps_of(thermal.fastest() / omega);
+        let h = period / steps as f64;
+        let tau = lock_in.time_constant;
+        let fade = nanotap_arithmetic::exp(-h / tau);
+        let tip = DVector::from_iterator(n, model.tip.row.iter().copied().take(n));
+        let deflection =
+            |state: &[f64]| -> f64 { state.iter().zip(&tip).map(|(x, row)| x * row).sum() };
+        let turn = |t: f64| {
+            Complex::new(
+                nanotap_arithmetic::cos(omega * t),
+                -nanotap_arithmetic::sin(omega * t),
+            )
+        };
+        let mut force = DMatrix::zeros(n, n);
+        force
+            .view_mut((modes, modes), (modes, modes))
+            .copy_from(&diffusion);
+        let sizes = sizes(orbit, omega, n, modes);
+        let mut stepper = Stepper::new(model);
+        let mut factor = DMatrix::identity(n + 2, n + 2);
+        let mut added = DMatrix::zeros(n + 2, n + 2);
+        let mut read = Complex::new(0.0, 0.0);
+        for _ in 0..orbit.period {
+            for step in 0..steps {
+                if control.is_cancelled() {
+                    return Err(Error::stopped());
+                }
+                let times = [step as f64 * h, (step + 1) as f64 * h, period];
+                let (after, next) = stepper.step(&state, branch, times)?;
+                let mut carried = DMatrix::zeros(n, n);
+                for column in 0..n {
+                    let mut side = |sign: f64| {
+                        let mut moved = state.clone();
+                        moved[column] += sign * sizes[column];
+                        stepper.step(&moved, branch, times)
+                    };
+                    let ((high, _), (low, _)) = (side(1.0)?, side(-1.0)?);
+                    for row in 0..n {
+                        carried[(row, column)] = 0.5 * (high[row] - low[row]) / sizes[column];
+                    }
+                }
+                // The filter gathers the deflection by the trapezoidal rule, which is accurate beyond
+                // all orders over whole periods.
+                let (before, behind) = (
+                    turn(times[0]) * (h * fade / tau),
+                    turn(times[1]) * (h / tau),
+                );
+                read = read * fade + before * deflection(&state) + behind * deflection(&after);
+                let mut one = DMatrix::zeros(n + 2, n + 2);
+                one.view_mut((0, 0), (n, n)).copy_from(&carried);
+                let seen = carried.tr_mul(&tip);
+                for column in 0..n {
+                    let through = before * tip[column] + behind * seen[column];
+                    one[(n, column)] = through.re;
+                    one[(n + 1, column)] = through.im;
+                }
+                one[(n, n)] = fade;
+                one[(n + 1, n + 1)] = fade;
+                let noise = 0.5 * h * (&carried * &force * carried.transpose() + &force);
+                let mut enters = DMatrix::zeros(n + 2, n);
+                enters.view_mut((0, 0), (n, n)).fill_with_identity();
+                for column in 0..n {
+                    let through = behind * tip[column];
+                    enters[(n, column)] = through.re;
+                    enters[(n + 1, column)] = through.im;
+                }
+                factor = &one * factor;
+                added = &one * added * one.transpose() + &enters * noise * enters.transpose();
+                (state, branch) = (after, next);
+            }
+        }
+        let left = nanotap_arithmetic::exp(-period * orbit.period as f64 / tau);
+        Ok(Self {
+            factor,
+            added,
+            read: read / (1.0 - left),
+        })
+    }
+
+    /// The covariance in the long run.
+    pub(super) fn stationary(&self) -> Result<DMatrix<f64>, Error> {
+        let (mut covariance, mut factor) = (self.added.clone(), self.factor.clone());
+        for _ in 0..DOUBLINGS {
+            let more = &factor * &covariance * factor.transpose();
+            covariance += &more;
+            if more.norm() <= f64::EPSILON * covariance.norm() {
+                return Ok(covariance);
+            }
+            factor = &factor * &factor;
+        }
+        Err(Error::numerics(
+            "disturbances of this orbit do not die out: its noise grows without bound",
+        ))
+    }
+}
+
+/// The entries of a state that vary continuously, and the branch that the law remembers.
+fn split(model: &Model, state: &[f64]) -> (Vec<f64>, Option<usize>) {
+    match &model.nonlinear {
+        None => (state.to_vec(), None),
+        Some(nonlinear) => {
+            let n = nonlinear.system.dimension();
+            let branch = state
+                .get(n)
+                .filter(|branch| nonlinear.remembers && **branch >= 0.0);
+            (
+                state[..n].to_vec(),
+                branch.map(|branch| branch.round() as usize),
+            )
+        }
+    }
+}
+
+/// Instants in a drive period: enough for the fastest free mode, whose frequency over that of the
+/// drive is given.
+fn steps_of(fastest: f64) -> usize {
+    let wanted = STEPS_OF_FASTEST * fastest;
+    (wanted.ceil() as usize).clamp(STEPS, MOST_STEPS)
+}
+
+/// How far each entry of the state is displaced.
+fn sizes(orbit: &OrbitReport, omega: f64, n: usize, modes: usize) -> Vec<f64> {
+    let amplitude = orbit
+        .observables
+        .first_harmonic
+        .abs()
+        .max(f64::MIN_POSITIVE);
+    let size = |k: usize| {
+        let is_velocity = k >= modes && k < 2 * modes;
+        let unit = if is_velocity { omega } else { 1.0 };
+        DISTURBANCE * amplitude * unit
+    };
+    (0..n).map(size).collect()
+}

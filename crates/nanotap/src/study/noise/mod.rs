@@ -1,0 +1,310 @@
+//! Thermal noise at a working point: of the lever alone, and in what a lock-in amplifier reads while
+//! the tip taps.
+//!
+//! By the fluctuation–dissipation theorem the lever's damping matrix C comes with a random force of
+//! intensity 2 k_B T C on its modes. Its effect is small, so it obeys the linearisation along the
+//! orbit: see `linearised.rs`. Noise of the sample and of the detector is not included, and neither
+//! are escapes to another state, for which the noise is large.
+
+mod linearised;
+
+use nalgebra::{Complex, DMatrix, DVector};
+use nanotap_arithmetic::ComplexFunctions as _;
+use schemars::JsonSchema;
+use serde::Serialize;
+
+use crate::Error;
+use crate::case::Case;
+use crate::case::physical::Kind;
+use crate::control::Control;
+use crate::model::cantilever::Cantilever;
+use crate::model::galerkin::Galerkin;
+use crate::model::parameter::Parameter;
+use crate::model::{Model, beam::Modes};
+use crate::observe::ObservableSet;
+use crate::study::orbit::{OrbitOptions, OrbitReport, OrbitStudy};
+use crate::study::request::options;
+use crate::study::value::Amount;
+use crate::study::{Study, cantilever};
+use linearised::{Linearised, LockIn};
+
+/// Boltzmann's constant in J/K; exact in the SI of 2019.
+pub const BOLTZMANN: f64 = 1.380_649e-23;
+
+/// Thermal noise at a working point. All quantities are in SI.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct NoiseReport {
+    /// Temperature in K.
+    pub temperature: f64,
+    /// Time constant of the lock-in amplifier's first-order filter in s.
+    pub time_constant: f64,
+    /// Its noise bandwidth in Hz, 1 over four time constants.
+    pub bandwidth: f64,
+    /// Root mean square of the tip deflection of the lever alone, without a drive, in m.
+    pub thermal_rms: f64,
+    /// Period of the orbit in drive periods.
+    pub period: usize,
+    /// Amplitude that the lock-in amplifier reads, in m.
+    #[serde(rename = "A")]
+    pub amplitude: f64,
+    /// Root mean square of the noise of this amplitude in m.
+    pub amplitude_rms: f64,
+    /// Phase that the lock-in amplifier reads, behind the drive, in degrees.
+    pub phase: f64,
+    /// Root mean square of the noise of this phase in degrees.
+    pub phase_rms: f64,
+    /// The same of the amplitude of the free lever under the same drive, in m.
+    pub free_amplitude_rms: f64,
+    /// The same of its phase, in degrees.
+    pub free_phase_rms: f64,
+    /// Force gradient in N/m that turns the phase of the free lever by its noise.
+    pub force_gradient_min: f64,
+}
+
+options! {
+    /// Options of the thermal noise.
+    pub struct NoiseOptions {
+        /// Temperature in kelvin
+        #[schemars(range(min = 0), extend("x-value" = "K"))]
+        pub temperature: f64 = 295.0,
+        /// Time constant of the lock-in amplifier's first-order filter; default: 0.25 ms
+        #[schemars(extend("x-value" = "TIME"))]
+        pub time_constant: Option<Amount> = None,
+        /// Noise bandwidth of the lock-in amplifier, 1 over four time constants, in place of it
+        #[schemars(extend("x-value" = "FREQUENCY"))]
+        pub bandwidth: Option<Amount> = None,
+    }
+}
+
+/// Time constant in s if none is given: a bandwidth of 1 kHz.
+const TIME_CONSTANT: f64 = 0.25e-3;
+
+impl NoiseOptions {
+    /// The time constant in s.
+    fn time_constant(&self) -> Result<f64, Error> {
+        let positive = |option, kind: Kind, amount: &Amount| {
+            let value = kind.parse(amount.text());
+            let value = value.map_err(|error| error.to_string()).and_then(|value| {
+                let valid = value > 0.0 && value.is_finite();
+                valid
+                    .then_some(value)
+                    .ok_or_else(|| format!("expected {} above zero, got {amount}", kind.noun()))
+            });
+            value.map_err(|words| {
+                Error::option(option, words, "write it as in \"1 ms\" or \"1 kHz\"")
+            })
+        };
+        match (&self.time_constant, &self.bandwidth) {
+            (Some(_), Some(_)) => Err(Error::input(
+                "the time constant and the bandwidth are both given",
+                "leave {time_constant} or {bandwidth} out",
+            )),
+            (Some(time), None) => positive("time_constant", Kind::Time, time),
+            (None, Some(frequency)) => {
+                Ok(0.25 / positive("bandwidth", Kind::Frequency, frequency)?)
+            }
+            (None, None) => Ok(TIME_CONSTANT),
+        }
+    }
+}
+
+/// Thermal noise.
+///
+/// ```
+/// use nanotap::case::Case;
+/// use nanotap::control::Control;
+/// use nanotap::study::Study;
+/// use nanotap::study::noise::{NoiseOptions, NoiseStudy};
+///
+/// let words = [
+///     "cantilever.k=40 N/m", "cantilever.f0=300 kHz", "cantilever.Q=400", "modes=1",
+///     "sample.stiffness=20 N/m", "gap.tip=1 um",
+///     "drive.actuation=tip", "drive.frequency_ratio=1", "drive.free_amplitude=10 nm",
+/// ];
+/// let case = Case::parse(None, &words.map(str::to_owned))?;
+/// let found = NoiseStudy::run(&case, &NoiseOptions::default(), &Control::default())?;
+/// // √(k_B T/k) of one mode, which is 3 % stiffer than the beam.
+/// assert!((found.thermal_rms - 9.94e-12).abs() < 1e-14);
+/// # Ok::<(), nanotap::Error>(())
+/// ```
+#[derive(Clone, Copy, Debug)]
+pub struct NoiseStudy;
+
+impl Study for NoiseStudy {
+    const NAME: &'static str = "noise";
+    const ABOUT: &'static str = "Compute thermal noise of amplitude and phase at a working point";
+    const COUNTED: &'static str = "steps";
+    type Options = NoiseOptions;
+    type Report = NoiseReport;
+
+    fn compute(
+        case: &Case,
+        options: &NoiseOptions,
+        control: &Control<'_>,
+    ) -> Result<NoiseReport, Error> {
+        let lever = cantilever(case, Self::NAME)?;
+        let view = case.physical().ok_or_else(|| {
+            Error::input(
+                "a dimensionless case has no unit of energy, and a temperature is one",
+                "give the lever and the sample in physical quantities",
+            )
+        })?;
+        if lever.tone2_ratio.is_some() {
+            return Err(Error::input(
+                "the noise under two tones is not known here",
+                "leave out the second tone of the drive",
+            ));
+        }
+        if !(options.temperature >= 0.0 && options.temperature.is_finite()) {
+            return Err(Error::option(
+                "temperature",
+                format!(
+                    "expected a temperature in kelvin, got {}",
+                    options.temperature
+                ),
+                "give 295",
+            ));
+        }
+        let scales = view.scales;
+        let time_constant = options.time_constant()?;
+        let thermal = Thermal {
+            equations: Galerkin::new(lever)
+                .map_err(|error| Error::input(error.to_string(), "change the case"))?,
+            energy: BOLTZMANN * options.temperature / scales.energy,
+            tip: Modes::new(lever.modes)
+                .map_err(|error| Error::input(error.to_string(), "change {modes}"))?
+                .shapes(1.0),
+        };
+        let lock_in = LockIn {
+            time_constant: time_constant / scales.time,
+        };
+        let tapping = thermal.reading(case, lock_in, control)?;
+        let free = thermal.reading(&free(lever), lock_in, control)?;
+        // A spring κ at the tip changes the free response by 1/(1 + κ χ).
+        let turn = thermal.compliance(lever.omega).im.abs() * scales.length / scales.force;
+        Ok(NoiseReport {
+            temperature: options.temperature,
+            time_constant,
+            bandwidth: 0.25 / time_constant,
+            thermal_rms: scales.length * thermal.tip_rms(),
+            period: tapping.period,
+            amplitude: scales.length * tapping.amplitude,
+            amplitude_rms: scales.length * tapping.amplitude_rms,
+            phase: tapping.phase.to_degrees(),
+            phase_rms: tapping.phase_rms.to_degrees(),
+            free_amplitude_rms: scales.length * free.amplitude_rms,
+            free_phase_rms: free.phase_rms.to_degrees(),
+            force_gradient_min: free.phase_rms / turn,
+        })
+    }
+}
+
+/// The same lever under the same drive, so far from the sample that it never touches.
+fn free(lever: &Cantilever) -> Case {
+    let mut free = lever.clone();
+    free.law = None;
+    let far = 1.0 + free.alpha5.abs();
+    Case::from(free.with(Parameter::Alpha5, 1e3 * far))
+}
+
+/// The lever's equations with the thermal force on them, in the model's units.
+struct Thermal {
+    equations: Galerkin,
+    /// k_B T.
+    energy: f64,
+    /// Mode shapes at the tip.
+    tip: DVector<f64>,
+}
+
+/// What a lock-in amplifier reads.
+struct Reading {
+    period: usize,
+    amplitude: f64,
+    amplitude_rms: f64,
+    /// Radians.
+    phase: f64,
+    phase_rms: f64,
+}
+
+impl Thermal {
+    /// Root mean square of the deflection by equipartition, √(k_B T φᵀ K⁻¹ φ).
+    fn tip_rms(&self) -> f64 {
+        let compliance = self.equations.stiffness[0].clone().lu().solve(&self.tip);
+        (self.energy * compliance.map_or(f64::NAN, |a| a.dot(&self.tip))).sqrt()
+    }
+
+    /// Deflection of the free tip by a unit force at the tip at a frequency.
+    fn compliance(&self, omega: f64) -> Complex<f64> {
+        let of = |matrix: &DMatrix<f64>, factor: Complex<f64>| matrix.map(|entry| factor * entry);
+        let matrix = of(&self.equations.stiffness[0], Complex::new(1.0, 0.0))
+            + of(&self.equations.mass, Complex::new(-omega * omega, 0.0))
+            + of(&self.equations.damping[0], Complex::new(0.0, omega));
+        let tip = self.tip.map(|entry| Complex::new(entry, 0.0));
+        let bent = matrix.lu().solve(&tip);
+        bent.map_or(Complex::new(f64::NAN, 0.0), |bent| bent.dot(&tip))
+    }
+
+    /// The highest frequency of the modes, from above.
+    fn fastest(&self) -> f64 {
+        let inverse = self.equations.mass.clone().lu();
+        let squares = inverse.solve(&self.equations.stiffness[0]);
+        squares.map_or(0.0, |squares| squares.trace().sqrt())
+    }
+
+    /// Covariance that a unit of time adds to the velocities: 2 k_B T M⁻¹ C M⁻¹.
+    fn diffusion(&self) -> DMatrix<f64> {
+        let mass = self.equations.mass.clone().lu();
+        let half = mass.solve(&self.equations.damping[0]).unwrap_or_default();
+        let whole = mass.solve(&half.transpose()).unwrap_or_default();
+        2.0 * self.energy * whole
+    }
+
+    /// The reading at the orbit of a case.
+    fn reading(
+        &self,
+        case: &Case,
+        lock_in: LockIn,
+        control: &Control<'_>,
+    ) -> Result<Reading, Error> {
+        let options = OrbitOptions {
+            harmonics: 0,
+            observables: Some(ObservableSet::FIRST_HARMONIC),
+            ..OrbitOptions::default()
+        };
+        let orbit = OrbitStudy::run(case, &options, control)?.motion;
+        if !orbit.stable {
+            return Err(Error::numerics(
+                "the orbit at this working point is unstable: noise drives the lever away from it",
+            ));
+        }
+        let model = case.model()?;
+        self.reading_at(&model, &orbit, lock_in, control)
+    }
+
+    fn reading_at(
+        &self,
+        model: &Model,
+        orbit: &OrbitReport,
+        lock_in: LockIn,
+        control: &Control<'_>,
+    ) -> Result<Reading, Error> {
+        let found = Linearised::along(model, orbit, self, lock_in, control)?;
+        let covariance = found.stationary()?;
+        let last = covariance.nrows() - 2;
+        let read = found.read;
+        // Without the ripple at twice the drive's frequency that the filter lets through.
+        let amplitude = orbit.observables.first_harmonic;
+        let size = read.modulus();
+        let along = DVector::from_vec(vec![read.re / size, read.im / size]);
+        let across = DVector::from_vec(vec![-read.im / size, read.re / size]);
+        let block = covariance.view((last, last), (2, 2));
+        let deviation = |way: &DVector<f64>| way.dot(&(block * way)).max(0.0).sqrt();
+        Ok(Reading {
+            period: orbit.period,
+            amplitude,
+            amplitude_rms: deviation(&along),
+            phase: orbit.observables.phase.to_radians(),
+            phase_rms: deviation(&across) / amplitude,
+        })
+    }
+}

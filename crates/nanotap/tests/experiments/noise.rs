@@ -1,0 +1,252 @@
+//! Thermal noise against closed forms of the free lever, another engine, and a long stochastic
+//! simulation.
+
+use nanotap::case::Case;
+use nanotap::control::Control;
+use nanotap::model::galerkin::Galerkin;
+use nanotap::study::Study as _;
+use nanotap::study::noise::{BOLTZMANN, NoiseOptions, NoiseReport, NoiseStudy};
+use nanotap_flow::Flow;
+
+/// A lever of 2 N/m at 70 kHz, driven by a force at its tip, with further words.
+fn lever(words: &[&str]) -> Case {
+    let mut all = vec![
+        "cantilever.k=2 N/m",
+        "cantilever.f0=70 kHz",
+        "drive.actuation=tip",
+        "drive.frequency_ratio=1",
+        "drive.free_amplitude=10 nm",
+    ];
+    all.extend(words);
+    let words: Vec<String> = all.iter().map(|word| (*word).to_owned()).collect();
+    Case::parse(None, &words).unwrap()
+}
+
+fn noise(case: &Case, time_constant: &str) -> NoiseReport {
+    let options = NoiseOptions {
+        time_constant: Some(time_constant.into()),
+        ..NoiseOptions::default()
+    };
+    NoiseStudy::run(case, &options, &Control::default()).unwrap()
+}
+
+/// √(k_B T Σ 1/kᵢ), where the modes together are stiffer than the beam by a known part: their
+/// static compliance is Σ 1/kᵢ.
+#[test]
+fn the_undriven_tip_moves_by_equipartition() {
+    for (modes, together) in [(1, 1.030_197), (3, 1.001_446)] {
+        let case = lever(&[
+            &format!("modes={modes}"),
+            "cantilever.Q=100",
+            "sample.stiffness=1 N/m",
+            "gap.tip=1 um",
+        ]);
+        let rms = noise(&case, "1 ms").thermal_rms;
+        let expected = (BOLTZMANN * 295.0 / (2.0 * together)).sqrt();
+        assert!(
+            (rms / expected - 1.0).abs() < 2e-4,
+            "{modes}: {rms} {expected}"
+        );
+    }
+}
+
+/// At resonance, behind a first-order filter of time constant τ, the amplitude of one mode has the
+/// rms √(k_B T/k₁ · t_c/(t_c + τ)) with t_c = 2Q/ω, and so has the phase times the amplitude; both
+/// up to 1/Q.
+#[test]
+fn the_free_lever_has_the_noise_of_its_resonance() {
+    for (quality, time) in [(100.0, 2e-4), (400.0, 1e-3), (2000.0, 1e-2)] {
+        let case = lever(&[
+            "modes=1",
+            &format!("cantilever.Q={quality}"),
+            "sample.stiffness=1 N/m",
+            "gap.tip=1 um",
+        ]);
+        let found = noise(&case, &format!("{time} s"));
+        let correlation = 2.0 * quality / (std::f64::consts::TAU * 70e3);
+        let stiffness = 2.0 * 1.030_197;
+        let expected = (BOLTZMANN * 295.0 / stiffness * correlation / (correlation + time)).sqrt();
+        let off = found.amplitude_rms / expected - 1.0;
+        assert!(off.abs() < 2.0 / quality + 1e-4, "{quality}, {time}: {off}");
+        let turned = found.phase_rms.to_radians() * found.amplitude;
+        assert!(
+            (turned / expected - 1.0).abs() < 2.0 / quality + 1e-4,
+            "{turned} {expected}"
+        );
+        // Far from the sample the orbit is the free motion.
+        assert!((found.free_amplitude_rms / found.amplitude_rms - 1.0).abs() < 1e-6);
+        // A gradient κ turns the phase at resonance by Q κ/k₁.
+        let gradient = stiffness / quality * found.free_phase_rms.to_radians();
+        assert!((found.force_gradient_min / gradient - 1.0).abs() < 1e-3);
+    }
+}
+
+/// A flat punch on an elastic half-space is a spring: the engine of nonlinear laws agrees with the
+/// exact one, tapping included.
+#[test]
+fn both_engines_have_the_same_noise() {
+    let shared = ["modes=2", "cantilever.Q=50"];
+    let spring = lever(
+        &[
+            &shared[..],
+            &[
+                "sample.stiffness=8 N/m",
+                "sample.damping=0 N s/m",
+                "gap.tip=8 nm",
+            ],
+        ]
+        .concat(),
+    );
+    // F = 2 R E/(1 − ν²) δ with R = 4 nm and E/(1 − ν²) = 1 GPa.
+    let punch = lever(
+        &[
+            &shared[..],
+            &[
+                "sample.law=punch",
+                "tip.radius=4 nm",
+                "sample.modulus=1 GPa",
+                "sample.poisson=0",
+                // Contact begins at this gap.
+                "sample.contact_distance=0.1 nm",
+                "gap.tip=8.1 nm",
+            ],
+        ]
+        .concat(),
+    );
+    let (a, b) = (noise(&spring, "0.1 ms"), noise(&punch, "0.1 ms"));
+    assert!(
+        (a.amplitude / b.amplitude - 1.0).abs() < 1e-9,
+        "{a:?} {b:?}"
+    );
+    assert!(a.amplitude < 9.5e-9, "it taps");
+    for (one, other) in [
+        (a.amplitude_rms, b.amplitude_rms),
+        (a.phase_rms, b.phase_rms),
+    ] {
+        assert!((one / other - 1.0).abs() < 1e-5, "{one} {other}");
+    }
+}
+
+/// The lever is followed with random kicks on its velocities, and its lock-in amplifier with it.
+#[test]
+fn a_stochastic_simulation_agrees_within_its_error_bars() {
+    const PERIODS: usize = 200_000;
+    const KICKS: usize = 64;
+    let case = lever(&[
+        "modes=1",
+        "cantilever.Q=30",
+        "sample.stiffness=5 N/m",
+        "sample.loss_tangent=0.1",
+        "gap.tip=8 nm",
+    ]);
+    let time_constant = 2e-4;
+    let expected = noise(&case, "0.2 ms");
+    let scales = case.physical().unwrap().scales;
+    let model = case.model().unwrap();
+    let equations = Galerkin::new(case.cantilever().unwrap()).unwrap();
+    let (period, omega) = (model.period(), model.frequency());
+    let h = period / KICKS as f64;
+    let tau = time_constant / scales.time;
+    let energy = BOLTZMANN * 295.0 / scales.energy;
+    let kick = (2.0 * energy * equations.damping[0][(0, 0)] * h).sqrt() / equations.mass[(0, 0)];
+    let mut random = Gaussian(7);
+    let mut flow = Flow::new(model.system.clone());
+    let mut state = nanotap::study::orbit::orbit(&model, &Default::default())
+        .unwrap()
+        .state;
+    let (mut re, mut im) = (0.0_f64, 0.0_f64);
+    let fade = (-h / tau).exp();
+    let mut read = Vec::with_capacity(PERIODS);
+    let tip = model.tip.row[0];
+    for _ in 0..PERIODS {
+        for k in 0..KICKS {
+            flow.start(&state, k as f64 * h).unwrap();
+            if k + 1 < KICKS {
+                flow.run_until((k + 1) as f64 * h, &mut ()).unwrap();
+            } else {
+                flow.run_period(&mut ()).unwrap();
+            }
+            flow.state(&mut state);
+            state[1] += kick * random.next();
+            let (sin, cos) = (omega * (k + 1) as f64 * h).sin_cos();
+            let signal = 2.0 * h / tau * tip * state[0];
+            re = re * fade + signal * cos;
+            im = im * fade - signal * sin;
+        }
+        read.push((re.hypot(im), im.atan2(re)));
+    }
+    // The beginning, before the filter has settled, does not count.
+    let settled = &read[(20.0 * tau / period) as usize..];
+    let deviation = |of: &dyn Fn(&(f64, f64)) -> f64| {
+        let n = settled.len() as f64;
+        let mean = settled.iter().map(of).sum::<f64>() / n;
+        (settled.iter().map(|x| (of(x) - mean).powi(2)).sum::<f64>() / n).sqrt()
+    };
+    let amplitude = deviation(&|x| x.0) * scales.length;
+    let phase = deviation(&|x| x.1).to_degrees();
+    // Independent readings are a few correlation times of filter and lever apart.
+    let correlation = 2.0 * (tau + 60.0 / omega) / period;
+    let error = (0.5 * correlation / settled.len() as f64).sqrt();
+    for (found, expected) in [
+        (amplitude, expected.amplitude_rms),
+        (phase, expected.phase_rms),
+    ] {
+        let off = (found / expected - 1.0) / error;
+        assert!(
+            off.abs() < 4.0,
+            "{found} {expected}: {off} standard errors of {error}"
+        );
+    }
+}
+
+/// Normal deviates from a small generator, Box and Muller's way.
+struct Gaussian(u64);
+
+impl Gaussian {
+    fn uniform(&mut self) -> f64 {
+        self.0 = self
+            .0
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1_442_695_040_888_963_407);
+        ((self.0 >> 11) as f64 + 0.5) / (1_u64 << 53) as f64
+    }
+
+    fn next(&mut self) -> f64 {
+        let (u, v) = (self.uniform(), self.uniform());
+        (-2.0 * u.ln()).sqrt() * (std::f64::consts::TAU * v).cos()
+    }
+}
+
+#[test]
+fn what_has_no_noise_is_refused_by_name() {
+    let refused = |case: &Case, options: NoiseOptions, words: &str| {
+        let error = NoiseStudy::run(case, &options, &Control::default()).unwrap_err();
+        assert!(error.to_string().contains(words), "{error}");
+    };
+    let plain = Case::from(nanotap::model::cantilever::Cantilever::paper());
+    refused(&plain, NoiseOptions::default(), "no unit of energy");
+    let case = lever(&[
+        "modes=1",
+        "cantilever.Q=100",
+        "sample.stiffness=1 N/m",
+        "gap.tip=1 um",
+    ]);
+    for (time, bandwidth, words) in [
+        (Some("1 ms"), Some("1 kHz"), "both given"),
+        (Some("0 s"), None, "above zero"),
+        (Some("1 kHz"), None, "expected a time"),
+        (None, Some("-1 Hz"), "above zero"),
+    ] {
+        let options = NoiseOptions {
+            time_constant: time.map(Into::into),
+            bandwidth: bandwidth.map(Into::into),
+            ..NoiseOptions::default()
+        };
+        refused(&case, options, words);
+    }
+    let hot = NoiseOptions {
+        temperature: f64::NAN,
+        ..NoiseOptions::default()
+    };
+    refused(&case, hot, "temperature");
+}

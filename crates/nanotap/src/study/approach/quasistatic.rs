@@ -29,7 +29,7 @@ pub(super) struct Found {
 
 /// Steps of the approximate flow after which no more rows are measured, for every hundred distances,
 /// so that a longer table is measured as completely.
-const ROW_STEPS: u64 = 25_000_000;
+const ROW_STEPS: u64 = 30_000_000;
 /// Steps that branches may take.
 const BRANCH_STEPS: u64 = 10_000_000;
 /// Points that the branches through a curve have all together, mostly; where steps suffice for fewer,

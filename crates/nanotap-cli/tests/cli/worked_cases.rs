@@ -184,7 +184,7 @@ follows! {
     the_capillary_bridge: "capillary.md", 1 commands, 4 numbers;
     the_examples_of_dforce: "dforce.md", 4 commands, 13 numbers;
     the_fm_lever: "fm-lever-on-polystyrene.md", 3 commands, 9 numbers;
-    the_gallery: "gallery.md", 27 commands, 0 numbers;
+    the_gallery: "gallery.md", 28 commands, 0 numbers;
     the_frequency_sweep: "frequency-sweep.md", 2 commands, 6 numbers;
     the_liquid: "liquid.md", 5 commands, 21 numbers;
     the_measured_modes: "measured-modes.md", 2 commands, 6 numbers;

@@ -349,7 +349,7 @@ impl Key {
     /// ```
     /// use nanotap::case::Key;
     /// assert_eq!(Key::find("gap.tip").unwrap().label(), "distance $z_c$");
-    /// assert_eq!(Key::find("alpha4").unwrap().label(), "contact stiffness $α₄$");
+    /// assert_eq!(Key::Alpha4.label(), "contact stiffness $α₄$");
     /// assert_eq!(Key::find("sample.film_thickness").unwrap().label(), "sample film thickness");
     /// ```
     pub fn label(self) -> String {

@@ -13,7 +13,8 @@
 //! stable orbits there are reported too, and, from the branches of all these continued round
 //! their folds, the other orbits at the setpoint.
 //!
-//! Fails by omission: orbits on other branches.
+//! Fails by omission: orbits on other branches, and a setpoint that the quantity passes twice between
+//! two neighbouring orbits of a branch.
 
 use nanotap_dynamics::{
     BranchPoint, ContinuationOptions, Control, DiagramOptions, PeriodicOrbit, ShootingOptions,

@@ -10,18 +10,18 @@ use nanotap::study::value::Axes;
 use nanotap::study::window::{Condition, Window, WindowOptions};
 use nanotap::study::{Computation as _, FreeMotion};
 
-use crate::common::{DMT, EV, lever};
+use crate::common::{DMT, EV, HERTZ, lever};
 
 /// A lever whose transient lasts a few tens of periods.
 fn quick(amplitude: f64, gap: f64, sample: &[&str]) -> Case {
     lever((0.9, 30.0, "100 kHz"), (amplitude, gap), sample)
 }
 
-/// The peak force and the phase at the distance of an amplitude are reached at that distance: on
-/// its approach the lever passes each of them once.
+/// The peak force and the phase at the distance of an amplitude are reached at that distance: over a
+/// sample that only repels, the lever passes each of them once on its approach.
 #[test]
 fn a_setpoint_is_an_amplitude_a_peak_force_or_a_phase() {
-    let lever = quick(20.0, 18.0, &DMT);
+    let lever = quick(20.0, 18.0, &HERTZ);
     let lines = lever.to_toml();
     let lines = lines
         .lines()

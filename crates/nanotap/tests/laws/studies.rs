@@ -52,10 +52,10 @@ fn a_setpoint_is_an_amplitude_a_peak_force_or_a_phase() {
         assert!(found.reached && found.stable);
         assert_eq!(found.branch, at.branch);
         assert!(
-            (found.gap / at.gap - 1.0).abs() < 1e-8,
+            (found.zc / at.zc - 1.0).abs() < 1e-8,
             "{name}: {} {}",
-            found.gap,
-            at.gap
+            found.zc,
+            at.zc
         );
         assert!((report.ratio - 0.8).abs() < 1e-8);
         let text = report.remark().text;

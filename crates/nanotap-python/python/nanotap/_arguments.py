@@ -14,6 +14,7 @@ import numpy.typing as npt
 
 from . import _nanotap
 from ._case import existing
+from ._describe import name_in_si
 from ._quantity import Range, in_si, many, si_unit, text, written
 
 if TYPE_CHECKING:
@@ -324,8 +325,41 @@ def tables(data: Any) -> list[dict[str, Any]]:
     raise TypeError(message)
 
 
+# Units as the columns of files have them.
+_COLUMN_UNITS = {"degree": "deg", "1": "", "drive periods": "", "1/drive period": ""}
+
+
+def _of_result(data: "xr.Dataset") -> "xr.Dataset":
+    """The motions of a result of nanotap, under the names of the columns of its CSV files: an
+    approach curve, a sweep, orbits over an array.
+    """
+    rows = data.first_harmonic.dims
+    if "zc" in rows:
+        # It stands beside the distance in metres.
+        data = data.drop_vars("alpha5", errors="ignore")
+    kept = {
+        str(name): variable
+        for name, variable in data.data_vars.items()
+        if variable.dims == rows
+        and variable.dtype.kind == "f"
+        and variable.attrs.get("units", "1") not in ("1", "drive periods")
+        and not str(name).startswith("physical_")
+    }
+    units = {"m", "N", "J", "W", "s", "m/s", "Hz"}
+    in_si = data.first_harmonic.attrs.get("units") in units
+    names = {name: name_in_si(name) if in_si else name for name in kept}
+    # By these the table of an approach curve is recognised.
+    first = ["classification", "period", "spectral_radius"] if "way" in rows else []
+    plain = data[[*first, *kept]].rename({k: v for k, v in names.items() if k != v})
+    others = [c for c in plain.coords if set(plain[c].dims) - set(rows)]
+    return plain.drop_vars(others)
+
+
 def _of_dataset(data: "xr.Dataset") -> dict[str, list[Any]]:
+    if "nanotap_version" in data.attrs and "first_harmonic" in data:
+        data = _of_result(data)
     units = {str(n): v.attrs.get("units", "") for n, v in data.variables.items()}
+    units = {name: _COLUMN_UNITS.get(unit, unit) for name, unit in units.items()}
     frame = data.to_dataframe().reset_index()
     named = {c: f"{c} ({units[c]})" if units.get(c) else c for c in map(str, frame)}
     return {header: column(c, frame[c]) for c, header in named.items()}

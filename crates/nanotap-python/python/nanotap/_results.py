@@ -101,13 +101,12 @@ class Fit(Record):
 
     def _table(self) -> list[list[str]]:
         """One row per parameter: name, value, error, interval, start."""
-        undetermined = set(self["undetermined"])
         return [
             [
                 _of_curve(p),
                 _quantity(p["value"], p["unit"]),
                 "not determined"
-                if p["key"] in undetermined or p["standard_error"] is None
+                if p["standard_error"] is None
                 else f"± {_number(p['standard_error'])}",
                 ""
                 if p["interval"] is None
@@ -120,6 +119,8 @@ class Fit(Record):
 
     def _goodness(self) -> list[str]:
         lines = [f"  warning: {remark}" for remark in self["remarks"]]
+        for one in self["undetermined"]:
+            lines.insert(0, f"  warning: not determined: {one['words']}")
         if not self["fits"]:
             lines.insert(0, "  warning: the law does not describe the data")
         if self["cancelled"]:

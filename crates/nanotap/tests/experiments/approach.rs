@@ -148,7 +148,7 @@ pub(crate) fn limited<R: Send>(steps: u64, work: impl Fn(&Control<'_>) -> R + Sy
 #[test]
 fn a_curve_ends_at_its_budget_of_steps() {
     let case = studied(MICA, &["gap.tip=7.127 nm"]);
-    let nm = 1e-9 / case.physical().unwrap().scales.length;
+    let nm = 1e-9;
     let options = ApproachOptions {
         from: Some((12.0 * nm).into()),
         to: Some((4.0 * nm).into()),

@@ -48,6 +48,10 @@ fn without_si(value: &Value, path: &str, found: &mut Vec<String>) {
             }
         }
         Value::Object(entries) => {
+            // The loop's settings: its free motion is told in SI above.
+            if path == "fm.modulation" {
+                return;
+            }
             let physical = entries.get("physical").or(entries.get("modulation_si"));
             for observable in OBSERVABLES {
                 let in_model = entries.get(observable.name).is_some_and(Value::is_number);

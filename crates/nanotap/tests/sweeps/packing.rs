@@ -97,6 +97,7 @@ fn shares_that_are_merged_come_to_the_same_bytes() {
     // A whole dataset and a share of it are the whole.
     let both = folder.join("both.zarr");
     merge(&[parts[0].clone(), whole.clone()], &both).unwrap();
+    finish(computed(&sweep, &both, "1/1")).unwrap();
     assert_same(&whole, &both);
 }
 
@@ -170,7 +171,8 @@ fn a_damaged_chunk_is_computed_again() {
     assert!(file.exists());
     std::fs::write(&file, b"damaged").unwrap();
     let store = Store::create_or_resume(&path, sweep.schema().clone()).unwrap();
-    assert_eq!(store.missing(), 1);
+    // The joined chunk held every chunk of work.
+    assert_eq!(store.missing(), store.chunks());
     sweep.compute(&store, &share("1/1")).unwrap();
     finish(store).unwrap();
     assert_eq!(bytes(&path), before);

@@ -123,7 +123,7 @@ fn known<'a>(document: &'a Document, kind: ModelKind, problems: &mut Problems) -
         };
         let key = match section {
             Section::Model => kind.key(&entry.key),
-            _ => section.keys().find(|key| key.name() == entry.key),
+            _ => section.key(&entry.key),
         };
         let Some(key) = key else {
             problems.add(|| match section {

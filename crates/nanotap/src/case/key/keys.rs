@@ -152,6 +152,13 @@ impl Entry {
         Self { example, ..self }
     }
 
+    const fn alias(self, alias: &'static str) -> Self {
+        Self {
+            alias: Some(alias),
+            ..self
+        }
+    }
+
     const fn label(self, label: &'static str) -> Self {
         Self { label, ..self }
     }
@@ -373,7 +380,7 @@ After from AFTER_LAWS => {
         .label("adhesion force");
     SampleIntermolecularDistance = quantity(
         Sample, "intermolecular_distance", Length, R::POSITIVE, "intermolecular distance a0, the gap at which contact begins",
-    ).under(Laws::Nonlinear).called("contact_distance")
+    ).under(Laws::Nonlinear).called("contact_distance").alias("contact_distance")
         .label("intermolecular distance $a_0$");
     SampleViscosity = quantity(Sample, "viscosity", Viscosity, R::NOT_NEGATIVE, "viscosity of the sample").under(Laws::Nonlinear)
         .label("sample viscosity $η$");

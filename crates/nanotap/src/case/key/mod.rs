@@ -58,6 +58,12 @@ impl Section {
     pub fn keys(self) -> impl Iterator<Item = Key> {
         Key::all().filter(move |key| key.section() == self)
     }
+
+    /// The key of this name or second name.
+    pub fn key(self, name: &str) -> Option<Key> {
+        self.keys()
+            .find(|key| key.name() == name || key.alias() == Some(name))
+    }
 }
 
 words! {
@@ -343,7 +349,7 @@ impl Key {
     /// ```
     /// use nanotap::case::Key;
     /// assert_eq!(Key::find("gap.tip").unwrap().label(), "distance $z_c$");
-    /// assert_eq!(Key::find("alpha4").unwrap().label(), "contact stiffness $α₄$");
+    /// assert_eq!(Key::Alpha4.label(), "contact stiffness $α₄$");
     /// assert_eq!(Key::find("sample.film_thickness").unwrap().label(), "sample film thickness");
     /// ```
     pub fn label(self) -> String {
@@ -452,7 +458,7 @@ impl Key {
     pub fn find(path: &str) -> Option<Self> {
         let (section, name) = path.split_once('.')?;
         let section = Section::find(section).filter(|section| section.is_physical())?;
-        section.keys().find(|key| key.name() == name)
+        section.key(name)
     }
 
     /// The reason why it cannot vary, if it cannot.

@@ -30,7 +30,7 @@ use crate::case::Case;
 use crate::case::document::CaseDocument;
 use crate::case::physical::{Held, Kind, Remark};
 use crate::model::model_map::ModelMap;
-use crate::observe::table::shown_phase;
+use crate::observe::table::{Observable, shown_phase};
 use crate::observe::{ObservableSet, Observables, OutOfRange, PhysicalMotion, measure};
 use crate::{Error, ErrorKind};
 
@@ -379,10 +379,11 @@ impl HeldQuantity {
         matches!(self.setpoint, Held::Amplitude(_))
     }
 
-    const fn set(&self) -> ObservableSet {
+    fn set(&self) -> ObservableSet {
         match self.setpoint {
             Held::Amplitude(_) | Held::Phase(_) => ObservableSet::FIRST_HARMONIC,
-            Held::PeakForce(_) => ObservableSet::PEAK_FORCE,
+            Held::PeakForce(_) => Observable::named("peak_force")
+                .map_or(ObservableSet::COMMON, |peak| ObservableSet::NONE.with(peak)),
         }
     }
 

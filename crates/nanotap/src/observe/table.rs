@@ -201,6 +201,9 @@ macro_rules! observables {
             pub const FIRST_HARMONIC: Self =
                 Self(1 << Row::first_harmonic as usize | 1 << Row::phase as usize);
 
+            /// The largest force of the sample.
+            pub const PEAK_FORCE: Self = Self(1 << Row::peak_force as usize);
+
             /// Minimum and maximum of the gap.
             pub(super) const GAP: Self = Self(1 << Row::gap_range as usize);
 

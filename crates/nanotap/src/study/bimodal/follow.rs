@@ -27,6 +27,8 @@ const SHORTEST: f64 = 1.0 / 4096.0;
 const FARTHEST: [f64; 3] = [0.1, 15.0, 0.3];
 /// Degrees from 90 up to which a drive counts as one at resonance.
 const AT_RESONANCE: f64 = 2.0;
+/// Logarithm of a tone's frequency over the resonance nearest to it, up to which its loop finds it.
+const FARTHEST_RESONANCE: f64 = 0.2;
 /// Size of the last harmonics of the phase, above which the motion is not known.
 const UNKNOWN: f64 = 1e-3;
 
@@ -130,10 +132,21 @@ fn tone(lever: &Cantilever, index: usize, kind: Loop, phase: f64) -> Result<Tone
             .context(format!("{} tone", ["first", "second"][index]))
             .remedy(format!("give {key}"))
     })?;
+    let free = FreeOscillation::of(&Case::from(alone), condition)?;
+    let away = nanotap_arithmetic::ln(free.frequency / drive[0]).abs();
+    if kind.holds_phase() && away > FARTHEST_RESONANCE {
+        return Err(Error::input(
+            format!(
+                "no mode of the lever resonates near the {} tone",
+                ["first", "second"][index]
+            ),
+            "give {modes} or another frequency",
+        ));
+    }
     Ok(Tone {
         holds_phase: kind.holds_phase(),
         holds_amplitude: kind.holds_amplitude(),
-        free: FreeOscillation::of(&Case::from(alone), condition)?,
+        free,
         drive,
         free_amplitude: free_motion.amplitude,
         free_phase: free_motion.phase,

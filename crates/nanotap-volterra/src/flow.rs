@@ -90,6 +90,9 @@ pub struct Flow {
     reached: bool,
     /// Length numbers that were accepted last on each branch.
     hints: Vec<usize>,
+    /// Those of the first steps after a switch, where contact begins and ends on a moving surface: the
+    /// last steps before may be so short that rounding hides the gap.
+    first_hints: Vec<usize>,
     work: Work,
     /// Cost of work that clones did.
     added_cost: u64,
@@ -112,6 +115,7 @@ impl Clone for Flow {
             has_pending: self.has_pending,
             reached: self.reached,
             hints: self.hints.clone(),
+            first_hints: self.first_hints.clone(),
             work: self.work.clone(),
             added_cost: self.added_cost,
         }
@@ -164,6 +168,7 @@ impl Flow {
             has_pending: false,
             reached: false,
             hints: vec![FIRST_INDEX; system.law().branches()],
+            first_hints: vec![FIRST_INDEX; system.law().branches()],
             work: Work {
                 values: zeros.clone(),
                 series: zeros.clone(),
@@ -239,14 +244,17 @@ impl Flow {
                 needed: "finite",
             });
         }
+        self.put(x, time, self.system.branch_at(time, x));
+        Ok(())
+    }
+
+    fn put(&mut self, x: &[f64], time: f64, branch: usize) {
         self.time = time;
+        self.branch = branch;
         self.system.to_modal(time, x, &mut self.modal);
-        let (gap, rate) = self.system.gap_of(time, &self.modal);
-        self.branch = self.system.law().branch_at(gap, rate);
         self.pinned = None;
         self.onset = None;
         self.has_pending = false;
-        Ok(())
     }
 
     /// As [`Flow::start`], on a branch that the law remembers.
@@ -263,7 +271,7 @@ impl Flow {
             });
         }
         self.start(x, time)?;
-        self.branch = branch;
+        self.put(x, time, branch);
         Ok(())
     }
 
@@ -313,6 +321,7 @@ impl Flow {
         }
         // The same start gives the same motion, whatever was run before.
         self.hints.fill(FIRST_INDEX);
+        self.first_hints.fill(FIRST_INDEX);
         let most = system.options().max_steps;
         let mut at_once = (self.time, 0);
         for count in 0.. {
@@ -372,7 +381,12 @@ impl Flow {
             Some(Approach::ThreeHalves) => (TimeMap::Start, false),
             Some(Approach::Half) => (TimeMap::Start, true),
         };
-        let mut index = self.hints[self.branch];
+        let first = self.onset.is_some() && !system.second_is_rate();
+        let mut index = if first {
+            self.first_hints[self.branch]
+        } else {
+            self.hints[self.branch]
+        };
         let mut refused = false;
         loop {
             if index >= LENGTHS {
@@ -384,6 +398,9 @@ impl Flow {
                 Attempt::Whole(growth) => {
                     let growth = if refused { 0 } else { growth };
                     self.hints[self.branch] = index.saturating_sub(growth);
+                    if first {
+                        self.first_hints[self.branch] = self.hints[self.branch];
+                    }
                     self.accept(system, end, observer)?;
                     return Ok(None);
                 }
@@ -500,9 +517,11 @@ impl Flow {
             }
             return Attempt::Shorter(next, Refusal::Unresolved);
         }
+        let branch = self.branch;
         let (map, slopes) = (self.step.map, perturbs.then(|| self.step.slopes()));
-        let resolves =
-            |index: usize| slopes.is_none_or(|slopes| system.kernel().resolves(map, index, slopes));
+        let resolves = |index: usize| {
+            slopes.is_none_or(|slopes| system.kernel_on(branch).resolves(map, index, slopes))
+        };
         if !resolves(index) {
             let next = (index + 1..LENGTHS).find(|&next| resolves(next));
             return Attempt::Shorter(next.unwrap_or(LENGTHS), Refusal::Unresolved);
@@ -621,7 +640,7 @@ impl Flow {
                     break;
                 }
                 let time_shift = self.step.time(next) - time;
-                let kernel = system.kernel();
+                let kernel = system.kernel_on(self.branch);
                 if kernel.along_tangent(time_shift) {
                     let force = self.step.force_at(self.step.end);
                     kernel.modes().apply(&self.modal, &mut self.work.modal);

@@ -162,6 +162,14 @@ fn settled(
     start: &[f64],
     period: Option<usize>,
 ) -> Result<PeriodicOrbit, Error> {
+    let slow = model.nonlinear.as_ref().filter(|law| law.is_slow());
+    if let Some(Ok(guess)) = slow.map(|law| law.settled_from(start))
+        && let Ok(orbit) = close_orbit(map, &guess, 1, &ShootingOptions::default())
+        && orbit.is_stable()
+        && period.is_none_or(|p| p % orbit.period == 0)
+    {
+        return Ok(orbit);
+    }
     let end = classify(map, start, &ClassifyOptions::default());
     if let MotionKind::Periodic(orbit) | MotionKind::TransientChaos { orbit, .. } = &end.kind
         && period.is_none_or(|p| p % orbit.period == 0)

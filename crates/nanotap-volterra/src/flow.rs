@@ -766,7 +766,14 @@ impl Flow {
             self.guard_values(system, exit, n);
             let size = crate::step::largest(&self.work.values);
             self.guard_series(system);
-            if fresh && self.work.values[0].abs() <= 1e-9 * size {
+            // On a moving surface no switch pins the gap.
+            let zero = match exit.guard {
+                Guard::Own(index) if fresh && !system.second_is_rate() => {
+                    self.own_rounding(system, index)
+                }
+                _ => 0.0,
+            };
+            if fresh && self.work.values[0].abs() <= zero.max(1e-9 * size) {
                 self.deflate(system);
             }
             let c = &self.work.series;
@@ -775,18 +782,14 @@ impl Flow {
             if c[0] > rest + 10.0 * tail + self.unresolved(system, exit) {
                 continue;
             }
-            let (gap, rate) = gap_scale(system, &self.step.modal);
             let rounding = match exit.guard {
                 // After division by the time since the switch, rounding weighs more near it.
                 _ if fresh => RESOLVED_FRESH * (c[0].abs() + rest),
-                Guard::Falls(_) | Guard::Rises(_) => ROUNDING * gap,
-                Guard::Turns => ROUNDING * rate,
-                // A guard of the law's own is a difference of what gap and rate make.
-                Guard::Own(index) => {
-                    let (at, moving) = (self.step.gap[0], self.step.rate[0]);
-                    let own = system.law().guard(index, at, moving);
-                    ROUNDING * (own.by_gap.abs() * gap + own.by_rate.abs() * rate)
+                Guard::Falls(_) | Guard::Rises(_) => {
+                    ROUNDING * gap_scale(system, &self.step.modal).0
                 }
+                Guard::Turns => ROUNDING * gap_scale(system, &self.step.modal).1,
+                Guard::Own(index) => self.own_rounding(system, index),
             };
             if tail > rounding.max(RESOLVED * (c[0].abs() + rest)) {
                 return Err(Refusal::Switch);
@@ -798,6 +801,15 @@ impl Flow {
             }
         }
         Ok(found)
+    }
+
+    /// What is rounding in a guard of the law's own: a difference of what gap and rate make.
+    fn own_rounding(&self, system: &System, index: usize) -> f64 {
+        let (gap, rate) = gap_scale(system, &self.step.modal);
+        let own = system
+            .law()
+            .guard(index, self.step.gap[0], self.step.rate[0]);
+        ROUNDING * (own.by_gap.abs() * gap + own.by_rate.abs() * rate)
     }
 
     /// Divides a guard that starts at zero by the time since, and takes its series again.

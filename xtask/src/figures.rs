@@ -128,9 +128,8 @@ fn read(path: &Path) -> Result<String, String> {
 fn pictures(text: &str) -> Vec<&str> {
     let links = text.split("](").skip(1);
     let paths = links.filter_map(|rest| rest.split(')').next());
-    paths
-        .filter(|path| path.ends_with(".svg") || path.ends_with(".png"))
-        .collect()
+    let is_picture = |path: &&str| matches!(path.rsplit('.').next(), Some("svg" | "png"));
+    paths.filter(is_picture).collect()
 }
 
 /// Arguments of each command that draws a figure, and the name of the figure's file.

@@ -220,28 +220,31 @@ pub(crate) fn spectrum(spectrum: &Spectrum, period: usize, units: &Units) -> Str
         lag(spectrum.phase, "the drive", 6),
         number::significant(100.0 * spectrum.thd, 4),
     );
-    let mut table = Table::new([
+    let two_tones = spectrum.harmonics.iter().any(|h| h.product.is_some());
+    let mut columns = vec![
         ("order", Align::Point),
         ("tip", Align::Point),
         ("lag (°)", Align::Point),
         ("force", Align::Point),
         ("lag (°)", Align::Point),
-    ]);
-    // Of a subharmonic motion the strong ones, under two tones the strongest (sidebands are far from
-    // the first orders), otherwise the first.
-    let mut strengths: Vec<f64> = spectrum.harmonics.iter().map(|h| h.tip).collect();
-    strengths.sort_by(|a, b| b.total_cmp(a));
-    let strongest = 1e-3 * strengths.first().copied().unwrap_or_default();
-    let two_tones = |first: &Harmonic| first.order * (period as f64) < 0.75;
-    let (least, count) = if spectrum.harmonics.first().is_some_and(two_tones) {
-        let last = strengths.get(2 * SHOWN - 1).copied();
-        (last.unwrap_or_default(), 2 * SHOWN)
+    ];
+    if two_tones {
+        columns.insert(0, ("product", Align::Left));
+    }
+    let mut table = Table::new(columns);
+    // Of a subharmonic motion the strong ones, under two tones the strongest, by size (sidebands are
+    // far from the first orders), otherwise the first.
+    let mut shown: Vec<&Harmonic> = spectrum.harmonics.iter().collect();
+    let count = if two_tones {
+        shown.sort_by(|a, b| b.tip.total_cmp(&a.tip));
+        2 * SHOWN
     } else {
-        let least = if period == 1 { 0.0 } else { strongest };
-        (least, SHOWN.max(2 * period).min(2 * SHOWN))
+        let largest = shown.iter().fold(0.0, |m: f64, h| m.max(h.tip));
+        let least = if period == 1 { 0.0 } else { 1e-3 * largest };
+        shown.retain(|h| h.tip >= least);
+        SHOWN.max(2 * period).min(2 * SHOWN)
     };
-    let shown = spectrum.harmonics.iter().filter(|h| h.tip >= least);
-    for h in shown.take(count) {
+    for h in shown.into_iter().take(count) {
         // The lag of nothing is noise.
         let lag = |amplitude: f64, lag: f64| {
             if amplitude > 0.0 {
@@ -250,15 +253,39 @@ pub(crate) fn spectrum(spectrum: &Spectrum, period: usize, units: &Units) -> Str
                 String::new()
             }
         };
-        table.row([
+        let mut row = vec![
             number::chosen((h.order * 1e6).round() / 1e6),
             number::quantity(units, Kind::Length, h.tip, [5, 4]),
             lag(h.tip, h.tip_phase),
             number::quantity(units, Kind::Force, h.force, [5, 4]),
             lag(h.force, h.force_phase),
-        ]);
+        ];
+        if two_tones {
+            row.insert(0, h.product.map_or_else(String::new, product));
+        }
+        table.row(row);
     }
     text.push_str(&table.render());
+    text
+}
+
+/// A product of two tones as it is written: 2f2 − f1.
+fn product([a, b]: [i32; 2]) -> String {
+    let mut parts = [(a, "f1"), (b, "f2")];
+    parts.sort_by_key(|(times, _)| *times < 0);
+    let mut text = String::new();
+    for (times, tone) in parts.into_iter().filter(|(times, _)| *times != 0) {
+        text.push_str(match (times < 0, text.is_empty()) {
+            (true, true) => "−",
+            (true, false) => " − ",
+            (false, true) => "",
+            (false, false) => " + ",
+        });
+        if times.abs() != 1 {
+            let _ = write!(text, "{}", times.abs());
+        }
+        text.push_str(tone);
+    }
     text
 }
 

@@ -57,6 +57,19 @@ impl Drive {
         Ok(drive)
     }
 
+    /// Two tones of angular frequencies `first` and `second` that need not repeat together: the
+    /// period is that of the first, and the second one's phase is another after it.
+    ///
+    /// # Errors
+    /// When one of them is not positive and finite.
+    pub fn unlocked(first: f64, second: f64) -> Result<Self, FlowError> {
+        let mut drive = Self::single(first)?;
+        let other = Self::single(second)?;
+        drive.harmonics.extend(other.harmonics);
+        drive.frequencies.extend(other.frequencies);
+        Ok(drive)
+    }
+
     /// The period `T`.
     pub fn period(&self) -> f64 {
         self.period

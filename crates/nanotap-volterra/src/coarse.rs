@@ -653,8 +653,8 @@ impl Tables {
         let mut change = f64::INFINITY;
         stages.evaluations = 0;
         for _ in 0..MAX_ITERATIONS {
-            // Two forces and their slopes.
-            stages.evaluations += 4;
+            // Two forces, their slopes and the equations for both take as long as eight forces.
+            stages.evaluations += 8;
             let [third, end] = [at(0, forces), at(2, forces)];
             let residuals = [
                 self.force(branch, third[0], third[1]) - forces[0],

@@ -13,8 +13,10 @@ use std::sync::Arc;
 
 /// Switches at one instant after which the law is reported to switch endlessly.
 const MOST_SWITCHES_AT_ONCE: usize = 64;
-/// What a factorisation costs, in steps of the approximate flow; an evaluation of the force costs one.
-const FACTORISATION_COST: u64 = 16;
+/// Evaluations of the force in closed form that cost as much as a step of the approximate flow, and
+/// what a factorisation costs in such steps.
+const STEP_EVALUATIONS: u64 = 2;
+const FACTORISATION_COST: u64 = 8;
 /// The first step of a run: a quarter of the longest.
 const FIRST_INDEX: usize = 4;
 /// A guard that is not certainly positive must be resolved to this fraction of its size.
@@ -205,7 +207,10 @@ impl Flow {
     /// Cost of the runs so far, in steps of the approximate flow.
     pub fn cost(&self) -> u64 {
         let statistics = self.solver.statistics;
-        statistics.evaluations + FACTORISATION_COST * statistics.factorisations + self.added_cost
+        let evaluations = self.system.law().cost() * statistics.evaluations;
+        evaluations / STEP_EVALUATIONS
+            + FACTORISATION_COST * statistics.factorisations
+            + self.added_cost
     }
 
     /// Adds the cost of work that a clone did.

@@ -124,6 +124,11 @@ pub trait ForceLaw: Debug + Send + Sync {
         false
     }
 
+    /// Time that an evaluation takes, in that of a force in closed form.
+    fn cost(&self) -> u64 {
+        1
+    }
+
     /// Whether the force depends on the gap's rate.
     fn depends_on_rate(&self) -> bool {
         true

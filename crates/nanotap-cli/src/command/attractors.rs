@@ -245,8 +245,8 @@ fn unseen_paragraphs(found: &Attractors, unseen: &UnseenReport) -> String {
                 percent(unseen.target)
             ),
             EndReport::MaxSteps { limit } => format!(
-                " The census ended at its limit of {} million steps of the approximate flow (an evaluation of \
-                 the force in the exact flow counts as one), before the requested {} %.",
+                " The census ended at its limit of {} million steps of the approximate flow (two evaluations \
+                 of the force in the exact flow count as one), before the requested {} %.",
                 limit / 1_000_000,
                 percent(unseen.target)
             ),

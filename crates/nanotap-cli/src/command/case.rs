@@ -4,6 +4,7 @@ use clap::Args;
 use nanotap::ErrorKind;
 use nanotap::case::document::equilibria;
 use nanotap::case::file as case_file;
+use nanotap::case::physical::Held;
 use nanotap::case::physical::force::SampleForce;
 use nanotap::case::physical::{Kind, Physical, Severity};
 use nanotap::case::quantity::format_electronvolts;
@@ -217,6 +218,16 @@ fn physical(title: &str, view: &Physical) -> String {
         let ratio = number::significant(setpoint, 4);
         given.row(["A/A0", &ratio, "setpoint"]);
     }
+    match view.held {
+        Some(Held::PeakForce(force)) => {
+            given.row(["", &Kind::Force.format(force), "setpoint of the peak force"]);
+        }
+        Some(Held::Phase(phase)) => {
+            let phase = format!("{}°", number::significant(phase, 4));
+            given.row(["", &phase, "setpoint of the phase lag"]);
+        }
+        Some(Held::Amplitude(_)) | None => {}
+    }
     given.row([
         "g0",
         &Kind::Length.format(scales.length),
@@ -378,7 +389,7 @@ fn force_rows(table: &mut Table, force: &SampleForce, frequency: f64) {
     }
 }
 
-/// Every distance at which an orbit has the setpoint amplitude.
+/// Every distance at which an orbit is at the setpoint.
 fn setpoint(report: &SetpointReport) -> String {
     let mut table = Table::new([
         ("gap.tip", Align::Right),
@@ -404,15 +415,22 @@ fn setpoint(report: &SetpointReport) -> String {
             format!("{stability}{reached}"),
         ]);
     }
-    format!(
-        "\n  {}\n{}",
-        style::bold(&format!(
+    let heading = match report.held {
+        "peak_force" => format!(
+            "where the peak force is {}",
+            Kind::Force.format(report.setpoint)
+        ),
+        "phase" => format!(
+            "where the phase is {}°",
+            number::significant(report.setpoint, 4)
+        ),
+        _ => format!(
             "where the amplitude is {}, {} of A0",
             Kind::Length.format(report.amplitude),
             number::significant(report.ratio, 4)
-        )),
-        table.render()
-    )
+        ),
+    };
+    format!("\n  {}\n{}", style::bold(&heading), table.render())
 }
 
 fn oscillator(case: &Case, oscillator: &Oscillator) -> String {

@@ -3,6 +3,7 @@
 mod approach;
 mod attractors;
 mod basin;
+mod bimodal;
 mod branch;
 mod case;
 mod catalogue;
@@ -117,7 +118,10 @@ pub(crate) enum Own {
     Approach(approach::Arguments),
     /// Compute a force curve at a finite speed, with its static branches
     ForceCurve(force_curve::Arguments),
+    /// Compute thermal noise of amplitude and phase at a working point
     Noise(noise::Arguments),
+    /// Follow two tones with their loops (AM–FM, FM–FM) against the distance
+    Bimodal(bimodal::Arguments),
     /// Simulate a line or an image under feedback
     Scan(scan::Arguments),
     /// Fit parameters of lever and sample to measured curves
@@ -167,6 +171,7 @@ pub(crate) fn run(command: &Command, output: &Output) -> Result<(), Failure> {
         Own::Approach(arguments) => approach::run(arguments, output),
         Own::ForceCurve(arguments) => force_curve::run(arguments, output),
         Own::Noise(arguments) => noise::run(arguments, output),
+        Own::Bimodal(arguments) => bimodal::run(arguments, output),
         Own::Scan(arguments) => scan::run(arguments, output),
         Own::Fit(arguments) => fit::run(arguments, output),
         Own::Reconstruct(arguments) => reconstruct::run(arguments, output),

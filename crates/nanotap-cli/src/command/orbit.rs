@@ -137,6 +137,12 @@ fn text(
     let mut text = format!("{}\n\n", style::bold(&heading));
     let verdict = format!("a period-{} orbit, {}", orbit.period, orbit.stability);
     let _ = writeln!(text, "  {}", style::bold(&verdict));
+    if model.repetition() > 1 {
+        text.push_str(&motion::paragraph(&format!(
+            "both tones repeat after {} periods of the first, which are called a drive period here",
+            model.repetition()
+        )));
+    }
     let defect = orbit.determinant_defect;
     let check = if defect <= MAX_DETERMINANT_DEFECT {
         format!("its multipliers agree with the trace formula to {defect:.1e}")

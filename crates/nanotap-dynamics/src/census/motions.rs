@@ -53,7 +53,7 @@ pub(super) struct Motions<'a, M> {
     /// Orbits of the map itself that were looked for on the followed one.
     paired: usize,
     exact_runs: usize,
-    /// Steps left for these.
+    /// Steps that these have taken.
     exact_steps: u64,
     /// Starts on which the coarse map failed that were followed on the map itself.
     retries: usize,
@@ -127,7 +127,7 @@ impl<'a, M: StroboscopicMap> Motions<'a, M> {
             followed_orbits: Vec::new(),
             paired: 0,
             exact_runs: 0,
-            exact_steps: options.max_steps.saturating_mul(EXACT_RUN_STEPS),
+            exact_steps: 0,
             retries: 0,
             failed_retries: 0,
             spectra: Vec::new(),
@@ -137,9 +137,10 @@ impl<'a, M: StroboscopicMap> Motions<'a, M> {
         }
     }
 
-    /// Cost of what was closed and classified on the map itself.
+    /// Cost of what was closed and classified on the map itself, without the runs that show what a motion
+    /// is, which have a budget of their own.
     pub(super) fn cost(&self) -> u64 {
-        self.exact.cost() - self.first_cost
+        self.exact.cost() - self.first_cost - self.exact_steps
     }
 
     /// Motions found so far.
@@ -267,14 +268,14 @@ impl<'a, M: StroboscopicMap> Motions<'a, M> {
     /// As [`classify_exactly`](Self::classify_exactly), of a motion that starts have come to; none where
     /// the budget of these runs is spent.
     fn confirm(&mut self, state: &[f64], periods: usize) -> Option<Classified> {
-        if self.exact_runs >= MAX_EXACT_RUNS || self.exact_steps == 0 {
+        let budget = self.options.max_steps.saturating_mul(EXACT_RUN_STEPS);
+        if self.exact_runs >= MAX_EXACT_RUNS || self.exact_steps >= budget {
             return None;
         }
         self.exact_runs += 1;
         let before = self.exact.cost();
-        let found = self.classify_exactly(state, periods, self.exact_steps);
-        let spent = self.exact.cost() - before;
-        self.exact_steps = self.exact_steps.saturating_sub(spent);
+        let found = self.classify_exactly(state, periods, budget - self.exact_steps);
+        self.exact_steps += self.exact.cost() - before;
         Some(found)
     }
 

@@ -285,8 +285,8 @@ def attractors(
         5000 initial states or 2,000,000 drive periods (600,000 under a nonlinear
         law) are reached. Under a nonlinear law an initial state is followed for at
         most 4 million steps of the approximate flow, and all together for 60
-        million, or 120 where chaos is watched; an evaluation of the force in the
-        exact flow counts as a step (1 to 1000000).
+        million, or 120 where chaos is watched; two evaluations of the force in the
+        exact flow count as a step (1 to 1000000).
     unseen : float | None
         Share of initial states that may lead to undiscovered motions, with 95 %
         confidence, at which sampling ends. Default: 0.01 under a nonlinear law and
@@ -450,9 +450,9 @@ def approach(
         Last distance of the approach; default: 0.
     points : int
         Number of distances in each direction. Under a nonlinear law the lever is
-        followed for at most 30 million steps of the approximate flow, and 25
-        million more are taken for every 100 distances; an evaluation of the force
-        in the exact flow counts as a step (2 to 20000).
+        followed for at most 30 million steps of the approximate flow, and as many
+        more are taken for every 100 distances; two evaluations of the force in the
+        exact flow count as a step (2 to 20000).
     branches : bool
         Also continue coexisting branches, stable and unstable.
     switch : int

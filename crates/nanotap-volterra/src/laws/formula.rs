@@ -80,6 +80,10 @@ pub trait Formula: Clone + Debug + Send + Sync + 'static {
     }
     /// The force.
     fn force<S: Scalar>(&self, c: &[S], branch: usize, gap: S, rate: S) -> S;
+    /// See [`ForceLaw::cost`].
+    fn cost(&self) -> u64 {
+        1
+    }
     /// Whether it depends on the rate.
     fn depends_on_rate(&self) -> bool {
         false
@@ -238,6 +242,10 @@ impl<F: Formula> ForceLaw for Law<F> {
 
     fn value(&self, branch: usize, gap: f64, rate: f64) -> f64 {
         self.formula.force(&self.constants, branch, gap, rate)
+    }
+
+    fn cost(&self) -> u64 {
+        self.formula.cost()
     }
 
     fn depends_on_rate(&self) -> bool {

@@ -77,6 +77,11 @@ impl Formula for Jkr {
         }
     }
 
+    /// The contact radius is the root of an equation.
+    fn cost(&self) -> u64 {
+        2
+    }
+
     fn remembers(&self) -> bool {
         true
     }

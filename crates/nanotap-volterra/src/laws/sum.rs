@@ -115,6 +115,10 @@ impl ForceLaw for Sum {
         true
     }
 
+    fn cost(&self) -> u64 {
+        self.terms.iter().map(|t| t.cost()).max().unwrap_or(1)
+    }
+
     fn depends_on_rate(&self) -> bool {
         self.terms.iter().any(|t| t.depends_on_rate())
     }

@@ -78,7 +78,7 @@ fn taken(key: Key, entry: &Entry) -> Map<String, Value> {
             say("x-unit", kind.si_unit().into());
         }
         Takes::Quantity(_) => say("type", "number".into()),
-        Takes::FractionOrLength => say("type", json!(["number", "string"])),
+        Takes::Setpoint => say("type", json!(["number", "string"])),
         Takes::Count(most) => {
             say("type", "integer".into());
             say("minimum", 1.into());

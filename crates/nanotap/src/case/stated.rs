@@ -109,10 +109,12 @@ impl Key {
         Ok(match self.entry().takes {
             Takes::Quantity(kind) => Value::Number(kind.parse(text)?, kind),
             Takes::Count(_) => Value::Number(Kind::Number.parse(text)?, Kind::Number),
-            Takes::FractionOrLength => {
-                let is_length = |read: Quantity| read.dimension == Kind::Length.dimension();
-                let length = text.parse::<Quantity>().is_ok_and(is_length);
-                let kind = if length { Kind::Length } else { Kind::Number };
+            Takes::Setpoint => {
+                let read = text.parse::<Quantity>().ok();
+                let mut kinds =
+                    [Kind::Length, Kind::Force, Kind::Angle, Kind::Frequency].into_iter();
+                let is_read = |kind: &Kind| read.is_some_and(|r| r.dimension == kind.dimension());
+                let kind = kinds.find(is_read).unwrap_or(Kind::Number);
                 Value::Number(kind.parse(text)?, kind)
             }
             Takes::Word(words) => {

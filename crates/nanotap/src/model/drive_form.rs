@@ -50,14 +50,15 @@ impl Actuation {
 }
 
 /// A ratio of two frequencies, in lowest terms and not 1.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FrequencyRatio {
     numerator: u32,
     denominator: u32,
+    value: f64,
 }
 
 /// Most periods of the first tone after which both repeat, and the largest numerator.
-const LARGEST: (u32, u32) = (64, 10_000);
+const LARGEST: (u32, u32) = (2_000, 20_000);
 /// How near a number must be to a ratio to count as one.
 const NEAR: f64 = 1e-9;
 
@@ -129,7 +130,23 @@ impl FrequencyRatio {
         Ok(Self {
             numerator,
             denominator,
+            value: f64::from(numerator) / f64::from(denominator),
         })
+    }
+
+    /// The ratio of two tones that need not repeat together. The map of such a drive is over one
+    /// period of the first tone, and the second one's phase is another at the beginning of the next.
+    pub(crate) const fn unlocked(value: f64) -> Self {
+        Self {
+            numerator: 0,
+            denominator: 1,
+            value,
+        }
+    }
+
+    /// Whether both tones repeat after [`denominator`](Self::denominator) periods of the first.
+    pub(crate) const fn repeats(self) -> bool {
+        self.numerator > 0
     }
 
     /// The ratio that a number is.
@@ -169,8 +186,8 @@ impl FrequencyRatio {
     }
 
     /// p/q.
-    pub fn value(self) -> f64 {
-        f64::from(self.numerator) / f64::from(self.denominator)
+    pub const fn value(self) -> f64 {
+        self.value
     }
 }
 

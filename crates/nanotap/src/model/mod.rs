@@ -462,7 +462,10 @@ impl Model {
 fn drive_of(case: &Cantilever) -> Result<Drive, FlowError> {
     match case.tone2_ratio {
         None => Drive::single(case.omega),
-        Some(ratio) => Drive::new(case.period(), &[ratio.denominator(), ratio.numerator()]),
+        Some(ratio) if ratio.repeats() => {
+            Drive::new(case.period(), &[ratio.denominator(), ratio.numerator()])
+        }
+        Some(ratio) => Drive::unlocked(case.omega, ratio.value() * case.omega),
     }
 }
 

@@ -343,22 +343,33 @@ impl NonlinearRecording {
         all
     }
 
-    /// The Fourier coefficients of outputs, a row a frequency.
+    /// The Fourier coefficients of outputs at multiples of a frequency, a row a multiple.
     fn fouriers(
         &self,
         outputs: &[&nanotap_volterra::Output],
-        frequencies: &[f64],
+        base: f64,
+        multiples: &[usize],
     ) -> Vec<Vec<Complex>> {
-        let fastest = frequencies.iter().fold(0.0, |m: f64, omega| m.max(*omega));
-        let samples = self.samples_resolving(fastest);
+        let largest = multiples.iter().copied().max().unwrap_or_default();
+        let samples = self.samples_resolving(base * largest as f64);
         let scale = 2.0 / self.end().max(f64::MIN_POSITIVE);
-        let mut rows = vec![vec![Complex::new(0.0, 0.0); outputs.len()]; frequencies.len()];
+        // e^{−ijωt} is a product of a small and a large multiple's: 2√j sines in place of j.
+        let stride = 1 + largest.isqrt();
+        let turned = |multiple: usize, time: f64| {
+            let (sin, cos) = nanotap_arithmetic::sin_cos(base * multiple as f64 * time);
+            Complex::new(cos, -sin)
+        };
+        let mut rows = vec![vec![Complex::new(0.0, 0.0); outputs.len()]; multiples.len()];
         for (weight, sample) in samples.iter().filter(|(weight, _)| *weight != 0.0) {
             let values: Vec<f64> = outputs.iter().map(|o| self.read(o, sample)).collect();
-            for (row, omega) in rows.iter_mut().zip(frequencies) {
-                let (sin, cos) = nanotap_arithmetic::sin_cos(omega * sample.time);
+            let small: Vec<Complex> = (0..stride).map(|j| turned(j, sample.time)).collect();
+            let large: Vec<Complex> = (0..=largest / stride)
+                .map(|j| turned(j * stride, sample.time) * (scale * weight))
+                .collect();
+            for (row, multiple) in rows.iter_mut().zip(multiples) {
+                let turn = large[multiple / stride] * small[multiple % stride];
                 for (sum, value) in row.iter_mut().zip(&values) {
-                    *sum += Complex::new(cos, -sin) * (scale * weight * value);
+                    *sum += turn * *value;
                 }
             }
         }
@@ -532,7 +543,7 @@ impl Curve {
 
     /// The Fourier coefficients ([`Curve::fourier`]) of several curves of one recording, a row a
     /// frequency.
-    pub fn fouriers(curves: &[&Self], frequencies: &[f64]) -> Vec<Vec<Complex>> {
+    pub fn fouriers(curves: &[&Self], base: f64, multiples: &[usize]) -> Vec<Vec<Complex>> {
         let (mut signals, mut outputs, mut nonlinear) = (Vec::new(), Vec::new(), None);
         for curve in curves {
             match curve {
@@ -544,8 +555,11 @@ impl Curve {
             }
         }
         match nonlinear {
-            Some(recording) => recording.fouriers(&outputs, frequencies),
-            None => nanotap_flow::integral::fouriers(&signals, frequencies),
+            Some(recording) => recording.fouriers(&outputs, base, multiples),
+            None => {
+                let frequencies: Vec<f64> = multiples.iter().map(|j| base * *j as f64).collect();
+                nanotap_flow::integral::fouriers(&signals, &frequencies)
+            }
         }
     }
 
@@ -554,7 +568,7 @@ impl Curve {
     pub fn fourier(&self, omega: f64) -> Complex {
         match self {
             Self::PiecewiseLinear(signal) => signal.fourier(omega),
-            Self::Nonlinear(recording, output) => recording.fouriers(&[output], &[omega])[0][0],
+            Self::Nonlinear(recording, output) => recording.fouriers(&[output], omega, &[1])[0][0],
         }
     }
 

@@ -71,6 +71,10 @@ pub(super) enum Tone {
     Second,
     /// A multiple of the drive frequency.
     Harmonic(u32),
+    /// 2ω₁ − ω₂, next to the first of two tones.
+    FirstSideband,
+    /// 2ω₂ − ω₁, next to the second.
+    SecondSideband,
 }
 
 impl Tone {
@@ -83,6 +87,8 @@ impl Tone {
                 second.unwrap_or_else(|| model.frequency())
             }
             Self::Harmonic(order) => f64::from(order) * model.frequency(),
+            Self::FirstSideband => 2.0 * model.frequency() - Self::Second.frequency(model),
+            Self::SecondSideband => 2.0 * Self::Second.frequency(model) - model.frequency(),
         }
     }
 }

@@ -293,9 +293,29 @@ impl<'a, D: Number> Measured<'a, D> {
     /// The component of the tip deflection at the second tone, if there is one, relative to the
     /// phase of the tone.
     pub(super) fn second_tone(&mut self) -> Option<Phasor<D>> {
+        self.product_of_tones(Tone::Second, 1.0)
+    }
+
+    /// The component of the tip deflection at 2ω₁ − ω₂.
+    pub(super) fn first_sideband(&mut self) -> Option<Phasor<D>> {
+        self.product_of_tones(Tone::FirstSideband, -1.0)
+    }
+
+    /// The component of the tip deflection at 2ω₂ − ω₁.
+    pub(super) fn second_sideband(&mut self) -> Option<Phasor<D>> {
+        self.product_of_tones(Tone::SecondSideband, 2.0)
+    }
+
+    /// The component of the tip deflection at a product of two tones with so many times the second,
+    /// relative to the phases of both; nothing of one tone, or at a frequency below zero.
+    fn product_of_tones(&mut self, tone: Tone, seconds: f64) -> Option<Phasor<D>> {
         self.model.system.drive().frequencies().get(1)?;
+        if tone.frequency(self.model) <= 0.0 {
+            return None;
+        }
         let own = self.gathered(|found| found.second_phase);
-        Some(self.component(Signal::Tip, Tone::Second).turned_back(own))
+        let seen = self.component(Signal::Tip, tone);
+        Some(seen.turned_back(own * D::from(seconds)))
     }
 
     /// The reading of an optical lever at the drive frequency: the slope at the tip, converted to a

@@ -49,6 +49,9 @@ pub struct PhysicalHarmonic {
     pub order: f64,
     /// Frequency, Hz.
     pub frequency: f64,
+    /// Of two tones: the numbers a and b of the lowest product a f₁ + b f₂ at this frequency.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub product: Option<[i32; 2]>,
     /// Amplitude of the tip deflection, m.
     pub tip: f64,
     /// Phase lag behind sin(order · ωt), degrees in (−180, 180].
@@ -164,6 +167,7 @@ impl PhysicalHarmonic {
             order: h.order,
             frequency: h.order * omega * scales.frequency,
             tip: h.tip * scales.length,
+            product: h.product,
             tip_phase: h.tip_phase,
             force: h.force * scales.force,
             force_phase: h.force_phase,

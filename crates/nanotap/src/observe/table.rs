@@ -274,6 +274,22 @@ observables! {
         "phase lag at the second tone (°)",
         "phase lag of the tip deflection behind the second tone",
         |m| m.second_tone().map(Phasor::lag);
+    first_sideband: Option<f64>, Length, rare,
+        "amplitude at $2f_1 - f_2$",
+        "amplitude of the tip deflection at twice the first tone's frequency less the second's",
+        |m| m.first_sideband().map(Phasor::norm);
+    first_sideband_phase: Option<f64>, Angle, rare,
+        "phase lag at $2f_1 - f_2$ (°)",
+        "phase lag of the tip deflection there behind the product of the tones",
+        |m| m.first_sideband().map(Phasor::lag);
+    second_sideband: Option<f64>, Length, rare,
+        "amplitude at $2f_2 - f_1$",
+        "amplitude of the tip deflection at twice the second tone's frequency less the first's",
+        |m| m.second_sideband().map(Phasor::norm);
+    second_sideband_phase: Option<f64>, Angle, rare,
+        "phase lag at $2f_2 - f_1$ (°)",
+        "phase lag of the tip deflection there behind the product of the tones",
+        |m| m.second_sideband().map(Phasor::lag);
     second_harmonic: f64, Length, rare,
         "amplitude of the second harmonic",
         "amplitude of the tip deflection at twice the drive frequency",

@@ -113,7 +113,7 @@ pub enum EndReport {
     },
     /// The work took as many steps of the approximate flow as a census takes at most.
     MaxSteps {
-        /// How many that is; an evaluation of the force in the exact flow counts as one.
+        /// How many that is; two evaluations of the force in the exact flow count as one.
         limit: u64,
     },
     /// The work was stopped.
@@ -596,8 +596,8 @@ options! {
         /// lead to undiscovered motions is below {unseen}, or 5000 initial states or 2,000,000
         /// drive periods (600,000 under a nonlinear law) are reached. Under a nonlinear law an initial
         /// state is followed for at most 4 million steps of the approximate flow, and all together
-        /// for 60 million, or 120 where chaos is watched; an evaluation of the force in the exact flow
-        /// counts as a step
+        /// for 60 million, or 120 where chaos is watched; two evaluations of the force in the exact
+        /// flow count as a step
         #[schemars(range(min = 1, max = MAX_STARTS), extend("x-value" = "S"))]
         pub starts: Option<usize> = None,
         /// Share of initial states that may lead to undiscovered motions, with 95 % confidence, at

@@ -6,6 +6,8 @@ pub mod attractors;
 pub mod averaged_orbits;
 #[cfg(feature = "dataset")]
 pub mod basin;
+#[cfg(feature = "fm")]
+pub mod bimodal;
 pub mod branch;
 pub mod contact_laws;
 pub mod convergence;
@@ -83,6 +85,8 @@ pub static STUDIES: &[StudyEntry] = &[
     StudyEntry::of::<convergence::ConvergenceStudy>(),
     StudyEntry::of::<contact_laws::ContactLawsStudy>(),
     StudyEntry::of::<noise::NoiseStudy>(),
+    #[cfg(feature = "fm")]
+    StudyEntry::of::<bimodal::BimodalStudy>(),
     StudyEntry::of::<scan::ScanStudy>(),
     StudyEntry::of::<force_curve::ForceCurveStudy>(),
 ];

@@ -1,17 +1,20 @@
-//! The distance at which the amplitude reaches its setpoint, as a feedback loop finds it.
+//! The distance at which the amplitude, the peak force or the phase reaches its setpoint, as a
+//! feedback loop finds it.
 //!
 //! The feedback comes from far and slowly: the lever follows its branch of stable orbits, and
 //! jumps where that ends (see [`approach`](super::approach)). It stops at the first distance at
-//! which the amplitude of the first harmonic, as a lock-in amplifier reads it, has fallen to the
-//! setpoint A_set. The orbit there is closed by Newton at distances chosen by regula falsi.
-//! Where the amplitude jumps past A_set instead, or the motion there is not periodic, nothing is
-//! chosen and the reason is given.
+//! which the held quantity has come from its value far from the sample to the setpoint: the amplitude
+//! of the first harmonic, as a lock-in amplifier reads it, has fallen to it, the peak force has risen
+//! to it, the phase has changed to it either way. The orbit there is closed by Newton at distances
+//! chosen by regula falsi. Where the quantity jumps past the setpoint instead, or the motion there
+//! is not periodic, nothing is chosen and the reason is given.
 //!
 //! Then the lever goes on to the sample's own position and back to the chosen distance: the other
 //! stable orbits there are reported too, and, from the branches of all these continued round
-//! their folds, the other orbits with the amplitude A_set.
+//! their folds, the other orbits at the setpoint.
 //!
-//! Fails by omission: orbits on other branches.
+//! Fails by omission: orbits on other branches, and a setpoint that the quantity passes twice between
+//! two neighbouring orbits of a branch.
 
 use nanotap_dynamics::{
     BranchPoint, ContinuationOptions, Control, DiagramOptions, PeriodicOrbit, ShootingOptions,
@@ -25,9 +28,9 @@ use super::approach::distance_sweep::{DistanceSweep, Motion, Piece, budget_text,
 use super::approach::{MAX_MULTIPLIER, SETPOINT_PERIODS, no_drive};
 use crate::case::Case;
 use crate::case::document::CaseDocument;
-use crate::case::physical::{Kind, Remark};
+use crate::case::physical::{Held, Kind, Remark};
 use crate::model::model_map::ModelMap;
-use crate::observe::table::shown_phase;
+use crate::observe::table::{Observable, shown_phase};
 use crate::observe::{ObservableSet, Observables, OutOfRange, PhysicalMotion, measure};
 use crate::{Error, ErrorKind};
 
@@ -46,6 +49,8 @@ pub struct SetpointSolution {
     pub spectral_radius: f64,
     /// Whether the approach stops at this distance.
     pub reached: bool,
+    /// Whether the mean force attracts or repels: `attractive` or `repulsive`.
+    pub branch: &'static str,
     /// State at drive phase 0.
     pub state: Vec<f64>,
     /// Observables in the model's units.
@@ -74,11 +79,15 @@ pub struct SetpointState {
 /// Solution of a setpoint for the distance.
 #[derive(Clone, Debug, Serialize)]
 pub struct SetpointReport {
-    /// A_set/A₀.
+    /// What is held: `amplitude`, `peak_force` or `phase`.
+    pub held: &'static str,
+    /// Its setpoint: the amplitude over A₀, the force in N, the phase in degrees.
+    pub setpoint: f64,
+    /// A/A₀ at the setpoint.
     pub ratio: f64,
-    /// A_set in m.
+    /// A at the setpoint, m.
     pub amplitude: f64,
-    /// All distances at which an orbit has this amplitude, from far to near.
+    /// All distances at which an orbit is at the setpoint, from far to near.
     pub solutions: Vec<SetpointSolution>,
     /// Index of the one that the approach reaches.
     pub chosen: usize,
@@ -106,8 +115,9 @@ impl SetpointReport {
         let more = match others {
             0 => String::new(),
             _ => format!(
-                "; {others} more orbit{} with this amplitude, {stable} of them stable, at {}",
+                "; {others} more orbit{} with this {}, {stable} of them stable, at {}",
                 if others == 1 { "" } else { "s" },
+                self.held.replace('_', " "),
                 self.solutions
                     .iter()
                     .filter(|s| !s.reached)
@@ -139,10 +149,26 @@ impl SetpointReport {
         let cut = budget.map_or_else(String::new, |reason| {
             format!("; other states may be missing: {reason}")
         });
-        Remark::note(format!(
-            "the setpoint A = {} (A/A0 = {}) is reached on approach at gap.tip = {}{more}{bistable}{cut}",
+        let amplitude = format!(
+            "A = {} (A/A0 = {})",
             Kind::Length.format(self.amplitude),
-            Kind::Number.format(self.ratio),
+            Kind::Number.format(self.ratio)
+        );
+        let branch = self.solutions.get(self.chosen).map_or("", |s| s.branch);
+        let reached = match self.held {
+            "amplitude" => format!("the setpoint {amplitude} is reached on approach"),
+            "phase" => format!(
+                "the setpoint of the phase, {}°, is reached on the {branch} branch with {amplitude}",
+                Kind::Number.format(self.setpoint)
+            ),
+            _ => format!(
+                "the setpoint of the peak force, {}, is reached on the {branch} branch with \
+                 {amplitude}",
+                Kind::Force.format(self.setpoint)
+            ),
+        };
+        Remark::note(format!(
+            "{reached} at gap.tip = {}{more}{bistable}{cut}",
             Kind::Length.format(self.zc()),
         ))
     }
@@ -175,19 +201,18 @@ pub fn solve_setpoint(case: &Case, control: &Control<'_>) -> Result<SetpointRepo
         )
     };
     let view = case.physical().ok_or_else(none)?;
-    let ratio = view.setpoint.ok_or_else(none)?;
+    let setpoint = view.held.ok_or_else(none)?;
     let free = FreeMotion::of(&case.model()?);
     if !(free.reach > 0.0 && free.reach.is_finite()) {
         return Err(no_drive());
     }
-    let target = ratio * free.amplitude;
+    let held = HeldQuantity::new(setpoint, &free, view.scales.force)?;
     let mut search = Search {
         case,
-        ratio,
-        target,
+        held,
         free,
         before: None,
-        least: f64::INFINITY,
+        nearest: held.far,
         found: None,
     };
     let range = (0.0, FARTHER * free.reach);
@@ -202,17 +227,26 @@ pub fn solve_setpoint(case: &Case, control: &Control<'_>) -> Result<SetpointRepo
     }
     if let Some(steps) = sweep.spent_budget() {
         return Err(Error::numerics(format!(
-            "the setpoint A/A0 = {ratio} was not reached: {}, to gap.tip = {}; give gap.tip, or raise \
+            "the setpoint {} was not reached: {}, to gap.tip = {}; give gap.tip, or {} \
              drive.setpoint",
+            held.words(),
             budget_text(steps),
-            search.shown(pieces.last().map_or(range.1, |piece| piece.to))
+            search.shown(pieces.last().map_or(range.1, |piece| piece.to)),
+            held.remedy()
         )));
     }
     let reached = search.found.take().unwrap_or_else(|| {
         Err(Error::numerics(format!(
-            "the setpoint A/A0 = {ratio} is not reached on the way to the sample's own position \
-             (gap.tip = 0), where A/A0 is {:.3}; raise drive.setpoint, or give gap.tip",
-            search.least / free.amplitude
+            "the setpoint {} is not reached on the way to the sample's own position \
+             (gap.tip = 0), {} {}; {} drive.setpoint, or give gap.tip",
+            held.words(),
+            if held.is_amplitude() {
+                "where"
+            } else {
+                "nearest to it"
+            },
+            held.state(search.nearest),
+            held.remedy()
         )))
     })?;
     // What a lever shows at this distance that comes from near.
@@ -225,10 +259,18 @@ pub fn solve_setpoint(case: &Case, control: &Control<'_>) -> Result<SetpointRepo
     if control.is_cancelled() {
         return Err(cancelled());
     }
+    let amplitude_ratio = reached.observables.first_harmonic / free.amplitude;
     solutions.push(reached);
     solutions.sort_by(|a, b| b.gap.total_cmp(&a.gap));
     let chosen = solutions.iter().position(|s| s.reached).unwrap_or(0);
+    let (name, value, ratio) = match setpoint {
+        Held::Amplitude(ratio) => ("amplitude", ratio, ratio),
+        Held::PeakForce(force) => ("peak_force", force, amplitude_ratio),
+        Held::Phase(phase) => ("phase", phase, amplitude_ratio),
+    };
     Ok(SetpointReport {
+        held: name,
+        setpoint: value,
         ratio,
         amplitude: ratio * view.free_amplitude,
         solutions,
@@ -299,34 +341,150 @@ const MIN_POINTS: usize = 16;
 /// How much farther than the free tip swings the way begins.
 const FARTHER: f64 = 2.0;
 
+/// The quantity that is held, in the model's units; a phase in degrees.
+#[derive(Clone, Copy, Debug)]
+struct HeldQuantity {
+    setpoint: Held,
+    target: f64,
+    /// Its value far from the sample.
+    far: f64,
+    /// A₀, and the unit of force in N.
+    free_amplitude: f64,
+    force_unit: f64,
+}
+
+impl HeldQuantity {
+    fn new(setpoint: Held, free: &FreeMotion, force_unit: f64) -> Result<Self, Error> {
+        let (target, far) = match setpoint {
+            Held::Amplitude(ratio) => (ratio * free.amplitude, free.amplitude),
+            Held::PeakForce(force) => (force / force_unit, 0.0),
+            Held::Phase(phase) => (near_phase(phase, free.phase), free.phase),
+        };
+        if target == far {
+            return Err(Error::input(
+                "the setpoint is the phase far from the sample: every distance would do",
+                "change drive.setpoint",
+            ));
+        }
+        Ok(Self {
+            setpoint,
+            target,
+            far,
+            free_amplitude: free.amplitude,
+            force_unit,
+        })
+    }
+
+    const fn is_amplitude(&self) -> bool {
+        matches!(self.setpoint, Held::Amplitude(_))
+    }
+
+    fn set(&self) -> ObservableSet {
+        match self.setpoint {
+            Held::Amplitude(_) | Held::Phase(_) => ObservableSet::FIRST_HARMONIC,
+            Held::PeakForce(_) => Observable::named("peak_force")
+                .map_or(ObservableSet::COMMON, |peak| ObservableSet::NONE.with(peak)),
+        }
+    }
+
+    fn of(&self, seen: &Observables) -> f64 {
+        match self.setpoint {
+            Held::Amplitude(_) => seen.first_harmonic,
+            Held::PeakForce(_) => seen.peak_force,
+            Held::Phase(_) => near_phase(seen.phase, self.far),
+        }
+    }
+
+    /// Whether a value is at the setpoint or beyond it, seen from far.
+    fn is_reached(&self, value: f64) -> bool {
+        if self.far > self.target {
+            value <= self.target
+        } else {
+            value >= self.target
+        }
+    }
+
+    /// The value of two that is the nearer to the setpoint.
+    fn nearer(&self, a: f64, b: f64) -> f64 {
+        if self.far > self.target {
+            a.min(b)
+        } else {
+            a.max(b)
+        }
+    }
+
+    fn shown(&self, value: f64) -> String {
+        match self.setpoint {
+            Held::Amplitude(_) => format!("{:.3}", value / self.free_amplitude),
+            Held::PeakForce(_) => Kind::Force.format(value * self.force_unit),
+            Held::Phase(_) => format!("{value:.2}°"),
+        }
+    }
+
+    /// The setpoint in words.
+    fn words(&self) -> String {
+        match self.setpoint {
+            Held::Amplitude(ratio) => format!("A/A0 = {ratio}"),
+            Held::PeakForce(force) => format!("peak force = {}", Kind::Force.format(force)),
+            Held::Phase(phase) => format!("phase = {phase}°"),
+        }
+    }
+
+    /// A value in words.
+    fn state(&self, value: f64) -> String {
+        let name = match self.setpoint {
+            Held::Amplitude(_) => "A/A0",
+            Held::PeakForce(_) => "the peak force",
+            Held::Phase(_) => "the phase",
+        };
+        format!("{name} is {}", self.shown(value))
+    }
+
+    const fn remedy(&self) -> &'static str {
+        if self.is_amplitude() {
+            "raise"
+        } else {
+            "change"
+        }
+    }
+}
+
+/// A phase in degrees within half a turn of another.
+fn near_phase(phase: f64, of: f64) -> f64 {
+    phase - 360.0 * ((phase - of) / 360.0).round()
+}
+
 /// The search for the setpoint along the way from far.
 struct Search<'a> {
     case: &'a Case,
-    ratio: f64,
-    /// The amplitude at the setpoint, in the model's unit.
-    target: f64,
+    held: HeldQuantity,
     free: FreeMotion,
-    /// The distance and the amplitude last passed.
+    /// The distance and the value last passed.
     before: Option<(f64, f64)>,
-    least: f64,
+    /// The value nearest to the setpoint.
+    nearest: f64,
     found: Option<Result<SetpointSolution, Error>>,
 }
 
-/// An orbit of a branch and its amplitude.
+/// An orbit of a branch and the value of the held quantity.
 #[derive(Clone, Debug)]
 struct Sample<'a> {
     gap: f64,
     orbit: &'a PeriodicOrbit,
-    amplitude: f64,
+    value: f64,
 }
 
-/// Amplitude at the drive's frequency of an orbit at a distance; NaN where it cannot be measured.
-fn amplitude(sweep: &DistanceSweep<'_>, gap: f64, orbit: &PeriodicOrbit) -> f64 {
+/// The held quantity of an orbit at a distance; NaN where it cannot be measured.
+fn value_at(
+    held: &HeldQuantity,
+    sweep: &DistanceSweep<'_>,
+    gap: f64,
+    orbit: &PeriodicOrbit,
+) -> f64 {
     let start = orbit.states.first().map_or(&[][..], Vec::as_slice);
     let model = sweep.model(gap).ok();
-    let seen =
-        model.and_then(|m| measure(&m, start, orbit.period, ObservableSet::FIRST_HARMONIC).ok());
-    seen.map_or(f64::NAN, |seen| seen.first_harmonic)
+    let seen = model.and_then(|m| measure(&m, start, orbit.period, held.set()).ok());
+    seen.map_or(f64::NAN, |seen| held.of(&seen))
 }
 
 impl Search<'_> {
@@ -349,11 +507,15 @@ impl Search<'_> {
                     None => motion.classification.name(),
                 };
                 self.found = Some(Err(Error::numerics(format!(
-                    "on approach the motion is {what} at gap.tip = {}, before the setpoint A/A0 = \
-                     {} is reached: it has no amplitude to hold; change drive.setpoint, or give \
-                     gap.tip",
+                    "on approach the motion is {what} at gap.tip = {}, before the setpoint {} is \
+                     reached: it has no {} to hold; change drive.setpoint, or give gap.tip",
                     self.shown(piece.from),
-                    self.ratio
+                    self.held.words(),
+                    match self.held.setpoint {
+                        Held::Amplitude(_) => "amplitude",
+                        Held::PeakForce(_) => "peak force",
+                        Held::Phase(_) => "phase",
+                    }
                 ))));
                 return true;
             }
@@ -371,28 +533,33 @@ impl Search<'_> {
             .into_iter()
             .filter_map(|(gap, orbit)| Some((gap, orbit?)))
             .collect();
-        let amplitudes: Vec<f64> = orbits
+        let held = self.held;
+        let values: Vec<f64> = orbits
             .par_iter()
             .with_max_len(1)
-            .map(|(gap, orbit)| amplitude(sweep, *gap, orbit))
+            .map(|(gap, orbit)| value_at(&held, sweep, *gap, orbit))
             .collect();
         let mut before: Option<Sample<'_>> = None;
-        for ((gap, orbit), amplitude) in orbits.iter().zip(amplitudes) {
+        for ((gap, orbit), value) in orbits.iter().zip(values) {
             let here = Sample {
                 gap: *gap,
                 orbit,
-                amplitude,
+                value,
             };
-            self.least = self.least.min(amplitude);
-            if amplitude <= self.target {
-                let jumped = |(from, above): (f64, f64)| {
+            self.nearest = held.nearer(self.nearest, value);
+            if held.is_reached(value) {
+                let jumped = |(from, before): (f64, f64)| {
+                    let (name, of) = match held.setpoint {
+                        Held::Amplitude(_) => ("amplitude", " of A0"),
+                        Held::PeakForce(_) => ("peak force", ""),
+                        Held::Phase(_) => ("phase", ""),
+                    };
                     Err(Error::numerics(format!(
-                        "on approach the amplitude jumps past the setpoint A/A0 = {}: from {:.3} \
-                         to {:.3} of A0 between gap.tip = {} and {}; change drive.setpoint, or \
-                         give gap.tip",
-                        self.ratio,
-                        above / self.free.amplitude,
-                        amplitude / self.free.amplitude,
+                        "on approach the {name} jumps past the setpoint {}: from {} to {}{of} \
+                         between gap.tip = {} and {}; change drive.setpoint, or give gap.tip",
+                        held.words(),
+                        held.shown(before),
+                        held.shown(value),
                         self.shown(from),
                         self.shown(*gap)
                     )))
@@ -407,12 +574,12 @@ impl Search<'_> {
                 self.found = match (crossed, self.before) {
                     (Some(Some(found)), _) => Some(Ok(found)),
                     (_, Some(above)) => Some(jumped(above)),
-                    // Below the setpoint from the first: nothing is reached from above.
+                    // Beyond the setpoint from the first: it is not reached from far.
                     (_, None) => None,
                 };
                 return true;
             }
-            self.before = Some((*gap, amplitude));
+            self.before = Some((*gap, value));
             before = Some(here);
         }
         false
@@ -467,18 +634,18 @@ impl Search<'_> {
         let diagram = assemble_diagram(&family, &seeds, &options, &quiet);
         for branch in &diagram.branches {
             let points: &[BranchPoint] = &branch.branch.points;
-            let amplitudes: Vec<f64> = points
+            let values: Vec<f64> = points
                 .par_iter()
                 .with_max_len(1)
-                .map(|p| amplitude(sweep, p.parameter, &p.orbit))
+                .map(|p| value_at(&self.held, sweep, p.parameter, &p.orbit))
                 .collect();
-            for (pair, both) in points.windows(2).zip(amplitudes.windows(2)) {
+            for (pair, both) in points.windows(2).zip(values.windows(2)) {
                 let [a, b] = [0, 1].map(|k| Sample {
                     gap: pair[k].parameter,
                     orbit: &pair[k].orbit,
-                    amplitude: both[k],
+                    value: both[k],
                 });
-                if (a.amplitude > self.target) != (b.amplitude > self.target)
+                if (a.value > self.held.target) != (b.value > self.held.target)
                     && let Some(solution) = self.crossing(sweep, &a, &b)
                 {
                     let near = 1e-9 * self.free.reach.max(solution.gap.abs());
@@ -516,7 +683,7 @@ impl Search<'_> {
 const STEPS: usize = 60;
 
 impl Search<'_> {
-    /// The orbit between two of a branch that has the target amplitude.
+    /// The orbit between two of a branch that is at the setpoint.
     fn crossing(
         &self,
         sweep: &DistanceSweep<'_>,
@@ -524,8 +691,8 @@ impl Search<'_> {
         b: &Sample<'_>,
     ) -> Option<SetpointSolution> {
         let view = self.case.physical()?;
-        let target = self.target;
-        let (mut low, mut high) = ((0.0, a.amplitude), (1.0, b.amplitude));
+        let target = self.held.target;
+        let (mut low, mut high) = ((0.0, a.value), (1.0, b.value));
         let mut closed: Option<(f64, PeriodicOrbit, Observables)> = None;
         for _ in 0..STEPS {
             // The curve is nearly straight between two points of a branch.
@@ -537,7 +704,7 @@ impl Search<'_> {
                 0.5 * (low.0 + high.0)
             };
             let (gap, orbit, observables) = orbit_between(sweep, a, b, t)?;
-            let value = observables.first_harmonic;
+            let value = self.held.of(&observables);
             closed = Some((gap, orbit, observables));
             if (value - target).abs() <= 1e-12 * target.abs() || high.0 - low.0 < 1e-14 {
                 break;
@@ -550,7 +717,7 @@ impl Search<'_> {
         }
         let (gap, orbit, observables) = closed?;
         // Where a fold lies between the points, Newton may have closed the other orbit.
-        if (observables.first_harmonic - target).abs() > 1e-6 * target.abs() {
+        if (self.held.of(&observables) - target).abs() > 1e-6 * target.abs() {
             return None;
         }
         Some(SetpointSolution {
@@ -560,6 +727,11 @@ impl Search<'_> {
             stable: orbit.is_stable(),
             spectral_radius: orbit.spectral_radius(),
             reached: false,
+            branch: if observables.mean_force < 0.0 {
+                "attractive"
+            } else {
+                "repulsive"
+            },
             state: orbit.states.first().cloned().unwrap_or_default(),
             physical: PhysicalMotion::of(&observables, view),
             observables,

@@ -6,6 +6,7 @@
 )]
 
 mod approach;
+mod bimodal;
 mod branches;
 mod extremes;
 mod fit;

@@ -151,13 +151,13 @@ setpoint=0.9
     assert!(!solved.unwrap().other_states.is_empty());
 }
 
-/// The search ends at its budget of steps: it has not reached the setpoint, and says how far it came;
-/// or it has, and says that other states may be missing.
+/// The search ends at its budget of steps and says how far it came; its result does not depend on the
+/// number of threads.
 #[test]
 fn a_search_ends_at_its_budget_of_steps() {
     let case = studied(MICA, &["drive.setpoint=0.9"]);
     let mut ends = Vec::new();
-    for steps in budgets() {
+    for steps in budgets().step_by(5) {
         let [alone, together] = limited(steps, |control| {
             solve_setpoint(&case, control).map(|report| (report.zc(), report.budget))
         });
@@ -170,13 +170,10 @@ fn a_search_ends_at_its_budget_of_steps() {
             .message()
             .contains("up to the budget of 0.02 million steps, to gap.tip =")
     );
-    let (zc, whole) = ends.last().unwrap().as_ref().unwrap();
-    assert_eq!(*whole, None);
-    let cut = ends
-        .iter()
-        .flatten()
-        .find(|(_, budget)| budget.is_some())
-        .unwrap();
-    assert_eq!(cut.0.to_bits(), zc.to_bits());
-    assert!(cut.1.as_ref().unwrap().contains("up to the budget of"));
+    let (zc, budget) = ends.last().unwrap().as_ref().unwrap();
+    assert_eq!(*budget, None);
+    // Whatever ends the search for other states, the distance is the same.
+    for (reached, _) in ends.iter().flatten() {
+        assert_eq!(reached.to_bits(), zc.to_bits());
+    }
 }

@@ -35,6 +35,8 @@ fn request(study: &str) -> Option<Value> {
         "convergence" => json!({"largest": 2}),
         // Their columns are those of the data, and their units are told with them.
         "fit" | "reconstruct" => return None,
+        // In SI as a whole.
+        "bimodal" | "force-curve" => return None,
         _ => json!({}),
     })
 }
@@ -48,8 +50,14 @@ fn without_si(value: &Value, path: &str, found: &mut Vec<String>) {
             }
         }
         Value::Object(entries) => {
-            // The loop's settings: its free motion is told in SI above.
-            if path == "fm.modulation" {
+            // The loop's settings, whose free motion is told in SI above; numbers of modes and
+            // relative differences by the observable's name.
+            let by_name = [
+                "fm.modulation",
+                "convergence.enough_readings",
+                "convergence.reading_differences[]",
+            ];
+            if by_name.contains(&path) {
                 return;
             }
             let physical = entries.get("physical").or(entries.get("modulation_si"));

@@ -10,11 +10,62 @@ use nanotap::study::value::Axes;
 use nanotap::study::window::{Condition, Window, WindowOptions};
 use nanotap::study::{Computation as _, FreeMotion};
 
-use crate::common::{DMT, EV, lever};
+use crate::common::{DMT, EV, HERTZ, lever};
 
 /// A lever whose transient lasts a few tens of periods.
 fn quick(amplitude: f64, gap: f64, sample: &[&str]) -> Case {
     lever((0.9, 30.0, "100 kHz"), (amplitude, gap), sample)
+}
+
+/// The peak force and the phase at the distance of an amplitude are reached at that distance: over a
+/// sample that only repels, the lever passes each of them once on its approach.
+#[test]
+fn a_setpoint_is_an_amplitude_a_peak_force_or_a_phase() {
+    let lever = quick(20.0, 18.0, &HERTZ);
+    let lines = lever.to_toml();
+    let lines = lines
+        .lines()
+        .filter(|l| *l != "[gap]" && !l.starts_with("tip = "));
+    let text = lines.collect::<Vec<_>>().join(
+        "
+",
+    );
+    let parsed = |setpoint: &str| {
+        let source = nanotap::case::file::Source {
+            name: "case.toml".into(),
+            text: text.clone(),
+        };
+        Case::parse(Some(source), &[format!("drive.setpoint={setpoint}")])
+    };
+    let held = |setpoint: &str| solve_setpoint(&parsed(setpoint).unwrap(), &Control::default());
+    let amplitude = held("0.8").unwrap();
+    assert_eq!(amplitude.held, "amplitude");
+    let at = &amplitude.solutions[amplitude.chosen];
+    let seen = at.physical.observables;
+    for (name, setpoint) in [
+        ("peak_force", format!("{:e} N", seen.peak_force)),
+        ("phase", format!("{} deg", seen.phase)),
+    ] {
+        let report = held(&setpoint).unwrap();
+        assert_eq!(report.held, name);
+        let found = &report.solutions[report.chosen];
+        assert!(found.reached && found.stable);
+        assert_eq!(found.branch, at.branch);
+        assert!(
+            (found.zc / at.zc - 1.0).abs() < 1e-8,
+            "{name}: {} {}",
+            found.zc,
+            at.zc
+        );
+        assert!((report.ratio - 0.8).abs() < 1e-8);
+        let text = report.remark().text;
+        assert!(text.contains(at.branch), "{text}");
+    }
+    // A force that no tapping reaches is refused with the largest on the way.
+    let refused = held("1 mN").unwrap_err().to_string();
+    assert!(refused.contains("the peak force is"), "{refused}");
+    let refused = parsed("-20 Hz").unwrap_err().to_string();
+    assert!(refused.contains("frequency modulation"), "{refused}");
 }
 
 /// An orbit at a solution of the setpoint is run again and has the setpoint's amplitude.

@@ -278,12 +278,17 @@ impl Key {
         let Value::Number(number, kind) = value else {
             return None;
         };
-        if self.entry().takes == Takes::FractionOrLength {
-            let right = *number > 0.0 && (*kind == Kind::Length || *number < 1.0);
-            return (!right).then_some(
-                "a setpoint is a fraction of the free amplitude between 0 and 1, or an \
-                 amplitude such as \"8 nm\"",
-            );
+        if self.entry().takes == Takes::Setpoint {
+            let right = *number > 0.0 && (*kind != Kind::Number || *number < 1.0);
+            return match kind {
+                Kind::Frequency => Some(
+                    "frequency shifts are held by frequency modulation: see `approach --fm --shift`",
+                ),
+                _ => (!right).then_some(
+                    "a setpoint is a fraction of the free amplitude between 0 and 1, an amplitude \
+                     such as \"8 nm\", a peak force such as \"1 nN\" or a phase such as \"120 deg\"",
+                ),
+            };
         }
         let range = self.entry().range;
         (!range.contains(*number)).then_some(range.reason)

@@ -426,8 +426,9 @@ After from AFTER_LAWS => {
     ).feeds(Parameter::Alpha2)
         .label("free amplitude $A_0$");
     DriveSetpoint = other(
-        Drive, "setpoint", Takes::FractionOrLength,
-        "amplitude that the feedback holds: a fraction of A0, or a length; it tells the distance",
+        Drive, "setpoint", Takes::Setpoint,
+        "what the feedback holds: a fraction of A0, an amplitude, a peak force or a phase; it tells \
+         the distance",
     ).feeds(Parameter::Alpha5)
         .label("setpoint $A/A_0$");
     DriveActuation = other(Drive, "actuation", Takes::Word(words!(Actuation)), "where the drive acts");

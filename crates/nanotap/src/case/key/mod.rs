@@ -131,8 +131,8 @@ fn without_subscripts(symbol: &str) -> String {
 pub enum Takes {
     /// A quantity of this kind; in `[model]` a plain number.
     Quantity(Kind),
-    /// A fraction, or a length.
-    FractionOrLength,
+    /// What a feedback holds: a fraction of the free amplitude, an amplitude, a peak force or a phase.
+    Setpoint,
     /// A whole number from 1 to this.
     Count(usize),
     /// One of these words.
@@ -351,7 +351,7 @@ impl Key {
     /// ```
     /// use nanotap::case::Key;
     /// assert_eq!(Key::find("gap.tip").unwrap().label(), "distance $z_c$");
-    /// assert_eq!(Key::find("alpha4").unwrap().label(), "contact stiffness $α₄$");
+    /// assert_eq!(Key::Alpha4.label(), "contact stiffness $α₄$");
     /// assert_eq!(Key::find("sample.film_thickness").unwrap().label(), "sample film thickness");
     /// ```
     pub fn label(self) -> String {
@@ -467,7 +467,7 @@ impl Key {
     pub fn cannot_vary(self) -> Option<&'static str> {
         match self.entry().takes {
             Takes::Quantity(_) => None,
-            Takes::FractionOrLength => Some(
+            Takes::Setpoint => Some(
                 "each setpoint has its own distance; vary gap.tip, or see A/A0 in the curve of \
                  an approach",
             ),

@@ -18,7 +18,8 @@ pub struct Drive {
     /// Its strength: of the clamped end's motion in m, of a force on the lever in N, or the free
     /// amplitude of the tip in m.
     pub(crate) strength: Given,
-    /// The setpoint, for experiments that solve for the gap: a fraction of A₀, or a length in m.
+    /// The setpoint, for experiments that solve for the gap: a fraction of A₀, or an amplitude, a
+    /// force or an angle in SI.
     pub(crate) setpoint: Option<(Kind, f64)>,
     /// Where it acts.
     pub actuation: Actuation,

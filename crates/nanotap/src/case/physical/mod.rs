@@ -58,7 +58,7 @@ pub use error::PhysicalError;
 pub use lever::{BeamGeometry, Lever, LeverData};
 pub use mapping::{MappingRow, Scales};
 pub use remark::{Remark, Severity};
-pub use view::Physical;
+pub use view::{Held, Physical};
 
 pub(crate) use reader::Reader;
 

@@ -43,9 +43,13 @@ impl Physical {
         remarks.extend(self.sample.remarks(reader, &self.tip));
         if !reader.has(Key::GapTip) {
             remarks.push(Remark::note(format!(
-                "gap.tip is not given: {}, the setpoint amplitude, until the setpoint is \
-                 solved for",
-                Kind::Length.format(self.parameters.get(Parameter::Alpha5))
+                "gap.tip is not given: {}, the {} amplitude, until the setpoint is solved for",
+                Kind::Length.format(self.parameters.get(Parameter::Alpha5)),
+                if self.setpoint.is_some() {
+                    "setpoint"
+                } else {
+                    "free"
+                }
             )));
         }
         if !reader.has(Key::GapBeam) && self.tip.height.is_none() {

@@ -25,6 +25,17 @@ use crate::model::parameter::{Numbers, Parameter, Unit};
 /// Default height of the tip; tips of silicon levers are 10 to 15 µm high.
 pub(super) const USUAL_TIP_HEIGHT: f64 = 10e-6;
 
+/// What a feedback holds, with its setpoint.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Held {
+    /// The amplitude, as a part of A₀.
+    Amplitude(f64),
+    /// The largest force of a period, N.
+    PeakForce(f64),
+    /// The phase lag of the deflection, degrees.
+    Phase(f64),
+}
+
 /// A physical case with its dimensionless parameters and the units between the two.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Physical {
@@ -47,6 +58,8 @@ pub struct Physical {
     pub free_phase: f64,
     /// Setpoint amplitude over A₀, if one was given: experiments solve for its gap.
     pub setpoint: Option<f64>,
+    /// What the feedback holds, if a setpoint was given.
+    pub held: Option<Held>,
     /// Height of the tip, g₀ − g₁, in m.
     pub tip_height: f64,
     /// Data of the lever.
@@ -283,11 +296,16 @@ fn mapped(reader: Reader<'_>, known: Option<Lever>) -> Result<Physical, Physical
         }
         _ => None,
     };
-    let setpoint = setpoint_ratio(reader, &drive, free_amplitude)?;
-    let tip_gap = match (reader.number(Key::GapTip)?, setpoint) {
+    let held = held(reader, &drive, free_amplitude)?;
+    let setpoint = match held {
+        Some(Held::Amplitude(ratio)) => Some(ratio),
+        _ => None,
+    };
+    let tip_gap = match (reader.number(Key::GapTip)?, held) {
         (Some(gap), _) => gap,
         // Before the setpoint is solved for.
-        (None, Some(ratio)) => ratio * free_amplitude,
+        (None, Some(Held::Amplitude(ratio))) => ratio * free_amplitude,
+        (None, Some(_)) => free_amplitude,
         (None, None) => {
             return Err(PhysicalError::missing(
                 Key::GapTip,
@@ -339,6 +357,7 @@ fn mapped(reader: Reader<'_>, known: Option<Lever>) -> Result<Physical, Physical
         second_free_amplitude: second.map(|(_, (_, free))| free),
         free_phase: -response.argument().to_degrees(),
         setpoint,
+        held,
         tip_height: beam_gap - tip_gap,
         data,
         tip,
@@ -392,15 +411,15 @@ fn free_case(lever: &Lever, frequency: f64, like: &Cantilever) -> Cantilever {
     }
 }
 
-fn setpoint_ratio(
+fn held(
     reader: Reader<'_>,
     drive: &Drive,
     free_amplitude: f64,
-) -> Result<Option<f64>, PhysicalError> {
+) -> Result<Option<Held>, PhysicalError> {
     match drive.setpoint {
         None => Ok(None),
         Some((Kind::Length, amplitude)) if amplitude < free_amplitude => {
-            Ok(Some(amplitude / free_amplitude))
+            Ok(Some(Held::Amplitude(amplitude / free_amplitude)))
         }
         Some((Kind::Length, _)) => Err(reader.impossible(
             Key::DriveSetpoint,
@@ -409,7 +428,9 @@ fn setpoint_ratio(
                 Kind::Length.format(free_amplitude)
             ),
         )),
-        Some((_, ratio)) => Ok(Some(ratio)),
+        Some((Kind::Force, force)) => Ok(Some(Held::PeakForce(force))),
+        Some((Kind::Angle, phase)) => Ok(Some(Held::Phase(phase.to_degrees()))),
+        Some((_, ratio)) => Ok(Some(Held::Amplitude(ratio))),
     }
 }
 

@@ -141,6 +141,8 @@ pub(in crate::study) struct FoundMotion {
     pub(in crate::study) state: Vec<f64>,
     /// Whether the motion from the start could not be computed.
     failed: bool,
+    /// Whether it is on an orbit, stable or not.
+    closes: bool,
     /// Whether it was only looked for an orbit.
     only_searched: bool,
 }
@@ -153,6 +155,7 @@ impl FoundMotion {
             state: orbit.states.first().cloned().unwrap_or_default(),
             orbit: Some(orbit),
             failed: false,
+            closes: true,
             only_searched: false,
         }
     }
@@ -164,6 +167,7 @@ impl FoundMotion {
             orbit: None,
             state: state.to_vec(),
             failed: true,
+            closes: false,
             only_searched: false,
         }
     }
@@ -360,10 +364,8 @@ impl<'a> DistanceSweep<'a> {
             let options = self.classify.clone();
             self.search_orbit(gap, start, &options)
         });
-        let is_confirmed = |motion: &FoundMotion| {
-            let is_periodic = motion.classification == Classification::Periodic;
-            !motion.failed && is_periodic == motion.orbit.is_some()
-        };
+        let is_confirmed =
+            |motion: &FoundMotion| !motion.failed && motion.closes == motion.orbit.is_some();
         let motion = searched
             .filter(is_confirmed)
             .unwrap_or_else(|| self.run_from(gap, start, self.classify.max_transient));
@@ -432,7 +434,7 @@ impl<'a> DistanceSweep<'a> {
             });
         }
         // An orbit of the approximate map alone shows nothing.
-        if motion.classification == Classification::Periodic && motion.orbit.is_none() {
+        if self.budget.is_some() && motion.closes && motion.orbit.is_none() {
             motion = named(&mut map, start, options);
         }
         FoundMotion {
@@ -945,6 +947,15 @@ fn named(map: &mut ModelMap, start: &[f64], options: &ClassifyOptions) -> FoundM
         classification: named.classification,
         evidence: named.evidence,
         orbit: named.orbit,
+        closes: matches!(
+            classified.kind,
+            MotionKind::Periodic(_)
+                | MotionKind::TransientChaos { .. }
+                | MotionKind::Undecided {
+                    reason: UndecidedReason::OnOrbitThatDoesNotAttract(_),
+                    ..
+                }
+        ),
         failed: matches!(
             classified.kind,
             MotionKind::Undecided {

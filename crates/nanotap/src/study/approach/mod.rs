@@ -605,8 +605,8 @@ options! {
         #[schemars(extend("x-value" = "DISTANCE"))]
         pub to: Option<Amount> = None,
         /// Number of distances in each direction. Under a nonlinear law the lever is followed for at
-        /// most 30 million steps of the approximate flow, and 25 million more are taken for every 100
-        /// distances; an evaluation of the force in the exact flow counts as a step
+        /// most 30 million steps of the approximate flow, and as many more are taken for every 100
+        /// distances; two evaluations of the force in the exact flow count as a step
         #[schemars(range(min = 2, max = MAX_DISTANCES), extend("x-value" = "P"))]
         pub points: usize = 80,
         /// Also continue coexisting branches, stable and unstable

@@ -29,7 +29,7 @@ pub(super) struct Found {
 
 /// Steps of the approximate flow after which no more rows are measured, for every hundred distances,
 /// so that a longer table is measured as completely.
-const ROW_STEPS: u64 = 25_000_000;
+const ROW_STEPS: u64 = 30_000_000;
 /// Steps that branches may take.
 const BRANCH_STEPS: u64 = 10_000_000;
 /// Points that the branches through a curve have all together, mostly; where steps suffice for fewer,
@@ -349,6 +349,13 @@ impl Written<'_> {
             for pair in pieces.windows(2).filter(|pair| pair[0].jumps) {
                 let (before, after) = (&pair[0], &pair[1]);
                 let view = self.curve.case.physical();
+                let row = |piece: &Piece, gap| self.row(way, gap, self.sweep.motion_at(piece, gap));
+                let (from, to) = (row(before, before.to)?, row(after, after.entered)?);
+                // What did not close on the grid may have come to the same orbit already.
+                let orbits = from.orbit.as_ref().zip(to.orbit.as_ref());
+                if from.gap == to.gap && orbits.is_some_and(|(a, b)| is_same(a, b)) {
+                    continue;
+                }
                 jumps.push(StateJump {
                     way,
                     gap: before.to,
@@ -356,12 +363,8 @@ impl Written<'_> {
                     uncertainty: before.uncertainty,
                     zc_uncertainty: view.map(|view| before.uncertainty * view.scales.length),
                     reason: before.end.to_string(),
-                    before: self.row(way, before.to, self.sweep.motion_at(before, before.to))?,
-                    after: self.row(
-                        way,
-                        after.entered,
-                        self.sweep.motion_at(after, after.entered),
-                    )?,
+                    before: from,
+                    after: to,
                 });
             }
         }

@@ -146,7 +146,8 @@ impl Search<'_> {
             .zip(&found.solution.x)
             .map(|(p, value)| match p.target {
                 parameters::Target::Key(_) if *value != 0.0 => value.abs(),
-                _ => p.size,
+                // Starts spread over a tenth of what the data could show at all.
+                _ => 10.0 * p.size,
             })
             .collect();
         information(&found.solution.jacobian, &sizes)

@@ -78,6 +78,27 @@ options! {
 }
 
 /// A force curve.
+///
+/// ```
+/// use nanotap::case::Case;
+/// use nanotap::case::physical::Catalogue;
+/// use nanotap::control::Control;
+/// use nanotap::study::Study as _;
+/// use nanotap::study::force_curve::{ForceCurveOptions, ForceCurveStudy};
+/// use std::path::Path;
+///
+/// let file = Path::new("../../docs/cases/force-curve.toml");
+/// let case = Case::load(Some(file), &[], &Catalogue::shared())?;
+/// let options = ForceCurveOptions {
+///     to: Some("-2 nm".into()),
+///     speed: Some("10 um/s".into()),
+///     ..ForceCurveOptions::default()
+/// };
+/// let curve = ForceCurveStudy::run(&case, &options, &Control::default())?;
+/// // The pull-off force of the law, HR/(6 a₀²) (docs/cases/force-curve.md).
+/// assert!((curve.summary.adhesion_force - 4.2852770e-9).abs() < 1e-15);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Copy, Debug)]
 pub struct ForceCurveStudy;
 

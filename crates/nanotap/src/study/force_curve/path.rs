@@ -131,7 +131,7 @@ impl<'a> Plan<'a> {
         let distance = |option, given: &Option<_>| implied(case, key, option, given.as_ref());
         let from = match distance("from", &options.from)? {
             Some(from) => from,
-            None if view.setpoint.is_none() => case.get(key),
+            None if !case.leaves_distance_to_setpoint() => case.get(key),
             None => {
                 return Err(Error::option(
                     "from",

@@ -45,7 +45,7 @@ pub(super) struct Linearised {
 
 /// The flow of a model from any instant of the drive period.
 enum Stepper {
-    Linear(Flow),
+    Linear(Box<Flow>),
     /// With the branch of the law at the beginning of the step, where the law remembers it.
     Nonlinear(Box<nanotap_volterra::Flow>),
 }
@@ -53,7 +53,7 @@ enum Stepper {
 impl Stepper {
     fn new(model: &Model) -> Self {
         match &model.nonlinear {
-            None => Self::Linear(Flow::new(model.system.clone())),
+            None => Self::Linear(Box::new(Flow::new(model.system.clone()))),
             Some(nonlinear) => Self::Nonlinear(Box::new(nanotap_volterra::Flow::new(
                 nonlinear.system.clone(),
             ))),

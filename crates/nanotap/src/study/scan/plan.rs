@@ -116,7 +116,7 @@ impl Plan {
             ));
         }
         let free_amplitude = view.free_amplitude;
-        let setpoint = setpoint(&options, case, view)?;
+        let setpoint = setpoint(&options, view)?;
         let mode = options.mode.unwrap_or_default();
         let z0 = match length(options.z0.as_ref(), "z0")? {
             Some(z0) => z0,
@@ -304,15 +304,11 @@ fn periods_of_line(options: &ScanOptions, frequency: f64, size: f64) -> Result<u
 }
 
 /// Setpoint over free amplitude.
-fn setpoint(options: &ScanOptions, case: &Case, view: &Physical) -> Result<f64, Error> {
+fn setpoint(options: &ScanOptions, view: &Physical) -> Result<f64, Error> {
     let given = match &options.setpoint {
-        None => {
-            let stated = case.get(Key::DriveSetpoint);
-            if !stated.is_finite() {
-                return Err(missing("setpoint", "setpoint = 0.8"));
-            }
-            stated
-        }
+        None => view
+            .setpoint
+            .ok_or_else(|| missing("setpoint", "setpoint = 0.8"))?,
         Some(Quantity::Number(part)) => *part,
         Some(text @ Quantity::Text(written)) => match Kind::Number.parse(written) {
             Ok(part) => part,

@@ -1,0 +1,194 @@
+//! `nanotap bimodal`: two tones with their loops against the distance.
+
+use clap::Args;
+use nanotap::case::physical::Kind;
+use nanotap::study::bimodal::{BimodalOptions, BimodalPoint, BimodalReport, BimodalStudy, Loop};
+
+use crate::arguments::CaseArguments;
+use crate::failure::Failure;
+use crate::given_case::GivenCase;
+use crate::output::Output;
+use crate::request::Request;
+use crate::table::{Align, Table};
+use crate::threads::ThreadsArgument;
+use crate::{motion, number, progress, style};
+
+/// Bimodal operation against the distance: amplitude, phase, frequency and drive of both tones as their
+/// loops hold them (AM–FM by default), and what the usual formulas make of them. The frequencies need
+/// no common period.
+#[derive(Args, Debug)]
+pub(crate) struct Arguments {
+    #[command(flatten)]
+    case: CaseArguments,
+
+    #[command(flatten)]
+    request: Request<BimodalOptions>,
+}
+
+pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure> {
+    let request = arguments.request.read()?;
+    let case = GivenCase::for_study(&arguments.case, true, output)?;
+    let report = progress::study::<BimodalStudy>(&case, &request, &ThreadsArgument::default())?;
+    output.study(&case, &report, |report| text(&case, report))
+}
+
+fn length(value: f64) -> String {
+    Kind::Length.format_digits(value, 4)
+}
+
+/// A column of a tone: heading, whether the loops show it, and text of a cell.
+type Column = (
+    &'static str,
+    fn(Loop) -> bool,
+    fn(&BimodalPoint, usize) -> String,
+);
+
+/// What is shown of a tone, as far as its loop lets it change.
+const COLUMNS: [Column; 4] = [
+    (
+        "A",
+        |kind| !kind.holds_amplitude(),
+        |p, k| length(p.tones[k].amplitude),
+    ),
+    (
+        "lag (°)",
+        |kind| !kind.holds_phase(),
+        |p, k| format!("{:.2}", p.tones[k].phase),
+    ),
+    (
+        "Δf",
+        |kind| kind.holds_phase(),
+        |p, k| Kind::Frequency.format_digits(p.tones[k].frequency_shift, 4),
+    ),
+    (
+        "drive",
+        |kind| kind.holds_amplitude(),
+        |p, k| number::significant(p.tones[k].drive_ratio, 4),
+    ),
+];
+
+fn text(case: &GivenCase, report: &BimodalReport) -> String {
+    let heading = format!(
+        "{}: {}, {}–{}",
+        case.title(),
+        case.summary(),
+        report.loops[0].name(),
+        report.loops[1].name()
+    );
+    let mut text = format!("{}\n\n", style::bold(&heading));
+    text.push_str(&free(report).render());
+    text.push('\n');
+    text.push_str(&curve(report).render());
+    if let Some(reason) = &report.ended {
+        text.push_str(&motion::paragraph(reason));
+    }
+    if let Some(last) = report.table.last() {
+        text.push('\n');
+        text.push_str(&at(last, report));
+    }
+    text
+}
+
+/// The free lever at both tones.
+fn free(report: &BimodalReport) -> Table {
+    let mut table = Table::new([
+        ("free lever", Align::Left),
+        ("A", Align::Left),
+        ("lag (°)", Align::Point),
+        ("frequency", Align::Left),
+        ("stiffness", Align::Left),
+    ]);
+    for (name, tone) in ["first tone", "second tone"].into_iter().zip(&report.free) {
+        table.row([
+            name.to_owned(),
+            length(tone.amplitude),
+            format!("{:.2}", tone.phase),
+            Kind::Frequency.format_digits(tone.frequency, 7),
+            Kind::Stiffness.format_digits(tone.stiffness, 4),
+        ]);
+    }
+    table
+}
+
+/// A row a distance.
+fn curve(report: &BimodalReport) -> Table {
+    let shown: Vec<(String, usize, &Column)> = [0, 1]
+        .into_iter()
+        .flat_map(|k| COLUMNS.iter().map(move |column| (k, column)))
+        .filter(|(k, (_, shows, _))| shows(report.loops[*k]))
+        .map(|(k, column)| (format!("{} {}", column.0, k + 1), k, column))
+        .collect();
+    let names = shown.iter().map(|(name, ..)| (name.as_str(), Align::Left));
+    let ends = [("F_max", Align::Left), ("E* by formula", Align::Left)];
+    let columns = std::iter::once(("distance", Align::Left))
+        .chain(names)
+        .chain(ends);
+    let mut table = Table::new(columns);
+    for point in &report.table {
+        let modulus = point.estimates.reduced_modulus;
+        let mut row = vec![length(point.zc)];
+        row.extend(shown.iter().map(|(_, k, column)| (column.2)(point, *k)));
+        row.push(Kind::Force.format_digits(point.peak_force, 4));
+        row.push(modulus.map_or_else(String::new, |value| Kind::Pressure.format_digits(value, 4)));
+        table.row(row);
+    }
+    table
+}
+
+/// The last motion, with the formulas beside it.
+fn at(point: &BimodalPoint, report: &BimodalReport) -> String {
+    let mut table = Table::new([
+        ("", Align::Left),
+        ("exact", Align::Left),
+        ("by formula", Align::Left),
+    ]);
+    for (name, tone) in ["first tone", "second tone"].into_iter().zip(&point.tones) {
+        let energy = |value| Kind::Energy.format_digits(value, 4);
+        table.row([
+            format!("virial, {name}"),
+            energy(tone.virial),
+            energy(tone.estimates.virial),
+        ]);
+        table.row([
+            format!("energy lost a period, {name}"),
+            energy(tone.dissipation),
+            energy(tone.estimates.dissipation),
+        ]);
+    }
+    let estimates = &point.estimates;
+    let row = |exact: Option<f64>, formula: Option<f64>, kind: Kind| {
+        [exact, formula].map(|value| value.map_or_else(String::new, |v| kind.format_digits(v, 4)))
+    };
+    let mut pair = |name: &str, [exact, formula]: [String; 2]| {
+        if !formula.is_empty() {
+            table.row([name.to_owned(), exact, formula]);
+        }
+    };
+    pair(
+        "reduced modulus E*",
+        row(
+            report.reduced_modulus,
+            estimates.reduced_modulus,
+            Kind::Pressure,
+        ),
+    );
+    pair(
+        "indentation",
+        row(Some(-point.closest), estimates.indentation, Kind::Length),
+    );
+    pair(
+        "loss tangent",
+        row(None, estimates.loss_tangent, Kind::Number),
+    );
+    format!(
+        "  {}\n{}{}",
+        style::bold(&format!("at {}", length(point.zc))),
+        table.render(),
+        motion::paragraph(&format!(
+            "A small disturbance at constant drives changes by {} in a period. The phases of the second \
+             tone leave out {:.0e} of the motion.",
+            number::significant(point.growth, 6),
+            point.error
+        ))
+    )
+}

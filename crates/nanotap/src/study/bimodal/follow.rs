@@ -1,0 +1,425 @@
+//! Following a motion under loops from far on towards the sample.
+
+use std::f64::consts::PI;
+
+use nanotap_flow::Complex;
+
+use super::formulas::{Readings, estimates};
+use super::loops::{Held, Loops, Tone};
+use super::torus::{Drives, Torus};
+use super::{BimodalOptions, BimodalPoint, BimodalReport, FreeTone, Loop, OPEN_LOOP, ToneReading};
+use crate::Error;
+use crate::case::physical::force::SampleForce;
+use crate::case::physical::{Kind, Physical};
+use crate::case::{Case, Key};
+use crate::control::Control;
+use crate::model::Model;
+use crate::model::cantilever::Cantilever;
+use crate::model::parameter::Parameter;
+use crate::study::FreeMotion;
+use crate::study::frequency_modulation::{FreeOscillation, Held as Condition};
+use crate::study::value::implied;
+
+/// How many steps the way between two distances is cut into at most.
+const SHORTEST: f64 = 1.0 / 4096.0;
+/// Changes of a step up to which the motion is taken for the same: amplitude over that of the free
+/// lever, phase in degrees, strength over that of the free lever.
+const FARTHEST: [f64; 3] = [0.1, 15.0, 0.3];
+/// Degrees from 90 up to which a drive counts as one at resonance.
+const AT_RESONANCE: f64 = 2.0;
+/// Logarithm of a tone's frequency over the resonance nearest to it, up to which its loop finds it.
+const FARTHEST_RESONANCE: f64 = 0.2;
+/// Size of the last harmonics of the phase, above which the motion is not known.
+const UNKNOWN: f64 = 1e-3;
+
+/// The approach, and what its distances are.
+struct Follower<'a> {
+    view: &'a Physical,
+    loops: Loops,
+    kinds: [Loop; 2],
+    radius: Option<f64>,
+}
+
+/// Follows the motion of `case` from far on.
+///
+/// # Errors
+/// When the conditions contradict each other, or there is no motion where the approach begins.
+pub(super) fn follow(
+    case: &Case,
+    lever: &Cantilever,
+    view: &Physical,
+    options: &BimodalOptions,
+    control: &Control<'_>,
+) -> Result<BimodalReport, Error> {
+    let kinds = [
+        options.first.unwrap_or(Loop::Am),
+        options.second.unwrap_or(Loop::Fm),
+    ];
+    let sought = view.setpoint.filter(|_| case.leaves_distance_to_setpoint());
+    if sought.is_some() && kinds[0].holds_amplitude() {
+        return Err(Error::input(
+            "the loop of the first tone and the setpoint both hold its amplitude",
+            "leave out drive.setpoint and give gap.tip, or give {first} am",
+        ));
+    }
+    let tones = [
+        tone(lever, 0, kinds[0], options.phase)?,
+        tone(lever, 1, kinds[1], options.second_phase)?,
+    ];
+    let length = tones.iter().map(Tone::size).sum();
+    let follower = Follower {
+        view,
+        radius: view.value(Key::TipRadius),
+        kinds,
+        loops: Loops {
+            lever: lever.clone(),
+            tones,
+            length,
+        },
+    };
+    let distance =
+        |option, given: &Option<_>| implied(case, case.gap_key(), option, given.as_ref());
+    let reach = FreeMotion::of(&Model::cantilever(lever)?).reach;
+    let first = distance("from", &options.from)?.unwrap_or(1.1 * reach.max(length));
+    let last = distance("to", &options.to)?;
+    let last = last.unwrap_or(if sought.is_some() { 0.0 } else { lever.alpha5 });
+    if first <= last {
+        return Err(Error::input(
+            format!(
+                "the approach begins at {} and cannot end at {}",
+                follower.length(first),
+                follower.length(last)
+            ),
+            "give a larger {from}, or a smaller {to}",
+        ));
+    }
+    let setpoint = sought.map(|ratio| ratio * follower.loops.tones[0].free_amplitude);
+    let (table, ended) = follower.approach([first, last], options.points, setpoint, control)?;
+    let force = view.sample.force.as_ref();
+    let hertz = view.sample.hertz.map(|hertz| hertz.reduced_modulus);
+    Ok(BimodalReport {
+        loops: kinds,
+        free: [0, 1].map(|k| follower.free(k)),
+        setpoint: setpoint.map(|amplitude| amplitude * view.scales.length),
+        reduced_modulus: force.and_then(SampleForce::reduced_modulus).or(hertz),
+        table,
+        ended,
+        stability: OPEN_LOOP,
+    })
+}
+
+/// A tone of the lever, with the free lever at its amplitude and the phase that is held.
+fn tone(lever: &Cantilever, index: usize, kind: Loop, phase: f64) -> Result<Tone, Error> {
+    let mut alone = lever.clone();
+    let ratio = alone.tone2_ratio.take();
+    let strength = lever.get(Parameter::Tone2Amplitude);
+    alone = alone
+        .with(Parameter::Tone2Amplitude, 0.0)
+        .with(Parameter::Tone2Phase, 0.0);
+    if let (1, Some(ratio)) = (index, ratio) {
+        alone.omega *= ratio.value();
+        alone.alpha2 = strength;
+    }
+    let drive = [alone.omega, alone.alpha2];
+    let free_motion = FreeMotion::of(&Model::cantilever(&alone)?);
+    let condition = Condition {
+        amplitude: free_motion.amplitude,
+        phase,
+    };
+    let key = ["drive.free_amplitude", "drive.second_free_amplitude"][index];
+    let condition = condition.check().map_err(|error| {
+        error
+            .context(format!("{} tone", ["first", "second"][index]))
+            .remedy(format!("give {key}"))
+    })?;
+    let free = FreeOscillation::of(&Case::from(alone), condition)?;
+    let away = nanotap_arithmetic::ln(free.frequency / drive[0]).abs();
+    if kind.holds_phase() && away > FARTHEST_RESONANCE {
+        return Err(Error::input(
+            format!(
+                "no mode of the lever resonates near the {} tone",
+                ["first", "second"][index]
+            ),
+            "give {modes} or another frequency",
+        ));
+    }
+    Ok(Tone {
+        holds_phase: kind.holds_phase(),
+        holds_amplitude: kind.holds_amplitude(),
+        free,
+        drive,
+        free_amplitude: free_motion.amplitude,
+        free_phase: free_motion.phase,
+    })
+}
+
+impl Follower<'_> {
+    fn length(&self, value: f64) -> String {
+        Kind::Length.format(value * self.view.scales.length)
+    }
+
+    /// The table of an approach between two distances, and why it ended early.
+    fn approach(
+        &self,
+        [first, last]: [f64; 2],
+        points: usize,
+        setpoint: Option<f64>,
+        control: &Control<'_>,
+    ) -> Result<(Vec<BimodalPoint>, Option<String>), Error> {
+        let dimension = Model::cantilever(&self.loops.lever)?.dimension();
+        let mut here = self
+            .loops
+            .hold(
+                (self.loops.free_drives(first), &Torus::at_rest(dimension)),
+                None,
+                None,
+                control,
+            )
+            .map_err(|error| error.remedy("begin farther away, with {from}"))?;
+        let mut before: Option<Held> = None;
+        let mut table = vec![self.point(&here)?];
+        if let Some(reason) = self.objection(&here) {
+            return Ok((table, Some(reason)));
+        }
+        for k in 1..points {
+            let target = first + (last - first) * k as f64 / (points - 1) as f64;
+            while here.drives().gap > target {
+                match self.step(
+                    &here,
+                    before.as_ref(),
+                    target,
+                    (first - last) / (points - 1) as f64,
+                    control,
+                ) {
+                    Ok(next) => before = Some(std::mem::replace(&mut here, next)),
+                    Err(error) if control.is_cancelled() => return Err(error),
+                    Err(error) => return Ok((table, Some(self.end(&here, &error)))),
+                }
+                if let Some(reason) = self.objection(&here) {
+                    return Ok((table, Some(reason)));
+                }
+                let passed = setpoint.filter(|amplitude| here.amplitude(0) <= *amplitude);
+                if let Some(amplitude) = passed {
+                    let reached =
+                        self.reached(before.as_ref().unwrap_or(&here), &here, amplitude, control)?;
+                    table.push(self.point(&reached)?);
+                    return Ok((table, None));
+                }
+            }
+            table.push(self.point(&here)?);
+            if let Some(progress) = control.progress {
+                progress(k, points);
+            }
+        }
+        let ended = setpoint.map(|amplitude| {
+            format!(
+                "the setpoint, an amplitude of {}, is not reached up to a distance of {}",
+                self.length(amplitude),
+                self.length(last)
+            )
+        });
+        Ok((table, ended))
+    }
+
+    /// A step towards `target`, as long as the motion changes little.
+    fn step(
+        &self,
+        here: &Held,
+        before: Option<&Held>,
+        target: f64,
+        whole: f64,
+        control: &Control<'_>,
+    ) -> Result<Held, Error> {
+        let gap = here.drives().gap;
+        let mut gap_step = gap - target;
+        loop {
+            // Exactly the target where the whole way is gone.
+            let there = if gap - gap_step <= target {
+                target
+            } else {
+                gap - gap_step
+            };
+            let (drives, torus) = predicted(here, before, there);
+            let reason = match self.loops.hold((drives, &torus), None, Some(here), control) {
+                Ok(next) if self.is_next(here, &next) => return Ok(next),
+                Ok(_) => Error::numerics("the motion changes by a jump"),
+                Err(error) if control.is_cancelled() => return Err(error),
+                Err(error) => error,
+            };
+            gap_step *= 0.5;
+            if gap_step < SHORTEST * whole {
+                return Err(reason);
+            }
+        }
+    }
+
+    /// Whether a motion is the continuation of another.
+    fn is_next(&self, here: &Held, next: &Held) -> bool {
+        (0..2).all(|k| {
+            let tone = &self.loops.tones[k];
+            let turned = next.phase(k) - here.phase(k);
+            let turned = turned - 360.0 * (turned / 360.0).round();
+            let grown = next.amplitude(k) - here.amplitude(k);
+            let stronger = next.drives().strength[k] - here.drives().strength[k];
+            grown.abs() <= FARTHEST[0] * tone.free_amplitude
+                && turned.abs() <= FARTHEST[1]
+                && stronger.abs() <= FARTHEST[2] * tone.free.strength
+        })
+    }
+
+    /// The motion at which the first tone has an amplitude that lies between those of two motions.
+    fn reached(
+        &self,
+        before: &Held,
+        behind: &Held,
+        amplitude: f64,
+        control: &Control<'_>,
+    ) -> Result<Held, Error> {
+        let ends = [before, behind].map(|held| held.amplitude(0) - amplitude);
+        let part = if ends[0] > ends[1] {
+            ends[0] / (ends[0] - ends[1])
+        } else {
+            1.0
+        };
+        let gaps = [before, behind].map(|held| held.drives().gap);
+        let gap = gaps[0] + part * (gaps[1] - gaps[0]);
+        let (drives, torus) = predicted(behind, Some(before), gap);
+        self.loops
+            .hold((drives, &torus), Some(amplitude), None, control)
+    }
+
+    /// Why a motion is not one of the instrument, if so.
+    fn objection(&self, held: &Held) -> Option<String> {
+        let at = self.length(held.drives().gap);
+        if held.closed.tail > UNKNOWN {
+            return Some(format!(
+                "at a distance of {at} the motion depends too sharply on the second tone's phase to be \
+                 computed: its last harmonics are {:.1e} of it",
+                held.closed.tail
+            ));
+        }
+        let open = self.kinds.iter().all(|kind| *kind == Loop::Am);
+        (open && held.closed.growth() >= 1.0)
+            .then(|| format!("the motion loses its stability before a distance of {at}"))
+    }
+
+    /// What is said where the motion ends.
+    fn end(&self, here: &Held, error: &Error) -> String {
+        format!(
+            "no motion follows the one at a distance of {}, where a small disturbance grows by {:.6} in a \
+             period: {}",
+            self.length(here.drives().gap),
+            here.closed.growth(),
+            error.message()
+        )
+    }
+
+    /// The free lever at a tone, in SI.
+    fn free(&self, index: usize) -> FreeTone {
+        let (tone, scales) = (&self.loops.tones[index], &self.view.scales);
+        let drives = self.loops.free_drives(0.0);
+        FreeTone {
+            amplitude: tone.free_amplitude * scales.length,
+            phase: if tone.holds_phase {
+                tone.free.phase
+            } else {
+                tone.free_phase
+            },
+            frequency: drives.frequency[index] * scales.frequency,
+            drive_strength: drives.strength[index] * self.strength(),
+            stiffness: tone.free.stiffness * scales.stiffness,
+            resonance: tone.free.frequency * scales.frequency,
+        }
+    }
+
+    /// The unit of the drive's strength.
+    fn strength(&self) -> f64 {
+        self.view
+            .scales
+            .of(Parameter::Alpha2, self.loops.lever.actuation)
+    }
+
+    /// A motion in SI.
+    fn point(&self, held: &Held) -> Result<BimodalPoint, Error> {
+        let scales = &self.view.scales;
+        let forces = held.closed.forces()?;
+        let readings = [0, 1].map(|k| self.readings(held, k));
+        let touches = forces.largest > 0.0;
+        Ok(BimodalPoint {
+            zc: held.drives().gap * scales.length,
+            tones: [0, 1].map(|k| self.reading(held, k, forces.tones[k], &readings[k])),
+            mean_force: forces.mean * scales.force,
+            peak_force: forces.largest * scales.force,
+            least_force: forces.lowest * scales.force,
+            closest: forces.closest * scales.length,
+            growth: held.closed.growth(),
+            error: held.closed.tail,
+            estimates: touches
+                .then(|| estimates(&readings, self.radius))
+                .unwrap_or_default(),
+        })
+    }
+
+    fn reading(&self, held: &Held, k: usize, force: Complex, readings: &Readings) -> ToneReading {
+        let scales = &self.view.scales;
+        let free = self.loops.free_drives(0.0);
+        // Of Re(c e^{iωt}): mean of the product, and minus the work on the tone's part in a period.
+        let product = force * held.tip[k].conj();
+        let frequency = held.drives().frequency[k];
+        ToneReading {
+            amplitude: held.amplitude(k) * scales.length,
+            phase: held.phase(k),
+            frequency: frequency * scales.frequency,
+            frequency_shift: (frequency - free.frequency[k]) * scales.frequency,
+            drive_strength: held.drives().strength[k] * self.strength(),
+            drive_ratio: held.drives().strength[k] / free.strength[k],
+            virial: 0.5 * product.re * scales.energy,
+            dissipation: -PI * product.im * scales.energy,
+            estimates: readings.estimates(),
+        }
+    }
+
+    /// What an instrument knows of a tone.
+    fn readings(&self, held: &Held, k: usize) -> Readings {
+        let (tone, scales) = (&self.loops.tones[k], &self.view.scales);
+        let strength = held.drives().strength[k] / tone.free.strength;
+        let kept = nanotap_arithmetic::sin(tone.free.phase.to_radians());
+        let stiffness = tone.free.stiffness;
+        let [amplitude, resonance] = [tone.free.amplitude, tone.free.frequency];
+        // What the free lever loses in a period is π k A²/Q at resonance.
+        let quality = PI * stiffness * amplitude * amplitude / tone.free.loss;
+        let shift = held.drives().frequency[k] - resonance;
+        let away = tone.free_phase - 90.0;
+        Readings {
+            stiffness: stiffness * scales.stiffness,
+            quality,
+            resonance: resonance * scales.frequency,
+            shift: tone.holds_phase.then_some(shift * scales.frequency),
+            amplitude: held.amplitude(k) * scales.length,
+            free_amplitude: strength * amplitude / kept * scales.length,
+            phase: held.phase(k).to_radians(),
+            at_resonance: !tone.holds_phase && away.abs() <= AT_RESONANCE,
+        }
+    }
+}
+
+/// Drive and torus at a distance, as two motions before it let expect.
+fn predicted(here: &Held, before: Option<&Held>, gap: f64) -> (Drives, Torus) {
+    let mut drives = *here.drives();
+    let Some(before) = before.filter(|before| before.drives().gap > here.drives().gap) else {
+        drives.gap = gap;
+        return (drives, here.closed.torus.clone());
+    };
+    let old = before.drives();
+    let share = (gap - drives.gap) / (drives.gap - old.gap);
+    let further = |now: f64, old: f64| now + share * (now - old);
+    for k in 0..2 {
+        drives.frequency[k] = further(drives.frequency[k], old.frequency[k]);
+        drives.strength[k] = further(drives.strength[k], old.strength[k]);
+    }
+    drives.gap = gap;
+    (
+        drives,
+        here.closed.torus.extrapolated(&before.closed.torus, share),
+    )
+}

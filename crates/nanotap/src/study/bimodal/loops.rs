@@ -1,0 +1,295 @@
+//! The loops of an instrument on two tones, as equations.
+//!
+//! A loop holds the phase of its tone by the frequency of the drive, or its amplitude by the strength,
+//! or both; the feedback of the distance holds the amplitude of the first tone. Each is an equation
+//! with an unknown of its own, and all of them hold exactly in the steady state of an instrument
+//! whose controllers integrate.
+
+use nalgebra::{DMatrix, DVector};
+use nanotap_arithmetic::ComplexFunctions as _;
+use nanotap_flow::Complex;
+
+use super::torus::{Closed, Drives, Torus, close};
+use crate::Error;
+use crate::control::Control;
+use crate::model::cantilever::Cantilever;
+use crate::observe::lag;
+use crate::study::frequency_modulation::FreeOscillation;
+
+/// Newton steps.
+const STEPS: usize = 30;
+/// Relative residual of the conditions at which Newton stops.
+const HELD: f64 = 1e-11;
+/// Relative residual that must be reached.
+const ACCEPTED: f64 = 1e-9;
+
+/// Shortest part of a Newton step that is tried.
+const SHORTEST: f64 = 0.1;
+
+/// What an unknown is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Unknown {
+    /// The frequency of a tone, by which its phase is held.
+    Frequency(usize),
+    /// The strength of a tone, by which its amplitude is held.
+    Strength(usize),
+    /// The distance, by which the amplitude of the first tone is held.
+    Gap,
+}
+
+impl Unknown {
+    /// A relative change for differences, which changes what is held by a small part.
+    const fn difference(self) -> f64 {
+        match self {
+            Self::Frequency(_) => 1e-7,
+            Self::Strength(_) | Self::Gap => 1e-5,
+        }
+    }
+
+    /// The largest relative change of a Newton step.
+    const fn farthest(self) -> f64 {
+        match self {
+            Self::Frequency(_) => 0.02,
+            Self::Strength(_) => 0.5,
+            Self::Gap => 0.05,
+        }
+    }
+}
+
+/// A tone and what its loop does.
+#[derive(Clone, Debug)]
+pub(super) struct Tone {
+    /// Whether the phase is held.
+    pub(super) holds_phase: bool,
+    /// Whether the amplitude is held.
+    pub(super) holds_amplitude: bool,
+    /// The free lever at the amplitude and phase of the tone.
+    pub(super) free: FreeOscillation,
+    /// The drive of the tone where nothing changes it: frequency and strength.
+    pub(super) drive: [f64; 2],
+    /// Free amplitude under that drive.
+    pub(super) free_amplitude: f64,
+    /// Its phase behind the drive in degrees.
+    pub(super) free_phase: f64,
+}
+
+impl Tone {
+    /// The largest amplitude of the free lever.
+    pub(super) fn size(&self) -> f64 {
+        self.free_amplitude.max(self.free.amplitude)
+    }
+}
+
+/// The lever with its loops.
+#[derive(Clone, Debug)]
+pub(super) struct Loops {
+    pub(super) lever: Cantilever,
+    pub(super) tones: [Tone; 2],
+    /// The size of the motion: the sum of both amplitudes.
+    pub(super) length: f64,
+}
+
+/// A motion that the loops hold.
+#[derive(Clone, Debug)]
+pub(super) struct Held {
+    pub(super) closed: Closed,
+    /// Components of the tip deflection at both tones.
+    pub(super) tip: [Complex; 2],
+    /// Changes of what is held by the unknowns, for the next motion.
+    slopes: Option<DMatrix<f64>>,
+}
+
+impl Held {
+    pub(super) fn drives(&self) -> &Drives {
+        &self.closed.drives
+    }
+
+    pub(super) fn amplitude(&self, tone: usize) -> f64 {
+        self.tip[tone].modulus()
+    }
+
+    /// Degrees behind the drive.
+    pub(super) fn phase(&self, tone: usize) -> f64 {
+        lag(self.tip[tone])
+    }
+}
+
+impl Loops {
+    /// The drives of the free lever.
+    pub(super) fn free_drives(&self, gap: f64) -> Drives {
+        let of = |tone: &Tone| {
+            [
+                if tone.holds_phase {
+                    tone.free.frequency
+                } else {
+                    tone.drive[0]
+                },
+                if tone.holds_amplitude {
+                    tone.free.strength
+                } else {
+                    tone.drive[1]
+                },
+            ]
+        };
+        let [first, second] = [&self.tones[0], &self.tones[1]].map(of);
+        Drives {
+            frequency: [first[0], second[0]],
+            strength: [first[1], second[1]],
+            gap,
+        }
+    }
+
+    fn unknowns(&self, setpoint: Option<f64>) -> Vec<Unknown> {
+        let mut unknowns = Vec::new();
+        for (k, tone) in self.tones.iter().enumerate() {
+            unknowns.extend(tone.holds_phase.then_some(Unknown::Frequency(k)));
+            unknowns.extend(tone.holds_amplitude.then_some(Unknown::Strength(k)));
+        }
+        unknowns.extend(setpoint.map(|_| Unknown::Gap));
+        unknowns
+    }
+
+    /// How far the conditions are from being held, relative or in radians.
+    fn residual(&self, unknowns: &[Unknown], setpoint: Option<f64>, held: &Held) -> DVector<f64> {
+        let of = |unknown: &Unknown| match *unknown {
+            Unknown::Frequency(tone) => {
+                let away = held.phase(tone) - self.tones[tone].free.phase;
+                (away - 360.0 * (away / 360.0).round()).to_radians()
+            }
+            Unknown::Strength(tone) => held.amplitude(tone) / self.tones[tone].free.amplitude - 1.0,
+            Unknown::Gap => held.amplitude(0) / setpoint.unwrap_or(f64::NAN) - 1.0,
+        };
+        DVector::from_iterator(unknowns.len(), unknowns.iter().map(of))
+    }
+
+    fn at(&self, drives: Drives, start: &Torus, control: &Control<'_>) -> Result<Held, Error> {
+        let closed = close(&self.lever, drives, start, self.length, control)?;
+        let tip = closed.readings()?;
+        Ok(Held {
+            closed,
+            tip,
+            slopes: None,
+        })
+    }
+
+    /// The motion that the loops hold near a drive and a torus; with `setpoint`, the distance at
+    /// which the first tone has this amplitude. `before` is a motion near, if one is known.
+    ///
+    /// # Errors
+    /// When there is none near.
+    pub(super) fn hold(
+        &self,
+        (start, torus): (Drives, &Torus),
+        setpoint: Option<f64>,
+        before: Option<&Held>,
+        control: &Control<'_>,
+    ) -> Result<Held, Error> {
+        let unknowns = self.unknowns(setpoint);
+        let mut here = self.at(start, torus, control)?;
+        let mut residual = self.residual(&unknowns, setpoint, &here);
+        let mut slopes = before.and_then(|before| before.slopes.clone());
+        slopes = slopes.filter(|slopes| slopes.nrows() == unknowns.len());
+        for _ in 0..STEPS {
+            let size = residual.amax();
+            if unknowns.is_empty() || size <= HELD {
+                here.slopes = slopes;
+                return Ok(here);
+            }
+            let fresh = slopes.is_none();
+            let matrix = match slopes.take() {
+                Some(matrix) => matrix,
+                None => self.differences(&unknowns, setpoint, &here, &residual, control)?,
+            };
+            let step = matrix
+                .clone()
+                .lu()
+                .solve(&-&residual)
+                .ok_or_else(singular)?;
+            let longest = unknowns
+                .iter()
+                .zip(step.iter())
+                .fold(1.0, |longest: f64, (u, step)| {
+                    longest.max(step.abs() / u.farthest())
+                });
+            let mut part = 1.0 / longest;
+            let (next, left) = loop {
+                let drives = self.moved(&unknowns, here.drives(), &(&step * part));
+                let next = self.at(drives, &here.closed.torus, control);
+                let shorter = fresh && part >= SHORTEST;
+                match next {
+                    Ok(next) => {
+                        let left = self.residual(&unknowns, setpoint, &next);
+                        if left.amax() < size || !shorter {
+                            break (next, left);
+                        }
+                    }
+                    Err(error) if control.is_cancelled() || !shorter => return Err(error),
+                    Err(_) => {}
+                }
+                part *= 0.5;
+            };
+            if left.amax() >= size {
+                if size <= ACCEPTED {
+                    return Ok(here);
+                }
+                if fresh {
+                    return Err(nothing());
+                }
+                continue;
+            }
+            // Broyden's update keeps the differences good enough as long as steps gain much.
+            if left.amax() <= 0.3 * size {
+                let step = step * part;
+                let change = &left - &residual - &matrix * &step;
+                slopes = Some(&matrix + change * step.transpose() / step.norm_squared());
+            }
+            (here, residual) = (next, left);
+        }
+        if residual.amax() <= ACCEPTED {
+            return Ok(here);
+        }
+        Err(nothing())
+    }
+
+    /// Changes of the residual by the unknowns, by differences.
+    fn differences(
+        &self,
+        unknowns: &[Unknown],
+        setpoint: Option<f64>,
+        here: &Held,
+        residual: &DVector<f64>,
+        control: &Control<'_>,
+    ) -> Result<DMatrix<f64>, Error> {
+        let mut matrix = DMatrix::zeros(unknowns.len(), unknowns.len());
+        for (column, unknown) in unknowns.iter().enumerate() {
+            let mut step = DVector::zeros(unknowns.len());
+            step[column] = unknown.difference();
+            let drives = self.moved(unknowns, here.drives(), &step);
+            let there = self.at(drives, &here.closed.torus, control)?;
+            let change = self.residual(unknowns, setpoint, &there) - residual;
+            matrix.set_column(column, &(change / step[column]));
+        }
+        Ok(matrix)
+    }
+
+    /// The drives after changes relative to themselves, of the distance relative to the length.
+    fn moved(&self, unknowns: &[Unknown], drives: &Drives, step: &DVector<f64>) -> Drives {
+        let mut moved = *drives;
+        for (unknown, step) in unknowns.iter().zip(step.iter()) {
+            match *unknown {
+                Unknown::Frequency(tone) => moved.frequency[tone] *= 1.0 + step,
+                Unknown::Strength(tone) => moved.strength[tone] *= 1.0 + step,
+                Unknown::Gap => moved.gap += step * self.length,
+            }
+        }
+        moved
+    }
+}
+
+fn nothing() -> Error {
+    Error::numerics("no motion near has the amplitudes and phases that the loops hold")
+}
+
+fn singular() -> Error {
+    Error::numerics("the equations of the loops are singular: the motion turns back here")
+}

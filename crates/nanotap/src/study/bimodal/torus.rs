@@ -1,0 +1,401 @@
+//! The motion under two tones whose frequencies have no common period.
+//!
+//! The second tone's phase θ at the beginning of a period of the first turns by 2πρ from period to
+//! period, with ρ = ω₂/ω₁. In the long run the state at the beginning of a period is a function u of
+//! this phase, a closed curve, with
+//!
+//! $$P_θ(u(θ)) = u(θ + 2πρ)$$
+//!
+//! where P_θ is the exact map of one period of the first tone. u is known at K equidistant phases and
+//! interpolated by trigonometric polynomials, which converge beyond all orders as long as the motion
+//! depends smoothly on the phase: Newton solves for all K states at once. Where contacts come and go
+//! with the phase, they converge slowly; the size of the last harmonics tells the error.
+
+use nalgebra::{DMatrix, DVector};
+use nanotap_arithmetic::ComplexFunctions as _;
+use nanotap_dynamics::StroboscopicMap as _;
+use nanotap_flow::Complex;
+use std::f64::consts::TAU;
+
+use crate::Error;
+use crate::control::Control;
+use crate::model::Model;
+use crate::model::cantilever::Cantilever;
+use crate::model::drive_form::FrequencyRatio;
+use crate::model::model_map::ModelMap;
+use crate::model::parameter::Parameter;
+use crate::model::recording::{Curve, Recording};
+
+/// Newton steps.
+const STEPS: usize = 12;
+/// Relative residual at which Newton stops.
+const CLOSED: f64 = 1e-13;
+/// Relative residual that must be reached.
+const ACCEPTED: f64 = 1e-10;
+/// Size of the last harmonics over that of the motion, above which there are too few phases.
+const RESOLVED: f64 = 1e-5;
+/// Phases at first, and at most.
+const PHASES: [usize; 2] = [9, 129];
+
+/// The drive of both tones and the distance, in the model's units.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Drives {
+    pub(super) frequency: [f64; 2],
+    pub(super) strength: [f64; 2],
+    pub(super) gap: f64,
+}
+
+impl Drives {
+    /// The lever under this drive, with the second tone at a phase in radians.
+    fn on(&self, lever: &Cantilever, phase: f64) -> Cantilever {
+        let mut lever = lever.clone();
+        lever.omega = self.frequency[0];
+        lever.alpha2 = self.strength[0];
+        lever.alpha5 = self.gap;
+        let ratio = self.frequency[1] / self.frequency[0];
+        lever.tone2_ratio = Some(FrequencyRatio::unlocked(ratio));
+        lever
+            .with(Parameter::Tone2Amplitude, self.strength[1])
+            .with(Parameter::Tone2Phase, phase.to_degrees())
+    }
+
+    /// Turns of the second tone in a period of the first.
+    fn rotation(&self) -> f64 {
+        self.frequency[1] / self.frequency[0]
+    }
+}
+
+/// States at the beginning of a period of the first tone, at equidistant phases of the second.
+#[derive(Clone, Debug)]
+pub(super) struct Torus {
+    states: Vec<Vec<f64>>,
+}
+
+impl Torus {
+    /// The lever at rest.
+    pub(super) fn at_rest(dimension: usize) -> Self {
+        Self {
+            states: vec![vec![0.0; dimension]; PHASES[0]],
+        }
+    }
+
+    /// The same with more phases.
+    fn with_phases(&self, count: usize) -> Self {
+        let states = (0..count).map(|k| {
+            let weights = weights(self.states.len(), k as f64 / count as f64);
+            combined(&weights, &self.states)
+        });
+        Self {
+            states: states.collect(),
+        }
+    }
+
+    /// What a step from `before` to this one leads to when `share` of it is repeated.
+    pub(super) fn extrapolated(&self, before: &Self, share: f64) -> Self {
+        let before = before.with_phases(self.states.len());
+        let states = self.states.iter().zip(&before.states);
+        let moved = states.map(|(now, before)| {
+            let entries = now.iter().zip(before);
+            entries
+                .map(|(now, before)| now + share * (now - before))
+                .collect()
+        });
+        Self {
+            states: moved.collect(),
+        }
+    }
+
+    /// The largest of the last two harmonics of the phase, over the sizes of the state's entries.
+    fn tail(&self, sizes: &[f64]) -> f64 {
+        let count = self.states.len();
+        let last = count / 2;
+        let harmonic = |order: usize, entry: usize| {
+            let terms = self.states.iter().enumerate().map(|(k, state)| {
+                let (sin, cos) =
+                    nanotap_arithmetic::sin_cos(TAU * ((order * k) % count) as f64 / count as f64);
+                Complex::new(cos, -sin) * state[entry]
+            });
+            terms.sum::<Complex>().modulus() * 2.0 / count as f64
+        };
+        let entries = sizes.iter().enumerate();
+        entries.fold(0.0, |largest: f64, (entry, size)| {
+            largest.max(harmonic(last, entry).max(harmonic(last - 1, entry)) / size)
+        })
+    }
+}
+
+/// Weights of an odd number of equidistant samples of a trigonometric polynomial at `turns` of a turn.
+fn weights(count: usize, turns: f64) -> Vec<f64> {
+    let weight = |k: usize| {
+        let away = (turns - k as f64 / count as f64).rem_euclid(1.0);
+        let angle = 0.5 * TAU * if away > 0.5 { away - 1.0 } else { away };
+        let below = count as f64 * nanotap_arithmetic::sin(angle);
+        if below == 0.0 {
+            1.0
+        } else {
+            nanotap_arithmetic::sin(count as f64 * angle) / below
+        }
+    };
+    (0..count).map(weight).collect()
+}
+
+fn combined(weights: &[f64], states: &[Vec<f64>]) -> Vec<f64> {
+    let mut sum = vec![0.0; states[0].len()];
+    for (weight, state) in weights.iter().zip(states) {
+        for (sum, entry) in sum.iter_mut().zip(state) {
+            *sum += weight * entry;
+        }
+    }
+    sum
+}
+
+/// A closed torus.
+#[derive(Clone, Debug)]
+pub(super) struct Closed {
+    pub(super) torus: Torus,
+    pub(super) drives: Drives,
+    /// The largest of the last harmonics of the phase, relative to the motion.
+    pub(super) tail: f64,
+    models: Vec<Model>,
+    jacobians: Vec<DMatrix<f64>>,
+}
+
+/// Force on the tip and height over the sample, over the phases of the second tone.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Forces {
+    /// Components at each tone: c of Re(c e^{iωt}).
+    pub(super) tones: [Complex; 2],
+    pub(super) mean: f64,
+    pub(super) largest: f64,
+    pub(super) lowest: f64,
+    /// Least height of the tip over the undeformed surface.
+    pub(super) closest: f64,
+}
+
+/// Closes the torus of `lever` near `start`; `amplitude` is the size of the motion.
+///
+/// # Errors
+/// When Newton does not close it, or the law remembers a branch.
+pub(super) fn close(
+    lever: &Cantilever,
+    drives: Drives,
+    start: &Torus,
+    amplitude: f64,
+    control: &Control<'_>,
+) -> Result<Closed, Error> {
+    let mut closed = newton(lever, drives, start.clone(), amplitude, control)?;
+    while closed.tail > RESOLVED && closed.torus.states.len() < PHASES[1] {
+        let more = 2 * closed.torus.states.len() - 1;
+        let finer = closed.torus.with_phases(more.min(PHASES[1]));
+        closed = newton(lever, drives, finer, amplitude, control)?;
+    }
+    Ok(closed)
+}
+
+fn newton(
+    lever: &Cantilever,
+    drives: Drives,
+    mut torus: Torus,
+    amplitude: f64,
+    control: &Control<'_>,
+) -> Result<Closed, Error> {
+    let count = torus.states.len();
+    let models = (0..count)
+        .map(|k| Model::cantilever(&drives.on(lever, TAU * k as f64 / count as f64)))
+        .collect::<Result<Vec<_>, _>>()
+        .map_err(|error| Error::numerics(error.to_string()))?;
+    let mut maps: Vec<ModelMap> = models.iter().map(ModelMap::new).collect();
+    if maps[0].discrete_entries() > 0 {
+        return Err(Error::input(
+            "this contact law remembers which of its branches it is on, which two tones without a \
+             common period do not allow here",
+            "choose a law without memory, or a second tone with drive.second_ratio as in 25/4 for `orbit`",
+        ));
+    }
+    let dimension = models[0].dimension();
+    let sizes = sizes(&models[0], amplitude, drives.frequency[0]);
+    let shift: Vec<Vec<f64>> = (0..count)
+        .map(|k| {
+            weights(
+                count,
+                k as f64 / count as f64 + drives.rotation().rem_euclid(1.0),
+            )
+        })
+        .collect();
+    let mut last = f64::INFINITY;
+    for _ in 0..STEPS {
+        if control.is_cancelled() {
+            return Err(Error::stopped());
+        }
+        let mut residual = DVector::zeros(count * dimension);
+        let mut jacobians = Vec::with_capacity(count);
+        for (k, map) in maps.iter_mut().enumerate() {
+            let mut end = torus.states[k].clone();
+            let mut jacobian = DMatrix::zeros(dimension, dimension);
+            map.advance_with_jacobian(&mut end, &mut jacobian)?;
+            let there = combined(&shift[k], &torus.states);
+            for i in 0..dimension {
+                residual[k * dimension + i] = (end[i] - there[i]) / sizes[i];
+            }
+            jacobians.push(jacobian);
+        }
+        let size = residual.amax();
+        let stalls = size <= ACCEPTED && size > 0.1 * last;
+        if size <= CLOSED || stalls {
+            let tail = torus.tail(&sizes);
+            return Ok(Closed {
+                torus,
+                drives,
+                tail,
+                models,
+                jacobians,
+            });
+        }
+        last = size;
+        let matrix = DMatrix::from_fn(count * dimension, count * dimension, |row, column| {
+            let (k, i) = (row / dimension, row % dimension);
+            let (j, l) = (column / dimension, column % dimension);
+            let carried = if k == j {
+                jacobians[k][(i, l)] * sizes[l] / sizes[i]
+            } else {
+                0.0
+            };
+            let turned = if i == l { shift[k][j] } else { 0.0 };
+            turned - carried
+        });
+        let step = matrix
+            .lu()
+            .solve(&residual)
+            .filter(|step| step.iter().all(|entry| entry.is_finite()))
+            .ok_or_else(|| Error::numerics("the motion under two tones turns back here"))?;
+        for (k, state) in torus.states.iter_mut().enumerate() {
+            for (i, entry) in state.iter_mut().enumerate() {
+                *entry += step[k * dimension + i] * sizes[i];
+            }
+        }
+    }
+    Err(Error::numerics(format!(
+        "Newton finds no motion under the two tones: after {STEPS} steps the equations are off by \
+         {last:.1e} of the amplitude"
+    )))
+}
+
+/// What size of each number of the state matters.
+fn sizes(model: &Model, amplitude: f64, frequency: f64) -> Vec<f64> {
+    let moving = model.dimension() - model.memory;
+    let size = |k: usize| match k {
+        k if k < moving / 2 => amplitude,
+        k if k < moving => amplitude * frequency,
+        _ if model.nonlinear.is_some() => 1.0,
+        _ => amplitude,
+    };
+    (0..model.dimension()).map(size).collect()
+}
+
+impl Closed {
+    /// What a lock-in amplifier on each tone reads: c of the component Re(c e^{iωt}) of the tip
+    /// deflection.
+    ///
+    /// # Errors
+    /// When the flow fails.
+    pub(super) fn readings(&self) -> Result<[Complex; 2], Error> {
+        let mut sum = [Complex::new(0.0, 0.0); 2];
+        for (k, (model, state)) in self.models.iter().zip(&self.torus.states).enumerate() {
+            let recording = Recording::of(model, state, 1)?;
+            self.add_tones(&mut sum, k, &recording.curve(&model.tip));
+        }
+        Ok(sum)
+    }
+
+    /// The forces on the way.
+    ///
+    /// # Errors
+    /// When the flow fails.
+    pub(super) fn forces(&self) -> Result<Forces, Error> {
+        let mut found = Forces {
+            tones: [Complex::new(0.0, 0.0); 2],
+            mean: 0.0,
+            largest: f64::NEG_INFINITY,
+            lowest: f64::INFINITY,
+            closest: f64::INFINITY,
+        };
+        for (k, (model, state)) in self.models.iter().zip(&self.torus.states).enumerate() {
+            let recording = Recording::of(model, state, 1)?;
+            let force = recording.force(model);
+            self.add_tones(&mut found.tones, k, &force);
+            found.mean += force.mean() / self.models.len() as f64;
+            if let Some((least, most)) = force.range() {
+                found.largest = found.largest.max(most.value);
+                found.lowest = found.lowest.min(least.value);
+            }
+            if let Some((least, _)) = recording.curve(&model.height).range() {
+                found.closest = found.closest.min(least.value);
+            }
+        }
+        Ok(found)
+    }
+
+    /// Adds the share of the phase of this index in the components of a curve at both tones. The
+    /// mean over the phases keeps of each what turns with the tone.
+    fn add_tones(&self, sum: &mut [Complex; 2], phase: usize, curve: &Curve) {
+        let count = self.models.len() as f64;
+        let (sin, cos) = nanotap_arithmetic::sin_cos(TAU * phase as f64 / count);
+        let back = [Complex::new(1.0, 0.0), Complex::new(cos, -sin)];
+        for tone in 0..2 {
+            let own = curve.fourier(self.drives.frequency[tone]);
+            sum[tone] += own * back[tone] / count;
+        }
+    }
+
+    /// How a small disturbance grows in a period of the first tone at constant drives, in the mean
+    /// over many: a factor.
+    pub(super) fn growth(&self) -> f64 {
+        /// Periods before the mean, and of the mean.
+        const PERIODS: [usize; 2] = [500, 2000];
+        let count = self.jacobians.len();
+        let dimension = self.jacobians[0].nrows();
+        let mut disturbance = DVector::from_element(dimension, 1.0);
+        // The weights of a smooth bump make the mean of what turns quasi-periodically converge beyond
+        // all orders (Das, Saiki, Sander and Yorke, Nonlinearity 30, 4111, 2017).
+        let weight = |period: usize| {
+            let part = (period as f64 - PERIODS[0] as f64 + 0.5) / PERIODS[1] as f64;
+            if part > 0.0 {
+                nanotap_arithmetic::exp(-1.0 / (part * (1.0 - part)))
+            } else {
+                0.0
+            }
+        };
+        let (mut sum, mut total) = (0.0, 0.0);
+        for period in 0..PERIODS[0] + PERIODS[1] {
+            let turns = (period as f64 * self.drives.rotation()).rem_euclid(1.0);
+            let weights = weights(count, turns);
+            let mut next = DVector::zeros(dimension);
+            for (weight, jacobian) in weights.iter().zip(&self.jacobians) {
+                next += *weight * (jacobian * &disturbance);
+            }
+            let factor = next.norm() / disturbance.norm();
+            disturbance = next / factor.max(f64::MIN_POSITIVE);
+            sum += weight(period) * nanotap_arithmetic::ln(factor.max(f64::MIN_POSITIVE));
+            total += weight(period);
+        }
+        nanotap_arithmetic::exp(sum / total)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn trigonometric_polynomials_are_interpolated_exactly() {
+        let curve = |turns: f64| 0.3 + (TAU * 3.0 * turns).sin() - 0.2 * (TAU * 4.0 * turns).cos();
+        let states: Vec<Vec<f64>> = (0..9).map(|k| vec![curve(k as f64 / 9.0)]).collect();
+        for turns in [0.0, 0.123, 1.0 / 9.0, 0.999] {
+            let value = combined(&weights(9, turns), &states)[0];
+            assert!((value - curve(turns)).abs() < 1e-13, "{turns}");
+        }
+        let torus = Torus { states };
+        // The coefficients of the fourth and third harmonics.
+        assert!((torus.tail(&[1.0]) - 1.0).abs() < 1e-13);
+    }
+}

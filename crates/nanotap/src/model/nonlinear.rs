@@ -524,8 +524,9 @@ impl Variation {
         let drive = model.system.drive();
         let beam = Beam::new(&galerkin, drive, 0)?;
         let n = nonlinear.system.dimension();
+        let still = law.iter().all(|slope| *slope == 0.0);
         let mut change = Change {
-            law: law.to_vec(),
+            law: if still { Vec::new() } else { law.to_vec() },
             constant: vec![0.0; n],
             tones: drive
                 .frequencies()

@@ -619,7 +619,7 @@ impl Kernel {
         let time = |panel: usize| map.time(h, width * panel as f64);
         let (end, mut low, mut high) = (time(panels), 0, panels - 1);
         while low < high {
-            let middle = (low + high) / 2;
+            let middle = usize::midpoint(low, high);
             if -rate * (end - time(middle + 1)) > FORGOTTEN {
                 low = middle + 1;
             } else {

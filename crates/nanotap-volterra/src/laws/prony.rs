@@ -161,7 +161,7 @@ impl Arms {
             });
         }
         for (k, (time, modulus)) in arms.iter().enumerate() {
-            if !(*time > 0.0) {
+            if time.is_nan() || *time <= 0.0 {
                 return refuse(k, "its time must be positive");
             }
             if !(*modulus >= 0.0 && modulus.is_finite()) {

@@ -297,6 +297,7 @@ Before from Parameter::COUNT => {
     LeverName = other(Cantilever, "lever", Takes::LeverName, "a lever of the catalogue, for what is not said");
     LeverK = quantity(Cantilever, "k", Stiffness, R::POSITIVE, "static spring constant at the tip, 3EI/L³")
         .label("spring constant $k$");
+    LeverK1 = quantity(Cantilever, "k1", Stiffness, R::POSITIVE, "stiffness of the first mode at the tip, as thermal tunes and point-mass models give it: 1.0302 k without a tip's mass");
     LeverF0 = quantity(Cantilever, "f0", Frequency, R::POSITIVE, "first free resonance, with the tip")
         .label("resonance frequency $f_0$");
     LeverF2 = quantity(Cantilever, "f2", Frequency, R::POSITIVE, "second free resonance; without a tip's mass it tells that mass")
@@ -461,6 +462,10 @@ pub(super) static ALTERNATIVES: &[Alternatives] = &[
     Alternatives {
         ways: &[&[Key::LeverQ], &[Key::FluidDensity, Key::FluidViscosity]],
         reason: "the fluid tells the quality factor",
+    },
+    Alternatives {
+        ways: &[&[Key::LeverK], &[Key::LeverK1]],
+        reason: "one follows from the other through the shape of the first mode",
     },
     Alternatives {
         ways: &[&[Key::DriveFrequency], &[Key::DriveFrequencyRatio]],

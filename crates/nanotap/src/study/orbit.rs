@@ -165,7 +165,7 @@ fn settled(
     let slow = model.nonlinear.as_ref().filter(|law| law.is_slow());
     if let Some(Ok(guess)) = slow.map(|law| law.settled_from(start))
         && let Ok(orbit) = close_orbit(map, &guess, 1, &ShootingOptions::default())
-        && orbit.stability != Stability::Unstable
+        && !matches!(orbit.stability, Stability::Unstable { .. })
         && period.is_none_or(|p| p % orbit.period == 0)
     {
         return Ok(orbit);

@@ -5,7 +5,8 @@
 use nanotap::case::{Case, Key};
 use nanotap::control::Control;
 use nanotap::study::attractors::{AttractorsOptions, attractors};
-use nanotap::study::orbit::{OrbitOptions, OrbitReport, orbit};
+use nanotap::study::averaged_orbits::averaged_orbits;
+use nanotap::study::orbit::{OrbitOptions, OrbitReport, orbit, report};
 
 use crate::derivatives::worst;
 
@@ -195,14 +196,19 @@ fn arms_over_many_decades() {
         (&[], [51.215_750_654_701_7, 58.765_439_910_936_5], 1e-7),
     ] {
         let case = epoxy(words);
-        let found = found(&case);
-        let values = amplitude_and_phase(&case, &found);
-        for (value, expected) in values.iter().zip(expected) {
-            assert!(
-                (value / expected - 1.0).abs() < tolerance,
-                "{words:?}: {value} {expected}"
-            );
-        }
+        let model = case.model().unwrap();
+        let orbits = averaged_orbits(&model);
+        let found: Vec<[f64; 2]> = orbits
+            .iter()
+            .map(|orbit| amplitude_and_phase(&case, &report(&model, orbit, 1).unwrap()))
+            .collect();
+        let is_there = |found: &[f64; 2]| {
+            let pairs = found.iter().zip(expected);
+            pairs
+                .map(|(value, expected)| (value / expected - 1.0).abs())
+                .all(|error| error < tolerance)
+        };
+        assert!(found.iter().any(is_there), "{words:?}: {found:?}");
     }
 }
 

@@ -281,7 +281,7 @@ impl Takes {
 /// The file that a text names, if it is not a table.
 pub(crate) fn file_named(text: &str) -> Option<&str> {
     let name = text.trim();
-    (!name.contains('\n') && !name.starts_with('[')).then_some(name)
+    (!name.is_empty() && !name.contains('\n') && !name.starts_with('[')).then_some(name)
 }
 
 /// Converts an array of rows, of which the first contains the names of the columns.

@@ -502,6 +502,8 @@ pub(crate) enum Variation {
 /// A step between maps on both sides, as a part of the number: the difference is good to its
 /// square.
 const STEP: f64 = 1e-5;
+/// The size of a number that may be zero.
+const SMALLEST: f64 = 1e-3;
 
 impl Variation {
     /// Along `slopes` of the case's numbers and `law` of its law's parameters (empty: none).
@@ -558,12 +560,15 @@ impl Variation {
         law: &[f64],
     ) -> Result<Self, ModelError> {
         // No number moves by more than a small part of itself.
-        let parts = slopes.iter().map(|(p, slope)| (case.get(*p), *slope));
+        let parts = slopes.iter();
+        let parts = parts.map(|(p, slope)| (case.get(*p).abs().max(SMALLEST), *slope));
         let values = case.law.iter().flat_map(|law| law.values().iter().copied());
-        let parts = parts.chain(values.zip(law.iter().copied()));
+        // Numbers of a law have the sizes of their units.
+        let sizes = values.map(|value| if value == 0.0 { SMALLEST } else { value.abs() });
+        let parts = parts.chain(sizes.zip(law.iter().copied()));
         let step = parts
             .filter(|(_, slope)| *slope != 0.0)
-            .map(|(value, slope)| STEP * value.abs().max(1e-3) / slope.abs())
+            .map(|(size, slope)| STEP * size / slope.abs())
             .filter(|step| step.is_finite())
             .fold(f64::INFINITY, f64::min);
         let at = |side: f64| {

@@ -84,10 +84,9 @@ impl Instrument {
 
     /// What lock-in amplifiers on both tones read over so many periods of the first, with a window
     /// that suppresses the other lines: amplitude, and lag in radians.
-    fn read(&mut self, periods: usize) -> [(f64, f64); 2] {
-        const STEPS: usize = 2400;
-        let h = TAU / self.omega[0] / STEPS as f64;
-        let count = periods * STEPS;
+    fn read(&mut self, periods: usize, steps: usize) -> [(f64, f64); 2] {
+        let h = TAU / self.omega[0] / steps as f64;
+        let count = periods * steps;
         let mut sums = [Complex::new(0.0, 0.0); 2];
         for step in 0..count {
             let window = (std::f64::consts::PI * step as f64 / count as f64)
@@ -152,9 +151,11 @@ fn simulated(
         state: [nalgebra::Vector2::zeros(); 2],
     };
     let mut read = [(0.0, 0.0); 2];
-    for _ in 0..24 {
-        instrument.read(150);
-        read = instrument.read(300);
+    for turn in 0..40 {
+        // Coarse steps until the loops are near.
+        let steps = if turn < 26 { 600 } else { 2400 };
+        instrument.read(150, steps);
+        read = instrument.read(300, steps);
         for tone in 0..2 {
             let (amplitude, lag) = read[tone];
             if kinds[tone].holds_phase() {

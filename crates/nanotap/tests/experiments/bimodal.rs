@@ -151,11 +151,12 @@ fn simulated(
         state: [nalgebra::Vector2::zeros(); 2],
     };
     let mut read = [(0.0, 0.0); 2];
-    for turn in 0..40 {
+    for turn in 0..25 {
         // Coarse steps until the loops are near.
-        let steps = if turn < 26 { 600 } else { 2400 };
+        let steps = if turn < 12 { 600 } else { 2400 };
         instrument.read(150, steps);
-        read = instrument.read(300, steps);
+        // Lines of the two tones lie close to each other, and a long window tells them apart.
+        read = instrument.read(if turn < 20 { 300 } else { 2400 }, steps);
         for tone in 0..2 {
             let (amplitude, lag) = read[tone];
             if kinds[tone].holds_phase() {

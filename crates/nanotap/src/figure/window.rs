@@ -14,6 +14,7 @@ const fn colour(condition: Condition) -> Colour {
         Condition::Subharmonic => Colour::BLUE,
         Condition::Irregular => Colour::VERMILLION,
         Condition::Undecided => Colour::GREY,
+        Condition::Unreached => Colour::WHITE,
     }
 }
 

@@ -36,6 +36,7 @@ pub mod simulate;
 pub mod start_box;
 #[cfg(feature = "dataset")]
 pub mod sweep;
+pub mod target;
 pub mod threads;
 pub mod value;
 #[cfg(feature = "dataset")]
@@ -150,6 +151,11 @@ pub trait DatasetStudy {
     type Options: Serialize + DeserializeOwned + JsonSchema;
     /// Summary of the finished dataset.
     type Report: Serialize + JsonSchema;
+
+    /// Whether the options solve for distances, so that none is solved for a setpoint of the case.
+    fn solves_distance(_: &Self::Options) -> bool {
+        false
+    }
 
     /// Plans the dataset of a `case` that `control` cancels: implements [`plan`](Self::plan).
     ///

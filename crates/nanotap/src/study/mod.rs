@@ -147,6 +147,8 @@ pub trait DatasetStudy {
     const ABOUT: &'static str;
     /// What its progress counts, in the plural.
     const COUNTED: &'static str;
+    /// What the progress of its plan counts, in the plural.
+    const PLANNED: &'static str = "approaches to the setpoints";
     /// Options: what front ends show, check and pass on as JSON.
     type Options: Serialize + DeserializeOwned + JsonSchema;
     /// Summary of the finished dataset.

@@ -24,9 +24,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use super::FreeMotion;
-use super::approach::distance_sweep::{
-    DistanceSweep, Motion, Piece, Place, budget_text, is_same,
-};
+use super::approach::distance_sweep::{DistanceSweep, Motion, Piece, Place, budget_text, is_same};
 use super::approach::{MAX_MULTIPLIER, SETPOINT_PERIODS, no_drive};
 use crate::case::Case;
 use crate::case::document::CaseDocument;
@@ -260,7 +258,9 @@ fn approach<'a>(
         };
         let trace = first.held.trace(sweep, piece);
         let open = searches.iter_mut().filter(|search| search.found.is_none());
-        open.fold(true, |all, search| search.ends_in(sweep, piece, &trace) && all)
+        open.fold(true, |all, search| {
+            search.ends_in(sweep, piece, &trace) && all
+        })
     });
     sweep.stops_on_grid = false;
     if control.is_cancelled() {

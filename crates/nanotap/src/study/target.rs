@@ -166,9 +166,7 @@ impl TargetPoint {
 
     /// Whether all conditions hold.
     pub fn meets(&self, targets: &[Target]) -> bool {
-        !self.unknown
-            && !self.motions.is_empty()
-            && targets.iter().all(|target| target.holds(self))
+        !self.unknown && !self.motions.is_empty() && targets.iter().all(|target| target.holds(self))
     }
 }
 
@@ -304,9 +302,7 @@ impl Target {
     fn holds(&self, point: &TargetPoint) -> bool {
         let each = |holds: &dyn Fn(&TargetMotion) -> bool| point.motions.iter().all(holds);
         match &self.condition {
-            Condition::States(comparison, count) => {
-                comparison.holds(point.states() as f64, *count)
-            }
+            Condition::States(comparison, count) => comparison.holds(point.states() as f64, *count),
             Condition::Period(comparison, period) => {
                 each(&|m| m.period > 0 && comparison.holds(m.period as f64, *period))
             }
@@ -338,10 +334,7 @@ fn unknown(name: &str) -> String {
     let names = names();
     let hint = near_name(name, names.iter().copied())
         .map_or_else(String::new, |near| format!("; did you mean `{near}`?"));
-    format!(
-        "expected one of {}, got `{name}`{hint}",
-        names.join(", ")
-    )
+    format!("expected one of {}, got `{name}`{hint}", names.join(", "))
 }
 
 /// A limit of an observable, in SI or in the model's units.
@@ -370,7 +363,9 @@ fn limit(observable: &Observable, text: &str, si: bool) -> Result<f64, String> {
                 .map_err(|error| error.to_string())?
                 .to_degrees(),
         },
-        None => Kind::Number.parse(text).map_err(|error| error.to_string())?,
+        None => Kind::Number
+            .parse(text)
+            .map_err(|error| error.to_string())?,
     };
     if value.is_finite() {
         Ok(value)
@@ -500,7 +495,11 @@ mod tests {
 
     #[test]
     fn conditions_hold_for_every_motion() {
-        let soft = motion(&[("peak_force", 0.5e-9), ("mean_force", -1e-11), ("phase", 120.0)]);
+        let soft = motion(&[
+            ("peak_force", 0.5e-9),
+            ("mean_force", -1e-11),
+            ("phase", 120.0),
+        ]);
         let hard = motion(&[
             ("peak_force", 2e-9),
             ("mean_force", 1e-10),
@@ -558,7 +557,9 @@ mod tests {
         }
         // A dimensionless case has no units.
         assert!(Target::parse("F_max < 1", false).is_ok());
-        let message = Target::parse("F_max < 1 nN", false).unwrap_err().to_string();
+        let message = Target::parse("F_max < 1 nN", false)
+            .unwrap_err()
+            .to_string();
         assert!(message.contains("model's units"), "{message}");
     }
 

@@ -23,8 +23,8 @@ use crate::study::limits::MAX_PERIOD;
 use crate::study::request::options;
 use crate::study::simulate::Classification;
 use crate::study::sweep::{
-    DISTANCE, FromNeighbour, Starts, Sweep, SweepOptions, Unreached, class_of, from_neighbours, held,
-    target_report, unreached,
+    DISTANCE, FromNeighbour, Starts, Sweep, SweepOptions, Unreached, class_of, from_neighbours,
+    held, target_report, unreached,
 };
 use crate::study::target::{TargetReport, Targets};
 use crate::study::value::Axes;

@@ -106,7 +106,9 @@ impl Sweep {
     ) -> Result<Self, Error> {
         let over = options.over.parse(case)?;
         check::check(case, &options, &over, &starts)?;
-        let targets = options.targets.parse(matches!(case.units(), Units::Si(_)))?;
+        let targets = options
+            .targets
+            .parse(matches!(case.units(), Units::Si(_)))?;
         check::targets(&targets, &starts)?;
         let distances = distances::solved(case, &over, control)?;
         // What the case says of a parameter that varies does not matter, and must not

@@ -126,7 +126,9 @@ impl Runs {
                     AttractorKind::Periodic(orbit) => orbit.period,
                     _ => 0,
                 };
-                let Some(case) = self.case_of(k) else { continue };
+                let Some(case) = self.case_of(k) else {
+                    continue;
+                };
                 let turn = if period == 0 { UNREPEATED } else { period };
                 let Ok(model) = case.model() else { continue };
                 let Ok(seen) = measure(&model, &attractor.state, turn, ObservableSet::COMMON)
@@ -161,19 +163,15 @@ impl Runs {
 
     /// Periods and states of the orbits on which a slowly moved lever may be, at values that
     /// are chosen.
-    fn quasistatic(
-        &self,
-        shape: &[usize],
-        control: &Control<'_>,
-    ) -> Vec<Vec<OrbitState>> {
+    fn quasistatic(&self, shape: &[usize], control: &Control<'_>) -> Vec<Vec<OrbitState>> {
         let quiet = Control {
             progress: None,
             ..*control
         };
         let gap = self.case.gap_key();
         let distances = self.over.iter();
-        let distances = distances
-            .map(|over| [gap, Key::GapTip, Key::DriveSetpoint].contains(&over.key));
+        let distances =
+            distances.map(|over| [gap, Key::GapTip, Key::DriveSetpoint].contains(&over.key));
         let distances: Vec<bool> = distances.collect();
         let columns = shape[0];
         let rows = shape.get(1).copied().unwrap_or(1);

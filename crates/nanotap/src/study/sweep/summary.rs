@@ -71,7 +71,10 @@ pub(crate) fn unreached(store: &Store) -> Vec<Unreached> {
 fn parameters(store: &Store) -> Vec<Vec<f64>> {
     let schema = store.schema();
     let count = schema.grid.axes.len() - 1;
-    (0..count).rev().map(|axis| schema.axis_values(axis)).collect()
+    (0..count)
+        .rev()
+        .map(|axis| schema.axis_values(axis))
+        .collect()
 }
 
 /// The file of a dataset with the conditions of `where`.

@@ -79,6 +79,13 @@ fn text(case: &GivenCase, report: &BimodalReport) -> String {
     text.push_str(&free(report).render());
     text.push('\n');
     text.push_str(&curve(report).render());
+    for jump in &report.jumps {
+        text.push_str(&motion::paragraph(&format!(
+            "Between {} and {} the motion jumps to another.",
+            length(jump.from),
+            length(jump.to)
+        )));
+    }
     if let Some(reason) = &report.ended {
         text.push_str(&motion::paragraph(reason));
     }

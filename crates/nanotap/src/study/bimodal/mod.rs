@@ -157,6 +157,15 @@ pub struct BimodalPoint {
     pub estimates: Estimates,
 }
 
+/// A jump from one motion to another. All quantities are in SI.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct BimodalJump {
+    /// The last distance of the motion before it in m.
+    pub from: f64,
+    /// The first distance of the motion behind it in m.
+    pub to: f64,
+}
+
 /// Bimodal operation against the distance.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct BimodalReport {
@@ -172,6 +181,9 @@ pub struct BimodalReport {
     pub reduced_modulus: Option<f64>,
     /// The motion at each distance, from far on; with a setpoint, the last is where it is reached.
     pub table: Vec<BimodalPoint>,
+    /// Where no motion followed and the lever went to another.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub jumps: Vec<BimodalJump>,
     /// Why the approach ended before its last distance.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub ended: Option<String>,

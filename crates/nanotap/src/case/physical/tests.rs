@@ -1379,3 +1379,23 @@ fn a_modal_stiffness_states_the_same_lever() {
     assert!(error.contains("mass_ratio"), "{error}");
     assert!(case(&["cantilever.k1=2 N/m", "cantilever.k=2 N/m"]).is_err());
 }
+
+/// k = E b h³/(4L³) and f0 = 1.8751²/(2π) √(k/(3m)) of a uniform silicon beam with E = 169 GPa along
+/// <110> (Hopcroft, Nix and Kenny, J. Microelectromech. Syst. 19, 229 (2010)) and 2329 kg/m³: the tip
+/// lowers f0, and data sheets round the thickness.
+#[test]
+fn catalogue_levers_are_like_silicon_beams() {
+    let catalogue = Catalogue::builtin().unwrap();
+    let mut rectangular = 0;
+    for lever in catalogue.levers() {
+        let Some(beam) = lever.geometry else { continue };
+        rectangular += 1;
+        let stiffness = beam.stiffness(169e9);
+        let frequency = 1.875_104_f64.powi(2) / std::f64::consts::TAU
+            * (stiffness / (3.0 * beam.mass(2329.0))).sqrt();
+        let [k, f0] = [lever.k / stiffness, lever.f0 / frequency];
+        assert!((0.9..1.2).contains(&k), "{}: k {k}", lever.name);
+        assert!((0.8..1.02).contains(&f0), "{}: f0 {f0}", lever.name);
+    }
+    assert!(rectangular >= 25, "{rectangular}");
+}

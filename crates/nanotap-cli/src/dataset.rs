@@ -100,7 +100,7 @@ impl DatasetArguments {
         let begun = Instant::now();
         let destination = self.destination(derived, plot.plot.as_deref())?;
         plot.check()?;
-        let plan = progress::watched(S::NAME, "starts of the census", false, |control| {
+        let plan = progress::watched(S::NAME, S::PLANNED, false, |control| {
             self.threads.install(|| S::plan(case, options, control))
         })??;
         let store = self.compute(&destination.store, &*plan, [S::NAME, noun], output)?;

@@ -19,6 +19,7 @@ mod series;
 mod study_arguments;
 mod style;
 mod table;
+mod targets;
 mod threads;
 
 use std::ffi::OsString;

@@ -2,7 +2,6 @@
 
 use clap::{Args, ValueEnum};
 use nanotap::case::Key;
-use nanotap::case::physical::Kind;
 use nanotap::figure::sweep::{figure, response};
 use nanotap::study::sweep::{Follow, Over, Summary, SweepOptions, SweepStudy};
 
@@ -14,6 +13,7 @@ use crate::number;
 use crate::output::Output;
 use crate::request::Request;
 use crate::table::{Align, Table};
+use crate::targets;
 
 /// Sweep one or two parameters, from any number of initial states.
 #[derive(Args, Debug)]
@@ -48,7 +48,8 @@ enum Show {
 
 pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure> {
     let options = arguments.request.read()?;
-    let case = GivenCase::of(&arguments.case, output)?;
+    let any_distance = options.over.solves_distance();
+    let case = GivenCase::for_study(&arguments.case, any_distance, output)?;
     let over = options.over.parse(&case)?;
     let keys: Vec<Key> = over.iter().map(|over| over.key).collect();
     case.note_constants(&keys, output);
@@ -100,8 +101,8 @@ fn text(
             format!(
                 "{} from {} to {} in {} values",
                 over.key.path(),
-                value(over, over.from),
-                value(over, over.to),
+                targets::value(over, over.from),
+                targets::value(over, over.to),
                 over.count
             )
         })
@@ -112,15 +113,16 @@ fn text(
         ranges.join(", "),
         number::counted(options.runs(over), "run", "runs")
     );
-    done.text(&heading, counts)
-}
-
-/// A value of a parameter in words.
-fn value(over: &Over, value: f64) -> String {
-    match over.key.kind() {
-        Kind::Number => number::chosen(value),
-        kind => kind.format(value),
-    }
+    done.text(&heading, |summary| {
+        let targets = summary.targets.as_ref();
+        let targets = targets.map(|found| targets::text(found, over));
+        let unreached = targets::unreached(&summary.unreached, over);
+        format!(
+            "{}{unreached}{}",
+            counts(summary),
+            targets.unwrap_or_default()
+        )
+    })
 }
 
 /// How many runs came to what.

@@ -17,6 +17,7 @@ use crate::number;
 use crate::output::Output;
 use crate::request::Request;
 use crate::table::{Align, Table};
+use crate::targets;
 
 /// The operating window over two parameters: where there is only one motion, and where a second
 /// state, subharmonics or chaos threaten.
@@ -37,7 +38,8 @@ pub(crate) struct Arguments {
 pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure> {
     let options = arguments.request.read()?;
     let names = options.over.names();
-    let case = GivenCase::of(&arguments.case, output)?;
+    let any_distance = options.over.solves_distance();
+    let case = GivenCase::for_study(&arguments.case, any_distance, output)?;
     let over = options.over.parse(&case)?;
     let keys: Vec<Key> = over.iter().map(|over| over.key).collect();
     case.note_constants(&keys, output);
@@ -64,7 +66,16 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
             number::counted(options.starts, "start", "starts"),
             over.iter().map(|over| over.count).product::<usize>()
         );
-        done.text(&heading, shares)
+        done.text(&heading, |window| {
+            let targets = window.targets.as_ref();
+            let targets = targets.map(|found| targets::text(found, &over));
+            let unreached = targets::unreached(&window.unreached, &over);
+            format!(
+                "{}{unreached}{}",
+                shares(window),
+                targets.unwrap_or_default()
+            )
+        })
     })
 }
 
@@ -72,7 +83,9 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
 fn shares(window: &Window) -> String {
     let mut table = Table::new([("there is", Align::Left), ("points (%)", Align::Point)]);
     for condition in Condition::ALL {
-        let share = window.shares.get(condition.name()).copied().unwrap_or(0.0);
+        let Some(&share) = window.shares.get(condition.name()) else {
+            continue;
+        };
         table.row([
             condition.words().to_owned(),
             number::significant(100.0 * share, 3),

@@ -3,7 +3,7 @@
 import json
 import os
 import tempfile
-from collections.abc import Iterable, Mapping
+from collections.abc import Hashable, Iterable, Mapping
 from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
@@ -180,10 +180,28 @@ def window(
             del ds.attrs["path"]
     dims = ds.classification.dims[:2]
     shares = found["shares"]
+    if (targets := found.get("targets")) is not None:
+        ds = _judged(ds, dims, targets)
     return ds.assign(
         condition=xr.DataArray(np.array(found["conditions"], dtype=str), dims=dims),
         share=("kind_of_point", np.array(list(shares.values())), _SHARE),
     ).assign_coords(kind_of_point=np.array(list(shares), dtype=str))
+
+
+def _judged(
+    ds: "xr.Dataset", dims: "tuple[Hashable, ...]", targets: Mapping[str, Any]
+) -> "xr.Dataset":
+    """Where the conditions of `where` hold; the region and the share as attributes."""
+    import xarray as xr
+
+    holds = np.array(targets["holds"], dtype=bool)
+    attrs = {
+        "long_name": "whether the conditions hold",
+        "where": targets["where"],
+        "share": targets["share"],
+        "region": json.dumps(targets.get("region")),
+    }
+    return ds.assign(holds=xr.DataArray(holds, dims=dims, attrs=attrs))
 
 
 _SHARE = {"long_name": "part of all points", "units": "1"}

@@ -767,6 +767,15 @@ impl Case {
         }
     }
 
+    /// The same case whose motions start from `state` at drive phase 0.
+    #[must_use]
+    pub(crate) fn starting_from(mut self, state: Vec<f64>) -> Self {
+        if let CaseKind::Quantities(quantities) = &mut self.what {
+            quantities.start = Some(state);
+        }
+        self
+    }
+
     /// The same case with the tip at `distance` (m) from the sample, where its setpoint is reached,
     /// with a note. Its motions start from `state` at drive phase 0. The unit of length is
     /// unchanged; the distance of the beam is then off by less than the free amplitude.

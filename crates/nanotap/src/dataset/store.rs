@@ -356,6 +356,21 @@ impl Store {
         names: [&str; N],
         mut call: impl FnMut(&[usize], [f64; N]),
     ) -> Result<(), StoreError> {
+        self.each_row(&names, |entry, row| {
+            call(entry, std::array::from_fn(|k| row[k]));
+        })
+    }
+
+    /// The same with the names in a slice.
+    ///
+    /// # Errors
+    /// As [`Store::each`].
+    pub fn each_row(
+        &self,
+        names: &[&str],
+        mut call: impl FnMut(&[usize], &[f64]),
+    ) -> Result<(), StoreError> {
+        let mut row = vec![f64::NAN; names.len()];
         for chunk in 0..self.chunks() {
             let block = self.schema.grid.block(chunk);
             let column = |name: &&str| {
@@ -369,8 +384,10 @@ impl Store {
             let columns = names.iter().map(column).collect::<Result<Vec<_>, _>>()?;
             let number = |k: usize, flat: usize| columns[k].get(flat).copied();
             for (flat, entry) in block.entries().enumerate() {
-                let row = std::array::from_fn(|k| number(k, flat).unwrap_or(f64::NAN));
-                call(&entry, row);
+                for (k, value) in row.iter_mut().enumerate() {
+                    *value = number(k, flat).unwrap_or(f64::NAN);
+                }
+                call(&entry, &row);
             }
         }
         Ok(())

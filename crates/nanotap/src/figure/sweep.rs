@@ -620,6 +620,23 @@ impl GridScale {
         !self.log && !self.values.iter().enumerate().all(even)
     }
 
+    /// The borders of the cells of the values, one more than there are values.
+    pub(crate) fn borders(&self) -> Vec<f64> {
+        let (from, to) = self.edges();
+        let between = self.values.windows(2).map(|pair| {
+            if self.log && !self.is_uneven() {
+                (pair[0] * pair[1]).sqrt()
+            } else {
+                0.5 * (pair[0] + pair[1])
+            }
+        });
+        let inner: Vec<f64> = between.collect();
+        std::iter::once(from)
+            .chain(inner)
+            .chain(std::iter::once(to))
+            .collect()
+    }
+
     /// The outer edges of cells around the values.
     pub(crate) fn edges(&self) -> (f64, f64) {
         let (from, to) = (self.values[0], self.values[self.values.len() - 1]);

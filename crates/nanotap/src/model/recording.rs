@@ -572,6 +572,25 @@ impl Curve {
         }
     }
 
+    /// The Fourier coefficients at several frequencies: as [`fourier`](Self::fourier) of each, for
+    /// less work.
+    pub fn fourier_at(&self, omegas: &[f64]) -> Vec<Complex> {
+        let Self::Nonlinear(recording, output) = self else {
+            return omegas.iter().map(|omega| self.fourier(*omega)).collect();
+        };
+        let fastest = omegas.iter().fold(0.0, |m: f64, omega| m.max(*omega));
+        let mut sums = vec![Complex::new(0.0, 0.0); omegas.len()];
+        for (weight, sample) in recording.samples_resolving(fastest) {
+            let value = weight * recording.read(output, &sample);
+            for (sum, omega) in sums.iter_mut().zip(omegas) {
+                let (sin, cos) = nanotap_arithmetic::sin_cos(omega * sample.time);
+                *sum += Complex::new(cos, -sin) * value;
+            }
+        }
+        let scale = 2.0 / recording.end().max(f64::MIN_POSITIVE);
+        sums.into_iter().map(|sum| sum * scale).collect()
+    }
+
     /// `∫ g h dt` with another curve of the same recording.
     pub fn product_integral(&self, other: &Self) -> f64 {
         match (self, other) {

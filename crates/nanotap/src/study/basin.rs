@@ -727,6 +727,7 @@ impl DatasetStudy for BasinStudy {
     const ABOUT: &'static str =
         "Compute basins of attraction on a two-dimensional slice of initial states";
     const COUNTED: &'static str = "rows";
+    const PLANNED: &'static str = "starts of the census";
     type Options = BasinOptions;
     type Report = Shares;
 

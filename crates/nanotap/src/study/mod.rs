@@ -36,6 +36,7 @@ pub mod simulate;
 pub mod start_box;
 #[cfg(feature = "dataset")]
 pub mod sweep;
+pub mod target;
 pub mod threads;
 pub mod value;
 #[cfg(feature = "dataset")]
@@ -146,10 +147,17 @@ pub trait DatasetStudy {
     const ABOUT: &'static str;
     /// What its progress counts, in the plural.
     const COUNTED: &'static str;
+    /// What the progress of its plan counts, in the plural.
+    const PLANNED: &'static str = "approaches to the setpoints";
     /// Options: what front ends show, check and pass on as JSON.
     type Options: Serialize + DeserializeOwned + JsonSchema;
     /// Summary of the finished dataset.
     type Report: Serialize + JsonSchema;
+
+    /// Whether the options solve for distances, so that none is solved for a setpoint of the case.
+    fn solves_distance(_: &Self::Options) -> bool {
+        false
+    }
 
     /// Plans the dataset of a `case` that `control` cancels: implements [`plan`](Self::plan).
     ///

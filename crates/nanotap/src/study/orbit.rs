@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 use nalgebra::DVector;
 use nanotap_dynamics::{
     ClassifyOptions, Complex, Control, MotionKind, OrbitSearch, PeriodicOrbit, Scheduling as _,
-    ShootingOptions, StroboscopicMap as _, check_size, classify, close_orbit,
+    ShootingOptions, Stability, StroboscopicMap as _, check_size, classify, close_orbit,
     close_orbit_from_points, find_orbits,
 };
 use nanotap_flow::Trajectory;
@@ -162,6 +162,14 @@ fn settled(
     start: &[f64],
     period: Option<usize>,
 ) -> Result<PeriodicOrbit, Error> {
+    let slow = model.nonlinear.as_ref().filter(|law| law.is_slow());
+    if let Some(Ok(guess)) = slow.map(|law| law.settled_from(start))
+        && let Ok(orbit) = close_orbit(map, &guess, 1, &ShootingOptions::default())
+        && !matches!(orbit.stability, Stability::Unstable { .. })
+        && period.is_none_or(|p| p % orbit.period == 0)
+    {
+        return Ok(orbit);
+    }
     let end = classify(map, start, &ClassifyOptions::default());
     if let MotionKind::Periodic(orbit) | MotionKind::TransientChaos { orbit, .. } = &end.kind
         && period.is_none_or(|p| p % orbit.period == 0)

@@ -112,7 +112,12 @@ impl StudyEntry {
             any_distance: false,
             run: Run::Dataset(|case, request, control| {
                 let request = read::<S::Options>(request)?;
-                S::plan(&at_setpoint(case.clone(), control)?.0, &request, control)
+                let case = if S::solves_distance(&request) {
+                    case.clone()
+                } else {
+                    at_setpoint(case.clone(), control)?.0
+                };
+                S::plan(&case, &request, control)
             }),
         }
     }

@@ -24,7 +24,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use super::FreeMotion;
-use super::approach::distance_sweep::{DistanceSweep, Motion, Piece, budget_text, is_same};
+use super::approach::distance_sweep::{DistanceSweep, Motion, Piece, Place, budget_text, is_same};
 use super::approach::{MAX_MULTIPLIER, SETPOINT_PERIODS, no_drive};
 use crate::case::Case;
 use crate::case::document::CaseDocument;
@@ -207,48 +207,11 @@ pub fn solve_setpoint(case: &Case, control: &Control<'_>) -> Result<SetpointRepo
         return Err(no_drive());
     }
     let held = HeldQuantity::new(setpoint, &free, view.scales.force)?;
-    let mut search = Search {
-        case,
-        held,
-        free,
-        before: None,
-        nearest: held.far,
-        found: None,
-    };
+    let mut search = Search::new(case, held, free);
     let range = (0.0, FARTHER * free.reach);
     let mut sweep = DistanceSweep::new(case, range, free.reach, SETPOINT_PERIODS, control)?;
-    let place = sweep.free()?;
-    // A motion that does not close ends the search.
-    sweep.stops_on_grid = true;
-    let (pieces, place) = sweep.way(place, 0.0, |sweep, piece| search.ends_in(sweep, piece));
-    sweep.stops_on_grid = false;
-    if control.is_cancelled() {
-        return Err(cancelled());
-    }
-    if let Some(steps) = sweep.spent_budget() {
-        return Err(Error::numerics(format!(
-            "the setpoint {} was not reached: {}, to gap.tip = {}; give gap.tip, or {} \
-             drive.setpoint",
-            held.words(),
-            budget_text(steps),
-            search.shown(pieces.last().map_or(range.1, |piece| piece.to)),
-            held.remedy()
-        )));
-    }
-    let reached = search.found.take().unwrap_or_else(|| {
-        Err(Error::numerics(format!(
-            "the setpoint {} is not reached on the way to the sample's own position \
-             (gap.tip = 0), {} {}; {} drive.setpoint, or give gap.tip",
-            held.words(),
-            if held.is_amplitude() {
-                "where"
-            } else {
-                "nearest to it"
-            },
-            held.state(search.nearest),
-            held.remedy()
-        )))
-    })?;
+    let place = approach(&mut sweep, std::slice::from_mut(&mut search), control)?;
+    let reached = search.result(&sweep)?;
     // What a lever shows at this distance that comes from near.
     sweep.allow_steps(OTHERS_STEPS);
     let (_, place) = sweep.way(place, 0.0, |_, _| false);
@@ -278,6 +241,85 @@ pub fn solve_setpoint(case: &Case, control: &Control<'_>) -> Result<SetpointRepo
         other_states,
         budget,
     })
+}
+
+/// Follows the lever from far until every search has ended; the place where it is then.
+fn approach<'a>(
+    sweep: &mut DistanceSweep<'a>,
+    searches: &mut [Search<'_>],
+    control: &Control<'_>,
+) -> Result<Place, Error> {
+    let place = sweep.free()?;
+    // A motion that does not close ends the search.
+    sweep.stops_on_grid = true;
+    let (pieces, place) = sweep.way(place, 0.0, |sweep, piece| {
+        let Some(first) = searches.iter().find(|search| search.found.is_none()) else {
+            return true;
+        };
+        let trace = first.held.trace(sweep, piece);
+        let open = searches.iter_mut().filter(|search| search.found.is_none());
+        open.fold(true, |all, search| {
+            search.ends_in(sweep, piece, &trace) && all
+        })
+    });
+    sweep.stops_on_grid = false;
+    if control.is_cancelled() {
+        return Err(cancelled());
+    }
+    let nearest = pieces.last().map(|piece| piece.to);
+    for search in searches {
+        search.nearest_gap = nearest.unwrap_or(search.nearest_gap);
+    }
+    Ok(place)
+}
+
+/// A distance at which a setpoint is first reached from far.
+#[derive(Clone, Debug, PartialEq)]
+pub(in crate::study) struct ReachedDistance {
+    /// The distance in m.
+    pub(in crate::study) zc: f64,
+    /// State of the orbit at drive phase 0.
+    pub(in crate::study) state: Vec<f64>,
+}
+
+/// The distances at which each of these fractions of the free amplitude is first reached from far,
+/// on one approach; the reason where one is not reached.
+///
+/// # Errors
+/// When the lever is not driven, or the work was cancelled.
+pub(in crate::study) fn reached_distances(
+    case: &Case,
+    ratios: &[f64],
+    control: &Control<'_>,
+) -> Result<Vec<Result<ReachedDistance, String>>, Error> {
+    let Some(view) = case.physical() else {
+        return Err(Error::input(
+            "a setpoint is one of physical quantities",
+            "give the case in physical quantities",
+        ));
+    };
+    let free = FreeMotion::of(&case.model()?);
+    if !(free.reach > 0.0 && free.reach.is_finite()) {
+        return Err(no_drive());
+    }
+    let mut searches = Vec::with_capacity(ratios.len());
+    for ratio in ratios {
+        let held = HeldQuantity::new(Held::Amplitude(*ratio), &free, view.scales.force)?;
+        searches.push(Search::new(case, held, free));
+    }
+    let range = (0.0, FARTHER * free.reach);
+    let mut sweep = DistanceSweep::new(case, range, free.reach, SETPOINT_PERIODS, control)?;
+    approach(&mut sweep, &mut searches, control)?;
+    let results = searches.iter_mut().map(|search| search.result(&sweep));
+    Ok(results
+        .map(|result| match result {
+            Ok(found) => Ok(ReachedDistance {
+                zc: found.zc,
+                state: found.state,
+            }),
+            Err(error) => Err(error.message()),
+        })
+        .collect())
 }
 
 /// The case at the distance where its setpoint is reached, and how that was found; a case
@@ -461,10 +503,15 @@ struct Search<'a> {
     free: FreeMotion,
     /// The distance and the value last passed.
     before: Option<(f64, f64)>,
-    /// The value nearest to the setpoint.
+    /// The value nearest to the setpoint, and the distance at which the way ended.
     nearest: f64,
+    nearest_gap: f64,
     found: Option<Result<SetpointSolution, Error>>,
 }
+
+/// The orbits along a piece of the way with their distances and values, or what the motion is that
+/// is no orbit.
+type Trace = Result<Vec<(f64, PeriodicOrbit, f64)>, &'static str>;
 
 /// An orbit of a branch and the value of the held quantity.
 #[derive(Clone, Debug)]
@@ -487,37 +534,17 @@ fn value_at(
     seen.map_or(f64::NAN, |seen| held.of(&seen))
 }
 
-impl Search<'_> {
-    /// The distance in words.
-    fn shown(&self, gap: f64) -> String {
-        self.case.physical().map_or_else(
-            || gap.to_string(),
-            |view| Kind::Length.format(gap * view.scales.length),
-        )
-    }
-
-    /// Whether the search ends in a piece of the way.
-    fn ends_in(&mut self, sweep: &DistanceSweep<'_>, piece: &Piece) -> bool {
+impl HeldQuantity {
+    /// The orbits along a piece of the way.
+    fn trace(&self, sweep: &DistanceSweep<'_>, piece: &Piece) -> Trace {
         let stretch = match &piece.motion {
             Motion::Periodic(stretch) => *stretch,
             Motion::OnGrid(_) => {
                 let motion = sweep.motion_at(piece, piece.entered);
-                let what = match motion.orbit {
+                return Err(match motion.orbit {
                     Some(_) => "of a long period",
                     None => motion.classification.name(),
-                };
-                self.found = Some(Err(Error::numerics(format!(
-                    "on approach the motion is {what} at gap.tip = {}, before the setpoint {} is \
-                     reached: it has no {} to hold; change drive.setpoint, or give gap.tip",
-                    self.shown(piece.from),
-                    self.held.words(),
-                    match self.held.setpoint {
-                        Held::Amplitude(_) => "amplitude",
-                        Held::PeakForce(_) => "peak force",
-                        Held::Phase(_) => "phase",
-                    }
-                ))));
-                return true;
+                });
             }
         };
         let points = &sweep.stretches[stretch].points;
@@ -533,14 +560,90 @@ impl Search<'_> {
             .into_iter()
             .filter_map(|(gap, orbit)| Some((gap, orbit?)))
             .collect();
-        let held = self.held;
-        let values: Vec<f64> = orbits
-            .par_iter()
+        Ok(orbits
+            .into_par_iter()
             .with_max_len(1)
-            .map(|(gap, orbit)| value_at(&held, sweep, *gap, orbit))
-            .collect();
+            .map(|(gap, orbit)| {
+                let value = value_at(self, sweep, gap, &orbit);
+                (gap, orbit, value)
+            })
+            .collect())
+    }
+}
+
+impl<'a> Search<'a> {
+    const fn new(case: &'a Case, held: HeldQuantity, free: FreeMotion) -> Self {
+        Self {
+            case,
+            held,
+            free,
+            before: None,
+            nearest: held.far,
+            nearest_gap: FARTHER * free.reach,
+            found: None,
+        }
+    }
+}
+
+impl Search<'_> {
+    /// The orbit that was found once the way has ended, or why there is none.
+    fn result(&mut self, sweep: &DistanceSweep<'_>) -> Result<SetpointSolution, Error> {
+        if let Some(found) = self.found.take() {
+            return found;
+        }
+        let words = self.held.words();
+        let remedy = self.held.remedy();
+        Err(Error::numerics(match sweep.spent_budget() {
+            Some(steps) => format!(
+                "the setpoint {words} was not reached: {}, to gap.tip = {}; give gap.tip, or \
+                 {remedy} drive.setpoint",
+                budget_text(steps),
+                self.shown(self.nearest_gap),
+            ),
+            None => format!(
+                "the setpoint {words} is not reached on the way to the sample's own position \
+                 (gap.tip = 0), {} {}; {remedy} drive.setpoint, or give gap.tip",
+                if self.held.is_amplitude() {
+                    "where"
+                } else {
+                    "nearest to it"
+                },
+                self.held.state(self.nearest),
+            ),
+        }))
+    }
+
+    /// The distance in words.
+    fn shown(&self, gap: f64) -> String {
+        self.case.physical().map_or_else(
+            || gap.to_string(),
+            |view| Kind::Length.format(gap * view.scales.length),
+        )
+    }
+
+    /// Whether the search ends in a piece of the way.
+    fn ends_in(&mut self, sweep: &DistanceSweep<'_>, piece: &Piece, trace: &Trace) -> bool {
+        let held = self.held;
+        let orbits = match trace {
+            Ok(orbits) => orbits,
+            Err(what) => {
+                self.found = Some(Err(Error::numerics(format!(
+                    "on approach the motion is {what} at gap.tip = {}, before the setpoint {} is \
+                     reached: it has no {} to hold; change drive.setpoint, or give gap.tip",
+                    self.shown(piece.from),
+                    held.words(),
+                    match held.setpoint {
+                        Held::Amplitude(_) => "amplitude",
+                        Held::PeakForce(_) => "peak force",
+                        Held::Phase(_) => "phase",
+                    }
+                ))));
+                return true;
+            }
+        };
         let mut before: Option<Sample<'_>> = None;
-        for ((gap, orbit), value) in orbits.iter().zip(values) {
+        for (gap, orbit, value) in orbits {
+            let value = *value;
             let here = Sample {
                 gap: *gap,
                 orbit,

@@ -297,6 +297,11 @@ impl Axes {
     pub fn names(&self) -> Vec<&str> {
         self.0.iter().map(|axis| name_of(axis)).collect()
     }
+
+    /// Whether a setpoint varies, so that its distances are solved for.
+    pub fn solves_distance(&self) -> bool {
+        self.names().contains(&Key::DriveSetpoint.path())
+    }
 }
 
 /// What stands before the values.

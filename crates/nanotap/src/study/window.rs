@@ -23,8 +23,10 @@ use crate::study::limits::MAX_PERIOD;
 use crate::study::request::options;
 use crate::study::simulate::Classification;
 use crate::study::sweep::{
-    FromNeighbour, Starts, Sweep, SweepOptions, class_of, from_neighbours, held,
+    DISTANCE, FromNeighbour, Starts, Sweep, SweepOptions, Unreached, class_of, from_neighbours,
+    held, target_report, unreached,
 };
+use crate::study::target::{TargetReport, Targets};
 use crate::study::value::Axes;
 use crate::study::{DatasetPlan, DatasetStudy};
 
@@ -43,17 +45,20 @@ pub enum Condition {
     Irregular,
     /// Nothing of these, but a start whose motion could not be named.
     Undecided,
+    /// No distance: the setpoint is not reached on approach.
+    Unreached,
 }
 
 impl Condition {
     /// All of them, the safest first.
-    pub const ALL: [Self; 6] = [
+    pub const ALL: [Self; 7] = [
         Self::NoContact,
         Self::OnePeriod1,
         Self::SecondState,
         Self::Subharmonic,
         Self::Irregular,
         Self::Undecided,
+        Self::Unreached,
     ];
 
     /// The key in data.
@@ -65,6 +70,7 @@ impl Condition {
             Self::Subharmonic => "subharmonic",
             Self::Irregular => "irregular",
             Self::Undecided => "undecided",
+            Self::Unreached => "setpoint-unreached",
         }
     }
 
@@ -77,6 +83,7 @@ impl Condition {
             Self::Subharmonic => "subharmonic",
             Self::Irregular => "chaos or torus",
             Self::Undecided => "undecided",
+            Self::Unreached => "setpoint not reached",
         }
     }
 }
@@ -111,11 +118,20 @@ pub struct Window {
     pub y: Vec<f64>,
     /// What there is, row by row, a row a value of the second.
     pub conditions: Vec<Vec<Condition>>,
-    /// Part of all points, by condition; every one is there.
+    /// Part of all points, by condition; every one is there, `setpoint-unreached` over setpoints.
     pub shares: BTreeMap<&'static str, f64>,
     /// What stays while the parameters vary although it was not stated, in SI.
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub held: BTreeMap<String, f64>,
+    /// Distance in m at each point, solved for the setpoint, row by row.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub distances: Vec<Vec<Option<f64>>>,
+    /// Where the setpoint is not reached.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub unreached: Vec<Unreached>,
+    /// Where the conditions of `where` hold.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub targets: Option<TargetReport>,
 }
 
 /// One motion found from one start.
@@ -184,12 +200,35 @@ impl Window {
                 seen.push(Seen::from(&motion));
             }
         }
-        let conditions: Vec<Vec<Condition>> = seen
+        let mut distances = Vec::new();
+        if schema.index_of(DISTANCE).is_some() {
+            distances = vec![vec![None; columns]; rows];
+            store.each([DISTANCE], |entry, [distance]| {
+                distances[entry[0]][entry[1]] = distance.is_finite().then_some(distance);
+            })?;
+        }
+        let reached = |k: usize| {
+            let row = distances.get(k / columns);
+            row.is_none_or(|row| row[k % columns].is_some())
+        };
+        let conditions: Vec<Condition> = seen
+            .iter()
+            .enumerate()
+            .map(|(k, motions)| {
+                if reached(k) {
+                    condition(motions)
+                } else {
+                    Condition::Unreached
+                }
+            })
+            .collect();
+        let conditions: Vec<Vec<Condition>> = conditions
             .chunks(columns.max(1))
-            .map(|row| row.iter().map(|motions| condition(motions)).collect())
+            .map(<[Condition]>::to_vec)
             .collect();
         let shares = Condition::ALL
             .into_iter()
+            .filter(|wanted| *wanted != Condition::Unreached || !distances.is_empty())
             .map(|wanted| {
                 let count = conditions
                     .iter()
@@ -206,6 +245,9 @@ impl Window {
             conditions,
             shares,
             held: held(store),
+            distances,
+            unreached: unreached(store),
+            targets: target_report(store)?,
         })
     }
 
@@ -257,7 +299,8 @@ options! {
     /// Options of an operating window.
     pub struct WindowOptions {
         /// Parameter and its values, as in gap.tip=5nm:25nm:41, drive.free_amplitude=10nm:60nm:26,
-        /// omega=2:4:81, or ascending values omega=2,2.5,4; twice, first the horizontal axis
+        /// omega=2:4:81, or ascending values omega=2,2.5,4; twice, first the horizontal axis. For
+        /// drive.setpoint=0.5:0.9:9 the distance is solved at each point
         #[schemars(extend("x-value" = "KEY=VALUES", "x-required" = true))]
         pub over: Axes = Axes::default(),
         /// Initial states at each point: rest, the linear responses, and samples at all amplitudes
@@ -269,6 +312,11 @@ options! {
         /// Longest period of orbits, in drive periods
         #[schemars(range(min = 1, max = MAX_PERIOD), extend("x-value" = "N"))]
         pub max_period: usize = 32,
+        /// Condition that every motion found at a point must meet, as in "F_max < 1 nN",
+        /// "regime = attractive", "states = 1"; several: all must hold
+        #[serde(rename = "where")]
+        #[schemars(extend("x-value" = "CONDITION"))]
+        pub targets: Targets = Targets::default(),
     }
 }
 
@@ -277,7 +325,7 @@ impl WindowOptions {
     ///
     /// # Errors
     /// When there are not two parameters, and as for a sweep.
-    pub fn sweep(&self, case: &Case) -> Result<Sweep, Error> {
+    pub fn sweep(&self, case: &Case, control: &Control<'_>) -> Result<Sweep, Error> {
         let count = self.over.0.len();
         if count != 2 {
             return Err(Error::input(
@@ -290,10 +338,11 @@ impl WindowOptions {
             // What a motion is counts, not its course.
             periods: 1,
             max_period: self.max_period,
+            targets: self.targets.clone(),
             ..SweepOptions::default()
         };
         let (count, seed) = (self.starts, self.seed);
-        Sweep::from(case, options, Starts::Spread { count, seed })
+        Sweep::from(case, options, Starts::Spread { count, seed }, control)
     }
 }
 
@@ -333,12 +382,16 @@ impl DatasetStudy for WindowStudy {
     type Options = WindowOptions;
     type Report = Window;
 
+    fn solves_distance(options: &WindowOptions) -> bool {
+        options.over.solves_distance()
+    }
+
     fn prepare(
         case: &Case,
         options: &WindowOptions,
-        _: &Control<'_>,
+        control: &Control<'_>,
     ) -> Result<DatasetPlan, Error> {
-        Ok(Box::new(options.sweep(case)?))
+        Ok(Box::new(options.sweep(case, control)?))
     }
 
     fn report(store: &Store) -> Result<Window, StoreError> {

@@ -22,6 +22,7 @@ fn lever(words: &[&str]) -> Case {
         "sample.law=hertz",
         "sample.modulus=1 GPa",
         "sample.poisson=0.3",
+        "sample.contact_distance=0.1 nm",
         "drive.actuation=tip",
         "drive.frequency_ratio=1",
         "drive.free_amplitude=20 nm",
@@ -55,6 +56,8 @@ struct Instrument {
     stiffness: nalgebra::Matrix2<f64>,
     tip: nalgebra::Vector2<f64>,
     gap: f64,
+    /// Height at which the contact begins.
+    begins: f64,
     /// Force of an indentation δ is this times δ^1.5.
     contact: f64,
     omega: [f64; 2],
@@ -70,7 +73,7 @@ impl Instrument {
         ahead: f64,
     ) -> [nalgebra::Vector2<f64>; 2] {
         let height = self.gap + self.tip.dot(a);
-        let mut force = self.contact * (-height).max(0.0).powf(1.5);
+        let mut force = self.contact * (self.begins - height).max(0.0).powf(1.5);
         for tone in 0..2 {
             force += self.strength[tone] * (self.phase[tone] + self.omega[tone] * ahead).sin();
         }
@@ -81,10 +84,9 @@ impl Instrument {
 
     /// What lock-in amplifiers on both tones read over so many periods of the first, with a window
     /// that suppresses the other lines: amplitude, and lag in radians.
-    fn read(&mut self, periods: usize) -> [(f64, f64); 2] {
-        const STEPS: usize = 2400;
-        let h = TAU / self.omega[0] / STEPS as f64;
-        let count = periods * STEPS;
+    fn read(&mut self, periods: usize, steps: usize) -> [(f64, f64); 2] {
+        let h = TAU / self.omega[0] / steps as f64;
+        let count = periods * steps;
         let mut sums = [Complex::new(0.0, 0.0); 2];
         for step in 0..count {
             let window = (std::f64::consts::PI * step as f64 / count as f64)
@@ -141,6 +143,7 @@ fn simulated(
         stiffness: square(&equations.stiffness[0]),
         tip: nalgebra::Vector2::new(equations.modes.tip[0], equations.modes.tip[1]),
         gap: lever.alpha5,
+        begins: 0.1e-9 / scales.length,
         contact,
         omega: [0, 1].map(|k| start.free[k].frequency / scales.frequency),
         strength: [0, 1].map(|k| start.free[k].drive_strength / scales.force),
@@ -148,18 +151,21 @@ fn simulated(
         state: [nalgebra::Vector2::zeros(); 2],
     };
     let mut read = [(0.0, 0.0); 2];
-    for _ in 0..24 {
-        instrument.read(150);
-        read = instrument.read(300);
+    for turn in 0..60 {
+        // Coarse steps until the loops are near.
+        let steps = if turn < 40 { 600 } else { 2400 };
+        instrument.read(150, steps);
+        // Lines of the two tones lie close to each other, and a long window tells them apart.
+        read = instrument.read(if turn < 56 { 300 } else { 2400 }, steps);
         for tone in 0..2 {
             let (amplitude, lag) = read[tone];
             if kinds[tone].holds_phase() {
                 let away = lag - std::f64::consts::FRAC_PI_2;
-                instrument.omega[tone] *= 1.0 - 0.8 * away / (2.0 * quality[tone]);
+                instrument.omega[tone] *= 1.0 - 0.4 * away / (2.0 * quality[tone]);
             }
             if kinds[tone].holds_amplitude() {
                 let wanted = start.free[tone].amplitude / scales.length;
-                instrument.strength[tone] *= (wanted / amplitude).powf(0.8);
+                instrument.strength[tone] *= (wanted / amplitude).powf(0.4);
             }
         }
     }
@@ -171,34 +177,39 @@ fn simulated(
 }
 
 #[test]
-fn loops_hold_what_their_simulation_holds() {
-    for (kinds, gap) in [
-        ([Loop::Am, Loop::Fm], "17 nm"),
-        ([Loop::Fm, Loop::Fm], "19.5 nm"),
-    ] {
-        let gap = format!("gap.tip={gap}");
-        let case = lever(&["drive.second_free_amplitude=1 nm", &gap]);
-        let report = report(&case, kinds[0], kinds[1]);
-        let found = last(&report);
-        let (frequency, strength, read) = simulated(&case, kinds, &report);
-        for tone in 0..2 {
-            let exact = found.tones[tone];
-            let shift = frequency[tone] - report.free[tone].frequency;
-            let close = |a: f64, b: f64, limit: f64| {
-                assert!((a - b).abs() <= limit, "{kinds:?} tone {tone}: {a} {b}");
-            };
-            close(read[tone].0, exact.amplitude, 1e-6 * exact.amplitude);
-            close(read[tone].1, exact.phase, 1e-4);
-            close(
-                strength[tone],
-                exact.drive_strength,
-                1e-6 * exact.drive_strength,
-            );
-            // Frequencies to 1e-8 of themselves.
-            close(shift, exact.frequency_shift, 1e-8 * exact.frequency);
-        }
-        assert!(found.tones[1].frequency_shift > 100.0, "{found:?}");
+fn am_fm_holds_what_its_simulation_holds() {
+    compared([Loop::Am, Loop::Fm], "17 nm");
+}
+
+#[test]
+fn fm_fm_holds_what_its_simulation_holds() {
+    compared([Loop::Fm, Loop::Fm], "19.8 nm");
+}
+
+/// The loops against their simulation at a distance.
+fn compared(kinds: [Loop; 2], gap: &str) {
+    let gap = format!("gap.tip={gap}");
+    let case = lever(&["drive.second_free_amplitude=1 nm", &gap]);
+    let report = report(&case, kinds[0], kinds[1]);
+    let found = last(&report);
+    let (frequency, strength, read) = simulated(&case, kinds, &report);
+    for tone in 0..2 {
+        let exact = found.tones[tone];
+        let shift = frequency[tone] - report.free[tone].frequency;
+        let close = |a: f64, b: f64, limit: f64| {
+            assert!((a - b).abs() <= limit, "{kinds:?} tone {tone}: {a} {b}");
+        };
+        close(read[tone].0, exact.amplitude, 1e-6 * exact.amplitude);
+        close(read[tone].1, exact.phase, 1e-4);
+        close(
+            strength[tone],
+            exact.drive_strength,
+            1e-6 * exact.drive_strength,
+        );
+        // Frequencies to 1e-8 of themselves.
+        close(shift, exact.frequency_shift, 1e-8 * exact.frequency);
     }
+    assert!(found.tones[1].frequency_shift > 100.0, "{found:?}");
 }
 
 /// Without loops, at a ratio of whole numbers, both tones are those of the orbit after which they
@@ -224,13 +235,12 @@ fn constant_tones_are_those_of_their_common_orbit() {
         );
         assert!((tone.phase - phase).abs() < 1e-6, "{tone:?} {phase}");
     }
+    let [re, im] = common.multipliers[0];
+    let growth = re.hypot(im).powf(0.01);
     assert!(
-        (found.growth
-            - common.multipliers[0][0]
-                .hypot(common.multipliers[0][1])
-                .powf(0.01))
-        .abs()
-            < 1e-6
+        (found.growth - growth).abs() < 1e-4,
+        "{} {growth}",
+        found.growth
     );
 }
 
@@ -294,7 +304,7 @@ fn contradictions_are_refused_by_name() {
         ],
         Loop::Am,
     );
-    assert!(one.contains("lags by"), "{one}");
+    assert!(one.contains("no mode of the lever resonates"), "{one}");
     let far = run(
         &["drive.second_free_amplitude=1 nm", "gap.tip=1 um"],
         Loop::Am,

@@ -35,8 +35,8 @@ fn request(study: &str) -> Option<Value> {
         "convergence" => json!({"largest": 2}),
         // Their columns are those of the data, and their units are told with them.
         "fit" | "reconstruct" => return None,
-        // In SI as a whole, and of two tones.
-        "bimodal" => return None,
+        // In SI as a whole.
+        "bimodal" | "force-curve" => return None,
         _ => json!({}),
     })
 }

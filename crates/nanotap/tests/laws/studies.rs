@@ -116,7 +116,7 @@ fn a_window_over_an_attractive_sample() {
         starts: 4,
         ..WindowOptions::default()
     };
-    let sweep = options.sweep(&case).unwrap();
+    let sweep = options.sweep(&case, &Control::default()).unwrap();
     let folder = std::env::temp_dir().join(format!("nanotap-window-{}", std::process::id()));
     std::fs::create_dir_all(&folder).unwrap();
     let store = Store::create_or_resume(&folder.join("window"), sweep.schema().clone()).unwrap();

@@ -6,6 +6,7 @@ use nanotap::model::Model;
 use nanotap::model::cantilever::Cantilever;
 use nanotap::model::contact::ContactLaw;
 use nanotap::model::drive_form::Actuation;
+use nanotap::model::galerkin::Galerkin;
 use nanotap::model::parameter::Parameter;
 use nanotap::observe::{ObservableSet, Spectrum, measure};
 use nanotap::study::orbit::{OrbitOptions, orbit};
@@ -178,4 +179,163 @@ fn phases_and_times_agree() {
     };
     let (a, b) = (run(&silent, &start, 0.0).0, run(&single, &start, 0.0).0);
     assert!(a.iter().zip(&b).all(|(a, b)| (a - b).abs() < 1e-13));
+}
+
+/// A tip of one mode on spring and damper under two tones, by the classical Runge–Kutta method with
+/// steps that end where contact begins and ends.
+struct Tapping {
+    /// Acceleration by deflection, speed and force at the tip.
+    own: [f64; 3],
+    contact: [f64; 3],
+    tones: [[f64; 2]; 2],
+}
+
+impl Tapping {
+    fn rate(&self, t: f64, [w, v]: [f64; 2], touches: bool) -> [f64; 2] {
+        let [stiffness, gap, damping] = self.contact;
+        let mut force = if touches {
+            -stiffness * (w + gap) - damping * v
+        } else {
+            0.0
+        };
+        for [strength, omega] in self.tones {
+            force += strength * (omega * t).sin();
+        }
+        [v, self.own[0] * w + self.own[1] * v + self.own[2] * force]
+    }
+
+    fn step(&self, t: f64, at: [f64; 2], h: f64, touches: bool) -> [f64; 2] {
+        let moved = |by: [f64; 2], h: f64| [at[0] + h * by[0], at[1] + h * by[1]];
+        let a = self.rate(t, at, touches);
+        let b = self.rate(t + 0.5 * h, moved(a, 0.5 * h), touches);
+        let c = self.rate(t + 0.5 * h, moved(b, 0.5 * h), touches);
+        let d = self.rate(t + h, moved(c, h), touches);
+        [0, 1].map(|k| at[k] + h / 6.0 * (a[k] + 2.0 * (b[k] + c[k]) + d[k]))
+    }
+
+    /// Follows `at` over a time, adding ∫ W e^(−iωt) dt at some frequencies.
+    fn follow(
+        &self,
+        at: &mut [f64; 2],
+        until: f64,
+        steps: usize,
+        lines: &[f64],
+        sums: &mut [Complex],
+    ) {
+        let h = until / steps as f64;
+        let gap = self.contact[1];
+        for k in 0..steps {
+            let (mut t, end) = (k as f64 * h, (k + 1) as f64 * h);
+            while t < end {
+                let touches = at[0] + gap < 0.0 || at[0] + gap == 0.0 && at[1] < 0.0;
+                let crossed = |next: [f64; 2]| (next[0] + gap < 0.0) != touches;
+                let mut length = end - t;
+                let mut next = self.step(t, *at, length, touches);
+                if crossed(next) {
+                    let (mut low, mut high) = (0.0, length);
+                    for _ in 0..60 {
+                        length = 0.5 * (low + high);
+                        let there = self.step(t, *at, length, touches);
+                        if crossed(there) {
+                            high = length
+                        } else {
+                            low = length
+                        }
+                    }
+                    next = self.step(t, *at, high, touches);
+                    next[0] = -gap;
+                    length = high;
+                }
+                // Simpson's rule, with the middle of the cubic through both ends.
+                let middle = 0.5 * (at[0] + next[0]) + length / 8.0 * (at[1] - next[1]);
+                for (sum, omega) in sums.iter_mut().zip(lines) {
+                    let turned = |t: f64| Complex::new((omega * t).cos(), -(omega * t).sin());
+                    *sum += (turned(t) * at[0]
+                        + turned(t + 0.5 * length) * (4.0 * middle)
+                        + turned(t + length) * next[0])
+                        * (length / 6.0);
+                }
+                *at = next;
+                t = if length == end - t { end } else { t + length };
+            }
+        }
+    }
+}
+
+/// Intermodulation of tones that repeat after 599 periods.
+#[test]
+fn intermodulation_agrees_with_another_integration() {
+    let ratio = 601.0 / 599.0;
+    let case = Cantilever {
+        actuation: Actuation::Tip,
+        omega: 3.51,
+        alpha2: 0.01,
+        alpha3: 0.05,
+        alpha4: 40.0,
+        alpha1: 0.0,
+        alpha5: 0.3,
+        alpha6: 0.2,
+        tone2_ratio: "601/599".parse().ok(),
+        ..Cantilever::paper().with_modes(1)
+    }
+    .with(Parameter::Tone2Amplitude, 0.01);
+    let model = Model::cantilever(&case).unwrap();
+    let found = orbit(&model, &OrbitOptions::default()).unwrap();
+    assert_eq!(found.period, 1);
+    assert!(
+        found.observables.contacts_per_period > 10.0,
+        "{} {}",
+        found.observables.contacts_per_period,
+        found.observables.tip_min
+    );
+    let equations = Galerkin::new(&case).unwrap();
+    let of = |matrix: &nalgebra::DMatrix<f64>| matrix[(0, 0)] / equations.mass[(0, 0)];
+    let tip = equations.modes.tip[0];
+    let tapping = Tapping {
+        own: [
+            -of(&equations.stiffness[0]),
+            -of(&equations.damping[0]),
+            tip * tip / equations.mass[(0, 0)],
+        ],
+        contact: [case.alpha4, case.alpha5, case.alpha6],
+        tones: [[0.01, case.omega], [0.01, ratio * case.omega]],
+    };
+    let whole = 599.0 * std::f64::consts::TAU / case.omega;
+    let mut at = [tip * found.state[0], tip * found.state[1]];
+    // From another state the lever comes to the same motion.
+    at[0] += 0.02;
+    let factors = [1.0, ratio, 2.0 - ratio, 2.0 * ratio - 1.0];
+    let lines = factors.map(|factor| factor * case.omega);
+    let mut sums = [Complex::new(0.0, 0.0); 4];
+    tapping.follow(&mut at, whole, 599 * 1000, &[], &mut []);
+    tapping.follow(&mut at, whole, 599 * 1000, &lines, &mut sums);
+    let o = &found.observables;
+    let seen = [
+        (o.first_harmonic, o.phase),
+        (o.tone2_response.unwrap(), o.tone2_lag.unwrap()),
+        (o.first_sideband.unwrap(), o.first_sideband_phase.unwrap()),
+        (o.second_sideband.unwrap(), o.second_sideband_phase.unwrap()),
+    ];
+    for (sum, (amplitude, lag)) in sums.into_iter().zip(seen) {
+        // Of A sin(ωt − lag): ∫ e^(−iωt) = A e^(−i lag) T/(2i).
+        let read = sum * Complex::new(0.0, 2.0 / whole);
+        let (sin, cos) = lag.to_radians().sin_cos();
+        let off = read - Complex::new(amplitude * cos, -amplitude * sin);
+        assert!(
+            off.modulus() < 1e-9 * o.first_harmonic,
+            "{read} {amplitude} {lag}"
+        );
+    }
+    // The spectrum lists them as products of the tones.
+    let spectrum = Spectrum::of(&model, &found.trajectory, 1, 2);
+    let line = |product| {
+        spectrum
+            .harmonics
+            .iter()
+            .find(|h| h.product == Some(product))
+            .unwrap()
+    };
+    for (product, (amplitude, _)) in [[1, 0], [0, 1], [2, -1], [-1, 2]].into_iter().zip(seen) {
+        assert!((line(product).tip - amplitude).abs() < 1e-12, "{product:?}");
+    }
 }

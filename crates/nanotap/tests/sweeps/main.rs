@@ -12,3 +12,4 @@ mod folder;
 mod neighbours;
 mod packing;
 mod physics;
+mod setpoints;

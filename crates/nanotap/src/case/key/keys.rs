@@ -253,7 +253,7 @@ pub(super) static TABLE: LazyLock<Vec<Entry>> = LazyLock::new(|| {
 
 use Kind::{
     Angle, ChargeDensity, Damping, Density, Energy, Force, Frequency, Length, Mass, Number,
-    Pressure, Repulsion, Stiffness, Viscosity, Voltage,
+    Pressure, Repulsion, Stiffness, Time, Viscosity, Voltage,
 };
 use Range as R;
 use Section::{Cantilever, Drive, Gap, Sample, Tip};
@@ -297,6 +297,7 @@ Before from Parameter::COUNT => {
     LeverName = other(Cantilever, "lever", Takes::LeverName, "a lever of the catalogue, for what is not said");
     LeverK = quantity(Cantilever, "k", Stiffness, R::POSITIVE, "static spring constant at the tip, 3EI/L³")
         .label("spring constant $k$");
+    LeverK1 = quantity(Cantilever, "k1", Stiffness, R::POSITIVE, "stiffness of the first mode at the tip, as thermal tunes and point-mass models give it: 1.0302 k without a tip's mass");
     LeverF0 = quantity(Cantilever, "f0", Frequency, R::POSITIVE, "first free resonance, with the tip")
         .label("resonance frequency $f_0$");
     LeverF2 = quantity(Cantilever, "f2", Frequency, R::POSITIVE, "second free resonance; without a tip's mass it tells that mass")
@@ -382,7 +383,7 @@ After from AFTER_LAWS => {
         Sample, "intermolecular_distance", Length, R::POSITIVE, "intermolecular distance a0, the gap at which contact begins",
     ).under(Laws::Nonlinear).called("contact_distance").alias("contact_distance")
         .label("intermolecular distance $a_0$");
-    SampleViscosity = quantity(Sample, "viscosity", Viscosity, R::NOT_NEGATIVE, "viscosity of the sample").under(Laws::Nonlinear)
+    SampleViscosity = quantity(Sample, "viscosity", Viscosity, R::NOT_NEGATIVE, "viscosity of the sample: elongational of a Kelvin–Voigt solid, García's η of viscous-contact").under(Laws::Nonlinear)
         .label("sample viscosity $η$");
     SampleThickness = quantity(Sample, "thickness", Length, R::POSITIVE, "thickness of a thin sample on its support").under(Laws::Nonlinear);
     SampleDecayLength = quantity(Sample, "decay_length", Length, R::POSITIVE, "distance in which exponential damping decays").under(Laws::Nonlinear);
@@ -394,6 +395,19 @@ After from AFTER_LAWS => {
     SampleDebyeLength = quantity(Sample, "debye_length", Length, R::POSITIVE, "Debye length of the electrolyte (dlvo)").under(Laws::Nonlinear);
     SampleCharge = quantity(Sample, "charge", ChargeDensity, R::ANY, "surface charge density of the sample (dlvo)").under(Laws::Nonlinear).called("sample_charge");
     SampleRepulsion = quantity(Sample, "repulsion", Repulsion, R::NOT_NEGATIVE, "constant of the repulsion (lennard-jones)").under(Laws::Nonlinear);
+
+    SampleDampingDistance = quantity(Sample, "damping_distance", Length, R::POSITIVE, "distance over which damping falls like a power of the gap (power-damping)").under(Laws::Nonlinear);
+    SampleDampingExponent = quantity(Sample, "damping_exponent", Number, R::NOT_NEGATIVE, "power by which damping falls with the gap (power-damping)").under(Laws::Nonlinear);
+    SampleSolvationForce = quantity(Sample, "solvation_force", Force, R::ANY, "solvation force at contact (solvation)").under(Laws::Nonlinear);
+    SampleSolvationPeriod = quantity(Sample, "solvation_period", Length, R::POSITIVE, "period of the solvation force (solvation)").under(Laws::Nonlinear);
+    SampleSolvationDecay = quantity(Sample, "solvation_decay", Length, R::POSITIVE, "decay length of the solvation force (solvation)").under(Laws::Nonlinear);
+    SampleArms = other(
+        Sample, "arms", Takes::Arms,
+        "relaxing arms of a Prony series (prony-sphere, prony-cone, prony-punch): rows of time and modulus, or a CSV file of them",
+    ).alias("prony").under(Laws::Nonlinear);
+    SampleArmModulusFactor = quantity(Sample, "arm_modulus_factor", Number, R::POSITIVE, "factor of the moduli of all arms").or(1.0).under(Laws::Nonlinear);
+    SampleArmTimeFactor = quantity(Sample, "arm_time_factor", Number, R::POSITIVE, "factor of the times of all arms: the shift of a time–temperature superposition").or(1.0).under(Laws::Nonlinear);
+    SampleHorizon = quantity(Sample, "horizon", Time, R::POSITIVE, "time of observation: slower arms count as elastic").under(Laws::Nonlinear);
 
     DriveFrequency = quantity(Drive, "frequency", Frequency, R::POSITIVE, "frequency of the drive")
         .feeds(Parameter::Omega)
@@ -448,6 +462,10 @@ pub(super) static ALTERNATIVES: &[Alternatives] = &[
     Alternatives {
         ways: &[&[Key::LeverQ], &[Key::FluidDensity, Key::FluidViscosity]],
         reason: "the fluid tells the quality factor",
+    },
+    Alternatives {
+        ways: &[&[Key::LeverK], &[Key::LeverK1]],
+        reason: "one follows from the other through the shape of the first mode",
     },
     Alternatives {
         ways: &[&[Key::DriveFrequency], &[Key::DriveFrequencyRatio]],

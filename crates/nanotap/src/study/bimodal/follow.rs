@@ -6,8 +6,11 @@ use nanotap_flow::Complex;
 
 use super::formulas::{Readings, estimates};
 use super::loops::{Held, Loops, Tone};
-use super::torus::{Drives, Torus};
-use super::{BimodalOptions, BimodalPoint, BimodalReport, FreeTone, Loop, OPEN_LOOP, ToneReading};
+use super::torus::{Drives, OVER_RESOLVED, Torus};
+use super::{
+    BimodalJump, BimodalOptions, BimodalPoint, BimodalReport, FreeTone, Loop, OPEN_LOOP,
+    ToneReading,
+};
 use crate::Error;
 use crate::case::physical::force::SampleForce;
 use crate::case::physical::{Kind, Physical};
@@ -20,17 +23,33 @@ use crate::study::FreeMotion;
 use crate::study::frequency_modulation::{FreeOscillation, Held as Condition};
 use crate::study::value::implied;
 
-/// How many steps the way between two distances is cut into at most.
-const SHORTEST: f64 = 1.0 / 4096.0;
+/// The first and the shortest step of the distance over the size of the motion.
+const FIRST: f64 = 0.02;
+const SHORTEST: f64 = 5e-4;
 /// Changes of a step up to which the motion is taken for the same: amplitude over that of the free
 /// lever, phase in degrees, strength over that of the free lever.
 const FARTHEST: [f64; 3] = [0.1, 15.0, 0.3];
 /// Degrees from 90 up to which a drive counts as one at resonance.
 const AT_RESONANCE: f64 = 2.0;
+/// Logarithm of a tone's frequency over the resonance nearest to it, up to which its loop finds it.
+const FARTHEST_RESONANCE: f64 = 0.2;
+/// Steps towards the distance of the setpoint, and the relative error of the amplitude there.
+const SECANTS: usize = 40;
+const REACHED: f64 = 1e-10;
+/// Time in which a motion settles, over the time in which a disturbance falls to 1/e.
+const FORGOTTEN: f64 = 20.0;
 /// Size of the last harmonics of the phase, above which the motion is not known.
 const UNKNOWN: f64 = 1e-3;
 
-/// The approach, and what its distances are.
+/// An approach: the motions, jumps between them, and why it ended early.
+#[derive(Default)]
+struct Approach {
+    table: Vec<BimodalPoint>,
+    jumps: Vec<BimodalJump>,
+    ended: Option<String>,
+}
+
+/// The lever with its loops, and what its readings are in SI.
 struct Follower<'a> {
     view: &'a Physical,
     loops: Loops,
@@ -92,7 +111,7 @@ pub(super) fn follow(
         ));
     }
     let setpoint = sought.map(|ratio| ratio * follower.loops.tones[0].free_amplitude);
-    let (table, ended) = follower.approach([first, last], options.points, setpoint, control)?;
+    let approach = follower.approach([first, last], options.points, setpoint, control)?;
     let force = view.sample.force.as_ref();
     let hertz = view.sample.hertz.map(|hertz| hertz.reduced_modulus);
     Ok(BimodalReport {
@@ -100,8 +119,9 @@ pub(super) fn follow(
         free: [0, 1].map(|k| follower.free(k)),
         setpoint: setpoint.map(|amplitude| amplitude * view.scales.length),
         reduced_modulus: force.and_then(SampleForce::reduced_modulus).or(hertz),
-        table,
-        ended,
+        table: approach.table,
+        jumps: approach.jumps,
+        ended: approach.ended,
         stability: OPEN_LOOP,
     })
 }
@@ -130,10 +150,21 @@ fn tone(lever: &Cantilever, index: usize, kind: Loop, phase: f64) -> Result<Tone
             .context(format!("{} tone", ["first", "second"][index]))
             .remedy(format!("give {key}"))
     })?;
+    let free = FreeOscillation::of(&Case::from(alone), condition)?;
+    let away = nanotap_arithmetic::ln(free.frequency / drive[0]).abs();
+    if kind.holds_phase() && away > FARTHEST_RESONANCE {
+        return Err(Error::input(
+            format!(
+                "no mode of the lever resonates near the {} tone",
+                ["first", "second"][index]
+            ),
+            "give {modes} or another frequency",
+        ));
+    }
     Ok(Tone {
         holds_phase: kind.holds_phase(),
         holds_amplitude: kind.holds_amplitude(),
-        free: FreeOscillation::of(&Case::from(alone), condition)?,
+        free,
         drive,
         free_amplitude: free_motion.amplitude,
         free_phase: free_motion.phase,
@@ -145,98 +176,144 @@ impl Follower<'_> {
         Kind::Length.format(value * self.view.scales.length)
     }
 
-    /// The table of an approach between two distances, and why it ended early.
+    /// An approach between two distances.
     fn approach(
         &self,
         [first, last]: [f64; 2],
         points: usize,
         setpoint: Option<f64>,
         control: &Control<'_>,
-    ) -> Result<(Vec<BimodalPoint>, Option<String>), Error> {
+    ) -> Result<Approach, Error> {
         let dimension = Model::cantilever(&self.loops.lever)?.dimension();
-        let mut here = self
-            .loops
-            .hold(
-                (self.loops.free_drives(first), &Torus::at_rest(dimension)),
-                None,
-                None,
-                control,
-            )
-            .map_err(|error| error.remedy("begin farther away, with {from}"))?;
+        let start = (self.loops.free_drives(first), &Torus::at_rest(dimension));
+        let begun = self.loops.hold(start, None, control);
+        let mut here = begun.map_err(|error| error.remedy("begin farther away, with {from}"))?;
         let mut before: Option<Held> = None;
-        let mut table = vec![self.point(&here)?];
-        if let Some(reason) = self.objection(&here) {
-            return Ok((table, Some(reason)));
-        }
+        let mut approach = Approach {
+            table: vec![self.point(&here)?],
+            ..Approach::default()
+        };
+        let step = (first - last) / (points - 1) as f64;
+        let mut stride = FIRST * self.loops.length;
+        let mut lost: Option<Error> = self.objection(&here).map(Error::numerics);
         for k in 1..points {
-            let target = first + (last - first) * k as f64 / (points - 1) as f64;
-            while here.drives().gap > target {
-                match self.step(
-                    &here,
-                    before.as_ref(),
-                    target,
-                    (first - last) / (points - 1) as f64,
-                    control,
-                ) {
+            let target = if k + 1 == points {
+                last
+            } else {
+                first - step * k as f64
+            };
+            while lost.is_none() && here.drives().gap > target {
+                match self.step(&here, before.as_ref(), target, &mut stride, control) {
                     Ok(next) => before = Some(std::mem::replace(&mut here, next)),
                     Err(error) if control.is_cancelled() => return Err(error),
-                    Err(error) => return Ok((table, Some(self.end(&here, &error)))),
+                    Err(error) => lost = Some(error),
                 }
-                if let Some(reason) = self.objection(&here) {
-                    return Ok((table, Some(reason)));
-                }
-                let passed = setpoint.filter(|amplitude| here.amplitude(0) <= *amplitude);
-                if let Some(amplitude) = passed {
-                    let reached =
-                        self.reached(before.as_ref().unwrap_or(&here), &here, amplitude, control)?;
-                    table.push(self.point(&reached)?);
-                    return Ok((table, None));
+                if setpoint.is_some_and(|amplitude| here.amplitude(0) <= amplitude) {
+                    break;
                 }
             }
-            table.push(self.point(&here)?);
+            if lost.is_some() {
+                let Some(next) = self.jump(&here, target, control)? else {
+                    continue;
+                };
+                lost = None;
+                approach.jumps.push(BimodalJump {
+                    from: here.drives().gap * self.view.scales.length,
+                    to: target * self.view.scales.length,
+                });
+                (before, here) = (None, next);
+                stride = FIRST * self.loops.length;
+            }
+            if let Some(amplitude) = setpoint.filter(|amplitude| here.amplitude(0) <= *amplitude) {
+                let reached = match &before {
+                    Some(before) => self.reached(before, &here, amplitude, control),
+                    None => Err(Error::numerics("it is passed by a jump")),
+                };
+                match reached {
+                    Ok(reached) => approach.table.push(self.point(&reached)?),
+                    Err(error) if control.is_cancelled() => return Err(error),
+                    Err(error) => {
+                        approach.table.push(self.point(&here)?);
+                        approach.ended = Some(format!(
+                            "the setpoint is an amplitude of {}: {}",
+                            self.length(amplitude),
+                            error.message()
+                        ));
+                    }
+                }
+                return Ok(approach);
+            }
+            approach.table.push(self.point(&here)?);
             if let Some(progress) = control.progress {
                 progress(k, points);
             }
         }
-        let ended = setpoint.map(|amplitude| {
-            format!(
-                "the setpoint, an amplitude of {}, is not reached up to a distance of {}",
-                self.length(amplitude),
-                self.length(last)
-            )
+        approach.ended = lost.map(|error| self.end(&here, &error)).or_else(|| {
+            setpoint.map(|amplitude| {
+                format!(
+                    "the setpoint, an amplitude of {}, is not reached up to a distance of {}",
+                    self.length(amplitude),
+                    self.length(last)
+                )
+            })
         });
-        Ok((table, ended))
+        Ok(approach)
     }
 
-    /// A step towards `target`, as long as the motion changes little.
+    /// A step towards `target` of `stride` at most, as long as the motion changes little. The stride
+    /// of the next one is left in its place.
     fn step(
         &self,
         here: &Held,
         before: Option<&Held>,
         target: f64,
-        whole: f64,
+        stride: &mut f64,
         control: &Control<'_>,
     ) -> Result<Held, Error> {
         let gap = here.drives().gap;
-        let mut gap_step = gap - target;
+        let shortest = SHORTEST * self.loops.length;
         loop {
             // Exactly the target where the whole way is gone.
-            let there = if gap - gap_step <= target {
+            let there = if gap - *stride <= target {
                 target
             } else {
-                gap - gap_step
+                gap - *stride
             };
             let (drives, torus) = predicted(here, before, there);
-            let reason = match self.loops.hold((drives, &torus), None, Some(here), control) {
-                Ok(next) if self.is_next(here, &next) => return Ok(next),
-                Ok(_) => Error::numerics("the motion changes by a jump"),
+            let reason = match self.loops.hold((drives, &torus), Some(here), control) {
+                Ok(next) => match self.objection(&next) {
+                    Some(reason) => Error::numerics(reason),
+                    None if self.is_next(here, &next) => {
+                        *stride *= 1.5;
+                        return Ok(next);
+                    }
+                    None => Error::numerics("the motion changes by a jump"),
+                },
                 Err(error) if control.is_cancelled() => return Err(error),
                 Err(error) => error,
             };
-            gap_step *= 0.5;
-            if gap_step < SHORTEST * whole {
+            *stride = 0.4 * (gap - there);
+            if *stride < shortest {
                 return Err(reason);
             }
+        }
+    }
+
+    /// The motion at `gap` that the lever goes to where no motion follows: the flow at the drives of
+    /// the last one, and then the loops. Nothing where they do not hold one near it.
+    fn jump(&self, here: &Held, gap: f64, control: &Control<'_>) -> Result<Option<Held>, Error> {
+        let mut drives = *here.drives();
+        drives.gap = gap;
+        let lever = &self.loops.lever;
+        // The lever forgets its state within some Q/π periods of the slower tone.
+        let damping = here.growth.min(1.0 - 1e-3);
+        let forgotten = (FORGOTTEN / (1.0 - damping)).ceil() as usize;
+        let settled = Torus::settled(lever, &drives, &here.closed.torus, forgotten, control);
+        let held = settled.and_then(|torus| self.loops.hold((drives, &torus), None, control));
+        match held {
+            Ok(held) => Ok(Some(held).filter(|held| self.objection(held).is_none())),
+            Err(error) if control.is_cancelled() => Err(error),
+            Err(_) => Ok(None),
         }
     }
 
@@ -262,41 +339,53 @@ impl Follower<'_> {
         amplitude: f64,
         control: &Control<'_>,
     ) -> Result<Held, Error> {
-        let ends = [before, behind].map(|held| held.amplitude(0) - amplitude);
-        let part = if ends[0] > ends[1] {
-            ends[0] / (ends[0] - ends[1])
-        } else {
-            1.0
-        };
-        let gaps = [before, behind].map(|held| held.drives().gap);
-        let gap = gaps[0] + part * (gaps[1] - gaps[0]);
-        let (drives, torus) = predicted(behind, Some(before), gap);
-        self.loops
-            .hold((drives, &torus), Some(amplitude), None, control)
+        let mut ends = [before.clone(), behind.clone()];
+        let off = |held: &Held| held.amplitude(0) / amplitude - 1.0;
+        let mut values = [off(before), off(behind)];
+        let mut moved = None;
+        for _ in 0..SECANTS {
+            let gaps = ends.each_ref().map(|held| held.drives().gap);
+            let part = values[0] / (values[0] - values[1]);
+            let gap = gaps[0] + part * (gaps[1] - gaps[0]);
+            let (drives, torus) = predicted(&ends[1], Some(&ends[0]), gap);
+            let held = self.loops.hold((drives, &torus), Some(&ends[1]), control)?;
+            let value = off(&held);
+            if value.abs() <= REACHED {
+                return Ok(held);
+            }
+            let side = usize::from(value < 0.0);
+            // The Illinois method: an end that stays counts half.
+            if moved == Some(side) {
+                values[1 - side] *= 0.5;
+            }
+            values[side] = value;
+            ends[side] = held;
+            moved = Some(side);
+        }
+        Err(Error::numerics(
+            "the setpoint is not found between two distances",
+        ))
     }
 
-    /// Why a motion is not one of the instrument, if so.
+    /// Why a motion is not one of the instrument, if so. Where the first tone's drive does not follow
+    /// its phase, what grows at constant drives grows under the loops too.
     fn objection(&self, held: &Held) -> Option<String> {
-        let at = self.length(held.drives().gap);
         if held.closed.tail > UNKNOWN {
             return Some(format!(
-                "at a distance of {at} the motion depends too sharply on the second tone's phase to be \
-                 computed: its last harmonics are {:.1e} of it",
+                "the motion depends too sharply on the second tone's phase to be computed; its last \
+                 harmonics are {:.1e} of it",
                 held.closed.tail
             ));
         }
-        let open = self.kinds.iter().all(|kind| *kind == Loop::Am);
-        (open && held.closed.growth() >= 1.0)
-            .then(|| format!("the motion loses its stability before a distance of {at}"))
+        (!self.kinds[0].holds_phase() && held.growth >= 1.0)
+            .then(|| "the motion loses its stability".to_owned())
     }
 
     /// What is said where the motion ends.
     fn end(&self, here: &Held, error: &Error) -> String {
         format!(
-            "no motion follows the one at a distance of {}, where a small disturbance grows by {:.6} in a \
-             period: {}",
+            "no motion is found closer than {}: {}",
             self.length(here.drives().gap),
-            here.closed.growth(),
             error.message()
         )
     }
@@ -339,7 +428,7 @@ impl Follower<'_> {
             peak_force: forces.largest * scales.force,
             least_force: forces.lowest * scales.force,
             closest: forces.closest * scales.length,
-            growth: held.closed.growth(),
+            growth: held.growth,
             error: held.closed.tail,
             estimates: touches
                 .then(|| estimates(&readings, self.radius))
@@ -405,8 +494,9 @@ fn predicted(here: &Held, before: Option<&Held>, gap: f64) -> (Drives, Torus) {
         drives.strength[k] = further(drives.strength[k], old.strength[k]);
     }
     drives.gap = gap;
-    (
-        drives,
-        here.closed.torus.extrapolated(&before.closed.torus, share),
-    )
+    let torus = here.closed.torus.extrapolated(&before.closed.torus, share);
+    if here.closed.tail < OVER_RESOLVED {
+        return (drives, torus.coarser());
+    }
+    (drives, torus)
 }

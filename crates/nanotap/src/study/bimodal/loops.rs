@@ -1,9 +1,8 @@
 //! The loops of an instrument on two tones, as equations.
 //!
 //! A loop holds the phase of its tone by the frequency of the drive, or its amplitude by the strength,
-//! or both; the feedback of the distance holds the amplitude of the first tone. Each is an equation
-//! with an unknown of its own, and all of them hold exactly in the steady state of an instrument
-//! whose controllers integrate.
+//! or both. Each is an equation with an unknown of its own, and all of them hold exactly in the steady
+//! state of an instrument whose controllers integrate.
 
 use nalgebra::{DMatrix, DVector};
 use nanotap_arithmetic::ComplexFunctions as _;
@@ -33,8 +32,6 @@ enum Unknown {
     Frequency(usize),
     /// The strength of a tone, by which its amplitude is held.
     Strength(usize),
-    /// The distance, by which the amplitude of the first tone is held.
-    Gap,
 }
 
 impl Unknown {
@@ -42,7 +39,7 @@ impl Unknown {
     const fn difference(self) -> f64 {
         match self {
             Self::Frequency(_) => 1e-7,
-            Self::Strength(_) | Self::Gap => 1e-5,
+            Self::Strength(_) => 1e-5,
         }
     }
 
@@ -51,7 +48,6 @@ impl Unknown {
         match self {
             Self::Frequency(_) => 0.02,
             Self::Strength(_) => 0.5,
-            Self::Gap => 0.05,
         }
     }
 }
@@ -95,6 +91,8 @@ pub(super) struct Held {
     pub(super) closed: Closed,
     /// Components of the tip deflection at both tones.
     pub(super) tip: [Complex; 2],
+    /// How a small disturbance grows in a period at constant drives.
+    pub(super) growth: f64,
     /// Changes of what is held by the unknowns, for the next motion.
     slopes: Option<DMatrix<f64>>,
 }
@@ -139,54 +137,70 @@ impl Loops {
         }
     }
 
-    fn unknowns(&self, setpoint: Option<f64>) -> Vec<Unknown> {
+    fn unknowns(&self) -> Vec<Unknown> {
         let mut unknowns = Vec::new();
         for (k, tone) in self.tones.iter().enumerate() {
             unknowns.extend(tone.holds_phase.then_some(Unknown::Frequency(k)));
             unknowns.extend(tone.holds_amplitude.then_some(Unknown::Strength(k)));
         }
-        unknowns.extend(setpoint.map(|_| Unknown::Gap));
         unknowns
     }
 
     /// How far the conditions are from being held, relative or in radians.
-    fn residual(&self, unknowns: &[Unknown], setpoint: Option<f64>, held: &Held) -> DVector<f64> {
+    fn residual(&self, unknowns: &[Unknown], held: &Held) -> DVector<f64> {
         let of = |unknown: &Unknown| match *unknown {
             Unknown::Frequency(tone) => {
                 let away = held.phase(tone) - self.tones[tone].free.phase;
                 (away - 360.0 * (away / 360.0).round()).to_radians()
             }
             Unknown::Strength(tone) => held.amplitude(tone) / self.tones[tone].free.amplitude - 1.0,
-            Unknown::Gap => held.amplitude(0) / setpoint.unwrap_or(f64::NAN) - 1.0,
         };
         DVector::from_iterator(unknowns.len(), unknowns.iter().map(of))
     }
 
-    fn at(&self, drives: Drives, start: &Torus, control: &Control<'_>) -> Result<Held, Error> {
-        let closed = close(&self.lever, drives, start, self.length, control)?;
+    fn at(
+        &self,
+        drives: Drives,
+        start: &Torus,
+        near: Option<&Held>,
+        control: &Control<'_>,
+    ) -> Result<Held, Error> {
+        let near = near.map(|near| &near.closed);
+        let closed = close(&self.lever, drives, start, self.length, near, control)?;
         let tip = closed.readings()?;
         Ok(Held {
             closed,
             tip,
+            growth: f64::NAN,
             slopes: None,
         })
     }
 
-    /// The motion that the loops hold near a drive and a torus; with `setpoint`, the distance at
-    /// which the first tone has this amplitude. `before` is a motion near, if one is known.
+    /// The motion that the loops hold near a drive and a torus. `before` is a motion near, if one is
+    /// known.
     ///
     /// # Errors
     /// When there is none near.
     pub(super) fn hold(
         &self,
-        (start, torus): (Drives, &Torus),
-        setpoint: Option<f64>,
+        start: (Drives, &Torus),
         before: Option<&Held>,
         control: &Control<'_>,
     ) -> Result<Held, Error> {
-        let unknowns = self.unknowns(setpoint);
-        let mut here = self.at(start, torus, control)?;
-        let mut residual = self.residual(&unknowns, setpoint, &here);
+        let mut held = self.solve(start, before, control)?;
+        held.growth = held.closed.growth()?;
+        Ok(held)
+    }
+
+    fn solve(
+        &self,
+        (start, torus): (Drives, &Torus),
+        before: Option<&Held>,
+        control: &Control<'_>,
+    ) -> Result<Held, Error> {
+        let unknowns = self.unknowns();
+        let mut here = self.at(start, torus, before, control)?;
+        let mut residual = self.residual(&unknowns, &here);
         let mut slopes = before.and_then(|before| before.slopes.clone());
         slopes = slopes.filter(|slopes| slopes.nrows() == unknowns.len());
         for _ in 0..STEPS {
@@ -198,7 +212,7 @@ impl Loops {
             let fresh = slopes.is_none();
             let matrix = match slopes.take() {
                 Some(matrix) => matrix,
-                None => self.differences(&unknowns, setpoint, &here, &residual, control)?,
+                None => self.differences(&unknowns, &here, &residual, control)?,
             };
             let step = matrix
                 .clone()
@@ -214,11 +228,11 @@ impl Loops {
             let mut part = 1.0 / longest;
             let (next, left) = loop {
                 let drives = self.moved(&unknowns, here.drives(), &(&step * part));
-                let next = self.at(drives, &here.closed.torus, control);
+                let next = self.at(drives, &here.closed.torus, Some(&here), control);
                 let shorter = fresh && part >= SHORTEST;
                 match next {
                     Ok(next) => {
-                        let left = self.residual(&unknowns, setpoint, &next);
+                        let left = self.residual(&unknowns, &next);
                         if left.amax() < size || !shorter {
                             break (next, left);
                         }
@@ -255,7 +269,6 @@ impl Loops {
     fn differences(
         &self,
         unknowns: &[Unknown],
-        setpoint: Option<f64>,
         here: &Held,
         residual: &DVector<f64>,
         control: &Control<'_>,
@@ -265,21 +278,20 @@ impl Loops {
             let mut step = DVector::zeros(unknowns.len());
             step[column] = unknown.difference();
             let drives = self.moved(unknowns, here.drives(), &step);
-            let there = self.at(drives, &here.closed.torus, control)?;
-            let change = self.residual(unknowns, setpoint, &there) - residual;
+            let there = self.at(drives, &here.closed.torus, Some(&here), control)?;
+            let change = self.residual(unknowns, &there) - residual;
             matrix.set_column(column, &(change / step[column]));
         }
         Ok(matrix)
     }
 
-    /// The drives after changes relative to themselves, of the distance relative to the length.
+    /// The drives after changes relative to themselves.
     fn moved(&self, unknowns: &[Unknown], drives: &Drives, step: &DVector<f64>) -> Drives {
         let mut moved = *drives;
         for (unknown, step) in unknowns.iter().zip(step.iter()) {
             match *unknown {
                 Unknown::Frequency(tone) => moved.frequency[tone] *= 1.0 + step,
                 Unknown::Strength(tone) => moved.strength[tone] *= 1.0 + step,
-                Unknown::Gap => moved.gap += step * self.length,
             }
         }
         moved

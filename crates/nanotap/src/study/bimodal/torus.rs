@@ -11,11 +11,13 @@
 //! depends smoothly on the phase: Newton solves for all K states at once. Where contacts come and go
 //! with the phase, they converge slowly; the size of the last harmonics tells the error.
 
-use nalgebra::{DMatrix, DVector};
+use std::f64::consts::TAU;
+use std::sync::Arc;
+
+use nalgebra::{DMatrix, DVector, Dyn, LU};
 use nanotap_arithmetic::ComplexFunctions as _;
 use nanotap_dynamics::StroboscopicMap as _;
 use nanotap_flow::Complex;
-use std::f64::consts::TAU;
 
 use crate::Error;
 use crate::control::Control;
@@ -27,15 +29,21 @@ use crate::model::parameter::Parameter;
 use crate::model::recording::{Curve, Recording};
 
 /// Newton steps.
-const STEPS: usize = 12;
+const STEPS: usize = 10;
+/// Shortest part of a Newton step that is tried.
+const SHORTEST: f64 = 0.2;
 /// Relative residual at which Newton stops.
 const CLOSED: f64 = 1e-13;
 /// Relative residual that must be reached.
 const ACCEPTED: f64 = 1e-10;
 /// Size of the last harmonics over that of the motion, above which there are too few phases.
-const RESOLVED: f64 = 1e-5;
+const RESOLVED: f64 = 1e-6;
 /// Phases at first, and at most.
 const PHASES: [usize; 2] = [9, 129];
+/// Phases that are fitted to a motion in time.
+const SETTLED_PHASES: usize = 33;
+/// Size of the last harmonics below which half as many phases do.
+pub(super) const OVER_RESOLVED: f64 = 1e-9;
 
 /// The drive of both tones and the distance, in the model's units.
 #[derive(Clone, Copy, Debug)]
@@ -88,6 +96,62 @@ impl Torus {
         Self {
             states: states.collect(),
         }
+    }
+
+    /// The motion that a state goes to at constant drives, from many periods and a fit of
+    /// trigonometric polynomials in the phase to the last of them.
+    ///
+    /// # Errors
+    /// When the flow fails.
+    pub(super) fn settled(
+        lever: &Cantilever,
+        drives: &Drives,
+        start: &Self,
+        periods: usize,
+        control: &Control<'_>,
+    ) -> Result<Self, Error> {
+        let count = SETTLED_PHASES;
+        let rows = 6 * count;
+        let mut state = start.states[0].clone();
+        let mut matrix = DMatrix::zeros(rows, count);
+        let mut values = DMatrix::zeros(rows, state.len());
+        for period in 0..periods + rows {
+            if control.is_cancelled() {
+                return Err(Error::stopped());
+            }
+            let turns = (period as f64 * drives.rotation()).rem_euclid(1.0);
+            if let Some(row) = period.checked_sub(periods) {
+                let weights = weights(count, turns);
+                matrix.row_mut(row).copy_from_slice(&weights);
+                values.row_mut(row).copy_from_slice(&state);
+            }
+            let model = Model::cantilever(&drives.on(lever, TAU * turns))?;
+            ModelMap::new(&model).advance(&mut state)?;
+        }
+        let fitted = (matrix.tr_mul(&matrix)).lu().solve(&matrix.tr_mul(&values));
+        let fitted = fitted.ok_or_else(|| {
+            Error::numerics("the two tones have nearly a common period: their phases repeat")
+        })?;
+        let states = fitted.row_iter().map(|row| row.iter().copied().collect());
+        Ok(Self {
+            states: states.collect(),
+        })
+    }
+
+    /// The same after part of a step relative to the sizes of the state's entries.
+    fn moved(&self, step: &DVector<f64>, part: f64, sizes: &[f64]) -> Self {
+        let mut moved = self.clone();
+        for (k, state) in moved.states.iter_mut().enumerate() {
+            for (i, entry) in state.iter_mut().enumerate() {
+                *entry += part * step[k * sizes.len() + i] * sizes[i];
+            }
+        }
+        moved
+    }
+
+    /// The same with half as many phases.
+    pub(super) fn coarser(&self) -> Self {
+        self.with_phases((self.states.len() / 2 | 1).max(PHASES[0]))
     }
 
     /// What a step from `before` to this one leads to when `share` of it is repeated.
@@ -157,7 +221,8 @@ pub(super) struct Closed {
     /// The largest of the last harmonics of the phase, relative to the motion.
     pub(super) tail: f64,
     models: Vec<Model>,
-    jacobians: Vec<DMatrix<f64>>,
+    /// Factors of Newton's matrix here or near.
+    factors: Arc<LU<f64, Dyn, Dyn>>,
 }
 
 /// Force on the tip and height over the sample, over the phases of the second tone.
@@ -172,7 +237,8 @@ pub(super) struct Forces {
     pub(super) closest: f64,
 }
 
-/// Closes the torus of `lever` near `start`; `amplitude` is the size of the motion.
+/// Closes the torus of `lever` near `start`; `amplitude` is the size of the motion, `near` a torus whose
+/// Newton matrix may serve.
 ///
 /// # Errors
 /// When Newton does not close it, or the law remembers a branch.
@@ -181,13 +247,14 @@ pub(super) fn close(
     drives: Drives,
     start: &Torus,
     amplitude: f64,
+    near: Option<&Closed>,
     control: &Control<'_>,
 ) -> Result<Closed, Error> {
-    let mut closed = newton(lever, drives, start.clone(), amplitude, control)?;
+    let mut closed = newton(lever, drives, start.clone(), amplitude, near, control)?;
     while closed.tail > RESOLVED && closed.torus.states.len() < PHASES[1] {
         let more = 2 * closed.torus.states.len() - 1;
         let finer = closed.torus.with_phases(more.min(PHASES[1]));
-        closed = newton(lever, drives, finer, amplitude, control)?;
+        closed = newton(lever, drives, finer, amplitude, None, control)?;
     }
     Ok(closed)
 }
@@ -197,6 +264,7 @@ fn newton(
     drives: Drives,
     mut torus: Torus,
     amplitude: f64,
+    near: Option<&Closed>,
     control: &Control<'_>,
 ) -> Result<Closed, Error> {
     let count = torus.states.len();
@@ -222,62 +290,117 @@ fn newton(
             )
         })
         .collect();
-    let mut last = f64::INFINITY;
-    for _ in 0..STEPS {
-        if control.is_cancelled() {
-            return Err(Error::stopped());
-        }
+    let mut off = |torus: &Torus, jacobians: Option<&mut Vec<DMatrix<f64>>>| {
         let mut residual = DVector::zeros(count * dimension);
-        let mut jacobians = Vec::with_capacity(count);
+        let mut of_periods = jacobians;
+        if let Some(jacobians) = &mut of_periods {
+            jacobians.clear();
+        }
         for (k, map) in maps.iter_mut().enumerate() {
+            if control.is_cancelled() {
+                return Err(Error::stopped());
+            }
             let mut end = torus.states[k].clone();
-            let mut jacobian = DMatrix::zeros(dimension, dimension);
-            map.advance_with_jacobian(&mut end, &mut jacobian)?;
+            match &mut of_periods {
+                Some(jacobians) => {
+                    let mut jacobian = DMatrix::zeros(dimension, dimension);
+                    map.advance_with_jacobian(&mut end, &mut jacobian)?;
+                    jacobians.push(jacobian);
+                }
+                None => map.advance(&mut end)?,
+            }
             let there = combined(&shift[k], &torus.states);
             for i in 0..dimension {
                 residual[k * dimension + i] = (end[i] - there[i]) / sizes[i];
             }
-            jacobians.push(jacobian);
         }
+        Ok(residual)
+    };
+    // The factors of a torus near do as long as steps gain much.
+    let mut factors = near
+        .filter(|near| near.torus.states.len() == count)
+        .map(|near| Arc::clone(&near.factors));
+    let mut jacobians = Vec::new();
+    let mut residual = off(&torus, None)?;
+    for _ in 0..STEPS {
         let size = residual.amax();
-        let stalls = size <= ACCEPTED && size > 0.1 * last;
-        if size <= CLOSED || stalls {
-            let tail = torus.tail(&sizes);
-            return Ok(Closed {
-                torus,
-                drives,
-                tail,
-                models,
-                jacobians,
-            });
+        if size <= CLOSED {
+            break;
         }
-        last = size;
-        let matrix = DMatrix::from_fn(count * dimension, count * dimension, |row, column| {
-            let (k, i) = (row / dimension, row % dimension);
-            let (j, l) = (column / dimension, column % dimension);
-            let carried = if k == j {
-                jacobians[k][(i, l)] * sizes[l] / sizes[i]
-            } else {
-                0.0
-            };
-            let turned = if i == l { shift[k][j] } else { 0.0 };
-            turned - carried
-        });
-        let step = matrix
-            .lu()
+        let borrowed = factors.is_some();
+        let used = match factors.take() {
+            Some(factors) => factors,
+            None => {
+                off(&torus, Some(&mut jacobians))?;
+                Arc::new(newton_matrix(&shift, &jacobians, &sizes).lu())
+            }
+        };
+        let step = used
             .solve(&residual)
             .filter(|step| step.iter().all(|entry| entry.is_finite()))
             .ok_or_else(|| Error::numerics("the motion under two tones turns back here"))?;
-        for (k, state) in torus.states.iter_mut().enumerate() {
-            for (i, entry) in state.iter_mut().enumerate() {
-                *entry += step[k * dimension + i] * sizes[i];
+        let mut part = 1.0;
+        let next = loop {
+            let next = torus.moved(&step, part, &sizes);
+            let left = off(&next, None)?;
+            if left.amax() < size {
+                break Some((next, left));
             }
+            part *= 0.5;
+            if part < SHORTEST || borrowed {
+                break None;
+            }
+        };
+        match next {
+            Some((next, left)) => {
+                if left.amax() < 0.2 * size {
+                    factors = Some(used);
+                }
+                (torus, residual) = (next, left);
+            }
+            // With factors of its own the torus does better only where rounding has the last word.
+            None if borrowed && size > ACCEPTED => {}
+            None => break,
         }
     }
-    Err(Error::numerics(format!(
-        "Newton finds no motion under the two tones: after {STEPS} steps the equations are off by \
-         {last:.1e} of the amplitude"
-    )))
+    let left = residual.amax();
+    if left > ACCEPTED {
+        return Err(Error::numerics(format!(
+            "Newton finds no motion under the two tones: the equations are off by {left:.1e} of the \
+             amplitude"
+        )));
+    }
+    let factors = match factors.or_else(|| near.map(|near| Arc::clone(&near.factors))) {
+        Some(factors) if factors.u().nrows() == count * dimension => factors,
+        _ => {
+            off(&torus, Some(&mut jacobians))?;
+            Arc::new(newton_matrix(&shift, &jacobians, &sizes).lu())
+        }
+    };
+    let tail = torus.tail(&sizes);
+    Ok(Closed {
+        torus,
+        drives,
+        tail,
+        models,
+        factors,
+    })
+}
+
+/// Newton's matrix in sizes of the state's entries: what turns less what the periods carry.
+fn newton_matrix(shift: &[Vec<f64>], jacobians: &[DMatrix<f64>], sizes: &[f64]) -> DMatrix<f64> {
+    let (count, dimension) = (shift.len(), sizes.len());
+    DMatrix::from_fn(count * dimension, count * dimension, |row, column| {
+        let (k, i) = (row / dimension, row % dimension);
+        let (j, l) = (column / dimension, column % dimension);
+        let carried = if k == j {
+            jacobians[k][(i, l)] * sizes[l] / sizes[i]
+        } else {
+            0.0
+        };
+        let turned = if i == l { shift[k][j] } else { 0.0 };
+        turned - carried
+    })
 }
 
 /// What size of each number of the state matters.
@@ -341,35 +464,53 @@ impl Closed {
         let count = self.models.len() as f64;
         let (sin, cos) = nanotap_arithmetic::sin_cos(TAU * phase as f64 / count);
         let back = [Complex::new(1.0, 0.0), Complex::new(cos, -sin)];
+        let own = curve.fourier_at(&self.drives.frequency);
         for tone in 0..2 {
-            let own = curve.fourier(self.drives.frequency[tone]);
-            sum[tone] += own * back[tone] / count;
+            sum[tone] += own[tone] * back[tone] / count;
         }
     }
 
     /// How a small disturbance grows in a period of the first tone at constant drives, in the mean
     /// over many: a factor.
-    pub(super) fn growth(&self) -> f64 {
-        /// Periods, of which the second half counts.
-        const PERIODS: usize = 2000;
-        let count = self.jacobians.len();
-        let dimension = self.jacobians[0].nrows();
+    ///
+    /// # Errors
+    /// When the flow fails.
+    pub(super) fn growth(&self) -> Result<f64, Error> {
+        /// Periods before the mean, and of the mean.
+        const PERIODS: [usize; 2] = [500, 2000];
+        let count = self.models.len();
+        let dimension = self.models[0].dimension();
+        let mut jacobians = Vec::with_capacity(count);
+        for (model, state) in self.models.iter().zip(&self.torus.states) {
+            let mut jacobian = DMatrix::zeros(dimension, dimension);
+            ModelMap::new(model).advance_with_jacobian(&mut state.clone(), &mut jacobian)?;
+            jacobians.push(jacobian);
+        }
         let mut disturbance = DVector::from_element(dimension, 1.0);
-        let mut sum = 0.0;
-        for period in 0..PERIODS {
+        // The weights of a smooth bump make the mean of what turns quasi-periodically converge beyond
+        // all orders (Das, Saiki, Sander and Yorke, Nonlinearity 30, 4111, 2017).
+        let weight = |period: usize| {
+            let part = (period as f64 - PERIODS[0] as f64 + 0.5) / PERIODS[1] as f64;
+            if part > 0.0 {
+                nanotap_arithmetic::exp(-1.0 / (part * (1.0 - part)))
+            } else {
+                0.0
+            }
+        };
+        let (mut sum, mut total) = (0.0, 0.0);
+        for period in 0..PERIODS[0] + PERIODS[1] {
             let turns = (period as f64 * self.drives.rotation()).rem_euclid(1.0);
             let weights = weights(count, turns);
             let mut next = DVector::zeros(dimension);
-            for (weight, jacobian) in weights.iter().zip(&self.jacobians) {
+            for (weight, jacobian) in weights.iter().zip(&jacobians) {
                 next += *weight * (jacobian * &disturbance);
             }
             let factor = next.norm() / disturbance.norm();
             disturbance = next / factor.max(f64::MIN_POSITIVE);
-            if period >= PERIODS / 2 {
-                sum += nanotap_arithmetic::ln(factor.max(f64::MIN_POSITIVE));
-            }
+            sum += weight(period) * nanotap_arithmetic::ln(factor.max(f64::MIN_POSITIVE));
+            total += weight(period);
         }
-        nanotap_arithmetic::exp(sum / (PERIODS - PERIODS / 2) as f64)
+        Ok(nanotap_arithmetic::exp(sum / total))
     }
 }
 

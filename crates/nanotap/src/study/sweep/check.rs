@@ -1,5 +1,6 @@
 //! Checks of a sweep before anything is computed.
 
+use super::distances::has_setpoint;
 use super::follow::Follow;
 use super::options::SweepOptions;
 use super::over::Over;
@@ -9,6 +10,7 @@ use crate::case::{Case, Key};
 use crate::model::Model;
 use crate::study::simulate::starting_state;
 use crate::study::start_box::box_with;
+use crate::study::target::Target;
 
 /// Most bytes that one chunk may take in memory.
 pub(super) const LARGEST_CHUNK: usize = 1 << 30;
@@ -65,8 +67,27 @@ pub(super) fn check(
             options.periods
         )));
     }
+    if has_setpoint(over) && options.follow != Follow::Off {
+        return Err(Error::option(
+            "follow",
+            "expected `off` where drive.setpoint varies: each of its distances is approached from far",
+            "leave {follow} out",
+        ));
+    }
     corners(case, over)?;
     fits(case, over, starts)
+}
+
+/// Conditions on the number of motions need more than one start.
+pub(super) fn targets(targets: &[Target], starts: &Starts) -> Result<(), Error> {
+    match targets.iter().find(|target| target.counts_states()) {
+        Some(target) if starts.count() < 2 => Err(Error::option(
+            "where",
+            format!("`{target}`: from one start one motion is found"),
+            "sample several {starts}, or use a window",
+        )),
+        _ => Ok(()),
+    }
 }
 
 /// The error of a sweep that is too large.

@@ -3,6 +3,7 @@
 use serde_json::{Value, json};
 
 use super::check::{check_size, model};
+use super::distances::has_setpoint;
 use super::follow::Follow;
 use super::over::Over;
 use super::run::{Outcome, Starts};
@@ -54,6 +55,11 @@ pub(super) const STATE: &str = "state";
 /// Name of the last axis of the grid.
 pub(super) const START: &str = "start";
 
+/// The distance that was solved for a setpoint, and the attribute with the reasons where there is
+/// none.
+pub(crate) const DISTANCE: &str = "distance";
+pub(super) const UNREACHED: &str = "setpoint_unreached";
+
 /// The attribute with what stays while the parameters vary.
 pub(super) const HELD: &str = "held";
 
@@ -64,11 +70,12 @@ pub(super) fn schema(runs: &Runs) -> Result<Schema, Error> {
         options,
         over,
         starts,
+        ..
     } = runs;
     let lanes = starts.count() * options.follow.directions().len().max(1);
     let states = state_names(case, over)?;
     let si = matches!(case.units(), Units::Si(_));
-    let variables = variables(options, states.len(), si);
+    let variables = variables(options, states.len(), si, has_setpoint(over));
     let bytes: usize = variables.iter().map(|v| v.stride() * v.kind.size()).sum();
     let x = &over[0];
     let (along_x, along_starts) = cut(runs, lanes, bytes);
@@ -112,7 +119,7 @@ fn state_names(case: &Case, over: &[Over]) -> Result<Vec<String>, Error> {
 }
 
 /// The variables; in SI where physical quantities vary, else in the model's units.
-fn variables(options: &SweepOptions, states: usize, si: bool) -> Vec<Variable> {
+fn variables(options: &SweepOptions, states: usize, si: bool, setpoint: bool) -> Vec<Variable> {
     let unit = |dimension: Dimension| {
         if si {
             dimension.si_unit()
@@ -172,6 +179,13 @@ fn variables(options: &SweepOptions, states: usize, si: bool) -> Vec<Variable> {
         )
         .along(PERIODS, options.periods),
     ]);
+    if setpoint {
+        variables.push(real(
+            DISTANCE,
+            "distance at which the setpoint is first reached from far; none where it is not",
+            "m",
+        ));
+    }
     if strobe > 0 {
         variables.push(
             real(
@@ -278,6 +292,11 @@ fn attributes(runs: &Runs) -> crate::dataset::schema::Attributes {
         "max_period": options.max_period,
     });
     all.insert("sweep".into(), attributes::text(&recipe));
+    if let Some(distances) = &runs.distances {
+        let reasons = distances.iter().map(|found| found.as_ref().err());
+        let reasons: Vec<_> = reasons.map(Option::<&String>::cloned).collect();
+        all.insert(UNREACHED.into(), attributes::text(&reasons));
+    }
     let keys: Vec<_> = runs.over.iter().map(|over| over.key).collect();
     let held = runs.case.held(&keys);
     if !held.is_empty() {
@@ -332,6 +351,7 @@ pub(super) fn columns(schema: &Schema, outcomes: &[Outcome]) -> Vec<Values> {
             "multiplier" => real(|o| o.multiplier),
             "lyapunov" => real(|o| o.lyapunov),
             "lyapunov_error" => real(|o| o.lyapunov_error),
+            DISTANCE => real(|o| o.distance),
             "period_max" => rows(variable, &|o| o.highs.clone()),
             "period_min" => rows(variable, &|o| o.lows.clone()),
             name => match Observable::named(name) {

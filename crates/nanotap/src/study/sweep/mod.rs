@@ -26,6 +26,7 @@
 
 mod check;
 mod dataset;
+mod distances;
 mod follow;
 mod neighbours;
 mod options;
@@ -33,21 +34,25 @@ mod over;
 mod run;
 mod summary;
 
-pub(crate) use dataset::class_of;
+pub(crate) use dataset::{DISTANCE, class_of};
 pub use follow::Follow;
 pub use neighbours::{FromNeighbour, from_neighbours};
 pub use options::{SweepOptions, SweepStudy};
 pub use over::{Over, Spacing};
 pub use run::Starts;
 pub use summary::Summary;
-pub(crate) use summary::held;
+pub use summary::Unreached;
+pub(crate) use summary::{held, target_report, unreached};
 
+use distances::Distances;
 use nanotap_dynamics::Control;
 
 use crate::Error;
-use crate::case::Case;
+use crate::case::units::Units;
+use crate::case::{Case, Key};
 use crate::dataset::{Block, Schema, Store, Work, WorkError, chunk_files, work};
 use crate::study::Computation;
+use crate::study::target::Target;
 use crate::study::threads::install;
 
 /// The runs of a sweep.
@@ -57,6 +62,8 @@ pub(in crate::study) struct Runs {
     options: SweepOptions,
     over: Vec<Over>,
     starts: Starts,
+    /// The distances of a sweep over setpoints.
+    distances: Option<Distances>,
 }
 
 /// A sweep that was checked: ready to be computed, chunk by chunk.
@@ -64,6 +71,8 @@ pub(in crate::study) struct Runs {
 pub struct Sweep {
     runs: Runs,
     schema: Schema,
+    /// Conditions that are evaluated once all is finished.
+    targets: Vec<Target>,
 }
 
 impl Sweep {
@@ -72,8 +81,20 @@ impl Sweep {
     /// # Errors
     /// When a parameter or a start is not valid, or there is too much of something.
     pub fn new(case: &Case, options: SweepOptions) -> Result<Self, Error> {
+        Self::with_control(case, options, &Control::default())
+    }
+
+    /// The same; `control` cancels the search for the distances of setpoints.
+    ///
+    /// # Errors
+    /// As [`Sweep::new`], and when it was cancelled.
+    pub fn with_control(
+        case: &Case,
+        options: SweepOptions,
+        control: &Control<'_>,
+    ) -> Result<Self, Error> {
         let starts = options.starts(&case.units())?;
-        Self::from(case, options, starts)
+        Self::from(case, options, starts, control)
     }
 
     /// The same from other starts than those of the options.
@@ -81,9 +102,15 @@ impl Sweep {
         case: &Case,
         options: SweepOptions,
         starts: Starts,
+        control: &Control<'_>,
     ) -> Result<Self, Error> {
         let over = options.over.parse(case)?;
         check::check(case, &options, &over, &starts)?;
+        let targets = options
+            .targets
+            .parse(matches!(case.units(), Units::Si(_)))?;
+        check::targets(&targets, &starts)?;
+        let distances = distances::solved(case, &over, control)?;
         // What the case says of a parameter that varies does not matter, and must not
         // make two datasets differ.
         let apply = |case: Case, over: &Over| over.apply(&case, 0);
@@ -92,9 +119,14 @@ impl Sweep {
             options,
             over,
             starts,
+            distances,
         };
         let schema = dataset::schema(&runs)?;
-        Ok(Self { runs, schema })
+        Ok(Self {
+            runs,
+            schema,
+            targets,
+        })
     }
 
     /// The options.
@@ -151,16 +183,34 @@ impl Runs {
         self.over.len() - 1
     }
 
-    /// The case at an entry of the grid.
-    fn case_at(&self, entry: &[usize]) -> Case {
+    /// Number of the values of an entry of the grid, the first parameter fastest.
+    fn index(&self, entry: &[usize]) -> usize {
         let axis = self.axis();
-        self.over
-            .iter()
-            .enumerate()
-            .fold(self.case.clone(), |case, (k, over)| {
-                // The first parameter varies fastest.
-                over.apply(&case, entry[axis - k])
-            })
+        let second = if axis > 0 { entry[0] } else { 0 };
+        entry[axis] + self.over[0].count * second
+    }
+
+    /// The case with the values of this number; `None` where its setpoint is not reached.
+    fn case_of(&self, index: usize) -> Option<Case> {
+        let columns = self.over[0].count;
+        let steps = self.over.iter().zip([index % columns, index / columns]);
+        let case = steps.fold(self.case.clone(), |case, (over, index)| {
+            over.apply(&case, index)
+        });
+        let Some(distances) = &self.distances else {
+            return Some(case);
+        };
+        let reached = distances.get(index)?.as_ref().ok()?;
+        let case = case.with(Key::GapTip, reached.zc);
+        Some(case.starting_from(reached.state.clone()))
+    }
+
+    /// The distance with the values of this number, solved for a setpoint, in m; otherwise NaN.
+    fn distance(&self, index: usize) -> f64 {
+        let reached = self.distances.as_ref().and_then(|all| all.get(index));
+        reached.map_or(f64::NAN, |reached| {
+            reached.as_ref().map_or(f64::NAN, |reached| reached.zc)
+        })
     }
 }
 
@@ -184,6 +234,7 @@ impl Computation for Sweep {
         if store.missing() > 0 {
             return Ok(());
         }
+        summary::write_targets(store, &self.targets)?;
         let threads = Some(how.threads).filter(|threads| *threads > 0);
         install(threads, || runs.share(store, &how.control))
             .map_err(|error| WorkError::Threads(Box::new(error)))?

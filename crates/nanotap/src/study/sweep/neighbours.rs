@@ -13,6 +13,8 @@
 //! Fails: where the number of modes varies, or no strobe states were kept, nothing is tried;
 //! an orbit that no run at any value ended on is not found.
 
+use std::collections::BTreeMap;
+
 use nanotap_dynamics::{
     AttractorKind, Control, PeriodicOrbit, ShootingOptions, close_orbit, grid_neighbours,
     share_orbits,
@@ -23,7 +25,7 @@ use serde::{Deserialize, Serialize};
 
 use super::run::is_on;
 use super::{Runs, Starts};
-use crate::case::{Case, CaseError, Key};
+use crate::case::{Case, Key};
 use crate::dataset::{Store, StoreError, WorkError};
 use crate::model::model_map::ModelMap;
 use crate::observe::{ObservableSet, measure};
@@ -50,6 +52,9 @@ pub struct FromNeighbour {
     pub tip_max: f64,
     /// Contact time / period.
     pub contact_fraction: f64,
+    /// Its observables by name, in the dataset's units.
+    #[serde(default)]
+    pub observables: BTreeMap<String, f64>,
 }
 
 impl Runs {
@@ -81,18 +86,15 @@ impl Runs {
         let shape: Vec<usize> = self.over.iter().map(|over| over.count).collect();
         let count: usize = shape.iter().product();
         let place = |k: usize| [k % shape[0], k / shape[0]];
-        let case_at = |k: usize| -> Case {
-            let steps = self.over.iter().zip(place(k));
-            steps.fold(self.case.clone(), |case, (over, index)| {
-                over.apply(&case, index)
-            })
+        let map_at = |k: usize| {
+            let case = self.case_of(k).ok_or("the setpoint is not reached")?;
+            let model = case.model().map_err(|error| error.to_string())?;
+            Ok::<_, String>(ModelMap::new(&model))
         };
-        let model_at = |k: usize| case_at(k).model();
-        let map_at = |k: usize| model_at(k).map(|m| ModelMap::new(&m));
         let neighbours = grid_neighbours(&shape);
         let states = self.orbit_states(store, strobe, count)?;
         let quasistatic = match self.starts {
-            Starts::Spread { .. } => self.quasistatic(&shape, &case_at, control),
+            Starts::Spread { .. } => self.quasistatic(&shape, control),
             _ => vec![Vec::new(); count],
         };
         // How many orbits runs ended on, and all that are known.
@@ -114,9 +116,8 @@ impl Runs {
             })
             .collect();
         let (own, known): (Vec<usize>, Vec<_>) = known.into_iter().unzip();
-        let at = |k: usize| map_at(k).map_err(|error: CaseError| error.to_string());
         let classify = short_run(self.options.max_period);
-        let values = share_orbits(known, at, neighbours, &classify, control);
+        let values = share_orbits(known, map_at, neighbours, &classify, control);
         let mut found = Vec::new();
         for (k, value) in values.into_iter().enumerate() {
             let gained = value.attractors.into_iter().skip(own[k]);
@@ -125,7 +126,9 @@ impl Runs {
                     AttractorKind::Periodic(orbit) => orbit.period,
                     _ => 0,
                 };
-                let case = case_at(k);
+                let Some(case) = self.case_of(k) else {
+                    continue;
+                };
                 let turn = if period == 0 { UNREPEATED } else { period };
                 let Ok(model) = case.model() else { continue };
                 let Ok(seen) = measure(&model, &attractor.state, turn, ObservableSet::COMMON)
@@ -148,6 +151,10 @@ impl Runs {
                     first_harmonic: seen.first_harmonic,
                     tip_max: seen.tip_max,
                     contact_fraction: seen.contact_fraction,
+                    observables: ObservableSet::COMMON
+                        .iter()
+                        .filter_map(|o| Some((o.name.to_owned(), (o.of)(&seen).number()?)))
+                        .collect(),
                 });
             }
         }
@@ -156,19 +163,15 @@ impl Runs {
 
     /// Periods and states of the orbits on which a slowly moved lever may be, at values that
     /// are chosen.
-    fn quasistatic(
-        &self,
-        shape: &[usize],
-        case_at: &(impl Fn(usize) -> Case + Sync),
-        control: &Control<'_>,
-    ) -> Vec<Vec<OrbitState>> {
+    fn quasistatic(&self, shape: &[usize], control: &Control<'_>) -> Vec<Vec<OrbitState>> {
         let quiet = Control {
             progress: None,
             ..*control
         };
         let gap = self.case.gap_key();
         let distances = self.over.iter();
-        let distances = distances.map(|over| over.key == gap || over.key == Key::GapTip);
+        let distances =
+            distances.map(|over| [gap, Key::GapTip, Key::DriveSetpoint].contains(&over.key));
         let distances: Vec<bool> = distances.collect();
         let columns = shape[0];
         let rows = shape.get(1).copied().unwrap_or(1);
@@ -189,13 +192,18 @@ impl Runs {
             .into_par_iter()
             .with_max_len(1)
             .map(|line| {
-                let case = case_at(line[0]);
+                // Where a setpoint is not reached there is no distance.
+                let reached = line.into_iter().filter_map(|k| Some((k, self.case_of(k)?)));
+                let (line, cases): (Vec<usize>, Vec<Case>) = reached.unzip();
+                let Some(case) = cases.first() else {
+                    return (line, Vec::new());
+                };
                 let most = self.options.max_period;
                 let states = if line.len() == 1 {
-                    states_near(&case, most, &quiet).map(|states| vec![states])
+                    states_near(case, most, &quiet).map(|states| vec![states])
                 } else {
-                    let gaps: Vec<f64> = line.iter().map(|&k| case_at(k).get(gap)).collect();
-                    states_at(&case, &gaps, most, &quiet)
+                    let gaps: Vec<f64> = cases.iter().map(|case| case.get(gap)).collect();
+                    states_at(case, &gaps, most, &quiet)
                 };
                 (line, states.unwrap_or_default())
             })

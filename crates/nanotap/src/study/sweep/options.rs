@@ -10,6 +10,7 @@ use crate::dataset::{Store, StoreError};
 use crate::study::attractors::MAX_STARTS;
 use crate::study::limits::{MAX_PERIOD, MAX_PERIODS};
 use crate::study::request::options;
+use crate::study::target::Targets;
 use crate::study::value::{Axes, Intervals};
 use crate::study::{DatasetPlan, DatasetStudy};
 
@@ -18,7 +19,8 @@ options! {
     pub struct SweepOptions {
         /// Parameter and its values, as in omega=2:4:400 (first, last, count), alpha4=1:1000:50:log
         /// in equal ratios, or ascending values omega=2,2.5,4; modes too; for a physical case also
-        /// drive.frequency=60kHz:80kHz:200; once or twice
+        /// drive.frequency=60kHz:80kHz:200, or drive.setpoint=0.5:0.9:9, for each of which the
+        /// distance is solved; once or twice
         #[schemars(extend("x-value" = "KEY=VALUES", "x-required" = true))]
         pub over: Axes = Axes::default(),
         /// Quasi-random initial states at each value, spread over a box; default: rest alone
@@ -51,6 +53,11 @@ options! {
         /// Longest period of orbits, in drive periods
         #[schemars(range(min = 1, max = MAX_PERIOD), extend("x-value" = "N"))]
         pub max_period: usize = 64,
+        /// Condition that every motion at a value must meet, as in "F_max < 1 nN",
+        /// "regime = attractive", "states = 1"; several: all must hold
+        #[serde(rename = "where")]
+        #[schemars(extend("x-value" = "CONDITION"))]
+        pub targets: Targets = Targets::default(),
     }
 }
 
@@ -130,8 +137,17 @@ impl DatasetStudy for SweepStudy {
     type Options = SweepOptions;
     type Report = Summary;
 
-    fn prepare(case: &Case, options: &SweepOptions, _: &Control<'_>) -> Result<DatasetPlan, Error> {
-        Ok(Box::new(Sweep::new(case, options.clone())?))
+    fn solves_distance(options: &SweepOptions) -> bool {
+        options.over.solves_distance()
+    }
+
+    fn prepare(
+        case: &Case,
+        options: &SweepOptions,
+        control: &Control<'_>,
+    ) -> Result<DatasetPlan, Error> {
+        let sweep = Sweep::with_control(case, options.clone(), control)?;
+        Ok(Box::new(sweep))
     }
 
     fn report(store: &Store) -> Result<Summary, StoreError> {

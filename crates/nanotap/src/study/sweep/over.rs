@@ -142,6 +142,12 @@ impl Over {
                 "from {from} in equal ratios; both ends must be above 0"
             ));
         }
+        if self.key == Key::DriveSetpoint && !(from > 0.0 && to < 1.0) {
+            return Err(format!(
+                "from {from} to {to}; a setpoint that varies is a fraction of the free amplitude, \
+                 above 0 and below 1"
+            ));
+        }
         if self.key == Key::Modes {
             let whole = |v: f64| v.fract() == 0.0 && (1.0..=MAX_MODES as f64).contains(&v);
             if !(0..count).all(|k| whole(self.value(k))) {
@@ -201,6 +207,9 @@ fn key(given: &str, name: &str, case: &Case) -> Result<Key, Error> {
     let modes = Key::Modes.name();
     if name.strip_prefix("model.").unwrap_or(name) == modes && case.cantilever().is_some() {
         return Ok(Key::Modes);
+    }
+    if case.is_physical() && name == Key::DriveSetpoint.path() {
+        return Ok(Key::DriveSetpoint);
     }
     case.key(name).map_err(|error| wrong(given, &error))
 }

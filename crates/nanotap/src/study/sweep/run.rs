@@ -1,5 +1,7 @@
 //! One run of a sweep, and the runs of one piece of work.
 
+use std::ops::Range;
+
 use nanotap_dynamics::{
     Classified, ClassifyOptions, LyapunovSpectrum, MotionKind, PeriodicOrbit, Scheduling as _,
     StroboscopicMap, classify_beside,
@@ -91,6 +93,8 @@ pub(super) struct Outcome {
     pub(super) lows: Vec<f64>,
     /// States at the ends of the last recorded periods.
     pub(super) strobe: Vec<Vec<f64>>,
+    /// Distance that was solved for the setpoint, m.
+    pub(super) distance: f64,
 }
 
 impl Outcome {
@@ -106,6 +110,7 @@ impl Outcome {
             highs: Vec::new(),
             lows: Vec::new(),
             strobe: Vec::new(),
+            distance: f64::NAN,
         }
     }
 
@@ -135,9 +140,25 @@ pub(super) fn at_value(
     let mut entry: Vec<usize> = block.ranges.iter().map(|r| r.start).collect();
     entry[axis] += item;
     let starts = block.ranges[axis + 1].clone();
-    let case = runs.case_at(&entry);
-    let Ok(model) = case.model() else {
-        // Driven at an undamped resonance: there is no bounded motion to name.
+    let mut outcomes = from_starts(runs, &entry, starts, cancelled)?;
+    let distance = runs.distance(runs.index(&entry));
+    for outcome in &mut outcomes {
+        outcome.distance = distance;
+    }
+    Some(outcomes)
+}
+
+/// The runs from some starts at an entry of the grid; `None` when it was stopped.
+fn from_starts(
+    runs: &Runs,
+    entry: &[usize],
+    starts: Range<usize>,
+    cancelled: &impl Fn() -> bool,
+) -> Option<Vec<Outcome>> {
+    let case = runs.case_of(runs.index(entry));
+    let model = case.as_ref().and_then(|case| case.model().ok());
+    let (Some(case), Some(model)) = (case, model) else {
+        // Driven at an undamped resonance, or no distance: there is no bounded motion to name.
         return Some(vec![
             Outcome::unknown(Classification::Undecided, 0);
             starts.len()
@@ -177,8 +198,9 @@ pub(super) fn along_line(
             return None;
         }
         entry[axis] = index;
-        let case = runs.case_at(&entry);
-        let Ok(model) = case.model() else {
+        let case = runs.case_of(runs.index(&entry));
+        let model = case.as_ref().and_then(|case| case.model().ok());
+        let (Some(case), Some(model)) = (case, model) else {
             outcomes[index] = Some(Outcome::unknown(Classification::Undecided, 0));
             continue;
         };

@@ -1,0 +1,167 @@
+//! Sweeps over setpoints, and conditions on the motions at their points.
+
+use nanotap::case::physical::Catalogue;
+use nanotap::case::{Case, Key};
+use nanotap::control::Control;
+use nanotap::dataset::{Share, Store, Work};
+use nanotap::figure::window::figure;
+use nanotap::study::Computation as _;
+use nanotap::study::setpoint::solve_setpoint;
+use nanotap::study::sweep::{Summary, Sweep, SweepOptions};
+use nanotap::study::target::Targets;
+use nanotap::study::value::Axes;
+use nanotap::study::window::{Condition, Window, WindowOptions};
+
+use crate::folder::Folder;
+
+/// A lever of one mode over a stiff sample.
+fn lever(setpoint: &str) -> Case {
+    let text = format!(
+        "[model]\nmodes = 1\n[cantilever]\nlever = \"PPP-NCHR\"\nQ = 400\n[tip]\nradius = \"10 nm\"\n\
+         [sample]\nmaterial = \"polystyrene\"\nloss_tangent = 0.1\n[drive]\nfrequency_ratio = 1.001\n\
+         free_amplitude = \"20 nm\"\nsetpoint = {setpoint}\n"
+    );
+    let folder = Folder::new();
+    let file = folder.join("case.toml");
+    std::fs::write(&file, text).unwrap();
+    Case::load(Some(&file), &[], &Catalogue::shared()).unwrap()
+}
+
+fn computed(sweep: &Sweep, folder: &Folder) -> Store {
+    let store = Store::create_or_resume(&folder.join("s"), sweep.schema().clone()).unwrap();
+    let control = Control::default();
+    let work = Work {
+        share: Share::WHOLE,
+        threads: 2,
+        control,
+    };
+    sweep.compute(&store, &work).unwrap();
+    store
+}
+
+/// Each distance is that of the setpoint alone, the motion there has the setpoint's amplitude, and
+/// conditions on it hold where they hold for the orbit of the setpoint.
+#[test]
+fn a_window_over_setpoints_solves_each_distance() {
+    let case = lever("0.8");
+    let amplitudes = [10e-9, 20e-9];
+    let ratios = [0.6, 0.9];
+    let options = |condition: &str| WindowOptions {
+        over: Axes(vec![
+            "drive.setpoint=0.6,0.9".to_owned(),
+            "drive.free_amplitude=10nm,20nm".to_owned(),
+        ]),
+        starts: 4,
+        targets: Targets(vec![condition.to_owned()]),
+        ..WindowOptions::default()
+    };
+    let control = Control::default();
+    let folder = Folder::new();
+    let sweep = options("F_max < 20 nN").sweep(&case, &control).unwrap();
+    let store = computed(&sweep, &folder);
+    let window = Window::of(&store).unwrap();
+    let targets = window.targets.as_ref().unwrap();
+    let mut largest = Vec::new();
+    for (row, amplitude) in amplitudes.iter().enumerate() {
+        for (column, ratio) in ratios.iter().enumerate() {
+            let alone = lever(&ratio.to_string()).with(Key::DriveFreeAmplitude, *amplitude);
+            let alone = alone.with(Key::DriveSetpoint, *ratio);
+            let solved = solve_setpoint(&alone, &control).unwrap();
+            let distance = window.distances[row][column].unwrap();
+            // The unit of length follows the distance where it is not held.
+            assert!(
+                (distance / solved.zc() - 1.0).abs() < 1e-6,
+                "{distance} {}",
+                solved.zc()
+            );
+            let force = solved.solutions[solved.chosen]
+                .physical
+                .observables
+                .peak_force;
+            largest.push(force);
+            assert_eq!(window.conditions[row][column], Condition::OnePeriod1);
+            assert_eq!(targets.holds[row][column], force < 20e-9, "{force}");
+        }
+    }
+    // Larger amplitudes and lower setpoints press harder.
+    assert!(
+        largest[0] > largest[1] && largest[2] > largest[0],
+        "{largest:?}"
+    );
+    assert!(targets.holds.concat().contains(&true) && targets.holds.concat().contains(&false));
+    store
+        .each(["first_harmonic", "distance"], |entry, [amplitude, _]| {
+            let wanted = amplitudes[entry[0]] * ratios[entry[1]];
+            assert!(
+                (amplitude / wanted - 1.0).abs() < 1e-6,
+                "{amplitude} {wanted}"
+            );
+        })
+        .unwrap();
+    // Another condition is evaluated on the same dataset.
+    let sweep = options("F_max < 1 N").sweep(&case, &control).unwrap();
+    let window = Window::of(&computed(&sweep, &folder)).unwrap();
+    let found = window.targets.unwrap();
+    assert_eq!(found.share, 1.0);
+    let region = found.region.unwrap();
+    assert_eq!((region.points, region.ranges[0]), (4, [0.6, 0.9]));
+    assert!(figure(&store).unwrap().to_svg().unwrap().contains("F_max"));
+}
+
+/// No lever comes to 2 % of its free amplitude before the sample's own position.
+#[test]
+fn no_motion_is_reported_where_a_setpoint_is_not_reached() {
+    let folder = Folder::new();
+    let options = SweepOptions {
+        targets: Targets(vec!["regime = repulsive".to_owned()]),
+        periods: 2,
+        ..SweepOptions::over(["drive.setpoint=0.02,0.9"])
+    };
+    let sweep = Sweep::new(&lever("0.8"), options).unwrap();
+    let summary = Summary::of(&computed(&sweep, &folder)).unwrap();
+    assert_eq!(summary.targets.unwrap().holds, [[false, true]]);
+    assert_eq!(summary.unreached.len(), 1);
+    assert_eq!(summary.unreached[0].values, [0.02]);
+    assert!(summary.unreached[0].reason.contains("is not reached"));
+    assert_eq!(
+        (summary.counts["periodic"], summary.counts["undecided"]),
+        (1, 1)
+    );
+}
+
+#[test]
+fn wrong_setpoints_are_refused() {
+    let refused = |over: &[&str], condition: Option<&str>| {
+        let options = SweepOptions {
+            targets: Targets(condition.map(str::to_owned).into_iter().collect()),
+            ..SweepOptions::over(over.iter().copied())
+        };
+        Sweep::new(&lever("0.8"), options).unwrap_err().to_string()
+    };
+    for (over, condition, words) in [
+        (&["drive.setpoint=0.5:1:3"][..], None, "above 0 and below 1"),
+        (
+            &["drive.setpoint=1nN:5nN:3"],
+            None,
+            "a number without a unit",
+        ),
+        (
+            &["drive.setpoint=0.5:0.9:3", "gap.tip=5nm:9nm:3"],
+            None,
+            "solved for the distance",
+        ),
+        (
+            &["drive.setpoint=0.5:0.9:3"],
+            Some("states = 1"),
+            "from one start",
+        ),
+        (
+            &["drive.setpoint=0.5:0.9:3"],
+            Some("F_max < 1 nm"),
+            "a force",
+        ),
+    ] {
+        let message = refused(over, condition);
+        assert!(message.contains(words), "{over:?}: {message}");
+    }
+}

@@ -1134,7 +1134,11 @@ fn attracting(text: &str, points: usize, noise: u64) -> Vec<(f64, f64, f64)> {
         let first = (place as usize).min(rows.len() - 2);
         let (a, b) = (rows[first], rows[first + 1]);
         // A jump has nothing between.
-        let part = if (a.2 - b.2).abs() > 5.0 { 0.0 } else { place - first as f64 };
+        let part = if (a.2 - b.2).abs() > 5.0 {
+            0.0
+        } else {
+            place - first as f64
+        };
         let mix = |a: f64, b: f64| a + part * (b - a);
         (
             mix(a.0, b.0),
@@ -1171,30 +1175,46 @@ fn an_instruments_export_is_fitted_as_it_is() {
             ("Phase (deg)", of(&|row| 95.0 - row.2)),
         ],
     );
-    table.columns.push(("Defl (V)".into(), vec![Entry::Number(0.1); 60]));
+    table
+        .columns
+        .push(("Defl (V)".into(), vec![Entry::Number(0.1); 60]));
     let start = case(ATTRACTING, &["sample.modulus=1 GPa"]);
     let guessed = FitOptions {
         convert: vec!["Amp=58 nm/V".into()],
         ..request(vec![table.clone()], &["sample.modulus", "gap.offset"])
     };
     let stated = FitOptions {
-        convert: ["Amp=58 nm/V", "ZSnsr=1520-x", "Phase=95-x"].map(String::from).to_vec(),
+        convert: ["Amp=58 nm/V", "ZSnsr=1520-x", "Phase=95-x"]
+            .map(String::from)
+            .to_vec(),
         start: vec!["gap.offset=0.4 nm".into()],
         ..guessed.clone()
     };
     for options in [guessed, stated] {
         let report = fitted(&start, &options);
-        assert!(report.fits && report.remarks.is_empty(), "{:?}", report.remarks);
+        assert!(
+            report.fits && report.remarks.is_empty(),
+            "{:?}",
+            report.remarks
+        );
         let [low, high] = report.parameters[0].interval.map(Option::unwrap);
         assert!(low < 3e9 && 3e9 < high && high < 1.2 * low, "{low} {high}");
         for done in ["Amp=58 nm/V", "`Defl`"] {
-            assert!(report.preparation.iter().any(|note| note.contains(done)), "{done}");
+            assert!(
+                report.preparation.iter().any(|note| note.contains(done)),
+                "{done}"
+            );
         }
         assert!(report.case_file.starts_with("# start: gap.offset="));
     }
     let unstated = request(vec![table], &["sample.modulus", "gap.offset"]);
     let slope = fitted(&start, &unstated);
-    assert!(slope.preparation.iter().any(|note| note.contains("slope in contact")));
+    assert!(
+        slope
+            .preparation
+            .iter()
+            .any(|note| note.contains("slope in contact"))
+    );
 }
 
 #[test]
@@ -1209,13 +1229,22 @@ fn corrections_may_be_fixed_and_starts_given() {
             ("phase (deg)", of(&|row| row.2 + 4.0)),
         ],
     );
-    let start = ["gap.offset=0.7 nm", "amplitude.scale=1.1", "phase.offset=4", "sample.modulus=2 GPa"];
+    let start = [
+        "gap.offset=0.7 nm",
+        "amplitude.scale=1.1",
+        "phase.offset=4",
+        "sample.modulus=2 GPa",
+    ];
     let options = FitOptions {
         start: start.map(String::from).to_vec(),
         ..request(vec![table], &["sample.modulus"])
     };
     let report = fitted(&case(ATTRACTING, &[]), &options);
-    assert!(report.fits && report.remarks.is_empty(), "{:?}", report.remarks);
+    assert!(
+        report.fits && report.remarks.is_empty(),
+        "{:?}",
+        report.remarks
+    );
     assert_eq!(report.parameters[0].start, 2e9);
     let [low, high] = report.parameters[0].interval.map(Option::unwrap);
     assert!(low < 3e9 && 3e9 < high, "{low} {high}");
@@ -1247,15 +1276,29 @@ fn long_curves_are_averaged_with_the_errors_of_their_scatter() {
     let free = ["sample.modulus", "sample.hamaker", "gap.offset"];
     let start = case(ATTRACTING, &["sample.modulus=2 GPa"]);
     let report = fitted(&start, &request(vec![table], &free));
-    assert!(report.fits && report.remarks.is_empty(), "{:?}", report.remarks);
-    assert!((60..=130).contains(&report.rows.len()), "{}", report.rows.len());
+    assert!(
+        report.fits && report.remarks.is_empty(),
+        "{:?}",
+        report.remarks
+    );
+    assert!(
+        (60..=130).contains(&report.rows.len()),
+        "{}",
+        report.rows.len()
+    );
     // The noise of one row.
     for (column, noise) in report.columns.iter().zip([0.03e-9, 0.15]) {
-        assert!((column.standard_error / noise - 1.0).abs() < 0.3, "{column:?}");
+        assert!(
+            (column.standard_error / noise - 1.0).abs() < 0.3,
+            "{column:?}"
+        );
     }
     for (parameter, truth) in report.parameters.iter().zip([3e9, 5e-20, -0.5e-9]) {
         let error = parameter.standard_error.unwrap();
-        assert!((parameter.value - truth).abs() < 4.0 * error, "{parameter:?}");
+        assert!(
+            (parameter.value - truth).abs() < 4.0 * error,
+            "{parameter:?}"
+        );
         assert!(error < 0.02 * truth.abs(), "{parameter:?}");
     }
 }
@@ -1278,7 +1321,10 @@ fn a_wrong_law_is_warned_of_from_few_rows() {
     let options = request(vec![table], &["sample.modulus", "gap.offset"]);
     let warned = |text: &str| {
         let report = fitted(&case(text, &[]), &options);
-        report.remarks.iter().any(|remark| remark.contains("not to be trusted"))
+        report
+            .remarks
+            .iter()
+            .any(|remark| remark.contains("not to be trusted"))
     };
     assert!(!warned(ATTRACTING));
     assert!(warned(&hertz));

@@ -56,7 +56,9 @@ impl Search<'_> {
         }
         let curve = self.problem.parameters[offset].curve.unwrap_or(0);
         let rows = &data.curves[curve].rows;
-        let known = rows.iter().filter_map(|row| Some((row.at[0], row.values[amplitude]?)));
+        let known = rows
+            .iter()
+            .filter_map(|row| Some((row.at[0], row.values[amplitude]?)));
         let (distance, amplitudes): (Vec<f64>, Vec<f64>) = known.unzip();
         let far = far_rows(&distance, &amplitudes);
         if far.is_empty() {
@@ -68,7 +70,11 @@ impl Search<'_> {
             Some(knee) if (knee - own[offset]).abs() > FAR * free => knee,
             _ => own[offset],
         };
-        let least = if self.problem.case.is_physical() { REACH.1 } else { 0.0 };
+        let least = if self.problem.case.is_physical() {
+            REACH.1
+        } else {
+            0.0
+        };
         let reach = (REACH.0 * free).max(least);
         let (low, high) = self.problem.parameters[offset].bounds;
         let offsets: Vec<f64> = (0..OFFSETS)
@@ -111,14 +117,18 @@ impl Search<'_> {
     ) -> Option<(f64, f64, f64)> {
         let rows = &self.problem.data.curves[curve].rows;
         let span = |values: &mut dyn Iterator<Item = f64>| {
-            values.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(v), h.max(v)))
+            values.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| {
+                (l.min(v), h.max(v))
+            })
         };
         let (near, far) = span(&mut rows.iter().map(|row| row.at[0]));
         let (least, most) = span(&mut offsets.iter().copied());
         let at_zero = with(x, offset, 0.0);
         let model = self.model_curve(&at_zero, curve, near + least, far + most)?;
         let cost = |of: f64| -> f64 {
-            rows.iter().map(|row| self.cost(&at_zero, curve, row, of, &model)).sum()
+            rows.iter()
+                .map(|row| self.cost(&at_zero, curve, row, of, &model))
+                .sum()
         };
         let costs = offsets.iter().map(|of| (cost(*of), *of));
         let (cost_there, there) = costs.min_by(|a, b| a.0.total_cmp(&b.0))?;
@@ -180,9 +190,13 @@ impl Search<'_> {
         let columns = &self.problem.data.columns;
         let of = |values: &dyn Fn(usize) -> f64| -> f64 {
             let costs = columns.iter().enumerate().filter_map(|(index, column)| {
-                let difference = self.problem.difference(x, curve, row, index, values(index))?;
+                let difference = self
+                    .problem
+                    .difference(x, curve, row, index, values(index))?;
                 let size = ROUGH_ERROR * column.spread.max(f64::MIN_POSITIVE);
-                Some(nanotap_arithmetic::ln_1p((difference / (3.0 * size)).powi(2)))
+                Some(nanotap_arithmetic::ln_1p(
+                    (difference / (3.0 * size)).powi(2),
+                ))
             });
             costs.sum()
         };
@@ -217,7 +231,9 @@ pub(super) fn begin_from_free_rows(
     let lag = instrument::free_lag(case);
     for curve in &data.curves {
         for rows in curve.rows.chunk_by(|a, b| a.way == b.way) {
-            let known = rows.iter().filter_map(|row| Some((row, row.values[amplitude]?)));
+            let known = rows
+                .iter()
+                .filter_map(|row| Some((row, row.values[amplitude]?)));
             let (rows, values): (Vec<&Row>, Vec<f64>) = known.unzip();
             let distance: Vec<f64> = rows.iter().map(|row| row.at[0]).collect();
             for k in far_rows(&distance, &values) {

@@ -459,7 +459,8 @@ fn guess(
     }
     if foreign
         && !stated.zero
-        && let Some(line) = tapping_line(&distance, &amplitude) {
+        && let Some(line) = tapping_line(&distance, &amplitude)
+    {
         let offset = free.amplitude - line.knee(free.amplitude);
         if offset.abs() > 2.0 * free.amplitude {
             for z in &mut distance {

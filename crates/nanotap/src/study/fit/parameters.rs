@@ -65,8 +65,7 @@ impl Parameter {
 
     /// Whether this is its name, or another one of its key.
     fn is_called(&self, name: &str) -> bool {
-        self.name == name
-            || matches!(self.target, Target::Key(key) if Key::find(name) == Some(key))
+        self.name == name || matches!(self.target, Target::Key(key) if Key::find(name) == Some(key))
     }
 
     /// Whether it counts for a curve.
@@ -286,9 +285,9 @@ fn nuisance(
 /// A value of a parameter in SI or the model's units.
 fn read(case: &Case, data: &Data, target: Target, text: &str) -> Result<f64, Error> {
     let number = || {
-        text.trim().parse::<f64>().map_err(|_| {
-            Error::input(format!("expected a number, got `{text}`"), "give a number")
-        })
+        text.trim()
+            .parse::<f64>()
+            .map_err(|_| Error::input(format!("expected a number, got `{text}`"), "give a number"))
     };
     match target {
         Target::Key(key) => Ok(case.value(key, text)?),
@@ -361,8 +360,13 @@ const PHYSICAL: [(Key, f64, f64); 11] = [
 /// Limits parameters that have no bounds of their own to physical values, if they start there.
 pub(super) fn keep_physical(parameters: &mut [Parameter], bounds: &Intervals) {
     for parameter in parameters {
-        let own = bounds.0.iter().any(|bound| parameter.is_called(&bound.name));
-        let limits = PHYSICAL.iter().find(|(key, ..)| parameter.target == Target::Key(*key));
+        let own = bounds
+            .0
+            .iter()
+            .any(|bound| parameter.is_called(&bound.name));
+        let limits = PHYSICAL
+            .iter()
+            .find(|(key, ..)| parameter.target == Target::Key(*key));
         let Some((_, low, high)) = limits.filter(|_| !own) else {
             continue;
         };

@@ -154,9 +154,12 @@ impl Search<'_> {
     /// takes them.
     fn corrections(&self, x: &[f64], curve: usize) -> String {
         let (case, data) = (self.problem.case, self.problem.data);
-        let own = self.problem.parameters.iter().zip(x).filter(|(p, _)| {
-            p.is_of(curve) && !matches!(p.target, parameters::Target::Key(_))
-        });
+        let own = self
+            .problem
+            .parameters
+            .iter()
+            .zip(x)
+            .filter(|(p, _)| p.is_of(curve) && !matches!(p.target, parameters::Target::Key(_)));
         let comment = own.map(|(p, value)| {
             let (name, value) = (&p.name, shortest(*value));
             match p.unit(data, case) {
@@ -239,7 +242,9 @@ impl Search<'_> {
             }
             let whole: f64 = changed.column(k).norm_squared();
             let uncertain = shares.iter().zip(&freedom);
-            let uncertain: f64 = uncertain.map(|(share, nu)| share * share / nu.max(1.0)).sum();
+            let uncertain: f64 = uncertain
+                .map(|(share, nu)| share * share / nu.max(1.0))
+                .sum();
             student(if uncertain > 0.0 {
                 (whole * whole / uncertain).max(1.0)
             } else {
@@ -251,7 +256,12 @@ impl Search<'_> {
 
     /// Why the residuals are not noise, at a level of one per cent: they are larger than the scatter
     /// that is known without the model, or keep their sign from row to row.
-    fn not_noise(&self, found: &Found, p_value: Option<f64>, columns: &[FittedColumn]) -> Vec<String> {
+    fn not_noise(
+        &self,
+        found: &Found,
+        p_value: Option<f64>,
+        columns: &[FittedColumn],
+    ) -> Vec<String> {
         let data = self.problem.data;
         let (x, point) = (&found.solution.x, &found.solution.point);
         let freedom = self.freedom_of_columns(&found.solution.jacobian);
@@ -304,7 +314,11 @@ impl Search<'_> {
         let of = |column: usize| {
             let mut sequences: Vec<Vec<usize>> = Vec::new();
             let mut before = None;
-            let rows = self.problem.rows().into_iter().zip(found.solution.point.iter());
+            let rows = self
+                .problem
+                .rows()
+                .into_iter()
+                .zip(found.solution.point.iter());
             for (index, ((curve, row), point)) in rows.enumerate() {
                 let place = Some((curve, row.way));
                 if place != before {

@@ -264,7 +264,11 @@ impl<'a> Search<'a> {
     fn shared_freedom(&self) -> Vec<f64> {
         let data = self.problem.data;
         let part = 1.0 - self.problem.parameters.len() as f64 / data.count() as f64;
-        let count = |index: usize| data.rows().filter(|row| row.values[index].is_some()).count();
+        let count = |index: usize| {
+            data.rows()
+                .filter(|row| row.values[index].is_some())
+                .count()
+        };
         (0..data.columns.len())
             .map(|index| part * count(index) as f64)
             .collect()

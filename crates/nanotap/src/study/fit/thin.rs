@@ -411,10 +411,23 @@ mod tests {
         let values: Vec<f64> = distance.iter().map(|x| value(*x)).collect();
         let found = bins(&distance, &[values], &[0.1], 20);
         assert!(found.windows(2).all(|w| w[0].end == w[1].start));
-        assert!(found.iter().any(|bin| distance[bin.start] > 15.0 && distance[bin.start - 1] <= 15.0));
-        let flat = found.iter().filter(|bin| distance[bin.end - 1] < 9.0).count();
-        let steep = found.iter().filter(|bin| distance[bin.start] > 10.0).count();
-        assert!(flat < 5 && steep > 10 && found.len() <= 23, "{flat} {steep}");
+        assert!(
+            found
+                .iter()
+                .any(|bin| distance[bin.start] > 15.0 && distance[bin.start - 1] <= 15.0)
+        );
+        let flat = found
+            .iter()
+            .filter(|bin| distance[bin.end - 1] < 9.0)
+            .count();
+        let steep = found
+            .iter()
+            .filter(|bin| distance[bin.start] > 10.0)
+            .count();
+        assert!(
+            flat < 5 && steep > 10 && found.len() <= 23,
+            "{flat} {steep}"
+        );
     }
 
     #[test]

@@ -231,7 +231,8 @@ impl Readings {
         let count = (count / segments).max(1);
         let mut rows = Vec::new();
         for segment in self.segments() {
-            let of = |of: &dyn Fn(&Reading) -> f64| -> Vec<f64> { segment.iter().map(of).collect() };
+            let of =
+                |of: &dyn Fn(&Reading) -> f64| -> Vec<f64> { segment.iter().map(of).collect() };
             let values = [0, 1].map(|index| of(&|row| row.values[index]));
             let bins = bins(&of(&|row| row.distance), &values, &errors, count);
             rows.extend(bins.into_iter().map(|bin| mean(&segment[bin])));

@@ -5,7 +5,7 @@ use nanotap::case::physical::Catalogue;
 use nanotap::case::units::prefixed;
 use nanotap::case::{Case, Key, Value, quantity::Kind};
 use nanotap::model::contact::ContactLaw;
-use nanotap_volterra::laws::TABLE;
+use nanotap_volterra::laws;
 use serde::Serialize;
 
 /// A key of the case as shown by the page.
@@ -242,11 +242,16 @@ fn choices(key: Key) -> Option<Vec<Choice>> {
         word: law.name().to_owned(),
         meaning: format!("{}: F = {}", law.meaning(), law.entry().formula),
     });
+    let is_other = |law: &&laws::TableLaw| {
+        ContactLaw::ALL
+            .iter()
+            .all(|other| other.name() != law.entry.name)
+    };
     Some(match key.entry().takes {
         Takes::Word(_) if key == Key::Contact => linear.collect(),
         Takes::Word(words) => plain(words.iter().map(|word| (*word).to_owned()).collect()),
         Takes::Law => linear
-            .chain(TABLE.iter().map(|law| Choice {
+            .chain(laws::all().filter(is_other).map(|law| Choice {
                 word: law.entry.name.to_owned(),
                 meaning: format!("{}: F = {}", law.entry.words, law.entry.formula),
             }))

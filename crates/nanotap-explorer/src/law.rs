@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use axum::Json;
 use axum::extract::State;
-use nanotap::case::Key;
+use nanotap::case::{Key, Value as Written};
 use serde::Deserialize;
 use serde_json::{Map, Value, json};
 
@@ -47,10 +47,9 @@ fn changes(app: &App, request: &LawRequest) -> Result<Value, ApiError> {
     }
     for (key, value) in &change.added {
         let text = value.text();
-        let shown = if *key == Key::SampleTable {
-            "a stiff curve with attraction"
-        } else {
-            &text
+        let shown = match value {
+            Written::Table(_) | Written::Arms(_) => "rows to begin with",
+            _ => &text,
         };
         words.push(format!("with {key} = {shown}, a usual value"));
         set.insert(key.path().into(), text.into());

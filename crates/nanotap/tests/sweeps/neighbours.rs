@@ -46,7 +46,7 @@ fn no_window_reports_a_bistable_point_as_safe() {
         ]),
         ..WindowOptions::default()
     };
-    let sweep = options.sweep(&lever).unwrap();
+    let sweep = options.sweep(&lever, &Control::default()).unwrap();
     let folder = Folder::new();
     let store = Store::create_or_resume(&folder.join("window"), sweep.schema().clone()).unwrap();
     sweep.compute(&store, &how()).unwrap();

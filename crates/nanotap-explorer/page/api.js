@@ -4,23 +4,30 @@
 const token = new URLSearchParams(location.search).get("token") ?? "";
 const running = new Map();
 
-export class Refused extends Error {}
+/** A refused request, with the keys and fields that the server names. */
+export class Refused extends Error {
+  constructor(message, keys = []) { super(message); this.keys = keys; }
+}
+
+const ENDED = "nanotap explore has ended; start it again";
 
 async function send(kind, path, body) {
   running.get(kind)?.abort();
   const control = new AbortController();
   running.set(kind, control);
-  const answer = await fetch(path, {
+  const sent = fetch(path, {
     method: body === undefined ? "GET" : "POST",
     headers: { "x-nanotap-token": token, ...(body === undefined ? {} : { "content-type": "application/json" }) },
     body: body === undefined ? undefined : JSON.stringify(body),
     signal: control.signal,
   });
+  // Without an answer of the server there is only a TypeError with the browser's words.
+  const answer = await sent.catch((error) => { throw superseded(error) ? error : new Refused(ENDED); });
   if (!answer.ok) {
     const text = await answer.text();
-    let message = text;
-    try { message = JSON.parse(text).error ?? text; } catch { /* plain words */ }
-    throw new Refused(message || `${answer.status} ${answer.statusText}`);
+    let told = { error: text };
+    try { told = JSON.parse(text); } catch { /* plain words */ }
+    throw new Refused(told.error || `${answer.status} ${answer.statusText}`, told.keys);
   }
   return answer;
 }
@@ -45,6 +52,9 @@ export function save(blob, name) {
   setTimeout(() => URL.revokeObjectURL(link.href), 1000);
 }
 
+/** The newest request of a kind, to stop it and no later one. */
+export const current = (kind) => running.get(kind);
+
 export function stop(kind) {
   running.get(kind)?.abort();
 }
@@ -56,14 +66,14 @@ export async function stream(kind, path, body, take) {
   const decoder = new TextDecoder();
   let rest = "";
   for (;;) {
-    const { done, value } = await reader.read();
+    const { done, value } = await reader.read().catch((error) => { throw superseded(error) ? error : new Refused(ENDED); });
     rest += decoder.decode(value ?? new Uint8Array(), { stream: !done });
     const lines = rest.split("\n");
     rest = lines.pop();
     for (const line of lines) {
       if (!line) continue;
       const message = JSON.parse(line);
-      if (message.error) throw new Refused(message.error);
+      if (message.error) throw new Refused(message.error, message.keys);
       take(message);
     }
     if (done) return;

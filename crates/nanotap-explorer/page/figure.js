@@ -160,6 +160,20 @@ function cross(element, place) {
   over(element, "cross", `M${panel.left + u * panel.width} ${panel.top}v${panel.height}M${panel.left} ${panel.top + (1 - v) * panel.height}h${panel.width}`);
 }
 
+/** Shows where the present motion is: a line at its x in every panel, and a dot at each height. */
+export function present(element, place) {
+  const paths = (element.panels ?? []).map((panel, k) => {
+    const u = place ? part(panel.x, place.x) : -1;
+    if (!(u >= 0 && u <= 1)) return ["", ""];
+    const x = panel.left + u * panel.width;
+    const v = Number.isFinite(place.heights[k]) ? part(panel.y, place.heights[k]) : -1;
+    const y = panel.top + (1 - v) * panel.height;
+    return [`M${x} ${panel.top}v${panel.height}`, v >= 0 && v <= 1 ? `M${x - 0.9} ${y}a.9 .9 0 1 0 1.8 0a.9 .9 0 1 0 -1.8 0z` : ""];
+  });
+  over(element, "now", paths.map(([line]) => line).join(""));
+  over(element, "dot", paths.map(([, dot]) => dot).join(""));
+}
+
 /** Makes a figure respond to pointer and keys. `tell(place)` is called where the cross goes, `go(place)`
  *  for a click or Enter, `zoom(views)` for another range: a list of {panel, x, y}. */
 export function alive(element, { views, tell, go, zoom }) {

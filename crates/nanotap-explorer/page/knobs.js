@@ -1,16 +1,26 @@
-// The controls: one for every key of the case, made from the server's table of keys.
+// The controls: one for every key of the case, made from the server's table of keys. Keys that say the
+// same are one control with a switch.
 
-import { state } from "./state.js";
+import { state, put as state_put, theCase } from "./state.js";
+import { ask, superseded } from "./api.js";
 
 const form = document.getElementById("knobs");
+const GROUPS = {
+  distance: "Distance or setpoint", drive: "Drive", sample: "Sample", lever: "Lever and tip",
+  model: "Numbers of the equations", more: "Further keys",
+};
+const ALWAYS = ["cantilever.lever", "sample.law", "sample.material", "contact"];
 let changed = () => {};
-let now = "";                 // state at drive phase 0 of the displayed motion
+let refused = () => {};
+let now = {};                 // the displayed motion: its start, and A/A0
+let shown = [];               // the keys whose controls are shown
 const opened = new Set();
 
 /** The motion from which a changed value continues, if requested. */
-export function follows(start) { now = start; }
+export function follows(motion) { now = motion; }
 
-export function onChange(listener) { changed = listener; }
+/** `told(key, finished)` is called when a value changed, `error(refusal, key)` when a law was refused. */
+export function onChange(told, error) { changed = told; refused = error; }
 
 function element(name, properties = {}, ...children) {
   const made = Object.assign(document.createElement(name), properties);
@@ -18,23 +28,32 @@ function element(name, properties = {}, ...children) {
   return made;
 }
 
-/** Creates the controls for the keys of the present case and keeps the focus. */
-export function build(keys) {
+/** Shows the keys of a case. Controls are made anew if other keys are stated, and keep the focus. While a
+ *  slider moves, or `keep` is true, existing ones only take the new values. */
+export function show(keys, keep = false) {
+  const outline = (all) => JSON.stringify(all.map((key) => [key.name, key.value === "", key.stated, key.choices && key.value]));
+  if ((keep || dragged()) && shown.length) update(keys, true);
+  else if (outline(keys) === outline(shown) && form.dataset.preset === state.preset) update(keys, false);
+  else build(keys);
+  shown = keys;
+}
+
+function build(keys) {
   const focused = document.activeElement?.id;
+  form.dataset.preset = state.preset;
   form.replaceChildren();
-  const sections = new Map();
-  for (const key of keys) {
-    if (!sections.has(key.section)) sections.set(key.section, []);
-    sections.get(key.section).push(key);
-  }
-  for (const [name, own] of sections) {
-    const box = element("fieldset", {}, element("legend", { textContent: name }));
-    const stated = own.filter((key) => key.value !== "");
-    const others = own.filter((key) => key.value === "");
-    box.append(...stated.map(knob));
-    if (others.length) {
-      const more = element("details", { open: opened.has(name) || stated.length === 0 },
-        element("summary", { textContent: `${others.length} not stated` }), ...others.map(knob));
+  const places = (name) => keys.filter((key) => key.group === name);
+  for (const [name, title] of Object.entries(GROUPS)) {
+    const own = places(name);
+    if (!own.length) continue;
+    const said = (key) => own.some((other) => other.stated && other.alternatives.includes(key.name));
+    const first = name === "more" ? [] : own.filter((key) => key.stated || ALWAYS.includes(key.name));
+    const rest = own.filter((key) => !first.includes(key) && !(said(key) && key.value !== ""));
+    const box = element("fieldset", {}, element("legend", { textContent: title }), ...first.map((key) => knob(key, own)));
+    box.dataset.group = name;
+    if (rest.length) {
+      const more = element("details", { open: opened.has(name) || (!first.length && name !== "more") },
+        element("summary", { textContent: name === "more" ? "modes, forms, second tone" : `${rest.length} more` }), ...rest.map((key) => knob(key, own)));
       more.addEventListener("toggle", () => { if (more.open) opened.add(name); else opened.delete(name); });
       box.append(more);
     }
@@ -43,33 +62,57 @@ export function build(keys) {
   if (focused) document.getElementById(focused)?.focus();
 }
 
-/** Sets the newest values in the existing controls, except in the one being edited. */
-export function update(keys) {
+/** Sets the newest values in the existing controls. A field in which something else was typed, and not
+ *  sent yet, keeps it. */
+function update(keys, keep) {
   for (const key of keys) {
     const field = form.querySelector(`[data-key="${key.name}"]`);
-    if (field && field !== document.activeElement && field.value !== key.value) field.value = key.value;
+    if (!field) continue;
+    const typing = field === document.activeElement && field.value !== field.dataset.shown && field.value !== state.set[key.name];
+    if (!typing && field.value !== key.value) field.value = key.value;
+    if (!typing) field.dataset.shown = field.value;
+    const range = form.querySelector(`[data-slider="${key.name}"]`);
+    if (range && key.slider && !range.matches(":active")) range.adjust(key, keep);
   }
 }
 
 /** Whether a slider is being moved. */
 export const dragged = () => form.querySelector("[data-slider]:active") !== null;
 
-function knob(key) {
-  const id = `key-${key.name.replace(/[^a-z0-9]/gi, "-")}`;
-  const words = key.symbol && key.symbol !== key.name ? `${key.symbol}  ${key.title}` : key.title;
+const idOf = (name) => `key-${name.replace(/[^a-z0-9]/gi, "-")}`;
+const words = (key) => (key.symbol && key.symbol !== key.name ? `${key.symbol}  ${key.title}` : key.title.replaceAll("_", " "));
+
+function knob(key, own) {
+  const id = idOf(key.name);
   const meaning = element("span", { className: "meaning", id: `${id}-meaning`, textContent: key.meaning });
-  const field = !key.choices ? typed(key) : key.sums ? summed(key, meaning) : chooser(key, meaning);
+  const field = key.sums ? summed(key, meaning) : key.choices ? chooser(key, meaning) : typed(key);
   field.id = id;
   field.dataset.key = key.name;
+  field.dataset.shown = key.value;
   field.setAttribute("aria-describedby", meaning.id);
-  const box = element("div", { className: "knob" }, element("label", { htmlFor: id, textContent: words }), field);
-  if (key.slider) box.append(slider(key, field, words));
-  box.append(meaning);
+  const label = element("label", { htmlFor: id, textContent: words(key), title: key.meaning });
+  const box = element("div", { className: "knob" }, label, field);
+  const others = key.stated ? own.filter((other) => key.alternatives.includes(other.name) && (other.value !== "" || other.name === "drive.setpoint")) : [];
+  if (others.length) {
+    const ways = element("select", { className: "switch" }, ...[key, ...others].map((one) => new Option(words(one), one.name)));
+    ways.setAttribute("aria-label", `${words(key)}, or what says the same`);
+    ways.dataset.switch = key.name;
+    ways.addEventListener("change", () => {
+      const other = others.find((one) => one.name === ways.value);
+      if (other) put(other, other.value || now.ratio || "0.8", true);
+    });
+    label.hidden = true;
+    field.setAttribute("aria-label", words(key));
+    box.prepend(ways);
+  }
+  if (key.slider) box.append(slider(key, field));
+  if (key.choices) box.append(meaning);
+  else { meaning.hidden = true; box.append(meaning); }
   return box;
 }
 
 function typed(key) {
-  const field = element("input", { type: "text", value: key.value });
+  const field = element("input", { type: "text", value: key.value, placeholder: key.stated ? "" : "not stated" });
   field.addEventListener("change", () => put(key, field.value.trim(), true));
   return field;
 }
@@ -78,62 +121,95 @@ function chooser(key, meaning) {
   const field = element("select");
   if (key.value === "") field.add(new Option("", "", true, true));
   for (const choice of key.choices) {
-    const words = choice.meaning ? `${choice.word}: ${choice.meaning}` : choice.word;
-    field.add(new Option(words, choice.word, false, choice.word === key.value));
+    const text = choice.meaning ? `${choice.word}: ${choice.meaning}` : choice.word;
+    field.add(new Option(text, choice.word, false, choice.word === key.value));
     if (choice.word === key.value && choice.meaning) meaning.textContent = `${key.meaning}: ${choice.meaning}`;
   }
   field.addEventListener("change", () => put(key, field.value, true));
   return field;
 }
 
-/** A choice of one option, or a sum of options with +. */
+/** A choice of one contact law, or a sum of laws with +: the field holds the whole name. */
 function summed(key, meaning) {
-  const field = typed(key);
-  const list = element("datalist", { id: `words-${key.name.replace(/[^a-z0-9]/gi, "-")}` },
-    ...key.choices.map((choice) => new Option(choice.meaning, choice.word)));
-  field.setAttribute("list", list.id);
-  const terms = key.value.split("+").map((word) => word.trim());
+  const field = element("input", { type: "text", value: key.value });
+  const terms = key.value.split("+").map((word) => word.trim()).filter(Boolean);
   const said = key.choices.filter((choice) => terms.includes(choice.word)).map((choice) => choice.meaning);
-  const known = element("details", {}, element("summary", { textContent: "laws" }),
-    element("dl", {}, ...key.choices.flatMap((choice) => [element("dt", { textContent: choice.word }), element("dd", { textContent: choice.meaning })])));
   meaning.textContent = said.length ? said.join("; ") : key.meaning;
-  meaning.append(known, list);
+  const chosen = (title, take) => {
+    const list = element("select", { className: "law" }, new Option(title, ""), ...key.choices.map((choice) => new Option(choice.word, choice.word)));
+    [...list.options].forEach((option, k) => { if (k) option.title = key.choices[k - 1].meaning; });
+    list.setAttribute("aria-label", title);
+    list.addEventListener("change", () => { if (list.value) law(key, take(list.value), field); });
+    return list;
+  };
+  field.addEventListener("change", () => law(key, field.value.trim(), field));
+  meaning.append(element("span", { className: "laws" }, chosen("another law …", (word) => word), chosen("add a law …", (word) => `${key.value} + ${word}`)));
   return field;
 }
 
-function slider(key, field, words) {
-  const { from, to, log } = key.slider;
+/** Another contact law: the server says which keys it does not take and which it needs. */
+async function law(key, text, field) {
+  try {
+    const answer = await ask("law", "/api/law", { case: theCase(), law: text });
+    for (const [name, value] of Object.entries(answer.set)) state.set[name] = value;
+    state.start = "";
+    changed(key.name, true, answer.words);
+  } catch (error) {
+    if (superseded(error)) return;
+    field.value = key.value;
+    refused(error, key);
+  }
+}
+
+function slider(key, field) {
   const range = element("input", { type: "range", min: 0, max: 1000, step: 1 });
-  range.setAttribute("aria-label", `${words}, slider`);
+  range.setAttribute("aria-label", `${words(key)}, slider`);
   range.dataset.slider = key.name;
   const whole = key.name === "modes";
-  if (whole) Object.assign(range, { min: from, max: to });
-  const place = (v) => (whole ? v : 1000 * (log ? Math.log(v / from) / Math.log(to / from) : (v - from) / (to - from)));
-  const value = (p) => (whole ? p : log ? from * (to / from) ** (p / 1000) : from + (to - from) * p / 1000);
-  range.value = place(key.number);
+  let own = key;
+  const value = (p) => {
+    const { from, to, log } = own.slider;
+    return whole ? p : log ? from * (to / from) ** (p / 1000) : from + (to - from) * p / 1000;
+  };
+  /** Moves the slider to the value of a key, in its own range if `keep`. */
+  range.adjust = (next, keep) => {
+    own = keep ? { ...next, slider: own.slider } : next;
+    const { from, to, log } = own.slider;
+    if (whole) Object.assign(range, { min: from, max: to });
+    const v = next.number;
+    range.value = whole ? v : 1000 * (log ? Math.log(v / from) / Math.log(to / from) : (v - from) / (to - from));
+    range.setAttribute("aria-valuetext", next.value);
+  };
+  range.adjust(key);
+  let dirty = false;
   const move = (finished) => {
-    field.value = `${Number(value(Number(range.value)).toPrecision(5))}${key.unit ? ` ${key.unit}` : ""}`;
+    dirty = !finished;
+    field.value = `${Number(value(Number(range.value)).toPrecision(5))}${own.unit ? ` ${own.unit}` : ""}`;
     range.setAttribute("aria-valuetext", field.value);
     put(key, field.value, finished);
   };
   range.addEventListener("input", () => move(false));
   range.addEventListener("change", () => move(true));
+  // A slider that was moved and put back does not change.
+  range.addEventListener("pointerup", () => setTimeout(() => { if (dirty) move(true); }));
   return range;
 }
 
 function put(key, text, finished) {
-  // A key that the preset states cannot be removed.
-  state.set[key.name] = text;
-  state.start = state.follow === "yes" ? now : "";
+  state_put(key.name, text, text === "" ? [] : key.alternatives);
+  if (state.follow !== "yes") state.start = "";
   changed(key.name, finished);
 }
 
-/** Marks the fields whose keys an error names. */
-export function mark(message) {
+/** Keys of the present case that say the same as one. */
+export const sameAs = (name) => shown.find((key) => key.name === name)?.alternatives ?? [];
+
+/** Marks the fields of the keys that the server names. */
+export function mark(names) {
   for (const field of form.querySelectorAll("[data-key]")) {
-    const name = field.dataset.key.split(".").pop();
-    const bad = Boolean(message) && new RegExp(`(^|[^a-z0-9_])${name}([^a-z0-9_]|$)`, "i").test(message);
+    const bad = names.includes(field.dataset.key);
     field.classList.toggle("bad", bad);
     if (bad) field.setAttribute("aria-invalid", "true"); else field.removeAttribute("aria-invalid");
+    if (bad) for (let box = field.closest("details"); box; box = box.parentElement.closest("details")) box.open = true;
   }
 }

@@ -1,8 +1,8 @@
-// The page: controls on the left, the motion in the middle, coexisting motions on the right,
-// studies below.
+// The page: controls on the left, the lever and the main figure in the middle, what one wants to know on
+// the right, everything else below.
 
-import { state, decode, remember, theCase } from "./state.js";
-import { ask, bytes, save, superseded } from "./api.js";
+import { state, caseText, decode, remember, theCase } from "./state.js";
+import { ask, bytes, save, stop, superseded } from "./api.js";
 import * as knobs from "./knobs.js";
 import * as lever from "./lever.js";
 import * as figure from "./figure.js";
@@ -10,42 +10,48 @@ import * as study from "./study.js";
 
 const $ = (id) => document.getElementById(id);
 const BUSY_DELAY = 300;        // milliseconds before the page shows that it computes
+const PATIENCE = 1000;         // milliseconds after which a motion gives way to a newer one
 const OFF = "0: off. Too few steps give motions that the equations do not have.";
+const OTHER = "computed for other values – find all again";
 let about = null;
 let outdated = false;         // a value changed while a motion was being computed
 let underway = false;
-let shown = "";               // the case whose controls are shown
+let moving = false;           // a slider is being moved
+let epoch = 0;                // counts links, clicks and cases: answers for earlier ones are dropped
+let displayed = null;         // the displayed motion: its case and its start
+let found = null;             // the case of the listed motions
+let steps = 0;                // entries of the history that can be undone
 const redrawn = [];            // called when figures were redrawn
 
 export function say(error) {
   const message = $("message");
   message.hidden = !error;
   message.textContent = error?.message ?? "";
-  knobs.mark(error?.message ?? "");
+  knobs.mark(error?.keys ?? []);
 }
 
+/** Marks the displayed motion as one of other values, or not. */
+function stale(is) { document.body.classList.toggle("other", is); }
+
 /** Requests the motion for the present values. While one is being computed the next one waits, so that a
- *  dragged slider shows as many motions as can be computed, and finally the last one. */
+ *  dragged slider shows as many motions as can be computed, and finally the last one; one that takes
+ *  long gives way. */
 export async function refresh() {
-  if (underway) { outdated = true; return; }
+  outdated = true;
+  if (underway) return;
   underway = true;
   document.body.dataset.busy = "yes";
-  const busyTimer = setTimeout(() => { $("busy").textContent = "computing …"; }, BUSY_DELAY);
+  const busyTimer = setTimeout(() => { $("busy").textContent = "computing …"; stale(true); }, BUSY_DELAY);
   let next = request();
   while (next) {
-    const { motion, error } = await next;
+    const { wish, motion, error } = await next;
     // The server computes the next motion while this one is drawn.
-    next = outdated ? request() : null;
-    if (motion) {
+    next = outdated && !follows() ? request() : null;
+    if (wish.epoch !== epoch) { /* dropped */ }
+    else if (motion) {
       say(null);
-      show(motion);
-      study.fill(motion.forms);
-    } else if (state.follow && state.start && /state/.test(error.message)) {
-      // With another number of modes the state has another length: the motion is then computed from
-      // rest.
-      state.start = "";
-      outdated = true;
-    } else if (!superseded(error)) say(error);
+      show(motion, wish);
+    } else if (!superseded(error)) { say(error); stale(true); }
     if (!next && outdated) next = request();
   }
   clearTimeout(busyTimer);
@@ -54,11 +60,18 @@ export async function refresh() {
   underway = false;
 }
 
+const follows = () => state.follow === "yes" && displayed !== null && displayed.epoch === epoch;
+
 /** The motion for the present values, or the reason why there is none. */
 function request() {
   outdated = false;
-  const wish = { case: theCase(), start: state.start, steps: state.steps, views: motionViews() };
-  return ask("motion", "/api/motion", wish).then((motion) => ({ motion }), (error) => ({ error }));
+  const wish = { case: theCase(), start: state.start, steps: state.steps, views: motionViews(), ranges: !moving };
+  if (follows() && caseText() !== displayed.text) Object.assign(wish, { from: displayed.case, start: displayed.start });
+  const asked = { ...wish, epoch, text: caseText() };
+  const patience = setInterval(() => { if (outdated || asked.epoch !== epoch) stop("motion"); }, PATIENCE);
+  const answer = ask("motion", "/api/motion", wish);
+  return answer.then((motion) => ({ wish: asked, motion }), (error) => ({ wish: asked, error }))
+    .finally(() => clearInterval(patience));
 }
 
 /** The visible ranges of the motion's figures. */
@@ -66,24 +79,47 @@ function motionViews() {
   return Object.fromEntries(["contact", "portrait"].filter((name) => state.views[name]?.length).map((name) => [name, state.views[name]]));
 }
 
-function show(motion) {
-  knobs.follows(motion.start);
+function show(motion, wish) {
+  displayed = { case: wish.case, text: wish.text, start: motion.start, epoch };
+  if (wish.from && !outdated) {
+    // A link starts where the followed motion is.
+    state.start = motion.start;
+    remember(false);
+  }
+  stale(false);
+  knobs.follows(motion.readout);
+  knobs.show(motion.keys, moving);
   $("summary").textContent = `${motion.title}: ${motion.summary}`;
-  // Controls are recreated if the stated keys change, but not while one is being edited.
-  const keys = state.preset + motion.keys.map((key) => `${key.name}${key.value === ""}${key.choices ? key.value : ""}`).join();
-  if (knobs.dragged() || keys === shown) knobs.update(motion.keys);
-  else { knobs.build(motion.keys); shown = keys; }
   figure.put($("portrait"), motion.figure);
   figure.put($("contact"), motion.contact);
   lever.show(motion.film);
   for (const again of redrawn) again();
   table(motion.observables);
+  readout(motion);
   $("remarks").textContent = motion.remarks.join(" · ");
   $("spurious").textContent = motion.fixed_step?.words ?? OFF;
   $("fixed").hidden = !motion.fixed_step?.figure;
   if (motion.fixed_step?.figure) figure.put($("fixed"), motion.fixed_step.figure);
   $("command").textContent = motion.command;
   $("python").textContent = motion.python;
+  markCensus();
+  if (!moving) study.fill(motion);
+  else study.follow(motion);
+}
+
+/** What one wants to know first. */
+function readout(motion) {
+  const lines = motion.readout.lines.map((line) => [line.name, line.words, line.shown]);
+  if (motion.distance) lines.unshift(["distance", "distance", motion.distance]);
+  lines.push(["regime", "regime", motion.readout.regime]);
+  $("readout").replaceChildren(...lines.flatMap(([name, words, shown]) => {
+    const [title, value] = ["dt", "dd"].map((tag) => document.createElement(tag));
+    title.textContent = words;
+    value.textContent = shown;
+    value.dataset.read = name;
+    return [title, value];
+  }));
+  $("regime").textContent = motion.readout.words;
 }
 
 /** Values change in place; lines are recreated if the set of observables changes. */
@@ -110,14 +146,20 @@ function table(rows) {
   });
 }
 
+/** What the listed motions are of. */
+const searched = () => caseText() + $("unstable").checked;
+
 async function census() {
   const list = $("attractors");
+  const own = searched();
   list.replaceChildren();
+  found = null;
   $("bound").textContent = "searching …";
   try {
-    const found = await ask("census", "/api/attractors", { case: theCase(), unstable: $("unstable").checked });
-    $("bound").textContent = found.bound;
-    list.replaceChildren(...found.motions.map((one) => {
+    const answer = await ask("census", "/api/attractors", { case: theCase(), unstable: $("unstable").checked });
+    if (searched() !== own) { $("bound").textContent = "the values changed: find all again"; return; }
+    found = { of: own, bound: answer.bound };
+    list.replaceChildren(...answer.motions.map((one) => {
       const item = document.createElement("li");
       const button = document.createElement("button");
       button.type = "button";
@@ -126,22 +168,36 @@ async function census() {
       button.addEventListener("click", () => {
         state.start = one.start;
         for (const other of list.querySelectorAll("button")) other.setAttribute("aria-pressed", String(other === button));
-        remember(true);
-        refresh();
+        remembered();
+        elsewhere();
       });
       item.append(button);
       return item;
     }));
+    markCensus();
   } catch (error) {
     if (!superseded(error)) $("bound").textContent = error.message;
   }
 }
 
-/** A census is valid for one case only. */
-function forgetCensus() {
-  if (!$("bound").textContent) return;
-  $("attractors").replaceChildren();
-  $("bound").textContent = "";
+/** The listed motions belong to one case only. */
+function markCensus() {
+  if (!found) return;
+  const other = searched() !== found.of;
+  $("attractors").classList.toggle("stale", other);
+  for (const button of $("attractors").querySelectorAll("button")) button.disabled = other;
+  $("bound").textContent = other ? OTHER : found.bound;
+}
+
+/** Another motion than one that continues the displayed one. */
+function elsewhere() {
+  epoch += 1;
+  refresh();
+}
+
+function remembered() {
+  if (remember(true)) steps += 1;
+  $("undo").disabled = steps <= 0;
 }
 
 async function exported(format) {
@@ -150,14 +206,18 @@ async function exported(format) {
 }
 
 function takeOver() {
+  const before = state.preset;
   decode(location.hash);
   if (!about.presets.some((p) => p.name === state.preset)) state.preset = about.presets[0].name;
+  if (state.preset !== before) found = null;
   $("preset").value = state.preset;
   $("steps").value = state.steps;
   $("follow").checked = state.follow === "yes";
-  forgetCensus();
+  $("note").textContent = "";
+  if (!found) { $("attractors").replaceChildren(); $("bound").textContent = ""; }
+  markCensus();
   study.restore();
-  refresh();
+  elsewhere();
 }
 
 async function begin() {
@@ -165,35 +225,48 @@ async function begin() {
     about = await ask("about", "/api/about");
   } catch (error) { say(error); return; }
   document.title = `nanotap explorer ${about.version}`;
-  for (const preset of about.presets) $("preset").add(new Option(preset.words, preset.name));
-  $("preset").addEventListener("change", () => {
-    Object.assign(state, { preset: $("preset").value, set: {}, start: "", study: {}, ran: "", views: {} });
-    remember(true);
+  const groups = new Map();
+  for (const preset of about.presets) {
+    if (!groups.has(preset.group)) groups.set(preset.group, Object.assign(document.createElement("optgroup"), { label: preset.group }));
+    groups.get(preset.group).append(new Option(preset.words, preset.name));
+  }
+  $("preset").append(...groups.values());
+  const fresh = (preset) => {
+    Object.assign(state, { preset, set: {}, start: "", study: {}, ran: "", views: {} });
+    remembered();
     takeOver();
-  });
-  knobs.onChange((_, finished) => {
+  };
+  $("preset").addEventListener("change", () => fresh($("preset").value));
+  $("reset").addEventListener("click", () => fresh(state.preset));
+  $("undo").addEventListener("click", () => { steps -= 1; $("undo").disabled = steps <= 0; history.back(); });
+  knobs.onChange((_, finished, note) => {
+    moving = !finished;
+    if (note !== undefined) $("note").textContent = note;
     // While a slider moves, the address is not changed.
-    if (finished) remember(true);
-    forgetCensus();
+    if (finished) remembered();
+    markCensus();
     refresh();
-  });
-  $("steps").addEventListener("change", () => { state.steps = Number($("steps").value) || 0; remember(true); refresh(); });
-  $("follow").addEventListener("change", () => { state.follow = $("follow").checked ? "yes" : ""; remember(true); });
+  }, (error) => say(error));
+  $("steps").addEventListener("change", () => { state.steps = Number($("steps").value) || 0; remembered(); refresh(); });
+  $("follow").addEventListener("change", () => { state.follow = $("follow").checked ? "yes" : ""; remembered(); });
+  $("unstable").addEventListener("change", markCensus);
   for (const name of ["contact", "portrait"]) {
     redrawn.push(figure.alive($(name), {
       views: () => state.views[name] ?? [],
       tell: (place) => { $("reading").textContent = place ? figure.words(place) : ""; },
-      zoom: (views) => { state.views[name] = views; remember(true); refresh(); },
+      zoom: (views) => { state.views[name] = views; remembered(); refresh(); },
     }));
   }
   $("census").addEventListener("click", census);
+  // The fragment of the address is the state.
+  $("skip").addEventListener("click", (event) => { event.preventDefault(); $("study").focus(); });
   for (const button of document.querySelectorAll("[data-export]")) {
     button.addEventListener("click", () => exported(button.dataset.export).catch(say));
   }
   $("knobs").addEventListener("submit", (event) => event.preventDefault());
   addEventListener("popstate", takeOver);
   addEventListener("hashchange", takeOver);
-  study.begin(() => { forgetCensus(); refresh(); });
+  study.begin(elsewhere);
   takeOver();
 }
 

@@ -5,7 +5,7 @@ const empty = () => ({
   set: {},                    // keys of the case that differ from it: key -> text
   start: "",                  // state at drive phase 0 from which the motion is computed
   follow: "",                 // "yes": a changed parameter continues from the displayed motion
-  tab: "diagram",
+  tab: "approach",
   steps: 0,                   // Runge-Kutta steps per period of the motion for comparison; 0: none
   study: {},                  // fields of the study's form: name -> text
   ran: "",                    // "yes": the study was computed
@@ -45,12 +45,26 @@ function view([name, panel], numbers) {
   (state.views[name] ??= []).push({ panel: Number(panel), x: numbers.slice(0, 2), y: numbers.slice(2) });
 }
 
-/** Writes the address: a new entry of the history for a completed change, otherwise in place. */
+/** Writes the address: a new entry of the history for a completed change, otherwise in place.
+ *  Returns whether there is a new entry. */
 export function remember(finished) {
   const address = `${location.pathname}${location.search}#${encoded()}`;
-  if (address === `${location.pathname}${location.search}${location.hash}`) return;
+  if (address === `${location.pathname}${location.search}${location.hash}`) return false;
   if (finished) history.pushState(null, "", address);
   else history.replaceState(null, "", address);
+  return finished;
+}
+
+/** States a value, in place of all that says the same. */
+export function put(name, text, alternatives = []) {
+  for (const other of alternatives) delete state.set[other];
+  state.set[name] = text;
+}
+
+/** The case as a text, for comparison; without some keys. */
+export function caseText(without = []) {
+  const kept = Object.entries(state.set).filter(([key]) => !without.includes(key)).sort();
+  return JSON.stringify([state.preset, kept]);
 }
 
 /** The case as sent to the server. */

@@ -1,26 +1,73 @@
 // The studies: a form for each, its figure in stages of increasing resolution, and clicks that go
 // to a motion.
 
-import { state, remember, theCase } from "./state.js";
-import { ask, bytes, save, stream, stop, superseded } from "./api.js";
+import { state, caseText, put, remember, theCase } from "./state.js";
+import { ask, bytes, current, save, stream, stop, superseded } from "./api.js";
+import { sameAs } from "./knobs.js";
 import * as figure from "./figure.js";
 
 const $ = (id) => document.getElementById(id);
 const TABS = {
-  diagram: "Diagram", branches: "Branches", resonance: "Resonance", approach: "Approach",
+  approach: "Approach", diagram: "Diagram", branches: "Branches", resonance: "Resonance",
   basin: "Basins", map: "Two parameters",
 };
 const NEAR = 0.05;            // fraction of a panel within which a click selects a drawn motion
+const PAUSE = 250;            // milliseconds after a change before an approach curve is drawn anew
+const OTHER = "computed for other values – compute again";
 let forms = null;
 let filled = "";              // the form that is shown
-let drawnFor = "";            // the request of the displayed figure
+let drawn = null;             // what the displayed figure is of, and where its clicks go
+let asking = null;            // the same of the figure that is being computed
 let number = 0;               // the server's number for the figure
-let clicks = null;
+let motion = null;            // the displayed motion
+let timer = 0;
 let gone = () => {};
 let redrawn = () => {};
 
 const views = () => state.views.study ?? [];
 const asked = () => JSON.stringify([state.preset, state.tab, state.study]);
+
+/** The keys of the case that a figure does not depend on: those along its axes. Other keys must be as
+ *  they stay along the axis, or the axis is another one. */
+function along(clicks) {
+  const names = Object.values(clicks?.set ?? {}).map((key) => key.name);
+  if (names.includes("gap.tip")) return ["gap.tip", "gap.beam", "drive.setpoint"];
+  const held = Object.entries(clicks?.fixed ?? {}).every(([name, text]) => state.set[name] === text);
+  return held ? names : [];
+}
+
+/** What a figure is of. */
+function subject(clicks) {
+  return { form: asked(), case: caseText(along(clicks)), start: state.tab === "basin" ? state.start : "" };
+}
+
+const same = (one, other) => one && ["form", "case", "start"].every((name) => one[name] === other[name]);
+const isCurrent = () => same(drawn, subject(drawn?.clicks));
+
+/** Marks a figure of another case. */
+function mark() {
+  const other = drawn !== null && !isCurrent();
+  $("study-figure").classList.toggle("stale", other);
+  $("study-export").classList.toggle("stale", other);
+  for (const button of document.querySelectorAll("[data-study-export]")) button.disabled = other;
+  $("stale").hidden = !other;
+  $("stale").textContent = other ? OTHER : "";
+  // A link contains only figures of its own case.
+  if (other && state.ran) { state.ran = ""; remember(false); }
+  point();
+}
+
+/** Shows the displayed motion on the figure. */
+function point() {
+  const [x] = Object.values(drawn?.clicks.set ?? {});
+  const value = x && motion?.keys.find((key) => key.name === x.name)?.si;
+  const shows = isCurrent() && Number.isFinite(value) && !drawn.clicks.set.y;
+  const heights = (drawn?.clicks.heights ?? []).map(({ name, factor }) => {
+    const row = motion?.observables.find((one) => one.name === name);
+    return row && (factor === null ? Number.parseFloat(row.shown) : factor * row.value);
+  });
+  figure.present($("study-figure"), shows ? { x: value * x.factor, heights } : null);
+}
 
 /** `motionChanged` is called when a click selected another motion. */
 export function begin(motionChanged) {
@@ -34,8 +81,8 @@ export function begin(motionChanged) {
       Object.assign(state, { tab: name, study: {}, ran: "" });
       delete state.views.study;
       restore();
-      fill(forms);
       remember(true);
+      if (motion) fill(motion);
     });
     $("tabs").append(tab);
   }
@@ -47,7 +94,7 @@ export function begin(motionChanged) {
     next.focus();
     next.click();
   });
-  $("study-form").addEventListener("submit", (event) => { event.preventDefault(); state.ran = "yes"; remember(true); compute(); });
+  $("study-form").addEventListener("submit", (event) => { event.preventDefault(); state.ran = "yes"; remember(true); compute(false); });
   redrawn = figure.alive($("study-figure"), {
     views,
     tell: (place) => { $("hover").textContent = place ? `${figure.words(place)}${nearest(place) ? ": a motion is drawn here" : ""}` : ""; },
@@ -66,7 +113,7 @@ export function begin(motionChanged) {
 
 /** Shows the tab given in the state. */
 export function restore() {
-  if (!(state.tab in TABS)) state.tab = "diagram";
+  if (!(state.tab in TABS)) state.tab = "approach";
   for (const tab of $("tabs").children) {
     const chosen = tab.id === `tab-${state.tab}`;
     tab.setAttribute("aria-selected", String(chosen));
@@ -76,13 +123,43 @@ export function restore() {
   filled = "";
 }
 
-/** Creates the form of the tab with the server's initial values. A figure that was computed for this form
- *  stays; one that the address contains is computed again. */
+/** Takes the displayed motion, with the server's forms. A figure of this case stays; one of another case
+ *  is marked; one that the address contains is computed again, and an approach curve always. */
 export function fill(next) {
-  forms = next;
-  const now = asked();
-  if (now === filled) return;
-  filled = now;
+  motion = next;
+  forms = next.forms;
+  const now = asked() + JSON.stringify(forms[state.tab]);
+  if (now !== filled) {
+    filled = now;
+    build();
+    if (drawn && drawn.form !== asked()) forget();
+  }
+  mark();
+  clearTimeout(timer);
+  if (same(asking, subject(asking?.clicks)) || isCurrent()) return;
+  if (asking) stop("study");
+  if (state.ran === "yes") compute(false);
+  else if (state.tab === "approach") timer = setTimeout(() => { if (!isCurrent()) compute(true); }, PAUSE);
+}
+
+/** Takes a motion that was computed while a slider moves. */
+export function follow(next) {
+  motion = next;
+  mark();
+}
+
+/** Removes the figure. */
+function forget() {
+  stop("study");
+  drawn = null;
+  $("study-figure").replaceChildren();
+  $("study-export").hidden = true;
+  $("progress").textContent = "";
+  $("hover").textContent = "";
+}
+
+/** Creates the form of the tab with the server's initial values. */
+function build() {
   const form = $("study-form");
   form.replaceChildren(...forms[state.tab].map((field) => {
     const label = document.createElement("label");
@@ -91,7 +168,12 @@ export function fill(next) {
     for (const choice of field.choices ?? []) input.add(new Option(choice, choice));
     Object.assign(input, { name: field.name, value: state.study[field.name] ?? field.value });
     if (!field.choices) Object.assign(input, { size: field.hint ? 15 : 10, placeholder: field.hint ?? "" });
-    input.addEventListener("change", () => { state.study[field.name] = input.value; filled = asked(); remember(true); });
+    input.addEventListener("change", () => {
+      state.study[field.name] = input.value;
+      filled = asked() + JSON.stringify(forms[state.tab]);
+      remember(true);
+      mark();
+    });
     label.append(input);
     return label;
   }));
@@ -99,47 +181,59 @@ export function fill(next) {
   const end = Object.assign(document.createElement("button"), { type: "button", textContent: "Stop" });
   end.addEventListener("click", () => stop("study"));
   form.append(compute_, end);
-  if (drawnFor === now) { look(); return; }
-  stop("study");
-  drawnFor = "";
-  clicks = null;
-  $("study-figure").replaceChildren();
-  $("study-export").hidden = true;
-  $("progress").textContent = "";
-  $("hover").textContent = "";
-  if (state.ran === "yes") compute();
 }
 
-async function compute() {
+/** Computes the figure of the form, in stages; a `quick` one ends after the first. */
+async function compute(quick) {
   const options = Object.fromEntries(new FormData($("study-form")));
   $("progress").textContent = "computing …";
-  const begun = asked();
-  drawnFor = begun;
+  const own = { ...subject(null), clicks: null };
+  const whole = caseText();
+  asking = own;
+  let request = null;
   try {
-    await stream("study", "/api/study", { case: theCase(), start: state.start, tab: state.tab, options }, async (message) => {
-      if (drawnFor !== begun) return;
+    const sent = stream("study", "/api/study", { case: theCase(), start: state.start, tab: state.tab, options }, (message) => {
+      // An answer for an older case is dropped.
+      if (asking !== own) return;
+      if (!own.clicks && caseText() !== whole) { request?.abort(); return; }
+      own.clicks = message.clicks;
+      Object.assign(own, { case: own.case && caseOf(own, message.clicks) });
+      drawn = own;
       number = message.number;
-      clicks = message.clicks;
       $("progress").textContent = message.words;
       $("study-command").textContent = message.command;
       $("study-python").textContent = message.python;
       $("study-export").hidden = false;
       if (views().length) look();
       else draw(message.figure);
+      mark();
+      if (quick) { $("progress").textContent = `${message.words}; Compute: more, with branches`; request?.abort(); }
     });
+    request = current("study");
+    await sent;
   } catch (error) {
-    if (drawnFor === begun) $("progress").textContent = superseded(error) ? "stopped" : error.message;
+    if (asking === own && !(quick && drawn === own)) $("progress").textContent = superseded(error) ? "stopped" : error.message;
   }
+  if (asking === own) asking = null;
 }
 
-function draw(drawn) {
-  figure.put($("study-figure"), drawn);
+/** The case of a figure, without the keys along its axes. */
+function caseOf(own, clicks) {
+  own.text ??= own.case;
+  const [preset, kept] = JSON.parse(own.text);
+  const left = along(clicks);
+  return JSON.stringify([preset, kept.filter(([key]) => !left.includes(key))]);
+}
+
+function draw(next) {
+  figure.put($("study-figure"), next);
   redrawn();
+  point();
 }
 
 /** Draws the visible range of the figure. */
 async function look() {
-  if (!number || !drawnFor) return;
+  if (!number || !drawn) return;
   try {
     draw(await ask("look", "/api/figure", { number, views: views() }));
   } catch (error) {
@@ -149,15 +243,22 @@ async function look() {
 
 /** Sets the values of the axes at a place, and shows the motion there. */
 function go(place) {
-  if (!clicks) return;
+  if (!drawn || !isCurrent()) return;
+  const { clicks } = drawn;
   const orbit = nearest(place);
   state.start = "";
   for (const [axis, key] of Object.entries(clicks.set ?? {})) {
     const value = (orbit && axis === "x" ? orbit[0] : place[axis]) / key.factor;
-    state.set[key.name] = `${orbit ? value : Number(value.toPrecision(7))}${key.unit ? ` ${key.unit}` : ""}`;
+    put(key.name, `${orbit ? value : Number(value.toPrecision(7))}${key.unit ? ` ${key.unit}` : ""}`, sameAs(key.name));
   }
+  for (const [name, text] of Object.entries(clicks.fixed ?? {})) put(name, text, sameAs(name));
   if (orbit) state.start = orbit[2];
-  if (clicks.start) state.start = clicks.start.map((entry) => (typeof entry === "string" ? place[entry] : entry)).join(",");
+  if (clicks.start) {
+    const entry = (one) => (one.axis ? place[one.axis] / clicks.factors[one.axis] : one);
+    state.start = clicks.start.map(entry).join(",");
+  }
+  // The clicked motion is one of the figure.
+  Object.assign(drawn, subject(clicks));
   remember(true);
   gone();
 }
@@ -168,7 +269,7 @@ function nearest(place) {
   const index = $("study-figure").panels.indexOf(panel);
   let best = null;
   let least = NEAR;
-  for (const orbit of clicks?.near ?? []) {
+  for (const orbit of drawn?.clicks.near ?? []) {
     const across = Math.abs(figure.part(panel.x, orbit[0]) - u);
     if (across >= least) continue;
     for (const height of orbit[1][index] ?? []) {

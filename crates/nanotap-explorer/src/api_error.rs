@@ -3,44 +3,96 @@
 use axum::Json;
 use axum::http::StatusCode;
 use axum::response::{IntoResponse, Response};
+use nanotap::case::CaseError;
+use nanotap::case::file::CaseFileError;
+use nanotap::error::ErrorPlace;
 use nanotap::{Error, ErrorKind};
 use serde_json::{Value, json};
 
 /// The reason of a failed request, with the terminal's message.
 #[derive(Clone, Debug)]
-pub(crate) struct ApiError(Error);
+pub(crate) struct ApiError {
+    error: Error,
+    /// The keys of the case, and the fields of the request, to correct.
+    keys: Vec<String>,
+}
 
 impl ApiError {
     /// From any error of the library.
     pub(crate) fn of(error: impl Into<Error>) -> Self {
-        Self(error.into())
+        let error = error.into();
+        let named = error
+            .problems
+            .iter()
+            .filter_map(|problem| match &problem.place {
+                ErrorPlace::Option(name) => Some(name.clone()),
+                ErrorPlace::Override(written) => Some(key_of(written).to_owned()),
+                _ => None,
+            });
+        let keys = named.collect();
+        Self { error, keys }
     }
 
     /// The request is wrong; `remedy` says what would be right.
     pub(crate) fn input(message: impl Into<String>, remedy: impl Into<String>) -> Self {
-        Self(Error::input(message, remedy))
+        Self::of(Error::input(message, remedy))
     }
 
     /// The request is right, but the computation failed.
     pub(crate) fn failed(message: impl Into<String>) -> Self {
-        Self(Error::numerics(message))
+        Self::of(Error::numerics(message))
+    }
+
+    /// The same, about a key or a field in addition.
+    pub(crate) fn about(mut self, key: &str) -> Self {
+        self.keys.push(key.to_owned());
+        self
+    }
+
+    /// Whether the work was cancelled.
+    pub(crate) fn is_stopped(&self) -> bool {
+        self.error.kind == ErrorKind::Stopped
     }
 
     /// The JSON that the page reads.
     pub(crate) fn json(&self) -> Value {
-        json!({ "error": self.0.to_string() })
+        json!({ "error": self.error.to_string(), "keys": self.keys })
     }
+}
+
+/// The key of a `key=value` word.
+pub(crate) fn key_of(word: &str) -> &str {
+    word.split('=').next().unwrap_or_default().trim()
 }
 
 impl From<Error> for ApiError {
     fn from(error: Error) -> Self {
-        Self(error)
+        Self::of(error)
+    }
+}
+
+impl From<CaseFileError> for ApiError {
+    fn from(error: CaseFileError) -> Self {
+        let keys = error.problems.iter().filter_map(|problem| problem.key);
+        let keys: Vec<String> = keys.map(str::to_owned).collect();
+        let mut of = Self::of(error);
+        of.keys.extend(keys);
+        of
+    }
+}
+
+impl From<CaseError> for ApiError {
+    fn from(error: CaseError) -> Self {
+        match error {
+            CaseError::Stated(error) => (*error).into(),
+            error => Self::of(error),
+        }
     }
 }
 
 impl IntoResponse for ApiError {
     fn into_response(self) -> Response {
-        let status = match self.0.kind {
+        let status = match self.error.kind {
             ErrorKind::BadInput | ErrorKind::Numerics => StatusCode::UNPROCESSABLE_ENTITY,
             ErrorKind::Files | ErrorKind::Stopped => StatusCode::INTERNAL_SERVER_ERROR,
         };

@@ -1,9 +1,9 @@
 //! The result of a click on the figure of a study: the value of a key at that place, and the state
 //! of the motion drawn there; and the branches that are drawn over the figure.
 
-use nanotap::case::Key;
 use nanotap::case::quantity::{JOULES_PER_ELECTRONVOLT, Kind};
 use nanotap::case::units::{Units, prefixed};
+use nanotap::case::{Case, Key};
 use nanotap::dataset::{Store, StoreError, Values};
 use nanotap::observe::table::shown_phase;
 use nanotap::observe::{Dimension, Observable, Observables};
@@ -11,7 +11,7 @@ use nanotap::study::approach::ApproachReport;
 use nanotap::study::branch::{BranchReport, PointReport};
 use nanotap::study::sweep::Over;
 use nanotap_figures::{Colour, Dash, Figure, Line, Panel};
-use serde_json::{Value, json};
+use serde_json::{Map, Value, json};
 
 use crate::motion_request::Start;
 
@@ -69,6 +69,21 @@ impl Height {
             .collect()
     }
 
+    /// The observable, and the factor from its value in the model's units to the drawn one; null for an
+    /// angle, which is drawn in degrees.
+    pub(crate) fn json(&self, units: &Units) -> Value {
+        let dimension = self.observable.dimension;
+        let si = dimension
+            .kind()
+            .and_then(|kind| Some((kind, units.si(kind)?)));
+        let factor = match (dimension, si) {
+            (Dimension::Angle, _) => None,
+            (_, Some((kind, si))) => Some(factor(kind, si, &self.unit)),
+            _ => Some(1.0),
+        };
+        json!({ "name": self.observable.name, "factor": factor })
+    }
+
     /// The drawn value of a value in SI (`si` is 1) or in a unit of `si` in SI.
     fn drawn(&self, value: f64, si: Option<f64>) -> f64 {
         let dimension = self.observable.dimension;
@@ -101,12 +116,38 @@ impl Height {
     }
 }
 
+/// Factor from an entry of a state to its drawn values.
+pub(crate) fn of_entry(units: &Units, name: &str, axis: &nanotap_figures::Axis) -> f64 {
+    let si = units.of_entry(name);
+    si.map_or(1.0, |(kind, si)| factor(kind, si, &unit_on(axis)))
+}
+
+/// What else a click must set, `key: value`, so that the case is the one that was drawn: what stays
+/// constant while `keys` vary, and at a setpoint the distance that was solved for.
+pub(crate) fn fixed(case: &Case, keys: &[Key]) -> Map<String, Value> {
+    let word = |(path, value): (&str, f64)| {
+        let key = Key::find(path)?;
+        let text = Value::from(key.kind().format_exact(value));
+        Some((path.to_owned(), text))
+    };
+    // The free amplitude, and the force that gives it, are the same at every distance.
+    let distance = keys == [Key::GapTip];
+    let held = case.held(keys).into_iter();
+    held.filter(|(path, _)| !distance || *path == Key::GapBeam.path())
+        .filter_map(word)
+        .collect()
+}
+
 /// The unit of a panel's vertical axis, which may be part of its label.
 fn unit_of(panel: &Panel) -> String {
-    if !panel.y.unit.is_empty() {
-        return panel.y.unit.clone();
+    unit_on(&panel.y)
+}
+
+fn unit_on(axis: &nanotap_figures::Axis) -> String {
+    if !axis.unit.is_empty() {
+        return axis.unit.clone();
     }
-    let label = panel.y.label.strip_suffix(')');
+    let label = axis.label.strip_suffix(')');
     let unit = label.and_then(|label| label.rsplit_once('('));
     unit.map_or_else(String::new, |(_, unit)| unit.to_owned())
 }
@@ -122,6 +163,11 @@ fn factor(kind: Kind, si: f64, unit: &str) -> f64 {
         .map(|power| prefixed(kind, si, 2.0 * 10f64.powi(power) / si))
         .find(|(_, name)| *name == unit)
         .map_or(1.0, |(factor, _)| factor)
+}
+
+/// The observables in the panels of a figure.
+pub(crate) fn of_heights(heights: &[Height], units: &Units) -> Vec<Value> {
+    heights.iter().map(|height| height.json(units)).collect()
 }
 
 /// A drawn motion: its x, its heights in each panel, and the state that starts it.

@@ -6,6 +6,7 @@ use axum::Json;
 use axum::extract::State;
 use axum::http::header;
 use axum::response::{IntoResponse as _, Response};
+use nanotap::case::units::Units;
 use nanotap::control::Control;
 use nanotap::model::Model;
 use nanotap::observe::time_series;
@@ -58,7 +59,10 @@ fn exported(
     let model = model_of(&case)?;
     let motion = Motion::find(&model, &Start::parse(&asked.start)?)?;
     if wish.format == "csv" {
-        return Ok(("text/csv", csv(&model, &motion)?.into_bytes()));
+        return Ok((
+            "text/csv",
+            csv(&model, &motion, &case.units())?.into_bytes(),
+        ));
     }
     let figure = match wish.figure.as_str() {
         "contact" => motion.contact_figure(&model, &case),
@@ -76,12 +80,14 @@ fn exported(
     picture(&figure, &wish.format)
 }
 
-/// The time series of one repetition, in the model's units.
-fn csv(model: &Model, motion: &Motion) -> Result<String, ApiError> {
-    let mut text = time_series::columns(model).join(",");
+/// The time series of one repetition, as the terminal writes it.
+fn csv(model: &Model, motion: &Motion, units: &Units) -> Result<String, ApiError> {
+    let mut text = time_series::heads(model, units).join(",");
     text.push('\n');
     time_series::sample(model, motion.state(), motion.periods(), RESOLUTION, |row| {
-        let cells: Vec<String> = row.iter().map(ToString::to_string).collect();
+        let cells: Vec<String> = time_series::scaled(row, units)
+            .map(|number| number.to_string())
+            .collect();
         text.push_str(&cells.join(","));
         text.push('\n');
     })

@@ -25,10 +25,13 @@ mod film;
 mod forms;
 mod guard;
 mod knobs;
+mod law;
+mod listen;
 mod maps;
 mod motion;
 mod motion_request;
 mod preset;
+mod readout;
 mod scratch;
 mod study;
 mod work;
@@ -111,7 +114,7 @@ pub fn serve(options: &Options, ready: impl FnOnce(&str)) -> Result<(), Error> {
             scratch: scratch.path().to_owned(),
         });
         tokio::select! {
-            served = axum::serve(listener, router(app)) => served.map_err(failed),
+            () = listen::listen(&listener, router(app)) => Ok(()),
             () = stopped.notified() => Ok(()),
         }
     });
@@ -126,11 +129,13 @@ fn router(app: Arc<App>) -> Router {
         .route("/{name}", get(assets::part))
         .route("/api/about", get(preset::about))
         .route("/api/motion", post(motion::motion))
+        .route("/api/law", post(law::law))
         .route("/api/attractors", post(census::attractors))
         .route("/api/study", post(study::study))
         .route("/api/figure", post(figures::figure))
         .route("/api/export", post(export::export))
         .layer(DefaultBodyLimit::max(LONGEST_REQUEST))
+        .layer(axum::middleware::from_fn(listen::whole))
         .layer(axum::middleware::from_fn_with_state(
             Arc::clone(&app),
             guard::guard,

@@ -5,20 +5,20 @@ use std::sync::Arc;
 use axum::Json;
 use axum::extract::State;
 use nanotap::ErrorKind;
-use nanotap::case::Case;
 use nanotap::case::quantity::Kind;
+use nanotap::case::{Case, Key};
 use nanotap::control::Control;
 use nanotap::figure::contact::contact_figure;
 use nanotap::figure::motion::{fixed_step_figure, orbit_figure, simulation_figure};
 use nanotap::model::Model;
 use nanotap::observe::table::shown_phase;
-use nanotap::observe::{Dimension, OBSERVABLES, Observables};
+use nanotap::observe::{Dimension, OBSERVABLES, Observable, Observables};
 use nanotap::study::orbit::{OrbitOptions, OrbitReport, orbit, spectral_radius};
 use nanotap::study::registry::Study as _;
+use nanotap::study::request::read;
 use nanotap::study::simulate::{
-    Method, SimulateOptions, SimulateReport, SimulateStudy, Simulation, simulate,
+    SimulateOptions, SimulateReport, SimulateStudy, Simulation, simulate,
 };
-use nanotap::study::value::Steps;
 use nanotap_figures::Figure;
 use serde_json::{Value, json};
 
@@ -26,10 +26,15 @@ use crate::api_error::ApiError;
 use crate::figures::{Views, drawn, viewed};
 use crate::film::film;
 use crate::motion_request::{MotionRequest, Start, model_of};
+use crate::readout::readout;
 use crate::{App, commands, forms, knobs};
 
 /// Largest number of drive periods in the film and the figures of a motion without a period.
 const LONGEST: usize = 16;
+/// Step with which a motion is followed, as a part of the value that changes.
+const STEP: f64 = 0.005;
+/// Most steps from one motion to the next.
+const MAX_STEPS: f64 = 200.0;
 /// Drive periods of a run of fixed steps.
 const FIXED_PERIODS: usize = 64;
 
@@ -140,14 +145,26 @@ fn answer(app: &App, request: &MotionRequest, control: &Control<'_>) -> Result<V
         request.case.base(app, control)?,
     );
     let model = model_of(&case)?;
-    let start = Start::parse(&request.start)?;
+    let mut start = Start::parse(&request.start)?;
+    if let Some(from) = &request.from {
+        start = followed(&from.case(app, control)?, &case, start)?;
+    }
     let motion = Motion::find(&model, &start)?;
+    let accepts = |word: String| request.case.with_word(app, word).is_some();
+    let accepts = request.ranges.then_some(&accepts as knobs::Accepts<'_>);
+    // The commands start where the followed motion does.
+    let mut said = request.clone();
+    if let (Some(_), Some(state)) = (&request.from, &start.state) {
+        said.start = Start::text(start.period, state);
+    }
     let remarks: Vec<String> = case.remarks().into_iter().map(|r| r.text).collect();
     Ok(json!({
         "title": case.title(),
         "summary": motion.words(),
         "remarks": remarks,
-        "keys": knobs::of(&case, &base),
+        "keys": knobs::of(&case, &base, accepts),
+        "readout": readout(&case, motion.observables()),
+        "distance": case.physical().map(|_| case.shown(Key::GapTip, case.get(Key::GapTip))),
         "observables": rows(&case, motion.observables()),
         "start": Start::text(None, motion.state()),
         "figure": unlettered(motion.figure(&model, &case), &request.views, "portrait")?,
@@ -155,9 +172,88 @@ fn answer(app: &App, request: &MotionRequest, control: &Control<'_>) -> Result<V
         "film": film(&case, &model, motion.state(), motion.periods())?,
         "fixed_step": fixed_step(&case, &model, request.steps, start.state, control)?,
         "forms": forms::forms(&case, &base, &model),
-        "command": commands::command(app, request, motion.study())?,
-        "python": commands::python(app, request, motion.study())?,
+        "command": commands::command(app, &said, motion.study())?,
+        "python": commands::python(app, &said, motion.study())?,
     }))
+}
+
+/// The start of a motion of `case` that is followed from a motion of `from` which starts at `start`. One
+/// number that differs changes in small steps, so that the motion that is reached depends on the way and
+/// not on how fast it was gone.
+fn followed(from: &Case, case: &Case, start: Start) -> Result<Start, ApiError> {
+    let differs = |key: &Key| {
+        let [before, after] = [from, case].map(|case| case.get(*key));
+        before.is_finite() && after.is_finite() && before != after && key.cannot_vary().is_none()
+    };
+    let [had, has] = [from, case].map(Case::units);
+    let (Some(mut state), None) = (start.state.clone(), start.period) else {
+        return Ok(start);
+    };
+    // With another number of modes the state has another length: the motion begins at rest.
+    let [had_size, has_size] = [from.model()?.dimension(), case.model()?.dimension()];
+    if state.len() != had_size || had_size != has_size {
+        return Ok(Start::default());
+    }
+    let changed: Vec<Key> = knobs::keys(case).filter(differs).collect();
+    let stated = changed
+        .iter()
+        .find(|key| case.stated(**key) != from.stated(**key));
+    let key = if case.is_physical() {
+        stated
+    } else {
+        changed.first()
+    };
+    if let Some(&key) = key {
+        let (before, after) = (from.get(key), case.get(key));
+        let step = STEP * before.abs().max(after.abs());
+        let (first, last) = ((before / step).round(), (after / step).round());
+        let count = (last - first).abs().min(MAX_STEPS) as usize;
+        let mut period = None;
+        for k in 1..count {
+            let value = step * (first + (last - first) * k as f64 / count as f64);
+            let there = from.with(key, value);
+            let Ok(model) = there.model() else { break };
+            if let Some(found) = near(&model, &state, &mut period)? {
+                state = found;
+            }
+        }
+    }
+    // States are in units of a length that may follow from the distance.
+    if let (Some(had), Some(has)) = (had.si(Kind::Length), has.si(Kind::Length)) {
+        state.iter_mut().for_each(|number| *number *= had / has);
+    }
+    Ok(Start {
+        period: None,
+        state: Some(state),
+    })
+}
+
+/// The state of the stable orbit to which a motion from `state` leads, if there is one. From an orbit of
+/// `period` nearby it is closed at once.
+fn near(
+    model: &Model,
+    state: &[f64],
+    period: &mut Option<usize>,
+) -> Result<Option<Vec<f64>>, ApiError> {
+    for tried in [*period, None] {
+        let options = OrbitOptions {
+            period: tried,
+            state: Some(state.to_vec()),
+            ..OrbitOptions::default()
+        };
+        match orbit(model, &options) {
+            Ok(found) if found.stable => {
+                *period = Some(found.period);
+                return Ok(Some(found.state));
+            }
+            Err(error) if error.kind == ErrorKind::Stopped => return Err(error.into()),
+            _ => *period = None,
+        }
+        if tried.is_none() {
+            break;
+        }
+    }
+    Ok(None)
 }
 
 /// The figure without panel letters, which are for publications; the page has headings.
@@ -171,35 +267,43 @@ fn unlettered(figure: Figure, views: &Views, name: &str) -> Result<Value, ApiErr
 
 /// Every scalar observable of the motion: as in the terminal's `--json`, and as text with its unit.
 fn rows(case: &Case, observables: &Observables) -> Vec<Value> {
-    let units = case.units();
     OBSERVABLES
         .iter()
         .filter_map(|observable| {
-            let value = (observable.of)(observables).number()?;
-            let dimension = observable.dimension;
-            let si = dimension
-                .kind()
-                .and_then(|kind| Some((kind, units.si(kind)?)));
-            let shown = match (dimension, si) {
-                (Dimension::Angle, _) => format!("{:.2}°", shown_phase(value)),
-                (_, Some((kind, unit))) => kind.format_digits(unit * value, 5),
-                (_, None) => {
-                    let number = Kind::Number.format_digits(value, 5);
-                    match dimension.model_unit() {
-                        "1" => number,
-                        "1/drive period" => format!("{number} per drive period"),
-                        unit => format!("{number} {unit}"),
-                    }
-                }
-            };
             Some(json!({
                 "name": observable.name,
                 "words": observable.words,
-                "value": value,
-                "shown": shown,
+                "value": (observable.of)(observables).number()?,
+                "shown": shown(case, observable, observables)?,
             }))
         })
         .collect()
+}
+
+/// A scalar observable as text with its unit.
+pub(crate) fn shown(
+    case: &Case,
+    observable: &Observable,
+    observables: &Observables,
+) -> Option<String> {
+    let value = (observable.of)(observables).number()?;
+    let dimension = observable.dimension;
+    let units = case.units();
+    let si = dimension
+        .kind()
+        .and_then(|kind| Some((kind, units.si(kind)?)));
+    Some(match (dimension, si) {
+        (Dimension::Angle, _) => format!("{:.2}°", shown_phase(value)),
+        (_, Some((kind, unit))) => kind.format_digits(unit * value, 5),
+        (_, None) => {
+            let number = Kind::Number.format_digits(value, 5);
+            match dimension.model_unit() {
+                "1" => number,
+                "1/drive period" => format!("{number} per drive period"),
+                unit => format!("{number} {unit}"),
+            }
+        }
+    })
 }
 
 /// The result of fixed Runge–Kutta steps; empty if not requested.
@@ -213,13 +317,9 @@ fn fixed_step(
     if steps == 0 {
         return Ok(None);
     }
-    let request = SimulateOptions {
-        method: Method::Rk4,
-        steps: Steps([steps, steps]),
-        periods: FIXED_PERIODS,
-        state,
-        ..SimulateOptions::default()
-    };
+    let request = json!({ "method": "rk4", "steps": steps, "periods": FIXED_PERIODS });
+    let mut request: SimulateOptions = read(request).map_err(|e| ApiError::of(e).about("steps"))?;
+    request.state = state;
     let run = match SimulateStudy::run(case, &request, control) {
         Ok(SimulateReport::FixedStep(run)) => run,
         Ok(SimulateReport::Exact(_)) => return Ok(None),

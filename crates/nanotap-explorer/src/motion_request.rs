@@ -2,12 +2,17 @@
 
 use nanotap::case::Case;
 use nanotap::model::Model;
+use nanotap::study::orbit::OrbitOptions;
+use nanotap::study::request::read;
 use serde::Deserialize;
+use serde_json::json;
 
 use crate::api_error::ApiError;
 use crate::figures::Views;
 use crate::preset::CaseSpec;
 
+/// Largest number of characters of a state in a message.
+const SHOWN: usize = 100;
 /// Largest number of modes of a motion that follows a slider.
 const MAX_MODES: usize = 20;
 
@@ -19,6 +24,12 @@ pub(crate) struct MotionRequest {
     /// Initial state; empty: rest; `n:state`: an orbit of period n near the state.
     #[serde(default)]
     pub(crate) start: String,
+    /// The case of the motion that starts at `start`, which is followed from there to `case`.
+    #[serde(default)]
+    pub(crate) from: Option<CaseSpec>,
+    /// Whether the ranges of the sliders are requested.
+    #[serde(default)]
+    pub(crate) ranges: bool,
     /// Runge–Kutta steps per period of the motion for comparison; 0: none.
     #[serde(default)]
     pub(crate) steps: u32,
@@ -44,19 +55,22 @@ impl Start {
             None => (None, text),
         };
         let wrong = || {
-            ApiError::input(
-                format!("`{text}` is not a state"),
-                "numbers are needed, as in 0.1,-0.02,0.3",
-            )
+            let words: String = text.chars().take(SHOWN).collect();
+            let message = format!("`{words}` is not a state");
+            ApiError::input(message, "numbers are needed, as in 0.1,-0.02,0.3").about("start")
         };
+        let number = |text: &str| text.trim().parse::<f64>().ok().filter(|x| x.is_finite());
+        let numbers = state.split(',').map(number).collect::<Option<Vec<f64>>>();
+        let period = period.map(|period| period.trim().parse::<u64>().map_err(|_| wrong()));
+        // The terminal's options, with their limits.
+        let options = json!({
+            "period": period.transpose()?,
+            "state": numbers.ok_or_else(wrong)?,
+        });
+        let options: OrbitOptions = read(options).map_err(|e| ApiError::of(e).about("start"))?;
         Ok(Self {
-            period: period.map(|p| p.parse().map_err(|_| wrong())).transpose()?,
-            state: Some(
-                state
-                    .split(',')
-                    .map(|number| number.trim().parse().map_err(|_| wrong()))
-                    .collect::<Result<_, _>>()?,
-            ),
+            period: options.period,
+            state: options.state,
         })
     }
 
@@ -76,7 +90,8 @@ pub(crate) fn model_of(case: &Case) -> Result<Model, ApiError> {
         return Err(ApiError::input(
             format!("modes = {} are too many for the explorer", cantilever.modes),
             format!("{MAX_MODES} at most; the terminal takes more"),
-        ));
+        )
+        .about("modes"));
     }
-    case.model().map_err(ApiError::of)
+    Ok(case.model()?)
 }

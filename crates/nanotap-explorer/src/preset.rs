@@ -5,15 +5,15 @@ use std::sync::{Arc, OnceLock};
 
 use axum::Json;
 use axum::extract::State;
-use nanotap::case::Case;
 use nanotap::case::file::{self, Source};
+use nanotap::case::{Case, Key};
 use nanotap::control::Control;
 use nanotap::study::setpoint::at_setpoint;
 use serde::Deserialize;
 use serde_json::{Value, json};
 
 use crate::App;
-use crate::api_error::ApiError;
+use crate::api_error::{ApiError, key_of};
 
 /// A case to start from.
 #[derive(Clone, Debug)]
@@ -41,6 +41,60 @@ impl Preset {
 /// The built-in cases: name, description, text, changes.
 const BUILT_IN: [(&str, &str, &str, &[&str]); 13] = [
     (
+        "dmt",
+        "DMT forces, in air",
+        include_str!("../cases/dforce-dmt.toml"),
+        &[],
+    ),
+    (
+        "bistable",
+        "Two states in attraction and repulsion",
+        include_str!("../cases/bistable-lever.toml"),
+        &[],
+    ),
+    (
+        "stiff-lever",
+        "NCHR-class lever: two branches",
+        include_str!("../cases/stiff-lever.toml"),
+        &[],
+    ),
+    (
+        "fm-lever",
+        "FM-class lever on polystyrene",
+        include_str!("../cases/fm-polystyrene.toml"),
+        &[],
+    ),
+    (
+        "two-modes",
+        "Two modes of a lever",
+        include_str!("../cases/two-modes.toml"),
+        &[],
+    ),
+    (
+        "hertz",
+        "Hertz contact, in air",
+        include_str!("../cases/dforce-hertz.toml"),
+        &[],
+    ),
+    (
+        "soft-sample",
+        "Lever on a soft sample",
+        include_str!("../cases/soft-sample.toml"),
+        &[],
+    ),
+    (
+        "capillary",
+        "A capillary bridge",
+        include_str!("../cases/capillary-bridge.toml"),
+        &[],
+    ),
+    (
+        "liquid",
+        "Kelvin–Voigt sample in a liquid",
+        include_str!("../cases/liquid-kelvin-voigt.toml"),
+        &[],
+    ),
+    (
         "paper",
         "The paper's case at Ω = 3",
         include_str!("../cases/paper.toml"),
@@ -57,60 +111,6 @@ const BUILT_IN: [(&str, &str, &str, &[&str]); 13] = [
         "No tip mass at Ω = 20: periods 1 and 4",
         include_str!("../cases/paper.toml"),
         &["omega=20", "alpha1=0"],
-    ),
-    (
-        "fm-lever",
-        "FM-class lever on polystyrene",
-        include_str!("../cases/fm-polystyrene.toml"),
-        &[],
-    ),
-    (
-        "stiff-lever",
-        "NCHR-class lever: two branches",
-        include_str!("../cases/stiff-lever.toml"),
-        &[],
-    ),
-    (
-        "soft-sample",
-        "Lever on a soft sample",
-        include_str!("../cases/soft-sample.toml"),
-        &[],
-    ),
-    (
-        "two-modes",
-        "Two modes of a lever",
-        include_str!("../cases/two-modes.toml"),
-        &[],
-    ),
-    (
-        "dmt",
-        "DMT forces, in air",
-        include_str!("../cases/dforce-dmt.toml"),
-        &[],
-    ),
-    (
-        "hertz",
-        "Hertz contact, in air",
-        include_str!("../cases/dforce-hertz.toml"),
-        &[],
-    ),
-    (
-        "bistable",
-        "Two states in attraction and repulsion",
-        include_str!("../cases/bistable-lever.toml"),
-        &[],
-    ),
-    (
-        "capillary",
-        "A capillary bridge",
-        include_str!("../cases/capillary-bridge.toml"),
-        &[],
-    ),
-    (
-        "liquid",
-        "Kelvin–Voigt sample in a liquid",
-        include_str!("../cases/liquid-kelvin-voigt.toml"),
-        &[],
     ),
     (
         "impact",
@@ -172,13 +172,16 @@ impl CaseSpec {
 
     /// The changes to the preset's text, each key once.
     pub(crate) fn words(&self, preset: &Preset) -> Vec<String> {
-        let key = |word: &String| word.split('=').next().unwrap_or_default().trim().to_owned();
-        let mut words: Vec<String> = preset
-            .set
-            .iter()
-            .filter(|word| !self.set.iter().any(|later| key(later) == key(word)))
-            .cloned()
-            .collect();
+        // A word replaces those of the preset about its key and about what says the same.
+        let replaces = |later: &String, word: &String| {
+            let same = Key::find(key_of(later)).is_some_and(|key| {
+                let mut others = key.alternatives();
+                others.any(|(other, _)| other.path() == key_of(word))
+            });
+            same && !later.trim_end().ends_with('=') || key_of(later) == key_of(word)
+        };
+        let kept = |word: &&String| !self.set.iter().any(|later| replaces(later, word));
+        let mut words: Vec<String> = preset.set.iter().filter(kept).cloned().collect();
         words.extend(self.set.iter().cloned());
         words
     }
@@ -186,7 +189,7 @@ impl CaseSpec {
     /// The case, checked as at the terminal, without solving for the distance of a setpoint.
     pub(crate) fn any_distance(&self, app: &App) -> Result<Case, ApiError> {
         let preset = self.preset(app)?;
-        let case = Case::parse(Some(preset.source()), &self.words(preset)).map_err(ApiError::of)?;
+        let case = Case::parse(Some(preset.source()), &self.words(preset))?;
         let changes: Vec<String> = self.set.iter().map(|word| changed(word)).collect();
         Ok(if changes.is_empty() {
             case.called(&preset.words)
@@ -202,7 +205,18 @@ impl CaseSpec {
 
     fn at_setpoint(&self, app: &App, control: &Control<'_>) -> Result<Case, ApiError> {
         let solved = at_setpoint(self.any_distance(app)?, control);
-        Ok(solved.map_err(ApiError::of)?.0)
+        let about = |error: nanotap::Error| ApiError::of(error).about(Key::DriveSetpoint.path());
+        Ok(solved.map_err(about)?.0)
+    }
+
+    /// The case with one more change, if it has a model.
+    pub(crate) fn with_word(&self, app: &App, word: String) -> Option<Case> {
+        let preset = self.preset(app).ok()?;
+        let mut changed = self.clone();
+        changed.set.retain(|other| key_of(other) != key_of(&word));
+        changed.set.push(word);
+        let case = Case::parse(Some(preset.source()), &changed.words(preset)).ok()?;
+        case.model().is_ok().then_some(case)
     }
 
     /// The case of the preset, without changes; its motions end once `control` cancels the work.
@@ -235,7 +249,15 @@ pub(crate) async fn about(State(app): State<Arc<App>>) -> Json<Value> {
     let presets: Vec<Value> = app
         .presets
         .iter()
-        .map(|preset| json!({ "name": preset.name, "words": preset.words }))
+        .map(|preset| {
+            let physical = preset.text.contains("[cantilever]");
+            let group = match preset.name.as_str() {
+                "file" => "Your case",
+                _ if physical => "Levers",
+                _ => "Numbers of the equations",
+            };
+            json!({ "name": preset.name, "words": preset.words, "group": group })
+        })
         .collect();
     Json(json!({ "version": env!("CARGO_PKG_VERSION"), "presets": presets }))
 }

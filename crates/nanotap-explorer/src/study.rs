@@ -20,7 +20,7 @@ use nanotap::study::branch::{BranchReport, BranchStudy};
 use nanotap::study::registry::{Study, study as study_named};
 use nanotap::study::request::read;
 use nanotap::study::sweep::Over;
-use nanotap_figures::Figure;
+use nanotap_figures::{Axis as Axes, Figure, Panel};
 use serde::Deserialize;
 use serde_json::{Map, Value, json};
 
@@ -231,10 +231,12 @@ impl Studied<'_> {
                 let near = clicks::in_sweep(store, x, &heights, response).map_err(ApiError::of)?;
                 Ok((figure, near))
             })?;
+            let heights = clicks::of_heights(&Height::of(&figure, names), &case.units());
+            let fixed = clicks::fixed(&case, &[over.key]);
             let hand = |figure: &Figure, near: &[Value], words, studies: &[Computed<'_>]| {
                 self.hand(&Stage {
                     figure: figure.clone(),
-                    clicks: &json!({ "set": { "x": x.json() }, "near": near }),
+                    clicks: &json!({ "set": { "x": x.json() }, "near": near, "fixed": fixed, "heights": heights }),
                     words,
                     studies,
                 })
@@ -249,9 +251,9 @@ impl Studied<'_> {
                 return Ok(());
             }
             let (report, followed) = self.followed(&case, &over, OVERLAID)?;
-            let heights = Height::of(&figure, names);
-            clicks::drawn_over(&mut figure, &report, x, &heights, &case.units());
-            near.extend(clicks::on_branches(&report, x, &heights, &case.units()));
+            let followed_heights = Height::of(&figure, names);
+            clicks::drawn_over(&mut figure, &report, x, &followed_heights, &case.units());
+            near.extend(clicks::on_branches(&report, x, &followed_heights, &case.units()));
             let orbits = report.points.len();
             let words = format!("{count} values and {orbits} orbits on branches");
             hand(&figure, &near, words, &[swept, ("branch", &followed)])
@@ -269,12 +271,13 @@ impl Studied<'_> {
                 json!({ "over": texts, "periods": RECORDED, "strobe": 1, "starts": STARTS.1 }),
             );
             let [x, y] = [&over[0].1, &over[1].1].map(|over| Axis::of(over).json());
+            let fixed = clicks::fixed(&case, &[over[0].1.key, over[1].1.key]);
             let figure = self.dataset(&case, "sweep", &options, |store| {
                 maps::figure(store, shows.unwrap_or_default()).map_err(ApiError::of)
             })?;
             self.hand(&Stage {
                 figure,
-                clicks: &json!({ "set": { "x": x, "y": y } }),
+                clicks: &json!({ "set": { "x": x, "y": y }, "fixed": fixed }),
                 words: progress(count.pow(2), finest.pow(2), "values"),
                 studies: &[("sweep", &options)],
             })
@@ -320,7 +323,12 @@ impl Studied<'_> {
             let near = clicks::on_branches(&report, axis, &heights, &case.units());
             self.hand(&Stage {
                 figure,
-                clicks: &json!({ "set": { "x": axis.json() }, "near": near }),
+                clicks: &json!({
+                    "set": { "x": axis.json() },
+                    "near": near,
+                    "heights": clicks::of_heights(&heights, &case.units()),
+                    "fixed": clicks::fixed(&case, &[over.key]),
+                }),
                 words: progress(values, finest, "censuses"),
                 studies: &[("branch", &options)],
             })
@@ -355,7 +363,12 @@ impl Studied<'_> {
             let near = clicks::of_approach(&report, factor, &heights, &units);
             self.hand(&Stage {
                 figure,
-                clicks: &json!({ "set": { "x": axis.json() }, "near": near }),
+                clicks: &json!({
+                    "set": { "x": axis.json() },
+                    "near": near,
+                    "heights": clicks::of_heights(&heights, &case.units()),
+                    "fixed": clicks::fixed(&case, &[axis.key]),
+                }),
                 words: progress(points, finest, "distances each way"),
                 studies: &[("approach", &options)],
             })
@@ -384,17 +397,24 @@ impl Studied<'_> {
                 .iter()
                 .enumerate()
                 .map(|(k, name)| match name {
-                    name if *name == x => json!("x"),
-                    name if *name == y => json!("y"),
+                    name if *name == x => json!({ "axis": "x" }),
+                    name if *name == y => json!({ "axis": "y" }),
                     _ => json!(origin.as_ref().and_then(|s| s.get(k)).unwrap_or(&0.0)),
                 })
                 .collect();
             let figure = self.dataset(&case, "basin", &options, |store| {
                 basin_figure(store).map_err(ApiError::of)
             })?;
+            let panel = figure.panels.first();
+            let factor = |name: &str, axis: fn(&Panel) -> &Axes| {
+                panel.map_or(1.0, |panel| {
+                    clicks::of_entry(&case.units(), name, axis(panel))
+                })
+            };
+            let factors = json!({ "x": factor(&x, |p| &p.x), "y": factor(&y, |p| &p.y) });
             self.hand(&Stage {
                 figure,
-                clicks: &json!({ "start": start }),
+                clicks: &json!({ "start": start, "factors": factors }),
                 words: progress(count, finest, "points each way"),
                 studies: &[("basin", &options)],
             })

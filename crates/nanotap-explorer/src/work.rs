@@ -1,7 +1,8 @@
 //! Computations for requests: on separate threads, few at a time, and cancelled when the client
 //! disconnects.
 
-use std::sync::Arc;
+use std::collections::VecDeque;
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
 use axum::body::Body;
@@ -14,8 +15,10 @@ use tokio_stream::wrappers::ReceiverStream;
 
 use crate::api_error::ApiError;
 
-/// Number of motions computed at once.
-const MOTIONS: usize = 2;
+/// Number of motions computed at once: a newer one stops the oldest.
+const MOTIONS: usize = 6;
+/// Number of threads for them: those that were stopped need a moment.
+const MOTION_THREADS: usize = 4 * MOTIONS;
 /// Number of studies computed at once; each uses all cores.
 const STUDIES: usize = 2;
 /// Longest time of a computation.
@@ -23,16 +26,19 @@ const LONGEST: Duration = Duration::from_secs(300);
 /// Number of messages that may wait for a slow client; a study has fewer stages.
 const WAITING: usize = 64;
 
-/// Limits of the computations: a long study does not delay motions.
+/// Limits of the computations: a long study does not delay motions, nor does a slow motion.
 pub(crate) struct Workers {
     motions: Arc<Semaphore>,
+    /// The flags of the running motions, the oldest first.
+    running: Arc<Mutex<VecDeque<Arc<CancelFlag>>>>,
     studies: Arc<Semaphore>,
 }
 
 impl Default for Workers {
     fn default() -> Self {
         Self {
-            motions: Arc::new(Semaphore::new(MOTIONS)),
+            motions: Arc::new(Semaphore::new(MOTION_THREADS)),
+            running: Arc::default(),
             studies: Arc::new(Semaphore::new(STUDIES)),
         }
     }
@@ -44,6 +50,16 @@ struct StopOnDrop(CancelFlag);
 impl Drop for StopOnDrop {
     fn drop(&mut self) {
         self.0.cancel();
+    }
+}
+
+/// Takes a motion off the list of those that run, when dropped.
+struct Done(Arc<Mutex<VecDeque<Arc<CancelFlag>>>>, Arc<CancelFlag>);
+
+impl Drop for Done {
+    fn drop(&mut self) {
+        let mut running = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        running.retain(|other| !Arc::ptr_eq(other, &self.1));
     }
 }
 
@@ -60,7 +76,24 @@ impl Workers {
         &self,
         work: impl FnOnce(&Control<'_>) -> Result<T, ApiError> + Send + 'static,
     ) -> Result<T, ApiError> {
-        Self::run_in(&self.motions, work).await
+        let own = Arc::new(CancelFlag::new());
+        {
+            let mut running = self.running.lock().unwrap_or_else(PoisonError::into_inner);
+            running.push_back(Arc::clone(&own));
+            if running.len() > MOTIONS
+                && let Some(oldest) = running.pop_front()
+            {
+                oldest.cancel();
+            }
+        }
+        let _done = Done(Arc::clone(&self.running), Arc::clone(&own));
+        let answer = Self::run_in(&self.motions, (*own).clone(), work).await;
+        match answer {
+            Err(error) if error.is_stopped() => Err(ApiError::failed(format!(
+                "stopped: {MOTIONS} newer motions were requested, from other pages perhaps"
+            ))),
+            answer => answer,
+        }
     }
 
     /// Runs `work` that may take long, within the limit of the studies.
@@ -68,15 +101,15 @@ impl Workers {
         &self,
         work: impl FnOnce(&Control<'_>) -> Result<T, ApiError> + Send + 'static,
     ) -> Result<T, ApiError> {
-        Self::run_in(&self.studies, work).await
+        Self::run_in(&self.studies, CancelFlag::new(), work).await
     }
 
     async fn run_in<T: Send + 'static>(
         places: &Arc<Semaphore>,
+        stop: CancelFlag,
         work: impl FnOnce(&Control<'_>) -> Result<T, ApiError> + Send + 'static,
     ) -> Result<T, ApiError> {
         let place = Arc::clone(places).acquire_owned().await;
-        let stop = CancelFlag::new();
         let _guard = StopOnDrop(stop.clone());
         let task = tokio::task::spawn_blocking(move || {
             let _place = place;

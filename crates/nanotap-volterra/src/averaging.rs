@@ -77,8 +77,12 @@ struct Average {
 }
 
 impl<'a> Averaging<'a> {
-    /// `None` without a drive that moves the gap, or where a mode has no response.
+    /// `None` without a drive that moves the gap, where a mode has no response, and of a surface that
+    /// relaxes.
     fn new(system: &'a System) -> Option<Self> {
+        if system.law().surface().is_some() {
+            return None;
+        }
         let tones = system.drive().tones.iter().zip(&system.gap_tones);
         let (tone, drive) = tones.max_by(|a, b| a.1.modulus().total_cmp(&b.1.modulus()))?;
         let unit = |frequency| {

@@ -368,6 +368,9 @@ impl Tables {
                 needed: "positive and finite",
             });
         }
+        if system.law().surface().is_some() {
+            return Err(VolterraError::Relaxing);
+        }
         let kernel = system.kernel();
         let blocks = kernel.modes().blocks();
         let parts = |v: &[f64]| -> Vec<[f64; 2]> {

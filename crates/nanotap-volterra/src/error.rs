@@ -74,6 +74,23 @@ pub enum VolterraError {
         /// Why not.
         reason: &'static str,
     },
+    /// The approximate flow has no surface that relaxes.
+    #[error("the approximate flow does not follow a surface that relaxes")]
+    Relaxing,
+    /// Maxwell arms that make no sense.
+    #[error("arm {arm} of the relaxing sample: {reason}")]
+    Arms {
+        /// Counted from 1.
+        arm: usize,
+        /// What is wrong there.
+        reason: &'static str,
+    },
+    /// A solid without a modulus at rest.
+    #[error(
+        "the sample relaxes to nothing: give it a modulus at rest above zero, or a horizon beyond \
+         which its slower arms count as elastic"
+    )]
+    Flows,
     /// A table of a force is no function.
     #[error("row {row} of the force table: {reason}")]
     Table {

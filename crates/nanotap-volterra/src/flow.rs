@@ -92,6 +92,9 @@ pub struct Flow {
     reached: bool,
     /// Length numbers that were accepted last on each branch.
     hints: Vec<usize>,
+    /// Those of the first steps after a switch, where contact begins and ends on a moving surface: the
+    /// last steps before may be so short that rounding hides the gap.
+    first_hints: Vec<usize>,
     work: Work,
     /// Cost of work that clones did.
     added_cost: u64,
@@ -114,6 +117,7 @@ impl Clone for Flow {
             has_pending: self.has_pending,
             reached: self.reached,
             hints: self.hints.clone(),
+            first_hints: self.first_hints.clone(),
             work: self.work.clone(),
             added_cost: self.added_cost,
         }
@@ -166,6 +170,7 @@ impl Flow {
             has_pending: false,
             reached: false,
             hints: vec![FIRST_INDEX; system.law().branches()],
+            first_hints: vec![FIRST_INDEX; system.law().branches()],
             work: Work {
                 values: zeros.clone(),
                 series: zeros.clone(),
@@ -244,14 +249,17 @@ impl Flow {
                 needed: "finite",
             });
         }
+        self.put(x, time, self.system.branch_at(time, x));
+        Ok(())
+    }
+
+    fn put(&mut self, x: &[f64], time: f64, branch: usize) {
         self.time = time;
+        self.branch = branch;
         self.system.to_modal(time, x, &mut self.modal);
-        let (gap, rate) = self.system.gap_of(time, &self.modal);
-        self.branch = self.system.law().branch_at(gap, rate);
         self.pinned = None;
         self.onset = None;
         self.has_pending = false;
-        Ok(())
     }
 
     /// As [`Flow::start`], on a branch that the law remembers.
@@ -268,7 +276,7 @@ impl Flow {
             });
         }
         self.start(x, time)?;
-        self.branch = branch;
+        self.put(x, time, branch);
         Ok(())
     }
 
@@ -318,6 +326,7 @@ impl Flow {
         }
         // The same start gives the same motion, whatever was run before.
         self.hints.fill(FIRST_INDEX);
+        self.first_hints.fill(FIRST_INDEX);
         let most = system.options().max_steps;
         let mut at_once = (self.time, 0);
         for count in 0.. {
@@ -377,7 +386,12 @@ impl Flow {
             Some(Approach::ThreeHalves) => (TimeMap::Start, false),
             Some(Approach::Half) => (TimeMap::Start, true),
         };
-        let mut index = self.hints[self.branch];
+        let first = self.onset.is_some() && !system.second_is_rate();
+        let mut index = if first {
+            self.first_hints[self.branch]
+        } else {
+            self.hints[self.branch]
+        };
         let mut refused = false;
         loop {
             if index >= LENGTHS {
@@ -389,6 +403,9 @@ impl Flow {
                 Attempt::Whole(growth) => {
                     let growth = if refused { 0 } else { growth };
                     self.hints[self.branch] = index.saturating_sub(growth);
+                    if first {
+                        self.first_hints[self.branch] = self.hints[self.branch];
+                    }
                     self.accept(system, end, observer)?;
                     return Ok(None);
                 }
@@ -505,9 +522,11 @@ impl Flow {
             }
             return Attempt::Shorter(next, Refusal::Unresolved);
         }
+        let branch = self.branch;
         let (map, slopes) = (self.step.map, perturbs.then(|| self.step.slopes()));
-        let resolves =
-            |index: usize| slopes.is_none_or(|slopes| system.kernel().resolves(map, index, slopes));
+        let resolves = |index: usize| {
+            slopes.is_none_or(|slopes| system.kernel_on(branch).resolves(map, index, slopes))
+        };
         if !resolves(index) {
             let next = (index + 1..LENGTHS).find(|&next| resolves(next));
             return Attempt::Shorter(next.unwrap_or(LENGTHS), Refusal::Unresolved);
@@ -626,7 +645,7 @@ impl Flow {
                     break;
                 }
                 let time_shift = self.step.time(next) - time;
-                let kernel = system.kernel();
+                let kernel = system.kernel_on(self.branch);
                 if kernel.along_tangent(time_shift) {
                     let force = self.step.force_at(self.step.end);
                     kernel.modes().apply(&self.modal, &mut self.work.modal);
@@ -752,7 +771,14 @@ impl Flow {
             self.guard_values(system, exit, n);
             let size = crate::step::largest(&self.work.values);
             self.guard_series(system);
-            if fresh && self.work.values[0].abs() <= 1e-9 * size {
+            // On a moving surface no switch pins the gap.
+            let zero = match exit.guard {
+                Guard::Own(index) if fresh && !system.second_is_rate() => {
+                    self.own_rounding(system, index)
+                }
+                _ => 0.0,
+            };
+            if fresh && self.work.values[0].abs() <= zero.max(1e-9 * size) {
                 self.deflate(system);
             }
             let c = &self.work.series;
@@ -761,18 +787,14 @@ impl Flow {
             if c[0] > rest + 10.0 * tail + self.unresolved(system, exit) {
                 continue;
             }
-            let (gap, rate) = gap_scale(system, &self.step.modal);
             let rounding = match exit.guard {
                 // After division by the time since the switch, rounding weighs more near it.
                 _ if fresh => RESOLVED_FRESH * (c[0].abs() + rest),
-                Guard::Falls(_) | Guard::Rises(_) => ROUNDING * gap,
-                Guard::Turns => ROUNDING * rate,
-                // A guard of the law's own is a difference of what gap and rate make.
-                Guard::Own(index) => {
-                    let (at, moving) = (self.step.gap[0], self.step.rate[0]);
-                    let own = system.law().guard(index, at, moving);
-                    ROUNDING * (own.by_gap.abs() * gap + own.by_rate.abs() * rate)
+                Guard::Falls(_) | Guard::Rises(_) => {
+                    ROUNDING * gap_scale(system, &self.step.modal).0
                 }
+                Guard::Turns => ROUNDING * gap_scale(system, &self.step.modal).1,
+                Guard::Own(index) => self.own_rounding(system, index),
             };
             if tail > rounding.max(RESOLVED * (c[0].abs() + rest)) {
                 return Err(Refusal::Switch);
@@ -784,6 +806,15 @@ impl Flow {
             }
         }
         Ok(found)
+    }
+
+    /// What is rounding in a guard of the law's own: a difference of what gap and rate make.
+    fn own_rounding(&self, system: &System, index: usize) -> f64 {
+        let (gap, rate) = gap_scale(system, &self.step.modal);
+        let own = system
+            .law()
+            .guard(index, self.step.gap[0], self.step.rate[0]);
+        ROUNDING * (own.by_gap.abs() * gap + own.by_rate.abs() * rate)
     }
 
     /// Divides a guard that starts at zero by the time since, and takes its series again.

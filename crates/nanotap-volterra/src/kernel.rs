@@ -37,6 +37,10 @@ const TANGENT: f64 = 3e-9;
 const PERTURBATION: f64 = 1e-13;
 /// Larger than the strength of any coupling on a step: steeper forces are refused.
 const STRONGEST: f64 = 1e3;
+/// Time times a decay's rate beyond which the short rule does not resolve it.
+const SHORT_DECAY: f64 = 0.5;
+/// Times a decay's rate after which nothing is left in double precision.
+const FORGOTTEN: f64 = 50.0;
 /// How far a mode may turn or decay within one panel.
 const PANEL_REACH: f64 = 8.0;
 
@@ -93,6 +97,11 @@ pub struct Kernel {
     pub(crate) readout: Vec<f64>,
     /// `row · R B`.
     pub(crate) rate_readout: Vec<f64>,
+    /// The row of the law's second argument: `rate_readout`, or the depth of a surface that
+    /// relaxes.
+    pub(crate) second_readout: Vec<f64>,
+    /// Number of coordinates at the end that are the surface's.
+    surface: usize,
     /// `L p`.
     pub(crate) source: Vec<f64>,
     row: RowDVector<f64>,
@@ -127,11 +136,11 @@ pub(crate) struct Table {
     pub(crate) times: Vec<f64>,
     /// Gap at the points from the modal coordinates at the start, points × dimension.
     pub(crate) gap: Vec<f64>,
-    /// Its rate.
+    /// The law's second argument, the gap's rate or the depth of the surface.
     pub(crate) rate: Vec<f64>,
     /// Gap at the points from the forces at the nodes, points × nodes.
     pub(crate) gap_force: Vec<f64>,
-    /// Its rate.
+    /// The law's second argument.
     pub(crate) rate_force: Vec<f64>,
     /// Force at the check points from the forces at the nodes, checks × nodes.
     pub(crate) between: Vec<f64>,
@@ -141,7 +150,7 @@ pub(crate) struct Table {
     pub(crate) exponentials: Vec<[[f64; 2]; 2]>,
     /// Gap at the points from a constant unit force.
     pub(crate) gap_unit: Vec<f64>,
-    /// Its rate.
+    /// The law's second argument.
     pub(crate) rate_unit: Vec<f64>,
     /// Sums of the sizes in the rows of `gap_force`, at the nodes.
     pub(crate) gap_sums: Vec<f64>,
@@ -313,6 +322,32 @@ impl Kernel {
         longest: f64,
         nodes: usize,
     ) -> Result<Arc<Self>, VolterraError> {
+        Self::with_surface(modes, row, column, longest, nodes, 0)
+    }
+
+    /// The same lever over a surface whose modes decay at `rates` and grow with the force at
+    /// `gains`; their sum is the second argument of the law.
+    pub(crate) fn over_surface(
+        &self,
+        rates: &[f64],
+        gains: &[f64],
+    ) -> Result<Arc<Self>, VolterraError> {
+        let (n, count) = (self.modes.dimension(), rates.len());
+        let row = self.row.clone().resize_horizontally(n + count, 0.0);
+        let mut column = self.column.clone().resize_vertically(n + count, 0.0);
+        column.rows_mut(n, count).copy_from_slice(gains);
+        let modes = self.modes.with_decays(rates)?;
+        Self::with_surface(modes, row, column, self.longest, self.nodes, count)
+    }
+
+    fn with_surface(
+        modes: Modes,
+        row: RowDVector<f64>,
+        column: DVector<f64>,
+        longest: f64,
+        nodes: usize,
+        surface: usize,
+    ) -> Result<Arc<Self>, VolterraError> {
         let n = modes.dimension();
         for (what, found) in [
             ("the row of the gap", row.len()),
@@ -368,7 +403,13 @@ impl Kernel {
                 }
             }
         }
-        let couplings = couplings(&modes, &readout, &rate_readout, &source);
+        let second_readout = if surface == 0 {
+            rate_readout.clone()
+        } else {
+            let of_surface = |k: usize| if k + surface < n { 0.0 } else { 1.0 };
+            (0..n).map(of_surface).collect()
+        };
+        let couplings = couplings(&modes, &readout, &second_readout, &source);
         let direct: f64 = readout.iter().zip(&source).map(|(r, b)| r * b).sum();
         if direct.abs() > 1e-9 * reach {
             return Err(VolterraError::Inertialess);
@@ -384,6 +425,8 @@ impl Kernel {
             modes,
             readout,
             rate_readout,
+            second_readout,
+            surface,
             source,
             row,
             column,
@@ -426,6 +469,11 @@ impl Kernel {
     /// The column of the force.
     pub fn column(&self) -> &DVector<f64> {
         &self.column
+    }
+
+    /// Number of coordinates at the end of the state that are the surface's.
+    pub const fn surface(&self) -> usize {
+        self.surface
     }
 
     /// Whether the modal coordinates follow their tangent to rounding for this time.
@@ -510,14 +558,14 @@ impl Kernel {
                 for j in 0..block.size {
                     for k in 0..block.size {
                         table.gap[(s + j) * rows + i] += self.readout[s + k] * e[k][j];
-                        table.rate[(s + j) * rows + i] += self.rate_readout[s + k] * e[k][j];
+                        table.rate[(s + j) * rows + i] += self.second_readout[s + k] * e[k][j];
                     }
                 }
                 self.moments(block, map, h, u, &mut moments);
                 for (j, moment) in moments.iter().enumerate() {
                     for k in 0..block.size {
                         of_gap[j] += self.readout[s + k] * moment[k];
-                        of_rate[j] += self.rate_readout[s + k] * moment[k];
+                        of_rate[j] += self.second_readout[s + k] * moment[k];
                     }
                 }
                 if i + 1 == n {
@@ -562,6 +610,25 @@ impl Kernel {
         ((block.rate() * fastest / PANEL_REACH).ceil() as usize).max(1)
     }
 
+    /// The first panel of these whose force a decaying coordinate still knows at their end.
+    fn first_panel(block: &Block, map: TimeMap, h: f64, width: f64, panels: usize) -> usize {
+        let rate = block.matrix[0][0];
+        if block.size == 2 || rate >= 0.0 {
+            return 0;
+        }
+        let time = |panel: usize| map.time(h, width * panel as f64);
+        let (end, mut low, mut high) = (time(panels), 0, panels - 1);
+        while low < high {
+            let middle = usize::midpoint(low, high);
+            if -rate * (end - time(middle + 1)) > FORGOTTEN {
+                low = middle + 1;
+            } else {
+                high = middle;
+            }
+        }
+        low
+    }
+
     /// `∫₀^{t(u)} e^{B(t(u) − s)} b T_j(s) ds` of one block for all `j`, in `out`.
     pub(crate) fn moments(
         &self,
@@ -580,7 +647,7 @@ impl Kernel {
         let source = self.source_of(block);
         let mut sums = [[0.0; 2]; MAX_NODES];
         let sums = &mut sums[..out.len()];
-        for panel in 0..panels {
+        for panel in Self::first_panel(block, map, h, width, panels)..panels {
             let ends = [width * panel as f64, width * (panel + 1) as f64];
             let panel = Panel::new(&self.panel, map, h, ends);
             panel.moments(block, sums);
@@ -617,15 +684,18 @@ impl Kernel {
         let end = map.time(h, u);
         // The panels of the block before, with the force on them times the weights.
         let mut panels: Vec<(Panel<PANEL_POINTS>, [f64; PANEL_POINTS])> = Vec::new();
+        let mut range = 0..0;
         for block in self.modes.blocks() {
             let s = block.start;
             let e = block.exp(end);
             let mut value = applied(e, &y[s..s + block.size]);
             let needed = Self::panels(block, map, h, u);
-            if needed != panels.len() {
-                let width = u / needed as f64;
+            let width = u / needed as f64;
+            let first = Self::first_panel(block, map, h, width, needed);
+            if range != (first..needed) {
+                range = first..needed;
                 panels.clear();
-                panels.extend((0..needed).map(|panel| {
+                panels.extend(range.clone().map(|panel| {
                     let ends = [width * panel as f64, width * (panel + 1) as f64];
                     let panel = Panel::new(&self.panel, map, h, ends);
                     let weighted = panel.weighted(coefficients);
@@ -672,6 +742,14 @@ impl Kernel {
         }
         for block in self.modes.blocks() {
             let e = block.exp(time);
+            if block.size == 1 && -block.matrix[0][0] * time > SHORT_DECAY {
+                let columns = y.chunks_exact_mut(self.modes.dimension());
+                for (y, column) in columns.zip(coefficients.chunks_exact(self.nodes)) {
+                    let own = &mut y[block.start];
+                    *own = e[0][0] * *own + self.decayed(block, map, h, [from, to], column);
+                }
+                continue;
+            }
             let (even, odd) = if forces.is_empty() {
                 ([0.0; SHORT_POINTS], [0.0; SHORT_POINTS])
             } else {
@@ -690,6 +768,33 @@ impl Kernel {
                 y.copy_from_slice(&value[..block.size]);
             }
         }
+    }
+
+    /// What the force between two places of a step leaves in a coordinate that decays.
+    fn decayed(
+        &self,
+        block: &Block,
+        map: TimeMap,
+        h: f64,
+        [from, to]: [f64; 2],
+        coefficients: &[f64],
+    ) -> f64 {
+        let rate = -block.matrix[0][0];
+        let end = map.time(h, to);
+        let start = map.time(h, from).max(end - FORGOTTEN / rate);
+        let panels = (rate * (end - start) / PANEL_REACH).ceil().max(1.0) as usize;
+        let place = |k: usize| {
+            let time = start + (end - start) * k as f64 / panels as f64;
+            map.variable(h, time)
+        };
+        (0..panels)
+            .map(|k| {
+                let ends = [place(k), if k + 1 == panels { to } else { place(k + 1) }];
+                let panel = Panel::new(&self.panel, map, h, ends);
+                let [sum, _] = panel.response(block, &panel.weighted(coefficients));
+                sum * self.source[block.start] * block.exp(end - panel.end)[0][0]
+            })
+            .sum()
     }
 
     /// `∂y(u)/∂forces` (dimension × nodes, column-major) of a step cut at `u`.

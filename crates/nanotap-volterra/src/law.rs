@@ -2,6 +2,7 @@
 //! function of the gap and its rate, and exits between them.
 
 use std::fmt::Debug;
+use std::sync::Arc;
 
 /// A value with its derivatives by the gap and by the gap's rate.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -84,6 +85,21 @@ pub struct Remark {
     pub limit: f64,
 }
 
+/// The surface of a sample that relaxes, as decaying coordinates `η̇ = −rate η + gain F_s` that the
+/// tip's force `F_s` on the surface drives in contact. Their sum is the surface's depth to the
+/// power of the contact law, and takes the place of the gap's rate in the law.
+#[derive(Clone, Debug)]
+pub struct Surface {
+    /// Rates of recovery.
+    pub rates: Vec<f64>,
+    /// Growth for a unit of force.
+    pub gains: Vec<f64>,
+    /// The constant part of the force in contact that does not act on the surface.
+    pub adhesion: f64,
+    /// The law of the surface at rest, when it has relaxed.
+    pub relaxed: Arc<dyn ForceLaw>,
+}
+
 /// A scalar force of a gap and its rate, repulsive positive.
 pub trait ForceLaw: Debug + Send + Sync {
     /// Names of the parameters that the law can be differentiated by.
@@ -160,6 +176,19 @@ pub trait ForceLaw: Debug + Send + Sync {
     /// Whether tip and sample touch on a branch: of most laws all but the first.
     fn touches(&self, branch: usize) -> bool {
         branch > 0
+    }
+
+    /// The surface, if it relaxes: the second argument of force and guards is then its depth to the
+    /// power of the contact law, in place of the gap's rate.
+    fn surface(&self) -> Option<&Surface> {
+        None
+    }
+
+    /// The same law with an attraction across the gap to its surface, if it can have one; of laws
+    /// with a surface of their own.
+    fn with_attraction(&self, law: &Arc<dyn ForceLaw>) -> Option<Arc<dyn ForceLaw>> {
+        let _ = law;
+        None
     }
 
     /// Whether the law has a memory: gap and rate do not determine the branch.

@@ -92,8 +92,8 @@
 //! # Ok::<(), VolterraError>(())
 //! ```
 //!
-//! Continuous memory that is linear in the state belongs into the modes; a law may remember a
-//! branch.
+//! Continuous memory that is linear in the state belongs into the modes, as that of a
+//! [`Surface`](law::Surface) that relaxes; a law may remember a branch.
 
 #![cfg_attr(
     test,
@@ -131,7 +131,7 @@ pub use error::{Refusal, VolterraError};
 pub use flow::{Flow, Switch};
 pub use force_sums::ForceSums;
 pub use kernel::Kernel;
-pub use law::{Approach, Exit, Force, ForceLaw, Guard, Remark};
+pub use law::{Approach, Exit, Force, ForceLaw, Guard, Remark, Surface};
 pub use modes::Modes;
 pub use step::Statistics;
 pub use system::{Drive, Options, System, Tone};

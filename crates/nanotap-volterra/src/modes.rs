@@ -345,6 +345,31 @@ impl Modes {
         })
     }
 
+    /// The same with coordinates `ẏ = −rate y` at the end of the state that nothing couples.
+    ///
+    /// # Errors
+    /// [`VolterraError::TooLarge`].
+    pub fn with_decays(&self, rates: &[f64]) -> Result<Self, VolterraError> {
+        let n = self.dimension();
+        let whole = n + rates.len();
+        check_size(whole)?;
+        let mut modes = Self {
+            blocks: self.blocks.clone(),
+            right: self.right.clone().resize(whole, whole, 0.0),
+            left: self.left.clone().resize(whole, whole, 0.0),
+        };
+        for (start, rate) in (n..).zip(rates) {
+            modes.right[(start, start)] = 1.0;
+            modes.left[(start, start)] = 1.0;
+            modes.blocks.push(Block {
+                start,
+                size: 1,
+                matrix: [[-rate, 0.0], [0.0, 0.0]],
+            });
+        }
+        Ok(modes)
+    }
+
     /// Dimension of the state.
     pub fn dimension(&self) -> usize {
         self.right.nrows()

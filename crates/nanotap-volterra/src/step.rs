@@ -104,7 +104,7 @@ impl Step {
 
     /// Modal coordinates at variable `u`, written to `out`.
     pub(crate) fn modal_at(&self, system: &System, u: f64, out: &mut [f64]) {
-        let kernel = system.kernel();
+        let kernel = system.kernel_on(self.branch);
         if u >= 1.0 {
             let table = kernel.table(self.map, self.index);
             advance_free(system, table, &self.modal, out);
@@ -119,6 +119,7 @@ impl Step {
                 out,
             );
         }
+        system.spare_surface(self.branch, self.map.time(self.length, u), out);
     }
 }
 
@@ -230,6 +231,10 @@ impl Solver {
         let rows = self.base_gap.len();
         self.base_gap.fill(system.gap_constant);
         self.base_rate.fill(0.0);
+        let adhesion = system.adhesion(step.branch);
+        if adhesion != 0.0 {
+            add_product(&table.rate_unit, &[-adhesion], &mut self.base_rate);
+        }
         let phasors = system.phasors(step.map, step.index);
         for (k, (tone, amplitude)) in system
             .drive()
@@ -243,7 +248,7 @@ impl Solver {
             let im = amplitude.re * sin + amplitude.im * cos;
             let phasors = &phasors[2 * k * rows..2 * (k + 1) * rows];
             add_product(phasors, &[re, -im], &mut self.base_gap);
-            if system.needs_rate {
+            if system.needs_rate && system.second_is_rate() {
                 let rate = [-tone.frequency * im, -tone.frequency * re];
                 add_product(phasors, &rate, &mut self.base_rate);
             }
@@ -421,7 +426,7 @@ impl Solver {
 
     /// Solves the step for its forces.
     pub(crate) fn solve(&mut self, system: &System, step: &mut Step) -> Result<Quality, Refusal> {
-        let table = system.kernel().table(step.map, step.index);
+        let table = system.kernel_on(step.branch).table(step.map, step.index);
         step.length = table.length;
         step.end = 1.0;
         self.free(system, table, step);
@@ -540,7 +545,7 @@ impl Solver {
         before: &Step,
         step: &mut Step,
     ) -> Result<Quality, Refusal> {
-        let kernel = system.kernel();
+        let kernel = system.kernel_on(step.branch);
         let table = kernel.table(step.map, step.index);
         step.length = table.length;
         step.end = 1.0;
@@ -630,7 +635,7 @@ impl Solver {
     /// How gap and rate at the points change as the start of the step moves along the motion,
     /// on which the force at the start is `force`.
     pub(crate) fn shift(&mut self, system: &System, table: &Table, step: &Step, force: f64) {
-        let kernel = system.kernel();
+        let kernel = system.kernel_on(step.branch);
         kernel.modes().apply(&step.modal, &mut self.slope);
         for (s, b) in self.slope.iter_mut().zip(&kernel.source) {
             *s += b * force;
@@ -645,7 +650,11 @@ impl Solver {
         for (i, time) in table.times.iter().enumerate() {
             let forced = system.forced_gap(step.start + time);
             self.shift_gap[i] = forced[1];
-            self.shift_rate[i] = forced[2];
+            self.shift_rate[i] = if system.second_is_rate() {
+                forced[2]
+            } else {
+                0.0
+            };
         }
     }
 
@@ -722,14 +731,16 @@ fn steepness(table: &Table, step: &Step) -> f64 {
     )
 }
 
-/// Bounds of the gap and its rate over the motion to come, for what rounding makes of them.
+/// Bounds of the gap and the law's second argument over the motion to come, for what rounding makes
+/// of them.
 pub(crate) fn gap_scale(system: &System, y: &[f64]) -> (f64, f64) {
     let kernel = system.kernel();
-    let [tones, mut rate] = system.gap_sizes;
+    let [tones, rate] = system.gap_sizes;
     let mut gap = system.gap_constant.abs() + tones;
+    let mut second = if system.second_is_rate() { rate } else { 0.0 };
     for (k, y) in y.iter().enumerate() {
         gap += (kernel.readout[k] * y).abs();
-        rate += (kernel.rate_readout[k] * y).abs();
+        second += (kernel.second_readout[k] * y).abs();
     }
-    (gap, rate)
+    (gap, second)
 }

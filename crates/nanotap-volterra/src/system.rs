@@ -1,7 +1,7 @@
 //! Modes, drive and law together.
 
 use crate::kernel::{Kernel, LENGTHS, TimeMap};
-use crate::law::{Exit, ForceLaw, Guard};
+use crate::law::{Exit, ForceLaw, Guard, Surface};
 use crate::{Complex, VolterraError};
 use nalgebra::DVector;
 use nanotap_arithmetic::{CancelFlag, ComplexFunctions as _};
@@ -58,6 +58,10 @@ impl Options {
 #[derive(Clone, Debug)]
 pub struct System {
     kernel: Arc<Kernel>,
+    /// The kernel and the forced response of the surface where it is free, if it relaxes.
+    free: Option<Box<FreeSurface>>,
+    /// On which branches tip and sample touch.
+    touches: Vec<bool>,
     law: Arc<dyn ForceLaw>,
     drive: Drive,
     options: Options,
@@ -79,6 +83,19 @@ pub struct System {
     phasors: Arc<[Vec<OnceLock<Phasors>>; 3]>,
     /// What ends its motions from outside.
     cancel: CancelFlag,
+}
+
+/// A surface that relaxes.
+#[derive(Clone, Debug)]
+struct FreeSurface {
+    /// The kernel with a force that acts on the lever alone.
+    kernel: Arc<Kernel>,
+    /// Without the surface.
+    lever: Arc<Kernel>,
+    rates: Vec<f64>,
+    gains: Vec<f64>,
+    /// The constant part of the force in contact that does not act on the surface.
+    adhesion: f64,
 }
 
 /// Cosines and sines of every tone at the points of a table.
@@ -133,6 +150,18 @@ impl Response {
     }
 }
 
+impl Drive {
+    /// The same of a state of `n` entries: those of a surface, at the end, are not driven.
+    fn resized(mut self, n: usize) -> Self {
+        self.constant = self.constant.resize_vertically(n, 0.0);
+        let none = Complex::new(0.0, 0.0);
+        for tone in &mut self.tones {
+            tone.forcing = std::mem::take(&mut tone.forcing).resize_vertically(n, none);
+        }
+        self
+    }
+}
+
 impl System {
     /// Joins them.
     ///
@@ -144,8 +173,80 @@ impl System {
         drive: Drive,
         options: Options,
     ) -> Result<Self, VolterraError> {
-        let n = kernel.modes().dimension();
-        check_drive(&drive, n)?;
+        check_drive(&drive, kernel.modes().dimension())?;
+        let surface = law.surface().cloned();
+        Self::over(kernel, drive, law, surface.as_ref(), options)
+    }
+
+    /// The same modes, law and options under another drive.
+    ///
+    /// # Errors
+    /// As [`System::new`].
+    pub fn driven_by(&self, drive: Drive) -> Result<Self, VolterraError> {
+        check_drive(&drive, self.dimension())?;
+        let (kernel, free) = (Arc::clone(&self.kernel), self.free.clone());
+        let system = Self::joined(kernel, free, Arc::clone(&self.law), drive, self.options)?;
+        Ok(system.cancelled_by(self.cancel.clone()))
+    }
+
+    /// The same over a surface none of whose coordinates is slower than `rate`, with the same
+    /// compliance at rest: its periodic motions are about the same, and soon reached.
+    ///
+    /// # Errors
+    /// As [`System::new`].
+    pub fn hastened(&self, rate: f64) -> Result<Self, VolterraError> {
+        let (Some(free), Some(surface)) = (&self.free, self.law.surface()) else {
+            return Ok(self.clone());
+        };
+        let mut surface = surface.clone();
+        for (own, gain) in surface.rates.iter_mut().zip(&mut surface.gains) {
+            let faster = own.max(rate);
+            *gain *= faster / *own;
+            *own = faster;
+        }
+        let lever = free.lever.modes().dimension();
+        let system = Self::over(
+            Arc::clone(&free.lever),
+            self.drive.clone().resized(lever),
+            Arc::clone(&self.law),
+            Some(&surface),
+            self.options,
+        )?;
+        Ok(system.cancelled_by(self.cancel.clone()))
+    }
+
+    /// Joins a lever with the surface, if there is one.
+    fn over(
+        lever: Arc<Kernel>,
+        drive: Drive,
+        law: Arc<dyn ForceLaw>,
+        surface: Option<&Surface>,
+        options: Options,
+    ) -> Result<Self, VolterraError> {
+        let Some(surface) = surface else {
+            return Self::joined(lever, None, law, drive, options);
+        };
+        let (rates, gains) = (&surface.rates, &surface.gains);
+        let (n, count) = (lever.modes().dimension(), rates.len());
+        let kernel = lever.over_surface(rates, gains)?;
+        let drive = drive.resized(n + count);
+        let free = FreeSurface {
+            kernel: lever.over_surface(rates, &vec![0.0; count])?,
+            lever,
+            rates: rates.clone(),
+            gains: gains.clone(),
+            adhesion: surface.adhesion,
+        };
+        Self::joined(kernel, Some(Box::new(free)), law, drive, options)
+    }
+
+    fn joined(
+        kernel: Arc<Kernel>,
+        free: Option<Box<FreeSurface>>,
+        law: Arc<dyn ForceLaw>,
+        drive: Drive,
+        options: Options,
+    ) -> Result<Self, VolterraError> {
         if !(options.tolerance > 0.0 && options.tolerance.is_finite()) {
             return Err(VolterraError::Value {
                 what: "the tolerance".into(),
@@ -185,6 +286,8 @@ impl System {
         Ok(Self {
             gap_constant: drive.offset + forced_gap,
             vanishes: (0..branches).map(|b| law.vanishes(b)).collect(),
+            touches: (0..branches).map(|b| law.touches(b)).collect(),
+            free,
             forced: response.to_state(&kernel),
             exits,
             law,
@@ -265,9 +368,62 @@ impl System {
         self.kernel.modes().dimension()
     }
 
-    /// Modes, gap and column.
+    /// Modes, gap and column; of a surface that relaxes those in contact.
     pub fn kernel(&self) -> &Arc<Kernel> {
         &self.kernel
+    }
+
+    /// The same on a branch of the law.
+    pub(crate) fn kernel_on(&self, branch: usize) -> &Arc<Kernel> {
+        match &self.free {
+            Some(free) if !self.touches[branch] => &free.kernel,
+            _ => &self.kernel,
+        }
+    }
+
+    /// The constant part of the force on a branch that does not act on the surface.
+    pub(crate) fn adhesion(&self, branch: usize) -> f64 {
+        let pressed = self.free.as_ref().filter(|_| self.touches[branch]);
+        pressed.map_or(0.0, |surface| surface.adhesion)
+    }
+
+    /// Takes from modal coordinates, reached under a force on everything after some time on a
+    /// branch, what the adhesion has done to the surface.
+    pub(crate) fn spare_surface(&self, branch: usize, time: f64, y: &mut [f64]) {
+        let adhesion = self.adhesion(branch);
+        let Some(surface) = self.free.as_ref().filter(|_| adhesion != 0.0) else {
+            return;
+        };
+        let first = y.len() - surface.rates.len();
+        let coordinates = surface.rates.iter().zip(&surface.gains);
+        for (y, (rate, gain)) in y[first..].iter_mut().zip(coordinates) {
+            *y += adhesion * gain * nanotap_arithmetic::exp_m1(-rate * time) / rate;
+        }
+    }
+
+    /// The same of the rates of modal coordinates.
+    pub(crate) fn spare_surface_rates(&self, branch: usize, slope: &mut [f64]) {
+        let adhesion = self.adhesion(branch);
+        if let Some(surface) = self.free.as_ref().filter(|_| adhesion != 0.0) {
+            let first = slope.len() - surface.gains.len();
+            for (slope, gain) in slope[first..].iter_mut().zip(&surface.gains) {
+                *slope -= adhesion * gain;
+            }
+        }
+    }
+
+    /// Whether the second argument of the law is the gap's rate.
+    pub(crate) const fn second_is_rate(&self) -> bool {
+        self.free.is_none()
+    }
+
+    /// The second argument of the law, in a state in which the gap has this rate: the depth of a
+    /// surface that relaxes, else the rate.
+    pub fn second_argument(&self, rate: f64, x: &[f64]) -> f64 {
+        match self.kernel.surface() {
+            0 => rate,
+            count => x[x.len() - count..].iter().sum(),
+        }
     }
 
     /// The law.
@@ -338,11 +494,40 @@ impl System {
         )
     }
 
+    /// The second argument of the law and its rate, at modal coordinates `y` that change like `slope`,
+    /// where the gap has this rate and acceleration.
+    pub(crate) fn second_of(
+        &self,
+        [rate, acceleration]: [f64; 2],
+        y: &[f64],
+        slope: &[f64],
+    ) -> [f64; 2] {
+        if self.second_is_rate() {
+            return [rate, acceleration];
+        }
+        let row = &self.kernel.second_readout;
+        let dot = |v: &[f64]| row.iter().zip(v).map(|(r, v)| r * v).sum::<f64>();
+        [dot(y), dot(slope)]
+    }
+
     /// The gap and its rate in state `x` at a time.
     pub fn gap(&self, time: f64, x: &[f64]) -> (f64, f64) {
         let mut y = vec![0.0; self.dimension()];
         self.to_modal(time, x, &mut y);
         self.gap_of(time, &y)
+    }
+
+    /// The motion of the free lever at a time, over an undeformed surface.
+    pub fn free_state(&self, time: f64) -> Vec<f64> {
+        let mut x = vec![0.0; self.dimension()];
+        self.write_forced(time, &mut x);
+        x
+    }
+
+    /// The branch of the law in state `x` at a time when nothing is known of the past.
+    pub fn branch_at(&self, time: f64, x: &[f64]) -> usize {
+        let (gap, rate) = self.gap(time, x);
+        self.law.branch_at(gap, self.second_argument(rate, x))
     }
 
     /// The forced response at a time, written to `x`.
@@ -386,12 +571,15 @@ impl System {
         let mut y = vec![0.0; n];
         self.to_modal(time, x, &mut y);
         let (gap, rate) = self.gap_of(time, &y);
-        let force = self.law.force(branch, gap, rate).value;
+        let second = self.second_argument(rate, x);
+        let force = self.law.force(branch, gap, second).value;
+        let kernel = self.kernel_on(branch);
         let mut slope = vec![0.0; n];
-        self.kernel.modes().apply(&y, &mut slope);
-        for (s, b) in slope.iter_mut().zip(&self.kernel.source) {
+        kernel.modes().apply(&y, &mut slope);
+        for (s, b) in slope.iter_mut().zip(&kernel.source) {
             *s += b * force;
         }
+        self.spare_surface_rates(branch, &mut slope);
         let right = self.kernel.modes().right();
         out.fill(0.0);
         for (k, s) in slope.iter().enumerate() {

@@ -318,14 +318,15 @@ impl Tangents {
         system.kernel().modes().right() * modal
     }
 
-    /// `ẏ` at modal coordinates `modal` under a force.
-    pub(crate) fn slope(system: &System, modal: &[f64], force: f64) -> Vec<f64> {
-        let kernel = system.kernel();
+    /// `ẏ` at modal coordinates `modal` under a force on a branch of the law.
+    pub(crate) fn slope(system: &System, branch: usize, modal: &[f64], force: f64) -> Vec<f64> {
+        let kernel = system.kernel_on(branch);
         let mut slope = vec![0.0; modal.len()];
         kernel.modes().apply(modal, &mut slope);
         for (s, b) in slope.iter_mut().zip(&kernel.source) {
             *s += b * force;
         }
+        system.spare_surface_rates(branch, &mut slope);
         slope
     }
 }
@@ -334,7 +335,7 @@ impl Observer for Tangents {
     const PERTURBS: bool = true;
 
     fn step(&mut self, system: &System, solver: &mut Solver, step: &Step, end: &[f64]) {
-        let kernel = system.kernel();
+        let kernel = system.kernel_on(step.branch);
         let table = kernel.table(step.map, step.index);
         let (n, dimension) = (step.forces.len(), system.dimension());
         let rows = n + CHECKS;
@@ -360,7 +361,7 @@ impl Observer for Tangents {
             // A solved step's matrix is regular, or Newton would not have converged.
             solver.factor(table, step);
         }
-        let start_slope = Self::slope(system, &step.modal, step.force_at(0.0));
+        let start_slope = Self::slope(system, step.branch, &step.modal, step.force_at(0.0));
         if step.moving_end {
             solver.shift(system, table, step, step.force_at(0.0));
         } else if step.moving_start {
@@ -382,7 +383,7 @@ impl Observer for Tangents {
                 .map(|j| table.gap_force[j * rows + n - 1] * x[j])
                 .sum()
         };
-        let end_slope = Self::slope(system, end, step.force_at(step.end));
+        let end_slope = Self::slope(system, step.branch, end, step.force_at(step.end));
         let count = self.shifts.len();
         if let Some(kept) = &mut self.kept {
             kept.push(StepChange {
@@ -418,9 +419,10 @@ impl Observer for Tangents {
                 if solver.rates {
                     add_product(&table.rate, y, rate);
                 }
+                let by_rate = f64::from(u8::from(system.second_is_rate()));
                 for (i, (d, v)) in self.base.iter().enumerate() {
                     gap[i] += d;
-                    rate[i] += v;
+                    rate[i] += by_rate * v;
                 }
                 gap_end = gap[n - 1];
                 for i in 0..n {
@@ -489,11 +491,12 @@ impl Observer for Tangents {
     }
 
     fn switch(&mut self, system: &System, switch: &Switch, exit: &Exit, modal: &[f64]) {
-        let kernel = system.kernel();
+        let kernel = system.kernel_on(switch.from);
         let dimension = system.dimension();
         let law = system.law();
-        let before = law.force(switch.from, switch.gap, switch.rate);
-        let after = law.force(switch.to, switch.gap, switch.rate).value;
+        let depth = system.second_of([switch.rate, 0.0], modal, &[])[0];
+        let before = law.force(switch.from, switch.gap, depth);
+        let after = law.force(switch.to, switch.gap, depth).value;
         let jump = after - before.value;
         // The guard h, positive before: its derivatives by gap and rate.
         let (by_gap, by_rate) = match exit.guard {
@@ -501,11 +504,11 @@ impl Observer for Tangents {
             Guard::Rises(_) => (-1.0, 0.0),
             Guard::Turns => (0.0, -1.0),
             Guard::Own(index) => {
-                let g = law.guard(index, switch.gap, switch.rate);
+                let g = law.guard(index, switch.gap, depth);
                 (g.by_gap, g.by_rate)
             }
         };
-        let slope = Self::slope(system, modal, before.value);
+        let slope = Self::slope(system, switch.from, modal, before.value);
         let acceleration = system.forced_gap(switch.time)[2]
             + kernel
                 .rate_readout
@@ -513,22 +516,24 @@ impl Observer for Tangents {
                 .zip(&slope)
                 .map(|(r, s)| r * s)
                 .sum::<f64>();
-        let fall = by_gap * switch.rate + by_rate * acceleration;
+        let [_, second] = system.second_of([switch.rate, acceleration], modal, &slope);
+        let fall = by_gap * switch.rate + by_rate * second;
         for column in 0..self.shifts.len() {
             let y = &mut self.columns[column * dimension..(column + 1) * dimension];
             if !self.moving {
                 let dot = |row: &[f64]| row.iter().zip(y.iter()).map(|(r, y)| r * y).sum::<f64>();
                 let mut change =
-                    by_gap * dot(&kernel.readout) + by_rate * dot(&kernel.rate_readout);
+                    by_gap * dot(&kernel.readout) + by_rate * dot(&kernel.second_readout);
                 if let Some(p) = column.checked_sub(self.plain).map(|p| &self.parameters[p]) {
                     let (d, v) = p.gap(system, switch.time);
+                    let v = if system.second_is_rate() { v } else { 0.0 };
                     change += by_gap * d + by_rate * v;
                     if !p.law.is_empty() {
                         law.guard_by_parameters(
                             switch.from,
                             switch.exit,
                             switch.gap,
-                            switch.rate,
+                            depth,
                             &mut self.law,
                         );
                         change += self.law.iter().zip(&p.law).map(|(a, b)| a * b).sum::<f64>();

@@ -160,7 +160,7 @@ impl Piece {
 
     pub(crate) fn sample(&self, system: &System, u: f64) -> Sample {
         let mut modal = vec![0.0; system.dimension()];
-        system.kernel().partial(
+        system.kernel_on(self.branch).partial(
             self.map,
             self.length,
             u,
@@ -168,6 +168,7 @@ impl Piece {
             &self.coefficients,
             &mut modal,
         );
+        system.spare_surface(self.branch, self.map.time(self.length, u), &mut modal);
         self.sample_of(system, u, &modal, &self.force_slope())
     }
 
@@ -294,10 +295,12 @@ impl Trajectory {
         Some(piece.sample(&self.system, u))
     }
 
-    /// The fastest rate of modes and drive.
+    /// The fastest rate of modes and drive, without those of a surface that relaxes.
     pub fn fastest(&self) -> f64 {
-        let blocks = self.system.kernel().modes().blocks();
-        let modes = blocks.iter().map(crate::modes::Block::rate);
+        let kernel = self.system.kernel();
+        let blocks = kernel.modes().blocks();
+        let lever = &blocks[..blocks.len() - kernel.surface()];
+        let modes = lever.iter().map(crate::modes::Block::rate);
         let tones = self.system.drive().tones.iter().map(|t| t.frequency);
         modes.chain(tones).fold(0.0, f64::max)
     }
@@ -345,13 +348,15 @@ impl Trajectory {
             let mut modal = piece.modal.clone();
             let mut last = 0.0;
             for (u, weight) in self.places(piece, omega) {
-                self.system.kernel().between(
+                self.system.kernel_on(piece.branch).between(
                     piece.map,
                     piece.length,
                     [last, u],
                     &mut modal,
                     &piece.coefficients,
                 );
+                let time = piece.map.time(piece.length, u) - piece.map.time(piece.length, last);
+                self.system.spare_surface(piece.branch, time, &mut modal);
                 last = u;
                 let sample = piece.sample_of(&self.system, u, &modal, &slope);
                 all.push(Node {

@@ -308,8 +308,10 @@ impl Variation {
             coefficients,
             ..
         } = place;
-        let kernel = system.kernel();
+        let kernel = system.kernel_on(piece.branch);
         kernel.between(piece.map, piece.length, range, modal, coefficients);
+        let [from, to] = range.map(|u| piece.map.time(piece.length, u));
+        system.spare_surface(piece.branch, to - from, &mut modal[..system.dimension()]);
         place.u = u;
         place.time = piece.start + piece.map.time(piece.length, u);
         let tones = system.drive().tones.iter();
@@ -415,7 +417,7 @@ impl Variation {
     fn rate(&self, reader: &Reader, place: &Place) -> f64 {
         let (system, piece) = (&self.motion.system, &self.motion.pieces[place.index]);
         let (u, modal) = (place.u, &place.modal[..system.dimension()]);
-        let slope = Tangents::slope(system, modal, series(&piece.coefficients, u));
+        let slope = Tangents::slope(system, piece.branch, modal, series(&piece.coefficients, u));
         let mut rate: f64 = reader.row.iter().zip(&slope).map(|(r, s)| r * s).sum();
         let tones = system.drive().tones.iter().zip(&reader.tones);
         for ((tone, z), phasor) in tones.zip(&place.phasors) {

@@ -464,7 +464,9 @@ fn fits_of_the_right_model_give_the_modulus_of_the_case() {
             fit.reduced_modulus / reduced()
         );
         assert!((fit.modulus.unwrap() / MODULUS - 1.0).abs() < 3e-4);
-        assert!((fit.contact_point - CONTACT).abs() < 1e-12);
+        // Hertz's contact begins at the surface, the others' at the contact distance.
+        let begins = if law == "hertz" { 0.0 } else { CONTACT };
+        assert!((fit.contact_point - begins).abs() < 1e-12);
         // Others are wrong where there is adhesion.
         if law != "hertz" {
             let hertz = &report.fits[0];

@@ -2,9 +2,12 @@
 
 use clap::Args;
 use nanotap::case::physical::Kind;
-use nanotap::study::bimodal::{BimodalOptions, BimodalPoint, BimodalReport, BimodalStudy, Loop};
+use nanotap::figure::bimodal::bimodal_figure;
+use nanotap::study::bimodal::{
+    BimodalOptions, BimodalPoint, BimodalReport, BimodalStudy, Loop, points_csv,
+};
 
-use crate::arguments::CaseArguments;
+use crate::arguments::{CaseArguments, OutArgument, PlotArgument};
 use crate::failure::Failure;
 use crate::given_case::GivenCase;
 use crate::output::Output;
@@ -23,12 +26,21 @@ pub(crate) struct Arguments {
 
     #[command(flatten)]
     request: Request<BimodalOptions>,
+
+    #[command(flatten)]
+    out: OutArgument,
+    #[command(flatten)]
+    plot: PlotArgument,
 }
 
 pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure> {
     let request = arguments.request.read()?;
+    arguments.out.check()?;
+    arguments.plot.check()?;
     let case = GivenCase::for_study(&arguments.case, true, output)?;
     let report = progress::study::<BimodalStudy>(&case, &request, &ThreadsArgument::default())?;
+    arguments.out.write(|| points_csv(&report))?;
+    arguments.plot.draw(|| bimodal_figure(&report))?;
     output.study(&case, &report, |report| text(&case, report))
 }
 

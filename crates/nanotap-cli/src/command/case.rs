@@ -247,7 +247,7 @@ fn physical(title: &str, view: &Physical) -> String {
         None => {
             given.row(["", case.contact.name(), case.contact.meaning()]);
         }
-        Some(force) => force_rows(&mut given, force),
+        Some(force) => force_rows(&mut given, force, view.parameters.get(Parameter::Omega)),
     }
     let mut mapping = Table::new([
         ("", Align::Left),
@@ -320,8 +320,8 @@ fn equilibria_table(all: &[Equilibrium], view: &Physical) -> String {
     text
 }
 
-/// The force laws with their quantities.
-fn force_rows(table: &mut Table, force: &SampleForce) {
+/// The force laws with their quantities, at a drive frequency in Hz.
+fn force_rows(table: &mut Table, force: &SampleForce, frequency: f64) {
     for term in &force.terms {
         table.row(["", term.entry.name, term.entry.words]);
         table.row(["", "", &format!("F = {}", term.entry.formula)]);
@@ -343,12 +343,44 @@ fn force_rows(table: &mut Table, force: &SampleForce) {
             continue;
         }
         shown.push(key);
-        let value = if value.is_infinite() {
+        let value = if value.is_infinite() && key == Key::SampleHorizon {
+            "none".to_owned()
+        } else if value.is_infinite() {
             "rigid".to_owned()
         } else {
             key.kind().format(value)
         };
         table.row(["", &value, parameter.words]);
+    }
+    if let Some(arms) = &force.arms {
+        let arms = arms.arms().points();
+        let number = arms.len();
+        let time = |(time, _): &(f64, f64)| Kind::Time.format(*time);
+        if let (Some(first), Some(last)) = (arms.first(), arms.last()) {
+            let range = format!("relaxing arms, from {} to {}", time(first), time(last));
+            table.row(["", &number.to_string(), &range]);
+        }
+        if let Some([storage, loss]) = force.dynamic_modulus(frequency) {
+            for (symbol, value, words) in [
+                (
+                    "E'",
+                    Kind::Pressure.format(storage),
+                    "storage modulus at the drive frequency",
+                ),
+                (
+                    "E''",
+                    Kind::Pressure.format(loss),
+                    "loss modulus at the drive frequency",
+                ),
+                (
+                    "tan δ",
+                    number::significant(loss / storage, 4),
+                    "loss tangent E''/E'",
+                ),
+            ] {
+                table.row([symbol, &value, words]);
+            }
+        }
     }
     if let Some(tabor) = force.tabor_parameter() {
         let value = number::significant(tabor, 3);

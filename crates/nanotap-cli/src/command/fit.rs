@@ -85,6 +85,9 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     if report.cancelled {
         output.warning("stopped before it was done");
     }
+    for done in &report.preparation {
+        output.note(done);
+    }
     for remark in &report.remarks {
         output.warning(remark);
     }

@@ -2,9 +2,9 @@
 
 use clap::Args;
 use nanotap::case::physical::Kind;
-use nanotap::study::noise::{NoiseOptions, NoiseReport, NoiseStudy};
+use nanotap::study::noise::{NoiseOptions, NoiseReport, NoiseStudy, spectrum_csv};
 
-use crate::arguments::CaseArguments;
+use crate::arguments::{CaseArguments, OutArgument};
 use crate::failure::Failure;
 use crate::given_case::GivenCase;
 use crate::output::Output;
@@ -22,12 +22,18 @@ pub(crate) struct Arguments {
 
     #[command(flatten)]
     request: Request<NoiseOptions>,
+
+    /// Writes the free lever's thermal spectrum
+    #[command(flatten)]
+    out: OutArgument,
 }
 
 pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure> {
     let request = arguments.request.read()?;
+    arguments.out.check()?;
     let case = GivenCase::of(&arguments.case, output)?;
     let report = progress::study::<NoiseStudy>(&case, &request, &ThreadsArgument::default())?;
+    arguments.out.write(|| spectrum_csv(&report.spectrum))?;
     output.study(&case, &report, |report| text(&case, report))
 }
 
@@ -67,10 +73,24 @@ fn text(case: &GivenCase, report: &NoiseReport) -> String {
         length(report.thermal_rms),
         Kind::Stiffness.format_digits(report.force_gradient_min, 4),
     );
+    let stiffness = |value| Kind::Stiffness.format_digits(value, 4);
+    let calibrations = report.calibrations.map_or_else(String::new, |found| {
+        let sader = found.sader.map_or_else(String::new, |value| {
+            format!("; Sader's method gives {} in air", stiffness(value))
+        });
+        format!(
+            "From this motion, read by an optical lever that was calibrated on a hard surface, the thermal method \
+             gives a spring constant of {} ({} without its factor 0.817){sader}. That of the case is {}.",
+            stiffness(found.thermal),
+            stiffness(found.thermal_without_factor),
+            stiffness(found.k)
+        )
+    });
     format!(
-        "{}\n\n{}\n{}",
+        "{}\n\n{}\n{}{}",
         style::bold(&heading),
         table.render(),
-        motion::paragraph(&filter)
+        motion::paragraph(&filter),
+        motion::paragraph(&calibrations)
     )
 }

@@ -180,6 +180,12 @@ fn text(
     text.push_str(&motion::spectrum(&orbit.spectrum, orbit.period, &units));
     text.push('\n');
     text.push_str(&motion::multipliers(&orbit.multipliers));
+    if let Some(periods) = orbit.decay_periods {
+        text.push_str(&motion::paragraph(&format!(
+            "a small disturbance falls to 1/e in {} drive periods",
+            number::significant(periods, 4)
+        )));
+    }
     if let Some(proof) = &orbit.proof {
         text.push('\n');
         text.push_str(&motion::proof(proof, model));

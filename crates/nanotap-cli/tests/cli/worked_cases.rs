@@ -139,6 +139,7 @@ fn every_document_has_a_test() {
             "README.md",
             "approach-curve.md",
             "beam.md",
+            "bimodal.md",
             "bistable.md",
             "capillary.md",
             "contact.md",
@@ -162,6 +163,7 @@ fn every_document_has_a_test() {
             "observables.md",
             "orbits.md",
             "period-doubling.md",
+            "polymer.md",
             "reconstruct.md",
             "samples.md",
             "scan.md",
@@ -229,10 +231,12 @@ follows! {
     the_measured_modes: "measured-modes.md", 2 commands, 6 numbers;
     the_moving_surface: "moving-surface.md", 7 commands, 26 numbers;
     the_period_doubling: "period-doubling.md", 2 commands, 6 numbers;
+    the_polymer: "polymer.md", 4 commands, 12 numbers;
     the_samples: "samples.md", 5 commands, 30 numbers;
     the_reconstruction: "reconstruct.md", 1 commands, 0 numbers;
     the_force_curve: "force-curve.md", 3 commands, 23 numbers;
     the_thermal_noise: "noise.md", 2 commands, 8 numbers;
+    bimodal_operation: "bimodal.md", 4 commands, 18 numbers;
     the_scan: "scan.md", 4 commands, 19 numbers;
     the_force_table: "table.md", 2 commands, 6 numbers;
     the_stiff_lever: "stiff-lever.md", 3 commands, 4 numbers;

@@ -289,7 +289,9 @@ def _finite(value: float) -> float | str:
 
 
 def names(name: str, value: Any) -> list[str]:
-    """Names: a single text, or several."""
+    """Names: a single text, or several; of a mapping, each as `name=value`."""
+    if isinstance(value, Mapping):
+        value = [f"{of}={text}" for of, text in value.items()]
     given = [value] if isinstance(value, str) else value
     if not isinstance(given, Iterable) or not all(isinstance(v, str) for v in given):
         message = f"{name}: expected names, got {value!r}"

@@ -331,7 +331,12 @@ class _Observed:
     grazing_contacts: int
     tone2_response: float
     tone2_lag: float
+    first_sideband: float
+    first_sideband_phase: float
+    second_sideband: float
+    second_sideband_phase: float
     determinant_defect: float
+    decay_periods: float
 
 
 @dataclass(frozen=True, repr=False, eq=False)

@@ -570,9 +570,12 @@ def fit(
     data: Any = None,
     free: Sequence[str] | None = None,
     per_curve: Sequence[str] | None = None,
+    convert: Sequence[str] | None = None,
+    start: Sequence[str] | None = None,
     bounds: Mapping[str, tuple[float | str, float | str]] | str | None = None,
     columns: Sequence[str] | None = None,
     laws: Sequence[str] | None = None,
+    rows: int = 100,
     starts: int = 8,
     seed: int = 0,
     max_period: int = 4,
@@ -596,12 +599,21 @@ def fit(
         NAME.scale of a column.
     per_curve : Sequence[str] | None
         Parameters to find with one value per curve.
+    convert : Sequence[str] | None
+        Conversions of columns, as in Amp="58 nm/V", Phase=90-x, Zsnsr=-x or
+        Ch3=amplitude.
+    start : Sequence[str] | None
+        Initial values of free parameters, and fixed corrections of columns, as in
+        gap.offset="10.3 nm".
     bounds : Mapping[str, tuple[float | str, float | str]] | str | None
         Bounds of parameters, as in {"sample.stiffness": ("1 N/m", "100 N/m")}.
     columns : Sequence[str] | None
         Columns of the data to use; default: all.
     laws : Sequence[str] | None
         Contact laws to compare, as in hertz,dmt; default: the law of the case.
+    rows : int
+        Average longer curves to about this many rows; 0: use every row (0 to
+        100000).
     starts : int
         Initial values to try until the data are described (1 to 1000).
     seed : int

@@ -382,7 +382,7 @@ def fit(
         raise TypeError(message)
     lists = {
         name: _arguments.names(name, options[name])
-        for name in ("free", "per_curve", "columns")
+        for name in ("free", "per_curve", "columns", "convert", "start")
         if options[name] is not None
     }
     asked = {**options, **lists, "data": _arguments.tables(options["data"])}

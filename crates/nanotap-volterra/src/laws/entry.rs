@@ -27,6 +27,8 @@ impl Dimension {
     }
     /// A pure number.
     pub const NUMBER: Self = Self::new(0, 0, 0, 0, "");
+    /// A time.
+    pub const TIME: Self = Self::new(0, 0, 1, 0, "s");
     /// An angle, in radians.
     pub const ANGLE: Self = Self::new(0, 0, 0, 0, "rad");
     /// A length.

@@ -2,7 +2,9 @@
 //!
 //! If the elastic law is `E g(δ)`, the force is `E g(δ) + η g'(δ) δ̇` (García, Gómez, Martínez,
 //! Patil, Dietz, Magerle, Phys. Rev. Lett. 97, 2006; García, Chem. Soc. Rev. 49, 2020): for the
-//! sphere `4/3 √(Rδ)/(1 − ν²) (Eδ + 3/2 ηδ̇)`, on a rigid tip. On the way out the sum becomes
+//! sphere `4/3 √(Rδ)/(1 − ν²) (Eδ + 3/2 ηδ̇)`, on a rigid tip. As `η` stands where `E` does it is the
+//! elongational viscosity, `2(1 + ν)` times the shear viscosity; the law `η' √(Rδ) δ̇` has
+//! `η' = 2η/(1 − ν²)`. On the way out the sum becomes
 //! negative before the contact ends. A surface that cannot pull releases the tip where `F = 0`, and
 //! then there is no force until the tip is outside or presses again; a surface that pulls stays
 //! until `d = a0`.
@@ -24,8 +26,15 @@ pub struct KelvinVoigt {
     pub pulls: bool,
 }
 
-const ROUND: &[ParameterEntry] = &[MODULUS, POISSON, VISCOSITY, RADIUS, CONTACT_DISTANCE];
-const POINTED: &[ParameterEntry] = &[MODULUS, POISSON, VISCOSITY, HALF_ANGLE, CONTACT_DISTANCE];
+/// Takes the place of Young's modulus, so that it is elongational.
+const ELONGATIONAL: ParameterEntry = ParameterEntry {
+    words: "elongational viscosity of the sample: 2(1 + ν) times the shear viscosity, and (1 − ν²)/2 \
+            times García's η in η √(Rδ) dδ/dt under a sphere",
+    ..VISCOSITY
+};
+
+const ROUND: &[ParameterEntry] = &[MODULUS, POISSON, ELONGATIONAL, RADIUS, CONTACT_DISTANCE];
+const POINTED: &[ParameterEntry] = &[MODULUS, POISSON, ELONGATIONAL, HALF_ANGLE, CONTACT_DISTANCE];
 const SOURCE: &str = "García et al., Phys. Rev. Lett. 97, 016103 (2006)";
 
 const fn entry(

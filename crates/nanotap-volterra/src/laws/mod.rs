@@ -15,6 +15,8 @@ pub mod jkr;
 pub mod kelvin_voigt;
 pub mod lennard_jones;
 pub mod polyline;
+pub mod prony;
+pub mod solvation;
 pub mod spring_damper;
 pub mod sum;
 pub mod thin;
@@ -46,6 +48,8 @@ enum Make {
     Formula(fn(Vec<f64>) -> Arc<dyn ForceLaw>),
     /// Parameters and rows of gap and force.
     Rows,
+    /// Parameters and the arms of a Prony series.
+    Arms(Shape),
 }
 
 impl TableLaw {
@@ -61,6 +65,10 @@ impl TableLaw {
             Make::Rows => Err(VolterraError::Table {
                 row: 1,
                 reason: "a force curve needs at least two rows",
+            }),
+            Make::Arms(_) => Err(VolterraError::Arms {
+                arm: 1,
+                reason: "a relaxing sample needs at least one arm",
             }),
         }
     }
@@ -109,7 +117,8 @@ const fn voigt(shape: Shape, pulls: bool) -> kelvin_voigt::KelvinVoigt {
     kelvin_voigt::KelvinVoigt { shape, pulls }
 }
 
-/// Every law given by parameters alone ([`polyline::TABLE`] has rows in addition).
+/// Every law given by parameters alone ([`polyline::TABLE`] has rows in addition,
+/// [`prony::TABLE`] arms).
 pub static TABLE: &[TableLaw] = table! {
     elastic::HERTZ => elastic::Elastic(Shape::Sphere),
     elastic::CONE => elastic::Elastic(Shape::Cone),
@@ -131,6 +140,8 @@ pub static TABLE: &[TableLaw] = table! {
     kelvin_voigt::PUNCH_PULLING => voigt(Shape::Punch, true),
     viscous::ROOT_VISCOSITY => viscous::RootViscosity,
     viscous::EXPONENTIAL_DAMPING => viscous::ExponentialDamping,
+    viscous::POWER_DAMPING => viscous::PowerDamping,
+    solvation::SOLVATION => solvation::Solvation,
     hysteresis::ADHESION_HYSTERESIS => hysteresis::AdhesionHysteresis,
     capillary::CAPILLARY => capillary::Capillary,
     electric::ELECTROSTATIC => electric::Electrostatic,
@@ -140,7 +151,7 @@ pub static TABLE: &[TableLaw] = table! {
 
 /// Every law.
 pub fn all() -> impl Iterator<Item = &'static TableLaw> {
-    TABLE.iter().chain([&polyline::TABLE])
+    TABLE.iter().chain(&prony::TABLE).chain([&polyline::TABLE])
 }
 
 /// The law of a name.
@@ -227,6 +238,18 @@ pub fn build_sum(
     }
     if let [(_, law)] = terms {
         return Ok(law.clone());
+    }
+    if let Some(k) = terms.iter().position(|(_, law)| law.surface().is_some()) {
+        let (own, relaxing) = &terms[k];
+        let (other, law) = &terms[usize::from(k == 0)];
+        let attracts = other.name.starts_with("van-der-waals") && terms.len() == 2;
+        let whole = relaxing.with_attraction(law).filter(|_| attracts);
+        return whole.ok_or(VolterraError::Sum {
+            first: own.name,
+            second: other.name,
+            reason: "to a sample that relaxes only one van der Waals attraction can be added, with \
+                     the same intermolecular distance",
+        });
     }
     Ok(Arc::new(sum::Sum::new(
         terms.iter().map(|(_, law)| law.clone()).collect(),

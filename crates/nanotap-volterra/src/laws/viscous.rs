@@ -1,8 +1,11 @@
 //! Dissipation added to any elastic law: viscosity that grows with the contact radius, and damping
 //! that falls off across the gap.
 //!
-//! `−η √(Rδ) ḋ` in contact (Garcia, Gómez et al.; used by dForce) and `−γ₀ e^{−d/x} ḋ` at any
-//! gap (Gotsmann, Seidel, Anczykowski, Fuchs, Phys. Rev. B 60, 1999).
+//! `−η √(Rδ) ḋ` in contact (Garcia, Gómez et al.; used by dForce), `−γ₀ e^{−d/x} ḋ` at any gap
+//! (Gotsmann, Seidel, Anczykowski, Fuchs, Phys. Rev. B 60, 1999), and a power of the gap,
+//! `−γ (d₀/(d − a0 + d₀))ⁿ ḋ`, in contact `−γ ḋ`: non-contact friction falls like a power 1.3 to 3
+//! (Stipe et al., Phys. Rev. Lett. 87, 2001), a squeezed film like the third below a disk and like the
+//! first below a sphere.
 
 use crate::law::Approach;
 use crate::laws::elastic::contact_ways;
@@ -111,5 +114,71 @@ impl Formula for ExponentialDamping {
 
     fn ways(&self, _branch: usize) -> Vec<Way> {
         Vec::new()
+    }
+}
+
+/// `−γ (d₀/(d − a0 + d₀))ⁿ ḋ`.
+#[derive(Clone, Copy, Debug)]
+pub struct PowerDamping;
+
+/// Its entry.
+pub static POWER_DAMPING: Entry = Entry {
+    name: "power-damping",
+    words: "damping that falls like a power of the gap",
+    formula: "−γ (d0/(d − a0 + d0))^n ḋ for d > a0, −γ ḋ in contact",
+    source: "B. C. Stipe et al., Phys. Rev. Lett. 87, 096801 (2001)",
+    parameters: &[
+        own(
+            "damping",
+            "damping γ at contact",
+            Dimension::DAMPING,
+            None,
+            Range::NotNegative,
+        ),
+        own(
+            "damping_distance",
+            "distance d0 over which the damping falls",
+            Dimension::LENGTH,
+            None,
+            Range::Positive,
+        ),
+        own(
+            "damping_exponent",
+            "power n by which the damping falls",
+            Dimension::NUMBER,
+            None,
+            Range::NotNegative,
+        ),
+        CONTACT_DISTANCE,
+    ],
+    parts: &[],
+    conservative: false,
+};
+
+impl Formula for PowerDamping {
+    fn entry(&self) -> &'static Entry {
+        &POWER_DAMPING
+    }
+
+    fn constants<S: Scalar>(&self, p: &[S]) -> Vec<S> {
+        vec![p[3], p[0], p[1], p[2]]
+    }
+
+    fn force<S: Scalar>(&self, c: &[S], branch: usize, gap: S, rate: S) -> S {
+        if branch == 1 {
+            return -c[1] * rate;
+        }
+        let ratio = c[2] / (gap - c[0] + c[2]);
+        let value = ratio.value();
+        let log = ratio.chain(nanotap_arithmetic::ln(value), value.recip());
+        -c[1] * (c[3] * log).exp() * rate
+    }
+
+    fn depends_on_rate(&self) -> bool {
+        true
+    }
+
+    fn ways(&self, branch: usize) -> Vec<Way> {
+        contact_ways(branch, Approach::Analytic)
     }
 }

@@ -179,7 +179,7 @@ pub(crate) fn beam_at(
 }
 
 /// Values in nm, nN and 1/ω0 for the parameters of the table of laws.
-const VALUES: [(&str, f64); 23] = [
+const VALUES: [(&str, f64); 28] = [
     ("modulus", 0.4),
     ("poisson", 0.3),
     ("tip_modulus", 160.0),
@@ -203,6 +203,11 @@ const VALUES: [(&str, f64); 23] = [
     ("permittivity", 0.01),
     ("debye_length", 2.0),
     ("stiffness", 3.0),
+    ("solvation_force", 0.1),
+    ("solvation_period", 2.5),
+    ("solvation_decay", 1.5),
+    ("damping_distance", 1.2),
+    ("damping_exponent", 2.5),
 ];
 
 /// See [`VALUES`]; charges are 0.01.

@@ -89,6 +89,12 @@ pub struct PhysicalSummary {
     /// Tabor's parameter of an elastic sphere with adhesion.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub tabor_parameter: Option<f64>,
+    /// Dynamic moduli of a sample that relaxes, at the drive frequency.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub dynamic_modulus: Option<DynamicModulus>,
+    /// Times and moduli of a relaxing sample's arms, s and Pa.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub arms: Vec<(f64, f64)>,
     /// Gaps and forces of a tabulated law, m and N.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub force_table: Vec<(f64, f64)>,
@@ -104,6 +110,17 @@ pub struct PhysicalSummary {
     pub force_unit: f64,
     /// The model's unit of energy, J.
     pub energy_unit: f64,
+}
+
+/// Young's modulus of a sample that relaxes under a small oscillation at the drive frequency.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct DynamicModulus {
+    /// Storage modulus E', Pa.
+    pub storage_modulus: f64,
+    /// Loss modulus E'', Pa.
+    pub loss_modulus: f64,
+    /// tan δ = E''/E'.
+    pub loss_tangent: f64,
 }
 
 /// A parameter of a nonlinear force law.
@@ -167,6 +184,22 @@ impl PhysicalSummary {
                 .force
                 .as_ref()
                 .and_then(SampleForce::tabor_parameter),
+            dynamic_modulus: view
+                .sample
+                .force
+                .as_ref()
+                .and_then(|force| force.dynamic_modulus(quantity(Parameter::Omega)))
+                .map(|[storage, loss]| DynamicModulus {
+                    storage_modulus: storage,
+                    loss_modulus: loss,
+                    loss_tangent: loss / storage,
+                }),
+            arms: view
+                .sample
+                .force
+                .as_ref()
+                .and_then(|force| force.arms.as_ref())
+                .map_or_else(Vec::new, |arms| arms.arms().points().to_vec()),
             force_table: view
                 .sample
                 .force

@@ -8,14 +8,19 @@ use std::path::Path;
 use std::sync::Arc;
 
 use nanotap_volterra::laws::polyline::Rows;
+use nanotap_volterra::laws::prony::Arms;
 use toml::de::DeValue;
 
+use super::key::Takes;
 use super::quantity::Kind;
+use super::stated::Value;
 use crate::Error;
 use crate::case::table::{Entry, Header, Table};
 
 /// Syntax of a table, for remedies.
 const SHAPE: &str = "write rows as in [[\"gap (nm)\", \"force (nN)\"], [-1, 8.5], [0, 0], [9, 0]]";
+const ARMS_SHAPE: &str =
+    "write rows as in [[\"time (us)\", \"modulus (MPa)\"], [0.38, 460], [1.7, 136]]";
 
 /// Why rows are not a force table.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -56,89 +61,13 @@ impl ForceTable {
         &self.0
     }
 
-    /// The table of a CSV file.
-    ///
-    /// # Errors
-    /// If it cannot be read or is not a force table, with the place.
-    pub(crate) fn read(path: &Path) -> Result<Self, ForceTableError> {
-        Self::of(&Table::read(path)?)
-    }
-
-    /// Parses an array, or the text of a CSV file.
-    ///
-    /// # Errors
-    /// As [`read`](Self::read), and if `text` names a file, which is not opened.
-    pub(crate) fn parse(text: &str) -> Result<Self, ForceTableError> {
-        if let Some(name) = file_named(text) {
-            return Err(ForceTableError::new(
-                format!("the file {name} is not opened here"),
-                format!("name it in a case file or on the command line, or {SHAPE}"),
-            ));
-        }
-        if text.trim_start().starts_with('[') {
-            let array = DeValue::parse(text).ok();
-            let table = array.and_then(|array| table_of(array.get_ref()));
-            return Self::of(&table.ok_or_else(|| ForceTableError::new("not a table", SHAPE))?);
-        }
-        Self::of(&Table::parse("the table", text)?)
-    }
-
     /// Creates a force table from the columns `gap` and `force` of a table.
     ///
     /// # Errors
     /// If they are missing, have no unit, or are not a function of the gap.
     pub(crate) fn of(table: &Table) -> Result<Self, ForceTableError> {
-        let column = |names: &[&str], kind: Kind, example: &str| {
-            let headers = || table.columns.iter().map(|(written, _)| Header::of(written));
-            let is = |header: &Header| names.contains(&header.name.to_lowercase().as_str());
-            let all: Vec<usize> = headers()
-                .enumerate()
-                .filter_map(|(k, header)| is(&header).then_some(k))
-                .collect();
-            let &[place] = all.as_slice() else {
-                let found: Vec<&str> = table.columns.iter().map(|(name, _)| &**name).collect();
-                let has = if found.is_empty() {
-                    "none at all".to_owned()
-                } else {
-                    found.join(", ")
-                };
-                let what = if all.is_empty() {
-                    "no"
-                } else {
-                    "more than one"
-                };
-                return Err(ForceTableError::new(
-                    format!(
-                        "{} has {what} column `{}`: it has {has}",
-                        table.name, names[0],
-                    ),
-                    format!("name it as in `{example}`"),
-                ));
-            };
-            let refuse = |row, what: String, remedy: String| {
-                ForceTableError::new(format!("{}: {what}", table.place(row, place)), remedy)
-            };
-            let (written, entries) = &table.columns[place];
-            let unit = Header::of(written).unit;
-            let named = || format!("name it as in `{example}`");
-            if unit.is_empty() {
-                return Err(refuse(None, "a column without a unit".to_owned(), named()));
-            }
-            let factor = kind
-                .parse(&format!("1 {unit}"))
-                .map_err(|error| refuse(None, error.to_string(), named()))?;
-            let number = |(row, entry): (usize, &Entry)| {
-                let what = match entry {
-                    Entry::Number(number) => return Ok(number * factor),
-                    Entry::Missing => "missing number".to_owned(),
-                    Entry::Text(text) => format!("`{text}` is not a number"),
-                };
-                Err(refuse(Some(row), what, "give a finite number".to_owned()))
-            };
-            entries.iter().enumerate().map(number).collect()
-        };
-        let gaps: Vec<f64> = column(&["gap", "distance", "d"], Kind::Length, "gap (nm)")?;
-        let forces: Vec<f64> = column(&["force", "f"], Kind::Force, "force (nN)")?;
+        let gaps = column(table, &["gap", "distance", "d"], Kind::Length, "gap (nm)")?;
+        let forces = column(table, &["force", "f"], Kind::Force, "force (nN)")?;
         let points: Vec<(f64, f64)> = gaps.into_iter().zip(forces).collect();
         let rows = Rows::new(&points).map_err(|error| {
             let remedy = "give each gap once, in the order of the gaps, and its force";
@@ -157,10 +86,202 @@ impl ForceTable {
     }
 }
 
+/// A column of a table, by one of its names, in SI.
+///
+/// # Errors
+/// If it is missing, has no unit, or an entry is not a number.
+fn column(
+    table: &Table,
+    names: &[&str],
+    kind: Kind,
+    example: &str,
+) -> Result<Vec<f64>, ForceTableError> {
+    let headers = || table.columns.iter().map(|(written, _)| Header::of(written));
+    let is = |header: &Header| names.contains(&header.name.to_lowercase().as_str());
+    let all: Vec<usize> = headers()
+        .enumerate()
+        .filter_map(|(k, header)| is(&header).then_some(k))
+        .collect();
+    let &[place] = all.as_slice() else {
+        let found: Vec<&str> = table.columns.iter().map(|(name, _)| &**name).collect();
+        let has = if found.is_empty() {
+            "none at all".to_owned()
+        } else {
+            found.join(", ")
+        };
+        let what = if all.is_empty() {
+            "no"
+        } else {
+            "more than one"
+        };
+        return Err(ForceTableError::new(
+            format!(
+                "{} has {what} column `{}`: it has {has}",
+                table.name, names[0],
+            ),
+            format!("name it as in `{example}`"),
+        ));
+    };
+    let refuse = |row, what: String, remedy: String| {
+        ForceTableError::new(format!("{}: {what}", table.place(row, place)), remedy)
+    };
+    let (written, entries) = &table.columns[place];
+    let unit = Header::of(written).unit;
+    let named = || format!("name it as in `{example}`");
+    if unit.is_empty() {
+        return Err(refuse(None, "a column without a unit".to_owned(), named()));
+    }
+    let factor = kind
+        .parse(&format!("1 {unit}"))
+        .map_err(|error| refuse(None, error.to_string(), named()))?;
+    let number = |(row, entry): (usize, &Entry)| {
+        let what = match entry {
+            Entry::Number(number) => return Ok(number * factor),
+            Entry::Missing => "missing number".to_owned(),
+            Entry::Text(text) => format!("`{text}` is not a number"),
+        };
+        Err(refuse(Some(row), what, "give a finite number".to_owned()))
+    };
+    entries.iter().enumerate().map(number).collect()
+}
+/// Maxwell arms as stated in a case: rows of time and modulus. Like a force table they are an array,
+/// `arms = [["time (us)", "modulus (MPa)"], [0.38, 460], [1.7, 136]]`, with `shear modulus` for a
+/// shear modulus, or the name of a CSV file; or each with its unit,
+/// `arms = [["460 MPa", "0.38 us"], ["136 MPa", "1.7 us"]]`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ArmTable(Arc<Arms>);
+
+impl ArmTable {
+    /// The arms, in s and Pa.
+    pub const fn arms(&self) -> &Arc<Arms> {
+        &self.0
+    }
+
+    /// Creates arms from the columns `time` and `modulus` or `shear modulus` of a table.
+    ///
+    /// # Errors
+    /// If they are missing, have no unit, or a value makes no sense.
+    pub(crate) fn of(table: &Table) -> Result<Self, ForceTableError> {
+        let (points, shear) = if let Some(points) = Self::quantities(table) {
+            (points, false)
+        } else {
+            let times = column(table, &["time", "tau", "τ"], Kind::Time, "time (us)")?;
+            let names = |column: &(String, Vec<Entry>)| Header::of(&column.0).name.to_lowercase();
+            let shear = table
+                .columns
+                .iter()
+                .map(names)
+                .any(|name| SHEAR.contains(&&*name));
+            let (names, example) = if shear {
+                (SHEAR, "shear modulus (MPa)")
+            } else {
+                (YOUNG, "modulus (MPa)")
+            };
+            let moduli = column(table, names, Kind::Pressure, example)?;
+            (times.into_iter().zip(moduli).collect(), shear)
+        };
+        let arms = Arms::new(&points, shear).map_err(|error| {
+            let remedy = "give each arm a time above zero and a modulus";
+            ForceTableError::new(format!("{}: {error}", table.name), remedy)
+        })?;
+        Ok(Self(Arc::new(arms)))
+    }
+
+    /// Times and moduli of rows in which every entry has its unit.
+    fn quantities(table: &Table) -> Option<Vec<(f64, f64)>> {
+        let [first, second] = table.columns.as_slice() else {
+            return None;
+        };
+        let read = |(header, entries): &(String, Vec<Entry>), kind: Kind| {
+            let texts = entries.iter().map(|entry| match entry {
+                Entry::Text(text) => Some(text.as_str()),
+                Entry::Number(_) | Entry::Missing => None,
+            });
+            let all = std::iter::once(Some(header.as_str())).chain(texts);
+            all.map(|text| kind.parse(text?).ok())
+                .collect::<Option<Vec<f64>>>()
+        };
+        let pair = |times, moduli| Some((read(times, Kind::Time)?, read(moduli, Kind::Pressure)?));
+        let (times, moduli) = pair(first, second).or_else(|| pair(second, first))?;
+        Some(times.into_iter().zip(moduli).collect())
+    }
+
+    /// The arms as an array that is read back as the same.
+    pub(crate) fn text(&self) -> String {
+        let name = if self.0.shear() {
+            "shear modulus"
+        } else {
+            "modulus"
+        };
+        let rows = self.0.points().iter();
+        let rows = rows.map(|(time, modulus)| {
+            let time = if time.is_infinite() {
+                "inf".to_owned()
+            } else {
+                format!("{time:?}")
+            };
+            format!("[{time}, {modulus:?}]")
+        });
+        let header = format!("[\"time (s)\", \"{name} (Pa)\"]");
+        let all: Vec<String> = std::iter::once(header).chain(rows).collect();
+        format!("[{}]", all.join(", "))
+    }
+}
+
+/// Names of a column of Young's moduli, and of shear moduli.
+const YOUNG: &[&str] = &["modulus", "e", "young's modulus"];
+const SHEAR: &[&str] = &["shear modulus", "g"];
+
+impl Takes {
+    /// The value of a key that takes a table.
+    ///
+    /// # Errors
+    /// If the table's columns are not those of the key.
+    pub(crate) fn of_table(self, table: &Table) -> Result<Value, ForceTableError> {
+        Ok(match self {
+            Self::Arms => Value::Arms(ArmTable::of(table)?),
+            _ => Value::Table(ForceTable::of(table)?),
+        })
+    }
+
+    /// The same of a CSV file.
+    ///
+    /// # Errors
+    /// If it cannot be read or is not such a table, with the place.
+    pub(crate) fn read_table(self, path: &Path) -> Result<Value, ForceTableError> {
+        self.of_table(&Table::read(path)?)
+    }
+
+    /// The same of an array, or of the text of a CSV file.
+    ///
+    /// # Errors
+    /// As [`of_table`](Self::of_table), and if `text` names a file, which is not opened.
+    pub(crate) fn parse_table(self, text: &str) -> Result<Value, ForceTableError> {
+        let shape = if self == Self::Arms {
+            ARMS_SHAPE
+        } else {
+            SHAPE
+        };
+        if let Some(name) = file_named(text) {
+            return Err(ForceTableError::new(
+                format!("the file {name} is not opened here"),
+                format!("name it in a case file or on the command line, or {shape}"),
+            ));
+        }
+        if text.trim_start().starts_with('[') {
+            let array = DeValue::parse(text).ok();
+            let table = array.and_then(|array| table_of(array.get_ref()));
+            return self
+                .of_table(&table.ok_or_else(|| ForceTableError::new("not a table", shape))?);
+        }
+        self.of_table(&Table::parse("the table", text)?)
+    }
+}
+
 /// The file that a text names, if it is not a table.
 pub(crate) fn file_named(text: &str) -> Option<&str> {
     let name = text.trim();
-    (!name.contains('\n') && !name.starts_with('[')).then_some(name)
+    (!name.is_empty() && !name.contains('\n') && !name.starts_with('[')).then_some(name)
 }
 
 /// Converts an array of rows, of which the first contains the names of the columns.

@@ -47,6 +47,7 @@ pub use family::{Family, PlaneFamily};
 pub use key::Key;
 pub use moving_gap::MovingGap;
 pub use stated::{Value, ValueError};
+pub use under_law::LawChange;
 
 use file::{CaseFileError, Described, Source};
 use key::ModelKind;

@@ -109,6 +109,17 @@ fn taken(key: Key, entry: &Entry) -> Map<String, Value> {
             );
             return schema;
         }
+        Takes::Arms => {
+            say("type", json!(["string", "array"]));
+            say(
+                "examples",
+                json!([
+                    "arms.csv",
+                    [["time (us)", "modulus (MPa)"], [0.38, 460], [1.7, 136]]
+                ]),
+            );
+            return schema;
+        }
         Takes::FrequencyRatio => {
             say("type", json!(["string", "number"]));
             say("examples", json!(["25/4", 6.25]));

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::file::{CaseFileError, Header, Place, Problem, Source};
-use super::force_table::{ForceTable, ForceTableError};
+use super::force_table::{ArmTable, ForceTable, ForceTableError};
 use super::key::{Key, Takes};
 use super::quantity::{Kind, Quantity, QuantityError};
 use nanotap_volterra::VolterraError;
@@ -26,6 +26,8 @@ pub enum Value {
     Ratio(FrequencyRatio),
     /// Rows of gap and force.
     Table(ForceTable),
+    /// Maxwell arms.
+    Arms(ArmTable),
 }
 
 impl Value {
@@ -37,6 +39,7 @@ impl Value {
             Self::Name(name) => name.to_string(),
             Self::Ratio(ratio) => ratio.to_string(),
             Self::Table(table) => table.text(),
+            Self::Arms(arms) => arms.text(),
         }
     }
 }
@@ -125,7 +128,7 @@ impl Key {
             Takes::Law => law(text)?,
             Takes::LeverName | Takes::MaterialName => Value::Name(text.into()),
             Takes::FrequencyRatio => Value::Ratio(text.parse()?),
-            Takes::Table => Value::Table(ForceTable::parse(text)?),
+            takes @ (Takes::Table | Takes::Arms) => takes.parse_table(text)?,
         })
     }
 }

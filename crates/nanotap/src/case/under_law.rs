@@ -1,11 +1,12 @@
 //! The same instrument over a sample that answers by another contact law.
 
-use super::key::Key;
+use super::key::{Key, Takes};
 use super::physical::force::{keys_of_contacts, linear_takes, takes};
 use super::stated::Value;
 use super::{Case, CaseKind};
 use crate::Error;
 use crate::model::contact::ContactLaw;
+use crate::model::parameter::Applies;
 use crate::model::sample_law::SampleLaw;
 
 /// A contact law by its name: a linear contact, or nonlinear forces joined by `+`.
@@ -38,7 +39,96 @@ impl LawName {
     }
 }
 
+/// The keys of the second tone that are nothing without its frequency.
+const SECOND: [Key; 4] = [
+    Key::SecondAmplitude,
+    Key::SecondForce,
+    Key::SecondFreeAmplitude,
+    Key::SecondPhase,
+];
+
+/// What changes in a case that takes another contact law.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LawChange {
+    /// The law's name.
+    pub law: String,
+    /// The keys that were stated and that the law does not take.
+    pub dropped: Vec<Key>,
+    /// The keys that the law needs and that were not stated, with usual values.
+    pub added: Vec<(Key, Value)>,
+}
+
+/// A force curve of a stiff sample with attraction, to begin with: gap in m, force in N.
+const CURVE: &str = "[[\"gap (nm)\", \"force (nN)\"], [-1, 20], [-0.5, 5], [0, -1.5], \
+     [0.5, -0.6], [1, -0.3], [2, -0.1], [5, -0.02], [10, 0]]";
+
+/// Three arms of a polymer whose times are those of tapping, to begin with.
+const ARMS: &str = "[[\"time (us)\", \"modulus (MPa)\"], [0.38, 460], [1.7, 136], [7.2, 67]]";
+
 impl Case {
+    /// What must be left away, and what added, for this case to take another contact law. A value to add
+    /// is that of `like` where it states one, else a usual one.
+    ///
+    /// # Errors
+    /// When the case is not a physical one, the law is unknown, or a sum counts a part twice.
+    pub fn law_change(&self, law: &str, like: &Self) -> Result<LawChange, Error> {
+        let name = LawName::read(law)?;
+        let CaseKind::Quantities(quantities) = &self.what else {
+            return Err(Error::input(
+                "expected a case in physical quantities",
+                "choose the contact with the key `contact`",
+            ));
+        };
+        let mut quantities = quantities.clone();
+        let stated = &mut quantities.stated;
+        let foreign = |key: &Key| stated.has(*key) && !name.takes(*key);
+        let dropped: Vec<Key> = keys_of_contacts().filter(foreign).collect();
+        for key in &dropped {
+            stated.remove(*key);
+        }
+        stated.put(Key::SampleLaw, name.0.clone());
+        let mut added: Vec<(Key, Value)> = Vec::new();
+        let mut mapped = quantities.mapped(true);
+        // Each key that is missing is added once.
+        while let Err(error) = &mapped.view {
+            let named = error.problems.first().and_then(|problem| problem.key);
+            let missing = named
+                .and_then(Key::find)
+                .filter(|key| !mapped.stated.has(*key));
+            let Some((key, value)) = missing.and_then(|key| Some((key, usual(key, like)?))) else {
+                return Err((**error).clone().into());
+            };
+            mapped.stated.put(key, value.clone());
+            added.push((key, value));
+            mapped = mapped.mapped(true);
+        }
+        Ok(LawChange {
+            law: name.text(),
+            dropped,
+            added,
+        })
+    }
+
+    /// True if the contact law, or the drive, of the case does not have a key.
+    pub fn is_foreign(&self, key: Key) -> bool {
+        if let (CaseKind::Cantilever(cantilever), Some(parameter)) = (&self.what, key.parameter()) {
+            // A measured number of a mode can always be stated.
+            let measured = parameter.entry().applies == Applies::Measured;
+            return !measured && !cantilever.has(parameter);
+        }
+        let CaseKind::Quantities(quantities) = &self.what else {
+            return false;
+        };
+        let stated = &quantities.stated;
+        let second = [Key::SecondFrequency, Key::SecondRatio];
+        if SECOND.contains(&key) {
+            return !second.iter().any(|key| stated.has(*key));
+        }
+        let linear = || Value::Word(ContactLaw::ALL[0].name());
+        let law = stated.get(Key::SampleLaw).cloned().unwrap_or_else(linear);
+        !LawName(law).takes(key)
+    }
+
     /// The same under another contact law: what that law does not take is left away, and what it
     /// needs and was not stated is taken from `more`.
     ///
@@ -67,5 +157,75 @@ impl Case {
             what: CaseKind::Quantities(Box::new(quantities.mapped(true).validated()?)),
             ..self.clone()
         })
+    }
+}
+
+/// A value of a key that a law needs: that of `like` if it states one, else a usual one.
+fn usual(key: Key, like: &Case) -> Option<Value> {
+    if let Some(value) = like.stated(key) {
+        return Some(value.clone());
+    }
+    match key.entry().takes {
+        Takes::Quantity(kind) => Some(Value::Number(key.entry().example, kind)),
+        takes @ Takes::Table => takes.parse_table(CURVE).ok(),
+        takes @ Takes::Arms => takes.parse_table(ARMS).ok(),
+        _ => None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::case::stated::laws;
+
+    /// A lever over a sample with a spring and a damper.
+    fn lever() -> Case {
+        let words = [
+            "cantilever.k=2.8 N/m",
+            "cantilever.f0=75 kHz",
+            "cantilever.Q=200",
+            "sample.stiffness=20 N/m",
+            "sample.damping=1e-7 N s/m",
+            "drive.frequency=75 kHz",
+            "drive.free_amplitude=20 nm",
+            "gap.tip=15 nm",
+        ];
+        Case::parse(None, &words.map(str::to_owned)).unwrap()
+    }
+
+    /// The case with the change made by `--set` words, as the explorer makes it.
+    fn changed(case: &Case, change: &LawChange) -> Case {
+        let dropped = change.dropped.iter().map(|key| format!("{key}="));
+        let added = change
+            .added
+            .iter()
+            .map(|(key, value)| format!("{key}={}", value.text()));
+        let law = std::iter::once(format!("sample.law={}", change.law));
+        let words: Vec<String> = dropped.chain(law).chain(added).collect();
+        case.restated(&words).unwrap()
+    }
+
+    #[test]
+    fn every_law_leads_to_every_law() {
+        let first = lever();
+        for law in laws() {
+            let there = changed(&first, &first.law_change(law, &first).unwrap());
+            let name = LawName::read(law).unwrap();
+            assert!(there.model().is_ok(), "{law}");
+            for key in keys_of_contacts().filter(|key| there.stated(*key).is_some()) {
+                assert!(name.takes(key) && !there.is_foreign(key), "{law}: {key}");
+            }
+            for next in laws() {
+                let change = there.law_change(next, &first).unwrap();
+                assert!(changed(&there, &change).model().is_ok(), "{law} to {next}");
+            }
+            // Back: what the first case stated returns.
+            let back = changed(&there, &there.law_change("spring-damper", &first).unwrap());
+            assert_eq!(back.get(Key::SampleStiffness), 20.0, "{law}");
+        }
+        let sum = first.law_change("hertz + capillary", &first).unwrap();
+        assert_eq!(sum.dropped, [Key::SampleStiffness, Key::SampleDamping]);
+        assert!(first.law_change("hertz + dmt", &first).is_err());
+        assert!(first.law_change("plastic", &first).is_err());
     }
 }

@@ -4,6 +4,8 @@ pub mod approach;
 pub mod attractors;
 #[cfg(feature = "dataset")]
 pub mod basin;
+#[cfg(feature = "fm")]
+pub mod bimodal;
 pub mod branch;
 pub mod contact;
 pub mod contact_laws;

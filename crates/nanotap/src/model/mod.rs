@@ -268,9 +268,9 @@ impl Model {
             return Self::on(&case.contact_law(None), galerkin, &drive, None);
         };
         let bare = Beam::new(&galerkin, &drive, 0)?;
-        let free = bare.regime(Regime::Free, &contact::no_sample(0).flight, true)?;
+        let free = bare.regime(Regime::Free, &contact::no_sample(&[]).flight, true)?;
         let nonlinear = Nonlinear::new(law, &bare, &free, &drive)?;
-        let flight = contact::no_sample(nonlinear.discrete_entries());
+        let flight = contact::no_sample(&nonlinear.memory_rates());
         Self::on(&flight, galerkin, &drive, Some(nonlinear))
     }
 
@@ -314,8 +314,8 @@ impl Model {
     /// The contact law of the piecewise-linear system, with derivatives by a parameter: that of the
     /// case, or none under a nonlinear law.
     fn law_of(&self, case: &Cantilever, parameter: Option<Parameter>) -> Law {
-        if self.nonlinear.is_some() {
-            contact::no_sample(self.memory)
+        if let Some(nonlinear) = &self.nonlinear {
+            contact::no_sample(&nonlinear.memory_rates())
         } else {
             case.contact_law(parameter)
         }

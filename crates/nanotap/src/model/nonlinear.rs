@@ -4,7 +4,7 @@
 //! The state is that of the free beam, `(a_1 … a_N, ȧ_1 … ȧ_N)`, and where the law remembers
 //! (whether the tip is attached, say) one more number: the branch of the law at drive phase 0.
 //! A whole number does not vary, so that its row and column of the Jacobian are zero and one
-//! multiplier is.
+//! multiplier is. A surface that relaxes adds its coordinates to those of the beam.
 
 use nanotap_arithmetic::{CancelFlag, ComplexFunctions as _};
 use std::collections::VecDeque;
@@ -16,8 +16,8 @@ use nanotap_dynamics::Tangency;
 use nanotap_flow::{Output, Regime};
 use nanotap_volterra::averaging::{about_rest, motions};
 use nanotap_volterra::{
-    Coarse, Drive, Flow, Guard, Kernel, Modes, Options, Parameter as Change, Remark, System, Tone,
-    ToneChange, Trajectory, VolterraError,
+    Coarse, Drive, Flow, ForceLaw, Guard, Kernel, Modes, Options, Parameter as Change, Remark,
+    System, Tone, ToneChange, Trajectory, VolterraError,
 };
 use serde::Serialize;
 
@@ -29,6 +29,13 @@ use crate::model::model_map::EngineMap;
 use crate::model::parameter::Parameter;
 use crate::model::sample_law::SampleLaw;
 use crate::model::{Model, ModelError, MotionError};
+
+/// Periods of a transient that leads to guesses of motions over a surface that relaxes, and the
+/// largest time of the surface there.
+const SETTLING_PERIODS: usize = 400;
+const SLOWEST_PERIODS: f64 = 15.0;
+/// Periods beyond which a surface is slow.
+const SLOW_PERIODS: f64 = 1000.0;
 
 /// Forces a step.
 const NODES: usize = 20;
@@ -131,6 +138,7 @@ impl Nonlinear {
         let n = self.system.dimension();
         let law = self.system.law();
         let (gap, rate) = self.system.gap(0.0, &state[..n]);
+        let second = self.system.second_argument(rate, &state[..n]);
         let known = remembered(&state[n..]);
         let possible = |branch: &usize| {
             *branch < law.branches()
@@ -139,17 +147,17 @@ impl Nonlinear {
                         Guard::Falls(level) => gap - level,
                         Guard::Rises(level) => level - gap,
                         Guard::Turns => -rate,
-                        Guard::Own(index) => law.guard(index, gap, rate).value,
+                        Guard::Own(index) => law.guard(index, gap, second).value,
                     };
                     guard >= 0.0
                 })
         };
         known
             .filter(possible)
-            .unwrap_or_else(|| law.branch_at(gap, rate))
+            .unwrap_or_else(|| law.branch_at(gap, second))
     }
 
-    /// Dimension of the state of the model: the lever's, and the branch where it is remembered.
+    /// Dimension of the state of the model: lever and surface, and the branch where it is remembered.
     pub(crate) fn dimension(&self) -> usize {
         self.system.dimension() + self.discrete_entries()
     }
@@ -158,6 +166,20 @@ impl Nonlinear {
     /// is remembered.
     pub(crate) fn discrete_entries(&self) -> usize {
         usize::from(self.remembers)
+    }
+
+    /// Rates of decay of the sample's entries at the end of a state: in flight those of a surface that
+    /// relaxes; 1 for whole numbers.
+    pub(crate) fn memory_rates(&self) -> Vec<f64> {
+        let surface = self.system.law().surface().map(|surface| &*surface.rates);
+        let whole = vec![1.0; self.discrete_entries()];
+        [surface.unwrap_or_default(), &whole].concat()
+    }
+
+    /// The law at rest: of a surface that relaxes, when it has.
+    pub(crate) fn static_law(&self) -> &Arc<dyn ForceLaw> {
+        let law = self.system.law();
+        law.surface().map_or(law, |surface| &surface.relaxed)
     }
 
     /// The state of the model with these coordinates of the lever, on a branch of the law.
@@ -171,6 +193,9 @@ impl Nonlinear {
     /// Guesses of periodic motions at drive phase 0, by averaging over the drive's strongest tone
     /// and by the linear response about each rest of the lever.
     pub(crate) fn averaged_states(&self) -> Vec<Vec<f64>> {
+        if self.system.law().surface().is_some() {
+            return self.settled_states().unwrap_or_default();
+        }
         let rests = self.equilibria();
         let gaps: Vec<f64> = rests.iter().map(|rest| rest.gap).collect();
         let about = |rest: &Equilibrium| about_rest(&self.system, rest.branch, rest.gap);
@@ -179,6 +204,36 @@ impl Nonlinear {
             .chain(rests.iter().filter_map(about))
             .map(|motion| self.state(motion.state, motion.branch))
             .collect()
+    }
+
+    /// Whether a surface takes so long to settle that no run is followed to its end.
+    pub(crate) fn is_slow(&self) -> bool {
+        let surface = self.system.law().surface();
+        let slowest = surface.and_then(|surface| surface.rates.iter().copied().reduce(f64::min));
+        slowest.is_some_and(|rate| rate * self.period * SLOW_PERIODS < 1.0)
+    }
+
+    /// States after a transient from rest and from the free motion.
+    fn settled_states(&self) -> Result<Vec<Vec<f64>>, VolterraError> {
+        let rest = vec![0.0; self.system.dimension()];
+        let starts = [rest, self.system.free_state(0.0)].into_iter();
+        starts.map(|start| self.settled_from(&start)).collect()
+    }
+
+    /// The state after a transient of [`SETTLING_PERIODS`] over a surface whose slow coordinates are
+    /// faster and have the same compliance: a guess of the motion that a run leads to.
+    pub(crate) fn settled_from(&self, start: &[f64]) -> Result<Vec<f64>, VolterraError> {
+        let system = self
+            .system
+            .hastened(1.0 / (SLOWEST_PERIODS * self.period))?;
+        let mut state = start[..system.dimension()].to_vec();
+        let mut flow = Flow::new(Arc::new(system));
+        for _ in 0..SETTLING_PERIODS {
+            flow.start(&state, 0.0)?;
+            flow.run_until(self.period)?;
+            flow.state(&mut state);
+        }
+        Ok(self.state(state, flow.branch()))
     }
 
     /// Puts `flow` at a state of the model at drive phase 0.
@@ -205,9 +260,10 @@ impl Nonlinear {
 
     /// The gap at which contact begins from outside, if there is one.
     pub(crate) fn contact_gap(&self) -> Option<f64> {
-        let outside = (0..self.contact.len()).filter(|branch| !self.contact[*branch]);
-        let exits = outside.flat_map(|branch| self.system.exits(branch));
-        let mut inwards = exits.filter(|exit| self.contact[exit.target]);
+        let law = self.static_law();
+        let outside = (0..law.branches()).filter(|branch| !law.touches(*branch));
+        let exits = outside.flat_map(|branch| law.exits(branch));
+        let mut inwards = exits.filter(|exit| law.touches(exit.target));
         inwards.find_map(|exit| match exit.guard {
             Guard::Falls(level) => Some(level),
             _ => None,
@@ -263,7 +319,7 @@ impl Nonlinear {
     /// The equilibria of the undriven lever, those with the tip farthest away first: zeros of
     /// `d − d₀ − c F(d)`, with the lever's static compliance `c`.
     pub fn equilibria(&self) -> Vec<Equilibrium> {
-        let law = self.system.law();
+        let law = self.static_law();
         let (rest, compliance) = (self.system.drive().offset, self.compliance());
         let tip = rest.abs();
         let mut found: Vec<Equilibrium> = Vec::new();
@@ -282,7 +338,7 @@ impl Nonlinear {
             .collect();
         for branch in 0..law.branches() {
             let (mut low, mut high) = (f64::NEG_INFINITY, f64::INFINITY);
-            for exit in self.system.exits(branch) {
+            for exit in law.exits(branch) {
                 match exit.guard {
                     Guard::Falls(level) => low = low.max(level),
                     Guard::Rises(level) => high = high.min(level),
@@ -318,7 +374,7 @@ impl Nonlinear {
                     gap: b,
                     deflection: b - rest,
                     force: force.value,
-                    contact: self.contact[branch],
+                    contact: law.touches(branch),
                     stable: compliance * force.by_gap < 1.0,
                     branch,
                 });
@@ -353,7 +409,7 @@ impl Nonlinear {
 
     /// The force at these gaps, evaluated quasi-statically, in this order.
     pub fn force_curve(&self, gaps: impl IntoIterator<Item = f64>) -> Vec<[f64; 2]> {
-        let law = self.system.law();
+        let law = self.static_law();
         let mut last: Option<(f64, usize)> = None;
         let mut curve = Vec::new();
         for gap in gaps {
@@ -364,16 +420,12 @@ impl Nonlinear {
             // At most every branch is passed on the way.
             for _ in 0..law.branches() {
                 let rises = last.is_some_and(|(before, _)| gap > before);
-                let exit = self
-                    .system
-                    .exits(branch)
-                    .iter()
-                    .find(|exit| match exit.guard {
-                        Guard::Falls(level) => gap < level,
-                        Guard::Rises(level) => gap > level,
-                        Guard::Turns => rises,
-                        Guard::Own(index) => law.guard(index, gap, 0.0).value < 0.0,
-                    });
+                let exit = law.exits(branch).into_iter().find(|exit| match exit.guard {
+                    Guard::Falls(level) => gap < level,
+                    Guard::Rises(level) => gap > level,
+                    Guard::Turns => rises,
+                    Guard::Own(index) => law.guard(index, gap, 0.0).value < 0.0,
+                });
                 let Some(exit) = exit else { break };
                 branch = exit.target;
             }
@@ -439,7 +491,7 @@ pub(crate) enum Variation {
         /// Of ln T.
         log_period: f64,
     },
-    /// Through the modes: from the maps on both sides.
+    /// Through the modes of lever or surface: from the maps on both sides.
     Differences {
         low: Arc<Nonlinear>,
         high: Arc<Nonlinear>,
@@ -450,6 +502,8 @@ pub(crate) enum Variation {
 /// A step between maps on both sides, as a part of the number: the difference is good to its
 /// square.
 const STEP: f64 = 1e-5;
+/// The size of a number that may be zero.
+const SMALLEST: f64 = 1e-3;
 
 impl Variation {
     /// Along `slopes` of the case's numbers and `law` of its law's parameters (empty: none).
@@ -464,6 +518,7 @@ impl Variation {
         if slopes
             .iter()
             .any(|(p, slope)| of_modes(*p) && *slope != 0.0)
+            || nonlinear.system.law().surface().is_some() && law.iter().any(|slope| *slope != 0.0)
         {
             return Self::between(case, nonlinear.system.cancel(), slopes, law);
         }
@@ -471,8 +526,9 @@ impl Variation {
         let drive = model.system.drive();
         let beam = Beam::new(&galerkin, drive, 0)?;
         let n = nonlinear.system.dimension();
+        let still = law.iter().all(|slope| *slope == 0.0);
         let mut change = Change {
-            law: law.to_vec(),
+            law: if still { Vec::new() } else { law.to_vec() },
             constant: vec![0.0; n],
             tones: drive
                 .frequencies()
@@ -504,12 +560,15 @@ impl Variation {
         law: &[f64],
     ) -> Result<Self, ModelError> {
         // No number moves by more than a small part of itself.
-        let parts = slopes.iter().map(|(p, slope)| (case.get(*p), *slope));
+        let parts = slopes.iter();
+        let parts = parts.map(|(p, slope)| (case.get(*p).abs().max(SMALLEST), *slope));
         let values = case.law.iter().flat_map(|law| law.values().iter().copied());
-        let parts = parts.chain(values.zip(law.iter().copied()));
+        // Numbers of a law have the sizes of their units.
+        let sizes = values.map(|value| if value == 0.0 { SMALLEST } else { value.abs() });
+        let parts = parts.chain(sizes.zip(law.iter().copied()));
         let step = parts
             .filter(|(_, slope)| *slope != 0.0)
-            .map(|(value, slope)| STEP * value.abs().max(1e-3) / slope.abs())
+            .map(|(size, slope)| STEP * size / slope.abs())
             .filter(|step| step.is_finite())
             .fold(f64::INFINITY, f64::min);
         let at = |side: f64| {
@@ -680,6 +739,7 @@ impl EngineMap for NonlinearMap {
 
     /// By the Runge–Kutta method of [`nanotap_volterra::coarse`].
     fn coarse(&self) -> Option<Box<dyn EngineMap>> {
+        // None of a surface that relaxes.
         Some(Box::new(CoarseMap {
             coarse: Coarse::new(&self.nonlinear.system, self.nonlinear.period).ok()?,
             nonlinear: Arc::clone(&self.nonlinear),
@@ -847,11 +907,20 @@ impl Nonlinear {
             return known;
         }
         let law = self.system.law();
-        let (row, column) = (self.system.kernel().row(), self.system.kernel().column());
-        let n = self.system.dimension() / 2;
-        let onto_rate: f64 = (0..n).map(|j| row[j] * column[n + j]).sum();
+        let kernel = self.system.kernel();
+        let (row, column, surface) = (kernel.row(), kernel.column(), kernel.surface());
+        let n = (self.system.dimension() - surface) / 2;
+        // Of the force onto the law's second argument: the gap's rate, or a surface in contact.
+        let onto: f64 = if surface == 0 {
+            (0..n).map(|j| row[j] * column[n + j]).sum()
+        } else {
+            column.rows(2 * n, surface).sum()
+        };
         let by_rate = period.integrate(1, |s, out| {
-            out[0] = law.force(s.branch, s.gap, s.rate).by_rate;
+            let second = self.system.second_argument(s.rate, s.state.as_slice());
+            let acts = surface == 0 || self.contact[s.branch];
+            let slope = law.force(s.branch, s.gap, second).by_rate;
+            out[0] = if acts { slope } else { 0.0 };
         });
         let turns = period
             .switches()
@@ -876,7 +945,7 @@ impl Nonlinear {
                 (acceleration(switch.to) / acceleration(switch.from)).abs(),
             ))
         });
-        self.free_log_determinant() + onto_rate * by_rate[0] + jumps.sum::<f64>()
+        self.free_log_determinant() + onto * by_rate[0] + jumps.sum::<f64>()
     }
 
     /// log|det DP| of the lever without a sample.

@@ -6,6 +6,7 @@ use std::sync::Arc;
 use crate::model::words::plain;
 use nanotap_volterra::laws::entry::{Entry, ParameterEntry};
 use nanotap_volterra::laws::polyline::Rows;
+use nanotap_volterra::laws::prony::Arms;
 use nanotap_volterra::laws::{TableLaw, all, build_sum, law};
 use nanotap_volterra::{ForceLaw, VolterraError};
 use serde::ser::SerializeSeq;
@@ -19,11 +20,16 @@ pub struct SampleLaw {
     values: Vec<f64>,
     /// The rows of a table, in whatever units its factors are measured in.
     rows: Option<Arc<Rows>>,
+    /// The arms of a sample that relaxes, in whatever units their factors are measured in.
+    arms: Option<Arc<Arms>>,
 }
 
 impl PartialEq for SampleLaw {
     fn eq(&self, other: &Self) -> bool {
-        self.values == other.values && self.rows == other.rows && self.names().eq(other.names())
+        self.values == other.values
+            && self.rows == other.rows
+            && self.arms == other.arms
+            && self.names().eq(other.names())
     }
 }
 
@@ -42,19 +48,21 @@ impl SampleLaw {
     }
 
     /// These laws with `values`, the parameters of all terms in sequence, in the model's units, and
-    /// the rows of a table if it is one of them.
+    /// the rows of a table and the arms of a Prony series, if one of them has these.
     ///
     /// # Errors
-    /// When a value makes no sense, rows are missing, or two of the laws cannot be added.
+    /// When a value makes no sense, rows or arms are missing, or two of the laws cannot be added.
     pub fn new(
         terms: Vec<&'static TableLaw>,
         values: Vec<f64>,
         rows: Option<Arc<Rows>>,
+        arms: Option<Arc<Arms>>,
     ) -> Result<Self, VolterraError> {
         let law = Self {
             terms,
             values,
             rows,
+            arms,
         };
         law.build()?;
         Ok(law)
@@ -90,9 +98,8 @@ impl SampleLaw {
     pub(crate) fn moved(&self, slopes: &[f64], step: f64) -> Self {
         let values = self.values.iter().zip(slopes);
         Self {
-            terms: self.terms.clone(),
             values: values.map(|(value, slope)| value + step * slope).collect(),
-            rows: self.rows.clone(),
+            ..self.clone()
         }
     }
 
@@ -106,9 +113,10 @@ impl SampleLaw {
         for term in &self.terms {
             let count = term.entry.parameters.len().min(rest.len());
             let (own, others) = rest.split_at(count);
-            let law = match &self.rows {
-                Some(rows) => term.through(rows, own),
-                None => term.with(own),
+            let law = match (&self.rows, &self.arms) {
+                (Some(rows), _) if term.has_rows() => term.through(rows, own),
+                (_, Some(arms)) if term.has_arms() => term.with_arms(arms, own),
+                _ => term.with(own),
             };
             built.push((term.entry, law?));
             rest = others;
@@ -127,17 +135,21 @@ impl Serialize for SampleLaw {
             parameters: std::collections::BTreeMap<&'static str, f64>,
             #[serde(skip_serializing_if = "Option::is_none")]
             rows: Option<&'a [(f64, f64)]>,
+            #[serde(skip_serializing_if = "Option::is_none")]
+            arms: Option<&'a [(f64, f64)]>,
         }
         let mut values = self.values.iter().copied();
         let mut terms = serializer.serialize_seq(Some(self.terms.len()))?;
         for law in &self.terms {
             let entry = law.entry;
             let rows = self.rows.as_deref().filter(|_| law.has_rows());
+            let arms = self.arms.as_deref().filter(|_| law.has_arms());
             let parameters = entry.parameters.iter().map(|p| p.name);
             terms.serialize_element(&Term {
                 law: entry.name,
                 parameters: parameters.zip(values.by_ref()).collect(),
                 rows: rows.map(Rows::points),
+                arms: arms.map(Arms::points),
             })?;
         }
         terms.end()

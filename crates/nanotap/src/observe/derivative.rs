@@ -295,7 +295,7 @@ pub(crate) fn first_harmonic_changes(
     let mut changes = Vec::new();
     // Columns of the derivatives; those with a parameter come last.
     let mut columns = Vec::new();
-    for k in 0..n - model.memory {
+    for k in 0..n - nonlinear.discrete_entries() {
         let mut start = vec![0.0; n];
         start[k] = 1.0;
         columns.push(k);

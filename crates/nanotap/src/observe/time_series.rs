@@ -2,6 +2,8 @@
 
 use nanotap_flow::Output;
 
+use crate::case::quantity::Kind;
+use crate::case::units::Units;
 use crate::model::{Model, MotionError};
 
 /// Largest number of rows of a time series: they take some gigabytes.
@@ -17,6 +19,33 @@ pub fn columns(model: &Model) -> Vec<String> {
     let mut names: Vec<String> = COLUMNS.map(str::to_owned).to_vec();
     names.extend(state_names(model));
     names
+}
+
+/// Columns of a physical case in SI: their heads without the unit, by index.
+const IN_SI: [(&str, Kind); 5] = [
+    ("time", Kind::Time),
+    ("tip", Kind::Length),
+    ("tip_rate", Kind::Velocity),
+    ("gap", Kind::Length),
+    ("force", Kind::Force),
+];
+
+/// The heads of the columns in these units. States stay in the model's units.
+pub fn heads(model: &Model, units: &Units) -> Vec<String> {
+    let names = columns(model).into_iter().enumerate();
+    let head = |(k, name): (usize, String)| match (units, IN_SI.get(k)) {
+        (Units::Si(_), Some((name, kind))) => units.column(name, *kind),
+        _ => units.state_column(&name),
+    };
+    names.map(head).collect()
+}
+
+/// A row in the units of its [`heads`].
+pub fn scaled<'a>(row: &'a [f64], units: &'a Units) -> impl Iterator<Item = f64> + 'a {
+    row.iter().enumerate().map(|(k, value)| match IN_SI.get(k) {
+        Some((_, kind)) => units.scaled(*kind, *value),
+        None => *value,
+    })
 }
 
 /// Names of the entries of a state.

@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 use nalgebra::DVector;
 use nanotap_dynamics::{
     ClassifyOptions, Complex, Control, MotionKind, OrbitSearch, PeriodicOrbit, Scheduling as _,
-    ShootingOptions, StroboscopicMap as _, check_size, classify, close_orbit,
+    ShootingOptions, Stability, StroboscopicMap as _, check_size, classify, close_orbit,
     close_orbit_from_points, find_orbits,
 };
 use nanotap_flow::Trajectory;
@@ -48,6 +48,10 @@ pub struct OrbitReport {
     pub multipliers: Vec<[f64; 2]>,
     /// Whether every multiplier is inside the unit circle, or the orbit is proved to be stable.
     pub stable: bool,
+    /// Drive periods in which a small disturbance of a stable orbit falls to 1/e, by the largest
+    /// multiplier.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub decay_periods: Option<f64>,
     /// What the multipliers say, or what is proved, in a word: stable, unstable or marginal;
     /// undecided where the multipliers contradict the trace formula.
     pub stability: &'static str,
@@ -98,6 +102,12 @@ pub fn spectral_radius(multipliers: &[[f64; 2]]) -> f64 {
         .iter()
         .map(|[re, im]| nanotap_arithmetic::hypot(*re, *im));
     moduli.fold(0.0, f64::max)
+}
+
+/// Drive periods in which a small disturbance of an orbit falls to 1/e; `None` where it does not.
+fn decay_periods(multipliers: &[[f64; 2]], period: usize) -> Option<f64> {
+    let radius = spectral_radius(multipliers);
+    (radius > 0.0 && radius < 1.0).then(|| -(period as f64) / nanotap_arithmetic::ln(radius))
 }
 
 /// Most harmonics of the drive frequency that are reported.
@@ -162,6 +172,14 @@ fn settled(
     start: &[f64],
     period: Option<usize>,
 ) -> Result<PeriodicOrbit, Error> {
+    let slow = model.nonlinear.as_ref().filter(|law| law.is_slow());
+    if let Some(Ok(guess)) = slow.map(|law| law.settled_from(start))
+        && let Ok(orbit) = close_orbit(map, &guess, 1, &ShootingOptions::default())
+        && !matches!(orbit.stability, Stability::Unstable { .. })
+        && period.is_none_or(|p| p % orbit.period == 0)
+    {
+        return Ok(orbit);
+    }
     let end = classify(map, start, &ClassifyOptions::default());
     if let MotionKind::Periodic(orbit) | MotionKind::TransientChaos { orbit, .. } = &end.kind
         && period.is_none_or(|p| p % orbit.period == 0)
@@ -294,6 +312,7 @@ fn report_on(
         states: orbit.states.clone(),
         residual: orbit.residual,
         error: orbit.error,
+        decay_periods: decay_periods(&pairs(&orbit.multipliers), orbit.period),
         multipliers: pairs(&orbit.multipliers),
         stable: agrees && orbit.is_stable(),
         stability: if agrees {

@@ -1115,3 +1115,217 @@ fn curves_of_amplitude_and_of_frequency_shifts_do_not_mix() {
         );
     }
 }
+
+/// A stiff lever over a sample of 3 GPa that attracts, at resonance.
+const ATTRACTING: &str = "[model]\nmodes = 1\n[cantilever]\nk = \"40 N/m\"\nf0 = \"325 kHz\"\n\
+     Q = 150\n[tip]\nradius = \"10 nm\"\nmodulus = \"170 GPa\"\npoisson = 0.28\n[sample]\n\
+     law = \"dmt\"\nmodulus = \"3 GPa\"\npoisson = 0.3\nhamaker = \"5e-20 J\"\n[drive]\n\
+     actuation = \"tip\"\nfrequency_ratio = 1\nfree_amplitude = \"15 nm\"\n[gap]\ntip = \"10 nm\"\n";
+
+/// An approach over that sample with noise, `points` rows from 22 to 9 nm between computed ones.
+fn attracting(text: &str, points: usize, noise: u64) -> Vec<(f64, f64, f64)> {
+    const COMPUTED: usize = 131;
+    let mut rows = curve(&case(text, &[]), 22.0, 9.0, COMPUTED);
+    rows.retain(|row| row.3 == Way::Approach);
+    rows.sort_by(|a, b| b.0.total_cmp(&a.0));
+    let mut noise = Noise(noise);
+    let between = |k: usize| {
+        let place = k as f64 / (points - 1) as f64 * (rows.len() - 1) as f64;
+        let first = (place as usize).min(rows.len() - 2);
+        let (a, b) = (rows[first], rows[first + 1]);
+        // A jump has nothing between.
+        let part = if (a.2 - b.2).abs() > 5.0 {
+            0.0
+        } else {
+            place - first as f64
+        };
+        let mix = |a: f64, b: f64| a + part * (b - a);
+        (
+            mix(a.0, b.0),
+            mix(a.1, b.1) + 0.03 * noise.normal(),
+            mix(a.2, b.2) + 0.15 * noise.normal(),
+        )
+    };
+    (0..points).map(between).collect()
+}
+
+fn columns(name: &str, columns: [(&str, Vec<f64>); 3]) -> Table {
+    let column = |(name, values): (&str, Vec<f64>)| {
+        let entries = values.into_iter().map(Entry::Number).collect();
+        (name.to_owned(), entries)
+    };
+    Table {
+        name: name.to_owned(),
+        columns: columns.into_iter().map(column).collect(),
+        lines: Vec::new(),
+    }
+}
+
+#[test]
+fn an_instruments_export_is_fitted_as_it_is() {
+    // In volts over a piezo that rises to the sample, with a phase that falls from 5° where the lever
+    // lags by 90°.
+    let rows = attracting(ATTRACTING, 60, 21);
+    let of = |f: &dyn Fn(&(f64, f64, f64)) -> f64| -> Vec<f64> { rows.iter().map(f).collect() };
+    let mut table = columns(
+        "export.csv",
+        [
+            ("ZSnsr (nm)", of(&|row| 1520.0 - row.0)),
+            ("Amp (V)", of(&|row| row.1 / 58.0)),
+            ("Phase (deg)", of(&|row| 95.0 - row.2)),
+        ],
+    );
+    table
+        .columns
+        .push(("Defl (V)".into(), vec![Entry::Number(0.1); 60]));
+    let start = case(ATTRACTING, &["sample.modulus=1 GPa"]);
+    let guessed = FitOptions {
+        convert: vec!["Amp=58 nm/V".into()],
+        ..request(vec![table.clone()], &["sample.modulus", "gap.offset"])
+    };
+    let stated = FitOptions {
+        convert: ["Amp=58 nm/V", "ZSnsr=1520-x", "Phase=95-x"]
+            .map(String::from)
+            .to_vec(),
+        start: vec!["gap.offset=0.4 nm".into()],
+        ..guessed.clone()
+    };
+    for options in [guessed, stated] {
+        let report = fitted(&start, &options);
+        assert!(
+            report.fits && report.remarks.is_empty(),
+            "{:?}",
+            report.remarks
+        );
+        let [low, high] = report.parameters[0].interval.map(Option::unwrap);
+        assert!(low < 3e9 && 3e9 < high && high < 1.2 * low, "{low} {high}");
+        for done in ["Amp=58 nm/V", "`Defl`"] {
+            assert!(
+                report.preparation.iter().any(|note| note.contains(done)),
+                "{done}"
+            );
+        }
+        assert!(report.case_file.starts_with("# start: gap.offset="));
+    }
+    let unstated = request(vec![table], &["sample.modulus", "gap.offset"]);
+    let slope = fitted(&start, &unstated);
+    assert!(
+        slope
+            .preparation
+            .iter()
+            .any(|note| note.contains("slope in contact"))
+    );
+}
+
+#[test]
+fn corrections_may_be_fixed_and_starts_given() {
+    let rows = attracting(ATTRACTING, 30, 22);
+    let of = |f: &dyn Fn(&(f64, f64, f64)) -> f64| -> Vec<f64> { rows.iter().map(f).collect() };
+    let table = columns(
+        "curve.csv",
+        [
+            ("distance (nm)", of(&|row| row.0 - 0.7)),
+            ("amplitude (nm)", of(&|row| 1.1 * row.1)),
+            ("phase (deg)", of(&|row| row.2 + 4.0)),
+        ],
+    );
+    let start = [
+        "gap.offset=0.7 nm",
+        "amplitude.scale=1.1",
+        "phase.offset=4",
+        "sample.modulus=2 GPa",
+    ];
+    let options = FitOptions {
+        start: start.map(String::from).to_vec(),
+        ..request(vec![table], &["sample.modulus"])
+    };
+    let report = fitted(&case(ATTRACTING, &[]), &options);
+    assert!(
+        report.fits && report.remarks.is_empty(),
+        "{:?}",
+        report.remarks
+    );
+    assert_eq!(report.parameters[0].start, 2e9);
+    let [low, high] = report.parameters[0].interval.map(Option::unwrap);
+    assert!(low < 3e9 && 3e9 < high, "{low} {high}");
+    let refused = |text: &str, why: &str| {
+        let options = FitOptions {
+            start: vec![text.into()],
+            ..options.clone()
+        };
+        let error = fit(&case(ATTRACTING, &[]), &options, &Control::default()).unwrap_err();
+        assert!(error.to_string().contains(why), "{error}");
+    };
+    refused("gap.offset", "expected NAME=VALUE");
+    refused("sample.hamaker=1e-20 J", "neither free nor a correction");
+    refused("amplitude.scale=0", "above zero");
+}
+
+#[test]
+fn long_curves_are_averaged_with_the_errors_of_their_scatter() {
+    let rows = attracting(ATTRACTING, 1500, 23);
+    let of = |f: &dyn Fn(&(f64, f64, f64)) -> f64| -> Vec<f64> { rows.iter().map(f).collect() };
+    let table = columns(
+        "long.csv",
+        [
+            ("distance (nm)", of(&|row| row.0 + 0.5)),
+            ("amplitude (nm)", of(&|row| row.1)),
+            ("phase (deg)", of(&|row| row.2)),
+        ],
+    );
+    let free = ["sample.modulus", "sample.hamaker", "gap.offset"];
+    let start = case(ATTRACTING, &["sample.modulus=2 GPa"]);
+    let report = fitted(&start, &request(vec![table], &free));
+    assert!(
+        report.fits && report.remarks.is_empty(),
+        "{:?}",
+        report.remarks
+    );
+    assert!(
+        (60..=130).contains(&report.rows.len()),
+        "{}",
+        report.rows.len()
+    );
+    // The noise of one row.
+    for (column, noise) in report.columns.iter().zip([0.03e-9, 0.15]) {
+        assert!(
+            (column.standard_error / noise - 1.0).abs() < 0.3,
+            "{column:?}"
+        );
+    }
+    for (parameter, truth) in report.parameters.iter().zip([3e9, 5e-20, -0.5e-9]) {
+        let error = parameter.standard_error.unwrap();
+        assert!(
+            (parameter.value - truth).abs() < 4.0 * error,
+            "{parameter:?}"
+        );
+        assert!(error < 0.02 * truth.abs(), "{parameter:?}");
+    }
+}
+
+#[test]
+fn a_wrong_law_is_warned_of_from_few_rows() {
+    // Without attraction the data cannot be described; 30 rows, of which a third are free.
+    let hertz = ATTRACTING.replace("law = \"dmt\"", "law = \"hertz\"");
+    let hertz = hertz.replace("hamaker = \"5e-20 J\"\n", "");
+    let rows = attracting(ATTRACTING, 30, 24);
+    let of = |f: &dyn Fn(&(f64, f64, f64)) -> f64| -> Vec<f64> { rows.iter().map(f).collect() };
+    let table = columns(
+        "curve.csv",
+        [
+            ("distance (nm)", of(&|row| row.0)),
+            ("amplitude (nm)", of(&|row| row.1)),
+            ("phase (deg)", of(&|row| row.2)),
+        ],
+    );
+    let options = request(vec![table], &["sample.modulus", "gap.offset"]);
+    let warned = |text: &str| {
+        let report = fitted(&case(text, &[]), &options);
+        report
+            .remarks
+            .iter()
+            .any(|remark| remark.contains("not to be trusted"))
+    };
+    assert!(!warned(ATTRACTING));
+    assert!(warned(&hertz));
+}

@@ -250,3 +250,68 @@ fn what_has_no_noise_is_refused_by_name() {
     };
     refused(&case, hot, "temperature");
 }
+
+/// The thermal spectrum of the free lever adds up to the mean square of equipartition.
+#[test]
+fn the_spectrum_adds_up_to_the_thermal_motion() {
+    let case = lever(&[
+        "modes=2",
+        "cantilever.Q=50",
+        "sample.stiffness=1 N/m",
+        "gap.tip=1 um",
+    ]);
+    let found = noise(&case, "1 ms");
+    let points = found.spectrum.frequency.iter().zip(&found.spectrum.density);
+    let points: Vec<(f64, f64)> = points.map(|(f, d)| (*f, *d)).collect();
+    let sum: f64 = points
+        .windows(2)
+        .map(|pair| 0.5 * (pair[1].0 - pair[0].0) * (pair[0].1 + pair[1].1))
+        .sum();
+    let ratio = sum / found.thermal_rms.powi(2);
+    assert!((ratio - 1.0).abs() < 0.02, "{ratio}");
+}
+
+/// The thermal method with the factor 0.817 (Butt and Jaschke 1995) gives the spring constant back;
+/// so does Sader's method for a lever whose f0 and Q are those that its own theory gives in air.
+#[test]
+fn calibrations_give_the_spring_constant_back() {
+    let dimensions = [
+        "cantilever.length=225 um",
+        "cantilever.width=30 um",
+        "cantilever.thickness=3 um",
+    ];
+    let air = [
+        "cantilever.fluid_density=1.18 kg/m3",
+        "cantilever.fluid_viscosity=1.86e-5 Pa s",
+    ];
+    let mut words = vec![
+        "modes=1",
+        "cantilever.k=2 N/m",
+        "cantilever.f0=70 kHz",
+        "drive.actuation=tip",
+        "drive.frequency_ratio=1",
+        "drive.free_amplitude=10 nm",
+        "sample.stiffness=1 N/m",
+        "gap.tip=1 um",
+    ];
+    words.extend(dimensions);
+    let all: Vec<String> = words
+        .iter()
+        .chain(&air)
+        .map(|word| (*word).to_owned())
+        .collect();
+    let in_air = Case::parse(None, &all).unwrap();
+    let theory = in_air.physical().unwrap().lever.clone();
+    words.retain(|word| !word.starts_with("cantilever.f0"));
+    let (f0, quality) = (
+        format!("cantilever.f0={} Hz", theory.f0),
+        format!("cantilever.Q={}", theory.quality_factor),
+    );
+    words.extend([f0.as_str(), quality.as_str()]);
+    let all: Vec<String> = words.iter().map(|word| (*word).to_owned()).collect();
+    let case = Case::parse(None, &all).unwrap();
+    let found = noise(&case, "1 ms").calibrations.unwrap();
+    assert!((found.thermal / 2.0 - 1.0).abs() < 3e-3, "{found:?}");
+    let sader = found.sader.unwrap();
+    assert!((sader / 2.0 - 1.0).abs() < 5e-3, "{found:?}");
+}

@@ -12,6 +12,7 @@ mod derivatives;
 mod frequency_modulation;
 mod grazing;
 mod permanent_contact;
+mod prony;
 mod reference;
 mod refusals;
 mod studies;

@@ -27,7 +27,7 @@ pub(crate) use reader::{Described, modes, parse_with_scan, word};
 
 use toml::de::{DeTable, DeValue};
 
-use super::force_table::{ForceTable, file_named};
+use super::force_table::file_named;
 use super::{Case, CaseKind, Kind, Value};
 use crate::case::key::Key;
 use crate::model::cantilever::{Cantilever, CosineTerm};
@@ -96,7 +96,10 @@ impl Case {
                 let gap = if text.is_empty() { "" } else { "\n" };
                 let _ = writeln!(text, "{gap}[{}]", key.section().name());
             }
-            let plain = matches!(value, Value::Number(_, Kind::Number) | Value::Table(_));
+            let plain = matches!(
+                value,
+                Value::Number(_, Kind::Number) | Value::Table(_) | Value::Arms(_)
+            );
             let quote = if plain { "" } else { "\"" };
             let _ = writeln!(text, "{} = {quote}{}{quote}", key.name(), value.text());
         }
@@ -104,71 +107,82 @@ impl Case {
     }
 }
 
-/// Reads the text of a case file. A force table that it names, by a path relative to the case file,
-/// becomes an array in the text: nothing else of a case is read from disk.
+/// The keys that take a table.
+const TABLES: [Key; 2] = [Key::SampleTable, Key::SampleArms];
+
+/// Reads the text of a case file. A force table or Maxwell arms that it names, by a path relative to
+/// the case file, become an array in the text: nothing else of a case is read from disk.
 ///
 /// # Errors
-/// If the file or its force table does not exist, cannot be read or is invalid.
+/// If the file or its table does not exist, cannot be read or is invalid.
 pub fn read(path: &Path) -> Result<Source, CaseFileError> {
-    let source = text_of(path)?;
-    let Some((span, name)) = table_named(&source.text) else {
-        return Ok(source);
-    };
-    let folder = path.parent().unwrap_or_else(|| Path::new(""));
-    let place = Place::Span(span.clone());
-    let table = table(&folder.join(name), place)
-        .map_err(|problem| CaseFileError::one(Some(source.clone()), problem))?;
-    let mut text = source.text;
-    text.replace_range(span, &table.text());
-    Ok(Source { text, ..source })
+    let mut source = text_of(path)?;
+    for key in TABLES {
+        let Some((span, name)) = table_named(key, &source.text) else {
+            continue;
+        };
+        let folder = path.parent().unwrap_or_else(|| Path::new(""));
+        let place = Place::Span(span.clone());
+        let table = table(key, &folder.join(name), place)
+            .map_err(|problem| CaseFileError::one(Some(source.clone()), problem))?;
+        source.text.replace_range(span, &table.text());
+    }
+    Ok(source)
 }
 
-/// Replaces the name of a force table in the `key=value` words of a command line by its rows.
+/// Replaces the name of a table in the `key=value` words of a command line by its rows.
 ///
 /// # Errors
-/// If it is not a force table.
+/// If it is not such a table.
 pub fn with_tables(words: &[String]) -> Result<Vec<String>, CaseFileError> {
-    let key = Key::SampleTable.path();
     let word = |word: &String| {
-        let named = word.split_once('=').filter(|(name, _)| name.trim() == key);
+        let named = word.split_once('=').and_then(|(name, text)| {
+            let key = Key::find(name.trim()).filter(|key| TABLES.contains(key))?;
+            Some((key, text))
+        });
         let quoted = |text: &str| match DeValue::parse(text.trim()).ok()?.into_inner() {
             DeValue::String(name) => Some(name.into_owned()),
             _ => None,
         };
         let text = named.map(|(_, text)| quoted(text).unwrap_or_else(|| text.to_owned()));
-        let Some(name) = text.as_deref().and_then(file_named) else {
+        let (Some((key, _)), Some(name)) = (named, text.as_deref().and_then(file_named)) else {
             return Ok(word.clone());
         };
         let place = Place::Override(word.clone());
-        let table = table(Path::new(name), place);
+        let table = table(key, Path::new(name), place);
         let table = table.map_err(|problem| CaseFileError::one(None, problem))?;
-        Ok(format!("{key}={}", table.text()))
+        Ok(format!("{}={}", key.path(), table.text()))
     };
     words.iter().map(word).collect()
 }
 
-/// Reads the force table in a file, named at `place`.
-fn table(path: &Path, place: Place) -> Result<ForceTable, Problem> {
-    ForceTable::read(path).map_err(|error| {
+/// Reads the table of a key in a file, named at `place`.
+fn table(key: Key, path: &Path, place: Place) -> Result<Value, Problem> {
+    key.entry().takes.read_table(path).map_err(|error| {
         let help = if error.remedy.is_empty() {
-            "name a CSV file with columns of gap and force"
+            if key == Key::SampleArms {
+                "name a CSV file with columns of time and modulus"
+            } else {
+                "name a CSV file with columns of gap and force"
+            }
         } else {
             error.remedy.as_str()
         };
         Problem::new(place, error.to_string())
             .help(help)
-            .key(Some(Key::SampleTable.path()))
+            .key(Some(key.path()))
     })
 }
 
-/// The file that the text of a case names as its force table, and its place.
-fn table_named(text: &str) -> Option<(std::ops::Range<usize>, String)> {
+/// The file that the text of a case names as the table of a key, and its place.
+fn table_named(key: Key, text: &str) -> Option<(std::ops::Range<usize>, String)> {
     let (tables, _) = DeTable::parse_recoverable(text);
-    let section = tables.get_ref().get(Key::SampleTable.section().name())?;
+    let section = tables.get_ref().get(key.section().name())?;
     let DeValue::Table(section) = section.get_ref() else {
         return None;
     };
-    let value = section.get(Key::SampleTable.name())?;
+    let alias = || section.get(key.alias()?);
+    let value = section.get(key.name()).or_else(alias)?;
     let DeValue::String(name) = value.get_ref() else {
         return None;
     };

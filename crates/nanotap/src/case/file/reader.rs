@@ -6,7 +6,6 @@ use std::sync::Arc;
 use super::document::{Document, Entry, Value as Written};
 use super::problem::{CaseFileError, Problem, Problems, Source};
 use super::refusal;
-use crate::case::force_table::ForceTable;
 use crate::case::key::{Key, ModelKind, Section, Takes};
 use crate::case::quantity::Kind;
 use crate::case::stated::{Origin, Replaced, Said, Stated, Value};
@@ -237,9 +236,11 @@ fn value(key: Key, entry: &Entry) -> Result<Value, Problem> {
 
 fn physical_value(key: Key, entry: &Entry) -> Result<Value, Problem> {
     let at = |message: String| Problem::new(entry.value_place.clone(), message);
-    if let (Takes::Table, Written::Rows(rows)) = (key.entry().takes, &entry.value) {
-        return ForceTable::of(rows)
-            .map(Value::Table)
+    if let (takes @ (Takes::Table | Takes::Arms), Written::Rows(rows)) =
+        (key.entry().takes, &entry.value)
+    {
+        return takes
+            .of_table(rows)
             .map_err(|error| at(format!("{key}: {error}")).help(error.remedy));
     }
     let Some(text) = entry.text() else {

@@ -73,7 +73,13 @@ fn of_law(parameter: Parameter) -> Option<Entry> {
     Some(
         quantity(Sample, entry.name, kind, range, meaning)
             .feeds(parameter)
-            .under(Laws::Some),
+            .under(Laws::Some)
+            .such_as(match kind {
+                Kind::Damping => 1e-7,
+                Kind::Time => 1e-6,
+                Kind::Force => 1e-9,
+                _ => 1.0,
+            }),
     )
 }
 
@@ -253,7 +259,7 @@ pub(super) static TABLE: LazyLock<Vec<Entry>> = LazyLock::new(|| {
 
 use Kind::{
     Angle, ChargeDensity, Damping, Density, Energy, Force, Frequency, Length, Mass, Number,
-    Pressure, Repulsion, Stiffness, Viscosity, Voltage,
+    Pressure, Repulsion, Stiffness, Time, Viscosity, Voltage,
 };
 use Range as R;
 use Section::{Cantilever, Drive, Gap, Sample, Tip};
@@ -297,6 +303,7 @@ Before from Parameter::COUNT => {
     LeverName = other(Cantilever, "lever", Takes::LeverName, "a lever of the catalogue, for what is not said");
     LeverK = quantity(Cantilever, "k", Stiffness, R::POSITIVE, "static spring constant at the tip, 3EI/L³")
         .label("spring constant $k$");
+    LeverK1 = quantity(Cantilever, "k1", Stiffness, R::POSITIVE, "stiffness of the first mode at the tip, as thermal tunes and point-mass models give it: 1.0302 k without a tip's mass");
     LeverF0 = quantity(Cantilever, "f0", Frequency, R::POSITIVE, "first free resonance, with the tip")
         .label("resonance frequency $f_0$");
     LeverF2 = quantity(Cantilever, "f2", Frequency, R::POSITIVE, "second free resonance; without a tip's mass it tells that mass")
@@ -330,15 +337,20 @@ Before from Parameter::COUNT => {
     TipShape = other(Tip, "shape", Takes::Word(&["cone", "pyramid", "sphere"]), "a solid tip, whose mass follows from its density")
         .feeds(Parameter::Alpha1);
     TipHeight = quantity(Tip, "height", Length, R::POSITIVE, "height of the tip: what separates the beam from the sample when it touches");
-    TipHalfAngle = quantity(Tip, "half_angle", Angle, FLANK, "angle between the tip's axis and its flank").called("half_angle");
+    TipHalfAngle = quantity(Tip, "half_angle", Angle, FLANK, "angle between the tip's axis and its flank").called("half_angle")
+        .such_as(0.35);
     TipDensity = quantity(Tip, "density", Density, R::POSITIVE, "density of the tip");
     TipRadius = quantity(Tip, "radius", Length, R::POSITIVE, "radius of curvature of the apex").called("radius")
-        .label("tip radius $R$");
+        .label("tip radius $R$")
+        .such_as(1e-8);
     TipMaterial = other(Tip, "material", Takes::MaterialName, "a material of the catalogue");
-    TipModulus = quantity(Tip, "modulus", Pressure, R::POSITIVE, "Young's modulus of the tip").called("tip_modulus");
-    TipPoisson = quantity(Tip, "poisson", Number, POISSON, "Poisson's ratio of the tip").called("tip_poisson");
+    TipModulus = quantity(Tip, "modulus", Pressure, R::POSITIVE, "Young's modulus of the tip").called("tip_modulus")
+        .such_as(1.7e11);
+    TipPoisson = quantity(Tip, "poisson", Number, POISSON, "Poisson's ratio of the tip").called("tip_poisson")
+        .such_as(0.28);
 
-    TipCharge = quantity(Tip, "charge", ChargeDensity, R::ANY, "surface charge density of the tip (dlvo)").under(Laws::Nonlinear).called("tip_charge");
+    TipCharge = quantity(Tip, "charge", ChargeDensity, R::ANY, "surface charge density of the tip (dlvo)").under(Laws::Nonlinear).called("tip_charge")
+        .such_as(-0.02);
 
     SampleLaw = other(
         Sample, "law", Takes::Law,
@@ -353,47 +365,85 @@ Before from Parameter::COUNT => {
     SampleMaterial = other(Sample, "material", Takes::MaterialName, "a material of the catalogue").under(Laws::Some);
     SampleStiffness = quantity(Sample, "stiffness", Stiffness, R::NOT_NEGATIVE, "contact stiffness K1")
         .feeds(Parameter::Alpha4).under(Laws::Some)
-        .label("sample stiffness");
+        .label("sample stiffness")
+        .such_as(10.0);
     SampleDamping = quantity(Sample, "damping", Damping, R::NOT_NEGATIVE, "contact damping C1")
-        .feeds(Parameter::Alpha6).under(Laws::Some);
+        .feeds(Parameter::Alpha6).under(Laws::Some)
+        .such_as(1e-7);
     SampleLossTangent = quantity(Sample, "loss_tangent", Number, R::NOT_NEGATIVE, "C1 ω/K1 at the drive frequency")
         .feeds(Parameter::Alpha6).under(Laws::Some);
 }
 After from AFTER_LAWS => {
     SampleModulus = quantity(Sample, "modulus", Pressure, R::POSITIVE, "Young's modulus of the sample")
         .feeds(Parameter::Alpha4).under(Laws::Some)
-        .label("sample modulus $E$");
-    SamplePoisson = quantity(Sample, "poisson", Number, POISSON, "Poisson's ratio of the sample").under(Laws::Some);
+        .label("sample modulus $E$")
+        .such_as(1e9);
+    SamplePoisson = quantity(Sample, "poisson", Number, POISSON, "Poisson's ratio of the sample").under(Laws::Some)
+        .such_as(0.3);
     SampleIndentation = quantity(
         Sample, "indentation", Length, R::POSITIVE, "indentation at which Hertz's stiffness is taken",
-    ).feeds(Parameter::Alpha4).under(Laws::Some);
+    ).feeds(Parameter::Alpha4).under(Laws::Some)
+        .such_as(1e-9);
 
     SampleHamaker = quantity(Sample, "hamaker", Energy, R::ANY, "Hamaker constant of tip, medium and sample").under(Laws::Nonlinear).called("attraction")
-        .label("Hamaker constant $H$");
+        .label("Hamaker constant $H$")
+        .such_as(6e-20);
     SampleWorkOfAdhesion = quantity(Sample, "work_of_adhesion", Stiffness, R::NOT_NEGATIVE, "work of adhesion, an energy an area").under(Laws::Nonlinear)
-        .label("work of adhesion $w$");
+        .label("work of adhesion $w$")
+        .such_as(0.02);
     SampleWorkOfRetraction = quantity(
         Sample, "work_of_retraction", Stiffness, R::NOT_NEGATIVE, "work of adhesion on retraction (adhesion-hysteresis)",
-    ).under(Laws::Nonlinear);
+    ).under(Laws::Nonlinear)
+        .such_as(0.03);
     SampleAdhesionForce = quantity(Sample, "adhesion_force", Force, R::NOT_NEGATIVE, "force that pulls the tip off")
         .under(Laws::Nonlinear)
-        .label("adhesion force");
+        .label("adhesion force")
+        .such_as(1e-9);
     SampleIntermolecularDistance = quantity(
         Sample, "intermolecular_distance", Length, R::POSITIVE, "intermolecular distance a0, the gap at which contact begins",
     ).under(Laws::Nonlinear).called("contact_distance").alias("contact_distance")
-        .label("intermolecular distance $a_0$");
-    SampleViscosity = quantity(Sample, "viscosity", Viscosity, R::NOT_NEGATIVE, "viscosity of the sample").under(Laws::Nonlinear)
-        .label("sample viscosity $η$");
-    SampleThickness = quantity(Sample, "thickness", Length, R::POSITIVE, "thickness of a thin sample on its support").under(Laws::Nonlinear);
-    SampleDecayLength = quantity(Sample, "decay_length", Length, R::POSITIVE, "distance in which exponential damping decays").under(Laws::Nonlinear);
-    SampleSurfaceTension = quantity(Sample, "surface_tension", Stiffness, R::POSITIVE, "surface tension of the liquid (capillary)").under(Laws::Nonlinear);
-    SampleFilmThickness = quantity(Sample, "film_thickness", Length, R::POSITIVE, "thickness of the adsorbed film (capillary)").under(Laws::Nonlinear);
-    SampleSurfaceEnergy = quantity(Sample, "surface_energy", Stiffness, R::POSITIVE, "surface energy of the solid (capillary)").under(Laws::Nonlinear);
-    SampleVoltage = quantity(Sample, "voltage", Voltage, R::ANY, "voltage between tip and sample (electrostatic)").under(Laws::Nonlinear);
+        .label("intermolecular distance $a_0$")
+        .such_as(1.65e-10);
+    SampleViscosity = quantity(Sample, "viscosity", Viscosity, R::NOT_NEGATIVE, "viscosity of the sample: elongational of a Kelvin–Voigt solid, García's η of viscous-contact").under(Laws::Nonlinear)
+        .label("sample viscosity $η$")
+        .such_as(1.0);
+    SampleThickness = quantity(Sample, "thickness", Length, R::POSITIVE, "thickness of a thin sample on its support").under(Laws::Nonlinear)
+        .such_as(2e-8);
+    SampleDecayLength = quantity(Sample, "decay_length", Length, R::POSITIVE, "distance in which exponential damping decays").under(Laws::Nonlinear)
+        .such_as(5e-10);
+    SampleSurfaceTension = quantity(Sample, "surface_tension", Stiffness, R::POSITIVE, "surface tension of the liquid (capillary)").under(Laws::Nonlinear)
+        .such_as(0.072);
+    SampleFilmThickness = quantity(Sample, "film_thickness", Length, R::POSITIVE, "thickness of the adsorbed film (capillary)").under(Laws::Nonlinear)
+        .such_as(3e-10);
+    SampleSurfaceEnergy = quantity(Sample, "surface_energy", Stiffness, R::POSITIVE, "surface energy of the solid (capillary)").under(Laws::Nonlinear)
+        .such_as(0.07);
+    SampleVoltage = quantity(Sample, "voltage", Voltage, R::ANY, "voltage between tip and sample (electrostatic)").under(Laws::Nonlinear)
+        .such_as(1.0);
     SamplePermittivity = quantity(Sample, "permittivity", Number, R::POSITIVE, "permittivity of the medium over that of free space").under(Laws::Nonlinear);
-    SampleDebyeLength = quantity(Sample, "debye_length", Length, R::POSITIVE, "Debye length of the electrolyte (dlvo)").under(Laws::Nonlinear);
-    SampleCharge = quantity(Sample, "charge", ChargeDensity, R::ANY, "surface charge density of the sample (dlvo)").under(Laws::Nonlinear).called("sample_charge");
-    SampleRepulsion = quantity(Sample, "repulsion", Repulsion, R::NOT_NEGATIVE, "constant of the repulsion (lennard-jones)").under(Laws::Nonlinear);
+    SampleDebyeLength = quantity(Sample, "debye_length", Length, R::POSITIVE, "Debye length of the electrolyte (dlvo)").under(Laws::Nonlinear)
+        .such_as(3e-9);
+    SampleCharge = quantity(Sample, "charge", ChargeDensity, R::ANY, "surface charge density of the sample (dlvo)").under(Laws::Nonlinear).called("sample_charge")
+        .such_as(-0.02);
+    SampleRepulsion = quantity(Sample, "repulsion", Repulsion, R::NOT_NEGATIVE, "constant of the repulsion (lennard-jones)").under(Laws::Nonlinear)
+        .such_as(1e-78);
+
+    SampleDampingDistance = quantity(Sample, "damping_distance", Length, R::POSITIVE, "distance over which damping falls like a power of the gap (power-damping)").under(Laws::Nonlinear)
+        .such_as(1e-9);
+    SampleDampingExponent = quantity(Sample, "damping_exponent", Number, R::NOT_NEGATIVE, "power by which damping falls with the gap (power-damping)").under(Laws::Nonlinear)
+        .such_as(3.0);
+    SampleSolvationForce = quantity(Sample, "solvation_force", Force, R::ANY, "solvation force at contact (solvation)").under(Laws::Nonlinear)
+        .such_as(1e-9);
+    SampleSolvationPeriod = quantity(Sample, "solvation_period", Length, R::POSITIVE, "period of the solvation force (solvation)").under(Laws::Nonlinear)
+        .such_as(3e-10);
+    SampleSolvationDecay = quantity(Sample, "solvation_decay", Length, R::POSITIVE, "decay length of the solvation force (solvation)").under(Laws::Nonlinear)
+        .such_as(3e-10);
+    SampleArms = other(
+        Sample, "arms", Takes::Arms,
+        "relaxing arms of a Prony series (prony-sphere, prony-cone, prony-punch): rows of time and modulus, or a CSV file of them",
+    ).alias("prony").under(Laws::Nonlinear);
+    SampleArmModulusFactor = quantity(Sample, "arm_modulus_factor", Number, R::POSITIVE, "factor of the moduli of all arms").or(1.0).under(Laws::Nonlinear);
+    SampleArmTimeFactor = quantity(Sample, "arm_time_factor", Number, R::POSITIVE, "factor of the times of all arms: the shift of a time–temperature superposition").or(1.0).under(Laws::Nonlinear);
+    SampleHorizon = quantity(Sample, "horizon", Time, R::POSITIVE, "time of observation: slower arms count as elastic").under(Laws::Nonlinear);
 
     DriveFrequency = quantity(Drive, "frequency", Frequency, R::POSITIVE, "frequency of the drive")
         .feeds(Parameter::Omega)
@@ -448,6 +498,10 @@ pub(super) static ALTERNATIVES: &[Alternatives] = &[
     Alternatives {
         ways: &[&[Key::LeverQ], &[Key::FluidDensity, Key::FluidViscosity]],
         reason: "the fluid tells the quality factor",
+    },
+    Alternatives {
+        ways: &[&[Key::LeverK], &[Key::LeverK1]],
+        reason: "one follows from the other through the shape of the first mode",
     },
     Alternatives {
         ways: &[&[Key::DriveFrequency], &[Key::DriveFrequencyRatio]],

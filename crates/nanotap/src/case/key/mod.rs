@@ -147,6 +147,8 @@ pub enum Takes {
     FrequencyRatio,
     /// Rows of gap and force, or the name of a CSV file of them.
     Table,
+    /// Rows of time and modulus, or the name of a CSV file of them.
+    Arms,
 }
 
 /// Range of a number.
@@ -472,6 +474,9 @@ impl Key {
             Takes::Count(_) => Some("it is a whole number"),
             Takes::FrequencyRatio => Some("it is a ratio of whole numbers"),
             Takes::Table => Some("it is a curve; vary sample.force_factor or sample.gap_factor"),
+            Takes::Arms => {
+                Some("it is a table; vary sample.arm_modulus_factor or sample.arm_time_factor")
+            }
             Takes::Word(_) | Takes::Law | Takes::LeverName | Takes::MaterialName => {
                 Some("it is a name, not a quantity")
             }

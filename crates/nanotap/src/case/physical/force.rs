@@ -3,8 +3,9 @@
 use std::f64::consts::PI;
 use std::sync::Arc;
 
-use nanotap_volterra::laws::entry::{Dimension, ParameterEntry};
+use nanotap_volterra::laws::entry::{Dimension, ParameterEntry, Part};
 use nanotap_volterra::laws::polyline::Rows;
+use nanotap_volterra::laws::prony::Arms;
 use nanotap_volterra::laws::{self, TableLaw};
 
 use super::elastic::Elastic;
@@ -14,7 +15,7 @@ use super::reader::Reader;
 use super::remark::Remark;
 use super::sample::reduced_modulus;
 use super::tip::Tip;
-use crate::case::force_table::ForceTable;
+use crate::case::force_table::{ArmTable, ForceTable};
 use crate::case::key::{Key, Laws};
 use crate::case::quantity::Kind;
 use crate::model::contact::ContactLaw;
@@ -33,11 +34,16 @@ pub struct SampleForce {
     pub values: Vec<f64>,
     /// The rows of a table, in m and N.
     pub table: Option<ForceTable>,
+    /// The arms of a sample that relaxes, in s and Pa.
+    pub arms: Option<ArmTable>,
 }
 
 impl PartialEq for SampleForce {
     fn eq(&self, other: &Self) -> bool {
-        self.values == other.values && self.table == other.table && self.names() == other.names()
+        self.values == other.values
+            && self.table == other.table
+            && self.arms == other.arms
+            && self.names() == other.names()
     }
 }
 
@@ -56,6 +62,7 @@ pub(crate) fn takes(terms: &[&'static TableLaw], key: Key) -> bool {
     let mut parameters = terms.iter().flat_map(|term| term.entry.parameters);
     parameters.clone().any(|p| key_of(p) == key)
         || key == Key::SampleTable && terms.iter().any(|term| term.has_rows())
+        || key == Key::SampleArms && terms.iter().any(|term| term.has_arms())
         || key == Key::SampleMaterial && parameters.any(|p| p.name == "modulus")
         || ADHESION.contains(&key) && adhesion_of(terms).is_some()
 }
@@ -119,12 +126,9 @@ impl SampleForce {
         let strange = keys_of_contacts().find(|key| reader.has(*key) && !takes(&terms, *key));
         if let Some(key) = strange {
             let mut keys: Vec<&str> = Vec::new();
-            let rows = terms.iter().find(|term| term.has_rows());
-            let rows = rows.map(|_| Key::SampleTable.path());
-            for key in rows
-                .into_iter()
-                .chain(parameters().map(|p| key_of(p).path()))
-            {
+            let tables = [Key::SampleTable, Key::SampleArms].into_iter();
+            let tables = tables.filter(|key| takes(&terms, *key)).map(Key::path);
+            for key in tables.chain(parameters().map(|p| key_of(p).path())) {
                 if !keys.contains(&key) {
                     keys.push(key);
                 }
@@ -140,7 +144,18 @@ impl SampleForce {
             values: Vec::new(),
             terms: terms.clone(),
             table: reader.table(Key::SampleTable).cloned(),
+            arms: reader.arms(Key::SampleArms).cloned(),
         };
+        if force.arms.is_none() && terms.iter().any(|term| term.has_arms()) {
+            return Err(PhysicalError::missing(
+                Key::SampleArms,
+                format!(
+                    "sample.law = \"{name}\" needs its relaxing arms, as in arms = \
+                     [[\"time (us)\", \"modulus (MPa)\"], [0.38, 460], [1.7, 136]] or arms = \
+                     \"arms.csv\""
+                ),
+            ));
+        }
         if force.table.is_none() && terms.iter().any(|term| term.has_rows()) {
             return Err(PhysicalError::missing(
                 Key::SampleTable,
@@ -158,7 +173,7 @@ impl SampleForce {
             }
             force.values.push(value);
         }
-        SampleLaw::new(terms, force.values.clone(), force.rows())
+        SampleLaw::new(terms, force.values.clone(), force.rows(), force.maxwell())
             .map_err(|error| refused(error.to_string()))?;
         Ok(Some(force))
     }
@@ -184,7 +199,14 @@ impl SampleForce {
             Key::SampleHamaker | Key::SampleWorkOfAdhesion => self.adhesion(reader, tip, key)?,
             _ => None,
         };
-        known.or(parameter.default).ok_or_else(|| {
+        // Without an attraction contact begins where the surfaces meet.
+        let touching = key == Key::SampleIntermolecularDistance && !self.attracts();
+        let default = if touching {
+            Some(0.0)
+        } else {
+            parameter.default
+        };
+        known.or(default).ok_or_else(|| {
             let ways = match key {
                 Key::SampleHamaker | Key::SampleWorkOfAdhesion
                     if adhesion_of(&self.terms).is_some() =>
@@ -201,6 +223,15 @@ impl SampleForce {
                 parameter.words
             );
             PhysicalError::missing(key, reason)
+        })
+    }
+
+    /// Whether one of the laws attracts.
+    fn attracts(&self) -> bool {
+        self.terms.iter().any(|term| {
+            let entry = term.entry;
+            entry.parts.contains(&Part::Adhesion)
+                || ["electrostatic", "capillary"].contains(&entry.name)
         })
     }
 
@@ -264,6 +295,7 @@ impl SampleForce {
                 terms,
                 values,
                 table: None,
+                arms: None,
             };
             if other.names() != self.names() {
                 all.push(other);
@@ -297,6 +329,10 @@ impl SampleForce {
     /// adhesion deforms the contact beyond its range (Tabor, J. Colloid Interface Sci. 58, 2
     /// (1977)).
     pub fn tabor_parameter(&self) -> Option<f64> {
+        // Of a sample that relaxes it depends on the rate.
+        if self.arms.is_some() {
+            return None;
+        }
         let (radius, distance) = (
             self.get(Key::TipRadius)?,
             self.get(Key::SampleIntermolecularDistance)?,
@@ -329,6 +365,20 @@ impl SampleForce {
         self.table.as_ref().map(|table| Arc::clone(table.rows()))
     }
 
+    fn maxwell(&self) -> Option<Arc<Arms>> {
+        self.arms.as_ref().map(|arms| Arc::clone(arms.arms()))
+    }
+
+    /// Storage and loss modulus, in Pa, of a sample that relaxes, at a frequency in Hz.
+    pub fn dynamic_modulus(&self, frequency: f64) -> Option<[f64; 2]> {
+        let first = self.terms.iter().position(|term| term.has_arms())?;
+        let before = self.terms[..first].iter();
+        let skipped: usize = before.map(|term| term.entry.parameters.len()).sum();
+        let values = self.values.get(skipped..)?.first_chunk()?;
+        let series = self.arms.as_ref()?.arms().series(values);
+        Some(series.dynamic(2.0 * PI * frequency))
+    }
+
     fn names(&self) -> Vec<&'static str> {
         self.terms.iter().map(|term| term.entry.name).collect()
     }
@@ -353,7 +403,13 @@ impl SampleForce {
         let entries = self.terms.iter().flat_map(|term| term.entry.parameters);
         let values = entries.zip(&self.values);
         let values = values.map(|(p, value)| value / size(p.dimension, scales));
-        SampleLaw::new(self.terms.clone(), values.collect(), self.rows()).map_err(|error| {
+        SampleLaw::new(
+            self.terms.clone(),
+            values.collect(),
+            self.rows(),
+            self.maxwell(),
+        )
+        .map_err(|error| {
             PhysicalError::impossible(Key::SampleLaw, self.names().join(" + "), error.to_string())
         })
     }

@@ -3,7 +3,7 @@
 use super::catalogue::{Catalogue, Lever, Material};
 use super::elastic::Elastic;
 use super::error::PhysicalError;
-use crate::case::force_table::ForceTable;
+use crate::case::force_table::{ArmTable, ForceTable};
 use crate::case::key::Key;
 use crate::case::stated::{Stated, Value};
 use crate::model::drive_form::FrequencyRatio;
@@ -61,6 +61,14 @@ impl<'a> Reader<'a> {
     pub(crate) fn table(self, key: Key) -> Option<&'a ForceTable> {
         match self.stated.get(key)? {
             Value::Table(table) => Some(table),
+            _ => None,
+        }
+    }
+
+    /// Maxwell arms.
+    pub(crate) fn arms(self, key: Key) -> Option<&'a ArmTable> {
+        match self.stated.get(key)? {
+            Value::Arms(arms) => Some(arms),
             _ => None,
         }
     }

@@ -92,6 +92,7 @@ const SILICON_BEAM: BeamGeometry = BeamGeometry {
 
 fn data(tip_mass: TipMass) -> LeverData {
     LeverData {
+        k1: None,
         k: Some(2.8),
         f0: Some(75e3),
         quality_factor: Some(200.0),
@@ -1345,6 +1346,38 @@ fn a_fluid_slows_and_damps_a_lever() {
         "cantilever.fluid_viscosity=1e9 Pa s",
     ];
     assert!(refused(&honey).contains("Reynolds"));
+}
+
+/// Without a tip's mass the stiffness of the first mode is β₁⁴/12 = 1.0302 of the static one; both state
+/// the same lever. A heavy tip moves like the end of a static lever.
+#[test]
+fn a_modal_stiffness_states_the_same_lever() {
+    let case = |words: &[&str]| {
+        let all = [
+            "cantilever.f0=75 kHz",
+            "cantilever.Q=200",
+            "sample.stiffness=1 N/m",
+            "drive.frequency=75 kHz",
+            "drive.free_amplitude=10 nm",
+            "gap.tip=8 nm",
+        ];
+        let words: Vec<String> = all.iter().chain(words).map(|&w| w.to_owned()).collect();
+        Case::parse(None, &words)
+    };
+    let k = |words: &[&str]| case(words).unwrap().get(Key::LeverK);
+    close(
+        k(&["cantilever.k1=2 N/m"]),
+        2.0 * 12.0 / 12.362_363_368_400_15,
+        1e-10,
+    );
+    let heavy = case(&["cantilever.k1=2 N/m", "tip.mass_ratio=1000"]).unwrap();
+    close(heavy.get(Key::LeverK), 2.0, 1e-4);
+    close(heavy.get(Key::LeverK1), 2.0, 1e-10);
+    let error = case(&["cantilever.k1=2 N/m", "tip.mass=1 ng"])
+        .unwrap_err()
+        .to_string();
+    assert!(error.contains("mass_ratio"), "{error}");
+    assert!(case(&["cantilever.k1=2 N/m", "cantilever.k=2 N/m"]).is_err());
 }
 
 /// k = E b h³/(4L³) and f0 = 1.8751²/(2π) √(k/(3m)) of a uniform silicon beam with E = 169 GPa along

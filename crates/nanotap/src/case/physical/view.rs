@@ -151,6 +151,7 @@ impl Physical {
         }
         Some(match key {
             Key::LeverK => self.lever.k,
+            Key::LeverK1 => self.lever.modal_stiffness()?,
             Key::LeverF0 => self.lever.f0,
             Key::LeverQ => self.lever.quality_factor,
             Key::LeverLength => self.data.geometry?.length,

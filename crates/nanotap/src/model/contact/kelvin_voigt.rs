@@ -49,7 +49,7 @@ const NO_DAMPER: f64 = 1e-30;
 /// The law.
 fn law(stiffness: Dual, damping: Dual) -> Law {
     if damping.value <= NO_DAMPER * stiffness.value {
-        return spring_damper::with_idle_variables(stiffness, damping, 1);
+        return spring_damper::with_idle_variables(stiffness, damping, &[1.0]);
     }
     let one = Dual::constant(1.0);
     let recovers = LinearForm::internal(0, -(stiffness / damping));

@@ -108,10 +108,10 @@ impl ContactLaw {
     }
 }
 
-/// No sample, but `internal` variables that decay and affect nothing.
-pub(crate) fn no_sample(internal: usize) -> Law {
+/// No sample, but internal variables that decay at these rates and affect nothing.
+pub(crate) fn no_sample(rates: &[f64]) -> Law {
     let none = Dual::constant(0.0);
-    spring_damper::with_idle_variables(none, none, internal)
+    spring_damper::with_idle_variables(none, none, rates)
 }
 
 #[cfg(test)]

@@ -51,13 +51,15 @@ pub(super) fn force(stiffness: Dual, damping: Dual) -> LinearForm {
     LinearForm::height(-stiffness).plus(&LinearForm::rate(-damping))
 }
 
-/// The same sample with internal variables that decay and affect nothing: the limit of a surface
-/// that recovers at once.
-pub(super) fn with_idle_variables(stiffness: Dual, damping: Dual, count: usize) -> Law {
-    let decays = |k| LinearForm::internal(k, Dual::constant(-1.0));
-    let rates: Vec<LinearForm> = (0..count).map(decays).collect();
+/// The same sample with internal variables that decay at these rates and affect nothing: the limit
+/// of a surface that recovers at once.
+pub(super) fn with_idle_variables(stiffness: Dual, damping: Dual, rates: &[f64]) -> Law {
+    let decays = rates.iter().enumerate();
+    let rates: Vec<LinearForm> = decays
+        .map(|(k, rate)| LinearForm::internal(k, Dual::constant(-rate)))
+        .collect();
     let mut law = law(stiffness, damping);
-    law.internal = count;
+    law.internal = rates.len();
     law.flight.rates.clone_from(&rates);
     law.contact.rates = rates;
     law

@@ -55,7 +55,7 @@ fn law(stiffness: Dual, arm: Dual, time: Dual) -> Law {
     // An arm that relaxes at once is a damper of no size; with no spring at all there is
     // no surface to recover.
     if time.value <= 0.0 || instantaneous.value <= 0.0 {
-        return spring_damper::with_idle_variables(stiffness, arm * time, 1);
+        return spring_damper::with_idle_variables(stiffness, arm * time, &[1.0]);
     }
     let one = Dual::constant(1.0);
     let elongation = |factor| LinearForm::internal(0, factor);

@@ -22,6 +22,7 @@ pub use formulas::{Estimates, ToneEstimates};
 use crate::Error;
 use crate::case::Case;
 use crate::control::Control;
+use crate::number::shortest;
 use crate::study::limits::MAX_DISTANCES;
 use crate::study::request::options;
 use crate::study::value::Amount;
@@ -189,6 +190,50 @@ pub struct BimodalReport {
     pub ended: Option<String>,
     /// What the growth says.
     pub stability: &'static str,
+}
+
+/// The table as CSV in SI, a row a distance.
+pub fn points_csv(report: &BimodalReport) -> String {
+    let tone = |k: usize| {
+        [
+            format!("amplitude_{k} (m)"),
+            format!("phase_{k} (deg)"),
+            format!("frequency_shift_{k} (Hz)"),
+            format!("drive_ratio_{k}"),
+            format!("virial_{k} (J)"),
+            format!("dissipation_{k} (J)"),
+        ]
+    };
+    let ends = ["peak_force (N)", "growth", "error", "formula_modulus (Pa)"];
+    let mut names = vec!["distance (m)".to_owned()];
+    names.extend([1, 2].map(tone).concat());
+    names.extend(ends.map(str::to_owned));
+    let mut csv = names.join(",") + "\n";
+    for point in &report.table {
+        let readings = point.tones.iter().flat_map(|tone| {
+            [
+                tone.amplitude,
+                tone.phase,
+                tone.frequency_shift,
+                tone.drive_ratio,
+                tone.virial,
+                tone.dissipation,
+            ]
+        });
+        let mut row = vec![shortest(point.zc)];
+        row.extend(readings.map(shortest));
+        row.extend([point.peak_force, point.growth, point.error].map(shortest));
+        row.push(
+            point
+                .estimates
+                .reduced_modulus
+                .map(shortest)
+                .unwrap_or_default(),
+        );
+        csv.push_str(&row.join(","));
+        csv.push('\n');
+    }
+    csv
 }
 
 /// What [`BimodalPoint::growth`] means for the stability.

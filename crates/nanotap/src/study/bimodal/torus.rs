@@ -37,7 +37,7 @@ const CLOSED: f64 = 1e-13;
 /// Relative residual that must be reached.
 const ACCEPTED: f64 = 1e-10;
 /// Size of the last harmonics over that of the motion, above which there are too few phases.
-const RESOLVED: f64 = 1e-5;
+const RESOLVED: f64 = 1e-6;
 /// Phases at first, and at most.
 const PHASES: [usize; 2] = [9, 129];
 /// Phases that are fitted to a motion in time.

@@ -21,6 +21,7 @@ use crate::observe::OBSERVABLES;
 use crate::study::approach::Way;
 
 use super::quantity::Quantity;
+use super::thin::Scatter;
 use crate::case::table::{Entry, Header, Table};
 
 /// All curves, and the meaning of their columns.
@@ -49,6 +50,8 @@ pub struct Column {
     pub factor: f64,
     /// Standard deviation of the values: the scale of residuals without a model.
     pub spread: f64,
+    /// Scatter of the values about smooth curves, where it is known.
+    pub(crate) scatter: Option<Scatter>,
 }
 
 /// A key that rows set.
@@ -82,6 +85,9 @@ pub struct Row {
     pub values: Vec<Option<f64>>,
     /// Their standard errors, if given.
     pub errors: Vec<Option<f64>>,
+    /// Standard errors of the values relative to those of a single row, which are estimated where
+    /// none are given.
+    pub relative: Vec<f64>,
     /// Direction of the abscissa, if given.
     pub way: Option<Way>,
     /// Line in the file, or number of the row from 1.
@@ -264,6 +270,7 @@ impl Data {
                         unit: header.unit.clone(),
                         factor: *factor,
                         spread: 0.0,
+                        scatter: None,
                     });
                     self.columns.len() - 1
                 })
@@ -283,6 +290,7 @@ impl Data {
             at: vec![f64::NAN; self.swept.len()],
             values: vec![None; self.columns.len()],
             errors: vec![None; self.columns.len()],
+            relative: vec![1.0; self.columns.len()],
             way: None,
             line: table.lines.get(index).copied().unwrap_or(index as u64 + 1),
         };
@@ -390,6 +398,7 @@ impl Data {
                 // Rows of tables that were read before one with a further column.
                 row.values.resize(count, None);
                 row.errors.resize(count, None);
+                row.relative.resize(count, 1.0);
             }
             if curve.rows.iter().all(|row| row.way.is_some()) {
                 // Approach goes to smaller distances, a sweep upwards to larger values.

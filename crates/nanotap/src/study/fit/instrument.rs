@@ -1,8 +1,8 @@
 //! Tables as instruments write them: names and units of their columns, the direction of the
 //! distance, approach and retract in one column, and zero and sign of the phase.
 //!
-//! Conversions are stated (`Amp=58 nm/V`, `Phase=90-x`) or guessed; every guess is reported. A
-//! table whose columns follow nanotap's own conventions stays as it is.
+//! Conversions are stated (`Amp=58 nm/V`, `Phase=90-x`) or guessed; every guess is reported, and what
+//! is stated is not guessed. A table whose columns follow nanotap's own conventions stays as it is.
 
 use nanotap_arithmetic::ComplexFunctions as _;
 
@@ -11,8 +11,12 @@ use crate::case::Case;
 use crate::case::physical::free_response::free_response;
 use crate::case::table::{Entry, Header, Table};
 
-/// Names of instruments' columns, in lower case without blanks, and what they are called here.
-const NAMES: [(&str, &str); 21] = [
+use super::data;
+use super::quantity::Quantity;
+
+/// Names of instruments' columns, in lower case without blanks, and what they are called here. Of
+/// several with the same meaning the first counts.
+const NAMES: [(&str, &str); 25] = [
     ("amp", "amplitude"),
     ("amp1", "amplitude"),
     ("amplitude1", "amplitude"),
@@ -22,15 +26,19 @@ const NAMES: [(&str, &str); 21] = [
     ("phas1", "phase"),
     ("lockinphase", "phase"),
     ("lock-inphase", "phase"),
+    ("r", "amplitude"),
+    ("theta", "phase"),
     ("zsnsr", "distance"),
     ("zsensor", "distance"),
-    ("z", "distance"),
-    ("zpiezo", "distance"),
-    ("piezo", "distance"),
-    ("height", "distance"),
     ("heightsensor", "distance"),
     ("measuredheight", "distance"),
     ("height(measured)", "distance"),
+    ("zpiezo", "distance"),
+    ("piezo", "distance"),
+    ("height", "distance"),
+    ("z", "distance"),
+    ("zposition", "distance"),
+    ("separation", "distance"),
     ("df", "frequency_shift"),
     ("freqshift", "frequency_shift"),
     ("frequencyshift", "frequency_shift"),
@@ -41,25 +49,48 @@ const OWN_PHASE: f64 = 15.0;
 /// Fewest rows from which anything is guessed.
 const MIN_ROWS: usize = 12;
 
-/// `tables` with the conversions, each of the form `NAME=RULE`, and then the guesses, which are
-/// described.
+/// Measured tables with the names and units that are known here.
+pub(crate) struct Prepared {
+    pub(crate) tables: Vec<Table>,
+    /// The columns to use, by their present names.
+    pub(crate) columns: Vec<String>,
+    /// What was done: conversions and guesses.
+    pub(crate) notes: Vec<String>,
+}
+
+/// What was stated of a table, which is not guessed.
+#[derive(Clone, Copy, Debug, Default)]
+struct Stated {
+    /// Any conversion: the table is an instrument's.
+    any: bool,
+    direction: bool,
+    zero: bool,
+    phase: bool,
+}
+
+/// `tables` with the conversions, each of the form `NAME=RULE`, and then the guesses. `columns`
+/// are the names of those to use, as in the file; none: all.
 ///
 /// # Errors
-/// When a conversion is not understood, or no table has its column.
+/// When a conversion is not understood, no table has its column, or a voltage cannot be converted.
 pub(crate) fn prepared(
     case: &Case,
     tables: &[Table],
     conversions: &[String],
-) -> Result<(Vec<Table>, Vec<String>), Error> {
+    columns: &[String],
+) -> Result<Prepared, Error> {
     let mut tables = tables.to_vec();
-    let mut foreign = vec![false; tables.len()];
+    let mut columns = columns.to_vec();
+    let mut stated = vec![Stated::default(); tables.len()];
+    let mut notes = Vec::new();
     for text in conversions {
         let conversion = Conversion::parse(text)?;
         let mut used = false;
-        for (table, foreign) in tables.iter_mut().zip(&mut foreign) {
-            let applied = conversion.apply(table)?;
-            *foreign |= applied;
-            used |= applied;
+        for (table, stated) in tables.iter_mut().zip(&mut stated) {
+            if conversion.apply(table)? {
+                used = true;
+                conversion.note(stated);
+            }
         }
         if !used {
             let names: Vec<String> = tables
@@ -73,13 +104,55 @@ pub(crate) fn prepared(
                 format!("the columns are {}", names.join(", ")),
             ));
         }
+        if let Some(renamed) = &conversion.renamed {
+            follow(&mut columns, &conversion.name, renamed);
+        }
+        notes.push(format!("converted as stated: {text}"));
     }
-    let mut remarks = Vec::new();
-    for (table, foreign) in tables.iter_mut().zip(foreign) {
-        let renamed = rename(table, &mut remarks);
-        guess(case, table, renamed || foreign, &mut remarks);
+    for (table, stated) in tables.iter_mut().zip(stated) {
+        let foreign = rename(table, &mut columns, &mut notes) || stated.any;
+        if foreign {
+            leave_out(case, table, &columns, &mut notes);
+        }
+        guess(case, table, foreign, stated, &mut notes)?;
     }
-    Ok((tables, remarks))
+    Ok(Prepared {
+        tables,
+        columns,
+        notes,
+    })
+}
+
+/// Keeps the selection of a column that is renamed.
+fn follow(columns: &mut [String], before: &str, after: &str) {
+    for column in columns {
+        if Header::of(column).name == before {
+            after.clone_into(column);
+        }
+    }
+}
+
+/// Leaves out an instrument's columns that are not understood, if no selection was made.
+fn leave_out(case: &Case, table: &mut Table, columns: &[String], notes: &mut Vec<String>) {
+    if !columns.is_empty() {
+        return;
+    }
+    let mut lost = Vec::new();
+    table.columns.retain(|(written, _)| {
+        let name = Header::of(written).name;
+        let plain = name.strip_suffix(" error").unwrap_or(&name).trim();
+        let known = matches!(plain, "direction" | "way" | "curve")
+            || Quantity::named(plain, true).is_some()
+            || data::set(plain, case).is_ok();
+        if !known {
+            lost.push(format!("`{name}`"));
+        }
+        known
+    });
+    if !lost.is_empty() {
+        let (name, lost) = (&table.name, lost.join(", "));
+        notes.push(format!("{name}: not understood and left out: {lost}"));
+    }
 }
 
 /// What is done to a column.
@@ -143,6 +216,23 @@ impl Conversion {
             });
         }
         Err(wrong(format!("`{rule}` is not a conversion")))
+    }
+
+    /// Notes what the conversion states.
+    fn note(&self, stated: &mut Stated) {
+        let plain = self.name.to_lowercase().replace([' ', '_'], "");
+        let known = NAMES.iter().find(|(own, _)| *own == plain);
+        let name = self.renamed.as_deref().or(known.map(|(_, name)| *name));
+        stated.any = true;
+        match name.unwrap_or(&plain) {
+            _ if self.renamed.is_some() => {}
+            "distance" | "zc" | "gap" => {
+                stated.direction = true;
+                stated.zero |= self.offset != 0.0;
+            }
+            "phase" => stated.phase = true,
+            _ => {}
+        }
     }
 
     /// Converts the column of `table` that has the name, if one does.
@@ -239,27 +329,25 @@ fn linear(rule: &str) -> Option<(f64, f64)> {
 }
 
 /// Gives instruments' columns the names that are known here, and says whether there are any.
-fn rename(table: &mut Table, remarks: &mut Vec<String>) -> bool {
-    let before = remarks.len();
-    let known = |table: &Table, name: &str| {
-        let mut headers = table.columns.iter().map(|(written, _)| Header::of(written));
-        headers.any(|header| header.name.to_lowercase() == name)
-    };
-    for place in 0..table.columns.len() {
-        let header = Header::of(&table.columns[place].0);
-        let plain = header.name.to_lowercase().replace([' ', '_'], "");
-        let Some((_, name)) = NAMES.iter().find(|(own, _)| *own == plain) else {
+fn rename(table: &mut Table, columns: &mut [String], notes: &mut Vec<String>) -> bool {
+    let before = notes.len();
+    let called = |written: &str| Header::of(written).name;
+    for (own, name) in NAMES {
+        let plain = |written: &str| called(written).to_lowercase().replace([' ', '_'], "");
+        let is_known = |(written, _): &(String, Vec<Entry>)| called(written).to_lowercase() == name;
+        let place = table.columns.iter().position(|(w, _)| plain(w) == own);
+        let Some(place) = place.filter(|_| !table.columns.iter().any(is_known)) else {
             continue;
         };
-        if !known(table, name) {
-            remarks.push(format!(
-                "{}: `{}` is taken as {name}",
-                table.name, header.name
-            ));
-            table.columns[place].0 = written(name, &header.unit);
-        }
+        let header = Header::of(&table.columns[place].0);
+        notes.push(format!(
+            "{}: `{}` is taken as {name}",
+            table.name, header.name
+        ));
+        follow(columns, &header.name, name);
+        table.columns[place].0 = written(name, &header.unit);
     }
-    remarks.len() > before
+    notes.len() > before
 }
 
 /// The columns of amplitude curves that guesses change.
@@ -283,9 +371,17 @@ fn places(table: &Table) -> Option<Places> {
 }
 
 /// Directions, and of a `foreign` table, whose columns had other names or were converted, the
-/// zeros of distance and phase and the sign of the phase.
-fn guess(case: &Case, table: &mut Table, foreign: bool, remarks: &mut Vec<String>) {
-    let Some(places) = places(table) else { return };
+/// zeros of distance and phase and the sign of the phase, except what was `stated`.
+fn guess(
+    case: &Case,
+    table: &mut Table,
+    foreign: bool,
+    stated: Stated,
+    remarks: &mut Vec<String>,
+) -> Result<(), Error> {
+    let Some(places) = places(table).filter(|places| is_curve(case, table, places)) else {
+        return Ok(());
+    };
     let numbers = |place: usize| -> Option<Vec<f64>> {
         let entries = table.columns[place].1.iter();
         entries
@@ -297,13 +393,13 @@ fn guess(case: &Case, table: &mut Table, foreign: bool, remarks: &mut Vec<String
     };
     let all = [places.distance, places.amplitude, places.phase].map(numbers);
     let [Some(mut distance), Some(mut amplitude), Some(mut phase)] = all else {
-        return;
+        return Ok(());
     };
     if distance.len() < MIN_ROWS {
-        return;
+        return Ok(());
     }
     let mut notes: Vec<String> = Vec::new();
-    if is_reversed(&distance, &amplitude) {
+    if !stated.direction && is_reversed(&distance, &amplitude) {
         for z in &mut distance {
             *z = -*z;
         }
@@ -327,12 +423,24 @@ fn guess(case: &Case, table: &mut Table, foreign: bool, remarks: &mut Vec<String
                     header.unit
                 ));
             }
-            _ => return,
+            _ => {
+                return Err(Error::option(
+                    "convert",
+                    format!(
+                        "{}: the amplitude is in {}, and too little of it falls in contact to tell its \
+                         sensitivity",
+                        table.place(None, places.amplitude),
+                        header.unit
+                    ),
+                    format!("state it, as in {}=58 nm/{}", header.name, header.unit),
+                ));
+            }
         }
     }
     let lag = free_lag(case);
     let free = free_rows(&distance, &amplitude);
     if foreign
+        && !stated.phase
         && let Some(own) = free.phase(&phase)
         && let Some(lag) = lag
         && wrapped(own - lag).abs() > OWN_PHASE
@@ -349,7 +457,10 @@ fn guess(case: &Case, table: &mut Table, foreign: bool, remarks: &mut Vec<String
              sample only attracts"
         ));
     }
-    if foreign && let Some(line) = tapping_line(&distance, &amplitude) {
+    if foreign
+        && !stated.zero
+        && let Some(line) = tapping_line(&distance, &amplitude)
+    {
         let offset = free.amplitude - line.knee(free.amplitude);
         if offset.abs() > 2.0 * free.amplitude {
             for z in &mut distance {
@@ -386,10 +497,30 @@ fn guess(case: &Case, table: &mut Table, foreign: bool, remarks: &mut Vec<String
     }
     let place = |note: String| format!("{}: {note}", table.name);
     remarks.extend(notes.into_iter().map(place));
+    Ok(())
+}
+
+/// Whether the rows are one curve over the distance: it varies, no other key does, and no column
+/// tells several curves or kinds of motion apart.
+fn is_curve(case: &Case, table: &Table, places: &Places) -> bool {
+    let mut columns = table.columns.iter().enumerate();
+    let varies = |place: usize| {
+        let entries = &table.columns[place].1;
+        entries.iter().any(|entry| Some(entry) != entries.first())
+    };
+    varies(places.distance)
+        && columns.all(|(place, (written, _))| {
+            let name = Header::of(written).name;
+            place == places.distance
+                || !matches!(name.as_str(), "curve" | "classification")
+                    && (Quantity::named(&name, true).is_some()
+                        || data::set(&name, case).is_err()
+                        || !varies(place))
+        })
 }
 
 /// The lever's free phase in degrees.
-fn free_lag(case: &Case) -> Option<f64> {
+pub(super) fn free_lag(case: &Case) -> Option<f64> {
     let cantilever = case.cantilever()?;
     let response = free_response(cantilever).ok()?;
     Some(-response.argument().to_degrees())
@@ -439,6 +570,14 @@ fn free_rows(distance: &[f64], amplitude: &[f64]) -> Free {
     }
 }
 
+/// The farthest rows, whose amplitude is free, the farthest first.
+pub(super) fn far_rows(distance: &[f64], amplitude: &[f64]) -> Vec<usize> {
+    if amplitude.len() < MIN_ROWS || amplitude.iter().any(|a| !a.is_finite()) {
+        return Vec::new();
+    }
+    free_rows(distance, amplitude).rows
+}
+
 /// How far the phase of deep rows lies from the free phase `own`, in degrees.
 fn deep_deviation(amplitude: &[f64], free: f64, phase: &[f64], own: f64) -> f64 {
     let in_range = |low: f64, high: f64| -> Vec<f64> {
@@ -456,7 +595,7 @@ fn deep_deviation(amplitude: &[f64], free: f64, phase: &[f64], own: f64) -> f64 
 }
 
 /// The line of the amplitude against the distance while tapping.
-struct Line {
+pub(super) struct Line {
     slope: f64,
     offset: f64,
     is_reliable: bool,
@@ -464,13 +603,13 @@ struct Line {
 
 impl Line {
     /// Where the line reaches the free amplitude.
-    fn knee(&self, free: f64) -> f64 {
+    pub(super) fn knee(&self, free: f64) -> f64 {
         (free - self.offset) / self.slope
     }
 }
 
 /// A robust line through the rows between 0.35 and 0.85 of the free amplitude.
-fn tapping_line(distance: &[f64], amplitude: &[f64]) -> Option<Line> {
+pub(super) fn tapping_line(distance: &[f64], amplitude: &[f64]) -> Option<Line> {
     let free = free_rows(distance, amplitude).amplitude;
     let rows: Vec<(f64, f64)> = distance
         .iter()

@@ -58,6 +58,15 @@ pub(super) fn compare(
                 ..request.clone()
             };
             request.bounds.0.retain(|bound| takes(law, &bound.name));
+            let name = |start: &String| {
+                start
+                    .split('=')
+                    .next()
+                    .unwrap_or_default()
+                    .trim()
+                    .to_owned()
+            };
+            request.start.retain(|start| takes(law, &name(start)));
             fit_one(&case, &request, control)
         });
         // A law whose fit was cancelled without a result is not judged.

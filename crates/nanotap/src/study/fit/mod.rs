@@ -21,6 +21,7 @@
 
 mod branches;
 mod data;
+mod guess;
 pub(crate) mod instrument;
 mod jumps;
 mod laws;
@@ -33,6 +34,7 @@ mod reporting;
 mod search;
 mod solve;
 mod statistics;
+pub(crate) mod thin;
 
 use nanotap_dynamics::Control;
 
@@ -45,7 +47,8 @@ pub use report::{
     OtherOrbit, Reading, Undetermined,
 };
 
-use parameters::parameters;
+use guess::begin_from_free_rows;
+use parameters::{begin, correct, keep_physical, parameters, starts};
 use problem::Problem;
 use problem::held::Loop;
 use search::Search;
@@ -76,6 +79,13 @@ options! {
         /// Parameters to find with one value per curve
         #[schemars(extend("x-value" = "KEY,…"))]
         pub per_curve: Vec<String> = Vec::new(),
+        /// Conversions of columns, as in Amp="58 nm/V", Phase=90-x, Zsnsr=-x or Ch3=amplitude
+        #[schemars(extend("x-value" = "NAME=RULE"))]
+        pub convert: Vec<String> = Vec::new(),
+        /// Initial values of free parameters, and fixed corrections of columns, as in
+        /// gap.offset="10.3 nm"
+        #[schemars(extend("x-value" = "NAME=VALUE"))]
+        pub start: Vec<String> = Vec::new(),
         /// Bounds of parameters, as in sample.stiffness="1 N/m:100 N/m"
         #[schemars(extend("x-value" = "KEY=LOW:HIGH"))]
         pub bounds: Intervals = Intervals::default(),
@@ -85,6 +95,9 @@ options! {
         /// Contact laws to compare, as in hertz,dmt; default: the law of the case
         #[schemars(extend("x-value" = "LAW,…"))]
         pub laws: Vec<String> = Vec::new(),
+        /// Average longer curves to about this many rows; 0: use every row
+        #[schemars(range(min = 0, max = MAX_ROWS), extend("x-value" = "ROWS"))]
+        pub rows: usize = 100,
         /// Initial values to try until the data are described
         #[schemars(range(min = 1, max = MAX_STARTS), extend("x-value" = "S"))]
         pub starts: usize = 8,
@@ -183,7 +196,10 @@ fn with_search<R>(
     if request.data.is_empty() {
         return Err(Error::option("data", "no data were given", "give a table"));
     }
-    let data = Data::read(case, &request.data, &names(&request.columns))?;
+    let columns = names(&request.columns);
+    let measured = instrument::prepared(case, &request.data, &request.convert, &columns)?;
+    let mut preparation = measured.notes;
+    let mut data = Data::read(case, &measured.tables, &measured.columns)?;
     let sets_distance = data.swept.iter().any(|s| data::is_distance(s.key));
     // The distance of the case is irrelevant if the rows set it.
     let case = if sets_distance {
@@ -193,12 +209,23 @@ fn with_search<R>(
     };
     let free = names(&request.free);
     let per_curve = names(&request.per_curve);
-    let parameters = parameters(&case, &data, &free, &per_curve, &request.bounds)?;
+    let starts = starts(&request.start)?;
+    let corrected = correct(&case, &mut data, &starts, |name| {
+        free.iter().chain(&per_curve).any(|free| free == name)
+    })?;
+    preparation.extend(corrected);
+    data.add_free_scatter();
+    preparation.extend(data.average(request.rows));
+    let mut parameters = parameters(&case, &data, &free, &per_curve, &request.bounds)?;
+    begin(&case, &data, &mut parameters, &starts)?;
+    preparation.extend(begin_from_free_rows(&case, &data, &mut parameters));
+    keep_physical(&mut parameters, &request.bounds);
     let held = data
         .is_modulated()
         .then(|| Loop::of(&case, request.phase))
         .transpose()?;
     work(&Search {
+        preparation: &preparation,
         problem: Problem {
             case: &case,
             data: &data,

@@ -40,6 +40,10 @@ pub(super) struct Parameter {
     pub(super) bounds: (f64, f64),
     /// Scale of the range of initial values.
     pub(super) size: f64,
+    /// Whether the initial value was given for this fit.
+    pub(super) is_given: bool,
+    /// Whether its bounds are the limits of what is physical.
+    pub(super) is_limited: bool,
 }
 
 impl Parameter {
@@ -57,6 +61,11 @@ impl Parameter {
                 }
             }
         }
+    }
+
+    /// Whether this is its name, or another one of its key.
+    fn is_called(&self, name: &str) -> bool {
+        self.name == name || matches!(self.target, Target::Key(key) if Key::find(name) == Some(key))
     }
 
     /// Whether it counts for a curve.
@@ -207,6 +216,8 @@ fn parameter(
             inside(range.high, range.below, -1.0),
         ),
         size: start.abs(),
+        is_given: false,
+        is_limited: false,
     })
 }
 
@@ -266,34 +277,49 @@ fn nuisance(
         start,
         bounds,
         size,
+        is_given: false,
+        is_limited: false,
     })
 }
 
-/// Sets the bounds of a parameter and moves its initial value between them.
+/// A value of a parameter in SI or the model's units.
+fn read(case: &Case, data: &Data, target: Target, text: &str) -> Result<f64, Error> {
+    let number = || {
+        text.trim()
+            .parse::<f64>()
+            .map_err(|_| Error::input(format!("expected a number, got `{text}`"), "give a number"))
+    };
+    match target {
+        Target::Key(key) => Ok(case.value(key, text)?),
+        Target::Place(at) => Ok(case.value(data.swept[at].key, text)?),
+        Target::Offset(column) => {
+            let quantity = data.columns[column].quantity;
+            match quantity.kind().filter(|_| case.is_physical()) {
+                Some(kind) => kind
+                    .parse(text)
+                    .map_err(|error| Error::input(error.to_string(), "give it with its unit")),
+                None if quantity.is_angle() => {
+                    let text = text.trim_end_matches(['°', ' ']).trim_end_matches("deg");
+                    text.trim().parse::<f64>().map_err(|_| {
+                        Error::input(format!("expected degrees, got `{text}`"), "give a number")
+                    })
+                }
+                None => number(),
+            }
+        }
+        Target::Scale(_) => number(),
+    }
+}
+
+/// Sets the bounds of a parameter; an initial value beyond them moves to their middle.
 fn bound(
     case: &Case,
     data: &Data,
     parameter: &mut Parameter,
     ends: [&Amount; 2],
 ) -> Result<(), Error> {
-    let read = |amount: &Amount| match parameter.target {
-        Target::Key(key) => Ok(case.value(key, amount.text())?),
-        Target::Place(at) => Ok(case.value(data.swept[at].key, amount.text())?),
-        Target::Offset(column) => {
-            let kind = data.columns[column].quantity.kind();
-            let kind = kind.filter(|_| case.is_physical());
-            let number = amount.text().parse::<f64>().ok();
-            match (kind, number) {
-                (Some(kind), _) => kind
-                    .parse(amount.text())
-                    .map_err(|error| Error::input(error.to_string(), "give it with its unit")),
-                (None, Some(number)) => Ok(number),
-                (None, None) => Err(no_number(amount)),
-            }
-        }
-        Target::Scale(_) => amount.text().parse::<f64>().map_err(|_| no_number(amount)),
-    };
-    let (low, high) = (read(ends[0])?, read(ends[1])?);
+    let [low, high] = ends.map(|end| read(case, data, parameter.target, end.text()));
+    let (low, high) = (low?, high?);
     let (least, most) = parameter.bounds;
     if !(low < high && low <= most && high >= least) {
         return Err(Error::input(
@@ -305,13 +331,147 @@ fn bound(
         ));
     }
     parameter.bounds = (low.max(least), high.min(most));
-    parameter.start = parameter
-        .start
-        .clamp(parameter.bounds.0, parameter.bounds.1);
-    parameter.size = parameter.size.min(parameter.bounds.1 - parameter.bounds.0);
+    let (low, high) = parameter.bounds;
+    if !(low..=high).contains(&parameter.start) {
+        parameter.start = match (low.is_finite(), high.is_finite()) {
+            (true, true) => between(low, high),
+            _ => parameter.start.clamp(low, high),
+        };
+    }
+    parameter.size = parameter.size.min(high - low);
     Ok(())
 }
 
-fn no_number(amount: &Amount) -> Error {
-    Error::input(format!("`{amount}` is not a number"), "give a number")
+/// Limits of what is physical, in SI: beyond them a fit has found something else than the sample.
+const PHYSICAL: [(Key, f64, f64); 11] = [
+    (Key::TipRadius, 1e-10, 1e-3),
+    (Key::TipModulus, 1e4, 1e13),
+    (Key::SampleModulus, 1e2, 1e13),
+    (Key::SampleStiffness, 0.0, 1e7),
+    (Key::SampleDamping, 0.0, 1e3),
+    (Key::SampleLossTangent, 0.0, 1e3),
+    (Key::SampleHamaker, -1e-19, 1e-17),
+    (Key::SampleWorkOfAdhesion, 0.0, 1e2),
+    (Key::SampleAdhesionForce, 0.0, 1e-3),
+    (Key::SampleIntermolecularDistance, 1e-11, 1e-7),
+    (Key::SampleViscosity, 0.0, 1e9),
+];
+
+/// Limits parameters that have no bounds of their own to physical values, if they start there.
+pub(super) fn keep_physical(parameters: &mut [Parameter], bounds: &Intervals) {
+    for parameter in parameters {
+        let own = bounds
+            .0
+            .iter()
+            .any(|bound| parameter.is_called(&bound.name));
+        let limits = PHYSICAL
+            .iter()
+            .find(|(key, ..)| parameter.target == Target::Key(*key));
+        let Some((_, low, high)) = limits.filter(|_| !own) else {
+            continue;
+        };
+        if (*low..=*high).contains(&parameter.start) {
+            let (least, most) = parameter.bounds;
+            parameter.bounds = (low.max(least), high.min(most));
+            parameter.is_limited = true;
+        }
+    }
+}
+
+/// A name and the text of its value.
+pub(super) type Start = (String, String);
+
+/// Initial values and fixed corrections, each of the form `NAME=VALUE`.
+pub(super) fn starts(given: &[String]) -> Result<Vec<Start>, Error> {
+    let parse = |text: &String| match text.split_once('=') {
+        Some((name, value)) if !name.trim().is_empty() => {
+            Ok((name.trim().to_owned(), value.trim().to_owned()))
+        }
+        _ => Err(Error::option(
+            "start",
+            format!("expected NAME=VALUE, got `{text}`"),
+            "write it as in gap.offset=\"10.3 nm\"",
+        )),
+    };
+    given.iter().map(parse).collect()
+}
+
+/// Sets the initial values of free parameters.
+pub(super) fn begin(
+    case: &Case,
+    data: &Data,
+    parameters: &mut [Parameter],
+    starts: &[Start],
+) -> Result<(), Error> {
+    for (name, text) in starts {
+        for parameter in parameters.iter_mut().filter(|p| p.is_called(name)) {
+            let value = read(case, data, parameter.target, text).map_err(|e| e.at("start"))?;
+            let (low, high) = parameter.bounds;
+            if !(low..=high).contains(&value) {
+                return Err(Error::option(
+                    "start",
+                    format!("{name} = {text} is not within its bounds"),
+                    "give a value between {bounds}",
+                ));
+            }
+            parameter.start = value;
+            parameter.is_given = true;
+            if let Target::Key(_) = parameter.target {
+                parameter.size = value.abs();
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Corrects the data by the values that are not of a free parameter, and says how.
+pub(super) fn correct(
+    case: &Case,
+    data: &mut Data,
+    starts: &[Start],
+    is_free: impl Fn(&str) -> bool,
+) -> Result<Vec<String>, Error> {
+    let mut notes = Vec::new();
+    for (name, text) in starts.iter().filter(|(name, _)| !is_free(name)) {
+        let target = match name.rsplit_once('.') {
+            Some((of, what @ ("offset" | "scale"))) => {
+                nuisance(case, data, name, of, what)
+                    .map_err(|e| e.at("start"))?
+                    .target
+            }
+            _ => {
+                return Err(Error::option(
+                    "start",
+                    format!("{name} is neither free nor a correction of a column"),
+                    format!("set it in the case, or name it in {{free}}: {name}"),
+                ));
+            }
+        };
+        let value = read(case, data, target, text).map_err(|e| e.at("start"))?;
+        if let (Target::Scale(_), true) = (target, value <= 0.0) {
+            return Err(Error::option(
+                "start",
+                format!("expected a factor above zero, got {text}"),
+                "give one as in amplitude.scale=1.02",
+            ));
+        }
+        for row in data.curves.iter_mut().flat_map(|curve| &mut curve.rows) {
+            match target {
+                Target::Place(at) => row.at[at] += value,
+                Target::Offset(column) => {
+                    row.values[column] = row.values[column].map(|of| of - value);
+                }
+                Target::Scale(column) => {
+                    row.values[column] = row.values[column].map(|of| of / value);
+                    row.errors[column] = row.errors[column].map(|of| of / value);
+                }
+                Target::Key(_) => {}
+            }
+        }
+        if let Target::Scale(column) = target {
+            data.columns[column].spread /= value;
+        }
+        notes.push(format!("corrected as stated: {name}={text}"));
+    }
+    Ok(notes)
 }

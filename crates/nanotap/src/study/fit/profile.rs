@@ -24,13 +24,13 @@ pub(super) enum Profile {
     Lower(Vec<f64>),
 }
 
-/// Computes the intervals of half-width `width` in standard errors, unless chi2 nearby is lower by
+/// Computes the intervals of half-widths `widths` in standard errors, unless chi2 nearby is lower by
 /// more than `deeper`.
 pub(super) fn profile(
     problem: &Problem<'_>,
     best: &Solution<Point>,
     information: &Information,
-    width: f64,
+    widths: &[f64],
     deeper: f64,
 ) -> Profile {
     let mut intervals = Vec::new();
@@ -46,7 +46,7 @@ pub(super) fn profile(
                 information,
                 (k, error),
                 side,
-                (width, deeper),
+                (widths[k], deeper),
             ) {
                 End::At(value) => *interval_end = Some(value),
                 End::None => {}

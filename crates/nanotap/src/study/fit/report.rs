@@ -41,6 +41,9 @@ pub struct FitReport {
     pub reason: Option<String>,
     /// Warnings about the result.
     pub remarks: Vec<String>,
+    /// What was done to the data before the fit: conversions, guesses, fixed corrections, averages.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub preparation: Vec<String>,
     /// Combinations of parameters that the data do not determine.
     pub undetermined: Vec<Undetermined>,
     /// Correlations of the parameters, in their order; 0 for undetermined ones.

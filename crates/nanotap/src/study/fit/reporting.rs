@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 
 use crate::case::Case;
+use crate::number::shortest;
 
 use super::MAX_PERIOD;
 use super::branches::settle;
@@ -16,12 +17,18 @@ use super::report::{
     Reading, Undetermined,
 };
 use super::search::{Found, MIN_PROBABILITY, Search, branches_of};
-use super::statistics::{self, Information, information, persistence, student};
+use super::statistics::{self, Information, Sequences, information, student};
 
 /// Smallest reduction of chi2 near the best values that counts.
 const MIN_REDUCTION: f64 = 0.1;
 /// Largest number of times that a fit continues from a lower chi2 of its profile.
 const MAX_CONTINUATIONS: usize = 4;
+/// Level of the tests whether the residuals are noise, all together.
+const LEVEL: f64 = 0.01;
+/// Fewest neighbouring rows whose residuals are tested for their signs.
+const MIN_SEQUENCE: usize = 8;
+/// Residuals below this part of a column's spread are rounding.
+const MIN_RESIDUAL: f64 = 1e-5;
 /// Largest number of rows that a remark lists.
 const MAX_LISTED_ROWS: usize = 8;
 
@@ -45,7 +52,7 @@ impl Search<'_> {
             for (column, noise) in found.noise.iter().enumerate() {
                 if row.values[column].is_some() {
                     estimated[column] |= row.errors[column].is_none();
-                    let error = row.errors[column].unwrap_or(*noise);
+                    let error = row.errors[column].unwrap_or(row.relative[column] * noise);
                     deviance += nanotap_arithmetic::ln(std::f64::consts::TAU * error * error);
                     if point.lost {
                         deviance += (self.problem.data.columns[column].spread / error).powi(2);
@@ -94,7 +101,10 @@ impl Search<'_> {
         let undetermined = undetermined(&information, parameters, data);
         let swept = data.swept[0].key;
         let best = |case_of_curve: Case| case_of_curve.leaving_distance_as(case).to_toml();
-        let cases: Vec<String> = problem.cases(x).into_iter().map(best).collect();
+        let cases = problem.cases(x).into_iter().map(best).enumerate();
+        let cases: Vec<String> = cases
+            .map(|(curve, file)| self.corrections(x, curve) + &file)
+            .collect();
         let curves = data
             .curves
             .iter()
@@ -120,6 +130,7 @@ impl Search<'_> {
             fits: reason.is_none(),
             reason,
             remarks,
+            preparation: self.preparation.to_vec(),
             undetermined,
             correlations: (0..parameters.len())
                 .map(|i| information.correlations.row(i).iter().copied().collect())
@@ -137,6 +148,26 @@ impl Search<'_> {
             cancelled: self.control.is_cancelled(),
             parameters: fitted,
         }
+    }
+
+    /// A comment for the case file of a curve: the corrections of its data, as the option `start`
+    /// takes them.
+    fn corrections(&self, x: &[f64], curve: usize) -> String {
+        let (case, data) = (self.problem.case, self.problem.data);
+        let own = self
+            .problem
+            .parameters
+            .iter()
+            .zip(x)
+            .filter(|(p, _)| p.is_of(curve) && !matches!(p.target, parameters::Target::Key(_)));
+        let comment = own.map(|(p, value)| {
+            let (name, value) = (&p.name, shortest(*value));
+            match p.unit(data, case) {
+                "1" => format!("# start: {name}={value}\n"),
+                unit => format!("# start: {name}={value} {unit}\n"),
+            }
+        });
+        comment.collect()
     }
 
     /// Information about the parameters from the Jacobian at the best values.
@@ -159,11 +190,7 @@ impl Search<'_> {
         let mut rounds = MAX_CONTINUATIONS;
         loop {
             let information = self.information(&found);
-            let width = if self.all_given() {
-                student(f64::INFINITY)
-            } else {
-                student(self.freedom(&found) as f64)
-            };
+            let widths = self.widths(&found, &information);
             let profiled = self.request.profile && !self.control.is_cancelled();
             let profiled = profiled.then(|| {
                 let problem = self.problem_of(&found);
@@ -172,11 +199,11 @@ impl Search<'_> {
                 } else {
                     f64::INFINITY
                 };
-                profile(&problem, &found.solution, &information, width, deeper)
+                profile(&problem, &found.solution, &information, &widths, deeper)
             });
             let Some(profiled) = profiled.filter(|_| !self.control.is_cancelled()) else {
                 let values = found.solution.x.iter().zip(&information.errors);
-                let symmetric = values.map(|(value, error)| {
+                let symmetric = values.zip(&widths).map(|((value, error), width)| {
                     [-1.0, 1.0].map(|side| error.map(|error| value + side * width * error))
                 });
                 let intervals = symmetric.collect();
@@ -193,6 +220,120 @@ impl Search<'_> {
                 }
             }
         }
+    }
+
+    /// Half-widths of the intervals in standard errors. The variance of a parameter is a sum over
+    /// the columns, whose noise is known with their own degrees of freedom (Satterthwaite,
+    /// Biometrics Bulletin 2, 110 (1946)); given errors are known.
+    fn widths(&self, found: &Found, information: &Information) -> Vec<f64> {
+        let data = self.problem.data;
+        let columns = data.columns.len();
+        let jacobian = &found.solution.jacobian;
+        let freedom = self.freedom_of_columns(jacobian);
+        let changed = jacobian * &information.covariance;
+        let width = |k: usize| {
+            let mut shares = vec![0.0; columns];
+            for (row, of) in data.rows().enumerate() {
+                for (column, share) in shares.iter_mut().enumerate() {
+                    if of.errors[column].is_none() {
+                        *share += changed[(row * columns + column, k)].powi(2);
+                    }
+                }
+            }
+            let whole: f64 = changed.column(k).norm_squared();
+            let uncertain = shares.iter().zip(&freedom);
+            let uncertain: f64 = uncertain
+                .map(|(share, nu)| share * share / nu.max(1.0))
+                .sum();
+            student(if uncertain > 0.0 {
+                (whole * whole / uncertain).max(1.0)
+            } else {
+                f64::INFINITY
+            })
+        };
+        (0..self.problem.parameters.len()).map(width).collect()
+    }
+
+    /// Why the residuals are not noise, at a level of one per cent: they are larger than the scatter
+    /// that is known without the model, or keep their sign from row to row.
+    fn not_noise(
+        &self,
+        found: &Found,
+        p_value: Option<f64>,
+        columns: &[FittedColumn],
+    ) -> Vec<String> {
+        let data = self.problem.data;
+        let (x, point) = (&found.solution.x, &found.solution.point);
+        let freedom = self.freedom_of_columns(&found.solution.jacobian);
+        let tests = columns.iter().filter(|column| column.estimated).count() + 1;
+        let level = LEVEL / tests as f64;
+        let mut reasons = Vec::new();
+        for (index, column) in columns.iter().enumerate() {
+            let Some(scatter) = data.columns[index].scatter.filter(|_| column.estimated) else {
+                continue;
+            };
+            let squares = self.relative_squares(x, point, index);
+            let ratio = squares / freedom[index].max(1.0) / scatter.error.powi(2);
+            if statistics::exceeding_ratio(ratio, [freedom[index], scatter.freedom]) < level {
+                reasons.push(format!(
+                    "the residuals of {} are {:.1} times as large as the scatter of neighbouring rows",
+                    column.name,
+                    ratio.sqrt()
+                ));
+            }
+        }
+        if let Some(p) = p_value.filter(|p| (MIN_PROBABILITY..LEVEL).contains(p)) {
+            reasons.push(format!(
+                "chi2 exceeds its value by chance with probability {p:.1e}"
+            ));
+        }
+        let sequences = self.sequences(found);
+        let most = sequences.iter().flatten().map(Vec::len).max().unwrap_or(0);
+        let basis = statistics::range(&found.solution.jacobian);
+        let of_rows = Sequences {
+            columns: &sequences,
+            basis: &basis,
+        };
+        let resolved = columns.iter().zip(&data.columns);
+        let resolved = resolved
+            .into_iter()
+            .any(|(fitted, column)| fitted.residual > MIN_RESIDUAL * column.spread);
+        if most >= MIN_SEQUENCE
+            && resolved
+            && of_rows.chance(found.solution.residuals.as_slice()) < level
+        {
+            reasons.push("the residuals keep their sign from row to row".to_owned());
+        }
+        reasons
+    }
+
+    /// Indices of the residuals of neighbouring rows in one direction, by column.
+    fn sequences(&self, found: &Found) -> Vec<Vec<Vec<usize>>> {
+        let data = self.problem.data;
+        let columns = data.columns.len();
+        let of = |column: usize| {
+            let mut sequences: Vec<Vec<usize>> = Vec::new();
+            let mut before = None;
+            let rows = self
+                .problem
+                .rows()
+                .into_iter()
+                .zip(found.solution.point.iter());
+            for (index, ((curve, row), point)) in rows.enumerate() {
+                let place = Some((curve, row.way));
+                if place != before {
+                    sequences.push(Vec::new());
+                    before = place;
+                }
+                if let (Some(sequence), Some(_), false) =
+                    (sequences.last_mut(), row.values[column], point.lost)
+                {
+                    sequence.push(index * columns + column);
+                }
+            }
+            sequences
+        };
+        (0..columns).map(of).collect()
     }
 
     /// True if one fit describes as much of the data better than another.
@@ -309,23 +450,31 @@ impl Search<'_> {
         if lost > 0 {
             remarks.push(self.without_orbit(found));
         }
-        for parameter in parameters.iter().filter(|p| p.at_bound) {
-            remarks.push(format!(
-                "{} ended at a bound: its standard error and interval do not hold",
-                parameter.key
-            ));
+        let all = parameters.iter().zip(self.problem.parameters);
+        for (parameter, of) in all.filter(|(p, _)| p.at_bound) {
+            let limit = of.is_limited && parameter.value != 0.0;
+            remarks.push(if limit {
+                format!(
+                    "{} ended at {} {}, the limit of what is physical: the data do not determine it, \
+                     or the law is not theirs; the option `bounds` sets other limits",
+                    parameter.key,
+                    shortest(parameter.value),
+                    parameter.unit
+                )
+            } else {
+                format!(
+                    "{} ended at a bound: its standard error and interval do not hold",
+                    parameter.key
+                )
+            });
         }
-        for (index, column) in columns.iter().enumerate() {
-            let differences = self.differences(&found.solution.x, point, index);
-            let persistence = persistence(&differences);
-            if persistence > 5.0 {
-                remarks.push(format!(
-                    "the residuals of {} keep their sign from row to row ({persistence:.0} \
-                     standard errors of their correlation): the law, the branch or an offset is \
-                     not that of the data",
-                    column.name
-                ));
-            }
+        let misfit = self.not_noise(found, p_value, columns);
+        if !misfit.is_empty() {
+            remarks.push(format!(
+                "{}: the law, the branch or an offset is not that of the data, and values and \
+                 intervals are not to be trusted",
+                misfit.join("; ")
+            ));
         }
         let unlikely = p_value.filter(|p| *p < MIN_PROBABILITY).map(|_| {
             format!(

@@ -1,6 +1,8 @@
 //! Search for the best values: a rough fit that finds the branches, a fine one in standard errors,
 //! and other initial values if the data are not described.
 
+use nalgebra::DMatrix;
+
 use super::FitOptions;
 use super::branches::Rows;
 use super::data::Data;
@@ -8,12 +10,14 @@ use super::jumps::Jump;
 use super::problem::{Point, Problem};
 use super::report::FitReport;
 use super::solve::{Solution, minimise};
-use super::statistics::{exceeding, persistence};
+use super::statistics::{exceeding, persistence, range};
 use crate::Error;
 use crate::control::Control;
 
 /// State of the search.
 pub(super) struct Search<'a> {
+    /// What was done to the data.
+    pub(super) preparation: &'a [String],
     pub(super) problem: Problem<'a>,
     pub(super) request: &'a FitOptions,
     pub(super) control: &'a Control<'a>,
@@ -29,7 +33,7 @@ pub(super) struct Found {
 }
 
 /// Standard error of a rough fit, as a fraction of a column's spread.
-const ROUGH_ERROR: f64 = 0.03;
+pub(super) const ROUGH_ERROR: f64 = 0.03;
 /// Rough standard errors above which a residual counts by its logarithm.
 const ROBUST_LIMIT: f64 = 3.0;
 /// Mean squared rough residual above which the data are not described.
@@ -90,7 +94,8 @@ impl<'a> Search<'a> {
         Ok(self.report(best, tried))
     }
 
-    /// Initial values: those of the case, then others within the bounds or a factor of four.
+    /// Initial values: those of a scan, if it finds better ones than the case's, those of the case,
+    /// then others within the bounds or a factor of four.
     fn starts(&self) -> Vec<Vec<f64>> {
         let mut state = self.request.seed ^ 0x9e37_79b9_7f4a_7c15;
         // SplitMix64 (Steele, Lea, Flood 2014).
@@ -102,8 +107,10 @@ impl<'a> Search<'a> {
             ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
         };
         let parameters = self.problem.parameters;
-        let own = parameters.iter().map(|p| p.start).collect();
-        let mut starts = vec![own];
+        let own: Vec<f64> = parameters.iter().map(|p| p.start).collect();
+        let mut starts: Vec<Vec<f64>> = self.scanned(&own).into_iter().collect();
+        starts.push(own);
+        starts.truncate(self.request.starts.max(1));
         while starts.len() < self.request.starts {
             let start = parameters.iter().map(|p| {
                 let u = random();
@@ -200,7 +207,7 @@ impl<'a> Search<'a> {
                 return None;
             }
             let branches = branches_of(&point);
-            noise = self.noise(&x, &point);
+            noise = self.noise(&x, &point, self.shared_freedom());
             let mut problem = self.weighted(noise.clone(), None);
             if self.request.jumps {
                 problem.find_jumps(&x, &mut point);
@@ -212,7 +219,8 @@ impl<'a> Search<'a> {
             };
             steps += solution.iterations;
             x.clone_from(&solution.x);
-            let after = self.noise(&x, &solution.point);
+            let freedom = self.freedom_of_columns(&solution.jacobian);
+            let after = self.noise(&x, &solution.point, freedom);
             let settled = noise
                 .iter()
                 .zip(&after)
@@ -235,23 +243,64 @@ impl<'a> Search<'a> {
         found
     }
 
-    /// Standard error of a value in each column, from its residuals; zero for a column without
-    /// residuals.
-    fn noise(&self, x: &[f64], point: &Point) -> Vec<f64> {
-        let count = self.problem.data.count() as f64;
-        let freedom = 1.0 - self.problem.parameters.len() as f64 / count;
+    /// Standard error of a value in each column, from its residuals and their degrees of freedom;
+    /// zero for a column without residuals.
+    fn noise(&self, x: &[f64], point: &Point, freedom: Vec<f64>) -> Vec<f64> {
         let columns = self.problem.data.columns.iter().enumerate();
         columns
             .map(|(index, column)| {
-                let differences = self.differences(x, point, index);
-                let squares: f64 = differences.iter().map(|d| d * d).sum();
-                let mean = squares / differences.len().max(1) as f64 / freedom;
+                let squares = self.relative_squares(x, point, index);
+                let mean = squares / freedom[index].max(1.0);
                 // Rounding of the model.
                 mean.sqrt()
                     .max(1e-10 * column.spread)
                     .max(f64::MIN_POSITIVE)
             })
             .collect()
+    }
+
+    /// Degrees of freedom of the columns before the leverages of the rows are known: the parameters
+    /// belong to all values equally.
+    fn shared_freedom(&self) -> Vec<f64> {
+        let data = self.problem.data;
+        let part = 1.0 - self.problem.parameters.len() as f64 / data.count() as f64;
+        let count = |index: usize| {
+            data.rows()
+                .filter(|row| row.values[index].is_some())
+                .count()
+        };
+        (0..data.columns.len())
+            .map(|index| part * count(index) as f64)
+            .collect()
+    }
+
+    /// Degrees of freedom of the columns: rows with an effect minus the sum of their leverages.
+    pub(super) fn freedom_of_columns(&self, jacobian: &DMatrix<f64>) -> Vec<f64> {
+        let data = self.problem.data;
+        let columns = data.columns.len();
+        let basis = range(jacobian);
+        let mut freedom = vec![0.0; columns];
+        for (row, of) in data.rows().enumerate() {
+            for (column, freedom) in freedom.iter_mut().enumerate() {
+                if of.values[column].is_some() {
+                    *freedom += 1.0 - basis.row(row * columns + column).norm_squared();
+                }
+            }
+        }
+        freedom
+    }
+
+    /// Sum of the squared differences of a column in units of the rows' relative errors.
+    pub(super) fn relative_squares(&self, x: &[f64], point: &Point, column: usize) -> f64 {
+        let rows = self.problem.rows();
+        let known = rows.iter().zip(point.iter()).filter(|(_, p)| !p.lost);
+        known
+            .filter_map(|((curve, row), point)| {
+                let value = point.values[column];
+                let difference = self.problem.difference(x, *curve, row, column, value)?;
+                Some((difference / row.relative[column]).powi(2))
+            })
+            .sum()
     }
 
     /// Model minus measured values of a column, for rows with both.

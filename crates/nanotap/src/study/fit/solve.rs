@@ -33,7 +33,7 @@ pub(super) struct Solution<P> {
     pub(super) point: P,
     /// |r|².
     pub(super) cost: f64,
-    residuals: DVector<f64>,
+    pub(super) residuals: DVector<f64>,
     pub(super) jacobian: DMatrix<f64>,
     pub(super) iterations: usize,
 }

@@ -76,9 +76,37 @@ pub(super) fn information(jacobian: &DMatrix<f64>, sizes: &[f64]) -> Information
     }
 }
 
+/// An orthonormal basis of the changes of the residuals by parameters: its rows' squared lengths
+/// are the leverages.
+pub(super) fn range(jacobian: &DMatrix<f64>) -> DMatrix<f64> {
+    let sizes: Vec<f64> = jacobian.column_iter().map(|c| c.norm()).collect();
+    let scaled = DMatrix::from_fn(jacobian.nrows(), jacobian.ncols(), |i, j| {
+        jacobian[(i, j)] / sizes[j].max(f64::MIN_POSITIVE)
+    });
+    let eigen = SymmetricEigen::new(scaled.tr_mul(&scaled));
+    let kept = (0..jacobian.ncols()).filter(|k| eigen.eigenvalues[*k] > ROUNDING * ROUNDING);
+    let directions = kept.map(|k| {
+        let along = eigen.eigenvectors.column(k);
+        &scaled * along / eigen.eigenvalues[k].sqrt()
+    });
+    let directions: Vec<_> = directions.collect();
+    DMatrix::from_fn(jacobian.nrows(), directions.len(), |i, k| directions[k][i])
+}
+
 /// Half the width, in standard errors, of a two-sided 95 % interval with so many degrees of
-/// freedom (infinitely many where the errors are given).
+/// freedom (infinitely many where the errors are given): between whole ones linear in their
+/// inverse.
 pub(super) fn student(freedom: f64) -> f64 {
+    let (low, high) = (freedom.floor().max(1.0), freedom.ceil().max(1.0));
+    if low == high || high > 1000.0 {
+        return student_of_whole(freedom);
+    }
+    let part = (1.0 / low - 1.0 / freedom.max(1.0)) / (1.0 / low - 1.0 / high);
+    let [low, high] = [low, high].map(student_of_whole);
+    low + part * (high - low)
+}
+
+fn student_of_whole(freedom: f64) -> f64 {
     const Z: f64 = 1.959_963_984_540_054;
     /// Above it two terms of the expansion (Abramowitz & Stegun 26.7.5) are good to 1e−8.
     const MANY: f64 = 1000.0;
@@ -159,6 +187,51 @@ pub(super) fn exceeding(value: f64, freedom: f64) -> f64 {
     (front * h).clamp(0.0, 1.0)
 }
 
+/// The probability that the ratio of two variances with these degrees of freedom exceeds `value`:
+/// the incomplete beta function I_x(ν₂/2, ν₁/2) at x = ν₂/(ν₂ + ν₁ F), by its continued fraction
+/// (Lentz's method; DLMF 8.17.22).
+pub(super) fn exceeding_ratio(value: f64, [first, second]: [f64; 2]) -> f64 {
+    if !(value > 0.0 && first > 0.0 && second > 0.0) {
+        return 1.0;
+    }
+    if value == f64::INFINITY {
+        return 0.0;
+    }
+    let x = second / (second + first * value);
+    beta(0.5 * second, 0.5 * first, x)
+}
+
+fn beta(a: f64, b: f64, x: f64) -> f64 {
+    if x > (a + 1.0) / (a + b + 2.0) {
+        return 1.0 - beta(b, a, 1.0 - x);
+    }
+    let front = nanotap_arithmetic::exp(
+        a * nanotap_arithmetic::ln(x) + b * nanotap_arithmetic::ln_1p(-x) + ln_gamma(a + b)
+            - ln_gamma(a)
+            - ln_gamma(b),
+    ) / a;
+    let bounded = |value: f64| {
+        if value.abs() < 1e-300 { 1e-300 } else { value }
+    };
+    let (mut c, mut d) = (1.0, 1.0 / bounded(1.0 - (a + b) * x / (a + 1.0)));
+    let mut h = d;
+    for m in 1..10_000 {
+        let m = f64::from(m);
+        let even = m * (b - m) * x / ((a + 2.0 * m - 1.0) * (a + 2.0 * m));
+        let odd = -(a + m) * (a + b + m) * x / ((a + 2.0 * m) * (a + 2.0 * m + 1.0));
+        let before = h;
+        for term in [even, odd] {
+            d = 1.0 / bounded(1.0 + term * d);
+            c = bounded(1.0 + term / c);
+            h *= c * d;
+        }
+        if (h - before).abs() < 1e-14 * h.abs() {
+            break;
+        }
+    }
+    (front * h).clamp(0.0, 1.0)
+}
+
 /// ln Γ(a) by Stirling's series, above its range by recurrence.
 fn ln_gamma(mut a: f64) -> f64 {
     let mut shift = 0.0;
@@ -180,6 +253,70 @@ pub(super) fn persistence(residuals: &[f64]) -> f64 {
     (residuals.len() as f64).sqrt() * neighbours / squares.max(f64::MIN_POSITIVE)
 }
 
+/// Residuals of neighbouring rows: the sequences, each of one column in one direction.
+pub(super) struct Sequences<'a> {
+    /// Indices of the residuals, a list per sequence, grouped by column.
+    pub(super) columns: &'a [Vec<Vec<usize>>],
+    /// Of the changes by parameters.
+    pub(super) basis: &'a DMatrix<f64>,
+}
+
+/// Draws of the null distribution of [`Sequences::chance`].
+const DRAWS: usize = 2000;
+/// Most deviates that are drawn for it.
+const MAX_DEVIATES: usize = 4_000_000;
+
+impl Sequences<'_> {
+    /// √n r₁ of every column, r₁ the autocorrelation of neighbours, summed.
+    fn persistence(&self, residuals: &[f64]) -> f64 {
+        let of = |sequences: &Vec<Vec<usize>>| {
+            let all = || sequences.iter().flatten();
+            let squares: f64 = all().map(|k| residuals[*k].powi(2)).sum();
+            let neighbours: f64 = sequences
+                .iter()
+                .flat_map(|sequence| sequence.windows(2))
+                .map(|w| residuals[w[0]] * residuals[w[1]])
+                .sum();
+            (all().count() as f64).sqrt() * neighbours / squares.max(f64::MIN_POSITIVE)
+        };
+        self.columns.iter().map(of).sum()
+    }
+
+    /// The probability that independent noise keeps its sign from row to row as much as these
+    /// residuals do. The null distribution is simulated: the fit takes the part of the noise that
+    /// the parameters can describe.
+    pub(super) fn chance(&self, residuals: &[f64]) -> f64 {
+        let found = self.persistence(residuals);
+        let count = residuals.len();
+        let draws = DRAWS.min(MAX_DEVIATES / count.max(1)).max(200);
+        let mut deviates = Deviates(0x5eed);
+        let exceeding = (0..draws).filter(|_| {
+            let noise = nalgebra::DVector::from_fn(count, |_, _| deviates.normal());
+            let left = &noise - self.basis * self.basis.tr_mul(&noise);
+            self.persistence(left.as_slice()) >= found
+        });
+        (exceeding.count() + 1) as f64 / (draws + 1) as f64
+    }
+}
+
+/// Normal deviates: SplitMix64 (Steele, Lea, Flood 2014), and Box and Muller.
+struct Deviates(u64);
+
+impl Deviates {
+    fn uniform(&mut self) -> f64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        (((z ^ (z >> 31)) >> 11) as f64 + 0.5) / (1u64 << 53) as f64
+    }
+
+    fn normal(&mut self) -> f64 {
+        let radius = (-2.0 * nanotap_arithmetic::ln(self.uniform())).sqrt();
+        radius * nanotap_arithmetic::cos(std::f64::consts::TAU * self.uniform())
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -197,6 +334,44 @@ mod tests {
     }
 
     #[test]
+    fn tails_of_ratios_of_variances_are_those_of_tables() {
+        // Abramowitz & Stegun, table 26.9: the 5 % and 1 % points.
+        for (freedom, value, chance) in [
+            ([1.0, 10.0], 4.96, 0.05),
+            ([10.0, 10.0], 2.98, 0.05),
+            ([5.0, 20.0], 4.10, 0.01),
+            ([30.0, 6.0], 7.23, 0.01),
+        ] {
+            let found = exceeding_ratio(value, freedom);
+            assert!((found / chance - 1.0).abs() < 0.01, "{freedom:?} {found}");
+        }
+    }
+
+    #[test]
+    fn noise_keeps_its_sign_as_often_as_it_should() {
+        // Of lines through 30 rows, two columns: the chance of noise is uniform.
+        let jacobian = DMatrix::from_fn(60, 2, |i, j| (i / 2).pow(j as u32) as f64);
+        let basis = range(&jacobian);
+        assert!((basis.norm_squared() - 2.0).abs() < 1e-9);
+        let columns = [0, 1].map(|c| vec![(0..30).map(|k| 2 * k + c).collect()]);
+        let sequences = Sequences {
+            columns: &columns,
+            basis: &basis,
+        };
+        let mut deviates = Deviates(7);
+        let mut few = 0;
+        for _ in 0..100 {
+            let noise = nalgebra::DVector::from_fn(60, |_, _| deviates.normal());
+            let left = &noise - &basis * basis.tr_mul(&noise);
+            few += usize::from(sequences.chance(left.as_slice()) < 0.1);
+        }
+        // 10 expected, three standard deviations are 9.
+        assert!((1..=19).contains(&few), "{few}");
+        let bent: Vec<f64> = (0..60).map(|i| ((i / 2) as f64 / 5.0).sin()).collect();
+        assert!(sequences.chance(&bent) < 0.001);
+    }
+
+    #[test]
     fn student_is_that_of_tables() {
         // Abramowitz & Stegun, table 26.10.
         let table = [
@@ -211,6 +386,8 @@ mod tests {
         for (freedom, t) in table {
             assert!((student(freedom) - t).abs() <= 5e-4, "{freedom}");
         }
+        // Between whole ones it falls.
+        assert!(student(2.5) < student(2.0) && student(2.5) > student(3.0));
         // The sums and the expansion meet.
         assert!((student(1000.0) - student(1000.0 + 1e-9)).abs() < 1e-8);
     }

@@ -106,14 +106,7 @@ impl Lever {
                     forcing: DVector::zeros(system.dimension()),
                     gap: Complex::new(0.0, 0.0),
                 });
-                let moved = nanotap_volterra::System::new(
-                    Arc::clone(system.kernel()),
-                    Arc::clone(system.law()),
-                    drive,
-                    system.options(),
-                )
-                .map_err(MotionError::from)?
-                .cancelled_by(system.cancel().clone());
+                let moved = system.driven_by(drive).map_err(MotionError::from)?;
                 Engine::Nonlinear(Box::new(Law {
                     offset: system.drive().offset - gap,
                     flow: nanotap_volterra::Flow::new(Arc::new(moved)),
@@ -209,11 +202,12 @@ impl Lever {
             Engine::Nonlinear(lever) => {
                 let (gap, rate) = lever.flow.gap();
                 let branch = lever.flow.branch();
-                let law = lever.nonlinear.system.law();
+                let system = &lever.nonlinear.system;
+                let second = system.second_argument(rate, &self.state[..system.dimension()]);
                 Instant {
                     gap,
                     deflection: self.model.tip.at(drive, &self.state, phase),
-                    force: law.force(branch, gap, rate).value,
+                    force: system.law().force(branch, gap, second).value,
                     contact: lever.nonlinear.contact[branch],
                 }
             }

@@ -173,6 +173,18 @@ impl StaticCurve {
                     .ok_or_else(none)?;
                 let state = &law.state[0] + &law.state[1] * rest.force;
                 let mut state = state.as_slice().to_vec();
+                if let Some(surface) = law.nonlinear.system.law().surface() {
+                    let contact = law.nonlinear.static_law().touches(rest.branch);
+                    let pressed = rest.force - surface.adhesion;
+                    let first = state.len() - surface.rates.len();
+                    for k in first..state.len() {
+                        state[k] = if contact {
+                            law.state[1][k] * pressed
+                        } else {
+                            0.0
+                        };
+                    }
+                }
                 if law.nonlinear.remembers {
                     // The flow chooses the branch.
                     state.push(-1.0);
@@ -394,7 +406,7 @@ impl LinearRests {
 impl LawRests {
     /// The rest at a separation on a branch, with `1 − c F′` and `F′`.
     fn rest(&self, branch: usize, gap: f64) -> (Rest, [f64; 2]) {
-        let force = self.nonlinear.system.law().force(branch, gap, 0.0);
+        let force = self.nonlinear.static_law().force(branch, gap, 0.0);
         let rest = Rest {
             distance: gap - self.offset - self.compliance * force.value,
             gap,
@@ -432,7 +444,7 @@ impl LawRests {
     }
 
     fn pieces(&self, near: f64, far: f64) -> Vec<Piece> {
-        let branches = 0..self.nonlinear.system.law().branches();
+        let branches = 0..self.nonlinear.static_law().branches();
         branches
             .flat_map(|branch| self.pieces_of(branch, near, far))
             .collect()
@@ -441,7 +453,7 @@ impl LawRests {
     /// Separations at which a branch is looked at, falling.
     fn gaps(&self, branch: usize, near: f64, far: f64) -> Vec<f64> {
         let (mut low, mut high) = (f64::NEG_INFINITY, f64::INFINITY);
-        for exit in self.nonlinear.system.exits(branch) {
+        for exit in self.nonlinear.static_law().exits(branch) {
             match exit.guard {
                 Guard::Falls(level) => low = low.max(level),
                 Guard::Rises(level) => high = high.min(level),
@@ -542,7 +554,7 @@ impl LawRests {
             }
         }
         Some(Piece {
-            contact: self.nonlinear.contact[lowest.branch],
+            contact: self.nonlinear.static_law().touches(lowest.branch),
             stable,
             rests,
             lowest,

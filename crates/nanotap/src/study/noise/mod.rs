@@ -6,6 +6,7 @@
 //! orbit: see `linearised.rs`. Noise of the sample and of the detector is not included, and neither
 //! are escapes to another state, for which the noise is large.
 
+mod free_lever;
 mod linearised;
 
 use nalgebra::{Complex, DMatrix, DVector};
@@ -26,6 +27,7 @@ use crate::study::orbit::{OrbitOptions, OrbitReport, OrbitStudy};
 use crate::study::request::options;
 use crate::study::value::Amount;
 use crate::study::{Study, cantilever};
+pub use free_lever::{Calibrations, ThermalSpectrum, spectrum_csv};
 use linearised::{Linearised, LockIn};
 
 /// Boltzmann's constant in J/K; exact in the SI of 2019.
@@ -59,6 +61,10 @@ pub struct NoiseReport {
     pub free_phase_rms: f64,
     /// Force gradient in N/m that turns the phase of the free lever by its noise.
     pub force_gradient_min: f64,
+    /// What calibrations of the spring constant would give.
+    pub calibrations: Option<Calibrations>,
+    /// Thermal spectrum of the free lever.
+    pub spectrum: ThermalSpectrum,
 }
 
 options! {
@@ -195,6 +201,8 @@ impl Study for NoiseStudy {
             free_amplitude_rms: scales.length * free.amplitude_rms,
             free_phase_rms: free.phase_rms.to_degrees(),
             force_gradient_min: free.phase_rms / turn,
+            calibrations: thermal.calibrations(&view),
+            spectrum: thermal.spectrum(&view),
         })
     }
 }

@@ -32,7 +32,7 @@ use crate::case::physical::Kind as Quantity;
 use crate::case::table::Table;
 use crate::study::approach::Way;
 use crate::study::fit::Data;
-use crate::study::fit::instrument::{prepared, wrapped};
+use crate::study::fit::instrument::{self, wrapped};
 use crate::study::frequency_modulation::average::sader_jarvis;
 use crate::study::registry::Study;
 use crate::study::value::Amount;
@@ -174,9 +174,9 @@ pub fn reconstruct(
     if options.data.is_empty() {
         return Err(Error::option("data", "there are no data", "give a table"));
     }
-    let (tables, remarks) = prepared(case, &options.data, &options.convert)?;
-    let data = Data::read(case, &tables, &options.columns)?;
-    let prepared = Prepared::of(case, &data, options, remarks)?;
+    let measured = instrument::prepared(case, &options.data, &options.convert, &options.columns)?;
+    let data = Data::read(case, &measured.tables, &measured.columns)?;
+    let prepared = Prepared::of(case, &data, options, measured.notes)?;
     let inverted = prepared.invert(None, control)?;
     let ways = prepared.ways(control)?;
     Ok(prepared.report(case, &inverted, ways))

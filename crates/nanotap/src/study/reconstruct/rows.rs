@@ -5,6 +5,7 @@ use crate::Error;
 use crate::observe::table::shown_phase;
 use crate::study::approach::Way;
 use crate::study::fit::instrument::{median, wrapped};
+use crate::study::fit::thin::bins;
 use crate::study::fit::{Data, Row};
 
 /// Least number of rows of the free level.
@@ -224,58 +225,17 @@ impl Readings {
     }
 
     /// Averages of consecutive rows, at most about `count` in all, with the standard errors
-    /// `errors` of one row. Bins have equal parts of the path in distance and values; a jump ends
-    /// a bin.
+    /// `errors` of one row.
     pub(super) fn averaged(&self, count: usize, errors: [f64; 2]) -> Self {
         let segments = self.segments().count().max(1);
-        let bins = (count / segments).max(1) as f64;
+        let count = (count / segments).max(1);
         let mut rows = Vec::new();
         for segment in self.segments() {
-            let range = |of: &dyn Fn(&Reading) -> f64| {
-                let low = segment.iter().map(of).fold(f64::INFINITY, f64::min);
-                let high = segment.iter().map(of).fold(f64::NEG_INFINITY, f64::max);
-                if high > low { high - low } else { 1.0 }
-            };
-            let half = segment.len() / (bins as usize * 4).max(1);
-            let smooth = |k: usize, index: usize| {
-                let near = &segment[k.saturating_sub(half)..(k + half + 1).min(segment.len())];
-                near.iter().map(|row| row.values[index]).sum::<f64>() / near.len() as f64
-            };
-            let ranges = [
-                range(&|row| row.values[0]),
-                range(&|row| row.values[1]),
-                range(&|row| row.distance) / 0.15,
-            ];
-            let mut path = vec![0.0];
-            let mut breaks = vec![false];
-            for k in 1..segment.len() {
-                let (a, b) = (&segment[k - 1], &segment[k]);
-                let part = |index: usize| {
-                    let step = (smooth(k, index) - smooth(k - 1, index)) / ranges[index];
-                    if step.is_finite() { step } else { 0.0 }
-                };
-                let along = (b.distance - a.distance) / ranges[2];
-                let step = (part(0).powi(2) + part(1).powi(2) + along * along).sqrt();
-                path.push(path[k - 1] + step);
-                let jump =
-                    |index: usize| (b.values[index] - a.values[index]).abs() > 10.0 * errors[index];
-                breaks.push(jump(0) || jump(1));
-            }
-            let whole = path.last().copied().unwrap_or(0.0).max(f64::MIN_POSITIVE);
-            let mut bin: Vec<Reading> = Vec::new();
-            let mut current = 0;
-            for (k, row) in segment.iter().enumerate() {
-                let place = (path[k] / whole * bins).min(bins - 1.0) as usize;
-                if !bin.is_empty() && (place != current || breaks[k]) {
-                    rows.push(mean(&bin));
-                    bin.clear();
-                }
-                current = place;
-                bin.push(*row);
-            }
-            if !bin.is_empty() {
-                rows.push(mean(&bin));
-            }
+            let of =
+                |of: &dyn Fn(&Reading) -> f64| -> Vec<f64> { segment.iter().map(of).collect() };
+            let values = [0, 1].map(|index| of(&|row| row.values[index]));
+            let bins = bins(&of(&|row| row.distance), &values, &errors, count);
+            rows.extend(bins.into_iter().map(|bin| mean(&segment[bin])));
         }
         Self {
             rows,

@@ -315,14 +315,8 @@ fn turned_system(nonlinear: &Nonlinear) -> Result<Arc<nanotap_volterra::System>,
         tone.forcing.neg_mut();
         tone.gap = -tone.gap;
     }
-    let turned = nanotap_volterra::System::new(
-        Arc::clone(system.kernel()),
-        Arc::clone(system.law()),
-        drive,
-        system.options(),
-    )
-    .map_err(MotionError::from)?;
-    Ok(Arc::new(turned.cancelled_by(system.cancel().clone())))
+    let turned = system.driven_by(drive).map_err(MotionError::from)?;
+    Ok(Arc::new(turned))
 }
 
 impl LinearLever {

@@ -29,6 +29,8 @@ use crate::model::exact_beam;
 pub struct LeverData {
     /// Static spring constant at the tip, k.
     pub k: Option<f64>,
+    /// Modal stiffness of the first mode at the tip, from which k follows.
+    pub k1: Option<f64>,
     /// First free resonance in Hz, with the tip, f₀.
     pub f0: Option<f64>,
     /// Quality factor of the first free resonance, Q.
@@ -157,6 +159,12 @@ impl Lever {
         })
     }
 
+    /// Stiffness of the first mode at the tip.
+    pub fn modal_stiffness(&self) -> Option<f64> {
+        let factor = modal_factor(TipMass::Ratio(self.tip_mass_ratio), None);
+        Some(self.k * factor.ok()?)
+    }
+
     /// Mass of the tip, M = α1 mL, in kg.
     pub fn tip_mass(&self) -> f64 {
         self.tip_mass_ratio * self.beam_mass
@@ -202,6 +210,15 @@ impl Lever {
                 measured,
                 computed,
             ));
+        }
+        if let Some(k1) = data.k1 {
+            remarks.push(Remark::note(format!(
+                "k1 = {} is the first mode's stiffness at the tip: the static spring constant is \
+                 k = k1/{} = {}",
+                Kind::Stiffness.format(k1),
+                Kind::Number.format_digits(k1 / self.k, 5),
+                Kind::Stiffness.format(self.k)
+            )));
         }
         if let (Some(_), Some(_), Some(weight), None) = (
             data.k.or(data.bending()),
@@ -330,6 +347,32 @@ fn ratio_to_beam(tip: TipMass, beam_mass: f64) -> Result<f64, PhysicalError> {
             "f2 tells the tip's mass only together with f0",
         )),
     }
+}
+
+/// The first mode's stiffness at the tip over the static one, `(∫φ²/φ(1)² + α1) Ω₁²/3`: β₁⁴/12 =
+/// 1.0302 without a tip's mass, nearer to 1 with it.
+fn modal_factor(tip: TipMass, f0: Option<f64>) -> Result<f64, PhysicalError> {
+    let ratio = match (tip, f0) {
+        (TipMass::Ratio(ratio), _) => bounded(ratio)?,
+        (TipMass::Absolute(mass), _) if mass == 0.0 => 0.0,
+        (TipMass::SecondMode(f2), Some(f0)) => ratio_from_second_mode(f2, f0)?,
+        (TipMass::SecondMode(_), None) => {
+            return Err(PhysicalError::missing(
+                Key::LeverF0,
+                "f2 tells the tip's mass only together with f0",
+            ));
+        }
+        (TipMass::Absolute(_), _) => {
+            return Err(PhysicalError::missing(
+                Key::TipMassRatio,
+                "the modal stiffness k1 leads to k only with the tip's mass as a part of the \
+                 beam's; else give k",
+            ));
+        }
+    };
+    let omega = exact_beam::frequencies(ratio, 0.0, 1)?[0];
+    let share = tip_share(omega.sqrt(), ratio);
+    Ok((1.0 / share + ratio) * omega * omega / 3.0)
 }
 
 fn bounded(ratio: f64) -> Result<f64, PhysicalError> {
@@ -486,19 +529,27 @@ impl LeverData {
                  water, tens of thousands in vacuum; take it from the free resonance",
             ));
         }
+        let f0 = reader
+            .number(Key::LeverF0)?
+            .or_else(|| lever.map(|lever| lever.f0));
+        let tip_mass = tip_mass.or(f2).unwrap_or(TipMass::Absolute(0.0));
+        let k1 = reader.number(Key::LeverK1)?;
+        let from_modal = k1
+            .map(|k1| Ok::<_, PhysicalError>(k1 / modal_factor(tip_mass, f0)?))
+            .transpose()?;
         Ok(Self {
             fluid,
             quality_factor,
             k: reader
                 .number(Key::LeverK)?
+                .or(from_modal)
                 .or_else(|| lever.map(|lever| lever.k)),
-            f0: reader
-                .number(Key::LeverF0)?
-                .or_else(|| lever.map(|lever| lever.f0)),
+            k1,
+            f0,
             geometry: read_geometry(reader)?.or_else(|| lever.and_then(|lever| lever.geometry)),
             modulus: reader.number(Key::LeverModulus)?,
             density: reader.number(Key::LeverDensity)?,
-            tip_mass: tip_mass.or(f2).unwrap_or(TipMass::Absolute(0.0)),
+            tip_mass,
             modes: crate::case::file::modes(reader.stated),
         })
     }

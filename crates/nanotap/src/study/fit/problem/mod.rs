@@ -291,7 +291,7 @@ impl Problem<'_> {
 
     /// The standard error of a measured value.
     pub(super) fn error(&self, row: &Row, column: usize) -> f64 {
-        row.errors[column].unwrap_or(self.noise[column])
+        row.errors[column].unwrap_or(row.relative[column] * self.noise[column])
     }
 
     /// Model minus measured value; `None` if nothing was measured.

@@ -1,0 +1,63 @@
+//! Another contact law: what must be left away with it, and what it needs in addition.
+
+use std::sync::Arc;
+
+use axum::Json;
+use axum::extract::State;
+use nanotap::case::Key;
+use serde::Deserialize;
+use serde_json::{Map, Value, json};
+
+use crate::App;
+use crate::api_error::ApiError;
+use crate::preset::CaseSpec;
+
+/// A law as requested by the page: its name, or names with + between them.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct LawRequest {
+    case: CaseSpec,
+    law: String,
+}
+
+pub(crate) async fn law(
+    State(app): State<Arc<App>>,
+    Json(request): Json<LawRequest>,
+) -> Result<Json<Value>, ApiError> {
+    let shared = Arc::clone(&app);
+    app.workers
+        .run(move |_| changes(&shared, &request))
+        .await
+        .map(Json)
+}
+
+/// The keys to set, empty where the law does not take them, and a sentence that says which.
+fn changes(app: &App, request: &LawRequest) -> Result<Value, ApiError> {
+    let about = |error: nanotap::Error| ApiError::of(error).about(Key::SampleLaw.path());
+    let case = request.case.any_distance(app)?;
+    let preset = request.case.preset(app)?.clone();
+    let base = nanotap::case::Case::parse(Some(preset.source()), &preset.set)?;
+    let change = case.law_change(&request.law, &base).map_err(about)?;
+    let mut set = Map::new();
+    set.insert(Key::SampleLaw.path().into(), change.law.clone().into());
+    let mut words = Vec::new();
+    for key in &change.dropped {
+        set.insert(key.path().into(), "".into());
+        words.push(format!("without {key}"));
+    }
+    for (key, value) in &change.added {
+        let text = value.text();
+        let shown = if *key == Key::SampleTable {
+            "a stiff curve with attraction"
+        } else {
+            &text
+        };
+        words.push(format!("with {key} = {shown}, a usual value"));
+        set.insert(key.path().into(), text.into());
+    }
+    let words = match words.as_slice() {
+        [] => String::new(),
+        _ => format!("{}: {}.", change.law, words.join("; ")),
+    };
+    Ok(json!({ "set": set, "words": words }))
+}

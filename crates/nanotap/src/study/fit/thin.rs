@@ -1,0 +1,442 @@
+//! Scatter of measured values, known without a model, and averages of many rows.
+//!
+//! Averages are of consecutive rows whose bins have equal parts of the path in distance and values,
+//! so that knees and steep parts keep their rows and flat ones do not; a jump ends a bin. Where the
+//! values bend within a bin, its value is that of a parabola at the mean distance, since the mean
+//! lies beside the curve. Standard errors follow from the scatter within the bins.
+
+use std::ops::Range;
+
+use nalgebra::{DMatrix, DVector};
+
+use super::data::{Column, Curve, Data, Row, is_distance};
+use super::instrument::{far_rows, median, wrapped};
+
+/// Scatter of the values of a column about smooth curves.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Scatter {
+    /// Standard deviation of one row, or of one whose relative error is 1.
+    pub(crate) error: f64,
+    /// Its degrees of freedom.
+    pub(crate) freedom: f64,
+}
+
+/// A step this many standard errors high is a jump.
+const JUMP: f64 = 10.0;
+/// The distance counts as this part of a value's range in the length of the path.
+const DISTANCE_SHARE: f64 = 0.15;
+/// Fewest rows of a bin to which a parabola is fitted.
+const MIN_PARABOLA: usize = 8;
+/// A parabola is used where it moves the value by more than this many of its standard errors.
+const BENT: f64 = 2.0;
+/// Rows whose worth the scatter of all bins has in that of one bin.
+const PRIOR: f64 = 20.0;
+/// Variances of bins above this multiple of their median do not count in the common one.
+const OUTLYING: f64 = 4.0;
+/// Fewest free rows of a curve and direction whose scatter counts.
+const MIN_FREE: usize = 4;
+/// Least scatter, relative to the largest value; of an angle, in degrees.
+const FLOORS: [f64; 2] = [1e-4, 0.01];
+
+/// Bins of consecutive rows, at most about `count`: `values` are the columns, `errors` the standard
+/// errors of one row.
+pub(crate) fn bins(
+    distance: &[f64],
+    values: &[Vec<f64>],
+    errors: &[f64],
+    count: usize,
+) -> Vec<Range<usize>> {
+    let rows = distance.len();
+    let range = |of: &[f64]| {
+        let known = of.iter().filter(|value| value.is_finite());
+        let (low, high) = known.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| {
+            (low.min(*value), high.max(*value))
+        });
+        if high > low { high - low } else { 1.0 }
+    };
+    let half = rows / (count * 4).max(1);
+    let smooth = |of: &[f64], k: usize| {
+        let near = &of[k.saturating_sub(half)..(k + half + 1).min(rows)];
+        near.iter().sum::<f64>() / near.len() as f64
+    };
+    let ranges: Vec<f64> = values.iter().map(|column| range(column)).collect();
+    let across = range(distance) / DISTANCE_SHARE;
+    let mut path = vec![0.0];
+    let mut breaks = vec![false];
+    for k in 1..rows {
+        let mut square = ((distance[k] - distance[k - 1]) / across).powi(2);
+        for (column, range) in values.iter().zip(&ranges) {
+            let step = (smooth(column, k) - smooth(column, k - 1)) / range;
+            square += if step.is_finite() { step * step } else { 0.0 };
+        }
+        path.push(path[k - 1] + square.sqrt());
+        let mut steps = values.iter().zip(errors);
+        breaks.push(steps.any(|(of, error)| (of[k] - of[k - 1]).abs() > JUMP * error));
+    }
+    let whole = path.last().copied().unwrap_or(0.0).max(f64::MIN_POSITIVE);
+    let place = |k: usize| (path[k] / whole * count as f64).min(count as f64 - 1.0) as usize;
+    let mut bins = Vec::new();
+    let mut first = 0;
+    for k in 1..=rows {
+        if k == rows || breaks[k] || place(k) != place(first) {
+            bins.push(first..k);
+            first = k;
+        }
+    }
+    bins
+}
+
+/// The standard deviation of the values in a sequence of rows, from third differences, which a
+/// smooth curve hardly has.
+fn scatter_of_row(values: &[f64]) -> f64 {
+    let third = |w: &[f64]| (w[3] - 3.0 * w[2] + 3.0 * w[1] - w[0]).abs();
+    let differences: Vec<f64> = values.windows(4).map(third).collect();
+    let known: Vec<f64> = differences.into_iter().filter(|d| d.is_finite()).collect();
+    1.4826 * median(known) / 20f64.sqrt()
+}
+
+/// Consecutive rows of one direction, as columns.
+struct Segment<'a> {
+    rows: &'a [Row],
+    distance: Vec<f64>,
+    /// One per column; angles without jumps by a turn, NaN where nothing was measured.
+    values: Vec<Vec<f64>>,
+}
+
+impl<'a> Segment<'a> {
+    fn of(rows: &'a [Row], columns: &[Column]) -> Self {
+        let values = columns.iter().enumerate().map(|(index, column)| {
+            let mut last = f64::NAN;
+            let rows = rows.iter().map(|row| {
+                let value = row.values[index].unwrap_or(f64::NAN);
+                let value = if column.quantity.is_angle() && last.is_finite() {
+                    last + wrapped(value - last)
+                } else {
+                    value
+                };
+                if value.is_finite() {
+                    last = value;
+                }
+                value
+            });
+            rows.collect()
+        });
+        Self {
+            rows,
+            distance: rows.iter().map(|row| row.at[0]).collect(),
+            values: values.collect(),
+        }
+    }
+}
+
+/// The segments of a curve.
+fn segments<'a>(curve: &'a Curve, columns: &'a [Column]) -> impl Iterator<Item = Segment<'a>> {
+    let same = |a: &Row, b: &Row| a.way == b.way && a.at[1..] == b.at[1..];
+    let parts = curve.rows.chunk_by(same);
+    parts.map(|rows| Segment::of(rows, columns))
+}
+
+/// A polynomial in the distance through some rows, by least squares.
+struct Polynomial {
+    /// Its value at the mean distance.
+    value: f64,
+    /// The standard error of that value, for rows with standard error 1.
+    error: f64,
+    /// How far it lies from the mean of the rows there, and the standard error of that.
+    bend: f64,
+    bend_error: f64,
+    /// Sum of the squared residuals, and their degrees of freedom.
+    squares: f64,
+    freedom: f64,
+}
+
+impl Polynomial {
+    /// Of the given degree; `None` if the rows do not determine it.
+    fn of(distance: &[f64], values: &[f64], degree: usize) -> Option<Self> {
+        let count = distance.len();
+        if count <= degree {
+            return None;
+        }
+        let mean = distance.iter().sum::<f64>() / count as f64;
+        let size = distance
+            .iter()
+            .fold(0.0, |m: f64, x| m.max((x - mean).abs()));
+        if degree > 0 && size == 0.0 {
+            return None;
+        }
+        let u = |k: usize| (distance[k] - mean) / size.max(f64::MIN_POSITIVE);
+        let square = (0..count).map(|k| u(k) * u(k)).sum::<f64>() / count as f64;
+        let matrix = DMatrix::from_fn(count, degree + 1, |k, j| match j {
+            0 => 1.0,
+            1 => u(k),
+            _ => u(k) * u(k),
+        });
+        let covariance = matrix.tr_mul(&matrix).try_inverse()?;
+        let right = DVector::from_column_slice(values);
+        let found = &covariance * matrix.tr_mul(&right);
+        let residuals = right - matrix * &found;
+        let known = found.iter().all(|c| c.is_finite());
+        known.then(|| Self {
+            value: found[0],
+            error: covariance[(0, 0)].sqrt(),
+            bend: if degree > 1 { found[2] * square } else { 0.0 },
+            bend_error: if degree > 1 {
+                covariance[(2, 2)].sqrt() * square
+            } else {
+                0.0
+            },
+            squares: residuals.norm_squared(),
+            freedom: (count - degree - 1) as f64,
+        })
+    }
+}
+
+impl Data {
+    /// The scatter of each column in the rows far from the sample, about a line in every curve and
+    /// direction; nothing if the distance is not what varies, or too few rows are far.
+    pub(super) fn add_free_scatter(&mut self) {
+        let amplitude = self
+            .columns
+            .iter()
+            .position(|c| matches!(c.quantity.name(), "first_harmonic" | "amplitude"));
+        let (Some(amplitude), true) = (amplitude, self.varies_distance()) else {
+            return;
+        };
+        let mut sums = vec![(0.0, 0.0); self.columns.len()];
+        for curve in &self.curves {
+            for segment in segments(curve, &self.columns) {
+                let free = far_rows(&segment.distance, &segment.values[amplitude]);
+                if free.len() < MIN_FREE {
+                    continue;
+                }
+                let pick = |of: &[f64]| -> Vec<f64> { free.iter().map(|k| of[*k]).collect() };
+                let distance = pick(&segment.distance);
+                for (values, sum) in segment.values.iter().zip(&mut sums) {
+                    let values = pick(values);
+                    if let Some(line) = Polynomial::of(&distance, &values, 1) {
+                        sum.0 += line.squares;
+                        sum.1 += line.freedom;
+                    }
+                }
+            }
+        }
+        for (index, (squares, freedom)) in sums.into_iter().enumerate() {
+            if freedom > 0.0 {
+                self.columns[index].scatter = Some(Scatter {
+                    error: (squares / freedom).sqrt().max(self.floor(index)),
+                    freedom,
+                });
+            }
+        }
+    }
+
+    /// Least scatter that is told from none.
+    fn floor(&self, column: usize) -> f64 {
+        if self.columns[column].quantity.is_angle() {
+            return FLOORS[1];
+        }
+        let values = self.rows().filter_map(|row| row.values[column]);
+        FLOORS[0] * values.fold(0.0, |m: f64, value| m.max(value.abs()))
+    }
+
+    /// True if the first of the positions is a distance.
+    fn varies_distance(&self) -> bool {
+        self.swept
+            .first()
+            .is_some_and(|swept| is_distance(swept.key))
+    }
+
+    /// Averages of consecutive rows, about `count` in all, if there are more than twice as many:
+    /// says how many rows became how many.
+    pub(super) fn average(&mut self, count: usize) -> Option<String> {
+        let rows = self.rows().count();
+        if count == 0 || rows <= 2 * count || !self.varies_distance() {
+            return None;
+        }
+        let mut binned: Vec<(usize, Vec<Row>, Vec<Bin>)> = Vec::new();
+        for (index, curve) in self.curves.iter().enumerate() {
+            for segment in segments(curve, &self.columns) {
+                let errors: Vec<f64> = segment
+                    .values
+                    .iter()
+                    .enumerate()
+                    .map(|(column, values)| scatter_of_row(values).max(self.floor(column)))
+                    .collect();
+                let share = (count * segment.rows.len()).div_ceil(rows).max(2);
+                let ranges = bins(&segment.distance, &segment.values, &errors, share);
+                let made: Vec<Bin> = ranges
+                    .into_iter()
+                    .map(|range| Bin::of(&segment, range))
+                    .collect();
+                binned.push((index, segment.rows.to_vec(), made));
+            }
+        }
+        let scatter: Vec<Scatter> = (0..self.columns.len())
+            .map(|column| {
+                let bins = binned.iter().flat_map(|(_, _, bins)| bins);
+                common(bins.filter_map(|bin| bin.fits[column].as_ref()))
+            })
+            .map(|(variance, freedom)| Scatter {
+                error: variance.sqrt(),
+                freedom,
+            })
+            .collect();
+        for curve in &mut self.curves {
+            curve.rows.clear();
+        }
+        for (curve, rows, bins) in binned {
+            let made = bins.iter().map(|bin| bin.row(&rows, &scatter));
+            self.curves[curve].rows.extend(made);
+        }
+        for (index, of) in scatter.into_iter().enumerate() {
+            let floor = self.floor(index);
+            self.columns[index].scatter = (of.freedom > 0.0).then(|| Scatter {
+                error: of.error.max(floor),
+                ..of
+            });
+        }
+        let averages = self.rows().count();
+        Some(format!(
+            "{rows} rows were averaged to {averages}, with standard errors from their scatter; the \
+             option `rows` sets how many, 0 uses every row"
+        ))
+    }
+}
+
+/// Consecutive rows that become one.
+struct Bin {
+    range: Range<usize>,
+    distance: f64,
+    /// The polynomials of each column: the mean, and a parabola or a line.
+    fits: Vec<Option<Fits>>,
+}
+
+struct Fits {
+    mean: f64,
+    count: usize,
+    best: Option<Polynomial>,
+}
+
+impl Bin {
+    fn of(segment: &Segment<'_>, range: Range<usize>) -> Self {
+        let distance = &segment.distance[range.clone()];
+        let fits = segment.values.iter().map(|values| {
+            let values = &values[range.clone()];
+            let known: Vec<usize> = (0..values.len())
+                .filter(|k| values[*k].is_finite())
+                .collect();
+            let pick = |of: &[f64]| -> Vec<f64> { known.iter().map(|k| of[*k]).collect() };
+            let (distance, values) = (pick(distance), pick(values));
+            let degree = match known.len() {
+                0 => return None,
+                1..4 => 0,
+                4..MIN_PARABOLA => 1,
+                _ => 2,
+            };
+            Some(Fits {
+                mean: values.iter().sum::<f64>() / values.len() as f64,
+                count: values.len(),
+                best: (degree > 0)
+                    .then(|| Polynomial::of(&distance, &values, degree))
+                    .flatten(),
+            })
+        });
+        Self {
+            fits: fits.collect(),
+            distance: distance.iter().sum::<f64>() / distance.len() as f64,
+            range,
+        }
+    }
+
+    /// The average, with errors relative to the common scatter where the rows give none.
+    fn row(&self, rows: &[Row], scatter: &[Scatter]) -> Row {
+        let rows = &rows[self.range.clone()];
+        let mut row = rows[0].clone();
+        row.at[0] = self.distance;
+        for (column, fits) in self.fits.iter().enumerate() {
+            let Some(fits) = fits else {
+                (row.values[column], row.errors[column]) = (None, None);
+                continue;
+            };
+            let common = scatter[column].error;
+            let mut own = common;
+            let (mut value, mut part) = (fits.mean, 1.0 / (fits.count as f64).sqrt());
+            if let Some(best) = &fits.best {
+                let (given, freedom) = (common * common, best.freedom);
+                own = ((PRIOR * given + best.squares) / (PRIOR + freedom)).sqrt();
+                if best.bend.abs() > BENT * best.bend_error * own {
+                    (value, part) = (best.value, best.error);
+                }
+            }
+            row.values[column] = Some(value);
+            let squares: Option<f64> = rows.iter().map(|r| Some(r.errors[column]?.powi(2))).sum();
+            row.errors[column] = squares
+                .map(|sum| (sum / fits.count as f64).sqrt() * part)
+                .filter(|_| fits.count == rows.len());
+            row.relative[column] = if common > 0.0 {
+                own / common * part
+            } else {
+                part
+            };
+        }
+        row
+    }
+}
+
+/// The common variance of bins, and its degrees of freedom. Bins in which something else happens
+/// than noise do not count.
+fn common<'a>(fits: impl Iterator<Item = &'a Fits>) -> (f64, f64) {
+    let known: Vec<(f64, f64)> = fits
+        .filter_map(|fits| fits.best.as_ref())
+        .filter(|best| best.freedom > 0.0)
+        .map(|best| (best.squares / best.freedom, best.freedom))
+        .collect();
+    let limit = OUTLYING * median(known.iter().map(|(variance, _)| *variance).collect());
+    let counted = known.iter().filter(|(variance, _)| *variance <= limit);
+    let (sum, freedom) = counted.fold((0.0, 0.0), |(sum, freedom), (variance, of)| {
+        (sum + variance * of, freedom + of)
+    });
+    (if freedom > 0.0 { sum / freedom } else { 0.0 }, freedom)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bins_end_at_jumps_and_keep_knees() {
+        // Flat, a slope, and a jump by 5 in the middle of the slope.
+        let distance: Vec<f64> = (0..400).map(|k| 0.05 * f64::from(k)).collect();
+        let value = |x: f64| if x < 10.0 { 10.0 } else { x } + if x > 15.0 { 5.0 } else { 0.0 };
+        let values: Vec<f64> = distance.iter().map(|x| value(*x)).collect();
+        let found = bins(&distance, &[values], &[0.1], 20);
+        assert!(found.windows(2).all(|w| w[0].end == w[1].start));
+        assert!(
+            found
+                .iter()
+                .any(|bin| distance[bin.start] > 15.0 && distance[bin.start - 1] <= 15.0)
+        );
+        let flat = found
+            .iter()
+            .filter(|bin| distance[bin.end - 1] < 9.0)
+            .count();
+        let steep = found
+            .iter()
+            .filter(|bin| distance[bin.start] > 10.0)
+            .count();
+        assert!(
+            flat < 5 && steep > 10 && found.len() <= 23,
+            "{flat} {steep}"
+        );
+    }
+
+    #[test]
+    fn a_parabola_gives_the_curve_where_the_mean_does_not() {
+        let distance: Vec<f64> = (0..11).map(|k| f64::from(k) - 5.0).collect();
+        let values: Vec<f64> = distance.iter().map(|x| 2.0 + x + 0.5 * x * x).collect();
+        let found = Polynomial::of(&distance, &values, 2).unwrap();
+        assert!((found.value - 2.0).abs() < 1e-12 && found.squares < 1e-20);
+        // The mean of x² over −5 … 5 in steps of 1 is 10.
+        assert!((found.bend - 5.0).abs() < 1e-12);
+    }
+}

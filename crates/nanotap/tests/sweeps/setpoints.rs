@@ -57,7 +57,7 @@ fn a_window_over_setpoints_solves_each_distance() {
     };
     let control = Control::default();
     let folder = Folder::new();
-    let sweep = options("F_max < 20 nN").sweep(&case, &control).unwrap();
+    let sweep = options("F_max < 10 nN").sweep(&case, &control).unwrap();
     let store = computed(&sweep, &folder);
     let window = Window::of(&store).unwrap();
     let targets = window.targets.as_ref().unwrap();
@@ -81,9 +81,9 @@ fn a_window_over_setpoints_solves_each_distance() {
             largest.push(force);
             // Of two states both must meet the condition.
             let holds = targets.holds[row][column];
-            assert!(!holds || force < 20e-9, "{force}");
+            assert!(!holds || force < 10e-9, "{force}");
             if window.conditions[row][column] == Condition::OnePeriod1 {
-                assert_eq!(holds, force < 20e-9, "{force}");
+                assert_eq!(holds, force < 10e-9, "{force}");
             }
         }
     }

@@ -303,6 +303,20 @@ def test_physical_quantities_vary(physical):
     assert window.condition.values[1, 2] == "no-contact"
     with pytest.raises(ValueError, match="two are needed"):
         nanotap.window(physical, over="gap.tip=15nm:30nm:3")
+    # The distance of a setpoint is solved, and the motion there has its amplitude.
+    swept = nanotap.sweep(
+        physical,
+        over={"drive.setpoint": [0.8, 0.9]},
+        where="regime = repulsive",
+        periods=2,
+    )
+    np.testing.assert_allclose(
+        swept.first_harmonic[:, 0], [16e-9, 18e-9], rtol=1e-6
+    )
+    assert float(swept.distance[0, 0]) < float(swept.distance[1, 0])
+    assert swept.holds.values.tolist() == [True, True]
+    with pytest.raises(ValueError, match="did you mean `F_max`"):
+        nanotap.sweep(physical, over="drive.setpoint=0.8,0.9", where=["F_mx < 1 nN"])
     with pytest.raises(ValueError, match=r"gap\.tap"):
         nanotap.sweep(physical, over="gap.tap=15nm:30nm:3")
 

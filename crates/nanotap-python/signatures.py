@@ -139,7 +139,9 @@ PYTHON: dict[str, tuple[tuple[tuple[str, str, str, str], ...], str, str]] = {
         "xr.Dataset",
         (
             "The sweep with `condition` over both parameters: no-contact, one-period-1, "
-            "second-state, subharmonic, irregular or undecided; `share` is the fraction of each."
+            "second-state, subharmonic, irregular, undecided, or setpoint-unreached; `share` is the "
+            "fraction of each. With `where`, `holds` says where the conditions hold; its attributes "
+            "have their share and the largest rectangle (`region`, JSON)."
         ),
     ),
     "basin": (

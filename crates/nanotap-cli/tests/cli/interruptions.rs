@@ -94,6 +94,7 @@ fn long_work(study: &str) -> Option<Vec<&'static str>> {
         "orbit" | "convergence" | "contact-laws" => vec!["case.toml", "--period", "10000"],
         "scan" => vec!["scan.toml"],
         "force-curve" => vec!["soft.toml", "--speed", "1 nm/s"],
+        "lever" => vec!["setpoint.toml"],
         other => panic!("say how long work of {other} is requested"),
     })
 }

@@ -39,7 +39,18 @@ def sweep(
     )
     noun = "values" if options["follow"] in (None, "off") else "lines"
     plan = ("sweep", _cased(case), request)
-    return _computed(plan, noun, out, chunk, threads, client, progress)
+    if not options["where"] or chunk != "1/1":
+        return _computed(plan, noun, out, chunk, threads, client, progress)
+    with tempfile.TemporaryDirectory(prefix="nanotap-") as folder:
+        store = (
+            os.path.join(folder, "sweep.zarr") if out is None else _ending(out, "out")
+        )
+        ds = _computed(plan, noun, store, chunk, threads, client, progress)
+        targets = json.loads(_nanotap.summary(store))["targets"]
+        if out is None:
+            ds = ds.load()
+            del ds.attrs["path"]
+    return _judged(ds, ds.classification.dims[:-1], targets)
 
 
 def basin(
@@ -194,7 +205,9 @@ def _judged(
     """Where the conditions of `where` hold; the region and the share as attributes."""
     import xarray as xr
 
-    holds = np.array(targets["holds"], dtype=bool)
+    holds = np.array(targets["holds"], dtype=bool).reshape(
+        [ds.sizes[dim] for dim in dims]
+    )
     attrs = {
         "long_name": "whether the conditions hold",
         "where": targets["where"],

@@ -18,7 +18,7 @@ use crate::folder::Folder;
 fn lever(setpoint: &str) -> Case {
     let text = format!(
         "[model]\nmodes = 1\n[cantilever]\nlever = \"PPP-NCHR\"\nQ = 400\n[tip]\nradius = \"10 nm\"\n\
-         [sample]\nmaterial = \"polystyrene\"\nloss_tangent = 0.1\n[drive]\nfrequency_ratio = 1.001\n\
+         [sample]\nmaterial = \"polystyrene\"\nloss_tangent = 0.1\n[drive]\nfrequency_ratio = 1\n\
          free_amplitude = \"20 nm\"\nsetpoint = {setpoint}\n"
     );
     let folder = Folder::new();
@@ -57,7 +57,7 @@ fn a_window_over_setpoints_solves_each_distance() {
     };
     let control = Control::default();
     let folder = Folder::new();
-    let sweep = options("F_max < 20 nN").sweep(&case, &control).unwrap();
+    let sweep = options("F_max < 10 nN").sweep(&case, &control).unwrap();
     let store = computed(&sweep, &folder);
     let window = Window::of(&store).unwrap();
     let targets = window.targets.as_ref().unwrap();
@@ -79,8 +79,12 @@ fn a_window_over_setpoints_solves_each_distance() {
                 .observables
                 .peak_force;
             largest.push(force);
-            assert_eq!(window.conditions[row][column], Condition::OnePeriod1);
-            assert_eq!(targets.holds[row][column], force < 20e-9, "{force}");
+            // Of two states both must meet the condition.
+            let holds = targets.holds[row][column];
+            assert!(!holds || force < 10e-9, "{force}");
+            if window.conditions[row][column] == Condition::OnePeriod1 {
+                assert_eq!(holds, force < 10e-9, "{force}");
+            }
         }
     }
     // Larger amplitudes and lower setpoints press harder.
@@ -108,20 +112,20 @@ fn a_window_over_setpoints_solves_each_distance() {
     assert!(figure(&store).unwrap().to_svg().unwrap().contains("F_max"));
 }
 
-/// No lever comes to 2 % of its free amplitude before the sample's own position.
+/// No lever comes to a ten-thousandth of its free amplitude before the sample's own position.
 #[test]
 fn no_motion_is_reported_where_a_setpoint_is_not_reached() {
     let folder = Folder::new();
     let options = SweepOptions {
         targets: Targets(vec!["regime = repulsive".to_owned()]),
         periods: 2,
-        ..SweepOptions::over(["drive.setpoint=0.02,0.9"])
+        ..SweepOptions::over(["drive.setpoint=1e-4,0.9"])
     };
     let sweep = Sweep::new(&lever("0.8"), options).unwrap();
     let summary = Summary::of(&computed(&sweep, &folder)).unwrap();
     assert_eq!(summary.targets.unwrap().holds, [[false, true]]);
     assert_eq!(summary.unreached.len(), 1);
-    assert_eq!(summary.unreached[0].values, [0.02]);
+    assert_eq!(summary.unreached[0].values, [1e-4]);
     assert!(summary.unreached[0].reason.contains("is not reached"));
     assert_eq!(
         (summary.counts["periodic"], summary.counts["undecided"]),

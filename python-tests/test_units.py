@@ -49,6 +49,7 @@ ELSEWHERE = {
     "catalogue",
     "open",
     "in_si",
+    "lever",
 }
 
 

@@ -50,7 +50,7 @@ pub use stated::{Value, ValueError};
 pub use under_law::LawChange;
 
 use file::{CaseFileError, Described, Source};
-use key::ModelKind;
+use key::{ModelKind, Section};
 use near_name::near_name;
 use physical::{Catalogue, Kind, Physical, Remark, Scales};
 use quantities::{Quantities, Slopes};
@@ -766,6 +766,82 @@ impl Case {
             what: CaseKind::Quantities(Box::new(quantities.mapped(true))),
             ..self
         }
+    }
+
+    /// Whether a fluid around the lever is stated, which determines the quality factor.
+    pub(crate) fn states_fluid(&self) -> bool {
+        let CaseKind::Quantities(quantities) = &self.what else {
+            return false;
+        };
+        quantities.stated.has(Key::FluidDensity)
+    }
+
+    /// The case with each of these levers of its catalogue, all of it if none is named: driven at
+    /// `frequency_ratio` of the free resonance with the same free amplitude. Quality factor or fluid
+    /// stay, and with `keep_tip` radius and height of the tip. The reason where a lever is impossible.
+    ///
+    /// # Errors
+    /// If a name is not in the catalogue.
+    pub(crate) fn with_catalogue_levers(
+        &self,
+        names: &[String],
+        frequency_ratio: f64,
+        keep_tip: bool,
+    ) -> Result<Vec<(String, Result<Self, String>)>, physical::PhysicalError> {
+        const KEPT: [Key; 8] = [
+            Key::LeverQ,
+            Key::FluidDensity,
+            Key::FluidViscosity,
+            Key::TipMaterial,
+            Key::TipModulus,
+            Key::TipPoisson,
+            Key::TipCharge,
+            Key::TipHalfAngle,
+        ];
+        let (CaseKind::Quantities(quantities), Some(view)) = (&self.what, self.physical()) else {
+            return Ok(Vec::new());
+        };
+        let catalogue = quantities.catalogue();
+        let levers = if names.is_empty() {
+            catalogue.levers().collect()
+        } else {
+            let named = names.iter();
+            named
+                .map(|name| catalogue.lever(Key::LeverName, name))
+                .collect::<Result<Vec<_>, _>>()?
+        };
+        let with = |lever: &physical::CatalogueLever| {
+            let mut stated = quantities.stated.clone();
+            let of_lever = |key: &Key| {
+                matches!(key.section(), Section::Cantilever | Section::Tip | Section::Gap)
+                    && !KEPT.contains(key)
+            };
+            for key in Key::all().filter(of_lever) {
+                stated.remove(key);
+            }
+            for (key, known) in [
+                (Key::TipRadius, lever.tip_radius),
+                (Key::TipHeight, lever.tip_height),
+            ] {
+                let value = self.get(key);
+                if (keep_tip || known.is_none()) && value.is_finite() {
+                    stated.set(key, value);
+                }
+            }
+            stated.put(Key::LeverName, Value::Name(lever.name.as_str().into()));
+            stated.set(Key::DriveFrequencyRatio, frequency_ratio);
+            stated.set(Key::DriveFreeAmplitude, view.free_amplitude);
+            let quantities = Quantities::new(stated, quantities.catalogue()).validated();
+            quantities.map(|quantities| Self {
+                what: CaseKind::Quantities(Box::new(quantities)),
+                ..self.clone()
+            })
+        };
+        let all = levers.into_iter().map(|lever| {
+            let case = with(lever).map_err(|error| error.to_string());
+            (lever.name.clone(), case)
+        });
+        Ok(all.collect())
     }
 
     /// The same case whose motions start from `state` at drive phase 0.

@@ -3,7 +3,7 @@
 use clap::Args;
 use nanotap::case::physical::Kind;
 use nanotap::observe::table::shown_phase;
-use nanotap::study::lever::{LeverOptions, LeverReport, LeverRow, LeverStudy};
+use nanotap::study::lever::{LeverOptions, LeverReport, LeverRow, LeverStudy, QualityFactorSource};
 
 use crate::arguments::CaseArguments;
 use crate::failure::Failure;
@@ -48,6 +48,7 @@ fn text(case: &GivenCase, report: &LeverReport) -> String {
         ("lever", Align::Left),
         ("k", Align::Point),
         ("f0", Align::Point),
+        ("Q", Align::Point),
         ("radius", Align::Point),
         ("F_max", Align::Point),
         ("indentation", Align::Point),
@@ -64,7 +65,9 @@ fn text(case: &GivenCase, report: &LeverReport) -> String {
     for row in &report.levers {
         let mut cells = cells(row);
         if fits {
-            let word = if row.holds == Some(true) { "yes" } else { "no" };
+            let word = row
+                .holds
+                .map_or("unknown", |holds| if holds { "yes" } else { "no" });
             cells.insert(1, word.to_owned());
         }
         table.row(cells);
@@ -79,23 +82,56 @@ fn text(case: &GivenCase, report: &LeverReport) -> String {
             report.levers.len()
         )));
     }
-    if let Some(first) = report.levers.first() {
-        text.push_str(&paragraph(&format!(
-            "quality factor: {} (first lever: {}). τ = Q/(π f0) is the time constant of the amplitude",
-            report.quality_factor_source,
-            number::significant(first.quality_factor, 4)
-        )));
-    }
+    text.push_str(&paragraph(&quality_factors(report)));
+    // Levers with the same reason share a sentence.
+    let mut reasons: Vec<(String, Vec<&str>)> = Vec::new();
     for row in &report.levers {
-        let budget = row.motion.as_ref().and_then(|motion| motion.budget.as_ref());
-        if let Some(reason) = row.reason.as_ref() {
-            text.push_str(&paragraph(&format!("{}: {reason}", row.lever)));
-        } else if let Some(reason) = budget {
-            text.push_str(&paragraph(&format!(
-                "{}: other states may be missing: {reason}",
-                row.lever
-            )));
+        let budget = row
+            .motion
+            .as_ref()
+            .and_then(|motion| motion.budget.as_ref());
+        let reason = match (&row.reason, budget) {
+            (Some(reason), _) => reason.clone(),
+            (None, Some(budget)) => format!("other states may be missing: {budget}"),
+            (None, None) => continue,
+        };
+        match reasons.iter_mut().find(|(other, _)| *other == reason) {
+            Some((_, levers)) => levers.push(&row.lever),
+            None => reasons.push((reason, vec![&row.lever])),
         }
+    }
+    for (reason, levers) in reasons {
+        text.push_str(&paragraph(&format!("{}: {reason}", levers.join(", "))));
+    }
+    text
+}
+
+/// Where the quality factors come from.
+fn quality_factors(report: &LeverReport) -> String {
+    let source = match report.quality_factor_source {
+        QualityFactorSource::Air => "of each lever in air, by its dimensions (Sader 1998)",
+        QualityFactorSource::Fluid => {
+            "of each lever in the fluid of the case, by its dimensions (Sader 1998)"
+        }
+        QualityFactorSource::Case => "that of the case for every lever",
+    };
+    let mut text = format!("Q: {source}; τ = Q/(π f0) is the time constant of the amplitude");
+    let known = report.levers.iter().filter_map(|row| {
+        let air = row.quality_factor_in_air?;
+        Some((
+            row,
+            air,
+            (air / row.quality_factor).max(row.quality_factor / air),
+        ))
+    });
+    if report.quality_factor_source == QualityFactorSource::Case
+        && let Some((row, air, _)) = known.max_by(|a, b| a.2.total_cmp(&b.2))
+    {
+        text.push_str(&format!(
+            ". In air the dimensions of {} give Q = {}; --quality-factor air computes that of each lever",
+            row.lever,
+            number::significant(air, 3)
+        ));
     }
     text
 }
@@ -112,6 +148,7 @@ fn cells(row: &LeverRow) -> Vec<String> {
         row.lever.clone(),
         shown(Kind::Stiffness, row.k),
         shown(Kind::Frequency, row.f0),
+        shown(Kind::Number, row.quality_factor),
         shown(Kind::Length, row.tip_radius.unwrap_or(f64::NAN)),
     ];
     match &row.motion {
@@ -126,7 +163,10 @@ fn cells(row: &LeverRow) -> Vec<String> {
                 number::significant(shown_phase(seen.phase), 4),
             ]);
         }
-        None => cells.extend(["", "", "not reached", "", "", ""].map(str::to_owned)),
+        None if row.k.is_finite() => {
+            cells.extend(["", "", "not reached", "", "", ""].map(str::to_owned));
+        }
+        None => cells.extend([""; 6].map(str::to_owned)),
     }
     cells.push(shown(Kind::Time, row.time_constant));
     cells

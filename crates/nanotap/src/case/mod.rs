@@ -465,6 +465,20 @@ impl Case {
         }
     }
 
+    /// The same case with a setpoint: a fraction of the free amplitude, or an amplitude, a peak force
+    /// or a phase in SI. A case without physical quantities is unchanged.
+    #[must_use]
+    pub(crate) fn with_setpoint(&self, value: f64, kind: Kind) -> Self {
+        let CaseKind::Quantities(quantities) = &self.what else {
+            return self.clone();
+        };
+        let quantities = quantities.with_of_kind(Key::DriveSetpoint, value, kind);
+        Self {
+            what: CaseKind::Quantities(Box::new(quantities)),
+            ..self.clone()
+        }
+    }
+
     /// The numbers that stay constant while `keys` vary, although they were not stated, in SI: stated
     /// together with values of the keys they give the same case. Empty if the stated values stay
     /// constant.
@@ -777,8 +791,9 @@ impl Case {
     }
 
     /// The case with each of these levers of its catalogue, all of it if none is named: driven at
-    /// `frequency_ratio` of the free resonance with the same free amplitude. Quality factor or fluid
-    /// stay, and with `keep_tip` radius and height of the tip. The reason where a lever is impossible.
+    /// `frequency_ratio` of the free resonance with the same free amplitude. With `keep_tip` radius and
+    /// height of the tip stay; otherwise a stated adhesion force is multiplied by the ratio of the
+    /// radii. Quality factor or fluid stay. The reason where a lever is impossible.
     ///
     /// # Errors
     /// If a name is not in the catalogue.
@@ -802,23 +817,28 @@ impl Case {
             return Ok(Vec::new());
         };
         let catalogue = quantities.catalogue();
-        let levers = if names.is_empty() {
-            catalogue.levers().collect()
-        } else {
-            let named = names.iter();
-            named
-                .map(|name| catalogue.lever(Key::LeverName, name))
-                .collect::<Result<Vec<_>, _>>()?
-        };
+        let mut levers: Vec<&physical::CatalogueLever> = Vec::new();
+        for name in names {
+            let lever = catalogue.lever(Key::LeverName, name)?;
+            if !levers.contains(&lever) {
+                levers.push(lever);
+            }
+        }
+        if names.is_empty() {
+            levers = catalogue.levers().collect();
+        }
         let with = |lever: &physical::CatalogueLever| {
             let mut stated = quantities.stated.clone();
             let of_lever = |key: &Key| {
-                matches!(key.section(), Section::Cantilever | Section::Tip | Section::Gap)
-                    && !KEPT.contains(key)
+                matches!(
+                    key.section(),
+                    Section::Cantilever | Section::Tip | Section::Gap
+                ) && !KEPT.contains(key)
             };
             for key in Key::all().filter(of_lever) {
                 stated.remove(key);
             }
+            let radius = self.get(Key::TipRadius);
             for (key, known) in [
                 (Key::TipRadius, lever.tip_radius),
                 (Key::TipHeight, lever.tip_height),
@@ -827,6 +847,12 @@ impl Case {
                 if (keep_tip || known.is_none()) && value.is_finite() {
                     stated.set(key, value);
                 }
+            }
+            if let Some(other) = lever.tip_radius.filter(|_| !keep_tip && radius.is_finite())
+                && stated.has(Key::SampleAdhesionForce)
+            {
+                let force = self.get(Key::SampleAdhesionForce) * other / radius;
+                stated.set(Key::SampleAdhesionForce, force);
             }
             stated.put(Key::LeverName, Value::Name(lever.name.as_str().into()));
             stated.set(Key::DriveFrequencyRatio, frequency_ratio);
@@ -842,6 +868,26 @@ impl Case {
             (lever.name.clone(), case)
         });
         Ok(all.collect())
+    }
+
+    /// The same case in a fluid of `density` in kg/m³ and `viscosity` in Pa s, which determines the
+    /// quality factors in place of the stated ones; the reason if that is impossible.
+    pub(crate) fn in_fluid(&self, density: f64, viscosity: f64) -> Result<Self, String> {
+        let CaseKind::Quantities(quantities) = &self.what else {
+            return Ok(self.clone());
+        };
+        let mut stated = quantities.stated.clone();
+        for key in [Key::LeverQ, Key::LeverQ2, Key::LeverQ3] {
+            stated.remove(key);
+        }
+        stated.set(Key::FluidDensity, density);
+        stated.set(Key::FluidViscosity, viscosity);
+        let quantities = Quantities::new(stated, quantities.catalogue()).validated();
+        let quantities = quantities.map_err(|error| error.to_string())?;
+        Ok(Self {
+            what: CaseKind::Quantities(Box::new(quantities)),
+            ..self.clone()
+        })
     }
 
     /// The same case whose motions start from `state` at drive phase 0.

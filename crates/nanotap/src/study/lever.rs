@@ -1,9 +1,10 @@
 //! Levers of the catalogue compared on the sample of a case, at its free amplitude and setpoint.
 //!
 //! Each lever replaces that of the case with its own stiffness, resonance and dimensions, and with
-//! its own tip radius and height unless the tip of the case is kept. The quality factor is that of
-//! the case, since it is the medium's; where the case states a fluid, it follows from the lever's
-//! dimensions. The drive keeps its ratio to the free resonance, and the free amplitude stays.
+//! its own tip radius and height unless the tip of the case is kept. Data sheets state no quality
+//! factor, since it depends on the medium: it follows from the dimensions of the lever in the fluid of
+//! the case or in air by Sader's hydrodynamic function, or is that of the case where the case is
+//! not one in air. The drive keeps its ratio to the free resonance, and the free amplitude stays.
 //! The distance is solved for the setpoint as a feedback loop finds it
 //! ([`setpoint`](super::setpoint)); the motion there is reported with the number of stable states
 //! that were found.
@@ -14,7 +15,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use nanotap_dynamics::Control;
 use rayon::prelude::*;
 use schemars::JsonSchema;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use crate::Error;
 use crate::case::{Case, Key};
@@ -27,7 +28,7 @@ use crate::study::target::{Regime, Target, TargetMotion, TargetPoint, Targets};
 options! {
     /// Options of the comparison of levers.
     pub struct LeverOptions {
-        /// Lever of the catalogue to compare; several; default: all
+        /// Compare only these levers of the catalogue; default: all
         #[schemars(extend("x-value" = "NAME,…"))]
         pub levers: Vec<String> = Vec::new(),
         /// Condition that every motion found at the setpoint must meet, as in "F_max < 1 nN",
@@ -37,6 +38,10 @@ options! {
         pub targets: Targets = Targets::default(),
         /// Keep radius and height of the tip of the case
         pub keep_tip: bool = false,
+        /// Take the quality factors from: air and the dimensions of each lever (Sader 1998), or the case,
+        /// the same for every lever; auto: from the fluid of the case, without one from air if the case
+        /// has about the quality factor of its lever in air, otherwise from the case
+        pub quality_factor: QualityFactor = QualityFactor::Auto,
     }
 }
 
@@ -52,6 +57,9 @@ pub struct LeverRow {
     /// Quality factor.
     #[serde(rename = "Q")]
     pub quality_factor: f64,
+    /// Quality factor in air at 20 °C by its dimensions (Sader 1998), if they are known.
+    #[serde(rename = "Q_air", skip_serializing_if = "Option::is_none")]
+    pub quality_factor_in_air: Option<f64>,
     /// Radius of the tip, m.
     pub tip_radius: Option<f64>,
     /// Time constant Q/(π f0) of the amplitude, s.
@@ -62,7 +70,8 @@ pub struct LeverRow {
     /// Why the setpoint is not reached, or the lever cannot be computed.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub reason: Option<String>,
-    /// Whether all conditions hold; absent without conditions.
+    /// Whether all conditions hold; absent without conditions, and where that is not known because
+    /// states may be missing.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub holds: Option<bool>,
 }
@@ -83,6 +92,59 @@ pub struct LeverMotion {
     pub physical: PhysicalMotion,
 }
 
+/// Which quality factors levers have.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum QualityFactor {
+    /// Those in the fluid of the case, in air, or that of the case.
+    #[default]
+    Auto,
+    /// Those in air.
+    Air,
+    /// That of the case, or those in its fluid.
+    Case,
+}
+
+/// Source of quality factors.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum QualityFactorSource {
+    /// That of the case, the same for every lever.
+    Case,
+    /// The fluid of the case and the dimensions of each lever.
+    Fluid,
+    /// Air and the dimensions of each lever.
+    Air,
+}
+
+impl QualityFactorSource {
+    fn of(case: &Case, choice: QualityFactor) -> Self {
+        let own = |case: &Case| case.physical().map(|view| view.lever.quality_factor);
+        let in_air = || own(&case.in_fluid(AIR[0], AIR[1]).ok()?);
+        match choice {
+            QualityFactor::Air => Self::Air,
+            _ if case.states_fluid() => Self::Fluid,
+            QualityFactor::Case => Self::Case,
+            QualityFactor::Auto => match own(case).zip(in_air()) {
+                Some((own, air)) if own.max(air) <= NEAR * own.min(air) => Self::Air,
+                _ => Self::Case,
+            },
+        }
+    }
+}
+
+/// Factor within which the quality factor of a case is that of its lever in air: internal losses,
+/// humidity and the sample's surface make the difference. In liquids it is far smaller.
+const NEAR: f64 = 3.0;
+
+/// Density in kg/m³ and viscosity in Pa s of dry air at 20 °C and 1013 hPa (CRC Handbook of
+/// Chemistry and Physics: 1.204 kg/m³, 18.2 µPa s).
+const AIR: [f64; 2] = [1.204, 18.2e-6];
+
+/// Why a lever has no quality factor in air.
+const NO_DIMENSIONS: &str =
+    "the quality factor in air is not known without the dimensions of the lever";
+
 /// The levers compared.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct LeverReport {
@@ -90,12 +152,13 @@ pub struct LeverReport {
     pub free_amplitude: f64,
     /// Drive frequency over the free resonance of each lever.
     pub frequency_ratio: f64,
-    /// Where the quality factor of the levers comes from.
-    pub quality_factor_source: &'static str,
+    /// Source of the quality factors.
+    pub quality_factor_source: QualityFactorSource,
     /// The conditions, which must all hold.
     #[serde(rename = "where", skip_serializing_if = "Vec::is_empty")]
     pub conditions: Vec<String>,
-    /// The levers: those for which the conditions hold first, then by peak force.
+    /// The levers: those for which the conditions hold first, then those for which that is not known;
+    /// in each group by peak force.
     pub levers: Vec<LeverRow>,
 }
 
@@ -149,6 +212,7 @@ pub fn compare_levers(
     let cases = cases.map_err(|error| {
         Error::option("levers", error.to_string(), "name levers of the catalogue")
     })?;
+    let source = QualityFactorSource::of(case, options.quality_factor);
     let quiet = Control {
         progress: None,
         ..*control
@@ -158,13 +222,26 @@ pub fn compare_levers(
         .into_par_iter()
         .with_max_len(1)
         .map(|(lever, case)| {
-            let row = match case {
-                Ok(case) => row(lever, &case, &targets, &quiet),
-                Err(reason) => LeverRow {
-                    holds: (!targets.is_empty()).then_some(false),
-                    reason: Some(reason),
-                    ..LeverRow::unknown(lever)
-                },
+            let in_air = case.clone().and_then(|case| {
+                let in_air = case.in_fluid(AIR[0], AIR[1]);
+                in_air.map_err(|_| NO_DIMENSIONS.to_owned())
+            });
+            let known = in_air.as_ref().ok().and_then(Case::physical);
+            let quality_factor_in_air = known.map(|view| view.lever.quality_factor);
+            let row = LeverRow {
+                quality_factor_in_air,
+                ..match if source == QualityFactorSource::Air {
+                    in_air
+                } else {
+                    case
+                } {
+                    Ok(case) => row(lever, &case, &targets, &quiet),
+                    Err(reason) => LeverRow {
+                        holds: (!targets.is_empty()).then_some(false),
+                        reason: Some(reason),
+                        ..LeverRow::unknown(lever)
+                    },
+                }
             };
             if let Some(progress) = control.progress {
                 progress(done.fetch_add(1, Ordering::Relaxed) + 1, total);
@@ -179,18 +256,19 @@ pub fn compare_levers(
         let force = row.motion.as_ref();
         force.map_or(f64::INFINITY, |m| m.physical.observables.peak_force)
     };
+    let rank = |row: &LeverRow| match row.holds {
+        Some(true) => 0,
+        None => 1,
+        Some(false) => 2,
+    };
     levers.sort_by(|a, b| {
-        let order = b.holds.cmp(&a.holds);
+        let order = rank(a).cmp(&rank(b));
         order.then(force(a).total_cmp(&force(b)))
     });
     Ok(LeverReport {
         free_amplitude: view.free_amplitude,
         frequency_ratio,
-        quality_factor_source: if case.states_fluid() {
-            "the fluid of the case and the dimensions of each lever"
-        } else {
-            "the case, the same for every lever"
-        },
+        quality_factor_source: source,
         conditions: targets.iter().map(Target::to_string).collect(),
         levers,
     })
@@ -203,6 +281,7 @@ impl LeverRow {
             k: f64::NAN,
             f0: f64::NAN,
             quality_factor: f64::NAN,
+            quality_factor_in_air: None,
             tip_radius: None,
             time_constant: f64::NAN,
             motion: None,
@@ -210,6 +289,18 @@ impl LeverRow {
             holds: None,
         }
     }
+}
+
+/// Whether all conditions hold. The number of states is not known where the search for them ended
+/// early.
+fn holds(point: &TargetPoint, targets: &[Target], motion: Option<&LeverMotion>) -> Option<bool> {
+    let is_cut = motion.is_some_and(|motion| motion.budget.is_some());
+    let (counts, others): (Vec<Target>, Vec<Target>) =
+        targets.iter().cloned().partition(Target::counts_states);
+    if targets.is_empty() || (is_cut && !counts.is_empty() && point.meets(&others)) {
+        return None;
+    }
+    Some(point.meets(targets))
 }
 
 fn row(lever: String, case: &Case, targets: &[Target], control: &Control<'_>) -> LeverRow {
@@ -243,9 +334,6 @@ fn row(lever: String, case: &Case, targets: &[Target], control: &Control<'_>) ->
                     physical: chosen.physical.clone(),
                 }
             });
-            // The number of states is not known where the search for them ended early.
-            point.unknown =
-                solved.budget.is_some() && targets.iter().any(Target::counts_states);
             (motion, None)
         }
         Err(error) => (None, Some(error.message())),
@@ -254,9 +342,10 @@ fn row(lever: String, case: &Case, targets: &[Target], control: &Control<'_>) ->
         k,
         f0,
         quality_factor,
+        quality_factor_in_air: None,
         tip_radius: Some(case.get(Key::TipRadius)).filter(|radius| radius.is_finite()),
         time_constant: quality_factor / (PI * f0),
-        holds: (!targets.is_empty()).then(|| point.meets(targets)),
+        holds: holds(&point, targets, motion.as_ref()),
         motion,
         reason,
         lever,

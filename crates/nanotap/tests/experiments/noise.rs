@@ -151,9 +151,10 @@ fn a_stochastic_simulation_agrees_within_its_error_bars() {
     let kick = (2.0 * energy * equations.damping[0][(0, 0)] * h).sqrt() / equations.mass[(0, 0)];
     let mut random = Gaussian(7);
     let mut flow = Flow::new(model.system.clone());
-    let mut state = nanotap::study::orbit::orbit(&model, &Default::default())
-        .unwrap()
-        .state;
+    let mut state =
+        nanotap::study::orbit::orbit(&model, &nanotap::study::orbit::OrbitOptions::default())
+            .unwrap()
+            .state;
     let (mut re, mut im) = (0.0_f64, 0.0_f64);
     let fade = (-h / tau).exp();
     let mut read = Vec::with_capacity(PERIODS);
@@ -301,7 +302,7 @@ fn calibrations_give_the_spring_constant_back() {
         .map(|word| (*word).to_owned())
         .collect();
     let in_air = Case::parse(None, &all).unwrap();
-    let theory = in_air.physical().unwrap().lever.clone();
+    let theory = in_air.physical().unwrap().lever;
     words.retain(|word| !word.starts_with("cantilever.f0"));
     let (f0, quality) = (
         format!("cantilever.f0={} Hz", theory.f0),

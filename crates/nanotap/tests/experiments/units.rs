@@ -34,9 +34,9 @@ fn request(study: &str) -> Option<Value> {
         "fm" => json!({"points": 3, "from": "25 nm", "to": "19 nm"}),
         "convergence" => json!({"largest": 2}),
         // Their columns are those of the data, and their units are told with them.
-        "fit" | "reconstruct" => return None,
+        "fit" | "reconstruct"
         // In SI as a whole.
-        "bimodal" | "force-curve" => return None,
+        | "bimodal" | "force-curve" => return None,
         _ => json!({}),
     })
 }

@@ -292,6 +292,6 @@ impl Study for BimodalStudy {
                 "give drive.second_ratio, near 6.27 for the second mode, and drive.second_free_amplitude",
             ));
         }
-        follow::follow(case, lever, &view, options, control)
+        follow::follow(case, lever, view, options, control)
     }
 }

@@ -201,8 +201,8 @@ impl Study for NoiseStudy {
             free_amplitude_rms: scales.length * free.amplitude_rms,
             free_phase_rms: free.phase_rms.to_degrees(),
             force_gradient_min: free.phase_rms / turn,
-            calibrations: thermal.calibrations(&view),
-            spectrum: thermal.spectrum(&view),
+            calibrations: thermal.calibrations(view),
+            spectrum: thermal.spectrum(view),
         })
     }
 }

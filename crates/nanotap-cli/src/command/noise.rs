@@ -88,7 +88,7 @@ fn text(case: &GivenCase, report: &NoiseReport) -> String {
              deviations away{rare}.",
             length(saddle.amplitude),
             degrees(saddle.phase),
-            number::significant(saddle.deviations, 3)
+            number::significant(saddle.deviations, 2)
         )
     });
     let stiffness = |value| Kind::Stiffness.format_digits(value, 4);
@@ -105,11 +105,13 @@ fn text(case: &GivenCase, report: &NoiseReport) -> String {
         )
     });
     format!(
-        "{}\n\n{}\n{}{}{}",
+        "{}\n\n{}\n{}",
         style::bold(&heading),
         table.render(),
-        motion::paragraph(&filter),
-        motion::paragraph(&saddle),
-        motion::paragraph(&calibrations)
+        [filter, saddle, calibrations]
+            .iter()
+            .filter(|words| !words.is_empty())
+            .map(|words| motion::paragraph(words))
+            .collect::<String>()
     )
 }

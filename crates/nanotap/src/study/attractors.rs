@@ -585,11 +585,14 @@ pub(in crate::study) fn saddles(
         ..OrbitSearch::default()
     };
     let mut found = find_orbits(&ModelMap::new(model), &searched, &search, control);
-    found.retain(|orbit| {
-        let unstable_dimension = 1;
-        orbit.stability == Stability::Unstable { unstable_dimension }
-    });
+    found.retain(is_saddle);
     Ok(found)
+}
+
+/// True of an orbit with one unstable multiplier.
+pub(in crate::study) fn is_saddle(orbit: &PeriodicOrbit) -> bool {
+    let unstable_dimension = 1;
+    orbit.stability == Stability::Unstable { unstable_dimension }
 }
 
 fn unstable_orbits(

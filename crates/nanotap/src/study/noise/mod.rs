@@ -64,7 +64,7 @@ pub struct NoiseReport {
     pub free_phase_rms: f64,
     /// Force gradient in N/m that turns the phase of the free lever by its noise.
     pub force_gradient_min: f64,
-    /// The unstable orbit on the boundary of the basin, if one of period 1 was found.
+    /// The unstable orbit on the boundary of the basin, if one was found.
     pub saddle: Option<SaddleDistance>,
     /// Spectrum of the noise that the lock-in amplifier reads.
     pub reading_spectrum: ReadingSpectrum,
@@ -86,6 +86,9 @@ options! {
         /// Noise bandwidth of the lock-in amplifier, 1 over four time constants, in place of it
         #[schemars(extend("x-value" = "FREQUENCY"))]
         pub bandwidth: Option<Amount> = None,
+        /// State near the orbit, at drive phase 0: a1,…,aN,v1,…,vN
+        #[schemars(extend("x-value" = "A1,…"))]
+        pub state: Option<Vec<f64>> = None,
     }
 }
 
@@ -191,8 +194,8 @@ impl Study for NoiseStudy {
         let lock_in = LockIn {
             time_constant: time_constant / scales.time,
         };
-        let tapping = thermal.reading(case, lock_in, control)?;
-        let free = thermal.reading(&free(lever), lock_in, control)?;
+        let tapping = thermal.reading(case, options.state.as_deref(), lock_in, control)?;
+        let free = thermal.reading(&free(lever), None, lock_in, control)?;
         // A spring κ at the tip changes the free response by 1/(1 + κ χ).
         let turn = thermal.compliance(lever.omega).im.abs() * scales.length / scales.force;
         Ok(NoiseReport {
@@ -209,8 +212,8 @@ impl Study for NoiseStudy {
             free_phase_rms: free.phase_rms.to_degrees(),
             force_gradient_min: free.phase_rms / turn,
             saddle: saddle::nearest(
-                &case.model()?,
-                &tapping.state,
+                case,
+                (&tapping.state, tapping.period),
                 &tapping.covariance,
                 scales.length,
                 control,
@@ -291,10 +294,12 @@ impl Thermal {
     fn reading(
         &self,
         case: &Case,
+        state: Option<&[f64]>,
         lock_in: LockIn,
         control: &Control<'_>,
     ) -> Result<Reading, Error> {
         let options = OrbitOptions {
+            state: state.map(<[f64]>::to_vec),
             harmonics: 0,
             observables: Some(ObservableSet::FIRST_HARMONIC),
             ..OrbitOptions::default()

@@ -310,9 +310,7 @@ def test_physical_quantities_vary(physical):
         where="regime = repulsive",
         periods=2,
     )
-    np.testing.assert_allclose(
-        swept.first_harmonic[:, 0], [16e-9, 18e-9], rtol=1e-6
-    )
+    np.testing.assert_allclose(swept.first_harmonic[:, 0], [16e-9, 18e-9], rtol=1e-6)
     assert float(swept.distance[0, 0]) < float(swept.distance[1, 0])
     assert swept.holds.values.tolist() == [True, True]
     with pytest.raises(ValueError, match="did you mean `F_max`"):

@@ -264,9 +264,10 @@ fn text(case: &GivenCase, report: &BranchReport) -> String {
             ("", Align::Left),
         ]);
         for b in &report.bifurcations {
-            let extra = b
-                .angle
-                .map_or_else(String::new, |a| format!("pair at {a:.2}°"));
+            let pair = b.angle.map(|angle| format!("pair at {angle:.2}°"));
+            let extra: Vec<String> = (b.criticality.map(str::to_owned).into_iter())
+                .chain(pair)
+                .collect();
             table.row([
                 (b.branch + 1).to_string(),
                 b.kind.to_owned(),
@@ -278,7 +279,7 @@ fn text(case: &GivenCase, report: &BranchReport) -> String {
                     length(b.observables.tip_max)
                 ),
                 number::significant(100.0 * b.observables.contact_fraction, 4),
-                extra,
+                extra.join(", "),
             ]);
         }
         text.push_str(&table.render());

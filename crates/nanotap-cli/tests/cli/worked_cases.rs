@@ -174,7 +174,7 @@ fn every_document_has_a_test() {
     );
 }
 
-/// The gallery shows commands of other pages, which are run there, and some of its own.
+/// The gallery shows commands of other pages, which are run there, and further ones.
 #[test]
 fn the_gallery() {
     let pages = documents();

@@ -19,6 +19,7 @@ __all__ = [
     "approach",
     "attractors",
     "basin",
+    "bimodal",
     "branch",
     "contact_laws",
     "convergence",
@@ -729,6 +730,7 @@ def sweep(
     strobe: int | None = None,
     transient: int | None = None,
     max_period: int = 64,
+    where: Sequence[str] | None = None,
     out: Path | None = None,
     chunk: str = "1/1",
     threads: int | None = None,
@@ -746,7 +748,8 @@ def sweep(
         last, count), {"alpha4": nanotap.range(1, 1000, 50, log=True)} in equal
         ratios, or ascending values {"omega": [2, 2.5, 4]}; modes too; for a
         physical case also {"drive.frequency": nanotap.range("60 kHz", "80 kHz",
-        200)}; once or twice.
+        200)}, or {"drive.setpoint": nanotap.range(0.5, 0.9, 9)}, for each of which
+        the distance is solved; once or twice.
     starts : int | None
         Quasi-random initial states at each value, spread over a box; default: rest
         alone (1 to 1000000).
@@ -772,6 +775,9 @@ def sweep(
         settled (0 to 100000000).
     max_period : int
         Longest period of orbits, in drive periods (1 to 10000).
+    where : Sequence[str] | None
+        Condition that every motion at a value must meet, as in "F_max < 1 nN",
+        "regime = attractive", "states = 1"; several: all must hold.
     out : Path | None
         The dataset, a folder with the extension .zarr; an existing one is resumed.
         Without it, everything is in memory.
@@ -815,6 +821,7 @@ def window(
     starts: int = 16,
     seed: int = 1,
     max_period: int = 32,
+    where: Sequence[str] | None = None,
     out: Path | None = None,
     threads: int | None = None,
     client: "Client | None" = None,
@@ -831,7 +838,8 @@ def window(
         Parameter and its values, as in {"gap.tip": nanotap.range("5 nm", "25 nm",
         41)}, {"drive.free_amplitude": nanotap.range("10 nm", "60 nm", 26)},
         {"omega": nanotap.range(2, 4, 81)}, or ascending values {"omega": [2, 2.5,
-        4]}; twice, first the horizontal axis.
+        4]}; twice, first the horizontal axis. For {"drive.setpoint":
+        nanotap.range(0.5, 0.9, 9)} the distance is solved at each point.
     starts : int
         Initial states at each point: rest, the linear responses, and samples at all
         amplitudes (1 to 1000000).
@@ -839,6 +847,9 @@ def window(
         Seed of the initial states.
     max_period : int
         Longest period of orbits, in drive periods (1 to 10000).
+    where : Sequence[str] | None
+        Condition that every motion found at a point must meet, as in "F_max < 1
+        nN", "regime = attractive", "states = 1"; several: all must hold.
     out : Path | None
         The dataset, a folder with the extension .zarr; an existing one is resumed.
         Without it, everything is in memory.
@@ -853,8 +864,9 @@ def window(
     Returns
     -------
     The sweep with `condition` over both parameters: no-contact, one-period-1,
-    second-state, subharmonic, irregular or undecided; `share` is the fraction of
-    each.
+    second-state, subharmonic, irregular, undecided, or setpoint-unreached; `share`
+    is the fraction of each. With `where`, `holds` says where the conditions hold;
+    its attributes have their share and the largest rectangle (`region`, JSON).
 
     Raises
     ------
@@ -1133,6 +1145,59 @@ def noise(
     """
     options = _arguments.options("noise", locals())
     return _studies.document("noise", case, options, threads, progress)
+
+def bimodal(
+    case: Case,
+    *,
+    first: Literal["am", "fm", "pll", "agc"] | None = None,
+    second: Literal["am", "fm", "pll", "agc"] | None = None,
+    phase: float = 90.0,
+    second_phase: float = 90.0,
+    from_: float | str | None = None,
+    to: float | str | None = None,
+    points: int = 30,
+    threads: int | None = None,
+    progress: Progress = None,
+) -> Record:
+    """Follow AM–FM, FM–FM and other bimodal operation against the distance.
+
+    Parameters
+    ----------
+    case : Case
+        The case.
+    first : Literal["am", "fm", "pll", "agc"] | None
+        Loop of the first tone; default: am.
+    second : Literal["am", "fm", "pll", "agc"] | None
+        Loop of the second tone; default: fm.
+    phase : float
+        Phase lag of the first tone to hold, in degrees.
+    second_phase : float
+        Phase lag of the second tone to hold, in degrees.
+    from_ : float | str | None
+        First distance, as in "30 nm"; default: where the lever is free.
+    to : float | str | None
+        Last distance; default: that of the case, or where its setpoint is reached.
+    points : int
+        Number of distances (2 to 20000).
+    threads : int | None
+        Number of threads; default: one per core.
+    progress : Progress
+        Whether to show a bar, or a function that is called with the finished and
+        the total count.
+
+    Returns
+    -------
+    The document, with the names of the terminal's JSON.
+
+    Raises
+    ------
+    ValueError
+        An argument is invalid; the message names it.
+    RuntimeError
+        The computation failed.
+    """
+    options = _arguments.options("bimodal", locals())
+    return _studies.document("bimodal", case, options, threads, progress)
 
 def scan(
     case: Case,

@@ -245,7 +245,7 @@ def _approach_dataset(case: Case, report: dict[str, Any]) -> "xr.Dataset":
     if unit:
         ds.attrs["parameter_unit"] = json.dumps(unit)
         ds.zc.attrs.update(long_name="distance to the sample", units="m")
-    # A dimensionless number, beside the distance in m.
+    # A dimensionless number; the distance in m is another entry.
     ds[name].attrs.update(long_name="distance to the sample over g0", units="1")
     if "branch_parameter" in ds:
         ds["branch_parameter"].attrs["units"] = "g0"
@@ -324,7 +324,7 @@ def _scan_dataset(case: Case, report: dict[str, Any]) -> "xr.Dataset":
     for name, value in report.items():
         if name not in {"trace", "retrace", "periods"} and value is not None:
             plain = isinstance(value, str | float) and not isinstance(value, bool)
-            # The scipy engine keeps an attribute `mode` of its own.
+            # The scipy engine has another attribute `mode`.
             key = "scan_mode" if name == "mode" else name
             ds.attrs[key] = value if plain else json.dumps(value)
     return ds

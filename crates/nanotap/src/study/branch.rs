@@ -3,9 +3,10 @@
 
 use nanotap_dynamics::{
     AttractorContinuationOptions, AttractorKind, Bifurcation, BifurcationKind, Branch, BranchEnd,
-    BranchPoint, CensusOptions, ClassifyOptions, ContinuationOptions, Control, CurveOptions,
-    Diagram, DiagramBranch, DiagramOptions, Direction, LyapunovOptions, PeriodicOrbit,
-    ShootingOptions, StartSet, assemble_diagram, continue_attractors, continue_orbit, trace_curve,
+    BranchPoint, CensusOptions, ClassifyOptions, ContinuationOptions, Control, Criticality,
+    CurveOptions, Diagram, DiagramBranch, DiagramOptions, Direction, LyapunovOptions,
+    PeriodicOrbit, ShootingOptions, StartSet, assemble_diagram, continue_attractors,
+    continue_orbit, trace_curve,
 };
 use rayon::prelude::*;
 use schemars::JsonSchema;
@@ -205,6 +206,11 @@ pub struct BifurcationReport {
     pub state: Vec<f64>,
     /// Floquet multipliers.
     pub multipliers: Vec<[f64; 2]>,
+    /// supercritical where the new motion of a flip or Neimark–Sacker point appears on the unstable
+    /// side of the orbit, subcritical where it is unstable; absent for other kinds, and where it is
+    /// not known.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub criticality: Option<&'static str>,
     /// Angle of the multiplier pair at a Neimark–Sacker point, degrees.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub angle: Option<f64>,
@@ -764,6 +770,7 @@ impl Measured<'_> {
         };
         Ok(BifurcationReport {
             kind: kind_name(b.kind),
+            criticality: b.criticality.map(Criticality::name),
             branch,
             period: b.orbit.period,
             parameter: b.parameter,

@@ -997,7 +997,7 @@ def test_the_keyboard_reaches_everything(page: Any, address: str) -> None:
         "steps",
         "which",
         "tab-approach",
-        "undo",
+        "reset",
         "study-figure",
         "follow",
     ):
@@ -1059,8 +1059,9 @@ def test_what_says_the_same_is_one_control(page: Any, address: str) -> None:
     until(page, lambda: "set.drive.frequency_ratio=1" in page.url)
     assert value(page, "first_harmonic") == pytest.approx(amplitude, rel=1e-9)
     page.select_option("[data-switch='drive.frequency_ratio']", "drive.frequency")
-    until(page, lambda: "set.drive.frequency=" in page.url)
-    assert "frequency_ratio" not in page.url
+    # Its own frequency again is no change.
+    until(page, lambda: "frequency" not in page.url)
+    assert page.input_value("[data-key='drive.frequency']") == "100 kHz"
     # From the distance to the setpoint that it has, and by its slider to another one.
     ratio = float(read(page, "ratio"))
     page.select_option("[data-switch='gap.tip']", "drive.setpoint")
@@ -1184,6 +1185,26 @@ def test_a_click_on_a_levers_basin_starts_where_it_says(
     assert a1 == pytest.approx(at / 10018, abs=0.01 * (x["to"] - x["from"]) / 10018)
 
 
+def test_a_plan_outlines_where_its_conditions_hold(page: Any, address: str) -> None:
+    ranges = "&study.from1=28+nm&study.to1=32+nm&study.from2=0.6&study.to2=0.7"
+    opened(page, address, f"preset=dmt&tab=plan&study.force=4+nN{ranges}")
+    page.click("#study-form button[type=submit]")
+    page.wait_for_selector("#study-figure svg", timeout=60_000)
+    words = page.inner_text("#progress")
+    page.click("#study-form button:has-text('Stop')")
+    # A large amplitude leaves one motion, in repulsion, at a peak force between 3 and 4 nN.
+    assert "all conditions hold at 100 %" in words
+    command = page.text_content("#study-command")
+    assert "--where 'F_max < 4 nN' --where 'states = 1'" in command
+    page.mouse.click(*spot(page, "study-figure", 0, 0.5, 0.5))
+    until(page, lambda: "set.drive.setpoint=" in page.url)
+    assert float(read(page, "ratio")) == pytest.approx(0.65, abs=0.005)
+    assert read(page, "regime") == "repulsive"
+    assert read(page, "peak_force").endswith("nN")
+    assert float(read(page, "peak_force").split()[0]) < 4
+    assert page.is_hidden("#stale")
+
+
 def test_the_approach_curve_is_drawn_at_once_with_the_motion_on_it(
     page: Any, address: str
 ) -> None:
@@ -1209,16 +1230,15 @@ def test_the_approach_curve_is_drawn_at_once_with_the_motion_on_it(
 
 
 def test_an_ended_server_says_so(page: Any) -> None:
+    other = page.context.browser.new_page()
+    other.set_default_timeout(30_000)
     with started() as server:
-        other = page.context.new_page()
         other.goto(line(server))
         other.wait_for_selector("td[data-observable=amplitude]")
-        server.terminate()
-        server.wait(10)
-        other.select_option("#preset", "paper")
-        other.wait_for_selector("#message:not([hidden])")
-        assert "start it again" in other.inner_text("#message")
-        other.close()
+    other.select_option("#preset", "paper")
+    other.wait_for_selector("#message:not([hidden])")
+    assert "start it again" in other.inner_text("#message")
+    other.close()
 
 
 def test_nothing_leaves_the_machine_and_nothing_complains(

@@ -1,7 +1,7 @@
 // The page: controls on the left, the lever and the main figure in the middle, what one wants to know on
 // the right, everything else below.
 
-import { state, caseText, decode, remember, theCase } from "./state.js";
+import { state, caseText, decode, remember, takeBase, theCase } from "./state.js";
 import { ask, bytes, save, stop, superseded } from "./api.js";
 import * as knobs from "./knobs.js";
 import * as lever from "./lever.js";
@@ -88,6 +88,7 @@ function show(motion, wish) {
     remember(false);
   }
   stale(false);
+  takeBase(wish.case, motion.keys);
   knobs.follows(motion.readout);
   knobs.show(motion.keys, moving);
   $("summary").textContent = `${motion.title}: ${motion.summary}`;

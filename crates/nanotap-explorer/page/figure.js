@@ -102,10 +102,8 @@ function join(svg, letters) {
 export function under(element, clientX, clientY) {
   const svg = element.querySelector("svg");
   if (!svg || !element.panels) return null;
-  const box = svg.getBoundingClientRect();
-  const view = svg.viewBox.baseVal;
-  const px = view.x + (clientX - box.left) / box.width * view.width;
-  const py = view.y + (clientY - box.top) / box.height * view.height;
+  // The figure may be narrower than its box.
+  const { x: px, y: py } = new DOMPoint(clientX, clientY).matrixTransform(svg.getScreenCTM().inverse());
   for (const panel of element.panels) {
     const u = (px - panel.left) / panel.width;
     const v = 1 - (py - panel.top) / panel.height;

@@ -20,6 +20,7 @@ let moving = false;           // a slider is being moved
 let epoch = 0;                // counts links, clicks and cases: answers for earlier ones are dropped
 let displayed = null;         // the displayed motion: its case and its start
 let found = null;             // the case of the listed motions
+let searching = null;         // the case of the motions that are being searched
 let steps = 0;                // entries of the history that can be undone
 const redrawn = [];            // called when figures were redrawn
 
@@ -155,9 +156,11 @@ async function census() {
   list.replaceChildren();
   found = null;
   $("bound").textContent = "searching …";
+  searching = own;
   try {
     const answer = await ask("census", "/api/attractors", { case: theCase(), unstable: $("unstable").checked });
-    if (searched() !== own) { $("bound").textContent = "the values changed: find all again"; return; }
+    if (searched() !== own) return;
+    searching = null;
     found = { of: own, bound: answer.bound };
     list.replaceChildren(...answer.motions.map((one) => {
       const item = document.createElement("li");
@@ -176,12 +179,19 @@ async function census() {
     }));
     markCensus();
   } catch (error) {
-    if (!superseded(error)) $("bound").textContent = error.message;
+    if (superseded(error)) return;
+    searching = null;
+    $("bound").textContent = error.message;
   }
 }
 
-/** The listed motions belong to one case only. */
+/** The listed motions belong to one case only; a search for those of another one ends. */
 function markCensus() {
+  if (searching !== null && searching !== searched()) {
+    searching = null;
+    stop("census");
+    $("bound").textContent = "the values changed: find all again";
+  }
   if (!found) return;
   const other = searched() !== found.of;
   $("attractors").classList.toggle("stale", other);

@@ -306,11 +306,11 @@ def test_physical_quantities_vary(physical):
     # The distance of a setpoint is solved, and the motion there has its amplitude.
     swept = nanotap.sweep(
         physical,
-        over={"drive.setpoint": [0.8, 0.9]},
+        over={"drive.setpoint": [0.85, 0.9]},
         where="regime = repulsive",
         periods=2,
     )
-    np.testing.assert_allclose(swept.first_harmonic[:, 0], [16e-9, 18e-9], rtol=1e-6)
+    np.testing.assert_allclose(swept.first_harmonic[:, 0], [17e-9, 18e-9], rtol=1e-6)
     assert float(swept.distance[0, 0]) < float(swept.distance[1, 0])
     assert swept.holds.values.tolist() == [True, True]
     with pytest.raises(ValueError, match="did you mean `F_max`"):

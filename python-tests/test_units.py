@@ -39,8 +39,9 @@ ARGUMENTS = {
         "starts": 2,
     },
 }
-# They need measured data, a table [scan], or no case.
+# They need measured data, a table [scan], a second tone, or no case.
 ELSEWHERE = {
+    "bimodal",
     "fit",
     "reconstruct",
     "scan",

@@ -20,6 +20,7 @@ use nalgebra::{Complex, DMatrix, DVector};
 use super::bifurcation::BifurcationKind;
 use super::solver::{BranchSolver, Node};
 use crate::map::MapFamily;
+use crate::orbit::multipliers::eigenvector;
 
 /// Whether the motion that appears at a bifurcation coexists with the stable or the unstable orbit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -99,9 +100,8 @@ struct NormalForm {
 
 impl NormalForm {
     fn new(middle: &DMatrix<f64>, multiplier: Complex<f64>) -> Option<Self> {
-        let complex = middle.map(|value| Complex::new(value, 0.0));
-        let right = null_vector(&shifted(&complex, multiplier))?;
-        let left = null_vector(&shifted(&complex.adjoint(), multiplier.conj()))?;
+        let right = eigenvector(middle, multiplier)?;
+        let left = eigenvector(&middle.transpose(), multiplier.conj())?;
         let product = left.dotc(&right);
         // ⟨p, q⟩ = 1; a defective multiplier has ⟨p, q⟩ = 0.
         if product.norm_sqr() < 1e-16 {
@@ -153,8 +153,11 @@ impl NormalForm {
         let bent = quadratic(-1.0, &q);
         let doubled = quadratic(1.0, &q);
         let by = |shift: Complex<f64>, vector: DVector<Complex<f64>>| {
-            let middle = self.middle.map(|value| Complex::new(value, 0.0));
-            (-shifted(&middle, shift)).lu().solve(&vector)
+            let middle = self.middle.map(|value| Complex::new(-value, 0.0));
+            let n = middle.nrows();
+            (middle + DMatrix::from_diagonal_element(n, n, shift))
+                .lu()
+                .solve(&vector)
         };
         let sum = cubic
             + quadratic(1.0, &by(Complex::new(1.0, 0.0), bent)?) * Complex::new(2.0, 0.0)
@@ -162,16 +165,4 @@ impl NormalForm {
         let value = (self.multiplier.conj() * self.left.dotc(&sum)).re;
         value.is_finite().then_some(value)
     }
-}
-
-/// `matrix` − `shift`.
-fn shifted(matrix: &DMatrix<Complex<f64>>, shift: Complex<f64>) -> DMatrix<Complex<f64>> {
-    matrix - DMatrix::from_diagonal_element(matrix.nrows(), matrix.ncols(), shift)
-}
-
-/// The unit vector that a nearly singular matrix maps to the smallest one.
-fn null_vector(matrix: &DMatrix<Complex<f64>>) -> Option<DVector<Complex<f64>>> {
-    let decomposed = matrix.clone().try_svd(false, true, f64::EPSILON, 10_000)?;
-    let (smallest, _) = decomposed.singular_values.argmin();
-    Some(decomposed.v_t?.row(smallest).adjoint())
 }

@@ -77,6 +77,11 @@ const OTHER_ENTRIES: &[(&str, &str, &str)] = &[
         "1",
     ),
     ("spectral_radius", "largest modulus of a multiplier", "1"),
+    (
+        "decay_periods",
+        "time in which a small disturbance falls to 1/e",
+        PERIODS,
+    ),
     ("multiplier", "largest modulus of a multiplier", "1"),
     (
         "multipliers",

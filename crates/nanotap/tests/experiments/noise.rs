@@ -200,7 +200,7 @@ fn the_saddle_comes_nearer_as_towards_a_fold() {
             &gap,
         ])
     };
-    let fold = 14.073_965_664_877_789;
+    let fold = 14.073_965_664_877_79;
     let of = |gap: f64, temperature: f64| {
         let case = words(gap);
         let census = AttractorsOptions::default();

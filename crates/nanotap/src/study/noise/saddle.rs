@@ -12,6 +12,7 @@
 
 use nalgebra::{DMatrix, DVector};
 use nanotap_arithmetic::ComplexFunctions as _;
+use nanotap_dynamics::orbit::multipliers::eigenvector;
 use nanotap_dynamics::{
     ContinuationOptions, Direction, PeriodicOrbit, ShootingOptions, StroboscopicMap, close_orbit,
     continue_orbit,
@@ -138,8 +139,10 @@ fn normal(model: &Model, saddle: &PeriodicOrbit, n: usize) -> Option<DVector<f64
         map.advance_with_jacobian(&mut state, &mut jacobian).ok()?;
         product = jacobian.view((0, 0), (n, n)) * product;
     }
-    let matrix = product.transpose() - DMatrix::from_diagonal_element(n, n, multiplier.re);
-    let decomposed = matrix.try_svd(false, true, f64::EPSILON, 10_000)?;
-    let (smallest, _) = decomposed.singular_values.argmin();
-    Some(decomposed.v_t?.row(smallest).transpose())
+    let vector = eigenvector(&product.transpose(), *multiplier)?;
+    // Up to a complex factor it is real.
+    let largest = *vector
+        .iter()
+        .max_by(|a, b| a.norm_sqr().total_cmp(&b.norm_sqr()))?;
+    Some(vector.map(|entry| (entry / largest).re))
 }

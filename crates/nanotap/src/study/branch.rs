@@ -3,8 +3,8 @@
 
 use nanotap_dynamics::{
     AttractorContinuationOptions, AttractorKind, Bifurcation, BifurcationKind, Branch, BranchEnd,
-    BranchPoint, CensusOptions, ClassifyOptions, ContinuationOptions, Control, Criticality,
-    CurveOptions, Diagram, DiagramBranch, DiagramOptions, Direction, LyapunovOptions,
+    BranchPoint, CensusOptions, ClassifyOptions, ContinuationOptions, ContinuedAttractor, Control,
+    Criticality, CurveOptions, Diagram, DiagramBranch, DiagramOptions, Direction, LyapunovOptions,
     PeriodicOrbit, ShootingOptions, StartSet, assemble_diagram, continue_attractors,
     continue_orbit, trace_curve,
 };
@@ -21,6 +21,7 @@ use crate::study::Study;
 use crate::study::limits::{MAX_DOUBLINGS, MAX_PERIOD, MAX_SEED_STARTS};
 use crate::study::orbit::{OrbitOptions, orbit, pairs};
 use crate::study::request::options;
+use crate::study::simulate::Classification;
 use crate::study::start_box::default_starts;
 use crate::study::value::{Amount, Interval, values};
 use crate::{Error, ErrorKind};
@@ -107,6 +108,9 @@ pub struct BranchReport {
     pub points_left_out: usize,
     /// Bifurcations of the branches.
     pub bifurcations: Vec<BifurcationReport>,
+    /// With `diagram`: the attractors of the census at each value, in the order of the values.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub attractors: Vec<AttractorShare>,
     /// Bifurcation curves in two parameters, if requested.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub loci: Option<Loci>,
@@ -223,6 +227,28 @@ pub struct BifurcationReport {
     /// The same in SI, where the parameter is a quantity of a physical case.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub physical: Option<PhysicalMotion>,
+}
+
+/// An attractor at one value of the parameter.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct AttractorShare {
+    /// Number of the attractor. One that Newton's method continues from value to value keeps its
+    /// number; a chaotic one and a torus have another at every value.
+    pub attractor: usize,
+    /// Value of the parameter.
+    pub parameter: f64,
+    /// Class of the motion.
+    pub classification: &'static str,
+    /// Period of its orbit, 0 of another motion.
+    pub period: usize,
+    /// Share of the initial states that reach it.
+    pub share: f64,
+    /// Lower end of the 95 % interval of the share.
+    pub share_low: f64,
+    /// Upper end of the 95 % interval of the share.
+    pub share_high: f64,
+    /// Whether no initial state reached it, but a neighbouring value leads to it.
+    pub from_neighbour: bool,
 }
 
 /// Bifurcation curves in two parameters.
@@ -407,10 +433,11 @@ pub fn branch(
         ));
     }
     let family = case.family(range.key);
-    let seeds = if options.diagram {
+    let (seeds, attractors) = if options.diagram {
         census_seeds(case, range, options, control)?
     } else {
-        vec![(range.from, first_orbit(case, range, options)?)]
+        let first = first_orbit(case, range, options)?;
+        (vec![(range.from, first)], Vec::new())
     };
     let diagram = if options.doublings() == 0 && !options.diagram {
         let direction = if range.to > range.from {
@@ -449,6 +476,7 @@ pub fn branch(
             control,
         ));
     }
+    report.attractors = attractors;
     report.cancelled = control.is_cancelled();
     report.parameter_unit = case.parameter_unit(range.key);
     Ok(report)
@@ -494,7 +522,7 @@ fn census_seeds(
     range: Range,
     options: &BranchOptions,
     control: &Control<'_>,
-) -> Result<Vec<(f64, PeriodicOrbit)>, Error> {
+) -> Result<(Vec<(f64, PeriodicOrbit)>, Vec<AttractorShare>), Error> {
     let steps = options.values.max(2) - 1;
     let values: Vec<f64> = (0..=steps)
         .map(|k| k as f64 / steps as f64)
@@ -526,8 +554,10 @@ fn census_seeds(
     let family = case.family(range.key);
     let known = continue_attractors(&family, &values, starts, &how, control);
     let mut found = Vec::new();
+    let mut shares = Vec::new();
     for (value, at) in values.iter().zip(known) {
         for each in at.attractors {
+            shares.push(share(*value, &each));
             if let AttractorKind::Periodic(orbit) = each.attractor.kind {
                 found.push((*value, orbit));
             }
@@ -541,7 +571,26 @@ fn census_seeds(
         ))
         .remedy(ELSEWHERE));
     }
-    Ok(found)
+    Ok((found, shares))
+}
+
+fn share(parameter: f64, found: &ContinuedAttractor) -> AttractorShare {
+    let of = &found.attractor;
+    let (classification, period) = match &of.kind {
+        AttractorKind::Periodic(orbit) => (Classification::Periodic, orbit.period),
+        AttractorKind::QuasiPeriodic(_) => (Classification::QuasiPeriodic, 0),
+        AttractorKind::Chaotic { .. } => (Classification::Chaotic, 0),
+    };
+    AttractorShare {
+        attractor: found.branch,
+        parameter,
+        classification: classification.name(),
+        period,
+        share: of.fraction.estimate,
+        share_low: of.fraction.low,
+        share_high: of.fraction.high,
+        from_neighbour: found.found_from.is_some(),
+    }
 }
 
 fn described(
@@ -566,6 +615,7 @@ fn described(
         points: Vec::new(),
         points_left_out: 0,
         bifurcations: Vec::new(),
+        attractors: Vec::new(),
         loci: None,
         failures: diagram
             .failures

@@ -92,4 +92,29 @@ fn a_diagram_contains_a_period_3_with_a_small_basin() {
     let high = stable.iter().copied().fold(0.0, f64::max);
     assert!((3.105..3.115).contains(&low), "{low}");
     assert!((3.175..3.185).contains(&high), "{high}");
+    // Joined from value to value it has one number there, and the shares at a value are parts of one.
+    let third: Vec<_> = report.attractors.iter().filter(|a| a.period == 3).collect();
+    assert!(third.len() > 1);
+    for one in third {
+        assert_eq!(one.attractor, third_number(&report));
+        assert!((low..=high).contains(&one.parameter), "{one:?}");
+    }
+    for at in report
+        .attractors
+        .chunk_by(|a, b| a.parameter == b.parameter)
+    {
+        let sum: f64 = at.iter().map(|one| one.share).sum();
+        assert!(sum > 0.5 && sum <= 1.0 + 1e-12, "{at:?}");
+        for one in at {
+            assert!(
+                one.share_low <= one.share && one.share <= one.share_high,
+                "{one:?}"
+            );
+        }
+    }
+}
+
+fn third_number(report: &BranchReport) -> usize {
+    let mut orbits = report.attractors.iter().filter(|a| a.period == 3);
+    orbits.next().unwrap().attractor
 }

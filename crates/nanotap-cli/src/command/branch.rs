@@ -286,6 +286,27 @@ fn text(case: &GivenCase, report: &BranchReport) -> String {
         }
         text.push_str(&table.render());
     }
+    if !report.events.is_empty() {
+        let _ = writeln!(text, "\n  {}", style::bold("events"));
+        let mut table = Table::new([
+            ("branch", Align::Right),
+            ("", Align::Left),
+            (report.parameter, Align::Left),
+            ("period", Align::Right),
+            ("", Align::Left),
+        ]);
+        for found in &report.events {
+            let point = &found.point;
+            table.row([
+                (point.branch + 1).to_string(),
+                found.event.clone(),
+                shown(point.parameter, 10),
+                point.period.to_string(),
+                if point.stable { "stable" } else { "unstable" }.to_owned(),
+            ]);
+        }
+        text.push_str(&table.render());
+    }
     if !report.attractors.is_empty() {
         let _ = writeln!(text, "\n  {}", style::bold("attractors of the census"));
         text.push_str(&attractors(report, |value| shown(value, 6)));
@@ -295,7 +316,7 @@ fn text(case: &GivenCase, report: &BranchReport) -> String {
             text,
             "\n  {}",
             style::bold(&format!(
-                "bifurcation curves in {} and {}",
+                "curves in {} and {}",
                 report.parameter, loci.second
             ))
         );
@@ -314,7 +335,7 @@ fn text(case: &GivenCase, report: &BranchReport) -> String {
         };
         for curve in &loci.curves {
             table.row([
-                curve.kind.to_owned(),
+                curve.event.clone().unwrap_or_else(|| curve.kind.to_owned()),
                 curve.period.to_string(),
                 curve.first.len().to_string(),
                 range(report.key, &curve.first),

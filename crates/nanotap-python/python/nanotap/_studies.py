@@ -86,10 +86,12 @@ def _branch_dataset(case: Case, report: dict[str, Any]) -> "xr.Dataset":
     attractors = [
         {"number": row.pop("attractor"), **row} for row in report.get("attractors", [])
     ]
+    events = [{"name": row.pop("event"), **row} for row in report.get("events", [])]
     variables = {
         **_columns(points, "point", "", len(entries)),
         **_columns(bifurcations, "bifurcation", "bifurcation_", len(entries)),
         **_columns(attractors, "attractor", "attractor_", len(entries)),
+        **_columns(events, "event", "event_", len(entries)),
     }
     if not bifurcations:
         # Without bifurcations the columns are there, and empty.
@@ -100,7 +102,11 @@ def _branch_dataset(case: Case, report: dict[str, Any]) -> "xr.Dataset":
         variables |= {key: (dims, values[:0]) for key, (dims, values) in one.items()}
     dims, values = variables.pop("parameter", ("point", np.empty(0)))
     # A number of the equations has no unit here; `parameter_unit` tells its SI value.
-    for redundant in ("parameter_si", "bifurcation_parameter_si"):
+    for redundant in (
+        "parameter_si",
+        "bifurcation_parameter_si",
+        "event_parameter_si",
+    ):
         variables.pop(redundant, None)
     coords: dict[str, Any] = {name: (dims, values), "state": words(entries)}
     coords["part"] = words(("re", "im"))
@@ -115,6 +121,10 @@ def _branch_dataset(case: Case, report: dict[str, Any]) -> "xr.Dataset":
             locus_kind=(
                 "locus_point",
                 np.repeat([str(c["kind"]) for c in curves], lengths),
+            ),
+            locus_event=(
+                "locus_point",
+                np.repeat([str(c.get("event", "")) for c in curves], lengths),
             ),
             locus_period=(
                 "locus_point",
@@ -140,6 +150,7 @@ def _branch_dataset(case: Case, report: dict[str, Any]) -> "xr.Dataset":
             "bifurcation_parameter",
             "bifurcation_uncertainty",
             *(["attractor_parameter"] if attractors else []),
+            *(["event_parameter"] if events else []),
         ):
             ds[of_parameter].attrs["units"] = unit["unit"] if "." in name else "1"
     if report.get("held"):

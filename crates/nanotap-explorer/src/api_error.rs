@@ -85,7 +85,7 @@ impl From<CaseError> for ApiError {
     fn from(error: CaseError) -> Self {
         match error {
             CaseError::Stated(error) => (*error).into(),
-            error => Self::of(error),
+            error @ CaseError::Model(_) => Self::of(error),
         }
     }
 }

@@ -220,7 +220,9 @@ fn followed(from: &Case, case: &Case, start: Start) -> Result<Start, ApiError> {
     }
     // States are in units of a length that may follow from the distance.
     if let (Some(had), Some(has)) = (had.si(Kind::Length), has.si(Kind::Length)) {
-        state.iter_mut().for_each(|number| *number *= had / has);
+        for number in &mut state {
+            *number *= had / has;
+        }
     }
     Ok(Start {
         period: None,

@@ -2,7 +2,7 @@
 
 use super::key::{Key, Takes};
 use super::physical::force::{keys_of_contacts, linear_takes, takes};
-use super::stated::Value;
+use super::stated::{Stated, Value};
 use super::{Case, CaseKind};
 use crate::Error;
 use crate::model::contact::ContactLaw;
@@ -19,6 +19,12 @@ impl LawName {
         let read = Key::SampleLaw.read(text);
         let law = read.map_err(|error| Error::input(error.to_string(), "name one of them"))?;
         Ok(Self(law))
+    }
+
+    /// The law of a case; the first linear one if it names none.
+    fn of(stated: &Stated) -> Self {
+        let linear = || Value::Word(ContactLaw::ALL[0].name());
+        Self(stated.get(Key::SampleLaw).cloned().unwrap_or_else(linear))
     }
 
     /// The law's name.
@@ -81,13 +87,26 @@ impl Case {
         };
         let mut quantities = quantities.clone();
         let stated = &mut quantities.stated;
-        let foreign = |key: &Key| stated.has(*key) && !name.takes(*key);
+        // What `like` states returns as soon as a law takes it again.
+        let present = LawName::of(stated);
+        let returns = |key: &Key| name.takes(*key) && !present.takes(*key);
+        let mut added: Vec<(Key, Value)> = keys_of_contacts()
+            .filter(returns)
+            .filter_map(|key| Some((key, like.stated(key)?.clone())))
+            .collect();
+        let replaced = |key: Key| {
+            key.alternatives()
+                .any(|(other, _)| added.iter().any(|(k, _)| *k == other))
+        };
+        let foreign = |key: &Key| stated.has(*key) && (!name.takes(*key) || replaced(*key));
         let dropped: Vec<Key> = keys_of_contacts().filter(foreign).collect();
         for key in &dropped {
             stated.remove(*key);
         }
         stated.put(Key::SampleLaw, name.0.clone());
-        let mut added: Vec<(Key, Value)> = Vec::new();
+        for (key, value) in &added {
+            stated.put(*key, value.clone());
+        }
         let mut mapped = quantities.mapped(true);
         // Each key that is missing is added once.
         while let Err(error) = &mapped.view {
@@ -124,9 +143,7 @@ impl Case {
         if SECOND.contains(&key) {
             return !second.iter().any(|key| stated.has(*key));
         }
-        let linear = || Value::Word(ContactLaw::ALL[0].name());
-        let law = stated.get(Key::SampleLaw).cloned().unwrap_or_else(linear);
-        !LawName(law).takes(key)
+        !LawName::of(stated).takes(key)
     }
 
     /// The same under another contact law: what that law does not take is left away, and what it

@@ -554,12 +554,11 @@ impl Curve {
                 }
             }
         }
-        match nonlinear {
-            Some(recording) => recording.fouriers(&outputs, base, multiples),
-            None => {
-                let frequencies: Vec<f64> = multiples.iter().map(|j| base * *j as f64).collect();
-                nanotap_flow::integral::fouriers(&signals, &frequencies)
-            }
+        if let Some(recording) = nonlinear {
+            recording.fouriers(&outputs, base, multiples)
+        } else {
+            let frequencies: Vec<f64> = multiples.iter().map(|j| base * *j as f64).collect();
+            nanotap_flow::integral::fouriers(&signals, &frequencies)
         }
     }
 

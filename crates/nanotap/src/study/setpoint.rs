@@ -244,8 +244,8 @@ pub fn solve_setpoint(case: &Case, control: &Control<'_>) -> Result<SetpointRepo
 }
 
 /// Follows the lever from far until every search has ended; the place where it is then.
-fn approach<'a>(
-    sweep: &mut DistanceSweep<'a>,
+fn approach(
+    sweep: &mut DistanceSweep<'_>,
     searches: &mut [Search<'_>],
     control: &Control<'_>,
 ) -> Result<Place, Error> {
@@ -258,9 +258,10 @@ fn approach<'a>(
         };
         let trace = first.held.trace(sweep, piece);
         let open = searches.iter_mut().filter(|search| search.found.is_none());
-        open.fold(true, |all, search| {
-            search.ends_in(sweep, piece, &trace) && all
-        })
+        let ended: Vec<bool> = open
+            .map(|search| search.ends_in(sweep, piece, &trace))
+            .collect();
+        ended.into_iter().all(|ended| ended)
     });
     sweep.stops_on_grid = false;
     if control.is_cancelled() {

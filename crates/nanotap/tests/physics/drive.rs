@@ -237,9 +237,9 @@ impl Tapping {
                         length = 0.5 * (low + high);
                         let there = self.step(t, *at, length, touches);
                         if crossed(there) {
-                            high = length
+                            high = length;
                         } else {
-                            low = length
+                            low = length;
                         }
                     }
                     next = self.step(t, *at, high, touches);

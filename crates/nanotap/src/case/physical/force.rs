@@ -3,6 +3,7 @@
 use std::f64::consts::PI;
 use std::sync::Arc;
 
+use nanotap_volterra::VolterraError;
 use nanotap_volterra::laws::entry::{Dimension, ParameterEntry, Part};
 use nanotap_volterra::laws::polyline::Rows;
 use nanotap_volterra::laws::prony::Arms;
@@ -173,8 +174,14 @@ impl SampleForce {
             }
             force.values.push(value);
         }
-        SampleLaw::new(terms, force.values.clone(), force.rows(), force.maxwell())
-            .map_err(|error| refused(error.to_string()))?;
+        SampleLaw::new(terms, force.values.clone(), force.rows(), force.maxwell()).map_err(
+            |error| match error {
+                VolterraError::Flows if !reader.has(Key::SampleModulus) => {
+                    PhysicalError::missing(Key::SampleModulus, error.to_string())
+                }
+                _ => refused(error.to_string()),
+            },
+        )?;
         Ok(Some(force))
     }
 

@@ -8,7 +8,7 @@ use super::formulas::{Readings, estimates};
 use super::loops::{Held, Loops, Tone};
 use super::torus::{Drives, OVER_RESOLVED, Torus};
 use super::{
-    BimodalJump, BimodalOptions, BimodalPoint, BimodalReport, FreeTone, Loop, OPEN_LOOP,
+    BimodalJump, BimodalOptions, BimodalPoint, BimodalReport, Estimates, FreeTone, Loop, OPEN_LOOP,
     ToneReading,
 };
 use crate::Error;
@@ -381,7 +381,7 @@ impl Follower<'_> {
             .then(|| "the motion loses its stability".to_owned())
     }
 
-    /// What is said where the motion ends.
+    /// Remark at the end of the motion.
     fn end(&self, here: &Held, error: &Error) -> String {
         format!(
             "no motion is found closer than {}: {}",
@@ -430,9 +430,11 @@ impl Follower<'_> {
             closest: forces.closest * scales.length,
             growth: held.growth,
             error: held.closed.tail,
-            estimates: touches
-                .then(|| estimates(&readings, self.radius))
-                .unwrap_or_default(),
+            estimates: if touches {
+                estimates(&readings, self.radius)
+            } else {
+                Estimates::default()
+            },
         })
     }
 

@@ -1,11 +1,11 @@
 //! What software of instruments computes from the readings of both tones.
 //!
-//! All of it assumes a force that is weak beside the lever's, amplitudes A₁ ≫ A₂ and much larger than
+//! All of it assumes a force that is small compared with the lever's, amplitudes A₁ ≫ A₂ and much larger than
 //! the indentation, and a sphere of radius R on an elastic half space without adhesion. Then the mean
 //! force F₀ follows from the first tone and the mean force gradient from the shift of the second:
 //!
 //! - AM: F₀ = k₁ A₁/(2 Q₁) √((A₀₁/A₁)² − 1); FM: F₀ = k₁ A₁ Δf₁/f₁;
-//! - E* = √(8/(R A₁)) k₂² (Δf₂/f₂)² A₁/F₀ (Herruzo, Perrino and Garcia, Nature Commun. 5, 3126, 2014;
+//! - E* = √(8/(R A₁)) k₂² (Δf₂/f₂)² A₁/F₀ (Herruzo, Perrino and Garcia, Nature Communications 5, 3126, 2014;
 //!   Garcia and Proksch, Eur. Polym. J. 49, 1897, 2013);
 //! - indentation δ = 2 k₂ Δf₂/f₂ √(2 A₁/R)/E*;
 //! - virial −k A A₀ cos φ/(2Q), under FM −k A² Δf/f, and energy π k A (A₀ sin φ − A f/f₀)/Q of a tone

@@ -1,7 +1,7 @@
 //! The loops of an instrument on two tones, as equations.
 //!
 //! A loop holds the phase of its tone by the frequency of the drive, or its amplitude by the strength,
-//! or both. Each is an equation with an unknown of its own, and all of them hold exactly in the steady
+//! or both. Each is an equation for one unknown, and all of them hold exactly in the steady
 //! state of an instrument whose controllers integrate.
 
 use nalgebra::{DMatrix, DVector};
@@ -227,7 +227,7 @@ impl Loops {
                 });
             let mut part = 1.0 / longest;
             let (next, left) = loop {
-                let drives = self.moved(&unknowns, here.drives(), &(&step * part));
+                let drives = Self::moved(&unknowns, here.drives(), &(&step * part));
                 let next = self.at(drives, &here.closed.torus, Some(&here), control);
                 let shorter = fresh && part >= SHORTEST;
                 match next {
@@ -277,8 +277,8 @@ impl Loops {
         for (column, unknown) in unknowns.iter().enumerate() {
             let mut step = DVector::zeros(unknowns.len());
             step[column] = unknown.difference();
-            let drives = self.moved(unknowns, here.drives(), &step);
-            let there = self.at(drives, &here.closed.torus, Some(&here), control)?;
+            let drives = Self::moved(unknowns, here.drives(), &step);
+            let there = self.at(drives, &here.closed.torus, Some(here), control)?;
             let change = self.residual(unknowns, &there) - residual;
             matrix.set_column(column, &(change / step[column]));
         }
@@ -286,7 +286,7 @@ impl Loops {
     }
 
     /// The drives after changes relative to themselves.
-    fn moved(&self, unknowns: &[Unknown], drives: &Drives, step: &DVector<f64>) -> Drives {
+    fn moved(unknowns: &[Unknown], drives: &Drives, step: &DVector<f64>) -> Drives {
         let mut moved = *drives;
         for (unknown, step) in unknowns.iter().zip(step.iter()) {
             match *unknown {

@@ -151,7 +151,7 @@ impl Torus {
 
     /// The same with half as many phases.
     pub(super) fn coarser(&self) -> Self {
-        self.with_phases((self.states.len() / 2 | 1).max(PHASES[0]))
+        self.with_phases(((self.states.len() / 2) | 1).max(PHASES[0]))
     }
 
     /// What a step from `before` to this one leads to when `share` of it is repeated.
@@ -328,12 +328,11 @@ fn newton(
             break;
         }
         let borrowed = factors.is_some();
-        let used = match factors.take() {
-            Some(factors) => factors,
-            None => {
-                off(&torus, Some(&mut jacobians))?;
-                Arc::new(newton_matrix(&shift, &jacobians, &sizes).lu())
-            }
+        let used = if let Some(factors) = factors.take() {
+            factors
+        } else {
+            off(&torus, Some(&mut jacobians))?;
+            Arc::new(newton_matrix(&shift, &jacobians, &sizes).lu())
         };
         let step = used
             .solve(&residual)
@@ -358,7 +357,7 @@ fn newton(
                 }
                 (torus, residual) = (next, left);
             }
-            // With factors of its own the torus does better only where rounding has the last word.
+            // Fresh factors improve the torus only at the level of rounding errors.
             None if borrowed && size > ACCEPTED => {}
             None => break,
         }

@@ -60,6 +60,10 @@ pub(crate) struct Prepared {
 
 /// What was stated of a table, which is not guessed.
 #[derive(Clone, Copy, Debug, Default)]
+#[expect(
+    clippy::struct_excessive_bools,
+    reason = "four questions, each answered by itself"
+)]
 struct Stated {
     /// Any conversion: the table is an instrument's.
     any: bool,

@@ -207,7 +207,7 @@ impl<'a> Search<'a> {
                 return None;
             }
             let branches = branches_of(&point);
-            noise = self.noise(&x, &point, self.shared_freedom());
+            noise = self.noise(&x, &point, &self.shared_freedom());
             let mut problem = self.weighted(noise.clone(), None);
             if self.request.jumps {
                 problem.find_jumps(&x, &mut point);
@@ -220,7 +220,7 @@ impl<'a> Search<'a> {
             steps += solution.iterations;
             x.clone_from(&solution.x);
             let freedom = self.freedom_of_columns(&solution.jacobian);
-            let after = self.noise(&x, &solution.point, freedom);
+            let after = self.noise(&x, &solution.point, &freedom);
             let settled = noise
                 .iter()
                 .zip(&after)
@@ -245,7 +245,7 @@ impl<'a> Search<'a> {
 
     /// Standard error of a value in each column, from its residuals and their degrees of freedom;
     /// zero for a column without residuals.
-    fn noise(&self, x: &[f64], point: &Point, freedom: Vec<f64>) -> Vec<f64> {
+    fn noise(&self, x: &[f64], point: &Point, freedom: &[f64]) -> Vec<f64> {
         let columns = self.problem.data.columns.iter().enumerate();
         columns
             .map(|(index, column)| {

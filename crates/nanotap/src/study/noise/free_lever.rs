@@ -160,11 +160,10 @@ pub fn spectrum_csv(spectrum: &ThermalSpectrum) -> String {
     use crate::number::shortest;
     let mut csv = String::from("frequency (Hz),density (m^2/Hz)\n");
     for (frequency, density) in spectrum.frequency.iter().zip(&spectrum.density) {
-        csv.push_str(&format!(
-            "{},{}\n",
-            shortest(*frequency),
-            shortest(*density)
-        ));
+        csv.push_str(&shortest(*frequency));
+        csv.push(',');
+        csv.push_str(&shortest(*density));
+        csv.push('\n');
     }
     csv
 }

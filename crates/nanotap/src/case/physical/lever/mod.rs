@@ -354,7 +354,7 @@ fn ratio_to_beam(tip: TipMass, beam_mass: f64) -> Result<f64, PhysicalError> {
 fn modal_factor(tip: TipMass, f0: Option<f64>) -> Result<f64, PhysicalError> {
     let ratio = match (tip, f0) {
         (TipMass::Ratio(ratio), _) => bounded(ratio)?,
-        (TipMass::Absolute(mass), _) if mass == 0.0 => 0.0,
+        (TipMass::Absolute(0.0), _) => 0.0,
         (TipMass::SecondMode(f2), Some(f0)) => ratio_from_second_mode(f2, f0)?,
         (TipMass::SecondMode(_), None) => {
             return Err(PhysicalError::missing(

@@ -348,6 +348,7 @@ def branch(
     starts: int = 16,
     seed: int = 1,
     second: Mapping[str, tuple[float | str, float | str]] | str | None = None,
+    event: Sequence[str] | None = None,
     max_step: float = 0.01,
     threads: int | None = None,
     progress: Progress = None,
@@ -388,6 +389,9 @@ def branch(
     second : Mapping[str, tuple[float | str, float | str]] | str | None
         Second parameter and its range, as in {"alpha4": (5, 40)}, for bifurcation
         curves in both.
+    event : Sequence[str] | None
+        An observable and its value, as in "F_max = 1 nN": where the orbits have it,
+        and with `second` its curve in both parameters; may be repeated.
     max_step : float
         Longest step, as a fraction of the range.
     threads : int | None
@@ -1124,6 +1128,7 @@ def noise(
     temperature: float = 295.0,
     time_constant: float | str | None = None,
     bandwidth: float | str | None = None,
+    state: Any = None,
     threads: int | None = None,
     progress: Progress = None,
 ) -> Record:
@@ -1141,6 +1146,8 @@ def noise(
     bandwidth : float | str | None
         Noise bandwidth of the lock-in amplifier, 1 over four time constants, in
         place of it.
+    state : Any
+        State near the orbit, at drive phase 0: a1,…,aN,v1,…,vN.
     threads : int | None
         Number of threads; default: one per core.
     progress : Progress

@@ -133,6 +133,26 @@ fn no_motion_is_reported_where_a_setpoint_is_not_reached() {
     );
 }
 
+/// Over silica with a free amplitude of 5 nm an attractive and a repulsive state coexist. Four starts
+/// at each setpoint meet the repulsive one at 0.7 and 0.85 only; its branch leads to those between.
+#[test]
+fn the_branch_of_a_state_leads_to_other_setpoints() {
+    let file = std::path::Path::new("../../docs/cases/force-limit-stiff.toml");
+    let case = Case::load(Some(file), &[], &Catalogue::shared()).unwrap();
+    let options = WindowOptions {
+        over: Axes(vec![
+            "drive.setpoint=0.7:0.85:4".to_owned(),
+            "drive.free_amplitude=5nm:6nm:2".to_owned(),
+        ]),
+        starts: 4,
+        ..WindowOptions::default()
+    };
+    let folder = Folder::new();
+    let sweep = options.sweep(&case, &Control::default()).unwrap();
+    let window = Window::of(&computed(&sweep, &folder)).unwrap();
+    assert_eq!(window.conditions[0], [Condition::SecondState; 4]);
+}
+
 /// Setpoints that are peak forces, phases or amplitudes: the motion has what is held, at the distance
 /// of the setpoint alone.
 #[test]

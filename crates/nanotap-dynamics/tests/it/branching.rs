@@ -185,51 +185,42 @@ impl Formula for Spiral {
     }
 }
 
+fn doubling(quadratic: f64, cubic: f64, rate: f64) -> Doubling {
+    Doubling {
+        rate,
+        quadratic,
+        cubic,
+    }
+}
+
+fn criticalities(branch: &Branch) -> Vec<Criticality> {
+    let bifurcations = branch.bifurcations.iter();
+    bifurcations.filter_map(|b| b.criticality).collect()
+}
+
+/// Where the parameter passes 0, of the fixed point 0.
+fn at_zero<F: Formula>(map: fn(f64) -> F) -> Vec<Criticality> {
+    let origin = vec![0.0; F::DIMENSION];
+    criticalities(&branch(&Family(map), -0.1, &origin, 1, 0.1, (-0.1, 0.1)))
+}
+
 #[test]
 fn the_criticality_is_that_of_the_normal_form() {
     use Criticality::{Subcritical, Supercritical};
-    let of = |branch: Branch| -> Vec<Criticality> {
-        branch
-            .bifurcations
-            .iter()
-            .filter_map(|b| b.criticality)
-            .collect()
-    };
-    fn doubling(quadratic: f64, cubic: f64, rate: f64) -> Doubling {
-        Doubling {
-            rate,
-            quadratic,
-            cubic,
-        }
-    }
-    let doublings: [(fn(f64) -> Doubling, Criticality); 4] = [
-        (|rate| doubling(0.0, 1.0, rate), Supercritical),
-        (|rate| doubling(0.0, -1.0, rate), Subcritical),
-        (|rate| doubling(1.0, -0.9, rate), Supercritical),
-        (|rate| doubling(1.0, -1.1, rate), Subcritical),
-    ];
-    for (map, expected) in doublings {
-        let found = of(branch(&Family(map), -0.1, &[0.0], 1, 0.1, (-0.1, 0.1)));
-        assert_eq!(found, [expected]);
-    }
-    let spirals: [(fn(f64) -> Spiral, Criticality); 2] = [
-        (|rate| Spiral { rate, sign: -1.0 }, Supercritical),
-        (|rate| Spiral { rate, sign: 1.0 }, Subcritical),
-    ];
-    for (map, expected) in spirals {
-        let found = of(branch(&Family(map), -0.1, &[0.0, 0.0], 1, 0.1, (-0.1, 0.1)));
-        assert_eq!(found, [expected]);
-    }
+    assert_eq!(at_zero(|rate| doubling(0.0, 1.0, rate)), [Supercritical]);
+    assert_eq!(at_zero(|rate| doubling(0.0, -1.0, rate)), [Subcritical]);
+    assert_eq!(at_zero(|rate| doubling(1.0, -0.9, rate)), [Supercritical]);
+    assert_eq!(at_zero(|rate| doubling(1.0, -1.1, rate)), [Subcritical]);
+    assert_eq!(at_zero(|rate| Spiral { rate, sign: -1.0 }), [Supercritical]);
+    assert_eq!(at_zero(|rate| Spiral { rate, sign: 1.0 }), [Subcritical]);
     // Hénon's and the logistic map's cascades, and Maynard Smith's circle (Kuznetsov, example 4.2).
     let henon = branch(&HENON, 0.2, &[0.8, 0.2], 1, 1.2, (0.0, 1.2));
-    assert_eq!(of(henon), [Supercritical]);
-    assert_eq!(
-        of(branch(&LOGISTIC, 2.5, &[0.6], 1, 3.6, (2.0, 3.6))),
-        [Supercritical]
-    );
+    assert_eq!(criticalities(&henon), [Supercritical]);
+    let logistic = branch(&LOGISTIC, 2.5, &[0.6], 1, 3.6, (2.0, 3.6));
+    assert_eq!(criticalities(&logistic), [Supercritical]);
     let delayed = Family(DelayedLogistic);
     let delayed = branch(&delayed, 1.8, &[0.44, 0.44], 1, 2.2, (1.5, 2.2));
-    assert_eq!(of(delayed), [Supercritical]);
+    assert_eq!(criticalities(&delayed), [Supercritical]);
 }
 
 /// a = 3(1−b)²/4 for the first flip, (1−b)² + (1+b)²/4 for the second.

@@ -347,6 +347,7 @@ def branch(
     starts: int = 16,
     seed: int = 1,
     second: Mapping[str, tuple[float | str, float | str]] | str | None = None,
+    event: Sequence[str] | None = None,
     max_step: float = 0.01,
     threads: int | None = None,
     progress: Progress = None,
@@ -387,6 +388,9 @@ def branch(
     second : Mapping[str, tuple[float | str, float | str]] | str | None
         Second parameter and its range, as in {"alpha4": (5, 40)}, for bifurcation
         curves in both.
+    event : Sequence[str] | None
+        An observable and its value, as in "F_max = 1 nN": where the orbits have it,
+        and with `second` its curve in both parameters; may be repeated.
     max_step : float
         Longest step, as a fraction of the range.
     threads : int | None

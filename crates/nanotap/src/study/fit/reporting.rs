@@ -7,7 +7,7 @@ use crate::number::shortest;
 
 use super::MAX_PERIOD;
 use super::branches::settle;
-use super::data::Data;
+use super::data::{Column, Data};
 use super::jumps::Jump;
 use super::parameters::{self, Parameter};
 use super::problem::Problem;
@@ -73,30 +73,12 @@ impl Search<'_> {
         let (case, data) = (self.problem.case, self.problem.data);
         let parameters = self.problem.parameters;
         let problem = self.problem_of(found);
-        let (x, point) = (&found.solution.x, &found.solution.point);
+        let x = &found.solution.x;
         let information = self.information(found);
         let given = self.all_given();
         let fitted = Self::fitted(&problem, found, &information, intervals);
         let p_value = given.then(|| self.probability(found));
-        let columns: Vec<FittedColumn> = data
-            .columns
-            .iter()
-            .enumerate()
-            .map(|(index, column)| {
-                let differences = self.differences(x, point, index);
-                let squares: f64 = differences.iter().map(|d| d * d).sum();
-                let rows = data.curves.iter().flat_map(|curve| &curve.rows);
-                let mut of = rows.filter(|row| row.values[index].is_some());
-                FittedColumn {
-                    name: column.name.clone(),
-                    observable: column.quantity.name().to_owned(),
-                    unit: column.quantity.unit(case.is_physical()).to_owned(),
-                    residual: (squares / differences.len().max(1) as f64).sqrt(),
-                    standard_error: found.noise[index],
-                    estimated: of.any(|row| row.errors[index].is_none()),
-                }
-            })
-            .collect();
+        let columns = self.columns(found);
         let (reason, remarks) = self.judge(found, p_value, &fitted, &columns);
         let undetermined = undetermined(&information, parameters, data);
         let swept = data.swept[0].key;
@@ -148,6 +130,26 @@ impl Search<'_> {
             cancelled: self.control.is_cancelled(),
             parameters: fitted,
         }
+    }
+
+    /// The columns with their residuals.
+    fn columns(&self, found: &Found) -> Vec<FittedColumn> {
+        let (case, data) = (self.problem.case, self.problem.data);
+        let (x, point) = (&found.solution.x, &found.solution.point);
+        let column = |(index, column): (usize, &Column)| {
+            let differences = self.differences(x, point, index);
+            let squares: f64 = differences.iter().map(|d| d * d).sum();
+            let mut of = data.rows().filter(|row| row.values[index].is_some());
+            FittedColumn {
+                name: column.name.clone(),
+                observable: column.quantity.name().to_owned(),
+                unit: column.quantity.unit(case.is_physical()).to_owned(),
+                residual: (squares / differences.len().max(1) as f64).sqrt(),
+                standard_error: found.noise[index],
+                estimated: of.any(|row| row.errors[index].is_none()),
+            }
+        };
+        data.columns.iter().enumerate().map(column).collect()
     }
 
     /// A comment for the case file of a curve: the corrections of its data, as the option `start`
@@ -256,13 +258,10 @@ impl Search<'_> {
 
     /// Why the residuals are not noise, at a level of one per cent: they are larger than the scatter
     /// that is known without the model, or keep their sign from row to row.
-    fn not_noise(
-        &self,
-        found: &Found,
-        p_value: Option<f64>,
-        columns: &[FittedColumn],
-    ) -> Vec<String> {
+    pub(super) fn not_noise(&self, found: &Found) -> Vec<String> {
         let data = self.problem.data;
+        let columns = &self.columns(found);
+        let p_value = self.all_given().then(|| self.probability(found));
         let (x, point) = (&found.solution.x, &found.solution.point);
         let freedom = self.freedom_of_columns(&found.solution.jacobian);
         let tests = columns.iter().filter(|column| column.estimated).count() + 1;
@@ -468,7 +467,7 @@ impl Search<'_> {
                 )
             });
         }
-        let misfit = self.not_noise(found, p_value, columns);
+        let misfit = self.not_noise(found);
         if !misfit.is_empty() {
             remarks.push(format!(
                 "{}: the law, the branch or an offset is not that of the data, and values and \

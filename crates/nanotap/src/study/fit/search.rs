@@ -53,20 +53,21 @@ const MAX_ROUNDS: usize = 6;
 
 impl<'a> Search<'a> {
     pub(super) fn run(&self) -> Result<FitReport, Error> {
-        let starts = self.starts();
+        let (starts, first) = self.starts();
         let mut best: Option<Found> = None;
         let mut tried = 0;
         for start in &starts {
             if self.control.is_cancelled() {
                 break;
             }
+            let scanned = (tried >= first).then(|| self.with_best_offset(start));
             tried += 1;
-            let found = self.fine(self.rough(start.clone()));
+            let found = self.fine(self.rough(scanned.flatten().unwrap_or_else(|| start.clone())));
             if let Some(report) = self.control.progress {
                 report(tried, starts.len());
             }
             let Some(found) = found else { continue };
-            let good = self.describes(&found);
+            let good = self.describes(&found) && self.is_trusted(&found);
             let misfit = self.misfit(&found);
             let least = best.as_ref().map(|best| self.misfit(best));
             if least.is_none_or(|least| misfit < least) {
@@ -94,9 +95,9 @@ impl<'a> Search<'a> {
         Ok(self.report(best, tried))
     }
 
-    /// Initial values: those of a scan, if it finds better ones than the case's, those of the case,
-    /// then others within the bounds or a factor of four.
-    fn starts(&self) -> Vec<Vec<f64>> {
+    /// Initial values: those of a scan, if it finds better ones than the case's, and those of the
+    /// case, and the number of these; then others within the bounds or a factor of four.
+    fn starts(&self) -> (Vec<Vec<f64>>, usize) {
         let mut state = self.request.seed ^ 0x9e37_79b9_7f4a_7c15;
         // SplitMix64 (Steele, Lea, Flood 2014).
         let mut random = || {
@@ -111,6 +112,7 @@ impl<'a> Search<'a> {
         let mut starts: Vec<Vec<f64>> = self.scanned(&own).into_iter().collect();
         starts.push(own);
         starts.truncate(self.request.starts.max(1));
+        let first = starts.len();
         while starts.len() < self.request.starts {
             let start = parameters.iter().map(|p| {
                 let u = random();
@@ -131,7 +133,7 @@ impl<'a> Search<'a> {
             });
             starts.push(start.collect());
         }
-        starts
+        (starts, first)
     }
 
     /// The problem with other weights.
@@ -351,6 +353,16 @@ impl<'a> Search<'a> {
     fn describes(&self, found: &Found) -> bool {
         (self.misfit(found) < MAX_MISFIT * ROUGH_ERROR * ROUGH_ERROR || self.leaves_noise(found))
             && (!self.all_given() || self.probability(found) > MIN_PROBABILITY)
+    }
+
+    /// True if no test tells the residuals from noise and no parameter ended at a limit of what is
+    /// physical.
+    fn is_trusted(&self, found: &Found) -> bool {
+        let all = self.problem.parameters.iter().zip(&found.solution.x);
+        let mut limited = all.filter(|(p, _)| p.is_limited);
+        let inside =
+            limited.all(|(p, value)| *value == 0.0 || (p.bounds.0 < *value && *value < p.bounds.1));
+        inside && self.not_noise(found).is_empty()
     }
 
     /// True if the residuals are smaller than the spread, do not keep their sign from row to row,

@@ -2,8 +2,9 @@
 //!
 //! Averages are of consecutive rows whose bins have equal parts of the path in distance and values,
 //! so that knees and steep parts keep their rows and flat ones do not; a jump ends a bin. Where the
-//! values bend within a bin, its value is that of a parabola at the mean distance, since the mean
-//! lies beside the curve. Standard errors follow from the scatter within the bins.
+//! curve bends, the mean of the rows lies beside it: the bend is known from the rows of the bin and
+//! of as many on either side, and taken off. Where it is large, the value is that of a parabola
+//! through the rows of the bin. Standard errors follow from the scatter within the bins.
 
 use std::ops::Range;
 
@@ -27,8 +28,9 @@ const JUMP: f64 = 10.0;
 const DISTANCE_SHARE: f64 = 0.15;
 /// Fewest rows of a bin to which a parabola is fitted.
 const MIN_PARABOLA: usize = 8;
-/// A parabola is used where it moves the value by more than this many of its standard errors.
-const BENT: f64 = 2.0;
+/// A parabola through the bin alone is used where the bend is more than this many standard errors of
+/// the mean.
+const BENT: f64 = 1.0;
 /// Rows whose worth the scatter of all bins has in that of one bin.
 const PRIOR: f64 = 20.0;
 /// Variances of bins above this multiple of their median do not count in the common one.
@@ -70,8 +72,7 @@ pub(crate) fn bins(
             square += if step.is_finite() { step * step } else { 0.0 };
         }
         path.push(path[k - 1] + square.sqrt());
-        let mut steps = values.iter().zip(errors);
-        breaks.push(steps.any(|(of, error)| (of[k] - of[k - 1]).abs() > JUMP * error));
+        breaks.push(is_jump(values, errors, k));
     }
     let whole = path.last().copied().unwrap_or(0.0).max(f64::MIN_POSITIVE);
     let place = |k: usize| (path[k] / whole * count as f64).min(count as f64 - 1.0) as usize;
@@ -84,6 +85,25 @@ pub(crate) fn bins(
         }
     }
     bins
+}
+
+/// Whether the values of a row are far from those of the row before.
+fn is_jump(values: &[Vec<f64>], errors: &[f64], row: usize) -> bool {
+    let mut steps = values.iter().zip(errors);
+    steps.any(|(of, error)| (of[row] - of[row - 1]).abs() > JUMP * error)
+}
+
+/// The rows of a bin and as many on either side, up to a jump.
+fn neighbourhood(values: &[Vec<f64>], errors: &[f64], bin: &Range<usize>) -> Range<usize> {
+    let rows = values.first().map_or(0, Vec::len);
+    let (mut first, mut end) = (bin.start, bin.end);
+    while first > bin.start.saturating_sub(bin.len()) && !is_jump(values, errors, first) {
+        first -= 1;
+    }
+    while end < (bin.end + bin.len()).min(rows) && !is_jump(values, errors, end) {
+        end += 1;
+    }
+    first..end
 }
 
 /// The standard deviation of the values in a sequence of rows, from third differences, which a
@@ -266,7 +286,7 @@ impl Data {
                 let ranges = bins(&segment.distance, &segment.values, &errors, share);
                 let made: Vec<Bin> = ranges
                     .into_iter()
-                    .map(|range| Bin::of(&segment, range))
+                    .map(|range| Bin::of(&segment, &errors, range))
                     .collect();
                 binned.push((index, segment.rows.to_vec(), made));
             }
@@ -303,6 +323,13 @@ impl Data {
     }
 }
 
+/// Mean square of the distances from their mean.
+fn spread(distance: &[f64]) -> f64 {
+    let count = distance.len() as f64;
+    let mean = distance.iter().sum::<f64>() / count;
+    distance.iter().map(|z| (z - mean).powi(2)).sum::<f64>() / count
+}
+
 /// Consecutive rows that become one.
 struct Bin {
     range: Range<usize>,
@@ -314,28 +341,36 @@ struct Bin {
 struct Fits {
     mean: f64,
     count: usize,
+    /// How far the mean lies from the curve, and the standard error of that for rows with standard
+    /// error 1.
+    bend: (f64, f64),
     best: Option<Polynomial>,
 }
 
 impl Bin {
-    fn of(segment: &Segment<'_>, range: Range<usize>) -> Self {
-        let distance = &segment.distance[range.clone()];
+    fn of(segment: &Segment<'_>, errors: &[f64], range: Range<usize>) -> Self {
+        let around = neighbourhood(&segment.values, errors, &range);
         let fits = segment.values.iter().map(|values| {
-            let values = &values[range.clone()];
-            let known: Vec<usize> = (0..values.len())
-                .filter(|k| values[*k].is_finite())
-                .collect();
-            let pick = |of: &[f64]| -> Vec<f64> { known.iter().map(|k| of[*k]).collect() };
-            let (distance, values) = (pick(distance), pick(values));
-            let degree = match known.len() {
+            let pick = |range: &Range<usize>| -> (Vec<f64>, Vec<f64>) {
+                let known = range.clone().filter(|k| values[*k].is_finite());
+                known.map(|k| (segment.distance[k], values[k])).unzip()
+            };
+            let (distance, values) = pick(&range);
+            let degree = match values.len() {
                 0 => return None,
                 1..4 => 0,
                 4..MIN_PARABOLA => 1,
                 _ => 2,
             };
+            let (wide, of_wide) = pick(&around);
+            let parabola = (wide.len() >= MIN_PARABOLA)
+                .then(|| Polynomial::of(&wide, &of_wide, 2))
+                .flatten();
+            let part = spread(&distance) / spread(&wide);
             Some(Fits {
                 mean: values.iter().sum::<f64>() / values.len() as f64,
                 count: values.len(),
+                bend: parabola.map_or((0.0, 0.0), |p| (part * p.bend, part * p.bend_error)),
                 best: (degree > 0)
                     .then(|| Polynomial::of(&distance, &values, degree))
                     .flatten(),
@@ -343,7 +378,7 @@ impl Bin {
         });
         Self {
             fits: fits.collect(),
-            distance: distance.iter().sum::<f64>() / distance.len() as f64,
+            distance: segment.distance[range.clone()].iter().sum::<f64>() / range.len() as f64,
             range,
         }
     }
@@ -360,11 +395,13 @@ impl Bin {
             };
             let common = scatter[column].error;
             let mut own = common;
-            let (mut value, mut part) = (fits.mean, 1.0 / (fits.count as f64).sqrt());
+            let of_mean = 1.0 / fits.count as f64;
+            let (bend, error) = fits.bend;
+            let (mut value, mut part) = (fits.mean - bend, (of_mean + error * error).sqrt());
             if let Some(best) = &fits.best {
                 let (given, freedom) = (common * common, best.freedom);
                 own = ((PRIOR * given + best.squares) / (PRIOR + freedom)).sqrt();
-                if best.bend.abs() > BENT * best.bend_error * own {
+                if best.bend_error > 0.0 && bend.abs() > BENT * of_mean.sqrt() * own {
                     (value, part) = (best.value, best.error);
                 }
             }

@@ -36,6 +36,8 @@ pub(super) struct Found {
 pub(super) const ROUGH_ERROR: f64 = 0.03;
 /// Rough standard errors above which a residual counts by its logarithm.
 const ROBUST_LIMIT: f64 = 3.0;
+/// Largest number of rows of a curve in a rough fit.
+const MAX_ROUGH_ROWS: usize = 50;
 /// Mean squared rough residual above which the data are not described.
 const MAX_MISFIT: f64 = 1.0;
 /// Number of residuals of a column from which on their signs distinguish noise from a misfit.
@@ -161,8 +163,8 @@ impl<'a> Search<'a> {
     /// Fits from initial values until branches and parameters are approximately right.
     fn rough(&self, mut x: Vec<f64>) -> Vec<f64> {
         let mut problem = self.weighted(self.rough_noise(), Some(ROBUST_LIMIT));
-        // Given errors are much smaller; they are used in the end.
-        let plain = plain_errors(problem.data);
+        // Given errors are much smaller; they are used in the end, as are all rows.
+        let plain = rough_data(problem.data);
         problem.data = &plain;
         let mut before: Option<Vec<usize>> = None;
         let mut known: Option<Vec<Rows>> = None;
@@ -398,13 +400,15 @@ pub(super) fn branches_of(point: &Point) -> Vec<usize> {
     point.iter().map(|row| row.branch).collect()
 }
 
-/// The data without their errors.
-fn plain_errors(data: &Data) -> Data {
-    let mut plain = data.clone();
-    for curve in &mut plain.curves {
+/// The data without their errors, and of a long curve every n-th row.
+fn rough_data(data: &Data) -> Data {
+    let mut rough = data.clone();
+    for curve in &mut rough.curves {
+        let stride = curve.rows.len().div_ceil(MAX_ROUGH_ROWS).max(1);
+        curve.rows = curve.rows.iter().step_by(stride).cloned().collect();
         for row in &mut curve.rows {
             row.errors.iter_mut().for_each(|error| *error = None);
         }
     }
-    plain
+    rough
 }

@@ -468,6 +468,28 @@ mod tests {
     }
 
     #[test]
+    fn averages_lie_on_a_bent_curve_and_have_the_errors_of_means() {
+        // A parabola in bins of 5 and of 12 rows; the mean of the outer ones lies beside it by less
+        // than its standard error.
+        let distance: Vec<f64> = (0..60).map(|k| 0.1 * f64::from(k)).collect();
+        let values: Vec<f64> = distance.iter().map(|x| 3.0 + x + 0.2 * x * x).collect();
+        let segment = Segment {
+            rows: &[],
+            distance: distance.clone(),
+            values: vec![values],
+        };
+        for count in [5, 12] {
+            let bin = Bin::of(&segment, &[0.5], 20..20 + count);
+            let fits = bin.fits[0].as_ref().unwrap();
+            let at = 3.0 + bin.distance + 0.2 * bin.distance * bin.distance;
+            assert!((fits.mean - fits.bend.0 - at).abs() < 1e-12, "{count}");
+            assert!(fits.bend.0.abs() > 1e-3);
+            // Three times as many rows over three times the length know the bend well.
+            assert!(fits.bend.1 < 0.1 / (count as f64).sqrt());
+        }
+    }
+
+    #[test]
     fn a_parabola_gives_the_curve_where_the_mean_does_not() {
         let distance: Vec<f64> = (0..11).map(|k| f64::from(k) - 5.0).collect();
         let values: Vec<f64> = distance.iter().map(|x| 2.0 + x + 0.5 * x * x).collect();

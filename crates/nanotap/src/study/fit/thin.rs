@@ -33,7 +33,8 @@ const MIN_PARABOLA: usize = 8;
 const BENT: f64 = 1.0;
 /// Rows whose worth the scatter of all bins has in that of one bin.
 const PRIOR: f64 = 20.0;
-/// Variances of bins above this multiple of their median do not count in the common one.
+/// Variances of bins that noise would exceed as seldom as a normal deviate exceeds this value do not
+/// count in the common one.
 const OUTLYING: f64 = 4.0;
 /// Fewest free rows of a curve and direction whose scatter counts.
 const MIN_FREE: usize = 4;
@@ -358,8 +359,8 @@ impl Bin {
             let (distance, values) = pick(&range);
             let degree = match values.len() {
                 0 => return None,
-                1..4 => 0,
-                4..MIN_PARABOLA => 1,
+                1..3 => 0,
+                3..MIN_PARABOLA => 1,
                 _ => 2,
             };
             let (wide, of_wide) = pick(&around);
@@ -428,12 +429,24 @@ fn common<'a>(fits: impl Iterator<Item = &'a Fits>) -> (f64, f64) {
         .filter(|best| best.freedom > 0.0)
         .map(|best| (best.squares / best.freedom, best.freedom))
         .collect();
-    let limit = OUTLYING * median(known.iter().map(|(variance, _)| *variance).collect());
-    let counted = known.iter().filter(|(variance, _)| *variance <= limit);
+    let relative = known
+        .iter()
+        .map(|(variance, of)| variance / quantile(*of, 0.0));
+    let middle = median(relative.collect());
+    let counted = known
+        .iter()
+        .filter(|(variance, of)| *variance <= middle * quantile(*of, OUTLYING));
     let (sum, freedom) = counted.fold((0.0, 0.0), |(sum, freedom), (variance, of)| {
         (sum + variance * of, freedom + of)
     });
     (if freedom > 0.0 { sum / freedom } else { 0.0 }, freedom)
+}
+
+/// χ² over its degrees of freedom that a normal deviate `z` corresponds to (Wilson and Hilferty,
+/// PNAS 17, 684 (1931)).
+fn quantile(freedom: f64, z: f64) -> f64 {
+    let variance = 2.0 / (9.0 * freedom);
+    (1.0 - variance + z * variance.sqrt()).powi(3)
 }
 
 #[cfg(test)]
@@ -465,6 +478,15 @@ mod tests {
             flat < 5 && steep > 10 && found.len() <= 23,
             "{flat} {steep}"
         );
+    }
+
+    #[test]
+    fn quantiles_of_chi_squared_are_those_of_tables() {
+        // Abramowitz & Stegun, table 26.8: the median and the 0.1 % point of 2 and of 10 degrees.
+        for (freedom, z, value) in [(2.0, 0.0, 1.386), (10.0, 0.0, 9.342), (10.0, 3.09, 29.588)] {
+            let found = freedom * quantile(freedom, z);
+            assert!((found / value - 1.0).abs() < 0.02, "{freedom} {found}");
+        }
     }
 
     #[test]

@@ -50,6 +50,12 @@ const MAX_CORRELATION: f64 = 2.0;
 pub(super) const MIN_PROBABILITY: f64 = 1e-6;
 /// Relative difference below which two misfits are equal.
 const MISFIT_TOLERANCE: f64 = 1e-3;
+/// The same of rough fits.
+const ROUGH_TOLERANCE: f64 = 0.02;
+/// Mean cost of a value up to which rough fits are not converged well enough to be compared.
+const MIN_ROUGH: f64 = 0.01;
+/// Cost of a row without an orbit in a rough fit.
+const LOST_COST: f64 = 100.0;
 /// Largest number of times that branches are assigned again.
 const MAX_ROUNDS: usize = 6;
 
@@ -57,6 +63,7 @@ impl<'a> Search<'a> {
     pub(super) fn run(&self) -> Result<FitReport, Error> {
         let (starts, first) = self.starts();
         let mut best: Option<Found> = None;
+        let mut least_rough = 0.0;
         let mut tried = 0;
         for start in &starts {
             if self.control.is_cancelled() {
@@ -64,11 +71,25 @@ impl<'a> Search<'a> {
             }
             let scanned = (tried >= first).then(|| self.with_best_offset(start));
             tried += 1;
-            let found = self.fine(self.rough(scanned.flatten().unwrap_or_else(|| start.clone())));
+            let (x, rough) = self.rough(scanned.flatten().unwrap_or_else(|| start.clone()));
+            // A minimum that is not lower is not computed in full, where a rough fit tells.
+            let tolerance = ROUGH_TOLERANCE * least_rough;
+            if least_rough > MIN_ROUGH && rough > least_rough - tolerance {
+                if rough <= least_rough + tolerance {
+                    break;
+                }
+                continue;
+            }
+            let found = self.fine(x);
             if let Some(report) = self.control.progress {
                 report(tried, starts.len());
             }
             let Some(found) = found else { continue };
+            least_rough = if best.is_some() {
+                least_rough.min(rough)
+            } else {
+                rough
+            };
             let good = self.describes(&found) && self.is_trusted(&found);
             let misfit = self.misfit(&found);
             let least = best.as_ref().map(|best| self.misfit(best));
@@ -160,8 +181,10 @@ impl<'a> Search<'a> {
             .collect()
     }
 
-    /// Fits from initial values until branches and parameters are approximately right.
-    fn rough(&self, mut x: Vec<f64>) -> Vec<f64> {
+    /// Fits from initial values until branches and parameters are approximately right, and returns
+    /// the mean cost of a value; infinite without a fit.
+    fn rough(&self, mut x: Vec<f64>) -> (Vec<f64>, f64) {
+        let mut mean = f64::INFINITY;
         let mut problem = self.weighted(self.rough_noise(), Some(ROBUST_LIMIT));
         // Given errors are much smaller; they are used in the end, as are all rows.
         let plain = rough_data(problem.data);
@@ -181,14 +204,19 @@ impl<'a> Search<'a> {
             if before.as_ref() == Some(&branches) {
                 break;
             }
-            let enough = 1e-4 * problem.data.count() as f64;
-            match minimise(&problem, x.clone(), point, &self.bounds(), enough) {
-                Some(solution) => x = solution.x,
+            let count = problem.data.count() as f64;
+            match minimise(&problem, x.clone(), point, &self.bounds(), 1e-4 * count) {
+                Some(solution) => {
+                    // Rows without an orbit cost as those that are far off.
+                    let lost = solution.point.iter().filter(|row| row.lost).count() as f64;
+                    mean = (solution.cost + LOST_COST * lost) / count;
+                    x = solution.x;
+                }
                 None => break,
             }
             before = Some(branches);
         }
-        x
+        (x, mean)
     }
 
     /// Continues the fit to the minimum in standard errors.

@@ -224,12 +224,17 @@ impl Data {
             return;
         };
         let mut sums = vec![(0.0, 0.0); self.columns.len()];
-        for curve in &self.curves {
+        let mut known = Vec::new();
+        for (index, curve) in self.curves.iter().enumerate() {
+            let mut before = 0;
             for segment in segments(curve, &self.columns) {
                 let free = far_rows(&segment.distance, &segment.values[amplitude]);
+                let first = before;
+                before += segment.rows.len();
                 if free.len() < MIN_FREE {
                     continue;
                 }
+                known.extend(free.iter().map(|row| (index, first + row)));
                 let pick = |of: &[f64]| -> Vec<f64> { free.iter().map(|k| of[*k]).collect() };
                 let distance = pick(&segment.distance);
                 for (values, sum) in segment.values.iter().zip(&mut sums) {
@@ -240,6 +245,9 @@ impl Data {
                     }
                 }
             }
+        }
+        for (curve, row) in known {
+            self.curves[curve].rows[row].is_free = true;
         }
         for (index, (squares, freedom)) in sums.into_iter().enumerate() {
             if freedom > 0.0 {
@@ -389,6 +397,8 @@ impl Bin {
         let rows = &rows[self.range.clone()];
         let mut row = rows[0].clone();
         row.at[0] = self.distance;
+        // The scatter of averages is known from their own rows.
+        row.is_free = false;
         for (column, fits) in self.fits.iter().enumerate() {
             let Some(fits) = fits else {
                 (row.values[column], row.errors[column]) = (None, None);

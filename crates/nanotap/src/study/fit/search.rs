@@ -229,8 +229,11 @@ impl<'a> Search<'a> {
                 break;
             }
             let problem = self.weighted(noise.clone(), None);
-            // The parameters change little from here on.
-            let known = found.as_ref().map(|found| found.candidates.as_slice());
+            // The parameters change little from here on; but a branch that ended too early reaches
+            // its last row now.
+            let is_whole = |found: &&Found| !found.solution.point.iter().any(|row| row.lost);
+            let known = found.as_ref().filter(is_whole);
+            let known = known.map(|found| found.candidates.as_slice());
             let (mut point, candidates) = problem.discover(&x, known);
             if self.control.is_cancelled() {
                 break;

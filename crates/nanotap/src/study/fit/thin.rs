@@ -31,6 +31,10 @@ const MIN_PARABOLA: usize = 8;
 /// A parabola through the bin alone is used where the bend is more than this many standard errors of
 /// the mean.
 const BENT: f64 = 1.0;
+/// A bin with a bend of more than this many standard errors of its mean is halved, as long as its
+/// halves have so many rows.
+const SPLIT: f64 = 0.5;
+const MIN_SPLIT: usize = 5;
 /// Rows whose worth the scatter of all bins has in that of one bin.
 const PRIOR: f64 = 20.0;
 /// Variances of bins that noise would exceed as seldom as a normal deviate exceeds this value do not
@@ -293,10 +297,10 @@ impl Data {
                     .collect();
                 let share = (count * segment.rows.len()).div_ceil(rows).max(2);
                 let ranges = bins(&segment.distance, &segment.values, &errors, share);
-                let made: Vec<Bin> = ranges
-                    .into_iter()
-                    .map(|range| Bin::of(&segment, &errors, range))
-                    .collect();
+                let mut made = Vec::new();
+                for range in ranges {
+                    Bin::add(&segment, &errors, range, &mut made);
+                }
                 binned.push((index, segment.rows.to_vec(), made));
             }
         }
@@ -357,6 +361,23 @@ struct Fits {
 }
 
 impl Bin {
+    /// Adds the bin of these rows, in halves if the curve bends too much in it.
+    fn add(segment: &Segment<'_>, errors: &[f64], range: Range<usize>, to: &mut Vec<Self>) {
+        let bin = Self::of(segment, errors, range);
+        let bends = bin.fits.iter().zip(errors).any(|(fits, error)| {
+            let bent = |of: &Fits| of.bend.0.abs() * (of.count as f64).sqrt() > SPLIT * error;
+            fits.as_ref().is_some_and(bent)
+        });
+        if bends && bin.range.len() >= 2 * MIN_SPLIT {
+            let middle = bin.range.start + bin.range.len() / 2;
+            for half in [bin.range.start..middle, middle..bin.range.end] {
+                Self::add(segment, errors, half, to);
+            }
+        } else {
+            to.push(bin);
+        }
+    }
+
     fn of(segment: &Segment<'_>, errors: &[f64], range: Range<usize>) -> Self {
         let around = neighbourhood(&segment.values, errors, &range);
         let fits = segment.values.iter().map(|values| {

@@ -274,6 +274,35 @@ def test_a_distance_left_to_the_setpoint_is_solved_for(physical):
     assert physical.setpoint_distances is None
 
 
+def test_a_diagram_has_the_shares_of_its_attractors(regular):
+    ds = nanotap.branch(
+        regular, parameter="omega", from_=3.0, to=3.2, diagram=True, values=3, starts=8
+    )
+    assert ds.attractor_number.dims == ("attractor",)
+    first = ds.attractor_number.values == ds.attractor_number.values[0]
+    assert ds.attractor_parameter.values[first] == pytest.approx([3.0, 3.1, 3.2])
+    assert set(ds.attractor_classification.values[first]) == {"periodic"}
+    assert ds.attractor_share.attrs["units"] == "1"
+    assert (ds.attractor_share.values <= 1).all()
+
+
+def test_events_are_located_on_branches(regular):
+    value = float(nanotap.orbit(regular.with_(omega=3.1)).tip_max)
+    ds = nanotap.branch(
+        regular,
+        parameter="omega",
+        from_=3.0,
+        to=3.2,
+        event=f"tip_max = {value!r}",
+        second="alpha4=19:21",
+    )
+    assert 3.1 == pytest.approx(float(ds.event_parameter[0]), abs=1e-9)
+    assert ds.event_name.values[0].startswith("tip_max")
+    of_event = ds.locus_kind.values == "event"
+    assert of_event.any()
+    assert float(np.abs(ds.locus_second.values[of_event] - 20).min()) < 1e-9
+
+
 def test_physical_quantities_vary(physical):
     ds = nanotap.branch(
         physical, parameter="gap.tip", from_="19 nm", to="18 nm", max_step=0.1
@@ -306,11 +335,11 @@ def test_physical_quantities_vary(physical):
     # The distance of a setpoint is solved, and the motion there has its amplitude.
     swept = nanotap.sweep(
         physical,
-        over={"drive.setpoint": [0.8, 0.9]},
+        over={"drive.setpoint": [0.85, 0.9]},
         where="regime = repulsive",
         periods=2,
     )
-    np.testing.assert_allclose(swept.first_harmonic[:, 0], [16e-9, 18e-9], rtol=1e-6)
+    np.testing.assert_allclose(swept.first_harmonic[:, 0], [17e-9, 18e-9], rtol=1e-6)
     assert float(swept.distance[0, 0]) < float(swept.distance[1, 0])
     assert swept.holds.values.tolist() == [True, True]
     with pytest.raises(ValueError, match="did you mean `F_max`"):

@@ -80,4 +80,4 @@ def test_examples_in_docstrings_hold():
                 runner.run(test)
     assert runner.summarize().failed == 0
     without = set(_signatures.__all__) - tested
-    assert without <= {"fit", "reconstruct", "scan", "fm", "force_curve"}, without
+    assert without <= {"fit", "reconstruct", "scan"}, without

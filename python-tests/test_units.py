@@ -39,8 +39,9 @@ ARGUMENTS = {
         "starts": 2,
     },
 }
-# They need measured data, a table [scan], or no case.
+# They need measured data, a table [scan], a second tone, or no case.
 ELSEWHERE = {
+    "bimodal",
     "fit",
     "reconstruct",
     "scan",
@@ -130,7 +131,7 @@ def _same(study, ds, back):
     "key", ["drive.frequency", "cantilever.Q", "gap.tip", "sample.stiffness"]
 )
 def test_arrays_sweeps_branches_and_derivatives_hold_the_same(lever, key):
-    """The drive's own force stays, whoever is asked."""
+    """The drive's own force stays in every study."""
     here = {
         "drive.frequency": 75e3,
         "cantilever.Q": 200.0,

@@ -197,6 +197,12 @@ CASE = ">>> case = nanotap.Case.paper(omega=3)"
 
 # One call of each study with the answer, after `case = nanotap.Case.paper(omega=3)`; the tests run
 # them.
+LEVER = """>>> lever = nanotap.Case(
+...     cantilever={"k": "2 N/m", "f0": "70 kHz", "Q": 100},
+...     sample={"stiffness": "5 N/m"},
+...     drive={"actuation": "tip", "frequency_ratio": 1, "free_amplitude": "10 nm"},
+...     gap={"tip": "8 nm"},
+... )"""
 EXAMPLES = {
     "modes": """
 >>> nanotap.modes(case).free.round(3).tolist()
@@ -254,6 +260,40 @@ array([0.0149, 2.8522, 4.4282])
     "contact-laws": """
 >>> [sample.contact for sample in nanotap.contact_laws(case, progress=False).samples]
 ['spring-damper', 'kelvin-voigt', 'standard-linear-solid']
+""",
+    "noise": f"""
+{LEVER}
+>>> found = nanotap.noise(lever)
+>>> print(f"{{found.thermal_rms:.3e}} m, {{found.amplitude_rms:.2e}} m")
+4.509e-11 m, 1.08e-11 m
+""",
+    "fm": f"""
+{LEVER}
+>>> curve = nanotap.fm(lever, points=2, from_="12 nm", to="9 nm", progress=False)
+>>> row = curve.table[1]
+>>> print(f"{{row.zc:.1e}} m: {{row.modulation_si.frequency_shift:.1f}} Hz")
+9.0e-09 m: 1323.3 Hz
+""",
+    "force-curve": f"""
+{LEVER}
+>>> curve = nanotap.force_curve(lever, progress=False)
+>>> print(f"{{curve.peak_force:.3e}} N")
+1.597e-09 N
+""",
+    "bimodal": """
+>>> lever = nanotap.Case(
+...     modes=2,
+...     cantilever={"k": "2 N/m", "f0": "70 kHz", "Q": 150},
+...     tip={"radius": "10 nm"},
+...     sample={"law": "hertz", "modulus": "1 GPa", "poisson": 0.3},
+...     drive={
+...         "actuation": "tip", "frequency_ratio": 1, "free_amplitude": "40 nm",
+...         "second_ratio": 6.27, "second_free_amplitude": "0.1 nm", "setpoint": 0.8,
+...     },
+... )
+>>> last = nanotap.bimodal(lever, progress=False).table[-1]
+>>> print(f"{last.tones[1].frequency_shift:.1f} Hz, {last.estimates.reduced_modulus:.3e} Pa by the formula")
+1035.7 Hz, 1.120e+09 Pa by the formula
 """,
 }
 

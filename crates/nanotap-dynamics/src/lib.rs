@@ -57,8 +57,8 @@ pub use classify::{
 pub use codim1_curves::{BifurcationCurve, CurveEnd, CurveOptions, CurvePoint, trace_curve};
 pub use continuation::{
     Bifurcation, BifurcationKind, Branch, BranchEnd, BranchPoint, ContinuationError,
-    ContinuationOptions, Diagram, DiagramBranch, DiagramOptions, Direction, OrbitTangency,
-    assemble_diagram, continue_orbit, switch_at_flip,
+    ContinuationOptions, Criticality, Diagram, DiagramBranch, DiagramOptions, Direction,
+    OrbitTangency, assemble_diagram, continue_orbit, switch_at_flip,
 };
 pub use control::{CancelFlag, Control};
 pub use failure::MapFailure;

@@ -4,6 +4,7 @@
 const SVG = "http://www.w3.org/2000/svg";
 const XLINK = "http://www.w3.org/1999/xlink";
 const DRAG = 6;               // pixels beyond which a press is not a click
+const EDGE = 0.01;            // part of a panel by which a pointer may be beside it
 
 /** Inserts a drawn figure. It has one element per line, and lines that are unchanged stay: a curve that
  *  follows a control costs that curve, not every letter of the figure. */
@@ -102,14 +103,13 @@ function join(svg, letters) {
 export function under(element, clientX, clientY) {
   const svg = element.querySelector("svg");
   if (!svg || !element.panels) return null;
-  const box = svg.getBoundingClientRect();
-  const view = svg.viewBox.baseVal;
-  const px = view.x + (clientX - box.left) / box.width * view.width;
-  const py = view.y + (clientY - box.top) / box.height * view.height;
+  // The figure may be narrower than its box.
+  const { x: px, y: py } = new DOMPoint(clientX, clientY).matrixTransform(svg.getScreenCTM().inverse());
   for (const panel of element.panels) {
     const u = (px - panel.left) / panel.width;
     const v = 1 - (py - panel.top) / panel.height;
-    if (u >= 0 && u <= 1 && v >= 0 && v <= 1) return at(panel, u, v);
+    // A motion on the frame can be pointed at, too.
+    if (Math.abs(within(u) - u) < EDGE && Math.abs(within(v) - v) < EDGE) return at(panel, within(u), within(v));
   }
   return null;
 }
@@ -131,7 +131,7 @@ export function part(axis, v) {
 
 /** Text with the values of the axes at a place. */
 export function words(place) {
-  const said = (axis) => `${place.panel[axis].label.replaceAll("$", "")} ${Number(place[axis].toPrecision(6))} ${place.panel[axis].unit}`.trim();
+  const said = (axis) => `${place.panel[axis].label.replaceAll("$", "").replaceAll("_0", "₀")} ${Number(place[axis].toPrecision(6))} ${place.panel[axis].unit}`.trim();
   return `${said("x")}, ${said("y")}`;
 }
 

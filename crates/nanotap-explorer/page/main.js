@@ -1,7 +1,7 @@
 // The page: controls on the left, the lever and the main figure in the middle, what one wants to know on
 // the right, everything else below.
 
-import { state, caseText, decode, remember, theCase } from "./state.js";
+import { state, caseText, decode, remember, takeBase, theCase } from "./state.js";
 import { ask, bytes, save, stop, superseded } from "./api.js";
 import * as knobs from "./knobs.js";
 import * as lever from "./lever.js";
@@ -20,6 +20,7 @@ let moving = false;           // a slider is being moved
 let epoch = 0;                // counts links, clicks and cases: answers for earlier ones are dropped
 let displayed = null;         // the displayed motion: its case and its start
 let found = null;             // the case of the listed motions
+let searching = null;         // the case of the motions that are being searched
 let steps = 0;                // entries of the history that can be undone
 const redrawn = [];            // called when figures were redrawn
 
@@ -87,6 +88,7 @@ function show(motion, wish) {
     remember(false);
   }
   stale(false);
+  takeBase(wish.case, motion.keys);
   knobs.follows(motion.readout);
   knobs.show(motion.keys, moving);
   $("summary").textContent = `${motion.title}: ${motion.summary}`;
@@ -155,9 +157,11 @@ async function census() {
   list.replaceChildren();
   found = null;
   $("bound").textContent = "searching …";
+  searching = own;
   try {
     const answer = await ask("census", "/api/attractors", { case: theCase(), unstable: $("unstable").checked });
-    if (searched() !== own) { $("bound").textContent = "the values changed: find all again"; return; }
+    if (searched() !== own) return;
+    searching = null;
     found = { of: own, bound: answer.bound };
     list.replaceChildren(...answer.motions.map((one) => {
       const item = document.createElement("li");
@@ -176,12 +180,19 @@ async function census() {
     }));
     markCensus();
   } catch (error) {
-    if (!superseded(error)) $("bound").textContent = error.message;
+    if (superseded(error)) return;
+    searching = null;
+    $("bound").textContent = error.message;
   }
 }
 
-/** The listed motions belong to one case only. */
+/** The listed motions belong to one case only; a search for those of another one ends. */
 function markCensus() {
+  if (searching !== null && searching !== searched()) {
+    searching = null;
+    stop("census");
+    $("bound").textContent = "the values changed: find all again";
+  }
   if (!found) return;
   const other = searched() !== found.of;
   $("attractors").classList.toggle("stale", other);

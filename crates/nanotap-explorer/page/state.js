@@ -55,11 +55,22 @@ export function remember(finished) {
   return finished;
 }
 
-/** States a value, in place of all that says the same. */
+let base = { preset: "", values: new Map() };
+
+/** Takes what the preset states, from the keys of its case without changes. */
+export function takeBase({ preset, set }, keys) {
+  if (!set.length) base = { preset, values: new Map(keys.filter((key) => key.stated).map((key) => [key.name, key.value])) };
+}
+
+/** States a value, in place of all that says the same. The preset's own value is no change. */
 export function put(name, text, alternatives = []) {
   for (const other of alternatives) delete state.set[other];
-  state.set[name] = text;
+  if (text !== "" && base.preset === state.preset && base.values.get(name) === text) delete state.set[name];
+  else state.set[name] = text;
 }
+
+/** The text of a stated value, if it is known. */
+export const statedText = (name) => state.set[name] ?? (base.preset === state.preset ? base.values.get(name) : undefined);
 
 /** The case as a text, for comparison; without some keys. */
 export function caseText(without = []) {

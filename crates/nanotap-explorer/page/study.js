@@ -1,7 +1,7 @@
 // The studies: a form for each, its figure in stages of increasing resolution, and clicks that go
 // to a motion.
 
-import { state, caseText, put, remember, theCase } from "./state.js";
+import { state, caseText, put, remember, statedText, theCase } from "./state.js";
 import { ask, bytes, current, save, stream, stop, superseded } from "./api.js";
 import { sameAs } from "./knobs.js";
 import * as figure from "./figure.js";
@@ -9,7 +9,7 @@ import * as figure from "./figure.js";
 const $ = (id) => document.getElementById(id);
 const TABS = {
   approach: "Approach", diagram: "Diagram", branches: "Branches", resonance: "Resonance",
-  basin: "Basins", map: "Two parameters",
+  basin: "Basins", map: "Two parameters", plan: "Plan",
 };
 const NEAR = 0.05;            // fraction of a panel within which a click selects a drawn motion
 const PAUSE = 250;            // milliseconds after a change before an approach curve is drawn anew
@@ -31,8 +31,9 @@ const asked = () => JSON.stringify([state.preset, state.tab, state.study]);
  *  they stay along the axis, or the axis is another one. */
 function along(clicks) {
   const names = Object.values(clicks?.set ?? {}).map((key) => key.name);
-  if (names.includes("gap.tip")) return ["gap.tip", "gap.beam", "drive.setpoint"];
-  const held = Object.entries(clicks?.fixed ?? {}).every(([name, text]) => state.set[name] === text);
+  const distances = ["gap.tip", "gap.beam", "drive.setpoint"];
+  if (names.some((name) => distances.includes(name))) return [...names, ...distances];
+  const held = Object.entries(clicks?.fixed ?? {}).every(([name, text]) => statedText(name) === text);
   return held ? names : [];
 }
 
@@ -57,16 +58,28 @@ function mark() {
   point();
 }
 
+/** A value of the displayed motion on an axis; its setpoint also where the distance is stated. */
+function valueOn(axis) {
+  const si = axis && motion?.keys.find((key) => key.name === axis.name)?.si;
+  const value = axis?.name === "drive.setpoint" && !Number.isFinite(si) ? Number(motion?.readout.ratio ?? NaN) : si;
+  return axis ? value * axis.factor : NaN;
+}
+
 /** Shows the displayed motion on the figure. */
 function point() {
-  const [x] = Object.values(drawn?.clicks.set ?? {});
-  const value = x && motion?.keys.find((key) => key.name === x.name)?.si;
-  const shows = isCurrent() && Number.isFinite(value) && !drawn.clicks.set.y;
+  const { x, y } = drawn?.clicks.set ?? {};
+  if (x && y) {
+    const shows = isCurrent() && Number.isFinite(valueOn(x));
+    figure.present($("study-figure"), shows ? { x: valueOn(x), heights: [valueOn(y)] } : null);
+    return;
+  }
+  const value = valueOn(x);
+  const shows = isCurrent() && Number.isFinite(value);
   const heights = (drawn?.clicks.heights ?? []).map(({ name, factor }) => {
     const row = motion?.observables.find((one) => one.name === name);
     return row && (factor === null ? Number.parseFloat(row.shown) : factor * row.value);
   });
-  figure.present($("study-figure"), shows ? { x: value * x.factor, heights } : null);
+  figure.present($("study-figure"), shows ? { x: value, heights } : null);
 }
 
 /** `motionChanged` is called when a click selected another motion. */

@@ -50,7 +50,7 @@ pub(crate) fn study_command(
             Value::Bool(true) => {
                 let _ = write!(line, " --{flag}");
             }
-            Value::Array(values) if option == "over" => {
+            Value::Array(values) if ["over", "where"].contains(&option.as_str()) => {
                 for value in values {
                     let _ = write!(line, " --{flag} {}", quoted(&text(value)));
                 }

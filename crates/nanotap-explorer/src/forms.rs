@@ -10,6 +10,13 @@ use serde_json::{Value, json};
 use crate::knobs;
 use crate::maps::Shows;
 
+/// The choice of a field that sets no condition.
+pub(crate) const ANY: &str = "any";
+/// The choice of a field that excludes a second motion.
+pub(crate) const ONE_STATE: &str = "no second one";
+/// Peak force that an ordinary polymer survives.
+const GENTLE: &str = "1 nN";
+
 /// The fields of the forms with their initial values.
 pub(crate) fn forms(case: &Case, base: &Case, model: &Model) -> Value {
     let keys: Vec<Key> = knobs::keys(case)
@@ -71,6 +78,28 @@ pub(crate) fn forms(case: &Case, base: &Case, model: &Model) -> Value {
         vec![shown],
     ]
     .concat();
+    // A lever is planned over its free amplitude and setpoint, an equation over its numbers.
+    let (across, up) = if case.is_physical() {
+        let mut up = parameter("2", Some(Key::DriveSetpoint), 0.0);
+        up[0]["choices"] = json!([Key::DriveSetpoint.path()]);
+        for (field, value) in [(1, "0.5"), (2, "0.95")] {
+            up[field]["value"] = json!(value);
+        }
+        let mut across = parameter("1", named(&[Key::DriveFreeAmplitude]), 0.5);
+        across[0]["choices"] = json!([Key::DriveFreeAmplitude.path()]);
+        (across, up)
+    } else {
+        (parameter("1", second, 0.5), parameter("2", frequency, band))
+    };
+    let force = if case.is_physical() { GENTLE } else { "" };
+    let conditions = vec![
+        json!({ "name": "force", "words": "peak force below", "value": force, "hint": ANY }),
+        json!({ "name": "regime", "words": "regime", "value": ANY,
+            "choices": [ANY, "attractive", "repulsive"] }),
+        json!({ "name": "states", "words": "motions", "value": ONE_STATE,
+            "choices": [ONE_STATE, ANY] }),
+    ];
+    let plan = [across, up, conditions].concat();
     let slice = [entry("x", 0), entry("y", velocity)].concat();
     json!({
         "diagram": parameter("", frequency, band),
@@ -81,6 +110,7 @@ pub(crate) fn forms(case: &Case, base: &Case, model: &Model) -> Value {
             json!({ "name": "to", "words": "to", "value": "", "hint": "0" }),
         ],
         "map": plane,
+        "plan": plan,
         "basin": slice,
     })
 }

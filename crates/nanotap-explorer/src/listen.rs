@@ -53,7 +53,19 @@ pub(crate) async fn whole(request: Request, next: Next) -> Response {
     let read = axum::body::to_bytes(body, crate::LONGEST_REQUEST);
     match tokio::time::timeout(LONGEST_ARRIVAL, read).await {
         Ok(Ok(bytes)) => next.run(Request::from_parts(head, Body::from(bytes))).await,
-        Ok(Err(_)) => StatusCode::PAYLOAD_TOO_LARGE.into_response(),
-        Err(_) => StatusCode::REQUEST_TIMEOUT.into_response(),
+        Ok(Err(_)) => {
+            let words = format!(
+                "expected at most {} bytes in a request",
+                crate::LONGEST_REQUEST
+            );
+            (StatusCode::PAYLOAD_TOO_LARGE, words).into_response()
+        }
+        Err(_) => {
+            let words = format!(
+                "the request did not arrive in {} s",
+                LONGEST_ARRIVAL.as_secs()
+            );
+            (StatusCode::REQUEST_TIMEOUT, words).into_response()
+        }
     }
 }

@@ -13,6 +13,7 @@ use nanotap::figure::approach::approach_figure;
 use nanotap::figure::basin::figure as basin_figure;
 use nanotap::figure::branch::{Shown, case_figure};
 use nanotap::figure::sweep::{figure as sweep_figure, response as response_figure};
+use nanotap::figure::window::figure as window_figure;
 use nanotap::model::Model;
 use nanotap::observe::time_series::state_names;
 use nanotap::study::approach::ApproachStudy;
@@ -20,6 +21,7 @@ use nanotap::study::branch::{BranchReport, BranchStudy};
 use nanotap::study::registry::{Study, study as study_named};
 use nanotap::study::request::read;
 use nanotap::study::sweep::Over;
+use nanotap::study::window::Window;
 use nanotap_figures::{Axis as Axes, Figure, Panel};
 use serde::Deserialize;
 use serde_json::{Map, Value, json};
@@ -29,6 +31,7 @@ use crate::api_error::ApiError;
 use crate::clicks::{self, Axis, Height};
 use crate::commands::{study_command, study_python};
 use crate::figures::drawn;
+use crate::forms;
 use crate::maps::{self, Shows};
 use crate::motion_request::{Start, model_of};
 use crate::preset::CaseSpec;
@@ -39,13 +42,17 @@ const DIAGRAM: [usize; 3] = [30, 120, 400];
 /// Numbers of values along each axis in the stages of a map.
 const MAP: [usize; 3] = [8, 20, 48];
 /// Numbers of points along each axis in the stages of a basin.
-const BASIN: [usize; 3] = [40, 120, 300];
+const BASIN: [usize; 4] = [12, 40, 120, 300];
 /// Numbers of distances in each direction in the stages of an approach curve.
 const APPROACH: [usize; 2] = [40, 150];
 /// Numbers of values with a census in the stages of a diagram of branches.
 const BRANCHES: [usize; 2] = [5, 15];
 /// Number of values with a census for branches that are drawn over another figure.
 const OVERLAID: usize = 7;
+/// Numbers of values along each axis in the stages of a plan.
+const PLAN: [usize; 2] = [6, 14];
+/// Initial states at each point of a plan.
+const PLAN_STARTS: usize = 4;
 /// Observables in the panels of an approach curve.
 const APPROACH_SHOWS: [&str; 4] = ["first_harmonic", "phase", "dissipation", "peak_force"];
 /// Initial states at each value of a diagram, and of a map.
@@ -74,6 +81,7 @@ enum Tab {
     Approach,
     Basin,
     Map,
+    Plan,
 }
 
 pub(crate) async fn study(
@@ -118,6 +126,7 @@ impl Studied<'_> {
             Tab::Diagram => self.sweep(&DIAGRAM, STARTS.0, false),
             Tab::Resonance => self.sweep(&DIAGRAM[..2], 0, true),
             Tab::Map => self.map(),
+            Tab::Plan => self.plan(),
             Tab::Branches => self.branches(),
             Tab::Approach => self.approach(),
             Tab::Basin => self.basin(),
@@ -280,6 +289,42 @@ impl Studied<'_> {
                 clicks: &json!({ "set": { "x": x, "y": y }, "fixed": fixed }),
                 words: progress(count.pow(2), finest.pow(2), "values"),
                 studies: &[("sweep", &options)],
+            })
+        })
+    }
+
+    /// Where, over two parameters, every motion meets the conditions of the form.
+    fn plan(&self) -> Result<(), ApiError> {
+        let case = self.request.case.any_distance(self.app)?;
+        let mut wanted = Vec::new();
+        if let Ok(force) = self.field("force") {
+            wanted.push(format!("F_max < {force}"));
+        }
+        match self.field("regime")? {
+            forms::ANY => {}
+            regime => wanted.push(format!("regime = {regime}")),
+        }
+        if self.field("states")? == forms::ONE_STATE {
+            wanted.push("states = 1".to_owned());
+        }
+        self.stages(&PLAN, |count, finest| {
+            let over = [self.over(&case, "1", count)?, self.over(&case, "2", count)?];
+            let texts: Vec<&String> = over.iter().map(|(text, _)| text).collect();
+            let options = object(json!({ "over": texts, "starts": PLAN_STARTS, "where": wanted }));
+            let [x, y] = [&over[0].1, &over[1].1].map(|over| Axis::of(over).json());
+            let fixed = clicks::fixed(&case, &[over[0].1.key, over[1].1.key]);
+            let (figure, safe) = self.dataset(&case, "window", &options, |store| {
+                let window = Window::of(store).map_err(ApiError::of)?;
+                Ok((window_figure(store).map_err(ApiError::of)?, window.targets))
+            })?;
+            let safe = safe.map_or_else(String::new, |targets| {
+                format!("; all conditions hold at {:.0} %", 100.0 * targets.share)
+            });
+            self.hand(&Stage {
+                figure,
+                clicks: &json!({ "set": { "x": x, "y": y }, "fixed": fixed }),
+                words: progress(count.pow(2), finest.pow(2), "points") + &safe,
+                studies: &[("window", &options)],
             })
         })
     }

@@ -154,7 +154,7 @@ fn curve(report: &BimodalReport) -> Table {
     table
 }
 
-/// The last motion, with the formulas beside it.
+/// The last motion, and the values of the formulas.
 fn at(point: &BimodalPoint, report: &BimodalReport) -> String {
     let mut table = Table::new([
         ("", Align::Left),

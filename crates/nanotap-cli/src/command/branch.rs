@@ -9,7 +9,9 @@ use nanotap::case::units::Units;
 use nanotap::figure::branch::{Shown, case_figure};
 use nanotap::number::shortest;
 use nanotap::observe::{ObservableSet, columns, time_series};
-use nanotap::study::branch::{BranchOptions, BranchReport, BranchStudy, PointReport};
+use nanotap::study::branch::{
+    AttractorShare, BranchOptions, BranchReport, BranchStudy, PointReport,
+};
 use nanotap::study::orbit::spectral_radius;
 
 use crate::arguments::{CaseArguments, OutArgument, PlotArgument};
@@ -264,9 +266,10 @@ fn text(case: &GivenCase, report: &BranchReport) -> String {
             ("", Align::Left),
         ]);
         for b in &report.bifurcations {
-            let extra = b
-                .angle
-                .map_or_else(String::new, |a| format!("pair at {a:.2}°"));
+            let pair = b.angle.map(|angle| format!("pair at {angle:.2}°"));
+            let extra: Vec<String> = (b.criticality.map(str::to_owned).into_iter())
+                .chain(pair)
+                .collect();
             table.row([
                 (b.branch + 1).to_string(),
                 b.kind.to_owned(),
@@ -278,17 +281,42 @@ fn text(case: &GivenCase, report: &BranchReport) -> String {
                     length(b.observables.tip_max)
                 ),
                 number::significant(100.0 * b.observables.contact_fraction, 4),
-                extra,
+                extra.join(", "),
             ]);
         }
         text.push_str(&table.render());
+    }
+    if !report.events.is_empty() {
+        let _ = writeln!(text, "\n  {}", style::bold("events"));
+        let mut table = Table::new([
+            ("branch", Align::Right),
+            ("", Align::Left),
+            (report.parameter, Align::Left),
+            ("period", Align::Right),
+            ("", Align::Left),
+        ]);
+        for found in &report.events {
+            let point = &found.point;
+            table.row([
+                (point.branch + 1).to_string(),
+                found.event.clone(),
+                shown(point.parameter, 10),
+                point.period.to_string(),
+                if point.stable { "stable" } else { "unstable" }.to_owned(),
+            ]);
+        }
+        text.push_str(&table.render());
+    }
+    if !report.attractors.is_empty() {
+        let _ = writeln!(text, "\n  {}", style::bold("attractors of the census"));
+        text.push_str(&attractors(report, |value| shown(value, 6)));
     }
     if let Some(loci) = &report.loci {
         let _ = writeln!(
             text,
             "\n  {}",
             style::bold(&format!(
-                "bifurcation curves in {} and {}",
+                "curves in {} and {}",
                 report.parameter, loci.second
             ))
         );
@@ -307,7 +335,7 @@ fn text(case: &GivenCase, report: &BranchReport) -> String {
         };
         for curve in &loci.curves {
             table.row([
-                curve.kind.to_owned(),
+                curve.event.clone().unwrap_or_else(|| curve.kind.to_owned()),
                 curve.period.to_string(),
                 curve.first.len().to_string(),
                 range(report.key, &curve.first),
@@ -319,4 +347,53 @@ fn text(case: &GivenCase, report: &BranchReport) -> String {
     }
     text.push_str(&failures(report, |value| shown(value, 8)));
     text
+}
+
+/// A row an attractor: where it exists, and its least and greatest share. Motions that are not
+/// joined from value to value count together.
+fn attractors(report: &BranchReport, shown: impl Fn(f64) -> String) -> String {
+    let mut table = Table::new([
+        ("", Align::Right),
+        ("motion", Align::Left),
+        (report.parameter, Align::Left),
+        ("share (%)", Align::Left),
+    ]);
+    let is_orbit = |one: &AttractorShare| one.period > 0;
+    let mut groups: Vec<(Option<usize>, Vec<&AttractorShare>)> = Vec::new();
+    for one in &report.attractors {
+        let number = is_orbit(one).then_some(one.attractor);
+        let same = |(of, all): &&mut (Option<usize>, Vec<&AttractorShare>)| {
+            *of == number && (number.is_some() || all[0].classification == one.classification)
+        };
+        match groups.iter_mut().find(same) {
+            Some((_, all)) => all.push(one),
+            None => groups.push((number, vec![one])),
+        }
+    }
+    for (number, all) in groups {
+        let (first, last) = (all[0], all[all.len() - 1]);
+        let low = all.iter().map(|one| one.share).fold(1.0, f64::min);
+        let high = all.iter().map(|one| one.share).fold(0.0, f64::max);
+        let motion = if is_orbit(first) {
+            format!("period {}", first.period)
+        } else {
+            first.classification.to_owned()
+        };
+        let percent = |share: f64| number::significant(100.0 * share, 3);
+        table.row([
+            number.map_or_else(String::new, |number| (number + 1).to_string()),
+            motion,
+            if all.len() > 1 {
+                format!("{} … {}", shown(first.parameter), shown(last.parameter))
+            } else {
+                shown(first.parameter)
+            },
+            if low < high {
+                format!("{} … {}", percent(low), percent(high))
+            } else {
+                percent(low)
+            },
+        ]);
+    }
+    table.render()
 }

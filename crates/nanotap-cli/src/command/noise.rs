@@ -37,6 +37,10 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     output.study(&case, &report, |report| text(&case, report))
 }
 
+/// Standard deviations to the boundary of a basin below which noise crosses it within seconds: at 5,
+/// about once in 300,000 correlation times.
+const OFTEN: f64 = 5.0;
+
 fn text(case: &GivenCase, report: &NoiseReport) -> String {
     let length = |value| Kind::Length.format_digits(value, 4);
     let degrees = |value| format!("{}°", number::significant(value, 4));
@@ -73,6 +77,20 @@ fn text(case: &GivenCase, report: &NoiseReport) -> String {
         length(report.thermal_rms),
         Kind::Stiffness.format_digits(report.force_gradient_min, 4),
     );
+    let saddle = report.saddle.map_or_else(String::new, |saddle| {
+        let rare = if saddle.deviations < OFTEN {
+            ": thermal noise takes the lever across it often"
+        } else {
+            ""
+        };
+        format!(
+            "The boundary of the basin, near the unstable orbit with A = {} and a phase of {}, is about {} standard \
+             deviations away{rare}.",
+            length(saddle.amplitude),
+            degrees(saddle.phase),
+            number::significant(saddle.deviations, 2)
+        )
+    });
     let stiffness = |value| Kind::Stiffness.format_digits(value, 4);
     let calibrations = report.calibrations.map_or_else(String::new, |found| {
         let sader = found.sader.map_or_else(String::new, |value| {
@@ -87,10 +105,13 @@ fn text(case: &GivenCase, report: &NoiseReport) -> String {
         )
     });
     format!(
-        "{}\n\n{}\n{}{}",
+        "{}\n\n{}\n{}",
         style::bold(&heading),
         table.render(),
-        motion::paragraph(&filter),
-        motion::paragraph(&calibrations)
+        [filter, saddle, calibrations]
+            .iter()
+            .filter(|words| !words.is_empty())
+            .map(|words| motion::paragraph(words))
+            .collect::<String>()
     )
 }

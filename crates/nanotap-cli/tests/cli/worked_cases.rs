@@ -174,7 +174,7 @@ fn every_document_has_a_test() {
     );
 }
 
-/// The gallery shows commands of other pages, which are run there, and some of its own.
+/// The gallery shows commands of other pages, which are run there, and further ones.
 #[test]
 fn the_gallery() {
     let pages = documents();
@@ -235,12 +235,12 @@ follows! {
     the_samples: "samples.md", 5 commands, 30 numbers;
     the_reconstruction: "reconstruct.md", 1 commands, 0 numbers;
     the_force_curve: "force-curve.md", 3 commands, 23 numbers;
-    the_thermal_noise: "noise.md", 2 commands, 8 numbers;
+    the_thermal_noise: "noise.md", 3 commands, 11 numbers;
     bimodal_operation: "bimodal.md", 4 commands, 18 numbers;
     the_scan: "scan.md", 4 commands, 19 numbers;
     the_force_table: "table.md", 2 commands, 6 numbers;
     the_stiff_lever: "stiff-lever.md", 3 commands, 4 numbers;
     the_tip_mass: "tip-mass.md", 3 commands, 6 numbers;
-    the_tutorial_of_the_dynamicist: "dynamicist.md", 7 commands, 31 numbers;
+    the_tutorial_of_the_dynamicist: "dynamicist.md", 7 commands, 32 numbers;
     the_tutorial_of_the_microscopist: "microscopist.md", 6 commands, 22 numbers;
 }

@@ -21,6 +21,7 @@
 use nalgebra::Complex;
 use nanotap_arithmetic::ComplexFunctions as _;
 
+use crate::continuation::criticality::{Criticality, criticality};
 use crate::continuation::solver::{BranchSolver, Node, OrbitTangency};
 use crate::map::MapFamily;
 use crate::orbit::PeriodicOrbit;
@@ -58,6 +59,9 @@ pub struct Bifurcation {
     pub kind: BifurcationKind,
     /// Parameter value.
     pub parameter: f64,
+    /// Whether the motion that a flip or a Neimark–Sacker bifurcation creates is on the unstable
+    /// side; `None` for the other kinds, and where it is not known.
+    pub criticality: Option<Criticality>,
     /// Width of the final bracket, in units of the parameter.
     pub uncertainty: f64,
     /// The orbit at the bifurcation. At a fold or crossing its error estimate is large, because the
@@ -365,6 +369,7 @@ pub(crate) fn between<F: MapFamily>(
         .filter_map(|(kind, zero)| {
             Some(Bifurcation {
                 kind,
+                criticality: criticality(solver, &zero.node, kind),
                 parameter: zero.node.parameter,
                 uncertainty: zero.uncertainty,
                 orbit: solver.orbit(&zero.node).ok()?,

@@ -32,6 +32,7 @@ pub(crate) fn dead_end<F: MapFamily>(
         let parameter = touch.node.parameter;
         branch.bifurcations.push(Bifurcation {
             kind: BifurcationKind::Grazing { time: touch.time },
+            criticality: None,
             parameter,
             uncertainty: touch.uncertainty,
             orbit,
@@ -49,6 +50,7 @@ pub(crate) fn dead_end<F: MapFamily>(
     {
         branch.bifurcations.push(Bifurcation {
             kind: BifurcationKind::Grazing { time },
+            criticality: None,
             parameter,
             uncertainty: (parameter - node.parameter).abs(),
             orbit,

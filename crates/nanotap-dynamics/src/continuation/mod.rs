@@ -14,6 +14,7 @@
 
 pub mod bifurcation;
 mod bifurcation_tasks;
+mod criticality;
 pub mod diagram;
 mod end;
 mod follow;
@@ -32,6 +33,7 @@ use crate::orbit::{PeriodicOrbit, ShootingError};
 use follow::{check, follow, solver_for};
 
 pub use bifurcation::{Bifurcation, BifurcationKind};
+pub use criticality::Criticality;
 pub use diagram::{Diagram, DiagramBranch, DiagramOptions, assemble_diagram};
 pub use solver::OrbitTangency;
 pub use switching::switch_at_flip;

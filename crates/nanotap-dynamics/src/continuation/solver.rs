@@ -4,7 +4,7 @@
 //! by a state scale and a parameter scale. The tangent follows from (DP − 1, ∂P/∂λ) with the
 //! previous tangent as border, which preserves its orientation.
 
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DVector};
 
 use crate::failure::{MapFailure, advance_with_tangencies, finite};
 use crate::map::{MapFamily, StroboscopicMap};
@@ -410,6 +410,35 @@ impl<'a, F: MapFamily> BranchSolver<'a, F> {
             slope: slope / length,
             iterations,
         })
+    }
+
+    /// Jacobian of all periods together, of the continuous entries, from the first state of a node or
+    /// from a state displaced from it.
+    pub(crate) fn monodromy(
+        &mut self,
+        node: &Node,
+        displacement: Option<&DVector<f64>>,
+    ) -> Option<DMatrix<f64>> {
+        let (d, c, n) = (self.d, self.continuous, self.n);
+        let touches = self.passes_touches;
+        let map = Self::map_at(self.family, &mut self.map, node.parameter, touches).ok()?;
+        let mut state = node.points[..d].to_vec();
+        for (x, by) in state[..c]
+            .iter_mut()
+            .zip(displacement.into_iter().flatten())
+        {
+            *x += by;
+        }
+        let mut product = DMatrix::identity(c, c);
+        let mut jacobian = DMatrix::zeros(d, d);
+        for _ in 0..n {
+            map.advance_with_jacobian(&mut state, &mut jacobian).ok()?;
+            product = jacobian.view((0, 0), (c, c)) * product;
+        }
+        product
+            .iter()
+            .all(|value| value.is_finite())
+            .then_some(product)
     }
 
     /// All tangencies of an orbit, in order of time.

@@ -10,8 +10,10 @@
 //! rounding, as in any method. A QR iteration that does not converge is an error.
 
 use nalgebra::linalg::balancing::balance_parlett_reinsch;
-use nalgebra::{Complex, DMatrix, Schur};
+use nalgebra::{Complex, DMatrix, DVector, Schur};
 use nanotap_arithmetic::ComplexFunctions as _;
+
+use crate::vector::unit;
 
 /// A multiplier whose modulus is within this of 1 is marginal: the motion needs ten million periods
 /// to grow or decay by a factor e. A double multiplier on the unit circle (an undamped system) is
@@ -125,6 +127,32 @@ impl Multipliers {
     pub fn stability(&self) -> Stability {
         stability_of(&self.values)
     }
+}
+
+/// Inverse iterations for an eigenvector: each gains as many digits as the multiplier has.
+const INVERSE_ITERATIONS: usize = 4;
+
+/// The eigenvector of unit length of a real matrix with one of its eigenvalues, by inverse iteration;
+/// `None` if it is not finite.
+pub fn eigenvector(
+    matrix: &DMatrix<f64>,
+    eigenvalue: Complex<f64>,
+) -> Option<DVector<Complex<f64>>> {
+    let n = matrix.nrows();
+    // Off the eigenvalue by a little, so that the matrix can be inverted.
+    let shift = eigenvalue + Complex::new(1e-10, 1e-10);
+    let shifted =
+        matrix.map(|value| Complex::new(value, 0.0)) - DMatrix::from_diagonal_element(n, n, shift);
+    let decomposed = shifted.lu();
+    let mut vector = DVector::from_fn(n, |k, _| Complex::new(unit(k as u64) + 0.5, 0.0));
+    for _ in 0..INVERSE_ITERATIONS {
+        vector = decomposed.solve(&vector)?;
+        vector /= Complex::new(vector.norm(), 0.0);
+    }
+    vector
+        .iter()
+        .all(|z| z.re.is_finite() && z.im.is_finite())
+        .then_some(vector)
 }
 
 /// Stability of an orbit with these multipliers.

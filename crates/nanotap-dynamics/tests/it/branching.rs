@@ -5,7 +5,7 @@ use std::convert::Infallible;
 use nanotap_arithmetic::ComplexFunctions as _;
 use nanotap_dynamics::{
     Bifurcation, BifurcationKind, Branch, BranchEnd, ContinuationError, ContinuationOptions,
-    Control, DMatrix, Direction, MapFamily, PeriodicOrbit, ShootingOptions, Stability,
+    Control, Criticality, DMatrix, Direction, MapFamily, PeriodicOrbit, ShootingOptions, Stability,
     StroboscopicMap, Tangency, close_orbit, continue_orbit, switch_at_flip,
 };
 
@@ -128,6 +128,99 @@ fn a_branch_ends_where_its_multiplier_exceeds_the_limit() {
     assert!(!b.end.is_failure());
     let before = &b.points[b.points.len() - 2].orbit;
     assert!(before.spectral_radius() <= 1.5);
+}
+
+/// x → −(1 + λ) x + a x² + c x³ (x is the fixed point 0): a flip at λ = 0, supercritical for a² + c > 0
+/// (Kuznetsov, section 4.5).
+#[derive(Clone, Debug)]
+struct Doubling {
+    rate: f64,
+    quadratic: f64,
+    cubic: f64,
+}
+
+impl Formula for Doubling {
+    const DIMENSION: usize = 1;
+    fn image(&self, x: &[f64], out: &mut [f64]) {
+        out[0] = x[0] * (-1.0 - self.rate + x[0] * (self.quadratic + self.cubic * x[0]));
+    }
+    fn jacobian(&self, x: &[f64], out: &mut DMatrix<f64>) {
+        out[(0, 0)] = -1.0 - self.rate + x[0] * (2.0 * self.quadratic + 3.0 * self.cubic * x[0]);
+    }
+    fn derivative(&self, x: &[f64], out: &mut [f64]) {
+        out[0] = -x[0];
+    }
+}
+
+/// z → e^{i} z (1 + λ + s |z|²): the torus is at |z|² = −λ/s.
+#[derive(Clone, Debug)]
+struct Spiral {
+    rate: f64,
+    sign: f64,
+}
+
+impl Formula for Spiral {
+    const DIMENSION: usize = 2;
+    fn image(&self, x: &[f64], out: &mut [f64]) {
+        let (s, c) = 1.0f64.sin_cos();
+        let r = 1.0 + self.rate + self.sign * (x[0] * x[0] + x[1] * x[1]);
+        out[0] = r * (c * x[0] - s * x[1]);
+        out[1] = r * (s * x[0] + c * x[1]);
+    }
+    fn jacobian(&self, x: &[f64], out: &mut DMatrix<f64>) {
+        let (s, c) = 1.0f64.sin_cos();
+        let r = 1.0 + self.rate + self.sign * (x[0] * x[0] + x[1] * x[1]);
+        let turned = [c * x[0] - s * x[1], s * x[0] + c * x[1]];
+        let turn = [[c, -s], [s, c]];
+        for i in 0..2 {
+            for j in 0..2 {
+                out[(i, j)] = r * turn[i][j] + 2.0 * self.sign * turned[i] * x[j];
+            }
+        }
+    }
+    fn derivative(&self, x: &[f64], out: &mut [f64]) {
+        let (s, c) = 1.0f64.sin_cos();
+        out[0] = c * x[0] - s * x[1];
+        out[1] = s * x[0] + c * x[1];
+    }
+}
+
+fn doubling(quadratic: f64, cubic: f64, rate: f64) -> Doubling {
+    Doubling {
+        rate,
+        quadratic,
+        cubic,
+    }
+}
+
+fn criticalities(branch: &Branch) -> Vec<Criticality> {
+    let bifurcations = branch.bifurcations.iter();
+    bifurcations.filter_map(|b| b.criticality).collect()
+}
+
+/// Where the parameter passes 0, of the fixed point 0.
+fn at_zero<F: Formula>(map: fn(f64) -> F) -> Vec<Criticality> {
+    let origin = vec![0.0; F::DIMENSION];
+    criticalities(&branch(&Family(map), -0.1, &origin, 1, 0.1, (-0.1, 0.1)))
+}
+
+#[test]
+fn the_criticality_is_that_of_the_normal_form() {
+    use Criticality::{Subcritical, Supercritical};
+    assert_eq!(at_zero(|rate| doubling(0.0, 1.0, rate)), [Supercritical]);
+    assert_eq!(at_zero(|rate| doubling(0.0, -1.0, rate)), [Subcritical]);
+    assert_eq!(at_zero(|rate| doubling(1.0, -0.9, rate)), [Supercritical]);
+    assert_eq!(at_zero(|rate| doubling(1.0, -1.1, rate)), [Subcritical]);
+    assert_eq!(at_zero(|rate| Spiral { rate, sign: -1.0 }), [Supercritical]);
+    assert_eq!(at_zero(|rate| Spiral { rate, sign: 1.0 }), [Subcritical]);
+    // Hénon's and the logistic map's cascades, and Maynard Smith's circle (Kuznetsov, example 4.2).
+    let henon = branch(&HENON, 0.2, &[0.8, 0.2], 1, 1.2, (0.0, 1.2));
+    assert_eq!(criticalities(&henon), [Supercritical]);
+    let logistic = branch(&LOGISTIC, 2.5, &[0.6], 1, 3.6, (2.0, 3.6));
+    assert_eq!(criticalities(&logistic), [Supercritical]);
+    let delayed = Family(DelayedLogistic);
+    let delayed = branch(&delayed, 1.8, &[0.44, 0.44], 1, 2.2, (1.5, 2.2));
+    assert_eq!(criticalities(&delayed), [Supercritical]);
 }
 
 /// a = 3(1−b)²/4 for the first flip, (1−b)² + (1+b)²/4 for the second.

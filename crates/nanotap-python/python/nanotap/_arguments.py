@@ -337,7 +337,7 @@ def _of_result(data: "xr.Dataset") -> "xr.Dataset":
     """
     rows = data.first_harmonic.dims
     if "zc" in rows:
-        # It stands beside the distance in metres.
+        # The same distance is also given in metres.
         data = data.drop_vars("alpha5", errors="ignore")
     kept = {
         str(name): variable

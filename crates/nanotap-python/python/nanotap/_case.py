@@ -383,7 +383,7 @@ def key_words(keys: Mapping[str, Any], kind: str = "cantilever") -> dict[str, st
     table = keys.get("model")
     stated = table.get("kind") if isinstance(table, Mapping) else None
     kind = str(keys.get("kind") or keys.get("model.kind") or stated or kind)
-    # The second names are those of a cantilever's numbers; an oscillator has a gap of its own.
+    # The second names are those of a cantilever's numbers; the gap of an oscillator is another one.
     second_names = _OTHER_NAMES if kind == "cantilever" else {}
     words: dict[str, str] = {}
     typed: dict[str, str] = {}

@@ -117,7 +117,7 @@ def _opened(name: str, chunks: Any) -> "xr.Dataset":
 
 
 def _worded(ds: "xr.Dataset") -> "xr.Dataset":
-    """`classification` in words, as in every other result, beside its codes in the store; empty
+    """`classification` in words, as in every other result, and as codes in the store; empty
     where a run is missing.
     """
     import xarray as xr

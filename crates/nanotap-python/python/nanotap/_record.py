@@ -38,7 +38,7 @@ class Record(Mapping[str, Any]):
         return sorted({*super().__dir__(), *self._entries})
 
     def __repr__(self) -> str:
-        inside = ", ".join(f"{key}={value!r}" for key, value in self.items())
+        inside = ", ".join(f"{key}={_short(value)}" for key, value in self.items())
         return f"Record({inside})"
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -47,6 +47,20 @@ class Record(Mapping[str, Any]):
     def to_dict(self) -> dict[str, Any]:
         """The entries as plain dictionaries and lists."""
         return {key: _plain(value) for key, value in self._entries.items()}
+
+
+# Entries of a list that are shown.
+_SHOWN = 6
+
+
+def _short(value: Any) -> str:
+    """`repr`, of a long list or one of records its length only."""
+    if isinstance(value, Record):
+        return f"Record({', '.join(value)})"
+    is_list = isinstance(value, list) and bool(value)
+    if is_list and (len(value) > _SHOWN or isinstance(value[0], Mapping | list)):
+        return f"[{len(value)} items]"
+    return repr(value)
 
 
 def _wrapped(value: Any) -> Any:

@@ -347,6 +347,7 @@ def branch(
     starts: int = 16,
     seed: int = 1,
     second: Mapping[str, tuple[float | str, float | str]] | str | None = None,
+    event: Sequence[str] | None = None,
     max_step: float = 0.01,
     threads: int | None = None,
     progress: Progress = None,
@@ -387,6 +388,9 @@ def branch(
     second : Mapping[str, tuple[float | str, float | str]] | str | None
         Second parameter and its range, as in {"alpha4": (5, 40)}, for bifurcation
         curves in both.
+    event : Sequence[str] | None
+        An observable and its value, as in "F_max = 1 nN": where the orbits have it,
+        and with `second` its curve in both parameters; may be repeated.
     max_step : float
         Longest step, as a fraction of the range.
     threads : int | None
@@ -561,6 +565,20 @@ def fm(
         An argument is invalid; the message names it.
     RuntimeError
         The computation failed.
+
+    Examples
+    --------
+    >>> case = nanotap.Case.paper(omega=3)
+    >>> lever = nanotap.Case(
+    ...     cantilever={"k": "2 N/m", "f0": "70 kHz", "Q": 100},
+    ...     sample={"stiffness": "5 N/m"},
+    ...     drive={"actuation": "tip", "frequency_ratio": 1, "free_amplitude": "10 nm"},
+    ...     gap={"tip": "8 nm"},
+    ... )
+    >>> curve = nanotap.fm(lever, points=2, from_="12 nm", to="9 nm", progress=False)
+    >>> row = curve.table[1]
+    >>> print(f"{row.zc:.1e} m: {row.modulation_si.frequency_shift:.1f} Hz")
+    9.0e-09 m: 1323.3 Hz
     """
     options = _arguments.options("fm", locals())
     return _studies.document("fm", case, options, threads, progress)
@@ -1109,6 +1127,7 @@ def noise(
     temperature: float = 295.0,
     time_constant: float | str | None = None,
     bandwidth: float | str | None = None,
+    state: Any = None,
     threads: int | None = None,
     progress: Progress = None,
 ) -> Record:
@@ -1126,6 +1145,8 @@ def noise(
     bandwidth : float | str | None
         Noise bandwidth of the lock-in amplifier, 1 over four time constants, in
         place of it.
+    state : Any
+        State near the orbit, at drive phase 0: a1,…,aN,v1,…,vN.
     threads : int | None
         Number of threads; default: one per core.
     progress : Progress
@@ -1142,6 +1163,19 @@ def noise(
         An argument is invalid; the message names it.
     RuntimeError
         The computation failed.
+
+    Examples
+    --------
+    >>> case = nanotap.Case.paper(omega=3)
+    >>> lever = nanotap.Case(
+    ...     cantilever={"k": "2 N/m", "f0": "70 kHz", "Q": 100},
+    ...     sample={"stiffness": "5 N/m"},
+    ...     drive={"actuation": "tip", "frequency_ratio": 1, "free_amplitude": "10 nm"},
+    ...     gap={"tip": "8 nm"},
+    ... )
+    >>> found = nanotap.noise(lever)
+    >>> print(f"{found.thermal_rms:.3e} m, {found.amplitude_rms:.2e} m")
+    4.509e-11 m, 1.08e-11 m
     """
     options = _arguments.options("noise", locals())
     return _studies.document("noise", case, options, threads, progress)
@@ -1195,6 +1229,23 @@ def bimodal(
         An argument is invalid; the message names it.
     RuntimeError
         The computation failed.
+
+    Examples
+    --------
+    >>> case = nanotap.Case.paper(omega=3)
+    >>> lever = nanotap.Case(
+    ...     modes=2,
+    ...     cantilever={"k": "2 N/m", "f0": "70 kHz", "Q": 150},
+    ...     tip={"radius": "10 nm"},
+    ...     sample={"law": "hertz", "modulus": "1 GPa", "poisson": 0.3},
+    ...     drive={
+    ...         "actuation": "tip", "frequency_ratio": 1, "free_amplitude": "40 nm",
+    ...         "second_ratio": 6.27, "second_free_amplitude": "0.1 nm", "setpoint": 0.8,
+    ...     },
+    ... )
+    >>> last = nanotap.bimodal(lever, progress=False).table[-1]
+    >>> print(f"{last.tones[1].frequency_shift:.1f} Hz, {last.estimates.reduced_modulus:.3e} Pa by the formula")
+    1035.7 Hz, 1.120e+09 Pa by the formula
     """
     options = _arguments.options("bimodal", locals())
     return _studies.document("bimodal", case, options, threads, progress)
@@ -1392,6 +1443,19 @@ def force_curve(
         An argument is invalid; the message names it.
     RuntimeError
         The computation failed.
+
+    Examples
+    --------
+    >>> case = nanotap.Case.paper(omega=3)
+    >>> lever = nanotap.Case(
+    ...     cantilever={"k": "2 N/m", "f0": "70 kHz", "Q": 100},
+    ...     sample={"stiffness": "5 N/m"},
+    ...     drive={"actuation": "tip", "frequency_ratio": 1, "free_amplitude": "10 nm"},
+    ...     gap={"tip": "8 nm"},
+    ... )
+    >>> curve = nanotap.force_curve(lever, progress=False)
+    >>> print(f"{curve.peak_force:.3e} N")
+    1.597e-09 N
     """
     options = _arguments.options("force-curve", locals())
     return _studies.document("force-curve", case, options, threads, progress)

@@ -83,19 +83,30 @@ def _branch_dataset(case: Case, report: dict[str, Any]) -> "xr.Dataset":
     entries = case.state_names
     points = report["points"]
     bifurcations = report["bifurcations"]
+    attractors = [
+        {"number": row.pop("attractor"), **row} for row in report.get("attractors", [])
+    ]
+    events = [{"name": row.pop("event"), **row} for row in report.get("events", [])]
     variables = {
         **_columns(points, "point", "", len(entries)),
         **_columns(bifurcations, "bifurcation", "bifurcation_", len(entries)),
+        **_columns(attractors, "attractor", "attractor_", len(entries)),
+        **_columns(events, "event", "event_", len(entries)),
     }
     if not bifurcations:
         # Without bifurcations the columns are there, and empty.
-        like = {"kind": "", "uncertainty": 0.0, **(points[0] if points else {})}
+        like = {"kind": "", "criticality": "", "uncertainty": 0.0}
+        like |= points[0] if points else {}
         one = _columns([like], "bifurcation", "bifurcation_", len(entries))
         one.pop("bifurcation_stable", None)
         variables |= {key: (dims, values[:0]) for key, (dims, values) in one.items()}
     dims, values = variables.pop("parameter", ("point", np.empty(0)))
     # A number of the equations has no unit here; `parameter_unit` tells its SI value.
-    for redundant in ("parameter_si", "bifurcation_parameter_si"):
+    for redundant in (
+        "parameter_si",
+        "bifurcation_parameter_si",
+        "event_parameter_si",
+    ):
         variables.pop(redundant, None)
     coords: dict[str, Any] = {name: (dims, values), "state": words(entries)}
     coords["part"] = words(("re", "im"))
@@ -110,6 +121,10 @@ def _branch_dataset(case: Case, report: dict[str, Any]) -> "xr.Dataset":
             locus_kind=(
                 "locus_point",
                 np.repeat([str(c["kind"]) for c in curves], lengths),
+            ),
+            locus_event=(
+                "locus_point",
+                np.repeat([str(c.get("event", "")) for c in curves], lengths),
             ),
             locus_period=(
                 "locus_point",
@@ -134,6 +149,8 @@ def _branch_dataset(case: Case, report: dict[str, Any]) -> "xr.Dataset":
             name,
             "bifurcation_parameter",
             "bifurcation_uncertainty",
+            *(["attractor_parameter"] if attractors else []),
+            *(["event_parameter"] if events else []),
         ):
             ds[of_parameter].attrs["units"] = unit["unit"] if "." in name else "1"
     if report.get("held"):
@@ -169,8 +186,10 @@ def _columns(
                 parts[k, : len(pairs)] = pairs
             dims = (dim, "multiplier", "part")
             columns[f"{prefix}multipliers"] = (dims, parts)
-        elif all(isinstance(value, str) for value in values):
-            columns[f"{prefix}{name}"] = (dim, np.array(values, dtype=str))
+        elif {type(value) for value in values} in ({str}, {str, type(None)}):
+            # Empty where there is no word.
+            texts = [value or "" for value in values]
+            columns[f"{prefix}{name}"] = (dim, np.array(texts, dtype=str))
         elif all(
             value is None or isinstance(value, bool | int | float) for value in values
         ):
@@ -245,7 +264,7 @@ def _approach_dataset(case: Case, report: dict[str, Any]) -> "xr.Dataset":
     if unit:
         ds.attrs["parameter_unit"] = json.dumps(unit)
         ds.zc.attrs.update(long_name="distance to the sample", units="m")
-    # A dimensionless number, beside the distance in m.
+    # A dimensionless number; the distance in m is another entry.
     ds[name].attrs.update(long_name="distance to the sample over g0", units="1")
     if "branch_parameter" in ds:
         ds["branch_parameter"].attrs["units"] = "g0"
@@ -324,7 +343,7 @@ def _scan_dataset(case: Case, report: dict[str, Any]) -> "xr.Dataset":
     for name, value in report.items():
         if name not in {"trace", "retrace", "periods"} and value is not None:
             plain = isinstance(value, str | float) and not isinstance(value, bool)
-            # The scipy engine keeps an attribute `mode` of its own.
+            # The scipy engine has another attribute `mode`.
             key = "scan_mode" if name == "mode" else name
             ds.attrs[key] = value if plain else json.dumps(value)
     return ds

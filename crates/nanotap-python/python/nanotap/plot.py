@@ -625,7 +625,7 @@ _ENDS = ("before", "after")
 
 
 def _in_electronvolts(values: "xr.DataArray") -> "xr.DataArray":
-    """Energies of one tap are told in electronvolts."""
+    """Energies of one tap are shown in electronvolts."""
     if values.attrs.get("units") != "J":
         return values
     return (values / _ELECTRONVOLT).assign_attrs(values.attrs, units="eV")

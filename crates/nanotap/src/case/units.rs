@@ -65,7 +65,7 @@ impl Units {
     }
 
     /// The head of a column with entries of states, which stay in the model's units: in SI these
-    /// stand in brackets, with the unit of length g₀ and that of time T.
+    /// are given in brackets, with the unit of length g₀ and that of time T.
     pub fn state_column(&self, name: &str) -> String {
         match self.of_entry(name) {
             Some((Kind::Length, _)) => format!("{name} (g0)"),

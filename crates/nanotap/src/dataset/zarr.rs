@@ -15,7 +15,7 @@ pub(super) const GROUP: &str = ".zgroup";
 pub(super) const ATTRIBUTES: &str = ".zattrs";
 pub(super) const ARRAY: &str = ".zarray";
 pub(super) const CONSOLIDATED: &str = ".zmetadata";
-/// What stands between the numbers in the name of a chunk; a dot if nothing is said.
+/// Separator of the numbers in the name of a chunk; a dot by default.
 pub(super) const SEPARATOR: &str = "dimension_separator";
 
 /// The `.zgroup` document.

@@ -1,5 +1,5 @@
 //! The figure of bimodal operation: what the loops let change of each tone, the largest force, and
-//! the modulus of the formula beside that of the sample.
+//! the moduli of the formula and of the sample.
 
 use nanotap_figures::{Axis, Colour, DOUBLE_COLUMN, Figure, Legend, Line, Panel, Rule};
 

@@ -4,7 +4,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use nanotap_figures::{
-    Axis, Colour, DOUBLE_COLUMN, Dash, Figure, Legend, Line, Markers, Motion,
+    Axis, Colour, DOUBLE_COLUMN, Dash, Figure, LINES, Legend, Line, Markers, Motion,
     ONE_AND_A_HALF_COLUMNS, Panel, ROUNDING, Shape,
 };
 use serde::Deserialize;
@@ -71,12 +71,13 @@ pub fn case_figure(case: &Case, report: &BranchReport, shown: Option<Shown>) -> 
     branch_figure(report, shown, beam, &axes, &case.units())
 }
 
-pub(crate) const MARKS: [(&str, Shape, Colour); 5] = [
+pub(crate) const MARKS: [(&str, Shape, Colour); 6] = [
     ("fold", Shape::Square, Colour::BLACK),
     ("flip", Shape::Diamond, Colour::VERMILLION),
     ("neimark-sacker", Shape::Triangle, Colour::PURPLE),
     ("grazing", Shape::Circle, Colour::GREEN),
     ("crossing", Shape::Cross, Colour::BLACK),
+    ("event", Shape::Circle, Colour::BLUE),
 ];
 
 /// Number of bifurcations beyond which marks are small.
@@ -157,6 +158,11 @@ pub fn branch_figure(
                 x: first.factor * b.parameter,
                 y: factor * of(shown, &b.observables, b.physical.as_ref(), &b.multipliers),
             })
+            .chain(report.events.iter().map(|found| BranchMark {
+                kind: "event".to_owned(),
+                x: first.factor * found.point.parameter,
+                y: factor * value(shown, &found.point),
+            }))
             .collect(),
         curves: report.loci.as_ref().map(|loci| BifurcationCurves {
             y_label: second.label.clone(),
@@ -168,6 +174,7 @@ pub fn branch_figure(
                 .iter()
                 .map(|curve| BifurcationCurve {
                     kind: curve.kind.to_owned(),
+                    event: curve.event.clone(),
                     period: curve.period,
                     meets: curve.meets.map(|what| what.unwrap_or_default().to_owned()),
                     x: curve.first.iter().map(|v| first.factor * v).collect(),
@@ -258,6 +265,9 @@ pub struct BifurcationCurves {
 pub struct BifurcationCurve {
     /// `fold`, `flip` …
     pub kind: String,
+    /// The event of a curve of events, as the user wrote it.
+    #[serde(default)]
+    pub event: Option<String>,
     /// Period of the orbit that bifurcates.
     pub period: usize,
     /// The first parameter along the curve.
@@ -335,11 +345,21 @@ impl BifurcationCurves {
         )
         .legend(Legend::Above);
         let mut named: BTreeSet<(&str, usize)> = BTreeSet::new();
+        let mut events: Vec<&str> = Vec::new();
         for curve in &self.curves {
             let (_, _, colour) = MARKS
                 .into_iter()
                 .find(|m| m.0 == curve.kind)
                 .unwrap_or(MARKS[0]);
+            // Each event has a colour of the palette.
+            let colour = curve.event.as_deref().map_or(colour, |event| {
+                let known = events.iter().position(|other| *other == event);
+                let index = known.unwrap_or_else(|| {
+                    events.push(event);
+                    events.len() - 1
+                });
+                LINES[index % LINES.len()]
+            });
             let mut line = Line::new(curve.x.iter().copied().zip(curve.y.iter().copied()))
                 .colour(colour)
                 .dash(match curve.period {
@@ -347,8 +367,9 @@ impl BifurcationCurves {
                     2 => Dash::Dashed,
                     _ => Dash::Dotted,
                 });
-            if named.insert((&curve.kind, curve.period)) {
-                line = line.label(format!("{}, period {}", word(&curve.kind), curve.period));
+            let name = curve.event.as_deref().unwrap_or(word(&curve.kind));
+            if named.insert((name, curve.period)) {
+                line = line.label(format!("{name}, period {}", curve.period));
             }
             panel = panel.with(line);
         }
@@ -406,6 +427,7 @@ pub(crate) fn word(kind: &str) -> &'static str {
         "flip" => "period doubling",
         "neimark-sacker" => "Neimark–Sacker",
         "grazing" => "grazing",
+        "event" => "event",
         _ => "crossing",
     }
 }

@@ -250,6 +250,11 @@ impl Model {
         state
     }
 
+    /// The state of the setpoint's motion at drive phase 0, or else the rest.
+    pub fn first_state(&self) -> Vec<f64> {
+        self.start.clone().unwrap_or_else(|| self.rest())
+    }
+
     /// Puts a state that lies behind a rigid stop on it.
     pub fn stop_at_wall(&self, state: &mut [f64]) {
         if let (Some(stop), Some(x)) = (self.rigid_stop, state.first_mut()) {

@@ -76,7 +76,15 @@ const OTHER_ENTRIES: &[(&str, &str, &str)] = &[
         "whether every multiplier is inside the unit circle",
         "1",
     ),
+    ("share", "share of the initial states", "1"),
+    ("share_low", "lower end of the share's 95 % interval", "1"),
+    ("share_high", "upper end of the share's 95 % interval", "1"),
     ("spectral_radius", "largest modulus of a multiplier", "1"),
+    (
+        "decay_periods",
+        "time in which a small disturbance falls to 1/e",
+        PERIODS,
+    ),
     ("multiplier", "largest modulus of a multiplier", "1"),
     (
         "multipliers",

@@ -3,7 +3,7 @@
 use nanotap_arithmetic::ComplexFunctions as _;
 use nanotap_dynamics::{
     AttractorKind, Census, CensusEnd, CensusOptions, ClassifyOptions, Control, Fraction,
-    OrbitSearch, PeriodicOrbit, StartBox, StartSet, census_of, find_orbits,
+    OrbitSearch, PeriodicOrbit, Stability, StartBox, StartSet, census_of, find_orbits,
 };
 use nanotap_volterra::coarse;
 use schemars::JsonSchema;
@@ -564,6 +564,36 @@ pub fn orbit_exponents(orbit: &PeriodicOrbit) -> Vec<f64> {
 
 /// Starts from which unstable orbits are looked for.
 const SEARCHED_STARTS: usize = 64;
+
+/// The orbits of period 1 with one unstable multiplier that Newton's method finds from averaging and
+/// from some initial states: the boundaries between basins pass through them.
+///
+/// # Errors
+/// When the initial states make no sense for the model.
+pub(in crate::study) fn saddles(
+    model: &Model,
+    control: &Control<'_>,
+) -> Result<Vec<PeriodicOrbit>, Error> {
+    let set = default_starts(model, AttractorsOptions::default().seed)?;
+    let mut searched: Vec<Vec<f64>> = averaged_orbits(model)
+        .into_iter()
+        .flat_map(|orbit| orbit.states)
+        .collect();
+    searched.extend((0..SEARCHED_STARTS).map_while(|k| set.start(k)));
+    let search = OrbitSearch {
+        max_period: 1,
+        ..OrbitSearch::default()
+    };
+    let mut found = find_orbits(&ModelMap::new(model), &searched, &search, control);
+    found.retain(is_saddle);
+    Ok(found)
+}
+
+/// True of an orbit with one unstable multiplier.
+pub(in crate::study) fn is_saddle(orbit: &PeriodicOrbit) -> bool {
+    let unstable_dimension = 1;
+    orbit.stability == Stability::Unstable { unstable_dimension }
+}
 
 fn unstable_orbits(
     model: &Model,

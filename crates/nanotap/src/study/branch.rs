@@ -3,9 +3,10 @@
 
 use nanotap_dynamics::{
     AttractorContinuationOptions, AttractorKind, Bifurcation, BifurcationKind, Branch, BranchEnd,
-    BranchPoint, CensusOptions, ClassifyOptions, ContinuationOptions, Control, CurveOptions,
-    Diagram, DiagramBranch, DiagramOptions, Direction, LyapunovOptions, PeriodicOrbit,
-    ShootingOptions, StartSet, assemble_diagram, continue_attractors, continue_orbit, trace_curve,
+    BranchPoint, CensusOptions, ClassifyOptions, ContinuationOptions, ContinuedAttractor, Control,
+    Criticality, CurveOptions, Diagram, DiagramBranch, DiagramOptions, Direction, LyapunovOptions,
+    PeriodicOrbit, ShootingOptions, StartSet, assemble_diagram, continue_attractors,
+    continue_orbit, trace_curve,
 };
 use rayon::prelude::*;
 use schemars::JsonSchema;
@@ -17,10 +18,13 @@ use crate::model::model_map::ModelMap;
 use crate::model::recording::Recording;
 use crate::observe::{ObservableSet, Observables, PhysicalMotion, measure};
 use crate::study::Study;
+use crate::study::event::{Event, EventReport, Window, between};
 use crate::study::limits::{MAX_DOUBLINGS, MAX_PERIOD, MAX_SEED_STARTS};
 use crate::study::orbit::{OrbitOptions, orbit, pairs};
 use crate::study::request::options;
+use crate::study::simulate::Classification;
 use crate::study::start_box::default_starts;
+use crate::study::target::Targets;
 use crate::study::value::{Amount, Interval, values};
 use crate::{Error, ErrorKind};
 
@@ -106,6 +110,12 @@ pub struct BranchReport {
     pub points_left_out: usize,
     /// Bifurcations of the branches.
     pub bifurcations: Vec<BifurcationReport>,
+    /// Where the requested events happen.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub events: Vec<EventReport>,
+    /// With `diagram`: the attractors of the census at each value, in the order of the values.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub attractors: Vec<AttractorShare>,
     /// Bifurcation curves in two parameters, if requested.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub loci: Option<Loci>,
@@ -205,6 +215,11 @@ pub struct BifurcationReport {
     pub state: Vec<f64>,
     /// Floquet multipliers.
     pub multipliers: Vec<[f64; 2]>,
+    /// supercritical where the new motion of a flip or Neimark–Sacker point appears on the unstable
+    /// side of the orbit, subcritical where it is unstable; absent for other kinds, and where it is
+    /// not known.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub criticality: Option<&'static str>,
     /// Angle of the multiplier pair at a Neimark–Sacker point, degrees.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub angle: Option<f64>,
@@ -217,6 +232,28 @@ pub struct BifurcationReport {
     /// The same in SI, where the parameter is a quantity of a physical case.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub physical: Option<PhysicalMotion>,
+}
+
+/// An attractor at one value of the parameter.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct AttractorShare {
+    /// Number of the attractor. One that Newton's method continues from value to value keeps its
+    /// number; a chaotic one and a torus have another at every value.
+    pub attractor: usize,
+    /// Value of the parameter.
+    pub parameter: f64,
+    /// Class of the motion.
+    pub classification: &'static str,
+    /// Period of its orbit, 0 of another motion.
+    pub period: usize,
+    /// Share of the initial states that reach it.
+    pub share: f64,
+    /// Lower end of the 95 % interval of the share.
+    pub share_low: f64,
+    /// Upper end of the 95 % interval of the share.
+    pub share_high: f64,
+    /// Whether no initial state reached it, but a neighbouring value leads to it.
+    pub from_neighbour: bool,
 }
 
 /// Bifurcation curves in two parameters.
@@ -236,8 +273,11 @@ pub struct Loci {
 /// A bifurcation curve.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct CurveReport {
-    /// fold, flip, neimark-sacker, grazing or crossing.
+    /// fold, flip, neimark-sacker, grazing, crossing or event.
     pub kind: &'static str,
+    /// The event, as it was given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub event: Option<String>,
     /// Period of the orbits on it.
     pub period: usize,
     /// The first parameter along it.
@@ -400,11 +440,15 @@ pub fn branch(
             "change {second} or {parameter}",
         ));
     }
+    let events: Vec<Event> = (options.event.0.iter())
+        .map(|text| Event::parse(text, case))
+        .collect::<Result<_, _>>()?;
     let family = case.family(range.key);
-    let seeds = if options.diagram {
+    let (seeds, attractors) = if options.diagram {
         census_seeds(case, range, options, control)?
     } else {
-        vec![(range.from, first_orbit(case, range, options)?)]
+        let first = first_orbit(case, range, options)?;
+        (vec![(range.from, first)], Vec::new())
     };
     let diagram = if options.doublings() == 0 && !options.diagram {
         let direction = if range.to > range.from {
@@ -442,6 +486,34 @@ pub fn branch(
             &mut report.failures,
             control,
         ));
+    }
+    report.attractors = attractors;
+    for event in &events {
+        let found = events_of(case, range.key, &report, event, control);
+        if let (Some(second), Some(loci)) = (second, &mut report.loci) {
+            let ordered = |range: Range| [range.from.min(range.to), range.from.max(range.to)];
+            let window = Window {
+                case,
+                keys: [range.key, second.key],
+                ranges: [ordered(range), loci.range],
+            };
+            let curves = found.iter().filter_map(|report| {
+                let point = &report.point;
+                let here = case.with(range.key, point.parameter).get(second.key);
+                let start = [point.parameter, here];
+                window.curve(start, (&point.state, point.period), event, control)
+            });
+            for curve in curves {
+                if !loci
+                    .curves
+                    .iter()
+                    .any(|known| is_on(known, &curve, &window))
+                {
+                    loci.curves.push(curve);
+                }
+            }
+        }
+        report.events.extend(found);
     }
     report.cancelled = control.is_cancelled();
     report.parameter_unit = case.parameter_unit(range.key);
@@ -488,7 +560,7 @@ fn census_seeds(
     range: Range,
     options: &BranchOptions,
     control: &Control<'_>,
-) -> Result<Vec<(f64, PeriodicOrbit)>, Error> {
+) -> Result<(Vec<(f64, PeriodicOrbit)>, Vec<AttractorShare>), Error> {
     let steps = options.values.max(2) - 1;
     let values: Vec<f64> = (0..=steps)
         .map(|k| k as f64 / steps as f64)
@@ -520,8 +592,10 @@ fn census_seeds(
     let family = case.family(range.key);
     let known = continue_attractors(&family, &values, starts, &how, control);
     let mut found = Vec::new();
+    let mut shares = Vec::new();
     for (value, at) in values.iter().zip(known) {
         for each in at.attractors {
+            shares.push(share(*value, &each));
             if let AttractorKind::Periodic(orbit) = each.attractor.kind {
                 found.push((*value, orbit));
             }
@@ -535,7 +609,78 @@ fn census_seeds(
         ))
         .remedy(ELSEWHERE));
     }
-    Ok(found)
+    Ok((found, shares))
+}
+
+/// Where an event happens on the branches of a report.
+fn events_of(
+    case: &Case,
+    key: Key,
+    report: &BranchReport,
+    event: &Event,
+    control: &Control<'_>,
+) -> Vec<EventReport> {
+    let measured = Measured {
+        case,
+        range: Range {
+            key,
+            from: report.from,
+            to: report.to,
+        },
+        observables: ObservableSet::COMMON,
+    };
+    let pairs: Vec<&[PointReport]> = report
+        .points
+        .windows(2)
+        .filter(|pair| pair[0].branch == pair[1].branch)
+        .collect();
+    pairs
+        .par_iter()
+        .with_max_len(1)
+        .filter(|_| !control.is_cancelled())
+        .filter_map(|pair| {
+            let (parameter, state) = between(case, key, [&pair[0], &pair[1]], event)?;
+            let model = case.with(key, parameter).model().ok()?;
+            let shooting = ShootingOptions::default();
+            let mut map = ModelMap::new(&model);
+            let period = pair[0].period;
+            let orbit = nanotap_dynamics::close_orbit(&mut map, &state, period, &shooting).ok()?;
+            let point = measured.orbit(pair[0].branch, parameter, &orbit).ok()?;
+            Some(EventReport {
+                event: event.to_string(),
+                point,
+            })
+        })
+        .collect()
+}
+
+/// Whether a curve of an event begins on one that is known.
+fn is_on(known: &CurveReport, curve: &CurveReport, window: &Window<'_>) -> bool {
+    let near = 1e-6 * (window.ranges[0][1] - window.ranges[0][0]);
+    let middle = curve.first.len() / 2;
+    known.event == curve.event
+        && known.period == curve.period
+        && crossings(known, curve.second[middle])
+            .any(|at| (at - curve.first[middle]).abs() <= 1e3 * near)
+}
+
+fn share(parameter: f64, found: &ContinuedAttractor) -> AttractorShare {
+    let of = &found.attractor;
+    let (classification, period) = match &of.kind {
+        AttractorKind::Periodic(orbit) => (Classification::Periodic, orbit.period),
+        AttractorKind::QuasiPeriodic(_) => (Classification::QuasiPeriodic, 0),
+        AttractorKind::Chaotic { .. } => (Classification::Chaotic, 0),
+    };
+    AttractorShare {
+        attractor: found.branch,
+        parameter,
+        classification: classification.name(),
+        period,
+        share: of.fraction.estimate,
+        share_low: of.fraction.low,
+        share_high: of.fraction.high,
+        from_neighbour: found.found_from.is_some(),
+    }
 }
 
 fn described(
@@ -560,6 +705,8 @@ fn described(
         points: Vec::new(),
         points_left_out: 0,
         bifurcations: Vec::new(),
+        events: Vec::new(),
+        attractors: Vec::new(),
         loci: None,
         failures: diagram
             .failures
@@ -741,15 +888,24 @@ impl Measured<'_> {
     }
 
     fn point(&self, branch: usize, p: &BranchPoint) -> Result<PointReport, Error> {
-        let (observables, physical) = self.seen(p.parameter, &p.orbit)?;
+        self.orbit(branch, p.parameter, &p.orbit)
+    }
+
+    fn orbit(
+        &self,
+        branch: usize,
+        parameter: f64,
+        orbit: &PeriodicOrbit,
+    ) -> Result<PointReport, Error> {
+        let (observables, physical) = self.seen(parameter, orbit)?;
         Ok(PointReport {
             branch,
-            period: p.orbit.period,
-            parameter: p.parameter,
-            parameter_si: self.in_si(p.parameter),
-            state: p.orbit.states.first().cloned().unwrap_or_default(),
-            multipliers: pairs(&p.orbit.multipliers),
-            stable: p.orbit.is_stable(),
+            period: orbit.period,
+            parameter,
+            parameter_si: self.in_si(parameter),
+            state: orbit.states.first().cloned().unwrap_or_default(),
+            multipliers: pairs(&orbit.multipliers),
+            stable: orbit.is_stable(),
             observables,
             physical,
         })
@@ -764,6 +920,7 @@ impl Measured<'_> {
         };
         Ok(BifurcationReport {
             kind: kind_name(b.kind),
+            criticality: b.criticality.map(Criticality::name),
             branch,
             period: b.orbit.period,
             parameter: b.parameter,
@@ -834,6 +991,7 @@ fn loci(
         match trace_curve(&family, b, here, &limits, control) {
             Ok(locus) => curves.push(CurveReport {
                 kind: kind_name(locus.kind),
+                event: None,
                 period: b.orbit.period,
                 first: locus.points.iter().map(|p| p.first).collect(),
                 second: locus.points.iter().map(|p| p.second).collect(),
@@ -908,6 +1066,10 @@ options! {
         /// Second parameter and its range, as in alpha4=5:40, for bifurcation curves in both
         #[schemars(extend("x-value" = "KEY=LOW:HIGH"))]
         pub second: Option<Interval> = None,
+        /// An observable and its value, as in "F_max = 1 nN": where the orbits have it, and with
+        /// {second} its curve in both parameters; may be repeated
+        #[schemars(extend("x-value" = "OBSERVABLE=VALUE"))]
+        pub event: Targets = Targets::default(),
         /// Longest step, as a fraction of the range
         #[schemars(range(min = 0.0, max = 1.0), extend("x-value" = "PART"))]
         pub max_step: f64 = 0.01,

@@ -11,6 +11,7 @@ pub mod bimodal;
 pub mod branch;
 pub mod contact_laws;
 pub mod convergence;
+pub mod event;
 #[cfg(feature = "fit")]
 pub mod fit;
 pub mod force_curve;

@@ -277,7 +277,7 @@ impl Target {
             _ => {
                 let named = |o: &&Observable| o.name == name || o.si_name == name;
                 let observable = ObservableSet::COMMON.iter().find(named);
-                let observable = observable.ok_or_else(|| wrong(unknown(name)))?;
+                let observable = observable.ok_or_else(|| wrong(unknown(name, &OWN)))?;
                 if !comparison.is_order() {
                     return Err(wrong(format!(
                         "expected <, <=, > or >= after `{name}`, which is a real number"
@@ -323,22 +323,20 @@ impl Target {
     }
 }
 
-/// Names of the quantities that can be compared.
-fn names() -> Vec<&'static str> {
-    let own = ["states", "regime", "period"].into_iter();
-    own.chain(ObservableSet::COMMON.iter().map(|o| o.si_name))
-        .collect()
-}
+/// Names that can be compared in addition to observables.
+const OWN: [&str; 3] = ["states", "regime", "period"];
 
-fn unknown(name: &str) -> String {
-    let names = names();
+/// What is wrong with a name that is neither an observable nor one of these.
+pub(super) fn unknown(name: &str, own: &[&'static str]) -> String {
+    let observables = ObservableSet::COMMON.iter().map(|o| o.si_name);
+    let names: Vec<&str> = own.iter().copied().chain(observables).collect();
     let hint = near_name(name, names.iter().copied())
         .map_or_else(String::new, |near| format!("; did you mean `{near}`?"));
     format!("expected one of {}, got `{name}`{hint}", names.join(", "))
 }
 
 /// A limit of an observable, in SI or in the model's units.
-fn limit(observable: &Observable, text: &str, si: bool) -> Result<f64, String> {
+pub(super) fn limit(observable: &Observable, text: &str, si: bool) -> Result<f64, String> {
     let kind = observable.dimension.kind();
     let name = observable.si_name;
     let bare = text.replace('\u{2212}', "-").parse::<f64>().ok();

@@ -131,7 +131,7 @@ pub(crate) fn budgets() -> impl Iterator<Item = u64> {
     (0..11).map(|k| 20_000 << k)
 }
 
-/// What comes of work on one thread and on two that ends at a budget of steps.
+/// Results of work on one thread and on two that ends at a budget of steps.
 pub(crate) fn limited<R: Send>(steps: u64, work: impl Fn(&Control<'_>) -> R + Sync) -> [R; 2] {
     [1, 2].map(|threads| {
         let flag = CancelFlag::default().with_budget(steps);

@@ -260,7 +260,7 @@ fn the_modulus_formula_holds_for_a_small_second_amplitude() {
         let setpoint = 0.8 * 40e-9;
         assert!((found.tones[0].amplitude / setpoint - 1.0).abs() < 1e-9);
         assert!((report.setpoint.unwrap() / setpoint - 1.0).abs() < 1e-12);
-        // Virials by formula: the mean force beside a single harmonic.
+        // Virials by formula: the mean force and a single harmonic.
         for tone in found.tones {
             assert!(
                 (tone.estimates.virial / tone.virial - 1.0).abs() < 5e-3,

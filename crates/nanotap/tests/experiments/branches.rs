@@ -4,6 +4,8 @@
 use nanotap::case::Case;
 use nanotap::control::Control;
 use nanotap::study::branch::{BranchOptions, BranchReport, branch};
+use nanotap::study::target::Targets;
+use nanotap::study::value::Interval;
 
 use crate::approach::{STIFF, studied};
 
@@ -92,4 +94,70 @@ fn a_diagram_contains_a_period_3_with_a_small_basin() {
     let high = stable.iter().copied().fold(0.0, f64::max);
     assert!((3.105..3.115).contains(&low), "{low}");
     assert!((3.175..3.185).contains(&high), "{high}");
+    // Joined from value to value it has one number there, and the shares at a value are parts of one.
+    let third: Vec<_> = report.attractors.iter().filter(|a| a.period == 3).collect();
+    assert!(third.len() > 1);
+    for one in &third {
+        assert_eq!(one.attractor, third[0].attractor);
+        assert!((low..=high).contains(&one.parameter), "{one:?}");
+    }
+    for at in report
+        .attractors
+        .chunk_by(|a, b| a.parameter == b.parameter)
+    {
+        let sum: f64 = at.iter().map(|one| one.share).sum();
+        assert!(sum > 0.5 && sum <= 1.0 + 1e-12, "{at:?}");
+        for one in at {
+            assert!(
+                one.share_low <= one.share && one.share <= one.share_high,
+                "{one:?}"
+            );
+        }
+    }
+}
+
+/// An oscillator that touches nothing: its amplitude F/√((1 − Ω²)² + (d Ω)²), for the damping d, is 2
+/// on a closed form of Ω and d.
+#[test]
+fn events_lie_on_their_closed_form() {
+    let text = "[model]\nkind = \"impact\"\nstiffness = 1\ndamping = 0.2\nforcing = 1\n\
+                omega = 0.6\ngap = 100\nrestitution = 0.8\n";
+    let case = studied(text, &[]);
+    let options = BranchOptions {
+        event: Targets(vec![
+            "first_harmonic = 2".to_owned(),
+            "phase = 45".to_owned(),
+        ]),
+        second: Some(Interval::of_key(case.key("damping").unwrap(), 0.1, 0.45)),
+        ..BranchOptions::over(case.key("omega").unwrap(), 0.6, 1.4)
+    };
+    let report = branch(&case, &options, &Control::default()).unwrap();
+    let amplitude = |omega: f64, d: f64| 1.0 / (1.0 - omega * omega).hypot(d * omega);
+    // The drive is counted along the force at phase 0, against the stop: 180° less the lag.
+    let phase = |omega: f64, d: f64| (d * omega).atan2(omega * omega - 1.0).to_degrees();
+    let [low, high] = [0, 1].map(|k| &report.events[k]);
+    assert!(low.point.parameter < 0.8 && high.point.parameter > 1.1);
+    for found in [low, high] {
+        let off = amplitude(found.point.parameter, 0.2) - 2.0;
+        assert!(off.abs() < 1e-9, "{off}");
+    }
+    assert!((phase(report.events[2].point.parameter, 0.2) - 45.0).abs() < 1e-7);
+    let curves = report.loci.unwrap().curves;
+    let of = |event: &str| {
+        let found = curves.iter().filter(|c| c.event.as_deref() == Some(event));
+        found.collect::<Vec<_>>()
+    };
+    // On either side of the resonance; above d = 0.5 both would meet.
+    assert_eq!(of("first_harmonic = 2").len(), 2);
+    for curve in &curves {
+        assert!(curve.first.len() > 20 && curve.ends.iter().all(|end| end.contains("edge")));
+        for (omega, d) in curve.first.iter().zip(&curve.second) {
+            let off = if curve.event.as_deref() == Some("phase = 45") {
+                (phase(*omega, *d) - 45.0) / 45.0
+            } else {
+                amplitude(*omega, *d) / 2.0 - 1.0
+            };
+            assert!(off.abs() < 1e-7, "{omega} {d}: {off}");
+        }
+    }
 }

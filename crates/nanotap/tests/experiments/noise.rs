@@ -1,10 +1,13 @@
 //! Thermal noise against closed forms of the free lever, another engine, and a long stochastic
 //! simulation.
 
+use std::f64::consts::TAU;
+
 use nanotap::case::Case;
 use nanotap::control::Control;
 use nanotap::model::galerkin::Galerkin;
 use nanotap::study::Study as _;
+use nanotap::study::attractors::{AttractorsOptions, AttractorsStudy};
 use nanotap::study::noise::{BOLTZMANN, NoiseOptions, NoiseReport, NoiseStudy};
 use nanotap_flow::Flow;
 
@@ -63,7 +66,7 @@ fn the_free_lever_has_the_noise_of_its_resonance() {
             "gap.tip=1 um",
         ]);
         let found = noise(&case, &format!("{time} s"));
-        let correlation = 2.0 * quality / (std::f64::consts::TAU * 70e3);
+        let correlation = 2.0 * quality / (TAU * 70e3);
         let stiffness = 2.0 * 1.030_197;
         let expected = (BOLTZMANN * 295.0 / stiffness * correlation / (correlation + time)).sqrt();
         let off = found.amplitude_rms / expected - 1.0;
@@ -125,6 +128,106 @@ fn both_engines_have_the_same_noise() {
     ] {
         assert!((one / other - 1.0).abs() < 1e-5, "{one} {other}");
     }
+}
+
+/// The integral of a spectrum is the square of the noise, and the free lever's has its Lorentzian
+/// behind the filter: 4 σ² t_c/((1 + (2π f t_c)²)(1 + (2π f τ)²)) with σ² = k_B T/k₁.
+#[test]
+fn spectra_of_the_reading_are_those_of_its_noise() {
+    let tapping = lever(&[
+        "modes=1",
+        "cantilever.Q=30",
+        "sample.stiffness=5 N/m",
+        "sample.loss_tangent=0.1",
+        "gap.tip=8 nm",
+    ]);
+    let free = lever(&[
+        "modes=1",
+        "cantilever.Q=1000",
+        "sample.stiffness=1 N/m",
+        "gap.tip=1 um",
+    ]);
+    for case in [&tapping, &free] {
+        let found = noise(case, "0.2 ms");
+        let spectrum = &found.reading_spectrum;
+        let integral = |density: &[f64]| -> f64 {
+            let f = &spectrum.frequency;
+            let parts =
+                (1..f.len()).map(|k| 0.5 * (f[k] - f[k - 1]) * (density[k] + density[k - 1]));
+            parts.sum::<f64>() + f[0] * density[0]
+        };
+        for (density, rms) in [
+            (&spectrum.amplitude, found.amplitude_rms),
+            (&spectrum.phase, found.phase_rms),
+        ] {
+            let off = integral(density) / (rms * rms) - 1.0;
+            assert!(off.abs() < 5e-3, "{off}");
+        }
+    }
+    let found = noise(&free, "0.2 ms");
+    let correlation = 2.0 * 1000.0 / (TAU * 70e3);
+    let square = BOLTZMANN * 295.0 / (2.0 * 1.030_197);
+    let spectrum = &found.reading_spectrum;
+    for (f, density) in spectrum.frequency.iter().zip(&spectrum.amplitude) {
+        let (a, b) = (TAU * f * correlation, TAU * f * 2e-4);
+        let expected = 4.0 * square * correlation / ((1.0 + a * a) * (1.0 + b * b));
+        // Further out the readings, once a period, alias.
+        if *f < 7e3 {
+            assert!(
+                (density / expected - 1.0).abs() < 0.03,
+                "{f}: {density} {expected}"
+            );
+        }
+    }
+}
+
+/// At a distance d from a fold the saddle is √d away, and disturbances decay and grow at a rate √d, so
+/// that the standard deviation of the noise goes as d^(−1/4): the boundary is d^(3/4) standard
+/// deviations away (Dykman and Krivoglaz, Physica A 104, 480, 1980). At any distance it is in proportion to
+/// 1/√T.
+#[test]
+fn the_saddle_comes_nearer_as_towards_a_fold() {
+    // The tapping state of this lever ends at 14.073965664877789 nm (fold of `nanotap approach`).
+    let words = |gap: f64| {
+        let gap = format!("gap.tip={gap} nm");
+        lever(&[
+            "modes=1",
+            "cantilever.Q=100",
+            "sample.stiffness=8 N/m",
+            "sample.damping=0 N s/m",
+            "drive.frequency_ratio=1.01",
+            "drive.free_amplitude=6.6 nm",
+            &gap,
+        ])
+    };
+    let fold = 14.073_965_664_877_79;
+    let of = |gap: f64, temperature: f64| {
+        let case = words(gap);
+        let census = AttractorsOptions::default();
+        let found = AttractorsStudy::run(&case, &census, &Control::default()).unwrap();
+        let orbits = found
+            .attractors
+            .iter()
+            .filter_map(|found| found.orbit.as_ref());
+        let tapping = orbits.max_by(|a, b| {
+            let [a, b] = [a, b].map(|orbit| orbit.observables.first_harmonic);
+            a.total_cmp(&b)
+        });
+        let options = NoiseOptions {
+            temperature,
+            state: Some(tapping.unwrap().state.clone()),
+            ..NoiseOptions::default()
+        };
+        let found = NoiseStudy::run(&case, &options, &Control::default()).unwrap();
+        assert!(found.amplitude > 1.4e-8);
+        found.saddle.unwrap().deviations
+    };
+    let [near, middle, far] = [1e-6, 4e-6, 1.6e-5].map(|d| of(fold - d, 295.0));
+    let order = |a: f64, b: f64| (b / a).ln() / 4f64.ln();
+    assert!((order(near, middle) - 0.75).abs() < 0.01, "{near} {middle}");
+    assert!((order(middle, far) - 0.75).abs() < 0.02, "{middle} {far}");
+    let cold = of(fold - 4e-6, 73.75);
+    assert!((cold / middle - 2.0).abs() < 1e-9, "{cold} {middle}");
 }
 
 /// The lever is followed with random kicks on its velocities, and its lock-in amplifier with it.
@@ -214,7 +317,7 @@ impl Gaussian {
 
     fn next(&mut self) -> f64 {
         let (u, v) = (self.uniform(), self.uniform());
-        (-2.0 * u.ln()).sqrt() * (std::f64::consts::TAU * v).cos()
+        (-2.0 * u.ln()).sqrt() * (TAU * v).cos()
     }
 }
 

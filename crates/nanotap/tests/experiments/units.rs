@@ -33,7 +33,7 @@ fn request(study: &str) -> Option<Value> {
         "approach" => json!({"points": 6}),
         "fm" => json!({"points": 3, "from": "25 nm", "to": "19 nm"}),
         "convergence" => json!({"largest": 2}),
-        // Their columns are those of the data, and their units are told with them.
+        // Their columns are those of the data, and their units are given with them.
         "fit" | "reconstruct"
         // In SI as a whole.
         | "bimodal" | "force-curve" => return None,
@@ -50,7 +50,7 @@ fn without_si(value: &Value, path: &str, found: &mut Vec<String>) {
             }
         }
         Value::Object(entries) => {
-            // The loop's settings, whose free motion is told in SI above; numbers of modes and
+            // The loop's settings, whose free motion is in SI above; numbers of modes and
             // relative differences by the observable's name.
             let by_name = [
                 "fm.modulation",
@@ -136,7 +136,7 @@ fn numbers_without_a_unit_are_in_si() {
     }
 }
 
-/// The distances of curves of different levers are those that were asked for, to the bit.
+/// The distances of curves of different levers are the requested ones, to the bit.
 #[test]
 fn levers_have_the_same_distances() {
     let distances = |case: &Case| -> Vec<f64> {

@@ -297,7 +297,7 @@ pub fn approach(
     };
     let mut found = quasistatic::found(&curve, &free, &distances, control)?;
     if let Some(exact) = distances_in_si(case, options, [from, to])? {
-        // The distances that were asked for, not these in the model's units and back: curves of
+        // The requested distances, not these in the model's units and back: curves of
         // different levers have the same ones.
         for row in &mut found.table {
             if let Some(k) = distances.iter().position(|gap| *gap == row.gap) {

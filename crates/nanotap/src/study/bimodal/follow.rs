@@ -381,7 +381,7 @@ impl Follower<'_> {
             .then(|| "the motion loses its stability".to_owned())
     }
 
-    /// What is said where the motion ends.
+    /// Remark at the end of the motion.
     fn end(&self, here: &Held, error: &Error) -> String {
         format!(
             "no motion is found closer than {}: {}",

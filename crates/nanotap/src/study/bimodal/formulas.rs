@@ -1,6 +1,6 @@
 //! What software of instruments computes from the readings of both tones.
 //!
-//! All of it assumes a force that is weak beside the lever's, amplitudes A₁ ≫ A₂ and much larger than
+//! All of it assumes a force that is small compared with the lever's, amplitudes A₁ ≫ A₂ and much larger than
 //! the indentation, and a sphere of radius R on an elastic half space without adhesion. Then the mean
 //! force F₀ follows from the first tone and the mean force gradient from the shift of the second:
 //!

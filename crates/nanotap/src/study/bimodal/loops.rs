@@ -1,7 +1,7 @@
 //! The loops of an instrument on two tones, as equations.
 //!
 //! A loop holds the phase of its tone by the frequency of the drive, or its amplitude by the strength,
-//! or both. Each is an equation with an unknown of its own, and all of them hold exactly in the steady
+//! or both. Each is an equation for one unknown, and all of them hold exactly in the steady
 //! state of an instrument whose controllers integrate.
 
 use nalgebra::{DMatrix, DVector};

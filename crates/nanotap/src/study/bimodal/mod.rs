@@ -1,4 +1,4 @@
-//! Bimodal operation: two tones, each with a loop of its own, against the distance.
+//! Bimodal operation: two tones, each with its own loop, against the distance.
 //!
 //! Amplitude modulation leaves a tone's drive as it is; frequency modulation holds phase and amplitude
 //! by its frequency and strength; there are loops of one of them alone. The two frequencies have no
@@ -6,7 +6,7 @@
 //! a period and Newton close; the loops are further equations (`loops.rs`). From far on, where the
 //! lever is free, the motion is followed towards the sample.
 //!
-//! Beside it stand the numbers that the usual formulas give from what an instrument reads
+//! The report also has the numbers that the usual formulas give from what an instrument reads
 //! (`formulas.rs`), so that one sees where they hold.
 
 mod follow;

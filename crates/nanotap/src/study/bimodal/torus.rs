@@ -357,7 +357,7 @@ fn newton(
                 }
                 (torus, residual) = (next, left);
             }
-            // With factors of its own the torus does better only where rounding has the last word.
+            // Fresh factors improve the torus only at the level of rounding errors.
             None if borrowed && size > ACCEPTED => {}
             None => break,
         }

@@ -263,7 +263,7 @@ impl Data {
         }
     }
 
-    /// Least scatter that is told from none.
+    /// Smallest scatter that counts as one.
     fn floor(&self, column: usize) -> f64 {
         if self.columns[column].quantity.is_angle() {
             return FLOORS[1];

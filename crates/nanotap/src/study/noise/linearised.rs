@@ -7,7 +7,10 @@
 //! `P = A P Aᵀ + Q`.
 
 use nalgebra::{Complex, DMatrix, DVector};
+use nanotap_arithmetic::ComplexFunctions as _;
 use nanotap_flow::Flow;
+use schemars::JsonSchema;
+use serde::Serialize;
 
 use super::Thermal;
 use crate::Error;
@@ -26,6 +29,35 @@ const DISTURBANCE: f64 = 1e-5;
 /// Doublings of the time over which covariance is gathered: 2⁶⁰ periods.
 const DOUBLINGS: usize = 60;
 
+/// Number of frequencies of a spectrum.
+const FREQUENCIES: usize = 120;
+/// Lowest frequency of a spectrum over the slowest rate of the orbit or of the filter.
+const LOWEST: f64 = 0.02;
+
+/// One-sided spectral densities of the amplitude and the phase that the lock-in amplifier reads, up to
+/// half the frequency of the orbit. Their integrals are the squares of the noise.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct ReadingSpectrum {
+    /// Distance from the drive's frequency in Hz.
+    pub frequency: Vec<f64>,
+    /// Density of the amplitude in m²/Hz.
+    pub amplitude: Vec<f64>,
+    /// Density of the phase in degrees²/Hz.
+    pub phase: Vec<f64>,
+}
+
+impl ReadingSpectrum {
+    /// The same in SI, with these units of length and time.
+    pub(super) fn in_si(&self, length: f64, time: f64) -> Self {
+        let scaled = |values: &[f64], by: f64| values.iter().map(|value| by * value).collect();
+        Self {
+            frequency: scaled(&self.frequency, 1.0 / time),
+            amplitude: scaled(&self.amplitude, length * length * time),
+            phase: scaled(&self.phase, time),
+        }
+    }
+}
+
 /// A lock-in amplifier with a first-order filter.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct LockIn {
@@ -41,6 +73,8 @@ pub(super) struct Linearised {
     added: DMatrix<f64>,
     /// What the lock-in amplifier reads without noise.
     pub(super) read: Complex<f64>,
+    /// Length of the orbit in the model's unit of time.
+    duration: f64,
 }
 
 /// The flow of a model from any instant of the drive period.
@@ -183,6 +217,7 @@ impl Linearised {
             factor,
             added,
             read: read / (1.0 - left),
+            duration: period * orbit.period as f64,
         })
     }
 
@@ -200,6 +235,60 @@ impl Linearised {
         Err(Error::numerics(
             "disturbances of this orbit do not die out: its noise grows without bound",
         ))
+    }
+}
+
+impl Linearised {
+    /// Spectra of the amplitude and the phase, which are the lock-in amplifier's two parts along and
+    /// across its mean reading. With A and Q of an orbit of length T they are
+    /// `2T uᵀ (e^{iωT} − A)⁻¹ Q (e^{iωT} − A)⁻ᴴ u`.
+    pub(super) fn spectrum(
+        &self,
+        [along, across]: [&DVector<f64>; 2],
+        amplitude: f64,
+        lock_in: LockIn,
+    ) -> Result<ReadingSpectrum, Error> {
+        let n = self.factor.nrows();
+        let complex = |matrix: &DMatrix<f64>| matrix.map(|entry| Complex::new(entry, 0.0));
+        let (factor, added) = (complex(&self.factor), complex(&self.added));
+        let slowest = (self.factor.complex_eigenvalues().iter())
+            .map(|value| -nanotap_arithmetic::ln(value.modulus()) / self.duration)
+            .fold(1.0 / lock_in.time_constant, f64::min);
+        let highest = 0.5 / self.duration;
+        let lowest = (LOWEST * slowest / std::f64::consts::TAU).min(0.1 * highest);
+        let ratio = nanotap_arithmetic::ln(highest / lowest) / (FREQUENCIES - 1) as f64;
+        let mut spectrum = ReadingSpectrum {
+            frequency: Vec::new(),
+            amplitude: Vec::new(),
+            phase: Vec::new(),
+        };
+        for k in 0..FREQUENCIES {
+            let frequency = lowest * nanotap_arithmetic::exp(k as f64 * ratio);
+            let angle = std::f64::consts::TAU * frequency * self.duration;
+            let turn = Complex::new(
+                nanotap_arithmetic::cos(angle),
+                nanotap_arithmetic::sin(angle),
+            );
+            // (e^{iωT} − A)ᵀ y = u.
+            let matrix = (DMatrix::from_diagonal_element(n, n, turn) - &factor).transpose();
+            let decomposed = matrix.lu();
+            let density = |way: &DVector<f64>| -> Option<f64> {
+                let mut part = DVector::zeros(n);
+                part[n - 2] = Complex::new(way[0], 0.0);
+                part[n - 1] = Complex::new(way[1], 0.0);
+                let through: DVector<Complex<f64>> = decomposed.solve(&part)?;
+                let through = through.map(|entry| entry.conj());
+                Some(2.0 * self.duration * through.dotc(&(&added * &through)).re)
+            };
+            let (Some(a), Some(b)) = (density(along), density(across)) else {
+                return Err(Error::numerics("the spectrum of the noise is not finite"));
+            };
+            spectrum.frequency.push(frequency);
+            spectrum.amplitude.push(a.max(0.0));
+            let degrees = (1.0 / amplitude).to_degrees();
+            spectrum.phase.push(b.max(0.0) * degrees * degrees);
+        }
+        Ok(spectrum)
     }
 }
 

@@ -3,11 +3,12 @@
 //!
 //! By the fluctuation–dissipation theorem the lever's damping matrix C comes with a random force of
 //! intensity 2 k_B T C on its modes. Its effect is small, so it obeys the linearisation along the
-//! orbit: see `linearised.rs`. Noise of the sample and of the detector is not included, and neither
-//! are escapes to another state, for which the noise is large.
+//! orbit: see `linearised.rs`. Noise of the sample and of the detector is not included. Escapes to
+//! another state need a large noise; `saddle.rs` estimates how large.
 
 mod free_lever;
 mod linearised;
+mod saddle;
 
 use nalgebra::{Complex, DMatrix, DVector};
 use nanotap_arithmetic::ComplexFunctions as _;
@@ -28,7 +29,9 @@ use crate::study::request::options;
 use crate::study::value::Amount;
 use crate::study::{Study, cantilever};
 pub use free_lever::{Calibrations, ThermalSpectrum, spectrum_csv};
+pub use linearised::ReadingSpectrum;
 use linearised::{Linearised, LockIn};
+pub use saddle::SaddleDistance;
 
 /// Boltzmann's constant in J/K; exact in the SI of 2019.
 pub const BOLTZMANN: f64 = 1.380_649e-23;
@@ -61,6 +64,10 @@ pub struct NoiseReport {
     pub free_phase_rms: f64,
     /// Force gradient in N/m that turns the phase of the free lever by its noise.
     pub force_gradient_min: f64,
+    /// The unstable orbit on the boundary of the basin, if one was found.
+    pub saddle: Option<SaddleDistance>,
+    /// Spectrum of the noise that the lock-in amplifier reads.
+    pub reading_spectrum: ReadingSpectrum,
     /// What calibrations of the spring constant would give.
     pub calibrations: Option<Calibrations>,
     /// Thermal spectrum of the free lever.
@@ -79,6 +86,9 @@ options! {
         /// Noise bandwidth of the lock-in amplifier, 1 over four time constants, in place of it
         #[schemars(extend("x-value" = "FREQUENCY"))]
         pub bandwidth: Option<Amount> = None,
+        /// State near the orbit, at drive phase 0: a1,…,aN,v1,…,vN
+        #[schemars(extend("x-value" = "A1,…"))]
+        pub state: Option<Vec<f64>> = None,
     }
 }
 
@@ -184,8 +194,8 @@ impl Study for NoiseStudy {
         let lock_in = LockIn {
             time_constant: time_constant / scales.time,
         };
-        let tapping = thermal.reading(case, lock_in, control)?;
-        let free = thermal.reading(&free(lever), lock_in, control)?;
+        let tapping = thermal.reading(case, options.state.as_deref(), lock_in, control)?;
+        let free = thermal.reading(&free(lever), None, lock_in, control)?;
         // A spring κ at the tip changes the free response by 1/(1 + κ χ).
         let turn = thermal.compliance(lever.omega).im.abs() * scales.length / scales.force;
         Ok(NoiseReport {
@@ -201,6 +211,14 @@ impl Study for NoiseStudy {
             free_amplitude_rms: scales.length * free.amplitude_rms,
             free_phase_rms: free.phase_rms.to_degrees(),
             force_gradient_min: free.phase_rms / turn,
+            saddle: saddle::nearest(
+                case,
+                (&tapping.state, tapping.period),
+                &tapping.covariance,
+                scales.length,
+                control,
+            )?,
+            reading_spectrum: tapping.spectrum.in_si(scales.length, scales.time),
             calibrations: thermal.calibrations(view),
             spectrum: thermal.spectrum(view),
         })
@@ -232,6 +250,11 @@ struct Reading {
     /// Radians.
     phase: f64,
     phase_rms: f64,
+    /// State at drive phase 0.
+    state: Vec<f64>,
+    /// Covariance of its continuous entries.
+    covariance: DMatrix<f64>,
+    spectrum: ReadingSpectrum,
 }
 
 impl Thermal {
@@ -271,10 +294,12 @@ impl Thermal {
     fn reading(
         &self,
         case: &Case,
+        state: Option<&[f64]>,
         lock_in: LockIn,
         control: &Control<'_>,
     ) -> Result<Reading, Error> {
         let options = OrbitOptions {
+            state: state.map(<[f64]>::to_vec),
             harmonics: 0,
             observables: Some(ObservableSet::FIRST_HARMONIC),
             ..OrbitOptions::default()
@@ -313,6 +338,9 @@ impl Thermal {
             amplitude_rms: deviation(&along),
             phase: orbit.observables.phase.to_radians(),
             phase_rms: deviation(&across) / amplitude,
+            state: orbit.state.clone(),
+            covariance: covariance.view((0, 0), (last, last)).clone_owned(),
+            spectrum: found.spectrum([&along, &across], amplitude, lock_in)?,
         })
     }
 }

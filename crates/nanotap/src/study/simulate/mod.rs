@@ -222,7 +222,7 @@ pub fn starting_state(model: &Model, state: Option<&[f64]>) -> Result<Vec<f64>, 
     let refused = |message| Err(Error::input(message, "count the numbers of {state}"));
     let n = model.dimension();
     let Some(state) = state else {
-        return Ok(model.start.clone().unwrap_or_else(|| model.rest()));
+        return Ok(model.first_state());
     };
     let mut state = state.to_vec();
     if state.len() + model.memory == n {

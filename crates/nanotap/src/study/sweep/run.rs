@@ -24,7 +24,7 @@ use crate::study::start_box::{box_with, default_starts};
 /// Where motions start.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Starts {
-    /// At rest.
+    /// At rest, or in the motion of the setpoint.
     Rest,
     /// In one state.
     Given(Vec<f64>),
@@ -60,7 +60,7 @@ impl Starts {
     /// The `index`-th one, for `model`.
     fn state(&self, index: usize, model: &Model) -> Vec<f64> {
         match self {
-            Self::Rest => model.rest(),
+            Self::Rest => model.first_state(),
             Self::Given(state) => state.clone(),
             // A box that cannot be had was refused when the sweep was made.
             Self::Seeded { seed, sides, .. } => box_with(model, sides)

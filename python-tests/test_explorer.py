@@ -1229,6 +1229,142 @@ def test_the_approach_curve_is_drawn_at_once_with_the_motion_on_it(
     assert page.is_hidden("#stale")
 
 
+def test_the_motions_of_a_lever_are_listed_by_themselves(
+    page: Any, address: str
+) -> None:
+    opened(page, address, "preset=dmt")
+    assert read(page, "regime") == "repulsive"
+    page.wait_for_selector("#attractors button >> nth=1", timeout=60_000)
+    # The case's own file says that an attractive and a repulsive oscillation coexist.
+    assert page.locator("#attractors button").count() == 2
+    assert "2 stable motions coexist here" in page.inner_text("#states")
+    pressed = page.locator("#attractors button[aria-pressed=true]")
+    assert pressed.count() == 1
+    assert "repulsive" in pressed.inner_text()
+    page.click("#attractors button:has-text('attractive')")
+    until(page, lambda: read(page, "regime") == "attractive")
+    assert read(page, "peak_force") == "0 N"
+    assert float(read(page, "phase").rstrip("°")) > 90
+    assert "attractive" in pressed.inner_text()
+    typed(page, "gap.tip", "24 nm")
+    until(page, lambda: read(page, "distance") == "24 nm")
+    # Clear of the sample there is one motion.
+    until(page, lambda: page.locator("#attractors button").count() == 1)
+    assert page.inner_text("#states") == ""
+
+
+def test_a_curve_that_waits_is_not_drawn_in_another_tab(
+    page: Any, address: str
+) -> None:
+    opened(page, address, "preset=dmt")
+    page.click("#tab-image")
+    page.wait_for_timeout(1000)
+    assert page.inner_text("#progress").startswith("A line of an image")
+    assert page.locator("#study-figure svg").count() == 0
+
+
+def test_a_pinned_curve_stays_behind_the_next(page: Any, address: str) -> None:
+    def legend() -> str:
+        texts = page.locator("#study-figure svg [aria-label]").evaluate_all(
+            "(all) => all.map((one) => one.getAttribute('aria-label')).join(' ')"
+        )
+        return str(texts)
+
+    opened(page, address, "preset=dmt")
+    page.wait_for_selector("#study-figure svg", timeout=60_000)
+    first = panels(page, "study-figure")[0]["y"]["to"]
+    assert "pinned" not in legend()
+    page.click("#pin")
+    typed(page, "drive.free_amplitude", "10 nm")
+    until(page, lambda: "pinned" in legend())
+    # The axis reaches to the larger amplitude of the pinned curve.
+    assert panels(page, "study-figure")[0]["y"]["to"] == pytest.approx(first, rel=0.05)
+    page.click("#pin")
+    until(page, lambda: "pinned" not in legend())
+    assert panels(page, "study-figure")[0]["y"]["to"] < 0.6 * first
+
+
+@pytest.mark.parametrize("preset", ["stiff-lever", "patch"])
+def test_the_command_of_an_image_gives_what_is_shown(
+    address: str, tmp_path: Path, preset: str
+) -> None:
+    case = {"preset": preset}
+    form = motion(address, preset)["forms"]["image"]
+    options = {field["name"]: field["value"] for field in form}
+    image = studied(address, case=case, tab="image", options=options)[-1]
+    assert image["figure"]["map"][0]["y"]["label"].startswith("height")
+    (tmp_path / "case.toml").write_text(case_file(address, case))
+    command = image["command"].replace("nanotap scan", f"'{PROGRAM}' scan")
+    done = subprocess.run(
+        ["sh", "-c", command.replace("--plot scan.svg", "--json")],
+        check=True,
+        capture_output=True,
+        text=True,
+        cwd=tmp_path,
+    )
+    verdict = json.loads(done.stdout)["verdict"]
+    assert image["words"].startswith(verdict)
+    if preset == "patch":
+        # docs/cases/scan.md: a flat sample, and a step where the lever changes its state.
+        assert "from the attractive to the repulsive state" in verdict
+
+
+LESSONS = [
+    "Two motions at one distance",
+    "Why the phase turns",
+    "Period doubling",
+    "A false step in an image",
+    "What a too coarse time step invents",
+    "An imaging window below a peak force",
+]
+
+
+@pytest.mark.parametrize("name", LESSONS)
+def test_a_guided_start_shows_what_it_says(page: Any, address: str, name: str) -> None:
+    def lag() -> float:
+        return float(read(page, "phase").rstrip("°"))
+
+    opened(page, address, "preset=soft-sample")
+    page.click("#learn summary")
+    assert page.locator("#lessons a").all_inner_texts() == LESSONS
+    page.click(f"#lessons a:has-text('{name}')")
+    until(page, lambda: "lesson=" in page.url)
+    for _ in range(400):
+        if page.locator("#study-figure:not(.stale) svg").count():
+            break
+        page.wait_for_timeout(100)
+    else:
+        told = ("#progress", "#bound", "#stale")
+        shown = [page.inner_text(element) for element in told]
+        pytest.fail(f"no figure: {page.url} {shown}")
+    assert page.inner_text("#lesson p").startswith(name)
+    assert page.is_hidden("#message")
+    if name == LESSONS[0]:
+        assert read(page, "peak_force").startswith("1.09")
+        assert lag() < 90
+    elif name == LESSONS[1]:
+        assert lag() == pytest.approx(90, abs=1)
+        for distance, shown in (("19 nm", 110), ("18 nm", 68)):
+            typed(page, "gap.tip", distance)
+            until(page, lambda d=distance: read(page, "distance") == d)
+            assert lag() == pytest.approx(shown, abs=1)
+    elif name == LESSONS[2]:
+        # Ω = 2.8 repeats after two drive periods, Ω = 3 after one.
+        for omega, period in (("2.8", "period 2"), ("3", "period 1")):
+            typed(page, "omega", omega)
+            until(page, lambda p=period: p in page.inner_text("#summary"))
+    elif name == LESSONS[3]:
+        words = page.inner_text("#progress")
+        assert "from the attractive to the repulsive state" in words
+    elif name == LESSONS[4]:
+        assert "period 1, stable" in page.inner_text("#summary")
+        assert "80 steps per period show" in page.inner_text("#spurious")
+    else:
+        assert "all conditions hold at" in page.inner_text("#progress")
+    page.click("#lesson button")
+    assert "lesson" not in page.url
+
+
 def test_an_ended_server_says_so(page: Any) -> None:
     other = page.context.browser.new_page()
     other.set_default_timeout(30_000)

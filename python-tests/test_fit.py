@@ -1,6 +1,8 @@
 """Fits from Python: tables of any kind, and their results."""
 
 import pickle
+import struct
+from pathlib import Path
 
 import nanotap
 import numpy as np
@@ -115,3 +117,63 @@ def test_each_curve_has_its_case(curve: dict[str, np.ndarray]) -> None:
     assert best.physical.Q == pytest.approx(found.best["cantilever.Q of two"])
     with pytest.raises(KeyError):
         found.best_case("three")
+
+
+def write_wave(path: Path, channels: dict[str, np.ndarray], note: str) -> None:
+    """A binary wave of version 5 (WaveMetrics, technical note 3): 64 bytes of sizes, 320 bytes about
+    the wave, the numbers, the note, and the labels of the columns.
+    """
+    data = np.array(list(channels.values()), dtype="<f8")
+    columns, rows = data.shape
+    labels = b"".join(name.encode().ljust(32, b"\0") for name in ["", *channels])
+    wave = struct.pack("<3Iihh6xh32s8x", 0, 0, 0, rows * columns, 4, 0, 1, b"curve")
+    wave += struct.pack("<4i8d", rows, columns, 0, 0, 1, 1, 1, 1, 0, 0, 0, 0)
+    wave = wave.ljust(320, b"\0")
+
+    def sizes(checksum: int) -> bytes:
+        of_labels = (0, len(labels), 0, 0)
+        return struct.pack(
+            "<2h4i4i4i3i",
+            5,
+            checksum,
+            320 + data.nbytes,
+            0,
+            len(note),
+            0,
+            *(0,) * 4,
+            *of_labels,
+            *(0,) * 3,
+        )
+
+    words = np.frombuffer(sizes(0) + wave, "<i2").astype(np.int64).sum()
+    checksum = (int(-words) + 2**15) % 2**16 - 2**15
+    path.write_bytes(sizes(checksum) + wave + data.tobytes() + note.encode() + labels)
+
+
+def test_instruments_files_are_read(
+    curve: dict[str, np.ndarray], tmp_path: Path
+) -> None:
+    pytest.importorskip("igor2")
+    path = tmp_path / "curve.ibw"
+    channels = {
+        "ZSnsr": 1e-9 * curve["distance (nm)"],
+        "Amp": 1e-9 * curve["amplitude (nm)"],
+        "Phase": curve["phase (deg)"],
+    }
+    write_wave(path, channels, "AmpInvOLS: 5.8e-08\rImagingMode: AC Mode")
+    read = nanotap.read(path)
+    assert read.attrs == {"AmpInvOLS": 5.8e-8, "ImagingMode": "AC Mode"}
+    np.testing.assert_allclose(read["Amp (nm)"], curve["amplitude (nm)"], rtol=1e-12)
+    found = nanotap.fit(
+        nanotap.Case.from_toml(LEVER), data=read, free=FREE, profile=False
+    )
+    assert found.best["sample.stiffness"] == pytest.approx(30, rel=1e-5)
+    text = tmp_path / "curve.csv"
+    read.to_csv(text, index=False)
+    np.testing.assert_allclose(nanotap.read(text)["Phase (deg)"], read["Phase (deg)"])
+    path = tmp_path / "curve.jpk-force"
+    path.write_bytes(b"PK")
+    with pytest.raises(ValueError, match="package afmformats"):
+        nanotap.read(path)
+    with pytest.raises(FileNotFoundError):
+        nanotap.read(tmp_path / "none.ibw")

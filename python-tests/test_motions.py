@@ -276,11 +276,11 @@ def test_a_distance_left_to_the_setpoint_is_solved_for(physical):
 
 def test_a_diagram_has_the_shares_of_its_attractors(regular):
     ds = nanotap.branch(
-        regular, parameter="omega", from_=3.0, to=3.2, diagram=True, values=3, starts=8
+        regular, parameter="omega", from_=3.0, to=3.1, diagram=True, values=3, starts=8
     )
     assert ds.attractor_number.dims == ("attractor",)
     first = ds.attractor_number.values == ds.attractor_number.values[0]
-    assert ds.attractor_parameter.values[first] == pytest.approx([3.0, 3.1, 3.2])
+    assert ds.attractor_parameter.values[first] == pytest.approx([3.0, 3.05, 3.1])
     assert set(ds.attractor_classification.values[first]) == {"periodic"}
     assert ds.attractor_share.attrs["units"] == "1"
     assert (ds.attractor_share.values <= 1).all()

@@ -49,6 +49,7 @@ ELSEWHERE = {
     "merge",
     "catalogue",
     "open",
+    "read",
     "in_si",
     "lever",
 }

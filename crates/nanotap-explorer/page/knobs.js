@@ -47,7 +47,9 @@ function build(keys) {
     const own = places(name);
     if (!own.length) continue;
     const said = (key) => own.some((other) => other.stated && other.alternatives.includes(key.name));
-    const first = name === "more" ? [] : own.filter((key) => key.stated || ALWAYS.includes(key.name));
+    // The distance of a setpoint follows from it.
+    const solved = (key) => key.name !== "drive.setpoint" && own.some((other) => other.name === "drive.setpoint" && other.stated);
+    const first = name === "more" ? [] : own.filter((key) => (key.stated || ALWAYS.includes(key.name)) && !solved(key));
     const rest = own.filter((key) => !first.includes(key) && !(said(key) && key.value !== ""));
     const box = element("fieldset", {}, element("legend", { textContent: title }), ...first.map((key) => knob(key, own)));
     box.dataset.group = name;
@@ -71,6 +73,8 @@ function update(keys, keep) {
     const typing = field === document.activeElement && field.value !== field.dataset.shown && field.value !== state.set[key.name];
     if (!typing && field.value !== key.value) field.value = key.value;
     if (!typing) field.dataset.shown = field.value;
+    const note = document.getElementById(`${idOf(key.name)}-note`);
+    if (note) note.textContent = key.note ? `. ${key.note}` : "";
     const range = form.querySelector(`[data-slider="${key.name}"]`);
     if (range && key.slider && !range.matches(":active")) range.adjust(key, keep);
   }
@@ -119,7 +123,7 @@ function typed(key) {
 
 function chooser(key, meaning) {
   const field = element("select");
-  if (key.value === "") field.add(new Option("", "", true, true));
+  if (key.value === "") field.add(new Option("own values", "", true, true));
   for (const choice of key.choices) {
     const text = choice.meaning ? `${choice.word}: ${choice.meaning}` : choice.word;
     field.add(new Option(text, choice.word, false, choice.word === key.value));
@@ -134,7 +138,9 @@ function summed(key, meaning) {
   const field = element("input", { type: "text", value: key.value });
   const terms = key.value.split("+").map((word) => word.trim()).filter(Boolean);
   const said = key.choices.filter((choice) => terms.includes(choice.word)).map((choice) => choice.meaning);
+  const note = element("span", { id: `${idOf(key.name)}-note`, textContent: key.note ? `. ${key.note}` : "" });
   meaning.textContent = said.length ? said.join("; ") : key.meaning;
+  meaning.append(note);
   const chosen = (title, take) => {
     const list = element("select", { className: "law" }, new Option(title, ""), ...key.choices.map((choice) => new Option(choice.word, choice.word)));
     [...list.options].forEach((option, k) => { if (k) option.title = key.choices[k - 1].meaning; });

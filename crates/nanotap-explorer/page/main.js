@@ -13,6 +13,24 @@ const BUSY_DELAY = 300;        // milliseconds before the page shows that it com
 const PATIENCE = 1000;         // milliseconds after which a motion gives way to a newer one
 const OFF = "0: off. Too few steps give motions that the equations do not have.";
 const OTHER = "computed for other values – find all again";
+const CALM = 700;              // milliseconds without a change before coexisting motions of a lever are searched
+const LONG = 10000;            // milliseconds after which that search ends
+const SAME = 1e-4;             // relative difference of amplitudes below which a listed motion is the displayed one
+/** Guided starts: words of the link, address, and what there is to see. */
+const LESSONS = {
+  bistable: ["Two motions at one distance", "preset=dmt",
+    "At 18 nm this lever has two stable motions: “Coexisting motions” lists both. Press the other one. The tip then stops touching, the peak force goes from about 1 nN to zero and the phase from below 90° to above, although no value has changed. Which one an instrument shows depends on how it came there."],
+  phase: ["Why the phase turns", "preset=dmt&set.gap.tip=24+nm",
+    "Far away the phase lags by 90°, at resonance. Move the distance from 24 nm to 19 nm: attraction lowers the resonance and the lag grows to 110°. At 18 nm a run from rest ends in repulsion, which raises the resonance: the lag falls to 68°. The curve of the phase shows both branches, with the present motion on it."],
+  doubling: ["Period doubling", "preset=paper&tab=diagram&ran=yes&study.key=omega&study.from=2.4&study.to=3.1",
+    "Each dot is the largest deflection in one drive period. Read from right to left: below Ω = 2.91 there are two dots, since the motion repeats only after two drive periods; around 2.6 it is chaotic. Click a dot: the lever above moves so."],
+  image: ["A false step in an image", "preset=patch&tab=image&ran=yes",
+    "The sample is flat; between 150 nm and 300 nm a patch attracts the tip less. There the lever jumps from its attractive to its repulsive state and stays, so the height in the image changes although the surface does not, and trace and retrace differ."],
+  step: ["What a too coarse time step invents", "preset=paper&steps=80",
+    "The equations give a motion of period 1. “Comparison with fixed time steps”, at the bottom, shows what 80 Runge–Kutta steps per period make of it. Try 40, then 400."],
+  plan: ["An imaging window below a peak force", "preset=dmt&tab=plan&ran=yes&study.force=4+nN",
+    "The black line surrounds the free amplitudes and setpoints at which the peak force stays below 4 nN and no second motion exists. Click inside it: the lever goes there. Change the force, then press Compute."],
+};
 let about = null;
 let outdated = false;         // a value changed while a motion was being computed
 let underway = false;
@@ -20,6 +38,8 @@ let moving = false;           // a slider is being moved
 let epoch = 0;                // counts links, clicks and cases: answers for earlier ones are dropped
 let displayed = null;         // the displayed motion: its case and its start
 let found = null;             // the case of the listed motions
+let calm = 0;                 // the timer of the search of coexisting motions
+let amplitude = NaN;          // of the displayed motion
 let searching = null;         // the case of the motions that are being searched
 let steps = 0;                // entries of the history that can be undone
 const redrawn = [];            // called when figures were redrawn
@@ -96,6 +116,7 @@ function show(motion, wish) {
   figure.put($("contact"), motion.contact);
   lever.show(motion.film);
   for (const again of redrawn) again();
+  amplitude = motion.observables.find((row) => row.name === "amplitude")?.value;
   table(motion.observables);
   readout(motion);
   $("remarks").textContent = motion.remarks.join(" · ");
@@ -105,6 +126,8 @@ function show(motion, wish) {
   $("command").textContent = motion.command;
   $("python").textContent = motion.python;
   markCensus();
+  clearTimeout(calm);
+  if (motion.distance && !moving && found?.of !== searched() && searching !== searched()) calm = setTimeout(() => census(LONG), CALM);
   if (!moving) study.fill(motion);
   else study.follow(motion);
 }
@@ -151,27 +174,34 @@ function table(rows) {
 /** What the listed motions are of. */
 const searched = () => caseText() + $("unstable").checked;
 
-async function census() {
+/** Lists the coexisting motions; after `longest` milliseconds, if given, the search ends. */
+async function census(longest) {
   const list = $("attractors");
   const own = searched();
+  clearTimeout(calm);
   list.replaceChildren();
   found = null;
   $("bound").textContent = "searching …";
   searching = own;
+  const end = longest && setTimeout(() => {
+    if (searching !== own) return;
+    stop("census");
+    searching = null;
+    $("bound").textContent = `not finished in ${longest / 1000} s; “Find all” takes the time it needs`;
+  }, longest);
   try {
     const answer = await ask("census", "/api/attractors", { case: theCase(), unstable: $("unstable").checked });
     if (searched() !== own) return;
     searching = null;
-    found = { of: own, bound: answer.bound };
+    found = { of: own, bound: answer.bound, stable: answer.motions.filter((one) => one.stable !== false).length };
     list.replaceChildren(...answer.motions.map((one) => {
       const item = document.createElement("li");
       const button = document.createElement("button");
       button.type = "button";
       button.textContent = `${one.words}, amplitude ${one.shown}`;
-      button.setAttribute("aria-pressed", String(one.start === state.start));
+      button.dataset.amplitude = one.amplitude;
       button.addEventListener("click", () => {
         state.start = one.start;
-        for (const other of list.querySelectorAll("button")) other.setAttribute("aria-pressed", String(other === button));
         remembered();
         elsewhere();
       });
@@ -183,6 +213,8 @@ async function census() {
     if (superseded(error)) return;
     searching = null;
     $("bound").textContent = error.message;
+  } finally {
+    clearTimeout(end);
   }
 }
 
@@ -193,10 +225,16 @@ function markCensus() {
     stop("census");
     $("bound").textContent = "the values changed: find all again";
   }
+  $("states").textContent = "";
   if (!found) return;
   const other = searched() !== found.of;
+  if (!other && found.stable > 1) $("states").textContent = `${found.stable} stable motions coexist here: one click each, below.`;
   $("attractors").classList.toggle("stale", other);
-  for (const button of $("attractors").querySelectorAll("button")) button.disabled = other;
+  for (const button of $("attractors").querySelectorAll("button")) {
+    const own = Number(button.dataset.amplitude);
+    button.disabled = other;
+    button.setAttribute("aria-pressed", String(!other && Math.abs(own - amplitude) <= SAME * own));
+  }
   $("bound").textContent = other ? OTHER : found.bound;
 }
 
@@ -225,6 +263,9 @@ function takeOver() {
   $("steps").value = state.steps;
   $("follow").checked = state.follow === "yes";
   $("note").textContent = "";
+  const lesson = LESSONS[state.lesson];
+  $("lesson").hidden = !lesson;
+  $("lesson").firstElementChild.textContent = lesson ? `${lesson[0]}. ${lesson[2]}` : "";
   if (!found) { $("attractors").replaceChildren(); $("bound").textContent = ""; }
   markCensus();
   study.restore();
@@ -242,8 +283,15 @@ async function begin() {
     groups.get(preset.group).append(new Option(preset.words, preset.name));
   }
   $("preset").append(...groups.values());
+  $("lessons").append(...Object.entries(LESSONS).map(([name, [words, address]]) => {
+    const item = document.createElement("li");
+    item.append(Object.assign(document.createElement("a"), { href: `#${address}&lesson=${name}`, textContent: words }));
+    return item;
+  }));
+  $("lessons").addEventListener("click", () => { $("learn").open = false; });
+  $("lesson").lastElementChild.addEventListener("click", () => { state.lesson = ""; $("lesson").hidden = true; remember(true); });
   const fresh = (preset) => {
-    Object.assign(state, { preset, set: {}, start: "", study: {}, ran: "", views: {} });
+    Object.assign(state, { preset, set: {}, start: "", study: {}, ran: "", views: {}, lesson: "" });
     remembered();
     takeOver();
   };
@@ -268,7 +316,7 @@ async function begin() {
       zoom: (views) => { state.views[name] = views; remembered(); refresh(); },
     }));
   }
-  $("census").addEventListener("click", census);
+  $("census").addEventListener("click", () => census());
   // The fragment of the address is the state.
   $("skip").addEventListener("click", (event) => { event.preventDefault(); $("study").focus(); });
   for (const button of document.querySelectorAll("[data-export]")) {

@@ -6,6 +6,7 @@ const empty = () => ({
   start: "",                  // state at drive phase 0 from which the motion is computed
   follow: "",                 // "yes": a changed parameter continues from the displayed motion
   tab: "approach",
+  lesson: "",                 // a guided start whose words are shown
   steps: 0,                   // Runge-Kutta steps per period of the motion for comparison; 0: none
   study: {},                  // fields of the study's form: name -> text
   ran: "",                    // "yes": the study was computed
@@ -14,7 +15,7 @@ const empty = () => ({
 
 export const state = empty();
 
-const FIELDS = ["preset", "start", "follow", "tab", "steps", "ran"];
+const FIELDS = ["preset", "lesson", "start", "follow", "tab", "steps", "ran"];
 
 /** The fragment of the address for `state`. */
 export function encoded() {

@@ -9,8 +9,20 @@ import * as figure from "./figure.js";
 const $ = (id) => document.getElementById(id);
 const TABS = {
   approach: "Approach", diagram: "Diagram", branches: "Branches", resonance: "Resonance",
-  basin: "Basins", map: "Two parameters", plan: "Plan",
+  basin: "Basins", map: "Two parameters", plan: "Plan", image: "Image",
 };
+/** What the studies show, until they are computed. */
+const HINTS = {
+  approach: "Amplitude, phase, energy and peak force against the distance, coming nearer and going away.",
+  diagram: "The largest deflections of the motions that runs lead to, against a parameter: where a motion doubles its period or becomes chaotic.",
+  branches: "Every motion followed against a parameter, stable or not: where motions begin, end and meet.",
+  resonance: "Amplitude and phase against the frequency, up and down: the resonance curve and its jumps.",
+  basin: "To which motion each initial deflection and velocity leads.",
+  map: "The kinds of motion, the peak force, or the number of motions over two parameters.",
+  image: "A line of an image under feedback: height, amplitude error, phase and peak force over a surface that is known.",
+  plan: "Where every motion keeps to the conditions, over free amplitude and setpoint: a window to image in.",
+};
+const PREFIX = { "-9": "G", "-6": "M", "-3": "k", 3: "m", 6: "µ", 9: "n", 12: "p", 15: "f" };
 const NEAR = 0.05;            // fraction of a panel within which a click selects a drawn motion
 const PAUSE = 250;            // milliseconds after a change before an approach curve is drawn anew
 const OTHER = "computed for other values – compute again";
@@ -18,6 +30,7 @@ let forms = null;
 let filled = "";              // the form that is shown
 let drawn = null;             // what the displayed figure is of, and where its clicks go
 let asking = null;            // the same of the figure that is being computed
+let pinned = 0;               // the number of the figure that is drawn behind
 let number = 0;               // the server's number for the figure
 let motion = null;            // the displayed motion
 let timer = 0;
@@ -126,6 +139,8 @@ export function begin(motionChanged) {
 
 /** Shows the tab given in the state. */
 export function restore() {
+  // A curve that waits to be drawn is of the former tab or case.
+  clearTimeout(timer);
   if (!(state.tab in TABS)) state.tab = "approach";
   for (const tab of $("tabs").children) {
     const chosen = tab.id === `tab-${state.tab}`;
@@ -141,6 +156,9 @@ export function restore() {
 export function fill(next) {
   motion = next;
   forms = next.forms;
+  // Only a lever makes images.
+  $("tab-image").hidden = !forms.image.length;
+  if (!forms[state.tab].length) { state.tab = "approach"; restore(); }
   const now = asked() + JSON.stringify(forms[state.tab]);
   if (now !== filled) {
     filled = now;
@@ -167,7 +185,7 @@ function forget() {
   drawn = null;
   $("study-figure").replaceChildren();
   $("study-export").hidden = true;
-  $("progress").textContent = "";
+  $("progress").textContent = HINTS[state.tab];
   $("hover").textContent = "";
 }
 
@@ -193,11 +211,24 @@ function build() {
   const compute_ = Object.assign(document.createElement("button"), { type: "submit", textContent: "Compute" });
   const end = Object.assign(document.createElement("button"), { type: "button", textContent: "Stop" });
   end.addEventListener("click", () => stop("study"));
-  form.append(compute_, end);
+  const pin = Object.assign(document.createElement("button"), { type: "button", id: "pin", textContent: pinned ? "Unpin" : "Pin" });
+  pin.title = "Keep the curves of this figure behind the next ones";
+  pin.setAttribute("aria-pressed", String(Boolean(pinned)));
+  pin.addEventListener("click", () => {
+    const before = pinned;
+    pinned = pinned || !drawn ? 0 : number;
+    pin.textContent = pinned ? "Unpin" : "Pin";
+    pin.setAttribute("aria-pressed", String(Boolean(pinned)));
+    // Without its pinned curves the figure is drawn anew.
+    if (before && drawn && isCurrent()) compute(state.tab === "approach" && state.ran !== "yes");
+  });
+  form.append(compute_, end, pin);
+  if (!drawn) $("progress").textContent = HINTS[state.tab];
 }
 
 /** Computes the figure of the form, in stages; a `quick` one ends after the first. */
 async function compute(quick) {
+  clearTimeout(timer);
   const options = Object.fromEntries(new FormData($("study-form")));
   $("progress").textContent = "computing …";
   const own = { ...subject(null), clicks: null };
@@ -205,7 +236,7 @@ async function compute(quick) {
   asking = own;
   let request = null;
   try {
-    const sent = stream("study", "/api/study", { case: theCase(), start: state.start, tab: state.tab, options }, (message) => {
+    const sent = stream("study", "/api/study", { case: theCase(), start: state.start, tab: state.tab, options, ...(pinned ? { pinned } : {}) }, (message) => {
       // An answer for an older case is dropped.
       if (asking !== own) return;
       if (!own.clicks && caseText() !== whole) { request?.abort(); return; }
@@ -261,8 +292,8 @@ function go(place) {
   const orbit = nearest(place);
   state.start = "";
   for (const [axis, key] of Object.entries(clicks.set ?? {})) {
-    const value = (orbit && axis === "x" ? orbit[0] : place[axis]) / key.factor;
-    put(key.name, `${orbit ? value : Number(value.toPrecision(7))}${key.unit ? ` ${key.unit}` : ""}`, sameAs(key.name));
+    const shown = orbit && axis === "x" ? orbit[0] : Number(place[axis].toPrecision(7));
+    put(key.name, inUnit(shown, key), sameAs(key.name));
   }
   for (const [name, text] of Object.entries(clicks.fixed ?? {})) put(name, text, sameAs(name));
   if (orbit) state.start = orbit[2];
@@ -274,6 +305,14 @@ function go(place) {
   Object.assign(drawn, subject(clicks));
   remember(true);
   gone();
+}
+
+/** A drawn value in the unit of its axis, or in that of the key. */
+function inUnit(shown, { factor, unit }) {
+  const power = Math.round(Math.log10(factor));
+  if (!unit) return `${shown / factor}`;
+  const prefix = Math.abs(factor / 10 ** power - 1) < 1e-9 && unit !== "kg" ? PREFIX[power] : undefined;
+  return prefix ? `${shown} ${prefix}${unit}` : `${shown / factor} ${unit}`;
 }
 
 /** The drawn motion nearest to a place, if one is near: [x, heights by panel, start]. */

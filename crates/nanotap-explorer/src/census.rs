@@ -7,6 +7,7 @@ use axum::extract::State;
 use nanotap::case::physical::Kind;
 use nanotap::case::units::Units;
 use nanotap::control::Control;
+use nanotap::observe::Observables;
 use nanotap::study::attractors::{Attractors, AttractorsOptions, AttractorsStudy};
 use nanotap::study::orbit::OrbitReport;
 use nanotap::study::registry::Study as _;
@@ -17,6 +18,7 @@ use crate::App;
 use crate::api_error::ApiError;
 use crate::motion_request::{Start, model_of};
 use crate::preset::CaseSpec;
+use crate::readout::regime;
 
 /// Longest period of the unstable orbits that are searched for.
 const UNSTABLE: usize = 4;
@@ -51,7 +53,7 @@ fn listed(app: &App, census: &Census, control: &Control<'_>) -> Result<Value, Ap
     let found = AttractorsStudy::run(&case, &request, control)?;
     let units = case.units();
     let stable = found.attractors.iter().filter_map(|one| {
-        let share = format!("{:.3} % of the starts", 100.0 * one.share.fraction);
+        let share = format!("{:.2} % of the starts", 100.0 * one.share.fraction);
         if let Some(orbit) = &one.orbit {
             return Some(entry(orbit, None, &share, &units));
         }
@@ -61,7 +63,7 @@ fn listed(app: &App, census: &Census, control: &Control<'_>) -> Result<Value, Ap
             "words": format!("{name}, {share}"),
             "start": Start::text(None, &non_periodic.state),
             "amplitude": non_periodic.observables.amplitude,
-            "shown": amplitude(non_periodic.observables.amplitude, &units),
+            "shown": shown(&non_periodic.observables, &units),
         }))
     });
     let unstable = found.unstable.iter().flatten();
@@ -70,22 +72,28 @@ fn listed(app: &App, census: &Census, control: &Control<'_>) -> Result<Value, Ap
     Ok(json!({ "motions": motions, "bound": bound(&found) }))
 }
 
-/// An amplitude as text, of a physical case with its unit.
-fn amplitude(value: f64, units: &Units) -> String {
-    let (kind, unit) = units
-        .si(Kind::Length)
-        .map_or((Kind::Number, 1.0), |unit| (Kind::Length, unit));
-    kind.format_digits(unit * value, 4)
+/// The amplitude as text; of a lever with its unit, and the peak force.
+fn shown(observables: &Observables, units: &Units) -> String {
+    let text = |kind: Kind, value: f64| match units.si(kind) {
+        Some(unit) => kind.format_digits(unit * value, 4),
+        None => Kind::Number.format_digits(value, 4),
+    };
+    let amplitude = text(Kind::Length, observables.amplitude);
+    if units.si(Kind::Force).is_none() {
+        return amplitude;
+    }
+    let force = text(Kind::Force, observables.peak_force);
+    format!("{amplitude}, peak force {force}")
 }
 
 fn entry(orbit: &OrbitReport, period: Option<usize>, remark: &str, units: &Units) -> Value {
     json!({
-        "words": format!("period {}, {remark}", orbit.period),
+        "words": format!("period {}, {}, {remark}", orbit.period, regime(&orbit.observables)),
         "start": Start::text(period, &orbit.state),
         "period": orbit.period,
         "stable": orbit.stable,
         "amplitude": orbit.observables.amplitude,
-        "shown": amplitude(orbit.observables.amplitude, units),
+        "shown": shown(&orbit.observables, units),
     })
 }
 

@@ -10,14 +10,16 @@ use crate::motion_request::{MotionRequest, Start};
 use crate::preset::CaseSpec;
 
 /// File name of the saved case.
-const CASE_FILE: &str = "case.toml";
+pub(crate) const CASE_FILE: &str = "case.toml";
 
 /// The path of the case file in commands: the given file if nothing was changed, otherwise the
 /// saved one.
-fn case_path(app: &App, case: &CaseSpec) -> Result<String, ApiError> {
-    let preset = case.preset(app)?;
-    let unchanged = !preset.path.is_empty() && case.words(preset).is_empty();
-    Ok(if unchanged { &preset.path } else { CASE_FILE }.to_owned())
+pub(crate) fn case_path(app: &App, case: &CaseSpec) -> Result<String, ApiError> {
+    Ok(if case.is_a_file(app)? {
+        case.preset(app)?.path.clone()
+    } else {
+        CASE_FILE.to_owned()
+    })
 }
 
 /// The command for the same motion.
@@ -76,7 +78,7 @@ fn text(value: &Value) -> String {
 }
 
 /// A word quoted for a shell.
-fn quoted(word: &str) -> String {
+pub(crate) fn quoted(word: &str) -> String {
     let plain = |c: char| c.is_ascii_alphanumeric() || "=:,._/+-".contains(c);
     if !word.is_empty() && word.chars().all(plain) {
         word.to_owned()

@@ -8,7 +8,7 @@ use axum::Json;
 use axum::extract::State;
 use axum::http::header;
 use axum::response::{IntoResponse as _, Response};
-use nanotap_figures::{DPI, Figure, Layer, Range};
+use nanotap_figures::{Axis, Colour, DPI, Figure, Layer, Range};
 use serde::Deserialize;
 use serde_json::{Value, json};
 
@@ -46,6 +46,43 @@ pub(crate) fn viewed(mut figure: Figure, views: &[View]) -> Figure {
         }
     }
     figure
+}
+
+/// Legend of the curves of a pinned figure.
+const PINNED: &str = "pinned";
+
+/// The figure with the curves of a pinned one behind its own, in the panels with the same axes; and
+/// whether there is one.
+pub(crate) fn over_pinned(mut figure: Figure, pinned: &Figure) -> (Figure, bool) {
+    let same = |one: &Axis, other: &Axis| one.label == other.label && one.unit == other.unit;
+    let mut any = false;
+    for (panel, old) in figure.panels.iter_mut().zip(&pinned.panels) {
+        if !same(&panel.x, &old.x) || !same(&panel.y, &old.y) {
+            continue;
+        }
+        let mut label = PINNED;
+        let mut behind = Vec::new();
+        for layer in &old.layers {
+            let mut layer = layer.clone();
+            let (colour, words) = match &mut layer {
+                Layer::Line(line) => (&mut line.colour, &mut line.label),
+                Layer::Points(points) => (&mut points.colour, &mut points.label),
+                Layer::Markers(markers) => (&mut markers.colour, &mut markers.label),
+                _ => continue,
+            };
+            // What was pinned behind the pinned figure stays there.
+            if words == PINNED {
+                continue;
+            }
+            *colour = Some(Colour::GREY);
+            std::mem::take(&mut label).clone_into(words);
+            behind.push(layer);
+        }
+        any |= !behind.is_empty();
+        behind.append(&mut panel.layers);
+        panel.layers = behind;
+    }
+    (figure, any)
 }
 
 /// A figure in the form that the page reads.
@@ -183,15 +220,19 @@ impl Shelf {
         number
     }
 
-    fn get(&self, number: u64) -> Result<Arc<Figure>, ApiError> {
-        let kept = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        let found = kept.figures.iter().find(|(own, _)| *own == number);
-        found.map(|(_, figure)| Arc::clone(figure)).ok_or_else(|| {
-            ApiError::input(
+    /// The figure with this number, which then counts as recent.
+    pub(crate) fn get(&self, number: u64) -> Result<Arc<Figure>, ApiError> {
+        let mut kept = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let place = kept.figures.iter().position(|(own, _)| *own == number);
+        let found = place.and_then(|place| kept.figures.remove(place));
+        let Some((_, figure)) = found else {
+            return Err(ApiError::input(
                 "this figure is no longer available",
                 "compute the study again",
-            )
-        })
+            ));
+        };
+        kept.figures.push_back((number, Arc::clone(&figure)));
+        Ok(figure)
     }
 }
 
@@ -248,6 +289,32 @@ mod tests {
             ]
         );
         assert!(text.starts_with("# panel 0, x: x nm\n"));
+    }
+
+    #[test]
+    fn a_pinned_curve_is_behind_where_the_axes_are_the_same() {
+        let panel = |unit: &str, y: f64| {
+            Panel::new(Axis::linear("$x$").unit(unit), Axis::linear("y"))
+                .with(Line::new([(1.0, y)]).label("curve"))
+        };
+        let drawn = |unit: &str, y: f64| Figure::new(1, 1).with(panel(unit, y));
+        let (twice, any) = over_pinned(drawn("nm", 3.0), &drawn("nm", 2.0));
+        assert!(any);
+        let heights: Vec<(f64, &str)> = twice.panels[0]
+            .layers
+            .iter()
+            .filter_map(|layer| match layer {
+                Layer::Line(line) => Some((line.points[0].1, line.label.as_str())),
+                _ => None,
+            })
+            .collect();
+        assert_eq!(heights, [(2.0, PINNED), (3.0, "curve")]);
+        // A pinned curve of a pinned figure is not drawn again.
+        let (third, _) = over_pinned(drawn("nm", 4.0), &twice);
+        assert_eq!(third.panels[0].layers.len(), 2);
+        let (other, any) = over_pinned(drawn("m", 3.0), &drawn("nm", 2.0));
+        assert!(!any);
+        assert_eq!(other.panels[0].layers.len(), 1);
     }
 
     #[test]

@@ -100,6 +100,7 @@ pub(crate) fn forms(case: &Case, base: &Case, model: &Model) -> Value {
             "choices": [ONE_STATE, ANY] }),
     ];
     let plan = [across, up, conditions].concat();
+    let image = image(case, base);
     let slice = [entry("x", 0), entry("y", velocity)].concat();
     json!({
         "diagram": parameter("", frequency, band),
@@ -111,8 +112,46 @@ pub(crate) fn forms(case: &Case, base: &Case, model: &Model) -> Value {
         ],
         "map": plane,
         "plan": plan,
+        "image": image,
         "basin": slice,
     })
+}
+
+/// Surfaces that the form of an image offers; that of the case's `[scan]` comes first, if it has one.
+pub(crate) const SURFACES: [&str; 4] = [OWN_SURFACE, "step", "grating", "particle"];
+const OWN_SURFACE: &str = "of the case";
+/// Drive periods of a line in one direction.
+const LINE_PERIODS: f64 = 5000.0;
+
+/// The fields of an image: what the case's `[scan]` does not say has usual values.
+fn image(case: &Case, base: &Case) -> Vec<Value> {
+    let Some(view) = base.physical() else {
+        return Vec::new();
+    };
+    let own = case.scan().is_some();
+    let frequency = base.get(Key::DriveFrequency);
+    // Half the rate at which the lever's amplitude follows.
+    let gain = std::f64::consts::PI * frequency / (2.0 * view.lever.quality_factor);
+    let surfaces = &SURFACES[usize::from(!own)..];
+    let field = |name: &str, words: &str, value: String| {
+        let value = if own { String::new() } else { value };
+        json!({ "name": name, "words": words, "value": value, "hint": OWN_SURFACE })
+    };
+    let rate = Kind::Frequency.format_digits(frequency / (2.0 * LINE_PERIODS), 3);
+    vec![
+        json!({ "name": "surface", "words": "surface", "value": surfaces[0], "choices": surfaces }),
+        json!({ "name": "height", "words": "height", "value": "10 nm" }),
+        field("size", "line", "500 nm".to_owned()),
+        field("rate", "lines a second", rate),
+        field("setpoint", "setpoint", "0.8".to_owned()),
+        field(
+            "gain",
+            "integral gain (1/s)",
+            format!("{gain:.3e}")
+                .parse()
+                .map_or_else(|_| String::new(), |gain: f64| gain.to_string()),
+        ),
+    ]
 }
 
 /// A range around the value of a key, as text.

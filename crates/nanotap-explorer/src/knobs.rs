@@ -34,6 +34,9 @@ pub(crate) struct Knob {
     choices: Option<Vec<Choice>>,
     /// Whether a sum of options is allowed.
     sums: bool,
+    /// What follows from it, in words.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    note: Option<String>,
     #[serde(skip_serializing_if = "Option::is_none")]
     slider: Option<Slider>,
 }
@@ -193,12 +196,23 @@ fn knob(case: &Case, base: &Case, key: Key, accepts: Option<Accepts<'_>>) -> Kno
         si: Some(value).filter(|value| value.is_finite()),
         choices,
         sums: matches!(key.entry().takes, Takes::Law),
+        note: tabor(case).filter(|_| key == Key::SampleLaw),
         slider,
     }
 }
 
+/// Tabor's parameter of the sample's law, in words.
+fn tabor(case: &Case) -> Option<String> {
+    let tabor = case.physical()?.sample.force.as_ref()?.tabor_parameter()?;
+    let number = Kind::Number.format_digits(tabor, 3);
+    Some(format!("Tabor's parameter: {number}"))
+}
+
 /// The words of a key beside its control.
 fn title(key: Key) -> String {
+    if [Key::SamplePoisson, Key::TipPoisson].contains(&key) {
+        return "Poisson's ratio ν".to_owned();
+    }
     match key.entry().label {
         "" => key.name().to_owned(),
         label => label.replace("_0", "₀").replace("_c", "").replace('$', ""),

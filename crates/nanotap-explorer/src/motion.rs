@@ -164,7 +164,7 @@ fn answer(app: &App, request: &MotionRequest, control: &Control<'_>) -> Result<V
         "remarks": remarks,
         "keys": knobs::of(&case, &base, accepts),
         "readout": readout(&case, motion.observables()),
-        "distance": case.physical().map(|_| case.shown(Key::GapTip, case.get(Key::GapTip))),
+        "distance": case.physical().map(|_| Kind::Length.format_digits(case.get(Key::GapTip), 5)),
         "observables": rows(&case, motion.observables()),
         "start": Start::text(None, motion.state()),
         "figure": unlettered(motion.figure(&model, &case), &request.views, "portrait")?,

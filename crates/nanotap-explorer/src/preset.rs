@@ -39,7 +39,7 @@ impl Preset {
 }
 
 /// The built-in cases: name, description, text, changes.
-const BUILT_IN: [(&str, &str, &str, &[&str]); 13] = [
+const BUILT_IN: [(&str, &str, &str, &[&str]); 14] = [
     (
         "dmt",
         "DMT forces, in air",
@@ -92,6 +92,12 @@ const BUILT_IN: [(&str, &str, &str, &[&str]); 13] = [
         "liquid",
         "Kelvin–Voigt sample in a liquid",
         include_str!("../cases/liquid-kelvin-voigt.toml"),
+        &[],
+    ),
+    (
+        "patch",
+        "Flat sample with a patch: a false step",
+        include_str!("../cases/scan-patch.toml"),
         &[],
     ),
     (
@@ -168,6 +174,12 @@ impl CaseSpec {
                     format!("there are {}", known.join(", ")),
                 )
             })
+    }
+
+    /// Whether it is the given file, without changes.
+    pub(crate) fn is_a_file(&self, app: &App) -> Result<bool, ApiError> {
+        let preset = self.preset(app)?;
+        Ok(!preset.path.is_empty() && self.words(preset).is_empty())
     }
 
     /// The changes to the preset's text, each key once.

@@ -53,7 +53,7 @@ fn ratio(case: &Case, observables: &Observables) -> Option<f64> {
 }
 
 /// The regime, in a word.
-fn regime(observables: &Observables) -> &'static str {
+pub(crate) fn regime(observables: &Observables) -> &'static str {
     match observables.mean_force {
         0.0 => "free",
         force if force < 0.0 => "attractive",

@@ -12,6 +12,7 @@ use nanotap::dataset::{Share, Store, Work};
 use nanotap::figure::approach::approach_figure;
 use nanotap::figure::basin::figure as basin_figure;
 use nanotap::figure::branch::{Shown, case_figure};
+use nanotap::figure::scan::scan_figure;
 use nanotap::figure::sweep::{figure as sweep_figure, response as response_figure};
 use nanotap::figure::window::figure as window_figure;
 use nanotap::model::Model;
@@ -20,6 +21,7 @@ use nanotap::study::approach::ApproachStudy;
 use nanotap::study::branch::{BranchReport, BranchStudy};
 use nanotap::study::registry::{Study, study as study_named};
 use nanotap::study::request::read;
+use nanotap::study::scan::ScanStudy;
 use nanotap::study::sweep::Over;
 use nanotap::study::window::Window;
 use nanotap_figures::{Axis as Axes, Figure, Panel};
@@ -29,8 +31,8 @@ use serde_json::{Map, Value, json};
 use crate::App;
 use crate::api_error::ApiError;
 use crate::clicks::{self, Axis, Height};
-use crate::commands::{study_command, study_python};
-use crate::figures::drawn;
+use crate::commands::{CASE_FILE, case_path, quoted, study_command, study_python};
+use crate::figures::{drawn, over_pinned};
 use crate::forms;
 use crate::maps::{self, Shows};
 use crate::motion_request::{Start, model_of};
@@ -50,7 +52,7 @@ const BRANCHES: [usize; 2] = [5, 15];
 /// Number of values with a census for branches that are drawn over another figure.
 const OVERLAID: usize = 7;
 /// Numbers of values along each axis in the stages of a plan.
-const PLAN: [usize; 2] = [6, 14];
+const PLAN: [usize; 3] = [4, 8, 16];
 /// Initial states at each point of a plan.
 const PLAN_STARTS: usize = 4;
 /// Observables in the panels of an approach curve.
@@ -69,6 +71,9 @@ pub(crate) struct StudyRequest {
     start: String,
     tab: Tab,
     options: Map<String, Value>,
+    /// Number of a figure whose curves are drawn behind; 0: none.
+    #[serde(default)]
+    pinned: u64,
 }
 
 /// The kind of study.
@@ -82,6 +87,7 @@ enum Tab {
     Basin,
     Map,
     Plan,
+    Image,
 }
 
 pub(crate) async fn study(
@@ -115,6 +121,8 @@ struct Stage<'a> {
     words: String,
     /// Names and requests of the studies in its figure.
     studies: &'a [Computed<'a>],
+    /// Lines of the case file in addition.
+    table: Option<String>,
 }
 
 /// The name of a study, and its options.
@@ -127,6 +135,7 @@ impl Studied<'_> {
             Tab::Resonance => self.sweep(&DIAGRAM[..2], 0, true),
             Tab::Map => self.map(),
             Tab::Plan => self.plan(),
+            Tab::Image => self.image(),
             Tab::Branches => self.branches(),
             Tab::Approach => self.approach(),
             Tab::Basin => self.basin(),
@@ -155,12 +164,32 @@ impl Studied<'_> {
         let command = |(name, request): &Computed<'_>| study_command(self.app, case, name, request);
         let commands = stage.studies.iter().map(command);
         let commands: Vec<String> = commands.collect::<Result<_, _>>()?;
+        let (figure, words) = match self.request.pinned {
+            0 => (stage.figure.clone(), stage.words.clone()),
+            pinned => {
+                let pinned = self.app.figures.get(pinned)?;
+                let (figure, any) = over_pinned(stage.figure.clone(), &pinned);
+                let other = if any {
+                    ""
+                } else {
+                    "; the pinned figure has other axes"
+                };
+                (figure, stage.words.clone() + other)
+            }
+        };
         (self.hand_over)(json!({
-            "figure": drawn(&stage.figure)?,
-            "number": self.app.figures.put(stage.figure.clone()),
+            "figure": drawn(&figure)?,
+            "number": self.app.figures.put(figure),
             "clicks": stage.clicks,
-            "words": stage.words,
-            "command": commands.join("\n"),
+            "words": words,
+            "command": match &stage.table {
+                Some(table) => {
+                    // The saved case has no other `[scan]`.
+                    let path = quoted(&case_path(self.app, case)?);
+                    appended(table, &commands.join("\n").replacen(&path, CASE_FILE, 1))
+                }
+                None => commands.join("\n"),
+            },
             "python": study_python(self.app, case, stage.studies)?,
         }));
         Ok(())
@@ -248,6 +277,7 @@ impl Studied<'_> {
                     clicks: &json!({ "set": { "x": x.json() }, "near": near, "fixed": fixed, "heights": heights }),
                     words,
                     studies,
+table: None,
                 })
             };
             let swept = ("sweep", &options);
@@ -289,6 +319,7 @@ impl Studied<'_> {
                 clicks: &json!({ "set": { "x": x, "y": y }, "fixed": fixed }),
                 words: progress(count.pow(2), finest.pow(2), "values"),
                 studies: &[("sweep", &options)],
+                table: None,
             })
         })
     }
@@ -325,8 +356,95 @@ impl Studied<'_> {
                 clicks: &json!({ "set": { "x": x, "y": y }, "fixed": fixed }),
                 words: progress(count.pow(2), finest.pow(2), "points") + &safe,
                 studies: &[("window", &options)],
+                table: None,
             })
         })
+    }
+
+    /// A line over the surface of the form, under feedback.
+    fn image(&self) -> Result<(), ApiError> {
+        let case = self.request.case.any_distance(self.app)?;
+        let mut options = object(json!({ "lines": 1 }));
+        for (field, option) in [
+            ("size", "size"),
+            ("rate", "line_rate"),
+            ("setpoint", "setpoint"),
+            ("gain", "integral_gain"),
+        ] {
+            if let Ok(text) = self.field(field) {
+                options.insert(option.to_owned(), text.into());
+            }
+        }
+        let mut computed = options.clone();
+        let surface = self.surface()?;
+        if let Some(surface) = &surface {
+            computed.insert("surface".to_owned(), json!([surface]));
+        }
+        let report = self.report::<ScanStudy>(&case, &computed)?;
+        let gain = report.feedback.as_ref();
+        let gain = gain.and_then(|feedback| feedback.largest_stable_gain);
+        let gain = gain.map_or_else(String::new, |gain| {
+            let gain = Kind::Number.format_digits(gain, 3);
+            format!(" The feedback is stable up to a gain of {gain}/s.")
+        });
+        self.hand(&Stage {
+            figure: scan_figure(&report),
+            clicks: &json!({}),
+            words: format!("{}{gain}", report.verdict),
+            studies: &[("scan", &options)],
+            table: self.scan_table(&case, surface)?,
+        })
+    }
+
+    /// The table `[scan]` that the saved case needs for the surface; `None` if its file has it.
+    fn scan_table(&self, case: &Case, surface: Option<Value>) -> Result<Option<String>, ApiError> {
+        let spec = &self.request.case;
+        if surface.is_none() && spec.is_a_file(self.app)? {
+            return Ok(None);
+        }
+        let mut table = case.scan().cloned().unwrap_or_default();
+        if let Some(surface) = surface {
+            table.retain(|name, _| !["profile", "image"].contains(&name.as_str()));
+            table.insert("surface".to_owned(), json!([surface]));
+        }
+        let lines = table
+            .iter()
+            .map(|(name, value)| format!("{name} = {}", inline(value)));
+        let lines: Vec<String> = lines.collect();
+        Ok(Some(format!("[scan]\n{}", lines.join("\n"))))
+    }
+
+    /// The surface of the form; `None`: that of the case.
+    fn surface(&self) -> Result<Option<Value>, ApiError> {
+        let [own, step, grating, particle] = forms::SURFACES;
+        let chosen = self.field("surface")?;
+        if chosen == own {
+            return Ok(None);
+        }
+        let height = self.field("height")?;
+        let line = self.field("size")?;
+        let length = |text: &str, field: &str| {
+            Kind::Length
+                .parse(text)
+                .map_err(|error| ApiError::input(error.to_string(), "as in \"10 nm\"").about(field))
+        };
+        let part = |part: f64| -> Result<String, ApiError> {
+            Ok(Kind::Length.format_exact(part * length(line, "size")?))
+        };
+        Ok(Some(if chosen == step {
+            json!({ "step": { "from": part(0.25)?, "to": part(0.65)?, "height": height } })
+        } else if chosen == grating {
+            json!({ "grating": { "height": height, "period": part(0.25)? } })
+        } else if chosen == particle {
+            let radius = Kind::Length.format_exact(0.5 * length(height, "height")?);
+            json!({ "particle": { "at": part(0.5)?, "radius": radius } })
+        } else {
+            let known = forms::SURFACES.join(", ");
+            return Err(ApiError::input(
+                format!("expected a surface, got `{chosen}`"),
+                format!("there are {known}"),
+            ));
+        }))
     }
 
     /// The branches over a parameter through the attractors of censuses at `values` of its values.
@@ -376,6 +494,7 @@ impl Studied<'_> {
                 }),
                 words: progress(values, finest, "censuses"),
                 studies: &[("branch", &options)],
+                table: None,
             })
         })
     }
@@ -418,6 +537,7 @@ impl Studied<'_> {
                 }),
                 words: progress(points, finest, "distances each way"),
                 studies: &[("approach", &options)],
+                table: None,
             })
         })
     }
@@ -464,8 +584,32 @@ impl Studied<'_> {
                 clicks: &json!({ "start": start, "factors": factors }),
                 words: progress(count, finest, "points each way"),
                 studies: &[("basin", &options)],
+                table: None,
             })
         })
+    }
+}
+
+/// A command after lines that it needs in the case file.
+fn appended(table: &str, command: &str) -> String {
+    format!("cat >> {CASE_FILE} <<'END'\n{table}\nEND\n{command}")
+}
+
+/// A value as in a case file.
+fn inline(value: &Value) -> String {
+    match value {
+        Value::Object(map) => {
+            let entries: Vec<String> = map
+                .iter()
+                .map(|(name, value)| format!("{name} = {}", inline(value)))
+                .collect();
+            format!("{{ {} }}", entries.join(", "))
+        }
+        Value::Array(values) => {
+            let values: Vec<String> = values.iter().map(inline).collect();
+            format!("[{}]", values.join(", "))
+        }
+        other => other.to_string(),
     }
 }
 

@@ -1,7 +1,6 @@
 //! Integrals of the law's force over a run, without a recording.
 
 use std::f64::consts::TAU;
-use std::sync::LazyLock;
 
 use crate::flow::{Flow, Observer, Switch};
 use crate::law::Exit;
@@ -16,8 +15,6 @@ use crate::{Complex, VolterraError};
 const NODES: usize = 16;
 /// Newton steps from the largest force at the nodes to the peak.
 const REFINEMENTS: usize = 4;
-
-static RULE: LazyLock<(Vec<f64>, Vec<f64>)> = LazyLock::new(|| gauss_legendre(NODES));
 
 /// Integrals of the force `F` over a run, its peak, and the time in contact.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -96,7 +93,7 @@ impl Observer for Summation {
             add_product(&system.kernel().coefficients, values, &mut self.gap);
             derivative(&self.gap, &mut self.gap_slope);
         }
-        let (places, weights) = &*RULE;
+        let (places, weights) = gauss_legendre(NODES);
         let (mut largest, mut largest_at) = (f64::NEG_INFINITY, 0.0);
         let (mut lowest, mut lowest_at) = (f64::INFINITY, 0.0);
         for (place, weight) in places.iter().zip(weights) {

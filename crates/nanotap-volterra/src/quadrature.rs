@@ -4,10 +4,22 @@
 #![allow(clippy::inline_always)]
 
 use std::f64::consts::PI;
+use std::sync::OnceLock;
 
-/// Nodes on `[0, 1]` and weights of the Gauss–Legendre rule with `count` points, by Newton
-/// on the Legendre polynomial.
-pub(crate) fn gauss_legendre(count: usize) -> (Vec<f64>, Vec<f64>) {
+/// Largest number of points of a Gauss–Legendre rule.
+const MAX_POINTS: usize = 32;
+/// The rules that were used, by their numbers of points.
+static RULES: [OnceLock<(Vec<f64>, Vec<f64>)>; MAX_POINTS + 1] =
+    [const { OnceLock::new() }; MAX_POINTS + 1];
+
+/// Nodes on `[0, 1]` and weights of the Gauss–Legendre rule with `count` points, at most
+/// [`MAX_POINTS`].
+pub(crate) fn gauss_legendre(count: usize) -> &'static (Vec<f64>, Vec<f64>) {
+    RULES[count].get_or_init(|| computed_gauss_legendre(count))
+}
+
+/// The same, by Newton on the Legendre polynomial.
+fn computed_gauss_legendre(count: usize) -> (Vec<f64>, Vec<f64>) {
     let mut nodes = vec![0.0; count];
     let mut weights = vec![0.0; count];
     for i in 0..count.div_ceil(2) {
@@ -137,7 +149,7 @@ mod tests {
             for power in 0..(2 * count) as i32 {
                 let sum: f64 = nodes
                     .iter()
-                    .zip(&weights)
+                    .zip(weights)
                     .map(|(x, w)| w * x.powi(power))
                     .sum();
                 assert!((sum - 1.0 / f64::from(power + 1)).abs() < 1e-14);

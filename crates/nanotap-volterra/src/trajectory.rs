@@ -530,7 +530,7 @@ impl Trajectory {
         let width = piece.end / panels as f64;
         let mut all = vec![(0.0, 0.0)];
         for panel in 0..panels {
-            let nodes = places.iter().zip(&weights);
+            let nodes = places.iter().zip(weights);
             all.extend(nodes.map(|(x, w)| (width * (panel as f64 + x), w * width)));
         }
         all.push((piece.end, 0.0));

@@ -22,6 +22,7 @@ from ._interrupt import Interrupted
 from ._map import Map, Motion, PeriodicOrbit
 from ._nanotap import __version__
 from ._quantity import Range as range  # noqa: F401 - not for `import *`
+from ._read import read
 from ._record import Record
 from ._results import (
     Attractor,
@@ -65,6 +66,7 @@ __all__ = [
     "open",
     "paper",
     "plot",
+    "read",
 ]
 
 

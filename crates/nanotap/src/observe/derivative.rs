@@ -13,7 +13,7 @@
 use std::borrow::Cow;
 use std::sync::Arc;
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DMatrix;
 use nanotap_arithmetic::Dual;
 use nanotap_flow::variation::{Speeds, Variation, VariedOutput};
 use nanotap_flow::{Flow, FlowError, Output, accumulate};
@@ -82,22 +82,68 @@ impl Derivative {
         observed: &Observables,
         set: ObservableSet,
     ) -> Result<Self, DerivativeError> {
-        let of_map = case.tangent(model, key)?;
-        let start = orbit_derivative(model, of_map.clone(), state, period)?;
-        let under = match (&model.nonlinear, linearised(&of_map)) {
-            (Some(_), None) => {
-                return Self::by_differences(case, key, (state, period), start, set);
+        let all = Self::of_keys(case, model, &[key], (state, period), observed, set)?;
+        all.into_iter().next().ok_or(DerivativeError::NotIsolated)
+    }
+
+    /// The same with respect to each of several keys, in their order, for less than one by one.
+    ///
+    /// # Errors
+    /// If the case is invalid near the value of one of the keys, or the orbit is not isolated.
+    pub fn of_keys(
+        case: &Case,
+        model: &Model,
+        keys: &[Key],
+        (state, period): (&[f64], usize),
+        observed: &Observables,
+        set: ObservableSet,
+    ) -> Result<Vec<Self>, DerivativeError> {
+        let tangents = keys.iter().map(|key| case.tangent(model, *key));
+        let tangents = tangents.collect::<Result<Vec<Tangent>, _>>()?;
+        let starts = orbit_derivatives(model, tangents.clone(), state, period)?;
+        let of_models = keys.iter().map(|key| case.model_tangent(model, *key));
+        let of_models = of_models.collect::<Result<Vec<ModelTangent>, _>>()?;
+        let followed: Vec<Followed<'_>> = of_models
+            .iter()
+            .map(|tangent| Followed::new(model, tangent, set, observed.beam_clearance_xi))
+            .collect();
+        let all = keys.iter().zip(starts);
+        let Some(nonlinear) = &model.nonlinear else {
+            let one = |((key, start), followed): ((&Key, Vec<f64>), &Followed<'_>)| {
+                let changes = followed.run(state, &start, period);
+                let changes = changes.map_err(MotionError::from)?;
+                Self::with_units(case, *key, start, observed, changes)
+            };
+            return all.zip(&followed).map(one).collect();
+        };
+        let by: Vec<Option<Along<'_>>> = tangents.iter().map(linearised).collect();
+        let (mut together, mut changes) = (Vec::new(), Vec::new());
+        for (((_, start), by), followed) in all.clone().zip(&by).zip(&followed) {
+            if let Some(by) = by {
+                together.push(followed);
+                changes.push(by(&start));
             }
-            (nonlinear, by) => nonlinear.as_ref().zip(by),
+        }
+        let found = Followed::run_under(&together, nonlinear, state, &changes, period)?;
+        let mut found = found.into_iter();
+        let one = |((key, start), by): ((&Key, Vec<f64>), &Option<Along<'_>>)| match by
+            .as_ref()
+            .and_then(|_| found.next())
+        {
+            Some(changes) => Self::with_units(case, *key, start, observed, changes),
+            None => Self::by_differences(case, *key, (state, period), start, set),
         };
-        let tangent = case.model_tangent(model, key)?;
-        let followed = Followed::new(model, &tangent, set, observed.beam_clearance_xi);
-        let observables = match under {
-            None => followed
-                .run(state, &start, period)
-                .map_err(MotionError::from)?,
-            Some((nonlinear, by)) => followed.run_under(nonlinear, state, by(&start), period)?,
-        };
+        all.zip(&by).map(one).collect()
+    }
+
+    /// The derivative whose values in the model's units are `observables`.
+    fn with_units(
+        case: &Case,
+        key: Key,
+        start: Vec<f64>,
+        observed: &Observables,
+        observables: Changes,
+    ) -> Result<Self, DerivativeError> {
         let physical = case
             .physical()
             .map(|view| {
@@ -117,9 +163,9 @@ impl Derivative {
             .transpose()?;
         Ok(Self {
             unit: key.is_physical().then(|| key.kind().si_unit()),
-            held: case.held(&[key]),
             state: start,
             observables,
+            held: case.held(&[key]),
             physical,
         })
     }
@@ -379,29 +425,30 @@ fn linearised(tangent: &Tangent) -> Option<Along<'_>> {
     }))
 }
 
-/// dx/dθ = (1 − DPⁿ)⁻¹ ∂Pⁿ/∂θ.
-fn orbit_derivative(
+/// dx/dθ = (1 − DPⁿ)⁻¹ ∂Pⁿ/∂θ, one per tangent.
+fn orbit_derivatives(
     model: &Model,
-    tangent: Tangent,
+    tangents: Vec<Tangent>,
     state: &[f64],
     period: usize,
-) -> Result<Vec<f64>, DerivativeError> {
-    let n = state.len();
-    let mut map = ModelMap::with_tangents(model, vec![tangent]);
+) -> Result<Vec<Vec<f64>>, DerivativeError> {
+    let (n, count) = (state.len(), tangents.len());
+    let mut map = ModelMap::with_tangents(model, tangents);
     let mut x = state.to_vec();
-    let (mut one, mut by) = (DMatrix::zeros(n, n), DMatrix::zeros(n, 1));
-    let (mut all, mut change) = (DMatrix::identity(n, n), DMatrix::zeros(n, 1));
+    let (mut one, mut by) = (DMatrix::zeros(n, n), DMatrix::zeros(n, count));
+    let (mut all, mut change) = (DMatrix::identity(n, n), DMatrix::zeros(n, count));
     for _ in 0..period {
         map.advance_with_derivatives(&mut x, &mut one, &mut by)?;
         change = &one * change + &by;
         all = &one * all;
     }
     let solved = (DMatrix::identity(n, n) - all).lu().solve(&change);
-    let solved: Option<DVector<f64>> = solved.map(|s| s.column(0).into_owned());
-    solved
-        .filter(|s| s.iter().all(|v| v.is_finite()))
-        .map(|s| s.as_slice().to_vec())
-        .ok_or(DerivativeError::NotIsolated)
+    let solved = solved.filter(|s| s.iter().all(|v| v.is_finite()));
+    let solved = solved.ok_or(DerivativeError::NotIsolated)?;
+    let columns = solved.column_iter();
+    Ok(columns
+        .map(|column| column.iter().copied().collect())
+        .collect())
 }
 
 /// An orbit and its derivative, followed together.
@@ -525,33 +572,47 @@ impl<'a> Followed<'a> {
         Impacts::new(stop, bounced, stuck)
     }
 
-    /// Follows the orbit of a model under a nonlinear force.
+    /// Follows the orbit of a model under a nonlinear force with several derivatives at once.
     fn run_under(
-        &self,
+        all: &[&Self],
         nonlinear: &Arc<Nonlinear>,
         state: &[f64],
-        change: Change,
+        changes: &[Change],
         period: usize,
-    ) -> Result<Changes, MotionError> {
-        let under = |output: &VariedOutput, force: f64| nanotap_volterra::VariedOutput {
-            value: nonlinear.output(&output.value[0], force),
-            changes: vec![nonlinear.output(&output.change[0], 0.0)],
+    ) -> Result<Vec<Changes>, MotionError> {
+        let Some(first) = all.first() else {
+            return Ok(Vec::new());
         };
-        let forces = self
+        let under = |each: Vec<&VariedOutput>, force: f64| nanotap_volterra::VariedOutput {
+            value: nonlinear.output(&each[0].value[0], force),
+            changes: each
+                .iter()
+                .map(|output| nonlinear.output(&output.change[0], 0.0))
+                .collect(),
+        };
+        let forces = first
             .required
             .signals
             .iter()
             .map(|s| s.force_part(nonlinear));
-        let outputs = self.outputs();
-        let outputs = outputs.iter().zip(forces.chain([0.0]));
-        let outputs: Vec<_> = outputs
-            .map(|(output, force)| under(output, force))
+        let each: Vec<Vec<VariedOutput>> = all.iter().map(|of| of.outputs()).collect();
+        let outputs: Vec<_> = forces
+            .chain([0.0])
+            .enumerate()
+            .take(each[0].len())
+            .map(|(k, force)| under(each.iter().map(|outputs| &outputs[k]).collect(), force))
             .collect();
-        let rate = under(&varied(Signal::HeightRate, self.model, self.tangent), 0.0);
-        let wanted = (outputs.as_slice(), &*self.functionals());
-        let gathered = gather(nonlinear, state, period, &[change], wanted, Some(&rate))?;
-        let gathered = gathered.into_iter().next().unwrap_or_default();
-        Ok(self.changes(gathered, Impacts::default(), period))
+        let rates: Vec<VariedOutput> = all
+            .iter()
+            .map(|of| varied(Signal::HeightRate, of.model, of.tangent))
+            .collect();
+        let rate = under(rates.iter().collect(), 0.0);
+        let wanted = (outputs.as_slice(), &*first.functionals());
+        let gathered = gather(nonlinear, state, period, changes, wanted, Some(&rate))?;
+        let of = all.iter().zip(gathered);
+        Ok(of
+            .map(|(of, gathered)| of.changes(gathered, Impacts::default(), period))
+            .collect())
     }
 
     fn changes(&self, gathered: Varied, impacts: Impacts<Dual>, period: usize) -> Changes {

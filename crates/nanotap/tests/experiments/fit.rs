@@ -1214,7 +1214,7 @@ fn an_instruments_export_is_fitted_as_it_is() {
 
 #[test]
 fn corrections_may_be_fixed_and_starts_given() {
-    let rows = attracting(ATTRACTING, 30, 22);
+    let rows = attracting(ATTRACTING, 30, 27);
     let of = |f: &dyn Fn(&(f64, f64, f64)) -> f64| -> Vec<f64> { rows.iter().map(f).collect() };
     let table = columns(
         "curve.csv",

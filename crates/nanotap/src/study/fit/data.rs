@@ -92,6 +92,8 @@ pub struct Row {
     pub way: Option<Way>,
     /// Line in the file, or number of the row from 1.
     pub line: u64,
+    /// Whether it is far from the sample, where the scatter of the values is known.
+    pub(crate) is_free: bool,
 }
 
 impl Data {
@@ -293,6 +295,7 @@ impl Data {
             relative: vec![1.0; self.columns.len()],
             way: None,
             line: table.lines.get(index).copied().unwrap_or(index as u64 + 1),
+            is_free: false,
         };
         let mut curve = table.name.clone();
         for (column, role) in roles.iter().enumerate() {

@@ -39,9 +39,18 @@ struct Place {
     motions: Vec<(usize, Vec<f64>)>,
 }
 
+/// Offsets of the distance to try.
+struct Scan {
+    /// Index of the curve that is scanned.
+    curve: usize,
+    /// Index of the offset among the parameters.
+    offset: usize,
+    offsets: Vec<f64>,
+}
+
 impl Search<'_> {
-    /// Better first values than `own`, if the scan finds some.
-    pub(super) fn scanned(&self, own: &[f64]) -> Option<Vec<f64>> {
+    /// The offsets to try; `None` if the distance has none, or nothing is known of it.
+    fn scan(&self) -> Option<Scan> {
         let data = self.problem.data;
         let amplitude = data
             .columns
@@ -54,7 +63,8 @@ impl Search<'_> {
         if self.problem.held.is_some() || data.swept.len() > 1 {
             return None;
         }
-        let curve = self.problem.parameters[offset].curve.unwrap_or(0);
+        let parameter = &self.problem.parameters[offset];
+        let curve = parameter.curve.unwrap_or(0);
         let rows = &data.curves[curve].rows;
         let known = rows
             .iter()
@@ -67,8 +77,8 @@ impl Search<'_> {
         let free = median(far.iter().map(|k| amplitudes[*k]).collect());
         let knee = tapping_line(&distance, &amplitudes).map(|line| free - line.knee(free));
         let centre = match knee {
-            Some(knee) if (knee - own[offset]).abs() > FAR * free => knee,
-            _ => own[offset],
+            Some(knee) if (knee - parameter.start).abs() > FAR * free => knee,
+            _ => parameter.start,
         };
         let least = if self.problem.case.is_physical() {
             REACH.1
@@ -76,12 +86,34 @@ impl Search<'_> {
             0.0
         };
         let reach = (REACH.0 * free).max(least);
-        let (low, high) = self.problem.parameters[offset].bounds;
+        let (low, high) = parameter.bounds;
         let offsets: Vec<f64> = (0..OFFSETS)
             .map(|k| centre + reach * (2.0 * k as f64 / (OFFSETS - 1) as f64 - 1.0))
-            .chain([own[offset]])
+            .chain([parameter.start])
             .filter(|of| (low..=high).contains(of))
             .collect();
+        Some(Scan {
+            curve,
+            offset,
+            offsets,
+        })
+    }
+
+    /// These values with the best offset of the distance.
+    pub(super) fn with_best_offset(&self, x: &[f64]) -> Option<Vec<f64>> {
+        let scan = self.scan()?;
+        let (_, of, _) = self.best_offset((scan.curve, scan.offset), x, &scan.offsets)?;
+        Some(with(x, scan.offset, of))
+    }
+
+    /// Better first values than `own`, if the scan finds some.
+    pub(super) fn scanned(&self, own: &[f64]) -> Option<Vec<f64>> {
+        let Scan {
+            curve,
+            offset,
+            offsets,
+        } = self.scan()?;
+        let rows = &self.problem.data.curves[curve].rows;
         let first = self.best_offset((curve, offset), own, &offsets)?;
         let values = rows.iter().flat_map(|row| &row.values).flatten().count() as f64;
         let stiffness = self.problem.parameters.iter().position(|p| {

@@ -357,7 +357,9 @@ const PHYSICAL: [(Key, f64, f64); 11] = [
     (Key::SampleViscosity, 0.0, 1e9),
 ];
 
-/// Limits parameters that have no bounds of their own to physical values, if they start there.
+/// Limits parameters that have no bounds of their own to physical values, if they start there. An
+/// attraction stays one: beside the minimum of chi2 with the right attraction there is often a
+/// second one with a repulsion.
 pub(super) fn keep_physical(parameters: &mut [Parameter], bounds: &Intervals) {
     for parameter in parameters {
         let own = bounds
@@ -370,6 +372,8 @@ pub(super) fn keep_physical(parameters: &mut [Parameter], bounds: &Intervals) {
         let Some((_, low, high)) = limits.filter(|_| !own) else {
             continue;
         };
+        let attracts = parameter.target == Target::Key(Key::SampleHamaker) && parameter.start > 0.0;
+        let low = if attracts { &0.0 } else { low };
         if (*low..=*high).contains(&parameter.start) {
             let (least, most) = parameter.bounds;
             parameter.bounds = (low.max(least), high.min(most));

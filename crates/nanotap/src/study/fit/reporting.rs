@@ -2,15 +2,17 @@
 
 use std::collections::BTreeMap;
 
+use nalgebra::DMatrix;
+
 use crate::case::Case;
 use crate::number::shortest;
 
 use super::MAX_PERIOD;
 use super::branches::settle;
-use super::data::Data;
+use super::data::{Column, Data, Row};
 use super::jumps::Jump;
 use super::parameters::{self, Parameter};
-use super::problem::Problem;
+use super::problem::{Problem, RowPoint};
 use super::profile::{Profile, profile};
 use super::report::{
     CurveCase, FitReport, FittedColumn, FittedJump, FittedParameter, FittedRow, OtherOrbit,
@@ -25,6 +27,10 @@ const MIN_REDUCTION: f64 = 0.1;
 const MAX_CONTINUATIONS: usize = 4;
 /// Level of the tests whether the residuals are noise, all together.
 const LEVEL: f64 = 0.01;
+/// Number of these tests: of their size and of their signs.
+const TESTS: f64 = 2.0;
+/// Chance up to which the size of a column's residuals is named.
+const LARGER: f64 = 0.05;
 /// Fewest neighbouring rows whose residuals are tested for their signs.
 const MIN_SEQUENCE: usize = 8;
 /// Residuals below this part of a column's spread are rounding.
@@ -73,30 +79,12 @@ impl Search<'_> {
         let (case, data) = (self.problem.case, self.problem.data);
         let parameters = self.problem.parameters;
         let problem = self.problem_of(found);
-        let (x, point) = (&found.solution.x, &found.solution.point);
+        let x = &found.solution.x;
         let information = self.information(found);
         let given = self.all_given();
         let fitted = Self::fitted(&problem, found, &information, intervals);
         let p_value = given.then(|| self.probability(found));
-        let columns: Vec<FittedColumn> = data
-            .columns
-            .iter()
-            .enumerate()
-            .map(|(index, column)| {
-                let differences = self.differences(x, point, index);
-                let squares: f64 = differences.iter().map(|d| d * d).sum();
-                let rows = data.curves.iter().flat_map(|curve| &curve.rows);
-                let mut of = rows.filter(|row| row.values[index].is_some());
-                FittedColumn {
-                    name: column.name.clone(),
-                    observable: column.quantity.name().to_owned(),
-                    unit: column.quantity.unit(case.is_physical()).to_owned(),
-                    residual: (squares / differences.len().max(1) as f64).sqrt(),
-                    standard_error: found.noise[index],
-                    estimated: of.any(|row| row.errors[index].is_none()),
-                }
-            })
-            .collect();
+        let columns = self.columns(found);
         let (reason, remarks) = self.judge(found, p_value, &fitted, &columns);
         let undetermined = undetermined(&information, parameters, data);
         let swept = data.swept[0].key;
@@ -148,6 +136,26 @@ impl Search<'_> {
             cancelled: self.control.is_cancelled(),
             parameters: fitted,
         }
+    }
+
+    /// The columns with their residuals.
+    fn columns(&self, found: &Found) -> Vec<FittedColumn> {
+        let (case, data) = (self.problem.case, self.problem.data);
+        let (x, point) = (&found.solution.x, &found.solution.point);
+        let column = |(index, column): (usize, &Column)| {
+            let differences = self.differences(x, point, index);
+            let squares: f64 = differences.iter().map(|d| d * d).sum();
+            let mut of = data.rows().filter(|row| row.values[index].is_some());
+            FittedColumn {
+                name: column.name.clone(),
+                observable: column.quantity.name().to_owned(),
+                unit: column.quantity.unit(case.is_physical()).to_owned(),
+                residual: (squares / differences.len().max(1) as f64).sqrt(),
+                standard_error: found.noise[index],
+                estimated: of.any(|row| row.errors[index].is_none()),
+            }
+        };
+        data.columns.iter().enumerate().map(column).collect()
     }
 
     /// A comment for the case file of a curve: the corrections of its data, as the option `start`
@@ -256,31 +264,35 @@ impl Search<'_> {
 
     /// Why the residuals are not noise, at a level of one per cent: they are larger than the scatter
     /// that is known without the model, or keep their sign from row to row.
-    fn not_noise(
-        &self,
-        found: &Found,
-        p_value: Option<f64>,
-        columns: &[FittedColumn],
-    ) -> Vec<String> {
+    pub(super) fn not_noise(&self, found: &Found) -> Vec<String> {
         let data = self.problem.data;
-        let (x, point) = (&found.solution.x, &found.solution.point);
-        let freedom = self.freedom_of_columns(&found.solution.jacobian);
-        let tests = columns.iter().filter(|column| column.estimated).count() + 1;
-        let level = LEVEL / tests as f64;
-        let mut reasons = Vec::new();
+        let columns = &self.columns(found);
+        let p_value = self.all_given().then(|| self.probability(found));
+        let basis = statistics::range(&found.solution.jacobian);
+        let level = LEVEL / TESTS;
+        let mut reasons: Vec<String> = Vec::new();
+        // Fisher's combination of the columns: -2 Σ ln p is χ² of two degrees of freedom each.
+        let (mut sum, mut larger) = (0.0, Vec::new());
         for (index, column) in columns.iter().enumerate() {
             let Some(scatter) = data.columns[index].scatter.filter(|_| column.estimated) else {
                 continue;
             };
-            let squares = self.relative_squares(x, point, index);
-            let ratio = squares / freedom[index].max(1.0) / scatter.error.powi(2);
-            if statistics::exceeding_ratio(ratio, [freedom[index], scatter.freedom]) < level {
-                reasons.push(format!(
-                    "the residuals of {} are {:.1} times as large as the scatter of neighbouring rows",
-                    column.name,
-                    ratio.sqrt()
-                ));
-            }
+            let (squares, freedom) = self.touched(found, &basis, index);
+            let ratio = squares / freedom.max(1.0) / scatter.error.powi(2);
+            let chance = statistics::exceeding_ratio(ratio, [freedom, scatter.freedom]);
+            sum -= 2.0 * nanotap_arithmetic::ln(chance.max(f64::MIN_POSITIVE));
+            larger.push((chance, column, ratio.sqrt()));
+        }
+        if statistics::exceeding(sum, 2.0 * larger.len() as f64) < level {
+            let least = larger.iter().fold(1.0, |least: f64, (p, ..)| least.min(*p));
+            let shown = larger.iter().filter(|(p, ..)| *p <= least.max(LARGER));
+            reasons.extend(shown.map(|(_, column, ratio)| {
+                format!(
+                    "the residuals of {} are {ratio:.1} times as large as the scatter of \
+                     neighbouring rows",
+                    column.name
+                )
+            }));
         }
         if let Some(p) = p_value.filter(|p| (MIN_PROBABILITY..LEVEL).contains(p)) {
             reasons.push(format!(
@@ -289,7 +301,6 @@ impl Search<'_> {
         }
         let sequences = self.sequences(found);
         let most = sequences.iter().flatten().map(Vec::len).max().unwrap_or(0);
-        let basis = statistics::range(&found.solution.jacobian);
         let of_rows = Sequences {
             columns: &sequences,
             basis: &basis,
@@ -305,6 +316,24 @@ impl Search<'_> {
             reasons.push("the residuals keep their sign from row to row".to_owned());
         }
         reasons
+    }
+
+    /// Sum of the squared differences of a column, in units of the rows' relative errors, and their
+    /// degrees of freedom, of the rows from which its scatter was not taken.
+    fn touched(&self, found: &Found, basis: &DMatrix<f64>, column: usize) -> (f64, f64) {
+        let (x, point) = (&found.solution.x, &found.solution.point);
+        let columns = self.problem.data.columns.len();
+        let rows = self.problem.rows().into_iter().zip(point.iter());
+        let of = |(index, ((curve, row), point)): (usize, ((usize, &Row), &RowPoint))| {
+            let value = point.values[column];
+            let known = !point.lost && !row.is_free;
+            let difference = known.then(|| self.problem.difference(x, curve, row, column, value));
+            let leverage = basis.row(index * columns + column).norm_squared();
+            let difference = difference.flatten()? / row.relative[column];
+            Some((difference * difference, 1.0 - leverage))
+        };
+        let all = rows.enumerate().filter_map(of);
+        all.fold((0.0, 0.0), |sum, one| (sum.0 + one.0, sum.1 + one.1))
     }
 
     /// Indices of the residuals of neighbouring rows in one direction, by column.
@@ -468,7 +497,7 @@ impl Search<'_> {
                 )
             });
         }
-        let misfit = self.not_noise(found, p_value, columns);
+        let misfit = self.not_noise(found);
         if !misfit.is_empty() {
             remarks.push(format!(
                 "{}: the law, the branch or an offset is not that of the data, and values and \

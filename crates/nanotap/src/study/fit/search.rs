@@ -36,6 +36,8 @@ pub(super) struct Found {
 pub(super) const ROUGH_ERROR: f64 = 0.03;
 /// Rough standard errors above which a residual counts by its logarithm.
 const ROBUST_LIMIT: f64 = 3.0;
+/// Largest number of rows of a curve in a rough fit.
+const MAX_ROUGH_ROWS: usize = 50;
 /// Mean squared rough residual above which the data are not described.
 const MAX_MISFIT: f64 = 1.0;
 /// Number of residuals of a column from which on their signs distinguish noise from a misfit.
@@ -48,25 +50,47 @@ const MAX_CORRELATION: f64 = 2.0;
 pub(super) const MIN_PROBABILITY: f64 = 1e-6;
 /// Relative difference below which two misfits are equal.
 const MISFIT_TOLERANCE: f64 = 1e-3;
+/// The same of rough fits.
+const ROUGH_TOLERANCE: f64 = 0.02;
+/// Mean cost of a value up to which rough fits are not converged well enough to be compared.
+const MIN_ROUGH: f64 = 0.01;
+/// Cost of a row without an orbit in a rough fit.
+const LOST_COST: f64 = 100.0;
 /// Largest number of times that branches are assigned again.
 const MAX_ROUNDS: usize = 6;
 
 impl<'a> Search<'a> {
     pub(super) fn run(&self) -> Result<FitReport, Error> {
-        let starts = self.starts();
+        let (starts, first) = self.starts();
         let mut best: Option<Found> = None;
+        let mut least_rough = 0.0;
         let mut tried = 0;
         for start in &starts {
             if self.control.is_cancelled() {
                 break;
             }
+            let scanned = (tried >= first).then(|| self.with_best_offset(start));
             tried += 1;
-            let found = self.fine(self.rough(start.clone()));
+            let (x, rough) = self.rough(scanned.flatten().unwrap_or_else(|| start.clone()));
+            // A minimum that is not lower is not computed in full, where a rough fit tells.
+            let tolerance = ROUGH_TOLERANCE * least_rough;
+            if least_rough > MIN_ROUGH && rough > least_rough - tolerance {
+                if rough <= least_rough + tolerance {
+                    break;
+                }
+                continue;
+            }
+            let found = self.fine(x);
             if let Some(report) = self.control.progress {
                 report(tried, starts.len());
             }
             let Some(found) = found else { continue };
-            let good = self.describes(&found);
+            least_rough = if best.is_some() {
+                least_rough.min(rough)
+            } else {
+                rough
+            };
+            let good = self.describes(&found) && self.is_trusted(&found);
             let misfit = self.misfit(&found);
             let least = best.as_ref().map(|best| self.misfit(best));
             if least.is_none_or(|least| misfit < least) {
@@ -94,9 +118,9 @@ impl<'a> Search<'a> {
         Ok(self.report(best, tried))
     }
 
-    /// Initial values: those of a scan, if it finds better ones than the case's, those of the case,
-    /// then others within the bounds or a factor of four.
-    fn starts(&self) -> Vec<Vec<f64>> {
+    /// Initial values: those of a scan, if it finds better ones than the case's, and those of the
+    /// case, and the number of these; then others within the bounds or a factor of four.
+    fn starts(&self) -> (Vec<Vec<f64>>, usize) {
         let mut state = self.request.seed ^ 0x9e37_79b9_7f4a_7c15;
         // SplitMix64 (Steele, Lea, Flood 2014).
         let mut random = || {
@@ -111,6 +135,7 @@ impl<'a> Search<'a> {
         let mut starts: Vec<Vec<f64>> = self.scanned(&own).into_iter().collect();
         starts.push(own);
         starts.truncate(self.request.starts.max(1));
+        let first = starts.len();
         while starts.len() < self.request.starts {
             let start = parameters.iter().map(|p| {
                 let u = random();
@@ -131,7 +156,7 @@ impl<'a> Search<'a> {
             });
             starts.push(start.collect());
         }
-        starts
+        (starts, first)
     }
 
     /// The problem with other weights.
@@ -156,11 +181,13 @@ impl<'a> Search<'a> {
             .collect()
     }
 
-    /// Fits from initial values until branches and parameters are approximately right.
-    fn rough(&self, mut x: Vec<f64>) -> Vec<f64> {
+    /// Fits from initial values until branches and parameters are approximately right, and returns
+    /// the mean cost of a value; infinite without a fit.
+    fn rough(&self, mut x: Vec<f64>) -> (Vec<f64>, f64) {
+        let mut mean = f64::INFINITY;
         let mut problem = self.weighted(self.rough_noise(), Some(ROBUST_LIMIT));
-        // Given errors are much smaller; they are used in the end.
-        let plain = plain_errors(problem.data);
+        // Given errors are much smaller; they are used in the end, as are all rows.
+        let plain = rough_data(problem.data);
         problem.data = &plain;
         let mut before: Option<Vec<usize>> = None;
         let mut known: Option<Vec<Rows>> = None;
@@ -177,14 +204,19 @@ impl<'a> Search<'a> {
             if before.as_ref() == Some(&branches) {
                 break;
             }
-            let enough = 1e-4 * problem.data.count() as f64;
-            match minimise(&problem, x.clone(), point, &self.bounds(), enough) {
-                Some(solution) => x = solution.x,
+            let count = problem.data.count() as f64;
+            match minimise(&problem, x.clone(), point, &self.bounds(), 1e-4 * count) {
+                Some(solution) => {
+                    // Rows without an orbit cost as those that are far off.
+                    let lost = solution.point.iter().filter(|row| row.lost).count() as f64;
+                    mean = (solution.cost + LOST_COST * lost) / count;
+                    x = solution.x;
+                }
                 None => break,
             }
             before = Some(branches);
         }
-        x
+        (x, mean)
     }
 
     /// Continues the fit to the minimum in standard errors.
@@ -197,8 +229,11 @@ impl<'a> Search<'a> {
                 break;
             }
             let problem = self.weighted(noise.clone(), None);
-            // The parameters change little from here on.
-            let known = found.as_ref().map(|found| found.candidates.as_slice());
+            // The parameters change little from here on; but a branch that ended too early reaches
+            // its last row now.
+            let is_whole = |found: &&Found| !found.solution.point.iter().any(|row| row.lost);
+            let known = found.as_ref().filter(is_whole);
+            let known = known.map(|found| found.candidates.as_slice());
             let (mut point, candidates) = problem.discover(&x, known);
             if self.control.is_cancelled() {
                 break;
@@ -353,6 +388,16 @@ impl<'a> Search<'a> {
             && (!self.all_given() || self.probability(found) > MIN_PROBABILITY)
     }
 
+    /// True if no test tells the residuals from noise and no parameter ended at a limit of what is
+    /// physical.
+    fn is_trusted(&self, found: &Found) -> bool {
+        let all = self.problem.parameters.iter().zip(&found.solution.x);
+        let mut limited = all.filter(|(p, _)| p.is_limited);
+        let inside =
+            limited.all(|(p, value)| *value == 0.0 || (p.bounds.0 < *value && *value < p.bounds.1));
+        inside && self.not_noise(found).is_empty()
+    }
+
     /// True if the residuals are smaller than the spread, do not keep their sign from row to row,
     /// and have no outlier, as far as there are enough of them.
     fn leaves_noise(&self, found: &Found) -> bool {
@@ -386,13 +431,15 @@ pub(super) fn branches_of(point: &Point) -> Vec<usize> {
     point.iter().map(|row| row.branch).collect()
 }
 
-/// The data without their errors.
-fn plain_errors(data: &Data) -> Data {
-    let mut plain = data.clone();
-    for curve in &mut plain.curves {
+/// The data without their errors, and of a long curve every n-th row.
+fn rough_data(data: &Data) -> Data {
+    let mut rough = data.clone();
+    for curve in &mut rough.curves {
+        let stride = curve.rows.len().div_ceil(MAX_ROUGH_ROWS).max(1);
+        curve.rows = curve.rows.iter().step_by(stride).cloned().collect();
         for row in &mut curve.rows {
             row.errors.iter_mut().for_each(|error| *error = None);
         }
     }
-    plain
+    rough
 }

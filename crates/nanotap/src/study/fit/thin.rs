@@ -2,8 +2,9 @@
 //!
 //! Averages are of consecutive rows whose bins have equal parts of the path in distance and values,
 //! so that knees and steep parts keep their rows and flat ones do not; a jump ends a bin. Where the
-//! values bend within a bin, its value is that of a parabola at the mean distance, since the mean
-//! lies beside the curve. Standard errors follow from the scatter within the bins.
+//! curve bends, the mean of the rows lies beside it: the bend is known from the rows of the bin and
+//! of as many on either side, and taken off. Where it is large, the value is that of a parabola
+//! through the rows of the bin. Standard errors follow from the scatter within the bins.
 
 use std::ops::Range;
 
@@ -27,11 +28,17 @@ const JUMP: f64 = 10.0;
 const DISTANCE_SHARE: f64 = 0.15;
 /// Fewest rows of a bin to which a parabola is fitted.
 const MIN_PARABOLA: usize = 8;
-/// A parabola is used where it moves the value by more than this many of its standard errors.
-const BENT: f64 = 2.0;
+/// A parabola through the bin alone is used where the bend is more than this many standard errors of
+/// the mean.
+const BENT: f64 = 1.0;
+/// A bin with a bend of more than this many standard errors of its mean is halved, as long as its
+/// halves have so many rows.
+const SPLIT: f64 = 0.5;
+const MIN_SPLIT: usize = 5;
 /// Rows whose worth the scatter of all bins has in that of one bin.
 const PRIOR: f64 = 20.0;
-/// Variances of bins above this multiple of their median do not count in the common one.
+/// Variances of bins that noise would exceed as seldom as a normal deviate exceeds this value do not
+/// count in the common one.
 const OUTLYING: f64 = 4.0;
 /// Fewest free rows of a curve and direction whose scatter counts.
 const MIN_FREE: usize = 4;
@@ -70,8 +77,7 @@ pub(crate) fn bins(
             square += if step.is_finite() { step * step } else { 0.0 };
         }
         path.push(path[k - 1] + square.sqrt());
-        let mut steps = values.iter().zip(errors);
-        breaks.push(steps.any(|(of, error)| (of[k] - of[k - 1]).abs() > JUMP * error));
+        breaks.push(is_jump(values, errors, k));
     }
     let whole = path.last().copied().unwrap_or(0.0).max(f64::MIN_POSITIVE);
     let place = |k: usize| (path[k] / whole * count as f64).min(count as f64 - 1.0) as usize;
@@ -84,6 +90,25 @@ pub(crate) fn bins(
         }
     }
     bins
+}
+
+/// Whether the values of a row are far from those of the row before.
+fn is_jump(values: &[Vec<f64>], errors: &[f64], row: usize) -> bool {
+    let mut steps = values.iter().zip(errors);
+    steps.any(|(of, error)| (of[row] - of[row - 1]).abs() > JUMP * error)
+}
+
+/// The rows of a bin and as many on either side, up to a jump.
+fn neighbourhood(values: &[Vec<f64>], errors: &[f64], bin: &Range<usize>) -> Range<usize> {
+    let rows = values.first().map_or(0, Vec::len);
+    let (mut first, mut end) = (bin.start, bin.end);
+    while first > bin.start.saturating_sub(bin.len()) && !is_jump(values, errors, first) {
+        first -= 1;
+    }
+    while end < (bin.end + bin.len()).min(rows) && !is_jump(values, errors, end) {
+        end += 1;
+    }
+    first..end
 }
 
 /// The standard deviation of the values in a sequence of rows, from third differences, which a
@@ -203,12 +228,17 @@ impl Data {
             return;
         };
         let mut sums = vec![(0.0, 0.0); self.columns.len()];
-        for curve in &self.curves {
+        let mut known = Vec::new();
+        for (index, curve) in self.curves.iter().enumerate() {
+            let mut before = 0;
             for segment in segments(curve, &self.columns) {
                 let free = far_rows(&segment.distance, &segment.values[amplitude]);
+                let first = before;
+                before += segment.rows.len();
                 if free.len() < MIN_FREE {
                     continue;
                 }
+                known.extend(free.iter().map(|row| (index, first + row)));
                 let pick = |of: &[f64]| -> Vec<f64> { free.iter().map(|k| of[*k]).collect() };
                 let distance = pick(&segment.distance);
                 for (values, sum) in segment.values.iter().zip(&mut sums) {
@@ -219,6 +249,9 @@ impl Data {
                     }
                 }
             }
+        }
+        for (curve, row) in known {
+            self.curves[curve].rows[row].is_free = true;
         }
         for (index, (squares, freedom)) in sums.into_iter().enumerate() {
             if freedom > 0.0 {
@@ -264,10 +297,10 @@ impl Data {
                     .collect();
                 let share = (count * segment.rows.len()).div_ceil(rows).max(2);
                 let ranges = bins(&segment.distance, &segment.values, &errors, share);
-                let made: Vec<Bin> = ranges
-                    .into_iter()
-                    .map(|range| Bin::of(&segment, range))
-                    .collect();
+                let mut made = Vec::new();
+                for range in ranges {
+                    Bin::add(&segment, &errors, range, &mut made);
+                }
                 binned.push((index, segment.rows.to_vec(), made));
             }
         }
@@ -303,6 +336,13 @@ impl Data {
     }
 }
 
+/// Mean square of the distances from their mean.
+fn spread(distance: &[f64]) -> f64 {
+    let count = distance.len() as f64;
+    let mean = distance.iter().sum::<f64>() / count;
+    distance.iter().map(|z| (z - mean).powi(2)).sum::<f64>() / count
+}
+
 /// Consecutive rows that become one.
 struct Bin {
     range: Range<usize>,
@@ -314,28 +354,53 @@ struct Bin {
 struct Fits {
     mean: f64,
     count: usize,
+    /// How far the mean lies from the curve, and the standard error of that for rows with standard
+    /// error 1.
+    bend: (f64, f64),
     best: Option<Polynomial>,
 }
 
 impl Bin {
-    fn of(segment: &Segment<'_>, range: Range<usize>) -> Self {
-        let distance = &segment.distance[range.clone()];
+    /// Adds the bin of these rows, in halves if the curve bends too much in it.
+    fn add(segment: &Segment<'_>, errors: &[f64], range: Range<usize>, to: &mut Vec<Self>) {
+        let bin = Self::of(segment, errors, range);
+        let bends = bin.fits.iter().zip(errors).any(|(fits, error)| {
+            let bent = |of: &Fits| of.bend.0.abs() * (of.count as f64).sqrt() > SPLIT * error;
+            fits.as_ref().is_some_and(bent)
+        });
+        if bends && bin.range.len() >= 2 * MIN_SPLIT {
+            let middle = bin.range.start + bin.range.len() / 2;
+            for half in [bin.range.start..middle, middle..bin.range.end] {
+                Self::add(segment, errors, half, to);
+            }
+        } else {
+            to.push(bin);
+        }
+    }
+
+    fn of(segment: &Segment<'_>, errors: &[f64], range: Range<usize>) -> Self {
+        let around = neighbourhood(&segment.values, errors, &range);
         let fits = segment.values.iter().map(|values| {
-            let values = &values[range.clone()];
-            let known: Vec<usize> = (0..values.len())
-                .filter(|k| values[*k].is_finite())
-                .collect();
-            let pick = |of: &[f64]| -> Vec<f64> { known.iter().map(|k| of[*k]).collect() };
-            let (distance, values) = (pick(distance), pick(values));
-            let degree = match known.len() {
+            let pick = |range: &Range<usize>| -> (Vec<f64>, Vec<f64>) {
+                let known = range.clone().filter(|k| values[*k].is_finite());
+                known.map(|k| (segment.distance[k], values[k])).unzip()
+            };
+            let (distance, values) = pick(&range);
+            let degree = match values.len() {
                 0 => return None,
-                1..4 => 0,
-                4..MIN_PARABOLA => 1,
+                1..3 => 0,
+                3..MIN_PARABOLA => 1,
                 _ => 2,
             };
+            let (wide, of_wide) = pick(&around);
+            let parabola = (wide.len() >= MIN_PARABOLA)
+                .then(|| Polynomial::of(&wide, &of_wide, 2))
+                .flatten();
+            let part = spread(&distance) / spread(&wide);
             Some(Fits {
                 mean: values.iter().sum::<f64>() / values.len() as f64,
                 count: values.len(),
+                bend: parabola.map_or((0.0, 0.0), |p| (part * p.bend, part * p.bend_error)),
                 best: (degree > 0)
                     .then(|| Polynomial::of(&distance, &values, degree))
                     .flatten(),
@@ -343,7 +408,7 @@ impl Bin {
         });
         Self {
             fits: fits.collect(),
-            distance: distance.iter().sum::<f64>() / distance.len() as f64,
+            distance: segment.distance[range.clone()].iter().sum::<f64>() / range.len() as f64,
             range,
         }
     }
@@ -353,6 +418,8 @@ impl Bin {
         let rows = &rows[self.range.clone()];
         let mut row = rows[0].clone();
         row.at[0] = self.distance;
+        // The scatter of averages is known from their own rows.
+        row.is_free = false;
         for (column, fits) in self.fits.iter().enumerate() {
             let Some(fits) = fits else {
                 (row.values[column], row.errors[column]) = (None, None);
@@ -360,11 +427,13 @@ impl Bin {
             };
             let common = scatter[column].error;
             let mut own = common;
-            let (mut value, mut part) = (fits.mean, 1.0 / (fits.count as f64).sqrt());
+            let of_mean = 1.0 / fits.count as f64;
+            let (bend, error) = fits.bend;
+            let (mut value, mut part) = (fits.mean - bend, (of_mean + error * error).sqrt());
             if let Some(best) = &fits.best {
                 let (given, freedom) = (common * common, best.freedom);
                 own = ((PRIOR * given + best.squares) / (PRIOR + freedom)).sqrt();
-                if best.bend.abs() > BENT * best.bend_error * own {
+                if best.bend_error > 0.0 && bend.abs() > BENT * of_mean.sqrt() * own {
                     (value, part) = (best.value, best.error);
                 }
             }
@@ -391,12 +460,24 @@ fn common<'a>(fits: impl Iterator<Item = &'a Fits>) -> (f64, f64) {
         .filter(|best| best.freedom > 0.0)
         .map(|best| (best.squares / best.freedom, best.freedom))
         .collect();
-    let limit = OUTLYING * median(known.iter().map(|(variance, _)| *variance).collect());
-    let counted = known.iter().filter(|(variance, _)| *variance <= limit);
+    let relative = known
+        .iter()
+        .map(|(variance, of)| variance / quantile(*of, 0.0));
+    let middle = median(relative.collect());
+    let counted = known
+        .iter()
+        .filter(|(variance, of)| *variance <= middle * quantile(*of, OUTLYING));
     let (sum, freedom) = counted.fold((0.0, 0.0), |(sum, freedom), (variance, of)| {
         (sum + variance * of, freedom + of)
     });
     (if freedom > 0.0 { sum / freedom } else { 0.0 }, freedom)
+}
+
+/// χ² over its degrees of freedom that a normal deviate `z` corresponds to (Wilson and Hilferty,
+/// PNAS 17, 684 (1931)).
+fn quantile(freedom: f64, z: f64) -> f64 {
+    let variance = 2.0 / (9.0 * freedom);
+    (1.0 - variance + z * variance.sqrt()).powi(3)
 }
 
 #[cfg(test)]
@@ -428,6 +509,37 @@ mod tests {
             flat < 5 && steep > 10 && found.len() <= 23,
             "{flat} {steep}"
         );
+    }
+
+    #[test]
+    fn quantiles_of_chi_squared_are_those_of_tables() {
+        // Abramowitz & Stegun, table 26.8: the median and the 0.1 % point of 2 and of 10 degrees.
+        for (freedom, z, value) in [(2.0, 0.0, 1.386), (10.0, 0.0, 9.342), (10.0, 3.09, 29.588)] {
+            let found = freedom * quantile(freedom, z);
+            assert!((found / value - 1.0).abs() < 0.02, "{freedom} {found}");
+        }
+    }
+
+    #[test]
+    fn averages_lie_on_a_bent_curve_and_have_the_errors_of_means() {
+        // A parabola in bins of 5 and of 12 rows; the mean of the outer ones lies beside it by less
+        // than its standard error.
+        let distance: Vec<f64> = (0..60).map(|k| 0.1 * f64::from(k)).collect();
+        let values: Vec<f64> = distance.iter().map(|x| 3.0 + x + 0.2 * x * x).collect();
+        let segment = Segment {
+            rows: &[],
+            distance: distance.clone(),
+            values: vec![values],
+        };
+        for count in [5, 12] {
+            let bin = Bin::of(&segment, &[0.5], 20..20 + count);
+            let fits = bin.fits[0].as_ref().unwrap();
+            let at = 3.0 + bin.distance + 0.2 * bin.distance * bin.distance;
+            assert!((fits.mean - fits.bend.0 - at).abs() < 1e-12, "{count}");
+            assert!(fits.bend.0.abs() > 1e-3);
+            // Three times as many rows over three times the length know the bend well.
+            assert!(fits.bend.1 < 0.1 / (count as f64).sqrt());
+        }
     }
 
     #[test]

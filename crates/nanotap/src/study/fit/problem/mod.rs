@@ -580,45 +580,57 @@ impl Problem<'_> {
         }
     }
 
-    /// Derivatives of the state and of the measured values by one parameter, with known `effects`
+    /// Derivatives of the state and of the measured values by every parameter, with known `effects`
     /// on the case.
-    fn derivative(
+    fn derivatives(
         &self,
         x: &[f64],
         (curve, point): (usize, &RowPoint),
-        parameter: usize,
-        effects: &Effects,
-    ) -> Option<(Vec<f64>, Vec<f64>)> {
+        effects: &[Effects],
+    ) -> Option<Vec<(Vec<f64>, Vec<f64>)>> {
         let (at, orbit) = (point.at.as_ref()?, point.orbit.as_ref()?);
         let (case, model) = &**at;
         let start = orbit.states.first()?;
         let columns = &self.data.columns;
-        let mut state = vec![0.0; start.len()];
-        let of = &self.parameters[parameter];
-        if !of.is_of(curve) {
-            return Some((state, vec![0.0; columns.len()]));
-        }
-        let mut by = of.direct(&point.values);
         let observables = point.observables.as_ref()?;
-        for (key, weight) in effects {
-            let at = (start.as_slice(), orbit.period);
-            let derivative = Derivative::of(case, model, *key, at, observables, self.set()).ok()?;
-            state
-                .iter_mut()
-                .zip(&derivative.state)
-                .for_each(|(sum, part)| *sum += weight * part);
-            for (column, of) in columns.iter().enumerate() {
-                let observable = of.quantity.observable()?;
-                let number = if case.is_physical() {
-                    derivative.number_in_si(observable)
-                } else {
-                    derivative.number(observable)
-                };
-                let scale = self.read(x, curve, column, 1.0) - self.read(x, curve, column, 0.0);
-                by[column] += weight * scale * number?;
+        let own = || {
+            let all = self.parameters.iter().zip(effects);
+            all.filter(|(parameter, _)| parameter.is_of(curve))
+        };
+        let mut keys: Vec<Key> = own().flat_map(|(_, of)| of).map(|(key, _)| *key).collect();
+        keys.sort_unstable();
+        keys.dedup();
+        let place = (start.as_slice(), orbit.period);
+        let by_key =
+            Derivative::of_keys(case, model, &keys, place, observables, self.set()).ok()?;
+        let scales: Vec<f64> = (0..columns.len())
+            .map(|column| self.read(x, curve, column, 1.0) - self.read(x, curve, column, 0.0))
+            .collect();
+        let one = |(parameter, effects): (&Parameter, &Effects)| {
+            let mut state = vec![0.0; start.len()];
+            if !parameter.is_of(curve) {
+                return Some((state, vec![0.0; columns.len()]));
             }
-        }
-        Some((state, by))
+            let mut by = parameter.direct(&point.values);
+            for (key, weight) in effects {
+                let derivative = &by_key[keys.binary_search(key).ok()?];
+                state
+                    .iter_mut()
+                    .zip(&derivative.state)
+                    .for_each(|(sum, part)| *sum += weight * part);
+                for (column, of) in columns.iter().enumerate() {
+                    let observable = of.quantity.observable()?;
+                    let number = if case.is_physical() {
+                        derivative.number_in_si(observable)
+                    } else {
+                        derivative.number(observable)
+                    };
+                    by[column] += weight * scales[column] * number?;
+                }
+            }
+            Some((state, by))
+        };
+        self.parameters.iter().zip(effects).map(one).collect()
     }
 }
 
@@ -716,9 +728,7 @@ impl LeastSquares for Problem<'_> {
                 }
                 let by: Option<Vec<_>> = match self.held {
                     Some(_) => Loop::derivatives(self, x, (*curve, point), &effects[*curve]),
-                    None => (0..count)
-                        .map(|k| self.derivative(x, (*curve, point), k, &effects[*curve][k]))
-                        .collect(),
+                    None => self.derivatives(x, (*curve, point), &effects[*curve]),
                 };
                 let Some(by) = by else {
                     return block;

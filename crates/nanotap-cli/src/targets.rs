@@ -12,7 +12,9 @@ use crate::page::paragraph;
 pub(crate) fn value(over: &Over, value: f64) -> String {
     match over.kind {
         // A fraction of a range has rounding errors in its last digits.
-        Kind::Number if over.key == Key::DriveSetpoint => number::chosen((1e9 * value).round() / 1e9),
+        Kind::Number if over.key == Key::DriveSetpoint => {
+            number::chosen((1e9 * value).round() / 1e9)
+        }
         Kind::Number => number::chosen(value),
         kind => kind.format(value),
     }

@@ -106,6 +106,9 @@ pub struct ParameterUnit {
 /// Keys of a physical case that stay constant while others vary, with their values in SI.
 pub type Held = BTreeMap<&'static str, f64>;
 
+/// The name of a lever of the catalogue, and the case with it or why that is impossible.
+pub(crate) type CaseOfLever = (String, Result<Case, String>);
+
 impl From<Cantilever> for Case {
     fn from(cantilever: Cantilever) -> Self {
         Self::new(CaseKind::Cantilever(cantilever))
@@ -802,7 +805,7 @@ impl Case {
         names: &[String],
         frequency_ratio: f64,
         keep_tip: bool,
-    ) -> Result<Vec<(String, Result<Self, String>)>, physical::PhysicalError> {
+    ) -> Result<Vec<CaseOfLever>, physical::PhysicalError> {
         const KEPT: [Key; 8] = [
             Key::LeverQ,
             Key::FluidDensity,

@@ -127,11 +127,12 @@ fn quality_factors(report: &LeverReport) -> String {
     if report.quality_factor_source == QualityFactorSource::Case
         && let Some((row, air, _)) = known.max_by(|a, b| a.2.total_cmp(&b.2))
     {
-        text.push_str(&format!(
+        let hint = format!(
             ". In air the dimensions of {} give Q = {}; --quality-factor air computes that of each lever",
             row.lever,
             number::significant(air, 3)
-        ));
+        );
+        text.push_str(&hint);
     }
     text
 }

@@ -1253,6 +1253,16 @@ def test_the_motions_of_a_lever_are_listed_by_themselves(
     assert page.inner_text("#states") == ""
 
 
+def test_a_curve_that_waits_is_not_drawn_in_another_tab(
+    page: Any, address: str
+) -> None:
+    opened(page, address, "preset=dmt")
+    page.click("#tab-image")
+    page.wait_for_timeout(1000)
+    assert page.inner_text("#progress").startswith("A line of an image")
+    assert page.locator("#study-figure svg").count() == 0
+
+
 def test_a_pinned_curve_stays_behind_the_next(page: Any, address: str) -> None:
     def legend() -> str:
         texts = page.locator("#study-figure svg [aria-label]").evaluate_all(
@@ -1319,7 +1329,14 @@ def test_a_guided_start_shows_what_it_says(page: Any, address: str, name: str) -
     assert page.locator("#lessons a").all_inner_texts() == LESSONS
     page.click(f"#lessons a:has-text('{name}')")
     until(page, lambda: "lesson=" in page.url)
-    page.wait_for_selector("#study-figure:not(.stale) svg", timeout=80_000)
+    for _ in range(400):
+        if page.locator("#study-figure:not(.stale) svg").count():
+            break
+        page.wait_for_timeout(100)
+    else:
+        told = ("#progress", "#bound", "#stale")
+        shown = [page.inner_text(element) for element in told]
+        pytest.fail(f"no figure: {page.url} {shown}")
     assert page.inner_text("#lesson p").startswith(name)
     assert page.is_hidden("#message")
     if name == LESSONS[0]:

@@ -28,6 +28,9 @@ export function put(element, drawn) {
   }
   element.tree = tree;
   element.panels = drawn.map;
+  // A column of panels is read by scrolling, not in one screen.
+  const { width, height } = tree.node.viewBox.baseVal;
+  element.classList.toggle("tall", height > width);
 }
 
 const closed = (line) => /(\/|<\/\w+)>$/.test(line);

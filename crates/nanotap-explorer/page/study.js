@@ -139,6 +139,8 @@ export function begin(motionChanged) {
 
 /** Shows the tab given in the state. */
 export function restore() {
+  // A curve that waits to be drawn is of the former tab or case.
+  clearTimeout(timer);
   if (!(state.tab in TABS)) state.tab = "approach";
   for (const tab of $("tabs").children) {
     const chosen = tab.id === `tab-${state.tab}`;
@@ -226,6 +228,7 @@ function build() {
 
 /** Computes the figure of the form, in stages; a `quick` one ends after the first. */
 async function compute(quick) {
+  clearTimeout(timer);
   const options = Object.fromEntries(new FormData($("study-form")));
   $("progress").textContent = "computing …";
   const own = { ...subject(null), clicks: null };

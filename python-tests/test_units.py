@@ -51,6 +51,7 @@ ELSEWHERE = {
     "open",
     "read",
     "in_si",
+    "lever",
 }
 
 

@@ -295,6 +295,22 @@ array([0.0149, 2.8522, 4.4282])
 >>> print(f"{last.tones[1].frequency_shift:.1f} Hz, {last.estimates.reduced_modulus:.3e} Pa by the formula")
 1035.7 Hz, 1.120e+09 Pa by the formula
 """,
+    "lever": """
+>>> gel = nanotap.Case(
+...     modes=1,
+...     cantilever={"lever": "PPP-FM", "Q": 200},
+...     tip={"material": "silicon"},
+...     sample={"law": "hertz", "modulus": "20 MPa", "poisson": 0.49},
+...     drive={
+...         "actuation": "tip", "frequency_ratio": 1, "free_amplitude": "20 nm", "setpoint": 0.8,
+...     },
+... )
+>>> found = nanotap.lever(gel, levers=["PPP-FM", "PPP-CONT"], where=["F_max < 0.5 nN"], progress=False)
+>>> for row in found.levers:
+...     print(row.lever, row.holds, f"{1e12 * row.physical.F_max:.1f} pN")
+PPP-CONT True 236.9 pN
+PPP-FM False 611.1 pN
+""",
 }
 
 # A study without additions: its document, with the names of the terminal's JSON.

@@ -1,5 +1,6 @@
 //! The text of conditions on the motions of a sweep or a window, and of setpoints that are not reached.
 
+use nanotap::case::Key;
 use nanotap::case::physical::Kind;
 use nanotap::study::sweep::{Over, Unreached};
 use nanotap::study::target::TargetReport;
@@ -9,7 +10,11 @@ use crate::page::paragraph;
 
 /// A value of a parameter in words.
 pub(crate) fn value(over: &Over, value: f64) -> String {
-    match over.key.kind() {
+    match over.kind {
+        // A fraction of a range has rounding errors in its last digits.
+        Kind::Number if over.key == Key::DriveSetpoint => {
+            number::chosen((1e9 * value).round() / 1e9)
+        }
         Kind::Number => number::chosen(value),
         kind => kind.format(value),
     }

@@ -19,13 +19,15 @@ use crate::motion_request::Start;
 #[derive(Clone, Copy)]
 pub(crate) struct Axis {
     pub(crate) key: Key,
+    /// Kind of its values.
+    pub(crate) kind: Kind,
     /// Factor from values of the key in SI to drawn values.
     pub(crate) factor: f64,
 }
 
 impl Axis {
     pub(crate) fn of(over: &Over) -> Self {
-        let kind = over.key.kind();
+        let kind = over.kind;
         let (from, to) = (over.from, over.to);
         let factor = if over.key.is_physical() && kind != Kind::Number {
             prefixed(kind, 1.0, from.abs().max(to.abs())).0
@@ -34,17 +36,14 @@ impl Axis {
         };
         Self {
             key: over.key,
+            kind,
             factor,
         }
     }
 
     pub(crate) fn json(&self) -> Value {
-        let physical = self.key.is_physical() && self.key.kind() != Kind::Number;
-        let unit = if physical {
-            self.key.kind().si_unit()
-        } else {
-            ""
-        };
+        let physical = self.key.is_physical() && self.kind != Kind::Number;
+        let unit = if physical { self.kind.si_unit() } else { "" };
         json!({ "name": self.key.path(), "factor": self.factor, "unit": unit })
     }
 }

@@ -515,10 +515,12 @@ table: None,
             let axis = match units.si(Kind::Length) {
                 Some(metres) => Axis {
                     key: Key::GapTip,
+                    kind: Kind::Length,
                     factor: factor / metres,
                 },
                 None => Axis {
                     key: case.gap_key(),
+                    kind: Kind::Number,
                     factor,
                 },
             };

@@ -13,6 +13,7 @@ mod explore;
 mod fit;
 mod force_curve;
 mod generate;
+mod lever;
 mod lyapunov;
 mod merge;
 mod modes;
@@ -118,6 +119,8 @@ pub(crate) enum Own {
     Approach(approach::Arguments),
     /// Compute a force curve at a finite speed, with its static branches
     ForceCurve(force_curve::Arguments),
+    /// Compare levers of the catalogue on the sample of a case
+    Lever(lever::Arguments),
     /// Compute thermal noise of amplitude and phase at a working point
     Noise(noise::Arguments),
     /// Follow two tones with their loops (AM–FM, FM–FM) against the distance
@@ -170,6 +173,7 @@ pub(crate) fn run(command: &Command, output: &Output) -> Result<(), Failure> {
         Own::Branch(arguments) => branch::run(arguments, output),
         Own::Approach(arguments) => approach::run(arguments, output),
         Own::ForceCurve(arguments) => force_curve::run(arguments, output),
+        Own::Lever(arguments) => lever::run(arguments, output),
         Own::Noise(arguments) => noise::run(arguments, output),
         Own::Bimodal(arguments) => bimodal::run(arguments, output),
         Own::Scan(arguments) => scan::run(arguments, output),

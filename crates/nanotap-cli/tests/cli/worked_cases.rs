@@ -151,6 +151,7 @@ fn every_document_has_a_test() {
             "flow.md",
             "fm-lever-on-polystyrene.md",
             "force-curve.md",
+            "force-limit.md",
             "frequency-modulation.md",
             "frequency-sweep.md",
             "gallery.md",
@@ -235,6 +236,7 @@ follows! {
     the_samples: "samples.md", 5 commands, 30 numbers;
     the_reconstruction: "reconstruct.md", 1 commands, 0 numbers;
     the_force_curve: "force-curve.md", 3 commands, 23 numbers;
+    the_limit_of_the_force: "force-limit.md", 6 commands, 29 numbers;
     the_thermal_noise: "noise.md", 3 commands, 11 numbers;
     bimodal_operation: "bimodal.md", 5 commands, 18 numbers;
     the_scan: "scan.md", 4 commands, 19 numbers;

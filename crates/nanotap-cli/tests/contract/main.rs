@@ -65,6 +65,7 @@ snapshots! {
     catalogue
     convergence
     help
+    lever
     lyapunov
     merge
     modes

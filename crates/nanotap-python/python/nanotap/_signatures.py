@@ -26,6 +26,7 @@ __all__ = [
     "fit",
     "fm",
     "force_curve",
+    "lever",
     "lyapunov",
     "modes",
     "noise",
@@ -1459,3 +1460,71 @@ def force_curve(
     """
     options = _arguments.options("force-curve", locals())
     return _studies.document("force-curve", case, options, threads, progress)
+
+def lever(
+    case: Case,
+    *,
+    levers: Sequence[str] | None = None,
+    where: Sequence[str] | None = None,
+    keep_tip: bool = False,
+    quality_factor: Literal["auto", "air", "case"] = "auto",
+    threads: int | None = None,
+    progress: Progress = None,
+) -> Record:
+    """Compare levers of the catalogue on the sample of a case.
+
+    Parameters
+    ----------
+    case : Case
+        The case.
+    levers : Sequence[str] | None
+        Compare only these levers of the catalogue; default: all.
+    where : Sequence[str] | None
+        Condition that every motion found at the setpoint must meet, as in "F_max <
+        1 nN", "regime = attractive", "states = 1"; several: all must hold.
+    keep_tip : bool
+        Keep radius and height of the tip of the case.
+    quality_factor : Literal["auto", "air", "case"]
+        Take the quality factors from: air and the dimensions of each lever (Sader
+        1998), or the case, the same for every lever; auto: from the fluid of the
+        case, without one from air if the case has about the quality factor of its
+        lever in air, otherwise from the case; `auto`: Those in the fluid of the
+        case, in air, or that of the case.; `air`: Those in air.; `case`: That of
+        the case, or those in its fluid..
+    threads : int | None
+        Number of threads; default: one per core.
+    progress : Progress
+        Whether to show a bar, or a function that is called with the finished and
+        the total count.
+
+    Returns
+    -------
+    The document, with the names of the terminal's JSON.
+
+    Raises
+    ------
+    ValueError
+        An argument is invalid; the message names it.
+    RuntimeError
+        The computation failed.
+
+    Examples
+    --------
+    >>> case = nanotap.Case.paper(omega=3)
+    >>> gel = nanotap.Case(
+    ...     modes=1,
+    ...     cantilever={"lever": "PPP-FM", "Q": 200},
+    ...     tip={"material": "silicon"},
+    ...     sample={"law": "hertz", "modulus": "20 MPa", "poisson": 0.49},
+    ...     drive={
+    ...         "actuation": "tip", "frequency_ratio": 1, "free_amplitude": "20 nm", "setpoint": 0.8,
+    ...     },
+    ... )
+    >>> found = nanotap.lever(gel, levers=["PPP-FM", "PPP-CONT"], where=["F_max < 0.5 nN"], progress=False)
+    >>> for row in found.levers:
+    ...     print(row.lever, row.holds, f"{1e12 * row.physical.F_max:.1f} pN")
+    PPP-CONT True 236.9 pN
+    PPP-FM False 611.1 pN
+    """
+    options = _arguments.options("lever", locals())
+    return _studies.document("lever", case, options, threads, progress)

@@ -50,7 +50,7 @@ pub use stated::{Value, ValueError};
 pub use under_law::LawChange;
 
 use file::{CaseFileError, Described, Source};
-use key::ModelKind;
+use key::{ModelKind, Section};
 use near_name::near_name;
 use physical::{Catalogue, Kind, Physical, Remark, Scales};
 use quantities::{Quantities, Slopes};
@@ -105,6 +105,9 @@ pub struct ParameterUnit {
 
 /// Keys of a physical case that stay constant while others vary, with their values in SI.
 pub type Held = BTreeMap<&'static str, f64>;
+
+/// The name of a lever of the catalogue, and the case with it or why that is impossible.
+pub(crate) type CaseOfLever = (String, Result<Case, String>);
 
 impl From<Cantilever> for Case {
     fn from(cantilever: Cantilever) -> Self {
@@ -465,6 +468,20 @@ impl Case {
         }
     }
 
+    /// The same case with a setpoint: a fraction of the free amplitude, or an amplitude, a peak force
+    /// or a phase in SI. A case without physical quantities is unchanged.
+    #[must_use]
+    pub(crate) fn with_setpoint(&self, value: f64, kind: Kind) -> Self {
+        let CaseKind::Quantities(quantities) = &self.what else {
+            return self.clone();
+        };
+        let quantities = quantities.with_of_kind(Key::DriveSetpoint, value, kind);
+        Self {
+            what: CaseKind::Quantities(Box::new(quantities)),
+            ..self.clone()
+        }
+    }
+
     /// The numbers that stay constant while `keys` vary, although they were not stated, in SI: stated
     /// together with values of the keys they give the same case. Empty if the stated values stay
     /// constant.
@@ -766,6 +783,114 @@ impl Case {
             what: CaseKind::Quantities(Box::new(quantities.mapped(true))),
             ..self
         }
+    }
+
+    /// Whether a fluid around the lever is stated, which determines the quality factor.
+    pub(crate) fn states_fluid(&self) -> bool {
+        let CaseKind::Quantities(quantities) = &self.what else {
+            return false;
+        };
+        quantities.stated.has(Key::FluidDensity)
+    }
+
+    /// The case with each of these levers of its catalogue, all of it if none is named: driven at
+    /// `frequency_ratio` of the free resonance with the same free amplitude. With `keep_tip` radius and
+    /// height of the tip stay; otherwise a stated adhesion force is multiplied by the ratio of the
+    /// radii. Quality factor or fluid stay. The reason where a lever is impossible.
+    ///
+    /// # Errors
+    /// If a name is not in the catalogue.
+    pub(crate) fn with_catalogue_levers(
+        &self,
+        names: &[String],
+        frequency_ratio: f64,
+        keep_tip: bool,
+    ) -> Result<Vec<CaseOfLever>, physical::PhysicalError> {
+        const KEPT: [Key; 8] = [
+            Key::LeverQ,
+            Key::FluidDensity,
+            Key::FluidViscosity,
+            Key::TipMaterial,
+            Key::TipModulus,
+            Key::TipPoisson,
+            Key::TipCharge,
+            Key::TipHalfAngle,
+        ];
+        let (CaseKind::Quantities(quantities), Some(view)) = (&self.what, self.physical()) else {
+            return Ok(Vec::new());
+        };
+        let catalogue = quantities.catalogue();
+        let mut levers: Vec<&physical::CatalogueLever> = Vec::new();
+        for name in names {
+            let lever = catalogue.lever(Key::LeverName, name)?;
+            if !levers.contains(&lever) {
+                levers.push(lever);
+            }
+        }
+        if names.is_empty() {
+            levers = catalogue.levers().collect();
+        }
+        let with = |lever: &physical::CatalogueLever| {
+            let mut stated = quantities.stated.clone();
+            let of_lever = |key: &Key| {
+                matches!(
+                    key.section(),
+                    Section::Cantilever | Section::Tip | Section::Gap
+                ) && !KEPT.contains(key)
+            };
+            for key in Key::all().filter(of_lever) {
+                stated.remove(key);
+            }
+            let radius = self.get(Key::TipRadius);
+            for (key, known) in [
+                (Key::TipRadius, lever.tip_radius),
+                (Key::TipHeight, lever.tip_height),
+            ] {
+                let value = self.get(key);
+                if (keep_tip || known.is_none()) && value.is_finite() {
+                    stated.set(key, value);
+                }
+            }
+            if let Some(other) = lever.tip_radius.filter(|_| !keep_tip && radius.is_finite())
+                && stated.has(Key::SampleAdhesionForce)
+            {
+                let force = self.get(Key::SampleAdhesionForce) * other / radius;
+                stated.set(Key::SampleAdhesionForce, force);
+            }
+            stated.put(Key::LeverName, Value::Name(lever.name.as_str().into()));
+            stated.set(Key::DriveFrequencyRatio, frequency_ratio);
+            stated.set(Key::DriveFreeAmplitude, view.free_amplitude);
+            let quantities = Quantities::new(stated, quantities.catalogue()).validated();
+            quantities.map(|quantities| Self {
+                what: CaseKind::Quantities(Box::new(quantities)),
+                ..self.clone()
+            })
+        };
+        let all = levers.into_iter().map(|lever| {
+            let case = with(lever).map_err(|error| error.to_string());
+            (lever.name.clone(), case)
+        });
+        Ok(all.collect())
+    }
+
+    /// The same case in a fluid of `density` in kg/m³ and `viscosity` in Pa s, which determines the
+    /// quality factors in place of the stated ones; the reason if that is impossible.
+    pub(crate) fn in_fluid(&self, density: f64, viscosity: f64) -> Result<Self, String> {
+        let CaseKind::Quantities(quantities) = &self.what else {
+            return Ok(self.clone());
+        };
+        let mut stated = quantities.stated.clone();
+        for key in [Key::LeverQ, Key::LeverQ2, Key::LeverQ3] {
+            stated.remove(key);
+        }
+        stated.set(Key::FluidDensity, density);
+        stated.set(Key::FluidViscosity, viscosity);
+        let quantities = Quantities::new(stated, quantities.catalogue()).validated();
+        let quantities = quantities.map_err(|error| error.to_string())?;
+        Ok(Self {
+            what: CaseKind::Quantities(Box::new(quantities)),
+            ..self.clone()
+        })
     }
 
     /// The same case whose motions start from `state` at drive phase 0.

@@ -89,6 +89,10 @@ impl Quantities {
     }
 
     pub(super) fn with(&self, key: Key, value: f64) -> Self {
+        self.with_of_kind(key, value, key.kind())
+    }
+
+    pub(super) fn with_of_kind(&self, key: Key, value: f64, kind: Kind) -> Self {
         let mut varied = self.clone();
         if let Some(parameter) = key.parameter() {
             varied.numbers.retain(|(other, _)| *other != parameter);
@@ -103,7 +107,7 @@ impl Quantities {
             varied.stated = view.implied_constants(&self.stated);
             varied.held = true;
         }
-        varied.stated.set(key, value);
+        varied.stated.set_of_kind(key, value, kind);
         varied.mapped(!matches!(key.section(), Section::Cantilever | Section::Tip))
     }
 

@@ -213,10 +213,15 @@ impl Stated {
 
     /// Changes a number, in place of all that says the same.
     pub(crate) fn set(&mut self, key: Key, value: f64) {
+        self.set_of_kind(key, value, key.kind());
+    }
+
+    /// The same of a key that takes several kinds.
+    pub(crate) fn set_of_kind(&mut self, key: Key, value: f64, kind: Kind) {
         for (other, _) in key.alternatives() {
             self.remove(other);
         }
-        let value = Value::Number(value, key.kind());
+        let value = Value::Number(value, kind);
         if self.get(key) == Some(&value) {
             return;
         }

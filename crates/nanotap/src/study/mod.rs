@@ -18,6 +18,7 @@ pub mod force_curve;
 mod free_motion;
 pub mod frequency_modulation;
 pub mod in_si;
+pub mod lever;
 pub mod limits;
 pub mod lyapunov;
 pub mod mode_share;
@@ -91,6 +92,7 @@ pub static STUDIES: &[StudyEntry] = &[
     StudyEntry::of::<bimodal::BimodalStudy>(),
     StudyEntry::of::<scan::ScanStudy>(),
     StudyEntry::of::<force_curve::ForceCurveStudy>(),
+    StudyEntry::of::<lever::LeverStudy>(),
 ];
 
 /// A study whose report is a document.

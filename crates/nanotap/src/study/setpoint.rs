@@ -283,29 +283,32 @@ pub(in crate::study) struct ReachedDistance {
     pub(in crate::study) state: Vec<f64>,
 }
 
-/// The distances at which each of these fractions of the free amplitude is first reached from far,
-/// on one approach; the reason where one is not reached.
+/// The distances at which the setpoints of these cases, which differ in nothing else and hold
+/// the same quantity, are first reached from far, on one approach; the reason where one is not reached.
 ///
 /// # Errors
-/// When the lever is not driven, or the work was cancelled.
+/// When a case is not possible, the lever is not driven, or the work was cancelled.
 pub(in crate::study) fn reached_distances(
-    case: &Case,
-    ratios: &[f64],
+    cases: &[Case],
     control: &Control<'_>,
 ) -> Result<Vec<Result<ReachedDistance, String>>, Error> {
-    let Some(view) = case.physical() else {
-        return Err(Error::input(
-            "a setpoint is one of physical quantities",
-            "give the case in physical quantities",
-        ));
+    let Some(case) = cases.first() else {
+        return Ok(Vec::new());
     };
     let free = FreeMotion::of(&case.model()?);
     if !(free.reach > 0.0 && free.reach.is_finite()) {
         return Err(no_drive());
     }
-    let mut searches = Vec::with_capacity(ratios.len());
-    for ratio in ratios {
-        let held = HeldQuantity::new(Held::Amplitude(*ratio), &free, view.scales.force)?;
+    let mut searches = Vec::with_capacity(cases.len());
+    for case in cases {
+        case.model()?;
+        let Some((view, held)) = case.physical().and_then(|view| Some((view, view.held?))) else {
+            return Err(Error::input(
+                "a setpoint is one of physical quantities",
+                "give the case in physical quantities",
+            ));
+        };
+        let held = HeldQuantity::new(held, &free, view.scales.force)?;
         searches.push(Search::new(case, held, free));
     }
     let range = (0.0, FARTHER * free.reach);

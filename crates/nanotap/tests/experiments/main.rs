@@ -11,6 +11,7 @@ mod branches;
 mod extremes;
 mod fit;
 mod identities;
+mod levers;
 mod modes_that_matter;
 mod noise;
 mod physical_quantities;

@@ -133,6 +133,80 @@ fn no_motion_is_reported_where_a_setpoint_is_not_reached() {
     );
 }
 
+/// Over silica with a free amplitude of 5 nm an attractive and a repulsive state coexist. Four starts
+/// at each setpoint meet the repulsive one at 0.7 and 0.85 only; its branch leads to those between.
+#[test]
+fn the_branch_of_a_state_leads_to_other_setpoints() {
+    let file = std::path::Path::new("../../docs/cases/force-limit-stiff.toml");
+    let case = Case::load(Some(file), &[], &Catalogue::shared()).unwrap();
+    let options = WindowOptions {
+        over: Axes(vec![
+            "drive.setpoint=0.7:0.85:4".to_owned(),
+            "drive.free_amplitude=5nm:6nm:2".to_owned(),
+        ]),
+        starts: 4,
+        ..WindowOptions::default()
+    };
+    let folder = Folder::new();
+    let sweep = options.sweep(&case, &Control::default()).unwrap();
+    let window = Window::of(&computed(&sweep, &folder)).unwrap();
+    assert_eq!(window.conditions[0], [Condition::SecondState; 4]);
+}
+
+/// Setpoints that are peak forces, phases or amplitudes: the motion has what is held, at the distance
+/// of the setpoint alone.
+#[test]
+fn peak_forces_phases_and_amplitudes_vary() {
+    let case = lever("0.8");
+    let control = Control::default();
+    let reached = |over: &str, observable: &str| {
+        let options = SweepOptions {
+            periods: 2,
+            ..SweepOptions::over([over])
+        };
+        let folder = Folder::new();
+        let store = computed(&Sweep::new(&case, options).unwrap(), &folder);
+        let mut found = Vec::new();
+        store
+            .each([observable, "distance"], |_, [value, distance]| {
+                found.push((value, distance));
+            })
+            .unwrap();
+        found
+    };
+    for (over, observable, setpoints, values) in [
+        (
+            "drive.setpoint=5nN:15nN:2",
+            "peak_force",
+            ["\"5 nN\"", "\"15 nN\""],
+            [5e-9, 15e-9],
+        ),
+        (
+            "drive.setpoint=60deg,75deg",
+            "phase",
+            ["\"60 deg\"", "\"75 deg\""],
+            [60.0, 75.0],
+        ),
+        (
+            "drive.setpoint=12nm:18nm:2",
+            "first_harmonic",
+            ["\"12 nm\"", "\"18 nm\""],
+            [12e-9, 18e-9],
+        ),
+    ] {
+        let found = reached(over, observable);
+        assert_eq!(found.len(), 2);
+        for (((value, distance), setpoint), wanted) in found.iter().zip(setpoints).zip(values) {
+            assert!((value / wanted - 1.0).abs() < 1e-6, "{over}: {value}");
+            let alone = solve_setpoint(&lever(setpoint), &control).unwrap();
+            assert!(
+                (distance / alone.zc() - 1.0).abs() < 1e-6,
+                "{over}: {distance}"
+            );
+        }
+    }
+}
+
 #[test]
 fn wrong_setpoints_are_refused() {
     let refused = |over: &[&str], condition: Option<&str>| {
@@ -144,10 +218,17 @@ fn wrong_setpoints_are_refused() {
     };
     for (over, condition, words) in [
         (&["drive.setpoint=0.5:1:3"][..], None, "above 0 and below 1"),
+        (&["drive.setpoint=0.5,1nN"], None, "setpoints of one kind"),
         (
-            &["drive.setpoint=1nN:5nN:3"],
+            &["drive.setpoint=10Hz:50Hz:3"],
             None,
-            "a number without a unit",
+            "fractions of the free amplitude",
+        ),
+        (&["drive.setpoint=-1nN:5nN:3"], None, "all above 0"),
+        (
+            &["drive.setpoint=15nm:25nm:3"],
+            None,
+            "below the free amplitude",
         ),
         (
             &["drive.setpoint=0.5:0.9:3", "gap.tip=5nm:9nm:3"],

@@ -53,6 +53,7 @@ pub mod sample;
 pub mod tip;
 mod view;
 
+pub(crate) use catalogue::Lever as CatalogueLever;
 pub use catalogue::{Catalogue, CatalogueError};
 pub use error::PhysicalError;
 pub use lever::{BeamGeometry, Lever, LeverData};

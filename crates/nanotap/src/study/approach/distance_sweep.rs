@@ -444,7 +444,7 @@ impl<'a> DistanceSweep<'a> {
     }
 
     /// The place on a stable orbit, whose stretch is continued both ways unless it is known.
-    fn on(&mut self, gap: f64, orbit: PeriodicOrbit) -> Place {
+    pub(in crate::study) fn on(&mut self, gap: f64, orbit: PeriodicOrbit) -> Place {
         let known = (0..self.stretches.len()).find(|&k| {
             let stretch = &self.stretches[k];
             stretch.period == orbit.period

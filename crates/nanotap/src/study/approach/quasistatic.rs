@@ -467,16 +467,19 @@ pub fn states_near(
     control: &Control<'_>,
 ) -> Result<Vec<PeriodicOrbit>, CaseError> {
     let at = case.get(case.gap_key());
-    states_at(case, &[at], max_period, control).map(|mut states| states.pop().unwrap_or_default())
+    states_at(case, &[at], &[], max_period, control)
+        .map(|mut states| states.pop().unwrap_or_default())
 }
 
-/// As [`states_near`], at each of some distances.
+/// As [`states_near`], at each of some distances; also the stable orbits to which the branches of
+/// `known` orbits, each at its distance, lead.
 ///
 /// # Errors
 /// As [`states_near`].
 pub fn states_at(
     case: &Case,
     distances: &[f64],
+    known: &[(f64, PeriodicOrbit)],
     max_period: usize,
     control: &Control<'_>,
 ) -> Result<Vec<Vec<PeriodicOrbit>>, CaseError> {
@@ -494,6 +497,13 @@ pub fn states_at(
     let mut sweep = DistanceSweep::new(case, (near, far), free.reach, max_period, control)?;
     sweep.allow_steps(SEED_STEPS);
     Ways::of(&mut sweep, far, near)?;
+    sweep.allow_steps(SEED_STEPS);
+    for (gap, orbit) in known {
+        if sweep.spent_budget().is_some() || control.is_cancelled() {
+            break;
+        }
+        sweep.on(*gap, orbit.clone());
+    }
     sweep.allow_steps(SEED_STEPS);
     Ok(distances
         .iter()

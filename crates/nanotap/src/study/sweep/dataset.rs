@@ -248,7 +248,7 @@ fn coordinates(runs: &Runs, lanes: usize, states: Vec<String>) -> Vec<Coordinate
 
 fn parameter(over: &Over) -> Coordinate {
     let values = Values::Real(over.values());
-    let unit = match over.key.kind() {
+    let unit = match over.kind {
         QuantityKind::Number => "1",
         kind => kind.si_unit(),
     };
@@ -258,7 +258,7 @@ fn parameter(over: &Over) -> Coordinate {
         .insert("symbol".into(), over.key.symbol().into());
     coordinate
         .attributes
-        .insert("label".into(), over.key.label().into());
+        .insert("label".into(), over.label().into());
     coordinate
         .attributes
         .insert("spacing".into(), json!(over.spacing));

@@ -1,5 +1,5 @@
-//! The distances of a sweep over setpoints, `drive.setpoint=0.5:0.9:9`: at every value the distance
-//! at which the amplitude first falls to the setpoint on a slow approach from far
+//! The distances of a sweep over setpoints, `drive.setpoint=0.5:0.9:9` or `1nN:5nN:5`: at every value
+//! the distance at which the setpoint is first reached on a slow approach from far
 //! ([`setpoint`](crate::study::setpoint)).
 //!
 //! One approach serves all setpoints at a value of the other parameter. Where a setpoint is not
@@ -47,7 +47,7 @@ pub(super) fn solved(
         ));
     }
     let other = over.get(1 - axis);
-    let ratios = over[axis].values();
+    let count = over[axis].count;
     let lines = other.map_or(1, |other| other.count);
     let done = AtomicUsize::new(0);
     let quiet = Control {
@@ -58,9 +58,9 @@ pub(super) fn solved(
         .into_par_iter()
         .with_max_len(1)
         .map(|line| {
-            let case = over[axis].apply(case, 0);
-            let case = other.map_or_else(|| case.clone(), |other| other.apply(&case, line));
-            let found = reached_distances(&case, &ratios, &quiet);
+            let case = other.map_or_else(|| case.clone(), |other| other.apply(case, line));
+            let cases: Vec<Case> = (0..count).map(|k| over[axis].apply(&case, k)).collect();
+            let found = reached_distances(&cases, &quiet);
             if let Some(progress) = control.progress {
                 progress(done.fetch_add(1, Ordering::Relaxed) + 1, lines);
             }
@@ -73,14 +73,14 @@ pub(super) fn solved(
         rows.push(match row {
             Ok(row) => row,
             Err(error) if control.is_cancelled() => return Err(error),
-            Err(error) => vec![Err(error.message()); ratios.len()],
+            Err(error) => vec![Err(error.message()); count],
         });
     }
     let columns = over[0].count;
-    let count = lines * ratios.len();
+    let points = lines * count;
     let at = |k: usize| {
         let place = [k % columns, k / columns];
         rows[if other.is_some() { place[1 - axis] } else { 0 }][place[axis]].clone()
     };
-    Ok(Some(Arc::new((0..count).map(at).collect())))
+    Ok(Some(Arc::new((0..points).map(at).collect())))
 }

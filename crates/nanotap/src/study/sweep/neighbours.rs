@@ -6,7 +6,8 @@
 //! both ways along every parameter, and what is new there at its neighbours in turn
 //! ([`nanotap_dynamics::share_orbits`]). Where starts of all sizes are drawn at each value, the
 //! states of a slowly moved lever there ([`states_near`]) are tried as well: one approach
-//! serves all distances of a line of values, and of many lines or values some are chosen, whose
+//! serves all distances of a line of values, along which the branches of the orbits that runs
+//! ended on are followed too, and of many lines or values some are chosen, whose
 //! states neighbours lead to in turn. What that finds is stored with the dataset, in
 //! `neighbours.json`: the runs stay what they are.
 //!
@@ -93,29 +94,31 @@ impl Runs {
         };
         let neighbours = grid_neighbours(&shape);
         let states = self.orbit_states(store, strobe, count)?;
+        let met: Vec<Vec<PeriodicOrbit>> = states
+            .into_par_iter()
+            .with_max_len(1)
+            .enumerate()
+            .map(|(k, met)| match map_at(k) {
+                Ok(mut map) if !control.is_cancelled() => closed(&mut map, Vec::new(), &met),
+                _ => Vec::new(),
+            })
+            .collect();
         let quasistatic = match self.starts {
-            Starts::Spread { .. } => self.quasistatic(&shape, control),
+            Starts::Spread { .. } => self.quasistatic(&shape, &met, control),
             _ => vec![Vec::new(); count],
         };
         // How many orbits runs ended on, and all that are known.
-        let known: Vec<(usize, Vec<PeriodicOrbit>)> = states
+        let own: Vec<usize> = met.iter().map(Vec::len).collect();
+        let known: Vec<Vec<PeriodicOrbit>> = met
             .into_par_iter()
             .zip(quasistatic)
             .with_max_len(1)
             .enumerate()
-            .map(|(k, (met, further))| {
-                let Ok(map) = map_at(k) else {
-                    return (0, Vec::new());
-                };
-                if control.is_cancelled() {
-                    return (0, Vec::new());
-                }
-                let own = closed(map.clone(), &met);
-                let all = closed(map, &[met, further].concat());
-                (own.len(), all)
+            .map(|(k, (met, further))| match map_at(k) {
+                Ok(mut map) if !control.is_cancelled() => closed(&mut map, met, &further),
+                _ => met,
             })
             .collect();
-        let (own, known): (Vec<usize>, Vec<_>) = known.into_iter().unzip();
         let classify = short_run(self.options.max_period);
         let values = share_orbits(known, map_at, neighbours, &classify, control);
         let mut found = Vec::new();
@@ -161,9 +164,14 @@ impl Runs {
         Ok(found)
     }
 
-    /// Periods and states of the orbits on which a slowly moved lever may be, at values that
-    /// are chosen.
-    fn quasistatic(&self, shape: &[usize], control: &Control<'_>) -> Vec<Vec<OrbitState>> {
+    /// Periods and states of the orbits on which a slowly moved lever may be, and of those on the
+    /// branches of the orbits that runs ended on, at values that are chosen.
+    fn quasistatic(
+        &self,
+        shape: &[usize],
+        met: &[Vec<PeriodicOrbit>],
+        control: &Control<'_>,
+    ) -> Vec<Vec<OrbitState>> {
         let quiet = Control {
             progress: None,
             ..*control
@@ -203,7 +211,11 @@ impl Runs {
                     states_near(case, most, &quiet).map(|states| vec![states])
                 } else {
                     let gaps: Vec<f64> = cases.iter().map(|case| case.get(gap)).collect();
-                    states_at(case, &gaps, most, &quiet)
+                    let known = line.iter().zip(&gaps);
+                    let known = known.flat_map(|(&k, &gap)| {
+                        met[k].iter().map(move |orbit| (gap, orbit.clone()))
+                    });
+                    states_at(case, &gaps, &known.collect::<Vec<_>>(), most, &quiet)
                 };
                 (line, states.unwrap_or_default())
             })
@@ -272,15 +284,18 @@ const LINES: usize = 16;
 /// Drive periods over which a motion that does not repeat is measured.
 const UNREPEATED: usize = 64;
 
-/// The stable orbits among the states that runs ended in, each once.
-fn closed(mut map: ModelMap, states: &[OrbitState]) -> Vec<PeriodicOrbit> {
-    let mut orbits: Vec<PeriodicOrbit> = Vec::new();
+/// These orbits, and the other stable ones among the states that runs ended in, each once.
+fn closed(
+    map: &mut ModelMap,
+    mut orbits: Vec<PeriodicOrbit>,
+    states: &[OrbitState],
+) -> Vec<PeriodicOrbit> {
     for (period, state) in states {
         let known = orbits.iter().filter(|o| o.period == *period);
         if known.into_iter().any(|orbit| is_on(orbit, state)) {
             continue;
         }
-        let Ok(orbit) = close_orbit(&mut map, state, *period, &ShootingOptions::default()) else {
+        let Ok(orbit) = close_orbit(map, state, *period, &ShootingOptions::default()) else {
             continue;
         };
         if orbit.is_stable() && !orbits.iter().any(|o| o.is_same_as(&orbit)) {

@@ -5,7 +5,8 @@ use std::fmt;
 use serde::Serialize;
 
 use crate::Error;
-use crate::case::{Case, Key, ValueOfKeyError};
+use crate::case::physical::Kind;
+use crate::case::{Case, Key, Value, ValueOfKeyError};
 use crate::model::beam::MAX_MODES;
 use crate::study::value::Axes;
 
@@ -30,6 +31,9 @@ pub enum Spacing {
 pub struct Over {
     /// The parameter.
     pub key: Key,
+    /// Kind of its values: of the key, or of a setpoint that is an amplitude, a peak force or a phase.
+    #[serde(skip)]
+    pub kind: Kind,
     /// First and least value.
     pub from: f64,
     /// Last and greatest value.
@@ -68,7 +72,25 @@ impl Over {
         };
         let (name, range) = given.split_once('=').ok_or_else(|| form("missing `=`"))?;
         let key = key(given, name.trim(), case)?;
+        let setpoint = |text: &str| match Key::DriveSetpoint.read(text) {
+            Ok(Value::Number(value, kind)) => Ok((value, kind)),
+            Ok(_) => Err(wrong(&format_args!("expected a setpoint, got `{text}`"))),
+            Err(error) => Err(wrong(&error)),
+        };
+        let mut kind = key.kind();
+        if key == Key::DriveSetpoint {
+            let first = range.split([':', ',']).next().unwrap_or_default();
+            kind = setpoint(first.trim())?.1;
+        }
         let number = |which, text: &str| {
+            if key == Key::DriveSetpoint {
+                return match setpoint(text)? {
+                    (value, other) if other == kind => Ok(value),
+                    _ => Err(wrong(&format_args!(
+                        "expected setpoints of one kind, got {which} `{text}`"
+                    ))),
+                };
+            }
             let no_number =
                 |value: &str| wrong(&format_args!("{which} `{value}` is not a finite number"));
             match case.value(key, text) {
@@ -84,11 +106,12 @@ impl Over {
             let listed = range
                 .split(',')
                 .map(|text| number("the value", text.trim()));
-            Self::listed(key, listed.collect::<Result<_, _>>()?)
+            Self::listed(key, kind, listed.collect::<Result<_, _>>()?)
         } else {
             let (from, to, count, spacing) = split(range).map_err(form)?;
             Self {
                 key,
+                kind,
                 from: number("the first value", from)?,
                 to: number("the last value", to)?,
                 count: count.parse().map_err(|_| {
@@ -103,9 +126,10 @@ impl Over {
     }
 
     /// `key` with these values.
-    fn listed(key: Key, listed: Vec<f64>) -> Self {
+    fn listed(key: Key, kind: Kind, listed: Vec<f64>) -> Self {
         Self {
             key,
+            kind,
             from: listed.first().copied().unwrap_or(f64::NAN),
             to: listed.last().copied().unwrap_or(f64::NAN),
             count: listed.len(),
@@ -142,11 +166,14 @@ impl Over {
                 "from {from} in equal ratios; both ends must be above 0"
             ));
         }
-        if self.key == Key::DriveSetpoint && !(from > 0.0 && to < 1.0) {
-            return Err(format!(
-                "from {from} to {to}; a setpoint that varies is a fraction of the free amplitude, \
-                 above 0 and below 1"
-            ));
+        if self.key == Key::DriveSetpoint {
+            let is_fraction = self.kind == Kind::Number;
+            if self.kind == Kind::Frequency || from <= 0.0 || (is_fraction && to >= 1.0) {
+                return Err(format!(
+                    "from {from} to {to}; expected setpoints that are fractions of the free \
+                     amplitude above 0 and below 1, amplitudes, peak forces or phases, all above 0"
+                ));
+            }
         }
         if self.key == Key::Modes {
             let whole = |v: f64| v.fract() == 0.0 && (1.0..=MAX_MODES as f64).contains(&v);
@@ -182,7 +209,23 @@ impl Over {
 
     /// `case` with the `index`-th value.
     pub fn apply(&self, case: &Case, index: usize) -> Case {
-        case.with(self.key, self.value(index))
+        let value = self.value(index);
+        if self.key == Key::DriveSetpoint {
+            return case.with_setpoint(value, self.kind);
+        }
+        case.with(self.key, value)
+    }
+
+    /// Label of an axis.
+    pub fn label(&self) -> String {
+        match self.kind {
+            Kind::Length if self.key == Key::DriveSetpoint => "setpoint $A$".to_owned(),
+            Kind::Force if self.key == Key::DriveSetpoint => {
+                "setpoint of the peak force".to_owned()
+            }
+            Kind::Angle if self.key == Key::DriveSetpoint => "setpoint of the phase".to_owned(),
+            _ => self.key.label(),
+        }
     }
 }
 

@@ -56,6 +56,8 @@ pub(crate) struct Prepared {
     pub(crate) columns: Vec<String>,
     /// What was done: conversions and guesses.
     pub(crate) notes: Vec<String>,
+    /// Whether the zero of a phase was guessed.
+    pub(crate) guessed_phase: bool,
 }
 
 /// What was stated of a table, which is not guessed.
@@ -113,17 +115,19 @@ pub(crate) fn prepared(
         }
         notes.push(format!("converted as stated: {text}"));
     }
+    let mut guessed_phase = false;
     for (table, stated) in tables.iter_mut().zip(stated) {
         let foreign = rename(table, &mut columns, &mut notes) || stated.any;
         if foreign {
             leave_out(case, table, &columns, &mut notes);
         }
-        guess(case, table, foreign, stated, &mut notes)?;
+        guessed_phase |= guess(case, table, foreign, stated, &mut notes)?;
     }
     Ok(Prepared {
         tables,
         columns,
         notes,
+        guessed_phase,
     })
 }
 
@@ -375,16 +379,17 @@ fn places(table: &Table) -> Option<Places> {
 }
 
 /// Directions, and of a `foreign` table, whose columns had other names or were converted, the
-/// zeros of distance and phase and the sign of the phase, except what was `stated`.
+/// zeros of distance and phase and the sign of the phase, except what was `stated`. Returns whether
+/// the zero of the phase is a guess.
 fn guess(
     case: &Case,
     table: &mut Table,
     foreign: bool,
     stated: Stated,
     remarks: &mut Vec<String>,
-) -> Result<(), Error> {
+) -> Result<bool, Error> {
     let Some(places) = places(table).filter(|places| is_curve(case, table, places)) else {
-        return Ok(());
+        return Ok(false);
     };
     let numbers = |place: usize| -> Option<Vec<f64>> {
         let entries = table.columns[place].1.iter();
@@ -397,11 +402,12 @@ fn guess(
     };
     let all = [places.distance, places.amplitude, places.phase].map(numbers);
     let [Some(mut distance), Some(mut amplitude), Some(mut phase)] = all else {
-        return Ok(());
+        return Ok(false);
     };
     if distance.len() < MIN_ROWS {
-        return Ok(());
+        return Ok(false);
     }
+    let mut guessed_phase = false;
     let mut notes: Vec<String> = Vec::new();
     if !stated.direction && is_reversed(&distance, &amplitude) {
         for z in &mut distance {
@@ -449,6 +455,7 @@ fn guess(
         && let Some(lag) = lag
         && wrapped(own - lag).abs() > OWN_PHASE
     {
+        guessed_phase = true;
         let deep = deep_deviation(&amplitude, free.amplitude, &phase, own);
         let sign = if deep > 0.0 { -1.0 } else { 1.0 };
         for value in &mut phase {
@@ -501,7 +508,7 @@ fn guess(
     }
     let place = |note: String| format!("{}: {note}", table.name);
     remarks.extend(notes.into_iter().map(place));
-    Ok(())
+    Ok(guessed_phase)
 }
 
 /// Whether the rows are one curve over the distance: it varies, no other key does, and no column

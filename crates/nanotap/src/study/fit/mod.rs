@@ -63,6 +63,8 @@ use crate::study::value::Intervals;
 
 /// Largest number of initial values of a fit.
 const MAX_STARTS: usize = 1000;
+/// Name of the zero of the phase.
+const PHASE: &str = "phase.offset";
 /// Longest period of the orbits in drive periods.
 const MAX_PERIOD: usize = 64;
 
@@ -207,9 +209,26 @@ fn with_search<R>(
     } else {
         at_setpoint(case.clone(), control)?.0
     };
-    let free = names(&request.free);
-    let per_curve = names(&request.per_curve);
+    let mut free = names(&request.free);
+    let mut per_curve = names(&request.per_curve);
     let starts = starts(&request.start)?;
+    // A zero that was read from noisy rows is known no better than they are.
+    let has_phase = data.columns.iter().any(|c| c.quantity.name() == "phase");
+    let mut known = free.iter().chain(&per_curve);
+    let is_known = known.any(|n| n == PHASE) || starts.iter().any(|(name, _)| name == PHASE);
+    if measured.guessed_phase && has_phase && !is_known {
+        let own = if data.curves.len() > 1 {
+            &mut per_curve
+        } else {
+            &mut free
+        };
+        own.push(PHASE.to_owned());
+        preparation.push(
+            "phase.offset is free too, because the zero of the phase is a guess: state the phase with \
+             the option `convert` to fix it"
+                .to_owned(),
+        );
+    }
     let corrected = correct(&case, &mut data, &starts, |name| {
         free.iter().chain(&per_curve).any(|free| free == name)
     })?;

@@ -553,6 +553,9 @@ fn first_orbit(case: &Case, range: Range, options: &BranchOptions) -> Result<Per
 /// Remedy where the start has no orbit to follow.
 const ELSEWHERE: &str = "begin elsewhere with {from}, or give a {state} near an orbit";
 
+/// Orbits to be followed, each with its value of the parameter.
+type Seeds = Vec<(f64, PeriodicOrbit)>;
+
 /// Stable orbits at several values of the parameter: those of a census at each, and those
 /// that the ones of the neighbouring values lead to, until no value gains another.
 fn census_seeds(
@@ -560,7 +563,7 @@ fn census_seeds(
     range: Range,
     options: &BranchOptions,
     control: &Control<'_>,
-) -> Result<(Vec<(f64, PeriodicOrbit)>, Vec<AttractorShare>), Error> {
+) -> Result<(Seeds, Vec<AttractorShare>), Error> {
     let steps = options.values.max(2) - 1;
     let values: Vec<f64> = (0..=steps)
         .map(|k| k as f64 / steps as f64)

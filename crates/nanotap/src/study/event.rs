@@ -87,7 +87,7 @@ impl Event {
     /// How far the observable is above the value; `None` if it is not a number.
     fn excess(&self, case: &Case, observables: &Observables) -> Option<f64> {
         let in_si = |view: &crate::case::physical::Physical| observables.in_si(&view.scales);
-        let seen = case.physical().map_or_else(|| observables.clone(), in_si);
+        let seen = case.physical().map_or_else(|| *observables, in_si);
         let value = (self.observable.of)(&seen).number()?;
         let value = if self.observable.name == "phase" {
             shown_phase(value)

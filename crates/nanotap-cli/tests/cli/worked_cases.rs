@@ -202,7 +202,7 @@ fn the_gallery() {
             assert!(folder.path().join(figure).exists(), "{command}");
         }
     }
-    assert_eq!(count, 28);
+    assert_eq!(count, 29);
 }
 
 /// One test per document, so that they run in parallel.

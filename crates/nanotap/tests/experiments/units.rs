@@ -36,7 +36,7 @@ fn request(study: &str) -> Option<Value> {
         // Their columns are those of the data, and their units are given with them.
         "fit" | "reconstruct"
         // In SI as a whole.
-        | "bimodal" | "force-curve" => return None,
+        | "bimodal" | "force-curve" | "lever" => return None,
         _ => json!({}),
     })
 }

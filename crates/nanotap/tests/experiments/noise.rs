@@ -78,6 +78,12 @@ fn the_free_lever_has_the_noise_of_its_resonance() {
         );
         // Far from the sample the orbit is the free motion.
         assert!((found.free_amplitude_rms / found.amplitude_rms - 1.0).abs() < 1e-6);
+        // Albrecht et al., J. Appl. Phys. 69, 668 (1991).
+        let square = BOLTZMANN * 295.0 * 70e3 * found.bandwidth
+            / (std::f64::consts::PI * stiffness * quality);
+        let frequency = square.sqrt() / 10e-9;
+        let off = found.free_frequency_rms / frequency - 1.0;
+        assert!(off.abs() < 2.0 / quality + 1e-3, "{quality}: {off}");
         // A gradient κ turns the phase at resonance by Q κ/k₁.
         let gradient = stiffness / quality * found.free_phase_rms.to_radians();
         assert!((found.force_gradient_min / gradient - 1.0).abs() < 1e-3);
@@ -233,7 +239,7 @@ fn the_saddle_comes_nearer_as_towards_a_fold() {
 /// The lever is followed with random kicks on its velocities, and its lock-in amplifier with it.
 #[test]
 fn a_stochastic_simulation_agrees_within_its_error_bars() {
-    const PERIODS: usize = 200_000;
+    const PERIODS: usize = 1_000_000;
     const KICKS: usize = 64;
     let case = lever(&[
         "modes=1",

@@ -62,6 +62,9 @@ pub struct NoiseReport {
     pub free_amplitude_rms: f64,
     /// The same of its phase, in degrees.
     pub free_phase_rms: f64,
+    /// Root mean square of the noise with which frequency modulation reads the free lever's frequency,
+    /// in the bandwidth and at the amplitude of this drive, in Hz.
+    pub free_frequency_rms: f64,
     /// Force gradient in N/m that turns the phase of the free lever by its noise.
     pub force_gradient_min: f64,
     /// The unstable orbit on the boundary of the basin, if one was found.
@@ -197,6 +200,7 @@ impl Study for NoiseStudy {
         let tapping = thermal.reading(case, options.state.as_deref(), lock_in, control)?;
         let free = thermal.reading(&free(lever), None, lock_in, control)?;
         // A spring κ at the tip changes the free response by 1/(1 + κ χ).
+        let frequency_rms = free.frequency_rms(thermal.delay(lever.omega), lock_in);
         let turn = thermal.compliance(lever.omega).im.abs() * scales.length / scales.force;
         Ok(NoiseReport {
             temperature: options.temperature,
@@ -210,6 +214,7 @@ impl Study for NoiseStudy {
             phase_rms: tapping.phase_rms.to_degrees(),
             free_amplitude_rms: scales.length * free.amplitude_rms,
             free_phase_rms: free.phase_rms.to_degrees(),
+            free_frequency_rms: frequency_rms / scales.time,
             force_gradient_min: free.phase_rms / turn,
             saddle: saddle::nearest(
                 case,
@@ -257,6 +262,18 @@ struct Reading {
     spectrum: ReadingSpectrum,
 }
 
+impl Reading {
+    /// Noise of the frequency at which a loop holds the phase, from that of the phase at low
+    /// frequencies and its derivative by the angular frequency: a loop undoes the delay of the lever,
+    /// so that the noise is white over the bandwidth (Albrecht et al., J. Appl. Phys. 69, 668, 1991).
+    fn frequency_rms(&self, delay: f64, lock_in: LockIn) -> f64 {
+        let density = self.spectrum.phase.first().copied().unwrap_or(f64::NAN);
+        let bandwidth = 0.25 / lock_in.time_constant;
+        let phase = (density * bandwidth).sqrt().to_radians();
+        phase / (delay.abs() * std::f64::consts::TAU)
+    }
+}
+
 impl Thermal {
     /// Root mean square of the deflection by equipartition, √(k_B T φᵀ K⁻¹ φ).
     fn tip_rms(&self) -> f64 {
@@ -273,6 +290,14 @@ impl Thermal {
         let tip = self.tip.map(|entry| Complex::new(entry, 0.0));
         let bent = matrix.lu().solve(&tip);
         bent.map_or(Complex::new(f64::NAN, 0.0), |bent| bent.dot(&tip))
+    }
+
+    /// Derivative of the phase lag of the free tip by the angular frequency of a force.
+    fn delay(&self, omega: f64) -> f64 {
+        let step = 1e-6 * omega;
+        let [low, high] = [omega - step, omega + step].map(|at| self.compliance(at));
+        let ratio = low / high;
+        nanotap_arithmetic::atan2(ratio.im, ratio.re) / (2.0 * step)
     }
 
     /// The highest frequency of the modes, from above.

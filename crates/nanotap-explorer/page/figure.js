@@ -4,7 +4,7 @@
 const SVG = "http://www.w3.org/2000/svg";
 const XLINK = "http://www.w3.org/1999/xlink";
 const DRAG = 6;               // pixels beyond which a press is not a click
-const EDGE = 0.01;            // part of a panel by which a pointer may be beside it
+const EDGE = 0.01;            // part of a panel by which a pointer may miss it
 
 /** Inserts a drawn figure. It has one element per line, and lines that are unchanged stay: a curve that
  *  follows a control costs that curve, not every letter of the figure. */

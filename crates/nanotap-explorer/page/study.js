@@ -66,7 +66,7 @@ function mark() {
   for (const button of document.querySelectorAll("[data-study-export]")) button.disabled = other;
   $("stale").hidden = !other;
   $("stale").textContent = other ? OTHER : "";
-  // A link contains only figures of its own case.
+  // A link contains only figures of the same case.
   if (other && state.ran) { state.ran = ""; remember(false); }
   point();
 }

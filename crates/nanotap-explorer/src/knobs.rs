@@ -208,7 +208,7 @@ fn tabor(case: &Case) -> Option<String> {
     Some(format!("Tabor's parameter: {number}"))
 }
 
-/// The words of a key beside its control.
+/// The words of a key next to its control.
 fn title(key: Key) -> String {
     if [Key::SamplePoisson, Key::TipPoisson].contains(&key) {
         return "Poisson's ratio ν".to_owned();

@@ -17,7 +17,7 @@ const READ: [(&str, &str); 6] = [
     ("contact_time", "contact time per period"),
     ("dissipation", "energy lost per period"),
 ];
-/// Smallest difference of phases, in degrees, that is said.
+/// Smallest difference of phases, in degrees, that is reported.
 const SAME_PHASE: f64 = 0.5;
 
 /// Numbers and sentence.

@@ -358,8 +358,8 @@ const PHYSICAL: [(Key, f64, f64); 11] = [
 ];
 
 /// Limits parameters that have no bounds of their own to physical values, if they start there. An
-/// attraction stays one: beside the minimum of chi2 with the right attraction there is often a
-/// second one with a repulsion.
+/// attraction stays one: in addition to the minimum of chi2 with the right attraction there is often
+/// a second one with a repulsion.
 pub(super) fn keep_physical(parameters: &mut [Parameter], bounds: &Intervals) {
     for parameter in parameters {
         let own = bounds

@@ -2,7 +2,7 @@
 //!
 //! Averages are of consecutive rows whose bins have equal parts of the path in distance and values,
 //! so that knees and steep parts keep their rows and flat ones do not; a jump ends a bin. Where the
-//! curve bends, the mean of the rows lies beside it: the bend is known from the rows of the bin and
+//! curve bends, the mean of the rows lies off it: the bend is known from the rows of the bin and
 //! of as many on either side, and taken off. Where it is large, the value is that of a parabola
 //! through the rows of the bin. Standard errors follow from the scatter within the bins.
 
@@ -522,7 +522,7 @@ mod tests {
 
     #[test]
     fn averages_lie_on_a_bent_curve_and_have_the_errors_of_means() {
-        // A parabola in bins of 5 and of 12 rows; the mean of the outer ones lies beside it by less
+        // A parabola in bins of 5 and of 12 rows; the mean of the outer ones lies off it by less
         // than its standard error.
         let distance: Vec<f64> = (0..60).map(|k| 0.1 * f64::from(k)).collect();
         let values: Vec<f64> = distance.iter().map(|x| 3.0 + x + 0.2 * x * x).collect();

@@ -93,7 +93,7 @@
 //! ```
 //!
 //! Continuous memory that is linear in the state belongs into the modes, as that of a
-//! [`Surface`](law::Surface) that relaxes; a law may remember a branch.
+//! [`Surface`] that relaxes; a law may remember a branch.
 
 #![cfg_attr(
     test,

@@ -33,7 +33,8 @@ def _attributes(name: str) -> dict[str, str]:
     """`long_name` and `units` of an entry; empty if unknown."""
     # The points of branches and of bifurcations have the observables of motions.
     for before in ("bifurcation_", "branch_", "coexisting_", "attractor_", "event_"):
-        name = name.removeprefix(before)
+        if name not in _GLOSSARY["model"]:
+            name = name.removeprefix(before)
     physical = name.startswith("physical_")
     words = _GLOSSARY["physical" if physical else "model"]
     inner = name.removeprefix("physical_")

@@ -1335,8 +1335,8 @@ def test_a_guided_start_shows_what_it_says(page: Any, address: str, name: str) -
             break
         page.wait_for_timeout(100)
     else:
-        told = ("#progress", "#bound", "#stale")
-        shown = [page.inner_text(element) for element in told]
+        lines = ("#progress", "#bound", "#stale")
+        shown = [page.inner_text(element) for element in lines]
         pytest.fail(f"no figure: {page.url} {shown}")
     assert page.inner_text("#lesson p").startswith(name)
     assert page.is_hidden("#message")

@@ -10,6 +10,7 @@ use crate::failure::{MapFailure, advance_with_tangencies, finite};
 use crate::map::{MapFamily, StroboscopicMap};
 use crate::orbit::PeriodicOrbit;
 use crate::orbit::block_cyclic::BlockCyclic;
+use crate::orbit::multipliers;
 use crate::orbit::parallel::for_each_period;
 use crate::orbit::shooting::{
     MAX_DISCRETE_UPDATES, MAX_FINAL_STEP, ROUNDING, Segments, ShootingError, ends_to_residuals,
@@ -419,26 +420,14 @@ impl<'a, F: MapFamily> BranchSolver<'a, F> {
         node: &Node,
         displacement: Option<&DVector<f64>>,
     ) -> Option<DMatrix<f64>> {
-        let (d, c, n) = (self.d, self.continuous, self.n);
         let touches = self.passes_touches;
         let map = Self::map_at(self.family, &mut self.map, node.parameter, touches).ok()?;
-        let mut state = node.points[..d].to_vec();
-        for (x, by) in state[..c]
-            .iter_mut()
-            .zip(displacement.into_iter().flatten())
-        {
+        let mut state = node.points[..self.d].to_vec();
+        // Discrete entries stay.
+        for (x, by) in state.iter_mut().zip(displacement.into_iter().flatten()) {
             *x += by;
         }
-        let mut product = DMatrix::identity(c, c);
-        let mut jacobian = DMatrix::zeros(d, d);
-        for _ in 0..n {
-            map.advance_with_jacobian(&mut state, &mut jacobian).ok()?;
-            product = jacobian.view((0, 0), (c, c)) * product;
-        }
-        product
-            .iter()
-            .all(|value| value.is_finite())
-            .then_some(product)
+        multipliers::monodromy(map, &state, self.n)
     }
 
     /// All tangencies of an orbit, in order of time.

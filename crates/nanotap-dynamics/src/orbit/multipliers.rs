@@ -13,6 +13,7 @@ use nalgebra::linalg::balancing::balance_parlett_reinsch;
 use nalgebra::{Complex, DMatrix, DVector, Schur};
 use nanotap_arithmetic::ComplexFunctions as _;
 
+use crate::map::StroboscopicMap;
 use crate::vector::unit;
 
 /// A multiplier whose modulus is within this of 1 is marginal: the motion needs ten million periods
@@ -127,6 +128,26 @@ impl Multipliers {
     pub fn stability(&self) -> Stability {
         stability_of(&self.values)
     }
+}
+
+/// Jacobian of the continuous entries over `periods` of a map from `state`; `None` where the map fails
+/// or the product is not finite.
+pub fn monodromy<M: StroboscopicMap>(
+    map: &mut M,
+    state: &[f64],
+    periods: usize,
+) -> Option<DMatrix<f64>> {
+    let d = map.dimension();
+    let c = d - map.discrete_entries();
+    let mut state = state.to_vec();
+    let mut product = DMatrix::identity(c, c);
+    let mut jacobian = DMatrix::zeros(d, d);
+    for _ in 0..periods {
+        map.advance_with_jacobian(&mut state, &mut jacobian).ok()?;
+        product = jacobian.view((0, 0), (c, c)) * product;
+    }
+    let is_finite = product.iter().all(|value| value.is_finite());
+    is_finite.then_some(product)
 }
 
 /// Inverse iterations for an eigenvector: each gains as many digits as the multiplier has.

@@ -16,6 +16,7 @@
 //! the distance of the sample, g₀, and the ratio of a second tone to the first. [`Case::held`]
 //! lists these numbers; stated together with the varied value they give the same point.
 
+mod catalogue_levers;
 pub mod document;
 mod error;
 mod family;
@@ -50,7 +51,7 @@ pub use stated::{Value, ValueError};
 pub use under_law::LawChange;
 
 use file::{CaseFileError, Described, Source};
-use key::{ModelKind, Section};
+use key::ModelKind;
 use near_name::near_name;
 use physical::{Catalogue, Kind, Physical, Remark, Scales};
 use quantities::{Quantities, Slopes};
@@ -105,9 +106,6 @@ pub struct ParameterUnit {
 
 /// Keys of a physical case that stay constant while others vary, with their values in SI.
 pub type Held = BTreeMap<&'static str, f64>;
-
-/// The name of a lever of the catalogue, and the case with it or why that is impossible.
-pub(crate) type CaseOfLever = (String, Result<Case, String>);
 
 impl From<Cantilever> for Case {
     fn from(cantilever: Cantilever) -> Self {
@@ -475,11 +473,7 @@ impl Case {
         let CaseKind::Quantities(quantities) = &self.what else {
             return self.clone();
         };
-        let quantities = quantities.with_of_kind(Key::DriveSetpoint, value, kind);
-        Self {
-            what: CaseKind::Quantities(Box::new(quantities)),
-            ..self.clone()
-        }
+        self.with_quantities(quantities.with_of_kind(Key::DriveSetpoint, value, kind))
     }
 
     /// The numbers that stay constant while `keys` vary, although they were not stated, in SI: stated
@@ -785,114 +779,6 @@ impl Case {
         }
     }
 
-    /// Whether a fluid around the lever is stated, which determines the quality factor.
-    pub(crate) fn states_fluid(&self) -> bool {
-        let CaseKind::Quantities(quantities) = &self.what else {
-            return false;
-        };
-        quantities.stated.has(Key::FluidDensity)
-    }
-
-    /// The case with each of these levers of its catalogue, all of it if none is named: driven at
-    /// `frequency_ratio` of the free resonance with the same free amplitude. With `keep_tip` radius and
-    /// height of the tip stay; otherwise a stated adhesion force is multiplied by the ratio of the
-    /// radii. Quality factor or fluid stay. The reason where a lever is impossible.
-    ///
-    /// # Errors
-    /// If a name is not in the catalogue.
-    pub(crate) fn with_catalogue_levers(
-        &self,
-        names: &[String],
-        frequency_ratio: f64,
-        keep_tip: bool,
-    ) -> Result<Vec<CaseOfLever>, physical::PhysicalError> {
-        const KEPT: [Key; 8] = [
-            Key::LeverQ,
-            Key::FluidDensity,
-            Key::FluidViscosity,
-            Key::TipMaterial,
-            Key::TipModulus,
-            Key::TipPoisson,
-            Key::TipCharge,
-            Key::TipHalfAngle,
-        ];
-        let (CaseKind::Quantities(quantities), Some(view)) = (&self.what, self.physical()) else {
-            return Ok(Vec::new());
-        };
-        let catalogue = quantities.catalogue();
-        let mut levers: Vec<&physical::CatalogueLever> = Vec::new();
-        for name in names {
-            let lever = catalogue.lever(Key::LeverName, name)?;
-            if !levers.contains(&lever) {
-                levers.push(lever);
-            }
-        }
-        if names.is_empty() {
-            levers = catalogue.levers().collect();
-        }
-        let with = |lever: &physical::CatalogueLever| {
-            let mut stated = quantities.stated.clone();
-            let of_lever = |key: &Key| {
-                matches!(
-                    key.section(),
-                    Section::Cantilever | Section::Tip | Section::Gap
-                ) && !KEPT.contains(key)
-            };
-            for key in Key::all().filter(of_lever) {
-                stated.remove(key);
-            }
-            let radius = self.get(Key::TipRadius);
-            for (key, known) in [
-                (Key::TipRadius, lever.tip_radius),
-                (Key::TipHeight, lever.tip_height),
-            ] {
-                let value = self.get(key);
-                if (keep_tip || known.is_none()) && value.is_finite() {
-                    stated.set(key, value);
-                }
-            }
-            if let Some(other) = lever.tip_radius.filter(|_| !keep_tip && radius.is_finite())
-                && stated.has(Key::SampleAdhesionForce)
-            {
-                let force = self.get(Key::SampleAdhesionForce) * other / radius;
-                stated.set(Key::SampleAdhesionForce, force);
-            }
-            stated.put(Key::LeverName, Value::Name(lever.name.as_str().into()));
-            stated.set(Key::DriveFrequencyRatio, frequency_ratio);
-            stated.set(Key::DriveFreeAmplitude, view.free_amplitude);
-            let quantities = Quantities::new(stated, quantities.catalogue()).validated();
-            quantities.map(|quantities| Self {
-                what: CaseKind::Quantities(Box::new(quantities)),
-                ..self.clone()
-            })
-        };
-        let all = levers.into_iter().map(|lever| {
-            let case = with(lever).map_err(|error| error.to_string());
-            (lever.name.clone(), case)
-        });
-        Ok(all.collect())
-    }
-
-    /// The same case in a fluid of `density` in kg/m³ and `viscosity` in Pa s, which determines the
-    /// quality factors in place of the stated ones; the reason if that is impossible.
-    pub(crate) fn in_fluid(&self, density: f64, viscosity: f64) -> Result<Self, String> {
-        let CaseKind::Quantities(quantities) = &self.what else {
-            return Ok(self.clone());
-        };
-        let mut stated = quantities.stated.clone();
-        for key in [Key::LeverQ, Key::LeverQ2, Key::LeverQ3] {
-            stated.remove(key);
-        }
-        stated.set(Key::FluidDensity, density);
-        stated.set(Key::FluidViscosity, viscosity);
-        let quantities = Quantities::new(stated, quantities.catalogue()).validated();
-        let quantities = quantities.map_err(|error| error.to_string())?;
-        Ok(Self {
-            what: CaseKind::Quantities(Box::new(quantities)),
-            ..self.clone()
-        })
-    }
-
     /// The same case whose motions start from `state` at drive phase 0.
     #[must_use]
     pub(crate) fn starting_from(mut self, state: Vec<f64>) -> Self {
@@ -927,10 +813,15 @@ impl Case {
         }
         quantities.notes.push(note);
         quantities.start = Some(state);
-        Ok(Self {
-            what: CaseKind::Quantities(Box::new(quantities.mapped(true).validated()?)),
+        Ok(self.with_quantities(quantities.mapped(true).validated()?))
+    }
+
+    /// The same case with other quantities.
+    fn with_quantities(&self, quantities: Quantities) -> Self {
+        Self {
+            what: CaseKind::Quantities(Box::new(quantities)),
             ..self.clone()
-        })
+        }
     }
 }
 

@@ -170,10 +170,7 @@ impl Case {
                 stated.set(*key, *value);
             }
         }
-        Ok(Self {
-            what: CaseKind::Quantities(Box::new(quantities.mapped(true).validated()?)),
-            ..self.clone()
-        })
+        Ok(self.with_quantities(quantities.mapped(true).validated()?))
     }
 }
 

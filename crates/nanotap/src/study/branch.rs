@@ -18,7 +18,7 @@ use crate::model::model_map::ModelMap;
 use crate::model::recording::Recording;
 use crate::observe::{ObservableSet, Observables, PhysicalMotion, measure};
 use crate::study::Study;
-use crate::study::event::{Event, EventReport, Window, between};
+use crate::study::event::{Event, EventReport, Window, along};
 use crate::study::limits::{MAX_DOUBLINGS, MAX_PERIOD, MAX_SEED_STARTS};
 use crate::study::orbit::{OrbitOptions, orbit, pairs};
 use crate::study::request::options;
@@ -632,27 +632,12 @@ fn events_of(
         },
         observables: ObservableSet::COMMON,
     };
-    let pairs: Vec<&[PointReport]> = report
-        .points
-        .windows(2)
-        .filter(|pair| pair[0].branch == pair[1].branch)
-        .collect();
-    pairs
-        .par_iter()
-        .with_max_len(1)
-        .filter(|_| !control.is_cancelled())
-        .filter_map(|pair| {
-            let (parameter, state) = between(case, key, [&pair[0], &pair[1]], event)?;
-            let model = case.with(key, parameter).model().ok()?;
-            let shooting = ShootingOptions::default();
-            let mut map = ModelMap::new(&model);
-            let period = pair[0].period;
-            let orbit = nanotap_dynamics::close_orbit(&mut map, &state, period, &shooting).ok()?;
-            let point = measured.orbit(pair[0].branch, parameter, &orbit).ok()?;
-            Some(EventReport {
-                event: event.to_string(),
-                point,
-            })
+    along(case, key, &report.points, event, control)
+        .into_par_iter()
+        .filter_map(|(branch, parameter, orbit)| {
+            let point = measured.orbit(branch, parameter, &orbit).ok()?;
+            let event = event.to_string();
+            Some(EventReport { event, point })
         })
         .collect()
 }

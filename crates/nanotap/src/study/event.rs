@@ -10,7 +10,8 @@
 
 use std::fmt;
 
-use nanotap_dynamics::{ShootingOptions, close_orbit};
+use nanotap_dynamics::{PeriodicOrbit, ShootingOptions, close_orbit};
+use rayon::prelude::*;
 use schemars::JsonSchema;
 use serde::Serialize;
 
@@ -99,34 +100,66 @@ impl Event {
     }
 }
 
-/// An orbit near a state.
+/// An orbit, and the excess there.
 struct Seen {
-    state: Vec<f64>,
+    orbit: PeriodicOrbit,
     excess: f64,
 }
 
-/// The excess of the orbit near `state`.
+impl Seen {
+    fn state(&self) -> &[f64] {
+        &self.orbit.states[0]
+    }
+}
+
+/// The orbit near `state`.
 fn seen(case: &Case, state: &[f64], period: usize, event: &Event) -> Option<Seen> {
     let model = case.model().ok()?;
     let mut map = ModelMap::new(&model);
     let orbit = close_orbit(&mut map, state, period, &ShootingOptions::default()).ok()?;
-    let state = orbit.states.first()?.clone();
-    let observables = measure(&model, &state, period, ObservableSet::COMMON).ok()?;
+    let start = orbit.states.first()?;
+    let observables = measure(&model, start, period, ObservableSet::COMMON).ok()?;
     let excess = event.excess(case, &observables)?;
-    Some(Seen { state, excess })
+    Some(Seen { orbit, excess })
 }
 
-/// The value of the parameter and a state at drive phase 0 where an event happens between two points
-/// of a branch; `None` if it does not, or an orbit cannot be closed.
-pub(super) fn between(
+/// The values of the parameter and the orbits at which an event happens, between neighbouring points
+/// of branches, each with the number of its branch. A crossing near which an orbit cannot be closed
+/// is left out.
+pub(super) fn along(
+    case: &Case,
+    key: Key,
+    points: &[PointReport],
+    event: &Event,
+    control: &Control<'_>,
+) -> Vec<(usize, f64, PeriodicOrbit)> {
+    let excess = |p: &PointReport| event.excess(&case.with(key, p.parameter), &p.observables);
+    let excesses: Vec<Option<f64>> = points.par_iter().map(excess).collect();
+    (1..points.len())
+        .into_par_iter()
+        .with_max_len(1)
+        .filter(|_| !control.is_cancelled())
+        .filter_map(|k| {
+            let [a, b] = [&points[k - 1], &points[k]];
+            let values = [excesses[k - 1]?, excesses[k]?];
+            let (parameter, orbit) = (a.branch == b.branch)
+                .then(|| between(case, key, [a, b], values, event))
+                .flatten()?;
+            Some((a.branch, parameter, orbit))
+        })
+        .collect()
+}
+
+/// Where an event happens between two points with these excesses; `None` if it does not, or an orbit
+/// cannot be closed.
+fn between(
     case: &Case,
     key: Key,
     [a, b]: [&PointReport; 2],
+    [mut below, mut above]: [f64; 2],
     event: &Event,
-) -> Option<(f64, Vec<f64>)> {
-    let excess = |p: &PointReport| event.excess(&case.with(key, p.parameter), &p.observables);
+) -> Option<(f64, PeriodicOrbit)> {
     let (mut low, mut high) = (0.0, 1.0);
-    let (mut below, mut above) = (excess(a)?, excess(b)?);
     if below * above > 0.0 || below == above {
         return None;
     }
@@ -158,7 +191,7 @@ pub(super) fn between(
     }
     // Where the value leaps there is no event.
     best.filter(|(_, seen)| seen.excess.abs() <= 1e-6 * size)
-        .map(|(parameter, seen)| (parameter, seen.state))
+        .map(|(parameter, seen)| (parameter, seen.orbit))
 }
 
 /// A window of two parameters, in which points are parts from 0 to 1.
@@ -203,7 +236,7 @@ impl Window<'_> {
             let mut there = at;
             // Towards the middle of the window.
             there[k] += if at[k] < 0.5 { DIFFERENCE } else { -DIFFERENCE };
-            let seen = self.seen(there, &here.state, period, event)?;
+            let seen = self.seen(there, here.state(), period, event)?;
             slope[k] = (seen.excess - here.excess) / (there[k] - at[k]);
         }
         let norm = nanotap_arithmetic::hypot(slope[0], slope[1]);
@@ -224,7 +257,7 @@ impl Window<'_> {
         let mut halves: Vec<(Vec<[f64; 2]>, &'static str)> = Vec::new();
         for sign in [-1.0, 1.0] {
             let first = Seen {
-                state: here.state.clone(),
+                orbit: here.orbit.clone(),
                 excess: here.excess,
             };
             let half = self.half(start, first, gradient, sign, (period, event), control);
@@ -321,7 +354,7 @@ impl Window<'_> {
         let norm = nanotap_arithmetic::hypot(gradient[0], gradient[1]);
         let normal = gradient.map(|v| v / norm);
         let (mut at, mut slope) = (from, norm);
-        let mut seen = self.seen(at, &near.state, period, event)?;
+        let mut seen = self.seen(at, near.state(), period, event)?;
         for _ in 0..8 {
             let move_by = -seen.excess / slope;
             if move_by.abs() > STEPS[0] {
@@ -331,7 +364,7 @@ impl Window<'_> {
                 return Some((at, seen));
             }
             let there = [0, 1].map(|k| at[k] + move_by * normal[k]);
-            let next = self.seen(there, &seen.state, period, event)?;
+            let next = self.seen(there, seen.state(), period, event)?;
             let secant = (next.excess - seen.excess) / move_by;
             if secant != 0.0 && secant.is_finite() {
                 slope = secant;

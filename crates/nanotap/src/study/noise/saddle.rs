@@ -12,10 +12,9 @@
 
 use nalgebra::{DMatrix, DVector};
 use nanotap_arithmetic::ComplexFunctions as _;
-use nanotap_dynamics::orbit::multipliers::eigenvector;
+use nanotap_dynamics::orbit::multipliers::{eigenvector, monodromy};
 use nanotap_dynamics::{
-    ContinuationOptions, Direction, PeriodicOrbit, ShootingOptions, StroboscopicMap, close_orbit,
-    continue_orbit,
+    ContinuationOptions, Direction, PeriodicOrbit, ShootingOptions, close_orbit, continue_orbit,
 };
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -56,12 +55,17 @@ pub(super) fn nearest(
     let model = &case.model()?;
     let mut candidates = saddles(model, control)?;
     candidates.extend(beyond_folds(case, model, (state, period), control));
-    let n = covariance.nrows();
+    // A search that was cut short knows of no nearest one.
+    if control.is_cancelled() {
+        return Err(Error::stopped());
+    }
     let mut nearest: Option<SaddleDistance> = None;
     for saddle in candidates {
-        let Some(normal) = normal(model, &saddle, n) else {
+        let Some(normal) = normal(model, &saddle) else {
             continue;
         };
+        let n = normal.len();
+        let covariance = covariance.view((0, 0), (n, n));
         let apart: f64 = (0..n)
             .map(|k| normal[k] * (saddle.states[0][k] - state[k]))
             .sum();
@@ -109,7 +113,7 @@ fn beyond_folds(
             continue;
         };
         // The first point is the orbit itself.
-        for pair in branch.points[1..].windows(2) {
+        for pair in branch.points.get(1..).unwrap_or_default().windows(2) {
             let [a, b] = [&pair[0], &pair[1]];
             let part = (gap - a.parameter) / (b.parameter - a.parameter);
             if !(0.0..=1.0).contains(&part) {
@@ -125,20 +129,14 @@ fn beyond_folds(
     found
 }
 
-/// The left eigenvector of the unstable multiplier of a saddle, of the first `n` entries.
-fn normal(model: &Model, saddle: &PeriodicOrbit, n: usize) -> Option<DVector<f64>> {
+/// The left eigenvector of the unstable multiplier of a saddle, of the continuous entries.
+fn normal(model: &Model, saddle: &PeriodicOrbit) -> Option<DVector<f64>> {
     let multiplier = saddle
         .multipliers
         .iter()
         .find(|multiplier| multiplier.modulus() > 1.0)?;
     let mut map = ModelMap::new(model);
-    let mut state = saddle.states[0].clone();
-    let mut jacobian = DMatrix::zeros(state.len(), state.len());
-    let mut product = DMatrix::identity(n, n);
-    for _ in 0..saddle.period {
-        map.advance_with_jacobian(&mut state, &mut jacobian).ok()?;
-        product = jacobian.view((0, 0), (n, n)) * product;
-    }
+    let product = monodromy(&mut map, &saddle.states[0], saddle.period)?;
     let vector = eigenvector(&product.transpose(), *multiplier)?;
     // Up to a complex factor it is real.
     let largest = *vector

@@ -260,6 +260,16 @@ fn with_search<R>(
     })
 }
 
+/// The measured curves of a fit as the model reads them: converted, not averaged.
+///
+/// # Errors
+/// If the data or a conversion is invalid.
+pub fn measured(case: &Case, request: &FitOptions) -> Result<Data, Error> {
+    let columns = names(&request.columns);
+    let measured = instrument::prepared(case, &request.data, &request.convert, &columns)?;
+    Data::read(case, &measured.tables, &measured.columns)
+}
+
 /// Residuals of measured curves for given values of the free parameters, for users' solvers.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Residuals {

@@ -1580,6 +1580,7 @@ def test_a_measured_curve_is_shown_over_the_model_and_fitted(
     until(page, lambda: "rows" in page.inner_text("#progress"))
     label = "document.querySelector('#study-figure canvas').ariaLabel"
     assert "measured" in page.evaluate(label)
+    page.click("#study-form summary")
     page.fill("#study-form [name=starts]", "1")
     page.click("#fit")
     page.wait_for_selector("#tables button", timeout=90_000)
@@ -1600,7 +1601,7 @@ def test_measured_data_are_bounded_and_refused_in_words(address: str) -> None:
     form = motion(address, "stiff-lever")["forms"]["data"]
     options = {field["name"]: field["value"] for field in form}
     wanted = {"case": {"preset": "stiff-lever"}, "tab": "data", "options": options}
-    for text, words in (("a,b\n1", "fields"), ("a,b\n1,2\n", "measured quantity")):
+    for text, words in (("a,b\n1", "fields"), ("a,b\n1,2\n", "observable")):
         told = studied(address, **wanted, data=["x.csv", text])[-1]
         assert words in told["error"], told
     with pytest.raises(urllib.error.HTTPError) as refused:

@@ -42,6 +42,9 @@ export function clear(element) {
   Object.assign(element, { figure: null, panels: null, now: null, place: null });
 }
 
+/** Shows the visible range that the views state. */
+export function renew(element) { arrange(element); draw(element); }
+
 /** Places the panels for the present width and views. */
 function arrange(element) {
   const wide = element.clientWidth;
@@ -195,7 +198,7 @@ export function alive(element, { views, tell, go, zoom, redrawn }) {
     zoom([...views().filter((view) => view.panel !== panel.index), { panel: panel.index, x: exact(x), y: exact(y) }]);
     again();
   };
-  const again = () => { arrange(element); draw(element); redrawn?.(); };
+  const again = () => { renew(element); redrawn?.(); };
   const around = (to, factor) => {
     const side = (axis, middle) => [middle - factor * middle, middle + factor * (1 - middle)].map((p) => value(to.panel[axis], p));
     see(to.panel, side("x", to.u), side("y", to.v));

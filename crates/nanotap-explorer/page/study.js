@@ -72,7 +72,7 @@ const isCurrent = () => same(drawn, subject(drawn?.clicks));
 function mark() {
   const other = drawn !== null && !isCurrent();
   $("study-figure").classList.toggle("stale", other);
-  $("study-export").classList.toggle("stale", other);
+  for (const id of ["study-export", "tables"]) $(id).classList.toggle("stale", other);
   for (const button of document.querySelectorAll("[data-study-export]")) button.disabled = other;
   $("stale").hidden = !other;
   $("stale").textContent = other ? OTHER : "";
@@ -193,13 +193,14 @@ export function fill(next) {
   forms = { ...plain, ...next.forms };
   // Only a lever makes images, and is compared with others.
   for (const name of ["image", "levers"]) $(`tab-${name}`).hidden = !forms[name].length;
-  if (!forms[state.tab].length) { state.tab = "approach"; restore(); }
+  if (!(state.tab in PLAIN || forms[state.tab].length)) { state.tab = "approach"; restore(); }
   const now = asked() + JSON.stringify(forms[state.tab]);
   if (now !== filled) {
     filled = now;
     build();
     if (drawn && drawn.form !== asked()) forget();
   }
+  figure.renew($("study-figure"));
   mark();
   clearTimeout(timer);
   if (same(asking, subject(asking?.clicks)) || isCurrent()) return;
@@ -221,7 +222,7 @@ function forget() {
   found = null;
   number = 0;
   figure.clear($("study-figure"));
-  $("study-figure").hidden = true;
+  $("study-figure").hidden = false;
   $("tables").replaceChildren();
   $("study-export").hidden = true;
   $("progress").textContent = hint();
@@ -292,17 +293,25 @@ function entry(field) {
 }
 
 /** A slider of a field, logarithmic around its usual value. */
-function slide({ words, slider: { from, to, unit } }, input) {
+function slide({ words, slider: { from, to, usual, unit } }, input) {
   const range = Object.assign(document.createElement("input"), { type: "range", min: 0, max: 1000 });
   range.setAttribute("aria-label", `${words}, slider`);
-  const own = Number.parseFloat(input.value) * { k: 1e3, m: 1e-3 }[/ ([km])/.exec(input.value)?.[1]] || Number.parseFloat(input.value) || Math.sqrt(from * to);
-  range.value = 1000 * Math.log(own / from) / Math.log(to / from);
+  const [, number, of] = /^([\d.e+-]+) ?(.*)$/.exec(input.value) ?? [];
+  range.value = 1000 * Math.log((of === unit ? Number(number) : usual) / from) / Math.log(to / from);
   range.addEventListener("input", () => { input.value = `${Number((from * (to / from) ** (range.value / 1000)).toPrecision(3))}${unit ? ` ${unit}` : ""}`; });
   range.addEventListener("change", () => {
     input.dispatchEvent(new Event("change"));
-    if (state.ran) compute(false);
+    again();
   });
   return range;
+}
+
+/** Computes a figure that is shown anew, with other options. */
+function again() {
+  if (!drawn) return;
+  state.ran = "yes";
+  remember(true);
+  compute(false);
 }
 
 /** A surface that is drawn by hand: a pointer sets its heights, arrow keys move and change one. */
@@ -339,7 +348,7 @@ function hand({ name, drawn: word }) {
   };
   canvas.addEventListener("pointerdown", (event) => { canvas.setPointerCapture(event.pointerId); last = null; set(event); });
   canvas.addEventListener("pointermove", (event) => { if (canvas.hasPointerCapture(event.pointerId)) set(event); });
-  canvas.addEventListener("pointerup", () => { keep(); if (state.ran) compute(false); });
+  canvas.addEventListener("pointerup", () => { keep(); again(); });
   canvas.addEventListener("keydown", (event) => {
     const [along, up] = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 0.05], ArrowDown: [0, -0.05] }[event.key] ?? [];
     if (along === undefined) return;

@@ -254,7 +254,8 @@ fn image(case: &Case, base: &Case) -> Vec<Value> {
     let rate = frequency / (2.0 * LINE_PERIODS);
     let shown = |kind: Kind, value: f64| kind.format_digits(value, 3);
     let slid = |mut field: Value, around: f64, unit: &str| {
-        field["slider"] = json!({ "from": around / SLIDES, "to": around * SLIDES, "unit": unit });
+        let (from, to) = (around / SLIDES, around * SLIDES);
+        field["slider"] = json!({ "from": from, "to": to, "usual": around, "unit": unit });
         field
     };
     vec![

@@ -6,8 +6,9 @@
 //! which the held quantity has come from its value far from the sample to the setpoint: the amplitude
 //! of the first harmonic, as a lock-in amplifier reads it, has fallen to it, the peak force has risen
 //! to it, the phase has changed to it either way. The orbit there is closed by Newton at distances
-//! chosen by regula falsi. Where the quantity jumps past the setpoint instead, or the motion there
-//! is not periodic, nothing is chosen and the reason is given.
+//! chosen by regula falsi. Motions that are not periodic are passed as long as their averages stay on
+//! the far side of the setpoint. Where the quantity jumps past the setpoint instead, or the motion
+//! there is not periodic, nothing is chosen and the reason is given.
 //!
 //! Then the lever goes on to the sample's own position and back to the chosen distance: the other
 //! stable orbits there are reported too, and, from the branches of all these continued round
@@ -24,7 +25,9 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use super::FreeMotion;
-use super::approach::distance_sweep::{DistanceSweep, Motion, Piece, Place, budget_text, is_same};
+use super::approach::distance_sweep::{
+    DistanceSweep, FoundMotion, Motion, Piece, Place, budget_text, is_same,
+};
 use super::approach::{MAX_MULTIPLIER, SETPOINT_PERIODS, no_drive};
 use crate::case::Case;
 use crate::case::document::CaseDocument;
@@ -250,8 +253,7 @@ fn approach(
     control: &Control<'_>,
 ) -> Result<Place, Error> {
     let place = sweep.free()?;
-    // A motion that does not close ends the search.
-    sweep.stops_on_grid = true;
+    sweep.piece_a_step = true;
     let (pieces, place) = sweep.way(place, 0.0, |sweep, piece| {
         let Some(first) = searches.iter().find(|search| search.found.is_none()) else {
             return true;
@@ -263,7 +265,7 @@ fn approach(
             .collect();
         ended.into_iter().all(|ended| ended)
     });
-    sweep.stops_on_grid = false;
+    sweep.piece_a_step = false;
     if control.is_cancelled() {
         return Err(cancelled());
     }
@@ -513,9 +515,16 @@ struct Search<'a> {
     found: Option<Result<SetpointSolution, Error>>,
 }
 
-/// The orbits along a piece of the way with their distances and values, or what the motion is that
-/// is no orbit.
-type Trace = Result<Vec<(f64, PeriodicOrbit, f64)>, &'static str>;
+/// Distances along a piece of the way with the values there.
+enum Trace {
+    /// Of the orbits of a branch.
+    Orbits(Vec<(f64, PeriodicOrbit, f64)>),
+    /// Of a motion without a branch, averaged.
+    Averages(Vec<(f64, f64)>),
+}
+
+/// Drive periods over which a motion without a branch is averaged.
+const AVERAGED_PERIODS: usize = 256;
 
 /// An orbit of a branch and the value of the held quantity.
 #[derive(Clone, Debug)]
@@ -533,22 +542,33 @@ fn value_at(
     orbit: &PeriodicOrbit,
 ) -> f64 {
     let start = orbit.states.first().map_or(&[][..], Vec::as_slice);
+    value_from(held, sweep, gap, start, orbit.period)
+}
+
+/// The same over so many periods from a state.
+fn value_from(
+    held: &HeldQuantity,
+    sweep: &DistanceSweep<'_>,
+    gap: f64,
+    start: &[f64],
+    periods: usize,
+) -> f64 {
     let model = sweep.model(gap).ok();
-    let seen = model.and_then(|m| measure(&m, start, orbit.period, held.set()).ok());
+    let seen = model.and_then(|m| measure(&m, start, periods, held.set()).ok());
     seen.map_or(f64::NAN, |seen| held.of(&seen))
 }
 
 impl HeldQuantity {
-    /// The orbits along a piece of the way.
+    /// The values along a piece of the way.
     fn trace(&self, sweep: &DistanceSweep<'_>, piece: &Piece) -> Trace {
         let stretch = match &piece.motion {
             Motion::Periodic(stretch) => *stretch,
-            Motion::OnGrid(_) => {
-                let motion = sweep.motion_at(piece, piece.entered);
-                return Err(match motion.orbit {
-                    Some(_) => "of a long period",
-                    None => motion.classification.name(),
-                });
+            Motion::OnGrid(found) => {
+                let average = |(gap, motion): &(f64, FoundMotion)| {
+                    let value = value_from(self, sweep, *gap, &motion.state, AVERAGED_PERIODS);
+                    (*gap, value)
+                };
+                return Trace::Averages(found.par_iter().map(average).collect());
             }
         };
         let points = &sweep.stretches[stretch].points;
@@ -564,14 +584,11 @@ impl HeldQuantity {
             .into_iter()
             .filter_map(|(gap, orbit)| Some((gap, orbit?)))
             .collect();
-        Ok(orbits
-            .into_par_iter()
-            .with_max_len(1)
-            .map(|(gap, orbit)| {
-                let value = value_at(self, sweep, gap, &orbit);
-                (gap, orbit, value)
-            })
-            .collect())
+        let valued = orbits.into_par_iter().with_max_len(1).map(|(gap, orbit)| {
+            let value = value_at(self, sweep, gap, &orbit);
+            (gap, orbit, value)
+        });
+        Trace::Orbits(valued.collect())
     }
 }
 
@@ -629,21 +646,8 @@ impl Search<'_> {
     fn ends_in(&mut self, sweep: &DistanceSweep<'_>, piece: &Piece, trace: &Trace) -> bool {
         let held = self.held;
         let orbits = match trace {
-            Ok(orbits) => orbits,
-            Err(what) => {
-                self.found = Some(Err(Error::numerics(format!(
-                    "on approach the motion is {what} at gap.tip = {}, before the setpoint {} is \
-                     reached: it has no {} to hold; change drive.setpoint, or give gap.tip",
-                    self.shown(piece.from),
-                    held.words(),
-                    match held.setpoint {
-                        Held::Amplitude(_) => "amplitude",
-                        Held::PeakForce(_) => "peak force",
-                        Held::Phase(_) => "phase",
-                    }
-                ))));
-                return true;
-            }
+            Trace::Orbits(orbits) => orbits,
+            Trace::Averages(values) => return self.ends_without_orbit(sweep, piece, values),
         };
         let mut before: Option<Sample<'_>> = None;
         for (gap, orbit, value) in orbits {
@@ -688,6 +692,40 @@ impl Search<'_> {
             }
             self.before = Some((*gap, value));
             before = Some(here);
+        }
+        false
+    }
+
+    /// The same of a motion that is not periodic.
+    fn ends_without_orbit(
+        &mut self,
+        sweep: &DistanceSweep<'_>,
+        piece: &Piece,
+        values: &[(f64, f64)],
+    ) -> bool {
+        let held = self.held;
+        for &(gap, value) in values {
+            if value.is_nan() || held.is_reached(value) {
+                let motion = sweep.motion_at(piece, gap);
+                let what = match motion.orbit {
+                    Some(_) => "of a long period",
+                    None => motion.classification.name(),
+                };
+                self.found = Some(Err(Error::numerics(format!(
+                    "on approach the motion is {what} at gap.tip = {}, before the setpoint {} is \
+                     reached: it has no {} to hold; change drive.setpoint, or give gap.tip",
+                    self.shown(gap),
+                    held.words(),
+                    match held.setpoint {
+                        Held::Amplitude(_) => "amplitude",
+                        Held::PeakForce(_) => "peak force",
+                        Held::Phase(_) => "phase",
+                    }
+                ))));
+                return true;
+            }
+            self.nearest = held.nearer(self.nearest, value);
+            self.before = Some((gap, value));
         }
         false
     }

@@ -3,7 +3,7 @@
 
 const NARROW = 520;           // CSS pixels below which panels stand in one column
 const RATIO = 0.62;           // height of a panel over its width
-const LEAST = 120;            // smallest height of a panel, CSS pixels
+const LEAST = 110;            // smallest height of a panel, CSS pixels
 const MM = 3.4;               // CSS pixels for a millimetre of print
 const POINT = 1.7;            // CSS pixels for a typographer's point
 const SCRIPT = 0.72;          // size of a sub- or superscript
@@ -72,10 +72,16 @@ export const plain = (source) => runs(source).map((run) => run.text).join("");
 function font(pen, size, run) {
   pen.font = `${run.italic ? "italic " : ""}${run.script ? SCRIPT * size : size}px system-ui, sans-serif`;
 }
+const widths = new Map();
 function width(pen, source, size) {
-  let sum = 0;
-  for (const run of runs(source)) { font(pen, size, run); sum += pen.measureText(run.text).width; }
-  return sum;
+  const key = `${size} ${source}`;
+  if (!widths.has(key)) {
+    if (widths.size > 5000) widths.clear();
+    let sum = 0;
+    for (const run of runs(source)) { font(pen, size, run); sum += pen.measureText(run.text).width; }
+    widths.set(key, sum);
+  }
+  return widths.get(key);
 }
 /** Writes words: `across` is 0 for the left end at x, 0.5 for the middle, 1 for the right end. */
 function write(pen, source, x, y, size, across = 0, colour = colours().ink) {
@@ -179,7 +185,7 @@ export function layout(pen, figure, wide, size, highest, views) {
   const upto = (list, n) => total(list.slice(0, n));
   // Text beside the panels. Ticks of the final height are not wider than these.
   for (const place of places) {
-    const words = [3, 5, 8].flatMap((most) => ticks(place.y, most).at.map(([, text]) => width(pen, text, size)));
+    const words = [2, 3, 4, 5, 6, 7, 8].flatMap((most) => ticks(place.y, most).at.map(([, text]) => width(pen, text, size)));
     place.words = place.row === rows - 1 || !figure.share_x || !places.some((other) => other.col === place.col && other.row > place.row);
     place.aside = Math.max(0, ...words) + 0.5 * size + (label(place.y) ? 1.5 * size : 0);
     place.bar = place.panel.layers.find((layer) => layer.kind === "heatmap");
@@ -208,7 +214,9 @@ export function layout(pen, figure, wide, size, highest, views) {
   const row = (key) => down.map((_, r) => most(places.filter((one) => one.row === r).map((one) => one[key])));
   const [above, below] = [row("above"), row("below")];
   const wanted = RATIO * most(columnWidth) * rows;
-  const heights = Math.max(LEAST * total(down) / Math.max(...down) * 0.8, LEAST * rows * 0.7, Math.min(wanted, highest - total(above) - total(below)));
+  // A column of panels is read by scrolling.
+  if (cols !== figure.cols) highest = Infinity;
+  const heights = Math.max(LEAST * total(down) / Math.max(...down) * 0.8, LEAST * rows * 0.95, Math.min(wanted, highest - total(above) - total(below)));
   let top = 0;
   down.forEach((share, r) => {
     top += above[r];

@@ -4,7 +4,7 @@ use nanotap::case::quantity::Kind;
 use nanotap::case::{Case, Key, Value as Stated};
 use nanotap::model::Model;
 use nanotap::observe::time_series::state_names;
-use nanotap::study::registry::{Run, STUDIES, StudyEntry, study};
+use nanotap::study::registry::{STUDIES, StudyEntry, study};
 use nanotap::study::request::{Property, properties};
 use nanotap::study::start_box::default_box;
 use serde_json::{Value, json};
@@ -40,7 +40,7 @@ const PLACED: [&str; 12] = [
 
 /// Whether the page makes the form of a study from its options, and shows its report.
 pub(crate) fn is_plain(entry: &StudyEntry) -> bool {
-    matches!(entry.run, Run::Document(_)) && !PLACED.contains(&entry.name)
+    entry.document.is_some() && !PLACED.contains(&entry.name)
 }
 
 /// The studies whose tabs are made from the registry.

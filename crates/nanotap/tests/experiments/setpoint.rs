@@ -4,6 +4,7 @@ use nanotap::case::Case;
 use nanotap::case::file::Source;
 use nanotap::control::Control;
 use nanotap::model::parameter::Parameter;
+use nanotap::study::frequency_modulation::{FrequencyModulationOptions, frequency_modulation};
 use nanotap::study::orbit::{OrbitOptions, orbit};
 use nanotap::study::setpoint::{at_setpoint, solve_setpoint};
 use nanotap::study::simulate::{SimulateOptions, simulate};
@@ -238,6 +239,49 @@ fn motions_that_do_not_close_are_passed_above_the_setpoint() {
     let error = solve_setpoint(&refused, &Control::default()).unwrap_err();
     assert!(
         error.message().contains("before the setpoint A/A0 = 0.998"),
+        "{}",
+        error.message()
+    );
+}
+
+/// A frequency shift is that of `fm`, reached first from far; the drive there keeps the free lever's
+/// amplitude at 90°, and motions start from the orbit.
+#[test]
+fn a_frequency_shift_is_a_setpoint() {
+    let text = include_str!("../../../../docs/cases/fm-polystyrene.toml");
+    let case = studied(text, &["gap.tip=", "drive.setpoint=2 kHz"]);
+    let (there, solved) = at_setpoint(case.clone(), &Control::default()).unwrap();
+    let solved = solved.unwrap();
+    let options = FrequencyModulationOptions {
+        shift: Some("2 kHz".into()),
+        ..FrequencyModulationOptions::default()
+    };
+    let curve = frequency_modulation(&case, &options, &Control::default()).unwrap();
+    let found = curve.modulation.unwrap().setpoints.unwrap();
+    // The same but for the damping, which the loss tangent gives at the frequency of the drive.
+    assert!((solved.zc() / found[0].zc.unwrap() - 1.0).abs() < 0.01);
+    let drive = solved.drive.unwrap();
+    let view = there.physical().unwrap();
+    let frequency = view.scales.frequency * view.cantilever.omega;
+    assert!((frequency / drive.frequency - 1.0).abs() < 1e-12);
+    let own = case.physical().unwrap().free_amplitude;
+    let closed = orbit(&there.model().unwrap(), &OrbitOptions::default()).unwrap();
+    let amplitude = closed.observables.first_harmonic * view.scales.length;
+    assert!((amplitude / own - 1.0).abs() < 1e-8, "{amplitude} {own}");
+    assert!(
+        (closed.observables.phase - 90.0).abs() < 1e-5,
+        "{}",
+        closed.observables.phase
+    );
+    let said = solved.remark().text;
+    assert!(
+        said.starts_with("the frequency shift 2 kHz is reached"),
+        "{said}"
+    );
+    let refused = studied(text, &["gap.tip=", "drive.setpoint=-20 Hz"]);
+    let error = solve_setpoint(&refused, &Control::default()).unwrap_err();
+    assert!(
+        error.message().contains("is not reached on approach"),
         "{}",
         error.message()
     );

@@ -215,7 +215,7 @@ export function layout(pen, figure, wide, size, highest, views) {
   const [above, below] = [row("above"), row("below")];
   const wanted = RATIO * most(columnWidth) * rows;
   // A column of panels is read by scrolling.
-  if (cols !== figure.cols) highest = Infinity;
+  if (wide < NARROW) highest = Infinity;
   const heights = Math.max(LEAST * total(down) / Math.max(...down) * 0.8, LEAST * rows * 0.95, Math.min(wanted, highest - total(above) - total(below)));
   let top = 0;
   down.forEach((share, r) => {

@@ -1403,8 +1403,6 @@ def test_the_tour_of_two_motions(page: Any, address: str, tmp_path: Path) -> Non
     computed(page, "basin")
     page.mouse.click(*spot(page, "study-figure", 0, 0.7, 0.4))
     until(page, lambda: "start=" in page.url)
-    for tab in ("branches", "diagram", "resonance", "map"):
-        computed(page, tab)
     page.fill("#steps", "40")
     page.press("#steps", "Enter")
     until(page, lambda: "40 steps per period" in page.inner_text("#spurious"))
@@ -1420,6 +1418,12 @@ def test_the_tour_of_two_motions(page: Any, address: str, tmp_path: Path) -> Non
         cwd=tmp_path,
     )
     assert json.loads(done.stdout)["amplitude"] == value(page, "amplitude")
+
+
+@pytest.mark.parametrize("tab", ["branches", "diagram", "resonance", "map"])
+def test_the_studies_of_the_tour(page: Any, address: str, tab: str) -> None:
+    opened(page, address, "preset=paper-fast")
+    computed(page, tab)
 
 
 def test_the_tour_of_a_jump(page: Any, address: str) -> None:

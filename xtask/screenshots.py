@@ -52,7 +52,8 @@ def taken(page: Any, name: str) -> None:
 
 def coexisting(page: Any, address: str) -> None:
     """Two motions of one case, and their basins."""
-    opened(page, address, "preset=paper-fast&tab=basin")
+    opened(page, address, "preset=paper-fast")
+    page.wait_for_selector("#study-figure canvas", timeout=120_000)
     page.click("#census")
     page.wait_for_selector("#attractors button >> nth=1", timeout=120_000)
     page.click("#attractors button:has-text('period 4')")
@@ -60,6 +61,7 @@ def coexisting(page: Any, address: str) -> None:
     idle(page)
     page.evaluate("scrollTo(0, 0)")
     taken(page, "explorer.png")
+    page.click("#tab-basin")
     compute(page)
     page.locator("#study").evaluate("one => one.scrollIntoView()")
     taken(page, "explorer-basin.png")

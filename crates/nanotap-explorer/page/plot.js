@@ -8,6 +8,7 @@ const MM = 3.4;               // CSS pixels for a millimetre of print
 const POINT = 1.7;            // CSS pixels for a typographer's point
 const SCRIPT = 0.72;          // size of a sub- or superscript
 const BAR = 12;               // width of a colour bar, CSS pixels
+let grown = 1;                // lines and marks grow with the letters
 
 const dark = matchMedia("(prefers-color-scheme: dark)");
 let theme = null;
@@ -190,7 +191,7 @@ export function layout(pen, figure, wide, size, highest, views) {
     place.aside = Math.max(0, ...words) + 0.5 * size + (label(place.y) ? 1.5 * size : 0);
     place.bar = place.panel.layers.find((layer) => layer.kind === "heatmap");
     const scale = place.bar && seen(place.bar.scale);
-    place.barAside = scale ? BAR + 1.5 * size + Math.max(0, ...ticks(scale, 5).at.map(([, text]) => width(pen, text, size))) + 1.6 * size : 0.9 * size;
+    place.barAside = scale ? BAR + 1.5 * size + Math.max(0, ...ticks(scale, 5).at.map(([, text]) => width(pen, text, size))) + 1.6 * size : 1.7 * size;
     place.below = place.words ? (label(place.x) ? 2.9 : 1.6) * size : 0.7 * size;
   }
   const most = (list) => Math.max(0, ...list);
@@ -235,7 +236,7 @@ export function layout(pen, figure, wide, size, highest, views) {
 const DASHES = { dashed: [4, 2.2], dotted: [1, 1.6], "dash-dot": [5, 1.8, 1.2, 1.8] };
 function stroke(pen, colour, points, dash) {
   pen.strokeStyle = shade(colour);
-  pen.lineWidth = Math.max(0.8, points * POINT);
+  pen.lineWidth = Math.max(0.8, points * POINT) * grown;
   pen.setLineDash((DASHES[dash] ?? []).map((one) => one * Math.max(1, pen.lineWidth)));
 }
 
@@ -249,7 +250,7 @@ const SHAPES = {
 };
 function marker(pen, layer, x, y) {
   pen.beginPath();
-  (SHAPES[layer.shape] ?? SHAPES.circle)(pen, x, y, Math.max(1.6, layer.size * MM / 2));
+  (SHAPES[layer.shape] ?? SHAPES.circle)(pen, x, y, Math.max(1.8, layer.size * MM / 2) * grown);
   const thin = layer.shape === "cross" || layer.shape === "plus" || layer.open;
   if (layer.open) { pen.fillStyle = colours().card; pen.fill(); }
   if (thin) { pen.strokeStyle = shade(layer.colour); pen.lineWidth = 1.3; pen.stroke(); return; }
@@ -305,7 +306,7 @@ function layer(pen, place, one) {
       break;
     }
     case "points": {
-      const size = Math.max(1.2, one.diameter * MM);
+      const size = Math.max(1.8, one.diameter * MM) * grown;
       pen.fillStyle = shade(one.colour);
       for (let k = 0; k < xs.length; k += 1) if (shown(k)) pen.fillRect(X(xs[k]) - size / 2, Y(ys[k]) - size / 2, size, size);
       break;
@@ -319,7 +320,7 @@ function layer(pen, place, one) {
         if (!shown(k)) continue;
         const [left, end] = one.kind === "bars" ? [X(xs[k] - one.width / 2), X(xs[k] + one.width / 2)] : [X(xs[k]) - 0.7, X(xs[k]) + 0.7];
         pen.fillRect(left, Math.min(foot, Y(ys[k])), end - left, Math.abs(foot - Y(ys[k])));
-        if (one.kind === "stems") { pen.beginPath(); pen.arc(X(xs[k]), Y(ys[k]), 2.6, 0, 7); pen.fill(); }
+        if (one.kind === "stems") { pen.beginPath(); pen.arc(X(xs[k]), Y(ys[k]), 2.6 * grown, 0, 7); pen.fill(); }
       }
       break;
     }
@@ -370,6 +371,7 @@ function note(pen, place, one, size) {
 /** Draws the panels of a layout. */
 export function paint(pen, { places }, size) {
   const { ink, soft, line } = colours();
+  grown = size / 12;
   pen.textBaseline = "alphabetic";
   for (const place of places) {
     const { left, top, width: wide, height: high } = place;

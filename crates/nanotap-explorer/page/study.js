@@ -222,7 +222,6 @@ function forget() {
   found = null;
   number = 0;
   figure.clear($("study-figure"));
-  $("study-figure").hidden = false;
   $("tables").replaceChildren();
   $("study-export").hidden = true;
   $("progress").textContent = hint();
@@ -267,7 +266,10 @@ function build() {
   }, "pin");
   pin.title = "Keep the curves of this figure behind the next ones";
   pin.setAttribute("aria-pressed", String(Boolean(pinned)));
-  if (!drawn) $("progress").textContent = hint();
+  if (drawn) return;
+  $("progress").textContent = hint();
+  // The approach curve comes by itself.
+  $("study-figure").hidden = state.tab !== "approach";
 }
 
 /** A field of the form. */

@@ -256,6 +256,12 @@ fn a_flat_sample_gives_the_orbit_of_every_law() {
                 .to_owned(),
         ),
         (
+            "generalised-maxwell",
+            "law = \"generalised-maxwell\"\nstiffness = \"10 N/m\"\n\
+             relaxation_arms = [[\"time (us)\", \"stiffness (N/m)\"], [1, 20], [0.3, 8]]\n"
+                .to_owned(),
+        ),
+        (
             "moving-surface",
             format!(
                 "law = \"moving-surface\"\n{linear}surface_stiffness = \"5 N/m\"\n\

@@ -21,7 +21,7 @@ pub(crate) fn on(law: ContactLaw, omega: f64) -> Cantilever {
         ContactLaw::StandardLinearSolid => case.with(Parameter::Alpha6, 0.0).on(law, &[40.0, 0.05]),
         ContactLaw::GeneralisedMaxwell => Cantilever {
             alpha6: 0.0,
-            arms: vec![[0.01, 15.0], [0.05, 20.0], [0.6, 5.0]],
+            arms: vec![[0.2, 15.0], [0.5, 20.0], [3.0, 5.0]],
             ..case.on(law, &[1.0, 1.0])
         },
         ContactLaw::MovingSurface => case.on(law, &[60.0, 8.0, 0.4]),

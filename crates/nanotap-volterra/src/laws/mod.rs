@@ -14,6 +14,7 @@ pub mod formula;
 pub mod hysteresis;
 pub mod jkr;
 pub mod kelvin_voigt;
+pub mod layer;
 pub mod lennard_jones;
 pub mod prony;
 pub mod solvation;
@@ -127,6 +128,9 @@ pub static TABLE: &[TableLaw] = table! {
     thin::SPHERE => thin::Thin(Shape::Sphere),
     thin::CONE => thin::Thin(Shape::Cone),
     thin::PUNCH => thin::Thin(Shape::Punch),
+    layer::SPHERE => layer::Layer(Shape::Sphere),
+    layer::CONE => layer::Layer(Shape::Cone),
+    layer::PUNCH => layer::Layer(Shape::Punch),
     dmt::DMT => dmt::Dmt,
     jkr::JKR => jkr::Jkr,
     van_der_waals::SPHERE => van_der_waals::VanDerWaals(Shape::Sphere),

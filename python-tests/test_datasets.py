@@ -200,3 +200,22 @@ def test_plain_zarr_reads_it_too(nanotap):
     group = zarr.open_group(nanotap.folder / said["path"], mode="r")
     assert group["period_max"].shape == (3, 1, 4)
     assert group.attrs["kind"] == "sweep"
+
+
+def test_an_image_is_written_line_by_line(tmp_path):
+    import nanotap
+
+    case = nanotap.Case.from_file(ROOT / "docs" / "cases" / "scan-particle.toml")
+    few = {"lines": 4, "pixels": 12, "periods": 300, "settle": 300, "line_settle": 100}
+    plain = nanotap.scan(case, **few, progress=False)
+    path = tmp_path / "image.zarr"
+    share = nanotap.scan(case, **few, out=path, chunk="1/2", progress=False)
+    assert np.isnan(share.height).sum() == share.height.size // 2
+    whole = nanotap.scan(case, **few, out=path, progress=False)
+    assert whole.attrs.pop("path") == str(path)
+    xr.testing.assert_identical(whole, plain)
+    assert nanotap.open(path).sizes == {"y": 4, "direction": 2, "x": 12, "flight": 8, "jump": 8}
+    with pytest.raises(ValueError, match="line_settle"):
+        nanotap.scan(
+            nanotap.Case.from_file(ROOT / "docs" / "cases" / "scan-step.toml"), out=path
+        )

@@ -171,14 +171,15 @@ PYTHON: dict[str, tuple[tuple[tuple[str, str, str, str], ...], str, str]] = {
         ),
     ),
     "scan": (
-        (THREADS, PROGRESS),
+        DATASET,
         "xr.Dataset",
         (
             "`height`, `amplitude_error`, `phase`, `peak_force`, `dissipation`, `state` … over "
             "`direction` (trace, retrace), `y` and `x`; the listed drive periods over `k` "
             "(`period_z`, `period_amplitude` …). The attributes hold the `verdict`, the `warnings`, "
             "and as JSON the statistics of the `lines`, the `branch_changes` and the analysis of "
-            "the feedback `loop`."
+            "the feedback `loop`. With `out`, the lines are written into a dataset as they are "
+            "finished (this needs `line_settle`), and a later call goes on with it."
         ),
     ),
     "lyapunov": (
@@ -419,7 +420,8 @@ def function(name: str, about: str, schema: dict[str, Any]) -> str:
     module = "_studies"
     if name in {"modes", *OVER_ARRAYS}:
         module = "_motions"
-    if extra[:1] == DATASET[:1]:
+    # A scan is a dataset only where it is written line by line.
+    if extra[:1] == DATASET[:1] and name != "scan":
         module = "_datasets"
     further = "".join(f", {argument}" for argument, *_ in extra)
     called = f"{python}(" if name in PYTHON else f'document("{name}", '

@@ -10,8 +10,10 @@ use nanotap::control::Control;
 use nanotap::dataset::gsf::Field;
 use nanotap::dataset::{self, Share, Store, Work, WorkError, table};
 use nanotap::figure as figures;
+use nanotap::study::DatasetStudy as _;
 use nanotap::study::basin;
 use nanotap::study::registry;
+use nanotap::study::scan::ScanLines;
 use nanotap::study::sweep::Summary;
 use nanotap::study::threads::{checked, install};
 use nanotap::study::window::Window;
@@ -196,10 +198,10 @@ fn opened(path: &Path) -> Result<(Store, String), Failure> {
 pub(crate) fn summary(path: PathBuf) -> PyResult<String> {
     let summary = || -> Result<String, Failure> {
         let (store, kind) = opened(&path)?;
-        Ok(if kind == "basin" {
-            serde_json::to_string(&basin::shares(&store)?)?
-        } else {
-            serde_json::to_string(&Summary::of(&store)?)?
+        Ok(match kind.as_str() {
+            "basin" => serde_json::to_string(&basin::shares(&store)?)?,
+            "scan" => serde_json::to_string(&ScanLines::report(&store)?)?,
+            _ => serde_json::to_string(&Summary::of(&store)?)?,
         })
     };
     Ok(summary()?)
@@ -225,10 +227,10 @@ pub(crate) fn figure<'py>(
     let format = format.to_owned();
     let done = watched(py, None, move |_| {
         let (store, kind) = opened(&path)?;
-        let figure = if kind == "basin" {
-            figures::basin::figure(&store)?
-        } else {
-            figures::sweep::figure(&store)?
+        let figure = match kind.as_str() {
+            "basin" => figures::basin::figure(&store)?,
+            "scan" => figures::scan::scan_figure(&ScanLines::report(&store)?),
+            _ => figures::sweep::figure(&store)?,
         };
         drawn(&figure, &format)
     })?;

@@ -432,3 +432,106 @@ fn cancelled_work_ends_at_once() {
     let error = ScanStudy::run(&case, &ScanOptions::default(), &control).unwrap_err();
     assert_eq!(error.kind, nanotap::ErrorKind::Stopped);
 }
+
+/// Lines that are finished stay when the work is stopped; the others are missing, and it is said.
+#[test]
+fn stopped_work_keeps_its_lines() {
+    use nanotap::control::CancelFlag;
+    for independent in [false, true] {
+        let flag = CancelFlag::new();
+        // The count rises every 256 periods; the scan has 10 lines of 5000.
+        let stop = |done: usize, _: usize| {
+            if done > 20_000 {
+                flag.cancel();
+            }
+        };
+        let control = Control {
+            cancel: Some(&flag),
+            progress: Some(&stop),
+        };
+        let mut words = vec!["scan.lines=10", "scan.periods=2500", "scan.pixels=50"];
+        if independent {
+            words.push("scan.line_settle=1000");
+        }
+        let case = parsed(STEP, &words);
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(2);
+        let run = || ScanStudy::run(&case, &ScanOptions::default(), &control).unwrap();
+        let report = pool.build().unwrap().install(run);
+        let whole = scan(&case, &ScanOptions::default()).unwrap();
+        assert_eq!(report.trace.height.len(), 10);
+        let scanned: Vec<usize> = report.lines.iter().step_by(2).map(|l| l.line).collect();
+        assert!((1..10).contains(&scanned.len()), "{scanned:?}");
+        for line in 0..10 {
+            let row = &report.trace.height[line];
+            if scanned.contains(&line) {
+                assert_eq!(row, &whole.trace.height[line]);
+            } else {
+                assert!(row.iter().all(|z| z.is_nan()));
+            }
+        }
+        let said = format!("{} of 10 lines are scanned", scanned.len());
+        assert_eq!(report.warnings[0], said);
+    }
+}
+
+/// A dataset of lines holds the whole report, whether it was computed at once, in shares that are
+/// merged, or stopped and continued.
+#[test]
+fn a_dataset_of_lines_is_the_scan() {
+    use nanotap::dataset::{Share, Store, Work, finish, merge};
+    use nanotap::study::DatasetStudy as _;
+    use nanotap::study::scan::ScanLines;
+    let case = parsed(
+        PATCH,
+        &[
+            "scan.lines=24",
+            "scan.periods=600",
+            "scan.pixels=20",
+            "scan.line_settle=200",
+            "scan.method=fast",
+        ],
+    );
+    let options = ScanOptions::default();
+    let direct = scan(&case, &options).unwrap();
+    assert!(direct.lines.iter().all(|line| line.parachuting.len() <= 8));
+    assert!(direct.error.is_some() && !direct.branch_changes.is_empty());
+    let folder = std::env::temp_dir().join(format!("nanotap-scan-{}", std::process::id()));
+    let plan = ScanLines::plan(&case, &options, &Control::default()).unwrap();
+    let shares: Vec<std::path::PathBuf> = ["1/2", "2/2"]
+        .iter()
+        .map(|share| {
+            let path = folder.join(share.replace('/', "-"));
+            let store = Store::create_or_resume(&path, plan.schema().clone()).unwrap();
+            let work = Work {
+                share: share.parse().unwrap(),
+                threads: 2,
+                control: Control::default(),
+            };
+            plan.compute(&store, &work).unwrap();
+            assert_eq!(store.missing(), 12);
+            path
+        })
+        .collect();
+    let merged = folder.join("merged");
+    merge(&shares, &merged).unwrap();
+    // One that holds a share goes on with the rest.
+    let store = Store::create_or_resume(&shares[0], plan.schema().clone()).unwrap();
+    let all = Work {
+        share: Share::WHOLE,
+        threads: 1,
+        control: Control::default(),
+    };
+    plan.compute(&store, &all).unwrap();
+    for store in [finish(store).unwrap(), Store::open(&merged).unwrap()] {
+        let report = ScanLines::report(&store).unwrap();
+        assert_eq!(report.lines, direct.lines);
+        assert_eq!(report.feedback, direct.feedback);
+        assert_eq!(report.error, direct.error);
+        let [found, expected] = [&report, &direct].map(|r| serde_json::to_string(r).unwrap());
+        assert!(found == expected);
+    }
+    // Lines that follow on each other are no dataset.
+    let error = ScanLines::plan(&parsed(STEP, &[]), &options, &Control::default()).unwrap_err();
+    assert!(error.to_string().contains("line_settle"), "{error}");
+    std::fs::remove_dir_all(folder).unwrap();
+}

@@ -226,6 +226,13 @@ fn physical(title: &str, view: &Physical) -> String {
             let phase = format!("{}°", number::significant(phase, 4));
             given.row(["", &phase, "setpoint of the phase lag"]);
         }
+        Some(Held::Shift(shift)) => {
+            given.row([
+                "",
+                &Kind::Frequency.format(shift),
+                "setpoint of the frequency shift",
+            ]);
+        }
         Some(Held::Amplitude(_)) | None => {}
     }
     given.row([
@@ -415,21 +422,7 @@ fn setpoint(report: &SetpointReport) -> String {
             format!("{stability}{reached}"),
         ]);
     }
-    let heading = match report.held {
-        "peak_force" => format!(
-            "where the peak force is {}",
-            Kind::Force.format(report.setpoint)
-        ),
-        "phase" => format!(
-            "where the phase is {}°",
-            number::significant(report.setpoint, 4)
-        ),
-        _ => format!(
-            "where the amplitude is {}, {} of A0",
-            Kind::Length.format(report.amplitude),
-            number::significant(report.ratio, 4)
-        ),
-    };
+    let heading = format!("where {}", report.held_value());
     format!("\n  {}\n{}", style::bold(&heading), table.render())
 }
 

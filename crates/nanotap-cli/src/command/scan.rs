@@ -4,13 +4,17 @@ use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
+use nanotap::dataset::Share;
 use nanotap::figure::scan::scan_figure;
+use nanotap::study::DatasetStudy as _;
 use nanotap::study::scan::report::LoopReport;
 use nanotap::study::scan::{
-    CHANNELS, Direction, LineStatistics, Method, ScanOptions, ScanReport, ScanStudy, pixels_csv,
+    CHANNELS, Direction, LineStatistics, Method, ScanLines, ScanOptions, ScanReport, ScanStudy,
+    pixels_csv,
 };
 
 use crate::arguments::{CaseArguments, PlotArgument};
+use crate::dataset::DatasetArguments;
 use crate::failure::Failure;
 use crate::given_case::GivenCase;
 use crate::output::Output;
@@ -32,9 +36,15 @@ pub(crate) struct Arguments {
     #[command(flatten)]
     threads: ThreadsArgument,
 
-    /// Write the pixels (.csv), or every channel of the trace for Gwyddion (.gsf, NAME-CHANNEL.gsf)
+    /// Write the pixels (.csv), every channel of the trace for Gwyddion (.gsf, NAME-CHANNEL.gsf), or
+    /// a dataset (.zarr). With --line-settle the dataset is written line by line; an unfinished one is
+    /// continued
     #[arg(long, value_name = "PATH")]
     out: Option<PathBuf>,
+
+    /// Compute only one of n shares of the lines of a dataset, as in 2/8; `nanotap merge` merges them
+    #[arg(long, value_name = "I/N", default_value_t = Share::WHOLE, hide_default_value = true)]
+    chunk: Share,
 
     #[command(flatten)]
     plot: PlotArgument,
@@ -43,9 +53,18 @@ pub(crate) struct Arguments {
 pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure> {
     let request = arguments.request.read()?;
     let ending = match &arguments.out {
+        Some(path) if file::ending(path, &["csv", "gsf", "zarr"])? == "zarr" => {
+            return dataset(arguments, path, &request, output);
+        }
         Some(path) => Some(file::claim(path, &["csv", "gsf"])?),
         None => None,
     };
+    if !arguments.chunk.is_whole() {
+        return Err(Failure::input(
+            "--chunk computes a share of a dataset",
+            "give --out NAME.zarr, too",
+        ));
+    }
     if let (Some(path), Some("gsf")) = (&arguments.out, ending) {
         for channel in CHANNELS {
             file::claim(&of_channel(path, channel.name), &["gsf"])?;
@@ -70,6 +89,37 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     }
     arguments.plot.draw(|| scan_figure(&report))?;
     output.study(&case, &report, |report| text(&case, report))
+}
+
+/// The scan as a dataset.
+fn dataset(
+    arguments: &Arguments,
+    path: &Path,
+    request: &ScanOptions,
+    output: &Output,
+) -> Result<(), Failure> {
+    let case = GivenCase::for_study(&arguments.case, true, output)?;
+    let dataset = DatasetArguments {
+        out: Some(path.to_owned()),
+        chunk: arguments.chunk,
+        threads: arguments.threads.clone(),
+    };
+    let done = dataset.run::<ScanLines>(
+        &case,
+        request,
+        "",
+        ScanLines::COUNTED,
+        0,
+        &arguments.plot,
+        |store| Ok(scan_figure(&ScanLines::report(store)?)),
+        output,
+    )?;
+    for warning in done.summary.iter().flat_map(|report| &report.warnings) {
+        output.warning(warning);
+    }
+    output.study(&case, &done, |done| {
+        done.text(&case.title(), |report| text(&case, report))
+    })
 }
 
 /// `image-height.gsf` next to `image.gsf`.

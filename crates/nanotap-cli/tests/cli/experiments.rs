@@ -278,6 +278,37 @@ fn the_window_reports_where_one_motion_exists() {
         .refused(&["1 parameters make no window", "twice"]);
 }
 
+/// An image of independent lines is a dataset that resumes; its report, figure and table are those
+/// of the scan.
+#[test]
+fn an_image_is_a_dataset_that_resumes() {
+    let folder = Folder::new();
+    let image = include_str!("../../../../docs/cases/scan-particle.toml");
+    folder.write(
+        "image.toml",
+        image.replace("periods = 5000", "periods = 500"),
+    );
+    let plain = ["scan", "image.toml", "--set", "scan.lines=6"];
+    let with = |more: &[&str]| folder.run(&[&plain, more].concat());
+    let scan = with(&["--json"]).json();
+    with(&["--out", "image.zarr", "--chunk", "1/2", "--quiet"]);
+    let whole = with(&["--out", "image.zarr", "--plot", "image.svg", "--json"]);
+    let said = "image.zarr: 3 of 6 chunks are there already";
+    assert!(whole.stderr.contains(said), "{}", whole.stderr);
+    let whole = whole.json();
+    for field in ["trace", "retrace", "lines", "loop", "verdict", "warnings"] {
+        assert_eq!(whole[field], scan[field], "{field}");
+    }
+    assert!(folder.read("image.svg").contains("height"));
+    let text = with(&["--out", "image.zarr"]).stdout;
+    assert!(
+        text.contains("image.zarr in") && text.contains("feedback loop"),
+        "{text}"
+    );
+    with(&["--chunk", "1/2"]).refused(&["--chunk", "--out NAME.zarr"]);
+    with(&["--set", "scan.line_settle=", "--out", "b.zarr"]).refused(&["--line-settle 2000"]);
+}
+
 /// Invalid levers and cases beyond the model's validity are reported with a remedy.
 #[test]
 fn impossible_levers_are_refused_and_touching_beams_warned_of() {

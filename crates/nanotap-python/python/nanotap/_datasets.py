@@ -40,12 +40,12 @@ def sweep(
     noun = "values" if options["follow"] in (None, "off") else "lines"
     plan = ("sweep", _cased(case), request)
     if not options["where"] or chunk != "1/1":
-        return _computed(plan, noun, out, chunk, threads, client, progress)
+        return computed(plan, noun, out, chunk, threads, client, progress)
     with tempfile.TemporaryDirectory(prefix="nanotap-") as folder:
         store = (
             os.path.join(folder, "sweep.zarr") if out is None else _ending(out, "out")
         )
-        ds = _computed(plan, noun, store, chunk, threads, client, progress)
+        ds = computed(plan, noun, store, chunk, threads, client, progress)
         targets = json.loads(_nanotap.summary(store))["targets"]
         if out is None:
             ds = ds.load()
@@ -72,7 +72,7 @@ def basin(
     axes = {name: _arguments.slice_axis(name, options[name]) for name in ("x", "y")}
     request = _arguments.request("basin", {**options, **axes, "attractors": known})
     plan = ("basin", _cased(case), request)
-    return _computed(plan, "rows", out, chunk, threads, client, progress)
+    return computed(plan, "rows", out, chunk, threads, client, progress)
 
 
 def _state_of(entry: Any, name: str) -> list[float]:
@@ -184,7 +184,7 @@ def window(
         store = (
             os.path.join(folder, "window.zarr") if out is None else _ending(out, "out")
         )
-        ds = _computed(plan, "values", store, "1/1", threads, client, progress)
+        ds = computed(plan, "values", store, "1/1", threads, client, progress)
         found = json.loads(_nanotap.window(store))
         if out is None:
             ds = ds.load()
@@ -241,7 +241,7 @@ def _ending(path: Path, name: str) -> str:
     return text
 
 
-def _computed(
+def computed(
     plan: "Plan",
     noun: str,
     out: Path | None,

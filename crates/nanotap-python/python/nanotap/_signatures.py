@@ -1285,7 +1285,10 @@ def scan(
     image_height: float | str | None = None,
     dilate: float | str | None = None,
     material: Any = None,
+    out: Path | None = None,
+    chunk: str = "1/1",
     threads: int | None = None,
+    client: "Client | None" = None,
     progress: Progress = None,
 ) -> "xr.Dataset":
     """Scan of a line or an image under feedback, drive period by period.
@@ -1360,8 +1363,15 @@ def scan(
         Widen the sampled heights by a sphere of this radius, the tip.
     material : Any
         Stretches of the line with another sample.
+    out : Path | None
+        The dataset, a folder with the extension .zarr; an existing one is resumed.
+        Without it, everything is in memory.
+    chunk : str
+        Only one of n shares, as in "2/8"; `merge` merges the shares.
     threads : int | None
         Number of threads; default: one per core.
+    client : "Client | None"
+        A Dask client on whose workers the chunks are computed, with the same bytes.
     progress : Progress
         Whether to show a bar, or a function that is called with the finished and
         the total count.
@@ -1372,7 +1382,9 @@ def scan(
     over `direction` (trace, retrace), `y` and `x`; the listed drive periods over
     `k` (`period_z`, `period_amplitude` …). The attributes hold the `verdict`, the
     `warnings`, and as JSON the statistics of the `lines`, the `branch_changes` and
-    the analysis of the feedback `loop`.
+    the analysis of the feedback `loop`. With `out`, the lines are written into a
+    dataset as they are finished (this needs `line_settle`), and a later call goes
+    on with it.
 
     Raises
     ------
@@ -1382,7 +1394,7 @@ def scan(
         The computation failed.
     """
     options = _arguments.options("scan", locals())
-    return _studies.scan(case, options, threads, progress)
+    return _studies.scan(case, options, out, chunk, threads, client, progress)
 
 def force_curve(
     case: Case,

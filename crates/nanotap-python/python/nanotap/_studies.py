@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
-from . import _arguments, _nanotap
+from . import _arguments, _datasets, _nanotap
 from ._arguments import Progress
 from ._case import Case, Path
 from ._describe import case_attributes, describe
@@ -26,6 +26,7 @@ from ._si import answered
 
 if TYPE_CHECKING:
     import xarray as xr
+    from distributed import Client
 
 Found = TypeVar("Found")
 
@@ -301,11 +302,24 @@ _LISTED = {
 
 
 def scan(
-    case: Case, options: Mapping[str, Any], threads: int | None, progress: Progress
+    case: Case,
+    options: Mapping[str, Any],
+    out: Path | None,
+    chunk: str,
+    threads: int | None,
+    client: "Client | None",
+    progress: Progress,
 ) -> "xr.Dataset":
     """Height, error, phase … over direction, line and pixel; the finished part if Ctrl-C stopped it."""
-    document, interrupted = _run("scan", case, options, threads, progress)
-    return _finished(_scan_dataset(case, document), interrupted)
+    if out is None and chunk == "1/1" and client is None:
+        document, interrupted = _run("scan", case, options, threads, progress)
+        return _finished(_scan_dataset(case, document), interrupted)
+    plan = ("scan", case, _arguments.request("scan", options))
+    ds = _datasets.computed(plan, "lines", out, chunk, threads, client, progress)
+    if out is None or chunk != "1/1":
+        return ds
+    whole = _scan_dataset(case, json.loads(_nanotap.summary(ds.attrs["path"])))
+    return whole.assign_attrs(path=ds.attrs["path"])
 
 
 def _scan_dataset(case: Case, report: dict[str, Any]) -> "xr.Dataset":

@@ -59,6 +59,7 @@ use stated::Replaced;
 use units::Units;
 
 use crate::model::cantilever::Cantilever;
+use crate::model::drive_form::Actuation;
 use crate::model::oscillator::{Oscillator, OscillatorParameter, Stop};
 use crate::model::{Model, ModelTangent, Tangent, cantilever_model_tangent};
 use crate::number::shortest;
@@ -466,8 +467,8 @@ impl Case {
         }
     }
 
-    /// The same case with a setpoint: a fraction of the free amplitude, or an amplitude, a peak force
-    /// or a phase in SI. A case without physical quantities is unchanged.
+    /// The same case with a setpoint: a fraction of the free amplitude, or an amplitude, a peak force,
+    /// a phase or a frequency shift in SI. A case without physical quantities is unchanged.
     #[must_use]
     pub(crate) fn with_setpoint(&self, value: f64, kind: Kind) -> Self {
         let CaseKind::Quantities(quantities) = &self.what else {
@@ -790,13 +791,15 @@ impl Case {
 
     /// The same case with the tip at `distance` (m) from the sample, where its setpoint is reached,
     /// with a note. Its motions start from `state` at drive phase 0. The unit of length is
-    /// unchanged; the distance of the beam is then off by less than the free amplitude.
+    /// unchanged; the distance of the beam is then off by less than the free amplitude. A `drive` of
+    /// another frequency (Hz) and strength (N, or m of a base) takes the place of the stated one.
     ///
     /// # Errors
     /// If the quantities are invalid there.
     pub fn at_distance(
         &self,
         distance: f64,
+        drive: Option<[f64; 2]>,
         note: Remark,
         state: Vec<f64>,
     ) -> Result<Self, CaseFileError> {
@@ -810,6 +813,14 @@ impl Case {
         if let Ok(beam) = beam {
             let beam = Value::Number(beam, Kind::Length);
             quantities.stated.put(Key::GapBeam, beam);
+        }
+        if let Some([frequency, strength]) = drive {
+            let key = match self.cantilever().map(|case| case.actuation) {
+                Some(Actuation::Base) | None => Key::DriveAmplitude,
+                Some(_) => Key::DriveForce,
+            };
+            quantities.stated.set(Key::DriveFrequency, frequency);
+            quantities.stated.set(key, strength);
         }
         quantities.notes.push(note);
         quantities.start = Some(state);

@@ -43,9 +43,9 @@ pub enum WorkError {
         "stopped; every chunk is finished, but orbits have not been continued to neighbouring values"
     )]
     Neighbours,
-    /// The threads could not be started.
+    /// A computation failed, or the threads could not be started.
     #[error(transparent)]
-    Threads(Box<crate::Error>),
+    Failed(Box<crate::Error>),
     /// The store failed.
     #[error(transparent)]
     Store(#[from] StoreError),
@@ -179,7 +179,7 @@ fn lock<T>(mutex: &Mutex<T>) -> std::sync::MutexGuard<'_, T> {
 impl From<WorkError> for crate::Error {
     fn from(error: WorkError) -> Self {
         match error {
-            WorkError::Threads(error) => *error,
+            WorkError::Failed(error) => *error,
             WorkError::Store(error) => error.into(),
             WorkError::Cancelled { .. } | WorkError::Neighbours => {
                 Self::new(crate::ErrorKind::Stopped, error.to_string())

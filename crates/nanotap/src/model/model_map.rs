@@ -300,6 +300,9 @@ pub(crate) fn together(map: &ModelMap, count: usize) -> usize {
         .clamp(1, map.batch_size())
 }
 
+/// Steps of a budget that an evaluation of the exact motion counts, by its time.
+const EVALUATION_STEPS: u64 = 10;
+
 /// The exact map of a piecewise-linear model.
 #[derive(Clone, Debug)]
 struct ExactMap {
@@ -352,7 +355,11 @@ impl ExactMap {
         run: impl FnOnce(&mut Self) -> Result<R, FlowError>,
     ) -> Result<R, MotionError> {
         self.begin(state)?;
-        let result = run(self)?;
+        let before = self.evaluations();
+        let result = run(self);
+        let steps = EVALUATION_STEPS * (self.evaluations() - before);
+        self.flow.system().cancel().spend(steps);
+        let result = result?;
         self.end(state);
         Ok(result)
     }

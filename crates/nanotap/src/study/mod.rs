@@ -90,7 +90,10 @@ pub static STUDIES: &[StudyEntry] = &[
     StudyEntry::of::<noise::NoiseStudy>(),
     #[cfg(feature = "fm")]
     StudyEntry::of::<bimodal::BimodalStudy>(),
+    #[cfg(not(feature = "dataset"))]
     StudyEntry::of::<scan::ScanStudy>(),
+    #[cfg(feature = "dataset")]
+    StudyEntry::of::<scan::ScanStudy>().or_dataset::<scan::ScanLines>(),
     StudyEntry::of::<force_curve::ForceCurveStudy>(),
     StudyEntry::of::<lever::LeverStudy>(),
 ];

@@ -24,6 +24,7 @@ use crate::observe::{
     record,
 };
 use crate::study::Study;
+use crate::study::approach::SETPOINT_PERIODS;
 use crate::study::in_si::InSi;
 use crate::study::limits::{MAX_PERIOD, MAX_SAMPLES};
 use crate::study::proof::{ProofReport, Prover};
@@ -150,7 +151,16 @@ pub fn orbit(model: &Model, options: &OrbitOptions) -> Result<OrbitReport, Error
         (Some(period), Some(_)) => {
             close_orbit(&mut map, &start, period, &ShootingOptions::default())?
         }
-        (period, _) => settled(model, &mut map, &start, period)?,
+        (period, state) => {
+            let own = state
+                .is_none()
+                .then(|| at_setpoint(model, &mut map, &start));
+            let own = own.flatten();
+            match own.filter(|orbit| period.is_none_or(|p| p % orbit.period == 0)) {
+                Some(orbit) => orbit,
+                None => settled(model, &mut map, &start, period)?,
+            }
+        }
     };
     let observables = options.observables.unwrap_or(ObservableSet::ALL);
     report_on(model, &found, options.harmonics, observables)
@@ -163,6 +173,27 @@ pub(in crate::study) fn no_period() -> Error {
         "give {period} 1 or more",
     )
 }
+
+/// The orbit of a setpoint, on which its motion starts: in a run its approach would be nothing but
+/// rounding, and one that is unstable without the feedback would be left.
+fn at_setpoint(model: &Model, map: &mut ModelMap, start: &[f64]) -> Option<PeriodicOrbit> {
+    model.start.as_ref()?;
+    let mut state = start.to_vec();
+    (1..=SETPOINT_PERIODS).find_map(|period| {
+        map.advance(&mut state).ok()?;
+        let size = start.iter().fold(0.0, |m: f64, x| m.max(x.abs()));
+        let back = state
+            .iter()
+            .zip(start)
+            .all(|(x, y)| (x - y).abs() <= ON_ORBIT * size);
+        let orbit = back.then(|| close_orbit(map, start, period, &ShootingOptions::default()));
+        let near = |orbit: &PeriodicOrbit| orbit.nearest(start).1 <= ON_ORBIT * orbit.scale();
+        orbit?.ok().filter(near)
+    })
+}
+
+/// How near a state is to its orbit.
+const ON_ORBIT: f64 = 1e-6;
 
 /// The orbit where a run from `start` settles, or one of the asked period: near its end, or
 /// anywhere.

@@ -30,7 +30,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! A sweep, a window and basins leave a dataset: [`StudyEntry::plan`] gives what computes it
+//! A sweep, a window and basins leave a dataset, and so does a scan of independent lines: [`StudyEntry::plan`] gives what computes it
 //! chunk by chunk. A figure is drawn from the report itself, by the study's function in
 //! `figure`.
 
@@ -63,19 +63,15 @@ pub struct StudyEntry {
     pub partial: bool,
     /// Whether it chooses the distance itself, so that none is solved for a setpoint.
     pub any_distance: bool,
-    /// Runs it.
-    pub run: Run,
+    /// Runs it to the JSON of its document, if it leaves one.
+    pub document: Option<Run<String>>,
+    /// Plans what is to be computed into a dataset, if it leaves one.
+    #[cfg(feature = "dataset")]
+    pub dataset: Option<Run<DatasetPlan>>,
 }
 
-/// How a study runs on a case: from the JSON of its request.
-#[derive(Clone, Copy, Debug)]
-pub enum Run {
-    /// To the JSON of its document.
-    Document(fn(&Case, Value, &Control<'_>) -> Result<String, Error>),
-    /// To what is to be computed into a dataset.
-    #[cfg(feature = "dataset")]
-    Dataset(fn(&Case, Value, &Control<'_>) -> Result<DatasetPlan, Error>),
-}
+/// What runs a study on a case, from the JSON of its request.
+pub type Run<R> = fn(&Case, Value, &Control<'_>) -> Result<R, Error>;
 
 impl StudyEntry {
     pub(super) const fn of<S: Study>() -> Self {
@@ -87,7 +83,7 @@ impl StudyEntry {
             counted: S::COUNTED,
             partial: S::PARTIAL,
             any_distance: S::ANY_DISTANCE,
-            run: Run::Document(|case, request, control| {
+            document: Some(|case, request, control| {
                 let request = read::<S::Options>(request)?;
                 let case = if S::ANY_DISTANCE {
                     case.clone()
@@ -97,6 +93,17 @@ impl StudyEntry {
                 let report = S::run(&case, &request, control)?;
                 Ok(serde_json::to_string(&Document::new(&report, &case))?)
             }),
+            #[cfg(feature = "dataset")]
+            dataset: None,
+        }
+    }
+
+    /// The same study, whose report can be a dataset, too.
+    #[cfg(feature = "dataset")]
+    pub(super) const fn or_dataset<S: DatasetStudy>(self) -> Self {
+        Self {
+            dataset: Self::dataset::<S>().dataset,
+            ..self
         }
     }
 
@@ -110,7 +117,8 @@ impl StudyEntry {
             counted: S::COUNTED,
             partial: true,
             any_distance: false,
-            run: Run::Dataset(|case, request, control| {
+            document: None,
+            dataset: Some(|case, request, control| {
                 let request = read::<S::Options>(request)?;
                 let case = if S::solves_distance(&request) {
                     case.clone()
@@ -132,14 +140,13 @@ impl StudyEntry {
         request: Value,
         control: &Control<'_>,
     ) -> Result<String, Error> {
-        match self.run {
-            Run::Document(run) => run(case, request, control),
-            #[cfg(feature = "dataset")]
-            Run::Dataset(_) => Err(Error::input(
+        let run = self.document.ok_or_else(|| {
+            Error::input(
                 format!("{} leaves a dataset, not a document", self.name),
                 "compute its plan into a folder",
-            )),
-        }
+            )
+        })?;
+        run(case, request, control)
     }
 
     /// What is to be computed into a dataset.
@@ -153,13 +160,13 @@ impl StudyEntry {
         request: Value,
         control: &Control<'_>,
     ) -> Result<DatasetPlan, Error> {
-        match self.run {
-            Run::Dataset(plan) => plan(case, request, control),
-            Run::Document(_) => Err(Error::input(
+        let plan = self.dataset.ok_or_else(|| {
+            Error::input(
                 format!("{} leaves a document, not a dataset", self.name),
                 "take its document",
-            )),
-        }
+            )
+        })?;
+        plan(case, request, control)
     }
 }
 

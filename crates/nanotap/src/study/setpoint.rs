@@ -6,12 +6,18 @@
 //! which the held quantity has come from its value far from the sample to the setpoint: the amplitude
 //! of the first harmonic, as a lock-in amplifier reads it, has fallen to it, the peak force has risen
 //! to it, the phase has changed to it either way. The orbit there is closed by Newton at distances
-//! chosen by regula falsi. Where the quantity jumps past the setpoint instead, or the motion there
-//! is not periodic, nothing is chosen and the reason is given.
+//! chosen by regula falsi. Motions that are not periodic are passed as long as their averages stay on
+//! the far side of the setpoint. Where the quantity jumps past the setpoint instead, or the motion
+//! there is not periodic, nothing is chosen and the reason is given.
 //!
 //! Then the lever goes on to the sample's own position and back to the chosen distance: the other
 //! stable orbits there are reported too, and, from the branches of all these continued round
 //! their folds, the other orbits at the setpoint.
+//!
+//! A setpoint that is a frequency shift is one of frequency modulation: amplitude and phase are held
+//! too ([`frequency_modulation`](super::frequency_modulation)), at those of the free lever and 90°, and
+//! the first distance on approach at which the shift has its value is chosen. Frequency and strength of
+//! the drive there take the place of the case's own.
 //!
 //! Fails by omission: orbits on other branches, and a setpoint that the quantity passes twice between
 //! two neighbouring orbits of a branch.
@@ -24,11 +30,15 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use super::FreeMotion;
-use super::approach::distance_sweep::{DistanceSweep, Motion, Piece, Place, budget_text, is_same};
-use super::approach::{MAX_MULTIPLIER, SETPOINT_PERIODS, no_drive};
-use crate::case::Case;
+use super::approach::distance_sweep::{
+    DistanceSweep, FoundMotion, Motion, Piece, Place, budget_text, is_same,
+};
+use super::approach::{MAX_MULTIPLIER, SETPOINT_PERIODS, Way, no_drive};
+use super::frequency_modulation::{self, FrequencyModulationOptions};
+use super::value::Amount;
 use crate::case::document::CaseDocument;
 use crate::case::physical::{Held, Kind, Remark};
+use crate::case::{Case, Key};
 use crate::model::model_map::ModelMap;
 use crate::observe::table::{Observable, shown_phase};
 use crate::observe::{ObservableSet, Observables, OutOfRange, PhysicalMotion, measure};
@@ -76,13 +86,27 @@ pub struct SetpointState {
     pub physical: PhysicalMotion,
 }
 
+/// The drive that keeps amplitude and phase at a frequency shift.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct SetpointDrive {
+    /// Its frequency, Hz.
+    pub frequency: f64,
+    /// Its strength: a force, N, or the amplitude of a driven base, m.
+    pub strength: f64,
+    /// Its strength over that of the free lever.
+    pub ratio: f64,
+}
+
 /// Solution of a setpoint for the distance.
 #[derive(Clone, Debug, Serialize)]
 pub struct SetpointReport {
-    /// What is held: `amplitude`, `peak_force` or `phase`.
+    /// What is held: `amplitude`, `peak_force`, `phase` or `frequency_shift`.
     pub held: &'static str,
-    /// Its setpoint: the amplitude over A₀, the force in N, the phase in degrees.
+    /// Its setpoint: the amplitude over A₀, the force in N, the phase in degrees, the shift in Hz.
     pub setpoint: f64,
+    /// The drive at a frequency shift.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub drive: Option<SetpointDrive>,
     /// A/A₀ at the setpoint.
     pub ratio: f64,
     /// A at the setpoint, m.
@@ -102,6 +126,23 @@ impl SetpointReport {
     /// The distance that the approach reaches, in m.
     pub fn zc(&self) -> f64 {
         self.solutions.get(self.chosen).map_or(f64::NAN, |s| s.zc)
+    }
+
+    /// What is held and its value, as in "the peak force is 1 nN".
+    pub fn held_value(&self) -> String {
+        match self.held {
+            "peak_force" => format!("the peak force is {}", Kind::Force.format(self.setpoint)),
+            "phase" => format!("the phase is {}°", Kind::Number.format(self.setpoint)),
+            "frequency_shift" => format!(
+                "the frequency shift is {}",
+                Kind::Frequency.format(self.setpoint)
+            ),
+            _ => format!(
+                "the amplitude is {}, {} of A0",
+                Kind::Length.format(self.amplitude),
+                Kind::Number.format_digits(self.ratio, 4)
+            ),
+        }
     }
 
     /// The solution, in a sentence.
@@ -161,6 +202,12 @@ impl SetpointReport {
                 "the setpoint of the phase, {}°, is reached on the {branch} branch with {amplitude}",
                 Kind::Number.format(self.setpoint)
             ),
+            "frequency_shift" => format!(
+                "the frequency shift {} is reached on approach, where the feedback of amplitude and phase \
+                 drives with {} times the free lever's strength,",
+                Kind::Frequency.format(self.setpoint),
+                Kind::Number.format_digits(self.drive.map_or(f64::NAN, |drive| drive.ratio), 4),
+            ),
             _ => format!(
                 "the setpoint of the peak force, {}, is reached on the {branch} branch with \
                  {amplitude}",
@@ -206,6 +253,9 @@ pub fn solve_setpoint(case: &Case, control: &Control<'_>) -> Result<SetpointRepo
     if !(free.reach > 0.0 && free.reach.is_finite()) {
         return Err(no_drive());
     }
+    if let Held::Shift(shift) = setpoint {
+        return solve_shift(case, shift, &free, control);
+    }
     let held = HeldQuantity::new(setpoint, &free, view.scales.force)?;
     let mut search = Search::new(case, held, free);
     let range = (0.0, FARTHER * free.reach);
@@ -230,10 +280,12 @@ pub fn solve_setpoint(case: &Case, control: &Control<'_>) -> Result<SetpointRepo
         Held::Amplitude(ratio) => ("amplitude", ratio, ratio),
         Held::PeakForce(force) => ("peak_force", force, amplitude_ratio),
         Held::Phase(phase) => ("phase", phase, amplitude_ratio),
+        Held::Shift(shift) => ("frequency_shift", shift, amplitude_ratio),
     };
     Ok(SetpointReport {
         held: name,
         setpoint: value,
+        drive: None,
         ratio,
         amplitude: ratio * view.free_amplitude,
         solutions,
@@ -243,6 +295,126 @@ pub fn solve_setpoint(case: &Case, control: &Control<'_>) -> Result<SetpointRepo
     })
 }
 
+/// Solves a frequency shift, in Hz, for the distance.
+fn solve_shift(
+    case: &Case,
+    shift: f64,
+    free: &FreeMotion,
+    control: &Control<'_>,
+) -> Result<SetpointReport, Error> {
+    // What depends on the frequency, as a loss tangent, is that of the frequency with the shift.
+    #[cfg(feature = "fm")]
+    let case = &at_shift(case, shift, free)?;
+    let options = FrequencyModulationOptions {
+        shift: Some(Amount::from(format!("{shift} Hz").as_str())),
+        ..FrequencyModulationOptions::default()
+    };
+    let curve = frequency_modulation::frequency_modulation(case, &options, control)?;
+    if control.is_cancelled() {
+        return Err(cancelled());
+    }
+    let shown = |shift: f64| Kind::Frequency.format(shift);
+    let refused = || {
+        let shifts = curve.table.iter().filter_map(|p| p.modulation_si);
+        let shifts: Vec<f64> = shifts.map(|m| m.frequency_shift).collect();
+        let [low, high] = [f64::min, f64::max].map(|f| shifts.iter().copied().fold(f64::NAN, f));
+        let ended = curve.modulation.as_ref().and_then(|m| m.ended.first());
+        let ended = ended.map_or_else(String::new, |end| format!(" ({})", end.reason));
+        Error::numerics(format!(
+            "the frequency shift {} is not reached on approach, on which shifts go from {} to \
+             {}{ended}; change drive.setpoint, or give gap.tip",
+            shown(shift),
+            shown(low),
+            shown(high),
+        ))
+    };
+    let found = curve.modulation.as_ref().and_then(|m| m.setpoints.as_ref());
+    let found = found
+        .into_iter()
+        .flatten()
+        .filter(|p| p.way == Way::Approach);
+    let mut solutions: Vec<SetpointSolution> = Vec::new();
+    let mut drive = None;
+    for point in found {
+        let (Some(orbit), Some(observables), Some(physical), Some(zc), Some(si), Some(modulated)) = (
+            &point.orbit,
+            point.observables,
+            &point.physical,
+            point.zc,
+            point.modulation_si,
+            point.modulation,
+        ) else {
+            continue;
+        };
+        let reached = drive.is_none();
+        drive.get_or_insert(SetpointDrive {
+            frequency: si.frequency,
+            strength: si.drive_strength,
+            ratio: modulated.drive_ratio,
+        });
+        solutions.push(SetpointSolution {
+            gap: point.gap,
+            zc,
+            period: orbit.period,
+            stable: orbit.is_stable(),
+            spectral_radius: orbit.spectral_radius(),
+            reached,
+            branch: branch_of(&observables),
+            state: orbit.states.first().cloned().unwrap_or_default(),
+            observables,
+            physical: physical.clone(),
+        });
+    }
+    let first = solutions.first().ok_or_else(refused)?;
+    let amplitude = first.physical.observables.first_harmonic;
+    Ok(SetpointReport {
+        held: "frequency_shift",
+        setpoint: shift,
+        drive,
+        ratio: first.observables.first_harmonic / free.amplitude,
+        amplitude,
+        solutions,
+        chosen: 0,
+        other_states: Vec::new(),
+        budget: None,
+    })
+}
+
+/// The case at the frequency of the free lever with a shift, in Hz, with the same free amplitude.
+#[cfg(feature = "fm")]
+fn at_shift(case: &Case, shift: f64, free: &FreeMotion) -> Result<Case, Error> {
+    let held = frequency_modulation::Held {
+        amplitude: free.amplitude,
+        phase: FrequencyModulationOptions::default().phase,
+    };
+    let lever = frequency_modulation::FreeOscillation::of(case, held.check()?)?;
+    let Some(view) = case.physical() else {
+        return Ok(case.clone());
+    };
+    let frequency = lever.frequency * view.scales.frequency + shift;
+    if frequency <= 0.0 {
+        return Err(Error::input(
+            format!(
+                "a frequency shift of {} leaves no frequency",
+                Kind::Frequency.format(shift)
+            ),
+            "change drive.setpoint",
+        ));
+    }
+    Ok(case
+        .with(Key::DriveFrequency, frequency)
+        .with(Key::DriveFreeAmplitude, view.free_amplitude))
+}
+
+/// The name of the branch of an orbit.
+const fn branch_of(seen: &Observables) -> &'static str {
+    if seen.mean_force < 0.0 {
+        "attractive"
+    } else {
+        "repulsive"
+    }
+}
+
 /// Follows the lever from far until every search has ended; the place where it is then.
 fn approach(
     sweep: &mut DistanceSweep<'_>,
@@ -250,8 +422,7 @@ fn approach(
     control: &Control<'_>,
 ) -> Result<Place, Error> {
     let place = sweep.free()?;
-    // A motion that does not close ends the search.
-    sweep.stops_on_grid = true;
+    sweep.piece_a_step = true;
     let (pieces, place) = sweep.way(place, 0.0, |sweep, piece| {
         let Some(first) = searches.iter().find(|search| search.found.is_none()) else {
             return true;
@@ -263,7 +434,7 @@ fn approach(
             .collect();
         ended.into_iter().all(|ended| ended)
     });
-    sweep.stops_on_grid = false;
+    sweep.piece_a_step = false;
     if control.is_cancelled() {
         return Err(cancelled());
     }
@@ -340,7 +511,9 @@ pub fn at_setpoint(
     }
     let report = solve_setpoint(&case.cancelled_by(control), control)?;
     let state = report.solutions.get(report.chosen).map(|s| s.state.clone());
-    let there = case.at_distance(report.zc(), report.remark(), state.unwrap_or_default())?;
+    let drive = report.drive.map(|drive| [drive.frequency, drive.strength]);
+    let state = state.unwrap_or_default();
+    let there = case.at_distance(report.zc(), drive, report.remark(), state)?;
     Ok((there, Some(report)))
 }
 
@@ -405,6 +578,12 @@ impl HeldQuantity {
             Held::Amplitude(ratio) => (ratio * free.amplitude, free.amplitude),
             Held::PeakForce(force) => (force / force_unit, 0.0),
             Held::Phase(phase) => (near_phase(phase, free.phase), free.phase),
+            Held::Shift(_) => {
+                return Err(Error::input(
+                    "setpoints that vary are amplitudes, peak forces or phases",
+                    "solve frequency shifts one by one, or with `fm --shift`",
+                ));
+            }
         };
         if target == far {
             return Err(Error::input(
@@ -427,7 +606,7 @@ impl HeldQuantity {
 
     fn set(&self) -> ObservableSet {
         match self.setpoint {
-            Held::Amplitude(_) | Held::Phase(_) => ObservableSet::FIRST_HARMONIC,
+            Held::Amplitude(_) | Held::Phase(_) | Held::Shift(_) => ObservableSet::FIRST_HARMONIC,
             Held::PeakForce(_) => Observable::named("peak_force")
                 .map_or(ObservableSet::COMMON, |peak| ObservableSet::NONE.with(peak)),
         }
@@ -437,7 +616,7 @@ impl HeldQuantity {
         match self.setpoint {
             Held::Amplitude(_) => seen.first_harmonic,
             Held::PeakForce(_) => seen.peak_force,
-            Held::Phase(_) => near_phase(seen.phase, self.far),
+            Held::Phase(_) | Held::Shift(_) => near_phase(seen.phase, self.far),
         }
     }
 
@@ -463,7 +642,7 @@ impl HeldQuantity {
         match self.setpoint {
             Held::Amplitude(_) => format!("{:.3}", value / self.free_amplitude),
             Held::PeakForce(_) => Kind::Force.format(value * self.force_unit),
-            Held::Phase(_) => format!("{value:.2}°"),
+            Held::Phase(_) | Held::Shift(_) => format!("{value:.2}°"),
         }
     }
 
@@ -473,6 +652,7 @@ impl HeldQuantity {
             Held::Amplitude(ratio) => format!("A/A0 = {ratio}"),
             Held::PeakForce(force) => format!("peak force = {}", Kind::Force.format(force)),
             Held::Phase(phase) => format!("phase = {phase}°"),
+            Held::Shift(shift) => format!("frequency shift = {}", Kind::Frequency.format(shift)),
         }
     }
 
@@ -481,7 +661,7 @@ impl HeldQuantity {
         let name = match self.setpoint {
             Held::Amplitude(_) => "A/A0",
             Held::PeakForce(_) => "the peak force",
-            Held::Phase(_) => "the phase",
+            Held::Phase(_) | Held::Shift(_) => "the phase",
         };
         format!("{name} is {}", self.shown(value))
     }
@@ -513,9 +693,16 @@ struct Search<'a> {
     found: Option<Result<SetpointSolution, Error>>,
 }
 
-/// The orbits along a piece of the way with their distances and values, or what the motion is that
-/// is no orbit.
-type Trace = Result<Vec<(f64, PeriodicOrbit, f64)>, &'static str>;
+/// Distances along a piece of the way with the values there.
+enum Trace {
+    /// Of the orbits of a branch.
+    Orbits(Vec<(f64, PeriodicOrbit, f64)>),
+    /// Of a motion without a branch, averaged.
+    Averages(Vec<(f64, f64)>),
+}
+
+/// Drive periods over which a motion without a branch is averaged.
+const AVERAGED_PERIODS: usize = 256;
 
 /// An orbit of a branch and the value of the held quantity.
 #[derive(Clone, Debug)]
@@ -533,22 +720,33 @@ fn value_at(
     orbit: &PeriodicOrbit,
 ) -> f64 {
     let start = orbit.states.first().map_or(&[][..], Vec::as_slice);
+    value_from(held, sweep, gap, start, orbit.period)
+}
+
+/// The same over so many periods from a state.
+fn value_from(
+    held: &HeldQuantity,
+    sweep: &DistanceSweep<'_>,
+    gap: f64,
+    start: &[f64],
+    periods: usize,
+) -> f64 {
     let model = sweep.model(gap).ok();
-    let seen = model.and_then(|m| measure(&m, start, orbit.period, held.set()).ok());
+    let seen = model.and_then(|m| measure(&m, start, periods, held.set()).ok());
     seen.map_or(f64::NAN, |seen| held.of(&seen))
 }
 
 impl HeldQuantity {
-    /// The orbits along a piece of the way.
+    /// The values along a piece of the way.
     fn trace(&self, sweep: &DistanceSweep<'_>, piece: &Piece) -> Trace {
         let stretch = match &piece.motion {
             Motion::Periodic(stretch) => *stretch,
-            Motion::OnGrid(_) => {
-                let motion = sweep.motion_at(piece, piece.entered);
-                return Err(match motion.orbit {
-                    Some(_) => "of a long period",
-                    None => motion.classification.name(),
-                });
+            Motion::OnGrid(found) => {
+                let average = |(gap, motion): &(f64, FoundMotion)| {
+                    let value = value_from(self, sweep, *gap, &motion.state, AVERAGED_PERIODS);
+                    (*gap, value)
+                };
+                return Trace::Averages(found.par_iter().map(average).collect());
             }
         };
         let points = &sweep.stretches[stretch].points;
@@ -564,14 +762,11 @@ impl HeldQuantity {
             .into_iter()
             .filter_map(|(gap, orbit)| Some((gap, orbit?)))
             .collect();
-        Ok(orbits
-            .into_par_iter()
-            .with_max_len(1)
-            .map(|(gap, orbit)| {
-                let value = value_at(self, sweep, gap, &orbit);
-                (gap, orbit, value)
-            })
-            .collect())
+        let valued = orbits.into_par_iter().with_max_len(1).map(|(gap, orbit)| {
+            let value = value_at(self, sweep, gap, &orbit);
+            (gap, orbit, value)
+        });
+        Trace::Orbits(valued.collect())
     }
 }
 
@@ -629,21 +824,8 @@ impl Search<'_> {
     fn ends_in(&mut self, sweep: &DistanceSweep<'_>, piece: &Piece, trace: &Trace) -> bool {
         let held = self.held;
         let orbits = match trace {
-            Ok(orbits) => orbits,
-            Err(what) => {
-                self.found = Some(Err(Error::numerics(format!(
-                    "on approach the motion is {what} at gap.tip = {}, before the setpoint {} is \
-                     reached: it has no {} to hold; change drive.setpoint, or give gap.tip",
-                    self.shown(piece.from),
-                    held.words(),
-                    match held.setpoint {
-                        Held::Amplitude(_) => "amplitude",
-                        Held::PeakForce(_) => "peak force",
-                        Held::Phase(_) => "phase",
-                    }
-                ))));
-                return true;
-            }
+            Trace::Orbits(orbits) => orbits,
+            Trace::Averages(values) => return self.ends_without_orbit(sweep, piece, values),
         };
         let mut before: Option<Sample<'_>> = None;
         for (gap, orbit, value) in orbits {
@@ -659,7 +841,7 @@ impl Search<'_> {
                     let (name, of) = match held.setpoint {
                         Held::Amplitude(_) => ("amplitude", " of A0"),
                         Held::PeakForce(_) => ("peak force", ""),
-                        Held::Phase(_) => ("phase", ""),
+                        Held::Phase(_) | Held::Shift(_) => ("phase", ""),
                     };
                     Err(Error::numerics(format!(
                         "on approach the {name} jumps past the setpoint {}: from {} to {}{of} \
@@ -688,6 +870,40 @@ impl Search<'_> {
             }
             self.before = Some((*gap, value));
             before = Some(here);
+        }
+        false
+    }
+
+    /// The same of a motion that is not periodic.
+    fn ends_without_orbit(
+        &mut self,
+        sweep: &DistanceSweep<'_>,
+        piece: &Piece,
+        values: &[(f64, f64)],
+    ) -> bool {
+        let held = self.held;
+        for &(gap, value) in values {
+            if value.is_nan() || held.is_reached(value) {
+                let motion = sweep.motion_at(piece, gap);
+                let what = match motion.orbit {
+                    Some(_) => "of a long period",
+                    None => motion.classification.name(),
+                };
+                self.found = Some(Err(Error::numerics(format!(
+                    "on approach the motion is {what} at gap.tip = {}, before the setpoint {} is \
+                     reached: it has no {} to hold; change drive.setpoint, or give gap.tip",
+                    self.shown(gap),
+                    held.words(),
+                    match held.setpoint {
+                        Held::Amplitude(_) => "amplitude",
+                        Held::PeakForce(_) => "peak force",
+                        Held::Phase(_) | Held::Shift(_) => "phase",
+                    }
+                ))));
+                return true;
+            }
+            self.nearest = held.nearer(self.nearest, value);
+            self.before = Some((gap, value));
         }
         false
     }
@@ -834,11 +1050,7 @@ impl Search<'_> {
             stable: orbit.is_stable(),
             spectral_radius: orbit.spectral_radius(),
             reached: false,
-            branch: if observables.mean_force < 0.0 {
-                "attractive"
-            } else {
-                "repulsive"
-            },
+            branch: branch_of(&observables),
             state: orbit.states.first().cloned().unwrap_or_default(),
             physical: PhysicalMotion::of(&observables, view),
             observables,

@@ -216,32 +216,48 @@ fn compared(kinds: [Loop; 2], gap: &str) {
 /// repeat; it is one of a family that hardly depends on the phase between the tones.
 #[test]
 fn constant_tones_are_those_of_their_common_orbit() {
-    let case = lever(&["drive.second_free_amplitude=0.5 nm", "gap.tip=17 nm"]);
-    let found = last(&report(&case, Loop::Am, Loop::Am));
-    let common = orbit(&case.model().unwrap(), &OrbitOptions::default()).unwrap();
-    let length = case.physical().unwrap().scales.length;
-    let seen = common.observables;
-    let of_orbit = [
-        (seen.first_harmonic * length, seen.phase),
-        (
-            seen.tone2_response.unwrap() * length,
-            seen.tone2_lag.unwrap(),
-        ),
+    let tones = ["drive.second_free_amplitude=0.5 nm", "gap.tip=17 nm"];
+    let laws: [&[&str]; 3] = [
+        &[],
+        // Memory that relaxes, and whether there is contact.
+        &[
+            "sample.contact_distance=",
+            "sample.law=prony-sphere",
+            "sample.modulus=33.38 MPa",
+            "sample.poisson=0.5",
+            "sample.arms=[[\"time (us)\", \"modulus (MPa)\"], [0.3832, 460], [1.671, 135.7]]",
+        ],
+        // Whether a neck is there.
+        &[
+            "sample.contact_distance=",
+            "sample.law=jkr",
+            "sample.work_of_adhesion=10 mJ/m^2",
+        ],
     ];
-    for (tone, (amplitude, phase)) in found.tones.iter().zip(of_orbit) {
-        assert!(
-            (tone.amplitude / amplitude - 1.0).abs() < 1e-8,
-            "{tone:?} {amplitude}"
-        );
-        assert!((tone.phase - phase).abs() < 1e-6, "{tone:?} {phase}");
+    for law in laws {
+        let case = lever(&[&tones, law].concat());
+        let found = last(&report(&case, Loop::Am, Loop::Am));
+        let common = orbit(&case.model().unwrap(), &OrbitOptions::default()).unwrap();
+        let length = case.physical().unwrap().scales.length;
+        let seen = common.observables;
+        let of_orbit = [
+            (seen.first_harmonic * length, seen.phase),
+            (
+                seen.tone2_response.unwrap() * length,
+                seen.tone2_lag.unwrap(),
+            ),
+        ];
+        for (tone, (amplitude, phase)) in found.tones.iter().zip(of_orbit) {
+            let off = (tone.amplitude / amplitude - 1.0).abs();
+            println!("{law:?} {off:.1e} {:.1e}", tone.phase - phase);
+            assert!(off < 1e-8, "{law:?}: {tone:?} {amplitude}");
+            assert!((tone.phase - phase).abs() < 1e-6, "{tone:?} {phase}");
+        }
+        let [re, im] = common.multipliers[0];
+        let growth = re.hypot(im).powf(0.01);
+        let off = (found.growth - growth).abs();
+        assert!(off < 1e-4, "{} {growth}", found.growth);
     }
-    let [re, im] = common.multipliers[0];
-    let growth = re.hypot(im).powf(0.01);
-    assert!(
-        (found.growth - growth).abs() < 1e-4,
-        "{} {growth}",
-        found.growth
-    );
 }
 
 /// The modulus formula holds for a second amplitude well below the indentation, and is half the

@@ -2,7 +2,7 @@
 
 use nanotap::case::Case;
 use nanotap::control::{CancelFlag, Control};
-use nanotap::study::registry::{Run, STUDIES, StudyEntry, study};
+use nanotap::study::registry::{STUDIES, StudyEntry, study};
 use nanotap::study::request::properties;
 use proptest::prelude::*;
 use serde_json::{Value, json};
@@ -25,9 +25,10 @@ fn run(study: &StudyEntry, case: &Case, request: Value) -> Result<(), String> {
         cancel: Some(&stop),
         progress: None,
     };
-    match study.run {
-        Run::Document(run) => run(case, request, &control).map(drop),
-        Run::Dataset(recipe) => recipe(case, request, &control).map(drop),
+    match (study.document, study.dataset) {
+        (Some(run), _) => run(case, request, &control).map(drop),
+        (None, Some(plan)) => plan(case, request, &control).map(drop),
+        (None, None) => Ok(()),
     }
     .map_err(|error| error.to_string())
 }

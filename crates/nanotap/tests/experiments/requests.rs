@@ -3,7 +3,7 @@
 
 use nanotap::case::Case;
 use nanotap::control::{CancelFlag, Control};
-use nanotap::study::registry::{Run, STUDIES};
+use nanotap::study::registry::STUDIES;
 use nanotap::{Error, ErrorKind};
 use proptest::prelude::*;
 use serde_json::{Value, json};
@@ -40,10 +40,12 @@ fn run(at: usize, request: Value) -> Result<(), Error> {
     let words = "modes=1 alpha1=0.1 alpha2=0.1 alpha3=0.1 alpha4=20 alpha6=0.2 omega=20";
     let words: Vec<String> = words.split(' ').map(str::to_owned).collect();
     let case = Case::parse(None, &words).unwrap();
-    match STUDIES[at].run {
-        Run::Document(run) => run(&case, request, &control).map(drop),
-        Run::Dataset(run) => run(&case, request, &control).map(drop),
+    let study = &STUDIES[at];
+    if let Some(plan) = study.dataset {
+        plan(&case, request.clone(), &control).map(drop)?;
     }
+    let run = study.document;
+    run.map_or(Ok(()), |run| run(&case, request, &control).map(drop))
 }
 
 proptest! {

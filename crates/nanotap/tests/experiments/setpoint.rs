@@ -4,6 +4,7 @@ use nanotap::case::Case;
 use nanotap::case::file::Source;
 use nanotap::control::Control;
 use nanotap::model::parameter::Parameter;
+use nanotap::study::frequency_modulation::{FrequencyModulationOptions, frequency_modulation};
 use nanotap::study::orbit::{OrbitOptions, orbit};
 use nanotap::study::setpoint::{at_setpoint, solve_setpoint};
 use nanotap::study::simulate::{SimulateOptions, simulate};
@@ -176,4 +177,112 @@ fn a_search_ends_at_its_budget_of_steps() {
     for (reached, _) in ends.iter().flatten() {
         assert_eq!(reached.to_bits(), zc.to_bits());
     }
+}
+
+/// A budget that ends only the search for other states leaves the setpoint as it is, and says that
+/// states may be missing.
+#[test]
+fn a_budget_may_end_only_the_search_for_other_states() {
+    let text = include_str!("../../../../docs/cases/bistable-lever.toml");
+    let case = studied(text, &["gap.tip=", "drive.setpoint=0.8"]);
+    let whole = solve_setpoint(&case, &Control::default()).unwrap();
+    assert!(whole.budget.is_none() && !whole.other_states.is_empty());
+    // The way to the setpoint takes 1.3 million steps, the others 4.6 million.
+    let [alone, together] = limited(2_000_000, |control| {
+        let report = solve_setpoint(&case, control).unwrap();
+        let remark = report.remark().text;
+        (report.zc().to_bits(), report.budget, remark)
+    });
+    assert_eq!(alone, together);
+    let (zc, budget, remark) = alone;
+    assert_eq!(zc, whole.zc().to_bits());
+    let reason = "the lever was followed up to the budget of 2 million steps";
+    assert_eq!(budget.as_deref(), Some(reason));
+    let said = format!("other states may be missing: {reason}");
+    assert!(remark.ends_with(&said), "{remark}");
+}
+
+/// Two tones at 601/599 in which hundreds of taps graze one after the other: the exact flow ends at the
+/// budget, too, and says how far it came.
+#[test]
+fn an_exact_search_ends_at_its_budget_of_steps() {
+    let text = include_str!("../../../../docs/cases/moving-surface.toml");
+    let two_tones = [
+        "model.modes=1",
+        "gap.tip=",
+        "drive.setpoint=0.8",
+        "drive.second_ratio=601/599",
+        "drive.second_free_amplitude=30 nm",
+    ];
+    let case = studied(text, &two_tones);
+    let [alone, together] = limited(3_000_000, |control| {
+        solve_setpoint(&case, control).map_err(|e| e.message())
+    });
+    let [alone, together] = [alone, together].map(Result::unwrap_err);
+    assert_eq!(alone, together);
+    let reason = "up to the budget of 3 million steps, to gap.tip =";
+    assert!(alone.contains(reason), "{alone}");
+}
+
+/// Near the first taps on a sticky surface that moves, the motion does not close while its amplitude
+/// stays near A₀: the lever passes it on the way to 0.8 A₀, as a feedback loop does.
+#[test]
+fn motions_that_do_not_close_are_passed_above_the_setpoint() {
+    let text = include_str!("../../../../docs/cases/moving-surface.toml");
+    let case = studied(text, &["gap.tip=", "drive.setpoint=0.8"]);
+    let report = solve_setpoint(&case, &Control::default()).unwrap();
+    let there = studied(text, &[&format!("gap.tip={}", report.zc())]);
+    let found = orbit(&there.model().unwrap(), &OrbitOptions::default()).unwrap();
+    let amplitude = found.observables.first_harmonic * there.physical().unwrap().scales.length;
+    assert!((amplitude / 24e-9 - 1.0).abs() < 1e-6, "{amplitude}");
+    let refused = studied(text, &["gap.tip=", "drive.setpoint=0.998"]);
+    let error = solve_setpoint(&refused, &Control::default()).unwrap_err();
+    assert!(
+        error.message().contains("before the setpoint A/A0 = 0.998"),
+        "{}",
+        error.message()
+    );
+}
+
+/// A frequency shift is that of `fm`, reached first from far; the drive there keeps the free lever's
+/// amplitude at 90°, and motions start from the orbit.
+#[test]
+fn a_frequency_shift_is_a_setpoint() {
+    let text = include_str!("../../../../docs/cases/fm-polystyrene.toml");
+    let case = studied(text, &["gap.tip=", "drive.setpoint=2 kHz"]);
+    let (there, solved) = at_setpoint(case.clone(), &Control::default()).unwrap();
+    let solved = solved.unwrap();
+    let options = FrequencyModulationOptions {
+        shift: Some("2 kHz".into()),
+        ..FrequencyModulationOptions::default()
+    };
+    let curve = frequency_modulation(&case, &options, &Control::default()).unwrap();
+    let found = curve.modulation.unwrap().setpoints.unwrap();
+    // The same but for the damping, which the loss tangent gives at the frequency of the drive.
+    assert!((solved.zc() / found[0].zc.unwrap() - 1.0).abs() < 0.01);
+    let drive = solved.drive.unwrap();
+    let view = there.physical().unwrap();
+    let frequency = view.scales.frequency * view.cantilever.omega;
+    assert!((frequency / drive.frequency - 1.0).abs() < 1e-12);
+    let own = case.physical().unwrap().free_amplitude;
+    let closed = orbit(&there.model().unwrap(), &OrbitOptions::default()).unwrap();
+    let amplitude = closed.observables.first_harmonic * view.scales.length;
+    assert!((amplitude / own - 1.0).abs() < 1e-8, "{amplitude} {own}");
+    assert!(
+        (closed.observables.phase - 90.0).abs() < 1e-5,
+        "{}",
+        closed.observables.phase
+    );
+    let said = solved.remark().text;
+    assert!(
+        said.starts_with("the frequency shift 2 kHz is reached"),
+        "{said}"
+    );
+    let refused = studied(text, &["gap.tip=", "drive.setpoint=-20 Hz"]);
+    let error = solve_setpoint(&refused, &Control::default()).unwrap_err();
+    assert!(
+        error.message().contains("is not reached on approach"),
+        "{}",
+        error.message()
+    );
 }

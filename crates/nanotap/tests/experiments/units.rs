@@ -4,7 +4,7 @@
 use nanotap::case::Case;
 use nanotap::control::Control;
 use nanotap::observe::table::OBSERVABLES;
-use nanotap::study::registry::{Run, STUDIES};
+use nanotap::study::registry::STUDIES;
 use serde_json::{Value, json};
 
 /// A lever on a spring and damper: one mode, so that every study is quick.
@@ -83,7 +83,7 @@ fn without_si(value: &Value, path: &str, found: &mut Vec<String>) {
 fn every_motion_of_every_study_is_told_in_si() {
     let case = lever();
     for study in STUDIES {
-        let (Run::Document(run), Some(request)) = (study.run, request(study.name)) else {
+        let (Some(run), Some(request)) = (study.document, request(study.name)) else {
             continue;
         };
         let answer = match run(&case, request, &Control::default()) {

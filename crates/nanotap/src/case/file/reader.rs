@@ -289,16 +289,16 @@ impl Key {
             return None;
         };
         if self.entry().takes == Takes::Setpoint {
-            let right = *number > 0.0 && (*kind != Kind::Number || *number < 1.0);
-            return match kind {
-                Kind::Frequency => Some(
-                    "frequency shifts are held by frequency modulation: see `approach --fm --shift`",
-                ),
-                _ => (!right).then_some(
-                    "a setpoint is a fraction of the free amplitude between 0 and 1, an amplitude \
-                     such as \"8 nm\", a peak force such as \"1 nN\" or a phase such as \"120 deg\"",
-                ),
+            let right = match kind {
+                Kind::Frequency => *number != 0.0,
+                Kind::Number => *number > 0.0 && *number < 1.0,
+                _ => *number > 0.0,
             };
+            return (!right).then_some(
+                "a setpoint is a fraction of the free amplitude between 0 and 1, an amplitude such as \
+                 \"8 nm\", a peak force such as \"1 nN\", a phase such as \"120 deg\" or a frequency \
+                 shift such as \"-50 Hz\"",
+            );
         }
         let range = self.entry().range;
         (!range.contains(*number)).then_some(range.reason)

@@ -481,8 +481,8 @@ After from AFTER_LAWS => {
         .label("free amplitude $A_0$");
     DriveSetpoint = other(
         Drive, "setpoint", Takes::Setpoint,
-        "what the feedback holds: a fraction of A0, an amplitude, a peak force or a phase; it tells \
-         the distance",
+        "what the feedback holds: a fraction of A0, an amplitude, a peak force, a phase, or under \
+         frequency modulation a frequency shift; it tells the distance",
     ).feeds(Parameter::Alpha5)
         .label("setpoint $A/A_0$");
     DriveActuation = other(Drive, "actuation", Takes::Word(words!(Actuation)), "where the drive acts");

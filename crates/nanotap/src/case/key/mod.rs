@@ -131,7 +131,8 @@ fn without_subscripts(symbol: &str) -> String {
 pub enum Takes {
     /// A quantity of this kind; in `[model]` a plain number.
     Quantity(Kind),
-    /// What a feedback holds: a fraction of the free amplitude, an amplitude, a peak force or a phase.
+    /// What a feedback holds: a fraction of the free amplitude, an amplitude, a peak force, a phase or a
+    /// frequency shift.
     Setpoint,
     /// A whole number from 1 to this.
     Count(usize),

@@ -34,6 +34,8 @@ pub enum Held {
     PeakForce(f64),
     /// The phase lag of the deflection, degrees.
     Phase(f64),
+    /// The shift of the frequency at which amplitude and phase are held, Hz.
+    Shift(f64),
 }
 
 /// A physical case with its dimensionless parameters and the units between the two.
@@ -434,6 +436,7 @@ fn held(
         )),
         Some((Kind::Force, force)) => Ok(Some(Held::PeakForce(force))),
         Some((Kind::Angle, phase)) => Ok(Some(Held::Phase(phase.to_degrees()))),
+        Some((Kind::Frequency, shift)) => Ok(Some(Held::Shift(shift))),
         Some((_, ratio)) => Ok(Some(Held::Amplitude(ratio))),
     }
 }

@@ -8,8 +8,8 @@
 //! motion that does not close is followed on a grid of distances that depends on the case alone,
 //! until an orbit is found there, whose branch is then continued back to its beginning as well.
 //!
-//! Under a nonlinear law the work is counted in steps of the approximate flow, and ends at a budget
-//! ([`SWEEP_STEPS`]): what was followed by then is kept, with the reason why it goes no further.
+//! The work is counted in steps of the flow and ends at a budget ([`SWEEP_STEPS`]): what was followed by
+//! then is kept, with the reason why it goes no further.
 //!
 //! Fails: what a motion that does not close meets within a step of the grid is not seen. Where it ends
 //! by a jump, the place is bisected to a thousandth of such a step: chaos that ends lives for long near
@@ -55,7 +55,7 @@ const BISECTIONS: usize = 10;
 /// Smallest step that is halved, in steps of the grid.
 const MIN_GRID_STEP: f64 = 1e-3;
 /// Branches and stretches without an orbit after which a way is not followed further.
-const MAX_PIECES: usize = 200;
+const MAX_PIECES: usize = 400;
 /// Points after which a branch is not followed further.
 const MAX_POINTS: usize = 2000;
 /// Periods in which a motion that is followed on the grid may close at each of its distances, and
@@ -66,7 +66,7 @@ const ROW_TRANSIENT: usize = 128;
 const DECAY_TIMES: f64 = 30.0;
 const MAX_TRANSIENT: usize = 1 << 15;
 
-/// Steps of the approximate flow after which a motion is not followed further along the distance.
+/// Steps after which a motion is not followed further along the distance.
 pub(in crate::study) const SWEEP_STEPS: u64 = 30_000_000;
 
 /// Reason why a piece of a path ends.
@@ -232,13 +232,13 @@ pub(in crate::study) struct DistanceSweep<'a> {
     scale: f64,
     classify: ClassifyOptions,
     control: &'a Control<'a>,
-    /// What cancels the work: the caller, or the budget of a case under a nonlinear law.
+    /// What cancels the work: the caller, or the budget.
     flag: CancelFlag,
-    budget: Option<u64>,
+    is_nonlinear: bool,
     /// Steps and points of the stretches that were continued.
     continued: (u64, usize),
-    /// Whether a motion that does not close is followed no further.
-    pub(in crate::study) stops_on_grid: bool,
+    /// Whether a motion that is followed on the grid is a piece of its own on every step.
+    pub(in crate::study) piece_a_step: bool,
     pub(in crate::study) stretches: Vec<Stretch>,
 }
 
@@ -279,25 +279,19 @@ impl<'a> DistanceSweep<'a> {
             },
             control,
             flag: CancelFlag::default(),
-            budget: None,
+            is_nonlinear: model.nonlinear.is_some(),
             continued: (0, 0),
-            stops_on_grid: false,
+            piece_a_step: false,
             stretches: Vec::new(),
         };
-        sweep.allow(model.nonlinear.is_some().then_some(SWEEP_STEPS));
+        sweep.allow_steps(SWEEP_STEPS);
         Ok(sweep)
     }
 
-    /// Allows so many steps from here on, of a case under a nonlinear law; none of another is
-    /// counted.
+    /// Allows so many steps from here on.
     pub(in crate::study) fn allow_steps(&mut self, steps: u64) {
-        self.allow(self.budget.map(|_| steps));
-    }
-
-    fn allow(&mut self, budget: Option<u64>) {
-        let flag = self.control.cancel.unwrap_or(self.case.cancel()).clone();
-        self.flag = budget.map_or_else(|| flag.clone(), |steps| flag.with_budget(steps));
-        self.budget = budget.and(self.flag.budget());
+        let flag = self.control.cancel.unwrap_or(self.case.cancel());
+        self.flag = flag.with_budget(steps);
         self.case = self.case.with_flag(&self.flag);
         self.family = self.case.family(self.case.gap_key());
     }
@@ -312,7 +306,7 @@ impl<'a> DistanceSweep<'a> {
 
     /// The budget, if it is spent.
     pub(in crate::study) fn spent_budget(&self) -> Option<u64> {
-        self.budget.filter(|_| self.flag.is_spent())
+        self.flag.budget().filter(|_| self.flag.is_spent())
     }
 
     /// Points of branches for which so many steps suffice, by the average so far; no end of them
@@ -360,7 +354,7 @@ impl<'a> DistanceSweep<'a> {
     /// Where a run from a state at a distance goes. Under a nonlinear law a motion that does not close
     /// on the approximate map is classified exactly only where it is reported.
     fn arrive(&mut self, gap: f64, start: &[f64]) -> Place {
-        let searched = self.budget.map(|_| {
+        let searched = self.is_nonlinear.then(|| {
             let options = self.classify.clone();
             self.search_orbit(gap, start, &options)
         });
@@ -434,7 +428,7 @@ impl<'a> DistanceSweep<'a> {
             });
         }
         // An orbit of the approximate map alone shows nothing.
-        if self.budget.is_some() && motion.closes && motion.orbit.is_none() {
+        if self.is_nonlinear && motion.closes && motion.orbit.is_none() {
             motion = named(&mut map, start, options);
         }
         FoundMotion {
@@ -480,7 +474,7 @@ impl<'a> DistanceSweep<'a> {
         ContinuationOptions {
             until_unstable: true,
             // Those of piecewise-linear systems take little time and end branches.
-            grazings: self.budget.is_none(),
+            grazings: !self.is_nonlinear,
             max_points: MAX_POINTS,
             parameter_scale: Some(self.scale),
             ..ContinuationOptions::over(near, far)
@@ -861,7 +855,8 @@ impl<'a> DistanceSweep<'a> {
             if (gap - to) * side >= 0.0 {
                 break;
             }
-            if self.stops_on_grid || self.flag.is_cancelled() {
+            let is_piece = self.piece_a_step && found.len() > 1;
+            if is_piece || self.flag.is_cancelled() {
                 piece.to = gap;
                 onwards = Some(Place::Off {
                     gap,

@@ -138,15 +138,31 @@ impl Torus {
         })
     }
 
-    /// The same after part of a step relative to the sizes of the state's entries.
+    /// The same after part of a step relative to the sizes of the state's continuous entries.
     fn moved(&self, step: &DVector<f64>, part: f64, sizes: &[f64]) -> Self {
         let mut moved = self.clone();
         for (k, state) in moved.states.iter_mut().enumerate() {
-            for (i, entry) in state.iter_mut().enumerate() {
-                *entry += part * step[k * sizes.len() + i] * sizes[i];
+            for (i, size) in sizes.iter().enumerate() {
+                state[i] += part * step[k * sizes.len() + i] * size;
             }
         }
         moved
+    }
+
+    /// The same with whole numbers as the last entries from `first` on, which interpolation leaves
+    /// with rounding errors; none if they differ from phase to phase.
+    fn on_one_branch(mut self, first: usize) -> Option<Self> {
+        for state in &mut self.states {
+            state[first..]
+                .iter_mut()
+                .for_each(|entry| *entry = entry.round());
+        }
+        let branch = |state: &Vec<f64>| state[first..].to_vec();
+        let own = branch(&self.states[0]);
+        self.states
+            .iter()
+            .all(|state| branch(state) == own)
+            .then_some(self)
     }
 
     /// The same with half as many phases.
@@ -241,7 +257,7 @@ pub(super) struct Forces {
 /// Newton matrix may serve.
 ///
 /// # Errors
-/// When Newton does not close it, or the law remembers a branch.
+/// When Newton does not close it, or the law is on different branches at different phases.
 pub(super) fn close(
     lever: &Cantilever,
     drives: Drives,
@@ -273,15 +289,19 @@ fn newton(
         .collect::<Result<Vec<_>, _>>()
         .map_err(|error| Error::numerics(error.to_string()))?;
     let mut maps: Vec<ModelMap> = models.iter().map(ModelMap::new).collect();
-    if maps[0].discrete_entries() > 0 {
-        return Err(Error::input(
-            "this contact law remembers which of its branches it is on, which two tones without a \
-             common period do not allow here",
-            "choose a law without memory, or a second tone with drive.second_ratio as in 25/4 for `orbit`",
-        ));
-    }
-    let dimension = models[0].dimension();
+    // Which of its branches a law is on must be the same at every phase, as off the surface.
+    let whole = models[0].dimension();
+    let dimension = whole - maps[0].discrete_entries();
+    let several = || {
+        Error::numerics(
+            "the contact law is on one of its branches at some phases of the second tone at the beginning \
+             of a period, and on another one at others: this is not solved for",
+        )
+        .remedy("give drive.second_ratio as in 25/4, and use `orbit`")
+    };
+    torus = torus.on_one_branch(dimension).ok_or_else(several)?;
     let sizes = sizes(&models[0], amplitude, drives.frequency[0]);
+    let sizes = &sizes[..dimension];
     let shift: Vec<Vec<f64>> = (0..count)
         .map(|k| {
             weights(
@@ -303,11 +323,14 @@ fn newton(
             let mut end = torus.states[k].clone();
             match &mut of_periods {
                 Some(jacobians) => {
-                    let mut jacobian = DMatrix::zeros(dimension, dimension);
+                    let mut jacobian = DMatrix::zeros(whole, whole);
                     map.advance_with_jacobian(&mut end, &mut jacobian)?;
                     jacobians.push(jacobian);
                 }
                 None => map.advance(&mut end)?,
+            }
+            if end[dimension..] != torus.states[k][dimension..] {
+                return Err(several());
             }
             let there = combined(&shift[k], &torus.states);
             for i in 0..dimension {
@@ -332,7 +355,7 @@ fn newton(
             factors
         } else {
             off(&torus, Some(&mut jacobians))?;
-            Arc::new(newton_matrix(&shift, &jacobians, &sizes).lu())
+            Arc::new(newton_matrix(&shift, &jacobians, sizes).lu())
         };
         let step = used
             .solve(&residual)
@@ -340,7 +363,7 @@ fn newton(
             .ok_or_else(|| Error::numerics("the motion under two tones turns back here"))?;
         let mut part = 1.0;
         let next = loop {
-            let next = torus.moved(&step, part, &sizes);
+            let next = torus.moved(&step, part, sizes);
             let left = off(&next, None)?;
             if left.amax() < size {
                 break Some((next, left));
@@ -373,10 +396,10 @@ fn newton(
         Some(factors) if factors.u().nrows() == count * dimension => factors,
         _ => {
             off(&torus, Some(&mut jacobians))?;
-            Arc::new(newton_matrix(&shift, &jacobians, &sizes).lu())
+            Arc::new(newton_matrix(&shift, &jacobians, sizes).lu())
         }
     };
-    let tail = torus.tail(&sizes);
+    let tail = torus.tail(sizes);
     Ok(Closed {
         torus,
         drives,
@@ -478,12 +501,13 @@ impl Closed {
         /// Periods before the mean, and of the mean.
         const PERIODS: [usize; 2] = [500, 2000];
         let count = self.models.len();
-        let dimension = self.models[0].dimension();
+        let whole = self.models[0].dimension();
+        let dimension = whole - ModelMap::new(&self.models[0]).discrete_entries();
         let mut jacobians = Vec::with_capacity(count);
         for (model, state) in self.models.iter().zip(&self.torus.states) {
-            let mut jacobian = DMatrix::zeros(dimension, dimension);
+            let mut jacobian = DMatrix::zeros(whole, whole);
             ModelMap::new(model).advance_with_jacobian(&mut state.clone(), &mut jacobian)?;
-            jacobians.push(jacobian);
+            jacobians.push(jacobian.view((0, 0), (dimension, dimension)).into_owned());
         }
         let mut disturbance = DVector::from_element(dimension, 1.0);
         // The weights of a smooth bump make the mean of what turns quasi-periodically converge beyond

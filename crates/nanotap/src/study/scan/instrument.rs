@@ -154,6 +154,14 @@ impl<'a> Instrument<'a> {
         Ok((lever, self.state.clone()))
     }
 
+    /// Height that the feedback asks for in the next period, m.
+    pub(super) fn height(&self) -> f64 {
+        match self.plan.mode {
+            Mode::ConstantAmplitude => self.controller.command(),
+            Mode::ConstantHeight => self.plan.z0,
+        }
+    }
+
     /// Periods whose command was limited by the range of z.
     pub(super) const fn at_range(&self) -> usize {
         self.controller.at_range

@@ -16,6 +16,8 @@ mod feedback;
 mod image;
 mod instrument;
 mod lever;
+#[cfg(feature = "dataset")]
+mod lines;
 mod loop_response;
 pub mod options;
 mod plan;
@@ -29,6 +31,8 @@ mod table;
 use nanotap_dynamics::Control;
 
 pub use instrument::Interaction;
+#[cfg(feature = "dataset")]
+pub use lines::ScanLines;
 pub use options::{Method, Mode, ScanOptions};
 pub use report::{Channels, Direction, LineStatistics, ListedPeriod, ScanReport};
 pub use table::{CHANNELS, Channel, pixels_csv};
@@ -38,7 +42,7 @@ use crate::case::Case;
 use crate::study::Study;
 use plan::Plan;
 use recorder::LineRecord;
-use run::{Recorded, run};
+use run::{Comparison, Recorded, Settled};
 
 /// A scan under feedback.
 ///
@@ -67,6 +71,7 @@ impl Study for ScanStudy {
     type Report = ScanReport;
 
     const COUNTED: &'static str = "drive periods";
+    const PARTIAL: bool = true;
     const ANY_DISTANCE: bool = true;
 
     fn compute(
@@ -75,86 +80,38 @@ impl Study for ScanStudy {
         control: &Control<'_>,
     ) -> Result<ScanReport, Error> {
         let plan = Plan::new(case, options, control)?;
-        let quality_factor = case
-            .physical()
-            .map_or(1.0, |view| view.lever.quality_factor);
-        let memory = quality_factor / std::f64::consts::PI;
-        let (recorded, settled) = run(&plan, memory, control)?;
-        let gap = plan.z0 / plan.length_unit;
-        let gap = recorded.lines.first().map_or(gap, |line| {
-            let first = line.pixels.height.first().copied().unwrap_or(plan.z0);
-            let surface = plan
-                .surface
-                .height(plan.position(0, false), line.statistics.y);
-            (first - surface) / plan.length_unit
-        });
-        let feedback = loop_response::loop_report(&plan, &settled, gap, quality_factor)?;
-        Ok(report(&plan, recorded, feedback, quality_factor))
+        let settled = Settled::new(&plan, lever_memory(case), control)?;
+        let recorded = settled.lines(control)?;
+        let header = header(&plan, case, &settled)?;
+        Ok(with_lines(header, recorded, [plan.lines, plan.pixels]))
     }
 }
 
-fn report(
-    plan: &Plan,
-    recorded: Recorded,
-    feedback: Option<report::LoopReport>,
-    quality_factor: f64,
-) -> ScanReport {
-    let directions = 1 + usize::from(plan.retrace);
-    let per_line = plan.periods * directions + plan.line_settle.unwrap_or(0);
-    let total_periods = plan.settle + plan.lines * per_line;
-    let comparison = recorded.comparison.report();
-    let exact_share = match (plan.method, comparison) {
-        (Method::QuasiStatic, _) => 0.0,
-        (Method::Fast, Some(error)) => error.periods as f64 / total_periods as f64,
-        // A piecewise-linear sample is exact by either method.
-        _ => 1.0,
-    };
-    let mut warnings = warnings(plan, &recorded, feedback.as_ref(), quality_factor);
-    let (mut trace, mut retrace) = (Channels::default(), Channels::default());
-    let mut lines = Vec::new();
-    for LineRecord { statistics, pixels } in recorded.lines {
-        let image = match statistics.direction {
-            Direction::Trace => &mut trace,
-            Direction::Retrace => &mut retrace,
-        };
-        image.surface.push(pixels.surface);
-        image.height.push(pixels.height);
-        image.amplitude_error.push(pixels.amplitude_error);
-        image.phase.push(pixels.phase);
-        image.peak_force.push(pixels.peak_force);
-        image.peak_force_max.push(pixels.peak_force_max);
-        image.dissipation.push(pixels.dissipation);
-        image.contact_fraction.push(pixels.contact_fraction);
-        image.mean_deflection.push(pixels.mean_deflection);
-        image.state.push(pixels.state);
-        lines.push(statistics);
-    }
-    let retrace = plan.retrace.then_some(retrace);
-    let trace_retrace_rms = retrace.as_ref().map(|retrace| {
-        let both = trace.height.iter().flatten();
-        let both = both.zip(retrace.height.iter().flatten());
-        let squares: Vec<f64> = both
-            .map(|(a, b)| (a - b) * (a - b))
-            .filter(|square| square.is_finite())
-            .collect();
-        (squares.iter().sum::<f64>() / squares.len().max(1) as f64).sqrt()
-    });
-    let verdict = verdict(plan, &lines, &recorded.changes);
-    if !recorded.changes.is_empty() {
-        warnings.push(
-            "the motion jumps onto another branch: a change of the height there is not one of \
-             the surface"
-                .into(),
-        );
-    }
-    ScanReport {
+/// Periods in which a disturbance of the lever of a case decays.
+fn lever_memory(case: &Case) -> f64 {
+    quality_factor(case) / std::f64::consts::PI
+}
+
+fn quality_factor(case: &Case) -> f64 {
+    let view = case.physical();
+    view.map_or(1.0, |view| view.lever.quality_factor)
+}
+
+/// The report of a plan before its lines.
+fn header(plan: &Plan, case: &Case, settled: &Settled<'_>) -> Result<ScanReport, Error> {
+    let quality_factor = quality_factor(case);
+    let first = (plan.position(0, false), plan.line_position(0));
+    let gap = settled.instrument.height() - plan.surface.height(first.0, first.1);
+    let gap = gap / plan.length_unit;
+    let feedback = loop_response::loop_report(plan, &settled.instrument, gap, quality_factor)?;
+    Ok(ScanReport {
         method: plan.method,
         mode: plan.mode,
-        exact_share,
-        error: comparison,
+        exact_share: 0.0,
+        error: None,
         size: plan.size,
         periods_per_line: plan.periods,
-        total_periods,
+        total_periods: plan.total_periods(),
         line_rate: plan.line_rate(),
         speed: plan.speed(),
         free_amplitude: plan.free_amplitude,
@@ -162,34 +119,110 @@ fn report(
         z0: plan.z0,
         integral_gain: plan.integral_gain,
         independent_lines: plan.line_settle.is_some(),
-        peak_force_max: lines.iter().map(|l| l.peak_force_max).fold(0.0, f64::max),
-        periods: recorded.listed,
-        lines,
-        trace_retrace_rms,
-        trace,
-        retrace,
-        branch_changes: recorded.changes,
+        peak_force_max: 0.0,
+        periods: Vec::new(),
+        lines: Vec::new(),
+        trace_retrace_rms: None,
+        trace: Channels::default(),
+        retrace: plan.retrace.then(Channels::default),
+        branch_changes: Vec::new(),
+        warnings: warnings(plan, feedback.as_ref(), quality_factor),
         feedback,
-        warnings,
-        verdict,
+        verdict: String::new(),
+    })
+}
+
+/// The report with its lines, of an image of so many lines and pixels.
+fn with_lines(header: ScanReport, recorded: Recorded, [lines, pixels]: [usize; 2]) -> ScanReport {
+    let mut report = header;
+    let image = Channels::missing(lines, pixels);
+    report.retrace = report.retrace.map(|_| image.clone());
+    report.trace = image;
+    let mut comparison = Comparison::default();
+    let mut at_range = recorded.at_range;
+    for line in &recorded.lines {
+        comparison.join(&line.comparison);
+        at_range += line.at_range;
+    }
+    report.error = comparison.report();
+    report.exact_share = match (report.method, report.error) {
+        (Method::QuasiStatic, _) => 0.0,
+        (Method::Fast, Some(error)) => error.periods as f64 / report.total_periods as f64,
+        // A piecewise-linear sample is exact by either method.
+        _ => 1.0,
+    };
+    for line in recorded.lines {
+        let LineRecord {
+            statistics, pixels, ..
+        } = line;
+        let image = match statistics.direction {
+            Direction::Trace => Some(&mut report.trace),
+            Direction::Retrace => report.retrace.as_mut(),
+        };
+        if let Some(image) = image {
+            image.set_line(statistics.line, pixels);
+        }
+        report.lines.push(statistics);
+    }
+    report.trace_retrace_rms = report.retrace.as_ref().map(|retrace| {
+        let both = report.trace.height.iter().flatten();
+        let both = both.zip(retrace.height.iter().flatten());
+        let squares: Vec<f64> = both
+            .map(|(a, b)| (a - b) * (a - b))
+            .filter(|square| square.is_finite())
+            .collect();
+        (squares.iter().sum::<f64>() / squares.len().max(1) as f64).sqrt()
+    });
+    report.peak_force_max = report
+        .lines
+        .iter()
+        .map(|line| line.peak_force_max)
+        .fold(0.0, f64::max);
+    report.verdict = verdict(report.mode, &report.lines, &recorded.changes);
+    let traces = report.lines.iter();
+    let scanned = traces.filter(|l| l.direction == Direction::Trace).count();
+    if scanned < lines {
+        let missing = format!("{scanned} of {lines} lines are scanned");
+        report.warnings.insert(0, missing);
+    }
+    if at_range > 0 {
+        let remedy = report.feedback.as_ref().map_or_else(String::new, stable);
+        report.warnings.push(format!(
+            "the z command is at an end of its range in {} drive periods{remedy}",
+            at_range
+        ));
+    }
+    if !recorded.changes.is_empty() {
+        report.warnings.push(
+            "the motion jumps onto another branch: a change of the height there is not one of \
+             the surface"
+                .into(),
+        );
+    }
+    report.periods = recorded.listed;
+    report.branch_changes = recorded.changes;
+    report
+}
+
+/// The largest stable gain, in words that go on from a warning.
+fn stable(feedback: &report::LoopReport) -> String {
+    match feedback.largest_stable_gain {
+        Some(gain) if gain > 0.0 => format!("; the largest stable integral gain is {gain:.4} 1/s"),
+        Some(_) => "; no integral gain makes it stable".to_owned(),
+        None => String::new(),
     }
 }
 
 /// Largest part of the largest stable gain at which a loop does not hunt after large errors.
 const HUNTING: f64 = 0.7;
 
+/// Reasons to doubt the image that are known before it.
 fn warnings(
     plan: &Plan,
-    recorded: &Recorded,
     feedback: Option<&report::LoopReport>,
     quality_factor: f64,
 ) -> Vec<String> {
     let mut warnings = Vec::new();
-    let stable = |feedback: &report::LoopReport| match feedback.largest_stable_gain {
-        Some(gain) if gain > 0.0 => format!("; the largest stable integral gain is {gain:.4} 1/s"),
-        Some(_) => "; no integral gain makes it stable".to_owned(),
-        None => String::new(),
-    };
     if let Some(feedback) = feedback {
         if feedback.spectral_radius >= 1.0 {
             warnings.push(format!(
@@ -213,13 +246,6 @@ fn warnings(
                 .into(),
         );
     }
-    if recorded.at_range > 0 {
-        let remedy = feedback.map_or_else(String::new, stable);
-        warnings.push(format!(
-            "the z command is at an end of its range in {} drive periods{remedy}",
-            recorded.at_range
-        ));
-    }
     if plan.periods < plan.pixels {
         warnings.push("a line has fewer drive periods than pixels".into());
     } else if (plan.periods as f64) < quality_factor / std::f64::consts::PI * plan.pixels as f64 {
@@ -241,7 +267,7 @@ fn warnings(
 }
 
 /// What the image shows, in a sentence.
-fn verdict(plan: &Plan, lines: &[LineStatistics], changes: &[report::BranchChange]) -> String {
+fn verdict(mode: Mode, lines: &[LineStatistics], changes: &[report::BranchChange]) -> String {
     let nm = |length: f64| format!("{:.3} nm", 1e9 * length);
     let largest = changes
         .iter()
@@ -270,7 +296,7 @@ fn verdict(plan: &Plan, lines: &[LineStatistics], changes: &[report::BranchChang
         );
     }
     let worst = lines.iter().map(|l| l.tracking_rms).fold(0.0, f64::max);
-    match plan.mode {
+    match mode {
         Mode::ConstantAmplitude => format!(
             "The height follows the surface to {} (root mean square of a line).",
             nm(worst)

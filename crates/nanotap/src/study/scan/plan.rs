@@ -194,6 +194,16 @@ impl Plan {
         }
     }
 
+    /// Drive periods that belong to a line.
+    pub(super) fn periods_per_line(&self) -> usize {
+        self.periods * (1 + usize::from(self.retrace)) + self.line_settle.unwrap_or(0)
+    }
+
+    /// Drive periods of the scan.
+    pub(super) fn total_periods(&self) -> usize {
+        self.settle + self.lines * self.periods_per_line()
+    }
+
     /// Position of a period along the line.
     pub(super) fn position(&self, index: usize, retrace: bool) -> f64 {
         let part = (index as f64 + 0.5) / self.periods as f64;

@@ -6,6 +6,7 @@ use nanotap_flow::Complex;
 use super::instrument::{Interaction, Period, lag};
 use super::plan::Plan;
 use super::report::{BranchChange, Direction, LineStatistics, ListedPeriod, Parachuting};
+use super::run::Comparison;
 
 /// Sums over the periods of a pixel.
 #[derive(Clone, Copy, Debug, Default)]
@@ -45,6 +46,9 @@ pub(super) struct PixelRow {
 pub(super) struct LineRecord {
     pub(super) statistics: LineStatistics,
     pub(super) pixels: PixelRow,
+    pub(super) comparison: Comparison,
+    /// Periods at an end of the range of z.
+    pub(super) at_range: usize,
 }
 
 /// Mean and sum of squared deviations.
@@ -211,7 +215,7 @@ impl<'a> LineRecorder<'a> {
     }
 
     /// The record of the line.
-    pub(super) fn finish(mut self) -> LineRecord {
+    pub(super) fn finish(mut self) -> (LineStatistics, PixelRow) {
         self.end_flight();
         let plan = self.plan;
         let count = self.count.max(1) as f64;
@@ -241,10 +245,7 @@ impl<'a> LineRecorder<'a> {
             overshoot: (self.height_range[1] - self.highest_surface - level).max(0.0),
             parachuting: std::mem::take(&mut self.parachuting),
         };
-        LineRecord {
-            statistics,
-            pixels: self.pixel_row(),
-        }
+        (statistics, self.pixel_row())
     }
 
     fn pixel_row(&self) -> PixelRow {

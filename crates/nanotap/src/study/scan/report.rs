@@ -1,13 +1,14 @@
 //! The report of a scan.
 
 use schemars::JsonSchema;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::instrument::Interaction;
 use super::options::{Method, Mode};
+use super::recorder::PixelRow;
 
 /// Direction of a line.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Direction {
     /// Rising positions
@@ -17,7 +18,7 @@ pub enum Direction {
 }
 
 /// Signals of a listed drive period, in SI.
-#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct ListedPeriod {
     /// Number of the period, from the start of settling.
     pub k: usize,
@@ -50,7 +51,7 @@ pub struct ListedPeriod {
 }
 
 /// A stretch on which the tip flies above the surface.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Parachuting {
     /// Its first drive period.
     pub first_period: usize,
@@ -63,7 +64,7 @@ pub struct Parachuting {
 }
 
 /// Statistics of a line in one direction, in SI.
-#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct LineStatistics {
     /// Number of the line, from 0.
     pub line: usize,
@@ -106,7 +107,7 @@ pub struct LineStatistics {
 }
 
 /// Channels of an image: a row a line, an entry a pixel; `null` where no period falls on a pixel.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, JsonSchema)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Channels {
     /// Mean height of the surface itself, m.
     pub surface: Vec<Vec<f64>>,
@@ -130,8 +131,49 @@ pub struct Channels {
     pub state: Vec<Vec<Option<Interaction>>>,
 }
 
+impl Channels {
+    /// An image without a scanned line.
+    pub(super) fn missing(lines: usize, pixels: usize) -> Self {
+        let none = vec![vec![f64::NAN; pixels]; lines];
+        Self {
+            surface: none.clone(),
+            height: none.clone(),
+            amplitude_error: none.clone(),
+            phase: none.clone(),
+            peak_force: none.clone(),
+            peak_force_max: none.clone(),
+            dissipation: none.clone(),
+            contact_fraction: none.clone(),
+            mean_deflection: none,
+            state: vec![vec![None; pixels]; lines],
+        }
+    }
+
+    /// Puts the pixels of a line in its place.
+    pub(super) fn set_line(&mut self, line: usize, pixels: PixelRow) {
+        for (rows, row) in [
+            (&mut self.surface, pixels.surface),
+            (&mut self.height, pixels.height),
+            (&mut self.amplitude_error, pixels.amplitude_error),
+            (&mut self.phase, pixels.phase),
+            (&mut self.peak_force, pixels.peak_force),
+            (&mut self.peak_force_max, pixels.peak_force_max),
+            (&mut self.dissipation, pixels.dissipation),
+            (&mut self.contact_fraction, pixels.contact_fraction),
+            (&mut self.mean_deflection, pixels.mean_deflection),
+        ] {
+            if let Some(own) = rows.get_mut(line) {
+                *own = row;
+            }
+        }
+        if let Some(own) = self.state.get_mut(line) {
+            *own = pixels.state;
+        }
+    }
+}
+
 /// A jump of the motion onto another branch.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct BranchChange {
     /// Drive period.
     pub k: usize,
@@ -150,7 +192,7 @@ pub struct BranchChange {
 }
 
 /// How a fast scan compares with an exact one, on parts of the scan that both run.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct MethodError {
     /// Drive periods compared.
     pub periods: usize,
@@ -165,7 +207,7 @@ pub struct MethodError {
 }
 
 /// The feedback loop linearised at the setpoint, on the flat surface.
-#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct LoopReport {
     /// Distance at which the motion has the setpoint amplitude, m.
     pub distance: f64,
@@ -194,7 +236,7 @@ pub struct LoopReport {
 }
 
 /// A scan.
-#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct ScanReport {
     /// How the drive periods were computed.
     pub method: Method,

@@ -10,7 +10,7 @@ use super::instrument::{Instrument, Period};
 use super::plan::Plan;
 use super::recorder::{BranchTracker, LineRecord, LineRecorder, listed};
 use super::report::{BranchChange, Direction, ListedPeriod, MethodError};
-use crate::Error;
+use crate::{Error, ErrorKind};
 
 /// What a scan recorded.
 #[derive(Debug, Default)]
@@ -18,8 +18,7 @@ pub(super) struct Recorded {
     pub(super) lines: Vec<LineRecord>,
     pub(super) listed: Vec<ListedPeriod>,
     pub(super) changes: Vec<BranchChange>,
-    pub(super) comparison: Comparison,
-    /// Periods at an end of the range of z.
+    /// Periods at an end of the range of z before the first line.
     pub(super) at_range: usize,
 }
 
@@ -27,8 +26,9 @@ pub(super) struct Recorded {
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Comparison {
     pub(super) periods: usize,
-    height: [f64; 2],
-    amplitude: [f64; 2],
+    /// Largest, and sum of squares.
+    pub(super) height: [f64; 2],
+    pub(super) amplitude: [f64; 2],
 }
 
 impl Comparison {
@@ -47,7 +47,7 @@ impl Comparison {
         }
     }
 
-    fn join(&mut self, other: &Self) {
+    pub(super) fn join(&mut self, other: &Self) {
         self.periods += other.periods;
         for (own, other) in [&mut self.height, &mut self.amplitude]
             .into_iter()
@@ -72,11 +72,10 @@ impl Comparison {
 }
 
 impl Recorded {
-    fn join(&mut self, other: Self) {
+    pub(super) fn join(&mut self, other: Self) {
         self.lines.extend(other.lines);
         self.listed.extend(other.listed);
         self.changes.extend(other.changes);
-        self.comparison.join(&other.comparison);
         self.at_range += other.at_range;
     }
 }
@@ -102,6 +101,8 @@ struct Runner<'a, 'c> {
     recorded: Recorded,
     /// Number of the next period.
     k: usize,
+    /// Periods at an end of the range of z up to the last line.
+    at_range: usize,
 }
 
 impl Runner<'_, '_> {
@@ -147,6 +148,7 @@ impl Runner<'_, '_> {
             (Vec::new(), 0)
         };
         let mut left = 0;
+        let mut comparison = Comparison::default();
         let mut recorder = LineRecorder::new(plan, line, direction, self.k);
         for index in 0..plan.periods {
             let x = plan.position(index, retrace);
@@ -161,17 +163,24 @@ impl Runner<'_, '_> {
             if let Some(exact) = self.exact.as_mut().filter(|_| left > 0) {
                 left -= 1;
                 let other = exact.run_period(x, period.surface, plan.material(x))?;
-                self.recorded.comparison.add(&period, &other);
+                comparison.add(&period, &other);
             }
             self.tracker.add(k, line, direction, &period);
             recorder.add(index, &period);
         }
-        self.recorded.lines.push(recorder.finish());
+        let at_range = self.instrument.at_range();
+        let (statistics, pixels) = recorder.finish();
+        self.recorded.lines.push(LineRecord {
+            statistics,
+            pixels,
+            comparison,
+            at_range: at_range - self.at_range,
+        });
+        self.at_range = at_range;
         Ok(())
     }
 
     fn finish(mut self) -> Recorded {
-        self.recorded.at_range = self.instrument.at_range();
         self.recorded.changes = self.tracker.finish();
         self.recorded
     }
@@ -202,66 +211,119 @@ fn compared_stretches(plan: &Plan, y: f64, retrace: bool) -> (Vec<usize>, usize)
     (starts, length)
 }
 
-/// Runs the plan. The second result is the instrument after settling.
-pub(super) fn run<'a>(
+/// An instrument that has settled before the first line.
+#[derive(Debug)]
+pub(super) struct Settled<'a> {
     plan: &'a Plan,
+    /// Periods in which a disturbance of the lever decays.
     lever_memory: f64,
-    control: &Control<'_>,
-) -> Result<(Recorded, Instrument<'a>), Error> {
-    let instrument = Instrument::new(plan)?;
-    let exact = if plan.method == super::options::Method::Fast && !instrument.is_exact() {
-        Some(instrument.exact()?)
-    } else {
-        None
-    };
-    let directions = 1 + usize::from(plan.retrace);
-    let per_line = plan.periods * directions + plan.line_settle.unwrap_or(0);
-    let done = AtomicUsize::new(0);
-    let mut runner = Runner {
-        plan,
-        control,
-        done: &done,
-        total: plan.settle + plan.lines * per_line,
-        instrument,
-        exact,
-        tracker: BranchTracker::new(lever_memory),
-        recorded: Recorded::default(),
-        k: 0,
-    };
-    runner.settle(0, plan.settle)?;
-    let settled = runner.instrument.clone();
-    let Some(line_settle) = plan.line_settle else {
-        for line in 0..plan.lines {
-            runner.run_line(line)?;
-        }
-        return Ok((runner.finish(), settled));
-    };
-    let mut all = Recorded {
-        listed: std::mem::take(&mut runner.recorded.listed),
-        ..Recorded::default()
-    };
-    let lines: Vec<Result<Recorded, Error>> = (0..plan.lines)
-        .into_par_iter()
-        .with_max_len(1)
-        .map(|line| {
-            let mut runner = Runner {
-                plan,
-                control,
-                done: &done,
-                total: runner.total,
-                instrument: settled.clone(),
-                exact: runner.exact.clone(),
-                tracker: BranchTracker::new(lever_memory),
-                recorded: Recorded::default(),
-                k: plan.settle + line * per_line,
-            };
-            runner.settle(line, line_settle)?;
-            runner.run_line(line)?;
-            Ok(runner.finish())
+    pub(super) instrument: Instrument<'a>,
+    /// An exact instrument for comparisons.
+    exact: Option<Instrument<'a>>,
+    listed: Vec<ListedPeriod>,
+    /// Periods that were run, for the progress.
+    done: AtomicUsize,
+}
+
+impl<'a> Settled<'a> {
+    pub(super) fn new(
+        plan: &'a Plan,
+        lever_memory: f64,
+        control: &Control<'_>,
+    ) -> Result<Self, Error> {
+        let instrument = Instrument::new(plan)?;
+        let exact = if plan.method == super::options::Method::Fast && !instrument.is_exact() {
+            Some(instrument.exact()?)
+        } else {
+            None
+        };
+        let settled = Self {
+            plan,
+            lever_memory,
+            instrument,
+            exact,
+            listed: Vec::new(),
+            done: AtomicUsize::new(0),
+        };
+        let mut runner = settled.runner(0, control);
+        runner.settle(0, plan.settle)?;
+        let (instrument, listed) = (runner.instrument, runner.recorded.listed);
+        Ok(Self {
+            instrument,
+            listed,
+            ..settled
         })
-        .collect();
-    for line in lines {
-        all.join(line?);
     }
-    Ok((all, settled))
+
+    /// What goes on from here with a drive period.
+    fn runner<'c>(&'c self, k: usize, control: &'c Control<'c>) -> Runner<'a, 'c> {
+        Runner {
+            plan: self.plan,
+            control,
+            done: &self.done,
+            total: self.plan.total_periods(),
+            instrument: self.instrument.clone(),
+            exact: self.exact.clone(),
+            tracker: BranchTracker::new(self.lever_memory),
+            recorded: Recorded::default(),
+            k,
+            at_range: self.instrument.at_range(),
+        }
+    }
+
+    /// A line that settles by itself before it.
+    pub(super) fn independent_line(
+        &self,
+        line: usize,
+        control: &Control<'_>,
+    ) -> Result<Recorded, Error> {
+        let plan = self.plan;
+        let mut runner = self.runner(plan.settle + line * plan.periods_per_line(), control);
+        runner.settle(line, plan.line_settle.unwrap_or(0))?;
+        runner.run_line(line)?;
+        Ok(runner.finish())
+    }
+
+    /// Every line, those that are finished if the work was cancelled.
+    pub(super) fn lines(&self, control: &Control<'_>) -> Result<Recorded, Error> {
+        let lines = 0..self.plan.lines;
+        let mut all = Recorded {
+            listed: self.listed.clone(),
+            at_range: self.instrument.at_range(),
+            ..Recorded::default()
+        };
+        if self.plan.line_settle.is_none() {
+            let mut runner = self.runner(self.plan.settle, control);
+            for line in lines {
+                match runner.run_line(line) {
+                    Err(error) if is_stopped(&error) => {
+                        runner.recorded.lines.retain(|l| l.statistics.line < line);
+                        break;
+                    }
+                    done => done?,
+                }
+            }
+            all.join(runner.finish());
+        } else {
+            let finished: Vec<Result<Recorded, Error>> = lines
+                .into_par_iter()
+                .with_max_len(1)
+                .map(|line| self.independent_line(line, control))
+                .collect();
+            for line in finished {
+                match line {
+                    Err(error) if is_stopped(&error) => {}
+                    line => all.join(line?),
+                }
+            }
+        }
+        if all.lines.is_empty() {
+            return Err(Error::stopped());
+        }
+        Ok(all)
+    }
+}
+
+fn is_stopped(error: &Error) -> bool {
+    error.kind == ErrorKind::Stopped
 }

@@ -237,7 +237,7 @@ impl Computation for Sweep {
         summary::write_targets(store, &self.targets)?;
         let threads = Some(how.threads).filter(|threads| *threads > 0);
         install(threads, || runs.share(store, &how.control))
-            .map_err(|error| WorkError::Threads(Box::new(error)))?
+            .map_err(|error| WorkError::Failed(Box::new(error)))?
     }
 
     fn chunk_files(&self, chunk: usize, control: &Control<'_>) -> Option<Vec<Vec<u8>>> {

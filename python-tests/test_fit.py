@@ -79,6 +79,33 @@ def test_frames_datasets_and_files_are_tables(
         )
 
 
+def test_a_force_volume_is_a_dataset(
+    curve: dict[str, np.ndarray], tmp_path: Path
+) -> None:
+    pandas = pytest.importorskip("pandas")
+    soft = nanotap.Case.from_toml(LEVER.replace("30 N/m", "24 N/m"))
+    frames = [
+        pandas.DataFrame({**curve, "x (um)": x, "y (um)": y})
+        for x, y in [(0, 0), (1, 0), (1, 1)]
+    ]
+    volume = pandas.concat(frames)
+    ds = nanotap.fit_map(soft, volume, ["x", "y"], FREE, progress=False)
+    assert dict(ds.sizes) == {"y": 2, "x": 2}
+    assert ds.x.attrs["units"] == "um"
+    stiffness = ds["sample.stiffness"]
+    assert stiffness.attrs["units"] == "N/m"
+    assert stiffness.values == pytest.approx(
+        np.array([[30, 30], [np.nan, 30]]), rel=1e-5, nan_ok=True
+    )
+    assert ds.result.values.tolist() == [["fits", "fits"], ["", "fits"]]
+    path = tmp_path / "map.zarr"
+    nanotap.fit_map(soft, volume, "x,y", FREE, out=path, chunk="1/2", progress=False)
+    again = nanotap.fit_map(soft, volume, "x,y", FREE, out=path, progress=False)
+    assert again.drop_attrs().identical(ds.drop_attrs())
+    with pytest.raises(ValueError, match="fit_map"):
+        nanotap.fit(soft, data=volume, free=FREE, pixels=["x", "y"])
+
+
 def test_what_is_no_table_is_refused(curve: dict[str, np.ndarray]) -> None:
     case = nanotap.Case.from_toml(LEVER)
     with pytest.raises(TypeError, match="data"):

@@ -12,6 +12,7 @@ use nanotap::dataset::{self, Share, Store, Work, WorkError, table};
 use nanotap::figure as figures;
 use nanotap::study::DatasetStudy as _;
 use nanotap::study::basin;
+use nanotap::study::fit::FitMap;
 use nanotap::study::registry;
 use nanotap::study::scan::ScanLines;
 use nanotap::study::sweep::Summary;
@@ -201,6 +202,7 @@ pub(crate) fn summary(path: PathBuf) -> PyResult<String> {
         Ok(match kind.as_str() {
             "basin" => serde_json::to_string(&basin::shares(&store)?)?,
             "scan" => serde_json::to_string(&ScanLines::report(&store)?)?,
+            "fit" => serde_json::to_string(&FitMap::report(&store)?)?,
             _ => serde_json::to_string(&Summary::of(&store)?)?,
         })
     };
@@ -230,6 +232,7 @@ pub(crate) fn figure<'py>(
         let figure = match kind.as_str() {
             "basin" => figures::basin::figure(&store)?,
             "scan" => figures::scan::scan_figure(&ScanLines::report(&store)?),
+            "fit" => figures::fit::fit_map_figure(&store)?,
             _ => figures::sweep::figure(&store)?,
         };
         drawn(&figure, &format)

@@ -183,8 +183,13 @@ fn at(point: &BimodalPoint, report: &BimodalReport) -> String {
             table.row([name.to_owned(), exact, formula]);
         }
     };
+    let relaxes = report.dynamic_moduli.is_some();
     pair(
-        "reduced modulus E*",
+        if relaxes {
+            "reduced modulus E*, relaxed"
+        } else {
+            "reduced modulus E*"
+        },
         row(
             report.reduced_modulus,
             estimates.reduced_modulus,
@@ -195,10 +200,23 @@ fn at(point: &BimodalPoint, report: &BimodalReport) -> String {
         "indentation",
         row(Some(-point.closest), estimates.indentation, Kind::Length),
     );
+    let of_tone = |k: usize| report.dynamic_moduli.map(|moduli| moduli[k]);
     pair(
-        "loss tangent",
-        row(None, estimates.loss_tangent, Kind::Number),
+        "loss tangent, first tone",
+        row(
+            of_tone(0).map(|[storage, loss]| loss / storage),
+            estimates.loss_tangent,
+            Kind::Number,
+        ),
     );
+    if let Some([storage, loss]) = of_tone(1) {
+        let modulus = |value| Kind::Pressure.format(value);
+        table.row([
+            "storage, loss modulus, second tone".to_owned(),
+            format!("{}, {}", modulus(storage), modulus(loss)),
+            String::new(),
+        ]);
+    }
     format!(
         "  {}\n{}{}",
         style::bold(&format!("at {}", length(point.zc))),

@@ -5,12 +5,15 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use nanotap::case::Key;
-use nanotap::figure::fit::fit_figure;
+use nanotap::dataset::Share;
+use nanotap::figure::fit::{fit_figure, fit_map_figure};
 use nanotap::number::shortest;
-use nanotap::study::fit::{FitOptions, FitReport, FitStudy, FittedParameter};
+use nanotap::study::DatasetStudy as _;
+use nanotap::study::fit::{FitMap, FitMapReport, FitOptions, FitReport, FitStudy, FittedParameter};
 use serde::Serialize;
 
 use crate::arguments::{CaseArguments, PlotArgument, measured};
+use crate::dataset::DatasetArguments;
 use crate::failure::Failure;
 use crate::given_case::GivenCase;
 use crate::output::Output;
@@ -41,9 +44,14 @@ pub(crate) struct Arguments {
     threads: ThreadsArgument,
 
     /// Write the case of the best fit (.toml), with --per-curve one per curve
-    /// (NAME-CURVE.toml), or the rows with model and residuals (.csv)
+    /// (NAME-CURVE.toml), or the rows with model and residuals (.csv); with --pixels the dataset
+    /// (.zarr), of which an unfinished one is continued
     #[arg(long, value_name = "PATH")]
     out: Option<PathBuf>,
+
+    /// With --pixels, fit only one of n shares of the pixels, as in 2/8; `nanotap merge` merges them
+    #[arg(long, value_name = "I/N", default_value_t = Share::WHOLE, hide_default_value = true)]
+    chunk: Share,
 
     #[command(flatten)]
     plot: PlotArgument,
@@ -60,6 +68,15 @@ struct Written<'a> {
 
 pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure> {
     let mut request = arguments.request.read()?;
+    if !request.pixels.is_empty() {
+        return map(arguments, &mut request, output);
+    }
+    if !arguments.chunk.is_whole() {
+        return Err(Failure::input(
+            "--chunk fits a share of the pixels of a map",
+            "give --pixels and --out NAME.zarr, too",
+        ));
+    }
     let ending = match &arguments.out {
         Some(path) => Some(file::claim(path, &["toml", "csv"])?),
         None => None,
@@ -100,6 +117,74 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
         None => Ok(()),
         Some(reason) => Err(Failure::numerics(format!("nothing fits: {reason}"))),
     }
+}
+
+/// The fits of a force volume, a pixel each, as a dataset.
+fn map(arguments: &Arguments, request: &mut FitOptions, output: &Output) -> Result<(), Failure> {
+    let Some(path) = &arguments.out else {
+        return Err(Failure::input(
+            "the fits of a force volume are a dataset",
+            "give --out NAME.zarr",
+        ));
+    };
+    file::ending(path, &["zarr", "csv"])?;
+    request.data = measured(&arguments.data, &arguments.also, "fit")?;
+    let case = GivenCase::for_study(&arguments.case, true, output)?;
+    let dataset = DatasetArguments {
+        out: Some(path.clone()),
+        chunk: arguments.chunk,
+        threads: arguments.threads.clone(),
+    };
+    let done = dataset.run::<FitMap>(
+        &case,
+        request,
+        "",
+        FitMap::COUNTED,
+        request.seed,
+        &arguments.plot,
+        fit_map_figure,
+        output,
+    )?;
+    output.study(&case, &done, |done| done.text(&case.title(), map_text))
+}
+
+/// A map of fits in short.
+fn map_text(report: &FitMapReport) -> String {
+    let mut table = Table::new([
+        ("parameter", Align::Left),
+        ("median", Align::Left),
+        ("5 % … 95 % of the pixels", Align::Left),
+        ("standard error", Align::Left),
+    ]);
+    for parameter in &report.parameters {
+        let shown = |value: Option<f64>| {
+            let (key, unit) = (&parameter.key, &parameter.unit);
+            value.map_or_else(|| "-".to_owned(), |value| with_unit(key, unit, value))
+        };
+        table.row([
+            parameter.key.clone(),
+            shown(parameter.median),
+            format!(
+                "{} … {}",
+                shown(parameter.range[0]),
+                shown(parameter.range[1])
+            ),
+            shown(parameter.standard_error),
+        ]);
+    }
+    format!(
+        "{}\n{}",
+        motion::paragraph(&format!(
+            "{} fitted: {} described, {} with warnings, {} not described, {} without a result; the \
+             table is of those described",
+            number::counted(report.pixels, "pixel", "pixels"),
+            report.fits,
+            report.warned,
+            report.misfits,
+            report.failed
+        )),
+        table.render()
+    )
 }
 
 /// Where the case of one curve is written: `best-CURVE.toml` next to `best.toml`.
@@ -162,11 +247,13 @@ fn csv(report: &FitReport) -> String {
 
 /// A value of a parameter with its unit.
 fn quantity(parameter: &FittedParameter, value: f64) -> String {
-    let key = Key::find(&parameter.key);
-    let offset = parameter.unit.as_str();
-    match key {
+    with_unit(&parameter.key, &parameter.unit, value)
+}
+
+fn with_unit(key: &str, unit: &str, value: f64) -> String {
+    match Key::find(key) {
         Some(key) => key.kind().format_digits(value, 5),
-        None => match offset {
+        None => match unit {
             "m" => nanotap::case::physical::Kind::Length.format_digits(value, 5),
             "Hz" => nanotap::case::physical::Kind::Frequency.format_digits(value, 5),
             "1" => number::significant(value, 5),

@@ -594,6 +594,7 @@ def fit(
     start: Sequence[str] | None = None,
     bounds: Mapping[str, tuple[float | str, float | str]] | str | None = None,
     columns: Sequence[str] | None = None,
+    pixels: Sequence[str] | None = None,
     laws: Sequence[str] | None = None,
     rows: int = 100,
     starts: int = 8,
@@ -629,11 +630,14 @@ def fit(
         Bounds of parameters, as in {"sample.stiffness": ("1 N/m", "100 N/m")}.
     columns : Sequence[str] | None
         Columns of the data to use; default: all.
+    pixels : Sequence[str] | None
+        Columns that name the pixel of a force volume, as in x,y: one fit a pixel,
+        into a dataset.
     laws : Sequence[str] | None
         Contact laws to compare, as in hertz,dmt; default: the law of the case.
     rows : int
         Average longer curves to about this many rows; 0: use every row (0 to
-        100000).
+        1000000).
     starts : int
         Initial values to try until the data are described (1 to 1000).
     seed : int

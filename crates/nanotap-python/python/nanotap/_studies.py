@@ -415,12 +415,78 @@ def fit(
         raise TypeError(message)
     lists = {
         name: _arguments.names(name, options[name])
-        for name in ("free", "per_curve", "columns", "convert", "start")
+        for name in ("free", "per_curve", "columns", "convert", "start", "pixels")
         if options[name] is not None
     }
     asked = {**options, **lists, "data": _arguments.tables(options["data"])}
     document, interrupted = _run("fit", case, asked, threads, progress)
     return _finished(Fit(document), interrupted)
+
+
+def fit_map(
+    case: Case,
+    data: Any,
+    pixels: str | Iterable[str],
+    free: str | Iterable[str],
+    *,
+    out: Path | None = None,
+    chunk: str = "1/1",
+    threads: int | None = None,
+    client: "Client | None" = None,
+    progress: Progress = None,
+    **options: Any,
+) -> "xr.Dataset":
+    """Fits a force volume: one curve a pixel, each from the result of its neighbour.
+
+    Args:
+        case: Lever and sample.
+        data: A table of all curves, as `fit` takes it, whose rows name their pixel.
+        pixels: One or two columns that name the pixel, such as `["x", "y"]`; the last changes
+            slowest.
+        free: Parameters to find, as in `fit`.
+        out: The dataset, a folder with the extension .zarr; an existing one is resumed. Without it,
+            everything is in memory.
+        chunk: Only one of n shares, as in "2/8"; `merge` merges the shares.
+        threads: Number of threads; default: one per core.
+        client: A Dask client on whose workers the chunks are computed, with the same bytes.
+        progress: Whether to show a bar, or a function that is called with the finished and the
+            total count of rows of pixels.
+        **options: Further options of `fit`, such as `convert` or `bounds`.
+
+    Returns:
+        Over the pixels each parameter (`ds["sample.modulus"]`) with its standard error
+        (`"sample.modulus_error"`), `chi2_reduced`, and `result`: fits, warned (with remarks, as where
+        the residuals are not noise), misfit, failed, or empty without data.
+
+    Raises:
+        ValueError: an option or the table is not valid.
+        Interrupted: Ctrl-C; its `result` is the dataset with the rest missing.
+
+    Example:
+        >>> import nanotap
+        >>> case = nanotap.Case.from_file("lever.toml")  # doctest: +SKIP
+        >>> ds = nanotap.fit_map(case, "volume.csv", ["x", "y"], "sample.modulus")  # doctest: +SKIP
+        >>> ds["sample.modulus"].median()  # doctest: +SKIP
+    """
+    lists = {
+        name: _arguments.names(name, options[name])
+        for name in ("columns", "convert", "start")
+        if options.get(name) is not None
+    }
+    asked = {
+        **options,
+        **lists,
+        "data": _arguments.tables(data),
+        "pixels": _arguments.names("pixels", pixels),
+        "free": _arguments.names("free", free),
+    }
+    plan = ("fit", _cased(case), _arguments.request("fit", asked))
+    ds = _datasets.computed(plan, "rows", out, chunk, threads, client, progress)
+    codes = ds.result
+    meanings = codes.attrs["flag_meanings"].split()
+    words_ = np.array([word if word != "missing" else "" for word in meanings])
+    attrs = {key: codes.attrs[key] for key in ("long_name", "units")}
+    return ds.assign(result=(codes.dims, words_[codes.values], attrs))
 
 
 def reconstruct(

@@ -11,7 +11,7 @@ use serde_json::{Map, Value, json};
 use crate::Error;
 
 /// Most rows of a table.
-pub const MAX_ROWS: usize = 100_000;
+pub const MAX_ROWS: usize = 1_000_000;
 /// Most bytes of a file.
 const MAX_BYTES: u64 = 256 << 20;
 

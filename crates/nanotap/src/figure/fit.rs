@@ -1,12 +1,14 @@
 //! The figure of a fit: measured curves, the fitted model, and the residuals.
 
 use nanotap_figures::{
-    Axis, Colour, DOUBLE_COLUMN, Figure, Legend, Line, Markers, Panel, Rule, category,
+    Axis, Colour, DOUBLE_COLUMN, Figure, Heatmap, Legend, Line, Markers, Panel, Rule, category,
 };
 
 use crate::case::Key;
 use crate::case::physical::Kind;
 use crate::case::units::prefixed;
+#[cfg(feature = "dataset")]
+use crate::dataset::{Store, StoreError};
 use crate::figure::shown::Shown;
 use crate::observe::table::shown_phase;
 use crate::study::approach::Way;
@@ -15,6 +17,88 @@ use crate::study::frequency_modulation::COLUMNS;
 
 /// Panels side by side.
 const ACROSS: usize = 3;
+
+/// A map of each fitted parameter of a force volume; of a single row of pixels, its values.
+///
+/// # Errors
+/// When a chunk is missing or damaged.
+#[cfg(feature = "dataset")]
+pub fn fit_map_figure(store: &Store) -> Result<Figure, StoreError> {
+    store.require_all()?;
+    let schema = store.schema();
+    let axes = &schema.grid.axes;
+    let mapped: Vec<usize> = (0..schema.variables.len())
+        .filter(|k| {
+            let error = format!("{}_error", schema.variables[*k].name);
+            schema.index_of(&error).is_some()
+        })
+        .collect();
+    let across = mapped.len().clamp(1, 2);
+    let down = mapped.len().div_ceil(across).max(1);
+    let mut figure = Figure::new(down, across)
+        .width(DOUBLE_COLUMN)
+        .height(80.0 * down as f64);
+    for k in mapped {
+        let mut values = Vec::new();
+        for chunk in 0..store.chunks() {
+            values.extend(store.read_chunk(&schema.grid.block(chunk), k)?.numbers());
+        }
+        let size = values.iter().fold(
+            0.0,
+            |m: f64, v| if v.is_finite() { m.max(v.abs()) } else { m },
+        );
+        let name = &schema.variables[k].name;
+        let kind = Key::find(name).map(|key| key.kind());
+        let unit = schema.variables[k].attributes.get("units");
+        let unit = unit.and_then(|unit| unit.as_str()).unwrap_or("1");
+        let kind = kind.or_else(|| (unit == "m").then_some(Kind::Length));
+        let (factor, unit) = match kind {
+            Some(kind) if kind != Kind::Number => prefixed(kind, 1.0, size),
+            _ => (1.0, unit.to_owned()),
+        };
+        let title = match unit.as_str() {
+            "1" | "" => name.clone(),
+            unit => format!("{name} ({unit})"),
+        };
+        let axis = |k: usize| {
+            let axis = &axes[k];
+            let unit = schema
+                .coordinate(&axis.name)
+                .and_then(|c| c.attributes.get("units"));
+            match unit.and_then(|unit| unit.as_str()).unwrap_or("1") {
+                "1" => Axis::linear(&axis.name),
+                unit => Axis::linear(format!("{} ({unit})", axis.name)),
+            }
+        };
+        let scaled = values.iter().map(|value| factor * value);
+        let [rows, columns] = match axes.len() {
+            1 => [1, axes[0].length],
+            _ => [axes[0].length, axes[1].length],
+        };
+        figure = figure.with(if rows == 1 {
+            let positions = schema.axis_values(axes.len() - 1);
+            let points = positions.into_iter().zip(scaled);
+            Panel::new(axis(axes.len() - 1), Axis::linear(title))
+                .with(Markers::new(points).colour(Colour::BLUE))
+        } else {
+            let edges = |k: usize| {
+                let at = schema.axis_values(k);
+                let (first, last) = (at[0], at[at.len() - 1]);
+                let half = 0.5 * (last - first) / (at.len() - 1).max(1) as f64;
+                (first - half, last + half)
+            };
+            Panel::new(axis(1).tight(), axis(0).tight()).with(Heatmap::new(
+                columns,
+                rows,
+                scaled,
+                edges(1),
+                edges(0),
+                Axis::linear(title),
+            ))
+        });
+    }
+    Ok(figure)
+}
 
 /// Each measured quantity with the fit and the other stable orbits, and below it the residuals in
 /// standard errors.

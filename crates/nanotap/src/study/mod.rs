@@ -74,8 +74,10 @@ pub static STUDIES: &[StudyEntry] = &[
     StudyEntry::of::<approach::ApproachStudy>(),
     #[cfg(feature = "fm")]
     StudyEntry::of::<frequency_modulation::FrequencyModulationStudy>(),
-    #[cfg(feature = "fit")]
+    #[cfg(all(feature = "fit", not(feature = "dataset")))]
     StudyEntry::of::<fit::FitStudy>(),
+    #[cfg(all(feature = "fit", feature = "dataset"))]
+    StudyEntry::of::<fit::FitStudy>().or_dataset::<fit::FitMap>(),
     #[cfg(feature = "fit")]
     StudyEntry::of::<reconstruct::ReconstructStudy>(),
     #[cfg(feature = "dataset")]

@@ -1324,3 +1324,120 @@ fn a_wrong_law_is_warned_of_from_few_rows() {
     assert!(!warned(ATTRACTING));
     assert!(warned(&hertz));
 }
+
+/// A force volume whose stiffness and distances differ from pixel to pixel: each is found, whatever the
+/// share or the number of threads; a pixel without data is missing, an
+/// impossible one is not described.
+#[test]
+fn a_force_volume_is_fitted_pixel_by_pixel() {
+    use nanotap::dataset::{Store, Work};
+    use nanotap::study::DatasetStudy as _;
+    use nanotap::study::fit::FitMap;
+    let stiffness = |x: usize, y: usize| 20.0 + 4.0 * x as f64 + 7.0 * y as f64;
+    let mut columns: Vec<(String, Vec<Entry>)> = [
+        "x (um)",
+        "y (um)",
+        "distance (nm)",
+        "amplitude (nm)",
+        "phase (deg)",
+    ]
+    .map(|name| (name.to_owned(), Vec::new()))
+    .to_vec();
+    for y in 0..3 {
+        for x in 0..4 {
+            if (x, y) == (3, 1) {
+                continue;
+            }
+            let set = format!("sample.stiffness={} N/m", stiffness(x, y));
+            let lever = case(LEVER, &[&set]);
+            for (distance, amplitude, phase, _) in curve(&lever, 22.0, 14.0, 9) {
+                // Three times steeper than under any stiffness.
+                let wrong = (x, y) == (2, 2);
+                let amplitude = if wrong {
+                    3.0 * distance - 40.0
+                } else {
+                    amplitude
+                };
+                let row = [
+                    0.5 * x as f64,
+                    0.5 * y as f64,
+                    distance + 0.1 * x as f64,
+                    amplitude,
+                    phase,
+                ];
+                for ((_, column), value) in columns.iter_mut().zip(row) {
+                    column.push(Entry::Number(value));
+                }
+            }
+        }
+    }
+    let table = Table {
+        name: "volume".to_owned(),
+        columns,
+        lines: Vec::new(),
+    };
+    let options = FitOptions {
+        pixels: vec!["x,y".to_owned()],
+        ..request(vec![table], &["sample.stiffness", "gap.offset"])
+    };
+    let lever = case(LEVER, &[]);
+    let plan = FitMap::plan(&lever, &options, &Control::default()).unwrap();
+    let folder = std::env::temp_dir().join(format!("nanotap-map-{}", std::process::id()));
+    let read = |name: &str, shares: &[&str], threads: usize| {
+        let store = Store::create_or_resume(&folder.join(name), plan.schema().clone()).unwrap();
+        for share in shares {
+            let work = Work {
+                share: share.parse().unwrap(),
+                threads,
+                control: Control::default(),
+            };
+            plan.compute(&store, &work).unwrap();
+        }
+        let report = FitMap::report(&store).unwrap();
+        let value = |name: &str, x: usize, y: usize| {
+            let k = store.schema().index_of(name).unwrap();
+            let row = store.read_chunk(&store.schema().grid.block(y), k);
+            row.unwrap().numbers()[x]
+        };
+        let all: Vec<[f64; 3]> = (0..12)
+            .map(|k| ["sample.stiffness", "gap.offset", "result"].map(|n| value(n, k % 4, k / 4)))
+            .collect();
+        (report, all)
+    };
+    let (report, found) = read("whole", &["1/1"], 1);
+    let (_, shared) = read("shared", &["2/2", "1/2"], 2);
+    assert_eq!(format!("{found:?}"), format!("{shared:?}"));
+    assert_eq!(
+        (report.pixels, report.fits, report.warned + report.misfits),
+        (11, 10, 1)
+    );
+    for (k, [value, offset, result]) in found.into_iter().enumerate() {
+        let (x, y) = (k % 4, k / 4);
+        match (x, y) {
+            (3, 1) => assert!(value.is_nan() && result == 0.0),
+            (2, 2) => assert!(result > 1.0),
+            _ => {
+                let off = value / stiffness(x, y) - 1.0;
+                assert!(off.abs() < 1e-4, "{x} {y}: {value}");
+                assert!(
+                    (offset + 0.1e-9 * x as f64).abs() < 1e-13,
+                    "{x} {y}: {offset}"
+                );
+                assert!(result == 1.0);
+            }
+        }
+    }
+    let median = report.parameters[0].median.unwrap();
+    assert!((28.0..39.0).contains(&median), "{median}");
+    std::fs::remove_dir_all(&folder).unwrap();
+    let refused = |pixels: &str, word: &str| {
+        let options = FitOptions {
+            pixels: vec![pixels.to_owned()],
+            ..options.clone()
+        };
+        let error = FitMap::plan(&lever, &options, &Control::default()).unwrap_err();
+        assert!(error.to_string().contains(word), "{error}");
+    };
+    refused("x,z", "no column `z`");
+    refused("x,y,phase", "one or two columns");
+}

@@ -114,9 +114,12 @@ pub(super) fn follow(
     let approach = follower.approach([first, last], options.points, setpoint, control)?;
     let force = view.sample.force.as_ref();
     let hertz = view.sample.hertz.map(|hertz| hertz.reduced_modulus);
+    let free = [0, 1].map(|k| follower.free(k));
+    let dynamic = |k: usize| force.and_then(|force| force.dynamic_modulus(free[k].frequency));
     Ok(BimodalReport {
         loops: kinds,
-        free: [0, 1].map(|k| follower.free(k)),
+        dynamic_moduli: dynamic(0).zip(dynamic(1)).map(|(a, b)| [a, b]),
+        free,
         setpoint: setpoint.map(|amplitude| amplitude * view.scales.length),
         reduced_modulus: force.and_then(SampleForce::reduced_modulus).or(hertz),
         table: approach.table,

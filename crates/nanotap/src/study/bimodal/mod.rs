@@ -180,6 +180,9 @@ pub struct BimodalReport {
     /// Reduced modulus E* of tip and sample of the case in Pa, if its law has one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub reduced_modulus: Option<f64>,
+    /// Storage and loss modulus, in Pa, of a sample that relaxes, at the free frequency of each tone.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub dynamic_moduli: Option<[[f64; 2]; 2]>,
     /// The motion at each distance, from far on; with a setpoint, the last is where it is reached.
     pub table: Vec<BimodalPoint>,
     /// Where no motion followed and the lever went to another.

@@ -25,6 +25,8 @@ mod guess;
 pub(crate) mod instrument;
 mod jumps;
 mod laws;
+#[cfg(feature = "dataset")]
+mod map;
 mod parameters;
 mod problem;
 mod profile;
@@ -41,6 +43,8 @@ use nanotap_dynamics::Control;
 pub use crate::case::table::{Entry, MAX_ROWS, Table};
 pub(crate) use data::is_distance;
 pub use data::{Column, Curve, Data, Row, SweptKey};
+#[cfg(feature = "dataset")]
+pub use map::{FitMap, FitMapReport, MappedParameter};
 pub use quantity::Quantity;
 pub use report::{
     ComparedLaw, CurveCase, FitReport, FittedColumn, FittedJump, FittedParameter, FittedRow,
@@ -94,6 +98,9 @@ options! {
         /// Columns of the data to use; default: all
         #[schemars(extend("x-value" = "NAME,…"))]
         pub columns: Vec<String> = Vec::new(),
+        /// Columns that name the pixel of a force volume, as in x,y: one fit a pixel, into a dataset
+        #[schemars(extend("x-value" = "NAME,…"))]
+        pub pixels: Vec<String> = Vec::new(),
         /// Contact laws to compare, as in hertz,dmt; default: the law of the case
         #[schemars(extend("x-value" = "LAW,…"))]
         pub laws: Vec<String> = Vec::new(),
@@ -197,6 +204,13 @@ fn with_search<R>(
 ) -> Result<R, Error> {
     if request.data.is_empty() {
         return Err(Error::option("data", "no data were given", "give a table"));
+    }
+    if !request.pixels.is_empty() {
+        return Err(Error::option(
+            "pixels",
+            "the fits of a force volume are a dataset",
+            "write it with `fit --out NAME.zarr`, or in Python with `fit_map`",
+        ));
     }
     let columns = names(&request.columns);
     let measured = instrument::prepared(case, &request.data, &request.convert, &columns)?;

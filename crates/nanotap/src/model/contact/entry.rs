@@ -33,6 +33,9 @@ pub struct Entry {
     pub(crate) law: fn(Numbers<'_>) -> Law,
 }
 
+/// Stiffness of a relaxing arm and its damper, from the numbers that only its law has.
+pub type ArmOf = fn(&[f64]) -> [f64; 2];
+
 /// The damper of a sample.
 #[derive(Clone, Copy, Debug)]
 pub enum Damper {
@@ -48,7 +51,7 @@ pub enum Damper {
         /// Why a physical case must not give a damper.
         not_damping: &'static str,
         /// Stiffness of the arm and its damper, of a law with a single one.
-        arm: Option<fn(&[f64]) -> [f64; 2]>,
+        arm: Option<ArmOf>,
     },
 }
 

@@ -11,6 +11,8 @@ let time = 0;                 // in drive periods
 let before = 0;
 let moving = !matchMedia("(prefers-reduced-motion: reduce)").matches;
 export const frames = { drawn: 0 };
+/** Whether the lever moves, or is paused. */
+export const moves = () => moving;
 
 play.addEventListener("click", () => { moving = !moving; label(); });
 function label() { play.textContent = moving ? "Pause" : "Play"; }

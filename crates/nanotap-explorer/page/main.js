@@ -42,7 +42,6 @@ let calm = 0;                 // the timer of the search of coexisting motions
 let amplitude = NaN;          // of the displayed motion
 let searching = null;         // the case of the motions that are being searched
 let steps = 0;                // entries of the history that can be undone
-const redrawn = [];            // called when figures were redrawn
 
 export function say(error) {
   const message = $("message");
@@ -86,7 +85,7 @@ const follows = () => state.follow === "yes" && displayed !== null && displayed.
 /** The motion for the present values, or the reason why there is none. */
 function request() {
   outdated = false;
-  const wish = { case: theCase(), start: state.start, steps: state.steps, views: motionViews(), ranges: !moving };
+  const wish = { case: theCase(), start: state.start, steps: state.steps, ranges: !moving };
   if (follows() && caseText() !== displayed.text) Object.assign(wish, { from: displayed.case, start: displayed.start });
   const asked = { ...wish, epoch, text: caseText() };
   const patience = setInterval(() => { if (outdated || asked.epoch !== epoch) stop("motion"); }, PATIENCE);
@@ -115,7 +114,6 @@ function show(motion, wish) {
   figure.put($("portrait"), motion.figure);
   figure.put($("contact"), motion.contact);
   lever.show(motion.film);
-  for (const again of redrawn) again();
   amplitude = motion.observables.find((row) => row.name === "amplitude")?.value;
   table(motion.observables);
   readout(motion);
@@ -123,6 +121,7 @@ function show(motion, wish) {
   $("spurious").textContent = motion.fixed_step?.words ?? OFF;
   $("fixed").hidden = !motion.fixed_step?.figure;
   if (motion.fixed_step?.figure) figure.put($("fixed"), motion.fixed_step.figure);
+  else figure.clear($("fixed"));
   $("command").textContent = motion.command;
   $("python").textContent = motion.python;
   markCensus();
@@ -310,11 +309,11 @@ async function begin() {
   $("follow").addEventListener("change", () => { state.follow = $("follow").checked ? "yes" : ""; remembered(); });
   $("unstable").addEventListener("change", markCensus);
   for (const name of ["contact", "portrait"]) {
-    redrawn.push(figure.alive($(name), {
+    figure.alive($(name), {
       views: () => state.views[name] ?? [],
       tell: (place) => { $("reading").textContent = place ? figure.words(place) : ""; },
-      zoom: (views) => { state.views[name] = views; remembered(); refresh(); },
-    }));
+      zoom: (views) => { state.views[name] = views; remembered(); },
+    });
   }
   $("census").addEventListener("click", () => census());
   // The fragment of the address is the state.
@@ -325,7 +324,7 @@ async function begin() {
   $("knobs").addEventListener("submit", (event) => event.preventDefault());
   addEventListener("popstate", takeOver);
   addEventListener("hashchange", takeOver);
-  study.begin(elsewhere);
+  study.begin(() => { markCensus(); elsewhere(); }, about.studies);
   takeOver();
 }
 

@@ -2,14 +2,15 @@
 // to a motion.
 
 import { state, caseText, put, remember, statedText, theCase } from "./state.js";
-import { ask, bytes, current, save, stream, stop, superseded } from "./api.js";
+import { bytes, current, save, stream, stop, superseded } from "./api.js";
 import { sameAs } from "./knobs.js";
 import * as figure from "./figure.js";
+import { moves } from "./lever.js";
 
 const $ = (id) => document.getElementById(id);
 const TABS = {
   approach: "Approach", diagram: "Diagram", branches: "Branches", resonance: "Resonance",
-  basin: "Basins", map: "Two parameters", plan: "Plan", image: "Image",
+  basin: "Basins", map: "Two parameters", plan: "Plan", levers: "Levers", image: "Image", data: "Data",
 };
 /** What the studies show, until they are computed. */
 const HINTS = {
@@ -20,13 +21,22 @@ const HINTS = {
   basin: "To which motion each initial deflection and velocity leads.",
   map: "The kinds of motion, the peak force, or the number of motions over two parameters.",
   image: "A line of an image under feedback: height, amplitude error, phase and peak force over a surface that is known.",
+  levers: "Levers of the catalogue on this sample, at the free amplitude and the setpoint: a click on a row takes that lever.",
+  data: "A measured curve over that of the model, and the fit of the model to it. Drop a CSV file on the page, or choose one; its columns are named as in “distance (nm)”, “amplitude (nm)”, “phase (deg)”. The file stays in this page.",
   plan: "Where every motion keeps to the conditions, over free amplitude and setpoint: a window to image in.",
 };
-const PREFIX = { "-9": "G", "-6": "M", "-3": "k", 3: "m", 6: "µ", 9: "n", 12: "p", 15: "f" };
+const MOST_DATA = 1.5e6;      // bytes of a measured file
+const COLUMNS = 64;           // heights of a surface that is drawn by hand
+const LINE = 6000;            // milliseconds in which the tip goes along the line of an image
+const FIRST = 5;              // fields of a form that are shown at once, if it has more than one in addition
 const NEAR = 0.05;            // fraction of a panel within which a click selects a drawn motion
 const PAUSE = 250;            // milliseconds after a change before an approach curve is drawn anew
 const OTHER = "computed for other values – compute again";
+const PLAIN = {};             // studies that the page knows from the registry only: name -> what they are about
+let plain = {};               // their forms
 let forms = null;
+let measured = null;          // name and text of the measured file
+let found = null;             // the case of a fit
 let filled = "";              // the form that is shown
 let drawn = null;             // what the displayed figure is of, and where its clicks go
 let asking = null;            // the same of the figure that is being computed
@@ -35,10 +45,10 @@ let number = 0;               // the server's number for the figure
 let motion = null;            // the displayed motion
 let timer = 0;
 let gone = () => {};
-let redrawn = () => {};
 
 const views = () => state.views.study ?? [];
-const asked = () => JSON.stringify([state.preset, state.tab, state.study]);
+const asked = () => JSON.stringify([state.preset, state.tab, state.study, state.tab === "data" && measured?.[0]]);
+const hint = () => HINTS[state.tab] ?? `${PLAIN[state.tab]}.`;
 
 /** The keys of the case that a figure does not depend on: those along its axes. Other keys must be as
  *  they stay along the axis, or the axis is another one. */
@@ -62,7 +72,7 @@ const isCurrent = () => same(drawn, subject(drawn?.clicks));
 function mark() {
   const other = drawn !== null && !isCurrent();
   $("study-figure").classList.toggle("stale", other);
-  $("study-export").classList.toggle("stale", other);
+  for (const id of ["study-export", "tables"]) $(id).classList.toggle("stale", other);
   for (const button of document.querySelectorAll("[data-study-export]")) button.disabled = other;
   $("stale").hidden = !other;
   $("stale").textContent = other ? OTHER : "";
@@ -80,7 +90,7 @@ function valueOn(axis) {
 
 /** Shows the displayed motion on the figure. */
 function point() {
-  const { x, y } = drawn?.clicks.set ?? {};
+  const { x, y } = drawn?.clicks?.set ?? {};
   if (x && y) {
     const shows = isCurrent() && Number.isFinite(valueOn(x));
     figure.present($("study-figure"), shows ? { x: valueOn(x), heights: [valueOn(y)] } : null);
@@ -88,28 +98,51 @@ function point() {
   }
   const value = valueOn(x);
   const shows = isCurrent() && Number.isFinite(value);
-  const heights = (drawn?.clicks.heights ?? []).map(({ name, factor }) => {
+  const heights = (drawn?.clicks?.heights ?? []).map(({ name, factor }) => {
     const row = motion?.observables.find((one) => one.name === name);
     return row && (factor === null ? Number.parseFloat(row.shown) : factor * row.value);
   });
   figure.present($("study-figure"), shows ? { x: value, heights } : null);
 }
 
-/** `motionChanged` is called when a click selected another motion. */
-export function begin(motionChanged) {
+function choose(name) {
+  Object.assign(state, { tab: name, study: {}, ran: "" });
+  delete state.views.study;
+  restore();
+  remember(true);
+  if (motion) fill(motion);
+}
+
+/** Takes a measured file. */
+async function take(file) {
+  if (!file) return;
+  if (state.tab !== "data") choose("data");
+  if (file.size > MOST_DATA) { $("progress").textContent = `${file.name} has ${file.size} bytes; the page takes ${MOST_DATA} at most, “nanotap fit” more`; return; }
+  measured = [file.name, await file.text()];
+  filled = "";
+  if (motion) fill(motion);
+  compute(false);
+}
+
+/** `motionChanged` is called when a click selected another motion; `studies` are those of the registry
+ *  that have no tab made for them. */
+export function begin(motionChanged, studies) {
   gone = motionChanged;
+  for (const { name, about, form } of studies) { PLAIN[name] = about; plain[name] = form; }
+  $("more").append(...studies.map(({ name, about }) => Object.assign(new Option(name.replaceAll("-", " "), name), { title: about })));
+  $("more").addEventListener("change", () => { if ($("more").value) choose($("more").value); });
+  addEventListener("dragover", (event) => { if (event.dataTransfer?.types.includes("Files")) event.preventDefault(); });
+  addEventListener("drop", (event) => {
+    if (!event.dataTransfer?.files.length) return;
+    event.preventDefault();
+    take(event.dataTransfer.files[0]);
+  });
   for (const [name, words] of Object.entries(TABS)) {
     const tab = document.createElement("button");
     Object.assign(tab, { type: "button", id: `tab-${name}`, textContent: words });
     tab.setAttribute("role", "tab");
     tab.setAttribute("aria-controls", "study-panel");
-    tab.addEventListener("click", () => {
-      Object.assign(state, { tab: name, study: {}, ran: "" });
-      delete state.views.study;
-      restore();
-      remember(true);
-      if (motion) fill(motion);
-    });
+    tab.addEventListener("click", () => choose(name));
     $("tabs").append(tab);
   }
   $("tabs").addEventListener("keydown", (event) => {
@@ -121,11 +154,12 @@ export function begin(motionChanged) {
     next.click();
   });
   $("study-form").addEventListener("submit", (event) => { event.preventDefault(); state.ran = "yes"; remember(true); compute(false); });
-  redrawn = figure.alive($("study-figure"), {
+  figure.alive($("study-figure"), {
     views,
     tell: (place) => { $("hover").textContent = place ? `${figure.words(place)}${nearest(place) ? ": a motion is drawn here" : ""}` : ""; },
     go,
-    zoom: (next) => { state.views.study = next; remember(true); look(); },
+    zoom: (next) => { state.views.study = next; remember(true); },
+    redrawn: point,
   });
   for (const button of document.querySelectorAll("[data-study-export]")) {
     button.addEventListener("click", async () => {
@@ -141,13 +175,14 @@ export function begin(motionChanged) {
 export function restore() {
   // A curve that waits to be drawn is of the former tab or case.
   clearTimeout(timer);
-  if (!(state.tab in TABS)) state.tab = "approach";
+  if (!(state.tab in TABS || state.tab in PLAIN)) state.tab = "approach";
   for (const tab of $("tabs").children) {
     const chosen = tab.id === `tab-${state.tab}`;
     tab.setAttribute("aria-selected", String(chosen));
     tab.tabIndex = chosen ? 0 : -1;
   }
-  $("study-panel").setAttribute("aria-labelledby", `tab-${state.tab}`);
+  $("more").value = state.tab in PLAIN ? state.tab : "";
+  $("study-panel").setAttribute("aria-labelledby", state.tab in PLAIN ? "more" : `tab-${state.tab}`);
   filled = "";
 }
 
@@ -155,16 +190,17 @@ export function restore() {
  *  is marked; one that the address contains is computed again, and an approach curve always. */
 export function fill(next) {
   motion = next;
-  forms = next.forms;
-  // Only a lever makes images.
-  $("tab-image").hidden = !forms.image.length;
-  if (!forms[state.tab].length) { state.tab = "approach"; restore(); }
+  forms = { ...plain, ...next.forms };
+  // Only a lever makes images, and is compared with others.
+  for (const name of ["image", "levers"]) $(`tab-${name}`).hidden = !forms[name].length;
+  if (!(state.tab in PLAIN || forms[state.tab].length)) { state.tab = "approach"; restore(); }
   const now = asked() + JSON.stringify(forms[state.tab]);
   if (now !== filled) {
     filled = now;
     build();
     if (drawn && drawn.form !== asked()) forget();
   }
+  figure.renew($("study-figure"));
   mark();
   clearTimeout(timer);
   if (same(asking, subject(asking?.clicks)) || isCurrent()) return;
@@ -183,74 +219,245 @@ export function follow(next) {
 function forget() {
   stop("study");
   drawn = null;
-  $("study-figure").replaceChildren();
+  found = null;
+  number = 0;
+  figure.clear($("study-figure"));
+  $("study-figure").hidden = false;
+  $("tables").replaceChildren();
   $("study-export").hidden = true;
-  $("progress").textContent = HINTS[state.tab];
+  $("progress").textContent = hint();
   $("hover").textContent = "";
 }
 
 /** Creates the form of the tab with the server's initial values. */
 function build() {
   const form = $("study-form");
-  form.replaceChildren(...forms[state.tab].map((field) => {
+  const fields = forms[state.tab].map(entry);
+  if (state.tab in PLAIN || state.tab === "data") {
+    const more = document.createElement("details");
+    more.append(Object.assign(document.createElement("summary"), { textContent: `${fields.length - FIRST} more` }), ...fields.splice(FIRST));
+    more.className = "row";
+    if (more.children.length > 2) fields.push(more);
+  }
+  form.replaceChildren(...fields);
+  const button = (words, pressed, id) => {
+    const made = Object.assign(document.createElement("button"), { type: pressed ? "button" : "submit", textContent: words });
+    if (id) made.id = id;
+    if (pressed) made.addEventListener("click", pressed);
+    form.append(made);
+    return made;
+  };
+  if (state.tab === "data") {
+    const file = Object.assign(document.createElement("input"), { type: "file", accept: ".csv,.txt,.tsv" });
+    file.addEventListener("change", () => take(file.files[0]));
     const label = document.createElement("label");
-    label.textContent = `${field.words} `;
-    const input = document.createElement(field.choices ? "select" : "input");
-    for (const choice of field.choices ?? []) input.add(new Option(choice, choice));
-    Object.assign(input, { name: field.name, value: state.study[field.name] ?? field.value });
-    if (!field.choices) Object.assign(input, { size: field.hint ? 15 : 10, placeholder: field.hint ?? "" });
-    input.addEventListener("change", () => {
-      state.study[field.name] = input.value;
-      filled = asked() + JSON.stringify(forms[state.tab]);
-      remember(true);
-      mark();
-    });
-    label.append(input);
-    return label;
-  }));
-  const compute_ = Object.assign(document.createElement("button"), { type: "submit", textContent: "Compute" });
-  const end = Object.assign(document.createElement("button"), { type: "button", textContent: "Stop" });
-  end.addEventListener("click", () => stop("study"));
-  const pin = Object.assign(document.createElement("button"), { type: "button", id: "pin", textContent: pinned ? "Unpin" : "Pin" });
-  pin.title = "Keep the curves of this figure behind the next ones";
-  pin.setAttribute("aria-pressed", String(Boolean(pinned)));
-  pin.addEventListener("click", () => {
+    label.append(measured ? `${measured[0]} ` : "measured file ", file);
+    form.prepend(label);
+  }
+  button(state.tab === "data" ? "Show" : "Compute");
+  if (state.tab === "data") button("Fit", () => compute(false, { fit: "yes" }), "fit");
+  button("Stop", () => stop("study"));
+  const pin = button(pinned ? "Unpin" : "Pin", () => {
     const before = pinned;
     pinned = pinned || !drawn ? 0 : number;
     pin.textContent = pinned ? "Unpin" : "Pin";
     pin.setAttribute("aria-pressed", String(Boolean(pinned)));
     // Without its pinned curves the figure is drawn anew.
     if (before && drawn && isCurrent()) compute(state.tab === "approach" && state.ran !== "yes");
+  }, "pin");
+  pin.title = "Keep the curves of this figure behind the next ones";
+  pin.setAttribute("aria-pressed", String(Boolean(pinned)));
+  if (!drawn) $("progress").textContent = hint();
+}
+
+/** A field of the form. */
+function entry(field) {
+  if (field.drawn) return hand(field);
+  const label = document.createElement("label");
+  label.textContent = `${field.words} `;
+  label.title = field.about ?? "";
+  const input = document.createElement(field.choices ? "select" : "input");
+  for (const choice of field.choices ?? []) input.add(new Option(choice, choice));
+  Object.assign(input, { name: field.name, value: state.study[field.name] ?? field.value });
+  if (!field.choices) Object.assign(input, { size: field.hint ? 15 : 10, placeholder: field.hint ?? "" });
+  input.addEventListener("change", () => {
+    state.study[field.name] = input.value;
+    if (field.name === "surface") for (const box of $("study-form").querySelectorAll(".hand")) box.hidden = input.value !== "drawn";
+    filled = asked() + JSON.stringify(forms[state.tab]);
+    remember(true);
+    mark();
   });
-  form.append(compute_, end, pin);
-  if (!drawn) $("progress").textContent = HINTS[state.tab];
+  label.append(input);
+  if (field.slider) label.append(slide(field, input));
+  return label;
+}
+
+/** A slider of a field, logarithmic around its usual value. */
+function slide({ words, slider: { from, to, usual, unit } }, input) {
+  const range = Object.assign(document.createElement("input"), { type: "range", min: 0, max: 1000 });
+  range.setAttribute("aria-label", `${words}, slider`);
+  const [, number, of] = /^([\d.e+-]+) ?(.*)$/.exec(input.value) ?? [];
+  range.value = 1000 * Math.log((of === unit ? Number(number) : usual) / from) / Math.log(to / from);
+  range.addEventListener("input", () => { input.value = `${Number((from * (to / from) ** (range.value / 1000)).toPrecision(3))}${unit ? ` ${unit}` : ""}`; });
+  range.addEventListener("change", () => {
+    input.dispatchEvent(new Event("change"));
+    again();
+  });
+  return range;
+}
+
+/** Computes a figure that is shown anew, with other options. */
+function again() {
+  if (!drawn) return;
+  state.ran = "yes";
+  remember(true);
+  compute(false);
+}
+
+/** A surface that is drawn by hand: a pointer sets its heights, arrow keys move and change one. */
+function hand({ name, drawn: word }) {
+  const heights = Array.from({ length: COLUMNS }, () => 0);
+  (state.study[name] ?? "").split(",").forEach((text, k) => { if (text !== "" && k < COLUMNS) heights[k] = Math.min(1, Math.max(0, Number(text) || 0)); });
+  const box = Object.assign(document.createElement("div"), { className: "hand", hidden: (state.study.surface ?? "") !== word });
+  const field = Object.assign(document.createElement("input"), { type: "hidden", name, value: state.study[name] ?? "" });
+  const canvas = Object.assign(document.createElement("canvas"), { width: COLUMNS * 8, height: 96, tabIndex: 0 });
+  canvas.setAttribute("role", "img");
+  canvas.setAttribute("aria-label", "Surface drawn by hand: drag to set its heights; arrow keys move along the line and change the height there");
+  let at = 0;
+  let last = null;
+  const show = () => {
+    const pen = canvas.getContext("2d");
+    const style = getComputedStyle(document.documentElement);
+    pen.clearRect(0, 0, canvas.width, canvas.height);
+    pen.fillStyle = style.getPropertyValue("--sample");
+    heights.forEach((height, k) => pen.fillRect(8 * k, 92 - 88 * height, 8, 4 + 88 * height));
+    if (document.activeElement === canvas) { pen.fillStyle = style.getPropertyValue("--accent"); pen.fillRect(8 * at, 92 - 88 * heights[at], 8, 3); }
+  };
+  const keep = () => { field.value = state.study[name] = heights.map((height) => Number(height.toFixed(2))).join(","); remember(true); mark(); };
+  const set = (event) => {
+    const area = canvas.getBoundingClientRect();
+    const k = Math.min(COLUMNS - 1, Math.max(0, Math.floor((event.clientX - area.left) / area.width * COLUMNS)));
+    const height = Math.min(1, Math.max(0, (area.bottom - event.clientY) / area.height));
+    // A quick pointer leaves no gaps.
+    const from = last ?? { k, height };
+    const steps = Math.max(1, Math.abs(k - from.k));
+    for (let n = 0; n <= steps; n += 1) heights[Math.round(from.k + (k - from.k) * n / steps)] = from.height + (height - from.height) * n / steps;
+    last = { k, height };
+    at = k;
+    show();
+  };
+  canvas.addEventListener("pointerdown", (event) => { canvas.setPointerCapture(event.pointerId); last = null; set(event); });
+  canvas.addEventListener("pointermove", (event) => { if (canvas.hasPointerCapture(event.pointerId)) set(event); });
+  canvas.addEventListener("pointerup", () => { keep(); again(); });
+  canvas.addEventListener("keydown", (event) => {
+    const [along, up] = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 0.05], ArrowDown: [0, -0.05] }[event.key] ?? [];
+    if (along === undefined) return;
+    event.preventDefault();
+    at = (at + along + COLUMNS) % COLUMNS;
+    heights[at] = Math.min(1, Math.max(0, heights[at] + up));
+    show();
+    if (up) keep();
+  });
+  for (const event of ["focus", "blur"]) canvas.addEventListener(event, show);
+  box.append(field, canvas);
+  setTimeout(show);
+  return box;
+}
+
+/** The tip goes along the line of an image again and again, while the lever moves. */
+function scan() {
+  const own = drawn;
+  const one = $("study-figure");
+  const begun = performance.now();
+  const follow = (now) => {
+    if (drawn !== own || state.tab !== "image" || !one.figure) return;
+    requestAnimationFrame(follow);
+    if (!moves() || !one.inView) return;
+    const share = ((now - begun) / LINE % 1 + 1) % 1;
+    const { x } = one.panels[0];
+    const at = x.from + share * (x.to - x.from);
+    figure.present(one, { x: at, heights: one.figure.panels.map(({ layers }, k) => height(layers.filter((layer) => layer.kind === "line")[k ? 0 : 1], at)) });
+  };
+  if (state.tab === "image") requestAnimationFrame(follow);
+}
+
+/** Height of a line at a place. */
+function height(line, at) {
+  const { x: xs, y: ys } = line?.points ?? { x: [], y: [] };
+  const k = xs.findIndex((x) => x >= at);
+  return k < 0 || ys[k] === null ? NaN : ys[k];
+}
+
+/** Shows the tables of a study. A row that has changes to the case makes them. */
+function show(tables) {
+  const make = (name, ...children) => { const made = document.createElement(name); made.append(...children); return made; };
+  $("tables").replaceChildren(...(tables ?? []).map(({ title, heads, rows }) => {
+    const table = make("table");
+    if (title) table.append(make("caption", title));
+    if (heads.some(([words]) => words)) {
+      table.append(make("thead", make("tr", ...heads.map(([words, about]) => Object.assign(make("th", words), { scope: "col", title: about })))));
+    }
+    table.append(make("tbody", ...rows.map(({ cells, set }) => {
+      const [first, ...rest] = cells;
+      const name = set ? Object.assign(make("button", first), { type: "button" }) : first;
+      const line = make("tr", Object.assign(make("th", name), { scope: "row" }), ...rest.map((cell) => make("td", cell)));
+      if (set) { line.className = "choice"; line.addEventListener("click", () => adopt(set)); }
+      return line;
+    })));
+    return make("div", table);
+  }));
+  if (!found) return;
+  const { file, set } = found;
+  const takes = Object.assign(make("button", "Take these values"), { type: "button" });
+  takes.addEventListener("click", () => adopt(set));
+  const saves = Object.assign(make("button", "Case file of the fit"), { type: "button" });
+  saves.addEventListener("click", () => save(new Blob([file], { type: "application/toml" }), "best.toml"));
+  const row = make("p", takes, saves);
+  row.className = "row";
+  $("tables").append(row);
+}
+
+/** States the values of another case that the figure belongs to as well. */
+function adopt(set) {
+  if (!isCurrent()) return;
+  state.set = { ...drawn.set, ...set };
+  state.start = "";
+  Object.assign(drawn, subject(drawn.clicks));
+  remember(true);
+  gone();
 }
 
 /** Computes the figure of the form, in stages; a `quick` one ends after the first. */
-async function compute(quick) {
+async function compute(quick, more = {}) {
   clearTimeout(timer);
-  const options = Object.fromEntries(new FormData($("study-form")));
+  const options = { ...Object.fromEntries(new FormData($("study-form"))), ...more };
+  const data = state.tab === "data" ? { data: measured } : {};
   $("progress").textContent = "computing …";
-  const own = { ...subject(null), clicks: null };
+  const own = { ...subject(null), clicks: null, set: { ...state.set } };
   const whole = caseText();
   asking = own;
   let request = null;
   try {
-    const sent = stream("study", "/api/study", { case: theCase(), start: state.start, tab: state.tab, options, ...(pinned ? { pinned } : {}) }, (message) => {
+    const sent = stream("study", "/api/study", { case: theCase(), start: state.start, tab: state.tab, options, ...data, ...(pinned ? { pinned } : {}) }, (message) => {
       // An answer for an older case is dropped.
       if (asking !== own) return;
+      if (message.progress) { $("progress").textContent = message.progress; return; }
       if (!own.clicks && caseText() !== whole) { request?.abort(); return; }
       own.clicks = message.clicks;
       Object.assign(own, { case: own.case && caseOf(own, message.clicks) });
       drawn = own;
-      number = message.number;
+      number = message.number ?? 0;
+      found = message.found ?? null;
       $("progress").textContent = message.words;
       $("study-command").textContent = message.command;
       $("study-python").textContent = message.python;
       $("study-export").hidden = false;
-      if (views().length) look();
-      else draw(message.figure);
+      for (const button of document.querySelectorAll("[data-study-export]")) button.hidden = !number;
+      $("study-figure").hidden = !number;
+      show(message.tables);
+      if (message.figure) figure.put($("study-figure"), message.figure);
       mark();
+      scan();
       if (quick) { $("progress").textContent = `${message.words}; Compute: more, with branches`; request?.abort(); }
     });
     request = current("study");
@@ -269,31 +476,15 @@ function caseOf(own, clicks) {
   return JSON.stringify([preset, kept.filter(([key]) => !left.includes(key))]);
 }
 
-function draw(next) {
-  figure.put($("study-figure"), next);
-  redrawn();
-  point();
-}
-
-/** Draws the visible range of the figure. */
-async function look() {
-  if (!number || !drawn) return;
-  try {
-    draw(await ask("look", "/api/figure", { number, views: views() }));
-  } catch (error) {
-    if (!superseded(error)) $("progress").textContent = error.message;
-  }
-}
-
 /** Sets the values of the axes at a place, and shows the motion there. */
 function go(place) {
   if (!drawn || !isCurrent()) return;
-  const { clicks } = drawn;
+  const clicks = drawn.clicks ?? {};
   const orbit = nearest(place);
   state.start = "";
   for (const [axis, key] of Object.entries(clicks.set ?? {})) {
     const shown = orbit && axis === "x" ? orbit[0] : Number(place[axis].toPrecision(7));
-    put(key.name, inUnit(shown, key), sameAs(key.name));
+    put(key.name, key.unit ? `${shown} ${key.unit}` : `${shown / key.factor}`, sameAs(key.name));
   }
   for (const [name, text] of Object.entries(clicks.fixed ?? {})) put(name, text, sameAs(name));
   if (orbit) state.start = orbit[2];
@@ -307,24 +498,15 @@ function go(place) {
   gone();
 }
 
-/** A drawn value in the unit of its axis, or in that of the key. */
-function inUnit(shown, { factor, unit }) {
-  const power = Math.round(Math.log10(factor));
-  if (!unit) return `${shown / factor}`;
-  const prefix = Math.abs(factor / 10 ** power - 1) < 1e-9 && unit !== "kg" ? PREFIX[power] : undefined;
-  return prefix ? `${shown} ${prefix}${unit}` : `${shown / factor} ${unit}`;
-}
-
 /** The drawn motion nearest to a place, if one is near: [x, heights by panel, start]. */
 function nearest(place) {
   const { panel, u, v } = place;
-  const index = $("study-figure").panels.indexOf(panel);
   let best = null;
   let least = NEAR;
-  for (const orbit of drawn?.clicks.near ?? []) {
+  for (const orbit of drawn?.clicks?.near ?? []) {
     const across = Math.abs(figure.part(panel.x, orbit[0]) - u);
     if (across >= least) continue;
-    for (const height of orbit[1][index] ?? []) {
+    for (const height of orbit[1][panel.index] ?? []) {
       const distance = Math.hypot(across, figure.part(panel.y, height) - v);
       if (distance < least) { least = distance; best = orbit; }
     }

@@ -20,7 +20,17 @@ pub(crate) struct ApiError {
 impl ApiError {
     /// From any error of the library.
     pub(crate) fn of(error: impl Into<Error>) -> Self {
-        let error = error.into();
+        let mut error = error.into();
+        // The page has no lines of a file; and a word that was refused names its key.
+        error.source = None;
+        for problem in &mut error.problems {
+            if let ErrorPlace::Override(written) = &problem.place {
+                let twice = format!("{}: ", key_of(written));
+                if let Some(rest) = problem.message.strip_prefix(&twice) {
+                    problem.message = rest.to_owned();
+                }
+            }
+        }
         let named = error
             .problems
             .iter()
@@ -76,7 +86,11 @@ impl From<CaseFileError> for ApiError {
         let keys = error.problems.iter().filter_map(|problem| problem.key);
         let keys: Vec<String> = keys.map(str::to_owned).collect();
         let mut of = Self::of(error);
-        of.keys.extend(keys);
+        for key in keys {
+            if !of.keys.contains(&key) {
+                of.keys.push(key);
+            }
+        }
         of
     }
 }

@@ -7,7 +7,7 @@ use axum::response::{IntoResponse, Response};
 const PAGE: &str = include_str!("../page/index.html");
 const STYLE: &str = "text/css; charset=utf-8";
 const SCRIPT: &str = "text/javascript; charset=utf-8";
-const PARTS: [(&str, &str, &str); 8] = [
+const PARTS: [(&str, &str, &str); 9] = [
     ("style.css", STYLE, include_str!("../page/style.css")),
     ("main.js", SCRIPT, include_str!("../page/main.js")),
     ("state.js", SCRIPT, include_str!("../page/state.js")),
@@ -16,6 +16,7 @@ const PARTS: [(&str, &str, &str); 8] = [
     ("lever.js", SCRIPT, include_str!("../page/lever.js")),
     ("study.js", SCRIPT, include_str!("../page/study.js")),
     ("figure.js", SCRIPT, include_str!("../page/figure.js")),
+    ("plot.js", SCRIPT, include_str!("../page/plot.js")),
 ];
 
 pub(crate) async fn page() -> impl IntoResponse {

@@ -1,7 +1,7 @@
 //! The result of a click on the figure of a study: the value of a key at that place, and the state
 //! of the motion drawn there; and the branches that are drawn over the figure.
 
-use nanotap::case::quantity::{JOULES_PER_ELECTRONVOLT, Kind};
+use nanotap::case::quantity::Kind;
 use nanotap::case::units::{Units, prefixed};
 use nanotap::case::{Case, Key};
 use nanotap::dataset::{Store, StoreError, Values};
@@ -16,35 +16,32 @@ use serde_json::{Map, Value, json};
 use crate::motion_request::Start;
 
 /// An axis of a figure on which a click sets a key.
-#[derive(Clone, Copy)]
+#[derive(Clone)]
 pub(crate) struct Axis {
     pub(crate) key: Key,
-    /// Kind of its values.
-    pub(crate) kind: Kind,
     /// Factor from values of the key in SI to drawn values.
     pub(crate) factor: f64,
+    /// Unit of the drawn values; empty for numbers.
+    pub(crate) unit: String,
 }
 
 impl Axis {
     pub(crate) fn of(over: &Over) -> Self {
-        let kind = over.kind;
-        let (from, to) = (over.from, over.to);
-        let factor = if over.key.is_physical() && kind != Kind::Number {
-            prefixed(kind, 1.0, from.abs().max(to.abs())).0
+        let size = over.from.abs().max(over.to.abs());
+        let (factor, unit) = if over.key.is_physical() && over.kind != Kind::Number {
+            prefixed(over.kind, 1.0, size)
         } else {
-            1.0
+            (1.0, String::new())
         };
         Self {
             key: over.key,
-            kind,
             factor,
+            unit,
         }
     }
 
     pub(crate) fn json(&self) -> Value {
-        let physical = self.key.is_physical() && self.kind != Kind::Number;
-        let unit = if physical { self.kind.si_unit() } else { "" };
-        json!({ "name": self.key.path(), "factor": self.factor, "unit": unit })
+        json!({ "name": self.key.path(), "factor": self.factor, "unit": self.unit })
     }
 }
 
@@ -81,6 +78,19 @@ impl Height {
             _ => Some(1.0),
         };
         json!({ "name": self.observable.name, "factor": factor })
+    }
+
+    /// Whether it shows the observable with this name.
+    pub(crate) fn is(&self, name: &str) -> bool {
+        self.observable.name == name
+    }
+
+    /// The drawn value of a measured one, which is in SI or in degrees.
+    pub(crate) fn of_measured(&self, value: f64) -> f64 {
+        match self.observable.dimension {
+            Dimension::Angle => value,
+            _ => self.drawn(value, Some(1.0)),
+        }
     }
 
     /// The drawn value of a value in SI (`si` is 1) or in a unit of `si` in SI.
@@ -143,25 +153,35 @@ fn unit_of(panel: &Panel) -> String {
 }
 
 fn unit_on(axis: &nanotap_figures::Axis) -> String {
+    parts(axis).1.to_owned()
+}
+
+/// Label and unit of an axis.
+pub(crate) fn parts(axis: &nanotap_figures::Axis) -> (&str, &str) {
     if !axis.unit.is_empty() {
-        return axis.unit.clone();
+        return (&axis.label, &axis.unit);
     }
     let label = axis.label.strip_suffix(')');
-    let unit = label.and_then(|label| label.rsplit_once('('));
-    unit.map_or_else(String::new, |(_, unit)| unit.to_owned())
+    let parts = label.and_then(|label| label.rsplit_once(" ("));
+    parts.unwrap_or((&axis.label, ""))
 }
 
 /// Factor from values in a unit of `si` in SI to values in `unit`.
 fn factor(kind: Kind, si: f64, unit: &str) -> f64 {
-    let (si, unit) = match unit.strip_suffix("eV") {
-        Some(prefix) => (si / JOULES_PER_ELECTRONVOLT, format!("{prefix}J")),
-        None => (si, unit.to_owned()),
-    };
-    (-18..=12)
-        .step_by(3)
-        .map(|power| prefixed(kind, si, 2.0 * 10f64.powi(power) / si))
-        .find(|(_, name)| *name == unit)
-        .map_or(1.0, |(factor, _)| factor)
+    let own = kind.parse(&format!("1 {unit}"));
+    own.map_or(1.0, |own| si / own)
+}
+
+/// What values in one unit are to be multiplied with to be in another; `None` if they measure
+/// different things.
+pub(crate) fn conversion(from: &str, to: &str) -> Option<f64> {
+    if from == to {
+        return Some(1.0);
+    }
+    Kind::ALL.into_iter().find_map(|kind| {
+        let [from, to] = [from, to].map(|unit| kind.parse(&format!("1 {unit}")).ok());
+        Some(from? / to?)
+    })
 }
 
 /// The observables in the panels of a figure.
@@ -177,7 +197,7 @@ fn place(x: f64, heights: &[Vec<f64>], start: &str) -> Value {
 /// The orbits of branches, as drawn.
 pub(crate) fn on_branches(
     report: &BranchReport,
-    x: Axis,
+    x: &Axis,
     heights: &[Height],
     units: &Units,
 ) -> Vec<Value> {
@@ -226,7 +246,7 @@ pub(crate) fn of_approach(
 /// observables.
 pub(crate) fn in_sweep(
     store: &Store,
-    x: Axis,
+    x: &Axis,
     heights: &[Height],
     response: bool,
 ) -> Result<Vec<Value>, StoreError> {
@@ -295,7 +315,7 @@ pub(crate) fn in_sweep(
 pub(crate) fn drawn_over(
     figure: &mut Figure,
     report: &BranchReport,
-    x: Axis,
+    x: &Axis,
     heights: &[Height],
     units: &Units,
 ) {
@@ -339,12 +359,15 @@ pub(crate) fn drawn_over(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use nanotap::case::quantity::JOULES_PER_ELECTRONVOLT;
 
     #[test]
     fn a_unit_says_its_factor() {
         assert!((factor(Kind::Length, 1.0, "nm") - 1e9).abs() < 1.0);
         // 2 model units of 5 nm each are 10 nm.
         assert!((2.0 * factor(Kind::Length, 5e-9, "nm") - 10.0).abs() < 1e-12);
+        assert!((conversion("nm", "um").unwrap() - 1e-3).abs() < 1e-12);
+        assert_eq!(conversion("nm", "nN"), None);
         let [joules, volts] = ["aJ", "eV"].map(|unit| factor(Kind::Energy, 1.0, unit));
         assert!((joules / volts - 1e18 * JOULES_PER_ELECTRONVOLT).abs() < 1e-12);
         let panel = Panel::new(

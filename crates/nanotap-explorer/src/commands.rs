@@ -45,19 +45,32 @@ pub(crate) fn study_command(
     name: &str,
     request: &Map<String, Value>,
 ) -> Result<String, ApiError> {
-    let mut line = format!("nanotap {name} {}", quoted(&case_path(app, case)?));
-    for (option, value) in request {
+    let mut line = format!("nanotap {name}");
+    for file in request
+        .get("data")
+        .and_then(Value::as_array)
+        .into_iter()
+        .flatten()
+    {
+        let _ = write!(line, " {}", quoted(&text(file)));
+    }
+    let _ = write!(line, " {}", quoted(&case_path(app, case)?));
+    for (option, value) in request.iter().filter(|(option, _)| *option != "data") {
         let flag = option.replace('_', "-");
         match value {
             Value::Bool(true) => {
                 let _ = write!(line, " --{flag}");
             }
-            Value::Array(values) if ["over", "where"].contains(&option.as_str()) => {
+            Value::Array(values) if ["over", "where", "set"].contains(&option.as_str()) => {
                 for value in values {
                     let _ = write!(line, " --{flag} {}", quoted(&text(value)));
                 }
             }
-            Value::Null | Value::Bool(false) => {}
+            // Only options that are on by default are given as off.
+            Value::Bool(false) => {
+                let _ = write!(line, " --no-{flag}");
+            }
+            Value::Null => {}
             Value::Array(values) => {
                 let values: Vec<String> = values.iter().map(text).collect();
                 let _ = write!(line, " --{flag}={}", quoted(&values.join(",")));
@@ -111,10 +124,24 @@ pub(crate) fn study_python(
     studies: &[(&str, &Map<String, Value>)],
 ) -> Result<String, ApiError> {
     let path = case_path(app, case)?;
-    let mut text = format!("import nanotap\n\ncase = nanotap.Case.from_file({path:?})\n");
+    let words = studies
+        .iter()
+        .filter_map(|(_, request)| request.get("set")?.as_array());
+    let words = words
+        .flatten()
+        .filter_map(|word| word.as_str()?.split_once('='));
+    let words: Vec<String> = words
+        .map(|(key, text)| format!("{key:?}: {text:?}"))
+        .collect();
+    let set = match words.as_slice() {
+        [] => String::new(),
+        words => format!(", **{{{}}}", words.join(", ")),
+    };
+    let mut text = format!("import nanotap\n\ncase = nanotap.Case.from_file({path:?}{set})\n");
     for (name, request) in studies {
+        let name = name.replace('-', "_");
         let _ = write!(text, "{name} = nanotap.{name}(case");
-        for (option, value) in *request {
+        for (option, value) in request.iter().filter(|(option, _)| *option != "set") {
             // `from` is a keyword of Python.
             let option = if option == "from" { "from_" } else { option };
             let value = match value {

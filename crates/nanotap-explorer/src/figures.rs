@@ -1,4 +1,4 @@
-//! Figures for the page (drawn in the visible range, with the map of their axes) and as files.
+//! Figures for the page, which draws their description, and as files.
 
 use std::collections::{BTreeMap, VecDeque};
 use std::fmt::Write as _;
@@ -14,9 +14,12 @@ use serde_json::{Value, json};
 
 use crate::App;
 use crate::api_error::ApiError;
+use crate::clicks::{conversion, parts};
 
 /// Number of figures of studies that are stored for redrawing.
 const KEPT: usize = 8;
+/// Steps of the colours of a map.
+const SHADES: usize = 64;
 
 /// The visible range of a panel, in the units of its axes.
 #[derive(Clone, Debug, Deserialize)]
@@ -51,28 +54,35 @@ pub(crate) fn viewed(mut figure: Figure, views: &[View]) -> Figure {
 /// Legend of the curves of a pinned figure.
 const PINNED: &str = "pinned";
 
-/// The figure with the curves of a pinned one behind its own, in the panels with the same axes; and
+/// The figure with the curves of a pinned one behind its own, in the panels with the same axes, and
 /// whether there is one.
 pub(crate) fn over_pinned(mut figure: Figure, pinned: &Figure) -> (Figure, bool) {
-    let same = |one: &Axis, other: &Axis| one.label == other.label && one.unit == other.unit;
+    let factor = |one: &Axis, other: &Axis| {
+        let ((label, unit), (of, from)) = (parts(one), parts(other));
+        (label == of).then(|| conversion(from, unit))?
+    };
     let mut any = false;
     for (panel, old) in figure.panels.iter_mut().zip(&pinned.panels) {
-        if !same(&panel.x, &old.x) || !same(&panel.y, &old.y) {
+        let (Some(across), Some(up)) = (factor(&panel.x, &old.x), factor(&panel.y, &old.y)) else {
             continue;
-        }
+        };
         let mut label = PINNED;
         let mut behind = Vec::new();
         for layer in &old.layers {
             let mut layer = layer.clone();
-            let (colour, words) = match &mut layer {
-                Layer::Line(line) => (&mut line.colour, &mut line.label),
-                Layer::Points(points) => (&mut points.colour, &mut points.label),
-                Layer::Markers(markers) => (&mut markers.colour, &mut markers.label),
+            let (colour, words, points) = match &mut layer {
+                Layer::Line(l) => (&mut l.colour, &mut l.label, &mut l.points),
+                Layer::Points(l) => (&mut l.colour, &mut l.label, &mut l.points),
+                Layer::Markers(l) => (&mut l.colour, &mut l.label, &mut l.points),
                 _ => continue,
             };
             // What was pinned behind the pinned figure stays there.
             if words == PINNED {
                 continue;
+            }
+            for (x, y) in points {
+                *x *= across;
+                *y *= up;
             }
             *colour = Some(Colour::GREY);
             std::mem::take(&mut label).clone_into(words);
@@ -85,10 +95,21 @@ pub(crate) fn over_pinned(mut figure: Figure, pinned: &Figure) -> (Figure, bool)
     (figure, any)
 }
 
-/// A figure in the form that the page reads.
+/// The description of a figure, which the page draws.
 pub(crate) fn drawn(figure: &Figure) -> Result<Value, ApiError> {
-    let (svg, map) = figure.to_svg_with_map().map_err(ApiError::of)?;
-    Ok(json!({ "svg": svg, "map": map }))
+    let text = figure.to_json().map_err(ApiError::of)?;
+    let mut drawn: Value = serde_json::from_str(&text)
+        .map_err(|error| ApiError::failed(format!("no JSON of the figure: {error}")))?;
+    for (k, panel) in figure.panels.iter().enumerate() {
+        for (n, layer) in panel.layers.iter().enumerate() {
+            if let Layer::Heatmap(map) = layer {
+                let colour = |k: usize| map.map.at(k as f64 / SHADES as f64).to_string();
+                let colours: Vec<String> = (0..=SHADES).map(colour).collect();
+                drawn["panels"][k]["layers"][n]["colours"] = json!(colours);
+            }
+        }
+    }
+    Ok(drawn)
 }
 
 /// A figure in a format, given by its file extension.
@@ -236,15 +257,13 @@ impl Shelf {
     }
 }
 
-/// Request for a stored figure, in another range or as a file.
+/// Request for a stored figure as a file, in a range.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct Wish {
     number: u64,
     #[serde(default)]
     views: Vec<View>,
-    /// File format; empty: for the page.
-    #[serde(default)]
     format: String,
 }
 
@@ -256,9 +275,6 @@ pub(crate) async fn figure(
     app.workers
         .run(move |_| {
             let figure = viewed(Figure::clone(&figure), &wish.views);
-            if wish.format.is_empty() {
-                return Ok(Json(drawn(&figure)?).into_response());
-            }
             let (kind, bytes) = picture(&figure, &wish.format)?;
             Ok(([(header::CONTENT_TYPE, kind)], bytes).into_response())
         })
@@ -312,7 +328,12 @@ mod tests {
         // A pinned curve of a pinned figure is not drawn again.
         let (third, _) = over_pinned(drawn("nm", 4.0), &twice);
         assert_eq!(third.panels[0].layers.len(), 2);
-        let (other, any) = over_pinned(drawn("m", 3.0), &drawn("nm", 2.0));
+        let (other, any) = over_pinned(drawn("um", 3.0), &drawn("nm", 2.0));
+        assert!(any);
+        assert!(
+            matches!(&other.panels[0].layers[0], Layer::Line(line) if (line.points[0].0 - 1e-3).abs() < 1e-15)
+        );
+        let (other, any) = over_pinned(drawn("Hz", 3.0), &drawn("nm", 2.0));
         assert!(!any);
         assert_eq!(other.panels[0].layers.len(), 1);
     }

@@ -1,9 +1,11 @@
 //! The forms of the studies: their fields and initial values.
 
 use nanotap::case::quantity::Kind;
-use nanotap::case::{Case, Key};
+use nanotap::case::{Case, Key, Value as Stated};
 use nanotap::model::Model;
 use nanotap::observe::time_series::state_names;
+use nanotap::study::registry::{STUDIES, StudyEntry, study};
+use nanotap::study::request::{Property, properties};
 use nanotap::study::start_box::default_box;
 use serde_json::{Value, json};
 
@@ -14,6 +16,83 @@ use crate::maps::Shows;
 pub(crate) const ANY: &str = "any";
 /// The choice of a field that excludes a second motion.
 pub(crate) const ONE_STATE: &str = "no second one";
+/// The choices of an option that is on or off.
+pub(crate) const YES: &str = "yes";
+const NO: &str = "no";
+/// The choice of the tip of the case for other levers.
+pub(crate) const OWN_TIP: &str = "of the case";
+/// Studies with a tab, or a place on the page, made for them.
+const PLACED: [&str; 12] = [
+    "simulate",
+    "orbit",
+    "attractors",
+    "branch",
+    "approach",
+    "sweep",
+    "window",
+    "basin",
+    "scan",
+    "fit",
+    "lever",
+    // Its data are those of another measurement.
+    "reconstruct",
+];
+
+/// Whether the page makes the form of a study from its options, and shows its report.
+pub(crate) fn is_plain(entry: &StudyEntry) -> bool {
+    entry.document.is_some() && !PLACED.contains(&entry.name)
+}
+
+/// The studies whose tabs are made from the registry.
+pub(crate) fn plain_studies() -> impl Iterator<Item = &'static StudyEntry> {
+    STUDIES.iter().filter(|entry| is_plain(entry))
+}
+
+/// A study of the registry: its name, what it is about, and its form.
+pub(crate) fn plain(entry: &StudyEntry) -> Value {
+    json!({ "name": entry.name, "about": entry.about, "form": of_options(entry) })
+}
+
+/// The form of a study's options.
+fn of_options(entry: &StudyEntry) -> Vec<Value> {
+    let schema = (entry.request)();
+    let own = |property: &Property<'_>| property.schema["x-own"] == true;
+    let field = |property: Property<'_>| {
+        let words = property.words();
+        let mut field = json!({
+            "name": property.name,
+            "words": property.name.replace('_', " "),
+            "about": property.description(),
+            "value": property.default().map_or_else(String::new, shown),
+        });
+        if property.allows("boolean") {
+            field["choices"] = json!([NO, YES]);
+        } else if !words.is_empty() {
+            let empty = property.default().is_none().then_some("");
+            let words = words.into_iter().map(|(word, _)| word);
+            field["choices"] = empty.into_iter().chain(words).collect();
+        } else {
+            field["hint"] = property.schema["x-value"].clone();
+        }
+        field
+    };
+    properties(&schema)
+        .filter(|property| !own(property))
+        .map(field)
+        .collect()
+}
+
+/// A default as a form has it.
+fn shown(value: &Value) -> String {
+    match value {
+        Value::Bool(true) => YES.to_owned(),
+        Value::Bool(false) => NO.to_owned(),
+        Value::String(text) => text.clone(),
+        Value::Array(all) => all.iter().map(shown).collect::<Vec<_>>().join(","),
+        other => other.to_string(),
+    }
+}
+
 /// Peak force that an ordinary polymer survives.
 const GENTLE: &str = "1 nN";
 
@@ -99,7 +178,12 @@ pub(crate) fn forms(case: &Case, base: &Case, model: &Model) -> Value {
         json!({ "name": "states", "words": "motions", "value": ONE_STATE,
             "choices": [ONE_STATE, ANY] }),
     ];
-    let plan = [across, up, conditions].concat();
+    let plan = [across, up, conditions.clone()].concat();
+    let levers = match case.physical() {
+        Some(view) => levers(view.held.and(case.stated(Key::DriveSetpoint)), conditions),
+        None => Vec::new(),
+    };
+    let data = data(case);
     let image = image(case, base);
     let slice = [entry("x", 0), entry("y", velocity)].concat();
     json!({
@@ -112,13 +196,43 @@ pub(crate) fn forms(case: &Case, base: &Case, model: &Model) -> Value {
         ],
         "map": plane,
         "plan": plan,
+        "levers": levers,
+        "data": data,
         "image": image,
         "basin": slice,
     })
 }
 
+/// The fields of the comparison of levers.
+fn levers(setpoint: Option<&Stated>, conditions: Vec<Value>) -> Vec<Value> {
+    let setpoint = setpoint.map_or_else(|| "0.8".to_owned(), Stated::text);
+    let own = vec![
+        json!({ "name": "setpoint", "words": "setpoint", "value": setpoint }),
+        json!({ "name": "tip", "words": "tip", "value": "of the lever",
+            "choices": ["of the lever", OWN_TIP] }),
+    ];
+    [own, conditions].concat()
+}
+
+/// The fields of measured data: the options of a fit.
+fn data(case: &Case) -> Vec<Value> {
+    let Some(entry) = study("fit") else {
+        return Vec::new();
+    };
+    let mut fields = of_options(entry);
+    let moduli = [Key::SampleModulus, Key::SampleStiffness];
+    let modulus = moduli.into_iter().find(|key| case.get(*key).is_finite());
+    if let (Some(modulus), Some(free)) = (modulus, fields.iter_mut().find(|f| f["name"] == "free"))
+    {
+        free["value"] = format!("{modulus},gap.offset").into();
+    }
+    fields
+}
+
 /// Surfaces that the form of an image offers; that of the case's `[scan]` comes first, if it has one.
-pub(crate) const SURFACES: [&str; 4] = [OWN_SURFACE, "step", "grating", "particle"];
+pub(crate) const SURFACES: [&str; 5] = [OWN_SURFACE, "step", "grating", "particle", DRAWN];
+/// The surface that is drawn by hand.
+pub(crate) const DRAWN: &str = "drawn";
 const OWN_SURFACE: &str = "of the case";
 /// Drive periods of a line in one direction.
 const LINE_PERIODS: f64 = 5000.0;
@@ -137,22 +251,34 @@ fn image(case: &Case, base: &Case) -> Vec<Value> {
         let value = if own { String::new() } else { value };
         json!({ "name": name, "words": words, "value": value, "hint": OWN_SURFACE })
     };
-    let rate = Kind::Frequency.format_digits(frequency / (2.0 * LINE_PERIODS), 3);
+    let rate = frequency / (2.0 * LINE_PERIODS);
+    let shown = |kind: Kind, value: f64| kind.format_digits(value, 3);
+    let slid = |mut field: Value, around: f64, unit: &str| {
+        let (from, to) = (around / SLIDES, around * SLIDES);
+        field["slider"] = json!({ "from": from, "to": to, "usual": around, "unit": unit });
+        field
+    };
     vec![
         json!({ "name": "surface", "words": "surface", "value": surfaces[0], "choices": surfaces }),
         json!({ "name": "height", "words": "height", "value": "10 nm" }),
+        json!({ "name": "profile", "words": "", "value": "", "drawn": DRAWN }),
         field("size", "line", "500 nm".to_owned()),
-        field("rate", "lines a second", rate),
         field("setpoint", "setpoint", "0.8".to_owned()),
-        field(
-            "gain",
-            "integral gain (1/s)",
-            format!("{gain:.3e}")
-                .parse()
-                .map_or_else(|_| String::new(), |gain: f64| gain.to_string()),
+        slid(
+            field("rate", "lines a second", shown(Kind::Frequency, rate)),
+            rate,
+            "Hz",
+        ),
+        slid(
+            field("gain", "integral gain (1/s)", shown(Kind::Number, gain)),
+            gain,
+            "",
         ),
     ]
 }
+
+/// The ends of a slider are the usual value divided by and multiplied by this factor.
+const SLIDES: f64 = 30.0;
 
 /// A range around the value of a key, as text.
 fn ends(base: &Case, key: Key, reach: f64) -> [String; 2] {

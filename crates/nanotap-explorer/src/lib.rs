@@ -32,6 +32,7 @@ mod motion;
 mod motion_request;
 mod preset;
 mod readout;
+mod report;
 mod scratch;
 mod study;
 mod work;
@@ -54,6 +55,8 @@ use crate::work::Workers;
 
 /// Largest request, in bytes; a case file and its options are far smaller.
 const LONGEST_REQUEST: usize = 256 << 10;
+/// Largest request with measured data.
+const LONGEST_DATA: usize = 2 << 20;
 
 /// The initial case of the explorer, and its port.
 #[derive(Clone, Debug, Default)]
@@ -134,7 +137,7 @@ fn router(app: Arc<App>) -> Router {
         .route("/api/study", post(study::study))
         .route("/api/figure", post(figures::figure))
         .route("/api/export", post(export::export))
-        .layer(DefaultBodyLimit::max(LONGEST_REQUEST))
+        .layer(DefaultBodyLimit::max(LONGEST_DATA))
         .layer(axum::middleware::from_fn(listen::whole))
         .layer(axum::middleware::from_fn_with_state(
             Arc::clone(&app),

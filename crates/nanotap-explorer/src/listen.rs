@@ -50,14 +50,15 @@ pub(crate) async fn listen(listener: &TcpListener, router: Router) {
 /// Reads the body of a request, within the limits of size and time.
 pub(crate) async fn whole(request: Request, next: Next) -> Response {
     let (head, body) = request.into_parts();
-    let read = axum::body::to_bytes(body, crate::LONGEST_REQUEST);
+    let longest = match head.uri.path() {
+        "/api/study" => crate::LONGEST_DATA,
+        _ => crate::LONGEST_REQUEST,
+    };
+    let read = axum::body::to_bytes(body, longest);
     match tokio::time::timeout(LONGEST_ARRIVAL, read).await {
         Ok(Ok(bytes)) => next.run(Request::from_parts(head, Body::from(bytes))).await,
         Ok(Err(_)) => {
-            let words = format!(
-                "expected at most {} bytes in a request",
-                crate::LONGEST_REQUEST
-            );
+            let words = format!("expected at most {longest} bytes in a request");
             (StatusCode::PAYLOAD_TOO_LARGE, words).into_response()
         }
         Err(_) => {

@@ -23,7 +23,7 @@ use nanotap_figures::Figure;
 use serde_json::{Value, json};
 
 use crate::api_error::ApiError;
-use crate::figures::{Views, drawn, viewed};
+use crate::figures::drawn;
 use crate::film::film;
 use crate::motion_request::{MotionRequest, Start, model_of};
 use crate::readout::readout;
@@ -167,8 +167,8 @@ fn answer(app: &App, request: &MotionRequest, control: &Control<'_>) -> Result<V
         "distance": case.physical().map(|_| Kind::Length.format_digits(case.get(Key::GapTip), 5)),
         "observables": rows(&case, motion.observables()),
         "start": Start::text(None, motion.state()),
-        "figure": unlettered(motion.figure(&model, &case), &request.views, "portrait")?,
-        "contact": unlettered(motion.contact_figure(&model, &case), &request.views, "contact")?,
+        "figure": drawn(&motion.figure(&model, &case))?,
+        "contact": drawn(&motion.contact_figure(&model, &case))?,
         "film": film(&case, &model, motion.state(), motion.periods())?,
         "fixed_step": fixed_step(&case, &model, request.steps, start.state, control)?,
         "forms": forms::forms(&case, &base, &model),
@@ -256,15 +256,6 @@ fn near(
         }
     }
     Ok(None)
-}
-
-/// The figure without panel letters, which are for publications; the page has headings.
-fn unlettered(figure: Figure, views: &Views, name: &str) -> Result<Value, ApiError> {
-    let figure = figure.letters(false);
-    match views.get(name) {
-        Some(views) => drawn(&viewed(figure, views)),
-        None => drawn(&figure),
-    }
 }
 
 /// Every scalar observable of the motion: as in the terminal's `--json`, and as text with its unit.

@@ -14,6 +14,7 @@ use serde_json::{Value, json};
 
 use crate::App;
 use crate::api_error::{ApiError, key_of};
+use crate::forms;
 
 /// A case to start from.
 #[derive(Clone, Debug)]
@@ -221,6 +222,14 @@ impl CaseSpec {
         Ok(solved.map_err(about)?.0)
     }
 
+    /// States a value in place of all that says the same.
+    pub(crate) fn put(&mut self, key: Key, text: &str) {
+        let same: Vec<&str> = key.alternatives().map(|(other, _)| other.path()).collect();
+        let says = |word: &String| key_of(word) == key.path() || same.contains(&key_of(word));
+        self.set.retain(|word| !says(word));
+        self.set.push(format!("{}={text}", key.path()));
+    }
+
     /// The case with one more change, if it has a model.
     pub(crate) fn with_word(&self, app: &App, word: String) -> Option<Case> {
         let preset = self.preset(app).ok()?;
@@ -271,7 +280,8 @@ pub(crate) async fn about(State(app): State<Arc<App>>) -> Json<Value> {
             json!({ "name": preset.name, "words": preset.words, "group": group })
         })
         .collect();
-    Json(json!({ "version": env!("CARGO_PKG_VERSION"), "presets": presets }))
+    let studies: Vec<Value> = forms::plain_studies().map(forms::plain).collect();
+    Json(json!({ "version": env!("CARGO_PKG_VERSION"), "presets": presets, "studies": studies }))
 }
 
 #[cfg(test)]

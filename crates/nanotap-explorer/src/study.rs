@@ -1,30 +1,37 @@
 //! The terminal's studies, in stages of increasing resolution until they are cancelled.
 
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::{Duration, Instant};
 
 use axum::Json;
 use axum::extract::State;
 use axum::response::Response;
+use nanotap::case::file::{Source, scan_table};
 use nanotap::case::quantity::Kind;
+use nanotap::case::units::prefixed;
 use nanotap::case::{Case, Key};
 use nanotap::control::Control;
 use nanotap::dataset::{Share, Store, Work};
 use nanotap::figure::approach::approach_figure;
 use nanotap::figure::basin::figure as basin_figure;
 use nanotap::figure::branch::{Shown, case_figure};
+use nanotap::figure::fit::fit_figure;
 use nanotap::figure::scan::scan_figure;
+use nanotap::figure::study::document_and_figure;
 use nanotap::figure::sweep::{figure as sweep_figure, response as response_figure};
 use nanotap::figure::window::figure as window_figure;
 use nanotap::model::Model;
 use nanotap::observe::time_series::state_names;
-use nanotap::study::approach::ApproachStudy;
+use nanotap::study::approach::{ApproachReport, ApproachStudy};
 use nanotap::study::branch::{BranchReport, BranchStudy};
-use nanotap::study::registry::{Study, study as study_named};
-use nanotap::study::request::read;
+use nanotap::study::fit::{FitOptions, FitReport, FitStudy, FittedParameter, Table, measured};
+use nanotap::study::lever::{LeverOptions, LeverStudy, QualityFactorSource, case_with_lever};
+use nanotap::study::registry::{Study, StudyEntry, study as study_named};
+use nanotap::study::request::{Property, properties, read};
 use nanotap::study::scan::ScanStudy;
 use nanotap::study::sweep::Over;
 use nanotap::study::window::Window;
-use nanotap_figures::{Axis as Axes, Figure, Panel};
+use nanotap_figures::{Axis as Axes, Colour, Figure, Markers, Panel};
 use serde::Deserialize;
 use serde_json::{Map, Value, json};
 
@@ -37,6 +44,7 @@ use crate::forms;
 use crate::maps::{self, Shows};
 use crate::motion_request::{Start, model_of};
 use crate::preset::CaseSpec;
+use crate::report;
 use crate::scratch::Scratch;
 
 /// Numbers of values of the parameter in the stages of a diagram.
@@ -61,6 +69,12 @@ const APPROACH_SHOWS: [&str; 4] = ["first_harmonic", "phase", "dissipation", "pe
 const STARTS: (usize, usize) = (6, 3);
 /// Drive periods recorded at each value.
 const RECORDED: usize = 32;
+/// Pixels of a line of an image, there and back.
+const LINE_PIXELS: f64 = 512.0;
+/// Most heights of a drawn surface.
+const MAX_DRAWN: usize = 1000;
+/// Time between messages on the progress.
+const BETWEEN: Duration = Duration::from_millis(300);
 
 /// A study as requested by the page: its fields by name.
 #[derive(Clone, Debug, Deserialize)]
@@ -69,25 +83,15 @@ pub(crate) struct StudyRequest {
     case: CaseSpec,
     #[serde(default)]
     start: String,
-    tab: Tab,
+    /// A tab of the page, or a study of the registry.
+    tab: String,
+    /// Measured data: name and text of their file.
+    #[serde(default)]
+    data: Option<(String, String)>,
     options: Map<String, Value>,
     /// Number of a figure whose curves are drawn behind; 0: none.
     #[serde(default)]
     pinned: u64,
-}
-
-/// The kind of study.
-#[derive(Clone, Copy, Debug, Deserialize)]
-#[serde(rename_all = "lowercase")]
-enum Tab {
-    Diagram,
-    Branches,
-    Resonance,
-    Approach,
-    Basin,
-    Map,
-    Plan,
-    Image,
 }
 
 pub(crate) async fn study(
@@ -106,23 +110,31 @@ pub(crate) async fn study(
     })
 }
 
+/// Sends a message to the page.
+type HandOver<'a> = &'a (dyn Fn(Value) + Sync);
+
 /// A running study.
 struct Studied<'a> {
     app: &'a App,
     request: &'a StudyRequest,
     control: &'a Control<'a>,
-    hand_over: &'a dyn Fn(Value),
+    hand_over: HandOver<'a>,
 }
 
 /// A finished stage.
+#[derive(Default)]
 struct Stage<'a> {
-    figure: Figure,
-    clicks: &'a Value,
+    figure: Option<Figure>,
+    clicks: Value,
     words: String,
     /// Names and requests of the studies in its figure.
     studies: &'a [Computed<'a>],
     /// Lines of the case file in addition.
-    table: Option<String>,
+    scan: Option<String>,
+    /// What the page shows below the figure.
+    tables: Vec<Value>,
+    /// A case file that was found, and the changes to the case that lead to it.
+    found: Option<(String, Map<String, Value>)>,
 }
 
 /// The name of a study, and its options.
@@ -130,16 +142,180 @@ type Computed<'a> = (&'a str, &'a Map<String, Value>);
 
 impl Studied<'_> {
     fn run(&self) -> Result<(), ApiError> {
-        match self.request.tab {
-            Tab::Diagram => self.sweep(&DIAGRAM, STARTS.0, false),
-            Tab::Resonance => self.sweep(&DIAGRAM[..2], 0, true),
-            Tab::Map => self.map(),
-            Tab::Plan => self.plan(),
-            Tab::Image => self.image(),
-            Tab::Branches => self.branches(),
-            Tab::Approach => self.approach(),
-            Tab::Basin => self.basin(),
+        match self.request.tab.as_str() {
+            "diagram" => self.sweep(&DIAGRAM, STARTS.0, false),
+            "resonance" => self.sweep(&DIAGRAM[..2], 0, true),
+            "map" => self.map(),
+            "plan" => self.plan(),
+            "image" => self.image(),
+            "branches" => self.branches(),
+            "approach" => self.approach(),
+            "basin" => self.basin(),
+            "levers" => self.levers(),
+            "data" => self.measured(),
+            name => self.any(name),
         }
+    }
+
+    /// Runs work whose progress the page shows.
+    fn counting<T>(&self, counted: &str, work: impl FnOnce(&Control<'_>) -> T) -> T {
+        let last = Mutex::new(Instant::now());
+        let progress = |done: usize, total: usize| {
+            let mut last = last.lock().unwrap_or_else(PoisonError::into_inner);
+            if last.elapsed() > BETWEEN {
+                *last = Instant::now();
+                (self.hand_over)(json!({ "progress": format!("{done} of {total} {counted}") }));
+            }
+        };
+        work(&Control {
+            cancel: self.control.cancel,
+            progress: Some(&progress),
+        })
+    }
+
+    /// The options that the form gives, of those that a study has; a default is not stated.
+    fn options(&self, entry: &StudyEntry) -> Map<String, Value> {
+        let schema = (entry.request)();
+        let given = |property: Property<'_>| {
+            let text = self.field(property.name).ok()?;
+            let value = if property.allows("boolean") && !property.allows("string") {
+                (text == forms::YES).into()
+            } else {
+                property.parsed(text)
+            };
+            (property.default() != Some(&value)).then(|| (property.name.to_owned(), value))
+        };
+        properties(&schema).filter_map(given).collect()
+    }
+
+    /// A study of the registry that has no tab with more than its options and its report.
+    fn any(&self, name: &str) -> Result<(), ApiError> {
+        let entry = study_named(name).filter(|entry| forms::is_plain(entry));
+        let entry = entry.ok_or_else(|| {
+            let known: Vec<&str> = forms::plain_studies().map(|entry| entry.name).collect();
+            ApiError::input(
+                format!("expected a study, got `{name}`"),
+                format!("there are {}", known.join(", ")),
+            )
+        })?;
+        let case = self.request.case.any_distance(self.app)?;
+        model_of(&case)?;
+        let options = self.options(entry);
+        let request = Value::Object(options.clone());
+        let (document, figure) = self.counting(entry.counted, |control| {
+            document_and_figure(entry, &case, request, control)
+        })?;
+        let schema = (entry.report)();
+        self.hand(Stage {
+            figure,
+            words: entry.about.to_owned(),
+            studies: &[(name, &options)],
+            tables: report::tables(&document, schema.as_value()),
+            ..Stage::default()
+        })
+    }
+
+    /// Levers of the catalogue on the sample of the case.
+    fn levers(&self) -> Result<(), ApiError> {
+        let mut spec = self.request.case.clone();
+        let setpoint = self.field("setpoint")?;
+        spec.put(Key::DriveSetpoint, setpoint);
+        let own = self.request.case.any_distance(self.app)?;
+        let case = spec.any_distance(self.app)?;
+        let conditions = self.conditions()?;
+        let unconditional = conditions.is_empty();
+        let mut options = object(json!({ "where": conditions }));
+        if self.field("tip")? == forms::OWN_TIP {
+            options.insert("keep_tip".into(), true.into());
+        }
+        let read: LeverOptions = read(Value::Object(options.clone()))?;
+        if case.stated(Key::DriveSetpoint) != own.stated(Key::DriveSetpoint) {
+            let word = format!("{}={setpoint}", Key::DriveSetpoint);
+            options.insert("set".into(), json!([word]));
+        }
+        let report = self.counting(LeverStudy::COUNTED, |control| {
+            LeverStudy::run(&case, &read, control)
+        })?;
+        let shown = |kind: Kind, value: f64| {
+            if value.is_finite() {
+                kind.format_digits(value, 3)
+            } else {
+                String::new()
+            }
+        };
+        let rows = report.levers.iter().map(|lever| {
+            let motion = lever.motion.as_ref();
+            let cells = [
+                lever.lever.clone(),
+                shown(Kind::Stiffness, lever.k),
+                shown(Kind::Frequency, lever.f0),
+                shown(Kind::Number, lever.quality_factor),
+                shown(Kind::Length, lever.tip_radius.unwrap_or(f64::NAN)),
+                match (motion, &lever.reason) {
+                    (Some(motion), _) => shown(Kind::Force, motion.physical.observables.peak_force),
+                    (None, Some(reason)) => reason.clone(),
+                    (None, None) => String::new(),
+                },
+                motion.map_or_else(String::new, |motion| motion.regime.to_owned()),
+                motion.map_or_else(String::new, |motion| motion.states.to_string()),
+                shown(Kind::Time, lever.time_constant * LINE_PIXELS),
+                lever
+                    .holds
+                    .map_or("", |holds| if holds { "yes" } else { "no" })
+                    .to_owned(),
+            ];
+            let taken = case_with_lever(&case, &lever.lever, &read).ok();
+            let set = taken.map(|taken| report::changes(&own, &taken));
+            let shown = &cells[..cells.len() - usize::from(unconditional)];
+            report::row(shown, set.as_ref().filter(|_| motion.is_some()))
+        });
+        let line = format!(
+            "{LINE_PIXELS} pixels there and back, a time constant of the amplitude Q/(π f0) each"
+        );
+        let heads = [
+            ("lever", "Name in the catalogue"),
+            ("k", "Spring constant"),
+            ("f₀", "Free resonance"),
+            ("Q", "Quality factor"),
+            ("tip", "Radius of the tip"),
+            ("peak force", "At the setpoint"),
+            ("regime", "Whether the mean force attracts or repels"),
+            ("states", "Stable motions found at this distance"),
+            ("a line", line.as_str()),
+            ("meets", "Whether all conditions hold"),
+        ];
+        let heads = &heads[..heads.len() - usize::from(unconditional)];
+        self.hand(Stage {
+            words: format!(
+                "{} levers at A₀ = {} and setpoint {setpoint}, with {}. A click on a row takes that lever.",
+                report.levers.len(),
+                shown(Kind::Length, report.free_amplitude),
+                match report.quality_factor_source {
+                    QualityFactorSource::Case => "the quality factor of the case",
+                    QualityFactorSource::Fluid => "quality factors in the fluid of the case",
+                    QualityFactorSource::Air => "quality factors in air",
+                }
+            ),
+            studies: &[("lever", &options)],
+            tables: vec![report::table("", heads, &rows.collect::<Vec<_>>())],
+            ..Stage::default()
+        })
+    }
+
+    /// The conditions of the form.
+    fn conditions(&self) -> Result<Vec<String>, ApiError> {
+        let mut wanted = Vec::new();
+        if let Ok(force) = self.field("force") {
+            wanted.push(format!("F_max < {force}"));
+        }
+        match self.field("regime")? {
+            forms::ANY => {}
+            regime => wanted.push(format!("regime = {regime}")),
+        }
+        if self.field("states")? == forms::ONE_STATE {
+            wanted.push("states = 1".to_owned());
+        }
+        Ok(wanted)
     }
 
     fn field(&self, name: &str) -> Result<&str, ApiError> {
@@ -159,39 +335,42 @@ impl Studied<'_> {
         Ok((text, over))
     }
 
-    fn hand(&self, stage: &Stage<'_>) -> Result<(), ApiError> {
+    fn hand(&self, stage: Stage<'_>) -> Result<(), ApiError> {
         let case = &self.request.case;
         let command = |(name, request): &Computed<'_>| study_command(self.app, case, name, request);
         let commands = stage.studies.iter().map(command);
         let commands: Vec<String> = commands.collect::<Result<_, _>>()?;
-        let (figure, words) = match self.request.pinned {
-            0 => (stage.figure.clone(), stage.words.clone()),
-            pinned => {
-                let pinned = self.app.figures.get(pinned)?;
-                let (figure, any) = over_pinned(stage.figure.clone(), &pinned);
-                let other = if any {
-                    ""
-                } else {
-                    "; the pinned figure has other axes"
-                };
-                (figure, stage.words.clone() + other)
+        let mut words = stage.words;
+        let mut figure = stage.figure;
+        if let (Some(own), 1..) = (&figure, self.request.pinned) {
+            let pinned = self.app.figures.get(self.request.pinned)?;
+            let (both, any) = over_pinned(own.clone(), &pinned);
+            if !any {
+                words.push_str("; the pinned figure has other axes");
             }
-        };
-        (self.hand_over)(json!({
-            "figure": drawn(&figure)?,
-            "number": self.app.figures.put(figure),
+            figure = Some(both);
+        }
+        let mut message = json!({
             "clicks": stage.clicks,
             "words": words,
-            "command": match &stage.table {
-                Some(table) => {
-                    // The saved case has no other `[scan]`.
+            "tables": stage.tables,
+            "command": match &stage.scan {
+                Some(scan) => {
                     let path = quoted(&case_path(self.app, case)?);
-                    appended(table, &commands.join("\n").replacen(&path, CASE_FILE, 1))
+                    with_scan(scan, &commands.join("\n").replacen(&path, CASE_FILE, 1))
                 }
                 None => commands.join("\n"),
             },
             "python": study_python(self.app, case, stage.studies)?,
-        }));
+        });
+        if let Some(figure) = figure {
+            message["figure"] = drawn(&figure)?;
+            message["number"] = self.app.figures.put(figure).into();
+        }
+        if let Some((file, set)) = stage.found {
+            message["found"] = json!({ "file": file, "set": set });
+        }
+        (self.hand_over)(message);
         Ok(())
     }
 
@@ -266,18 +445,18 @@ impl Studied<'_> {
             let (mut figure, mut near) = self.dataset(&case, "sweep", &options, |store| {
                 let figure = draw(store).map_err(ApiError::of)?;
                 let heights = Height::of(&figure, names);
-                let near = clicks::in_sweep(store, x, &heights, response).map_err(ApiError::of)?;
+                let near = clicks::in_sweep(store, &x, &heights, response).map_err(ApiError::of)?;
                 Ok((figure, near))
             })?;
             let heights = clicks::of_heights(&Height::of(&figure, names), &case.units());
             let fixed = clicks::fixed(&case, &[over.key]);
             let hand = |figure: &Figure, near: &[Value], words, studies: &[Computed<'_>]| {
-                self.hand(&Stage {
-                    figure: figure.clone(),
-                    clicks: &json!({ "set": { "x": x.json() }, "near": near, "fixed": fixed, "heights": heights }),
+                self.hand(Stage {
+                    figure: Some(figure.clone()),
+                    clicks: json!({ "set": { "x": x.json() }, "near": near, "fixed": fixed, "heights": heights }),
                     words,
                     studies,
-table: None,
+..Stage::default()
                 })
             };
             let swept = ("sweep", &options);
@@ -291,8 +470,8 @@ table: None,
             }
             let (report, followed) = self.followed(&case, &over, OVERLAID)?;
             let followed_heights = Height::of(&figure, names);
-            clicks::drawn_over(&mut figure, &report, x, &followed_heights, &case.units());
-            near.extend(clicks::on_branches(&report, x, &followed_heights, &case.units()));
+            clicks::drawn_over(&mut figure, &report, &x, &followed_heights, &case.units());
+            near.extend(clicks::on_branches(&report, &x, &followed_heights, &case.units()));
             let orbits = report.points.len();
             let words = format!("{count} values and {orbits} orbits on branches");
             hand(&figure, &near, words, &[swept, ("branch", &followed)])
@@ -314,12 +493,12 @@ table: None,
             let figure = self.dataset(&case, "sweep", &options, |store| {
                 maps::figure(store, shows.unwrap_or_default()).map_err(ApiError::of)
             })?;
-            self.hand(&Stage {
-                figure,
-                clicks: &json!({ "set": { "x": x, "y": y }, "fixed": fixed }),
+            self.hand(Stage {
+                figure: Some(figure),
+                clicks: json!({ "set": { "x": x, "y": y }, "fixed": fixed }),
                 words: progress(count.pow(2), finest.pow(2), "values"),
                 studies: &[("sweep", &options)],
-                table: None,
+                ..Stage::default()
             })
         })
     }
@@ -327,17 +506,7 @@ table: None,
     /// Where, over two parameters, every motion meets the conditions of the form.
     fn plan(&self) -> Result<(), ApiError> {
         let case = self.request.case.any_distance(self.app)?;
-        let mut wanted = Vec::new();
-        if let Ok(force) = self.field("force") {
-            wanted.push(format!("F_max < {force}"));
-        }
-        match self.field("regime")? {
-            forms::ANY => {}
-            regime => wanted.push(format!("regime = {regime}")),
-        }
-        if self.field("states")? == forms::ONE_STATE {
-            wanted.push("states = 1".to_owned());
-        }
+        let wanted = self.conditions()?;
         self.stages(&PLAN, |count, finest| {
             let over = [self.over(&case, "1", count)?, self.over(&case, "2", count)?];
             let texts: Vec<&String> = over.iter().map(|(text, _)| text).collect();
@@ -351,12 +520,12 @@ table: None,
             let safe = safe.map_or_else(String::new, |targets| {
                 format!("; all conditions hold at {:.0} %", 100.0 * targets.share)
             });
-            self.hand(&Stage {
-                figure,
-                clicks: &json!({ "set": { "x": x, "y": y }, "fixed": fixed }),
+            self.hand(Stage {
+                figure: Some(figure),
+                clicks: json!({ "set": { "x": x, "y": y }, "fixed": fixed }),
                 words: progress(count.pow(2), finest.pow(2), "points") + &safe,
                 studies: &[("window", &options)],
-                table: None,
+                ..Stage::default()
             })
         })
     }
@@ -377,9 +546,7 @@ table: None,
         }
         let mut computed = options.clone();
         let surface = self.surface()?;
-        if let Some(surface) = &surface {
-            computed.insert("surface".to_owned(), json!([surface]));
-        }
+        computed.extend(surface.clone().unwrap_or_default());
         let report = self.report::<ScanStudy>(&case, &computed)?;
         let gain = report.feedback.as_ref();
         let gain = gain.and_then(|feedback| feedback.largest_stable_gain);
@@ -387,64 +554,67 @@ table: None,
             let gain = Kind::Number.format_digits(gain, 3);
             format!(" The feedback is stable up to a gain of {gain}/s.")
         });
-        self.hand(&Stage {
-            figure: scan_figure(&report),
-            clicks: &json!({}),
+        self.hand(Stage {
+            figure: Some(scan_figure(&report)),
+            clicks: json!({}),
             words: format!("{}{gain}", report.verdict),
             studies: &[("scan", &options)],
-            table: self.scan_table(&case, surface)?,
+            scan: Self::scan_table(&case, surface),
+            ..Stage::default()
         })
     }
 
-    /// The table `[scan]` that the saved case needs for the surface; `None` if its file has it.
-    fn scan_table(&self, case: &Case, surface: Option<Value>) -> Result<Option<String>, ApiError> {
-        let spec = &self.request.case;
-        if surface.is_none() && spec.is_a_file(self.app)? {
-            return Ok(None);
-        }
+    /// The table `[scan]` that the saved case needs for another surface than its own.
+    fn scan_table(case: &Case, surface: Option<Map<String, Value>>) -> Option<String> {
+        let surface = surface?;
         let mut table = case.scan().cloned().unwrap_or_default();
-        if let Some(surface) = surface {
-            table.retain(|name, _| !["profile", "image"].contains(&name.as_str()));
-            table.insert("surface".to_owned(), json!([surface]));
-        }
-        let lines = table
-            .iter()
-            .map(|(name, value)| format!("{name} = {}", inline(value)));
-        let lines: Vec<String> = lines.collect();
-        Ok(Some(format!("[scan]\n{}", lines.join("\n"))))
+        table.retain(|name, _| !["profile", "image"].contains(&name.as_str()));
+        table.extend(surface);
+        Some(scan_table(&table))
     }
 
-    /// The surface of the form; `None`: that of the case.
-    fn surface(&self) -> Result<Option<Value>, ApiError> {
-        let [own, step, grating, particle] = forms::SURFACES;
+    /// The surface of the form, as keys of `[scan]`; `None`: that of the case.
+    fn surface(&self) -> Result<Option<Map<String, Value>>, ApiError> {
+        let [own, step, grating, particle, drawn] = forms::SURFACES;
         let chosen = self.field("surface")?;
         if chosen == own {
             return Ok(None);
         }
-        let height = self.field("height")?;
-        let line = self.field("size")?;
-        let length = |text: &str, field: &str| {
-            Kind::Length
-                .parse(text)
+        let length = |field: &str| {
+            let value = Kind::Length.parse(self.field(field)?);
+            value
                 .map_err(|error| ApiError::input(error.to_string(), "as in \"10 nm\"").about(field))
         };
-        let part = |part: f64| -> Result<String, ApiError> {
-            Ok(Kind::Length.format_exact(part * length(line, "size")?))
-        };
-        Ok(Some(if chosen == step {
-            json!({ "step": { "from": part(0.25)?, "to": part(0.65)?, "height": height } })
+        let (height, line) = (length("height")?, length("size")?);
+        let text = |value: f64| Kind::Length.format_exact(value);
+        let feature = if chosen == step {
+            json!({ "step": { "from": text(0.25 * line), "to": text(0.65 * line), "height": text(height) } })
         } else if chosen == grating {
-            json!({ "grating": { "height": height, "period": part(0.25)? } })
+            json!({ "grating": { "height": text(height), "period": text(0.25 * line) } })
         } else if chosen == particle {
-            let radius = Kind::Length.format_exact(0.5 * length(height, "height")?);
-            json!({ "particle": { "at": part(0.5)?, "radius": radius } })
+            json!({ "particle": { "at": text(0.5 * line), "radius": text(0.5 * height) } })
+        } else if chosen == drawn {
+            let numbers = self.field("profile")?.split(',').map(str::parse::<f64>);
+            let parts = numbers.collect::<Result<Vec<f64>, _>>().ok();
+            let parts = parts.filter(|parts| (2..=MAX_DRAWN).contains(&parts.len()));
+            let parts = parts.ok_or_else(|| {
+                let message = format!("expected 2 to {MAX_DRAWN} heights between 0 and 1");
+                ApiError::input(message, "draw the surface").about("profile")
+            })?;
+            let heights: Vec<f64> = parts.iter().map(|part| part * height).collect();
+            // A drawn surface has no features in addition.
+            let flat = json!({ "step": { "from": "0 m", "to": text(line), "height": "0 m" } });
+            return Ok(Some(object(
+                json!({ "profile": heights, "surface": [flat] }),
+            )));
         } else {
             let known = forms::SURFACES.join(", ");
             return Err(ApiError::input(
                 format!("expected a surface, got `{chosen}`"),
                 format!("there are {known}"),
             ));
-        }))
+        };
+        Ok(Some(object(json!({ "surface": [feature] }))))
     }
 
     /// The branches over a parameter through the attractors of censuses at `values` of its values.
@@ -483,10 +653,10 @@ table: None,
             let figure = case_figure(&case, &report, None);
             let shown = Shown::usual(&case).observable().map_or("", |o| o.name);
             let heights = Height::of(&figure, &[shown]);
-            let near = clicks::on_branches(&report, axis, &heights, &case.units());
-            self.hand(&Stage {
-                figure,
-                clicks: &json!({
+            let near = clicks::on_branches(&report, &axis, &heights, &case.units());
+            self.hand(Stage {
+                figure: Some(figure),
+                clicks: json!({
                     "set": { "x": axis.json() },
                     "near": near,
                     "heights": clicks::of_heights(&heights, &case.units()),
@@ -494,7 +664,7 @@ table: None,
                 }),
                 words: progress(values, finest, "censuses"),
                 studies: &[("branch", &options)],
-                table: None,
+                ..Stage::default()
             })
         })
     }
@@ -511,34 +681,141 @@ table: None,
             }
             let report = self.report::<ApproachStudy>(&case, &options)?;
             let units = case.units();
-            let (factor, _) = units.axis(Kind::Length, report.from.abs().max(report.to.abs()));
-            let axis = match units.si(Kind::Length) {
-                Some(metres) => Axis {
-                    key: Key::GapTip,
-                    kind: Kind::Length,
-                    factor: factor / metres,
-                },
-                None => Axis {
-                    key: case.gap_key(),
-                    kind: Kind::Number,
-                    factor,
-                },
-            };
-            let figure = approach_figure(&report, &units);
-            let heights = Height::of(&figure, &APPROACH_SHOWS);
-            let near = clicks::of_approach(&report, factor, &heights, &units);
-            self.hand(&Stage {
-                figure,
-                clicks: &json!({
-                    "set": { "x": axis.json() },
+            let drawn = Approached::of(&case, &report);
+            let near = clicks::of_approach(&report, drawn.factor, &drawn.heights, &units);
+            self.hand(Stage {
+                clicks: json!({
+                    "set": { "x": drawn.axis.json() },
                     "near": near,
-                    "heights": clicks::of_heights(&heights, &case.units()),
-                    "fixed": clicks::fixed(&case, &[axis.key]),
+                    "heights": clicks::of_heights(&drawn.heights, &units),
+                    "fixed": clicks::fixed(&case, &[drawn.axis.key]),
                 }),
+                figure: Some(drawn.figure),
                 words: progress(points, finest, "distances each way"),
                 studies: &[("approach", &options)],
-                table: None,
+                ..Stage::default()
             })
+        })
+    }
+
+    /// Measured data: over the model's curve, or with the fit of the model to them.
+    fn measured(&self) -> Result<(), ApiError> {
+        let case = self.request.case.any_distance(self.app)?;
+        model_of(&case)?;
+        let Some((name, text)) = &self.request.data else {
+            return Err(ApiError::input("no data", "drop a file on the page"));
+        };
+        let entry = study_named(FitStudy::NAME);
+        let options = entry.map_or_else(Map::new, |entry| self.options(entry));
+        let mut request: FitOptions = read(Value::Object(options.clone()))?;
+        request.data = vec![Table::parse(name, text).map_err(ApiError::of)?];
+        let mut named = object(json!({ "data": [name] }));
+        named.extend(options);
+        if self.field("fit").is_err() {
+            return self.over_model(&case, &request, &named);
+        }
+        let report = self.counting(FitStudy::COUNTED, |control| {
+            FitStudy::run(&case, &request, control)
+        })?;
+        let found = Source {
+            name: CASE_FILE.to_owned(),
+            text: report.case_file.clone(),
+        };
+        let set = Case::parse(Some(found), &[]).map(|found| report::changes(&case, &found));
+        let notes = report.reason.iter().chain(&report.remarks);
+        let notes: Vec<&str> = notes.map(String::as_str).collect();
+        let fits = if report.fits {
+            "The model describes the data."
+        } else {
+            "The model does not describe the data."
+        };
+        self.hand(Stage {
+            figure: Some(fit_figure(&report)),
+            words: format!("{fits} {}", notes.join(". ")).trim_end().to_owned(),
+            studies: &[("fit", &named)],
+            tables: vec![parameters(&report)],
+            found: set.ok().map(|set| (report.case_file.clone(), set)),
+            ..Stage::default()
+        })
+    }
+
+    /// Measured data over the model's curve, where they are of the distance; otherwise alone.
+    fn over_model(
+        &self,
+        case: &Case,
+        request: &FitOptions,
+        named: &Map<String, Value>,
+    ) -> Result<(), ApiError> {
+        let data = measured(case, request)?;
+        let swept = data.swept.first().map(|swept| swept.key);
+        let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
+        for row in data.rows() {
+            let at = row.at.first().copied().unwrap_or(f64::NAN);
+            (low, high) = (low.min(at), high.max(at));
+        }
+        let length = |value: f64| Kind::Length.format_exact(value);
+        let distance = swept == Some(Key::GapTip) && case.is_physical() && low < high;
+        let (mut figure, factor) = if distance {
+            let options =
+                object(json!({ "points": APPROACH[0], "from": length(high), "to": length(low) }));
+            let report = self.report::<ApproachStudy>(case, &options)?;
+            let Approached { figure, axis, .. } = Approached::of(case, &report);
+            (figure, axis.factor)
+        } else {
+            let kind = swept.map_or(Kind::Number, Key::kind);
+            let (factor, unit) = match kind {
+                Kind::Number => (1.0, String::new()),
+                kind => prefixed(kind, 1.0, low.abs().max(high.abs())),
+            };
+            let label = swept.map_or("", Key::path);
+            let mut figure = Figure::new(1, data.columns.len());
+            for column in &data.columns {
+                let x = Axes::linear(label).unit(unit.clone());
+                figure = figure.with(Panel::new(x, Axes::linear(column.name.clone())));
+            }
+            (figure, factor)
+        };
+        let heights = Height::of(&figure, &APPROACH_SHOWS);
+        let mut left = Vec::new();
+        for (k, column) in data.columns.iter().enumerate() {
+            let place = if distance {
+                heights
+                    .iter()
+                    .position(|height| height.is(column.quantity.name()))
+            } else {
+                Some(k)
+            };
+            let Some(panel) = place.and_then(|place| figure.panels.get_mut(place)) else {
+                left.push(column.name.as_str());
+                continue;
+            };
+            let drawn = |value: f64| match place.and_then(|place| heights.get(place)) {
+                Some(height) if distance => height.of_measured(value),
+                _ => value,
+            };
+            let points = data.rows().filter_map(|row| {
+                let value = (*row.values.get(k)?)?;
+                Some((factor * row.at.first()?, drawn(value)))
+            });
+            let markers = Markers::new(points)
+                .open()
+                .colour(Colour::BLACK)
+                .label("measured");
+            panel.layers.push(markers.into());
+        }
+        let mut words = format!(
+            "{} rows. “Fit” finds the free parameters.",
+            data.rows().count()
+        );
+        if !left.is_empty() {
+            words.push_str(" Not drawn: ");
+            words.push_str(&left.join(", "));
+        }
+        self.hand(Stage {
+            figure: Some(figure),
+            words,
+            studies: &[("fit", named)],
+            ..Stage::default()
         })
     }
 
@@ -579,38 +856,97 @@ table: None,
                 })
             };
             let factors = json!({ "x": factor(&x, |p| &p.x), "y": factor(&y, |p| &p.y) });
-            self.hand(&Stage {
-                figure,
-                clicks: &json!({ "start": start, "factors": factors }),
+            self.hand(Stage {
+                figure: Some(figure),
+                clicks: json!({ "start": start, "factors": factors }),
                 words: progress(count, finest, "points each way"),
                 studies: &[("basin", &options)],
-                table: None,
+                ..Stage::default()
             })
         })
     }
 }
 
-/// A command after lines that it needs in the case file.
-fn appended(table: &str, command: &str) -> String {
-    format!("cat >> {CASE_FILE} <<'END'\n{table}\nEND\n{command}")
+/// A command after lines that replace `[scan]`, the last table of a saved case.
+fn with_scan(table: &str, command: &str) -> String {
+    format!(
+        "sed -i.bak '/^\\[scan\\]/,$d' {CASE_FILE}\ncat >> {CASE_FILE} <<'END'\n{table}END\n{command}"
+    )
 }
 
-/// A value as in a case file.
-fn inline(value: &Value) -> String {
-    match value {
-        Value::Object(map) => {
-            let entries: Vec<String> = map
-                .iter()
-                .map(|(name, value)| format!("{name} = {}", inline(value)))
-                .collect();
-            format!("{{ {} }}", entries.join(", "))
+/// An approach curve as drawn.
+struct Approached {
+    figure: Figure,
+    axis: Axis,
+    /// From distances in the model's unit to drawn ones.
+    factor: f64,
+    heights: Vec<Height>,
+}
+
+impl Approached {
+    fn of(case: &Case, report: &ApproachReport) -> Self {
+        let units = case.units();
+        let (factor, unit) = units.axis(Kind::Length, report.from.abs().max(report.to.abs()));
+        let axis = match units.si(Kind::Length) {
+            Some(metres) => Axis {
+                key: Key::GapTip,
+                factor: factor / metres,
+                unit: unit.trim_matches([' ', '(', ')']).to_owned(),
+            },
+            None => Axis {
+                key: case.gap_key(),
+                factor,
+                unit: String::new(),
+            },
+        };
+        let figure = approach_figure(report, &units);
+        let heights = Height::of(&figure, &APPROACH_SHOWS);
+        Self {
+            figure,
+            axis,
+            factor,
+            heights,
         }
-        Value::Array(values) => {
-            let values: Vec<String> = values.iter().map(inline).collect();
-            format!("[{}]", values.join(", "))
-        }
-        other => other.to_string(),
     }
+}
+
+/// The fitted parameters with their intervals.
+fn parameters(report: &FitReport) -> Value {
+    let text = |parameter: &FittedParameter, value: Option<f64>| match value {
+        None => "not determined".to_owned(),
+        Some(value) => {
+            let of_unit = |kind: &Kind| kind.si_unit() == parameter.unit;
+            let kind = Key::find(&parameter.key).map(Key::kind);
+            let kind = kind.or_else(|| Kind::ALL.into_iter().find(of_unit));
+            kind.unwrap_or(Kind::Number).format_digits(value, 4)
+        }
+    };
+    let rows = report.parameters.iter().map(|one| {
+        let name = match &one.curve {
+            Some(curve) => format!("{} of {curve}", one.key),
+            None => one.key.clone(),
+        };
+        let [low, high] = one.interval.map(|end| text(one, end));
+        let cells = [
+            name,
+            text(one, Some(one.value)),
+            text(one, one.standard_error),
+            match one.interval {
+                [None, None] => "not determined".to_owned(),
+                _ => format!("{low} to {high}"),
+            },
+            text(one, Some(one.start)),
+        ];
+        report::row(&cells, None)
+    });
+    let heads = [
+        ("parameter", "Key of the case, or correction of a column"),
+        ("value", "Of the best fit"),
+        ("standard error", ""),
+        ("95 % interval", ""),
+        ("began at", "Initial value"),
+    ];
+    report::table("", &heads, &rows.collect::<Vec<_>>())
 }
 
 fn progress(done: usize, finest: usize, counted: &str) -> String {

@@ -125,7 +125,9 @@ impl Workers {
     /// Runs `work` and sends its results as lines of JSON as they come.
     pub(crate) fn stream(
         &self,
-        work: impl FnOnce(&Control<'_>, &dyn Fn(Value)) -> Result<(), ApiError> + Send + 'static,
+        work: impl FnOnce(&Control<'_>, &(dyn Fn(Value) + Sync)) -> Result<(), ApiError>
+        + Send
+        + 'static,
     ) -> Response {
         let places = Arc::clone(&self.studies);
         let (sender, receiver) = mpsc::channel::<Result<String, std::convert::Infallible>>(WAITING);

@@ -175,11 +175,10 @@ fn map_text(report: &FitMapReport) -> String {
     format!(
         "{}\n{}",
         motion::paragraph(&format!(
-            "{} fitted: {} described, {} with warnings, {} not described, {} without a result; the \
-             table is of those described",
+            "{} fitted: {} described, {} not described, {} without a result; the table is of those \
+             described",
             number::counted(report.pixels, "pixel", "pixels"),
             report.fits,
-            report.warned,
             report.misfits,
             report.failed
         )),

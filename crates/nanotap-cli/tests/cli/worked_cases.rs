@@ -202,7 +202,7 @@ fn the_gallery() {
             assert!(folder.path().join(figure).exists(), "{command}");
         }
     }
-    assert_eq!(count, 29);
+    assert_eq!(count, 30);
 }
 
 /// One test per document, so that they run in parallel.
@@ -216,7 +216,7 @@ macro_rules! follows {
 }
 
 follows! {
-    fit: "fit.md", 7 commands, 40 numbers;
+    fit: "fit.md", 8 commands, 44 numbers;
     fit_of_sticky_and_wet_samples: "fit-adhesion.md", 2 commands, 10 numbers;
     fit_of_frequency_shifts: "fit-frequency-modulation.md", 1 commands, 7 numbers;
     frequency_modulation: "frequency-modulation.md", 3 commands, 23 numbers;

@@ -455,8 +455,8 @@ def fit_map(
 
     Returns:
         Over the pixels each parameter (`ds["sample.modulus"]`) with its standard error
-        (`"sample.modulus_error"`), `chi2_reduced`, and `result`: fits, warned (with remarks, as where
-        the residuals are not noise), misfit, failed, or empty without data.
+        (`"sample.modulus_error"`), `chi2_reduced`, and `result`: fits, misfit (the residuals are not
+        noise), failed, or empty without data.
 
     Raises:
         ValueError: an option or the table is not valid.

@@ -105,6 +105,17 @@ impl Table {
         Ok(table)
     }
 
+    /// The same with its rows in the other order.
+    #[must_use]
+    pub(crate) fn reversed(&self) -> Self {
+        let mut table = self.clone();
+        for (_, column) in &mut table.columns {
+            column.reverse();
+        }
+        table.lines.reverse();
+        table
+    }
+
     /// How many rows it has.
     pub fn rows(&self) -> usize {
         self.columns.iter().map(|(_, c)| c.len()).max().unwrap_or(0)

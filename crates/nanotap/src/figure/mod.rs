@@ -19,6 +19,7 @@ pub mod panels;
 pub mod reconstruct;
 pub mod scan;
 pub mod shown;
+pub mod study;
 #[cfg(feature = "dataset")]
 pub mod sweep;
 #[cfg(feature = "dataset")]

@@ -193,26 +193,13 @@ pub fn compare_levers(
     options: &LeverOptions,
     control: &Control<'_>,
 ) -> Result<LeverReport, Error> {
-    let view = case.physical().filter(|view| view.held.is_some());
-    let Some(view) = view else {
-        return Err(Error::input(
-            "levers are compared at a setpoint, and the case has none",
-            "give drive.setpoint, as in setpoint = 0.8, in physical quantities",
-        ));
-    };
     let targets = options.targets.parse(true)?;
-    let frequency_ratio = view.scales.frequency * view.cantilever.omega / view.lever.f0;
-    if view.cantilever.tone2_ratio.is_some() {
-        return Err(Error::input(
-            "levers are compared under one tone, and the case has a second one",
-            "leave drive.second_frequency and drive.second_ratio out",
-        ));
-    }
-    let cases = case.with_catalogue_levers(&options.levers, frequency_ratio, options.keep_tip);
-    let cases = cases.map_err(|error| {
-        Error::option("levers", error.to_string(), "name levers of the catalogue")
-    })?;
-    let source = QualityFactorSource::of(case, options.quality_factor);
+    let LeverCases {
+        free_amplitude,
+        frequency_ratio,
+        source,
+        cases,
+    } = LeverCases::of(case, options)?;
     let quiet = Control {
         progress: None,
         ..*control
@@ -222,10 +209,7 @@ pub fn compare_levers(
         .into_par_iter()
         .with_max_len(1)
         .map(|(lever, case)| {
-            let in_air = case.clone().and_then(|case| {
-                let in_air = case.in_fluid(AIR[0], AIR[1]);
-                in_air.map_err(|_| NO_DIMENSIONS.to_owned())
-            });
+            let in_air = in_air(&case);
             let known = in_air.as_ref().ok().and_then(Case::physical);
             let quality_factor_in_air = known.map(|view| view.lever.quality_factor);
             let row = LeverRow {
@@ -266,12 +250,75 @@ pub fn compare_levers(
         order.then(force(a).total_cmp(&force(b)))
     });
     Ok(LeverReport {
-        free_amplitude: view.free_amplitude,
+        free_amplitude,
         frequency_ratio,
         quality_factor_source: source,
         conditions: targets.iter().map(Target::to_string).collect(),
         levers,
     })
+}
+
+/// The case with a lever of the catalogue in place of its own, as it is compared.
+///
+/// # Errors
+/// As [`compare_levers`], and when the lever cannot be computed.
+pub fn case_with_lever(case: &Case, lever: &str, options: &LeverOptions) -> Result<Case, Error> {
+    let only = LeverOptions {
+        levers: vec![lever.to_owned()],
+        ..options.clone()
+    };
+    let found = LeverCases::of(case, &only)?;
+    let own = found.cases.into_iter().next().map(|(_, own)| own);
+    let own = own.unwrap_or_else(|| Err(format!("no lever called `{lever}`")));
+    let own = match found.source {
+        QualityFactorSource::Air => in_air(&own),
+        _ => own,
+    };
+    own.map_err(|reason| Error::option("levers", reason, "choose another lever"))
+}
+
+/// The cases of the levers to compare.
+struct LeverCases {
+    /// In m.
+    free_amplitude: f64,
+    frequency_ratio: f64,
+    source: QualityFactorSource,
+    cases: Vec<(String, Result<Case, String>)>,
+}
+
+impl LeverCases {
+    fn of(case: &Case, options: &LeverOptions) -> Result<Self, Error> {
+        let view = case.physical().filter(|view| view.held.is_some());
+        let Some(view) = view else {
+            return Err(Error::input(
+                "levers are compared at a setpoint, and the case has none",
+                "give drive.setpoint, as in setpoint = 0.8, in physical quantities",
+            ));
+        };
+        if view.cantilever.tone2_ratio.is_some() {
+            return Err(Error::input(
+                "levers are compared under one tone, and the case has a second one",
+                "leave drive.second_frequency and drive.second_ratio out",
+            ));
+        }
+        let frequency_ratio = view.scales.frequency * view.cantilever.omega / view.lever.f0;
+        let cases = case.with_catalogue_levers(&options.levers, frequency_ratio, options.keep_tip);
+        let cases = cases.map_err(|error| {
+            Error::option("levers", error.to_string(), "name levers of the catalogue")
+        })?;
+        Ok(Self {
+            free_amplitude: view.free_amplitude,
+            frequency_ratio,
+            source: QualityFactorSource::of(case, options.quality_factor),
+            cases,
+        })
+    }
+}
+
+/// The case of a lever in air.
+fn in_air(case: &Result<Case, String>) -> Result<Case, String> {
+    let in_air = case.clone()?.in_fluid(AIR[0], AIR[1]);
+    in_air.map_err(|_| NO_DIMENSIONS.to_owned())
 }
 
 impl LeverRow {

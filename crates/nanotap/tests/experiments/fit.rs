@@ -1408,7 +1408,7 @@ fn a_force_volume_is_fitted_pixel_by_pixel() {
     let (_, shared) = read("shared", &["2/2", "1/2"], 2);
     assert_eq!(format!("{found:?}"), format!("{shared:?}"));
     assert_eq!(
-        (report.pixels, report.fits, report.warned + report.misfits),
+        (report.pixels, report.fits, report.misfits + report.failed),
         (11, 10, 1)
     );
     for (k, [value, offset, result]) in found.into_iter().enumerate() {
@@ -1440,4 +1440,34 @@ fn a_force_volume_is_fitted_pixel_by_pixel() {
     };
     refused("x,z", "no column `z`");
     refused("x,y,phase", "one or two columns");
+}
+
+/// A curve that was sorted by distance says nothing of its direction: where the lever jumps on approach
+/// and not on retraction, the order in which the model describes it is found, and said.
+#[test]
+fn a_curve_in_the_wrong_order_is_turned() {
+    let lever = case(LEVER, &[]);
+    let there = curve(&lever, 24.0, 10.0, 40);
+    let approach: Vec<_> = there
+        .into_iter()
+        .filter(|row| row.3 == Way::Approach)
+        .collect();
+    let mut sorted = measured(&approach, &mut Noise(3), [0.02, 0.1], false);
+    for (_, column) in &mut sorted.columns {
+        column.reverse();
+    }
+    sorted.columns.truncate(3);
+    let start = case(LEVER, &["sample.stiffness=24 N/m"]);
+    let found = fitted(
+        &start,
+        &request(vec![sorted], &["sample.stiffness", "gap.offset"]),
+    );
+    assert!(found.fits && !found.misfit, "{:?}", found.remarks);
+    let said = found
+        .preparation
+        .iter()
+        .any(|note| note.contains("other order"));
+    assert!(said, "{:?}", found.preparation);
+    let [low, high] = found.parameters[0].interval.map(Option::unwrap);
+    assert!(low < 30.0 && 30.0 < high, "{low} {high}");
 }

@@ -76,7 +76,7 @@ pub fn to_toml(case: &Cantilever) -> String {
 
 impl Case {
     /// The case as a file that is read back as the same case: all numbers of the equations, or the
-    /// stated physical quantities.
+    /// stated physical quantities with `[scan]`.
     pub fn to_toml(&self) -> String {
         use std::fmt::Write as _;
         let quantities = match &self.what {
@@ -110,7 +110,36 @@ impl Case {
             let quote = if plain { "" } else { "\"" };
             let _ = writeln!(text, "{} = {quote}{}{quote}", key.name(), value.text());
         }
+        if let Some(scan) = self.scan() {
+            let _ = write!(text, "\n{}", scan_table(scan));
+        }
         text
+    }
+}
+
+/// The table `[scan]` of a case file.
+pub fn scan_table(scan: &serde_json::Map<String, serde_json::Value>) -> String {
+    let lines = scan
+        .iter()
+        .map(|(name, value)| format!("{name} = {}\n", inline(value)));
+    format!("[scan]\n{}", lines.collect::<String>())
+}
+
+/// A value of JSON on one line of TOML.
+fn inline(value: &serde_json::Value) -> String {
+    use serde_json::Value;
+    match value {
+        Value::Object(map) => {
+            let entries = map
+                .iter()
+                .map(|(name, value)| format!("{name} = {}", inline(value)));
+            format!("{{ {} }}", entries.collect::<Vec<_>>().join(", "))
+        }
+        Value::Array(values) => {
+            let values: Vec<String> = values.iter().map(inline).collect();
+            format!("[{}]", values.join(", "))
+        }
+        other => other.to_string(),
     }
 }
 

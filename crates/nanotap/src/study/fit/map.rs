@@ -29,9 +29,9 @@ const FIRST: usize = 8;
 /// Chunks of a map with one axis.
 const CHUNKS: usize = 64;
 
-/// What came of a pixel, by its code: the curve is described; it is, with remarks that a fit of it alone
-/// would print; it is not; there is no result.
-const RESULTS: [&str; 4] = ["fits", "warned", "misfit", "failed"];
+/// What came of a pixel, by its code: the curve is described; the residuals are not noise, or nothing
+/// describes it; there is no result.
+const RESULTS: [&str; 3] = ["fits", "misfit", "failed"];
 
 /// The variable with the code.
 const RESULT: &str = "result";
@@ -72,9 +72,7 @@ pub struct FitMapReport {
     pub pixels: usize,
     /// Pixels whose curve is described.
     pub fits: usize,
-    /// Pixels with remarks that a fit of this curve alone prints, as where the residuals are not noise.
-    pub warned: usize,
-    /// Pixels whose curve is not described by the best values.
+    /// Pixels whose curve is not described: the residuals of the best values are not noise.
     pub misfits: usize,
     /// Pixels without a result.
     pub failed: usize,
@@ -136,9 +134,8 @@ impl FitMapReport {
         Ok(Self {
             pixels: results.iter().filter(|result| **result != 0.0).count(),
             fits: count(1.0),
-            warned: count(2.0),
-            misfits: count(3.0),
-            failed: count(4.0),
+            misfits: count(2.0),
+            failed: count(3.0),
             parameters: parameters.collect(),
         })
     }
@@ -171,6 +168,8 @@ struct Map {
     /// Rows of the table of each pixel, by the number of its entry in the grid.
     rows: BTreeMap<usize, Vec<usize>>,
     parameters: Vec<String>,
+    /// Whether the rows of the first pixel are in the other order.
+    turned: bool,
     schema: Schema,
 }
 
@@ -229,6 +228,7 @@ impl Map {
             table,
             rows,
             parameters: Vec::new(),
+            turned: false,
             schema: Schema {
                 grid: Grid { axes: Vec::new() },
                 variables: Vec::new(),
@@ -237,6 +237,7 @@ impl Map {
             },
         };
         let first = map.first(control)?;
+        map.turned = first.turned;
         map.parameters = first.parameters.iter().map(|p| p.key.clone()).collect();
         map.describe(&first, axes);
         Ok(map)
@@ -271,12 +272,14 @@ impl Map {
             (header.clone(), own.collect())
         });
         let lines = rows.iter().filter_map(|row| self.table.lines.get(*row));
+        let table = Table {
+            name: self.table.name.clone(),
+            columns: columns.collect(),
+            lines: lines.copied().collect(),
+        };
+        let turned = before.map_or(self.turned, |before| before.turned);
         let mut options = FitOptions {
-            data: vec![Table {
-                name: self.table.name.clone(),
-                columns: columns.collect(),
-                lines: lines.copied().collect(),
-            }],
+            data: vec![if turned { table.reversed() } else { table }],
             ..self.options.clone()
         };
         if let Some(before) = before {
@@ -293,7 +296,9 @@ impl Map {
             let further: Vec<String> = further.collect();
             options.start.extend(further);
         }
-        fit(&self.case, &options, control)
+        let mut found = fit(&self.case, &options, control)?;
+        found.turned ^= turned;
+        Ok(found)
     }
 
     /// Grid, variables and coordinates, once the parameters are known.
@@ -363,13 +368,13 @@ impl Map {
                     .as_ref()
                     .map(|near| self.fitted(rows, Some(near), &quiet));
                 let report = match near {
-                    Some(Ok(report)) if report.fits && report.remarks.is_empty() => Ok(report),
+                    Some(Ok(report)) if report.fits && !report.misfit => Ok(report),
                     _ => self.fitted(rows, None, &quiet),
                 };
                 if quiet.is_cancelled() {
                     return None;
                 }
-                values[count - 1] = 4.0;
+                values[count - 1] = 3.0;
                 if let Ok(report) = report {
                     let of = |key: &String| report.parameters.iter().find(|p| p.key == *key);
                     for (k, parameter) in self.parameters.iter().map(of).enumerate() {
@@ -378,13 +383,9 @@ impl Map {
                         values[2 * k + 1] = error.unwrap_or(f64::NAN);
                     }
                     values[count - 2] = report.chi2 / report.degrees_of_freedom.max(1) as f64;
-                    let clean = report.remarks.is_empty();
-                    values[count - 1] = match (report.fits, clean) {
-                        (true, true) => 1.0,
-                        (true, false) => 2.0,
-                        (false, _) => 3.0,
-                    };
-                    if report.fits && clean {
+                    let fits = report.fits && !report.misfit;
+                    values[count - 1] = if fits { 1.0 } else { 2.0 };
+                    if fits {
                         before = Some(report);
                     }
                 }

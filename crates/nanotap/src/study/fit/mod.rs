@@ -186,13 +186,40 @@ pub fn fit(case: &Case, request: &FitOptions, control: &Control<'_>) -> Result<F
     }
 }
 
-/// Finds the free parameters under the law of the case.
+/// Finds the free parameters under the law of the case. Rows in whose order the tip may have moved
+/// either way, and that the model does not describe, are tried in the other order.
 fn fit_one(case: &Case, request: &FitOptions, control: &Control<'_>) -> Result<FitReport, Error> {
-    #[expect(
-        clippy::redundant_closure_for_method_calls,
-        reason = "the method itself is not general enough in its lifetime"
-    )]
-    with_search(case, request, control, |search| search.run())
+    let run = |request: &FitOptions| {
+        with_search(case, request, control, |search| {
+            let knows_way = search.problem.data.rows().any(|row| row.way.is_some());
+            let swept = search.problem.data.swept.first();
+            let by_distance = swept.is_some_and(|swept| data::is_distance(swept.key));
+            Ok((search.run()?, knows_way || !by_distance))
+        })
+    };
+    let (found, is_known) = run(request)?;
+    let [table] = &request.data[..] else {
+        return Ok(found);
+    };
+    if is_known || !(found.misfit || !found.fits) || control.is_cancelled() {
+        return Ok(found);
+    }
+    let turned = FitOptions {
+        data: vec![table.reversed()],
+        ..request.clone()
+    };
+    match run(&turned) {
+        Ok((mut other, _)) if other.fits && !other.misfit => {
+            other.turned = true;
+            other.preparation.push(
+                "the rows are read in the other order, in which the model describes them: state a \
+                 column `direction` (approach, retract) to fix it"
+                    .to_owned(),
+            );
+            Ok(other)
+        }
+        _ => Ok(found),
+    }
 }
 
 /// Calls `work` with the data and parameters of a request.
@@ -272,6 +299,16 @@ fn with_search<R>(
         request,
         control,
     })
+}
+
+/// The measured curves of a fit as the model reads them: converted, not averaged.
+///
+/// # Errors
+/// If the data or a conversion is invalid.
+pub fn measured(case: &Case, request: &FitOptions) -> Result<Data, Error> {
+    let columns = names(&request.columns);
+    let measured = instrument::prepared(case, &request.data, &request.convert, &columns)?;
+    Data::read(case, &measured.tables, &measured.columns)
 }
 
 /// Residuals of measured curves for given values of the free parameters, for users' solvers.

@@ -39,6 +39,13 @@ pub struct FitReport {
     /// Reason if it does not.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub reason: Option<String>,
+    /// Whether the residuals are not the noise of the data: the law, the branch or an offset is not
+    /// theirs.
+    #[serde(default)]
+    pub misfit: bool,
+    /// Whether the rows were read in the other order.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub turned: bool,
     /// Warnings about the result.
     pub remarks: Vec<String>,
     /// What was done to the data before the fit: conversions, guesses, fixed corrections, averages.

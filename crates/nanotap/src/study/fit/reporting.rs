@@ -38,6 +38,10 @@ const MIN_RESIDUAL: f64 = 1e-5;
 /// Largest number of rows that a remark lists.
 const MAX_LISTED_ROWS: usize = 8;
 
+/// Standard errors from the end of the model's branch beyond which a jump contradicts the model. Its
+/// place is between two rows, less than two of them from the middle.
+const MAX_JUMP: f64 = 5.0;
+
 impl Search<'_> {
     /// The problem with the standard errors and the jumps of a result.
     fn problem_of(&self, found: &Found) -> Problem<'_> {
@@ -117,6 +121,8 @@ impl Search<'_> {
             laws: Vec::new(),
             fits: reason.is_none(),
             reason,
+            misfit: !self.not_noise(found).is_empty(),
+            turned: false,
             remarks,
             preparation: self.preparation.to_vec(),
             undetermined,
@@ -315,6 +321,14 @@ impl Search<'_> {
         {
             reasons.push("the residuals keep their sign from row to row".to_owned());
         }
+        let farthest = self.jumps_off(found).fold(0.0, f64::max);
+        if farthest > MAX_JUMP {
+            reasons.push(format!(
+                "a jump of the data is {farthest:.0} standard errors of its place from where the branch \
+                 of the model ends (on approach and retraction it ends at different distances, and noise \
+                 can end it early; without the jumps as data the rows alone count)"
+            ));
+        }
         reasons
     }
 
@@ -373,10 +387,15 @@ impl Search<'_> {
 
     /// Contribution of the jumps to chi2.
     fn squared_jumps(&self, found: &Found) -> f64 {
+        self.jumps_off(found).map(|off| off * off).sum()
+    }
+
+    /// How far each jump is from the end of the model's branch, in standard errors of its place.
+    fn jumps_off(&self, found: &Found) -> impl Iterator<Item = f64> {
         let problem = self.problem_of(found);
         let (x, point) = (&found.solution.x, &found.solution.point);
-        let jumps = (0..found.jumps.len()).map(|k| problem.jump_residual(x, point, k).powi(2));
-        jumps.sum()
+        let off = (0..found.jumps.len()).map(|k| problem.jump_residual(x, point, k).abs());
+        off.collect::<Vec<_>>().into_iter()
     }
 
     fn fitted(

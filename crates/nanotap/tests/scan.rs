@@ -433,7 +433,7 @@ fn cancelled_work_ends_at_once() {
     assert_eq!(error.kind, nanotap::ErrorKind::Stopped);
 }
 
-/// Lines that are finished stay when the work is stopped; the others are missing, and it is said.
+/// Lines that are finished stay when the work is stopped; the others are missing, and a warning counts them.
 #[test]
 fn stopped_work_keeps_its_lines() {
     use nanotap::control::CancelFlag;

@@ -503,9 +503,9 @@ def test_a_state_that_is_none_is_refused_and_the_server_stays(address: str) -> N
         "1:" + "0," * 9999 + "0",
         ":",
     ):
-        told = refusal(address, "/api/motion", {"case": case, "start": start})
-        assert "start" in told["keys"] or "state" in told["error"], start
-        assert len(told["error"]) < 2000
+        answer = refusal(address, "/api/motion", {"case": case, "start": start})
+        assert "start" in answer["keys"] or "state" in answer["error"], start
+        assert len(answer["error"]) < 2000
     assert motion(address)["summary"].startswith("period")
 
 
@@ -1509,9 +1509,9 @@ def about(address: str) -> dict[str, Any]:
 
 def test_a_refusal_names_a_key_once(address: str) -> None:
     case = {"preset": "dmt", "set": ["gap.tip=abc"]}
-    told = refusal(address, "/api/motion", {"case": case})
-    assert told["keys"] == ["gap.tip"]
-    assert told["error"].count("gap.tip") == 1
+    answer = refusal(address, "/api/motion", {"case": case})
+    assert answer["keys"] == ["gap.tip"]
+    assert answer["error"].count("gap.tip") == 1
 
 
 def cells(page: Any, row: Any) -> list[str]:
@@ -1606,8 +1606,8 @@ def test_measured_data_are_bounded_and_refused_in_words(address: str) -> None:
     options = {field["name"]: field["value"] for field in form}
     wanted = {"case": {"preset": "stiff-lever"}, "tab": "data", "options": options}
     for text, words in (("a,b\n1", "fields"), ("a,b\n1,2\n", "observable")):
-        told = studied(address, **wanted, data=["x.csv", text])[-1]
-        assert words in told["error"], told
+        answer = studied(address, **wanted, data=["x.csv", text])[-1]
+        assert words in answer["error"], answer
     with pytest.raises(urllib.error.HTTPError) as refused:
         asked(address, "/api/study", wanted | {"data": ["x.csv", "1" * 2_200_000]})
     assert refused.value.code == 413

@@ -25,9 +25,9 @@ async function send(kind, path, body) {
   const answer = await sent.catch((error) => { throw superseded(error) ? error : new Refused(ENDED); });
   if (!answer.ok) {
     const text = await answer.text();
-    let told = { error: text };
-    try { told = JSON.parse(text); } catch { /* plain words */ }
-    throw new Refused(told.error || `${answer.status} ${answer.statusText}`, told.keys);
+    let refusal = { error: text };
+    try { refusal = JSON.parse(text); } catch { /* plain words */ }
+    throw new Refused(refusal.error || `${answer.status} ${answer.statusText}`, refusal.keys);
   }
   return answer;
 }

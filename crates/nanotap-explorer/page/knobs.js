@@ -19,8 +19,8 @@ const opened = new Set();
 /** The motion from which a changed value continues, if requested. */
 export function follows(motion) { now = motion; }
 
-/** `told(key, finished)` is called when a value changed, `error(refusal, key)` when a law was refused. */
-export function onChange(told, error) { changed = told; refused = error; }
+/** `onChanged(key, finished)` is called when a value changed, `error(refusal, key)` when a law was refused. */
+export function onChange(onChanged, error) { changed = onChanged; refused = error; }
 
 function element(name, properties = {}, ...children) {
   const made = Object.assign(document.createElement(name), properties);

@@ -121,12 +121,15 @@ pub(crate) fn keys(case: &Case) -> impl Iterator<Item = Key> {
         // Another kind of model is a separate case.
         let takes = key.entry().models.contains(&kind) && *key != Key::Kind;
         // A table has no control.
-        let curve = matches!(key.entry().takes, Takes::Table | Takes::Arms);
+        let curve = matches!(
+            key.entry().takes,
+            Takes::Table | Takes::Arms | Takes::Springs | Takes::ModelArms
+        );
         let in_addition = [Key::Modes, Key::CosineTerm].contains(key);
         if physical {
             key.is_physical() && !curve || in_addition
         } else {
-            takes
+            takes && !curve
         }
     })
 }

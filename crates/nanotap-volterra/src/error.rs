@@ -121,7 +121,8 @@ pub enum VolterraError {
     /// More steps were needed than are allowed.
     #[error(
         "the limit of {steps} steps was reached at time {time}: the force changes too fast for the \
-         modes, as under a damping that grows without bound in the contact"
+         modes, as under a damping that grows without bound in the contact: with \
+         `exponential-damping` raise `decay_length` or lower `damping`"
     )]
     TooManySteps {
         /// The steps taken.

@@ -19,6 +19,8 @@ const STEP_EVALUATIONS: u64 = 2;
 const FACTORISATION_COST: u64 = 8;
 /// The first step of a run: a quarter of the longest.
 const FIRST_INDEX: usize = 4;
+/// Length of a step that is to pass the end of a piece of a curve, over the time to that end.
+const PAST_END: f64 = 1.45;
 /// A guard that is not certainly positive must be resolved to this fraction of its size.
 const RESOLVED: f64 = 1e-11;
 /// The same on the first step after a switch.
@@ -392,6 +394,9 @@ impl Flow {
         } else {
             self.hints[self.branch]
         };
+        if system.law().is_piecewise() {
+            index = index.max(self.index_to_end(system));
+        }
         let mut refused = false;
         loop {
             if index >= LENGTHS {
@@ -616,6 +621,21 @@ impl Flow {
     }
 
     /// Cuts the step in `self.step` at `u`, hands it on and switches.
+    /// The index of a step that just passes the end of the branch, at the present rate.
+    fn index_to_end(&self, system: &System) -> usize {
+        let (gap, rate) = system.gap_of(self.time, &self.modal);
+        let times = system
+            .exits(self.branch)
+            .iter()
+            .map(|exit| match exit.guard {
+                Guard::Falls(level) | Guard::Rises(level) => (level - gap) / rate,
+                Guard::Turns | Guard::Own(_) => f64::INFINITY,
+            });
+        let ahead = times.filter(|time| *time > 0.0 && time.is_finite());
+        let below = |time: f64| system.kernel().index_below(PAST_END * time);
+        ahead.reduce(f64::min).and_then(below).unwrap_or(0)
+    }
+
     fn switch<O: Observer>(
         &mut self,
         system: &System,

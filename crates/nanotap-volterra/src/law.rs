@@ -191,6 +191,11 @@ pub trait ForceLaw: Debug + Send + Sync {
         None
     }
 
+    /// Whether branches are pieces of one smooth curve, each of little use beyond its ends.
+    fn is_piecewise(&self) -> bool {
+        false
+    }
+
     /// Whether the law has a memory: gap and rate do not determine the branch.
     fn remembers(&self) -> bool {
         false

@@ -10,7 +10,7 @@ use std::sync::{Arc, OnceLock};
 /// The largest number of tones.
 pub const MAX_TONES: usize = 64;
 /// The largest number of branches of a law.
-pub const MAX_BRANCHES: usize = 4096;
+pub const MAX_BRANCHES: usize = 4097;
 
 /// One tone of the drive: `Re(… e^{iωt})`.
 #[derive(Clone, Debug, PartialEq)]

@@ -118,10 +118,22 @@ fn prony(name: &str, arms: &[(f64, f64)], parameters: &[f64; 7]) -> Arc<dyn Forc
 }
 
 fn with_attraction(law: &Arc<dyn ForceLaw>, name: &str, values: &[f64]) -> Arc<dyn ForceLaw> {
-    let (own, other) = (laws::law(name).unwrap(), laws::law("prony-sphere").unwrap());
-    let attraction = own.with(values).unwrap();
-    laws::build_sum(&[(other.entry, Arc::clone(law)), (own.entry, attraction)]).unwrap()
+    with_attractions(law, &[(name, values)])
 }
+
+/// The sum of an elastic or relaxing law with others.
+fn with_attractions(law: &Arc<dyn ForceLaw>, others: &[(&str, &[f64])]) -> Arc<dyn ForceLaw> {
+    let first = laws::law("prony-sphere").unwrap();
+    let mut terms = vec![(first.entry, Arc::clone(law))];
+    for (name, values) in others {
+        let own = laws::law(name).unwrap();
+        terms.push((own.entry, own.with(values).unwrap()));
+    }
+    laws::build_sum(&terms).unwrap()
+}
+
+/// Parameters of a capillary bridge that forms at 1.2 nm and ruptures at about 4 nm.
+const CAPILLARY: [f64; 9] = [0.7, 0.5, f64::INFINITY, 0.3, 10.0, 0.2, 0.03, 0.6, 0.02];
 
 struct Found {
     orbit: PeriodicOrbit,
@@ -398,6 +410,35 @@ fn fast_and_slow_arms_are_hertz() {
     same(&limit, &hertz(0.2));
 }
 
+/// A capillary bridge over an arm that is much slower than a contact is one over Hertz's solid.
+#[test]
+fn a_bridge_over_a_slow_arm_is_one_over_an_elastic_sample() {
+    let lever = PIB_LEVER;
+    let van_der_waals: &[f64] = &[0.1, 10.0, 0.2];
+    let others: [(&str, &[f64]); 2] = [("capillary", &CAPILLARY), ("van-der-waals", van_der_waals)];
+    let hertz = laws::law("hertz").unwrap();
+    let elastic = hertz.with(&[0.5, 0.4, f64::INFINITY, 0.3, 10.0, 0.2]);
+    let slow = parameters(0.2, 0.4, 10.0, 0.2, 1.0);
+    let slow = prony("prony-sphere", &[(1e13, 0.3)], &slow);
+    let [(a, lost_a), (b, lost_b)] = [elastic.unwrap(), slow].map(|law| {
+        let system = lever.system(with_attractions(&law, &others));
+        let mut state = vec![0.0; system.dimension()];
+        (state[0], state[1]) = (-21.0, 12.0);
+        let mut flow = Flow::new(Arc::new(system));
+        flow.start(&state, 0.0).unwrap();
+        let motion = flow.record_until(3.0 * TAU).unwrap();
+        flow.state(&mut state);
+        (state, -motion.work())
+    });
+    for k in 0..2 {
+        assert!((a[k] - b[k]).abs() < 1e-9 * lever.gap, "{a:?} {b:?}");
+    }
+    assert!(
+        lost_a > 0.1 && (lost_a / lost_b - 1.0).abs() < 1e-9,
+        "{lost_a} {lost_b}"
+    );
+}
+
 /// Random samples, levers and starts against fixed steps of Runge and Kutta's method for the arms'
 /// own coordinates `ξ_i`.
 #[test]
@@ -420,7 +461,14 @@ fn random_cases_agree_with_an_independent_integrator() {
         ][shape];
         let mut law = prony(name, &arms, &parameters(rest, 0.4, size, contact, 1.0));
         let hamaker = within(0.01, 0.1);
-        if attraction {
+        let electric = attraction && shape == 0;
+        let permittivity = 0.002;
+        if electric {
+            let van_der_waals: &[f64] = &[hamaker, size, contact];
+            let biased: &[f64] = &[1.3, size, contact, permittivity];
+            let others = [("electrostatic", biased), (attracts, van_der_waals)];
+            law = with_attractions(&law, &others);
+        } else if attraction {
             law = with_attraction(&law, attracts, &[hamaker, size, contact]);
         }
         let lever = Lever {
@@ -439,7 +487,8 @@ fn random_cases_agree_with_an_independent_integrator() {
         flow.start(&state, 0.0).unwrap();
         let motion = flow.record_until(2.0 * TAU).unwrap();
         flow.state(&mut state);
-        touched += usize::from(motion.fraction(|branch| branch == 1) > 0.0);
+        let system = flow.system();
+        touched += usize::from(motion.fraction(|branch| system.law().touches(branch)) > 0.0);
         let power = [1.5, 2.0, 1.0][shape];
         let stiffness = match shape {
             0 => 4.0 / 3.0 * size.sqrt(),
@@ -448,7 +497,10 @@ fn random_cases_agree_with_an_independent_integrator() {
         } / (1.0 - 0.4 * 0.4);
         let pull = |g: f64| match shape {
             _ if !attraction => 0.0,
-            0 => -hamaker * size / (6.0 * g * g),
+            0 => {
+                let bias = TAU / 2.0 * permittivity * (1.3 * size).powi(2);
+                -hamaker * size / (6.0 * g * g) - bias / (g * (g + size))
+            }
             1 => -hamaker * size.tan().powi(2) / (6.0 * g),
             _ => -hamaker * size * size / (6.0 * g.powi(3)),
         };
@@ -533,7 +585,13 @@ fn derivatives_are_those_of_the_map() {
     let lever = PIB_LEVER;
     let parameters = parameters(PIB_REST, 0.5, 10.0, 0.2, lever.rate());
     let law = prony("prony-sphere", &PIB, &parameters);
-    let law = with_attraction(&law, "van-der-waals", &[0.1, 10.0, 0.2]);
+    let van_der_waals: (&str, &[f64]) = ("van-der-waals", &[0.1, 10.0, 0.2]);
+    check_jacobian(&lever, with_attractions(&law, &[van_der_waals]));
+    let bridge: (&str, &[f64]) = ("capillary", &CAPILLARY);
+    check_jacobian(&lever, with_attractions(&law, &[van_der_waals, bridge]));
+}
+
+fn check_jacobian(lever: &Lever, law: Arc<dyn ForceLaw>) {
     let mut map = Strobe::new(lever.system(law), TAU);
     let mut state = vec![-21.0, 12.0, 0.0, 0.0, 0.0];
     for _ in 0..5 {

@@ -15,8 +15,9 @@ mod random;
 use common::{beam, beam_modes, value};
 use extrapolation::Plain;
 use nalgebra::DMatrix;
+use nanotap_volterra::laws::curve::Interpolation;
 use nanotap_volterra::laws::entry::{Entry, Part};
-use nanotap_volterra::laws::polyline::{self, Rows};
+use nanotap_volterra::laws::table::{self, Rows};
 use nanotap_volterra::laws::{self, TableLaw, build_sum};
 use nanotap_volterra::{Flow, ForceLaw};
 use random::Random;
@@ -31,7 +32,7 @@ fn law(random: &mut Random, of: &'static TableLaw) -> (&'static Entry, Arc<dyn F
         // Separation takes more work than the attraction gave.
         let near = match parameter.name {
             "work_of_retraction" => near + 0.01,
-            "gap_factor" | "force_factor" => 1.0 + 0.3 * random.next(),
+            "gap_factor" | "force_factor" | "damping_factor" => 1.0 + 0.3 * random.next(),
             _ => near,
         };
         assert!(parameter.range.holds(near), "{} = {near}", parameter.name);
@@ -47,7 +48,11 @@ fn law(random: &mut Random, of: &'static TableLaw) -> (&'static Entry, Arc<dyn F
                 (gap, wall - 0.6 * (-(gap - 0.2).powi(2)).exp())
             })
             .collect();
-        of.through(&Rows::new(&points).unwrap(), &parameters)
+        let damping: Vec<f64> = points.iter().map(|(gap, _)| 0.02 / (4.0 + gap)).collect();
+        let [plain, damped] = [&[][..], &damping].map(|all| Rows::damped(&points, all).unwrap());
+        let rows = if random.next() > 0.0 { damped } else { plain };
+        let by = Interpolation::ALL[((1.0 + random.next()) * 1.5) as usize % 3];
+        of.through(&rows.by(by), &parameters)
     } else {
         of.with(&parameters)
     };
@@ -211,7 +216,7 @@ impl Case {
 fn check(count: usize, mut random: Random) {
     let plain = laws::all().filter(|law| !law.has_arms());
     let all: Vec<&'static TableLaw> = plain.collect();
-    assert_eq!(all.last().unwrap().entry, polyline::TABLE.entry);
+    assert_eq!(all.last().unwrap().entry, table::TABLE.entry);
     let (mut worst, mut worst_jacobian, mut touched, mut jacobians) = (0.0_f64, 0.0_f64, 0, 0);
     for k in 0..count {
         // 11 and 3 have no common factor with the numbers of laws and modes: all pairs occur.

@@ -11,8 +11,10 @@ mod extrapolation;
 #[path = "common/random.rs"]
 mod random;
 
-use common::{beam, beam_modes, table_law, value};
+use common::{beam, beam_modes, dmt, table_law, value};
 use extrapolation::Plain;
+use nanotap_volterra::laws::curve::Interpolation;
+use nanotap_volterra::laws::table::{ForceTable, Rows};
 use nanotap_volterra::laws::{self, TABLE};
 use nanotap_volterra::{Flow, ForceLaw};
 use random::Random;
@@ -114,6 +116,53 @@ fn of_ten_and_twenty_modes() {
     }
 }
 
+/// A thousand rows of DMT contact: the spline through them takes about the evaluations of the law
+/// itself, the polyline fifty times as many.
+#[test]
+fn a_spline_costs_about_as_much_as_its_law() {
+    let law = dmt();
+    let point = |k: i32| {
+        let s = f64::from(k) / 999.0;
+        let gap = -1.0 + 41.0 * s * s;
+        (gap, law.value(law.branch_at(gap, 0.0), gap, 0.0))
+    };
+    let rows = Rows::new(&(0..1000).map(point).collect::<Vec<_>>()).unwrap();
+    let end = |law: Arc<dyn ForceLaw>| {
+        let mut flow = Flow::new(Arc::new(beam(law, 3, 0.9, 200.0, 20.0, 18.0, 20)));
+        flow.start(&[7.0048, 0.0, 0.0, 17.1408, 0.0, 0.0], 0.0)
+            .unwrap();
+        flow.run_until(20.0 * TAU).unwrap();
+        let mut x = [0.0; 6];
+        flow.state(&mut x);
+        (x[0], flow.statistics().evaluations as f64)
+    };
+    let (expected, cost) = end(law.clone());
+    for (by, most, off) in [
+        (Interpolation::Natural, 2.0, 1e-3),
+        (Interpolation::Monotone, 2.0, 1e-3),
+        (Interpolation::Linear, 80.0, 1e-2),
+    ] {
+        let (found, evaluations) = end(Arc::new(ForceTable::new(&rows.by(by))));
+        println!(
+            "{}: {} {:e}",
+            by.name(),
+            evaluations / cost,
+            found - expected
+        );
+        assert!(
+            evaluations < most * cost,
+            "{}: {}",
+            by.name(),
+            evaluations / cost
+        );
+        assert!(
+            (found - expected).abs() < off,
+            "{}: {found} {expected}",
+            by.name()
+        );
+    }
+}
+
 #[test]
 fn a_polyline_converges_to_its_law_with_the_square_of_the_spacing() {
     let parameters: Vec<f64> = laws::law("dmt")
@@ -147,8 +196,8 @@ fn a_polyline_converges_to_its_law_with_the_square_of_the_spacing() {
             let branch = smooth.branch_at(gap, 0.0);
             points.push((gap, smooth.force(branch, gap, 0.0).value));
         }
-        let polyline = laws::polyline::Polyline::new(&points).unwrap();
-        let found = end(Arc::new(polyline));
+        let rows = Rows::new(&points).unwrap();
+        let found = end(Arc::new(ForceTable::new(&rows)));
         let error = found
             .iter()
             .zip(&exact)

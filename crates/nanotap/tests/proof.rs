@@ -258,23 +258,31 @@ fn every_piecewise_linear_lever_can_be_proved() {
         assert!(proof.proved, "{lever:?}: {}", proof.statement);
         assert_eq!(proof.theorem.unwrap().stability, "stable", "{lever:?}");
     }
-    let solid = Case::parse(
-        None,
+    let solids: [&[&str]; 2] = [
         &[
+            "contact=standard-linear-solid",
+            "relaxation_stiffness=5",
+            "relaxation_time=0.1",
+        ],
+        &[
+            "contact=generalised-maxwell",
+            "relaxation_arms=[[\"time\", \"stiffness\"], [0.1, 5], [0.5, 3], [0.02, 4]]",
+        ],
+    ];
+    for solid in solids {
+        let words = [
             "alpha1=0.1",
             "alpha2=0.1",
             "alpha3=0.1",
             "alpha4=20",
             "omega=20",
             "modes=2",
-            "contact=standard-linear-solid",
-            "relaxation_stiffness=5",
-            "relaxation_time=0.1",
-        ]
-        .map(str::to_owned),
-    );
-    let proof = found(&solid.unwrap(), &OrbitOptions::default()).1;
-    assert!(proof.proved, "{}", proof.statement);
+        ];
+        let words: Vec<String> = [&words, solid].concat().iter().map(|&w| w.into()).collect();
+        let solid = Case::parse(None, &words).unwrap();
+        let proof = found(&solid, &OrbitOptions::default()).1;
+        assert!(proof.proved, "{}", proof.statement);
+    }
 }
 
 /// A discontinuous force is not covered by the proofs, which report this.

@@ -256,6 +256,12 @@ fn a_flat_sample_gives_the_orbit_of_every_law() {
                 .to_owned(),
         ),
         (
+            "generalised-maxwell",
+            "law = \"generalised-maxwell\"\nstiffness = \"10 N/m\"\n\
+             relaxation_arms = [[\"time (us)\", \"stiffness (N/m)\"], [1, 20], [0.3, 8]]\n"
+                .to_owned(),
+        ),
+        (
             "moving-surface",
             format!(
                 "law = \"moving-surface\"\n{linear}surface_stiffness = \"5 N/m\"\n\
@@ -427,7 +433,7 @@ fn cancelled_work_ends_at_once() {
     assert_eq!(error.kind, nanotap::ErrorKind::Stopped);
 }
 
-/// Lines that are finished stay when the work is stopped; the others are missing, and it is said.
+/// Lines that are finished stay when the work is stopped; the others are missing, and a warning counts them.
 #[test]
 fn stopped_work_keeps_its_lines() {
     use nanotap::control::CancelFlag;

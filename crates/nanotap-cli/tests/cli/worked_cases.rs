@@ -232,7 +232,7 @@ follows! {
     the_measured_modes: "measured-modes.md", 2 commands, 6 numbers;
     the_moving_surface: "moving-surface.md", 7 commands, 26 numbers;
     the_period_doubling: "period-doubling.md", 2 commands, 6 numbers;
-    the_polymer: "polymer.md", 4 commands, 12 numbers;
+    the_polymer: "polymer.md", 8 commands, 25 numbers;
     the_samples: "samples.md", 5 commands, 30 numbers;
     the_reconstruction: "reconstruct.md", 1 commands, 0 numbers;
     the_force_curve: "force-curve.md", 3 commands, 23 numbers;
@@ -240,7 +240,7 @@ follows! {
     the_thermal_noise: "noise.md", 3 commands, 11 numbers;
     bimodal_operation: "bimodal.md", 5 commands, 18 numbers;
     the_scan: "scan.md", 4 commands, 19 numbers;
-    the_force_table: "table.md", 2 commands, 6 numbers;
+    the_force_table: "table.md", 3 commands, 8 numbers;
     the_stiff_lever: "stiff-lever.md", 3 commands, 4 numbers;
     the_tip_mass: "tip-mass.md", 3 commands, 6 numbers;
     the_tutorial_of_the_dynamicist: "dynamicist.md", 7 commands, 32 numbers;

@@ -5,6 +5,7 @@
 //! All quantities may be in any consistent units; the defaults are SI.
 
 pub mod capillary;
+pub mod curve;
 pub mod dmt;
 pub mod elastic;
 pub mod electric;
@@ -13,12 +14,13 @@ pub mod formula;
 pub mod hysteresis;
 pub mod jkr;
 pub mod kelvin_voigt;
+pub mod layer;
 pub mod lennard_jones;
-pub mod polyline;
 pub mod prony;
 pub mod solvation;
 pub mod spring_damper;
 pub mod sum;
+pub mod table;
 pub mod thin;
 pub mod van_der_waals;
 pub mod viscous;
@@ -117,7 +119,7 @@ const fn voigt(shape: Shape, pulls: bool) -> kelvin_voigt::KelvinVoigt {
     kelvin_voigt::KelvinVoigt { shape, pulls }
 }
 
-/// Every law given by parameters alone ([`polyline::TABLE`] has rows in addition,
+/// Every law given by parameters alone ([`table::TABLE`] has rows in addition,
 /// [`prony::TABLE`] arms).
 pub static TABLE: &[TableLaw] = table! {
     elastic::HERTZ => elastic::Elastic(Shape::Sphere),
@@ -126,6 +128,9 @@ pub static TABLE: &[TableLaw] = table! {
     thin::SPHERE => thin::Thin(Shape::Sphere),
     thin::CONE => thin::Thin(Shape::Cone),
     thin::PUNCH => thin::Thin(Shape::Punch),
+    layer::SPHERE => layer::Layer(Shape::Sphere),
+    layer::CONE => layer::Layer(Shape::Cone),
+    layer::PUNCH => layer::Layer(Shape::Punch),
     dmt::DMT => dmt::Dmt,
     jkr::JKR => jkr::Jkr,
     van_der_waals::SPHERE => van_der_waals::VanDerWaals(Shape::Sphere),
@@ -151,7 +156,7 @@ pub static TABLE: &[TableLaw] = table! {
 
 /// Every law.
 pub fn all() -> impl Iterator<Item = &'static TableLaw> {
-    TABLE.iter().chain(&prony::TABLE).chain([&polyline::TABLE])
+    TABLE.iter().chain(&prony::TABLE).chain([&table::TABLE])
 }
 
 /// The law of a name.
@@ -241,14 +246,17 @@ pub fn build_sum(
     }
     if let Some(k) = terms.iter().position(|(_, law)| law.surface().is_some()) {
         let (own, relaxing) = &terms[k];
-        let (other, law) = &terms[usize::from(k == 0)];
-        let attracts = other.name.starts_with("van-der-waals") && terms.len() == 2;
-        let whole = relaxing.with_attraction(law).filter(|_| attracts);
-        return whole.ok_or(VolterraError::Sum {
+        let mut others = terms[..k].iter().chain(&terms[k + 1..]);
+        let laws: Vec<Arc<dyn ForceLaw>> = others.clone().map(|(_, law)| law.clone()).collect();
+        let law = match &laws[..] {
+            [law] => law.clone(),
+            _ => Arc::new(sum::Sum::new(laws)),
+        };
+        return relaxing.with_attraction(&law).ok_or(VolterraError::Sum {
             first: own.name,
-            second: other.name,
-            reason: "to a sample that relaxes only one van der Waals attraction can be added, with \
-                     the same intermolecular distance",
+            second: others.next().map_or("", |(other, _)| other.name),
+            reason: "to a sample that relaxes only forces of the gap alone can be added that are \
+                     constant in contact and have the same intermolecular distance",
         });
     }
     Ok(Arc::new(sum::Sum::new(

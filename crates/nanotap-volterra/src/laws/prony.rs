@@ -317,7 +317,74 @@ pub struct Prony {
     /// `K E₀`.
     stiffness: f64,
     surface: Surface,
-    attraction: Option<Arc<dyn ForceLaw>>,
+    attraction: Option<Attraction>,
+}
+
+/// A force across the gap to the surface, with the branches of the whole law: constant in contact.
+#[derive(Clone, Debug)]
+struct Attraction {
+    law: Arc<dyn ForceLaw>,
+    /// The branches of contact and of flight at the end of a contact.
+    contact: usize,
+    flight: usize,
+    /// Ways out of its branches in flight, and whether the gap falls or rises to a level there.
+    guards: Vec<(f64, f64)>,
+}
+
+/// The first guard of an attraction, after those of contact.
+const FIRST_GUARD: usize = 2;
+
+impl Attraction {
+    /// Of a law that depends on the gap alone and is constant in contact, which begins at this gap.
+    fn of(law: &Arc<dyn ForceLaw>, contact_gap: f64) -> Option<Self> {
+        if law.depends_on_rate() || law.surface().is_some() {
+            return None;
+        }
+        // A slow approach from far on, to the branch in which they touch.
+        let mut flight = law.branch_at(f64::INFINITY, -1.0);
+        let falls = |exit: Exit| match exit.guard {
+            Guard::Falls(level) => Some((level, exit.target)),
+            _ => None,
+        };
+        let mut left = law.branches();
+        let contact = loop {
+            left = left.checked_sub(1)?;
+            let next = law.exits(flight).into_iter().filter_map(falls);
+            let (level, target) = next.max_by(|a, b| a.0.total_cmp(&b.0))?;
+            match (law.touches(target), level == contact_gap) {
+                (true, true) => break target,
+                (false, false) if level > contact_gap => flight = target,
+                _ => return None,
+            }
+        };
+        let [near, deep] = [0.0, 1.0].map(|depth| law.value(contact, contact_gap - depth, 0.0));
+        let mut guards = Vec::new();
+        for branch in (0..law.branches()).filter(|branch| !law.touches(*branch)) {
+            for exit in law.exits(branch) {
+                guards.push(match exit.guard {
+                    Guard::Falls(level) => (level, 1.0),
+                    Guard::Rises(level) => (level, -1.0),
+                    Guard::Turns | Guard::Own(_) => return None,
+                });
+            }
+        }
+        (near == deep).then(|| Self {
+            law: Arc::clone(law),
+            contact,
+            flight,
+            guards,
+        })
+    }
+
+    /// The number of a guard.
+    fn guard(&self, guard: Guard) -> usize {
+        let same = |(level, sign): &(f64, f64)| match guard {
+            Guard::Falls(other) => *sign > 0.0 && *level == other,
+            Guard::Rises(other) => *sign < 0.0 && *level == other,
+            Guard::Turns | Guard::Own(_) => false,
+        };
+        FIRST_GUARD + self.guards.iter().position(same).unwrap_or(0)
+    }
 }
 
 impl Prony {
@@ -379,21 +446,33 @@ impl Prony {
 impl ForceLaw for Prony {
     fn parameters(&self) -> Vec<&'static str> {
         let own = self.entry.parameters.iter().map(|p| p.name);
-        let others = self.attraction.iter().flat_map(|law| law.parameters());
+        let others = self.attraction.iter().flat_map(|of| of.law.parameters());
         own.chain(others).collect()
     }
 
     fn branches(&self) -> usize {
-        2
+        self.attraction.as_ref().map_or(2, |of| of.law.branches())
     }
 
     fn branch_at(&self, gap: f64, s: f64) -> usize {
         let delta = self.contact - gap;
-        usize::from(delta > 0.0 && self.root(delta) * delta > s)
+        let touches = delta > 0.0 && self.root(delta) * delta > s;
+        let Some(attraction) = &self.attraction else {
+            return usize::from(touches);
+        };
+        if touches {
+            return attraction.contact;
+        }
+        let branch = attraction.law.branch_at(gap + self.depth(s)[0], 0.0);
+        if attraction.law.touches(branch) {
+            attraction.flight
+        } else {
+            branch
+        }
     }
 
     fn force(&self, branch: usize, gap: f64, s: f64) -> Force {
-        if branch == 1 {
+        if self.touches(branch) {
             let delta = self.contact - gap;
             let root = self.root(delta);
             return Force {
@@ -406,7 +485,7 @@ impl ForceLaw for Prony {
             return Force::default();
         };
         let [depth, slope] = self.depth(s);
-        let force = attraction.force(0, gap + depth, 0.0);
+        let force = attraction.law.force(branch, gap + depth, 0.0);
         Force {
             by_rate: force.by_gap * slope,
             ..force
@@ -414,18 +493,39 @@ impl ForceLaw for Prony {
     }
 
     fn exits(&self, branch: usize) -> Vec<Exit> {
-        if branch == 0 {
-            // Of a virgin surface the force sets in like the power of the law.
-            let onset = self.shape.approach();
-            vec![Exit::new(Guard::Own(0), 1).with(Approach::Analytic, onset)]
-        } else {
-            vec![Exit::new(Guard::Own(1), 0)]
+        // Of a virgin surface the force sets in like the power of the law.
+        let onset = self.shape.approach();
+        let begins = |to| Exit::new(Guard::Own(0), to).with(Approach::Analytic, onset);
+        let touches = self.touches(branch);
+        match &self.attraction {
+            None if touches => vec![Exit::new(Guard::Own(1), 0)],
+            None => vec![begins(1)],
+            Some(attraction) if touches => vec![Exit::new(Guard::Own(1), attraction.flight)],
+            Some(attraction) => {
+                let exits = attraction.law.exits(branch).into_iter();
+                let own = |exit: Exit| {
+                    if attraction.law.touches(exit.target) {
+                        return begins(attraction.contact);
+                    }
+                    Exit::new(Guard::Own(attraction.guard(exit.guard)), exit.target)
+                };
+                exits.map(own).collect()
+            }
         }
     }
 
     /// In flight the gap to the surface; in contact `δ − s/δ^{m−1}`, which rises like `δ` on a virgin
     /// surface.
     fn guard(&self, index: usize, gap: f64, s: f64) -> Force {
+        if let (Some(of), Some(number)) = (&self.attraction, index.checked_sub(FIRST_GUARD)) {
+            let [depth, slope] = self.depth(s);
+            let (level, sign) = of.guards.get(number).copied().unwrap_or((0.0, 1.0));
+            return Force {
+                value: sign * (gap + depth - level),
+                by_gap: sign,
+                by_rate: sign * slope,
+            };
+        }
         if index == 0 {
             let [depth, slope] = self.depth(s);
             return Force {
@@ -464,20 +564,29 @@ impl ForceLaw for Prony {
     }
 
     fn with_attraction(&self, law: &Arc<dyn ForceLaw>) -> Option<Arc<dyn ForceLaw>> {
-        let begins = law.exits(0).into_iter().map(|exit| exit.guard);
-        if self.attraction.is_some() || !begins.eq([Guard::Falls(self.contact)]) {
-            return None;
-        }
+        let attraction = Attraction::of(law, self.contact).filter(|_| self.attraction.is_none())?;
         let mut whole = self.clone();
-        whole.surface.adhesion = law.value(1, self.contact, 0.0);
+        whole.surface.adhesion = law.value(attraction.contact, self.contact, 0.0);
         let relaxed = vec![Arc::clone(&self.surface.relaxed), Arc::clone(law)];
         whole.surface.relaxed = Arc::new(super::sum::Sum::new(relaxed));
-        whole.attraction = Some(Arc::clone(law));
+        whole.attraction = Some(attraction);
         Some(Arc::new(whole))
     }
 
+    fn touches(&self, branch: usize) -> bool {
+        let attraction = self.attraction.as_ref();
+        attraction.map_or(branch > 0, |of| of.law.touches(branch))
+    }
+
+    fn remembers(&self) -> bool {
+        self.attraction
+            .as_ref()
+            .is_some_and(|of| of.law.remembers())
+    }
+
     fn vanishes(&self, branch: usize) -> bool {
-        branch == 0 && self.attraction.is_none()
+        let attraction = self.attraction.as_ref();
+        !self.touches(branch) && attraction.is_none_or(|of| of.law.vanishes(branch))
     }
 
     fn remarks(&self, least_gap: f64) -> Vec<Remark> {

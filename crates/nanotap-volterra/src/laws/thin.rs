@@ -4,8 +4,8 @@
 //! cone `(8/(3π)) E tan θ δ² (1 + 0.721χ + 0.650χ² + 0.491χ³ + 0.225χ⁴)`, `χ = δ tan θ/h`; flat
 //! punch `(8/3) E a δ (1 + 1.133χ + 1.283χ² + 0.598χ³ − 0.291χ⁴)`, `χ = a/h` (García and García,
 //! Biophys. J. 114, 2018; ν = ½). Under a sphere the series is too stiff by 0.3 % at `χ = 0.42`, 1 % at
-//! 0.55, 5 % at 0.75 and 16 % at 1.02 (against the exact layer, by a Fredholm equation): it is
-//! reported beyond 0.5 %, `χ = 0.47`.
+//! 0.55, 5 % at 0.75 and 16 % at 1.02, against the exact [layer](super::layer): a motion that goes
+//! farther than an error of 0.5 % is reported.
 
 use crate::law::Remark;
 use crate::laws::elastic::{Shape, contact_ways};
@@ -15,9 +15,6 @@ use crate::laws::entry::{
 use crate::laws::formula::{Formula, Way};
 use nanotap_arithmetic::Scalar;
 use std::f64::consts::PI;
-
-/// `χ` at which the sphere's series is off by 0.5 %.
-const SPHERE_LIMIT: f64 = 0.47;
 
 /// See the module.
 #[derive(Clone, Copy, Debug)]
@@ -75,8 +72,38 @@ fn series<S: Scalar>(coefficients: &[f64; 5], x: S) -> S {
 }
 
 impl Thin {
+    /// `χ` at which the series is off by 0.5 %.
+    const fn limit(self) -> f64 {
+        match self.0 {
+            Shape::Sphere => 0.463,
+            Shape::Cone => 0.903,
+            Shape::Punch => 0.476,
+        }
+    }
+
+    /// The force over that of a half-space.
+    pub(crate) fn correction<S: Scalar>(self, ratio: S) -> S {
+        let coefficients = match self.0 {
+            Shape::Sphere => &SPHERE_SERIES,
+            Shape::Cone => &CONE_SERIES,
+            Shape::Punch => &PUNCH_SERIES,
+        };
+        series(coefficients, ratio)
+    }
+
+    /// `a0`, what multiplies `δ^p` on a half-space, and what `χ` is made with.
+    pub(crate) fn half_space<S: Scalar>(self, p: &[S]) -> [S; 3] {
+        let (modulus, size, thickness, contact) = (p[0], p[1], p[2], p[3]);
+        let (stiffness, scale) = match self.0 {
+            Shape::Sphere => (modulus * size.sqrt() * (16.0 / 9.0), size.sqrt()),
+            Shape::Cone => (modulus * size.tan() * (8.0 / (3.0 * PI)), size.tan()),
+            Shape::Punch => (modulus * size * (8.0 / 3.0), size),
+        };
+        [contact, stiffness, scale / thickness]
+    }
+
     /// `χ` at an indentation.
-    fn ratio<S: Scalar>(self, scale: S, indentation: S) -> S {
+    pub(crate) fn ratio<S: Scalar>(self, scale: S, indentation: S) -> S {
         match self.0 {
             Shape::Sphere => indentation.sqrt() * scale,
             Shape::Cone => indentation * scale,
@@ -96,27 +123,12 @@ impl Formula for Thin {
 
     /// `a0`, what multiplies `δ^p`, and what `χ` is made with.
     fn constants<S: Scalar>(&self, p: &[S]) -> Vec<S> {
-        let (modulus, size, thickness, contact) = (p[0], p[1], p[2], p[3]);
-        match self.0 {
-            Shape::Sphere => vec![
-                contact,
-                modulus * size.sqrt() * (16.0 / 9.0),
-                size.sqrt() / thickness,
-            ],
-            Shape::Cone => vec![
-                contact,
-                modulus * size.tan() * (8.0 / (3.0 * PI)),
-                size.tan() / thickness,
-            ],
-            Shape::Punch => {
-                let ratio = size / thickness;
-                vec![
-                    contact,
-                    modulus * size * series(&PUNCH_SERIES, ratio) * (8.0 / 3.0),
-                    ratio,
-                ]
-            }
-        }
+        let [contact, stiffness, scale] = self.half_space(p);
+        let stiffness = match self.0 {
+            Shape::Sphere | Shape::Cone => stiffness,
+            Shape::Punch => stiffness * self.correction(scale),
+        };
+        vec![contact, stiffness, scale]
     }
 
     fn force<S: Scalar>(&self, c: &[S], branch: usize, gap: S, _rate: S) -> S {
@@ -126,8 +138,7 @@ impl Formula for Thin {
         let delta = c[0] - gap;
         let elastic = c[1] * self.0.power(delta);
         match self.0 {
-            Shape::Sphere => elastic * series(&SPHERE_SERIES, self.ratio(c[2], delta)),
-            Shape::Cone => elastic * series(&CONE_SERIES, self.ratio(c[2], delta)),
+            Shape::Sphere | Shape::Cone => elastic * self.correction(self.ratio(c[2], delta)),
             Shape::Punch => elastic,
         }
     }
@@ -167,11 +178,7 @@ impl Formula for Thin {
         }
         let c = self.constants(p);
         let value = self.ratio(c[2], delta);
-        let limit = if self.0 == Shape::Sphere {
-            SPHERE_LIMIT
-        } else {
-            1.0
-        };
+        let limit = self.limit();
         if value > limit {
             vec![Remark {
                 ratio: "χ",

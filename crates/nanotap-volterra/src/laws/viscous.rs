@@ -7,7 +7,7 @@
 //! (Stipe et al., Phys. Rev. Lett. 87, 2001), a squeezed film like the third below a disk and like the
 //! first below a sphere.
 
-use crate::law::Approach;
+use crate::law::{Approach, Remark};
 use crate::laws::elastic::contact_ways;
 use crate::laws::entry::{CONTACT_DISTANCE, Dimension, Entry, RADIUS, Range, VISCOSITY, own};
 use crate::laws::formula::{Formula, Way};
@@ -56,6 +56,10 @@ impl Formula for RootViscosity {
         branch == 0
     }
 }
+
+/// Decay lengths below zero gap from which exponential damping is out of range: there it is twenty
+/// times that at zero gap.
+const DEEPEST: f64 = 3.0;
 
 /// `−γ₀ e^{−d/x} ḋ`.
 #[derive(Clone, Copy, Debug)]
@@ -114,6 +118,18 @@ impl Formula for ExponentialDamping {
 
     fn ways(&self, _branch: usize) -> Vec<Way> {
         Vec::new()
+    }
+
+    /// The law is one of a gap; deep in a contact its damping has no meaning.
+    fn remarks(&self, p: &[f64], least_gap: f64) -> Vec<Remark> {
+        let value = -least_gap / p[1];
+        let deep = value > DEEPEST;
+        let remark = Remark {
+            ratio: "−d/decay_length",
+            value,
+            limit: DEEPEST,
+        };
+        deep.then_some(remark).into_iter().collect()
     }
 }
 

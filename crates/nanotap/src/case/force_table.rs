@@ -1,4 +1,5 @@
-//! A force table as stated in a case: rows of gap and force, the first one with the units.
+//! A force table as stated in a case: rows of gap, force and, if there is one, damping, the first one
+//! with the units.
 //!
 //! In a case file it is an array, `table = [["gap (nm)", "force (nN)"], [-1, 8.5], [0, 0], [9,
 //! 0]]`, or the name of a CSV file with these columns. Such a file is read relative to the case
@@ -7,8 +8,9 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use nanotap_volterra::laws::polyline::Rows;
+use nanotap_volterra::laws::curve::Interpolation;
 use nanotap_volterra::laws::prony::Arms;
+use nanotap_volterra::laws::table::Rows;
 use toml::de::DeValue;
 
 use super::key::Takes;
@@ -21,6 +23,9 @@ use crate::case::table::{Entry, Header, Table};
 const SHAPE: &str = "write rows as in [[\"gap (nm)\", \"force (nN)\"], [-1, 8.5], [0, 0], [9, 0]]";
 const ARMS_SHAPE: &str =
     "write rows as in [[\"time (us)\", \"modulus (MPa)\"], [0.38, 460], [1.7, 136]]";
+const SPRINGS_SHAPE: &str =
+    "write rows as in [[\"time (us)\", \"stiffness (N/m)\"], [0.5, 50], [4, 10]]";
+const MODEL_ARMS_SHAPE: &str = "write rows as in [[\"time\", \"stiffness\"], [0.1, 20], [1, 5]]";
 
 /// Why rows are not a force table.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -51,7 +56,7 @@ impl ForceTableError {
     }
 }
 
-/// A force table: rows of gap in m and force in N.
+/// A force table: rows of gap in m, force in N and, if there is one, damping in N s/m.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ForceTable(Arc<Rows>);
 
@@ -68,22 +73,52 @@ impl ForceTable {
     pub(crate) fn of(table: &Table) -> Result<Self, ForceTableError> {
         let gaps = column(table, &["gap", "distance", "d"], Kind::Length, "gap (nm)")?;
         let forces = column(table, &["force", "f"], Kind::Force, "force (nN)")?;
+        let damping = if has(table, DAMPING) {
+            column(table, DAMPING, Kind::Damping, "damping (N s/m)")?
+        } else {
+            Vec::new()
+        };
         let points: Vec<(f64, f64)> = gaps.into_iter().zip(forces).collect();
-        let rows = Rows::new(&points).map_err(|error| {
+        let rows = Rows::damped(&points, &damping).map_err(|error| {
             let remedy = "give each gap once, in the order of the gaps, and its force";
             ForceTableError::new(format!("{}: {error}", table.name), remedy)
         })?;
         Ok(Self(Arc::new(rows)))
     }
 
+    /// The same rows with another curve between them.
+    pub(crate) fn by(&self, interpolation: Interpolation) -> Self {
+        Self(Arc::new(self.0.by(interpolation)))
+    }
+
     /// The table as an array that is read back as the same.
     pub(crate) fn text(&self) -> String {
-        let rows = self.0.points().iter();
-        let rows = rows.map(|(gap, force)| format!("[{gap:?}, {force:?}]"));
-        let header = "[\"gap (m)\", \"force (N)\"]".to_owned();
-        let all: Vec<String> = std::iter::once(header).chain(rows).collect();
+        let mut header = "[\"gap (m)\", \"force (N)\"".to_owned();
+        if !self.0.damping().is_empty() {
+            header.push_str(", \"damping (N s/m)\"");
+        }
+        let rows = self
+            .0
+            .points()
+            .iter()
+            .enumerate()
+            .map(|(row, (gap, force))| {
+                let damping = self.0.damping().get(row);
+                let damping = damping.map_or(String::new(), |damping| format!(", {damping:?}"));
+                format!("[{gap:?}, {force:?}{damping}]")
+            });
+        let all: Vec<String> = std::iter::once(format!("{header}]")).chain(rows).collect();
         format!("[{}]", all.join(", "))
     }
+}
+
+/// Names of a column of damping.
+const DAMPING: &[&str] = &["damping", "gamma", "γ"];
+
+/// Whether a table has a column of one of these names.
+fn has(table: &Table, names: &[&str]) -> bool {
+    let mut headers = table.columns.iter().map(|(written, _)| Header::of(written));
+    headers.any(|header| names.contains(&header.name.to_lowercase().as_str()))
 }
 
 /// A column of a table, by one of its names, in SI.
@@ -128,11 +163,11 @@ fn column(
     let (written, entries) = &table.columns[place];
     let unit = Header::of(written).unit;
     let named = || format!("name it as in `{example}`");
-    if unit.is_empty() {
+    if unit.is_empty() && kind != Kind::Number {
         return Err(refuse(None, "a column without a unit".to_owned(), named()));
     }
     let factor = kind
-        .parse(&format!("1 {unit}"))
+        .parse(format!("1 {unit}").trim_end())
         .map_err(|error| refuse(None, error.to_string(), named()))?;
     let number = |(row, entry): (usize, &Entry)| {
         let what = match entry {
@@ -147,48 +182,81 @@ fn column(
 /// Maxwell arms as stated in a case: rows of time and modulus. Like a force table they are an array,
 /// `arms = [["time (us)", "modulus (MPa)"], [0.38, 460], [1.7, 136]]`, with `shear modulus` for a
 /// shear modulus, or the name of a CSV file; or each with its unit,
-/// `arms = [["460 MPa", "0.38 us"], ["136 MPa", "1.7 us"]]`.
+/// `arms = [["460 MPa", "0.38 us"], ["136 MPa", "1.7 us"]]`. The arms of a piecewise-linear sample
+/// have a stiffness in place of the modulus; in `[model]` their columns are plain numbers.
 #[derive(Clone, Debug, PartialEq)]
-pub struct ArmTable(Arc<Arms>);
+pub struct ArmTable {
+    arms: Arc<Arms>,
+    strength: Strength,
+}
 
-impl ArmTable {
-    /// The arms, in s and Pa.
-    pub const fn arms(&self) -> &Arc<Arms> {
-        &self.0
+/// What says how strong an arm is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Strength {
+    /// Young's or shear modulus, Pa.
+    Modulus,
+    /// Stiffness, N/m.
+    Stiffness,
+    /// Stiffness in the model's unit, as its time.
+    Number,
+}
+
+impl Strength {
+    const fn kind(self) -> Kind {
+        match self {
+            Self::Modulus => Kind::Pressure,
+            Self::Stiffness => Kind::Stiffness,
+            Self::Number => Kind::Number,
+        }
     }
 
-    /// Creates arms from the columns `time` and `modulus` or `shear modulus` of a table.
+    /// Names of the column, and an example of its header.
+    const fn column(self, shear: bool) -> (&'static [&'static str], &'static str) {
+        match self {
+            Self::Modulus if shear => (SHEAR, "shear modulus (MPa)"),
+            Self::Modulus => (YOUNG, "modulus (MPa)"),
+            Self::Stiffness => (STIFFNESS, "stiffness (N/m)"),
+            Self::Number => (STIFFNESS, "stiffness"),
+        }
+    }
+}
+
+impl ArmTable {
+    /// The arms, in s and Pa or N/m, or in the model's units.
+    pub const fn arms(&self) -> &Arc<Arms> {
+        &self.arms
+    }
+
+    /// Creates arms from the columns `time` and `modulus`, `shear modulus` or `stiffness` of a table.
     ///
     /// # Errors
     /// If they are missing, have no unit, or a value makes no sense.
-    pub(crate) fn of(table: &Table) -> Result<Self, ForceTableError> {
-        let (points, shear) = if let Some(points) = Self::quantities(table) {
-            (points, false)
+    fn of(table: &Table, strength: Strength) -> Result<Self, ForceTableError> {
+        let shear = strength == Strength::Modulus && has(table, SHEAR);
+        let points = if let Some(points) = Self::quantities(table, strength.kind()) {
+            points
         } else {
-            let times = column(table, &["time", "tau", "τ"], Kind::Time, "time (us)")?;
-            let names = |column: &(String, Vec<Entry>)| Header::of(&column.0).name.to_lowercase();
-            let shear = table
-                .columns
-                .iter()
-                .map(names)
-                .any(|name| SHEAR.contains(&&*name));
-            let (names, example) = if shear {
-                (SHEAR, "shear modulus (MPa)")
-            } else {
-                (YOUNG, "modulus (MPa)")
+            let (kind, example) = match strength {
+                Strength::Number => (Kind::Number, "time"),
+                Strength::Modulus | Strength::Stiffness => (Kind::Time, "time (us)"),
             };
-            let moduli = column(table, names, Kind::Pressure, example)?;
-            (times.into_iter().zip(moduli).collect(), shear)
+            let times = column(table, &["time", "tau", "τ"], kind, example)?;
+            let (names, example) = strength.column(shear);
+            let strengths = column(table, names, strength.kind(), example)?;
+            times.into_iter().zip(strengths).collect()
         };
         let arms = Arms::new(&points, shear).map_err(|error| {
-            let remedy = "give each arm a time above zero and a modulus";
+            let remedy = "give each arm a time above zero, and a modulus or stiffness";
             ForceTableError::new(format!("{}: {error}", table.name), remedy)
         })?;
-        Ok(Self(Arc::new(arms)))
+        Ok(Self {
+            arms: Arc::new(arms),
+            strength,
+        })
     }
 
     /// Times and moduli of rows in which every entry has its unit.
-    fn quantities(table: &Table) -> Option<Vec<(f64, f64)>> {
+    fn quantities(table: &Table, strength: Kind) -> Option<Vec<(f64, f64)>> {
         let [first, second] = table.columns.as_slice() else {
             return None;
         };
@@ -201,19 +269,20 @@ impl ArmTable {
             all.map(|text| kind.parse(text?).ok())
                 .collect::<Option<Vec<f64>>>()
         };
-        let pair = |times, moduli| Some((read(times, Kind::Time)?, read(moduli, Kind::Pressure)?));
+        let pair = |times, moduli| Some((read(times, Kind::Time)?, read(moduli, strength)?));
         let (times, moduli) = pair(first, second).or_else(|| pair(second, first))?;
         Some(times.into_iter().zip(moduli).collect())
     }
 
     /// The arms as an array that is read back as the same.
     pub(crate) fn text(&self) -> String {
-        let name = if self.0.shear() {
-            "shear modulus"
-        } else {
-            "modulus"
+        let header = match self.strength {
+            Strength::Modulus if self.arms.shear() => "\"time (s)\", \"shear modulus (Pa)\"",
+            Strength::Modulus => "\"time (s)\", \"modulus (Pa)\"",
+            Strength::Stiffness => "\"time (s)\", \"stiffness (N/m)\"",
+            Strength::Number => "\"time\", \"stiffness\"",
         };
-        let rows = self.0.points().iter();
+        let rows = self.arms.points().iter();
         let rows = rows.map(|(time, modulus)| {
             let time = if time.is_infinite() {
                 "inf".to_owned()
@@ -222,8 +291,7 @@ impl ArmTable {
             };
             format!("[{time}, {modulus:?}]")
         });
-        let header = format!("[\"time (s)\", \"{name} (Pa)\"]");
-        let all: Vec<String> = std::iter::once(header).chain(rows).collect();
+        let all: Vec<String> = std::iter::once(format!("[{header}]")).chain(rows).collect();
         format!("[{}]", all.join(", "))
     }
 }
@@ -231,6 +299,8 @@ impl ArmTable {
 /// Names of a column of Young's moduli, and of shear moduli.
 const YOUNG: &[&str] = &["modulus", "e", "young's modulus"];
 const SHEAR: &[&str] = &["shear modulus", "g"];
+/// Names of a column of stiffnesses.
+const STIFFNESS: &[&str] = &["stiffness", "k"];
 
 impl Takes {
     /// The value of a key that takes a table.
@@ -239,7 +309,9 @@ impl Takes {
     /// If the table's columns are not those of the key.
     pub(crate) fn of_table(self, table: &Table) -> Result<Value, ForceTableError> {
         Ok(match self {
-            Self::Arms => Value::Arms(ArmTable::of(table)?),
+            Self::Arms => Value::Arms(ArmTable::of(table, Strength::Modulus)?),
+            Self::Springs => Value::Arms(ArmTable::of(table, Strength::Stiffness)?),
+            Self::ModelArms => Value::Arms(ArmTable::of(table, Strength::Number)?),
             _ => Value::Table(ForceTable::of(table)?),
         })
     }
@@ -257,10 +329,11 @@ impl Takes {
     /// # Errors
     /// As [`of_table`](Self::of_table), and if `text` names a file, which is not opened.
     pub(crate) fn parse_table(self, text: &str) -> Result<Value, ForceTableError> {
-        let shape = if self == Self::Arms {
-            ARMS_SHAPE
-        } else {
-            SHAPE
+        let shape = match self {
+            Self::Arms => ARMS_SHAPE,
+            Self::Springs => SPRINGS_SHAPE,
+            Self::ModelArms => MODEL_ARMS_SHAPE,
+            _ => SHAPE,
         };
         if let Some(name) = file_named(text) {
             return Err(ForceTableError::new(

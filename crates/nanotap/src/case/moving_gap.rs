@@ -153,7 +153,11 @@ mod tests {
                     alpha6,
                     ..paper.clone()
                 };
-                Case::from(case.on(law, numbers))
+                let mut case = case.on(law, numbers);
+                if law.entry().arms {
+                    case.arms = vec![[1.0, 0.5], [8.0, 0.2]];
+                }
+                Case::from(case)
             })
             .collect();
         for stop in [

@@ -120,6 +120,25 @@ fn taken(key: Key, entry: &Entry) -> Map<String, Value> {
             );
             return schema;
         }
+        Takes::Springs => {
+            say("type", json!(["string", "array"]));
+            say(
+                "examples",
+                json!([
+                    "arms.csv",
+                    [["time (us)", "stiffness (N/m)"], [0.5, 50], [4, 10]]
+                ]),
+            );
+            return schema;
+        }
+        Takes::ModelArms => {
+            say("type", "array".into());
+            say(
+                "examples",
+                json!([[["time", "stiffness"], [0.1, 20], [1, 5]]]),
+            );
+            return schema;
+        }
         Takes::FrequencyRatio => {
             say("type", json!(["string", "number"]));
             say("examples", json!(["25/4", 6.25]));

@@ -128,7 +128,9 @@ impl Key {
             Takes::Law => law(text)?,
             Takes::LeverName | Takes::MaterialName => Value::Name(text.into()),
             Takes::FrequencyRatio => Value::Ratio(text.parse()?),
-            takes @ (Takes::Table | Takes::Arms) => takes.parse_table(text)?,
+            takes @ (Takes::Table | Takes::Arms | Takes::Springs | Takes::ModelArms) => {
+                takes.parse_table(text)?
+            }
         })
     }
 }

@@ -71,6 +71,9 @@ const CURVE: &str = "[[\"gap (nm)\", \"force (nN)\"], [-1, 20], [-0.5, 5], [0, -
 /// Three arms of a polymer whose times are those of tapping, to begin with.
 const ARMS: &str = "[[\"time (us)\", \"modulus (MPa)\"], [0.38, 460], [1.7, 136], [7.2, 67]]";
 
+/// Arms of a stiffness in place of the modulus.
+const SPRINGS: &str = "[[\"time (us)\", \"stiffness (N/m)\"], [0.5, 10], [4, 3]]";
+
 impl Case {
     /// What must be left away, and what added, for this case to take another contact law. A value to add
     /// is that of `like` where it states one, else a usual one.
@@ -183,6 +186,7 @@ fn usual(key: Key, like: &Case) -> Option<Value> {
         Takes::Quantity(kind) => Some(Value::Number(key.entry().example, kind)),
         takes @ Takes::Table => takes.parse_table(CURVE).ok(),
         takes @ Takes::Arms => takes.parse_table(ARMS).ok(),
+        takes @ Takes::Springs => takes.parse_table(SPRINGS).ok(),
         _ => None,
     }
 }

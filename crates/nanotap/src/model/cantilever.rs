@@ -6,10 +6,10 @@ use serde::ser::SerializeMap as _;
 use serde::{Serialize, Serializer};
 
 use crate::model::beam::{MAX_MODES, ModeCountError};
-use crate::model::contact::ContactLaw;
 use crate::model::contact::dual::Dual;
 use crate::model::contact::entry::Damper;
 use crate::model::contact::law::Law;
+use crate::model::contact::{ContactLaw, MAX_ARMS};
 use crate::model::drive_form::{Actuation, FrequencyRatio};
 use crate::model::parameter::{Applies, LARGEST_ALPHA, Numbers, OMEGA_RANGE, Parameter, Unit};
 use crate::model::sample_law::SampleLaw;
@@ -58,6 +58,9 @@ pub struct Cantilever {
     pub actuation: Actuation,
     /// Frequency of a second tone over Ω.
     pub tone2_ratio: Option<FrequencyRatio>,
+    /// Time and stiffness of each relaxing arm, of a contact law with a list of these, in the model's
+    /// units.
+    pub arms: Vec<[f64; 2]>,
     /// The parameters that only some laws, drives and levers have; see [`get`](Self::get).
     pub further: Numbers,
 }
@@ -79,6 +82,7 @@ impl Cantilever {
             law: None,
             actuation: Actuation::Base,
             tone2_ratio: None,
+            arms: Vec::new(),
             further: Numbers::ZERO,
         }
     }
@@ -133,6 +137,9 @@ impl Cantilever {
         for (parameter, number) in Parameter::of_law(contact).zip(numbers) {
             self.further.set(parameter, *number);
         }
+        if !contact.entry().arms {
+            self.arms.clear();
+        }
         Self { contact, ..self }
     }
 
@@ -186,8 +193,8 @@ impl Cantilever {
     /// Stiffness and damper of the arm that its contact law has in place of α6, if it has one.
     pub fn arm(&self) -> Option<[f64; 2]> {
         match self.contact.entry().damper {
-            Damper::InArm { arm, .. } => Some(arm(&self.own_numbers())),
-            Damper::Contact { .. } => None,
+            Damper::InArm { arm: Some(arm), .. } => Some(arm(&self.own_numbers())),
+            Damper::InArm { .. } | Damper::Contact { .. } => None,
         }
     }
 
@@ -250,6 +257,41 @@ impl Cantilever {
                 });
             }
         }
+        self.check_arms()
+    }
+
+    /// Checks the relaxing arms.
+    ///
+    /// # Errors
+    /// [`CantileverError`] for the first value that makes no sense.
+    pub(crate) fn check_arms(&self) -> Result<(), CantileverError> {
+        let refuse = |value, reason| {
+            Err(CantileverError {
+                key: "relaxation_arms",
+                value,
+                reason,
+            })
+        };
+        let count = self.arms.len();
+        let takes = self.law.is_none() && self.contact.entry().arms;
+        if !takes && count > 0 {
+            return refuse(
+                count as f64,
+                Reason::OtherLaw(ContactLaw::GeneralisedMaxwell),
+            );
+        }
+        if takes && !(1..=MAX_ARMS).contains(&count) {
+            return refuse(count as f64, Reason::Arms);
+        }
+        let size = |value: &f64| (0.0..=LARGEST_ALPHA).contains(value);
+        for [time, stiffness] in &self.arms {
+            if !(*time > 0.0 && size(time)) {
+                return refuse(*time, Reason::ArmTime);
+            }
+            if !size(stiffness) {
+                return refuse(*stiffness, Reason::Negative);
+            }
+        }
         Ok(())
     }
 
@@ -263,7 +305,8 @@ impl Cantilever {
 
     /// What the sample answers, with the derivative of its numbers with respect to `parameter`.
     pub(crate) fn contact_law(&self, parameter: Option<Parameter>) -> Law {
-        self.contact.law(|number| self.dual(number, parameter))
+        let number = |number| self.dual(number, parameter);
+        self.contact.law(number, &self.arms)
     }
 }
 
@@ -331,6 +374,9 @@ impl Serialize for Cantilever {
         if let Some(law) = &self.law {
             map.serialize_entry("law", law)?;
         }
+        if !self.arms.is_empty() {
+            map.serialize_entry("relaxation_arms", &self.arms)?;
+        }
         for parameter in self.written_law_numbers() {
             map.serialize_entry(parameter.name(), &self.get(parameter))?;
         }
@@ -372,6 +418,10 @@ pub enum Reason {
     FrequencyOutOfRange,
     /// What the contact law objects to.
     Law(&'static str),
+    /// Too many relaxing arms, or none.
+    Arms,
+    /// An arm's time that is not positive and finite.
+    ArmTime,
     /// A spring or a damper in addition to a nonlinear law.
     SpringOfLaw,
     /// A number that only this other law has.
@@ -406,6 +456,14 @@ impl fmt::Display for Reason {
                 OMEGA_RANGE.0, OMEGA_RANGE.1
             ),
             Self::Law(reason) => formatter.write_str(reason),
+            Self::Arms => write!(
+                formatter,
+                "expected 1 to {MAX_ARMS} relaxing arms, each a time and a stiffness"
+            ),
+            Self::ArmTime => write!(
+                formatter,
+                "the time of an arm must be above 0 and at most {LARGEST_ALPHA:e}"
+            ),
             Self::SpringOfLaw => formatter.write_str(
                 "must be 0 with a nonlinear force law, which describes the whole sample",
             ),

@@ -5,8 +5,8 @@ use std::sync::Arc;
 
 use crate::model::words::plain;
 use nanotap_volterra::laws::entry::{Entry, ParameterEntry};
-use nanotap_volterra::laws::polyline::Rows;
 use nanotap_volterra::laws::prony::Arms;
+use nanotap_volterra::laws::table::Rows;
 use nanotap_volterra::laws::{TableLaw, all, build_sum, law};
 use nanotap_volterra::{ForceLaw, VolterraError};
 use serde::ser::SerializeSeq;
@@ -136,6 +136,10 @@ impl Serialize for SampleLaw {
             #[serde(skip_serializing_if = "Option::is_none")]
             rows: Option<&'a [(f64, f64)]>,
             #[serde(skip_serializing_if = "Option::is_none")]
+            damping: Option<&'a [f64]>,
+            #[serde(skip_serializing_if = "Option::is_none")]
+            interpolation: Option<&'static str>,
+            #[serde(skip_serializing_if = "Option::is_none")]
             arms: Option<&'a [(f64, f64)]>,
         }
         let mut values = self.values.iter().copied();
@@ -149,6 +153,8 @@ impl Serialize for SampleLaw {
                 law: entry.name,
                 parameters: parameters.zip(values.by_ref()).collect(),
                 rows: rows.map(Rows::points),
+                damping: rows.map(Rows::damping).filter(|all| !all.is_empty()),
+                interpolation: rows.map(|rows| rows.interpolation().name()),
                 arms: arms.map(Arms::points),
             })?;
         }

@@ -261,12 +261,14 @@ impl<'a, D: Number> Measured<'a, D> {
         let work = self.impacts() + self.work_on_sample();
         let work = work / self.periods();
         let (force, depth) = if self.model.nonlinear.is_some() {
-            // Attraction stores energy without contact.
+            // Attraction stores energy without contact, and an orbit closes to the rounding of the
+            // deflection, which a force may bend much farther than the tip moves.
             let [near, far] = self.range(Signal::Height);
+            let bent = self.reach();
             let pull = -self.least(Signal::Force).value();
             (
                 self.peak_force().value().max(pull),
-                (far.value() - near.value()),
+                (far.value() - near.value()).max(bent),
             )
         } else {
             (self.peak_force().value(), self.indentation().value())

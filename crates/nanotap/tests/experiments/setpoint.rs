@@ -202,7 +202,7 @@ fn a_budget_may_end_only_the_search_for_other_states() {
     assert!(remark.ends_with(&said), "{remark}");
 }
 
-/// Two tones at 601/599 in which hundreds of taps graze one after the other: the exact flow ends at the
+/// Two tones at 601/599 in which hundreds of taps graze in sequence: the exact flow ends at the
 /// budget, too, and says how far it came.
 #[test]
 fn an_exact_search_ends_at_its_budget_of_steps() {

@@ -113,6 +113,88 @@ fn a_punch_on_one_arm_is_the_standard_linear_solid() {
     assert!((values[0] / 24.371_528_606_334 - 1.0).abs() < 1e-9);
 }
 
+/// Under a flat punch any number of arms is the generalised Maxwell sample of the piecewise-linear
+/// engine.
+#[test]
+fn a_punch_on_many_arms_is_the_generalised_maxwell_sample() {
+    // 2R/(1 − ν²) = 1 nm.
+    let nonlinear = case(&[
+        "sample.law=prony-punch",
+        "tip.radius=0.5 nm",
+        "sample.poisson=0",
+        "sample.modulus=5 GPa",
+        "sample.arms=[[\"4 GPa\", \"2 us\"], [\"3 GPa\", \"0.3 us\"], [\"1 GPa\", \"15 us\"]]",
+        "sample.arm_time_factor=0.9",
+    ]);
+    let exact = case(&[
+        "sample.law=generalised-maxwell",
+        "sample.poisson=",
+        "sample.modulus=",
+        "sample.arms=",
+        "sample.stiffness=5 N/m",
+        "sample.relaxation_arms=[[\"time (us)\", \"stiffness (N/m)\"], [2, 4], [0.3, 3], [15, 1]]",
+        "sample.relaxation_time_factor=0.9",
+    ]);
+    let [a, b] = [&nonlinear, &exact].map(found);
+    let values = amplitude_and_phase(&nonlinear, &a);
+    for (value, expected) in values.iter().zip(amplitude_and_phase(&exact, &b)) {
+        assert!((value / expected - 1.0).abs() < 1e-11, "{value} {expected}");
+    }
+    let (a, b) = (&a.observables, &b.observables);
+    for (value, expected) in [
+        (a.dissipation, b.dissipation),
+        (a.peak_force, b.peak_force),
+        (a.contact_fraction, b.contact_fraction),
+        (a.indentation, b.indentation),
+    ] {
+        assert!((value / expected - 1.0).abs() < 1e-10, "{value} {expected}");
+    }
+}
+
+/// Relaxing arms are written as they are read, under both sections, and refused elsewhere.
+#[test]
+fn relaxing_arms_are_read_and_written() {
+    let words = [
+        "sample.law=generalised-maxwell",
+        "sample.poisson=",
+        "sample.modulus=",
+        "sample.arms=",
+        "sample.stiffness=5 N/m",
+        "sample.relaxation_arms=[[\"4 N/m\", \"2 us\"], [\"3000 mN/m\", \"300 ns\"]]",
+    ];
+    let physical = case(&words);
+    let lever = physical.cantilever().unwrap();
+    assert_eq!(lever.arms.len(), 2);
+    let again = |text: String| {
+        let name = "again.toml".into();
+        Case::parse(Some(nanotap::case::file::Source { name, text }), &[]).unwrap()
+    };
+    let same = again(physical.to_toml());
+    assert_eq!(same.cantilever().unwrap(), lever);
+    let model = Case::from(lever.clone());
+    assert_eq!(again(model.to_toml()).cantilever().unwrap(), lever);
+    let refused = |words: &[&str]| {
+        let words: Vec<String> = words.iter().map(|&w| w.to_owned()).collect();
+        Case::parse(None, &words).unwrap_err().to_string()
+    };
+    let paper = ["alpha1=0", "alpha2=1", "alpha3=1", "alpha4=1", "omega=2"];
+    let maxwell = "contact=generalised-maxwell";
+    let of = |more: &[&str]| refused(&[&paper[..], more].concat());
+    assert!(
+        of(&[maxwell]).contains("1 to 12 relaxing arms"),
+        "{}",
+        of(&[maxwell])
+    );
+    let arms = "relaxation_arms=[[\"time\", \"stiffness\"], [0.1, 2]]";
+    let other = of(&["contact=kelvin-voigt", "alpha6=1", arms]);
+    assert!(other.contains("generalised-maxwell"), "{other}");
+    let negative = of(&[
+        maxwell,
+        "relaxation_arms=[[\"time\", \"stiffness\"], [-1, 2]]",
+    ]);
+    assert!(negative.contains("time must be positive"), "{negative}");
+}
+
 /// Derivatives by the state's entries, the surface's among them, and by quantities of the case.
 #[test]
 fn derivatives() {

@@ -54,11 +54,10 @@ fn two_straight_lines_are_the_linear_contact() {
     }
 }
 
-/// The repulsive orbit of DMT contact with van der Waals attraction (A = 18.52532864 nm, φ =
-/// 67.86119340° by scalar Volterra collocation): the error of a polyline decreases with the square
-/// of the spacing of its rows.
-#[test]
-fn rows_of_a_smooth_law_converge_to_its_orbit() {
+/// The case of DMT contact with van der Waals attraction (A = 18.52532864 nm, φ = 67.86119340° of the
+/// repulsive orbit by scalar Volterra collocation) with its law as rows on either side of a0, evenly in
+/// the root of the distance from there, where the law is curved.
+fn rows_of_dmt(counts: [i32; 2], more: &[&str]) -> OrbitReport {
     let smooth = air(20.0, 18.0, &DMT);
     let law = smooth.cantilever().unwrap().law.clone().unwrap();
     let law = law.build().unwrap();
@@ -67,36 +66,116 @@ fn rows_of_a_smooth_law_converge_to_its_orbit() {
     let a = 18.52532864e-9 / scales.length / smooth.model().unwrap().tip.row[0];
     let (sin, cos) = 67.86119340_f64.to_radians().sin_cos();
     let state = [-a * sin, a * smooth.model().unwrap().frequency() * cos];
-    let errors: Vec<f64> = [60, 120, 240]
-        .into_iter()
-        .map(|count| {
-            // Evenly in the root of the distance from a0, where the law is curved.
-            let rows = (-count..=count).map(|k| {
-                let s = f64::from(k) / f64::from(count);
-                let gap = 0.169 + if k < 0 { -3.0 * s * s } else { 45.0 * s * s };
-                let at = gap / length;
-                (
-                    gap,
-                    force * law.force(law.branch_at(at, 0.0), at, 0.0).value,
-                )
-            });
-            let rows = table(rows);
-            let words = [
-                "sample.law=table",
-                "sample.intermolecular_distance=0.169 nm",
-                &rows,
-            ];
-            let found = near(&air(20.0, 18.0, &words), &state);
-            assert!(found.stable);
-            let seen = found.observables.in_si(&scales);
-            assert!((seen.contact_fraction - 0.0870649270).abs() < 1e-3);
-            1e9 * seen.first_harmonic - 18.52532864
-        })
-        .collect();
+    let rows = (-counts[0]..=counts[1]).map(|k| {
+        let s = f64::from(k) / f64::from(counts[usize::from(k > 0)]);
+        let gap = 0.169 + if k < 0 { -3.0 * s * s } else { 45.0 * s * s };
+        let at = gap / length;
+        let branch = law.branch_at(at, 0.0);
+        (gap, force * law.force(branch, at, 0.0).value)
+    });
+    let rows = table(rows);
+    let words = [
+        "sample.law=table",
+        "sample.intermolecular_distance=0.169 nm",
+        &rows,
+    ];
+    let found = near(&air(20.0, 18.0, &[&words, more].concat()), &state);
+    assert!(found.stable);
+    let seen = found.observables.in_si(&scales);
+    assert!((seen.contact_fraction - 0.0870649270).abs() < 1e-3);
+    found
+}
+
+/// A in nm less that of the law.
+fn error(found: &OrbitReport) -> f64 {
+    let scales = air(20.0, 18.0, &DMT).physical().unwrap().scales;
+    1e9 * found.observables.in_si(&scales).first_harmonic - 18.52532864
+}
+
+/// The error of a polyline decreases with the square of the spacing of its rows.
+#[test]
+fn rows_of_a_smooth_law_converge_to_its_orbit() {
+    let errors = [60, 120, 240].map(|count| error(&rows_of_dmt([count; 2], &[])));
     for pair in errors.windows(2) {
         assert!((3.5..4.5).contains(&(pair[0] / pair[1])), "{errors:?}");
     }
     assert!(errors[2].abs() < 1e-4, "{errors:?}");
+}
+
+/// A spline through as many rows is nearer by far; a thousand rows give the law to six digits.
+#[test]
+fn a_spline_is_nearer_to_the_law() {
+    let straight = error(&rows_of_dmt([60; 2], &[]));
+    for by in ["monotone", "natural"] {
+        let word = format!("sample.interpolation={by}");
+        let few = error(&rows_of_dmt([60; 2], &[&word]));
+        assert!(
+            few.abs() < 0.1 * straight.abs(),
+            "{by}: {few:e} {straight:e}"
+        );
+        let many = error(&rows_of_dmt([300, 700], &[&word]));
+        assert!(many.abs() < 1e-6, "{by}: {many:e}");
+    }
+}
+
+/// A column of damping does what exponential damping does, and its rows are read in their unit.
+#[test]
+fn a_table_has_a_column_of_damping() {
+    let force = |gap: f64| {
+        if gap < 0.0 {
+            gap * gap - 5.0 * gap
+        } else {
+            0.0
+        }
+    };
+    let rows = |damping: bool| {
+        let rows = (0..1000).map(|k| {
+            let gap = -2.5 + 0.04 * f64::from(k);
+            let column = format!(", {:?}", 2e3 * (-gap / 0.8).exp());
+            let column = if damping { &*column } else { "" };
+            format!("[{gap:?}, {:?}{column}]", force(gap))
+        });
+        let header = if damping {
+            ", \"damping (pN s/m)\""
+        } else {
+            ""
+        };
+        let rows: Vec<String> = rows.collect();
+        format!(
+            "sample.table=[[\"gap (nm)\", \"force (nN)\"{header}], {}]",
+            rows.join(", ")
+        )
+    };
+    let natural = "sample.interpolation=natural";
+    let law = [
+        "sample.law=table + exponential-damping",
+        "sample.damping=2e-9 N s/m",
+        "sample.decay_length=0.8 nm",
+        natural,
+        &rows(false),
+    ];
+    let column = ["sample.law=table", natural, &rows(true)];
+    let [law, column] = [&law[..], &column].map(|words| air(20.0, 15.0, words));
+    let expected = orbit(&law.model().unwrap(), &OrbitOptions::default()).unwrap();
+    let found = near(&column, &expected.state);
+    assert!(found.stable && found.determinant_defect < 1e-9);
+    let (a, b) = (&found.observables, &expected.observables);
+    for (a, b) in [
+        (a.first_harmonic, b.first_harmonic),
+        (a.phase, b.phase),
+        (a.dissipation, b.dissipation),
+        (a.peak_force, b.peak_force),
+    ] {
+        assert!((a / b - 1.0).abs() < 1e-6, "{a} {b}");
+    }
+    assert!(a.dissipation > 0.0);
+    // What was read is written.
+    let again = nanotap::case::file::Source {
+        name: "again.toml".into(),
+        text: column.to_toml(),
+    };
+    let again = Case::parse(Some(again), &[]).unwrap();
+    assert_eq!(again.cantilever().unwrap(), column.cantilever().unwrap());
 }
 
 #[test]
@@ -119,8 +198,20 @@ fn derivatives_by_the_factors_of_a_table_and_by_the_lever() {
         Key::LeverK,
         Key::DriveFrequency,
     ];
-    let worst = worst(&case, &keys, &state);
-    assert!(worst < 1e-6, "{worst}");
+    let off = worst(&case, &keys, &state);
+    assert!(off < 1e-6, "{off}");
+    let rows = "sample.table=[[\"gap (nm)\", \"force (nN)\", \"damping (uN s/m)\"], [-2, 9, 0.05], \
+        [-0.5, 1, 0.04], [0, -1, 0.02], [0.7, -0.8, 0.01], [6, 0, 0]]";
+    let words = [
+        "modes=2",
+        "sample.law=table",
+        "sample.interpolation=natural",
+        rows,
+    ];
+    let case = air(20.0, 10.0, &words);
+    let keys = [&keys[..], &[Key::SampleDampingFactor]].concat();
+    let off = worst(&case, &keys, &state);
+    assert!(off < 1e-6, "{off}");
 }
 
 /// A folder for one test.
@@ -243,6 +334,19 @@ fn tables_that_are_not_functions_are_refused_with_their_place() {
     );
     assert!(said(&["sample.law=table", "sample.table=[1, 2]"]).contains("an array"));
     assert!(said(&["sample.law=table", "sample.table=3"]).contains("not opened"));
+    let law = "sample.law=table";
+    let negative =
+        "sample.table=[[\"gap (nm)\", \"force (nN)\", \"damping (N s/m)\"], [0, 1, 0], [1, 0, -1]]";
+    assert!(said(&[law, negative]).contains("the damping is negative"));
+    assert!(said(&[law, &rows, "sample.damping_factor=2"]).contains("no column of damping"));
+    assert!(said(&[law, &rows, "sample.interpolation=cubic"]).contains("monotone"));
+    let hertz = [
+        "sample.law=hertz",
+        "sample.modulus=1 GPa",
+        "tip.radius=5 nm",
+    ];
+    let said = said(&[&hertz[..], &["sample.interpolation=natural"]].concat());
+    assert!(said.contains("not a parameter of"), "{said}");
 }
 
 /// A table may be combined with a rate-dependent law.

@@ -19,6 +19,11 @@ pub(crate) fn on(law: ContactLaw, omega: f64) -> Cantilever {
     match law {
         ContactLaw::SpringDamper | ContactLaw::KelvinVoigt => case.on(law, &[]),
         ContactLaw::StandardLinearSolid => case.with(Parameter::Alpha6, 0.0).on(law, &[40.0, 0.05]),
+        ContactLaw::GeneralisedMaxwell => Cantilever {
+            alpha6: 0.0,
+            arms: vec![[0.2, 15.0], [0.5, 20.0], [3.0, 5.0]],
+            ..case.on(law, &[1.0, 1.0])
+        },
         ContactLaw::MovingSurface => case.on(law, &[60.0, 8.0, 0.4]),
     }
 }
@@ -147,20 +152,24 @@ proptest! {
     /// recovering surface never pulls, and only contact ends contact.
     #[test]
     fn samples_are_passive(
-        law in 0..4_usize, modes in 1..5_usize, omega in 0.5..25.0_f64,
+        law in 0..5_usize, modes in 1..5_usize, omega in 0.5..25.0_f64,
         stiffness in 0.0..200.0_f64, damping in 1e-6..20.0_f64, gap in -0.2..0.3_f64,
         a in -0.3..0.3_f64, v in -3.0..3.0_f64, memory in -0.3..0.3_f64,
     ) {
         let law = ContactLaw::ALL[law];
         let mut case = Cantilever { modes, omega, alpha4: stiffness, alpha5: gap, ..Cantilever::paper() };
-        case.alpha6 = if law == ContactLaw::StandardLinearSolid { 0.0 } else { damping };
+        case.alpha6 = if law.has_damper() { damping } else { 0.0 };
         case = case.on(law, &match law {
             ContactLaw::StandardLinearSolid => vec![3.0 * damping, 0.1 * damping],
             ContactLaw::MovingSurface => {
                 vec![1.0 + 0.5 * stiffness, damping, 3.0 * gap.max(0.0)]
             }
+            ContactLaw::GeneralisedMaxwell => vec![1.0, 1.0],
             _ => Vec::new(),
         });
+        if law == ContactLaw::GeneralisedMaxwell {
+            case.arms = vec![[0.1 * damping, damping], [1.0, 0.3 * damping]];
+        }
         let model = Model::cantilever(&case).unwrap();
         let mut state = vec![0.0; model.dimension()];
         (state[0], state[modes]) = (a, v);

@@ -46,7 +46,7 @@ fn damping(random: &mut Random) -> f64 {
 fn beam(random: &mut Random, number: usize) -> Cantilever {
     let alpha3 = damping(random);
     let contact = ContactLaw::ALL[number % ContactLaw::ALL.len()];
-    let solid = contact == ContactLaw::StandardLinearSolid;
+    let solid = !contact.has_damper();
     let alpha4 = random.log(1e-3, 1e6);
     let mut case = Cantilever {
         modes: 1 + (20.0 * random.part().powi(2)) as usize,
@@ -78,9 +78,14 @@ fn beam(random: &mut Random, number: usize) -> Cantilever {
                 alpha4.sqrt() * random.log(0.05, 1.0),
                 alpha4 * random.log(1e-4, 1e-1),
             ],
+            ContactLaw::GeneralisedMaxwell => vec![1.0, 1.0],
             _ => Vec::new(),
         },
     );
+    if contact == ContactLaw::GeneralisedMaxwell {
+        let mut arm = || [random.log(1e-2, 1.0), alpha4 * random.log(0.1, 10.0)];
+        case.arms = vec![arm(), arm(), arm()];
+    }
     case
 }
 

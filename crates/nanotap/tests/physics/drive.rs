@@ -119,6 +119,7 @@ fn every_drive_has_its_derivatives_and_balances_its_energy() {
                 modes: 2,
                 alpha5: 0.03,
                 alpha6: sample.alpha6,
+                arms: sample.arms.clone(),
                 ..two_tones(actuation).on(law, &own_numbers(&sample))
             };
             let subject = Case::from(case);

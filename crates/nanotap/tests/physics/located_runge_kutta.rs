@@ -17,7 +17,7 @@ pub(crate) struct Motion {
     pub(crate) beam: DVector<f64>,
     /// Position of the surface's free end, and elongation of the arm's damper.
     pub(crate) surface: f64,
-    pub(crate) damper: f64,
+    pub(crate) dampers: Vec<f64>,
     pub(crate) touching: bool,
     /// The energy dissipated in the sample, and the largest and the smallest force.
     pub(crate) dissipated: f64,
@@ -31,12 +31,18 @@ pub(crate) struct Independent {
     inverse_mass: nalgebra::DMatrix<f64>,
 }
 
-/// Rates of (beam, surface, damper, dissipated energy).
-type Rates = (DVector<f64>, [f64; 3]);
+/// Rates of (beam, surface, dissipated energy, dampers).
+type Rates = (DVector<f64>, [f64; 2], Vec<f64>);
 
-/// Stiffness and relaxation time of a standard linear solid's arm.
-fn arm(case: &Cantilever) -> [f64; 2] {
-    ["relaxation_stiffness", "relaxation_time"].map(|of| case.get(parameter(of)))
+/// Stiffness and relaxation time of the arms.
+fn arms(case: &Cantilever) -> Vec<[f64; 2]> {
+    match case.contact {
+        ContactLaw::StandardLinearSolid => {
+            vec![["relaxation_stiffness", "relaxation_time"].map(|of| case.get(parameter(of)))]
+        }
+        ContactLaw::GeneralisedMaxwell => case.arms.iter().map(|[t, k]| [*k, *t]).collect(),
+        _ => Vec::new(),
+    }
 }
 
 impl Independent {
@@ -61,10 +67,14 @@ impl Independent {
 
     /// Force of the sample in contact on the tip at height `h` and speed `v`.
     fn pressed(&self, h: f64, v: f64, m: &Motion) -> f64 {
-        let (c, damper) = (&self.case, m.damper);
+        let c = &self.case;
         match c.contact {
             ContactLaw::SpringDamper | ContactLaw::KelvinVoigt => -c.alpha4 * h - c.alpha6 * v,
-            ContactLaw::StandardLinearSolid => -c.alpha4 * h + arm(c)[0] * (-h - damper),
+            ContactLaw::StandardLinearSolid | ContactLaw::GeneralisedMaxwell => {
+                let pushes = arms(c).into_iter().zip(&m.dampers);
+                let pushes = pushes.map(|([stiffness, _], damper)| stiffness * (-h - damper));
+                -c.alpha4 * h + pushes.sum::<f64>()
+            }
             ContactLaw::MovingSurface => {
                 let rate = v - self.surface_speed(h, v, m);
                 -MovingSurface::of(c).adhesion - c.alpha4 * (h - m.surface) - c.alpha6 * rate
@@ -90,10 +100,14 @@ impl Independent {
         match c.contact {
             ContactLaw::SpringDamper => 0.0,
             ContactLaw::KelvinVoigt | ContactLaw::MovingSurface => m.surface,
-            // α4 u + k (u + w) = 0
-            ContactLaw::StandardLinearSolid => {
-                let [stiffness, _] = arm(c);
-                -stiffness * m.damper / (c.alpha4 + stiffness)
+            // α4 u + Σ k (u + w) = 0
+            ContactLaw::StandardLinearSolid | ContactLaw::GeneralisedMaxwell => {
+                let (mut moment, mut all) = (0.0, c.alpha4);
+                for ([stiffness, _], damper) in arms(c).into_iter().zip(&m.dampers) {
+                    moment += stiffness * damper;
+                    all += stiffness;
+                }
+                -moment / all
             }
         }
     }
@@ -117,31 +131,36 @@ impl Independent {
         let mut beam = DVector::zeros(2 * n);
         beam.rows_mut(0, n).copy_from(&speed);
         beam.rows_mut(n, n).copy_from(&(&self.inverse_mass * pull));
-        let (surface, damper, lost) = match c.contact {
-            ContactLaw::SpringDamper => (0.0, 0.0, if m.touching { c.alpha6 * v * v } else { 0.0 }),
+        let none = Vec::new;
+        let (surface, dampers, lost) = match c.contact {
+            ContactLaw::SpringDamper => {
+                (0.0, none(), if m.touching { c.alpha6 * v * v } else { 0.0 })
+            }
             ContactLaw::KelvinVoigt => {
                 let speed = if m.touching {
                     v
                 } else {
                     -c.alpha4 / c.alpha6 * m.surface
                 };
-                (speed, 0.0, c.alpha6 * speed * speed)
+                (speed, none(), c.alpha6 * speed * speed)
             }
-            ContactLaw::StandardLinearSolid => {
+            ContactLaw::StandardLinearSolid | ContactLaw::GeneralisedMaxwell => {
                 let at = if m.touching { h } else { self.free_surface(m) };
-                let [stiffness, time] = arm(c);
-                let speed = (-at - m.damper) / time;
-                let viscosity = stiffness * time;
-                (0.0, speed, viscosity * speed * speed)
+                let arms = arms(c);
+                let speeds = arms.iter().zip(&m.dampers);
+                let speeds: Vec<f64> = speeds.map(|([_, time], w)| (-at - w) / time).collect();
+                let lost = arms.iter().zip(&speeds);
+                let lost = lost.map(|([stiffness, time], speed)| stiffness * time * speed * speed);
+                (0.0, speeds.clone(), lost.sum())
             }
             ContactLaw::MovingSurface => {
                 let speed = self.surface_speed(h, v, m);
                 let rate = if m.touching { v - speed } else { 0.0 };
                 let lost = MovingSurface::of(c).damping * speed * speed + c.alpha6 * rate * rate;
-                (speed, 0.0, lost)
+                (speed, none(), lost)
             }
         };
-        (beam, [surface, damper, lost])
+        (beam, [surface, lost], dampers)
     }
 
     fn step(&self, t: f64, m: &Motion, h: f64) -> Motion {
@@ -149,19 +168,23 @@ impl Independent {
             let mut next = m.clone();
             next.beam.axpy(h, &k.0, 1.0);
             next.surface += h * k.1[0];
-            next.damper += h * k.1[1];
-            next.dissipated += h * k.1[2];
+            next.dissipated += h * k.1[1];
+            for (damper, speed) in next.dampers.iter_mut().zip(&k.2) {
+                *damper += h * speed;
+            }
             next
         };
         let a = self.rates(t, m);
         let b = self.rates(t + 0.5 * h, &along(&a, 0.5 * h));
         let c = self.rates(t + 0.5 * h, &along(&b, 0.5 * h));
         let d = self.rates(t + h, &along(&c, h));
-        let mean = |i: usize| (a.1[i] + 2.0 * (b.1[i] + c.1[i]) + d.1[i]) / 6.0;
+        let mean = |of: &dyn Fn(&Rates) -> f64| (of(&a) + 2.0 * (of(&b) + of(&c)) + of(&d)) / 6.0;
+        let dampers = (0..a.2.len()).map(|i| mean(&|rates| rates.2[i]));
         along(
             &(
                 (&a.0 + (&b.0 + &c.0) * 2.0 + &d.0) / 6.0,
-                [mean(0), mean(1), mean(2)],
+                [0, 1].map(|i| mean(&|rates| rates.1[i])),
+                dampers.collect(),
             ),
             h,
         )
@@ -183,7 +206,7 @@ impl Independent {
         let mut m = Motion {
             beam: DVector::from_column_slice(beam),
             surface: 0.0,
-            damper: 0.0,
+            dampers: vec![0.0; arms(&self.case).len()],
             touching: false,
             dissipated: 0.0,
             force: [0.0; 2],

@@ -29,7 +29,7 @@ use toml::de::{DeTable, DeValue};
 
 use super::force_table::file_named;
 use super::{Case, CaseKind, Kind, Value};
-use crate::case::key::Key;
+use crate::case::key::{Key, Takes};
 use crate::model::cantilever::{Cantilever, CosineTerm};
 use crate::model::contact::ContactLaw;
 use crate::model::drive_form::Actuation;
@@ -63,6 +63,13 @@ pub fn to_toml(case: &Cantilever) -> String {
             case.contact,
             case.contact.meaning()
         );
+    }
+    if !case.arms.is_empty() {
+        let arms = case.arms.iter();
+        let arms = arms.map(|[time, stiffness]| format!(", [{time:?}, {stiffness:?}]"));
+        let arms: String = arms.collect();
+        let key = Key::RelaxationArms;
+        let _ = writeln!(text, "{key} = [[\"time\", \"stiffness\"]{arms}]");
     }
     text
 }
@@ -137,7 +144,12 @@ fn inline(value: &serde_json::Value) -> String {
 }
 
 /// The keys that take a table.
-const TABLES: [Key; 2] = [Key::SampleTable, Key::SampleArms];
+const TABLES: [Key; 4] = [
+    Key::SampleTable,
+    Key::SampleArms,
+    Key::SampleRelaxationArms,
+    Key::RelaxationArms,
+];
 
 /// Reads the text of a case file. A force table or Maxwell arms that it names, by a path relative to
 /// the case file, become an array in the text: nothing else of a case is read from disk.
@@ -189,10 +201,12 @@ pub fn with_tables(words: &[String]) -> Result<Vec<String>, CaseFileError> {
 fn table(key: Key, path: &Path, place: Place) -> Result<Value, Problem> {
     key.entry().takes.read_table(path).map_err(|error| {
         let help = if error.remedy.is_empty() {
-            if key == Key::SampleArms {
-                "name a CSV file with columns of time and modulus"
-            } else {
-                "name a CSV file with columns of gap and force"
+            match key.entry().takes {
+                Takes::Arms => "name a CSV file with columns of time and modulus",
+                Takes::Springs | Takes::ModelArms => {
+                    "name a CSV file with columns of time and stiffness"
+                }
+                _ => "name a CSV file with columns of gap and force",
             }
         } else {
             error.remedy.as_str()

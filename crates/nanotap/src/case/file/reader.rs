@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use super::document::{Document, Entry, Value as Written};
-use super::problem::{CaseFileError, Problem, Problems, Source};
+use super::problem::{CaseFileError, Place, Problem, Problems, Source};
 use super::refusal;
 use crate::case::key::{Key, ModelKind, Section, Takes};
 use crate::case::quantity::Kind;
@@ -221,6 +221,16 @@ fn value(key: Key, entry: &Entry) -> Result<Value, Problem> {
         Takes::Word(words) => key
             .read(text)
             .map_err(|_| refusal::not_among(entry, text, words)),
+        takes @ Takes::ModelArms => {
+            let read = match &entry.value {
+                Written::Rows(rows) => takes.of_table(rows),
+                _ => takes.parse_table(text),
+            };
+            read.map_err(|error| {
+                Problem::new(entry.value_place.clone(), format!("{key}: {error}"))
+                    .help(error.remedy)
+            })
+        }
         Takes::FrequencyRatio => {
             let text = if text.is_empty() {
                 &entry.written
@@ -236,7 +246,7 @@ fn value(key: Key, entry: &Entry) -> Result<Value, Problem> {
 
 fn physical_value(key: Key, entry: &Entry) -> Result<Value, Problem> {
     let at = |message: String| Problem::new(entry.value_place.clone(), message);
-    if let (takes @ (Takes::Table | Takes::Arms), Written::Rows(rows)) =
+    if let (takes @ (Takes::Table | Takes::Arms | Takes::Springs), Written::Rows(rows)) =
         (key.entry().takes, &entry.value)
     {
         return takes
@@ -357,6 +367,17 @@ fn cantilever(
             problems
                 .add(|| refusal::out_of_range(entry, &reason.to_string()).key(Some(key.path())));
         }
+    }
+    if let Some(Value::Arms(arms)) = stated.get(Key::RelaxationArms) {
+        let points = arms.arms().points().iter();
+        case.arms = points.map(|&(time, stiffness)| [time, stiffness]).collect();
+    }
+    if let Err(error) = case.check_arms() {
+        let key = Key::RelaxationArms;
+        let place = known
+            .get(&key)
+            .map_or(Place::Whole, |entry| entry.value_place.clone());
+        problems.add(|| Problem::new(place, error.to_string()).key(Some(key.path())));
     }
     (complete && problems.found.len() == before).then_some(case)
 }

@@ -300,6 +300,14 @@ Before from Parameter::COUNT => {
         ..PLAIN
     };
 
+    RelaxationArms = Entry {
+        name: "relaxation_arms",
+        takes: Takes::ModelArms,
+        models: CANTILEVER,
+        meaning: "relaxing arms of contact = \"generalised-maxwell\": rows of time and stiffness, measured as relaxation_time and relaxation_stiffness",
+        ..PLAIN
+    };
+
     LeverName = other(Cantilever, "lever", Takes::LeverName, "a lever of the catalogue, for what is not said");
     LeverK = quantity(Cantilever, "k", Stiffness, R::POSITIVE, "static spring constant at the tip, 3EI/L³")
         .label("spring constant $k$");
@@ -358,10 +366,15 @@ Before from Parameter::COUNT => {
     );
     SampleTable = other(
         Sample, "table", Takes::Table,
-        "force curve of sample.law = \"table\": rows of gap and force, or a CSV file of them",
+        "force curve of sample.law = \"table\": rows of gap, force and, if there is one, damping, or a CSV file of them",
     ).under(Laws::Nonlinear);
     SampleGapFactor = quantity(Sample, "gap_factor", Number, R::POSITIVE, "factor by which a table's gaps are stretched").or(1.0).under(Laws::Nonlinear);
     SampleForceFactor = quantity(Sample, "force_factor", Number, R::NOT_NEGATIVE, "factor of a table's forces").or(1.0).under(Laws::Nonlinear);
+    SampleDampingFactor = quantity(Sample, "damping_factor", Number, R::NOT_NEGATIVE, "factor of a table's damping").or(1.0).under(Laws::Nonlinear);
+    SampleInterpolation = other(
+        Sample, "interpolation", Takes::Word(&["linear", "monotone", "natural"]),
+        "curve between a table's rows: straight lines (default), a cubic spline that stays between them, or a natural cubic spline",
+    ).under(Laws::Nonlinear);
     SampleMaterial = other(Sample, "material", Takes::MaterialName, "a material of the catalogue").under(Laws::Some);
     SampleStiffness = quantity(Sample, "stiffness", Stiffness, R::NOT_NEGATIVE, "contact stiffness K1")
         .feeds(Parameter::Alpha4).under(Laws::Some)
@@ -441,6 +454,10 @@ After from AFTER_LAWS => {
         Sample, "arms", Takes::Arms,
         "relaxing arms of a Prony series (prony-sphere, prony-cone, prony-punch): rows of time and modulus, or a CSV file of them",
     ).alias("prony").under(Laws::Nonlinear);
+    SampleRelaxationArms = other(
+        Sample, "relaxation_arms", Takes::Springs,
+        "relaxing arms of a generalised Maxwell sample (generalised-maxwell): rows of time and stiffness, or a CSV file of them",
+    ).under(Laws::Nonlinear);
     SampleArmModulusFactor = quantity(Sample, "arm_modulus_factor", Number, R::POSITIVE, "factor of the moduli of all arms").or(1.0).under(Laws::Nonlinear);
     SampleArmTimeFactor = quantity(Sample, "arm_time_factor", Number, R::POSITIVE, "factor of the times of all arms: the shift of a time–temperature superposition").or(1.0).under(Laws::Nonlinear);
     SampleHorizon = quantity(Sample, "horizon", Time, R::POSITIVE, "time of observation: slower arms count as elastic").under(Laws::Nonlinear);

@@ -150,6 +150,10 @@ pub enum Takes {
     Table,
     /// Rows of time and modulus, or the name of a CSV file of them.
     Arms,
+    /// Rows of time and stiffness, or the name of a CSV file of them.
+    Springs,
+    /// Rows of time and stiffness as numbers of the model.
+    ModelArms,
 }
 
 /// Range of a number.
@@ -478,6 +482,9 @@ impl Key {
             Takes::Arms => {
                 Some("it is a table; vary sample.arm_modulus_factor or sample.arm_time_factor")
             }
+            Takes::Springs | Takes::ModelArms => {
+                Some("it is a table; vary relaxation_stiffness_factor or relaxation_time_factor")
+            }
             Takes::Word(_) | Takes::Law | Takes::LeverName | Takes::MaterialName => {
                 Some("it is a name, not a quantity")
             }
@@ -654,7 +661,9 @@ mod tests {
                 let key = Key::stating(number).unwrap();
                 words.push(format!("{key}={}", key.kind().example()));
             }
-            let case = crate::case::Case::parse(None, &words).unwrap();
+            let arms = "sample.relaxation_arms=[[\"1 us\", \"5 N/m\"]]".to_owned();
+            let all = [&words[..], &vec![arms; usize::from(law.entry().arms)]].concat();
+            let case = crate::case::Case::parse(None, &all).unwrap();
             let view = case.physical().unwrap();
             let document = crate::case::document::CaseDocument::of(&case);
             let document = serde_json::to_value(document).unwrap();

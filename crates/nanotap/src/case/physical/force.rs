@@ -4,9 +4,10 @@ use std::f64::consts::PI;
 use std::sync::Arc;
 
 use nanotap_volterra::VolterraError;
+use nanotap_volterra::laws::curve::Interpolation;
 use nanotap_volterra::laws::entry::{Dimension, ParameterEntry, Part};
-use nanotap_volterra::laws::polyline::Rows;
 use nanotap_volterra::laws::prony::Arms;
+use nanotap_volterra::laws::table::Rows;
 use nanotap_volterra::laws::{self, TableLaw};
 
 use super::elastic::Elastic;
@@ -62,7 +63,8 @@ pub(crate) fn keys_of_contacts() -> impl Iterator<Item = Key> {
 pub(crate) fn takes(terms: &[&'static TableLaw], key: Key) -> bool {
     let mut parameters = terms.iter().flat_map(|term| term.entry.parameters);
     parameters.clone().any(|p| key_of(p) == key)
-        || key == Key::SampleTable && terms.iter().any(|term| term.has_rows())
+        || [Key::SampleTable, Key::SampleInterpolation].contains(&key)
+            && terms.iter().any(|term| term.has_rows())
         || key == Key::SampleArms && terms.iter().any(|term| term.has_arms())
         || key == Key::SampleMaterial && parameters.any(|p| p.name == "modulus")
         || ADHESION.contains(&key) && adhesion_of(terms).is_some()
@@ -75,6 +77,7 @@ pub(crate) fn linear_takes(law: ContactLaw, key: Key) -> bool {
     }
     match key {
         Key::SampleDamping | Key::SampleLossTangent => law.has_damper(),
+        Key::SampleRelaxationArms => law.entry().arms,
         _ => key.entry().laws == Laws::Some,
     }
 }
@@ -115,6 +118,9 @@ impl SampleForce {
                     let other = others.iter().find(|(_, of)| number.entry().applies == *of);
                     let other = other.map_or("", |(law, _)| law.name());
                     format!("it belongs to a law with adhesion, as sample.law = \"dmt\" or \"{other}\"")
+                } else if key == Key::SampleRelaxationArms {
+                    let law = ContactLaw::GeneralisedMaxwell;
+                    format!("it belongs to sample.law = \"{law}\"")
                 } else {
                     format!("it belongs to a nonlinear force law{}", laws_with(key))
                 };
@@ -144,7 +150,12 @@ impl SampleForce {
         let mut force = Self {
             values: Vec::new(),
             terms: terms.clone(),
-            table: reader.table(Key::SampleTable).cloned(),
+            table: reader.table(Key::SampleTable).map(|table| {
+                let named =
+                    |by: &Interpolation| Some(by.name()) == reader.word(Key::SampleInterpolation);
+                let by = Interpolation::ALL.into_iter().find(named);
+                by.map_or_else(|| table.clone(), |by| table.by(by))
+            }),
             arms: reader.arms(Key::SampleArms).cloned(),
         };
         if force.arms.is_none() && terms.iter().any(|term| term.has_arms()) {
@@ -165,6 +176,14 @@ impl SampleForce {
                      the columns `gap (nm)` and `force (nN)`"
                 ),
             ));
+        }
+        let damped = force
+            .table
+            .as_ref()
+            .is_some_and(|table| !table.rows().damping().is_empty());
+        if reader.has(Key::SampleDampingFactor) && !damped {
+            let reason = "the table has no column of damping, as in `damping (N s/m)`";
+            return Err(reader.impossible(Key::SampleDampingFactor, reason));
         }
         for parameter in parameters() {
             let value = force.value(reader, tip, parameter)?;

@@ -10,6 +10,7 @@ use super::force::SampleForce;
 use super::reader::Reader;
 use super::remark::Remark;
 use super::tip::Tip;
+use crate::case::force_table::ArmTable;
 use crate::case::key::{Key, Laws};
 use crate::case::quantity::Kind;
 use crate::model::contact::ContactLaw;
@@ -107,6 +108,8 @@ pub struct Sample {
     pub law: ContactLaw,
     /// Further parameters of the law, in SI.
     pub numbers: Vec<f64>,
+    /// Relaxing arms of the law, in s and N/m.
+    pub arms: Option<ArmTable>,
     /// Elastic constants, if known.
     pub elastic: Option<Elastic>,
     /// A nonlinear force law in place of the above.
@@ -123,6 +126,7 @@ impl Sample {
                 damping: None,
                 law: ContactLaw::default(),
                 numbers: Vec::new(),
+                arms: None,
                 elastic: None,
                 force: Some(force),
             });
@@ -146,6 +150,7 @@ impl Sample {
             damping,
             law,
             numbers: read_numbers(reader, law)?,
+            arms: read_arms(reader, law)?,
             elastic,
             force: None,
         })
@@ -227,6 +232,24 @@ fn read_numbers(reader: Reader<'_>, law: ContactLaw) -> Result<Vec<f64>, Physica
         }
     }
     Ok(numbers)
+}
+
+/// The relaxing arms of `law`, if it has a list of these.
+fn read_arms(reader: Reader<'_>, law: ContactLaw) -> Result<Option<ArmTable>, PhysicalError> {
+    if !law.entry().arms {
+        return Ok(None);
+    }
+    let arms = reader.arms(Key::SampleRelaxationArms);
+    arms.cloned().map(Some).ok_or_else(|| {
+        PhysicalError::missing(
+            Key::SampleRelaxationArms,
+            format!(
+                "sample.law = \"{law}\" needs its relaxing arms, as in relaxation_arms = \
+                 [[\"time (us)\", \"stiffness (N/m)\"], [0.5, 50], [4, 10]] or relaxation_arms = \
+                 \"arms.csv\""
+            ),
+        )
+    })
 }
 
 fn read_hertz(reader: Reader<'_>, tip: &Tip) -> Result<(Hertz, Elastic), PhysicalError> {

@@ -1186,7 +1186,7 @@ fn laws_and_drives_are_refused_with_what_would_be_right() {
         (
             &[("sample", "thickness", "50 nm")],
             "it belongs to a nonlinear force law (laws with it: thin-sphere, thin-cone, \
-             thin-punch)",
+             thin-punch, layer-sphere, layer-cone, layer-punch)",
         ),
         (
             &[

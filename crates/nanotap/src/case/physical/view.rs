@@ -346,6 +346,9 @@ fn mapped(reader: Reader<'_>, known: Option<Lever>) -> Result<Physical, Physical
         parameters.set(Parameter::Tone2Phase, phase);
     }
     let mut cantilever = scales.case(&parameters, &like);
+    let arms = sample.arms.iter().flat_map(|arms| arms.arms().points());
+    let arms = arms.map(|(time, stiffness)| [time / scales.time, stiffness / scales.stiffness]);
+    cantilever.arms = arms.collect();
     cantilever.validate()?;
     if let Some(force) = &sample.force {
         cantilever.law = Some(force.in_model(&scales)?);

@@ -19,6 +19,8 @@ pub struct Entry {
     pub numbers: &'static [ParameterEntry],
     /// Example of the physical quantities behind these numbers, for messages that one is missing.
     pub needs: &'static str,
+    /// Whether it has a list of relaxing arms.
+    pub arms: bool,
     /// Whether the surface pulls a touching tip with a constant force, so that the force jumps
     /// where contact begins and the lever may rest in several places.
     pub attracts: bool,
@@ -30,6 +32,9 @@ pub struct Entry {
     /// The equations.
     pub(crate) law: fn(Numbers<'_>) -> Law,
 }
+
+/// Stiffness of a relaxing arm and its damper, from the numbers that only its law has.
+pub type ArmOf = fn(&[f64]) -> [f64; 2];
 
 /// The damper of a sample.
 #[derive(Clone, Copy, Debug)]
@@ -45,8 +50,8 @@ pub enum Damper {
         not_alpha6: &'static str,
         /// Why a physical case must not give a damper.
         not_damping: &'static str,
-        /// Stiffness of the arm and its damper.
-        arm: fn(&[f64]) -> [f64; 2],
+        /// Stiffness of the arm and its damper, of a law with a single one.
+        arm: Option<ArmOf>,
     },
 }
 
@@ -59,6 +64,8 @@ pub(crate) struct Numbers<'a> {
     pub(crate) damping: Dual,
     /// Those that only this law has, in the order of its entry.
     pub(crate) own: &'a [Dual],
+    /// Relaxing arms, each a time and a stiffness.
+    pub(crate) arms: &'a [[f64; 2]],
 }
 
 /// No objection to any number.

@@ -44,8 +44,11 @@ laws! {
     SpringDamper = spring_damper;
     KelvinVoigt = kelvin_voigt;
     StandardLinearSolid = standard_linear_solid;
+    GeneralisedMaxwell = generalised_maxwell;
     MovingSurface = moving_surface;
 }
+
+pub(crate) use generalised_maxwell::MAX_ARMS;
 
 /// How many numbers only one of the laws has.
 pub(crate) const NUMBERS: usize = count(ContactLaw::ALL.len(), false);
@@ -97,13 +100,14 @@ impl ContactLaw {
         count(self as usize, false)
     }
 
-    /// The equations with these numbers.
-    pub(crate) fn law(self, dual: impl Fn(Parameter) -> Dual) -> Law {
+    /// The equations with these numbers, and relaxing arms of a time and a stiffness each.
+    pub(crate) fn law(self, dual: impl Fn(Parameter) -> Dual, arms: &[[f64; 2]]) -> Law {
         let own: Vec<Dual> = Parameter::of_law(self).map(&dual).collect();
         (self.entry().law)(Numbers {
             stiffness: dual(Parameter::Alpha4),
             damping: dual(Parameter::Alpha6),
             own: &own,
+            arms,
         })
     }
 }

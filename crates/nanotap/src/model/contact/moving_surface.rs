@@ -51,6 +51,7 @@ pub(super) static ENTRY: Entry = Entry {
     ],
     needs: "a moving surface needs its own spring and damper, as in \
             surface_stiffness = \"2 N/m\" and surface_damping = \"1e-6 N s/m\"",
+    arms: false,
     attracts: true,
     objection,
     like: None,

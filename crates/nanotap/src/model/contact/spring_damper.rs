@@ -17,6 +17,7 @@ pub(super) static ENTRY: Entry = Entry {
     },
     numbers: &[],
     needs: "",
+    arms: false,
     attracts: false,
     objection: any,
     like: Some(|_, _| Vec::new()),

@@ -13,10 +13,8 @@
 //! Limits: τ_m → 0 leaves the spring α4 (relaxed), τ_m → ∞ the spring α4 + k_m
 //! (instantaneous); k_m → ∞ at constant k_m τ_m is the Kelvin–Voigt surface of damper k_m τ_m.
 
-use super::dual::Dual;
 use super::entry::{Damper, Entry, any};
-use super::law::{Bilinear, Law, LinearForm, SampleResponse};
-use super::spring_damper;
+use super::generalised_maxwell;
 use crate::model::parameter::{ParameterEntry, SampleKey, Unit};
 
 /// Its entry.
@@ -29,7 +27,7 @@ pub(super) static ENTRY: Entry = Entry {
                      arm's: relaxation_stiffness times relaxation_time",
         not_damping: "a standard linear solid has its damper in the relaxing arm: give \
                       sample.relaxation_stiffness and sample.relaxation_time",
-        arm: |own| [own[0], own[0] * own[1]],
+        arm: Some(|own| [own[0], own[0] * own[1]]),
     },
     numbers: &[
         ParameterEntry::new("relaxation_stiffness", "kₘ", "stiffness of the relaxing arm over bending stiffness, km·L³/(EI)")
@@ -43,50 +41,9 @@ pub(super) static ENTRY: Entry = Entry {
     ],
     needs: "a standard linear solid has a relaxing arm of this stiffness, as in \
             relaxation_stiffness = \"50 N/m\", and time, as in relaxation_time = \"0.5 us\"",
+    arms: false,
     attracts: false,
     objection: any,
     like: Some(|arm, damper| vec![arm, damper / arm]),
-    law: |numbers| law(numbers.stiffness, numbers.own[0], numbers.own[1]),
+    law: |numbers| generalised_maxwell::law(numbers.stiffness, &[[numbers.own[0], numbers.own[1]]]),
 };
-
-/// The law.
-fn law(stiffness: Dual, arm: Dual, time: Dual) -> Law {
-    let instantaneous = stiffness + arm;
-    // An arm that relaxes at once is a damper of no size; with no spring at all there is
-    // no surface to recover.
-    if time.value <= 0.0 || instantaneous.value <= 0.0 {
-        return spring_damper::with_idle_variables(stiffness, arm * time, &[1.0]);
-    }
-    let one = Dual::constant(1.0);
-    let elongation = |factor| LinearForm::internal(0, factor);
-    let recovered = elongation(arm / instantaneous);
-    let gap = LinearForm::height(one).plus(&recovered);
-    let response = |force, of_spring: &LinearForm, indentation: &LinearForm| SampleResponse {
-        force,
-        rates: vec![of_spring.times(one / time)],
-        dissipated: vec![Bilinear::square(arm.value / time.value, of_spring)],
-        stored: vec![
-            Bilinear::square(0.5 * stiffness.value, indentation),
-            Bilinear::square(0.5 * arm.value, of_spring),
-        ],
-    };
-    // The elongation of the arm's spring is δ − w.
-    let (free, held) = (
-        elongation(-stiffness / instantaneous),
-        LinearForm::height(-one).plus(&elongation(-one)),
-    );
-    Law {
-        internal: 1,
-        release_guard: gap.times(-one),
-        release_reset: None,
-        onsets: None,
-        flight: response(LinearForm::default(), &free, &recovered),
-        contact: response(
-            gap.times(-instantaneous),
-            &held,
-            &LinearForm::height(-one),
-        ),
-        gap,
-        plain_contact: false,
-    }
-}

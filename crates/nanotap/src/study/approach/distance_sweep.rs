@@ -237,7 +237,7 @@ pub(in crate::study) struct DistanceSweep<'a> {
     is_nonlinear: bool,
     /// Steps and points of the stretches that were continued.
     continued: (u64, usize),
-    /// Whether a motion that is followed on the grid is a piece of its own on every step.
+    /// Whether a motion that is followed on the grid is one piece per step.
     pub(in crate::study) piece_a_step: bool,
     pub(in crate::study) stretches: Vec<Stretch>,
 }

@@ -1,7 +1,7 @@
 //! Fits of a map of curves: a force volume, one fit a pixel, into a dataset.
 //!
-//! The rows of the data name their pixel in further columns. Pixels of a chunk are fitted one after the
-//! other, each from the result of the one before; where that does not describe the data, from every
+//! The rows of the data name their pixel in further columns. Pixels of a chunk are fitted in
+//! sequence, each from the result of the one before; where that does not describe the data, from every
 //! initial value again, as a single curve. The result does not depend on threads.
 
 use std::collections::BTreeMap;

@@ -243,7 +243,7 @@ impl Computation for Image {
     }
 }
 
-/// Numbers by the name of their variable, those of both directions one after the other.
+/// Numbers by the name of their variable, first of the trace, then of the retrace.
 type Numbers = HashMap<String, Vec<f64>>;
 
 impl Image {

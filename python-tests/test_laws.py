@@ -13,6 +13,10 @@ LAWS = {
         "relaxation_stiffness": "5 N/m",
         "relaxation_time": "100 ns",
     },
+    "generalised-maxwell": {
+        "stiffness": "5 N/m",
+        "relaxation_arms": {"time (ns)": [100, 900], "stiffness (N/m)": [5, 2]},
+    },
     "moving-surface": {
         "stiffness": "5 N/m",
         "damping": 1e-7,

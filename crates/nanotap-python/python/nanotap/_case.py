@@ -44,7 +44,7 @@ class Case:
     as dictionaries, with quantities and their units: texts (`"10 nm"`), numbers in SI (`1e-8`), or
     quantities of pint, astropy or unyt. A force curve, `sample={"law": "table", "table": …}`,
     is the path of a CSV file, or its columns as a dictionary or a pandas table with units in the
-    names: `{"gap (nm)": […], "force (nN)": […]}`.
+    names: `{"gap (nm)": […], "force (nN)": […]}`; so are relaxing arms (`arms`, `relaxation_arms`).
 
     >>> Case(alpha1=0.1, alpha2=0.1, alpha3=0.1, alpha4=20, alpha6=0.2, omega=2.6).omega
     2.6
@@ -407,6 +407,16 @@ def key_words(keys: Mapping[str, Any], kind: str = "cantilever") -> dict[str, st
     return words
 
 
+#: Keys that take rows, as lists or as columns.
+TABLES = {
+    "sample.table",
+    "sample.arms",
+    "sample.prony",
+    "sample.relaxation_arms",
+    "relaxation_arms",
+}
+
+
 def _written(name: str, value: Any) -> str:
     if value is None:
         # The key is removed.
@@ -418,7 +428,7 @@ def _written(name: str, value: Any) -> str:
         return json.dumps(value, ensure_ascii=False)
     if isinstance(value, int | float) and not isinstance(value, bool):
         return json.dumps(text(name, value)) if si_unit(name) else repr(value)
-    if name == "sample.table":
+    if name in TABLES:
         return json.dumps(_rows(value))
     message = f"{name}: expected a number or a text, got {value!r}"
     raise TypeError(message)

@@ -145,7 +145,7 @@ fn map(arguments: &Arguments, request: &mut FitOptions, output: &Output) -> Resu
         fit_map_figure,
         output,
     )?;
-    output.study(&case, &done, |done| done.text(&case.title(), map_text))
+    output.study(&case, &done, |done| done.text(case.title(), map_text))
 }
 
 /// A map of fits in short.

@@ -118,7 +118,7 @@ fn dataset(
         output.warning(warning);
     }
     output.study(&case, &done, |done| {
-        done.text(&case.title(), |report| text(&case, report))
+        done.text(case.title(), |report| text(&case, report))
     })
 }
 

@@ -48,7 +48,7 @@ pub fn fit_map_figure(store: &Store) -> Result<Figure, StoreError> {
             |m: f64, v| if v.is_finite() { m.max(v.abs()) } else { m },
         );
         let name = &schema.variables[k].name;
-        let kind = Key::find(name).map(|key| key.kind());
+        let kind = Key::find(name).map(Key::kind);
         let unit = schema.variables[k].attributes.get("units");
         let unit = unit.and_then(|unit| unit.as_str()).unwrap_or("1");
         let kind = kind.or_else(|| (unit == "m").then_some(Kind::Length));

@@ -201,7 +201,8 @@ fn fit_one(case: &Case, request: &FitOptions, control: &Control<'_>) -> Result<F
     let [table] = &request.data[..] else {
         return Ok(found);
     };
-    if is_known || !(found.misfit || !found.fits) || control.is_cancelled() {
+    let is_described = found.fits && !found.misfit;
+    if is_known || is_described || control.is_cancelled() {
         return Ok(found);
     }
     let turned = FitOptions {

@@ -9,6 +9,10 @@ use crate::study::approach::Way;
 
 /// Report of a fit. Values are in SI for a physical case, otherwise in the model's units; phases in
 /// degrees.
+#[expect(
+    clippy::struct_excessive_bools,
+    reason = "each is an independent answer, and a field in JSON"
+)]
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 pub struct FitReport {
     /// The free parameters.

@@ -188,8 +188,7 @@ fn with_lines(header: ScanReport, recorded: Recorded, [lines, pixels]: [usize; 2
     if at_range > 0 {
         let remedy = report.feedback.as_ref().map_or_else(String::new, stable);
         report.warnings.push(format!(
-            "the z command is at an end of its range in {} drive periods{remedy}",
-            at_range
+            "the z command is at an end of its range in {at_range} drive periods{remedy}"
         ));
     }
     if !recorded.changes.is_empty() {

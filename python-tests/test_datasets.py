@@ -214,7 +214,13 @@ def test_an_image_is_written_line_by_line(tmp_path):
     whole = nanotap.scan(case, **few, out=path, progress=False)
     assert whole.attrs.pop("path") == str(path)
     xr.testing.assert_identical(whole, plain)
-    assert nanotap.open(path).sizes == {"y": 4, "direction": 2, "x": 12, "flight": 8, "jump": 8}
+    assert nanotap.open(path).sizes == {
+        "y": 4,
+        "direction": 2,
+        "x": 12,
+        "flight": 8,
+        "jump": 8,
+    }
     with pytest.raises(ValueError, match="line_settle"):
         nanotap.scan(
             nanotap.Case.from_file(ROOT / "docs" / "cases" / "scan-step.toml"), out=path

@@ -43,6 +43,7 @@ ARGUMENTS = {
 ELSEWHERE = {
     "bimodal",
     "fit",
+    "fit_map",
     "reconstruct",
     "scan",
     "paper",

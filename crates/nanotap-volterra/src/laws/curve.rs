@@ -3,8 +3,8 @@
 //! The natural cubic spline has two continuous derivatives. The monotone one is the same with its
 //! slopes limited (J. M. Hyman, SIAM J. Sci. Stat. Comput. 4, 645 (1983)): between two rows it never
 //! leaves their range, and it has one continuous derivative. Runs of cubics are then replaced by one
-//! polynomial of degree [`DEGREE`] with the same values and slopes at both ends, as long as it is
-//! within [`ACCURACY`] of the spline: a thousand rows of a smooth curve become some tens of pieces.
+//! polynomial of degree `DEGREE` with the same values and slopes at both ends, as long as it is
+//! within `ACCURACY` of the spline: a thousand rows of a smooth curve become some tens of pieces.
 
 // Only what is inlined into a function for wide registers gets their instructions.
 #![allow(clippy::inline_always)]

@@ -11,7 +11,7 @@
 //!
 //! `φ(a) = 0` where the edge is free, `F = 2E* ∫₀ᵃ φ dx`. It was solved by Gauss–Legendre quadrature
 //! with 120 nodes (220 change nothing in the first 12 digits), and `C` expanded in Chebyshev polynomials
-//! between 0 and each of [`EDGES`].
+//! between 0 and each of `EDGES`.
 
 use crate::law::Remark;
 use crate::laws::curve;
@@ -176,7 +176,7 @@ impl Formula for Layer {
     }
 }
 
-/// `C(χ)` on each interval between two [`EDGES`] in `T_k(u)`, `u` from −1 to 1.
+/// `C(χ)` on each interval between two `EDGES` in `T_k(u)`, `u` from −1 to 1.
 const SPHERE_SERIES: [&[f64]; 6] = [
     &[
         1.233_447_438_178_102,

@@ -14,10 +14,10 @@
 //! stable orbits there are reported too, and, from the branches of all these continued round
 //! their folds, the other orbits at the setpoint.
 //!
-//! A setpoint that is a frequency shift is one of frequency modulation: amplitude and phase are held
-//! too ([`frequency_modulation`](super::frequency_modulation)), at those of the free lever and 90°, and
-//! the first distance on approach at which the shift has its value is chosen. Frequency and strength of
-//! the drive there take the place of the case's own.
+//! A setpoint that is a frequency shift is one of frequency modulation ([`frequency_modulation`]):
+//! amplitude and phase are held too, at those of the free lever and 90°, and the first distance on
+//! approach at which the shift has its value is chosen. Frequency and strength of the drive there take
+//! the place of the case's own.
 //!
 //! Fails by omission: orbits on other branches, and a setpoint that the quantity passes twice between
 //! two neighbouring orbits of a branch.

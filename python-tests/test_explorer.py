@@ -547,6 +547,8 @@ def test_newer_motions_are_not_held_up_by_slow_ones(address: str) -> None:
         client = http.client.HTTPConnection(base.removeprefix("http://"), timeout=60)
         client.request("POST", "/api/motion", json.dumps(slow), headers)
         clients.append(client)
+    # Until the server has read them all: one that it reads later is newer.
+    time.sleep(2)
     assert motion(address)["summary"].startswith("period")
     refused = clients[0].getresponse()
     assert "newer motions" in json.loads(refused.read())["error"]

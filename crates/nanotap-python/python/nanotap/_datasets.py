@@ -120,20 +120,22 @@ def _worded(ds: "xr.Dataset") -> "xr.Dataset":
     """`classification` in words, as in every other result, and as codes in the store; empty
     where a run is missing.
     """
-    import xarray as xr
-
     codes = ds.get("classification")
     if codes is None:
         return ds
+    return ds.assign(classification=in_words(codes), classification_code=codes)
+
+
+def in_words(codes: "xr.DataArray") -> "xr.DataArray":
+    """The meanings of the codes of a store; empty where there is none."""
+    import xarray as xr
+
     meanings = codes.attrs["flag_meanings"].split()
     words = np.array([word if word != "missing" else "" for word in meanings])
-    named = xr.apply_ufunc(
+    named: xr.DataArray = xr.apply_ufunc(
         words.__getitem__, codes, dask="parallelized", output_dtypes=[words.dtype]
     )
-    attrs = {key: codes.attrs[key] for key in ("long_name", "units")}
-    return ds.assign(
-        classification=named.assign_attrs(attrs), classification_code=codes
-    )
+    return named.assign_attrs({key: codes.attrs[key] for key in ("long_name", "units")})
 
 
 def merge(sources: Iterable[Path], out: Path) -> Record:

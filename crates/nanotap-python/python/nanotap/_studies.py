@@ -482,11 +482,7 @@ def fit_map(
     }
     plan = ("fit", _cased(case), _arguments.request("fit", asked))
     ds = _datasets.computed(plan, "rows", out, chunk, threads, client, progress)
-    codes = ds.result
-    meanings = codes.attrs["flag_meanings"].split()
-    words_ = np.array([word if word != "missing" else "" for word in meanings])
-    attrs = {key: codes.attrs[key] for key in ("long_name", "units")}
-    return ds.assign(result=(codes.dims, words_[codes.values], attrs))
+    return ds.assign(result=_datasets.in_words(ds.result))
 
 
 def reconstruct(

@@ -89,7 +89,8 @@ impl Search<'_> {
         let fitted = Self::fitted(&problem, found, &information, intervals);
         let p_value = given.then(|| self.probability(found));
         let columns = self.columns(found);
-        let (reason, remarks) = self.judge(found, p_value, &fitted, &columns);
+        let misfit = self.not_noise(found);
+        let (reason, remarks) = self.judge(found, p_value, &fitted, &columns, &misfit);
         let undetermined = undetermined(&information, parameters, data);
         let swept = data.swept[0].key;
         let best = |case_of_curve: Case| case_of_curve.leaving_distance_as(case).to_toml();
@@ -121,7 +122,7 @@ impl Search<'_> {
             laws: Vec::new(),
             fits: reason.is_none(),
             reason,
-            misfit: !self.not_noise(found).is_empty(),
+            misfit: !misfit.is_empty(),
             turned: false,
             remarks,
             preparation: self.preparation.to_vec(),
@@ -483,6 +484,7 @@ impl Search<'_> {
         p_value: Option<f64>,
         parameters: &[FittedParameter],
         columns: &[FittedColumn],
+        misfit: &[String],
     ) -> (Option<String>, Vec<String>) {
         let data = self.problem.data;
         let point = &found.solution.point;
@@ -516,7 +518,6 @@ impl Search<'_> {
                 )
             });
         }
-        let misfit = self.not_noise(found);
         if !misfit.is_empty() {
             remarks.push(format!(
                 "{}: the law, the branch or an offset is not that of the data, and values and \

@@ -205,11 +205,12 @@ fn setpoints_fixed_steps_and_the_paper_stop_too() {
     }
 }
 
-/// A single period may take minutes, or be refused because of that.
+/// A single period may take minutes, or be refused because of that after two seconds. (`lyapunov`
+/// is refused after 0.3 s, about when the signal arrives: it would race.)
 #[test]
 fn one_long_period_stops_too() {
     let folder = folder();
-    for command in ["simulate", "orbit", "attractors", "approach", "lyapunov"] {
+    for command in ["simulate", "orbit", "attractors", "approach"] {
         let arguments = [command, "stiff.toml"];
         let found = interrupted(&folder, &arguments, "-INT");
         if found.1.is_some() {

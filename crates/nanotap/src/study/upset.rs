@@ -85,6 +85,9 @@ pub struct Knocks {
     pub smallest: Option<Upset>,
     /// The largest change of the tip's speed that was tried.
     pub largest_tried: f64,
+    /// The same in m/s, of a physical case.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub largest_tried_in_si: Option<f64>,
 }
 
 /// A knock: an instant of the orbit, and a change of the tip's speed.
@@ -158,6 +161,9 @@ pub fn upset(
             found
         }),
         largest_tried,
+        largest_tried_in_si: case
+            .physical()
+            .map(|view| view.scales.velocity * largest_tried),
     })
 }
 

@@ -17,6 +17,7 @@ use serde::Serialize;
 
 use crate::Error;
 use crate::case::Case;
+use crate::case::physical::quantity::JOULES_PER_ELECTRONVOLT;
 use crate::model::galerkin::Galerkin;
 use crate::model::model_map::ModelMap;
 use crate::model::stepper::Stepper;
@@ -26,8 +27,11 @@ use crate::study::simulate::{Classification, Named};
 
 /// Instants of an orbit at which it is knocked.
 pub const INSTANTS: usize = 48;
-/// The smallest and the largest change of the tip's speed, over its amplitude in the orbit.
-const SIZES: [f64; 2] = [1.0 / 4096.0, 4.0];
+/// Changes of the tip's speed over its amplitude in the orbit: the first that is tried, the least that
+/// is told from rounding, and the largest.
+const FIRST_SIZE: f64 = 1.0 / 1024.0;
+const LEAST_SIZE: f64 = 1e-9;
+const LARGEST_SIZE: f64 = 4.0;
 /// Ratio of sizes before bisection.
 const GROWTH: f64 = 2.0;
 /// Bisections of that ratio: to 0.3 %.
@@ -143,7 +147,7 @@ pub fn upset(
     };
     let seen = measure(model, state, period, ObservableSet::FIRST_HARMONIC)?;
     let unit = seen.first_harmonic * model.frequency();
-    let largest_tried = SIZES[1] * unit;
+    let largest_tried = LARGEST_SIZE * unit;
     let found = knocked.search(unit, control)?;
     Ok(Knocks {
         smallest: found.map(|mut found| {
@@ -154,7 +158,7 @@ pub fn upset(
                     tip_speed: scales.velocity * found.tip_speed,
                     impulse: scales.force * scales.time * found.impulse,
                     energy,
-                    energy_ev: energy / crate::case::physical::quantity::JOULES_PER_ELECTRONVOLT,
+                    energy_ev: energy / JOULES_PER_ELECTRONVOLT,
                     amplitude: found.first_harmonic.map(|a| scales.length * a),
                 }
             });
@@ -197,21 +201,27 @@ impl Knocked<'_> {
             };
             knocks.iter().map(resized).collect()
         };
-        let mut size = SIZES[0] * unit;
+        let mut size = FIRST_SIZE * unit;
         let mut upsetting = self.upsetting(&sized(&everywhere, size), control)?;
-        let smallest = size;
-        while upsetting.is_empty() {
-            size *= GROWTH;
-            if size > SIZES[1] * unit * (1.0 + f64::EPSILON) {
-                return Ok(None);
+        if upsetting.is_empty() {
+            while upsetting.is_empty() {
+                size *= GROWTH;
+                if size > LARGEST_SIZE * unit {
+                    return Ok(None);
+                }
+                upsetting = self.upsetting(&sized(&everywhere, size), control)?;
             }
-            upsetting = self.upsetting(&sized(&everywhere, size), control)?;
+        } else {
+            while size > LEAST_SIZE * unit {
+                let smaller = self.upsetting(&sized(&upsetting, size / GROWTH), control)?;
+                if smaller.is_empty() {
+                    break;
+                }
+                (size, upsetting) = (size / GROWTH, smaller);
+            }
         }
         let mut harmless = size / GROWTH;
         for _ in 0..BISECTIONS {
-            if size <= smallest {
-                break;
-            }
             let middle = (harmless * size).sqrt();
             let found = self.upsetting(&sized(&upsetting, middle), control)?;
             if found.is_empty() {

@@ -77,10 +77,10 @@ struct Average {
 }
 
 impl<'a> Averaging<'a> {
-    /// `None` without a drive that moves the gap, where a mode has no response, and of a surface that
-    /// relaxes.
+    /// `None` without a drive that moves the gap, where a mode has no response, of a surface that
+    /// relaxes, and of a force that depends on time.
     fn new(system: &'a System) -> Option<Self> {
-        if system.law().surface().is_some() {
+        if system.law().surface().is_some() || system.law().takes_signal() {
             return None;
         }
         let tones = system.drive().tones.iter().zip(&system.gap_tones);

@@ -368,7 +368,7 @@ impl Tables {
                 needed: "positive and finite",
             });
         }
-        if system.law().surface().is_some() {
+        if system.law().surface().is_some() || system.law().takes_signal() {
             return Err(VolterraError::Relaxing);
         }
         let kernel = system.kernel();

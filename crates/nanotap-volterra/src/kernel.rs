@@ -89,6 +89,17 @@ impl TimeMap {
     }
 }
 
+/// The second argument of a law.
+#[derive(Clone, Copy, Debug)]
+enum Second {
+    /// The gap's rate.
+    Rate,
+    /// A given signal.
+    Signal,
+    /// The depth of a surface with this many coordinates.
+    Surface(usize),
+}
+
 /// The modes with a gap read from them and a column by which the force enters.
 #[derive(Debug)]
 pub struct Kernel {
@@ -97,8 +108,7 @@ pub struct Kernel {
     pub(crate) readout: Vec<f64>,
     /// `row · R B`.
     pub(crate) rate_readout: Vec<f64>,
-    /// The row of the law's second argument: `rate_readout`, or the depth of a surface that
-    /// relaxes.
+    /// The row of the law's second argument: `rate_readout`, the depth of a surface that relaxes, or 0.
     pub(crate) second_readout: Vec<f64>,
     /// Number of coordinates at the end that are the surface's.
     surface: usize,
@@ -322,7 +332,14 @@ impl Kernel {
         longest: f64,
         nodes: usize,
     ) -> Result<Arc<Self>, VolterraError> {
-        Self::with_surface(modes, row, column, longest, nodes, 0)
+        Self::with_second(modes, row, column, longest, nodes, Second::Rate)
+    }
+
+    /// The same lever with a second argument of the law that is no function of the state.
+    pub(crate) fn with_signal(&self) -> Result<Arc<Self>, VolterraError> {
+        let (row, column) = (self.row.clone(), self.column.clone());
+        let modes = self.modes.clone();
+        Self::with_second(modes, row, column, self.longest, self.nodes, Second::Signal)
     }
 
     /// The same lever over a surface whose modes decay at `rates` and grow with the force at
@@ -337,16 +354,17 @@ impl Kernel {
         let mut column = self.column.clone().resize_vertically(n + count, 0.0);
         column.rows_mut(n, count).copy_from_slice(gains);
         let modes = self.modes.with_decays(rates)?;
-        Self::with_surface(modes, row, column, self.longest, self.nodes, count)
+        let second = Second::Surface(count);
+        Self::with_second(modes, row, column, self.longest, self.nodes, second)
     }
 
-    fn with_surface(
+    fn with_second(
         modes: Modes,
         row: RowDVector<f64>,
         column: DVector<f64>,
         longest: f64,
         nodes: usize,
-        surface: usize,
+        second: Second,
     ) -> Result<Arc<Self>, VolterraError> {
         let n = modes.dimension();
         for (what, found) in [
@@ -403,11 +421,13 @@ impl Kernel {
                 }
             }
         }
-        let second_readout = if surface == 0 {
-            rate_readout.clone()
-        } else {
-            let of_surface = |k: usize| if k + surface < n { 0.0 } else { 1.0 };
-            (0..n).map(of_surface).collect()
+        let (surface, second_readout) = match second {
+            Second::Rate => (0, rate_readout.clone()),
+            Second::Signal => (0, vec![0.0; n]),
+            Second::Surface(count) => {
+                let of_surface = |k: usize| if k + count < n { 0.0 } else { 1.0 };
+                (count, (0..n).map(of_surface).collect())
+            }
         };
         let couplings = couplings(&modes, &readout, &second_readout, &source);
         let direct: f64 = readout.iter().zip(&source).map(|(r, b)| r * b).sum();

@@ -134,6 +134,17 @@ pub trait ForceLaw: Debug + Send + Sync {
         true
     }
 
+    /// Whether the second argument of the force is the signal `cos ωt` of the system's second tone, or of its
+    /// only one, in place of the gap's rate.
+    fn takes_signal(&self) -> bool {
+        false
+    }
+
+    /// The law averaged over the signal, of laws that take one.
+    fn averaged(&self) -> Option<Arc<dyn ForceLaw>> {
+        None
+    }
+
     /// The force at the nodes of a step and its derivatives by gap and rate, as
     /// [`ForceLaw::force`] at each. All slices are of one length.
     fn forces(

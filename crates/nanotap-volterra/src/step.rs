@@ -253,6 +253,11 @@ impl Solver {
                 add_product(phasors, &rate, &mut self.base_rate);
             }
         }
+        if let Some((tone, frequency)) = system.signal() {
+            let (sin, cos) = nanotap_arithmetic::sin_cos(frequency * step.start);
+            let phasors = &phasors[2 * tone * rows..2 * (tone + 1) * rows];
+            add_product(phasors, &[cos, -sin], &mut self.base_rate);
+        }
         add_product(&table.gap, &step.modal, &mut self.base_gap);
         if system.needs_rate {
             add_product(&table.rate, &step.modal, &mut self.base_rate);
@@ -650,7 +655,9 @@ impl Solver {
         for (i, time) in table.times.iter().enumerate() {
             let forced = system.forced_gap(step.start + time);
             self.shift_gap[i] = forced[1];
-            self.shift_rate[i] = if system.second_is_rate() {
+            self.shift_rate[i] = if let Some((_, frequency)) = system.signal() {
+                -frequency * nanotap_arithmetic::sin(frequency * (step.start + time))
+            } else if system.second_is_rate() {
                 forced[2]
             } else {
                 0.0
@@ -737,7 +744,11 @@ pub(crate) fn gap_scale(system: &System, y: &[f64]) -> (f64, f64) {
     let kernel = system.kernel();
     let [tones, rate] = system.gap_sizes;
     let mut gap = system.gap_constant.abs() + tones;
-    let mut second = if system.second_is_rate() { rate } else { 0.0 };
+    let mut second = match system.signal() {
+        Some(_) => 1.0,
+        None if system.second_is_rate() => rate,
+        None => 0.0,
+    };
     for (k, y) in y.iter().enumerate() {
         gap += (kernel.readout[k] * y).abs();
         second += (kernel.second_readout[k] * y).abs();

@@ -80,6 +80,7 @@ pub struct System {
     pub(crate) gap_sizes: [f64; 2],
     /// Whether a step needs the gap's rate: the law or a guard does.
     pub(crate) needs_rate: bool,
+    takes_signal: bool,
     phasors: Arc<[Vec<OnceLock<Phasors>>; 3]>,
     /// What ends its motions from outside.
     cancel: CancelFlag,
@@ -223,6 +224,16 @@ impl System {
         surface: Option<&Surface>,
         options: Options,
     ) -> Result<Self, VolterraError> {
+        if law.takes_signal() {
+            if drive.tones.is_empty() {
+                return Err(VolterraError::Shape {
+                    what: "the tones",
+                    found: 0,
+                    expected: 1,
+                });
+            }
+            return Self::joined(lever.with_signal()?, None, law, drive, options);
+        }
         let Some(surface) = surface else {
             return Self::joined(lever, None, law, drive, options);
         };
@@ -289,6 +300,7 @@ impl System {
             touches: (0..branches).map(|b| law.touches(b)).collect(),
             free,
             forced: response.to_state(&kernel),
+            takes_signal: law.takes_signal(),
             exits,
             law,
             drive,
@@ -413,13 +425,23 @@ impl System {
     }
 
     /// Whether the second argument of the law is the gap's rate.
-    pub(crate) const fn second_is_rate(&self) -> bool {
-        self.free.is_none()
+    pub(crate) fn second_is_rate(&self) -> bool {
+        self.free.is_none() && self.signal().is_none()
     }
 
-    /// The second argument of the law, in a state in which the gap has this rate: the depth of a
-    /// surface that relaxes, else the rate.
-    pub fn second_argument(&self, rate: f64, x: &[f64]) -> f64 {
+    /// Number and frequency of the tone whose signal the law takes, if it takes one.
+    pub(crate) fn signal(&self) -> Option<(usize, f64)> {
+        let tone = self.drive.tones.len().min(2).checked_sub(1)?;
+        self.takes_signal
+            .then(|| (tone, self.drive.tones[tone].frequency))
+    }
+
+    /// The second argument of the law at a time, in a state in which the gap has this rate: a signal, the
+    /// depth of a surface that relaxes, or the rate.
+    pub fn second_argument(&self, time: f64, rate: f64, x: &[f64]) -> f64 {
+        if let Some((_, frequency)) = self.signal() {
+            return nanotap_arithmetic::cos(frequency * time);
+        }
         match self.kernel.surface() {
             0 => rate,
             count => x[x.len() - count..].iter().sum(),
@@ -494,16 +516,21 @@ impl System {
         )
     }
 
-    /// The second argument of the law and its rate, at modal coordinates `y` that change like `slope`,
-    /// where the gap has this rate and acceleration.
+    /// The second argument of the law and its rate at a time, at modal coordinates `y` that change like
+    /// `slope`, where the gap has this rate and acceleration.
     pub(crate) fn second_of(
         &self,
+        time: f64,
         [rate, acceleration]: [f64; 2],
         y: &[f64],
         slope: &[f64],
     ) -> [f64; 2] {
         if self.second_is_rate() {
             return [rate, acceleration];
+        }
+        if let Some((_, frequency)) = self.signal() {
+            let (sin, cos) = nanotap_arithmetic::sin_cos(frequency * time);
+            return [cos, -frequency * sin];
         }
         let row = &self.kernel.second_readout;
         let dot = |v: &[f64]| row.iter().zip(v).map(|(r, v)| r * v).sum::<f64>();
@@ -527,7 +554,7 @@ impl System {
     /// The branch of the law in state `x` at a time when nothing is known of the past.
     pub fn branch_at(&self, time: f64, x: &[f64]) -> usize {
         let (gap, rate) = self.gap(time, x);
-        self.law.branch_at(gap, self.second_argument(rate, x))
+        self.law.branch_at(gap, self.second_argument(time, rate, x))
     }
 
     /// The forced response at a time, written to `x`.
@@ -571,7 +598,7 @@ impl System {
         let mut y = vec![0.0; n];
         self.to_modal(time, x, &mut y);
         let (gap, rate) = self.gap_of(time, &y);
-        let second = self.second_argument(rate, x);
+        let second = self.second_argument(time, rate, x);
         let force = self.law.force(branch, gap, second).value;
         let kernel = self.kernel_on(branch);
         let mut slope = vec![0.0; n];

@@ -155,6 +155,18 @@ impl Forced {
         out
     }
 
+    /// The change of the law's arguments at a time.
+    fn arguments(&self, system: &System, time: f64) -> (f64, f64) {
+        let (gap, rate) = self.gap(system, time);
+        if system.second_is_rate() {
+            return (gap, rate);
+        }
+        let second = system.signal().map_or(0.0, |(tone, frequency)| {
+            -self.frequencies[tone] * time * nanotap_arithmetic::sin(frequency * time)
+        });
+        (gap, second)
+    }
+
     /// The change of the forced response's modal coordinates at a time.
     fn modal(&self, system: &System, time: f64) -> DVector<f64> {
         let mut out = self.constant.clone();
@@ -408,7 +420,7 @@ impl Observer for Tangents {
                 self.base.extend(
                     table.times[..n]
                         .iter()
-                        .map(|t| p.gap(system, step.start + t)),
+                        .map(|t| p.arguments(system, step.start + t)),
                 );
             }
             let mut gap_end = 0.0;
@@ -419,10 +431,9 @@ impl Observer for Tangents {
                 if solver.rates {
                     add_product(&table.rate, y, rate);
                 }
-                let by_rate = f64::from(u8::from(system.second_is_rate()));
                 for (i, (d, v)) in self.base.iter().enumerate() {
                     gap[i] += d;
-                    rate[i] += by_rate * v;
+                    rate[i] += v;
                 }
                 gap_end = gap[n - 1];
                 for i in 0..n {
@@ -494,7 +505,7 @@ impl Observer for Tangents {
         let kernel = system.kernel_on(switch.from);
         let dimension = system.dimension();
         let law = system.law();
-        let depth = system.second_of([switch.rate, 0.0], modal, &[])[0];
+        let depth = system.second_of(switch.time, [switch.rate, 0.0], modal, &[])[0];
         let before = law.force(switch.from, switch.gap, depth);
         let after = law.force(switch.to, switch.gap, depth).value;
         let jump = after - before.value;
@@ -516,7 +527,7 @@ impl Observer for Tangents {
                 .zip(&slope)
                 .map(|(r, s)| r * s)
                 .sum::<f64>();
-        let [_, second] = system.second_of([switch.rate, acceleration], modal, &slope);
+        let [_, second] = system.second_of(switch.time, [switch.rate, acceleration], modal, &slope);
         let fall = by_gap * switch.rate + by_rate * second;
         for column in 0..self.shifts.len() {
             let y = &mut self.columns[column * dimension..(column + 1) * dimension];
@@ -525,8 +536,7 @@ impl Observer for Tangents {
                 let mut change =
                     by_gap * dot(&kernel.readout) + by_rate * dot(&kernel.second_readout);
                 if let Some(p) = column.checked_sub(self.plain).map(|p| &self.parameters[p]) {
-                    let (d, v) = p.gap(system, switch.time);
-                    let v = if system.second_is_rate() { v } else { 0.0 };
+                    let (d, v) = p.arguments(system, switch.time);
                     change += by_gap * d + by_rate * v;
                     if !p.law.is_empty() {
                         law.guard_by_parameters(

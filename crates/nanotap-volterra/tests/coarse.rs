@@ -88,7 +88,11 @@ fn every_law_is_followed() {
     for modes in [1, 3, 10] {
         for index in 0..TABLE.len() {
             let name = TABLE[index].entry.name;
-            let system = beam(table_law(index, None), modes, 1.0, 20.0, AMPLITUDE, 8.0, 20);
+            let law = table_law(index, None);
+            if law.takes_signal() {
+                continue;
+            }
+            let system = beam(law, modes, 1.0, 20.0, AMPLITUDE, 8.0, 20);
             let [median, largest] = compare(&Arc::new(system), name, TAU, 40);
             assert!(median < 5e-6, "{name}, {modes} modes: {median:.1e}");
             assert!(largest < 1e-4, "{name}, {modes} modes: {largest:.1e}");
@@ -155,8 +159,12 @@ fn the_jacobian_is_that_of_the_exact_flow() {
     let x = [-7.0, 0.02, -7.0, 0.1];
     for index in 0..TABLE.len() {
         let name = TABLE[index].entry.name;
+        let law = table_law(index, None);
+        if law.takes_signal() {
+            continue;
+        }
         let system = Arc::new(beam(
-            table_law(index, None),
+            law,
             2,
             1.0,
             20.0,

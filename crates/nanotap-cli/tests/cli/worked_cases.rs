@@ -155,6 +155,7 @@ fn every_document_has_a_test() {
             "frequency-modulation.md",
             "frequency-sweep.md",
             "gallery.md",
+            "kelvin-probe.md",
             "liquid.md",
             "measured-modes.md",
             "microscopist.md",
@@ -202,7 +203,7 @@ fn the_gallery() {
             assert!(folder.path().join(figure).exists(), "{command}");
         }
     }
-    assert_eq!(count, 30);
+    assert_eq!(count, 31);
 }
 
 /// One test per document, so that they run in parallel.
@@ -228,6 +229,7 @@ follows! {
     the_examples_of_dforce: "dforce.md", 4 commands, 13 numbers;
     the_fm_lever: "fm-lever-on-polystyrene.md", 3 commands, 9 numbers;
     the_frequency_sweep: "frequency-sweep.md", 2 commands, 6 numbers;
+    the_kelvin_probe: "kelvin-probe.md", 2 commands, 8 numbers;
     the_liquid: "liquid.md", 6 commands, 27 numbers;
     the_measured_modes: "measured-modes.md", 2 commands, 6 numbers;
     the_moving_surface: "moving-surface.md", 7 commands, 26 numbers;

@@ -5,14 +5,15 @@
 //! 2005), `ε` the absolute permittivity of the medium. In contact (`d < a0`) each stays as it
 //! is at `a0`, so that neither jumps there.
 
-use crate::law::Approach;
+use crate::law::{Approach, ForceLaw};
 use crate::laws::elastic::contact_ways;
 use crate::laws::entry::{
     CONTACT_DISTANCE, Dimension, Entry, HAMAKER, ParameterEntry, Part, RADIUS, Range, own,
 };
-use crate::laws::formula::{Formula, Way};
+use crate::laws::formula::{Formula, Law, Way};
 use nanotap_arithmetic::Scalar;
 use std::f64::consts::PI;
+use std::sync::Arc;
 
 const PERMITTIVITY: ParameterEntry = own(
     "permittivity",
@@ -77,6 +78,95 @@ impl Formula for Electrostatic {
         } else {
             away(c[0]) - c[3] * (gap - c[0])
         })
+    }
+}
+
+/// Of a biased sphere under dc and ac voltage.
+#[derive(Clone, Copy, Debug)]
+pub struct ElectrostaticAc {
+    /// Whether the force is averaged over the ac voltage.
+    pub averaged: bool,
+}
+
+/// Its entry.
+pub static ELECTROSTATIC_AC: Entry = Entry {
+    name: "electrostatic-ac",
+    words: "electrostatic attraction under dc and ac voltage (KPFM, EFM)",
+    formula: "−π ε R² (U − U_c + V cos ωt)²/(d (d + R)) for d > a0, its value at a0 in contact; ω is the \
+              frequency of the second tone of the drive",
+    source: "Hudlet, Saint Jean, Guthmann, Berger, Eur. Phys. J. B 2, 5 (1998); Nonnenmacher, O'Boyle, \
+             Wickramasinghe, Appl. Phys. Lett. 58, 2921 (1991)",
+    parameters: &[
+        own(
+            "voltage",
+            "voltage U between tip and sample",
+            Dimension::VOLTAGE,
+            None,
+            Range::Finite,
+        ),
+        own(
+            "ac_voltage",
+            "amplitude V of the ac voltage",
+            Dimension::VOLTAGE,
+            None,
+            Range::Finite,
+        ),
+        own(
+            "contact_potential",
+            "contact potential difference U_c",
+            Dimension::VOLTAGE,
+            Some(0.0),
+            Range::Finite,
+        ),
+        RADIUS,
+        CONTACT_DISTANCE,
+        PERMITTIVITY,
+    ],
+    parts: &[],
+    conservative: false,
+};
+
+impl Formula for ElectrostaticAc {
+    fn entry(&self) -> &'static Entry {
+        &ELECTROSTATIC_AC
+    }
+
+    /// `a0`, `−π ε R²`, `R`, its value at `a0`, `U − U_c`, `V`.
+    fn constants<S: Scalar>(&self, p: &[S]) -> Vec<S> {
+        let strength = p[5] * p[3].square() * (-PI);
+        let contact = strength / (p[4] * (p[4] + p[3]));
+        vec![p[4], strength, p[3], contact, p[0] - p[2], p[1]]
+    }
+
+    fn force<S: Scalar>(&self, c: &[S], branch: usize, gap: S, signal: S) -> S {
+        let square = if self.averaged {
+            c[4].square() + c[5].square() * 0.5
+        } else {
+            (c[4] + c[5] * signal).square()
+        };
+        let unit = if branch == 0 {
+            c[1] / (gap * (gap + c[2]))
+        } else {
+            c[3]
+        };
+        unit * square
+    }
+
+    fn depends_on_rate(&self) -> bool {
+        !self.averaged
+    }
+
+    fn takes_signal(&self) -> bool {
+        !self.averaged
+    }
+
+    fn averaged(&self, p: &[f64]) -> Option<Arc<dyn ForceLaw>> {
+        let law = Law::new(Self { averaged: true }, p.to_vec());
+        (!self.averaged).then(|| Arc::new(law) as Arc<dyn ForceLaw>)
+    }
+
+    fn ways(&self, branch: usize) -> Vec<Way> {
+        contact_ways(branch, Approach::Analytic)
     }
 }
 

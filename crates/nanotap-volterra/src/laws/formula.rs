@@ -8,6 +8,7 @@ use crate::laws::entry::Entry;
 use crate::linear::wide_registers;
 use nanotap_arithmetic::{Dual, Scalar};
 use std::fmt::Debug;
+use std::sync::Arc;
 
 /// When a branch is left, with a level of the gap named by its place among the constants.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -87,6 +88,15 @@ pub trait Formula: Clone + Debug + Send + Sync + 'static {
     /// Whether it depends on the rate.
     fn depends_on_rate(&self) -> bool {
         false
+    }
+    /// See [`ForceLaw::takes_signal`].
+    fn takes_signal(&self) -> bool {
+        false
+    }
+    /// See [`ForceLaw::averaged`].
+    fn averaged(&self, p: &[f64]) -> Option<Arc<dyn ForceLaw>> {
+        let _ = p;
+        None
     }
     /// The ways out.
     fn ways(&self, branch: usize) -> Vec<Way>;
@@ -250,6 +260,14 @@ impl<F: Formula> ForceLaw for Law<F> {
 
     fn depends_on_rate(&self) -> bool {
         self.formula.depends_on_rate()
+    }
+
+    fn takes_signal(&self) -> bool {
+        self.formula.takes_signal()
+    }
+
+    fn averaged(&self) -> Option<Arc<dyn ForceLaw>> {
+        self.formula.averaged(&self.parameters)
     }
 
     fn forces(&self, branch: usize, gaps: &[f64], rates: &[f64], out: [&mut [f64]; 3]) {

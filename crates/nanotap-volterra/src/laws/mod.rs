@@ -26,7 +26,7 @@ pub mod van_der_waals;
 pub mod viscous;
 
 use crate::error::VolterraError;
-use crate::law::ForceLaw;
+use crate::law::{Exit, ForceLaw, Guard};
 use elastic::Shape;
 use entry::{Entry, Part};
 use formula::{Formula, Law};
@@ -150,6 +150,7 @@ pub static TABLE: &[TableLaw] = table! {
     hysteresis::ADHESION_HYSTERESIS => hysteresis::AdhesionHysteresis,
     capillary::CAPILLARY => capillary::Capillary,
     electric::ELECTROSTATIC => electric::Electrostatic,
+    electric::ELECTROSTATIC_AC => electric::ElectrostaticAc { averaged: false },
     electric::DLVO => electric::Dlvo,
     spring_damper::SPRING_DAMPER => spring_damper::SpringDamper,
 };
@@ -243,6 +244,24 @@ pub fn build_sum(
     }
     if let [(_, law)] = terms {
         return Ok(law.clone());
+    }
+    if let Some(k) = terms.iter().position(|(_, law)| law.takes_signal()) {
+        let on_gap_alone = |law: &dyn ForceLaw| {
+            let turns = |exit: Exit| matches!(exit.guard, Guard::Turns | Guard::Own(_));
+            let switches = (0..law.branches())
+                .flat_map(|branch| law.exits(branch))
+                .any(turns);
+            !law.depends_on_rate() && law.surface().is_none() && !switches
+        };
+        let mut others = terms.iter().enumerate().filter(|(other, _)| *other != k);
+        if let Some((_, (other, _))) = others.find(|(_, (_, law))| !on_gap_alone(law.as_ref())) {
+            return Err(VolterraError::Sum {
+                first: terms[k].0.name,
+                second: other.name,
+                reason: "to a force that depends on time only forces of the gap alone can be added, \
+                         without memory",
+            });
+        }
     }
     if let Some(k) = terms.iter().position(|(_, law)| law.surface().is_some()) {
         let (own, relaxing) = &terms[k];

@@ -123,6 +123,17 @@ impl ForceLaw for Sum {
         self.terms.iter().any(|t| t.depends_on_rate())
     }
 
+    fn takes_signal(&self) -> bool {
+        self.terms.iter().any(|t| t.takes_signal())
+    }
+
+    fn averaged(&self) -> Option<Arc<dyn ForceLaw>> {
+        let terms = self.terms.iter();
+        let averaged = terms.map(|t| t.averaged().unwrap_or_else(|| Arc::clone(t)));
+        self.takes_signal()
+            .then(|| Arc::new(Self::new(averaged.collect())) as Arc<dyn ForceLaw>)
+    }
+
     fn forces(&self, branch: usize, gaps: &[f64], rates: &[f64], mut out: [&mut [f64]; 3]) {
         for sums in &mut out {
             sums.fill(0.0);

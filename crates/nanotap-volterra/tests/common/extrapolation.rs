@@ -30,7 +30,12 @@ impl Plain<'_> {
     fn field(&self, t: f64, x: &[f64], branch: usize, out: &mut [f64]) {
         let n = self.modes.len();
         let (gap, rate) = self.gap(x);
-        let push = self.drive * t.cos() + self.law.force(branch, gap, rate).value / self.k;
+        let second = if self.law.takes_signal() {
+            t.cos()
+        } else {
+            rate
+        };
+        let push = self.drive * t.cos() + self.law.force(branch, gap, second).value / self.k;
         for (k, (stiffness, damping, sign)) in self.modes.iter().enumerate() {
             out[k] = x[n + k];
             out[n + k] = -stiffness * x[k] - damping * x[n + k] + sign * push;

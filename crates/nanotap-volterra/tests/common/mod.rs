@@ -179,7 +179,7 @@ pub(crate) fn beam_at(
 }
 
 /// Values in nm, nN and 1/ω0 for the parameters of the table of laws.
-const VALUES: [(&str, f64); 28] = [
+const VALUES: [(&str, f64); 30] = [
     ("modulus", 0.4),
     ("poisson", 0.3),
     ("tip_modulus", 160.0),
@@ -200,6 +200,8 @@ const VALUES: [(&str, f64); 28] = [
     ("film_thickness", 0.5),
     ("surface_energy", 0.05),
     ("voltage", 1.3),
+    ("ac_voltage", 0.7),
+    ("contact_potential", 0.2),
     ("permittivity", 0.01),
     ("debye_length", 2.0),
     ("stiffness", 3.0),

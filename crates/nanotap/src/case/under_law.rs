@@ -271,7 +271,9 @@ mod tests {
         }
         let sum = first.law_change("hertz + capillary", &first).unwrap();
         assert_eq!(sum.dropped, [Key::SampleStiffness, Key::SampleDamping]);
-        let model = Case::parse(None, &["omega=3".to_owned()]).unwrap();
+        let numbers = "alpha1=0.1 alpha2=0.1 alpha3=0.1 alpha4=20 alpha6=0.2 omega=3";
+        let numbers: Vec<String> = numbers.split(' ').map(str::to_owned).collect();
+        let model = Case::parse(None, &numbers).unwrap();
         for law in ContactLaw::ALL {
             let change = model.law_change(law.name(), &model).unwrap();
             assert_eq!(change.key, Key::Contact);

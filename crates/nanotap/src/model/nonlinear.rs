@@ -60,6 +60,8 @@ pub struct Nonlinear {
     pub(crate) clamp_force: f64,
     /// Whether the law remembers its branch.
     pub remembers: bool,
+    /// The law averaged over time, if it depends on that.
+    averaged_law: Option<Arc<dyn ForceLaw>>,
 }
 
 impl PartialEq for Nonlinear {
@@ -117,6 +119,7 @@ impl Nonlinear {
             period: drive.period(),
             clamp_force: beam.clamp_force(),
             remembers: law.remembers(),
+            averaged_law: law.averaged(),
         })
     }
 
@@ -138,7 +141,7 @@ impl Nonlinear {
         let n = self.system.dimension();
         let law = self.system.law();
         let (gap, rate) = self.system.gap(0.0, &state[..n]);
-        let second = self.system.second_argument(rate, &state[..n]);
+        let second = self.system.second_argument(0.0, rate, &state[..n]);
         let known = remembered(&state[n..]);
         let possible = |branch: &usize| {
             *branch < law.branches()
@@ -176,10 +179,11 @@ impl Nonlinear {
         [surface.unwrap_or_default(), &whole].concat()
     }
 
-    /// The law at rest: of a surface that relaxes, when it has.
+    /// The law at rest: of a surface that relaxes, when it has; of a force that depends on time, averaged.
     pub(crate) fn static_law(&self) -> &Arc<dyn ForceLaw> {
         let law = self.system.law();
-        law.surface().map_or(law, |surface| &surface.relaxed)
+        let averaged = self.averaged_law.as_ref().unwrap_or(law);
+        law.surface().map_or(averaged, |surface| &surface.relaxed)
     }
 
     /// The state of the model with these coordinates of the lever, on a branch of the law.
@@ -193,7 +197,7 @@ impl Nonlinear {
     /// Guesses of periodic motions at drive phase 0, by averaging over the drive's strongest tone
     /// and by the linear response about each rest of the lever.
     pub(crate) fn averaged_states(&self) -> Vec<Vec<f64>> {
-        if self.system.law().surface().is_some() {
+        if self.system.law().surface().is_some() || self.averaged_law.is_some() {
             return self.settled_states().unwrap_or_default();
         }
         let rests = self.equilibria();
@@ -889,7 +893,7 @@ impl Nonlinear {
         let turns = (0..law.branches())
             .flat_map(|branch| self.system.exits(branch))
             .any(|exit| exit.guard == Guard::Turns);
-        let varies = law.depends_on_rate() || turns;
+        let varies = law.depends_on_rate() && !law.takes_signal() || turns;
         (!varies).then(|| self.free_log_determinant())
     }
 
@@ -917,7 +921,9 @@ impl Nonlinear {
             column.rows(2 * n, surface).sum()
         };
         let by_rate = period.integrate(1, |s, out| {
-            let second = self.system.second_argument(s.rate, s.state.as_slice());
+            let second = self
+                .system
+                .second_argument(s.time, s.rate, s.state.as_slice());
             let acts = surface == 0 || self.contact[s.branch];
             let slope = law.force(s.branch, s.gap, second).by_rate;
             out[0] = if acts { slope } else { 0.0 };

@@ -103,6 +103,11 @@ impl SampleLaw {
         }
     }
 
+    /// Whether the force depends on time, as that of an ac voltage does.
+    pub fn takes_signal(&self) -> bool {
+        self.build().is_ok_and(|law| law.takes_signal())
+    }
+
     /// The force law.
     ///
     /// # Errors

@@ -63,6 +63,7 @@ use crate::case::document::CaseDocument;
 #[cfg(feature = "dataset")]
 use crate::dataset::{Schema, Store, StoreError, Work, WorkError};
 use crate::model::cantilever::Cantilever;
+use crate::model::sample_law::SampleLaw;
 use registry::StudyEntry;
 
 /// Every study.
@@ -244,6 +245,23 @@ impl<'a, R: Serialize> Document<'a, R> {
             case: CaseDocument::of(case),
         }
     }
+}
+
+/// Refuses a force that depends on time, for `what`.
+///
+/// # Errors
+/// When the case has an ac voltage.
+pub(crate) fn without_signal(case: &Case, what: &str) -> Result<(), Error> {
+    let law = case.cantilever().and_then(|lever| lever.law.as_ref());
+    if law.is_some_and(SampleLaw::takes_signal) {
+        return Err(Error::input(
+            format!(
+                "{what} needs a force that does not depend on time, and here the ac voltage changes it"
+            ),
+            "take the law electrostatic in place of electrostatic-ac, without ac_voltage",
+        ));
+    }
+    Ok(())
 }
 
 /// The dimensionless cantilever of a case, for a study that needs one.

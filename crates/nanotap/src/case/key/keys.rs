@@ -439,8 +439,11 @@ After from AFTER_LAWS => {
         .such_as(3e-10);
     SampleSurfaceEnergy = quantity(Sample, "surface_energy", Stiffness, R::POSITIVE, "surface energy of the solid (capillary)").under(Laws::Nonlinear)
         .such_as(0.07);
-    SampleVoltage = quantity(Sample, "voltage", Voltage, R::ANY, "voltage between tip and sample (electrostatic)").under(Laws::Nonlinear)
+    SampleVoltage = quantity(Sample, "voltage", Voltage, R::ANY, "dc voltage between tip and sample (electrostatic, electrostatic-ac)").under(Laws::Nonlinear)
         .such_as(1.0);
+    SampleAcVoltage = quantity(Sample, "ac_voltage", Voltage, R::ANY, "amplitude of an ac voltage between tip and sample at the frequency of the second tone of the drive (electrostatic-ac)").under(Laws::Nonlinear)
+        .such_as(1.0);
+    SampleContactPotential = quantity(Sample, "contact_potential", Voltage, R::ANY, "contact potential difference, which the voltage compensates (electrostatic-ac)").under(Laws::Nonlinear);
     SamplePermittivity = quantity(Sample, "permittivity", Number, R::POSITIVE, "permittivity of the medium over that of free space").under(Laws::Nonlinear);
     SampleDebyeLength = quantity(Sample, "debye_length", Length, R::POSITIVE, "Debye length of the electrolyte (dlvo)").under(Laws::Nonlinear)
         .such_as(3e-9);

@@ -253,10 +253,11 @@ static NODES: LazyLock<Vec<Node>> = LazyLock::new(|| {
             functions: signed(values),
         });
     };
-    // From 0 on: 1e-6, 4e-6, …, 1 and in equal panels.
-    let mut edges: Vec<f64> = (0..=10).map(|j| 0.25_f64.powi(10 - j)).collect();
+    // From 0 on: 3^−12, 3^−11, …, 1, 2, 4 and in equal panels.
+    let mut edges: Vec<f64> = (-13..=0).map(|j| 3.0_f64.powi(j)).collect();
     edges[0] = 0.0;
-    edges.extend((1..=9).map(|j| 1.0 + f64::from(j) * (JOIN - 1.0) / 9.0));
+    edges.push(2.0);
+    edges.extend((0..=8).map(|j| 4.0 + f64::from(j) * (JOIN - 4.0) / 8.0));
     for (q, weight) in panels(&edges) {
         add(complex(q), complex(weight), bessel(q).map(complex));
     }

@@ -283,6 +283,7 @@ impl Study for BimodalStudy {
         control: &Control<'_>,
     ) -> Result<BimodalReport, Error> {
         let lever = cantilever(case, Self::NAME)?;
+        crate::study::without_signal(case, "bimodal operation")?;
         let view = case.physical().ok_or_else(|| {
             Error::input(
                 "the readings of an instrument are in physical units, and this case has none",

@@ -203,7 +203,7 @@ impl Lever {
                 let (gap, rate) = lever.flow.gap();
                 let branch = lever.flow.branch();
                 let system = &lever.nonlinear.system;
-                let second = system.second_argument(rate, &self.state[..system.dimension()]);
+                let second = system.second_argument(phase, rate, &self.state[..system.dimension()]);
                 Instant {
                     gap,
                     deflection: self.model.tip.at(drive, &self.state, phase),

@@ -11,6 +11,7 @@ use crate::case::physical::{Kind, Physical};
 use crate::model::Model;
 use crate::study::approach::speed_of;
 use crate::study::value::{Amount, implied};
+use crate::study::without_signal;
 
 /// Most stretches of flow of a curve.
 const MAX_STRETCHES: f64 = 50e6;
@@ -142,6 +143,7 @@ impl<'a> Plan<'a> {
         };
         let there = case.with(key, from);
         let model = there.model()?;
+        without_signal(case, "a force curve")?;
         if model.system.drive().frequencies().len() != 1 {
             return Err(Error::input(
                 "a force curve needs a drive of one tone",

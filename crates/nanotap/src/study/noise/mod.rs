@@ -168,6 +168,7 @@ impl Study for NoiseStudy {
         control: &Control<'_>,
     ) -> Result<NoiseReport, Error> {
         let lever = cantilever(case, Self::NAME)?;
+        crate::study::without_signal(case, "the thermal noise")?;
         let view = case.physical().ok_or_else(|| {
             Error::input(
                 "a dimensionless case has no unit of energy, and a temperature is one",

@@ -131,6 +131,7 @@ impl Lever {
     pub(super) fn new(case: &Case, engine: Engine) -> Result<Self, Error> {
         let model = case.model()?;
         let cantilever = crate::study::cantilever(case, "scan")?;
+        crate::study::without_signal(case, "a scan")?;
         if model.system.drive().frequencies().len() != 1 {
             return Err(Error::input(
                 "a scan needs a drive of one tone",

@@ -9,6 +9,7 @@ use nanotap::model::galerkin::Galerkin;
 use nanotap::study::Study as _;
 use nanotap::study::attractors::{AttractorsOptions, AttractorsStudy};
 use nanotap::study::noise::{BOLTZMANN, NoiseOptions, NoiseReport, NoiseStudy};
+use nanotap::study::setpoint::at_setpoint;
 use nanotap_flow::Flow;
 
 /// A lever of 2 N/m at 70 kHz, driven by a force at its tip, with further words.
@@ -108,12 +109,13 @@ fn frequency_modulation_has_the_noise_of_its_amplitude_over_any_sample() {
         "sample.modulus=1 GPa",
         "sample.hamaker=2e-19 J",
         "tip.radius=20 nm",
-        "drive.setpoint=-30 Hz",
+        "drive.setpoint=-60 Hz",
     ];
     let quality = 200.0;
     for sample in [linear.as_slice(), &dmt] {
         let quality_factor = format!("cantilever.Q={quality}");
         let case = lever(&[&["modes=1", &quality_factor], sample].concat());
+        let (case, _) = at_setpoint(case, &Control::default()).unwrap();
         let found = noise(&case, "1 ms");
         assert!((found.phase - 90.0).abs() < 0.1, "{found:?}");
         let square = BOLTZMANN * 295.0 * found.frequency * found.bandwidth

@@ -129,7 +129,8 @@ function chooser(key, meaning) {
     field.add(new Option(text, choice.word, false, choice.word === key.value));
     if (choice.word === key.value && choice.meaning) meaning.textContent = `${key.meaning}: ${choice.meaning}`;
   }
-  field.addEventListener("change", () => put(key, field.value, true));
+  const contact = key.name === "contact";
+  field.addEventListener("change", () => (contact ? law(key, field.value, field) : put(key, field.value, true)));
   return field;
 }
 

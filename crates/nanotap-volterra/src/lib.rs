@@ -133,6 +133,7 @@ pub use force_sums::ForceSums;
 pub use kernel::Kernel;
 pub use law::{Approach, Exit, Force, ForceLaw, Guard, Remark, Surface};
 pub use modes::Modes;
+pub use quadrature::gauss_legendre;
 pub use step::Statistics;
 pub use system::{Drive, Options, System, Tone};
 pub use tangent::{Parameter, ToneChange};

@@ -12,9 +12,11 @@ const MAX_POINTS: usize = 32;
 static RULES: [OnceLock<(Vec<f64>, Vec<f64>)>; MAX_POINTS + 1] =
     [const { OnceLock::new() }; MAX_POINTS + 1];
 
-/// Nodes on `[0, 1]` and weights of the Gauss–Legendre rule with `count` points, at most
-/// [`MAX_POINTS`].
-pub(crate) fn gauss_legendre(count: usize) -> &'static (Vec<f64>, Vec<f64>) {
+/// Nodes on `[0, 1]` and weights of the Gauss–Legendre rule with `count` points, at most 32.
+///
+/// # Panics
+/// For more points.
+pub fn gauss_legendre(count: usize) -> &'static (Vec<f64>, Vec<f64>) {
     RULES[count].get_or_init(|| computed_gauss_legendre(count))
 }
 

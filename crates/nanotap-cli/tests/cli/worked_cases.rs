@@ -228,11 +228,11 @@ follows! {
     the_examples_of_dforce: "dforce.md", 4 commands, 13 numbers;
     the_fm_lever: "fm-lever-on-polystyrene.md", 3 commands, 9 numbers;
     the_frequency_sweep: "frequency-sweep.md", 2 commands, 6 numbers;
-    the_liquid: "liquid.md", 5 commands, 21 numbers;
+    the_liquid: "liquid.md", 6 commands, 27 numbers;
     the_measured_modes: "measured-modes.md", 2 commands, 6 numbers;
     the_moving_surface: "moving-surface.md", 7 commands, 26 numbers;
     the_period_doubling: "period-doubling.md", 2 commands, 6 numbers;
-    the_polymer: "polymer.md", 8 commands, 25 numbers;
+    the_polymer: "polymer.md", 9 commands, 25 numbers;
     the_samples: "samples.md", 5 commands, 30 numbers;
     the_reconstruction: "reconstruct.md", 1 commands, 0 numbers;
     the_force_curve: "force-curve.md", 3 commands, 23 numbers;

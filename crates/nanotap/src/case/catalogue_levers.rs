@@ -31,10 +31,11 @@ impl Case {
         frequency_ratio: f64,
         keep_tip: bool,
     ) -> Result<Vec<CaseOfLever>, PhysicalError> {
-        const KEPT: [Key; 8] = [
+        const KEPT: [Key; 9] = [
             Key::LeverQ,
             Key::FluidDensity,
             Key::FluidViscosity,
+            Key::LeverHeight,
             Key::TipMaterial,
             Key::TipModulus,
             Key::TipPoisson,

@@ -6,6 +6,7 @@ use super::physical::force::{keys_of_contacts, linear_takes, takes};
 use super::stated::{Stated, Value};
 use super::{Case, CaseKind};
 use crate::Error;
+use crate::model::cantilever::Cantilever;
 use crate::model::contact::ContactLaw;
 use crate::model::parameter::Applies;
 use crate::model::sample_law::SampleLaw;
@@ -49,6 +50,8 @@ impl LawName {
 /// What changes in a case that takes another contact law.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LawChange {
+    /// The key that names the law.
+    pub key: Key,
     /// The law's name.
     pub law: String,
     /// The keys that were stated and that the law does not take.
@@ -64,6 +67,9 @@ const CURVE: &str = "[[\"gap (nm)\", \"force (nN)\"], [-1, 20], [-0.5, 5], [0, -
 /// Three arms of a polymer whose times are those of tapping, to begin with.
 const ARMS: &str = "[[\"time (us)\", \"modulus (MPa)\"], [0.38, 460], [1.7, 136], [7.2, 67]]";
 
+/// Arms of the dimensionless model, with times of the order of a contact's.
+const MODEL_ARMS: &str = "[[\"time\", \"stiffness\"], [0.05, 10], [0.5, 5]]";
+
 /// Arms of a stiffness in place of the modulus.
 const SPRINGS: &str = "[[\"time (us)\", \"stiffness (N/m)\"], [0.5, 10], [4, 3]]";
 
@@ -72,13 +78,17 @@ impl Case {
     /// is that of `like` where it states one, else a usual one.
     ///
     /// # Errors
-    /// When the case is not a physical one, the law is unknown, or a sum counts a part twice.
+    /// When the case is an oscillator, the law is unknown, not one of a dimensionless case, or a sum counts
+    /// a part twice.
     pub fn law_change(&self, law: &str, like: &Self) -> Result<LawChange, Error> {
+        if let CaseKind::Cantilever(cantilever) = &self.what {
+            return contact_change(cantilever, law);
+        }
         let name = LawName::read(law)?;
         let CaseKind::Quantities(quantities) = &self.what else {
             return Err(Error::input(
-                "expected a case in physical quantities",
-                "choose the contact with the key `contact`",
+                "expected a case with a contact law, got an oscillator",
+                "choose a case of a lever",
             ));
         };
         let mut quantities = quantities.clone();
@@ -118,6 +128,7 @@ impl Case {
             mapped = mapped.mapped(true);
         }
         Ok(LawChange {
+            key: Key::SampleLaw,
             law: name.text(),
             dropped,
             added,
@@ -169,6 +180,29 @@ impl Case {
         }
         Ok(self.with_quantities(quantities.mapped(true).validated()?))
     }
+}
+
+/// The change of a dimensionless case to another contact.
+fn contact_change(cantilever: &Cantilever, law: &str) -> Result<LawChange, Error> {
+    let read = Key::Contact.read(law);
+    let read = read.map_err(|error| Error::input(error.to_string(), "name one of them"))?;
+    let takes = read
+        .text()
+        .parse()
+        .is_ok_and(|law: ContactLaw| law.entry().arms);
+    let arms = Key::RelaxationArms;
+    let has = !cantilever.arms.is_empty();
+    let usual = Takes::ModelArms.parse_table(MODEL_ARMS).ok();
+    Ok(LawChange {
+        key: Key::Contact,
+        law: read.text(),
+        dropped: (has && !takes).then_some(arms).into_iter().collect(),
+        added: usual
+            .filter(|_| takes && !has)
+            .map(|value| (arms, value))
+            .into_iter()
+            .collect(),
+    })
 }
 
 /// A value of a key that a law needs: that of `like` if it states one, else a usual one.
@@ -237,6 +271,21 @@ mod tests {
         }
         let sum = first.law_change("hertz + capillary", &first).unwrap();
         assert_eq!(sum.dropped, [Key::SampleStiffness, Key::SampleDamping]);
+        let model = Case::parse(None, &["omega=3".to_owned()]).unwrap();
+        for law in ContactLaw::ALL {
+            let change = model.law_change(law.name(), &model).unwrap();
+            assert_eq!(change.key, Key::Contact);
+            let added = change.added.iter();
+            let added = added.map(|(key, value)| format!("{key}={}", value.text()));
+            let words: Vec<String> = std::iter::once(format!("contact={law}"))
+                .chain(added)
+                .collect();
+            let there = model.restated(&words).unwrap();
+            assert!(there.model().is_ok(), "{law}");
+            let back = there.law_change("spring-damper", &model).unwrap();
+            assert_eq!(back.dropped.len(), change.added.len(), "{law}");
+        }
+        assert!(model.law_change("hertz", &model).is_err());
         assert!(first.law_change("hertz + dmt", &first).is_err());
         assert!(first.law_change("plastic", &first).is_err());
     }

@@ -340,6 +340,8 @@ Before from Parameter::COUNT => {
         .feeds(Parameter::Alpha3);
     FluidViscosity = quantity(Cantilever, "fluid_viscosity", Viscosity, R::POSITIVE, "viscosity of the fluid around the lever")
         .feeds(Parameter::Alpha3);
+    LeverHeight = quantity(Cantilever, "height", Length, R::POSITIVE, "height of the lever over the surface, which adds mass and damping by the fluid between, with fluid_density and fluid_viscosity; at least 0.025 of the width")
+        .feeds(Parameter::Alpha3);
     LeverLength = quantity(Cantilever, "length", Length, R::POSITIVE, "length of the beam");
     LeverWidth = quantity(Cantilever, "width", Length, R::POSITIVE, "width of the beam");
     LeverThickness = quantity(Cantilever, "thickness", Length, R::POSITIVE, "thickness in the direction of bending");

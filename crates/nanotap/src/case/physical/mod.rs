@@ -37,6 +37,7 @@
 //! ```
 
 mod beam_geometry;
+pub mod blade;
 pub mod catalogue;
 pub mod drive;
 mod elastic;

@@ -14,6 +14,7 @@ use crate::case::physical::fluid::{Fluid, hydrodynamic_function};
 const AIR: Fluid = Fluid {
     density: 1.18,
     viscosity: 1.86e-5,
+    height: None,
 };
 /// Spring constant over k_B T/⟨s²⟩ of the first mode of a uniform beam, s as an optical lever reads it
 /// with its static calibration (Butt and Jaschke, Nanotechnology 6, 1, 1995).

@@ -2,7 +2,7 @@
 
 use std::f64::consts::{PI, TAU};
 
-use super::Lever;
+use super::{Lever, Mode};
 use crate::case::physical::error::PhysicalError;
 use crate::case::physical::fluid::Fluid;
 use crate::case::physical::remark::Remark;
@@ -45,7 +45,7 @@ impl Fluid {
 
     /// Frequency, quality factor and stiffness at the tip of the second and third mode of `lever`,
     /// which is that in the fluid: each swings with the mass and the damping that Γ has at its own
-    /// frequency. In SI; 0 beyond the `count` modes, and where Γ is not known.
+    /// frequency and wavelength. In SI; 0 beyond the `count` modes, and where Γ is not known.
     pub(crate) fn higher_modes(
         self,
         lever: &Lever,
@@ -57,28 +57,32 @@ impl Fluid {
         let dry = lever.beam_mass - unit * self.on_lever(width, lever.f0)?.re;
         let mut found = Numbers::ZERO;
         for k in 1..count.min(3) {
-            let (mut frequency, _) = lever.mode(k, lever.beam_mass)?;
+            let mut mode = lever.mode(k, lever.beam_mass)?;
+            let gamma_of = |mode: &Mode| {
+                self.blade(width, mode.frequency, mode.wavenumber / length)
+                    .hydrodynamic_function()
+            };
             for _ in 0..MAX_ITERATIONS {
-                let Ok(gamma) = self.on_lever(width, frequency) else {
+                let Some(gamma) = gamma_of(&mode) else {
                     return Ok(found);
                 };
-                let last = frequency;
-                (frequency, _) = lever.mode(k, dry + unit * gamma.re)?;
-                if (frequency - last).abs() <= 1e-14 * last {
+                let last = mode.frequency;
+                mode = lever.mode(k, dry + unit * gamma.re)?;
+                if (mode.frequency - last).abs() <= 1e-14 * last {
                     break;
                 }
             }
-            let Ok(gamma) = self.on_lever(width, frequency) else {
+            let Some(gamma) = gamma_of(&mode) else {
                 return Ok(found);
             };
             let mass = dry + unit * gamma.re;
-            let (_, share) = lever.mode(k, mass)?;
+            let share = lever.mode(k, mass)?.tip_share;
             // The beam's ∫φ² and the tip's φ(1)², of a mode that is 1 at the tip.
             let modal = mass / share + lever.tip_mass();
             let numbers = [
-                frequency,
+                mode.frequency,
                 modal * share / (unit * gamma.im),
-                modal * (TAU * frequency).powi(2),
+                modal * (TAU * mode.frequency).powi(2),
             ];
             let of_mode = Parameter::MEASURED.into_iter().skip(k - 1).step_by(2);
             for (parameter, number) in of_mode.zip(numbers) {
@@ -90,10 +94,15 @@ impl Fluid {
 
     /// Note about the fluid.
     pub(crate) fn remark(self, lever: &Lever, width: f64) -> Remark {
+        let (over, source) = self.height.map_or((String::new(), "Sader 1998"), |height| {
+            let height = Kind::Length.format(height);
+            (format!(", {height} over a surface"), "Green and Sader 2005")
+        });
         Remark::note(format!(
-            "in a fluid of {} and {} the lever resonates at {} with Q = {} (Re = {}; Sader 1998), a \
-             given f0 is that in vacuum; the second and third mode have mass and damping of their \
-             own (up to Re = 1e4), any beyond those of the first",
+            "in a fluid of {} and {}{over} the lever resonates at {} with Q = {} (Re = {}; {source}), a \
+             given f0 is that in vacuum; mass and damping of the second and third mode follow from \
+             their frequency and wavelength (Van Eysden and Sader 2007), those of any beyond are \
+             those of the first",
             Kind::Density.format(self.density),
             Kind::Viscosity.format(self.viscosity),
             Kind::Frequency.format(lever.f0),

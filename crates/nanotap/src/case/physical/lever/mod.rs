@@ -81,6 +81,16 @@ pub struct Lever {
     pub modes: usize,
 }
 
+/// A free mode of the exact beam.
+struct Mode {
+    /// In Hz.
+    frequency: f64,
+    /// β, times the length.
+    wavenumber: f64,
+    /// φ(1)²/∫φ².
+    tip_share: f64,
+}
+
 /// The largest tip mass ratio considered. Beyond it the beam is a massless spring to six
 /// digits.
 const LARGEST_RATIO: f64 = 1e6;
@@ -191,13 +201,18 @@ impl Lever {
         omega * (1.0 + self.tip_mass_ratio * share) / self.quality_factor
     }
 
-    /// Frequency in Hz and φ(1)²/∫φ² of the free mode `k` (0 is the first) for a beam of mass
-    /// `beam_mass` in kg, including added mass, and the tip's mass.
-    pub(super) fn mode(&self, k: usize, beam_mass: f64) -> Result<(f64, f64), PhysicalError> {
+    /// The free mode `k` (0 is the first) for a beam of mass `beam_mass` in kg, including added mass, and
+    /// the tip's mass.
+    fn mode(&self, k: usize, beam_mass: f64) -> Result<Mode, PhysicalError> {
         let ratio = bounded(self.tip_mass() / beam_mass)?;
         let omega = exact_beam::frequencies(ratio, 0.0, k + 1)?[k];
         let time = (3.0 * beam_mass / self.k).sqrt();
-        Ok((omega / (TAU * time), tip_share(omega.sqrt(), ratio)))
+        let wavenumber = omega.sqrt();
+        Ok(Mode {
+            frequency: omega / (TAU * time),
+            wavenumber,
+            tip_share: tip_share(wavenumber, ratio),
+        })
     }
 
     /// Assumptions and warnings about the lever.

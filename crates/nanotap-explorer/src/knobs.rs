@@ -87,15 +87,15 @@ pub(crate) fn of(case: &Case, base: &Case, accepts: Option<Accepts<'_>>) -> Vec<
 
 /// The group of the page in which a key stands.
 fn group(key: Key, physical: bool) -> &'static str {
-    let second =
-        key.name().starts_with("second_") || [Key::Tone2Ratio, Key::DriveHold].contains(&key);
+    let of_tone = ["second_", "third_", "tone"];
+    let rare = of_tone.iter().any(|tone| key.name().starts_with(tone)) || key == Key::DriveHold;
     match key.section() {
-        _ if second => "more",
+        _ if rare => "more",
         Section::Model if physical || key.entry().feeds.is_some() => "more",
         Section::Model => match key.entry().takes {
             Takes::Word(_) if key != Key::Contact => "more",
             Takes::Count(_) => "more",
-            _ if key.name().starts_with("mode") || key.name().starts_with("tone") => "more",
+            _ if key.name().starts_with("mode") => "more",
             _ => "model",
         },
         Section::Cantilever | Section::Tip => "lever",

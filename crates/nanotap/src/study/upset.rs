@@ -36,6 +36,8 @@ const LARGEST_SIZE: f64 = 4.0;
 const GROWTH: f64 = 2.0;
 /// Bisections of that ratio: to 0.3 %.
 const BISECTIONS: usize = 8;
+/// Rounds of knocks, of those that grow: 13 sizes, and the bisections.
+const ROUNDS: usize = 13 + BISECTIONS;
 /// By how much a knock is made larger whose motion returns by the flow itself, and how often.
 const ENLARGED: (f64, usize) = (1.01, 5);
 
@@ -111,12 +113,14 @@ struct Knocked<'a> {
     speeds: Vec<f64>,
     /// Change of the tip's speed by an impulse of 1.
     mobility: f64,
+    /// Rounds of knocks so far.
+    rounds: usize,
 }
 
 /// The smallest knock that upsets the stable orbit through `state`.
 ///
 /// # Errors
-/// When the orbit is not stable, or the work was stopped.
+/// When the orbit is not stable, the tip does not move, or the work was stopped.
 pub fn upset(
     case: &Case,
     (state, period): (&[f64], usize),
@@ -144,9 +148,16 @@ pub fn upset(
         stepper: Stepper::new(model),
         speeds,
         mobility,
+        rounds: 0,
     };
     let seen = measure(model, state, period, ObservableSet::FIRST_HARMONIC)?;
     let unit = seen.first_harmonic * model.frequency();
+    if !(unit > 0.0 && unit.is_finite()) {
+        return Err(Error::input(
+            "the drive does not move the tip, so that no speed says how large a knock should be",
+            "ask for {upset} of a driven motion",
+        ));
+    }
     let largest_tried = LARGEST_SIZE * unit;
     let found = knocked.search(unit, control)?;
     Ok(Knocks {
@@ -247,7 +258,15 @@ impl Knocked<'_> {
         let starts = starts.collect::<Result<Vec<_>, _>>()?;
         let own = (self.orbit.period, self.orbit.states[0].clone());
         let starts = StartSet::given(starts).with_seeds([own]);
-        let found = census_of(&self.map, &starts, &CensusOptions::default(), control);
+        let quiet = Control {
+            progress: None,
+            ..*control
+        };
+        let found = census_of(&self.map, &starts, &CensusOptions::default(), &quiet);
+        self.rounds += 1;
+        if let Some(progress) = control.progress {
+            progress(self.rounds, self.rounds.max(ROUNDS));
+        }
         if found.cancelled || control.is_cancelled() {
             return Err(Error::stopped());
         }

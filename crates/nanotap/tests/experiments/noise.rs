@@ -9,6 +9,7 @@ use nanotap::model::galerkin::Galerkin;
 use nanotap::study::Study as _;
 use nanotap::study::attractors::{AttractorsOptions, AttractorsStudy};
 use nanotap::study::noise::{BOLTZMANN, NoiseOptions, NoiseReport, NoiseStudy};
+use nanotap::study::setpoint::at_setpoint;
 use nanotap_flow::Flow;
 
 /// A lever of 2 N/m at 70 kHz, driven by a force at its tip, with further words.
@@ -94,8 +95,10 @@ fn the_free_lever_has_the_noise_of_its_resonance() {
 }
 
 /// The phase of a lever that is held at 90° and at its amplitude turns with the noise force across
-/// its motion whatever the sample does, to first order of 1/Q: Albrecht's noise at this amplitude. A
-/// lock-in amplifier that holds neither reads another noise there.
+/// its motion whatever the sample does: Albrecht's noise at this amplitude. The slow thermal
+/// deflection, of density 4 k_B T/(k ω Q), adds its square times that of the shift's slope, which over
+/// the punch is (1.5 · 200 Hz/0.247 nm)²: 3 % of the noise. At a drive that is not held, a lock-in
+/// amplifier reads six times the phase noise of the free lever there.
 #[test]
 fn frequency_modulation_has_the_noise_of_its_amplitude_over_any_sample() {
     let linear = [
@@ -108,24 +111,20 @@ fn frequency_modulation_has_the_noise_of_its_amplitude_over_any_sample() {
         "sample.modulus=1 GPa",
         "sample.hamaker=2e-19 J",
         "tip.radius=20 nm",
-        "drive.setpoint=-30 Hz",
+        "drive.setpoint=-60 Hz",
     ];
     let quality = 200.0;
     for sample in [linear.as_slice(), &dmt] {
         let quality_factor = format!("cantilever.Q={quality}");
         let case = lever(&[&["modes=1", &quality_factor], sample].concat());
+        let (case, _) = at_setpoint(case, &Control::default()).unwrap();
         let found = noise(&case, "1 ms");
-        assert!((found.phase - 90.0).abs() < 0.1, "{found:?}");
+        assert!((found.phase - 90.0).abs() < 0.1, "{}", found.phase);
         let square = BOLTZMANN * 295.0 * found.frequency * found.bandwidth
             / (std::f64::consts::PI * 2.0 * 1.030_197 * quality);
         let expected = square.sqrt() / found.amplitude;
         let off = found.frequency_rms / expected - 1.0;
-        println!(
-            "{off} {} {}",
-            found.frequency_rms,
-            found.phase_rms / found.free_phase_rms
-        );
-        assert!(off.abs() < 2.0 / quality, "{off} {found:?}");
+        assert!((-2.0 / quality..0.05).contains(&off), "{off}");
     }
 }
 

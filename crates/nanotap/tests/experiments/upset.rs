@@ -134,6 +134,13 @@ fn where_one_motion_exists_no_knock_upsets_it() {
 }
 
 #[test]
+fn a_tip_at_rest_is_refused() {
+    let words = ["drive.free_amplitude=0 nm".to_owned()];
+    let refused = knocked(&lever(5.0, &words), None).unwrap_err();
+    assert!(refused.to_string().contains("does not move"), "{refused}");
+}
+
+#[test]
 fn an_unstable_orbit_is_refused() {
     let words = [
         "kind=impact",

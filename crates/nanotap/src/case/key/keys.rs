@@ -566,6 +566,17 @@ pub(super) static ALTERNATIVES: &[Alternatives] = &[
         reason: "one follows from the other through the lever's free response",
     },
     Alternatives {
+        ways: &[&[Key::ThirdFrequency], &[Key::ThirdRatio]],
+        reason: "each gives the frequency",
+    },
+    Alternatives {
+        ways: &[
+            &[Key::ThirdAmplitude, Key::ThirdForce],
+            &[Key::ThirdFreeAmplitude],
+        ],
+        reason: "one follows from the other through the lever's free response",
+    },
+    Alternatives {
         ways: &[&[Key::SampleDamping], &[Key::SampleLossTangent]],
         reason: "each gives the damper C1",
     },

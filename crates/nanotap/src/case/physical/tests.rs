@@ -1188,7 +1188,7 @@ fn samples_have_their_laws() {
 
 #[test]
 fn laws_and_drives_are_refused_with_what_would_be_right() {
-    let cases: [(&[Entry], &str); 16] = [
+    let cases: [(&[Entry], &str); 17] = [
         (
             &[("sample", "law", "hertz")],
             "it is not a parameter of sample.law",
@@ -1261,6 +1261,13 @@ fn laws_and_drives_are_refused_with_what_would_be_right() {
                 ("drive", "third_amplitude", "1 nm"),
             ],
             "drive.third_frequency",
+        ),
+        (
+            &[
+                ("drive", "third_ratio", "3"),
+                ("drive", "third_frequency", "197.1 kHz"),
+            ],
+            "each gives the frequency",
         ),
     ];
     for (changes, words) in cases {

@@ -101,6 +101,9 @@ options! {
     }
 }
 
+/// Time constant, in drive periods, of a lock-in amplifier without ripple.
+const SLOW_PERIODS: f64 = 1e5;
+
 /// Time constant in s if none is given: a bandwidth of 1 kHz.
 const TIME_CONSTANT: f64 = 0.25e-3;
 
@@ -381,6 +384,27 @@ impl Thermal {
         self.reading_at(&model, &orbit, lock_in, control)
     }
 
+    /// Spectral densities of the amplitude and the phase at low frequencies, as a slow lock-in amplifier
+    /// reads them: the ripple of a fast one would mix a part of the phase's noise into the amplitude's.
+    fn slow_densities(
+        &self,
+        model: &Model,
+        orbit: &OrbitReport,
+        control: &Control<'_>,
+    ) -> Result<Matrix2<f64>, Error> {
+        let slow = LockIn {
+            time_constant: SLOW_PERIODS * model.period(),
+        };
+        let found = Linearised::along(model, orbit, self, slow, control)?;
+        // The reading of a sin(Ωt − θ) is −i a e^{−iθ}; a larger lag turns it clockwise.
+        let lag = orbit.observables.phase.to_radians();
+        let (sin, cos) = nanotap_arithmetic::sin_cos(lag);
+        let along = DVector::from_vec(vec![-sin, -cos]);
+        let across = DVector::from_vec(vec![-cos, sin]);
+        let densities = found.slow_densities([&along, &across], orbit.observables.first_harmonic);
+        Ok(densities.unwrap_or_else(|| Matrix2::repeat(f64::NAN)))
+    }
+
     fn reading_at(
         &self,
         model: &Model,
@@ -407,9 +431,7 @@ impl Thermal {
             phase_rms: deviation(&across) / amplitude,
             state: orbit.state.clone(),
             covariance: covariance.view((0, 0), (last, last)).clone_owned(),
-            slow_densities: found
-                .slow_densities([&along, &across], amplitude)
-                .unwrap_or_else(|| Matrix2::repeat(f64::NAN)),
+            slow_densities: self.slow_densities(model, orbit, control)?,
             spectrum: found.spectrum([&along, &across], amplitude, lock_in)?,
         })
     }

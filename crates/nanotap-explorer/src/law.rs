@@ -33,13 +33,18 @@ pub(crate) async fn law(
 
 /// The keys to set, empty where the law does not take them, and a sentence that says which.
 fn changes(app: &App, request: &LawRequest) -> Result<Value, ApiError> {
-    let about = |error: nanotap::Error| ApiError::of(error).about(Key::SampleLaw.path());
     let case = request.case.any_distance(app)?;
+    let key = if case.is_physical() {
+        Key::SampleLaw
+    } else {
+        Key::Contact
+    };
+    let about = |error: nanotap::Error| ApiError::of(error).about(key.path());
     let preset = request.case.preset(app)?.clone();
     let base = nanotap::case::Case::parse(Some(preset.source()), &preset.set)?;
     let change = case.law_change(&request.law, &base).map_err(about)?;
     let mut set = Map::new();
-    set.insert(Key::SampleLaw.path().into(), change.law.clone().into());
+    set.insert(key.path().into(), change.law.clone().into());
     let mut words = Vec::new();
     for key in &change.dropped {
         set.insert(key.path().into(), "".into());

@@ -15,7 +15,7 @@ use crate::maps::Shows;
 /// The choice of a field that sets no condition.
 pub(crate) const ANY: &str = "any";
 /// The choice of a field that excludes a second motion.
-pub(crate) const ONE_STATE: &str = "no second one";
+pub(crate) const ONE_STATE: &str = "only one";
 /// The choices of an option that is on or off.
 pub(crate) const YES: &str = "yes";
 const NO: &str = "no";

@@ -845,9 +845,14 @@ impl Studied<'_> {
             ReconstructMethod::AmplitudeModulation => "amplitude and phase",
             ReconstructMethod::FrequencyModulation => "frequency shift",
         };
-        let mut words = format!("Force from {method} of {} rows.", report.rows.len());
-        for remark in &report.remarks {
-            let _ = write!(words, " {}.", remark.trim_end_matches('.'));
+        let set = self.table_law(case, &report);
+        let negative = report.table.damping.iter().any(|damping| *damping < 0.0);
+        let none = "as a law the force has no damping where it is negative";
+        let notes = report.remarks.iter().map(String::as_str);
+        let notes = notes.chain((set.is_some() && negative).then_some(none));
+        let mut words = format!("Force from {method} of {} rows", report.rows.len());
+        for note in notes {
+            let _ = write!(words, "; {note}");
         }
         self.hand(Stage {
             figure: Some(reconstruct_figure(&report)),
@@ -855,7 +860,7 @@ impl Studied<'_> {
             studies: &[(ReconstructStudy::NAME, named)],
             tables: vec![force_values(&report)],
             found: Some(Found {
-                set: self.table_law(case, &report),
+                set,
                 take: "Use as the sample's force table",
                 file: report.csv(),
                 save: "Force curve (CSV)",
@@ -1117,7 +1122,8 @@ fn force_rows(report: &ReconstructReport) -> String {
     for ((distance, force), damping) in rows {
         let _ = write!(text, ", [{:.6e}, {:.6e}", 1e9 * distance, 1e9 * force);
         if damped {
-            let _ = write!(text, ", {damping:.6e}");
+            // A law has no negative damping.
+            let _ = write!(text, ", {:.6e}", damping.max(0.0));
         }
         text.push(']');
     }

@@ -173,6 +173,17 @@ def test_arrays_with_named_dimensions_go_together(regular):
     assert ds.amplitude[3] == nanotap.orbit(regular, omega=3.1, alpha4=15).amplitude
 
 
+def test_an_orbit_says_which_knock_upsets_it(regular):
+    alone = nanotap.orbit(regular, upset=True).upset
+    assert alone.smallest is None and alone.largest_tried > 0
+    bistable = nanotap.Case.from_file(ROOT / "docs" / "cases" / "bistable-lever.toml")
+    found = nanotap.orbit(bistable, upset=True).upset.smallest
+    # docs/cases/bistable.md
+    assert found.physical.tip_speed == pytest.approx(1.442e-3, rel=0.01)
+    assert found.leads_to == "periodic" and found.period == 1
+    assert nanotap.orbit(regular).upset is None
+
+
 def test_where_there_is_no_orbit_the_reason_stands(regular):
     ds = nanotap.orbit(regular, omega=[2.6, 3.0])
     assert "not periodic" in ds.failure.values[0] and ds.failure.values[1] == ""

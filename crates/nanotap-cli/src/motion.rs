@@ -101,9 +101,13 @@ fn observables(o: &Observables, units: &Units, beam: bool) -> String {
         o.first_harmonic,
         &behind,
     ));
-    if let Some((amplitude, phase)) = o.tone2_response.zip(o.tone2_lag) {
-        let behind = lag(phase, "that tone", 4);
-        table.row(length("at the second tone", amplitude, &behind));
+    for (what, tone) in [
+        ("at the second tone", o.tone2_response.zip(o.tone2_lag)),
+        ("at the third tone", o.tone3_response.zip(o.tone3_lag)),
+    ] {
+        if let Some((amplitude, phase)) = tone {
+            table.row(length(what, amplitude, &lag(phase, "that tone", 4)));
+        }
     }
     if let Some((amplitude, phase)) = o.tip_motion.zip(o.tip_motion_phase) {
         let behind = format!("{}, deflection and base", lag(phase, "the base", 4));
@@ -220,7 +224,7 @@ pub(crate) fn spectrum(spectrum: &Spectrum, period: usize, units: &Units) -> Str
         lag(spectrum.phase, "the drive", 6),
         number::significant(100.0 * spectrum.thd, 4),
     );
-    let two_tones = spectrum.harmonics.iter().any(|h| h.product.is_some());
+    let several_tones = spectrum.harmonics.iter().any(|h| h.product.is_some());
     let mut columns = vec![
         ("order", Align::Point),
         ("tip", Align::Point),
@@ -228,14 +232,14 @@ pub(crate) fn spectrum(spectrum: &Spectrum, period: usize, units: &Units) -> Str
         ("force", Align::Point),
         ("lag (°)", Align::Point),
     ];
-    if two_tones {
+    if several_tones {
         columns.insert(0, ("product", Align::Left));
     }
     let mut table = Table::new(columns);
-    // Of a subharmonic motion the strong ones, under two tones the strongest, by size (sidebands are
+    // Of a subharmonic motion the strong ones, under several tones the strongest, by size (sidebands are
     // far from the first orders), otherwise the first.
     let mut shown: Vec<&Harmonic> = spectrum.harmonics.iter().collect();
-    let count = if two_tones {
+    let count = if several_tones {
         shown.sort_by(|a, b| b.tip.total_cmp(&a.tip));
         2 * SHOWN
     } else {
@@ -260,8 +264,8 @@ pub(crate) fn spectrum(spectrum: &Spectrum, period: usize, units: &Units) -> Str
             number::quantity(units, Kind::Force, h.force, [5, 4]),
             lag(h.force, h.force_phase),
         ];
-        if two_tones {
-            row.insert(0, h.product.map_or_else(String::new, product));
+        if several_tones {
+            row.insert(0, h.product.as_deref().map_or_else(String::new, product));
         }
         table.row(row);
     }
@@ -269,9 +273,9 @@ pub(crate) fn spectrum(spectrum: &Spectrum, period: usize, units: &Units) -> Str
     text
 }
 
-/// A product of two tones as it is written: 2f2 − f1.
-fn product([a, b]: [i32; 2]) -> String {
-    let mut parts = [(a, "f1"), (b, "f2")];
+/// A product of several tones as it is written: 2f2 − f1.
+fn product(of: &[i32]) -> String {
+    let mut parts: Vec<(i32, usize)> = of.iter().copied().zip(1..).collect();
     parts.sort_by_key(|(times, _)| *times < 0);
     let mut text = String::new();
     for (times, tone) in parts.into_iter().filter(|(times, _)| *times != 0) {
@@ -284,7 +288,7 @@ fn product([a, b]: [i32; 2]) -> String {
         if times.abs() != 1 {
             let _ = write!(text, "{}", times.abs());
         }
-        text.push_str(tone);
+        let _ = write!(text, "f{tone}");
     }
     text
 }

@@ -95,7 +95,7 @@ fn group(key: Key, physical: bool) -> &'static str {
         Section::Model => match key.entry().takes {
             Takes::Word(_) if key != Key::Contact => "more",
             Takes::Count(_) => "more",
-            _ if key.name().starts_with("mode") || key.name().starts_with("tone2") => "more",
+            _ if key.name().starts_with("mode") || key.name().starts_with("tone") => "more",
             _ => "model",
         },
         Section::Cantilever | Section::Tip => "lever",
@@ -238,9 +238,10 @@ fn word(case: &Case, key: Key) -> String {
         Key::SampleLaw => stated.unwrap_or_else(|| cantilever.contact.name().to_owned()),
         Key::Actuation | Key::DriveActuation => cantilever.actuation.name().to_owned(),
         Key::CosineTerm => cantilever.cosine_term.name().to_owned(),
-        Key::Tone2Ratio => cantilever
-            .tone2_ratio
-            .map_or_else(String::new, |ratio| ratio.to_string()),
+        Key::Tone2Ratio | Key::Tone3Ratio => cantilever
+            .further_tones
+            .get(usize::from(key == Key::Tone3Ratio))
+            .map_or_else(String::new, ToString::to_string),
         _ => stated.unwrap_or_default(),
     }
 }

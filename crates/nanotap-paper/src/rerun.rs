@@ -20,8 +20,8 @@ pub(super) fn on_case(command: &str, case: &Cantilever, options: &str) -> String
     if case.actuation != Actuation::default() {
         let _ = write!(line, " --set actuation={}", case.actuation);
     }
-    if let Some(ratio) = case.tone2_ratio {
-        let _ = write!(line, " --set tone2_ratio={ratio}");
+    for (k, ratio) in case.further_tones.iter().enumerate() {
+        let _ = write!(line, " --set tone{}_ratio={ratio}", k + 2);
     }
     if case.contact != ContactLaw::default() {
         let _ = write!(line, " --set contact={}", case.contact);
@@ -88,7 +88,7 @@ mod tests {
             .with(Parameter::Omega, 20.0);
         case.cosine_term = CosineTerm::Printed;
         case.contact = ContactLaw::KelvinVoigt;
-        case.tone2_ratio = Some("25/4".parse().unwrap());
+        case.further_tones = vec!["25/4".parse().unwrap()];
         case.further.set(Parameter::Tone2Amplitude, 0.01);
         let line = on_case("simulate", &case, "--periods 4");
         assert!(line.starts_with("nanotap simulate ") && line.ends_with(" --periods 4"));

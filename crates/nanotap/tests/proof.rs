@@ -250,6 +250,9 @@ fn every_piecewise_linear_lever_can_be_proved() {
             "tone2_ratio=3/2",
             "tone2_amplitude=0.02",
             "tone2_phase=30",
+            "tone3_ratio=5/2",
+            "tone3_amplitude=0.01",
+            "tone3_phase=-50",
         ],
         &["omega=20", "modes=3", "alpha5=5"],
     ];
@@ -501,6 +504,9 @@ fn interval_equations_contain_the_ordinary_ones() {
             "tone2_ratio=3/2",
             "tone2_amplitude=0.02",
             "tone2_phase=30",
+            "tone3_ratio=5/2",
+            "tone3_amplitude=0.01",
+            "tone3_phase=-50",
         ],
     ] {
         let case = case(more);

@@ -135,15 +135,14 @@ fn cantilever(title: &str, case: &Cantilever) -> String {
         number::counted(case.modes, "mode", "modes")
     );
     let period = number::significant(case.period(), 7);
-    let formula = case.tone2_ratio.map_or_else(
-        || "2π/Ω".to_owned(),
-        |ratio| {
-            format!(
-                "{}·2π/Ω, after which both tones repeat,",
-                ratio.denominator()
-            )
-        },
-    );
+    let formula = match case.further_tones.len() {
+        0 => "2π/Ω".to_owned(),
+        tones => format!(
+            "{}·2π/Ω, after which {} tones repeat,",
+            case.repetition(),
+            if tones == 1 { "both" } else { "all" }
+        ),
+    };
     format!(
         "{}\n\n{}\n  drive period {formula} = {period}\n",
         style::bold(&heading),
@@ -245,9 +244,10 @@ fn physical(title: &str, view: &Physical) -> String {
         &format!("{:.4e} s", scales.time),
         "unit of time, √(mL⁴/(EI))",
     ]);
-    if let (Some(free), Some(ratio)) = (view.second_free_amplitude, case.tone2_ratio) {
-        let what = format!("free amplitude at the second tone, {ratio} of the first's frequency");
-        given.row(["A02", &Kind::Length.format(free), &what]);
+    let tones = view.further_free_amplitudes.iter().zip(&case.further_tones);
+    for ((free, ratio), (symbol, word)) in tones.zip([("A02", "second"), ("A03", "third")]) {
+        let what = format!("free amplitude at the {word} tone, {ratio} of the first's frequency");
+        given.row([symbol, &Kind::Length.format(*free), &what]);
     }
     given.row(["", case.actuation.name(), case.actuation.meaning()]);
     match &view.sample.force {

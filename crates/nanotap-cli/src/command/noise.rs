@@ -68,15 +68,21 @@ fn text(case: &GivenCase, report: &NoiseReport) -> String {
         degrees(report.phase_rms),
         degrees(report.free_phase_rms),
     ]);
+    let hertz = |value| Kind::Frequency.format_digits(value, 4);
+    table.row([
+        "frequency, A and phase held".to_owned(),
+        hertz(report.frequency),
+        hertz(report.frequency_rms),
+        hertz(report.free_frequency_rms),
+    ]);
     let filter = format!(
         "In a lock-in amplifier with a first-order filter of {} (noise bandwidth {}). Without a drive the tip \
-         moves by {} rms. The noise of the free lever's phase is that of a force gradient of {}; frequency \
-         modulation reads its frequency with a noise of {}. Noise of detector and sample is not included.",
+         moves by {} rms. The noise of the free lever's phase is that of a force gradient of {}. Frequency \
+         modulation holds amplitude and phase, and reads the frequency. Noise of detector and sample is not included.",
         Kind::Time.format_digits(report.time_constant, 4),
         Kind::Frequency.format_digits(report.bandwidth, 4),
         length(report.thermal_rms),
         Kind::Stiffness.format_digits(report.force_gradient_min, 4),
-        Kind::Frequency.format_digits(report.free_frequency_rms, 4),
     );
     let saddle = report.saddle.map_or_else(String::new, |saddle| {
         let rare = if saddle.deviations < OFTEN {

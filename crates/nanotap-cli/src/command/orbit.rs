@@ -4,11 +4,13 @@ use std::fmt::Write as _;
 
 use clap::Args;
 use nanotap::case::physical::Kind;
+use nanotap::case::quantity::format_electronvolts;
 use nanotap::case::units::Units;
 use nanotap::figure::motion::orbit_figure;
 use nanotap::model::Model;
 use nanotap::observe::{ObservableSet, time_series};
 use nanotap::study::orbit::{MAX_DETERMINANT_DEFECT, OrbitOptions, OrbitReport, OrbitStudy};
+use nanotap::study::upset::{INSTANTS, Knocks};
 
 use crate::arguments::{CaseArguments, OutArgument, PlotArgument};
 use crate::failure::Failure;
@@ -126,6 +128,51 @@ fn harmonics_csv(orbit: &OrbitReport, units: &Units, omega: f64) -> String {
     csv
 }
 
+/// The smallest knock that upsets the orbit, in a sentence.
+fn upset(knocks: &Knocks, units: &Units) -> String {
+    let speed = |value: f64| number::quantity(units, Kind::Velocity, value, [4, 4]);
+    let Some(found) = &knocks.smallest else {
+        return format!(
+            "no knock on the tip was found that upsets it: of those tried, at {INSTANTS} instants and \
+             with changes of the tip's speed of up to {}, none is followed by another motion",
+            speed(knocks.largest_tried)
+        );
+    };
+    let way = if found.tip_speed > 0.0 {
+        "away from the sample"
+    } else {
+        "towards the sample"
+    };
+    let size = match &found.physical {
+        Some(knock) => format!(
+            "an impulse of {} N s, {}",
+            number::significant(knock.impulse.abs(), 3),
+            format_electronvolts(knock.energy)
+        ),
+        None => format!(
+            "an impulse of {}",
+            number::significant(found.impulse.abs(), 4)
+        ),
+    };
+    let mut motion = found.leads_to.name().to_owned();
+    if let Some(period) = found.period {
+        let _ = write!(motion, ", period {period}");
+    }
+    if let Some(amplitude) = found.first_harmonic {
+        let _ = write!(
+            motion,
+            ", amplitude {}",
+            number::quantity(units, Kind::Length, amplitude, [4, 4])
+        );
+    }
+    format!(
+        "the smallest knock that upsets it changes the tip's speed by {} {way} ({size}) at {}° of \
+         the drive, and another motion follows: {motion}",
+        speed(found.tip_speed.abs()),
+        number::significant(found.drive_phase, 4),
+    )
+}
+
 fn text(
     case: &GivenCase,
     model: &Model,
@@ -139,7 +186,7 @@ fn text(
     let _ = writeln!(text, "  {}", style::bold(&verdict));
     if model.repetition() > 1 {
         text.push_str(&motion::paragraph(&format!(
-            "both tones repeat after {} periods of the first, which are called a drive period here",
+            "the tones repeat after {} periods of the first, which are called a drive period here",
             model.repetition()
         )));
     }
@@ -185,6 +232,9 @@ fn text(
             "a small disturbance falls to 1/e in {} drive periods",
             number::significant(periods, 4)
         )));
+    }
+    if let Some(knocks) = &orbit.upset {
+        text.push_str(&motion::paragraph(&upset(knocks, &units)));
     }
     if let Some(proof) = &orbit.proof {
         text.push('\n');

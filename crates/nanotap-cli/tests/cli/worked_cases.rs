@@ -223,7 +223,7 @@ follows! {
     the_theory_of_the_beam: "beam.md", 3 commands, 6 numbers;
     the_theory_of_the_observables: "observables.md", 1 commands, 3 numbers;
     the_approach_curve: "approach-curve.md", 2 commands, 12 numbers;
-    the_bistable_lever: "bistable.md", 2 commands, 9 numbers;
+    the_bistable_lever: "bistable.md", 3 commands, 13 numbers;
     the_capillary_bridge: "capillary.md", 1 commands, 4 numbers;
     the_examples_of_dforce: "dforce.md", 4 commands, 13 numbers;
     the_fm_lever: "fm-lever-on-polystyrene.md", 3 commands, 9 numbers;

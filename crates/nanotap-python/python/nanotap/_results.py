@@ -331,6 +331,8 @@ class _Observed:
     grazing_contacts: int
     tone2_response: float
     tone2_lag: float
+    tone3_response: float
+    tone3_lag: float
     first_sideband: float
     first_sideband_phase: float
     second_sideband: float
@@ -368,6 +370,9 @@ class Orbit(_Observed, Result):
         physical: Observables in SI, if the case is physical.
         derivatives: Derivatives by the requested keys: `state`, the
             observables, `physical`.
+        upset: The smallest knock on the tip that upsets it, if requested: `smallest`
+            (`tip_speed`, `impulse`, `energy`, `drive_phase`, `leads_to`, `physical` in SI, or
+            None) and `largest_tried`.
         proof: Result of the proof, if requested: `proved`, `statement`, and if proved
             enclosures of `state`, `switches` and `multipliers`, `stability`,
             `unique_within`.
@@ -389,6 +394,7 @@ class Orbit(_Observed, Result):
     thd: float
     physical: Record | None = None
     derivatives: Record | None = None
+    upset: Record | None = None
     proof: Record | None = None
     made_series: "Callable[[], xr.Dataset] | xr.Dataset | None" = field(
         default=None, kw_only=True

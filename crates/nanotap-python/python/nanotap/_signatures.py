@@ -173,6 +173,7 @@ def orbit(  # type: ignore[overload-overlap]
     observables: Sequence[str] | None = None,
     resolution: int = 200,
     derivatives: Sequence[str] | None = None,
+    upset: bool = False,
     prove: bool = False,
     threads: int | None = None,
     progress: Progress = None,
@@ -188,6 +189,7 @@ def orbit(
     observables: Sequence[str] | None = None,
     resolution: int = 200,
     derivatives: Sequence[str] | None = None,
+    upset: bool = False,
     prove: bool = False,
     threads: int | None = None,
     progress: Progress = None,
@@ -202,6 +204,7 @@ def orbit(
     observables: Sequence[str] | None = None,
     resolution: int = 200,
     derivatives: Sequence[str] | None = None,
+    upset: bool = False,
     prove: bool = False,
     threads: int | None = None,
     progress: Progress = None,
@@ -227,6 +230,9 @@ def orbit(
     derivatives : Sequence[str] | None
         Keys of the case for derivatives of the orbit and its observables; the same
         quantities stay constant as in a sweep.
+    upset : bool
+        Find the smallest knock on the tip after which the lever goes to another
+        motion.
     prove : bool
         Prove existence, local uniqueness and stability by interval arithmetic.
     threads : int | None

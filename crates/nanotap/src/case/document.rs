@@ -74,6 +74,15 @@ pub struct PhysicalSummary {
     /// Amplitude of the second tone, m or N, if there is one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub second_amplitude: Option<f64>,
+    /// Free amplitude of the third tone, m, if there is one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub third_free_amplitude: Option<f64>,
+    /// Frequency of the third tone, Hz, if there is one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub third_frequency: Option<f64>,
+    /// Amplitude of the third tone, m or N, if there is one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub third_amplitude: Option<f64>,
     /// Setpoint amplitude over free amplitude, if given.
     pub setpoint: Option<f64>,
     /// Contact stiffness, N/m.
@@ -147,7 +156,12 @@ impl PhysicalSummary {
             ..
         } = view;
         let quantity = |parameter| parameters.get(parameter);
-        let second = cantilever.tone2_ratio;
+        let [second, third] = [0, 1].map(|k| {
+            let ratio = cantilever.further_tones.get(k)?;
+            let strength = quantity(Parameter::TONES[k][0]);
+            let frequency = ratio.value() * quantity(Parameter::Omega);
+            Some((frequency, strength, *view.further_free_amplitudes.get(k)?))
+        });
         Self {
             k: lever.k,
             f0: lever.f0,
@@ -159,9 +173,12 @@ impl PhysicalSummary {
             free_amplitude: view.free_amplitude,
             free_phase_degrees: view.free_phase,
             phase_reference: view.phase_reference(),
-            second_free_amplitude: view.second_free_amplitude,
-            second_frequency: second.map(|ratio| ratio.value() * quantity(Parameter::Omega)),
-            second_amplitude: second.map(|_| quantity(Parameter::Tone2Amplitude)),
+            second_free_amplitude: second.map(|(_, _, free)| free),
+            second_frequency: second.map(|(frequency, _, _)| frequency),
+            second_amplitude: second.map(|(_, strength, _)| strength),
+            third_free_amplitude: third.map(|(_, _, free)| free),
+            third_frequency: third.map(|(frequency, _, _)| frequency),
+            third_amplitude: third.map(|(_, strength, _)| strength),
             setpoint: view.setpoint,
             contact_stiffness: quantity(Parameter::Alpha4),
             contact_damping: quantity(Parameter::Alpha6),

@@ -1,6 +1,7 @@
 //! The same instrument over a sample that answers by another contact law.
 
 use super::key::{Key, Takes};
+use super::physical::drive::{FURTHER, ToneKeys};
 use super::physical::force::{keys_of_contacts, linear_takes, takes};
 use super::quantity::Kind;
 use super::stated::{Stated, Value};
@@ -46,14 +47,6 @@ impl LawName {
         SampleLaw::terms(&name).is_ok_and(|terms| takes(&terms, key))
     }
 }
-
-/// The keys of the second tone that are nothing without its frequency.
-const SECOND: [Key; 4] = [
-    Key::SecondAmplitude,
-    Key::SecondForce,
-    Key::SecondFreeAmplitude,
-    Key::SecondPhase,
-];
 
 /// What changes in a case that takes another contact law.
 #[derive(Clone, Debug, PartialEq)]
@@ -151,9 +144,10 @@ impl Case {
             return false;
         };
         let stated = &quantities.stated;
-        let second = [Key::SecondFrequency, Key::SecondRatio];
-        if SECOND.contains(&key) {
-            return !second.iter().any(|key| stated.has(*key));
+        // Strength and phase of a further tone are nothing without its frequency.
+        let of_tone = |keys: &&ToneKeys| keys.strength.contains(&key) || keys.phase == key;
+        if let Some(keys) = FURTHER.iter().find(of_tone) {
+            return !(stated.has(keys.frequency) || stated.has(keys.ratio));
         }
         !LawName::of(stated).takes(key)
     }

@@ -117,12 +117,14 @@ impl Layout {
                 &self.at_velocities(&of.cosine),
             )
             .with_constant(&self.at_velocities(&of.constant));
-        match &of.second {
-            Some([sine, cosine]) => {
-                forcing.with_tone(1, &self.at_velocities(sine), &self.at_velocities(cosine))
-            }
-            None => forcing,
-        }
+        let further = of.further.iter().enumerate();
+        further.fold(forcing, |forcing, (k, [sine, cosine])| {
+            forcing.with_tone(
+                k + 1,
+                &self.at_velocities(sine),
+                &self.at_velocities(cosine),
+            )
+        })
     }
 
     fn gap(self, gap: &Gap) -> Output {
@@ -130,10 +132,10 @@ impl Layout {
             .row(&gap.tip, 0)
             .with_tone(0, gap.sine, 0.0)
             .with_constant(gap.constant);
-        match gap.second {
-            Some([sine, cosine]) => output.with_tone(1, sine, cosine),
-            None => output,
-        }
+        let further = gap.further.iter().enumerate();
+        further.fold(output, |output, (k, [sine, cosine])| {
+            output.with_tone(k + 1, *sine, *cosine)
+        })
     }
 }
 
@@ -327,17 +329,16 @@ impl<'a> Beam<'a> {
         }
     }
 
-    /// The drive itself, α2 sin Ωτ and the second tone.
+    /// The drive itself, α2 sin Ωτ and the further tones.
     fn drive_output(&self) -> Output {
         let case = &self.galerkin.case;
         let still = self.layout.internal(std::iter::empty());
         let drive = still.with_tone(0, case.alpha2, 0.0);
-        if case.tone2_ratio.is_none() {
-            return drive;
-        }
-        let (sin, cos) = nanotap_arithmetic::sin_cos(case.get(Parameter::Tone2Phase).to_radians());
-        let amplitude = case.get(Parameter::Tone2Amplitude);
-        drive.with_tone(1, amplitude * cos, amplitude * sin)
+        (0..case.further_tones.len()).fold(drive, |drive, k| {
+            let [amplitude, phase] = Parameter::TONES[k].map(|of| case.get(of));
+            let (sin, cos) = nanotap_arithmetic::sin_cos(phase.to_radians());
+            drive.with_tone(k + 1, amplitude * cos, amplitude * sin)
+        })
     }
 
     /// Displacement of the base: the drive, if it acts there.
@@ -483,11 +484,12 @@ impl<'a> Beam<'a> {
             sine: of_vector(&df.sine, &f.sine),
             cosine: of_vector(&df.cosine, &f.cosine),
             constant: of_vector(&df.constant, &f.constant),
-            second: df
-                .second
-                .as_ref()
-                .zip(f.second.as_ref())
-                .map(|(df, f)| [0, 1].map(|k| of_vector(&df[k], &f[k]))),
+            further: df
+                .further
+                .iter()
+                .zip(&f.further)
+                .map(|(df, f)| [0, 1].map(|k| of_vector(&df[k], &f[k])))
+                .collect(),
         });
         let height = self.layout.gap(&derivative.gap);
         let mut height_rate = self.layout.row(&derivative.gap.tip, 1);
@@ -633,10 +635,11 @@ impl Solve {
             sine: self.vector(&of.sine),
             cosine: self.vector(&of.cosine),
             constant: self.vector(&of.constant),
-            second: of
-                .second
-                .as_ref()
-                .map(|tone| [0, 1].map(|k| self.vector(&tone[k]))),
+            further: of
+                .further
+                .iter()
+                .map(|tone| [0, 1].map(|k| self.vector(&tone[k])))
+                .collect(),
         }
     }
 }

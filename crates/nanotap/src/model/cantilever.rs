@@ -10,7 +10,7 @@ use crate::model::contact::dual::Dual;
 use crate::model::contact::entry::Damper;
 use crate::model::contact::law::Law;
 use crate::model::contact::{ContactLaw, MAX_ARMS};
-use crate::model::drive_form::{Actuation, FrequencyRatio};
+use crate::model::drive_form::{Actuation, FrequencyRatio, LARGEST, MAX_TONES, repetition};
 use crate::model::parameter::{Applies, LARGEST_ALPHA, Numbers, OMEGA_RANGE, Parameter, Unit};
 use crate::model::sample_law::SampleLaw;
 use crate::model::words::words;
@@ -56,8 +56,8 @@ pub struct Cantilever {
     /// Where the drive acts; α2 is an amplitude of motion or of force accordingly, see
     /// [`drive_form`](crate::model::drive_form).
     pub actuation: Actuation,
-    /// Frequency of a second tone over Ω.
-    pub tone2_ratio: Option<FrequencyRatio>,
+    /// Frequencies of further tones over Ω: of the second, and of a third.
+    pub further_tones: Vec<FrequencyRatio>,
     /// Time and stiffness of each relaxing arm, of a contact law with a list of these, in the model's
     /// units.
     pub arms: Vec<[f64; 2]>,
@@ -81,7 +81,7 @@ impl Cantilever {
             contact: ContactLaw::SpringDamper,
             law: None,
             actuation: Actuation::Base,
-            tone2_ratio: None,
+            further_tones: Vec::new(),
             arms: Vec::new(),
             further: Numbers::ZERO,
         }
@@ -163,7 +163,7 @@ impl Cantilever {
             Applies::Spring => self.law.is_none(),
             Applies::Damper => self.law.is_none() && self.contact.has_damper(),
             Applies::Law(law) => self.law.is_none() && self.contact == law,
-            Applies::SecondTone => self.tone2_ratio.is_some(),
+            Applies::Tone(number) => self.further_tones.len() + 2 > number,
             Applies::Measured => self.get(parameter) != 0.0,
         }
     }
@@ -204,11 +204,26 @@ impl Cantilever {
         self.law.is_none() && self.contact.entry().attracts
     }
 
-    /// The period of the drive: 2π/Ω, or with a second tone the time after which both
+    /// Periods of the first tone after which all tones repeat.
+    pub fn repetition(&self) -> u32 {
+        u32::try_from(repetition(&self.further_tones)).unwrap_or(u32::MAX)
+    }
+
+    /// The period of the drive: 2π/Ω, or with several tones the time after which all
     /// repeat.
     pub fn period(&self) -> f64 {
-        let repetition = self.tone2_ratio.map_or(1, FrequencyRatio::denominator);
-        f64::from(repetition) * std::f64::consts::TAU / self.omega
+        f64::from(self.repetition()) * std::f64::consts::TAU / self.omega
+    }
+
+    /// The same case under its first tone alone.
+    #[must_use]
+    pub fn under_one_tone(mut self) -> Self {
+        self.further_tones.clear();
+        for [amplitude, phase] in Parameter::TONES {
+            self.further.set(amplitude, 0.0);
+            self.further.set(phase, 0.0);
+        }
+        self
     }
 
     /// What is wrong with the value of a parameter with this case's law and drive: one that does
@@ -232,7 +247,7 @@ impl Cantilever {
             }
             (Applies::Damper, Damper::InArm { not_alpha6, .. }) => Some(Reason::Law(not_alpha6)),
             (Applies::Law(law), _) => Some(Reason::OtherLaw(law)),
-            (Applies::SecondTone, _) => Some(Reason::NoSecondTone),
+            (Applies::Tone(number), _) => Some(Reason::NoTone(number)),
             _ => None,
         }
     }
@@ -257,6 +272,7 @@ impl Cantilever {
                 });
             }
         }
+        self.check_tones()?;
         self.check_arms()
     }
 
@@ -290,6 +306,29 @@ impl Cantilever {
             }
             if !size(stiffness) {
                 return refuse(*stiffness, Reason::Negative);
+            }
+        }
+        Ok(())
+    }
+
+    /// Checks the frequencies of the tones against each other.
+    pub(crate) fn check_tones(&self) -> Result<(), CantileverError> {
+        let refuse = |k: usize, reason| {
+            Err(CantileverError {
+                key: ["tone2_ratio", "tone3_ratio"][k.min(1)],
+                value: self.further_tones[k].value(),
+                reason,
+            })
+        };
+        for (k, ratio) in self.further_tones.iter().enumerate() {
+            if k + 2 > MAX_TONES || k > 0 && !ratio.repeats() {
+                return refuse(k, Reason::Tones);
+            }
+            if self.further_tones[..k].contains(ratio) {
+                return refuse(k, Reason::SameTone);
+            }
+            if repetition(&self.further_tones[..=k]) > u64::from(LARGEST.0) {
+                return refuse(k, Reason::Repetition);
             }
         }
         Ok(())
@@ -381,7 +420,10 @@ impl Serialize for Cantilever {
             map.serialize_entry(parameter.name(), &self.get(parameter))?;
         }
         map.serialize_entry("actuation", &self.actuation)?;
-        map.serialize_entry("tone2_ratio", &self.tone2_ratio)?;
+        map.serialize_entry("tone2_ratio", &self.further_tones.first())?;
+        if let Some(third) = self.further_tones.get(1) {
+            map.serialize_entry("tone3_ratio", third)?;
+        }
         for parameter in self.written().filter(|of| !is_of_law(*of)) {
             map.serialize_entry(parameter.name(), &self.get(parameter))?;
         }
@@ -426,8 +468,14 @@ pub enum Reason {
     SpringOfLaw,
     /// A number that only this other law has.
     OtherLaw(ContactLaw),
-    /// A second tone without a frequency.
-    NoSecondTone,
+    /// The strength or phase of a further tone, by its number, that has no frequency.
+    NoTone(usize),
+    /// Too many tones.
+    Tones,
+    /// Two tones with the same frequency.
+    SameTone,
+    /// Tones that repeat together after too many periods.
+    Repetition,
 }
 
 impl fmt::Display for Reason {
@@ -467,8 +515,22 @@ impl fmt::Display for Reason {
             Self::SpringOfLaw => formatter.write_str(
                 "must be 0 with a nonlinear force law, which describes the whole sample",
             ),
-            Self::NoSecondTone => formatter
-                .write_str("no second tone: give tone2_ratio, as in \"25/4\", or leave this out"),
+            Self::NoTone(number) => {
+                let word = if *number == 2 { "second" } else { "third" };
+                write!(
+                    formatter,
+                    "no {word} tone: give tone{number}_ratio, as in \"25/4\", or leave this out"
+                )
+            }
+            Self::Tones => write!(formatter, "expected at most {MAX_TONES} tones"),
+            Self::SameTone => formatter
+                .write_str("two tones have the same frequency: add their amplitudes to one tone"),
+            Self::Repetition => write!(
+                formatter,
+                "the tones repeat together after more than {} periods of the first; choose \
+                 ratios with a common denominator",
+                LARGEST.0
+            ),
             Self::OtherLaw(law) => write!(
                 formatter,
                 "belongs to contact = \"{law}\"; leave it out with any other"

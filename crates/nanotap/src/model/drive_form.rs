@@ -6,8 +6,9 @@
 //! the clamped end is at rest, and the gap is not modulated. A static force A at the tip would bend it
 //! by A/3.
 //!
-//! A second tone has p/q of the first one's frequency. Both repeat after q periods of the
-//! first, so that the stroboscopic map is of that period.
+//! A second tone, and a third, has p/q of the first one's frequency. All repeat after as many
+//! periods of the first as the least common multiple of the q, and the stroboscopic map is of that
+//! period.
 
 use std::fmt;
 use std::str::FromStr;
@@ -57,8 +58,11 @@ pub struct FrequencyRatio {
     value: f64,
 }
 
-/// Most periods of the first tone after which both repeat, and the largest numerator.
-const LARGEST: (u32, u32) = (2_000, 20_000);
+/// Most tones of a drive.
+pub const MAX_TONES: usize = 3;
+
+/// Most periods of the first tone after which all repeat, and the largest numerator.
+pub(crate) const LARGEST: (u32, u32) = (2_000, 20_000);
 /// How near a number must be to a ratio to count as one.
 const NEAR: f64 = 1e-9;
 
@@ -113,12 +117,9 @@ impl FrequencyRatio {
         if numerator == 0 || denominator == 0 {
             return Err(range);
         }
-        let (mut a, mut b) = (numerator, denominator);
-        while b > 0 {
-            (a, b) = (b, a % b);
-        }
-        let terms = (u32::try_from(numerator / a), u32::try_from(denominator / a));
-        let (Ok(numerator), Ok(denominator)) = terms else {
+        let divisor = greatest_divisor(numerator, denominator);
+        let terms = [numerator, denominator].map(|term| u32::try_from(term / divisor));
+        let [Ok(numerator), Ok(denominator)] = terms else {
             return Err(range);
         };
         if numerator > LARGEST.1 || denominator > LARGEST.0 {
@@ -175,7 +176,7 @@ impl FrequencyRatio {
         })
     }
 
-    /// p: the second tone's periods in a repetition of both.
+    /// p: the tone's periods in a repetition of it and the first.
     pub const fn numerator(self) -> u32 {
         self.numerator
     }
@@ -189,6 +190,21 @@ impl FrequencyRatio {
     pub const fn value(self) -> f64 {
         self.value
     }
+}
+
+/// Periods of the first tone after which all tones repeat, for the ratios of the others: the least
+/// common multiple of their denominators.
+pub(crate) fn repetition(further: &[FrequencyRatio]) -> u64 {
+    let multiple = |a: u64, b: u64| a / greatest_divisor(a, b) * b;
+    let denominators = further.iter().map(|ratio| u64::from(ratio.denominator()));
+    denominators.fold(1, multiple)
+}
+
+const fn greatest_divisor(mut a: u64, mut b: u64) -> u64 {
+    while b > 0 {
+        (a, b) = (b, a % b);
+    }
+    a
 }
 
 impl fmt::Display for FrequencyRatio {

@@ -14,7 +14,7 @@ use crate::model::beam::Modes;
 use crate::model::cantilever::{Cantilever, CosineTerm};
 use crate::model::contact::ContactLaw;
 use crate::model::contact::law::{LinearForm, SampleResponse};
-use crate::model::drive_form::{Actuation, FrequencyRatio};
+use crate::model::drive_form::Actuation;
 use crate::model::oscillator::{Oscillator, Stop};
 use crate::model::parameter::Parameter;
 
@@ -126,9 +126,8 @@ pub fn enclosed(case: &Cantilever) -> Result<System, EnclosureError> {
         beam.regime(&law.flight, begins),
         beam.regime(&law.contact, ends),
     ];
-    let repetition = case.tone2_ratio.map_or(1, FrequencyRatio::denominator);
-    let period =
-        Interval::point(f64::from(2 * repetition)) * Interval::pi() / Interval::decimal(case.omega);
+    let period = Interval::point(f64::from(2 * case.repetition())) * Interval::pi()
+        / Interval::decimal(case.omega);
     Ok(System::new(period, beam.frequencies.clone(), regimes)?)
 }
 
@@ -284,13 +283,13 @@ impl EnclosedBeam {
         // s sin wτ + c cos wτ = Re((c − i s) e^{iwτ}); a phase turns it.
         let sine = |s: Interval, c: Interval| Rectangle::new(c, -s);
         let mut amplitudes = vec![(typed(case.alpha2), Rectangle::ONE)];
-        if let Some(ratio) = case.tone2_ratio {
+        for (ratio, [amplitude, phase]) in case.further_tones.iter().zip(Parameter::TONES) {
             let [p, q] = [ratio.numerator(), ratio.denominator()];
             frequencies.push(omega * Interval::point(f64::from(p)) / Interval::point(f64::from(q)));
-            let degrees = typed(case.get(Parameter::Tone2Phase));
+            let degrees = typed(case.get(phase));
             let phase = degrees * Interval::pi() / Interval::point(180.0);
             let turn = Rectangle::imaginary(phase).exp();
-            amplitudes.push((typed(case.get(Parameter::Tone2Amplitude)), turn));
+            amplitudes.push((typed(case.get(amplitude)), turn));
         }
         let mut gap_tones = Vec::new();
         let mut drives = Vec::new();

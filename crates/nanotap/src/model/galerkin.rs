@@ -2,7 +2,7 @@
 //! respect to every parameter.
 //!
 //! In either regime M Ẍ + C Ẋ + K X = s sin Ωτ + c cos Ωτ + k, and the gap between
-//! tip and sample is V_T = p·X + α2 sin Ωτ + α5, Eq. (8); with a second tone, or a drive
+//! tip and sample is V_T = p·X + α2 sin Ωτ + α5, Eq. (8); with further tones, or a drive
 //! that acts on the lever itself, as [`drive_form`](crate::model::drive_form) says.
 
 use std::sync::Arc;
@@ -48,8 +48,8 @@ pub struct Forcing {
     pub cosine: DVector<f64>,
     /// k, the part constant in time.
     pub constant: DVector<f64>,
-    /// Sine and cosine coefficients at the second tone's frequency, if there is one.
-    pub second: Option<[DVector<f64>; 2]>,
+    /// Sine and cosine coefficients at the frequencies of further tones.
+    pub further: Vec<[DVector<f64>; 2]>,
 }
 
 /// The gap V_T = p·X + sine · sin Ωτ + constant, Eq. (8), or a derivative of it.
@@ -61,8 +61,8 @@ pub struct Gap {
     pub sine: f64,
     /// The part constant in time.
     pub constant: f64,
-    /// Sine and cosine coefficients at the second tone's frequency, if there is one.
-    pub second: Option<[f64; 2]>,
+    /// Sine and cosine coefficients at the frequencies of further tones.
+    pub further: Vec<[f64; 2]>,
 }
 
 /// The equations of motion of one case. Arrays are indexed by [`Regime::index`].
@@ -158,8 +158,7 @@ impl GalerkinDerivative {
                 self.damping[r] += each.square(each.damping, derivative);
                 self.stiffness[r] += each.square(each.stiffness, derivative);
             }
-            let second = case.tone2_ratio.map(Which::Second);
-            for which in std::iter::once(Which::First).chain(second) {
+            for which in Which::all(case) {
                 let [sine, cosine] = Tone::new(case, &dual, which).gap;
                 let rate = which.rate(&dual);
                 let (mass, drag) = (
@@ -181,17 +180,12 @@ impl GalerkinDerivative {
 impl Forcing {
     /// Adds sine and cosine coefficients of a tone.
     fn add(&mut self, which: Which, [sine, cosine]: &[DVector<f64>; 2]) {
-        match (which, &mut self.second) {
-            (Which::First, _) => {
-                self.sine += sine;
-                self.cosine += cosine;
-            }
-            (Which::Second(_), Some(second)) => {
-                second[0] += sine;
-                second[1] += cosine;
-            }
-            (Which::Second(_), None) => {}
-        }
+        let [own_sine, own_cosine] = match which {
+            Which::First => [&mut self.sine, &mut self.cosine],
+            Which::Further(k, _) => self.further[k].each_mut(),
+        };
+        *own_sine += sine;
+        *own_cosine += cosine;
     }
 }
 
@@ -216,7 +210,7 @@ impl Tone<Dual> {
         let rate = which.rate(dual);
         let (amplitude, phase) = match which {
             Which::First => (dual(Parameter::Alpha2), zero),
-            Which::Second(_) => (dual(Parameter::Tone2Amplitude), dual(Parameter::Tone2Phase)),
+            Which::Further(k, _) => Parameter::TONES[k].map(dual).into(),
         };
         let (sin, cos) = phase.to_radians().sin_cos();
         // s sin(wτ + θ) + c cos(wτ + θ)
@@ -264,16 +258,23 @@ impl Tone<Dual> {
 #[derive(Clone, Copy)]
 enum Which {
     First,
-    Second(FrequencyRatio),
+    /// Its place among the further tones, and its frequency over that of the first.
+    Further(usize, FrequencyRatio),
 }
 
 impl Which {
+    /// All tones of a case.
+    fn all(case: &Cantilever) -> impl Iterator<Item = Self> {
+        let further = case.further_tones.iter().enumerate();
+        std::iter::once(Self::First).chain(further.map(|(k, ratio)| Self::Further(k, *ratio)))
+    }
+
     /// Its frequency.
     fn rate(self, dual: &impl Fn(Parameter) -> Dual) -> Dual {
         let omega = dual(Parameter::Omega);
         match self {
             Self::First => omega,
-            Self::Second(ratio) => omega * Dual::constant(ratio.value()),
+            Self::Further(_, ratio) => omega * Dual::constant(ratio.value()),
         }
     }
 }
@@ -308,7 +309,6 @@ impl Coefficients {
 
     fn numbers(case: &Cantilever, parameter: Option<Parameter>, number: fn(Dual) -> f64) -> Self {
         let dual = |p| Dual::new(case.get(p), f64::from(u8::from(Some(p) == parameter)));
-        let second = case.tone2_ratio.map(Which::Second);
         let one = Dual::constant(1.0);
         Self {
             beam_mass: number(one),
@@ -317,8 +317,7 @@ impl Coefficients {
             contact_damping: number(dual(Parameter::Alpha6)),
             beam_stiffness: number(one),
             contact_stiffness: number(dual(Parameter::Alpha4)),
-            tones: std::iter::once(Which::First)
-                .chain(second)
+            tones: Which::all(case)
                 .map(|which| Tone::new(case, &dual, which).map(number))
                 .collect(),
             contact_constant: number(-(dual(Parameter::Alpha4) * dual(Parameter::Alpha5))),
@@ -352,7 +351,7 @@ impl Coefficients {
                 sine,
                 cosine,
                 constant: p * (touching * self.contact_constant),
-                second: self.tones.get(1).map(tone),
+                further: self.tones[1..].iter().map(tone).collect(),
             }
         };
         GalerkinDerivative {
@@ -370,7 +369,7 @@ impl Coefficients {
                 tip: p * self.gap_tip,
                 sine: self.tones[0].gap[0],
                 constant: self.gap_constant,
-                second: self.tones.get(1).map(|tone| tone.gap),
+                further: self.tones[1..].iter().map(|tone| tone.gap).collect(),
             },
         }
     }
@@ -412,9 +411,9 @@ mod tests {
         }
         all.extend(g.gap.tip.iter());
         all.extend([g.gap.sine, g.gap.constant]);
-        all.extend(g.gap.second.iter().flatten());
-        let second = g.forcing.iter().filter_map(|f| f.second.as_ref());
-        all.extend(second.flatten().flat_map(|v| v.iter()));
+        all.extend(g.gap.further.iter().flatten());
+        let further = g.forcing.iter().flat_map(|f| &f.further);
+        all.extend(further.flatten().flat_map(|v| v.iter()));
         all
     }
 

@@ -28,6 +28,7 @@ pub mod parameter;
 pub mod recording;
 pub mod sample_law;
 pub mod spectrum;
+pub(crate) mod stepper;
 mod tangent;
 pub mod words;
 
@@ -44,6 +45,7 @@ use crate::model::beam::Modes;
 use crate::model::beam_equations::Beam;
 use crate::model::cantilever::{Cantilever, CantileverError};
 use crate::model::contact::law::Law;
+use crate::model::drive_form::FrequencyRatio;
 use crate::model::galerkin::{Galerkin, Regime};
 use crate::model::nonlinear::{Equilibrium, Nonlinear, Variation};
 use crate::model::parameter::Parameter;
@@ -101,8 +103,8 @@ pub struct Model {
     pub beam: Option<BeamOutputs>,
     /// How many numbers at the end of the state are the sample's.
     pub memory: usize,
-    /// Phase of a second tone in rad.
-    pub second_phase: f64,
+    /// Phases of further tones in rad.
+    pub tone_phases: Vec<f64>,
     /// How an internal variable of the surface that is overwritten at the end of each contact
     /// changes volumes of states.
     pub memory_reset: Option<MemoryReset>,
@@ -297,7 +299,12 @@ impl Model {
         let contact: Vec<bool> = (0..regimes.len()).map(|r| r > 0).collect();
         let outputs = beam.outputs(law, regimes.len());
         let system = Arc::new(System::new(drive.clone(), regimes, transitions)?);
-        let second_phase = galerkin.case.get(Parameter::Tone2Phase).to_radians();
+        let of_tones = Parameter::TONES
+            .iter()
+            .take(galerkin.case.further_tones.len());
+        let tone_phases = of_tones
+            .map(|[_, phase]| galerkin.case.get(*phase).to_radians())
+            .collect();
         Ok(Self {
             contact,
             tip: outputs.tip,
@@ -309,7 +316,7 @@ impl Model {
             beam: Some(outputs.beam),
             memory: law.internal,
             memory_reset: outputs.memory_reset,
-            second_phase,
+            tone_phases,
             nonlinear: nonlinear.map(Arc::new),
             start: None,
             system,
@@ -463,14 +470,18 @@ impl Model {
     }
 }
 
-/// The drive's tones: the first, and the second if there is one.
+/// The drive's tones: the first, and further ones if there are any.
 fn drive_of(case: &Cantilever) -> Result<Drive, FlowError> {
-    match case.tone2_ratio {
-        None => Drive::single(case.omega),
-        Some(ratio) if ratio.repeats() => {
-            Drive::new(case.period(), &[ratio.denominator(), ratio.numerator()])
+    match case.further_tones[..] {
+        [] => Drive::single(case.omega),
+        [ratio] if !ratio.repeats() => Drive::unlocked(case.omega, ratio.value() * case.omega),
+        ref further => {
+            let repetition = case.repetition();
+            let harmonic = |of: &FrequencyRatio| repetition / of.denominator() * of.numerator();
+            let harmonics = further.iter().map(harmonic);
+            let harmonics: Vec<u32> = std::iter::once(repetition).chain(harmonics).collect();
+            Drive::new(case.period(), &harmonics)
         }
-        Some(ratio) => Drive::unlocked(case.omega, ratio.value() * case.omega),
     }
 }
 
@@ -570,7 +581,6 @@ pub(crate) fn cantilever_model_tangent(
     let law = model.law_of(case, Some(parameter));
     let beam = Beam::new(&galerkin, model.system.drive(), law.internal)?;
     let change = beam.derivative(parameter);
-    let second_phase = f64::from(u8::from(parameter == Parameter::Tone2Phase));
     Ok(ModelTangent {
         system: cantilever_tangent(case, model, parameter)?,
         base: change.base(&beam),
@@ -581,7 +591,11 @@ pub(crate) fn cantilever_model_tangent(
             .collect(),
         beam_power: change.beam_power(&beam, parameter),
         height: change.into_height(),
-        second_phase: second_phase.to_radians(),
+        tone_phases: Parameter::TONES
+            .iter()
+            .take(case.further_tones.len())
+            .map(|[_, phase]| f64::from(u8::from(parameter == *phase)).to_radians())
+            .collect(),
         rigid_stop: RigidStop::default(),
     })
 }

@@ -306,7 +306,7 @@ impl Oscillator {
             memory_reset: None,
             nonlinear: None,
             start: None,
-            second_phase: 0.0,
+            tone_phases: Vec::new(),
             height: gap.clone(),
             gap,
             system,

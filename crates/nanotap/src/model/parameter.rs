@@ -11,6 +11,7 @@ use std::sync::LazyLock;
 use serde::{Serialize, Serializer};
 
 use crate::model::contact::{self, ContactLaw};
+use crate::model::drive_form::MAX_TONES;
 
 /// Largest size of α1 … α6. A larger number is probably a value in SI units, and products of
 /// parameters would lose too many digits.
@@ -66,8 +67,8 @@ pub enum Applies {
     Damper,
     /// With this contact law.
     Law(ContactLaw),
-    /// With a second tone.
-    SecondTone,
+    /// With this tone, 2 or 3, beside the first.
+    Tone(usize),
     /// Where it is not 0: a measured number of a mode.
     Measured,
 }
@@ -260,12 +261,19 @@ parameters! {
     }
     Further from Parameter::PAPER + contact::NUMBERS => {
         Tone2Amplitude = number("tone2_amplitude", "A₂", "amplitude of the second tone, measured as alpha2")
-            .also("second_tone_amplitude").or(0.0).when(Applies::SecondTone).always_written()
+            .also("second_tone_amplitude").or(0.0).when(Applies::Tone(2)).always_written()
             .of(Unit::Drive, "base amplitude of the second tone", "f2/g0")
             .by_force("force of the second tone F2", "F2 L^3/(EI g0) = 3 F2/(k g0)");
         Tone2Phase = number("tone2_phase", "θ₂", "phase of the second tone in degrees")
-            .also("second_tone_phase").or(0.0).when(Applies::SecondTone).within(SIGNED).always_written()
+            .also("second_tone_phase").or(0.0).when(Applies::Tone(2)).within(SIGNED).always_written()
             .of(Unit::Degrees, "phase of the second tone", "degrees");
+        Tone3Amplitude = number("tone3_amplitude", "A₃", "amplitude of the third tone, measured as alpha2")
+            .or(0.0).when(Applies::Tone(3))
+            .of(Unit::Drive, "base amplitude of the third tone", "f3/g0")
+            .by_force("force of the third tone F3", "F3 L^3/(EI g0) = 3 F3/(k g0)");
+        Tone3Phase = number("tone3_phase", "θ₃", "phase of the third tone in degrees")
+            .or(0.0).when(Applies::Tone(3)).within(SIGNED)
+            .of(Unit::Degrees, "phase of the third tone", "degrees");
         Mode2Frequency = measured("mode2_frequency", "Ω₂", "measured frequency of the second free mode, as omega (0: the beam's own)")
             .of(Unit::Frequency, "frequency of the second mode", "2 pi f2 T");
         Mode3Frequency = measured("mode3_frequency", "Ω₃", "measured frequency of the third free mode, as omega (0: the beam's own)")
@@ -309,6 +317,11 @@ impl Parameter {
         Self::Mode3Quality,
         Self::Mode2Stiffness,
         Self::Mode3Stiffness,
+    ];
+    /// Amplitude and phase of each further tone.
+    pub const TONES: [[Self; 2]; MAX_TONES - 1] = [
+        [Self::Tone2Amplitude, Self::Tone2Phase],
+        [Self::Tone3Amplitude, Self::Tone3Phase],
     ];
     /// How many of them are the paper's.
     pub(crate) const PAPER: usize = Paper::ENTRIES.len();

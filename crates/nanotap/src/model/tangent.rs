@@ -19,8 +19,8 @@ pub struct ModelTangent {
     pub force: Vec<Output>,
     /// Of the factors of what the beam's own damping takes.
     pub(crate) beam_power: Vec<[Output; 2]>,
-    /// Of the second tone's phase in rad.
-    pub second_phase: f64,
+    /// Of the phases of further tones in rad.
+    pub tone_phases: Vec<f64>,
     /// Of the rigid stop.
     pub rigid_stop: RigidStop,
 }
@@ -36,7 +36,7 @@ impl ModelTangent {
             base: zero.clone(),
             force: vec![zero.clone(); model.force.len()],
             beam_power: vec![[zero.clone(), zero]; products],
-            second_phase: 0.0,
+            tone_phases: vec![0.0; model.tone_phases.len()],
             rigid_stop: RigidStop::default(),
         }
     }
@@ -59,7 +59,9 @@ impl ModelTangent {
         {
             *mine = mine.plus(factor, &more);
         }
-        self.second_phase += factor * other.second_phase;
+        for (mine, more) in self.tone_phases.iter_mut().zip(&other.tone_phases) {
+            *mine += factor * more;
+        }
         let (stop, more) = (&mut self.rigid_stop, &other.rigid_stop);
         stop.mass += factor * more.mass;
         stop.restitution += factor * more.restitution;

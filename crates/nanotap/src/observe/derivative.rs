@@ -636,7 +636,13 @@ impl<'a> Followed<'a> {
                 period: 0.0,
             }),
             impacts,
-            second_phase: Dual::new(self.model.second_phase, self.tangent.second_phase),
+            tone_phases: self
+                .model
+                .tone_phases
+                .iter()
+                .zip(&self.tangent.tone_phases)
+                .map(|(phase, change)| Dual::new(*phase, *change))
+                .collect(),
         };
         Observables::changes(self.set, &mut Measured::of(self.model, Some(found)))
     }

@@ -65,10 +65,10 @@ impl Signal {
 /// A frequency of the drive.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Tone {
-    /// The drive frequency; with two tones, that of the first.
+    /// The drive frequency; with several tones, that of the first.
     First,
-    /// The second tone's.
-    Second,
+    /// That of a further tone, by its place among these.
+    Further(usize),
     /// A multiple of the drive frequency.
     Harmonic(u32),
     /// 2ω₁ − ω₂, next to the first of two tones.
@@ -82,13 +82,13 @@ impl Tone {
     pub(super) fn frequency(self, model: &Model) -> f64 {
         match self {
             Self::First => model.frequency(),
-            Self::Second => {
-                let second = model.system.drive().frequencies().get(1).copied();
-                second.unwrap_or_else(|| model.frequency())
+            Self::Further(k) => {
+                let further = model.system.drive().frequencies().get(k + 1).copied();
+                further.unwrap_or_else(|| model.frequency())
             }
             Self::Harmonic(order) => f64::from(order) * model.frequency(),
-            Self::FirstSideband => 2.0 * model.frequency() - Self::Second.frequency(model),
-            Self::SecondSideband => 2.0 * Self::Second.frequency(model) - model.frequency(),
+            Self::FirstSideband => 2.0 * model.frequency() - Self::Further(0).frequency(model),
+            Self::SecondSideband => 2.0 * Self::Further(0).frequency(model) - model.frequency(),
         }
     }
 }

@@ -11,13 +11,13 @@ use crate::model::Model;
 use crate::model::recording::{Curve, Recording};
 
 /// One component of a periodic motion, in the model's units.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct Harmonic {
     /// Frequency as a multiple of the drive frequency; fractional for a subharmonic motion.
     pub order: f64,
-    /// Of two tones: the numbers a and b of the lowest product a f₁ + b f₂ at this frequency.
+    /// Of several tones: the numbers a, b, … of the lowest product a f₁ + b f₂ + … at this frequency.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub product: Option<[i32; 2]>,
+    pub product: Option<Vec<i32>>,
     /// Amplitude of the tip deflection.
     pub tip: f64,
     /// Phase lag of the tip deflection behind sin(order · Ωτ), degrees in (−180, 180].
@@ -34,7 +34,7 @@ pub struct Harmonic {
 /// The spectrum of a periodic motion.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct Spectrum {
-    /// Components at `j Ω/n`, `j = 1, 2, …`, for a motion of period `n`. Under two tones that repeat
+    /// Components at `j Ω/n`, `j = 1, 2, …`, for a motion of period `n`. Under several tones that repeat
     /// after more than 64 periods of the first, those where products of the tones lie.
     pub harmonics: Vec<Harmonic>,
     /// Fraction of the tip deflection's power (variance) outside the drive frequency, 0 … 1: the
@@ -52,42 +52,58 @@ pub struct Spectrum {
 
 /// Periods of the first tone, up to which every multiple of the fundamental frequency is listed.
 const DENSE: usize = 64;
-/// Largest order |a| + |b| of a listed product a ω₁ + b ω₂ of two tones.
-const MIXING: i64 = 40;
+/// Largest order |a| + |b| + … of a listed product a ω₁ + b ω₂ + … of several tones.
+const MIXING: i32 = 40;
 /// Most components that are listed.
 const MAX_LINES: usize = 40_000;
 
-/// A multiple of a motion's fundamental frequency, and the product of two tones that lies there.
-type Line = (usize, Option<[i32; 2]>);
+/// A multiple of a motion's fundamental frequency, and the product of several tones that lies there.
+type Line = (usize, Option<Vec<i32>>);
+
+/// Calls `found` with all whole numbers, as many as `product` has from `at` on, whose sizes add up to
+/// `order`.
+fn products(product: &mut [i32], at: usize, order: i32, found: &mut impl FnMut(&[i32])) {
+    if at + 1 < product.len() {
+        for a in -order..=order {
+            product[at] = a;
+            products(product, at + 1, order - a.abs(), found);
+        }
+    } else {
+        for last in [-order, order] {
+            product[at] = last;
+            found(product);
+        }
+    }
+}
 
 /// The multiples of a motion's fundamental frequency up to `orders` times the drive frequency that
 /// its spectrum lists.
 fn lines(model: &Model, period: usize, orders: usize) -> Vec<Line> {
     let count = orders * model.repetition() * period;
-    let &[q, p] = model.system.drive().harmonics() else {
+    let tones = model.system.drive().harmonics();
+    if tones.len() < 2 {
         return (1..=count).map(|multiple| (multiple, None)).collect();
-    };
-    let period = period as i64;
-    let [q, p] = [q, p].map(|tone| i64::from(tone) * period);
+    }
     // Those of low order first, so that they name what lies at the same frequency as others.
-    let mut products = BTreeMap::new();
+    let mut named = BTreeMap::new();
     for order in 1..=MIXING {
-        for a in -order..=order {
-            let b = order - a.abs();
-            for b in [-b, b] {
-                if let Ok(multiple) = usize::try_from(a * q + b * p)
-                    && (1..=count).contains(&multiple)
-                {
-                    products.entry(multiple).or_insert([a, b].map(|n| n as i32));
-                }
+        products(&mut vec![0; tones.len()], 0, order, &mut |product| {
+            let terms = product.iter().zip(tones);
+            let multiple: i64 = terms
+                .map(|(a, tone)| i64::from(*a) * i64::from(*tone))
+                .sum();
+            if let Ok(multiple) = usize::try_from(multiple * period as i64)
+                && (1..=count).contains(&multiple)
+            {
+                named.entry(multiple).or_insert_with(|| product.to_vec());
             }
-        }
+        });
     }
     if model.repetition() > DENSE && period == 1 {
-        return products.into_iter().map(|(j, ab)| (j, Some(ab))).collect();
+        return named.into_iter().map(|(j, of)| (j, Some(of))).collect();
     }
     (1..=count.min(MAX_LINES))
-        .map(|multiple| (multiple, products.get(&multiple).copied()))
+        .map(|multiple| (multiple, named.get(&multiple).cloned()))
         .collect()
 }
 
@@ -98,7 +114,7 @@ impl Spectrum {
         let tip = recording.curve(&model.tip);
         let force = recording.force(model);
         let slope = model.beam.as_ref().map(|beam| recording.curve(&beam.slope));
-        // Both tones are multiples of the motion's fundamental frequency.
+        // All tones are multiples of the motion's fundamental frequency.
         let repetition = model.repetition() * period;
         let base = model.frequency() / repetition as f64;
         let lines = lines(model, period, orders);
@@ -122,7 +138,7 @@ impl Spectrum {
                 let force = of[1] + by_impulses(base * *multiple as f64);
                 Harmonic {
                     order: *multiple as f64 / repetition as f64,
-                    product: *product,
+                    product: product.clone(),
                     tip: of[0].modulus(),
                     tip_phase: lag(of[0]),
                     force: force.modulus(),

@@ -203,7 +203,7 @@ impl Measurement<'_> {
                 stored_by_sample: 0.0,
                 clearance: clearance.flatten(),
                 impacts: impacts(model, gathered),
-                second_phase: model.second_phase,
+                tone_phases: model.tone_phases.clone(),
             })
         } else {
             None

@@ -32,8 +32,8 @@ pub(super) struct Found<D> {
     pub(super) stored_by_sample: D,
     pub(super) clearance: Option<Clearance<D>>,
     pub(super) impacts: Impacts<D>,
-    /// Phase of the second tone in radians.
-    pub(super) second_phase: D,
+    /// Phases of further tones in radians.
+    pub(super) tone_phases: Vec<D>,
 }
 
 impl Found<f64> {
@@ -292,32 +292,34 @@ impl<'a, D: Number> Measured<'a, D> {
         self.gathered(|found| found.impacts.energy)
     }
 
-    /// The component of the tip deflection at the second tone, if there is one, relative to the
-    /// phase of the tone.
-    pub(super) fn second_tone(&mut self) -> Option<Phasor<D>> {
-        self.product_of_tones(Tone::Second, 1.0)
+    /// The component of the tip deflection at a further tone, if there is one, relative to the
+    /// phase of the tone; 0 is the second tone.
+    pub(super) fn further_tone(&mut self, k: usize) -> Option<Phasor<D>> {
+        self.product_of_tones(Tone::Further(k), k, 1.0)
     }
 
     /// The component of the tip deflection at 2ω₁ − ω₂.
     pub(super) fn first_sideband(&mut self) -> Option<Phasor<D>> {
-        self.product_of_tones(Tone::FirstSideband, -1.0)
+        self.product_of_tones(Tone::FirstSideband, 0, -1.0)
     }
 
     /// The component of the tip deflection at 2ω₂ − ω₁.
     pub(super) fn second_sideband(&mut self) -> Option<Phasor<D>> {
-        self.product_of_tones(Tone::SecondSideband, 2.0)
+        self.product_of_tones(Tone::SecondSideband, 0, 2.0)
     }
 
-    /// The component of the tip deflection at a product of two tones with so many times the second,
-    /// relative to the phases of both; nothing of one tone, or at a frequency below zero.
-    fn product_of_tones(&mut self, tone: Tone, seconds: f64) -> Option<Phasor<D>> {
-        self.model.system.drive().frequencies().get(1)?;
+    /// The component of the tip deflection at a product of the first tone and so many `times` a
+    /// further one, relative to the phases of both; nothing where that tone is not, or at a
+    /// frequency below zero.
+    fn product_of_tones(&mut self, tone: Tone, further: usize, times: f64) -> Option<Phasor<D>> {
+        self.model.system.drive().frequencies().get(further + 1)?;
         if tone.frequency(self.model) <= 0.0 {
             return None;
         }
-        let own = self.gathered(|found| found.second_phase);
+        let own =
+            self.gathered(|found| found.tone_phases.get(further).copied().unwrap_or_default());
         let seen = self.component(Signal::Tip, tone);
-        Some(seen.turned_back(own * D::from(seconds)))
+        Some(seen.turned_back(own * D::from(times)))
     }
 
     /// The reading of an optical lever at the drive frequency: the slope at the tip, converted to a

@@ -146,7 +146,7 @@ impl Run for NonlinearRun<'_> {
             stored: after.0 - before.0 + by_sample,
             stored_by_sample: by_sample,
             impacts: Impacts::default(),
-            second_phase: model.second_phase,
+            tone_phases: model.tone_phases.clone(),
             clearance: run
                 .clearance
                 .and_then(|search| search.found(model, nonlinear)),

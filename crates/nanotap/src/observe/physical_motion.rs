@@ -43,15 +43,15 @@ pub struct Setting {
 }
 
 /// One component of a periodic motion; SI units, angles in degrees.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct PhysicalHarmonic {
     /// Frequency as a multiple of the drive frequency.
     pub order: f64,
     /// Frequency, Hz.
     pub frequency: f64,
-    /// Of two tones: the numbers a and b of the lowest product a f₁ + b f₂ at this frequency.
+    /// Of several tones: the numbers a, b, … of the lowest product a f₁ + b f₂ + … at this frequency.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub product: Option<[i32; 2]>,
+    pub product: Option<Vec<i32>>,
     /// Amplitude of the tip deflection, m.
     pub tip: f64,
     /// Phase lag behind sin(order · ωt), degrees in (−180, 180].
@@ -167,7 +167,7 @@ impl PhysicalHarmonic {
             order: h.order,
             frequency: h.order * omega * scales.frequency,
             tip: h.tip * scales.length,
-            product: h.product,
+            product: h.product.clone(),
             tip_phase: h.tip_phase,
             force: h.force * scales.force,
             force_phase: h.force_phase,

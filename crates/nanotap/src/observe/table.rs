@@ -269,11 +269,19 @@ observables! {
     tone2_response: Option<f64>, Length, rare,
         "amplitude at the second tone",
         "amplitude of the tip deflection at the frequency of the second tone",
-        |m| m.second_tone().map(Phasor::norm);
+        |m| m.further_tone(0).map(Phasor::norm);
     tone2_lag: Option<f64>, Angle, rare,
         "phase lag at the second tone (°)",
         "phase lag of the tip deflection behind the second tone",
-        |m| m.second_tone().map(Phasor::lag);
+        |m| m.further_tone(0).map(Phasor::lag);
+    tone3_response: Option<f64>, Length, rare,
+        "amplitude at the third tone",
+        "amplitude of the tip deflection at the frequency of the third tone",
+        |m| m.further_tone(1).map(Phasor::norm);
+    tone3_lag: Option<f64>, Angle, rare,
+        "phase lag at the third tone (°)",
+        "phase lag of the tip deflection behind the third tone",
+        |m| m.further_tone(1).map(Phasor::lag);
     first_sideband: Option<f64>, Length, rare,
         "amplitude at $2f_1 - f_2$",
         "amplitude of the tip deflection at twice the first tone's frequency less the second's",

@@ -295,7 +295,7 @@ impl LeverCases {
                 "give drive.setpoint, as in setpoint = 0.8, in physical quantities",
             ));
         };
-        if view.cantilever.tone2_ratio.is_some() {
+        if !view.cantilever.further_tones.is_empty() {
             return Err(Error::input(
                 "levers are compared under one tone, and the case has a second one",
                 "leave drive.second_frequency and drive.second_ratio out",

@@ -40,6 +40,7 @@ pub mod start_box;
 pub mod sweep;
 pub mod target;
 pub mod threads;
+pub mod upset;
 pub mod value;
 #[cfg(feature = "dataset")]
 pub mod window;

@@ -31,6 +31,7 @@ use crate::study::proof::{ProofReport, Prover};
 use crate::study::request::options;
 use crate::study::simulate::{Named, starting_state};
 use crate::study::start_box::default_box;
+use crate::study::upset::{Knocks, upset};
 
 /// A periodic orbit with its stability and observables.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
@@ -74,6 +75,9 @@ pub struct OrbitReport {
     /// Excursions beyond the range of a nonlinear force law.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub out_of_range: Vec<OutOfRange>,
+    /// The smallest knock on the tip that upsets it, if requested.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub upset: Option<Knocks>,
     /// The proof, if requested.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub proof: Option<ProofReport>,
@@ -357,6 +361,7 @@ fn report_on(
         out_of_range: OutOfRange::of(model, &seen.observables),
         observables: seen.observables,
         derivatives: BTreeMap::new(),
+        upset: None,
         proof: None,
         trajectory: seen.recording,
     })
@@ -530,6 +535,8 @@ options! {
         /// stay constant as in a sweep
         #[schemars(extend("x-value" = "KEY,…"))]
         pub derivatives: Vec<String> = Vec::new(),
+        /// Find the smallest knock on the tip after which the lever goes to another motion
+        pub upset: bool = false,
         /// Prove existence, local uniqueness and stability by interval arithmetic
         pub prove: bool = false,
     }
@@ -548,7 +555,7 @@ impl Study for OrbitStudy {
     fn compute(
         case: &Case,
         options: &OrbitOptions,
-        _: &Control<'_>,
+        control: &Control<'_>,
     ) -> Result<InSi<OrbitReport>, Error> {
         let keys = options.derivatives.iter();
         let keys = keys
@@ -562,6 +569,10 @@ impl Study for OrbitStudy {
             let derivative =
                 Derivative::of(case, &model, key, at, &found.observables, observables)?;
             found.derivatives.insert(key.path(), derivative);
+        }
+        if options.upset {
+            let at = (found.state.as_slice(), found.period);
+            found.upset = Some(upset(case, at, control)?);
         }
         if options.prove {
             found.prove(&Prover::new(case));

@@ -452,10 +452,13 @@ pub(in crate::study) struct ReachedDistance {
     pub(in crate::study) zc: f64,
     /// State of the orbit at drive phase 0.
     pub(in crate::study) state: Vec<f64>,
+    /// The drive there, at a frequency shift.
+    pub(in crate::study) drive: Option<SetpointDrive>,
 }
 
 /// The distances at which the setpoints of these cases, which differ in nothing else and hold
 /// the same quantity, are first reached from far, on one approach; the reason where one is not reached.
+/// Frequency shifts have an approach each.
 ///
 /// # Errors
 /// When a case is not possible, the lever is not driven, or the work was cancelled.
@@ -469,6 +472,10 @@ pub(in crate::study) fn reached_distances(
     let free = FreeMotion::of(&case.model()?);
     if !(free.reach > 0.0 && free.reach.is_finite()) {
         return Err(no_drive());
+    }
+    let held = case.physical().and_then(|view| view.held);
+    if matches!(held, Some(Held::Shift(_))) {
+        return shifted_distances(cases, control);
     }
     let mut searches = Vec::with_capacity(cases.len());
     for case in cases {
@@ -491,10 +498,32 @@ pub(in crate::study) fn reached_distances(
             Ok(found) => Ok(ReachedDistance {
                 zc: found.zc,
                 state: found.state,
+                drive: None,
             }),
             Err(error) => Err(error.message()),
         })
         .collect())
+}
+
+/// The same of frequency shifts.
+fn shifted_distances(
+    cases: &[Case],
+    control: &Control<'_>,
+) -> Result<Vec<Result<ReachedDistance, String>>, Error> {
+    let solved = cases.par_iter().with_max_len(1);
+    let solved = solved.map(|case| match solve_setpoint(case, control) {
+        Ok(found) => Ok(Ok(ReachedDistance {
+            zc: found.zc(),
+            state: found
+                .solutions
+                .get(found.chosen)
+                .map_or_else(Vec::new, |solution| solution.state.clone()),
+            drive: found.drive,
+        })),
+        Err(error) if control.is_cancelled() => Err(error),
+        Err(error) => Ok(Err(error.message())),
+    });
+    solved.collect()
 }
 
 /// The case at the distance where its setpoint is reached, and how that was found; a case
@@ -580,8 +609,8 @@ impl HeldQuantity {
             Held::Phase(phase) => (near_phase(phase, free.phase), free.phase),
             Held::Shift(_) => {
                 return Err(Error::input(
-                    "setpoints that vary are amplitudes, peak forces or phases",
-                    "solve frequency shifts one by one, or with `fm --shift`",
+                    "setpoints that vary must all be frequency shifts, or none",
+                    "give setpoints of one kind",
                 ));
             }
         };

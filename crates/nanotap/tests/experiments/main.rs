@@ -19,3 +19,4 @@ mod reconstruct;
 mod requests;
 mod setpoint;
 mod units;
+mod upset;

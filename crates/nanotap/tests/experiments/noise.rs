@@ -84,9 +84,48 @@ fn the_free_lever_has_the_noise_of_its_resonance() {
         let frequency = square.sqrt() / 10e-9;
         let off = found.free_frequency_rms / frequency - 1.0;
         assert!(off.abs() < 2.0 / quality + 1e-3, "{quality}: {off}");
+        // Loops that hold the amplitude too change nothing of a linear lever.
+        let held = found.frequency_rms / found.free_frequency_rms - 1.0;
+        assert!(held.abs() < 1e-3, "{quality}: {held}");
         // A gradient κ turns the phase at resonance by Q κ/k₁.
         let gradient = stiffness / quality * found.free_phase_rms.to_radians();
         assert!((found.force_gradient_min / gradient - 1.0).abs() < 1e-3);
+    }
+}
+
+/// The phase of a lever that is held at 90° and at its amplitude turns with the noise force across
+/// its motion whatever the sample does, to first order of 1/Q: Albrecht's noise at this amplitude. A
+/// lock-in amplifier that holds neither reads another noise there.
+#[test]
+fn frequency_modulation_has_the_noise_of_its_amplitude_over_any_sample() {
+    let linear = [
+        "sample.stiffness=5 N/m",
+        "sample.loss_tangent=0.1",
+        "drive.setpoint=200 Hz",
+    ];
+    let dmt = [
+        "sample.law=dmt",
+        "sample.modulus=1 GPa",
+        "sample.hamaker=2e-19 J",
+        "tip.radius=20 nm",
+        "drive.setpoint=-30 Hz",
+    ];
+    let quality = 200.0;
+    for sample in [linear.as_slice(), &dmt] {
+        let quality_factor = format!("cantilever.Q={quality}");
+        let case = lever(&[&["modes=1", &quality_factor], sample].concat());
+        let found = noise(&case, "1 ms");
+        assert!((found.phase - 90.0).abs() < 0.1, "{found:?}");
+        let square = BOLTZMANN * 295.0 * found.frequency * found.bandwidth
+            / (std::f64::consts::PI * 2.0 * 1.030_197 * quality);
+        let expected = square.sqrt() / found.amplitude;
+        let off = found.frequency_rms / expected - 1.0;
+        println!(
+            "{off} {} {}",
+            found.frequency_rms,
+            found.phase_rms / found.free_phase_rms
+        );
+        assert!(off.abs() < 2.0 / quality, "{off} {found:?}");
     }
 }
 

@@ -1,4 +1,4 @@
-//! Base and direct actuation, with one tone and with two.
+//! Base and direct actuation, with one tone, two and three.
 
 use nanotap::case::Case;
 use nanotap::case::physical::free_response::response_at;
@@ -25,7 +25,7 @@ fn two_tones(actuation: Actuation) -> Cantilever {
         } else {
             0.6
         },
-        tone2_ratio: Some("25/4".parse().unwrap()),
+        further_tones: vec!["25/4".parse().unwrap()],
         omega: 3.1,
         ..Cantilever::paper()
     };
@@ -38,14 +38,23 @@ fn two_tones(actuation: Actuation) -> Cantilever {
         .with(Parameter::Tone2Phase, 35.0)
 }
 
-/// Far from the sample the motion is the sum of the responses to both tones, each with the
+/// The same and a third at 9/2 of the first.
+fn three_tones(actuation: Actuation) -> Cantilever {
+    let mut case = two_tones(actuation);
+    case.further_tones.push("9/2".parse().unwrap());
+    let amplitude = 0.7 * case.get(Parameter::Tone2Amplitude);
+    case.with(Parameter::Tone3Amplitude, amplitude)
+        .with(Parameter::Tone3Phase, -70.0)
+}
+
+/// Far from the sample the motion is the sum of the responses to all tones, each with the
 /// amplitude and phase of its closed form.
 #[test]
 fn tones_superpose_in_free_flight() {
     for actuation in Actuation::ALL {
         let case = Cantilever {
             alpha5: 50.0,
-            ..two_tones(actuation)
+            ..three_tones(actuation)
         };
         let model = Model::cantilever(&case).unwrap();
         let found = orbit(&model, &OrbitOptions::default()).unwrap();
@@ -59,6 +68,12 @@ fn tones_superpose_in_free_flight() {
                 o.tone2_response.unwrap(),
                 o.tone2_lag.unwrap(),
             ),
+            (
+                case.get(Parameter::Tone3Amplitude),
+                4.5 * case.omega,
+                o.tone3_response.unwrap(),
+                o.tone3_lag.unwrap(),
+            ),
         ];
         for (drive, frequency, amplitude, phase) in tones {
             let z = response_at(&case, frequency).unwrap();
@@ -70,7 +85,8 @@ fn tones_superpose_in_free_flight() {
             assert!(off.min(360.0 - off) < 1e-8, "{actuation}: {off}");
         }
         // There is no other motion.
-        let power = 0.5 * (o.first_harmonic.powi(2) + o.tone2_response.unwrap().powi(2));
+        let further = [o.tone2_response, o.tone3_response].map(|of| of.unwrap().powi(2));
+        let power = 0.5 * (o.first_harmonic.powi(2) + further[0] + further[1]);
         assert!((o.rms_deflection.powi(2) / power - 1.0).abs() < 1e-10);
         let spectrum = Spectrum::of(&model, &found.trajectory, 1, 8);
         let at = |order: f64| {
@@ -108,8 +124,8 @@ fn slow_drives_are_static() {
     }
 }
 
-/// With contacts, every actuation and both tones: derivatives with respect to all parameters,
-/// including those of the second tone, and a closed energy balance.
+/// With contacts, every actuation and three tones: derivatives with respect to all parameters,
+/// including those of the tones, and a closed energy balance.
 #[test]
 fn every_drive_has_its_derivatives_and_balances_its_energy() {
     for actuation in Actuation::ALL {
@@ -120,7 +136,7 @@ fn every_drive_has_its_derivatives_and_balances_its_energy() {
                 alpha5: 0.03,
                 alpha6: sample.alpha6,
                 arms: sample.arms.clone(),
-                ..two_tones(actuation).on(law, &own_numbers(&sample))
+                ..three_tones(actuation).on(law, &own_numbers(&sample))
             };
             let subject = Case::from(case);
             let model = subject.model().unwrap();
@@ -148,7 +164,7 @@ fn every_drive_has_its_derivatives_and_balances_its_energy() {
 #[test]
 fn phases_and_times_agree() {
     let case = Cantilever {
-        tone2_ratio: Some("3/2".parse().unwrap()),
+        further_tones: vec!["3/2".parse().unwrap()],
         ..two_tones(Actuation::Base)
     };
     let first = std::f64::consts::TAU / case.omega;
@@ -175,7 +191,7 @@ fn phases_and_times_agree() {
     // A second tone of amplitude zero has no effect, except on the length of the period.
     let silent = case.clone().with(Parameter::Tone2Amplitude, 0.0);
     let single = Cantilever {
-        tone2_ratio: None,
+        further_tones: Vec::new(),
         ..silent.clone().with(Parameter::Tone2Phase, 0.0)
     };
     let (a, b) = (run(&silent, &start, 0.0).0, run(&single, &start, 0.0).0);
@@ -188,7 +204,7 @@ struct Tapping {
     /// Acceleration by deflection, speed and force at the tip.
     own: [f64; 3],
     contact: [f64; 3],
-    tones: [[f64; 2]; 2],
+    tones: Vec<[f64; 2]>,
 }
 
 impl Tapping {
@@ -199,7 +215,7 @@ impl Tapping {
         } else {
             0.0
         };
-        for [strength, omega] in self.tones {
+        for [strength, omega] in &self.tones {
             force += strength * (omega * t).sin();
         }
         [v, self.own[0] * w + self.own[1] * v + self.own[2] * force]
@@ -263,11 +279,19 @@ impl Tapping {
     }
 }
 
-/// Intermodulation of tones that repeat after 599 periods.
+/// Intermodulation of two and of three tones that repeat after 599 periods.
 #[test]
 fn intermodulation_agrees_with_another_integration() {
+    for third in [None, Some(606)] {
+        intermodulate(third);
+    }
+}
+
+/// With a third tone at `third`/599 of the first.
+fn intermodulate(third: Option<u32>) {
     let ratio = 601.0 / 599.0;
-    let case = Cantilever {
+    let third_ratio = third.map(|third| f64::from(third) / 599.0);
+    let mut case = Cantilever {
         actuation: Actuation::Tip,
         omega: 3.51,
         alpha2: 0.01,
@@ -276,10 +300,15 @@ fn intermodulation_agrees_with_another_integration() {
         alpha1: 0.0,
         alpha5: 0.3,
         alpha6: 0.2,
-        tone2_ratio: "601/599".parse().ok(),
+        further_tones: vec!["601/599".parse().unwrap()],
         ..Cantilever::paper().with_modes(1)
     }
     .with(Parameter::Tone2Amplitude, 0.01);
+    if let Some(third) = third {
+        case.further_tones
+            .push(format!("{third}/599").parse().unwrap());
+        case = case.with(Parameter::Tone3Amplitude, 0.01);
+    }
     let model = Model::cantilever(&case).unwrap();
     let found = orbit(&model, &OrbitOptions::default()).unwrap();
     assert_eq!(found.period, 1);
@@ -299,44 +328,55 @@ fn intermodulation_agrees_with_another_integration() {
             tip * tip / equations.mass[(0, 0)],
         ],
         contact: [case.alpha4, case.alpha5, case.alpha6],
-        tones: [[0.01, case.omega], [0.01, ratio * case.omega]],
+        tones: [Some(1.0), Some(ratio), third_ratio]
+            .into_iter()
+            .flatten()
+            .map(|ratio| [0.01, ratio * case.omega])
+            .collect(),
     };
     let whole = 599.0 * std::f64::consts::TAU / case.omega;
     let mut at = [tip * found.state[0], tip * found.state[1]];
     // From another state the lever comes to the same motion.
     at[0] += 0.02;
-    let factors = [1.0, ratio, 2.0 - ratio, 2.0 * ratio - 1.0];
-    let lines = factors.map(|factor| factor * case.omega);
-    let mut sums = [Complex::new(0.0, 0.0); 4];
+    let mut factors = vec![1.0, ratio, 2.0 - ratio, 2.0 * ratio - 1.0];
+    if let Some(third) = third_ratio {
+        factors.extend([third, 1.0 + ratio - third]);
+    }
+    let lines: Vec<f64> = factors.iter().map(|factor| factor * case.omega).collect();
+    let mut sums = vec![Complex::new(0.0, 0.0); lines.len()];
     tapping.follow(&mut at, whole, 599 * 1000, &[], &mut []);
     tapping.follow(&mut at, whole, 599 * 1000, &lines, &mut sums);
     let o = &found.observables;
-    let seen = [
+    // The spectrum lists them as products of the tones.
+    let spectrum = Spectrum::of(&model, &found.trajectory, 1, 2);
+    let line = |product: &[i32]| {
+        let mut harmonics = spectrum.harmonics.iter();
+        let found = harmonics.find(|h| h.product.as_deref() == Some(product));
+        found.map(|h| (h.tip, h.tip_phase)).unwrap()
+    };
+    let mut seen = vec![
         (o.first_harmonic, o.phase),
         (o.tone2_response.unwrap(), o.tone2_lag.unwrap()),
         (o.first_sideband.unwrap(), o.first_sideband_phase.unwrap()),
         (o.second_sideband.unwrap(), o.second_sideband_phase.unwrap()),
     ];
-    for (sum, (amplitude, lag)) in sums.into_iter().zip(seen) {
+    if third.is_some() {
+        let tone = (o.tone3_response.unwrap(), o.tone3_lag.unwrap());
+        seen.extend([tone, line(&[1, 1, -1])]);
+    }
+    for (sum, (amplitude, lag)) in sums.into_iter().zip(&seen) {
         // Of A sin(ωt − lag): ∫ e^(−iωt) = A e^(−i lag) T/(2i).
         let read = sum * Complex::new(0.0, 2.0 / whole);
         let (sin, cos) = lag.to_radians().sin_cos();
-        let off = read - Complex::new(amplitude * cos, -amplitude * sin);
+        let off = read - Complex::new(cos, -sin) * *amplitude;
         assert!(
             off.modulus() < 1e-9 * o.first_harmonic,
             "{read} {amplitude} {lag}"
         );
     }
-    // The spectrum lists them as products of the tones.
-    let spectrum = Spectrum::of(&model, &found.trajectory, 1, 2);
-    let line = |product| {
-        spectrum
-            .harmonics
-            .iter()
-            .find(|h| h.product == Some(product))
-            .unwrap()
-    };
-    for (product, (amplitude, _)) in [[1, 0], [0, 1], [2, -1], [-1, 2]].into_iter().zip(seen) {
-        assert!((line(product).tip - amplitude).abs() < 1e-12, "{product:?}");
+    let products = [[1, 0, 0], [0, 1, 0], [2, -1, 0], [-1, 2, 0], [0, 0, 1]];
+    for (product, (amplitude, _)) in products.iter().zip(&seen) {
+        let product = &product[..2 + usize::from(third.is_some())];
+        assert!((line(product).0 - amplitude).abs() < 1e-12, "{product:?}");
     }
 }

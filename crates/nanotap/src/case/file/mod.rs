@@ -52,8 +52,12 @@ pub fn to_toml(case: &Cantilever) -> String {
         let (name, meaning) = (case.actuation.name(), case.actuation.meaning());
         let _ = writeln!(text, "actuation = \"{name}\"  # {meaning}");
     }
-    if let Some(ratio) = case.tone2_ratio {
-        let (key, meaning) = (Key::Tone2Ratio, Key::Tone2Ratio.meaning());
+    for (ratio, key) in case
+        .further_tones
+        .iter()
+        .zip([Key::Tone2Ratio, Key::Tone3Ratio])
+    {
+        let meaning = key.meaning();
         let _ = writeln!(text, "{key} = \"{ratio}\"  # {meaning}");
     }
     if case.contact != ContactLaw::default() {

@@ -336,12 +336,18 @@ fn cantilever(
         contact: law,
         actuation: word::<Actuation>(stated, Key::Actuation)?,
         cosine_term: word(stated, Key::CosineTerm)?,
-        tone2_ratio: match stated.get(Key::Tone2Ratio) {
-            Some(Value::Ratio(ratio)) => Some(*ratio),
-            _ => None,
-        },
+        further_tones: [Key::Tone2Ratio, Key::Tone3Ratio]
+            .into_iter()
+            .map_while(|key| match stated.get(key) {
+                Some(Value::Ratio(ratio)) => Some(*ratio),
+                _ => None,
+            })
+            .collect(),
         ..Cantilever::paper()
     };
+    if let (None, Some(entry)) = (stated.get(Key::Tone2Ratio), known.get(&Key::Tone3Ratio)) {
+        problems.add(|| refusal::third_without_second(entry));
+    }
     if let (CosineTerm::Printed, Actuation::Tip | Actuation::Distributed, Some(entry)) = (
         case.cosine_term,
         case.actuation,
@@ -372,12 +378,14 @@ fn cantilever(
         let points = arms.arms().points().iter();
         case.arms = points.map(|&(time, stiffness)| [time, stiffness]).collect();
     }
-    if let Err(error) = case.check_arms() {
-        let key = Key::RelaxationArms;
-        let place = known
-            .get(&key)
-            .map_or(Place::Whole, |entry| entry.value_place.clone());
-        problems.add(|| Problem::new(place, error.to_string()).key(Some(key.path())));
+    for error in [case.check_arms(), case.check_tones()]
+        .into_iter()
+        .filter_map(Result::err)
+    {
+        let key = ModelKind::Cantilever.key(error.key);
+        let entry = key.and_then(|key| known.get(&key));
+        let place = entry.map_or(Place::Whole, |entry| entry.value_place.clone());
+        problems.add(|| Problem::new(place, error.to_string()).key(key.map(Key::path)));
     }
     (complete && problems.found.len() == before).then_some(case)
 }

@@ -299,6 +299,14 @@ pub(super) fn out_of_range(entry: &Entry, reason: &str) -> Problem {
 }
 
 /// The printed cosine term without base actuation.
+pub(super) fn third_without_second(entry: &Entry) -> Problem {
+    Problem::new(
+        entry.value_place.clone(),
+        "the drive has a third tone and no second one",
+    )
+    .help("call it the second, tone2_ratio")
+}
+
 pub(super) fn printed_term(entry: &Entry) -> Problem {
     Problem::new(
         entry.value_place.clone(),

@@ -415,10 +415,10 @@ fn laws_and_drives_are_read_and_checked() {
         ],
     );
     assert_eq!(driven.actuation, Actuation::Tip);
-    assert_eq!(driven.tone2_ratio, "6.25".parse().ok());
+    assert_eq!(driven.further_tones, ["6.25".parse().unwrap()]);
     assert_eq!(
-        dimensionless(PAPER, &["tone2_ratio=6.25"]).tone2_ratio,
-        driven.tone2_ratio
+        dimensionless(PAPER, &["tone2_ratio=6.25"]).further_tones,
+        driven.further_tones
     );
     for (words, refusal_words) in [
         (
@@ -432,6 +432,16 @@ fn laws_and_drives_are_read_and_checked() {
             "belongs to contact = \"standard-linear-solid\"",
         ),
         (&["tone2_amplitude=0.1"], "no second tone: give tone2_ratio"),
+        (&["tone3_amplitude=0.1"], "no third tone: give tone3_ratio"),
+        (&["tone3_ratio=3"], "a third tone and no second one"),
+        (
+            &["tone2_ratio=3/2", "tone3_ratio=1.5"],
+            "the same frequency",
+        ),
+        (
+            &["tone2_ratio=601/599", "tone3_ratio=603/601"],
+            "after more than 2000 periods",
+        ),
         (&["tone2_ratio=3.14159"], "the nearest is"),
         (&["tone2_ratio=two"], "is not a ratio of frequencies"),
         (&["tone2_ratio=1"], "the same frequency"),
@@ -459,10 +469,11 @@ fn a_case_written_out_is_read_back() {
     let case = Cantilever {
         alpha6: 0.0,
         actuation: Actuation::Distributed,
-        tone2_ratio: "25/4".parse().ok(),
+        further_tones: vec!["25/4".parse().unwrap(), "17/2".parse().unwrap()],
         ..Cantilever::paper()
     };
     let case = case
+        .with(Parameter::Tone3Amplitude, 0.003)
         .on(ContactLaw::StandardLinearSolid, &[40.0, 0.1 / 3.0])
         .with(Parameter::Tone2Amplitude, 0.01)
         .with(Parameter::Tone2Phase, -12.5);

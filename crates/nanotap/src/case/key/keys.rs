@@ -299,6 +299,13 @@ Before from Parameter::COUNT => {
         meaning: "frequency of the second tone over omega",
         ..PLAIN
     };
+    Tone3Ratio = Entry {
+        name: "tone3_ratio",
+        takes: Takes::FrequencyRatio,
+        models: CANTILEVER,
+        meaning: "frequency of the third tone over omega",
+        ..PLAIN
+    };
 
     RelaxationArms = Entry {
         name: "relaxation_arms",
@@ -501,6 +508,17 @@ After from AFTER_LAWS => {
         .label("free amplitude at the second tone");
     SecondPhase = quantity(Drive, "second_phase", Angle, R::ANY, "phase of the second tone")
         .feeds(Parameter::Tone2Phase);
+    ThirdFrequency = quantity(Drive, "third_frequency", Frequency, R::POSITIVE, "frequency of a third tone");
+    ThirdRatio = other(Drive, "third_ratio", Takes::FrequencyRatio, "frequency of a third tone over that of the first");
+    ThirdAmplitude = quantity(Drive, "third_amplitude", Length, R::NOT_NEGATIVE, "amplitude of the third tone's motion of the clamped end")
+        .feeds(Parameter::Tone3Amplitude);
+    ThirdForce = quantity(Drive, "third_force", Force, R::NOT_NEGATIVE, "amplitude of the third tone's force on the lever")
+        .feeds(Parameter::Tone3Amplitude);
+    ThirdFreeAmplitude = quantity(Drive, "third_free_amplitude", Length, R::NOT_NEGATIVE, "free amplitude of the tip at the third tone")
+        .feeds(Parameter::Tone3Amplitude)
+        .label("free amplitude at the third tone");
+    ThirdPhase = quantity(Drive, "third_phase", Angle, R::ANY, "phase of the third tone")
+        .feeds(Parameter::Tone3Phase);
 
     GapTip = quantity(Gap, "tip", Length, R::ANY, "gap between tip and sample at rest, g1; negative: pressed in")
         .feeds(Parameter::Alpha5)

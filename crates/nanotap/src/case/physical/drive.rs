@@ -5,7 +5,7 @@ use super::reader::Reader;
 use crate::case::key::Key;
 use crate::case::quantity::Kind;
 use crate::case::stated::Value;
-use crate::model::drive_form::{Actuation, FrequencyRatio, RatioError};
+use crate::model::drive_form::{Actuation, FrequencyRatio, MAX_TONES, RatioError};
 
 /// A quantity that one of several keys states: the key, and its value in SI.
 pub(crate) type Given = (Key, f64);
@@ -23,44 +23,98 @@ pub struct Drive {
     pub(crate) setpoint: Option<(Kind, f64)>,
     /// Where it acts.
     pub actuation: Actuation,
-    /// The second tone, if there is one.
-    pub(crate) second: Option<SecondTone>,
+    /// The second tone, if there is one, and the third.
+    pub(crate) further: [Option<FurtherTone>; MAX_TONES - 1],
 }
 
-/// A second tone of the drive.
+/// The keys of a further tone.
+#[derive(Debug, PartialEq)]
+pub(crate) struct ToneKeys {
+    /// Which tone it is, as the keys have it.
+    word: &'static str,
+    /// Its frequency.
+    pub(crate) frequency: Key,
+    /// Its frequency over that of the first.
+    pub(crate) ratio: Key,
+    /// Its strength: motion of the base, force on the lever, free amplitude of the tip.
+    pub(crate) strength: [Key; 3],
+    /// Its phase.
+    pub(crate) phase: Key,
+}
+
+/// The keys of each further tone.
+pub(crate) static FURTHER: [ToneKeys; MAX_TONES - 1] = [
+    ToneKeys {
+        word: "second",
+        frequency: Key::SecondFrequency,
+        ratio: Key::SecondRatio,
+        strength: [
+            Key::SecondAmplitude,
+            Key::SecondForce,
+            Key::SecondFreeAmplitude,
+        ],
+        phase: Key::SecondPhase,
+    },
+    ToneKeys {
+        word: "third",
+        frequency: Key::ThirdFrequency,
+        ratio: Key::ThirdRatio,
+        strength: [
+            Key::ThirdAmplitude,
+            Key::ThirdForce,
+            Key::ThirdFreeAmplitude,
+        ],
+        phase: Key::ThirdPhase,
+    },
+];
+
+/// A further tone of the drive.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct SecondTone {
-    /// Its frequency in Hz, which must be a ratio of small whole numbers to the first one's.
-    frequency: Option<f64>,
-    /// Its frequency over that of the first, in place of that.
-    ratio: Option<FrequencyRatio>,
+pub(crate) struct FurtherTone {
+    /// Its keys.
+    pub(crate) keys: &'static ToneKeys,
+    /// Its frequency.
+    frequency: ToneFrequency,
     /// Its strength, as that of the first.
     pub(crate) strength: Given,
     /// Its phase in rad.
     pub(crate) phase: f64,
 }
 
-impl SecondTone {
+/// The frequency of a further tone.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum ToneFrequency {
+    /// In Hz, which must be a ratio of small whole numbers to the first one's.
+    Hertz(f64),
+    /// Over that of the first.
+    Ratio(FrequencyRatio),
+}
+
+impl FurtherTone {
     /// The ratio to a first tone of `frequency` Hz.
-    pub(crate) fn ratio(&self, frequency: f64) -> Result<Option<FrequencyRatio>, PhysicalError> {
-        let Some(second) = self.frequency else {
-            return Ok(self.ratio);
+    pub(crate) fn ratio(&self, frequency: f64) -> Result<FrequencyRatio, PhysicalError> {
+        let own = match self.frequency {
+            ToneFrequency::Ratio(ratio) => return Ok(ratio),
+            ToneFrequency::Hertz(own) => own,
         };
-        let ratio = FrequencyRatio::of(second / frequency).map_err(|error| {
+        FrequencyRatio::of(own / frequency).map_err(|error| {
             let nearest = match &error {
                 RatioError::Irrational { nearest, .. } => format!(
-                    ", or drive.second_frequency = {}",
+                    ", or drive.{}_frequency = {}",
+                    self.keys.word,
                     Kind::Frequency.format_digits(nearest.value() * frequency, 12)
                 ),
                 _ => String::new(),
             };
             PhysicalError::impossible(
-                Key::SecondFrequency,
-                Kind::Frequency.format_digits(second, 12),
-                format!("{error}; say that by drive.second_ratio{nearest}"),
+                self.keys.frequency,
+                Kind::Frequency.format_digits(own, 12),
+                format!(
+                    "{error}; say that by drive.{}_ratio{nearest}",
+                    self.keys.word
+                ),
             )
-        })?;
-        Ok(Some(ratio))
+        })
     }
 }
 
@@ -95,7 +149,7 @@ impl Drive {
                 _ => (Kind::Number, value),
             }),
             actuation,
-            second: read_second(reader, actuation)?,
+            further: read_further(reader, actuation)?,
         })
     }
 }
@@ -106,13 +160,6 @@ pub(crate) const FIRST: [Key; 3] = [
     Key::DriveAmplitude,
     Key::DriveForce,
     Key::DriveFreeAmplitude,
-];
-
-/// Keys for the strength of the second tone.
-pub(crate) const SECOND: [Key; 3] = [
-    Key::SecondAmplitude,
-    Key::SecondForce,
-    Key::SecondFreeAmplitude,
 ];
 
 /// A motion of the base, a force on the lever, or a free amplitude of the tip, under these
@@ -141,30 +188,51 @@ fn read_strength(
     reader.first(&[key, free])
 }
 
-fn read_second(
+fn read_further(
     reader: Reader<'_>,
     actuation: Actuation,
-) -> Result<Option<SecondTone>, PhysicalError> {
-    let frequency = reader.number(Key::SecondFrequency)?;
-    let strength = read_strength(reader, actuation, SECOND)?;
-    let phase = reader.number(Key::SecondPhase)?;
-    let ratio = reader.ratio(Key::SecondRatio);
-    match (frequency.is_some() || ratio.is_some(), strength) {
-        (true, Some(strength)) => Ok(Some(SecondTone {
+) -> Result<[Option<FurtherTone>; MAX_TONES - 1], PhysicalError> {
+    let mut tones = [None; MAX_TONES - 1];
+    for (tone, keys) in tones.iter_mut().zip(&FURTHER) {
+        *tone = read_tone(reader, actuation, keys)?;
+    }
+    if matches!(tones, [None, Some(_)]) {
+        return Err(PhysicalError::missing(
+            FURTHER[0].frequency,
+            "the drive has a third tone and no second one: call the third the second",
+        ));
+    }
+    Ok(tones)
+}
+
+fn read_tone(
+    reader: Reader<'_>,
+    actuation: Actuation,
+    keys: &'static ToneKeys,
+) -> Result<Option<FurtherTone>, PhysicalError> {
+    let word = keys.word;
+    let ratio = reader.ratio(keys.ratio).map(ToneFrequency::Ratio);
+    let frequency = reader.number(keys.frequency)?.map(ToneFrequency::Hertz);
+    let strength = read_strength(reader, actuation, keys.strength)?;
+    let phase = reader.number(keys.phase)?;
+    match (frequency.or(ratio), strength) {
+        (Some(frequency), Some(strength)) => Ok(Some(FurtherTone {
+            keys,
             frequency,
-            ratio,
             strength,
             phase: phase.unwrap_or(0.0),
         })),
-        (false, None) if phase.is_none() => Ok(None),
-        (false, _) => Err(PhysicalError::missing(
-            Key::SecondFrequency,
-            "the second tone needs a frequency, or drive.second_ratio as in \"25/4\"",
+        (None, None) if phase.is_none() => Ok(None),
+        (None, _) => Err(PhysicalError::missing(
+            keys.frequency,
+            format!("the {word} tone needs a frequency, or drive.{word}_ratio as in \"25/4\""),
         )),
-        (true, None) => Err(PhysicalError::missing(
-            Key::SecondFreeAmplitude,
-            "the second tone needs a strength: its free amplitude, or second_amplitude of the \
-             base or second_force on the lever",
+        (Some(_), None) => Err(PhysicalError::missing(
+            keys.strength[2],
+            format!(
+                "the {word} tone needs a strength: its free amplitude, or {word}_amplitude of the \
+                 base or {word}_force on the lever"
+            ),
         )),
     }
 }

@@ -6,7 +6,6 @@ use crate::model::beam::Modes;
 use crate::model::cantilever::{Cantilever, CantileverError, CosineTerm, Reason};
 use crate::model::drive_form::Actuation;
 use crate::model::galerkin::{Galerkin, Regime};
-use crate::model::parameter::Parameter;
 
 /// Complex amplitude of the tip's deflection per amplitude of the drive at its frequency Ω:
 /// see [`response_at`].
@@ -73,12 +72,8 @@ fn response_with_measured_modes(
     let free = Cantilever {
         alpha2: 1.0,
         omega: frequency,
-        tone2_ratio: None,
-        ..case.clone()
+        ..case.clone().under_one_tone()
     };
-    let free = free
-        .with(Parameter::Tone2Amplitude, 0.0)
-        .with(Parameter::Tone2Phase, 0.0);
     let free = Galerkin::new(&free)?;
     let r = Regime::Free.index();
     let impedance = free.stiffness[r].map(Complex::from)

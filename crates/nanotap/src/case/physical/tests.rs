@@ -1118,27 +1118,37 @@ fn a_force_on_the_lever_gives_its_free_amplitude() {
     }
 }
 
-/// Both tones have the requested free amplitudes, by the closed form of each.
+/// All tones have the requested free amplitudes, by the closed form of each.
 #[test]
-fn a_second_tone_has_its_own_free_amplitude() {
+fn further_tones_have_their_own_free_amplitudes() {
     let resolved = resolve(&changed(&[
         ("drive", "amplitude", ""),
         ("drive", "free_amplitude", "20 nm"),
         ("drive", "second_frequency", "410.625 kHz"),
         ("drive", "second_free_amplitude", "0.5 nm"),
         ("drive", "second_phase", "30 deg"),
+        ("drive", "third_ratio", "17.5"),
+        ("drive", "third_free_amplitude", "0.1 nm"),
+        ("drive", "third_phase", "-20 deg"),
     ]))
     .unwrap();
     let case = &resolved.cantilever;
-    let ratio = case.tone2_ratio.unwrap();
+    let ratio = case.further_tones[0];
     assert_eq!(ratio.to_string(), "25/4");
+    assert_eq!(case.further_tones[1].to_string(), "35/2");
     close(case.get(Parameter::Tone2Phase), 30.0, 1e-12);
+    close(case.get(Parameter::Tone3Phase), -20.0, 1e-12);
     for (amplitude, frequency, expected) in [
         (case.alpha2, case.omega, 20e-9),
         (
             case.get(Parameter::Tone2Amplitude),
             6.25 * case.omega,
             0.5e-9,
+        ),
+        (
+            case.get(Parameter::Tone3Amplitude),
+            17.5 * case.omega,
+            0.1e-9,
         ),
     ] {
         let z = super::free_response::response_at(case, frequency).unwrap();
@@ -1148,7 +1158,7 @@ fn a_second_tone_has_its_own_free_amplitude() {
             1e-9,
         );
     }
-    assert_eq!(resolved.second_free_amplitude, Some(0.5e-9));
+    assert_eq!(resolved.further_free_amplitudes, [0.5e-9, 0.1e-9]);
 }
 
 /// The laws of a sample with what each needs: 3 km/k and the time over the model's unit.
@@ -1178,7 +1188,7 @@ fn samples_have_their_laws() {
 
 #[test]
 fn laws_and_drives_are_refused_with_what_would_be_right() {
-    let cases: [(&[Entry], &str); 12] = [
+    let cases: [(&[Entry], &str); 16] = [
         (
             &[("sample", "law", "hertz")],
             "it is not a parameter of sample.law",
@@ -1226,6 +1236,31 @@ fn laws_and_drives_are_refused_with_what_would_be_right() {
         (
             &[("drive", "second_ratio", "25/4")],
             "second_free_amplitude",
+        ),
+        (&[("drive", "third_ratio", "3")], "third_free_amplitude"),
+        (
+            &[
+                ("drive", "third_ratio", "3"),
+                ("drive", "third_amplitude", "1 nm"),
+            ],
+            "no second one",
+        ),
+        (
+            &[
+                ("drive", "second_ratio", "3"),
+                ("drive", "second_amplitude", "1 nm"),
+                ("drive", "third_phase", "1 rad"),
+            ],
+            "the third tone needs a frequency",
+        ),
+        (
+            &[
+                ("drive", "second_ratio", "3"),
+                ("drive", "second_amplitude", "1 nm"),
+                ("drive", "third_frequency", "197.1 kHz"),
+                ("drive", "third_amplitude", "1 nm"),
+            ],
+            "drive.third_frequency",
         ),
     ];
     for (changes, words) in cases {

@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 
 use nalgebra::Complex;
 
-use super::drive::{Drive, FIRST, Given, SECOND};
+use super::drive::{Drive, FIRST, FURTHER, FurtherTone, Given};
 use super::error::PhysicalError;
 use super::free_response::{free_response, response_at};
 use super::lever::{Lever, LeverData};
@@ -53,8 +53,8 @@ pub struct Physical {
     pub parameters: Numbers,
     /// Free amplitude A₀ of the tip's deflection at the drive frequency, in m.
     pub free_amplitude: f64,
-    /// Free amplitude of the second tone, in m, if there is one.
-    pub second_free_amplitude: Option<f64>,
+    /// Free amplitudes of further tones, in m.
+    pub further_free_amplitudes: Vec<f64>,
     /// Phase of the free deflection behind the drive (the base's displacement, or the force
     /// on the lever) in degrees: 90 at resonance.
     pub free_phase: f64,
@@ -94,11 +94,12 @@ impl Physical {
         let response = free_response(&self.cantilever)?;
         self.free_amplitude = self.cantilever.alpha2 * response.modulus() * self.scales.length;
         self.free_phase = -response.argument().to_degrees();
-        if let Some(ratio) = self.cantilever.tone2_ratio {
-            let second = response_at(&self.cantilever, ratio.value() * self.cantilever.omega)?;
-            let amplitude = self.cantilever.get(Parameter::Tone2Amplitude) * second.modulus();
-            self.second_free_amplitude = Some(amplitude * self.scales.length);
-        }
+        let tones = self.cantilever.further_tones.iter().zip(Parameter::TONES);
+        let amplitudes = tones.map(|(ratio, [strength, _])| {
+            let response = response_at(&self.cantilever, ratio.value() * self.cantilever.omega)?;
+            Ok(self.cantilever.get(strength) * response.modulus() * self.scales.length)
+        });
+        self.further_free_amplitudes = amplitudes.collect::<Result<_, PhysicalError>>()?;
         self.tip_height = self.scales.length - self.parameters.get(Parameter::Alpha5);
         Ok(self)
     }
@@ -132,8 +133,23 @@ impl Physical {
 
     /// The value of a quantity in SI, stated or derived; `None` if it is unknown.
     pub(crate) fn value(&self, key: Key) -> Option<f64> {
-        let second = self.cantilever.tone2_ratio;
         let quantity = |parameter| self.parameters.get(parameter);
+        let tones = self.cantilever.further_tones.iter().zip(&FURTHER);
+        for (k, (ratio, keys)) in tones.enumerate() {
+            let [strength, phase] = Parameter::TONES[k];
+            if key == keys.frequency {
+                return Some(ratio.value() * quantity(Parameter::Omega));
+            }
+            if key == self.strength_key(keys.strength) {
+                return Some(quantity(strength));
+            }
+            if key == keys.strength[2] {
+                return self.further_free_amplitudes.get(k).copied();
+            }
+            if key == keys.phase {
+                return Some(quantity(phase));
+            }
+        }
         if let Some(force) = &self.sample.force {
             if let Some(value) = force.get(key) {
                 return Some(value);
@@ -180,12 +196,6 @@ impl Physical {
                 quantity(Parameter::Alpha2)
             }
             Key::DriveFreeAmplitude => self.free_amplitude,
-            Key::SecondFrequency => second?.value() * quantity(Parameter::Omega),
-            Key::SecondAmplitude | Key::SecondForce if key == self.strength_key(SECOND) => {
-                second.map(|_| quantity(Parameter::Tone2Amplitude))?
-            }
-            Key::SecondFreeAmplitude => self.second_free_amplitude?,
-            Key::SecondPhase => second.map(|_| quantity(Parameter::Tone2Phase))?,
             Key::GapTip => quantity(Parameter::Alpha5),
             Key::GapBeam => self.scales.length,
             _ => return None,
@@ -194,7 +204,7 @@ impl Physical {
 
     /// What stays while a quantity varies, said as numbers of their own. An experimenter who
     /// turns one knob leaves the others: the drive keeps its own amplitude (a piezo its
-    /// voltage, not the lever's answer to it) unless `drive.hold` says otherwise, the second tone its place among the harmonics
+    /// voltage, not the lever's answer to it) unless `drive.hold` says otherwise, further tones their place among the harmonics
     /// of the first, the sample its place, and the unit of length g₀ stays so that all values have
     /// the same unit.
     pub(crate) fn implied_constants(&self, stated: &Stated) -> Stated {
@@ -202,7 +212,8 @@ impl Physical {
         held.set(Key::GapBeam, self.scales.length);
         held.set(Key::GapTip, self.parameters.get(Parameter::Alpha5));
         let hold: Hold = word(stated, Key::DriveHold).unwrap_or_default();
-        for keys in [FIRST, SECOND] {
+        let further = FURTHER.iter().map(|keys| keys.strength);
+        for keys in std::iter::once(FIRST).chain(further) {
             let [_, _, free] = keys;
             let strength = self.strength_key(keys);
             let (stays, follows) = match hold {
@@ -213,12 +224,11 @@ impl Physical {
                 held.set(stays, value);
             }
         }
-        if let (Some(ratio), true) = (
-            self.cantilever.tone2_ratio,
-            stated.has(Key::SecondFrequency),
-        ) {
-            held.remove(Key::SecondFrequency);
-            held.put(Key::SecondRatio, Value::Ratio(ratio));
+        for (ratio, keys) in self.cantilever.further_tones.iter().zip(&FURTHER) {
+            if stated.has(keys.frequency) {
+                held.remove(keys.frequency);
+                held.put(keys.ratio, Value::Ratio(*ratio));
+            }
         }
         held
     }
@@ -236,7 +246,12 @@ fn named(reader: Reader<'_>, error: PhysicalError) -> PhysicalError {
         let fed = key.entry().feeds.or_else(|| key.law_number());
         fed.is_some() && fed == parameter
     };
-    let stated = Key::all().find(|key| feeds(key) && reader.has(*key));
+    let of_tone = |key: &Key| {
+        FURTHER.iter().zip(2..).any(|(keys, number)| {
+            [keys.frequency, keys.ratio].contains(key) && error.key == format!("tone{number}_ratio")
+        })
+    };
+    let stated = Key::all().find(|key| (feeds(key) || of_tone(key)) && reader.has(*key));
     PhysicalError::Model {
         key: stated.map(|key| (key, reader.stated.written(key))),
         error,
@@ -254,13 +269,14 @@ fn mapped(reader: Reader<'_>, known: Option<Lever>) -> Result<Physical, Physical
         (Key::DriveFrequencyRatio, ratio) => ratio * lever.f0,
         (_, frequency) => frequency,
     };
-    let ratio = drive.second.map(|second| second.ratio(frequency));
+    let further: Vec<FurtherTone> = drive.further.into_iter().flatten().collect();
+    let ratios = further.iter().map(|tone| tone.ratio(frequency));
     let like = Cantilever {
         modes: modes(reader.stated),
         cosine_term: word(reader.stated, Key::CosineTerm).unwrap_or_default(),
         contact: sample.law,
         actuation: drive.actuation,
-        tone2_ratio: ratio.transpose()?.flatten(),
+        further_tones: ratios.collect::<Result<_, _>>()?,
         ..Cantilever::paper()
     };
     // The free response does not depend on g0, so any length serves as unit here: g0 = 1 m,
@@ -291,14 +307,14 @@ fn mapped(reader: Reader<'_>, known: Option<Lever>) -> Result<Physical, Physical
     let strength =
         |strength, response: Complex<f64>, key| applied(strength, response.modulus() / unit, key);
     let (base, free_amplitude) = strength(drive.strength, response, Key::DriveFreeAmplitude)?;
-    let second = match (drive.second, like.tone2_ratio) {
-        (Some(second), Some(ratio)) => {
+    let strengths = further
+        .iter()
+        .zip(&like.further_tones)
+        .map(|(tone, ratio)| {
             let response = response_at(&free, ratio.value() * free.omega)?;
-            let key = Key::SecondFreeAmplitude;
-            Some((second.phase, strength(second.strength, response, key)?))
-        }
-        _ => None,
-    };
+            strength(tone.strength, response, tone.keys.strength[2])
+        });
+    let strengths: Vec<(f64, f64)> = strengths.collect::<Result<_, _>>()?;
     let held = held(reader, &drive, free_amplitude)?;
     let setpoint = match held {
         Some(Held::Amplitude(ratio)) => Some(ratio),
@@ -341,9 +357,10 @@ fn mapped(reader: Reader<'_>, known: Option<Lever>) -> Result<Physical, Physical
     for (parameter, number) in Parameter::of_law(sample.law).zip(&sample.numbers) {
         parameters.set(parameter, *number);
     }
-    if let Some((phase, (applied, _))) = second {
-        parameters.set(Parameter::Tone2Amplitude, applied);
-        parameters.set(Parameter::Tone2Phase, phase);
+    for (k, (tone, (applied, _))) in further.iter().zip(&strengths).enumerate() {
+        let [strength, phase] = Parameter::TONES[k];
+        parameters.set(strength, *applied);
+        parameters.set(phase, tone.phase);
     }
     let mut cantilever = scales.case(&parameters, &like);
     let arms = sample.arms.iter().flat_map(|arms| arms.arms().points());
@@ -360,7 +377,7 @@ fn mapped(reader: Reader<'_>, known: Option<Lever>) -> Result<Physical, Physical
         sample,
         parameters,
         free_amplitude,
-        second_free_amplitude: second.map(|(_, (_, free))| free),
+        further_free_amplitudes: strengths.iter().map(|(_, free)| *free).collect(),
         free_phase: -response.argument().to_degrees(),
         setpoint,
         held,

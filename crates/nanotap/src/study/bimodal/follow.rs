@@ -131,13 +131,9 @@ pub(super) fn follow(
 
 /// A tone of the lever, with the free lever at its amplitude and the phase that is held.
 fn tone(lever: &Cantilever, index: usize, kind: Loop, phase: f64) -> Result<Tone, Error> {
-    let mut alone = lever.clone();
-    let ratio = alone.tone2_ratio.take();
+    let mut alone = lever.clone().under_one_tone();
     let strength = lever.get(Parameter::Tone2Amplitude);
-    alone = alone
-        .with(Parameter::Tone2Amplitude, 0.0)
-        .with(Parameter::Tone2Phase, 0.0);
-    if let (1, Some(ratio)) = (index, ratio) {
+    if let (1, Some(ratio)) = (index, lever.further_tones.first()) {
         alone.omega *= ratio.value();
         alone.alpha2 = strength;
     }

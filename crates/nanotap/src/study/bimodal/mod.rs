@@ -289,9 +289,9 @@ impl Study for BimodalStudy {
                 "give lever, sample and drive in physical quantities",
             )
         })?;
-        if lever.tone2_ratio.is_none() {
+        if lever.further_tones.len() != 1 {
             return Err(Error::input(
-                "bimodal operation needs a second tone",
+                "bimodal operation needs a second tone, and no third",
                 "give drive.second_ratio, near 6.27 for the second mode, and drive.second_free_amplitude",
             ));
         }

@@ -61,7 +61,7 @@ impl Drives {
         lever.alpha2 = self.strength[0];
         lever.alpha5 = self.gap;
         let ratio = self.frequency[1] / self.frequency[0];
-        lever.tone2_ratio = Some(FrequencyRatio::unlocked(ratio));
+        lever.further_tones = vec![FrequencyRatio::unlocked(ratio)];
         lever
             .with(Parameter::Tone2Amplitude, self.strength[1])
             .with(Parameter::Tone2Phase, phase.to_degrees())

@@ -6,16 +6,16 @@
 //! disturbance is multiplied by a matrix and gains a covariance; its stationary covariance P obeys
 //! `P = A P Aᵀ + Q`.
 
-use nalgebra::{Complex, DMatrix, DVector};
+use nalgebra::{Complex, DMatrix, DVector, Matrix2};
 use nanotap_arithmetic::ComplexFunctions as _;
-use nanotap_flow::Flow;
 use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::Thermal;
 use crate::Error;
 use crate::control::Control;
-use crate::model::{Model, MotionError};
+use crate::model::Model;
+use crate::model::stepper::Stepper;
 use crate::study::orbit::OrbitReport;
 
 /// Instants in a drive period at least.
@@ -77,55 +77,6 @@ pub(super) struct Linearised {
     duration: f64,
 }
 
-/// The flow of a model from any instant of the drive period.
-enum Stepper {
-    Linear(Box<Flow>),
-    /// With the branch of the law at the beginning of the step, where the law remembers it.
-    Nonlinear(Box<nanotap_volterra::Flow>),
-}
-
-impl Stepper {
-    fn new(model: &Model) -> Self {
-        match &model.nonlinear {
-            None => Self::Linear(Box::new(Flow::new(model.system.clone()))),
-            Some(nonlinear) => Self::Nonlinear(Box::new(nanotap_volterra::Flow::new(
-                nonlinear.system.clone(),
-            ))),
-        }
-    }
-
-    /// State and branch after a step from time `from` to `to` of a drive period; `whole` is its length.
-    fn step(
-        &mut self,
-        state: &[f64],
-        branch: Option<usize>,
-        [from, to, whole]: [f64; 3],
-    ) -> Result<(Vec<f64>, Option<usize>), MotionError> {
-        let mut after = state.to_vec();
-        match self {
-            Self::Linear(flow) => {
-                flow.start(state, from)?;
-                if to < whole {
-                    flow.run_until(to, &mut ())?;
-                } else {
-                    flow.run_period(&mut ())?;
-                }
-                flow.state(&mut after);
-                Ok((after, None))
-            }
-            Self::Nonlinear(flow) => {
-                match branch {
-                    Some(branch) => flow.start_on(state, from, branch)?,
-                    None => flow.start(state, from)?,
-                }
-                flow.run_until(to)?;
-                flow.state(&mut after);
-                Ok((after, branch.map(|_| flow.branch())))
-            }
-        }
-    }
-}
-
 impl Linearised {
     /// Linearises the flow along an orbit.
     pub(super) fn along(
@@ -139,7 +90,7 @@ impl Linearised {
         let omega = model.frequency();
         let diffusion = thermal.diffusion();
         let modes = diffusion.nrows();
-        let (mut state, mut branch) = split(model, &orbit.state);
+        let (mut state, mut branch) = model.split(&orbit.state);
         let n = state.len();
         let steps = steps_of(thermal.fastest() / omega);
         let h = period / steps as f64;
@@ -239,6 +190,26 @@ impl Linearised {
 }
 
 impl Linearised {
+    /// One-sided spectral densities of the amplitude and the phase (in radians), and between these, far
+    /// below the slowest rate: `2T G Q Gᵀ` with `G = (1 − A)⁻¹` on both; see [`spectrum`](Self::spectrum).
+    pub(super) fn slow_densities(
+        &self,
+        [along, across]: [&DVector<f64>; 2],
+        amplitude: f64,
+    ) -> Option<Matrix2<f64>> {
+        let n = self.factor.nrows();
+        let matrix = (DMatrix::identity(n, n) - &self.factor).transpose().lu();
+        let through = |way: &DVector<f64>, unit: f64| {
+            let mut part = DVector::zeros(n);
+            part.rows_mut(n - 2, 2).copy_from(&(way * unit));
+            matrix.solve(&part)
+        };
+        let ways = [through(along, 1.0)?, through(across, 1.0 / amplitude)?];
+        let density =
+            |k: usize, l: usize| 2.0 * self.duration * ways[k].dot(&(&self.added * &ways[l]));
+        Some(Matrix2::from_fn(density))
+    }
+
     /// Spectra of the amplitude and the phase, which are the lock-in amplifier's two parts along and
     /// across its mean reading. With A and Q of an orbit of length T they are
     /// `2T uᵀ (e^{iωT} − A)⁻¹ Q (e^{iωT} − A)⁻ᴴ u`.
@@ -289,23 +260,6 @@ impl Linearised {
             spectrum.phase.push(b.max(0.0) * degrees * degrees);
         }
         Ok(spectrum)
-    }
-}
-
-/// The entries of a state that vary continuously, and the branch that the law remembers.
-fn split(model: &Model, state: &[f64]) -> (Vec<f64>, Option<usize>) {
-    match &model.nonlinear {
-        None => (state.to_vec(), None),
-        Some(nonlinear) => {
-            let n = nonlinear.system.dimension();
-            let branch = state
-                .get(n)
-                .filter(|branch| nonlinear.remembers && **branch >= 0.0);
-            (
-                state[..n].to_vec(),
-                branch.map(|branch| branch.round() as usize),
-            )
-        }
     }
 }
 

@@ -10,20 +10,21 @@ mod free_lever;
 mod linearised;
 mod saddle;
 
-use nalgebra::{Complex, DMatrix, DVector};
+use nalgebra::{Complex, DMatrix, DVector, Matrix2};
 use nanotap_arithmetic::ComplexFunctions as _;
 use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::Error;
 use crate::case::Case;
+use crate::case::key::Key;
 use crate::case::physical::Kind;
 use crate::control::Control;
 use crate::model::cantilever::Cantilever;
 use crate::model::galerkin::Galerkin;
 use crate::model::parameter::Parameter;
 use crate::model::{Model, beam::Modes};
-use crate::observe::ObservableSet;
+use crate::observe::{Derivative, ObservableSet, measure};
 use crate::study::orbit::{OrbitOptions, OrbitReport, OrbitStudy};
 use crate::study::request::options;
 use crate::study::value::Amount;
@@ -58,7 +59,12 @@ pub struct NoiseReport {
     pub phase: f64,
     /// Root mean square of the noise of this phase in degrees.
     pub phase_rms: f64,
-    /// The same of the amplitude of the free lever under the same drive, in m.
+    /// Drive frequency in Hz.
+    pub frequency: f64,
+    /// Root mean square of the noise with which frequency modulation reads the frequency at this
+    /// working point, in the bandwidth, while it holds the amplitude and the phase, in Hz.
+    pub frequency_rms: f64,
+    /// The same as `amplitude_rms` of the free lever under the same drive, in m.
     pub free_amplitude_rms: f64,
     /// The same of its phase, in degrees.
     pub free_phase_rms: f64,
@@ -168,7 +174,7 @@ impl Study for NoiseStudy {
                 "give the lever and the sample in physical quantities",
             )
         })?;
-        if lever.tone2_ratio.is_some() {
+        if !lever.further_tones.is_empty() {
             return Err(Error::input(
                 "the noise under two tones is not known here",
                 "leave out the second tone of the drive",
@@ -199,6 +205,7 @@ impl Study for NoiseStudy {
         };
         let tapping = thermal.reading(case, options.state.as_deref(), lock_in, control)?;
         let free = thermal.reading(&free(lever), None, lock_in, control)?;
+        let model = case.model()?;
         // A spring κ at the tip changes the free response by 1/(1 + κ χ).
         let frequency_rms = free.frequency_rms(thermal.delay(lever.omega), lock_in);
         let turn = thermal.compliance(lever.omega).im.abs() * scales.length / scales.force;
@@ -212,6 +219,8 @@ impl Study for NoiseStudy {
             amplitude_rms: scales.length * tapping.amplitude_rms,
             phase: tapping.phase.to_degrees(),
             phase_rms: tapping.phase_rms.to_degrees(),
+            frequency: scales.frequency * lever.omega,
+            frequency_rms: tapping.held_frequency_rms(lever, &model, lock_in)? / scales.time,
             free_amplitude_rms: scales.length * free.amplitude_rms,
             free_phase_rms: free.phase_rms.to_degrees(),
             free_frequency_rms: frequency_rms / scales.time,
@@ -259,6 +268,8 @@ struct Reading {
     state: Vec<f64>,
     /// Covariance of its continuous entries.
     covariance: DMatrix<f64>,
+    /// Spectral densities of the amplitude and the phase at low frequencies.
+    slow_densities: Matrix2<f64>,
     spectrum: ReadingSpectrum,
 }
 
@@ -271,6 +282,36 @@ impl Reading {
         let bandwidth = 0.25 / lock_in.time_constant;
         let phase = (density * bandwidth).sqrt().to_radians();
         phase / (delay.abs() * std::f64::consts::TAU)
+    }
+
+    /// Noise of the drive frequency under loops that hold the amplitude and the phase by the frequency
+    /// and the strength of the drive: by what they undo at low frequencies, the derivatives of the
+    /// orbit by both. It is white over the bandwidth up to 1/Q, since noise and loops act on the
+    /// lever in the same way.
+    fn held_frequency_rms(
+        &self,
+        lever: &Cantilever,
+        model: &Model,
+        lock_in: LockIn,
+    ) -> Result<f64, Error> {
+        let set = ObservableSet::FIRST_HARMONIC;
+        let at = (self.state.as_slice(), self.period);
+        let observed = measure(model, &self.state, self.period, set)?;
+        let keys = [Parameter::Omega, Parameter::Alpha2].map(Key::of);
+        let case = Case::from(lever.clone());
+        let changes = Derivative::of_keys(&case, model, &keys, at, &observed, set)?;
+        // Of the amplitude, and of the phase in degrees.
+        let units = [1.0, 1.0_f64.to_radians()];
+        let change = |row: usize, column: usize| {
+            let of_set = changes[column].observables.get(row);
+            let change = of_set.and_then(|(_, change)| change.number());
+            change.map_or(f64::NAN, |change| units[row] * change)
+        };
+        let undone = Matrix2::from_fn(change).try_inverse();
+        let undone = undone.unwrap_or_else(|| Matrix2::repeat(f64::NAN));
+        let density = (undone * self.slow_densities * undone.transpose())[(0, 0)];
+        let bandwidth = 0.25 / lock_in.time_constant;
+        Ok((density * bandwidth).sqrt() / std::f64::consts::TAU)
     }
 }
 
@@ -365,6 +406,9 @@ impl Thermal {
             phase_rms: deviation(&across) / amplitude,
             state: orbit.state.clone(),
             covariance: covariance.view((0, 0), (last, last)).clone_owned(),
+            slow_densities: found
+                .slow_densities([&along, &across], amplitude)
+                .unwrap_or_else(|| Matrix2::repeat(f64::NAN)),
             spectrum: found.spectrum([&along, &across], amplitude, lock_in)?,
         })
     }

@@ -119,8 +119,8 @@ fn about(case: &Cantilever) -> String {
         .map(|parameter| format!("{} = {}", parameter.name(), shortest(case.get(parameter))))
         .collect();
     let mut text = format!("N = {}, {}", case.modes, numbers.join(", "));
-    if let Some(ratio) = case.tone2_ratio {
-        let _ = write!(text, ", tone2_ratio = {ratio}");
+    for (k, ratio) in case.further_tones.iter().enumerate() {
+        let _ = write!(text, ", tone{}_ratio = {ratio}", k + 2);
     }
     if case.contact != ContactLaw::default() {
         let _ = write!(text, ", contact = {}", case.contact);

@@ -92,7 +92,7 @@ impl Lever {
     /// When the case is not a cantilever with one tone.
     pub(super) fn of(case: &Case) -> Result<Self, Error> {
         let cantilever = cantilever(case, "reconstruct")?;
-        if cantilever.tone2_ratio.is_some() {
+        if !cantilever.further_tones.is_empty() {
             return Err(Error::input(
                 "a second drive tone is not supported by `reconstruct`",
                 "take a case with one tone",

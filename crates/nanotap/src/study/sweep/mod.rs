@@ -48,6 +48,7 @@ use distances::Distances;
 use nanotap_dynamics::Control;
 
 use crate::Error;
+use crate::case::physical::drive::FIRST;
 use crate::case::units::Units;
 use crate::case::{Case, Key};
 use crate::dataset::{Block, Schema, Store, Work, WorkError, chunk_files, work};
@@ -201,7 +202,13 @@ impl Runs {
             return Some(case);
         };
         let reached = distances.get(index)?.as_ref().ok()?;
-        let case = case.with(Key::GapTip, reached.zc);
+        let mut case = case.with(Key::GapTip, reached.zc);
+        if let (Some(drive), Some(view)) = (reached.drive, self.case.physical()) {
+            let strength = view.strength_key(FIRST);
+            case = case
+                .with(Key::DriveFrequency, drive.frequency)
+                .with(strength, drive.strength);
+        }
         Some(case.starting_from(reached.state.clone()))
     }
 

@@ -31,7 +31,7 @@ pub enum Spacing {
 pub struct Over {
     /// The parameter.
     pub key: Key,
-    /// Kind of its values: of the key, or of a setpoint that is an amplitude, a peak force or a phase.
+    /// Kind of its values: of the key, or of a setpoint that is an amplitude, a force, a phase or a shift.
     #[serde(skip)]
     pub kind: Kind,
     /// First and least value.
@@ -168,10 +168,12 @@ impl Over {
         }
         if self.key == Key::DriveSetpoint {
             let is_fraction = self.kind == Kind::Number;
-            if self.kind == Kind::Frequency || from <= 0.0 || (is_fraction && to >= 1.0) {
+            let is_shift = self.kind == Kind::Frequency;
+            if !is_shift && from <= 0.0 || is_fraction && to >= 1.0 {
                 return Err(format!(
                     "from {from} to {to}; expected setpoints that are fractions of the free \
-                     amplitude above 0 and below 1, amplitudes, peak forces or phases, all above 0"
+                     amplitude above 0 and below 1, amplitudes, peak forces or phases, all above 0, \
+                     or frequency shifts"
                 ));
             }
         }
@@ -222,6 +224,9 @@ impl Over {
             Kind::Length if self.key == Key::DriveSetpoint => "setpoint $A$".to_owned(),
             Kind::Force if self.key == Key::DriveSetpoint => {
                 "setpoint of the peak force".to_owned()
+            }
+            Kind::Frequency if self.key == Key::DriveSetpoint => {
+                "setpoint of the frequency shift".to_owned()
             }
             Kind::Angle if self.key == Key::DriveSetpoint => "setpoint of the phase".to_owned(),
             _ => self.key.label(),

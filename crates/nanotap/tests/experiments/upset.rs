@@ -1,0 +1,155 @@
+//! The smallest knock that upsets an orbit: its law next to a fold, and knocks followed by hand.
+
+use nanotap::case::Case;
+use nanotap::control::Control;
+use nanotap::model::galerkin::Galerkin;
+use nanotap::model::model_map::ModelMap;
+use nanotap::study::Study as _;
+use nanotap::study::attractors::{AttractorsOptions, AttractorsStudy};
+use nanotap::study::orbit::{OrbitOptions, OrbitReport, OrbitStudy};
+use nanotap_dynamics::{ClassifyOptions, MotionKind, classify};
+use nanotap_flow::Flow;
+
+/// The lever whose tapping state ends at 14.073965664877789 nm (fold of `nanotap approach`).
+fn lever(gap: f64, further: &[String]) -> Case {
+    let mut words = [
+        "cantilever.k=2 N/m",
+        "cantilever.f0=70 kHz",
+        "cantilever.Q=100",
+        "modes=1",
+        "sample.stiffness=8 N/m",
+        "sample.damping=0 N s/m",
+        "drive.actuation=tip",
+        "drive.frequency_ratio=1.01",
+        "drive.free_amplitude=6.6 nm",
+        &format!("gap.tip={gap} nm"),
+    ]
+    .map(str::to_owned)
+    .to_vec();
+    words.extend_from_slice(further);
+    Case::parse(None, &words).unwrap()
+}
+
+/// Its tapping state, the largest motion.
+fn tapping(case: &Case) -> Vec<f64> {
+    let census = AttractorsOptions::default();
+    let found = AttractorsStudy::run(case, &census, &Control::default()).unwrap();
+    let orbits = found.attractors.iter().filter_map(|a| a.orbit.as_ref());
+    let largest = orbits.max_by(|a, b| {
+        let [a, b] = [a, b].map(|orbit| orbit.observables.first_harmonic);
+        a.total_cmp(&b)
+    });
+    largest.unwrap().state.clone()
+}
+
+fn knocked(case: &Case, state: Option<&[f64]>) -> Result<OrbitReport, nanotap::Error> {
+    let options = OrbitOptions {
+        state: state.map(<[f64]>::to_vec),
+        upset: true,
+        ..OrbitOptions::default()
+    };
+    let found = OrbitStudy::run(case, &options, &Control::default());
+    found.map(|found| found.motion)
+}
+
+/// Whether the motion returns to the orbit through `state` after a knock of `tip_speed` at a part of
+/// the drive period.
+fn returns(case: &Case, state: &[f64], part: f64, tip_speed: f64) -> bool {
+    let model = case.model().unwrap();
+    let equations = Galerkin::new(case.cantilever().unwrap()).unwrap();
+    let moved = equations
+        .mass
+        .clone()
+        .lu()
+        .solve(&equations.modes.tip)
+        .unwrap();
+    let of_tip = moved.dot(&equations.modes.tip);
+    let mut flow = Flow::new(model.system.clone());
+    let mut at = state.to_vec();
+    let time = part * model.period();
+    flow.start(state, 0.0).unwrap();
+    flow.run_until(time, &mut ()).unwrap();
+    flow.state(&mut at);
+    let modes = moved.len();
+    for (speed, part) in at[modes..].iter_mut().zip(&moved) {
+        *speed += tip_speed * part / of_tip;
+    }
+    flow.start(&at, time).unwrap();
+    flow.run_period(&mut ()).unwrap();
+    flow.state(&mut at);
+    let end = classify(&mut ModelMap::new(&model), &at, &ClassifyOptions::default());
+    match end.kind {
+        MotionKind::Periodic(orbit) => {
+            let size = state.iter().fold(0.0, |m: f64, x| m.max(x.abs()));
+            let near = orbit.states[0].iter().zip(state);
+            near.fold(0.0, |m: f64, (a, b)| m.max((a - b).abs())) < 1e-6 * size
+        }
+        _ => false,
+    }
+}
+
+/// A saddle lies √d away at a distance d from a fold, and the basin with it.
+#[test]
+fn next_to_a_fold_the_knock_goes_as_the_root_of_the_distance() {
+    let fold = 14.073_965_664_877_79;
+    let of = |distance: f64| {
+        let case = lever(fold - distance, &[]);
+        let state = tapping(&case);
+        let found = knocked(&case, Some(&state))
+            .unwrap()
+            .upset
+            .unwrap()
+            .smallest
+            .unwrap();
+        let part = found.drive_phase / 360.0;
+        let speed = found.tip_speed;
+        assert!(returns(&case, &state, part, 0.97 * speed), "{found:?}");
+        assert!(!returns(&case, &state, part, 1.03 * speed), "{found:?}");
+        // What follows is the free motion, in A0.
+        let physical = found.physical.unwrap();
+        assert!((physical.amplitude.unwrap() / 6.6e-9 - 1.0).abs() < 1e-9);
+        // J v/2 of a mass k₁/ω₁², where k₁ = 1.0302 k.
+        let mass = 2.0 * 1.030_197 / (std::f64::consts::TAU * 70e3).powi(2);
+        assert!((physical.impulse / (mass * physical.tip_speed) - 1.0).abs() < 1e-3);
+        let energy = 0.5 * mass * physical.tip_speed.powi(2);
+        assert!((physical.energy / energy - 1.0).abs() < 1e-3);
+        physical.tip_speed.abs()
+    };
+    let [near, far] = [1e-4, 4e-4].map(of);
+    assert!((far / near - 2.0).abs() < 0.06, "{near} {far}");
+}
+
+/// A linear lever comes back from any knock, and so does a tapping one without another state.
+#[test]
+fn where_one_motion_exists_no_knock_upsets_it() {
+    for (gap, damping) in [(1000.0, 0.0), (5.0, 1e-7)] {
+        let words = [format!("sample.damping={damping} N s/m")];
+        let case = lever(gap, &words);
+        let found = knocked(&case, None).unwrap().upset.unwrap();
+        assert!(
+            found.smallest.is_none() && found.largest_tried > 0.0,
+            "{found:?}"
+        );
+    }
+}
+
+#[test]
+fn an_unstable_orbit_is_refused() {
+    let words = [
+        "kind=impact",
+        "stiffness=1",
+        "damping=0.1",
+        "forcing=1",
+        "omega=3.7",
+        "gap=-0.2",
+        "restitution=0.8",
+    ];
+    let case = Case::parse(None, &words.map(str::to_owned)).unwrap();
+    let options = OrbitOptions {
+        period: Some(1),
+        upset: true,
+        ..OrbitOptions::default()
+    };
+    let refused = OrbitStudy::run(&case, &options, &Control::default()).unwrap_err();
+    assert!(refused.to_string().contains("not stable"), "{refused}");
+}

@@ -1201,13 +1201,13 @@ def test_a_slider_shows_what_the_server_used(
 ) -> None:
     """At 5, 50 or 95 % of its range: slider, field, address and the server's case agree."""
     more = "&set.gap.tip=16+nm" if preset == "stiff-lever" else ""
-    opened(page, address, f"preset={preset}{more}")
+    opened(page, address, f"preset={preset}{more}&tab=modes")
     sliders = page.locator("[data-slider]").evaluate_all(
         "(all) => all.filter((one) => one.checkVisibility()).map((one) => one.dataset.slider)"
     )
     assert len(sliders) >= 5
     for k, name in enumerate(sliders):
-        opened(page, address, f"preset={preset}{more}")
+        opened(page, address, f"preset={preset}{more}&tab=modes")
         slider = page.locator(f"[data-slider='{name}']")
         low, high = (int(slider.get_attribute(end)) for end in ("min", "max"))
         place = low + round((high - low) * (0.05, 0.5, 0.95)[k % 3])

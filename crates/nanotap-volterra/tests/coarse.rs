@@ -163,15 +163,7 @@ fn the_jacobian_is_that_of_the_exact_flow() {
         if law.takes_signal() {
             continue;
         }
-        let system = Arc::new(beam(
-            law,
-            2,
-            1.0,
-            20.0,
-            AMPLITUDE,
-            8.0,
-            20,
-        ));
+        let system = Arc::new(beam(law, 2, 1.0, 20.0, AMPLITUDE, 8.0, 20));
         let mut flow = Flow::new(Arc::clone(&system));
         let mut reference = DMatrix::zeros(4, 4);
         for c in 0..4 {

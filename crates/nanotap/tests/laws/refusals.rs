@@ -175,3 +175,31 @@ fn the_static_snap_in_is_found() {
         "{near:?}"
     );
 }
+
+/// What an ac voltage excludes says so.
+#[test]
+fn studies_of_a_steady_force_refuse_an_ac_voltage() {
+    let source = nanotap::case::file::Source {
+        name: "kelvin-probe.toml".into(),
+        text: include_str!("../../../../docs/cases/kelvin-probe.toml").into(),
+    };
+    let case = Case::parse(Some(source), &[]).unwrap();
+    for name in ["noise", "bimodal", "force-curve"] {
+        let study = nanotap::study::registry::study(name).unwrap();
+        let request = serde_json::json!({});
+        let refused = study.document(&case, request, &nanotap::control::Control::default());
+        let said = refused.unwrap_err().to_string();
+        assert!(said.contains("ac voltage"), "{name}: {said}");
+    }
+    // At rest the force is its mean over the voltage's period, (U − U_c)² + V²/2 in place of the square.
+    let rest = case.model().unwrap().equilibria()[0];
+    let [radius, distance] = [20e-9, 15e-9];
+    let strength = -std::f64::consts::PI * 8.854_187_812_8e-12 * radius * radius;
+    let expected = strength * (0.16 + 0.5) / (distance * (distance + radius));
+    let attraction = -1e-19 * radius / (6.0 * distance * distance);
+    let found = rest.force * case.physical().unwrap().scales.force;
+    assert!(
+        (found / (expected + attraction) - 1.0).abs() < 1e-2,
+        "{found} {expected} {attraction}"
+    );
+}

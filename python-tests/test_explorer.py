@@ -465,13 +465,6 @@ def test_every_law_can_be_chosen_from_every_lever(address: str) -> None:
                 if key != "sample.law":
                     said = f"with {key}" if text else f"without {key}"
                     assert said in answer["words"]
-    keys = {key["name"]: key for key in motion(address, "paper")["keys"]}
-    for law in [choice["word"] for choice in keys["contact"]["choices"]]:
-        chosen = {"case": {"preset": "paper"}, "law": law}
-        answer = json.loads(asked(address, "/api/law", chosen))
-        case = {"preset": "paper", "set": words(answer["set"])}
-        assert f'contact = "{law}"' in case_file(address, case), law
-        assert ("relaxation_arms" in answer["set"]) == (law == "generalised-maxwell")
     wrong = {"case": {"preset": "dmt"}, "law": "plastic"}
     assert "sample.law" in refusal(address, "/api/law", wrong)["keys"]
 

@@ -72,8 +72,12 @@ pub struct StudyEntry {
     pub dataset: Option<Run<DatasetPlan>>,
     /// The JSON of the summary of its finished dataset, if it leaves one.
     #[cfg(feature = "dataset")]
-    pub summary: Option<fn(&Store) -> Result<Value, Error>>,
+    pub summary: Option<Summarise>,
 }
+
+/// What summarises a finished dataset, as JSON.
+#[cfg(feature = "dataset")]
+pub type Summarise = fn(&Store) -> Result<Value, Error>;
 
 /// What runs a study on a case, from the JSON of its request.
 pub type Run<R> = fn(&Case, Value, &Control<'_>) -> Result<R, Error>;

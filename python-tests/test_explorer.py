@@ -523,7 +523,9 @@ PREFIXES = {
     "": 0,
     **dict(zip("zafpnµmkMGT", (*range(-21, -2, 3), 3, 6, 9, 12), strict=True)),
 }
-UNIT = re.compile(r"([zafpnµmkMGT]??)(m|m/s|N/m|N s/m|N|Pa s|Pa|Hz|J|J/m\^2|s|g|W|V|kg/m\^3|rad/s|deg|)")
+UNIT = re.compile(
+    r"([zafpnµmkMGT]??)(m|m/s|N/m|N s/m|N|Pa s|Pa|Hz|J|J/m\^2|s|g|W|V|kg/m\^3|rad/s|deg|)"
+)
 
 
 def si(text: str) -> float:
@@ -1792,6 +1794,11 @@ def test_a_force_without_a_law_is_reconstructed(
     with page.expect_download() as saved:
         page.click("#tables button:has-text('CSV')")
     assert Path(saved.value.path()).read_text().startswith("distance (nm),force (nN)")
+    # Of another case the figure is marked.
+    typed(page, "drive.free_amplitude", "21 nm")
+    until(page, lambda: page.is_visible("#stale"))
+    typed(page, "drive.free_amplitude", "20 nm")
+    until(page, lambda: page.is_hidden("#stale"))
     # As the law of the sample: what is shown is what is used.
     page.click("#tables button:has-text('force table')")
     until(page, lambda: page.input_value("[data-key='sample.law']") == "table")
@@ -1799,9 +1806,6 @@ def test_a_force_without_a_law_is_reconstructed(
     assert "set.sample.table=" in page.url
     assert len(page.inner_text("#summary")) < 500
     assert value(page, "peak_force") > 0
-    # Of another curve's lever the figure is marked.
-    typed(page, "cantilever.k", "30 N/m")
-    until(page, lambda: page.is_visible("#stale"))
 
 
 def test_a_measured_curve_is_shown_over_the_model_and_fitted(

@@ -1,6 +1,7 @@
 //! The same instrument over a sample that answers by another contact law.
 
 use super::key::{Key, Takes};
+use super::physical::Kind;
 use super::physical::drive::{FURTHER, ToneKeys};
 use super::physical::force::{keys_of_contacts, linear_takes, takes};
 use super::stated::{Stated, Value};
@@ -8,7 +9,7 @@ use super::{Case, CaseKind};
 use crate::Error;
 use crate::model::cantilever::Cantilever;
 use crate::model::contact::ContactLaw;
-use crate::model::parameter::Applies;
+use crate::model::parameter::{Applies, Parameter};
 use crate::model::sample_law::SampleLaw;
 
 /// A contact law by its name: a linear contact, or nonlinear forces joined by `+`.
@@ -82,7 +83,7 @@ impl Case {
     /// a part twice.
     pub fn law_change(&self, law: &str, like: &Self) -> Result<LawChange, Error> {
         if let CaseKind::Cantilever(cantilever) = &self.what {
-            return contact_change(cantilever, law);
+            return contact_change(cantilever, like, law);
         }
         let name = LawName::read(law)?;
         let CaseKind::Quantities(quantities) = &self.what else {
@@ -182,26 +183,48 @@ impl Case {
     }
 }
 
-/// The change of a dimensionless case to another contact.
-fn contact_change(cantilever: &Cantilever, law: &str) -> Result<LawChange, Error> {
+/// The change of a dimensionless case to another contact. A number is that of `like` where it has it.
+fn contact_change(cantilever: &Cantilever, like: &Case, law: &str) -> Result<LawChange, Error> {
     let read = Key::Contact.read(law);
     let read = read.map_err(|error| Error::input(error.to_string(), "name one of them"))?;
-    let takes = read
-        .text()
-        .parse()
-        .is_ok_and(|law: ContactLaw| law.entry().arms);
-    let arms = Key::RelaxationArms;
-    let has = !cantilever.arms.is_empty();
-    let usual = Takes::ModelArms.parse_table(MODEL_ARMS).ok();
+    let present = cantilever.contact;
+    let next = read.text().parse().unwrap_or(present);
+    let has = |law, parameter| {
+        let under = Cantilever {
+            contact: law,
+            ..cantilever.clone()
+        };
+        under.has(parameter)
+    };
+    let (mut dropped, mut added) = (Vec::new(), Vec::new());
+    let own = [present, next].into_iter().flat_map(Parameter::of_law);
+    for parameter in own.chain([Parameter::Alpha6]) {
+        let key = Key::of(parameter);
+        if has(present, parameter) && !has(next, parameter) {
+            dropped.push(key);
+        } else if !has(present, parameter)
+            && has(next, parameter)
+            && key.default_under(next).is_none()
+        {
+            let known = like.cantilever().filter(|like| like.has(parameter));
+            let value = known.map_or(key.entry().example, |like| like.get(parameter));
+            added.push((key, Value::Number(value, Kind::Number)));
+        }
+    }
+    let key = Key::RelaxationArms;
+    match (cantilever.arms.is_empty(), next.entry().arms) {
+        (false, false) => dropped.push(key),
+        (true, true) => {
+            let usual = Takes::ModelArms.parse_table(MODEL_ARMS);
+            added.extend(usual.ok().map(|value| (key, value)));
+        }
+        _ => {}
+    }
     Ok(LawChange {
         key: Key::Contact,
-        law: read.text(),
-        dropped: (has && !takes).then_some(arms).into_iter().collect(),
-        added: usual
-            .filter(|_| takes && !has)
-            .map(|value| (arms, value))
-            .into_iter()
-            .collect(),
+        law: next.name().into(),
+        dropped,
+        added,
     })
 }
 
@@ -277,15 +300,18 @@ mod tests {
         for law in ContactLaw::ALL {
             let change = model.law_change(law.name(), &model).unwrap();
             assert_eq!(change.key, Key::Contact);
-            let added = change.added.iter();
-            let added = added.map(|(key, value)| format!("{key}={}", value.text()));
-            let words: Vec<String> = std::iter::once(format!("contact={law}"))
-                .chain(added)
-                .collect();
-            let there = model.restated(&words).unwrap();
+            let words = |change: &LawChange| -> Vec<String> {
+                let dropped = change.dropped.iter().map(|key| format!("{key}="));
+                let added = change.added.iter();
+                let added = added.map(|(key, value)| format!("{key}={}", value.text()));
+                let law = std::iter::once(format!("contact={}", change.law));
+                law.chain(dropped).chain(added).collect()
+            };
+            let there = model.restated(&words(&change)).unwrap();
             assert!(there.model().is_ok(), "{law}");
             let back = there.law_change("spring-damper", &model).unwrap();
-            assert_eq!(back.dropped.len(), change.added.len(), "{law}");
+            let back = there.restated(&words(&back)).unwrap();
+            assert_eq!(back.cantilever(), model.cantilever(), "{law}");
         }
         assert!(model.law_change("hertz", &model).is_err());
         assert!(first.law_change("hertz + dmt", &first).is_err());

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import http.client
 import json
+import math
 import os
 import random
 import re
@@ -15,7 +16,9 @@ import subprocess
 import sys
 import threading
 import time
+import tomllib
 import urllib.error
+import urllib.parse
 import urllib.request
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -467,11 +470,33 @@ def test_every_law_can_be_chosen_from_every_lever(address: str) -> None:
         chosen = {"case": {"preset": "paper"}, "law": law}
         answer = json.loads(asked(address, "/api/law", chosen))
         case = {"preset": "paper", "set": words(answer["set"])}
-        written = f'contact = "{law}"' in case_file(address, case)
-        assert written == (law != "spring-damper"), law
+        assert f'contact = "{law}"' in case_file(address, case), law
         assert ("relaxation_arms" in answer["set"]) == (law == "generalised-maxwell")
     wrong = {"case": {"preset": "dmt"}, "law": "plastic"}
     assert "sample.law" in refusal(address, "/api/law", wrong)["keys"]
+
+
+def test_every_contact_can_be_chosen_from_every_cantilever(address: str) -> None:
+    """In the model's units: what is shown is what the case file states."""
+    walked = 0
+    for preset in presets(address, "Numbers of the equations"):
+        keys = {key["name"]: key for key in motion(address, preset)["keys"]}
+        choices = keys["contact"]["choices"] if "contact" in keys else []
+        for word in [choice["word"] for choice in choices]:
+            chosen = {"case": {"preset": preset}, "law": word}
+            answer = json.loads(asked(address, "/api/law", chosen))
+            case = {"preset": preset, "set": words(answer["set"])}
+            stated = tomllib.loads(case_file(address, case))["model"]
+            assert stated.get("contact", "spring-damper") == word
+            case["set"].append("modes=1")
+            shown = json.loads(asked(address, "/api/motion", {"case": case}))["keys"]
+            named = {key["name"]: key["value"] for key in shown}
+            assert named["contact"] == word
+            for key, text in answer["set"].items():
+                if text and key in named:
+                    assert named[key] == text, (preset, word, key)
+            walked += 1
+    assert walked >= 15
 
 
 def test_no_slider_leads_to_a_case_that_is_refused(address: str) -> None:
@@ -494,9 +519,33 @@ def test_no_slider_leads_to_a_case_that_is_refused(address: str) -> None:
                 number = round(value) if key["name"] == "modes" else f"{value:.5g}"
                 others = [word for word in fixed if not word.startswith(key["name"])]
                 word = f"{key['name']}={number} {key['unit']}".strip()
-                assert case_file(address, {"preset": preset, "set": [*others, word]})
+                case = {"preset": preset, "set": [*others, word]}
+                text = word.split("=")[1]
+                assert states(case_file(address, case), key["name"], text), word
                 walked += 1
     assert walked > 400
+
+
+PREFIXES = {
+    "": 0,
+    **dict(zip("zafpnµmkMGT", (*range(-21, -2, 3), 3, 6, 9, 12), strict=True)),
+}
+UNIT = re.compile(r"([zafpnµmkMGT]??)(m|m/s|N/m|N s/m|N|Pa s|Pa|Hz|J|J/m\^2|s|g|W|V|kg/m\^3|rad/s|deg|)")
+
+
+def si(text: str) -> float:
+    """A quantity as text, in the unit without a prefix."""
+    number, _, unit = text.strip().partition(" ")
+    match = UNIT.fullmatch(unit)
+    assert match is not None, text
+    return float(number) * 10.0 ** PREFIXES[match[1]]
+
+
+def states(file: str, key: str, text: str) -> bool:
+    """Whether a case file states this value."""
+    section, _, name = key.rpartition(".")
+    stated = tomllib.loads(file)[section or "model"][name]
+    return si(str(stated)) == pytest.approx(si(text), rel=1e-9, abs=1e-40)
 
 
 def test_a_state_that_is_none_is_refused_and_the_server_stays(address: str) -> None:
@@ -1076,6 +1125,41 @@ def test_the_law_shown_is_the_law_used(page: Any, address: str) -> None:
     assert value(page, "first_harmonic") == attraction
 
 
+def test_each_law_of_the_list_is_shown_and_used(page: Any, address: str) -> None:
+    """On the page every third law, and every contact; all of them by other tests."""
+    for preset, key, place in (
+        # Clear of the sample, where a motion is computed at once.
+        ("dmt&set.gap.tip=60+nm", "sample.law", "select.law >> nth=0"),
+        ("paper&set.alpha5=3", "contact", "[data-key=contact]"),
+    ):
+        opened(page, address, f"preset={preset}&tab=modes")
+        choices = page.locator(f"{place} >> option")
+        laws = [
+            law
+            for law in choices.evaluate_all("(all) => all.map((one) => one.value)")
+            if law
+        ]
+        assert len(laws) >= 5
+        for law in laws[:: 3 if key == "sample.law" else 1]:
+            page.select_option(place, law)
+            until(
+                page,
+                lambda key=key, law=law: page.input_value(f"[data-key='{key}']") == law,
+            )
+            assert page.is_hidden("#message"), (law, page.inner_text("#message"))
+            linked = urllib.parse.parse_qsl(
+                page.url.split("#")[1], keep_blank_values=True
+            )
+            changed = [
+                f"{name[4:]}={text}" for name, text in linked if name[:4] == "set."
+            ]
+            case = {"preset": preset.split("&")[0], "set": changed}
+            file = case_file(address, case)
+            section, _, name = key.rpartition(".")
+            stated = tomllib.loads(file)[section or "model"]
+            assert stated.get(name, "spring-damper") == law
+
+
 def test_what_says_the_same_is_one_control(page: Any, address: str) -> None:
     opened(page, address, "preset=dmt")
     amplitude = value(page, "first_harmonic")
@@ -1116,6 +1200,64 @@ def test_sliders_fields_and_history_agree(page: Any, address: str) -> None:
     page.click("#reset")
     until(page, lambda: page.input_value(field) == "18 nm")
     assert "set." not in page.url
+
+
+@pytest.mark.parametrize("preset", ["dmt", "stiff-lever", "liquid", "paper", "impact"])
+def test_a_slider_shows_what_the_server_used(
+    page: Any, address: str, preset: str
+) -> None:
+    """At 5, 50 or 95 % of its range: slider, field, address and the server's case agree."""
+    more = "&set.gap.tip=16+nm" if preset == "stiff-lever" else ""
+    opened(page, address, f"preset={preset}{more}&tab=modes")
+    sliders = page.locator("[data-slider]").evaluate_all(
+        "(all) => all.filter((one) => one.checkVisibility()).map((one) => one.dataset.slider)"
+    )
+    assert len(sliders) >= 5
+    for k, name in enumerate(sliders):
+        opened(page, address, f"preset={preset}{more}&tab=modes")
+        slider = page.locator(f"[data-slider='{name}']")
+        low, high = (int(slider.get_attribute(end)) for end in ("min", "max"))
+        place = low + round((high - low) * (0.05, 0.5, 0.95)[k % 3])
+        if place == int(slider.input_value()):
+            place += 1
+        slider.evaluate(
+            """(one, place) => {
+            one.value = place;
+            for (const event of ["input", "change"]) one.dispatchEvent(new Event(event));
+        }""",
+            place,
+        )
+        until(page, lambda name=name: f"set.{name}=" in page.url)
+        assert page.is_hidden("#message"), (name, page.inner_text("#message"))
+        field = page.input_value(f"[data-key='{name}']")
+        linked = urllib.parse.parse_qs(page.url.split("#")[1])
+        linked = {key: text[0] for key, text in linked.items()}
+        assert si(linked[f"set.{name}"]) == pytest.approx(si(field), rel=1e-9), name
+        # The range may have changed; the slider is where its value is in it.
+        assert slider.get_attribute("aria-valuetext") == field
+        case = {
+            "preset": preset,
+            "set": [
+                f"{key[4:]}={text}" for key, text in linked.items() if key[:4] == "set."
+            ],
+        }
+        asked_for = {"case": case, "ranges": True}
+        answer = json.loads(asked(address, "/api/motion", asked_for))
+        key = next(key for key in answer["keys"] if key["name"] == name)
+        assert field == key["value"], name
+        assert key["si"] == pytest.approx(si(field), rel=1e-6, abs=1e-40)
+        assert states(case_file(address, case), name, field), name
+        if name != "modes":
+            own, number = key["slider"], key["number"]
+            part = (number - own["from"]) / (own["to"] - own["from"])
+            if own["log"]:
+                part = math.log(number / own["from"]) / math.log(
+                    own["to"] / own["from"]
+                )
+            assert int(slider.input_value()) == pytest.approx(1000 * part, abs=1), name
+        # The motion on the page is the one of these values.
+        rows = {row["name"]: row["value"] for row in answer["observables"]}
+        assert value(page, "amplitude") == rows["amplitude"], name
 
 
 def test_a_figure_of_other_values_says_so(page: Any, address: str) -> None:
@@ -1553,11 +1695,18 @@ def test_every_study_of_the_registry_has_a_form_and_a_report(address: str) -> No
     names = [study["name"] for study in studies]
     for wanted in ("convergence", "contact-laws", "lyapunov", "fm", "force-curve"):
         assert wanted in names
+    # Those that leave a dataset are listed, too.
+    assert {"sweep", "window"} <= set(names)
     quick = {"points": "6", "periods": "50", "modes": "2", "transient": "50"}
     for study in studies:
         options = {field["name"]: field["value"] for field in study["form"]}
         options |= {name: text for name, text in quick.items() if name in options}
         case = {"preset": "two-modes" if study["name"] == "convergence" else "dmt"}
+        usual = motion(address, case["preset"])["forms"]["usual"].get(study["name"], {})
+        # Two values of each parameter.
+        options |= {name: re.sub(r":\d+\b", ":2", text) for name, text in usual.items()}
+        if "starts" in options:
+            options["starts"] = "1"
         stages = studied(address, case=case, tab=study["name"], options=options)
         last = stages[-1]
         if study["name"] == "bimodal":
@@ -1582,7 +1731,84 @@ def test_a_study_of_the_registry_is_computed_on_the_page(
     page.wait_for_selector("#tables tbody tr", timeout=60_000)
 
 
+def test_a_dataset_is_shown_and_its_folder_removed(page: Any, tmp_path: Path) -> None:
+    own = page.context.browser.new_page()
+    own.set_default_timeout(30_000)
+    with started(TMPDIR=str(tmp_path)) as server:
+        address = line(server)
+        opened(own, address, "preset=paper&tab=sweep&study.over=omega=2.9,3,3.1")
+        assert own.input_value("#more") == "sweep"
+        own.click("#study-form button[type=submit]")
+        own.wait_for_selector("#tables tbody tr", timeout=60_000)
+        idle(own)
+        assert inked(own, "study-figure") > 0.01
+        assert "period 1" in own.inner_text("#tables") or "periodic" in own.inner_text(
+            "#tables"
+        )
+        command = own.text_content("#study-command")
+        assert command.startswith("nanotap sweep case.toml --over omega=2.9,3,3.1")
+        # Another case has other usual values.
+        opened(own, address, "preset=dmt&tab=sweep")
+        assert "drive.frequency=" in own.input_value("#study-form [name=over]")
+        left = [path for path in tmp_path.glob("nanotap-explorer-*/*")]
+        assert left == []
+    own.close()
+
+
 CURVE = Path(__file__).parent.parent / "docs/cases/polystyrene-curve.csv"
+
+
+def test_a_force_without_a_law_is_reconstructed(
+    page: Any, address: str, tmp_path: Path
+) -> None:
+    opened(page, address, "preset=stiff-lever&tab=data")
+    page.set_input_files("#study-form input[type=file]", CURVE)
+    until(page, lambda: "rows" in page.inner_text("#progress"))
+    page.click("#reconstruct")
+    page.wait_for_selector("#tables button", timeout=90_000)
+    command = page.text_content("#study-command").split()
+    assert command[:4] == ["nanotap", "reconstruct", CURVE.name, "case.toml"]
+    # The terminal gives the same: its numbers are those drawn, and those in words.
+    (tmp_path / "case.toml").write_text(case_file(address, {"preset": "stiff-lever"}))
+    shutil.copy(CURVE, tmp_path)
+    done = subprocess.run(
+        [PROGRAM, *command[1:4], "--json"],
+        check=True,
+        capture_output=True,
+        text=True,
+        cwd=tmp_path,
+    )
+    found = json.loads(done.stdout)
+    layers = page.evaluate(
+        "document.getElementById('study-figure').figure.panels[0].layers"
+    )
+    force = next(one for one in layers if one.get("label") == "force")
+    drawn = dict(zip(force["points"]["x"], force["points"]["y"], strict=True))
+    table = dict(zip(found["table"]["distance"], found["table"]["force"], strict=True))
+    assert len(drawn) > 20
+    scale = max(map(abs, table.values()))
+    for distance, height in drawn.items():
+        near = min(table, key=lambda one: abs(1e9 * one - distance))
+        assert 1e9 * near == pytest.approx(distance, abs=1e-3)
+        assert 1e-9 * height == pytest.approx(table[near], abs=1e-4 * scale)
+    rows = dict(cells(page, row) for row in page.locator("#tables tbody tr").all())
+    closest = 1e9 * found["closest"]
+    assert si(rows["closest approach"]) == pytest.approx(1e-9 * closest, rel=1e-3)
+    for remark in found["remarks"]:
+        assert remark in page.inner_text("#progress")
+    with page.expect_download() as saved:
+        page.click("#tables button:has-text('CSV')")
+    assert Path(saved.value.path()).read_text().startswith("distance (nm),force (nN)")
+    # As the law of the sample: what is shown is what is used.
+    page.click("#tables button:has-text('force table')")
+    until(page, lambda: page.input_value("[data-key='sample.law']") == "table")
+    assert page.is_hidden("#message")
+    assert "set.sample.table=" in page.url
+    assert len(page.inner_text("#summary")) < 500
+    assert value(page, "peak_force") > 0
+    # Of another curve's lever the figure is marked.
+    typed(page, "cantilever.k", "30 N/m")
+    until(page, lambda: page.is_visible("#stale"))
 
 
 def test_a_measured_curve_is_shown_over_the_model_and_fitted(
@@ -1602,7 +1828,7 @@ def test_a_measured_curve_is_shown_over_the_model_and_fitted(
     modulus = next(row for row in rows if row[0] == "sample.modulus")
     assert float(modulus[1].split()[0]) == pytest.approx(4, rel=0.05)
     assert "to" in modulus[3]
-    page.click("#tables button:has-text('Take')")
+    page.click("#tables button:has-text('Use')")
     until(page, lambda: "set.sample.modulus" in page.url)
     field = page.input_value("[data-key='sample.modulus']")
     assert float(field.split()[0]) == pytest.approx(4, rel=0.05)

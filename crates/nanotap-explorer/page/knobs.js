@@ -99,7 +99,7 @@ function knob(key, own) {
   const others = key.stated ? own.filter((other) => key.alternatives.includes(other.name) && (other.value !== "" || other.name === "drive.setpoint")) : [];
   if (others.length) {
     const ways = element("select", { className: "switch" }, ...[key, ...others].map((one) => new Option(words(one), one.name)));
-    ways.setAttribute("aria-label", `${words(key)}, or what says the same`);
+    ways.setAttribute("aria-label", `${words(key)}, or another key for the same`);
     ways.dataset.switch = key.name;
     ways.addEventListener("change", () => {
       const other = others.find((one) => one.name === ways.value);
@@ -129,8 +129,7 @@ function chooser(key, meaning) {
     field.add(new Option(text, choice.word, false, choice.word === key.value));
     if (choice.word === key.value && choice.meaning) meaning.textContent = `${key.meaning}: ${choice.meaning}`;
   }
-  const contact = key.name === "contact";
-  field.addEventListener("change", () => (contact ? law(key, field.value, field) : put(key, field.value, true)));
+  field.addEventListener("change", () => (key.name === "contact" ? law(key, field.value, field) : put(key, field.value, true)));
   return field;
 }
 

@@ -9,6 +9,7 @@ const speed = document.getElementById("speed");
 let film = null;
 let time = 0;                 // in drive periods
 let before = 0;
+let size = 12;                // of the letters
 let moving = !matchMedia("(prefers-reduced-motion: reduce)").matches;
 export const frames = { drawn: 0 };
 /** Whether the lever moves, or is paused. */
@@ -34,7 +35,10 @@ function draw() {
   const ratio = devicePixelRatio || 1;
   const width = Math.round(canvas.clientWidth * ratio);
   const height = Math.round(canvas.clientHeight * ratio);
-  if (canvas.width !== width || canvas.height !== height) { canvas.width = width; canvas.height = height; }
+  if (canvas.width !== width || canvas.height !== height) {
+    Object.assign(canvas, { width, height });
+    size = 0.86 * Number.parseFloat(getComputedStyle(document.body).fontSize) * ratio;
+  }
   pen.clearRect(0, 0, width, height);
   if (!film) return;
   const count = film.beam.length;
@@ -70,9 +74,9 @@ function draw() {
   // The tip.
   pen.fillStyle = pen.strokeStyle;
   pen.beginPath(); pen.moveTo(right - 7 * ratio, y(tip)); pen.lineTo(right + 7 * ratio, y(tip)); pen.lineTo(right, y(film.apex[k])); pen.closePath(); pen.fill();
-  pen.fillStyle = colour("--ink"); pen.font = `${12 * ratio}px system-ui`;
-  pen.fillText(`height: ${film.scale}; length of the lever not to scale`, left, 16 * ratio);
-  pen.fillText(touching ? "contact" : "", right - 24 * ratio, height - 6 * ratio);
+  pen.fillStyle = colour("--ink"); pen.font = `${size}px system-ui`;
+  pen.fillText(`height shown: ${film.scale}; length not to scale`, left, 1.35 * size);
+  pen.fillText(touching ? "contact" : "", right - 2 * size, height - 0.5 * size);
   clock.textContent = `drive period ${Math.floor(time % film.periods) + 1} of ${film.periods}, phase ${(360 * (time % 1)).toFixed(0)}°`;
   frames.drawn += 1;
 }

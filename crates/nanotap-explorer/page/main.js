@@ -19,17 +19,17 @@ const SAME = 1e-4;             // relative difference of amplitudes below which 
 /** Guided starts: words of the link, address, and what there is to see. */
 const LESSONS = {
   bistable: ["Two motions at one distance", "preset=dmt",
-    "At 18 nm this lever has two stable motions: “Coexisting motions” lists both. Press the other one. The tip then stops touching, the peak force goes from about 1 nN to zero and the phase from below 90° to above, although no value has changed. Which one an instrument shows depends on how it came there."],
+    "At 18 nm this lever has two stable motions: “Coexisting motions” lists both. Press the other one. The tip then stops touching, the peak force goes from about 1 nN to zero and the phase from below 90° to above, although no value has changed. Which one an instrument shows depends on its history."],
   phase: ["Why the phase turns", "preset=dmt&set.gap.tip=24+nm",
     "Far away the phase lags by 90°, at resonance. Move the distance from 24 nm to 19 nm: attraction lowers the resonance and the lag grows to 110°. At 18 nm a run from rest ends in repulsion, which raises the resonance: the lag falls to 68°. The curve of the phase shows both branches, with the present motion on it."],
   doubling: ["Period doubling", "preset=paper&tab=diagram&ran=yes&study.key=omega&study.from=2.4&study.to=3.1",
-    "Each dot is the largest deflection in one drive period. Read from right to left: below Ω = 2.91 there are two dots, since the motion repeats only after two drive periods; around 2.6 it is chaotic. Click a dot: the lever above moves so."],
+    "Each dot is the largest deflection in one drive period. Read from right to left: below Ω = 2.91 there are two dots, since the motion repeats only after two drive periods; around 2.6 it is chaotic. Click a dot: the lever above shows that motion."],
   image: ["A false step in an image", "preset=patch&tab=image&ran=yes",
     "The sample is flat; between 150 nm and 300 nm a patch attracts the tip less. There the lever jumps from its attractive to its repulsive state and stays, so the height in the image changes although the surface does not, and trace and retrace differ."],
   step: ["What a too coarse time step invents", "preset=paper&steps=80",
     "The equations give a motion of period 1. “Comparison with fixed time steps”, at the bottom, shows what 80 Runge–Kutta steps per period make of it. Try 40, then 400."],
   plan: ["An imaging window below a peak force", "preset=dmt&tab=plan&ran=yes&study.force=4+nN",
-    "The black line surrounds the free amplitudes and setpoints at which the peak force stays below 4 nN and no second motion exists. Click inside it: the lever goes there. Change the force, then press Compute."],
+    "The black line surrounds the free amplitudes and setpoints at which the peak force stays below 4 nN and no second motion exists. Click inside it: the case takes these values. Change the force, then press Compute."],
 };
 let about = null;
 let outdated = false;         // a value changed while a motion was being computed
@@ -186,7 +186,7 @@ async function census(longest) {
     if (searching !== own) return;
     stop("census");
     searching = null;
-    $("bound").textContent = `not finished in ${longest / 1000} s; “Find all” takes the time it needs`;
+    $("bound").textContent = `not finished after ${longest / 1000} s; “Find all” has no such limit`;
   }, longest);
   try {
     const answer = await ask("census", "/api/attractors", { case: theCase(), unstable: $("unstable").checked });

@@ -188,7 +188,7 @@ export function layout(pen, figure, wide, size, highest, views) {
   for (const place of places) {
     const words = [2, 3, 4, 5, 6, 7, 8].flatMap((most) => ticks(place.y, most).at.map(([, text]) => width(pen, text, size)));
     place.words = place.row === rows - 1 || !figure.share_x || !places.some((other) => other.col === place.col && other.row > place.row);
-    place.aside = Math.max(0, ...words) + 0.5 * size + (label(place.y) ? 1.5 * size : 0);
+    place.aside = Math.max(0, ...words) + 0.7 * size + (label(place.y) ? 1.5 * size : 0);
     place.bar = place.panel.layers.find((layer) => layer.kind === "heatmap");
     const scale = place.bar && seen(place.bar.scale);
     place.barAside = scale ? BAR + 1.5 * size + Math.max(0, ...ticks(scale, 5).at.map(([, text]) => width(pen, text, size))) + 1.6 * size : 1.7 * size;
@@ -224,7 +224,8 @@ export function layout(pen, figure, wide, size, highest, views) {
     const height = heights * share / total(down);
     for (const place of places.filter((one) => one.row === r)) {
       const left = upto(columns, place.col) + upto(columnWidth, place.col) + asides[place.col];
-      Object.assign(place, { left, top, width: columnWidth[place.col], height });
+      // The labels of a column stand in one line.
+      Object.assign(place, { left, top, width: columnWidth[place.col], height, aside: asides[place.col] });
     }
     top += height + below[r];
   });

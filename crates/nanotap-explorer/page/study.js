@@ -20,10 +20,10 @@ const HINTS = {
   resonance: "Amplitude and phase against the frequency, up and down: the resonance curve and its jumps.",
   basin: "To which motion each initial deflection and velocity leads.",
   map: "The kinds of motion, the peak force, or the number of motions over two parameters.",
-  image: "A line of an image under feedback: height, amplitude error, phase and peak force over a surface that is known.",
-  levers: "Levers of the catalogue on this sample, at the free amplitude and the setpoint: a click on a row takes that lever.",
-  data: "A measured curve over that of the model, and the fit of the model to it. Drop a CSV file on the page, or choose one; its columns are named as in “distance (nm)”, “amplitude (nm)”, “phase (deg)”. The file stays in this page.",
-  plan: "Where every motion keeps to the conditions, over free amplitude and setpoint: a window to image in.",
+  image: "A line of an image under feedback: height, amplitude error, phase and peak force over a known surface.",
+  levers: "Levers of the catalogue on this sample, at the free amplitude and the setpoint: a click on a row chooses that lever.",
+  data: "A measured curve over that of the model, the fit of the model to it, and its force without a contact law. Drop a CSV file on the page, or choose one; its columns are named as in “distance (nm)”, “amplitude (nm)”, “phase (deg)”. The file stays in this page.",
+  plan: "Where every motion meets the conditions, over free amplitude and setpoint: the window for imaging.",
 };
 const MOST_DATA = 1.5e6;      // bytes of a measured file
 const COLUMNS = 64;           // heights of a surface that is drawn by hand
@@ -48,6 +48,7 @@ let gone = () => {};
 
 const views = () => state.views.study ?? [];
 const asked = () => JSON.stringify([state.preset, state.tab, state.study, state.tab === "data" && measured?.[0]]);
+const shape = () => asked() + JSON.stringify([forms[state.tab], state.tab in PLAIN && forms.usual[state.tab]]);
 const hint = () => HINTS[state.tab] ?? `${PLAIN[state.tab]}.`;
 
 /** The keys of the case that a figure does not depend on: those along its axes. Other keys must be as
@@ -117,7 +118,7 @@ function choose(name) {
 async function take(file) {
   if (!file) return;
   if (state.tab !== "data") choose("data");
-  if (file.size > MOST_DATA) { $("progress").textContent = `${file.name} has ${file.size} bytes; the page takes ${MOST_DATA} at most, “nanotap fit” more`; return; }
+  if (file.size > MOST_DATA) { $("progress").textContent = `${file.name} has ${file.size} bytes; the page reads at most ${MOST_DATA}, the terminal more`; return; }
   measured = [file.name, await file.text()];
   filled = "";
   if (motion) fill(motion);
@@ -194,7 +195,7 @@ export function fill(next) {
   // Only a lever makes images, and is compared with others.
   for (const name of ["image", "levers"]) $(`tab-${name}`).hidden = !forms[name].length;
   if (!(state.tab in PLAIN || forms[state.tab].length)) { state.tab = "approach"; restore(); }
-  const now = asked() + JSON.stringify(forms[state.tab]);
+  const now = shape();
   if (now !== filled) {
     filled = now;
     build();
@@ -254,7 +255,11 @@ function build() {
     form.prepend(label);
   }
   button(state.tab === "data" ? "Show" : "Compute");
-  if (state.tab === "data") button("Fit", () => compute(false, { fit: "yes" }), "fit");
+  if (state.tab === "data") {
+    button("Fit", () => compute(false, { fit: "yes" }), "fit");
+    button("Force without a law", () => compute(false, { reconstruct: "yes" }), "reconstruct").title
+      = "Conservative force and dissipation against distance from the curve, without a contact law";
+  }
   button("Stop", () => stop("study"));
   const pin = button(pinned ? "Unpin" : "Pin", () => {
     const before = pinned;
@@ -280,12 +285,14 @@ function entry(field) {
   label.title = field.about ?? "";
   const input = document.createElement(field.choices ? "select" : "input");
   for (const choice of field.choices ?? []) input.add(new Option(choice, choice));
-  Object.assign(input, { name: field.name, value: state.study[field.name] ?? field.value });
+  // What a study of the registry needs has a usual value for the case.
+  const usual = state.tab in PLAIN ? forms.usual[state.tab]?.[field.name] : undefined;
+  Object.assign(input, { name: field.name, value: state.study[field.name] ?? usual ?? field.value });
   if (!field.choices) Object.assign(input, { size: field.hint ? 15 : 10, placeholder: field.hint ?? "" });
   input.addEventListener("change", () => {
     state.study[field.name] = input.value;
     if (field.name === "surface") for (const box of $("study-form").querySelectorAll(".hand")) box.hidden = input.value !== "drawn";
-    filled = asked() + JSON.stringify(forms[state.tab]);
+    filled = shape();
     remember(true);
     mark();
   });
@@ -409,12 +416,13 @@ function show(tables) {
     return make("div", table);
   }));
   if (!found) return;
-  const { file, set } = found;
-  const takes = Object.assign(make("button", "Take these values"), { type: "button" });
-  takes.addEventListener("click", () => adopt(set));
-  const saves = Object.assign(make("button", "Case file of the fit"), { type: "button" });
-  saves.addEventListener("click", () => save(new Blob([file], { type: "application/toml" }), "best.toml"));
-  const row = make("p", takes, saves);
+  const { set, take, file, save: words, name } = found;
+  const button = (text, pressed) => {
+    const made = Object.assign(make("button", text), { type: "button" });
+    made.addEventListener("click", pressed);
+    return made;
+  };
+  const row = make("p", ...(set ? [button(take, () => adopt(set))] : []), button(words, () => save(new Blob([file]), name)));
   row.className = "row";
   $("tables").append(row);
 }
@@ -460,7 +468,7 @@ async function compute(quick, more = {}) {
       if (message.figure) figure.put($("study-figure"), message.figure);
       mark();
       scan();
-      if (quick) { $("progress").textContent = `${message.words}; Compute: more, with branches`; request?.abort(); }
+      if (quick) { $("progress").textContent = `${message.words}; “Compute” refines the curve and follows its branches`; request?.abort(); }
     });
     request = current("study");
     await sent;

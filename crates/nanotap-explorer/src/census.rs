@@ -53,7 +53,7 @@ fn listed(app: &App, census: &Census, control: &Control<'_>) -> Result<Value, Ap
     let found = AttractorsStudy::run(&case, &request, control)?;
     let units = case.units();
     let stable = found.attractors.iter().filter_map(|one| {
-        let share = format!("{:.2} % of the starts", 100.0 * one.share.fraction);
+        let share = format!("{:.2} % of the initial states", 100.0 * one.share.fraction);
         if let Some(orbit) = &one.orbit {
             return Some(entry(orbit, None, &share, &units));
         }
@@ -107,10 +107,10 @@ fn bound(found: &Attractors) -> String {
     });
     let counted = |count: usize, what: &str| (count > 0).then(|| format!("{count} {what}"));
     let parts = [
-        Some(format!("{} starts", found.starts)),
+        Some(format!("{} initial states", found.starts)),
         unseen,
         counted(found.undecided_fraction.count, "undecided"),
-        counted(found.unbounded.count, "left every bound"),
+        counted(found.unbounded.count, "unbounded"),
     ];
     parts.into_iter().flatten().collect::<Vec<_>>().join("; ")
 }

@@ -139,9 +139,14 @@ pub(crate) fn study_python(
     };
     let mut text = format!("import nanotap\n\ncase = nanotap.Case.from_file({path:?}{set})\n");
     for (name, request) in studies {
-        let name = name.replace('-', "_");
+        let name = match *name {
+            // The fits of a force volume are another function of Python.
+            "fit" if request.contains_key("pixels") => "fit_map".to_owned(),
+            name => name.replace('-', "_"),
+        };
         let _ = write!(text, "{name} = nanotap.{name}(case");
-        for (option, value) in request.iter().filter(|(option, _)| *option != "set") {
+        let stated = |(option, _): &(&String, &Value)| !["set", "out"].contains(&option.as_str());
+        for (option, value) in request.iter().filter(stated) {
             // `from` is a keyword of Python.
             let option = if option == "from" { "from_" } else { option };
             let value = match value {

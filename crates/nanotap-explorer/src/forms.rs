@@ -15,32 +15,31 @@ use crate::maps::Shows;
 /// The choice of a field that sets no condition.
 pub(crate) const ANY: &str = "any";
 /// The choice of a field that excludes a second motion.
-pub(crate) const ONE_STATE: &str = "no second one";
+pub(crate) const ONE_STATE: &str = "only one";
 /// The choices of an option that is on or off.
 pub(crate) const YES: &str = "yes";
 const NO: &str = "no";
 /// The choice of the tip of the case for other levers.
 pub(crate) const OWN_TIP: &str = "of the case";
 /// Studies with a tab, or a place on the page, made for them.
-const PLACED: [&str; 12] = [
+const PLACED: [&str; 10] = [
     "simulate",
     "orbit",
     "attractors",
     "branch",
     "approach",
-    "sweep",
-    "window",
     "basin",
     "scan",
     "fit",
-    "lever",
-    // Its data are those of another measurement.
     "reconstruct",
+    "lever",
 ];
+/// Values of a sweep, and along each axis of a window, to begin with.
+const POINTS: [usize; 2] = [41, 8];
 
 /// Whether the page makes the form of a study from its options, and shows its report.
 pub(crate) fn is_plain(entry: &StudyEntry) -> bool {
-    entry.document.is_some() && !PLACED.contains(&entry.name)
+    !PLACED.contains(&entry.name)
 }
 
 /// The studies whose tabs are made from the registry.
@@ -183,10 +182,26 @@ pub(crate) fn forms(case: &Case, base: &Case, model: &Model) -> Value {
         Some(view) => levers(view.held.and(case.stated(Key::DriveSetpoint)), conditions),
         None => Vec::new(),
     };
+    // What the studies of the registry that leave a dataset need.
+    let text = |field: &Value| field["value"].as_str().unwrap_or_default().replace(' ', "");
+    let range = |fields: &[Value], count: usize| {
+        let parts: Vec<String> = fields.iter().map(text).collect();
+        match parts.as_slice() {
+            [key, from, to] if !key.is_empty() => format!("{key}={from}:{to}:{count}"),
+            _ => String::new(),
+        }
+    };
+    let (one, other) = (parameter("", frequency, band), parameter("", second, 0.5));
+    let across_both = [&other, &one].map(|axis| range(axis, POINTS[1])).join(",");
+    let usual = json!({
+        "sweep": { "over": range(&one, POINTS[0]) },
+        "window": { "over": across_both },
+    });
     let data = data(case);
     let image = image(case, base);
     let slice = [entry("x", 0), entry("y", velocity)].concat();
     json!({
+        "usual": usual,
         "diagram": parameter("", frequency, band),
         "branches": parameter("", frequency, band),
         "resonance": parameter("", frequency, band),
@@ -214,12 +229,14 @@ fn levers(setpoint: Option<&Stated>, conditions: Vec<Value>) -> Vec<Value> {
     [own, conditions].concat()
 }
 
-/// The fields of measured data: the options of a fit.
+/// The fields of measured data: the options of a fit, and those that a reconstruction has in addition.
 fn data(case: &Case) -> Vec<Value> {
-    let Some(entry) = study("fit") else {
-        return Vec::new();
-    };
-    let mut fields = of_options(entry);
+    let mut fields: Vec<Value> = Vec::new();
+    for entry in ["fit", "reconstruct"].into_iter().filter_map(study) {
+        let new = |field: &Value| fields.iter().all(|other| other["name"] != field["name"]);
+        let more: Vec<Value> = of_options(entry).into_iter().filter(new).collect();
+        fields.extend(more);
+    }
     let moduli = [Key::SampleModulus, Key::SampleStiffness];
     let modulus = moduli.into_iter().find(|key| case.get(*key).is_finite());
     if let (Some(modulus), Some(free)) = (modulus, fields.iter_mut().find(|f| f["name"] == "free"))
@@ -262,10 +279,10 @@ fn image(case: &Case, base: &Case) -> Vec<Value> {
         json!({ "name": "surface", "words": "surface", "value": surfaces[0], "choices": surfaces }),
         json!({ "name": "height", "words": "height", "value": "10 nm" }),
         json!({ "name": "profile", "words": "", "value": "", "drawn": DRAWN }),
-        field("size", "line", "500 nm".to_owned()),
+        field("size", "line length", "500 nm".to_owned()),
         field("setpoint", "setpoint", "0.8".to_owned()),
         slid(
-            field("rate", "lines a second", shown(Kind::Frequency, rate)),
+            field("rate", "line rate", shown(Kind::Frequency, rate)),
             rate,
             "Hz",
         ),

@@ -55,7 +55,7 @@ fn refusal(app: &App, request: &Request) -> Option<(StatusCode, &'static str)> {
     if !own.iter().any(|own| own == host) {
         return Some((
             StatusCode::MISDIRECTED_REQUEST,
-            "this is the nanotap explorer of another address",
+            "the explorer has another address",
         ));
     }
     if let Some(origin) = text(headers, header::ORIGIN.as_str())
@@ -63,7 +63,7 @@ fn refusal(app: &App, request: &Request) -> Option<(StatusCode, &'static str)> {
     {
         return Some((
             StatusCode::FORBIDDEN,
-            "another site's pages may not ask this explorer",
+            "pages of other sites cannot use this explorer",
         ));
     }
     let path = request.uri().path();
@@ -80,7 +80,7 @@ fn refusal(app: &App, request: &Request) -> Option<(StatusCode, &'static str)> {
     }
     Some((
         StatusCode::FORBIDDEN,
-        "open the address that `nanotap explore` printed: it carries the token of this start",
+        "open the address that `nanotap explore` printed: it contains the token",
     ))
 }
 

@@ -34,7 +34,7 @@ pub(crate) async fn law(
 /// The keys to set, empty where the law does not take them, and a sentence that says which.
 fn changes(app: &App, request: &LawRequest) -> Result<Value, ApiError> {
     let case = request.case.any_distance(app)?;
-    let key = if case.physical().is_some() {
+    let key = if case.is_physical() {
         Key::SampleLaw
     } else {
         Key::Contact
@@ -44,7 +44,7 @@ fn changes(app: &App, request: &LawRequest) -> Result<Value, ApiError> {
     let base = nanotap::case::Case::parse(Some(preset.source()), &preset.set)?;
     let change = case.law_change(&request.law, &base).map_err(about)?;
     let mut set = Map::new();
-    set.insert(change.key.path().into(), change.law.clone().into());
+    set.insert(key.path().into(), change.law.clone().into());
     let mut words = Vec::new();
     for key in &change.dropped {
         set.insert(key.path().into(), "".into());

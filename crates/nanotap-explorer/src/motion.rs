@@ -325,7 +325,7 @@ fn fixed_step(
     );
     Ok(Some(json!({
         "words": format!(
-            "{steps} steps per period show {shown}. The exact flow goes from there to: {}",
+            "{steps} steps per period show {shown}. From the same state the exact flow reaches: {}",
             run.exact.evidence
         ),
         "figure": drawn(&fixed_step_figure(model, &run, &case.units()))?,

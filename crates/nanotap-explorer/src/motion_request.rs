@@ -88,8 +88,11 @@ pub(crate) fn model_of(case: &Case) -> Result<Model, ApiError> {
         && cantilever.modes > MAX_MODES
     {
         return Err(ApiError::input(
-            format!("modes = {} are too many for the explorer", cantilever.modes),
-            format!("{MAX_MODES} at most; the terminal takes more"),
+            format!(
+                "expected at most {MAX_MODES} modes, got {}",
+                cantilever.modes
+            ),
+            "the terminal computes more",
         )
         .about("modes"));
     }

@@ -260,6 +260,8 @@ impl CaseSpec {
 fn changed(word: &str) -> String {
     match word.split_once('=') {
         Some((key, value)) if value.trim().is_empty() => format!("no {}", key.trim()),
+        // Rows are not words of a title.
+        Some((key, value)) if value.trim().starts_with('[') => format!("{} = …", key.trim()),
         Some((key, value)) => format!("{} = {}", key.trim(), value.trim()),
         None => word.to_owned(),
     }

@@ -1,5 +1,6 @@
 //! The terminal's studies, in stages of increasing resolution until they are cancelled.
 
+use std::fmt::Write as _;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
@@ -7,7 +8,7 @@ use axum::Json;
 use axum::extract::State;
 use axum::response::Response;
 use nanotap::case::file::{Source, scan_table};
-use nanotap::case::quantity::Kind;
+use nanotap::case::quantity::{Kind, format_electronvolts};
 use nanotap::case::units::prefixed;
 use nanotap::case::{Case, Key};
 use nanotap::control::Control;
@@ -16,8 +17,9 @@ use nanotap::figure::approach::approach_figure;
 use nanotap::figure::basin::figure as basin_figure;
 use nanotap::figure::branch::{Shown, case_figure};
 use nanotap::figure::fit::fit_figure;
+use nanotap::figure::reconstruct::reconstruct_figure;
 use nanotap::figure::scan::scan_figure;
-use nanotap::figure::study::document_and_figure;
+use nanotap::figure::study::{dataset_figure, document_and_figure};
 use nanotap::figure::sweep::{figure as sweep_figure, response as response_figure};
 use nanotap::figure::window::figure as window_figure;
 use nanotap::model::Model;
@@ -26,13 +28,16 @@ use nanotap::study::approach::{ApproachReport, ApproachStudy};
 use nanotap::study::branch::{BranchReport, BranchStudy};
 use nanotap::study::fit::{FitOptions, FitReport, FitStudy, FittedParameter, Table, measured};
 use nanotap::study::lever::{LeverOptions, LeverStudy, QualityFactorSource, case_with_lever};
+use nanotap::study::reconstruct::{
+    ReconstructMethod, ReconstructOptions, ReconstructReport, ReconstructStudy,
+};
 use nanotap::study::registry::{Study, StudyEntry, study as study_named};
 use nanotap::study::request::{Property, properties, read};
 use nanotap::study::scan::ScanStudy;
 use nanotap::study::sweep::Over;
 use nanotap::study::window::Window;
 use nanotap_figures::{Axis as Axes, Colour, Figure, Markers, Panel};
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value, json};
 
 use crate::App;
@@ -133,8 +138,19 @@ struct Stage<'a> {
     scan: Option<String>,
     /// What the page shows below the figure.
     tables: Vec<Value>,
-    /// A case file that was found, and the changes to the case that lead to it.
-    found: Option<(String, Map<String, Value>)>,
+    found: Option<Found>,
+}
+
+/// What a study found, to go on from.
+#[derive(Serialize)]
+struct Found {
+    /// The changes to the case that lead to it, and the words of the button that makes them.
+    set: Option<Map<String, Value>>,
+    take: &'static str,
+    /// A file of it, the words of the button that saves it, and its name.
+    file: String,
+    save: &'static str,
+    name: &'static str,
 }
 
 /// The name of a study, and its options.
@@ -178,8 +194,11 @@ impl Studied<'_> {
         let schema = (entry.request)();
         let given = |property: Property<'_>| {
             let text = self.field(property.name).ok()?;
+            let pairs = property.schema["x-value"].as_str();
             let value = if property.allows("boolean") && !property.allows("string") {
                 (text == forms::YES).into()
+            } else if property.allows("array") && pairs.is_some_and(|form| form.contains('=')) {
+                pairs_of(text).into()
             } else {
                 property.parsed(text)
             };
@@ -202,9 +221,13 @@ impl Studied<'_> {
         model_of(&case)?;
         let options = self.options(entry);
         let request = Value::Object(options.clone());
-        let (document, figure) = self.counting(entry.counted, |control| {
-            document_and_figure(entry, &case, request, control)
-        })?;
+        let (document, figure) = if entry.document.is_some() {
+            self.counting(entry.counted, |control| {
+                document_and_figure(entry, &case, request, control)
+            })?
+        } else {
+            self.whole_dataset(entry, &case, request)?
+        };
         let schema = (entry.report)();
         self.hand(Stage {
             figure,
@@ -212,6 +235,22 @@ impl Studied<'_> {
             studies: &[(name, &options)],
             tables: report::tables(&document, schema.as_value()),
             ..Stage::default()
+        })
+    }
+
+    /// The summary and the figure of a study's dataset.
+    fn whole_dataset(
+        &self,
+        entry: &StudyEntry,
+        case: &Case,
+        request: Value,
+    ) -> Result<(Value, Option<Figure>), ApiError> {
+        self.counting(entry.counted, |control| {
+            self.dataset(case, entry, request, control, |store| {
+                let summary = entry.summary.map(|of| of(store)).transpose()?;
+                let figure = dataset_figure(entry.name, store).map_err(ApiError::of)?;
+                Ok((summary.unwrap_or_default(), figure))
+            })
         })
     }
 
@@ -270,7 +309,7 @@ impl Studied<'_> {
             report::row(shown, set.as_ref().filter(|_| motion.is_some()))
         });
         let line = format!(
-            "{LINE_PIXELS} pixels there and back, a time constant of the amplitude Q/(π f0) each"
+            "{LINE_PIXELS} pixels there and back, with one time constant Q/(π f0) of the amplitude each"
         );
         let heads = [
             ("lever", "Name in the catalogue"),
@@ -281,13 +320,13 @@ impl Studied<'_> {
             ("peak force", "At the setpoint"),
             ("regime", "Whether the mean force attracts or repels"),
             ("states", "Stable motions found at this distance"),
-            ("a line", line.as_str()),
-            ("meets", "Whether all conditions hold"),
+            ("line time", line.as_str()),
+            ("conditions", "Whether all conditions hold"),
         ];
         let heads = &heads[..heads.len() - usize::from(unconditional)];
         self.hand(Stage {
             words: format!(
-                "{} levers at A₀ = {} and setpoint {setpoint}, with {}. A click on a row takes that lever.",
+                "{} levers at A₀ = {} and setpoint {setpoint}, with {}. A click on a row chooses that lever.",
                 report.levers.len(),
                 shown(Kind::Length, report.free_amplitude),
                 match report.quality_factor_source {
@@ -367,8 +406,8 @@ impl Studied<'_> {
             message["figure"] = drawn(&figure)?;
             message["number"] = self.app.figures.put(figure).into();
         }
-        if let Some((file, set)) = stage.found {
-            message["found"] = json!({ "file": file, "set": set });
+        if let Some(found) = stage.found {
+            message["found"] = json!(found);
         }
         (self.hand_over)(message);
         Ok(())
@@ -378,13 +417,12 @@ impl Studied<'_> {
     fn dataset<T>(
         &self,
         case: &Case,
-        name: &str,
-        request: &Map<String, Value>,
+        entry: &StudyEntry,
+        request: Value,
+        control: &Control<'_>,
         use_it: impl FnOnce(&Store) -> Result<T, ApiError>,
     ) -> Result<T, ApiError> {
-        let entry =
-            study_named(name).ok_or_else(|| ApiError::failed(format!("unknown study `{name}`")))?;
-        let plan = entry.plan(case, Value::Object(request.clone()), self.control)?;
+        let plan = entry.plan(case, request, control)?;
         let scratch = Scratch::within(&self.app.scratch)?;
         let store =
             Store::create_or_resume(&scratch.path().join("data.zarr"), plan.schema().clone())
@@ -392,13 +430,24 @@ impl Studied<'_> {
         let work = Work {
             share: Share::WHOLE,
             threads: 0,
-            control: Control {
-                cancel: self.control.cancel,
-                progress: None,
-            },
+            control: *control,
         };
         plan.compute(&store, &work).map_err(ApiError::of)?;
         use_it(&store)
+    }
+
+    /// The dataset of a stage.
+    fn staged<T>(
+        &self,
+        case: &Case,
+        name: &str,
+        request: &Map<String, Value>,
+        use_it: impl FnOnce(&Store) -> Result<T, ApiError>,
+    ) -> Result<T, ApiError> {
+        let entry =
+            study_named(name).ok_or_else(|| ApiError::failed(format!("unknown study `{name}`")))?;
+        let request = Value::Object(request.clone());
+        self.dataset(case, entry, request, self.control, use_it)
     }
 
     /// Computes the stages one by one until the work is cancelled; `stage` gets its count and the
@@ -442,7 +491,7 @@ impl Studied<'_> {
                 options.insert("starts".into(), starts.into());
             }
             let x = Axis::of(&over);
-            let (mut figure, mut near) = self.dataset(&case, "sweep", &options, |store| {
+            let (mut figure, mut near) = self.staged(&case, "sweep", &options, |store| {
                 let figure = draw(store).map_err(ApiError::of)?;
                 let heights = Height::of(&figure, names);
                 let near = clicks::in_sweep(store, &x, &heights, response).map_err(ApiError::of)?;
@@ -490,7 +539,7 @@ impl Studied<'_> {
             );
             let [x, y] = [&over[0].1, &over[1].1].map(|over| Axis::of(over).json());
             let fixed = clicks::fixed(&case, &[over[0].1.key, over[1].1.key]);
-            let figure = self.dataset(&case, "sweep", &options, |store| {
+            let figure = self.staged(&case, "sweep", &options, |store| {
                 maps::figure(store, shows.unwrap_or_default()).map_err(ApiError::of)
             })?;
             self.hand(Stage {
@@ -513,7 +562,7 @@ impl Studied<'_> {
             let options = object(json!({ "over": texts, "starts": PLAN_STARTS, "where": wanted }));
             let [x, y] = [&over[0].1, &over[1].1].map(|over| Axis::of(over).json());
             let fixed = clicks::fixed(&case, &[over[0].1.key, over[1].1.key]);
-            let (figure, safe) = self.dataset(&case, "window", &options, |store| {
+            let (figure, safe) = self.staged(&case, "window", &options, |store| {
                 let window = Window::of(store).map_err(ApiError::of)?;
                 Ok((window_figure(store).map_err(ApiError::of)?, window.targets))
             })?;
@@ -705,14 +754,29 @@ impl Studied<'_> {
         let Some((name, text)) = &self.request.data else {
             return Err(ApiError::input("no data", "drop a file on the page"));
         };
-        let entry = study_named(FitStudy::NAME);
-        let options = entry.map_or_else(Map::new, |entry| self.options(entry));
-        let mut request: FitOptions = read(Value::Object(options.clone()))?;
-        request.data = vec![Table::parse(name, text).map_err(ApiError::of)?];
+        let table = Table::parse(name, text).map_err(ApiError::of)?;
+        let options = |study| study_named(study).map_or_else(Map::new, |entry| self.options(entry));
+        let of_fit = options(FitStudy::NAME);
         let mut named = object(json!({ "data": [name] }));
-        named.extend(options);
+        if self.field("reconstruct").is_ok() {
+            let mut of_curve = options(ReconstructStudy::NAME);
+            // The form has the fit's default where both studies have an option.
+            let given = |name: &String| of_fit.contains_key(name);
+            let fitted = serde_json::to_value(FitOptions::default()).unwrap_or_default();
+            of_curve.retain(|name, _| fitted.get(name).is_none() || given(name));
+            let mut request: ReconstructOptions = read(Value::Object(of_curve.clone()))?;
+            request.data = vec![table];
+            named.extend(of_curve);
+            return self.reconstructed(&case, &request, &named);
+        }
+        let mut request: FitOptions = read(Value::Object(of_fit.clone()))?;
+        request.data = vec![table];
+        named.extend(of_fit);
         if self.field("fit").is_err() {
             return self.over_model(&case, &request, &named);
+        }
+        if !request.pixels.is_empty() {
+            return self.fitted_pixels(&case, &request, named);
         }
         let report = self.counting(FitStudy::COUNTED, |control| {
             FitStudy::run(&case, &request, control)
@@ -722,6 +786,13 @@ impl Studied<'_> {
             text: report.case_file.clone(),
         };
         let set = Case::parse(Some(found), &[]).map(|found| report::changes(&case, &found));
+        let found = Found {
+            set: set.ok(),
+            take: "Use these values",
+            file: report.case_file.clone(),
+            save: "Case file of the fit",
+            name: "best.toml",
+        };
         let notes = report.reason.iter().chain(&report.remarks);
         let notes: Vec<&str> = notes.map(String::as_str).collect();
         let fits = if report.fits {
@@ -734,9 +805,85 @@ impl Studied<'_> {
             words: format!("{fits} {}", notes.join(". ")).trim_end().to_owned(),
             studies: &[("fit", &named)],
             tables: vec![parameters(&report)],
-            found: set.ok().map(|set| (report.case_file.clone(), set)),
+            found: Some(found),
             ..Stage::default()
         })
+    }
+
+    /// The fits of a force volume, one a pixel.
+    fn fitted_pixels(
+        &self,
+        case: &Case,
+        request: &FitOptions,
+        mut named: Map<String, Value>,
+    ) -> Result<(), ApiError> {
+        let entry = study_named(FitStudy::NAME)
+            .ok_or_else(|| ApiError::failed("this program has no fit"))?;
+        let options = serde_json::to_value(request).map_err(nanotap::Error::from)?;
+        let (summary, figure) = self.whole_dataset(entry, case, options)?;
+        named.insert("out".into(), "fit.zarr".into());
+        self.hand(Stage {
+            figure,
+            words: "One fit a pixel.".to_owned(),
+            studies: &[(FitStudy::NAME, &named)],
+            tables: report::tables(&summary, &Value::Null),
+            ..Stage::default()
+        })
+    }
+
+    /// Force and dissipation of measured data, without a contact law.
+    fn reconstructed(
+        &self,
+        case: &Case,
+        request: &ReconstructOptions,
+        named: &Map<String, Value>,
+    ) -> Result<(), ApiError> {
+        let report = self.counting(ReconstructStudy::COUNTED, |control| {
+            ReconstructStudy::run(case, request, control)
+        })?;
+        let method = match report.method {
+            ReconstructMethod::AmplitudeModulation => "amplitude and phase",
+            ReconstructMethod::FrequencyModulation => "frequency shift",
+        };
+        let set = self.table_law(case, &report);
+        let negative = report.table.damping.iter().any(|damping| *damping < 0.0);
+        let none = "as a law the force has no damping where it is negative";
+        let notes = report.remarks.iter().map(String::as_str);
+        let notes = notes.chain((set.is_some() && negative).then_some(none));
+        let mut words = format!("Force from {method} of {} rows", report.rows.len());
+        for note in notes {
+            let _ = write!(words, "; {note}");
+        }
+        self.hand(Stage {
+            figure: Some(reconstruct_figure(&report)),
+            words,
+            studies: &[(ReconstructStudy::NAME, named)],
+            tables: vec![force_values(&report)],
+            found: Some(Found {
+                set,
+                take: "Use as the sample's force table",
+                file: report.csv(),
+                save: "Force curve (CSV)",
+                name: "force.csv",
+            }),
+            ..Stage::default()
+        })
+    }
+
+    /// The changes to the case that take a reconstructed force as its contact law, where it can.
+    fn table_law(&self, case: &Case, report: &ReconstructReport) -> Option<Map<String, Value>> {
+        let change = case.law_change("table", case).ok()?;
+        let mut set = object(json!({ Key::SampleLaw.path(): change.law }));
+        for key in &change.dropped {
+            set.insert(key.path().into(), "".into());
+        }
+        set.insert(Key::SampleTable.path().into(), force_rows(report).into());
+        let mut spec = self.request.case.clone();
+        for (key, text) in &set {
+            spec.put(Key::find(key)?, text.as_str()?);
+        }
+        let taken = spec.any_distance(self.app).ok()?;
+        taken.model().is_ok().then_some(set)
     }
 
     /// Measured data over the model's curve, where they are of the distance; otherwise alone.
@@ -804,7 +951,7 @@ impl Studied<'_> {
             panel.layers.push(markers.into());
         }
         let mut words = format!(
-            "{} rows. “Fit” finds the free parameters.",
+            "{} rows. “Fit” finds the free parameters, “Force without a law” the force and the dissipation.",
             data.rows().count()
         );
         if !left.is_empty() {
@@ -846,7 +993,7 @@ impl Studied<'_> {
                     _ => json!(origin.as_ref().and_then(|s| s.get(k)).unwrap_or(&0.0)),
                 })
                 .collect();
-            let figure = self.dataset(&case, "basin", &options, |store| {
+            let figure = self.staged(&case, "basin", &options, |store| {
                 basin_figure(store).map_err(ApiError::of)
             })?;
             let panel = figure.panels.first();
@@ -865,6 +1012,18 @@ impl Studied<'_> {
             })
         })
     }
+}
+
+/// The parts of a list of `NAME=VALUE`, whose values may contain commas.
+fn pairs_of(text: &str) -> Vec<String> {
+    let mut pairs: Vec<String> = Vec::new();
+    for part in text.split(',').map(str::trim) {
+        match pairs.last_mut() {
+            Some(pair) if !part.contains('=') => *pair = format!("{pair},{part}"),
+            _ => pairs.push(part.to_owned()),
+        }
+    }
+    pairs
 }
 
 /// A command after lines that replace `[scan]`, the last table of a saved case.
@@ -947,6 +1106,84 @@ fn parameters(report: &FitReport) -> Value {
         ("began at", "Initial value"),
     ];
     report::table("", &heads, &rows.collect::<Vec<_>>())
+}
+
+/// The force of a reconstruction as rows of `sample.table`.
+fn force_rows(report: &ReconstructReport) -> String {
+    let table = &report.table;
+    let damped = report.has_damping;
+    let mut text = String::from("[[\"gap (nm)\", \"force (nN)\"");
+    text.push_str(if damped {
+        ", \"damping (N s/m)\"]"
+    } else {
+        "]"
+    });
+    let rows = table.distance.iter().zip(&table.force).zip(&table.damping);
+    for ((distance, force), damping) in rows {
+        let _ = write!(text, ", [{:.6e}, {:.6e}", 1e9 * distance, 1e9 * force);
+        if damped {
+            // A law has no negative damping.
+            let _ = write!(text, ", {:.6e}", damping.max(0.0));
+        }
+        text.push(']');
+    }
+    text.push(']');
+    text
+}
+
+/// The values of a reconstruction.
+fn force_values(report: &ReconstructReport) -> Value {
+    let shown = |kind: Kind, value: f64, digits: usize| {
+        let kind = if report.physical { kind } else { Kind::Number };
+        kind.format_digits(value, digits)
+    };
+    let energy = |value: f64| match report.physical {
+        true => format_electronvolts(value),
+        false => Kind::Number.format_digits(value, 4),
+    };
+    let mut values = Vec::new();
+    if let Some(minimum) = &report.minimum {
+        let [force, error] = [(minimum.force, 4), (minimum.force_error, 2)]
+            .map(|(value, digits)| shown(Kind::Force, value, digits));
+        let at = shown(Kind::Length, minimum.distance, 4);
+        values.push([
+            "minimum of the force".to_owned(),
+            format!("{force} ± {error} at {at}"),
+        ]);
+    }
+    let dissipated = report.rows.iter().map(|row| row.dissipation);
+    let dissipated = dissipated.fold(0.0, f64::max);
+    values.extend([
+        [
+            "closest approach".to_owned(),
+            shown(Kind::Length, report.closest, 4),
+        ],
+        [
+            "largest dissipation".to_owned(),
+            if report.has_damping {
+                energy(dissipated)
+            } else {
+                "not determined".to_owned()
+            },
+        ],
+        [
+            "free amplitude and phase".to_owned(),
+            format!(
+                "{}, {}°",
+                shown(Kind::Length, report.free_amplitude, 5),
+                Kind::Number.format_digits(report.free_phase, 5)
+            ),
+        ],
+        [
+            "mean squared residual, in standard errors".to_owned(),
+            Kind::Number.format_digits(report.chi2, 3),
+        ],
+    ]);
+    let rows: Vec<Value> = values
+        .iter()
+        .map(|cells| report::row(cells, None))
+        .collect();
+    report::table("", &[("", ""), ("", "")], &rows)
 }
 
 fn progress(done: usize, finest: usize, counted: &str) -> String {

@@ -239,7 +239,7 @@ follows! {
     the_reconstruction: "reconstruct.md", 1 commands, 0 numbers;
     the_force_curve: "force-curve.md", 3 commands, 23 numbers;
     the_limit_of_the_force: "force-limit.md", 6 commands, 29 numbers;
-    the_thermal_noise: "noise.md", 3 commands, 11 numbers;
+    the_thermal_noise: "noise.md", 3 commands, 13 numbers;
     bimodal_operation: "bimodal.md", 5 commands, 18 numbers;
     the_scan: "scan.md", 4 commands, 19 numbers;
     the_force_table: "table.md", 3 commands, 8 numbers;

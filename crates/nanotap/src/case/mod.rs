@@ -53,6 +53,7 @@ pub use under_law::LawChange;
 use file::{CaseFileError, Described, Source};
 use key::ModelKind;
 use near_name::near_name;
+use physical::drive::FIRST;
 use physical::{Catalogue, Kind, Physical, Remark, Scales};
 use quantities::{Quantities, Slopes};
 use stated::Replaced;
@@ -490,7 +491,10 @@ impl Case {
         let replaced = |other: Key| {
             let same =
                 |key: &Key| *key == other || key.alternatives().any(|(same, _)| same == other);
-            keys.iter().any(same)
+            // At a frequency shift the drive follows from the amplitude that is held.
+            let shift = matches!(view.held, Some(physical::Held::Shift(_)));
+            let follows = shift && FIRST.contains(&other);
+            keys.iter().any(same) || keys.contains(&Key::DriveSetpoint) && follows
         };
         let held = view.implied_constants(&quantities.stated);
         held.iter()

@@ -1,9 +1,9 @@
 //! The same instrument over a sample that answers by another contact law.
 
 use super::key::{Key, Takes};
-use super::physical::Kind;
 use super::physical::drive::{FURTHER, ToneKeys};
 use super::physical::force::{keys_of_contacts, linear_takes, takes};
+use super::quantity::Kind;
 use super::stated::{Stated, Value};
 use super::{Case, CaseKind};
 use crate::Error;
@@ -51,8 +51,6 @@ impl LawName {
 /// What changes in a case that takes another contact law.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LawChange {
-    /// The key that names the law.
-    pub key: Key,
     /// The law's name.
     pub law: String,
     /// The keys that were stated and that the law does not take.
@@ -68,30 +66,30 @@ const CURVE: &str = "[[\"gap (nm)\", \"force (nN)\"], [-1, 20], [-0.5, 5], [0, -
 /// Three arms of a polymer whose times are those of tapping, to begin with.
 const ARMS: &str = "[[\"time (us)\", \"modulus (MPa)\"], [0.38, 460], [1.7, 136], [7.2, 67]]";
 
-/// Arms of the dimensionless model, with times of the order of a contact's.
-const MODEL_ARMS: &str = "[[\"time\", \"stiffness\"], [0.05, 10], [0.5, 5]]";
-
 /// Arms of a stiffness in place of the modulus.
 const SPRINGS: &str = "[[\"time (us)\", \"stiffness (N/m)\"], [0.5, 10], [4, 3]]";
+
+/// Arms of a dimensionless case.
+const MODEL_ARMS: &str = "[[\"time\", \"stiffness\"], [0.1, 20], [1, 5]]";
 
 impl Case {
     /// What must be left away, and what added, for this case to take another contact law. A value to add
     /// is that of `like` where it states one, else a usual one.
     ///
     /// # Errors
-    /// When the case is an oscillator, the law is unknown, not one of a dimensionless case, or a sum counts
-    /// a part twice.
+    /// When the case is an oscillator, the law is unknown, or a sum counts a part twice.
     pub fn law_change(&self, law: &str, like: &Self) -> Result<LawChange, Error> {
-        if let CaseKind::Cantilever(cantilever) = &self.what {
-            return contact_change(cantilever, like, law);
-        }
-        let name = LawName::read(law)?;
-        let CaseKind::Quantities(quantities) = &self.what else {
-            return Err(Error::input(
-                "expected a case with a contact law, got an oscillator",
-                "choose a case of a lever",
-            ));
+        let quantities = match &self.what {
+            CaseKind::Quantities(quantities) => quantities,
+            CaseKind::Cantilever(cantilever) => return contact_change(cantilever, law, like),
+            CaseKind::Oscillator(_) => {
+                return Err(Error::input(
+                    "expected a cantilever, got an oscillator",
+                    "an oscillator has a stop in place of a contact law",
+                ));
+            }
         };
+        let name = LawName::read(law)?;
         let mut quantities = quantities.clone();
         let stated = &mut quantities.stated;
         // What `like` states returns as soon as a law takes it again.
@@ -129,7 +127,6 @@ impl Case {
             mapped = mapped.mapped(true);
         }
         Ok(LawChange {
-            key: Key::SampleLaw,
             law: name.text(),
             dropped,
             added,
@@ -183,46 +180,44 @@ impl Case {
     }
 }
 
-/// The change of a dimensionless case to another contact. A number is that of `like` where it has it.
-fn contact_change(cantilever: &Cantilever, like: &Case, law: &str) -> Result<LawChange, Error> {
-    let read = Key::Contact.read(law);
-    let read = read.map_err(|error| Error::input(error.to_string(), "name one of them"))?;
-    let present = cantilever.contact;
-    let next = read.text().parse().unwrap_or(present);
-    let has = |law, parameter| {
-        let under = Cantilever {
-            contact: law,
-            ..cantilever.clone()
-        };
-        under.has(parameter)
+/// The change of a dimensionless case to another linear contact.
+fn contact_change(before: &Cantilever, law: &str, like: &Case) -> Result<LawChange, Error> {
+    let unknown = |error: String| Error::input(error, "name one of them");
+    let read = Key::Contact.read(law).map_err(|e| unknown(e.to_string()))?;
+    let contact: ContactLaw = (read.text().parse()).map_err(|_| unknown(law.to_owned()))?;
+    let after = Cantilever {
+        contact,
+        ..before.clone()
     };
+    let like = like.cantilever();
     let (mut dropped, mut added) = (Vec::new(), Vec::new());
-    let own = [present, next].into_iter().flat_map(Parameter::of_law);
-    for parameter in own.chain([Parameter::Alpha6]) {
-        let key = Key::of(parameter);
-        if has(present, parameter) && !has(next, parameter) {
-            dropped.push(key);
-        } else if !has(present, parameter)
-            && has(next, parameter)
-            && key.default_under(next).is_none()
-        {
-            let known = like.cantilever().filter(|like| like.has(parameter));
-            let value = known.map_or(key.entry().example, |like| like.get(parameter));
-            added.push((key, Value::Number(value, Kind::Number)));
+    for of in Parameter::every().filter(|of| before.has(*of) != after.has(*of)) {
+        let (key, example) = (Key::of(of), of.entry().example);
+        let stated = like.filter(|like| like.has(of)).map(|like| like.get(of));
+        if before.has(of) {
+            if key.default_under(before.contact) != Some(before.get(of)) {
+                dropped.push(key);
+            }
+        } else if stated.is_some() || key.default_under(contact).is_none() {
+            added.push((key, Value::Number(stated.unwrap_or(example), Kind::Number)));
         }
     }
     let key = Key::RelaxationArms;
-    match (cantilever.arms.is_empty(), next.entry().arms) {
-        (false, false) => dropped.push(key),
-        (true, true) => {
-            let usual = Takes::ModelArms.parse_table(MODEL_ARMS);
-            added.extend(usual.ok().map(|value| (key, value)));
+    match (before.contact.entry().arms, contact.entry().arms) {
+        (true, false) => dropped.push(key),
+        (false, true) => {
+            let arms = like.map_or(&[][..], |like| &like.arms);
+            let text = match arms {
+                [] => MODEL_ARMS.to_owned(),
+                arms => format!("[[\"time\", \"stiffness\"], {}", &format!("{arms:?}")[1..]),
+            };
+            let rows = key.entry().takes.parse_table(&text);
+            added.push((key, rows.map_err(|error| unknown(error.to_string()))?));
         }
         _ => {}
     }
     Ok(LawChange {
-        key: Key::Contact,
-        law: next.name().into(),
+        law: contact.name().to_owned(),
         dropped,
         added,
     })
@@ -294,27 +289,41 @@ mod tests {
         }
         let sum = first.law_change("hertz + capillary", &first).unwrap();
         assert_eq!(sum.dropped, [Key::SampleStiffness, Key::SampleDamping]);
-        let numbers = "alpha1=0.1 alpha2=0.1 alpha3=0.1 alpha4=20 alpha6=0.2 omega=3";
-        let numbers: Vec<String> = numbers.split(' ').map(str::to_owned).collect();
-        let model = Case::parse(None, &numbers).unwrap();
-        for law in ContactLaw::ALL {
-            let change = model.law_change(law.name(), &model).unwrap();
-            assert_eq!(change.key, Key::Contact);
-            let words = |change: &LawChange| -> Vec<String> {
-                let dropped = change.dropped.iter().map(|key| format!("{key}="));
-                let added = change.added.iter();
-                let added = added.map(|(key, value)| format!("{key}={}", value.text()));
-                let law = std::iter::once(format!("contact={}", change.law));
-                law.chain(dropped).chain(added).collect()
-            };
-            let there = model.restated(&words(&change)).unwrap();
-            assert!(there.model().is_ok(), "{law}");
-            let back = there.law_change("spring-damper", &model).unwrap();
-            let back = there.restated(&words(&back)).unwrap();
-            assert_eq!(back.cantilever(), model.cantilever(), "{law}");
-        }
-        assert!(model.law_change("hertz", &model).is_err());
         assert!(first.law_change("hertz + dmt", &first).is_err());
         assert!(first.law_change("plastic", &first).is_err());
+    }
+
+    #[test]
+    fn every_contact_of_the_model_leads_to_every_contact() {
+        let words = [
+            "alpha1=0.1",
+            "alpha2=0.1",
+            "alpha3=0.1",
+            "alpha4=20",
+            "alpha6=0.2",
+            "omega=3",
+        ];
+        let first = Case::parse(None, &words.map(str::to_owned)).unwrap();
+        let changed = |case: &Case, contact: ContactLaw| {
+            let change = case.law_change(contact.name(), &first).unwrap();
+            let dropped = change.dropped.iter().map(|key| format!("{key}="));
+            let added = (change.added.iter()).map(|(key, value)| format!("{key}={}", value.text()));
+            let law = std::iter::once(format!("contact={}", change.law));
+            let words: Vec<String> = dropped.chain(law).chain(added).collect();
+            let there = case.restated(&words).unwrap();
+            assert_eq!(there.cantilever().unwrap().contact, contact);
+            assert!(there.model().is_ok(), "{contact:?}");
+            there
+        };
+        for contact in ContactLaw::ALL {
+            let there = changed(&first, contact);
+            for next in ContactLaw::ALL {
+                changed(&there, next);
+            }
+            // Back: what the first case stated returns.
+            let back = changed(&there, first.cantilever().unwrap().contact);
+            assert_eq!(back.cantilever(), first.cantilever(), "{contact:?}");
+        }
+        assert!(first.law_change("hertz", &first).is_err());
     }
 }

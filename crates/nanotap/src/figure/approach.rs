@@ -2,7 +2,9 @@
 
 use std::collections::BTreeSet;
 
-use nanotap_figures::{Axis, Colour, DOUBLE_COLUMN, Dash, Figure, Legend, Line, Markers, Panel};
+use nanotap_figures::{
+    Axis, Colour, DOUBLE_COLUMN, Dash, Figure, Legend, Line, Markers, Panel, Shape,
+};
 use serde::Deserialize;
 
 use crate::case::physical::Kind;
@@ -295,7 +297,11 @@ impl ApproachPanel {
         }
         if !self.coexisting.is_empty() {
             let markers = Markers::new(self.coexisting.clone());
-            let markers = markers.colour(Colour::GREEN).size(0.8);
+            // Another shape, since blue and green are alike to some.
+            let markers = markers
+                .colour(Colour::GREEN)
+                .shape(Shape::Triangle)
+                .size(1.1);
             panel = panel.with(markers.label("coexists"));
         }
         with_marks(panel, &self.bifurcations, [1.8, 1.0], 1.0)

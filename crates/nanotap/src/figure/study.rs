@@ -6,11 +6,17 @@ use serde_json::Value;
 
 use crate::Error;
 use crate::case::Case;
+#[cfg(feature = "dataset")]
+use crate::dataset::{Store, StoreError};
 use crate::figure;
 use crate::model::beam::Modes;
+#[cfg(all(feature = "dataset", feature = "fit"))]
+use crate::study::fit;
 use crate::study::registry::{Document, Study, StudyEntry};
 use crate::study::request::read;
 use crate::study::setpoint::at_setpoint;
+#[cfg(feature = "dataset")]
+use crate::study::{DatasetStudy as _, basin, scan, sweep, window};
 use crate::study::{contact_laws, convergence, force_curve, lyapunov, modes};
 
 /// The document of a study, and its figure if it has one.
@@ -68,6 +74,23 @@ pub fn document_and_figure(
             Ok((serde_json::from_str(&document)?, None))
         }
     }
+}
+
+/// The figure of a study's finished dataset, if it has one.
+///
+/// # Errors
+/// When a chunk is missing or damaged.
+#[cfg(feature = "dataset")]
+pub fn dataset_figure(study: &str, store: &Store) -> Result<Option<Figure>, StoreError> {
+    Ok(Some(match study {
+        sweep::SweepStudy::NAME => figure::sweep::figure(store)?,
+        window::WindowStudy::NAME => figure::window::figure(store)?,
+        basin::BasinStudy::NAME => figure::basin::figure(store)?,
+        scan::ScanLines::NAME => figure::scan::scan_figure(&scan::ScanLines::report(store)?),
+        #[cfg(feature = "fit")]
+        fit::FitMap::NAME => figure::fit::fit_map_figure(store)?,
+        _ => return Ok(None),
+    }))
 }
 
 fn drawn<S: Study>(

@@ -40,6 +40,8 @@ use serde_json::Value;
 
 use crate::Error;
 use crate::case::Case;
+#[cfg(feature = "dataset")]
+use crate::dataset::Store;
 use crate::study::request::{answer_schema, read, schema};
 use crate::study::setpoint::at_setpoint;
 #[cfg(feature = "dataset")]
@@ -68,6 +70,9 @@ pub struct StudyEntry {
     /// Plans what is to be computed into a dataset, if it leaves one.
     #[cfg(feature = "dataset")]
     pub dataset: Option<Run<DatasetPlan>>,
+    /// The JSON of the summary of its finished dataset, if it leaves one.
+    #[cfg(feature = "dataset")]
+    pub summary: Option<fn(&Store) -> Result<Value, Error>>,
 }
 
 /// What runs a study on a case, from the JSON of its request.
@@ -95,14 +100,20 @@ impl StudyEntry {
             }),
             #[cfg(feature = "dataset")]
             dataset: None,
+            #[cfg(feature = "dataset")]
+            summary: None,
         }
     }
 
     /// The same study, whose report can be a dataset, too.
     #[cfg(feature = "dataset")]
     pub(super) const fn or_dataset<S: DatasetStudy>(self) -> Self {
+        let Self {
+            dataset, summary, ..
+        } = Self::dataset::<S>();
         Self {
-            dataset: Self::dataset::<S>().dataset,
+            dataset,
+            summary,
             ..self
         }
     }
@@ -127,6 +138,7 @@ impl StudyEntry {
                 };
                 S::plan(&case, &request, control)
             }),
+            summary: Some(|store| Ok(serde_json::to_value(S::report(store)?)?)),
         }
     }
 

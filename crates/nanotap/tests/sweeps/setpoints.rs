@@ -218,6 +218,9 @@ fn shifts_that_vary_are_those_of_each_alone() {
         let words = ["gap.tip=", &format!("drive.setpoint={setpoint}")].map(str::to_owned);
         Case::load(Some(file), &words, &Catalogue::shared()).unwrap()
     };
+    // The drive follows, and nothing is said of its strength.
+    let held = at("1 kHz").held(&[Key::DriveSetpoint]);
+    assert!(!held.contains_key("drive.amplitude"), "{held:?}");
     let options = SweepOptions {
         periods: 2,
         ..SweepOptions::over(["drive.setpoint=1kHz,2kHz"])

@@ -1137,9 +1137,12 @@ fn force_values(report: &ReconstructReport) -> Value {
         let kind = if report.physical { kind } else { Kind::Number };
         kind.format_digits(value, digits)
     };
-    let energy = |value: f64| match report.physical {
-        true => format_electronvolts(value),
-        false => Kind::Number.format_digits(value, 4),
+    let energy = |value: f64| {
+        if report.physical {
+            format_electronvolts(value)
+        } else {
+            Kind::Number.format_digits(value, 4)
+        }
     };
     let mut values = Vec::new();
     if let Some(minimum) = &report.minimum {

@@ -195,9 +195,8 @@ fn contact_change(before: &Cantilever, law: &str, like: &Case) -> Result<LawChan
         let (key, example) = (Key::of(of), of.entry().example);
         let stated = like.filter(|like| like.has(of)).map(|like| like.get(of));
         if before.has(of) {
-            if key.default_under(before.contact) != Some(before.get(of)) {
-                dropped.push(key);
-            }
+            // A value that is the default may be stated, too.
+            dropped.push(key);
         } else if stated.is_some() || key.default_under(contact).is_none() {
             added.push((key, Value::Number(stated.unwrap_or(example), Kind::Number)));
         }

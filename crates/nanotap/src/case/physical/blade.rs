@@ -15,13 +15,13 @@
 //! G = s/(2m(m + s)),   s² = k² + q²,   m² = s² + iRe,   Re = ρωa²/μ,
 //! ```
 //!
-//! and over a wall further terms, which take the no-slip condition there into account ([`Wave::over`]).
+//! and over a wall further terms, which take the no-slip condition there into account (`Wave::over`).
 //!
 //! Each stress is a sum of Chebyshev polynomials over √(1 − y²), whose Fourier transforms are Bessel
 //! functions, so that the uniform velocity of the blade leads to a symmetric system of equations with
 //! the matrix π ∫₀^∞ J_m(q) J_n(q) G(q) dq (Galerkin's method). The total force is the first unknown.
 //!
-//! The products of Bessel functions oscillate. Beyond [`JOIN`] they are sums of products of Hankel
+//! The products of Bessel functions oscillate. Beyond `JOIN` they are sums of products of Hankel
 //! functions: H¹H² does not oscillate, and H¹H¹ and H²H² fall exponentially along q = JOIN ± it. The nodes
 //! of these integrals and the functions there are the same for every blade.
 //!

@@ -180,7 +180,6 @@ def write_wave(path: Path, channels: dict[str, np.ndarray], note: str) -> None:
 def test_instruments_files_are_read(
     curve: dict[str, np.ndarray], tmp_path: Path
 ) -> None:
-    pytest.importorskip("igor2")
     path = tmp_path / "curve.ibw"
     channels = {
         "ZSnsr": 1e-9 * curve["distance (nm)"],
@@ -200,7 +199,11 @@ def test_instruments_files_are_read(
     np.testing.assert_allclose(nanotap.read(text)["Phase (deg)"], read["Phase (deg)"])
     path = tmp_path / "curve.jpk-force"
     path.write_bytes(b"PK")
-    with pytest.raises(ValueError, match="package afmformats"):
+    with pytest.raises(ValueError, match="not a force curve of JPK"):
+        nanotap.read(path)
+    path = tmp_path / "curve.gwy"
+    path.write_bytes(b"GWYP")
+    with pytest.raises(ValueError, match="package gwyfile"):
         nanotap.read(path)
     with pytest.raises(FileNotFoundError):
         nanotap.read(tmp_path / "none.ibw")

@@ -307,7 +307,9 @@ def tables(data: Any) -> list[dict[str, Any]]:
     if hasattr(data, "data_vars"):  # xarray
         return [{"columns": _of_dataset(data)}]
     if hasattr(data, "columns") and not isinstance(data, Mapping):  # pandas, polars
-        return [{"columns": {str(c): column(str(c), data[c]) for c in data.columns}}]
+        notes = {str(k): str(v) for k, v in getattr(data, "attrs", {}).items()}
+        columns = {str(c): column(str(c), data[c]) for c in data.columns}
+        return [{"columns": columns, "notes": notes}]
     if isinstance(data, Mapping):
         if data and all(
             isinstance(v, Mapping) or hasattr(v, "columns") or hasattr(v, "data_vars")

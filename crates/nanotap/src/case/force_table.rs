@@ -379,7 +379,7 @@ pub(crate) fn table_of(value: &DeValue<'_>) -> Option<Table> {
     let mut table = Table {
         name: "the table".to_owned(),
         columns: header.into_iter().map(|name| (name, Vec::new())).collect(),
-        lines: Vec::new(),
+        ..Table::default()
     };
     for row in rest {
         let fields = fields(row).filter(|fields| fields.len() == table.columns.len())?;

@@ -28,6 +28,8 @@ pub mod near_name;
 pub mod physical;
 mod quantities;
 pub mod quantity;
+#[cfg(feature = "fit")]
+mod recording;
 pub mod schema;
 mod stated;
 pub mod table;

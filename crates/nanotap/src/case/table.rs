@@ -1,6 +1,7 @@
 //! Tables of named columns, each with its unit, as a file or a program gives them.
 
 use std::borrow::Cow;
+use std::collections::BTreeMap;
 use std::path::Path;
 
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
@@ -36,10 +37,12 @@ pub struct Table {
     pub columns: Vec<(String, Vec<Entry>)>,
     /// Line of each row in the file that it was read from; empty where there is none.
     pub lines: Vec<u64>,
+    /// What an instrument's file says of the measurement, by name.
+    pub notes: Vec<(String, String)>,
 }
 
 impl Table {
-    /// Reads a CSV file: fields parted by commas, semicolons or tabs, the first line names the
+    /// Reads an instrument's file (`.ibw`, `.jpk-force`, `.nid`), or a CSV file: fields parted by commas, semicolons or tabs, the first line names the
     /// columns, lines that begin with `#` are skipped.
     ///
     /// # Errors
@@ -54,7 +57,17 @@ impl Table {
                 "keep fewer rows",
             ));
         }
-        let text = std::fs::read_to_string(path).map_err(refuse)?;
+        let bytes = std::fs::read(path).map_err(refuse)?;
+        #[cfg(feature = "fit")]
+        if let Some(recorded) = super::recording::parse(&name, &bytes) {
+            return recorded;
+        }
+        let text = String::from_utf8(bytes).map_err(|_| {
+            Error::input(
+                format!("{name} is not a text (UTF-8)"),
+                "export the curve as text, with the names of the columns in the first line",
+            )
+        })?;
         Self::parse(&name, &text)
     }
 
@@ -86,7 +99,7 @@ impl Table {
         let mut table = Self {
             name: name.to_owned(),
             columns: named.collect(),
-            lines: Vec::new(),
+            ..Self::default()
         };
         for record in reader.records() {
             let record = record.map_err(|error| refuse(&error))?;
@@ -192,7 +205,13 @@ impl Serialize for Table {
             .iter()
             .map(|(header, column)| (header.clone(), json!(column)))
             .collect();
-        json!({"name": self.name, "columns": columns}).serialize(serializer)
+        let mut table = json!({"name": self.name, "columns": columns});
+        if !self.notes.is_empty() {
+            let notes = self.notes.iter();
+            let notes: Map<String, Value> = notes.map(|(k, v)| (k.clone(), json!(v))).collect();
+            table["notes"] = json!(notes);
+        }
+        table.serialize(serializer)
     }
 }
 
@@ -204,6 +223,8 @@ impl<'de> Deserialize<'de> for Table {
             #[serde(default)]
             name: Option<String>,
             columns: Map<String, Value>,
+            #[serde(default)]
+            notes: BTreeMap<String, String>,
         }
         let given = Given::deserialize(deserializer)?;
         let column = |(header, values): (String, Value)| {
@@ -216,6 +237,7 @@ impl<'de> Deserialize<'de> for Table {
             name: given.name.unwrap_or_else(|| "data".to_owned()),
             columns: columns.collect::<Result<_, D::Error>>()?,
             lines: Vec::new(),
+            notes: given.notes.into_iter().collect(),
         })
     }
 }
@@ -236,6 +258,7 @@ impl JsonSchema for Table {
             "properties": {
                 "name": {"type": "string"},
                 "columns": {"type": "object", "additionalProperties": column},
+                "notes": {"type": "object", "additionalProperties": {"type": "string"}},
             },
             "required": ["columns"],
         })

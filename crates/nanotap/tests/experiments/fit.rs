@@ -94,7 +94,7 @@ fn measured(
     Table {
         name: "curve".to_owned(),
         columns,
-        lines: Vec::new(),
+        ..Table::default()
     }
 }
 
@@ -353,7 +353,7 @@ fn a_free_amplitude_is_fitted_to_resonance_curves() {
             ("amplitude (nm)".to_owned(), amplitude),
             ("phase (deg)".to_owned(), phase),
         ],
-        lines: Vec::new(),
+        ..Table::default()
     };
     let start = case(LEVER, &[]);
     let request = request(vec![table], &["drive.free_amplitude", "cantilever.Q"]);
@@ -420,7 +420,7 @@ fn a_resonance_curve_is_fitted_with_both_branches() {
     let table = Table {
         name: "resonance".to_owned(),
         columns,
-        lines: Vec::new(),
+        ..Table::default()
     };
     let start = case(
         LEVER,
@@ -911,7 +911,7 @@ fn a_table_of_approach_is_fitted_unchanged() {
     let table = Table {
         name: "curve".to_owned(),
         columns,
-        lines: Vec::new(),
+        ..Table::default()
     };
     let start = case(LEVER, &["sample.stiffness=25 N/m"]);
     let mut asked = request(vec![table], &["sample.stiffness"]);
@@ -987,7 +987,7 @@ fn modulated(case: &Case, range: [f64; 2], points: usize, noise: Option<u64>) ->
     Table {
         name: "fm.csv".to_owned(),
         columns,
-        lines: Vec::new(),
+        ..Table::default()
     }
 }
 
@@ -1096,7 +1096,7 @@ fn curves_of_amplitude_and_of_frequency_shifts_do_not_mix() {
             ("distance (nm)".to_owned(), numbers([12.0, 11.0, 10.0])),
             ("amplitude (nm)".to_owned(), numbers([10.0, 9.9, 9.5])),
         ],
-        lines: Vec::new(),
+        ..Table::default()
     };
     let mut mixed = shifts.clone();
     mixed
@@ -1143,7 +1143,7 @@ fn columns(name: &str, columns: [(&str, Vec<f64>); 3]) -> Table {
     Table {
         name: name.to_owned(),
         columns: columns.into_iter().map(column).collect(),
-        lines: Vec::new(),
+        ..Table::default()
     }
 }
 
@@ -1374,7 +1374,7 @@ fn a_force_volume_is_fitted_pixel_by_pixel() {
     let table = Table {
         name: "volume".to_owned(),
         columns,
-        lines: Vec::new(),
+        ..Table::default()
     };
     let options = FitOptions {
         pixels: vec!["x,y".to_owned()],

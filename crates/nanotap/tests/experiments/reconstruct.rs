@@ -68,7 +68,7 @@ fn rows(reference: &Value, step: usize, noise: [f64; 2], seed: u64) -> Table {
             .into_iter()
             .map(|(name, values): (&str, Vec<Entry>)| (name.to_owned(), thinned(values)))
             .collect(),
-        lines: Vec::new(),
+        ..Table::default()
     }
 }
 
@@ -179,7 +179,7 @@ fn table(columns: &[(&str, Vec<f64>)]) -> Table {
             .iter()
             .map(|(name, values)| ((*name).to_owned(), entries(values)))
             .collect(),
-        lines: Vec::new(),
+        ..Table::default()
     }
 }
 

@@ -7,16 +7,17 @@
 use nanotap_arithmetic::ComplexFunctions as _;
 
 use crate::Error;
-use crate::case::Case;
 use crate::case::physical::free_response::free_response;
 use crate::case::table::{Entry, Header, Table};
+use crate::case::{Case, Key};
+use crate::number::shortest;
 
 use super::data;
 use super::quantity::Quantity;
 
 /// Names of instruments' columns, in lower case without blanks, and what they are called here. Of
 /// several with the same meaning the first counts.
-const NAMES: [(&str, &str); 25] = [
+const NAMES: [(&str, &str); 27] = [
     ("amp", "amplitude"),
     ("amp1", "amplitude"),
     ("amplitude1", "amplitude"),
@@ -36,6 +37,8 @@ const NAMES: [(&str, &str); 25] = [
     ("zpiezo", "distance"),
     ("piezo", "distance"),
     ("height", "distance"),
+    ("z-axissensor", "distance"),
+    ("z-axis", "distance"),
     ("z", "distance"),
     ("zposition", "distance"),
     ("separation", "distance"),
@@ -118,6 +121,7 @@ pub(crate) fn prepared(
     let mut guessed_phase = false;
     for (table, stated) in tables.iter_mut().zip(stated) {
         let foreign = rename(table, &mut columns, &mut notes) || stated.any;
+        from_header(case, table, &mut notes);
         if foreign {
             leave_out(case, table, &columns, &mut notes);
         }
@@ -358,6 +362,72 @@ fn rename(table: &mut Table, columns: &mut [String], notes: &mut Vec<String>) ->
     notes.len() > before
 }
 
+/// Sensitivities by the column that they convert from V, in the file's header, in m/V.
+const SENSITIVITIES: [(&str, &str); 1] = [("amplitude", "AmpInvOLS")];
+/// A property of the lever in the header that differs from the case's by more than this part is
+/// reported.
+const OTHER_LEVER: f64 = 0.02;
+
+/// What the header of an instrument's file says: the sensitivity of columns in V, and the lever,
+/// where it is another than that of the case.
+fn from_header(case: &Case, table: &mut Table, notes: &mut Vec<String>) {
+    let stated = |name: &str| {
+        let (_, value) = table.notes.iter().find(|(known, _)| known == name)?;
+        value
+            .parse::<f64>()
+            .ok()
+            .filter(|of| of.is_finite() && *of > 0.0)
+    };
+    let levers = [
+        (Key::LeverK, "SpringConstant", "N/m"),
+        (Key::LeverF0, "ThermalFrequency", "Hz"),
+        (Key::LeverQ, "ThermalQ", ""),
+    ];
+    for (key, name, unit) in levers {
+        let value = case.get(key);
+        if let Some(of) = stated(name).filter(|of| (of / value - 1.0).abs() > OTHER_LEVER) {
+            let amount = |of: f64| format!("{} {unit}", shortest(of)).trim_end().to_owned();
+            notes.push(format!(
+                "{}: the header says {name} = {}, the case {} = {}: the case counts",
+                table.name,
+                amount(of),
+                key.path(),
+                amount(value)
+            ));
+        }
+    }
+    let found: Vec<(usize, f64, &str)> = SENSITIVITIES
+        .iter()
+        .filter_map(|(column, name)| Some((place_of(table, &[column])?, stated(name)?, *name)))
+        .collect();
+    for (place, sensitivity, name) in found {
+        let header = Header::of(&table.columns[place].0);
+        let per_unit = match header.unit.as_str() {
+            "V" => 1e9 * sensitivity,
+            "mV" => 1e6 * sensitivity,
+            _ => continue,
+        };
+        for entry in &mut table.columns[place].1 {
+            if let Entry::Number(x) = entry {
+                *x *= per_unit;
+            }
+        }
+        table.columns[place].0 = written(&header.name, "nm");
+        notes.push(format!(
+            "{}: {} = {per_unit:.5} nm/{} is that of the header ({name}); state another one with the \
+             option `convert`",
+            table.name, header.name, header.unit
+        ));
+    }
+}
+
+/// The place of a column with one of these names.
+fn place_of(table: &Table, names: &[&str]) -> Option<usize> {
+    let name = |written: &str| Header::of(written).name.to_lowercase();
+    let is = |(written, _): &(String, Vec<Entry>)| names.contains(&name(written).as_str());
+    table.columns.iter().position(is)
+}
+
 /// The columns of amplitude curves that guesses change.
 struct Places {
     distance: usize,
@@ -366,15 +436,10 @@ struct Places {
 }
 
 fn places(table: &Table) -> Option<Places> {
-    let place = |names: &[&str]| {
-        let name = |written: &str| Header::of(written).name.to_lowercase();
-        let is = |(written, _): &(String, Vec<Entry>)| names.contains(&name(written).as_str());
-        table.columns.iter().position(is)
-    };
     Some(Places {
-        distance: place(&["distance", "zc", "gap"])?,
-        amplitude: place(&["amplitude", "first_harmonic", "a"])?,
-        phase: place(&["phase"])?,
+        distance: place_of(table, &["distance", "zc", "gap"])?,
+        amplitude: place_of(table, &["amplitude", "first_harmonic", "a"])?,
+        phase: place_of(table, &["phase"])?,
     })
 }
 
@@ -721,5 +786,47 @@ mod tests {
         for wrong in ["Amp", "=x", "Amp=", "Amp=58 nm", "Amp=?"] {
             assert!(Conversion::parse(wrong).is_err(), "{wrong}");
         }
+    }
+
+    #[test]
+    fn a_header_converts_volts_and_names_another_lever() {
+        let words = [
+            "cantilever.k=2 N/m",
+            "cantilever.f0=70 kHz",
+            "cantilever.Q=120",
+            "sample.stiffness=8 N/m",
+            "drive.frequency=70 kHz",
+            "drive.free_amplitude=20 nm",
+            "gap.tip=10 nm",
+        ];
+        let case = Case::parse(None, &words.map(str::to_owned)).unwrap();
+        let column = |name: &str, value: f64| (name.to_owned(), vec![Entry::Number(value)]);
+        let note = |name: &str, value: &str| (name.to_owned(), value.to_owned());
+        let table = Table {
+            name: "curve.ibw".to_owned(),
+            columns: vec![
+                column("ZSnsr (nm)", 1.0),
+                column("Amp (V)", 0.5),
+                column("Phase (deg)", 90.0),
+            ],
+            notes: vec![
+                note("AmpInvOLS", "5.8e-08"),
+                note("SpringConstant", "42"),
+                note("ThermalQ", "121"),
+            ],
+            ..Table::default()
+        };
+        let found = prepared(&case, std::slice::from_ref(&table), &[], &[]).unwrap();
+        let (header, values) = &found.tables[0].columns[1];
+        assert_eq!(header, "amplitude (nm)");
+        // 0.5 V at 58 nm/V.
+        assert!(matches!(values[0], Entry::Number(x) if (x - 29.0).abs() < 1e-12));
+        let says = |text: &str| found.notes.iter().any(|note| note.contains(text));
+        assert!(says("AmpInvOLS") && says("SpringConstant = 42 N/m") && !says("ThermalQ"));
+        // What is stated counts.
+        let stated = ["Amp=60 nm/V".to_owned()];
+        let found = prepared(&case, &[table], &stated, &[]).unwrap();
+        let (_, values) = &found.tables[0].columns[1];
+        assert!(matches!(values[0], Entry::Number(x) if (x - 30.0).abs() < 1e-12));
     }
 }

@@ -276,6 +276,7 @@ impl Map {
             name: self.table.name.clone(),
             columns: columns.collect(),
             lines: lines.copied().collect(),
+            notes: self.table.notes.clone(),
         };
         let turned = before.map_or(self.turned, |before| before.turned);
         let mut options = FitOptions {

@@ -66,18 +66,25 @@ impl ForceTable {
         &self.0
     }
 
-    /// Creates a force table from the columns `gap` and `force` of a table.
+    /// Creates a force table from the columns `gap`, `force` and, if there is one, `damping` of a
+    /// table. Where it has a column `damping error` too, as a reconstructed force, a damping below zero
+    /// is no more than its error and counts as none.
     ///
     /// # Errors
     /// If they are missing, have no unit, or are not a function of the gap.
     pub(crate) fn of(table: &Table) -> Result<Self, ForceTableError> {
         let gaps = column(table, &["gap", "distance", "d"], Kind::Length, "gap (nm)")?;
         let forces = column(table, &["force", "f"], Kind::Force, "force (nN)")?;
-        let damping = if has(table, DAMPING) {
+        let mut damping = if has(table, DAMPING) {
             column(table, DAMPING, Kind::Damping, "damping (N s/m)")?
         } else {
             Vec::new()
         };
+        if has(table, &["damping error"]) {
+            for value in &mut damping {
+                *value = value.max(0.0);
+            }
+        }
         let points: Vec<(f64, f64)> = gaps.into_iter().zip(forces).collect();
         let rows = Rows::damped(&points, &damping).map_err(|error| {
             let remedy = "give each gap once, in the order of the gaps, and its force";

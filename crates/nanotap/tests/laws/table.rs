@@ -364,3 +364,24 @@ fn a_table_may_be_damped() {
     assert!(found.stable && found.observables.dissipation > 0.0);
     assert!(found.determinant_defect < 1e-9);
 }
+
+/// A reconstructed force has damping below zero where it is no more than its error.
+#[test]
+fn uncertain_damping_below_zero_counts_as_none() {
+    let curve = folder("uncertain").join("curve.csv");
+    std::fs::write(
+        &curve,
+        "distance (nm),force (nN),damping (N s/m),damping error (N s/m)\n\
+         0,1,1e-8,1e-9\n1,0,-1e-9,2e-9\n",
+    )
+    .unwrap();
+    let case = curve.with_file_name("lever.toml");
+    let text = format!("[sample]\nlaw = \"table\"\ntable = \"curve.csv\"\n{LEVER}");
+    std::fs::write(&case, text).unwrap();
+    let certain = "sample.table=[[\"gap (nm)\", \"force (nN)\", \"damping (N s/m)\"], \
+                   [0, 1, 1e-8], [1, 0, 0]]";
+    let [read, stated] = [&[][..], &[certain]].map(|words| loaded(&case, words).unwrap());
+    let laws = [read, stated].map(|case| case.cantilever().unwrap().law.clone());
+    assert_eq!(laws[0], laws[1]);
+    std::fs::remove_dir_all(curve.parent().unwrap()).unwrap();
+}

@@ -541,6 +541,74 @@ fn harmonics_are_columns() {
 }
 
 #[test]
+fn sidebands_are_columns() {
+    // Two tones around the resonance, which repeat together after 10 periods.
+    let text = LEVER
+        .replace("Q = 400", "Q = 50")
+        .replace(
+            "frequency_ratio = 1.001",
+            "frequency_ratio = 0.955\nsecond_ratio = \"11/10\"",
+        )
+        .replace("\"20 nm\"", "\"10 nm\"\nsecond_free_amplitude = \"10 nm\"");
+    let truth = case(&text, &[]);
+    let names = [
+        "amplitude (nm)",
+        "first_sideband (nm)",
+        "first_sideband_phase (deg)",
+        "second_sideband (nm)",
+        "second_sideband_phase (deg)",
+    ];
+    let mut columns = vec![("distance (nm)".to_owned(), Vec::new())];
+    columns.extend(names.map(|name| (name.to_owned(), Vec::new())));
+    let mut noise = Noise(5);
+    for k in 0..6 {
+        let distance = 8.0 + 1.5 * f64::from(k);
+        let at = case(&text, &[&format!("gap.tip={distance} nm")]);
+        let found = orbit(&at.model().unwrap(), &OrbitOptions::default()).unwrap();
+        let seen = found.observables.in_si(&at.physical().unwrap().scales);
+        let row = [
+            distance,
+            1e9 * seen.first_harmonic + 0.005 * noise.normal(),
+            1e9 * seen.first_sideband.unwrap() + 0.005 * noise.normal(),
+            seen.first_sideband_phase.unwrap() + 0.2 * noise.normal(),
+            1e9 * seen.second_sideband.unwrap() + 0.005 * noise.normal(),
+            seen.second_sideband_phase.unwrap() + 0.2 * noise.normal(),
+        ];
+        for (column, value) in columns.iter_mut().zip(row) {
+            column.1.push(Entry::Number(value));
+        }
+    }
+    let table = Table {
+        columns,
+        ..Table::default()
+    };
+    let free = ["sample.stiffness", "sample.loss_tangent", "gap.offset"];
+    let request = request(vec![table], &free);
+    derivatives_are_right(
+        &truth,
+        &request,
+        &[30.0, 0.1, 0.0],
+        &[0.01, 1e-4, 1e-13],
+        1e-4,
+    );
+    let start = case(
+        &text,
+        &["sample.stiffness=24 N/m", "sample.loss_tangent=0.15"],
+    );
+    let report = fitted(&start, &request);
+    for (parameter, truth) in report.parameters.iter().zip([30.0, 0.1, 0.0]) {
+        let error = parameter.standard_error.unwrap();
+        assert!(
+            (parameter.value - truth).abs() < 4.0 * error,
+            "{parameter:?}"
+        );
+    }
+    let stiffness = &report.parameters[0];
+    let error = stiffness.standard_error.unwrap();
+    assert!(error < 0.1 * stiffness.value, "{stiffness:?}");
+}
+
+#[test]
 fn undetermined_combinations_are_named() {
     // Hertz's stiffness at an indentation: K1 = 2 E* √(R δ), so only this combination of E and δ is
     // determined.

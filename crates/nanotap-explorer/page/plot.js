@@ -224,7 +224,7 @@ export function layout(pen, figure, wide, size, highest, views) {
     const height = heights * share / total(down);
     for (const place of places.filter((one) => one.row === r)) {
       const left = upto(columns, place.col) + upto(columnWidth, place.col) + asides[place.col];
-      // The labels of a column stand in one line.
+      // The labels of a column are aligned.
       Object.assign(place, { left, top, width: columnWidth[place.col], height, aside: asides[place.col] });
     }
     top += height + below[r];

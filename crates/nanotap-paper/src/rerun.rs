@@ -3,6 +3,7 @@
 
 use std::fmt::Write as _;
 
+use nanotap::case::Key;
 use nanotap::model::cantilever::{Cantilever, CosineTerm};
 use nanotap::model::contact::ContactLaw;
 use nanotap::model::drive_form::Actuation;
@@ -20,8 +21,8 @@ pub(super) fn on_case(command: &str, case: &Cantilever, options: &str) -> String
     if case.actuation != Actuation::default() {
         let _ = write!(line, " --set actuation={}", case.actuation);
     }
-    for (k, ratio) in case.further_tones.iter().enumerate() {
-        let _ = write!(line, " --set tone{}_ratio={ratio}", k + 2);
+    for (ratio, key) in case.further_tones.iter().zip(Key::TONE_RATIOS) {
+        let _ = write!(line, " --set {}={ratio}", key.name());
     }
     if case.contact != ContactLaw::default() {
         let _ = write!(line, " --set contact={}", case.contact);

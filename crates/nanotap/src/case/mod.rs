@@ -62,7 +62,6 @@ use stated::Replaced;
 use units::Units;
 
 use crate::model::cantilever::Cantilever;
-use crate::model::drive_form::Actuation;
 use crate::model::oscillator::{Oscillator, OscillatorParameter, Stop};
 use crate::model::{Model, ModelTangent, Tangent, cantilever_model_tangent};
 use crate::number::shortest;
@@ -820,13 +819,9 @@ impl Case {
             let beam = Value::Number(beam, Kind::Length);
             quantities.stated.put(Key::GapBeam, beam);
         }
-        if let Some([frequency, strength]) = drive {
-            let key = match self.cantilever().map(|case| case.actuation) {
-                Some(Actuation::Base) | None => Key::DriveAmplitude,
-                Some(_) => Key::DriveForce,
-            };
+        if let (Some([frequency, strength]), Some(view)) = (drive, self.physical()) {
             quantities.stated.set(Key::DriveFrequency, frequency);
-            quantities.stated.set(key, strength);
+            quantities.stated.set(view.strength_key(FIRST), strength);
         }
         quantities.notes.push(note);
         quantities.start = Some(state);

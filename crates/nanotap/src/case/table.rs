@@ -42,7 +42,8 @@ pub struct Table {
 }
 
 impl Table {
-    /// Reads an instrument's file (`.ibw`, `.jpk-force`, `.nid`), or a CSV file: fields parted by commas, semicolons or tabs, the first line names the
+    /// Reads an instrument's file (`.ibw`, `.jpk-force`, `.nid`), or a CSV file: fields parted by
+    /// commas, semicolons or tabs, the first line names the
     /// columns, lines that begin with `#` are skipped.
     ///
     /// # Errors

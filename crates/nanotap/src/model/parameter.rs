@@ -67,7 +67,7 @@ pub enum Applies {
     Damper,
     /// With this contact law.
     Law(ContactLaw),
-    /// With this tone, 2 or 3, beside the first.
+    /// Where the drive has this further tone, 2 or 3.
     Tone(usize),
     /// Where it is not 0: a measured number of a mode.
     Measured,

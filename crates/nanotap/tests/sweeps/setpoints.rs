@@ -218,7 +218,7 @@ fn shifts_that_vary_are_those_of_each_alone() {
         let words = ["gap.tip=", &format!("drive.setpoint={setpoint}")].map(str::to_owned);
         Case::load(Some(file), &words, &Catalogue::shared()).unwrap()
     };
-    // The drive follows, and nothing is said of its strength.
+    // The strength of the drive follows from the amplitude: it is not among what is held.
     let held = at("1 kHz").held(&[Key::DriveSetpoint]);
     assert!(!held.contains_key("drive.amplitude"), "{held:?}");
     let options = SweepOptions {

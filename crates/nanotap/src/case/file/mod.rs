@@ -52,11 +52,7 @@ pub fn to_toml(case: &Cantilever) -> String {
         let (name, meaning) = (case.actuation.name(), case.actuation.meaning());
         let _ = writeln!(text, "actuation = \"{name}\"  # {meaning}");
     }
-    for (ratio, key) in case
-        .further_tones
-        .iter()
-        .zip([Key::Tone2Ratio, Key::Tone3Ratio])
-    {
+    for (ratio, key) in case.further_tones.iter().zip(Key::TONE_RATIOS) {
         let meaning = key.meaning();
         let _ = writeln!(text, "{key} = \"{ratio}\"  # {meaning}");
     }

@@ -336,7 +336,7 @@ fn cantilever(
         contact: law,
         actuation: word::<Actuation>(stated, Key::Actuation)?,
         cosine_term: word(stated, Key::CosineTerm)?,
-        further_tones: [Key::Tone2Ratio, Key::Tone3Ratio]
+        further_tones: Key::TONE_RATIOS
             .into_iter()
             .map_while(|key| match stated.get(key) {
                 Some(Value::Ratio(ratio)) => Some(*ratio),

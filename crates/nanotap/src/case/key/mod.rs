@@ -14,7 +14,7 @@ use serde::{Serialize, Serializer};
 use super::near_name::near_name;
 use super::quantity::Kind;
 use crate::model::contact::ContactLaw;
-use crate::model::drive_form::Actuation;
+use crate::model::drive_form::{Actuation, MAX_TONES};
 use crate::model::oscillator::OscillatorParameter;
 use crate::model::parameter::{Applies, Parameter, Unit};
 use crate::model::words::words;
@@ -467,6 +467,9 @@ impl Key {
         let section = Section::find(section).filter(|section| section.is_physical())?;
         section.key(name)
     }
+
+    /// The frequency of each further tone over that of the first, in a dimensionless case.
+    pub const TONE_RATIOS: [Self; MAX_TONES - 1] = [Self::Tone2Ratio, Self::Tone3Ratio];
 
     /// The reason why it cannot vary, if it cannot.
     pub fn cannot_vary(self) -> Option<&'static str> {

@@ -247,8 +247,8 @@ fn named(reader: Reader<'_>, error: PhysicalError) -> PhysicalError {
         fed.is_some() && fed == parameter
     };
     let of_tone = |key: &Key| {
-        FURTHER.iter().zip(2..).any(|(keys, number)| {
-            [keys.frequency, keys.ratio].contains(key) && error.key == format!("tone{number}_ratio")
+        FURTHER.iter().zip(Key::TONE_RATIOS).any(|(keys, ratio)| {
+            [keys.frequency, keys.ratio].contains(key) && error.key == ratio.name()
         })
     };
     let stated = Key::all().find(|key| (feeds(key) || of_tone(key)) && reader.has(*key));

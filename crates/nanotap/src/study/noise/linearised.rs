@@ -65,6 +65,13 @@ pub(super) struct LockIn {
     pub(super) time_constant: f64,
 }
 
+impl LockIn {
+    /// Its noise bandwidth.
+    pub(super) fn bandwidth(self) -> f64 {
+        0.25 / self.time_constant
+    }
+}
+
 /// One period of an orbit, linearised.
 pub(super) struct Linearised {
     /// What multiplies a disturbance of the state, and of the lock-in amplifier's two parts.

@@ -24,7 +24,7 @@ use crate::model::cantilever::Cantilever;
 use crate::model::galerkin::Galerkin;
 use crate::model::parameter::Parameter;
 use crate::model::{Model, beam::Modes};
-use crate::observe::{Derivative, ObservableSet, measure};
+use crate::observe::{Derivative, ObservableSet};
 use crate::study::orbit::{OrbitOptions, OrbitReport, OrbitStudy};
 use crate::study::request::options;
 use crate::study::value::Amount;
@@ -209,7 +209,8 @@ impl Study for NoiseStudy {
         };
         let tapping = thermal.reading(case, options.state.as_deref(), lock_in, control)?;
         let free = thermal.reading(&free(lever), None, lock_in, control)?;
-        let model = case.model()?;
+        let orbit = &tapping.orbit;
+        let held_rms = thermal.held_frequency_rms(lever, &tapping, lock_in, control)?;
         // A spring κ at the tip changes the free response by 1/(1 + κ χ).
         let frequency_rms = free.frequency_rms(thermal.delay(lever.omega), lock_in);
         let turn = thermal.compliance(lever.omega).im.abs() * scales.length / scales.force;
@@ -218,20 +219,20 @@ impl Study for NoiseStudy {
             time_constant,
             bandwidth: 0.25 / time_constant,
             thermal_rms: scales.length * thermal.tip_rms(),
-            period: tapping.period,
-            amplitude: scales.length * tapping.amplitude,
+            period: orbit.period,
+            amplitude: scales.length * orbit.observables.first_harmonic,
             amplitude_rms: scales.length * tapping.amplitude_rms,
-            phase: tapping.phase.to_degrees(),
+            phase: orbit.observables.phase,
             phase_rms: tapping.phase_rms.to_degrees(),
             frequency: scales.frequency * lever.omega,
-            frequency_rms: tapping.held_frequency_rms(lever, &model, lock_in)? / scales.time,
+            frequency_rms: held_rms / scales.time,
             free_amplitude_rms: scales.length * free.amplitude_rms,
             free_phase_rms: free.phase_rms.to_degrees(),
             free_frequency_rms: frequency_rms / scales.time,
             force_gradient_min: free.phase_rms / turn,
             saddle: saddle::nearest(
                 case,
-                (&tapping.state, tapping.period),
+                (&orbit.state, orbit.period),
                 &tapping.covariance,
                 scales.length,
                 control,
@@ -262,18 +263,13 @@ struct Thermal {
 
 /// What a lock-in amplifier reads.
 struct Reading {
-    period: usize,
-    amplitude: f64,
+    model: Model,
+    orbit: OrbitReport,
     amplitude_rms: f64,
     /// Radians.
-    phase: f64,
     phase_rms: f64,
-    /// State at drive phase 0.
-    state: Vec<f64>,
-    /// Covariance of its continuous entries.
+    /// Covariance of the continuous entries of the state.
     covariance: DMatrix<f64>,
-    /// Spectral densities of the amplitude and the phase at low frequencies.
-    slow_densities: Matrix2<f64>,
     spectrum: ReadingSpectrum,
 }
 
@@ -283,11 +279,12 @@ impl Reading {
     /// so that the noise is white over the bandwidth (Albrecht et al., J. Appl. Phys. 69, 668, 1991).
     fn frequency_rms(&self, delay: f64, lock_in: LockIn) -> f64 {
         let density = self.spectrum.phase.first().copied().unwrap_or(f64::NAN);
-        let bandwidth = 0.25 / lock_in.time_constant;
-        let phase = (density * bandwidth).sqrt().to_radians();
+        let phase = (density * lock_in.bandwidth()).sqrt().to_radians();
         phase / (delay.abs() * std::f64::consts::TAU)
     }
+}
 
+impl Thermal {
     /// Noise of the drive frequency under loops that hold the amplitude and the phase by the frequency
     /// and the strength of the drive: by what they undo at low frequencies, the derivatives of the
     /// orbit by both. It is white over the bandwidth up to 1/Q, since noise and loops act on the
@@ -295,15 +292,15 @@ impl Reading {
     fn held_frequency_rms(
         &self,
         lever: &Cantilever,
-        model: &Model,
+        Reading { model, orbit, .. }: &Reading,
         lock_in: LockIn,
+        control: &Control<'_>,
     ) -> Result<f64, Error> {
         let set = ObservableSet::FIRST_HARMONIC;
-        let at = (self.state.as_slice(), self.period);
-        let observed = measure(model, &self.state, self.period, set)?;
+        let at = (orbit.state.as_slice(), orbit.period);
         let keys = [Parameter::Omega, Parameter::Alpha2].map(Key::of);
         let case = Case::from(lever.clone());
-        let changes = Derivative::of_keys(&case, model, &keys, at, &observed, set)?;
+        let changes = Derivative::of_keys(&case, model, &keys, at, &orbit.observables, set)?;
         // Of the amplitude, and of the phase in degrees.
         let units = [1.0, 1.0_f64.to_radians()];
         let change = |row: usize, column: usize| {
@@ -313,13 +310,11 @@ impl Reading {
         };
         let undone = Matrix2::from_fn(change).try_inverse();
         let undone = undone.unwrap_or_else(|| Matrix2::repeat(f64::NAN));
-        let density = (undone * self.slow_densities * undone.transpose())[(0, 0)];
-        let bandwidth = 0.25 / lock_in.time_constant;
-        Ok((density * bandwidth).sqrt() / std::f64::consts::TAU)
+        let densities = self.slow_densities(model, orbit, control)?;
+        let density = (undone * densities * undone.transpose())[(0, 0)];
+        Ok((density * lock_in.bandwidth()).sqrt() / std::f64::consts::TAU)
     }
-}
 
-impl Thermal {
     /// Root mean square of the deflection by equipartition, √(k_B T φᵀ K⁻¹ φ).
     fn tip_rms(&self) -> f64 {
         let compliance = self.equations.stiffness[0].clone().lu().solve(&self.tip);
@@ -380,8 +375,7 @@ impl Thermal {
                 "the orbit at this working point is unstable: noise drives the lever away from it",
             ));
         }
-        let model = case.model()?;
-        self.reading_at(&model, &orbit, lock_in, control)
+        self.reading_at(case.model()?, orbit, lock_in, control)
     }
 
     /// Spectral densities of the amplitude and the phase at low frequencies, as a slow lock-in amplifier
@@ -407,12 +401,12 @@ impl Thermal {
 
     fn reading_at(
         &self,
-        model: &Model,
-        orbit: &OrbitReport,
+        model: Model,
+        orbit: OrbitReport,
         lock_in: LockIn,
         control: &Control<'_>,
     ) -> Result<Reading, Error> {
-        let found = Linearised::along(model, orbit, self, lock_in, control)?;
+        let found = Linearised::along(&model, &orbit, self, lock_in, control)?;
         let covariance = found.stationary()?;
         let last = covariance.nrows() - 2;
         let read = found.read;
@@ -424,15 +418,12 @@ impl Thermal {
         let block = covariance.view((last, last), (2, 2));
         let deviation = |way: &DVector<f64>| way.dot(&(block * way)).max(0.0).sqrt();
         Ok(Reading {
-            period: orbit.period,
-            amplitude,
             amplitude_rms: deviation(&along),
-            phase: orbit.observables.phase.to_radians(),
             phase_rms: deviation(&across) / amplitude,
-            state: orbit.state.clone(),
             covariance: covariance.view((0, 0), (last, last)).clone_owned(),
-            slow_densities: self.slow_densities(model, orbit, control)?,
             spectrum: found.spectrum([&along, &across], amplitude, lock_in)?,
+            model,
+            orbit,
         })
     }
 }

@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use nanotap_flow::Trajectory;
 use nanotap_proof::{Candidate, Interval, ProofError, Stability, Switch, System, Theorem, prove};
 
-use crate::case::Case;
+use crate::case::{Case, Key};
 use crate::model::cantilever::{Cantilever, CosineTerm};
 use crate::model::contact::ContactLaw;
 use crate::model::drive_form::Actuation;
@@ -119,8 +119,8 @@ fn about(case: &Cantilever) -> String {
         .map(|parameter| format!("{} = {}", parameter.name(), shortest(case.get(parameter))))
         .collect();
     let mut text = format!("N = {}, {}", case.modes, numbers.join(", "));
-    for (k, ratio) in case.further_tones.iter().enumerate() {
-        let _ = write!(text, ", tone{}_ratio = {ratio}", k + 2);
+    for (ratio, key) in case.further_tones.iter().zip(Key::TONE_RATIOS) {
+        let _ = write!(text, ", {} = {ratio}", key.name());
     }
     if case.contact != ContactLaw::default() {
         let _ = write!(text, ", contact = {}", case.contact);

@@ -204,6 +204,15 @@ export function alive(element, { views, tell, go, zoom, redrawn }) {
     see(to.panel, side("x", to.u), side("y", to.v));
   };
   const spread = () => { const [a, b] = [...fingers.values()]; return { size: Math.hypot(a.x - b.x, a.y - b.y), x: (a.x + b.x) / 2, y: (a.y + b.y) / 2 }; };
+  // A figure that is painted again meanwhile has new panels: their number says which one it is.
+  const drag = (event) => {
+    const next = here(event);
+    if (!pressed || next?.panel.index !== pressed.place.panel.index) return;
+    if (Math.hypot(event.clientX - pressed.x, event.clientY - pressed.y) <= DRAG) return;
+    const { panel, u, v } = pressed.place;
+    element.zone = [panel.left + u * panel.width, panel.top + (1 - v) * panel.height, (next.u - u) * panel.width, (v - next.v) * panel.height];
+    pressed.to = next;
+  };
   element.addEventListener("pointerdown", (event) => {
     swallow = false;
     if (event.pointerType === "touch") {
@@ -222,15 +231,11 @@ export function alive(element, { views, tell, go, zoom, redrawn }) {
       }
       return;
     }
-    const next = here(event);
-    if (pressed && next?.panel === pressed.place.panel && Math.hypot(event.clientX - pressed.x, event.clientY - pressed.y) > DRAG) {
-      const { panel, u, v } = pressed.place;
-      element.zone = [panel.left + u * panel.width, panel.top + (1 - v) * panel.height, (next.u - u) * panel.width, (v - next.v) * panel.height];
-      pressed.to = next;
-    }
-    move(next);
+    drag(event);
+    move(here(event));
   });
-  element.addEventListener("pointerup", () => {
+  element.addEventListener("pointerup", (event) => {
+    drag(event);
     element.zone = null;
     if (pressed?.to) {
       swallow = true;

@@ -25,8 +25,8 @@ use crate::{file, motion, number, progress, style};
 /// Fit parameters of lever and sample to measured curves.
 #[derive(Args, Debug)]
 pub(crate) struct Arguments {
-    /// The measured curve (CSV), its columns named as in `distance (nm)`, `amplitude (nm)`,
-    /// `phase (deg)`
+    /// The measured curve (CSV, .ibw, .jpk-force or .nid), its columns named as in `distance (nm)`,
+    /// `amplitude (nm)`, `phase (deg)`
     #[arg(value_name = "DATA")]
     data: PathBuf,
 

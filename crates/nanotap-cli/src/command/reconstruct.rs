@@ -25,8 +25,8 @@ const SHOWN: usize = 15;
 /// Force and dissipation against distance from a measured curve.
 #[derive(Args, Debug)]
 pub(crate) struct Arguments {
-    /// The measured curve (CSV), its columns named as in `distance (nm)`, `amplitude (nm)`,
-    /// `phase (deg)`, or `frequency_shift (Hz)`
+    /// The measured curve (CSV, .ibw, .jpk-force or .nid), its columns named as in `distance (nm)`,
+    /// `amplitude (nm)`, `phase (deg)`, or `frequency_shift (Hz)`
     #[arg(value_name = "DATA")]
     data: PathBuf,
 

@@ -10,6 +10,7 @@ mod bimodal;
 mod branches;
 mod extremes;
 mod fit;
+mod force_curve_fit;
 mod identities;
 mod levers;
 mod modes_that_matter;

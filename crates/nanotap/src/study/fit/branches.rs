@@ -309,8 +309,9 @@ pub(super) fn newton_continuation(
 type Reached = (f64, Option<(usize, usize)>);
 
 /// The branch of each row: the path of lowest cost, with a penalty of `price` for each change of
-/// branch. `costs` has one entry per candidate. `None` where a row has no orbit.
-pub(super) fn path(rows: &Rows, costs: &[Vec<f64>], price: f64) -> Vec<Option<usize>> {
+/// branch. `rows` are the branches of the candidates of each row, `costs` has one entry per
+/// candidate. `None` where a row has no candidate.
+pub(super) fn path(rows: &[Vec<usize>], costs: &[Vec<f64>], price: f64) -> Vec<Option<usize>> {
     let mut best: Vec<Vec<Reached>> = Vec::new();
     let mut last: Option<usize> = None;
     for (row, candidates) in rows.iter().enumerate() {
@@ -321,11 +322,7 @@ pub(super) fn path(rows: &Rows, costs: &[Vec<f64>], price: f64) -> Vec<Option<us
             let steps = rows[before].iter().zip(&best[before]).enumerate();
             let (cost, from) = steps
                 .map(|(k, (other, (sum, _)))| {
-                    let change = if other.branch == candidate.branch {
-                        0.0
-                    } else {
-                        price
-                    };
+                    let change = if other == candidate { 0.0 } else { price };
                     (sum + change, k)
                 })
                 .min_by(|a, b| a.0.total_cmp(&b.0))
@@ -353,18 +350,17 @@ pub(super) fn path(rows: &Rows, costs: &[Vec<f64>], price: f64) -> Vec<Option<us
 }
 
 /// Removes the last row before and the first row after each change of branch from the other branch,
-/// if it is assigned to that branch only because its own has no orbit there. With slightly wrong
+/// if it is assigned to that branch only because its own has none there. With slightly wrong
 /// parameters a branch ends too early, and a row assigned to the other branch would bias the fit.
 /// `costs` as in [`path`]; `max_noise_cost` is more than the cost of noise.
 pub(super) fn release_branch_ends(
-    rows: &Rows,
+    rows: &[Vec<usize>],
     costs: &[Vec<f64>],
     max_noise_cost: f64,
     chosen: &mut [Option<usize>],
 ) {
-    let branch = |chosen: &[Option<usize>], row: usize| {
-        chosen[row].map(|candidate| rows[row][candidate].branch)
-    };
+    let branch =
+        |chosen: &[Option<usize>], row: usize| chosen[row].map(|candidate| rows[row][candidate]);
     let before = chosen.to_vec();
     for row in 1..before.len() {
         let (a, b) = (branch(&before, row - 1), branch(&before, row));
@@ -375,7 +371,7 @@ pub(super) fn release_branch_ends(
         for (here, other) in [(row - 1, b), (row, a)] {
             let is_dear =
                 before[here].is_some_and(|candidate| costs[here][candidate] > max_noise_cost);
-            let has_other = rows[here].iter().any(|candidate| candidate.branch == other);
+            let has_other = rows[here].contains(&other);
             if is_dear && !has_other {
                 chosen[here] = None;
             }

@@ -109,6 +109,13 @@ impl Data {
             .any(|column| column.quantity.modulated().is_some())
     }
 
+    /// True if the data are force curves: the lever is at rest at every row.
+    pub fn is_force_curve(&self) -> bool {
+        self.columns
+            .iter()
+            .any(|column| column.quantity.rest().is_some())
+    }
+
     /// The rows of all curves, curve by curve.
     pub fn rows(&self) -> impl Iterator<Item = &Row> {
         self.curves.iter().flat_map(|curve| &curve.rows)
@@ -158,7 +165,42 @@ impl Data {
             ));
         }
         data.finish();
+        if data.is_force_curve() {
+            data.check_force_curve(case)?;
+        }
         Ok(data)
+    }
+
+    fn check_force_curve(&self, case: &Case) -> Result<(), Error> {
+        if !case.is_physical() {
+            return Err(Error::input(
+                format!("{}: a force curve needs physical quantities", case.title()),
+                "state the lever in [cantilever] and [sample], with units",
+            ));
+        }
+        let other = self.columns.iter().find(|c| c.quantity.rest().is_none());
+        if let Some(other) = other {
+            return Err(Error::option(
+                "data",
+                format!(
+                    "`{}` cannot be combined with a force curve, whose lever is at rest",
+                    other.name
+                ),
+                "select {columns}: deflection, or those of the oscillation",
+            ));
+        }
+        let further = self.swept.iter().find(|swept| !is_distance(swept.key));
+        if let Some(further) = further {
+            return Err(Error::option(
+                "data",
+                format!(
+                    "`{}`: the rows of a force curve differ in their distance alone",
+                    further.name
+                ),
+                "leave the column out with {columns}, and state it in the case",
+            ));
+        }
+        Ok(())
     }
 
     fn add(&mut self, case: &Case, table: &Table, only: &[String]) -> Result<(), Error> {
@@ -574,7 +616,15 @@ pub(super) fn set(name: &str, case: &Case) -> Result<Key, Error> {
         _ => {}
     }
     case.key(name).map_err(|error| {
-        let words = ["distance", "frequency", "amplitude", "direction", "curve"];
+        let words = [
+            "distance",
+            "frequency",
+            "amplitude",
+            "deflection",
+            "force",
+            "direction",
+            "curve",
+        ];
         let observables = OBSERVABLES.iter().filter(|o| o.is_number);
         let names = words.into_iter().chain(observables.map(|o| o.name));
         let names: Vec<&str> = names.collect();

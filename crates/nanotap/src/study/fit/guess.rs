@@ -7,6 +7,7 @@
 
 use rayon::prelude::*;
 
+use super::baseline::begin_from_baseline;
 use super::data::{Curve, Data, Row, is_distance};
 use super::instrument::{self, far_rows, median, tapping_line, wrapped};
 use super::parameters::{Parameter, Target};
@@ -101,6 +102,9 @@ impl Search<'_> {
 
     /// These values with the best offset of the distance.
     pub(super) fn with_best_offset(&self, x: &[f64]) -> Option<Vec<f64>> {
+        if self.problem.data.is_force_curve() {
+            return Some(self.aligned(x));
+        }
         let scan = self.scan()?;
         let (_, of, _) = self.best_offset((scan.curve, scan.offset), x, &scan.offsets)?;
         Some(with(x, scan.offset, of))
@@ -108,6 +112,9 @@ impl Search<'_> {
 
     /// Better first values than `own`, if the scan finds some.
     pub(super) fn scanned(&self, own: &[f64]) -> Option<Vec<f64>> {
+        if self.problem.data.is_force_curve() {
+            return self.scanned_rests(own);
+        }
         let Scan {
             curve,
             offset,
@@ -255,6 +262,9 @@ pub(super) fn begin_from_free_rows(
     data: &Data,
     parameters: &mut [Parameter],
 ) -> Option<String> {
+    if data.is_force_curve() {
+        return begin_from_baseline(data, parameters);
+    }
     let column = |name: &str| data.columns.iter().position(|c| c.quantity.name() == name);
     let amplitude = column("first_harmonic").filter(|_| is_distance(data.swept[0].key))?;
     let phase = column("phase");
@@ -306,7 +316,7 @@ pub(super) fn begin_from_free_rows(
 }
 
 /// Parameters of which one has another value.
-fn with(x: &[f64], index: usize, value: f64) -> Vec<f64> {
+pub(super) fn with(x: &[f64], index: usize, value: f64) -> Vec<f64> {
     let mut x = x.to_vec();
     x[index] = value;
     x

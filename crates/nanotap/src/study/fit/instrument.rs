@@ -7,6 +7,7 @@
 use nanotap_arithmetic::ComplexFunctions as _;
 
 use crate::Error;
+use crate::case::physical::Kind;
 use crate::case::physical::free_response::free_response;
 use crate::case::table::{Entry, Header, Table};
 use crate::case::{Case, Key};
@@ -17,7 +18,7 @@ use super::quantity::Quantity;
 
 /// Names of instruments' columns, in lower case without blanks, and what they are called here. Of
 /// several with the same meaning the first counts.
-const NAMES: [(&str, &str); 27] = [
+const NAMES: [(&str, &str); 33] = [
     ("amp", "amplitude"),
     ("amp1", "amplitude"),
     ("amplitude1", "amplitude"),
@@ -45,7 +46,15 @@ const NAMES: [(&str, &str); 27] = [
     ("df", "frequency_shift"),
     ("freqshift", "frequency_shift"),
     ("frequencyshift", "frequency_shift"),
+    ("defl", "deflection"),
+    ("deflsensor", "deflection"),
+    ("verticaldeflection", "deflection"),
+    ("vdeflection", "deflection"),
+    ("cantileverdeflection", "deflection"),
+    ("tipdeflection", "deflection"),
 ];
+/// Columns that a force curve does not need.
+const OF_FORCE_CURVE: [&str; 3] = ["separation", "time", "contact"];
 
 /// The free phase is the instrument's own where it is this far from the lever's, in degrees.
 const OWN_PHASE: f64 = 15.0;
@@ -122,10 +131,14 @@ pub(crate) fn prepared(
     for (table, stated) in tables.iter_mut().zip(stated) {
         let foreign = rename(table, &mut columns, &mut notes) || stated.any;
         from_header(case, table, &mut notes);
+        if is_force_curve(table) {
+            force_curve(case, table, &columns, &mut notes)?;
+        }
         if foreign {
             leave_out(case, table, &columns, &mut notes);
         }
         guessed_phase |= guess(case, table, foreign, stated, &mut notes)?;
+        guess_force_curve(case, table, stated, &mut notes);
     }
     Ok(Prepared {
         tables,
@@ -348,7 +361,13 @@ fn rename(table: &mut Table, columns: &mut [String], notes: &mut Vec<String>) ->
         let plain = |written: &str| called(written).to_lowercase().replace([' ', '_'], "");
         let is_known = |(written, _): &(String, Vec<Entry>)| called(written).to_lowercase() == name;
         let place = table.columns.iter().position(|(w, _)| plain(w) == own);
-        let Some(place) = place.filter(|_| !table.columns.iter().any(is_known)) else {
+        // The separation of a force curve is the distance and the deflection.
+        let is_other = match (own, name) {
+            ("separation", _) => is_force_curve(table) && !oscillates(table),
+            (_, "deflection") => oscillates(table),
+            _ => false,
+        };
+        let Some(place) = place.filter(|_| !is_other && !table.columns.iter().any(is_known)) else {
             continue;
         };
         let header = Header::of(&table.columns[place].0);
@@ -363,7 +382,7 @@ fn rename(table: &mut Table, columns: &mut [String], notes: &mut Vec<String>) ->
 }
 
 /// Sensitivities by the column that they convert from V, in the file's header, in m/V.
-const SENSITIVITIES: [(&str, &str); 1] = [("amplitude", "AmpInvOLS")];
+const SENSITIVITIES: [(&str, &str); 2] = [("deflection", "InvOLS"), ("amplitude", "AmpInvOLS")];
 /// A property of the lever in the header that differs from the case's by more than this part is
 /// reported.
 const OTHER_LEVER: f64 = 0.02;
@@ -428,6 +447,199 @@ fn place_of(table: &Table, names: &[&str]) -> Option<usize> {
     table.columns.iter().position(is)
 }
 
+/// Whether a column is a quantity of an oscillation.
+fn oscillates(table: &Table) -> bool {
+    table.columns.iter().any(|(written, _)| {
+        let quantity = Quantity::named(&Header::of(written).name, true);
+        quantity.is_some_and(|quantity| quantity.rest().is_none())
+    })
+}
+
+/// Whether a column is a quantity of a force curve, or an instrument's name of one.
+fn is_force_curve(table: &Table) -> bool {
+    let names = NAMES.iter().filter(|(_, name)| *name == "deflection");
+    let own: Vec<&str> = names
+        .map(|(own, _)| *own)
+        .chain(["deflection", "force"])
+        .collect();
+    let plain = |written: &str| {
+        Header::of(written)
+            .name
+            .to_lowercase()
+            .replace([' ', '_'], "")
+    };
+    table
+        .columns
+        .iter()
+        .any(|(w, _)| own.contains(&plain(w).as_str()))
+}
+
+/// The numbers of a column; `None` if it has other entries.
+fn numbers(table: &Table, place: usize) -> Option<Vec<f64>> {
+    let entries = table.columns[place].1.iter();
+    entries
+        .map(|entry| match entry {
+            Entry::Number(x) if x.is_finite() => Some(*x),
+            _ => None,
+        })
+        .collect()
+}
+
+/// Leaves out the columns that a force curve does not need, and of an oscillating lever its
+/// deflection, if no selection was made; a separation without a distance becomes one.
+fn force_curve(
+    case: &Case,
+    table: &mut Table,
+    columns: &[String],
+    notes: &mut Vec<String>,
+) -> Result<(), Error> {
+    let remove = |table: &mut Table, names: &[&str]| {
+        table.columns.retain(|(written, _)| {
+            let name = Header::of(written).name.to_lowercase();
+            !names.contains(&name.strip_suffix(" error").unwrap_or(&name).trim())
+        });
+    };
+    if columns.is_empty() && oscillates(table) {
+        remove(table, &["deflection", "force"]);
+        remove(table, &OF_FORCE_CURVE);
+        notes.push(format!(
+            "{}: the deflection is left out: the columns of the oscillation are fitted",
+            table.name
+        ));
+        return Ok(());
+    }
+    if place_of(table, &["distance", "zc", "gap", "gap.tip"]).is_none() {
+        distance_of_separation(case, table, notes)?;
+    }
+    if columns.is_empty() {
+        remove(table, &OF_FORCE_CURVE);
+        if place_of(table, &["deflection"]).is_some() {
+            remove(table, &["force"]);
+        }
+    }
+    Ok(())
+}
+
+/// The distance as the separation without the deflection: an instrument computes the separation
+/// from both, with the stiffness of the lever if it gives the force alone.
+fn distance_of_separation(
+    case: &Case,
+    table: &mut Table,
+    notes: &mut Vec<String>,
+) -> Result<(), Error> {
+    let place = |name: &str| place_of(table, &[name]);
+    let (Some(separation), Some(of)) = (
+        place("separation"),
+        place("deflection").or_else(|| place("force")),
+    ) else {
+        return Ok(());
+    };
+    let size = |place: usize, kind: Kind| {
+        let unit = Header::of(&table.columns[place].0).unit;
+        let size = kind.parse(&format!("1 {unit}"));
+        size.map_err(|error| {
+            Error::input(
+                format!("{}: {error}", table.place(None, place)),
+                "name it as in `separation (nm)`, `deflection (nm)`, `force (nN)`",
+            )
+        })
+    };
+    let is_force = Header::of(&table.columns[of].0)
+        .name
+        .eq_ignore_ascii_case("force");
+    let (by_value, how) = if is_force {
+        let stiffness = case.get(Key::LeverK);
+        (size(of, Kind::Force)? / stiffness, "force / cantilever.k")
+    } else {
+        (size(of, Kind::Length)?, "deflection")
+    };
+    let factor = by_value / size(separation, Kind::Length)?;
+    let unit = Header::of(&table.columns[separation].0).unit;
+    let values = table.columns[of].1.clone();
+    for (entry, value) in table.columns[separation].1.iter_mut().zip(values) {
+        *entry = match (&entry, value) {
+            (Entry::Number(s), Entry::Number(v)) => Entry::Number(s - factor * v),
+            _ => Entry::Missing,
+        };
+    }
+    table.columns[separation].0 = written("distance", &unit);
+    notes.push(format!(
+        "{}: the distance is taken as separation - {how}",
+        table.name
+    ));
+    Ok(())
+}
+
+/// Direction of the distance of a force curve, and where it turns.
+fn guess_force_curve(case: &Case, table: &mut Table, stated: Stated, notes: &mut Vec<String>) {
+    let places = (
+        place_of(table, &["distance", "zc", "gap"]),
+        place_of(table, &["deflection", "force"]),
+    );
+    let ((Some(place), Some(of)), false) = (places, oscillates(table)) else {
+        return;
+    };
+    let known = (numbers(table, place), numbers(table, of));
+    let (Some(mut distance), Some(values)) = known else {
+        return;
+    };
+    let places = Places {
+        distance: place,
+        amplitude: of,
+        phase: of,
+    };
+    if distance.len() < MIN_ROWS || !is_curve(case, table, &places) {
+        return;
+    }
+    if !stated.direction && bends_far(&distance, &values) {
+        for z in &mut distance {
+            *z = -*z;
+        }
+        table.columns[place].1 = distance.iter().copied().map(Entry::Number).collect();
+        notes.push(format!(
+            "{}: the distance is counted the other way, so that the lever is free where it is large",
+            table.name
+        ));
+    }
+    add_direction(table, &distance, notes);
+}
+
+/// Whether a force curve changes more where the distance is large than where it is small.
+fn bends_far(distance: &[f64], values: &[f64]) -> bool {
+    let sorted = by_distance(distance);
+    let part = (distance.len() / 12).clamp(3, distance.len() / 4);
+    let level = |from: usize| {
+        median(
+            sorted[from..from + part]
+                .iter()
+                .map(|k| values[*k])
+                .collect(),
+        )
+    };
+    let last = sorted.len() - part;
+    let near = (level(0) - level(part)).abs();
+    (level(last) - level(last - part)).abs() > near
+}
+
+/// Approach and retract as a column, if there is none and the distance turns.
+fn add_direction(table: &mut Table, distance: &[f64], notes: &mut Vec<String>) {
+    let has_direction = place_of(table, &["direction", "way"]).is_some();
+    if !has_direction && let Some(turn) = turning_point(distance) {
+        let direction = |from: usize, to: usize| {
+            let falls = distance[to - 1] < distance[from];
+            Entry::Text(if falls { "approach" } else { "retract" }.to_owned())
+        };
+        let (first, second) = (direction(0, turn), direction(turn, distance.len()));
+        let column = (0..distance.len()).map(|k| if k < turn { &first } else { &second });
+        let column = column.cloned().collect();
+        table.columns.push(("direction".to_owned(), column));
+        notes.push(format!(
+            "{}: approach and retract part at row {turn}",
+            table.name
+        ));
+    }
+}
+
 /// The columns of amplitude curves that guesses change.
 struct Places {
     distance: usize,
@@ -456,16 +668,8 @@ fn guess(
     let Some(places) = places(table).filter(|places| is_curve(case, table, places)) else {
         return Ok(false);
     };
-    let numbers = |place: usize| -> Option<Vec<f64>> {
-        let entries = table.columns[place].1.iter();
-        entries
-            .map(|entry| match entry {
-                Entry::Number(x) if x.is_finite() => Some(*x),
-                _ => None,
-            })
-            .collect()
-    };
-    let all = [places.distance, places.amplitude, places.phase].map(numbers);
+    let all = [places.distance, places.amplitude, places.phase];
+    let all = all.map(|place| numbers(table, place));
     let [Some(mut distance), Some(mut amplitude), Some(mut phase)] = all else {
         return Ok(false);
     };
@@ -556,23 +760,9 @@ fn guess(
     ] {
         table.columns[place].1 = values.iter().copied().map(Entry::Number).collect();
     }
-    let has_direction = table
-        .columns
-        .iter()
-        .any(|(written, _)| matches!(Header::of(written).name.as_str(), "direction" | "way"));
-    if !has_direction && let Some(turn) = turning_point(&distance) {
-        let direction = |from: usize, to: usize| {
-            let falls = distance[to - 1] < distance[from];
-            Entry::Text(if falls { "approach" } else { "retract" }.to_owned())
-        };
-        let (first, second) = (direction(0, turn), direction(turn, distance.len()));
-        let column = (0..distance.len()).map(|k| if k < turn { &first } else { &second });
-        let column = column.cloned().collect();
-        table.columns.push(("direction".to_owned(), column));
-        notes.push(format!("approach and retract part at row {turn}"));
-    }
     let place = |note: String| format!("{}: {note}", table.name);
     remarks.extend(notes.into_iter().map(place));
+    add_direction(table, &distance, remarks);
     Ok(guessed_phase)
 }
 
@@ -621,6 +811,8 @@ fn by_distance(distance: &[f64]) -> Vec<usize> {
 struct Free {
     amplitude: f64,
     rows: Vec<usize>,
+    /// The rows after them that may be free.
+    doubtful: Vec<usize>,
 }
 
 impl Free {
@@ -639,19 +831,28 @@ fn free_rows(distance: &[f64], amplitude: &[f64]) -> Free {
     let level = median(sorted[..end].iter().map(|k| amplitude[*k]).collect());
     let leaves = |k: &usize| (amplitude[*k] / level - 1.0).abs() > 0.02;
     let free = sorted.iter().position(leaves).unwrap_or(sorted.len());
-    sorted.truncate((free * 4 / 5).max(3));
+    sorted.truncate(free.max(3));
+    // The last ones may feel the sample already.
+    let doubtful = sorted.split_off((free * 4 / 5).max(3));
     Free {
         amplitude: level,
         rows: sorted,
+        doubtful,
     }
 }
 
 /// The farthest rows, whose amplitude is free, the farthest first.
 pub(super) fn far_rows(distance: &[f64], amplitude: &[f64]) -> Vec<usize> {
+    far_and_doubtful_rows(distance, amplitude)[0].clone()
+}
+
+/// The same, and the rows after them that may be free.
+pub(super) fn far_and_doubtful_rows(distance: &[f64], amplitude: &[f64]) -> [Vec<usize>; 2] {
     if amplitude.len() < MIN_ROWS || amplitude.iter().any(|a| !a.is_finite()) {
-        return Vec::new();
+        return [Vec::new(), Vec::new()];
     }
-    free_rows(distance, amplitude).rows
+    let free = free_rows(distance, amplitude);
+    [free.rows, free.doubtful]
 }
 
 /// How far the phase of deep rows lies from the free phase `own`, in degrees.

@@ -16,9 +16,13 @@
 //! A curve under frequency modulation consists of orbits with given amplitude and phase; frequency
 //! and strength of the drive are unknowns (`problem/held.rs`).
 //!
+//! A force curve is one of rests of the lever: neither its drive nor its motion counts
+//! (`problem/rest.rs`).
+//!
 //! Fails by stopping in a local minimum (`fits` is false then, as a warning), and where the data
 //! belong to a motion that is not periodic.
 
+mod baseline;
 mod branches;
 mod data;
 mod guess;
@@ -194,7 +198,8 @@ fn fit_one(case: &Case, request: &FitOptions, control: &Control<'_>) -> Result<F
             let knows_way = search.problem.data.rows().any(|row| row.way.is_some());
             let swept = search.problem.data.swept.first();
             let by_distance = swept.is_some_and(|swept| data::is_distance(swept.key));
-            Ok((search.run()?, knows_way || !by_distance))
+            let is_rest = search.problem.data.is_force_curve();
+            Ok((search.run()?, knows_way || !by_distance || is_rest))
         })
     };
     let (found, is_known) = run(request)?;
@@ -277,6 +282,9 @@ fn with_search<R>(
     preparation.extend(corrected);
     data.add_free_scatter();
     preparation.extend(data.average(request.rows));
+    if data.is_force_curve() {
+        preparation.extend(baseline::assumptions(&case, &data)?);
+    }
     let mut parameters = parameters(&case, &data, &free, &per_curve, &request.bounds)?;
     begin(&case, &data, &mut parameters, &starts)?;
     preparation.extend(begin_from_free_rows(&case, &data, &mut parameters));

@@ -1,5 +1,5 @@
-//! The quantity in a column of measured values: an observable of the motion, or a reading of a
-//! frequency modulation loop.
+//! The quantity in a column of measured values: an observable of the motion, a reading of a
+//! frequency modulation loop, or a reading of a force curve.
 
 use crate::case::physical::Kind;
 use crate::observe::{Dimension, OBSERVABLES, Observable};
@@ -12,6 +12,17 @@ pub enum Quantity {
     Observed(&'static Observable),
     /// A reading of frequency modulation.
     Modulated(&'static ModulatedColumn),
+    /// A reading of a force curve.
+    Rest(RestQuantity),
+}
+
+/// What is read of a lever at rest.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum RestQuantity {
+    /// Deflection of the tip away from the sample.
+    Deflection,
+    /// Force of the sample on the tip, positive if it repels.
+    Force,
 }
 
 /// Quantities that an instrument under frequency modulation records; the other columns of the study
@@ -36,10 +47,16 @@ impl Quantity {
         let modulated = COLUMNS
             .iter()
             .find(|c| c.name == lower && RECORDED.contains(&c.name));
+        let rest = match lower.as_str() {
+            "deflection" => Some(RestQuantity::Deflection),
+            "force" => Some(RestQuantity::Force),
+            _ => None,
+        };
         let exact = numbers().find(|o| o.name == name || o.si_name == name);
         let observed = exact.or_else(|| numbers().find(|o| o.name == lower));
         modulated
             .map(Self::Modulated)
+            .or_else(|| rest.map(Self::Rest))
             .or_else(|| observed.map(Self::Observed))
     }
 
@@ -48,6 +65,8 @@ impl Quantity {
         match self {
             Self::Observed(observable) => observable.name,
             Self::Modulated(column) => column.name,
+            Self::Rest(RestQuantity::Deflection) => "deflection",
+            Self::Rest(RestQuantity::Force) => "force",
         }
     }
 
@@ -55,7 +74,7 @@ impl Quantity {
     pub(super) const fn si_name(self) -> &'static str {
         match self {
             Self::Observed(observable) => observable.si_name,
-            Self::Modulated(column) => column.name,
+            Self::Modulated(_) | Self::Rest(_) => self.name(),
         }
     }
 
@@ -63,15 +82,23 @@ impl Quantity {
     pub const fn observable(self) -> Option<&'static Observable> {
         match self {
             Self::Observed(observable) => Some(observable),
-            Self::Modulated(_) => None,
+            Self::Modulated(_) | Self::Rest(_) => None,
         }
     }
 
     /// The reading of frequency modulation, if it is one.
     pub const fn modulated(self) -> Option<&'static ModulatedColumn> {
         match self {
-            Self::Observed(_) => None,
             Self::Modulated(column) => Some(column),
+            Self::Observed(_) | Self::Rest(_) => None,
+        }
+    }
+
+    /// The reading of a force curve, if it is one.
+    pub const fn rest(self) -> Option<RestQuantity> {
+        match self {
+            Self::Rest(quantity) => Some(quantity),
+            Self::Observed(_) | Self::Modulated(_) => None,
         }
     }
 
@@ -86,6 +113,8 @@ impl Quantity {
         match self {
             Self::Observed(observable) => observable.dimension.kind(),
             Self::Modulated(column) => column.kind,
+            Self::Rest(RestQuantity::Deflection) => Some(Kind::Length),
+            Self::Rest(RestQuantity::Force) => Some(Kind::Force),
         }
     }
 
@@ -94,8 +123,8 @@ impl Quantity {
         match (self, self.kind()) {
             (Self::Observed(o), Some(_)) if !physical => o.dimension.model_unit(),
             (Self::Observed(o), _) => o.dimension.si_unit(),
-            (Self::Modulated(_), Some(kind)) if physical => kind.si_unit(),
-            (Self::Modulated(_), _) => "1",
+            (_, Some(kind)) if physical => kind.si_unit(),
+            _ => "1",
         }
     }
 }

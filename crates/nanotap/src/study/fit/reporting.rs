@@ -25,10 +25,10 @@ use super::statistics::{self, Information, Sequences, information, student};
 const MIN_REDUCTION: f64 = 0.1;
 /// Largest number of times that a fit continues from a lower chi2 of its profile.
 const MAX_CONTINUATIONS: usize = 4;
-/// Level of the tests whether the residuals are noise, all together.
+/// Level of the tests whether the residuals are noise: of their size, which is the only one that
+/// sees much in few rows, and of their signs.
 const LEVEL: f64 = 0.01;
-/// Number of these tests: of their size and of their signs.
-const TESTS: f64 = 2.0;
+const LEVEL_OF_SIGNS: f64 = 0.005;
 /// Chance up to which the size of a column's residuals is named.
 const LARGER: f64 = 0.05;
 /// Fewest neighbouring rows whose residuals are tested for their signs.
@@ -41,6 +41,8 @@ const MAX_LISTED_ROWS: usize = 8;
 /// Standard errors from the end of the model's branch beyond which a jump contradicts the model. Its
 /// place is between two rows, less than two of them from the middle.
 const MAX_JUMP: f64 = 5.0;
+/// So many rows of a force curve may lie beyond the end of their branch, which noise moves.
+const MAX_ENDED: usize = 2;
 
 impl Search<'_> {
     /// The problem with the standard errors and the jumps of a result.
@@ -269,14 +271,13 @@ impl Search<'_> {
         (0..self.problem.parameters.len()).map(width).collect()
     }
 
-    /// Why the residuals are not noise, at a level of one per cent: they are larger than the scatter
+    /// Why the residuals are not noise, at a level of one and a half per cent: they are larger than the scatter
     /// that is known without the model, or keep their sign from row to row.
     pub(super) fn not_noise(&self, found: &Found) -> Vec<String> {
         let data = self.problem.data;
         let columns = &self.columns(found);
         let p_value = self.all_given().then(|| self.probability(found));
         let basis = statistics::range(&found.solution.jacobian);
-        let level = LEVEL / TESTS;
         let mut reasons: Vec<String> = Vec::new();
         // Fisher's combination of the columns: -2 Σ ln p is χ² of two degrees of freedom each.
         let (mut sum, mut larger) = (0.0, Vec::new());
@@ -290,7 +291,7 @@ impl Search<'_> {
             sum -= 2.0 * nanotap_arithmetic::ln(chance.max(f64::MIN_POSITIVE));
             larger.push((chance, column, ratio.sqrt()));
         }
-        if statistics::exceeding(sum, 2.0 * larger.len() as f64) < level {
+        if statistics::exceeding(sum, 2.0 * larger.len() as f64) < LEVEL {
             let least = larger.iter().fold(1.0, |least: f64, (p, ..)| least.min(*p));
             let shown = larger.iter().filter(|(p, ..)| *p <= least.max(LARGER));
             reasons.extend(shown.map(|(_, column, ratio)| {
@@ -318,7 +319,7 @@ impl Search<'_> {
             .any(|(fitted, column)| fitted.residual > MIN_RESIDUAL * column.spread);
         if most >= MIN_SEQUENCE
             && resolved
-            && of_rows.chance(found.solution.residuals.as_slice()) < level
+            && of_rows.chance(found.solution.residuals.as_slice()) < LEVEL_OF_SIGNS
         {
             reasons.push("the residuals keep their sign from row to row".to_owned());
         }
@@ -328,6 +329,13 @@ impl Search<'_> {
                 "a jump of the data is {farthest:.0} standard errors of its place from where the branch \
                  of the model ends (on approach and retraction it ends at different distances, and noise \
                  can end it early; without the jumps as data the rows alone count)"
+            ));
+        }
+        let point = found.solution.point.iter();
+        let ended = point.filter(|row| row.lost && row.rest.is_some()).count();
+        if ended > MAX_ENDED * data.curves.len() {
+            reasons.push(format!(
+                "{ended} rows lie beyond the end of the branch on which the lever rests"
             ));
         }
         reasons
@@ -447,6 +455,14 @@ impl Search<'_> {
                 rows.len()
             );
         }
+        if problem.data.is_force_curve() {
+            return format!(
+                "{} of {} rows do not count: the lever rings after a jump there, or has no rest on their \
+                 branch: lines {lines}",
+                lost.len(),
+                rows.len()
+            );
+        }
         let cases = problem.cases(x);
         let longer = lost
             .iter()
@@ -538,7 +554,12 @@ impl Search<'_> {
             .zip(&data.columns)
             .all(|(fitted, column)| fitted.residual > 0.5 * column.spread);
         let reason = if 2 * lost > point.len() {
-            Some("more than half of the rows have no periodic orbit".to_owned())
+            let motion = if data.is_force_curve() {
+                "rest"
+            } else {
+                "periodic orbit"
+            };
+            Some(format!("more than half of the rows have no {motion}"))
         } else if nothing {
             Some("the residuals are as large as the variation of the data".to_owned())
         } else {

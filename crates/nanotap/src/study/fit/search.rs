@@ -7,7 +7,7 @@ use super::FitOptions;
 use super::branches::Rows;
 use super::data::Data;
 use super::jumps::Jump;
-use super::problem::{Point, Problem};
+use super::problem::{MAX_RINGING, Point, Problem};
 use super::report::FitReport;
 use super::solve::{Solution, minimise};
 use super::statistics::{exceeding, persistence, range};
@@ -35,7 +35,7 @@ pub(super) struct Found {
 /// Standard error of a rough fit, as a fraction of a column's spread.
 pub(super) const ROUGH_ERROR: f64 = 0.03;
 /// Rough standard errors above which a residual counts by its logarithm.
-const ROBUST_LIMIT: f64 = 3.0;
+pub(super) const ROBUST_LIMIT: f64 = 3.0;
 /// Largest number of rows of a curve in a rough fit.
 const MAX_ROUGH_ROWS: usize = 50;
 /// Mean squared rough residual above which the data are not described.
@@ -54,6 +54,8 @@ const MISFIT_TOLERANCE: f64 = 1e-3;
 const ROUGH_TOLERANCE: f64 = 0.02;
 /// Mean cost of a value up to which rough fits are not converged well enough to be compared.
 const MIN_ROUGH: f64 = 0.01;
+/// Jumps of a force curve there and back.
+const JUMPS: usize = 2;
 /// Cost of a row without an orbit in a rough fit.
 const LOST_COST: f64 = 100.0;
 /// Largest number of times that branches are assigned again.
@@ -362,7 +364,16 @@ impl<'a> Search<'a> {
             sum += differences.iter().map(|d| (d / size).powi(2)).sum::<f64>();
         }
         let lost = data.count() - count.min(data.count());
-        (sum + lost as f64) / data.count() as f64
+        (sum + lost.saturating_sub(self.ringing()) as f64) / data.count() as f64
+    }
+
+    /// Most rows that may be lost without a doubt: a force curve rings after its jumps.
+    fn ringing(&self) -> usize {
+        if self.problem.data.is_force_curve() {
+            JUMPS * (MAX_RINGING + 1) * self.problem.data.curves.len()
+        } else {
+            0
+        }
     }
 
     /// True if all standard errors were given.
@@ -402,9 +413,9 @@ impl<'a> Search<'a> {
     /// and have no outlier, as far as there are enough of them.
     fn leaves_noise(&self, found: &Found) -> bool {
         let (x, point) = (&found.solution.x, &found.solution.point);
-        let lost = point.iter().any(|row| row.lost);
+        let lost = point.iter().filter(|row| row.lost).count();
         let columns = self.problem.data.columns.iter().enumerate();
-        !lost
+        lost <= self.ringing()
             && columns.into_iter().all(|(index, column)| {
                 let left = self.differences(x, point, index);
                 let squares: f64 = left.iter().map(|d| (d / column.spread).powi(2)).sum();

@@ -10,8 +10,9 @@ use std::ops::Range;
 
 use nalgebra::{DMatrix, DVector};
 
+use super::baseline::baseline_rows;
 use super::data::{Column, Curve, Data, Row, is_distance};
-use super::instrument::{far_rows, median, wrapped};
+use super::instrument::{far_and_doubtful_rows, median, wrapped};
 
 /// Scatter of the values of a column about smooth curves.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -35,11 +36,17 @@ const BENT: f64 = 1.0;
 /// halves have so many rows.
 const SPLIT: f64 = 0.5;
 const MIN_SPLIT: usize = 5;
+/// Share of the noise in the path.
+const NOISE_OF_PATH: f64 = 0.35;
 /// Rows whose worth the scatter of all bins has in that of one bin.
 const PRIOR: f64 = 20.0;
 /// Variances of bins that noise would exceed as seldom as a normal deviate exceeds this value do not
 /// count in the common one.
 const OUTLYING: f64 = 4.0;
+/// A slope of the free rows of more than this many standard errors is a drift.
+const DRIFT: f64 = 2.0;
+/// A row after the free ones is one of them within so many standard errors of their level.
+const ON_LEVEL: f64 = 2.5;
 /// Fewest free rows of a curve and direction whose scatter counts.
 const MIN_FREE: usize = 4;
 /// Least scatter, relative to the largest value; of an angle, in degrees.
@@ -61,19 +68,26 @@ pub(crate) fn bins(
         });
         if high > low { high - low } else { 1.0 }
     };
-    let half = rows / (count * 4).max(1);
-    let smooth = |of: &[f64], k: usize| {
+    let smooth = |of: &[f64], k: usize, half: usize| {
         let near = &of[k.saturating_sub(half)..(k + half + 1).min(rows)];
         near.iter().sum::<f64>() / near.len() as f64
     };
     let ranges: Vec<f64> = values.iter().map(|column| range(column)).collect();
+    // As many rows on either side as leave little noise in the path: bins that end where the noise is
+    // large have less scatter within them than between them.
+    let [least, most] = [4, 1].map(|part| rows / (part * count).max(1));
+    let half = |(error, range): (&f64, &f64)| {
+        let rows = rows as f64 * error / (NOISE_OF_PATH * range);
+        (rows as usize).clamp(least, most)
+    };
+    let halves: Vec<usize> = errors.iter().zip(&ranges).map(half).collect();
     let across = range(distance) / DISTANCE_SHARE;
     let mut path = vec![0.0];
     let mut breaks = vec![false];
     for k in 1..rows {
         let mut square = ((distance[k] - distance[k - 1]) / across).powi(2);
-        for (column, range) in values.iter().zip(&ranges) {
-            let step = (smooth(column, k) - smooth(column, k - 1)) / range;
+        for ((column, range), half) in values.iter().zip(&ranges).zip(&halves) {
+            let step = (smooth(column, k, *half) - smooth(column, k - 1, *half)) / range;
             square += if step.is_finite() { step * step } else { 0.0 };
         }
         path.push(path[k - 1] + square.sqrt());
@@ -113,7 +127,7 @@ fn neighbourhood(values: &[Vec<f64>], errors: &[f64], bin: &Range<usize>) -> Ran
 
 /// The standard deviation of the values in a sequence of rows, from third differences, which a
 /// smooth curve hardly has.
-fn scatter_of_row(values: &[f64]) -> f64 {
+pub(super) fn scatter_of_row(values: &[f64]) -> f64 {
     let third = |w: &[f64]| (w[3] - 3.0 * w[2] + 3.0 * w[1] - w[0]).abs();
     let differences: Vec<f64> = values.windows(4).map(third).collect();
     let known: Vec<f64> = differences.into_iter().filter(|d| d.is_finite()).collect();
@@ -167,9 +181,14 @@ struct Polynomial {
     value: f64,
     /// The standard error of that value, for rows with standard error 1.
     error: f64,
-    /// How far it lies from the mean of the rows there, and the standard error of that.
+    /// How far it lies from the mean of the rows there.
     bend: f64,
-    bend_error: f64,
+    /// Covariances of that and the coefficients of 1, u and u², for rows with standard error 1. u is
+    /// the distance from the first number in units of the second.
+    bend_covariance: [f64; 3],
+    u: [f64; 2],
+    /// Mean of u².
+    square: f64,
     /// Sum of the squared residuals, and their degrees of freedom.
     squares: f64,
     freedom: f64,
@@ -202,29 +221,72 @@ impl Polynomial {
         let residuals = right - matrix * &found;
         let known = found.iter().all(|c| c.is_finite());
         known.then(|| Self {
+            u: [mean, size.max(f64::MIN_POSITIVE)],
+            square,
             value: found[0],
             error: covariance[(0, 0)].sqrt(),
             bend: if degree > 1 { found[2] * square } else { 0.0 },
-            bend_error: if degree > 1 {
-                covariance[(2, 2)].sqrt() * square
-            } else {
-                0.0
-            },
+            bend_covariance: [0, 1, 2].map(|k| {
+                if degree > 1 {
+                    covariance[(2, k)] * square
+                } else {
+                    0.0
+                }
+            }),
             squares: residuals.norm_squared(),
             freedom: (count - degree - 1) as f64,
         })
     }
+
+    /// What taking off this `part` of the bend adds to the variance of the mean of some of the rows,
+    /// for rows with standard error 1.
+    fn variance_without_bend(&self, distance: &[f64], part: f64) -> f64 {
+        let [middle, size] = self.u;
+        let powers = distance.iter().map(|z| (z - middle) / size);
+        let sums = powers.fold([0.0; 3], |[a, b, c], u| [a + 1.0, b + u, c + u * u]);
+        let shared = self.bend_covariance.iter().zip(sums);
+        let shared: f64 = shared.map(|(c, sum)| c * sum / sums[0]).sum();
+        let square = self.square * self.bend_covariance[2];
+        part * part * square - 2.0 * part * shared
+    }
+}
+
+/// The level of some rows, or a line through them where they drift, and whether they do: a slope
+/// costs a degree of freedom of few.
+fn level_or_line(distance: &[f64], values: &[f64], rows: &[usize]) -> Option<(Polynomial, bool)> {
+    let pick = |of: &[f64]| -> Vec<f64> { rows.iter().map(|k| of[*k]).collect() };
+    let (distance, values) = (pick(distance), pick(values));
+    let level = Polynomial::of(&distance, &values, 0)?;
+    let Some(line) = Polynomial::of(&distance, &values, 1) else {
+        return Some((level, false));
+    };
+    let share = (level.squares - line.squares) / (line.squares / line.freedom);
+    Some(if share > DRIFT * DRIFT {
+        (line, true)
+    } else {
+        (level, false)
+    })
+}
+
+/// Whether a value lies on the level of others, which do not drift.
+fn is_level(distance: &[f64], values: &[f64], rows: &[usize], row: usize) -> bool {
+    level_or_line(distance, values, rows).is_some_and(|(level, drifts)| {
+        let error = (level.squares / level.freedom).sqrt() * (1.0 + level.error.powi(2)).sqrt();
+        !drifts && (values[row] - level.value).abs() <= ON_LEVEL * error
+    })
 }
 
 impl Data {
-    /// The scatter of each column in the rows far from the sample, about a line in every curve and
-    /// direction; nothing if the distance is not what varies, or too few rows are far.
+    /// The scatter of each column in the rows far from the sample, about their level in every curve and
+    /// direction, or about a line if they drift; nothing if the distance is not what varies, or too few rows are far.
     pub(super) fn add_free_scatter(&mut self) {
         let amplitude = self
             .columns
             .iter()
             .position(|c| matches!(c.quantity.name(), "first_harmonic" | "amplitude"));
-        let (Some(amplitude), true) = (amplitude, self.varies_distance()) else {
+        let is_force_curve = self.is_force_curve();
+        let level = if is_force_curve { Some(0) } else { amplitude };
+        let (Some(level), true) = (level, self.varies_distance()) else {
             return;
         };
         let mut sums = vec![(0.0, 0.0); self.columns.len()];
@@ -232,20 +294,30 @@ impl Data {
         for (index, curve) in self.curves.iter().enumerate() {
             let mut before = 0;
             for segment in segments(curve, &self.columns) {
-                let free = far_rows(&segment.distance, &segment.values[amplitude]);
+                let of_level = &segment.values[level];
+                let [mut free, doubtful] = if is_force_curve {
+                    baseline_rows(&segment.distance, of_level)
+                } else {
+                    far_and_doubtful_rows(&segment.distance, of_level)
+                };
                 let first = before;
                 before += segment.rows.len();
                 if free.len() < MIN_FREE {
                     continue;
                 }
+                for row in doubtful {
+                    let mut columns = segment.values.iter();
+                    if !columns.all(|values| is_level(&segment.distance, values, &free, row)) {
+                        break;
+                    }
+                    free.push(row);
+                }
                 known.extend(free.iter().map(|row| (index, first + row)));
-                let pick = |of: &[f64]| -> Vec<f64> { free.iter().map(|k| of[*k]).collect() };
-                let distance = pick(&segment.distance);
                 for (values, sum) in segment.values.iter().zip(&mut sums) {
-                    let values = pick(values);
-                    if let Some(line) = Polynomial::of(&distance, &values, 1) {
-                        sum.0 += line.squares;
-                        sum.1 += line.freedom;
+                    let found = level_or_line(&segment.distance, values, &free);
+                    if let Some((of, _)) = found {
+                        sum.0 += of.squares;
+                        sum.1 += of.freedom;
                     }
                 }
             }
@@ -354,9 +426,10 @@ struct Bin {
 struct Fits {
     mean: f64,
     count: usize,
-    /// How far the mean lies from the curve, and the standard error of that for rows with standard
-    /// error 1.
-    bend: (f64, f64),
+    /// How far the mean lies from the curve, and the variance of the mean without that for rows with
+    /// standard error 1: the rows of the bin are among those that the bend is known from.
+    bend: f64,
+    variance: f64,
     best: Option<Polynomial>,
 }
 
@@ -365,7 +438,7 @@ impl Bin {
     fn add(segment: &Segment<'_>, errors: &[f64], range: Range<usize>, to: &mut Vec<Self>) {
         let bin = Self::of(segment, errors, range);
         let bends = bin.fits.iter().zip(errors).any(|(fits, error)| {
-            let bent = |of: &Fits| of.bend.0.abs() * (of.count as f64).sqrt() > SPLIT * error;
+            let bent = |of: &Fits| of.bend.abs() * (of.count as f64).sqrt() > SPLIT * error;
             fits.as_ref().is_some_and(bent)
         });
         if bends && bin.range.len() >= 2 * MIN_SPLIT {
@@ -397,10 +470,13 @@ impl Bin {
                 .then(|| Polynomial::of(&wide, &of_wide, 2))
                 .flatten();
             let part = spread(&distance) / spread(&wide);
+            let of_mean = 1.0 / values.len() as f64;
+            let variance = |p: &Polynomial| of_mean + p.variance_without_bend(&distance, part);
             Some(Fits {
-                mean: values.iter().sum::<f64>() / values.len() as f64,
+                mean: values.iter().sum::<f64>() * of_mean,
                 count: values.len(),
-                bend: parabola.map_or((0.0, 0.0), |p| (part * p.bend, part * p.bend_error)),
+                bend: parabola.as_ref().map_or(0.0, |p| part * p.bend),
+                variance: parabola.as_ref().map_or(of_mean, variance),
                 best: (degree > 0)
                     .then(|| Polynomial::of(&distance, &values, degree))
                     .flatten(),
@@ -428,12 +504,12 @@ impl Bin {
             let common = scatter[column].error;
             let mut own = common;
             let of_mean = 1.0 / fits.count as f64;
-            let (bend, error) = fits.bend;
-            let (mut value, mut part) = (fits.mean - bend, (of_mean + error * error).sqrt());
+            let (mut value, mut part) = (fits.mean - fits.bend, fits.variance.sqrt());
             if let Some(best) = &fits.best {
                 let (given, freedom) = (common * common, best.freedom);
                 own = ((PRIOR * given + best.squares) / (PRIOR + freedom)).sqrt();
-                if best.bend_error > 0.0 && bend.abs() > BENT * of_mean.sqrt() * own {
+                let is_parabola = best.bend_covariance[2] > 0.0;
+                if is_parabola && fits.bend.abs() > BENT * of_mean.sqrt() * own {
                     (value, part) = (best.value, best.error);
                 }
             }
@@ -535,10 +611,22 @@ mod tests {
             let bin = Bin::of(&segment, &[0.5], 20..20 + count);
             let fits = bin.fits[0].as_ref().unwrap();
             let at = 3.0 + bin.distance + 0.2 * bin.distance * bin.distance;
-            assert!((fits.mean - fits.bend.0 - at).abs() < 1e-12, "{count}");
-            assert!(fits.bend.0.abs() > 1e-3);
-            // Three times as many rows over three times the length know the bend well.
-            assert!(fits.bend.1 < 0.1 / (count as f64).sqrt());
+            assert!((fits.mean - fits.bend - at).abs() < 1e-12, "{count}");
+            assert!(fits.bend.abs() > 1e-3);
+            // The average is linear in the values: its variance is the sum of its squared weights.
+            let weight = |row: usize| {
+                let mut segment = Segment {
+                    rows: &[],
+                    distance: distance.clone(),
+                    values: vec![vec![0.0; distance.len()]],
+                };
+                segment.values[0][row] = 1.0;
+                let bin = Bin::of(&segment, &[0.5], 20..20 + count);
+                let fits = bin.fits[0].as_ref().unwrap();
+                fits.mean - fits.bend
+            };
+            let variance: f64 = (0..distance.len()).map(|row| weight(row).powi(2)).sum();
+            assert!((variance / fits.variance - 1.0).abs() < 1e-12, "{count}");
         }
     }
 

@@ -21,6 +21,7 @@ mod fits;
 mod lever;
 mod path;
 mod report;
+mod rest;
 mod run;
 mod statics;
 
@@ -31,6 +32,8 @@ pub use report::{
     CurvePoint, ForceCurveReport, ForceCurveSummary, StaticBranch, StaticJump, StaticPoint,
     Statics, Waveform, points_csv,
 };
+
+pub(crate) use rest::{Chain, RestLever, StableRest};
 
 use crate::Error;
 use crate::case::Case;

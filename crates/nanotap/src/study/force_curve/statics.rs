@@ -19,7 +19,7 @@ pub(super) struct Rest {
     pub(super) distance: f64,
     pub(super) gap: f64,
     pub(super) force: f64,
-    /// Branch of the law.
+    /// Branch of the law, or regime of a piecewise-linear sample.
     branch: usize,
 }
 
@@ -92,7 +92,7 @@ const POINTS: usize = 1200;
 /// Smallest step from there, as a part of the range.
 const NEAR: f64 = 1e-9;
 /// Two ends meet within this part of the range.
-const MEET: f64 = 1e-9;
+pub(super) const MEET: f64 = 1e-9;
 
 impl StaticCurve {
     /// The rests of the lever of `case` with its model.
@@ -197,7 +197,11 @@ impl StaticCurve {
     /// The pieces of all branches between two distances.
     pub(super) fn pieces(&self, near: f64, far: f64) -> Vec<Piece> {
         match self {
-            Self::Linear(regimes) => regimes.iter().filter_map(|r| r.piece(near, far)).collect(),
+            Self::Linear(regimes) => {
+                let numbered = regimes.iter().enumerate();
+                let pieces = numbered.filter_map(|(k, regime)| regime.piece(k, near, far));
+                pieces.collect()
+            }
             Self::Law(law) => law.pieces(near, far),
         }
     }
@@ -252,12 +256,43 @@ impl StaticCurve {
     }
 
     /// The rest of a piece at a distance.
-    fn at(&self, piece: &Piece, distance: f64) -> Option<Rest> {
+    pub(super) fn at(&self, piece: &Piece, distance: f64) -> Option<Rest> {
         self.between(piece, |rest| rest.distance, distance)
     }
 
+    /// Compliance of the lever at rest, in the model's units.
+    pub(super) fn compliance(&self) -> Option<f64> {
+        match self {
+            Self::Linear(regimes) => {
+                let pressed = regimes.iter().find(|regime| regime.force[1] != 0.0)?;
+                Some((pressed.gap[1] - 1.0) / pressed.force[1])
+            }
+            Self::Law(law) => Some(law.compliance),
+        }
+    }
+
+    /// The rest at the separation of a known one, of a piecewise-linear sample that at a distance;
+    /// and for a law how distance and force change with the separation.
+    pub(super) fn beside(&self, known: &Rest, distance: f64) -> (Rest, Option<[f64; 2]>) {
+        match self {
+            Self::Linear(regimes) => {
+                let regime = known.branch.min(regimes.len() - 1);
+                (regimes[regime].rest(regime, distance), None)
+            }
+            Self::Law(law) => {
+                let (rest, slopes) = law.rest(known.branch, known.gap);
+                (rest, Some(slopes))
+            }
+        }
+    }
+
     /// The first rest of a piece at which a quantity has a value.
-    fn between(&self, piece: &Piece, of: impl Fn(&Rest) -> f64, value: f64) -> Option<Rest> {
+    pub(super) fn between(
+        &self,
+        piece: &Piece,
+        of: impl Fn(&Rest) -> f64,
+        value: f64,
+    ) -> Option<Rest> {
         if let Some(rest) = piece.rests.iter().find(|rest| of(rest) == value) {
             return Some(*rest);
         }
@@ -339,11 +374,11 @@ impl Rest {
 }
 
 impl Piece {
-    fn high(&self) -> Rest {
+    pub(super) fn high(&self) -> Rest {
         self.rests[0]
     }
 
-    fn low(&self) -> Rest {
+    pub(super) fn low(&self) -> Rest {
         self.rests[self.rests.len() - 1]
     }
 }
@@ -357,17 +392,17 @@ impl LinearRests {
             .all(|[value, slope]| value + moved * slope > 0.0)
     }
 
-    fn rest(&self, distance: f64) -> Rest {
+    fn rest(&self, regime: usize, distance: f64) -> Rest {
         let at = |[value, slope]: [f64; 2]| value + (distance - self.origin) * slope;
         Rest {
             distance,
             gap: at(self.gap),
             force: at(self.force),
-            branch: 0,
+            branch: regime,
         }
     }
 
-    fn piece(&self, near: f64, far: f64) -> Option<Piece> {
+    fn piece(&self, regime: usize, near: f64, far: f64) -> Option<Piece> {
         let (mut low, mut high) = (near, far);
         for [value, slope] in &self.guards {
             let root = self.origin - value / slope;
@@ -382,7 +417,7 @@ impl LinearRests {
         if low >= high {
             return None;
         }
-        let mut rests = vec![self.rest(high), self.rest(low)];
+        let mut rests = vec![self.rest(regime, high), self.rest(regime, low)];
         let mut cut = [high == far, low == near];
         if rests[1].gap > rests[0].gap {
             rests.reverse();

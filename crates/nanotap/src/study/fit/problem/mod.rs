@@ -1,6 +1,7 @@
 //! The residuals of measured curves and their exact derivatives.
 
 pub(super) mod held;
+mod rest;
 
 use std::ops::Deref;
 use std::sync::Arc;
@@ -22,6 +23,10 @@ use crate::study::fit::jumps::{Fold, Jump};
 use crate::study::fit::parameters::{Parameter, Target};
 use crate::study::fit::solve::LeastSquares;
 use held::{HeldRow, Loop};
+use rest::Beside;
+pub(super) use rest::MAX_RINGING;
+
+use crate::study::force_curve::StableRest;
 
 /// Measured curves, a case, and its free parameters.
 #[derive(Clone)]
@@ -64,6 +69,8 @@ pub(super) struct RowPoint {
     pub(super) at: Option<Arc<(Case, Model)>>,
     /// The orbit under frequency modulation; if it is lost, the last known one.
     pub(super) held: Option<Box<HeldRow>>,
+    /// The lever at rest, of a force curve.
+    pub(super) rest: Option<StableRest>,
 }
 
 impl RowPoint {
@@ -78,6 +85,7 @@ impl RowPoint {
             states: Vec::new(),
             at: None,
             held: None,
+            rest: None,
         }
     }
 
@@ -251,9 +259,8 @@ impl Problem<'_> {
             lost: false,
             branch,
             observables: Some(Box::new(observables)),
-            states: Vec::new(),
             at: Some(at),
-            held: None,
+            ..RowPoint::nothing(0)
         })
     }
 
@@ -333,6 +340,9 @@ impl Problem<'_> {
         if let Some(held) = self.held {
             return held.discover(self, x);
         }
+        if self.data.is_force_curve() {
+            return self.discover_rests(x);
+        }
         let bases = self.cases(x);
         let curves: Vec<(Point, Rows)> = self
             .data
@@ -397,8 +407,9 @@ impl Problem<'_> {
     pub(super) fn find_jumps(&mut self, x: &[f64], point: &mut Point) {
         self.jumps.clear();
         point.folds.clear();
-        // Other folds end a branch if a loop controls amplitude and phase.
-        if self.held.is_some() {
+        // Other folds end a branch if a loop controls amplitude and phase, and the jumps of a force
+        // curve ring.
+        if self.held.is_some() || self.data.is_force_curve() {
             return;
         }
         let rows = self.rows();
@@ -534,9 +545,6 @@ impl Problem<'_> {
         places: &[Vec<f64>],
         rows: &Rows,
     ) -> Point {
-        const BRANCH_CHANGE_COST: f64 = 20.0;
-        // One residual of eight standard errors.
-        const MAX_NOISE_COST: f64 = 18.0;
         let measured = &self.data.curves[curve].rows;
         let seen: Vec<Vec<Option<RowPoint>>> = (0..rows.len())
             .into_par_iter()
@@ -553,6 +561,24 @@ impl Problem<'_> {
                 rows[row].iter().map(one).collect()
             })
             .collect();
+        let branches: Vec<Vec<usize>> = rows
+            .iter()
+            .map(|row| row.iter().map(|candidate| candidate.branch).collect())
+            .collect();
+        self.chosen(x, (curve, measured), &branches, &seen)
+    }
+
+    /// Selects of the points of each row, with their branches, the one that belongs to the data.
+    fn chosen(
+        &self,
+        x: &[f64],
+        (curve, measured): (usize, &[Row]),
+        branches: &[Vec<usize>],
+        seen: &[Vec<Option<RowPoint>>],
+    ) -> Point {
+        const BRANCH_CHANGE_COST: f64 = 20.0;
+        // One residual of eight standard errors.
+        const MAX_NOISE_COST: f64 = 18.0;
         let cost = |row: usize, point: &Option<RowPoint>| {
             let Some(point) = point else { return 1e6 };
             let residuals = (0..self.data.columns.len()).filter_map(|column| {
@@ -568,8 +594,12 @@ impl Problem<'_> {
             .enumerate()
             .map(|(row, points)| points.iter().map(|point| cost(row, point)).collect())
             .collect();
-        let mut chosen = path(rows, &costs, BRANCH_CHANGE_COST);
-        release_branch_ends(rows, &costs, MAX_NOISE_COST, &mut chosen);
+        let mut chosen = path(branches, &costs, BRANCH_CHANGE_COST);
+        if !self.data.is_force_curve() {
+            release_branch_ends(branches, &costs, MAX_NOISE_COST, &mut chosen);
+        } else if self.robust.is_none() {
+            self.release_ringing(x, (curve, measured), seen, &mut chosen);
+        }
         let pick = |(row, chosen): (usize, Option<usize>)| {
             let found = chosen.and_then(|k| seen[row][k].clone());
             found.unwrap_or_else(|| RowPoint::nothing(self.data.columns.len()))
@@ -654,6 +684,9 @@ impl LeastSquares for Problem<'_> {
             let point = held.follow(self, (x, &bases), (before, from));
             return self.finished(point);
         }
+        if self.data.is_force_curve() {
+            return self.finished(self.follow_rests(x, from));
+        }
         let one = |((curve, row), before_point): (&(usize, &Row), &RowPoint)| {
             let lost = || before_point.without_orbit();
             let follow = || {
@@ -714,6 +747,8 @@ impl LeastSquares for Problem<'_> {
         let (columns, count) = (self.data.columns.len(), self.parameters.len());
         let rows = self.rows();
         let effects = self.effects(x);
+        let beside = self.data.is_force_curve();
+        let beside = beside.then(|| Beside::of(self, x, &effects));
         let jumps = (0..self.jumps.len()).into_par_iter();
         let jumps: Vec<Vec<f64>> = jumps
             .map(|index| self.jump_derivatives(&effects, point, index))
@@ -726,9 +761,14 @@ impl LeastSquares for Problem<'_> {
                 if point.lost || self.finished(()).is_none() {
                     return block;
                 }
-                let by: Option<Vec<_>> = match self.held {
-                    Some(_) => Loop::derivatives(self, x, (*curve, point), &effects[*curve]),
-                    None => self.derivatives(x, (*curve, point), &effects[*curve]),
+                let effects = &effects[*curve];
+                let by: Option<Vec<_>> = match (self.held, &beside) {
+                    (Some(_), _) => Loop::derivatives(self, x, (*curve, point), effects),
+                    (_, Some(beside)) => {
+                        let at = self.place(x, *curve, row)[0];
+                        beside.derivatives(self, x, (*curve, point, at), effects)
+                    }
+                    _ => self.derivatives(x, (*curve, point), effects),
                 };
                 let Some(by) = by else {
                     return block;

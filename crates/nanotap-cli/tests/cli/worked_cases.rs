@@ -4,7 +4,7 @@
 //!
 //! A `console` block contains commands, one per line that begins with `$ nanotap`. The following
 //! table contains values of the JSON document of the last command: a JSON pointer, the value, and
-//! its tolerance, relative (`1 %`) or absolute (`0.5`); `exactly` compares texts and whole numbers.
+//! its tolerance, relative (`1 %`) or absolute (`0.5`); `exactly` compares texts, whole numbers, true and false.
 
 use std::path::{Path, PathBuf};
 
@@ -57,6 +57,7 @@ fn holds(found: &Value, value: &str, within: &str) -> bool {
     if within == "exactly" {
         return match found {
             Value::String(text) => text == value,
+            Value::Bool(is) => is.to_string() == value,
             number => number.as_i64().is_some() && number.as_i64() == value.parse().ok(),
         };
     }

@@ -106,6 +106,25 @@ def test_a_force_volume_is_a_dataset(
         nanotap.fit(soft, data=volume, free=FREE, pixels=["x", "y"])
 
 
+def test_a_computed_force_curve_is_a_table() -> None:
+    def case(modulus: str, amplitude: str = "0 nm") -> nanotap.Case:
+        text = LEVER.replace('"20 nm"', f'"{amplitude}"').replace(
+            'stiffness = "30 N/m"\nloss_tangent = 0.1',
+            f'law = "dmt"\nmodulus = "{modulus}"\nhamaker = "5e-20 J"\n'
+            '[tip]\nradius = "10 nm"',
+        )
+        return nanotap.Case.from_toml(text)
+
+    ramp = {"to": "-5 nm", "speed": "1 um/s", "points": 60}
+    curve = nanotap.force_curve(case("500 MPa"), **ramp)
+    found = nanotap.fit(case("50 MPa"), data=curve, free=["sample.modulus"])
+    # The static branch differs from the motion by the ringing after jumps alone.
+    assert found.best["sample.modulus"] == pytest.approx(500e6, rel=1e-3)
+    driven = nanotap.force_curve(case("500 MPa", "5 nm"), **ramp)
+    with pytest.raises(ValueError, match="driven"):
+        nanotap.fit(case("50 MPa"), data=driven, free=["sample.modulus"])
+
+
 def test_what_is_no_table_is_refused(curve: dict[str, np.ndarray]) -> None:
     case = nanotap.Case.from_toml(LEVER)
     with pytest.raises(TypeError, match="data"):

@@ -16,6 +16,7 @@ from . import _nanotap
 from ._case import existing
 from ._describe import name_in_si
 from ._quantity import Range, in_si, many, si_unit, text, written
+from ._record import Record
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -300,7 +301,9 @@ def names(name: str, value: Any) -> list[str]:
 
 
 def tables(data: Any) -> list[dict[str, Any]]:
-    """Measured curves as tables: files, mappings of columns, data frames, datasets, or several."""
+    """Measured curves as tables: files, mappings of columns, data frames, datasets, computed force
+    curves, or several.
+    """
     if isinstance(data, str | os.PathLike):
         table: dict[str, Any] = json.loads(_nanotap.table(existing(data)))
         return [table]
@@ -310,6 +313,19 @@ def tables(data: Any) -> list[dict[str, Any]]:
         notes = {str(k): str(v) for k, v in getattr(data, "attrs", {}).items()}
         columns = {str(c): column(str(c), data[c]) for c in data.columns}
         return [{"columns": columns, "notes": notes}]
+    if isinstance(data, Record) and "table" in data:
+        if data["driven"]:
+            message = (
+                "data: the lever of this force curve is driven, and a fit takes it as at "
+                "rest: compute the curve with drive.free_amplitude = 0"
+            )
+            raise ValueError(message)
+        rows = data.to_dict()["table"]
+        columns = {
+            header: [row[name] for row in rows]
+            for name, header in _OF_FORCE_CURVE.items()
+        }
+        return [{"columns": columns}]
     if isinstance(data, Mapping):
         if data and all(
             isinstance(v, Mapping) or hasattr(v, "columns") or hasattr(v, "data_vars")
@@ -328,6 +344,13 @@ def tables(data: Any) -> list[dict[str, Any]]:
     message = f"data: expected a table of columns, got {data!r}"
     raise TypeError(message)
 
+
+# Entries of the rows of a computed force curve that are fitted, as headers.
+_OF_FORCE_CURVE = {
+    "way": "way",
+    "distance": "distance (m)",
+    "deflection": "deflection (m)",
+}
 
 # Units as the columns of files have them.
 _COLUMN_UNITS = {"degree": "deg", "1": "", "drive periods": "", "1/drive period": ""}

@@ -121,9 +121,9 @@ impl RestLever {
     pub(crate) fn near(&self, known: &StableRest, of: &Self, distance: f64) -> StableRest {
         let mut rest = known.rest;
         rest.gap *= of.length / self.length;
-        let (rest, slopes) = self.statics.beside(&rest, distance / self.length);
+        let (rest, slopes) = self.statics.nearby(&rest, distance / self.length);
         let mut found = self.in_si(rest);
-        let own = of.statics.beside(&known.rest, distance / of.length).1;
+        let own = of.statics.nearby(&known.rest, distance / of.length).1;
         // The slopes of the other lever, so that those of two levers differ in nothing else.
         if let (Some([by_gap, stiffness]), true) = (own, slopes.is_some()) {
             let change = (distance - rest.distance * self.length) / by_gap;

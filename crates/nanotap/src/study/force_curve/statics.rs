@@ -273,7 +273,7 @@ impl StaticCurve {
 
     /// The rest at the separation of a known one, of a piecewise-linear sample that at a distance;
     /// and for a law how distance and force change with the separation.
-    pub(super) fn beside(&self, known: &Rest, distance: f64) -> (Rest, Option<[f64; 2]>) {
+    pub(super) fn nearby(&self, known: &Rest, distance: f64) -> (Rest, Option<[f64; 2]>) {
         match self {
             Self::Linear(regimes) => {
                 let regime = known.branch.min(regimes.len() - 1);

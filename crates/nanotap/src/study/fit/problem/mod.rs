@@ -23,8 +23,8 @@ use crate::study::fit::jumps::{Fold, Jump};
 use crate::study::fit::parameters::{Parameter, Target};
 use crate::study::fit::solve::LeastSquares;
 use held::{HeldRow, Loop};
-use rest::Beside;
 pub(super) use rest::MAX_RINGING;
+use rest::Nearby;
 
 use crate::study::force_curve::StableRest;
 
@@ -747,8 +747,8 @@ impl LeastSquares for Problem<'_> {
         let (columns, count) = (self.data.columns.len(), self.parameters.len());
         let rows = self.rows();
         let effects = self.effects(x);
-        let beside = self.data.is_force_curve();
-        let beside = beside.then(|| Beside::of(self, x, &effects));
+        let nearby = self.data.is_force_curve();
+        let nearby = nearby.then(|| Nearby::of(self, x, &effects));
         let jumps = (0..self.jumps.len()).into_par_iter();
         let jumps: Vec<Vec<f64>> = jumps
             .map(|index| self.jump_derivatives(&effects, point, index))
@@ -762,11 +762,11 @@ impl LeastSquares for Problem<'_> {
                     return block;
                 }
                 let effects = &effects[*curve];
-                let by: Option<Vec<_>> = match (self.held, &beside) {
+                let by: Option<Vec<_>> = match (self.held, &nearby) {
                     (Some(_), _) => Loop::derivatives(self, x, (*curve, point), effects),
-                    (_, Some(beside)) => {
+                    (_, Some(nearby)) => {
                         let at = self.place(x, *curve, row)[0];
-                        beside.derivatives(self, x, (*curve, point, at), effects)
+                        nearby.derivatives(self, x, (*curve, point, at), effects)
                     }
                     _ => self.derivatives(x, (*curve, point), effects),
                 };

@@ -263,16 +263,16 @@ fn span(values: &[f64]) -> [f64; 2] {
 }
 
 /// The levers of every curve, and those with a key a little lower and higher.
-pub(super) struct Beside {
-    curves: Vec<Option<LeverBeside>>,
+pub(super) struct Nearby {
+    curves: Vec<Option<LeverNearby>>,
 }
 
-struct LeverBeside {
+struct LeverNearby {
     lever: RestLever,
     keys: Vec<(Key, [RestLever; 2], f64)>,
 }
 
-impl Beside {
+impl Nearby {
     pub(super) fn of(problem: &Problem<'_>, x: &[f64], effects: &[Vec<Effects>]) -> Self {
         let bases = problem.cases(x);
         let curves: Vec<usize> = (0..bases.len()).collect();
@@ -281,7 +281,7 @@ impl Beside {
             let mut keys: Vec<Key> = effects[*curve].iter().flatten().map(|(k, _)| *k).collect();
             keys.sort_unstable();
             keys.dedup();
-            let beside = |key: Key| {
+            let nearby = |key: Key| {
                 let value = case.get(key);
                 let range = key.range();
                 let step = STEP
@@ -306,9 +306,9 @@ impl Beside {
                 Some((key, [lever(low)?, lever(high)?], high - low))
             };
             let keys = keys.into_iter().filter(|key| !is_distance(*key));
-            Some(LeverBeside {
+            Some(LeverNearby {
                 lever: RestLever::of(&case).ok()?,
-                keys: keys.map(beside).collect::<Option<_>>()?,
+                keys: keys.map(nearby).collect::<Option<_>>()?,
             })
         };
         Self {

@@ -4,7 +4,8 @@
 //!
 //! A `console` block contains commands, one per line that begins with `$ nanotap`. The following
 //! table contains values of the JSON document of the last command: a JSON pointer, the value, and
-//! its tolerance, relative (`1 %`) or absolute (`0.5`); `exactly` compares texts, whole numbers, true and false.
+//! its tolerance, relative (`1 %`) or absolute (`0.5`); `exactly` compares texts, whole numbers, true
+//! and false.
 
 use std::path::{Path, PathBuf};
 

@@ -43,8 +43,8 @@ pub struct Table {
 
 impl Table {
     /// Reads an instrument's file (`.ibw`, `.jpk-force`, `.nid`), or a CSV file: fields parted by
-    /// commas, semicolons or tabs, the first line names the
-    /// columns, lines that begin with `#` are skipped.
+    /// commas, semicolons or tabs, the first line names the columns, lines that begin with `#` are
+    /// skipped.
     ///
     /// # Errors
     /// When the file cannot be read or is no such table; the message has line and column.

@@ -27,8 +27,8 @@ use crate::study::simulate::{Classification, Named};
 
 /// Instants of an orbit at which it is knocked.
 pub const INSTANTS: usize = 48;
-/// Changes of the tip's speed over its amplitude in the orbit: the first that is tried, the least, which is still far
-/// above rounding, and the largest.
+/// Changes of the tip's speed over its amplitude in the orbit: the first that is tried, the least,
+/// which is still far above rounding, and the largest.
 const FIRST_SIZE: f64 = 1.0 / 1024.0;
 const LEAST_SIZE: f64 = 1e-9;
 const LARGEST_SIZE: f64 = 4.0;

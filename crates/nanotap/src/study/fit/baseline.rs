@@ -13,6 +13,7 @@ use super::parameters::{Parameter, Target};
 use super::problem::Problem;
 use super::search::{ROBUST_LIMIT, Search};
 use super::solve::LeastSquares as _;
+use super::statistics::span;
 use super::thin::scatter_of_row;
 use crate::Error;
 use crate::case::{Case, Key};
@@ -37,10 +38,6 @@ const MIN_POWER: f64 = 0.2;
 const MEETINGS: usize = 2;
 /// Cost of a row without a rest.
 const LOST: f64 = 100.0;
-/// Depth beyond the data at which the deepest row is searched for first, in m, and how often it is
-/// raised.
-const REACH: f64 = 1e-9;
-const TRIES: usize = 8;
 /// Compliance of the modes at rest, relative to that of the beam, below which it is reported.
 const COMPLIANT: f64 = 0.99;
 /// A baseline this part of the range of the values off zero is reported.
@@ -120,7 +117,8 @@ pub(super) fn begin_from_baseline(data: &Data, parameters: &mut [Parameter]) -> 
                     parameter.start = level;
                 }
             }
-            if !is_free && level.abs() > OFF_ZERO * (values_range(&values)) {
+            let [least, most] = span(values.iter().copied());
+            if !is_free && level.abs() > OFF_ZERO * (most - least) {
                 let unit = column.quantity.unit(true);
                 note = Some(format!(
                     "the {} of the rows far from the sample is {level:.3e} {unit}: name \
@@ -133,22 +131,14 @@ pub(super) fn begin_from_baseline(data: &Data, parameters: &mut [Parameter]) -> 
     note
 }
 
-fn values_range(values: &[f64]) -> f64 {
-    let most = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-    most - values.iter().copied().fold(f64::INFINITY, f64::min)
-}
-
 impl Search<'_> {
     /// Better first values than `own`, if the scan finds some.
     pub(super) fn scanned_rests(&self, own: &[f64]) -> Option<Vec<f64>> {
         let parameters = self.problem.parameters;
         let own_cost = self.cost_of_rests(own);
-        let is_stiffness = |p: &Parameter| {
-            let keys = [Key::SampleModulus, Key::SampleStiffness];
-            keys.iter().any(|key| p.target == Target::Key(*key)) && !p.is_given
-        };
+        let keys = [Key::SampleModulus, Key::SampleStiffness];
         let stiffnesses: Vec<usize> = (0..own.len())
-            .filter(|k| is_stiffness(&parameters[*k]))
+            .filter(|k| parameters[*k].is_unknown_of(&keys))
             .collect();
         let count = (DECADES.0 / DECADES.1) as i32;
         let powers = if stiffnesses.is_empty() {
@@ -205,11 +195,9 @@ impl Search<'_> {
 
     /// Values of a curve without scales and offsets, and the distance of each.
     fn values_of_curve(problem: &Problem<'_>, x: &[f64], curve: usize) -> Vec<[f64; 2]> {
-        let zero = problem.read(x, curve, 0, 0.0);
-        let scale = problem.read(x, curve, 0, 1.0) - zero;
         let rows = problem.data.curves[curve].rows.iter();
         let known = rows.filter_map(|row| {
-            let value = (row.values[0]? - zero) / scale;
+            let value = problem.unread(x, curve, 0, row.values[0]?);
             Some([problem.place(x, curve, row)[0], value])
         });
         known.collect()
@@ -228,16 +216,10 @@ impl Search<'_> {
         let quantity = problem.data.columns[0].quantity.rest()?;
         // Whatever the zero of the data is, the surface of the model is at 0.
         let moved = with(x, k, x[k] - at);
-        let mut beyond = REACH;
-        for _ in 0..TRIES {
-            let rested = problem.rested(&moved, curve, beyond)?;
-            if let Some(distance) = rested.distance_of(quantity, value) {
-                let (low, high) = problem.parameters[k].bounds;
-                return Some((k, (moved[k] + distance).clamp(low, high)));
-            }
-            beyond *= 4.0;
-        }
-        None
+        let rested = problem.rested(&moved, curve)?;
+        let distance = rested.distance_of(quantity, value)?;
+        let (low, high) = problem.parameters[k].bounds;
+        Some((k, (moved[k] + distance).clamp(low, high)))
     }
 
     /// The parameter of the adhesion, by its index, with a value nearer to the pull-off force of a
@@ -249,20 +231,15 @@ impl Search<'_> {
             Key::SampleAdhesionForce,
             Key::SampleHamaker,
         ];
-        let k = problem.parameters.iter().position(|p| {
-            let is_adhesion = keys.iter().any(|key| p.target == Target::Key(*key));
-            is_adhesion && !p.is_given && p.is_of(curve)
-        })?;
+        let mut parameters = problem.parameters.iter();
+        let k = parameters.position(|p| p.is_unknown_of(&keys) && p.is_of(curve))?;
         let values = Self::values_of_curve(problem, x, curve).into_iter();
         let [_, least] = values.min_by(|a, b| a[1].total_cmp(&b[1]))?;
         let quantity = problem.data.columns[0].quantity.rest()?;
         let (low, high) = problem.parameters[k].bounds;
-        // A strong adhesion ends far beyond the data.
-        let ranges: Vec<f64> = (0..TRIES).map(|k| REACH * 4f64.powi(k as i32)).collect();
         let pull_off = |value: f64| {
-            let x = with(x, k, value);
-            let of = |beyond: &f64| problem.rested(&x, curve, *beyond)?.pull_off(quantity);
-            ranges.iter().find_map(of)
+            let rested = problem.rested(&with(x, k, value), curve)?;
+            rested.pull_off(quantity)
         };
         // On a stiff sample the pull-off force is proportional to the parameter, on a soft one it
         // goes as a power of it, which the last two values tell.
@@ -284,6 +261,6 @@ impl Search<'_> {
             }
             value = next;
         }
-        (value > 0.0 && value.is_finite()).then_some((k, value))
+        Some((k, value))
     }
 }

@@ -172,12 +172,7 @@ impl Data {
     }
 
     fn check_force_curve(&self, case: &Case) -> Result<(), Error> {
-        if !case.is_physical() {
-            return Err(Error::input(
-                format!("{}: a force curve needs physical quantities", case.title()),
-                "state the lever in [cantilever] and [sample], with units",
-            ));
-        }
+        crate::study::force_curve::physical(case)?;
         let other = self.columns.iter().find(|c| c.quantity.rest().is_none());
         if let Some(other) = other {
             return Err(Error::option(

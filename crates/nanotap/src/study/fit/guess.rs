@@ -13,6 +13,7 @@ use super::instrument::{self, far_rows, median, tapping_line, wrapped};
 use super::parameters::{Parameter, Target};
 use super::problem::Problem;
 use super::search::{ROUGH_ERROR, Search};
+use super::statistics::span;
 use crate::case::{Case, Key};
 
 /// Number of distances of the model's curve.
@@ -124,10 +125,8 @@ impl Search<'_> {
         let first = self.best_offset((curve, offset), own, &offsets)?;
         let values = rows.iter().flat_map(|row| &row.values).flatten().count() as f64;
         let stiffness = self.problem.parameters.iter().position(|p| {
-            let is_stiffness = [Key::SampleModulus, Key::SampleStiffness, Key::Alpha4]
-                .iter()
-                .any(|key| p.target == Target::Key(*key));
-            is_stiffness && !p.is_given && p.is_of(curve)
+            let keys = [Key::SampleModulus, Key::SampleStiffness, Key::Alpha4];
+            p.is_unknown_of(&keys) && p.is_of(curve)
         });
         let mut best = (first.0, with(own, offset, first.1));
         if let Some(stiffness) = stiffness.filter(|_| first.0 > DESCRIBED * values) {
@@ -155,13 +154,8 @@ impl Search<'_> {
         offsets: &[f64],
     ) -> Option<(f64, f64, f64)> {
         let rows = &self.problem.data.curves[curve].rows;
-        let span = |values: &mut dyn Iterator<Item = f64>| {
-            values.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| {
-                (l.min(v), h.max(v))
-            })
-        };
-        let (near, far) = span(&mut rows.iter().map(|row| row.at[0]));
-        let (least, most) = span(&mut offsets.iter().copied());
+        let [near, far] = span(rows.iter().map(|row| row.at[0]));
+        let [least, most] = span(offsets.iter().copied());
         let at_zero = with(x, offset, 0.0);
         let model = self.model_curve(&at_zero, curve, near + least, far + most)?;
         let cost = |of: f64| -> f64 {

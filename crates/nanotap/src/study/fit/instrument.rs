@@ -245,7 +245,7 @@ impl Conversion {
 
     /// Notes what the conversion states.
     fn note(&self, stated: &mut Stated) {
-        let plain = self.name.to_lowercase().replace([' ', '_'], "");
+        let plain = plain(&self.name);
         let known = NAMES.iter().find(|(own, _)| *own == plain);
         let name = self.renamed.as_deref().or(known.map(|(_, name)| *name));
         stated.any = true;
@@ -353,14 +353,21 @@ fn linear(rule: &str) -> Option<(f64, f64)> {
     Some((factor, offset.unwrap_or(0.0)))
 }
 
+/// A name of a column as in [`NAMES`].
+fn plain(name: &str) -> String {
+    name.to_lowercase().replace([' ', '_'], "")
+}
+
 /// Gives instruments' columns the names that are known here, and says whether there are any.
 fn rename(table: &mut Table, columns: &mut [String], notes: &mut Vec<String>) -> bool {
     let before = notes.len();
     let called = |written: &str| Header::of(written).name;
     for (own, name) in NAMES {
-        let plain = |written: &str| called(written).to_lowercase().replace([' ', '_'], "");
         let is_known = |(written, _): &(String, Vec<Entry>)| called(written).to_lowercase() == name;
-        let place = table.columns.iter().position(|(w, _)| plain(w) == own);
+        let place = table
+            .columns
+            .iter()
+            .position(|(w, _)| plain(&called(w)) == own);
         // The separation of a force curve is the distance and the deflection.
         let is_other = match (own, name) {
             ("separation", _) => is_force_curve(table) && !oscillates(table),
@@ -462,16 +469,8 @@ fn is_force_curve(table: &Table) -> bool {
         .map(|(own, _)| *own)
         .chain(["deflection", "force"])
         .collect();
-    let plain = |written: &str| {
-        Header::of(written)
-            .name
-            .to_lowercase()
-            .replace([' ', '_'], "")
-    };
-    table
-        .columns
-        .iter()
-        .any(|(w, _)| own.contains(&plain(w).as_str()))
+    let mut columns = table.columns.iter();
+    columns.any(|(w, _)| own.contains(&plain(&Header::of(w).name).as_str()))
 }
 
 /// The numbers of a column; `None` if it has other entries.

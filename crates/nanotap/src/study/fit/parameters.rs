@@ -11,6 +11,7 @@ use crate::study::value::{Amount, Interval, Intervals};
 use super::data::{self, Data, is_distance};
 use super::laws::between;
 use super::quantity::Quantity;
+use super::statistics::span;
 
 /// What a parameter changes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -66,6 +67,11 @@ impl Parameter {
     /// Whether this is its name, or another one of its key.
     fn is_called(&self, name: &str) -> bool {
         self.name == name || matches!(self.target, Target::Key(key) if Key::find(name) == Some(key))
+    }
+
+    /// Whether it is one of these keys, with no initial value given.
+    pub(super) fn is_unknown_of(&self, keys: &[Key]) -> bool {
+        !self.is_given && keys.iter().any(|key| self.target == Target::Key(*key))
     }
 
     /// Whether it counts for a curve.
@@ -253,9 +259,7 @@ fn nuisance(
             Some(at) if what == "offset" => {
                 let rows = data.curves.iter().flat_map(|curve| &curve.rows);
                 let values = rows.map(|row| row.at[at]);
-                let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| {
-                    (l.min(v), h.max(v))
-                });
+                let [low, high] = span(values);
                 (Target::Place(at), 0.0, 0.05 * (high - low), any)
             }
             _ => {

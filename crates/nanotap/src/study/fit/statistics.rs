@@ -76,6 +76,12 @@ pub(super) fn information(jacobian: &DMatrix<f64>, sizes: &[f64]) -> Information
     }
 }
 
+/// Least and largest of some values.
+pub(super) fn span(values: impl Iterator<Item = f64>) -> [f64; 2] {
+    let none = [f64::INFINITY, f64::NEG_INFINITY];
+    values.fold(none, |[low, high], value| [low.min(value), high.max(value)])
+}
+
 /// An orthonormal basis of the changes of the residuals by parameters: its rows' squared lengths
 /// are the leverages.
 pub(super) fn range(jacobian: &DMatrix<f64>) -> DMatrix<f64> {

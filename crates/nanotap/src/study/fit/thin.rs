@@ -13,6 +13,7 @@ use nalgebra::{DMatrix, DVector};
 use super::baseline::baseline_rows;
 use super::data::{Column, Curve, Data, Row, is_distance};
 use super::instrument::{far_and_doubtful_rows, median, wrapped};
+use super::statistics::span;
 
 /// Scatter of the values of a column about smooth curves.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -62,10 +63,7 @@ pub(crate) fn bins(
 ) -> Vec<Range<usize>> {
     let rows = distance.len();
     let range = |of: &[f64]| {
-        let known = of.iter().filter(|value| value.is_finite());
-        let (low, high) = known.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| {
-            (low.min(*value), high.max(*value))
-        });
+        let [low, high] = span(of.iter().copied().filter(|value| value.is_finite()));
         if high > low { high - low } else { 1.0 }
     };
     let smooth = |of: &[f64], k: usize, half: usize| {
@@ -277,8 +275,9 @@ fn is_level(distance: &[f64], values: &[f64], rows: &[usize], row: usize) -> boo
 }
 
 impl Data {
-    /// The scatter of each column in the rows far from the sample, about their level in every curve and
-    /// direction, or about a line if they drift; nothing if the distance is not what varies, or too few rows are far.
+    /// The scatter of each column in the rows far from the sample, about their level in every curve
+    /// and direction, or about a line if they drift; nothing if the distance is not what varies, or
+    /// too few rows are far.
     pub(super) fn add_free_scatter(&mut self) {
         let amplitude = self
             .columns

@@ -33,6 +33,7 @@ pub use report::{
     Statics, Waveform, points_csv,
 };
 
+pub(crate) use path::physical;
 pub(crate) use rest::{Chain, RestLever, StableRest};
 
 use crate::Error;

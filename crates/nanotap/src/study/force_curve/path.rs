@@ -113,21 +113,29 @@ fn kind(
     )))
 }
 
+/// The physical quantities of a case, which a force curve needs.
+///
+/// # Errors
+/// When there are none.
+pub(crate) fn physical(case: &Case) -> Result<&Physical, Error> {
+    case.physical().ok_or_else(|| {
+        Error::input(
+            format!(
+                "{}: a force curve needs a cantilever in physical quantities",
+                case.title()
+            ),
+            "state the lever in [cantilever], [drive] and [sample], with units",
+        )
+    })
+}
+
 impl<'a> Plan<'a> {
     /// The plan of these options for a case.
     ///
     /// # Errors
     /// When an option or the case is not valid.
     pub(super) fn new(case: &'a Case, options: &ForceCurveOptions) -> Result<Self, Error> {
-        let view = case.physical().ok_or_else(|| {
-            Error::input(
-                format!(
-                    "{}: a force curve needs a cantilever in physical quantities",
-                    case.title()
-                ),
-                "state the lever in [cantilever], [drive] and [sample], with units",
-            )
-        })?;
+        let view = physical(case)?;
         let key = case.gap_key();
         let distance = |option, given: &Option<_>| implied(case, key, option, given.as_ref());
         let from = match distance("from", &options.from)? {

@@ -1,6 +1,7 @@
 //! The lever at rest at any distance, in SI, for fits of force curves.
 
-use super::statics::{MEET, Piece, Rest, StaticCurve};
+use super::path::physical;
+use super::statics::{Piece, Rest, StaticCurve};
 use crate::Error;
 use crate::case::Case;
 
@@ -33,12 +34,7 @@ impl RestLever {
     /// # Errors
     /// When the case has no model or no units.
     pub(crate) fn of(case: &Case) -> Result<Self, Error> {
-        let view = case.physical().ok_or_else(|| {
-            Error::input(
-                format!("{}: a force curve needs physical quantities", case.title()),
-                "state the lever in [cantilever] and [sample], with units",
-            )
-        })?;
+        let view = physical(case)?;
         Ok(Self {
             statics: StaticCurve::new(case, &case.model()?)?,
             length: view.scales.length,
@@ -57,15 +53,11 @@ impl RestLever {
         let mut pieces = self.statics.pieces(near, far);
         pieces.retain(|piece| piece.stable);
         pieces.sort_by(|a, b| b.high().gap.total_cmp(&a.high().gap));
-        let meets = |a: Rest, b: Rest| {
-            let within = MEET * (far - near);
-            (a.gap - b.gap).abs() <= within && (a.distance - b.distance).abs() <= within
-        };
         let mut chains: Vec<Chain> = Vec::new();
         for piece in pieces {
             let ends = |chain: &&mut Chain| {
                 let last = chain.0.last();
-                last.is_some_and(|last| meets(last.low(), piece.high()))
+                last.is_some_and(|last| last.low().meets(&piece.high(), far - near))
             };
             match chains.iter_mut().find(ends) {
                 Some(chain) => chain.0.push(piece),

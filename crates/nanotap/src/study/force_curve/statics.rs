@@ -92,7 +92,7 @@ const POINTS: usize = 1200;
 /// Smallest step from there, as a part of the range.
 const NEAR: f64 = 1e-9;
 /// Two ends meet within this part of the range.
-pub(super) const MEET: f64 = 1e-9;
+const MEET: f64 = 1e-9;
 
 impl StaticCurve {
     /// The rests of the lever of `case` with its model.
@@ -328,11 +328,7 @@ impl StaticCurve {
                 let others = pieces.iter().filter(|other| other.stable);
                 others.filter(|other| !std::ptr::eq(*other, piece))
             };
-            let meets = |other: &&Piece| {
-                let first = begin(other);
-                (first.gap - last.gap).abs() <= MEET * range
-                    && (first.distance - last.distance).abs() <= MEET * range
-            };
+            let meets = |other: &&Piece| begin(other).meets(&last, range);
             if let Some(next) = others().find(meets) {
                 visited.push(next);
                 continue;
@@ -362,6 +358,12 @@ impl StaticCurve {
 }
 
 impl Rest {
+    /// Whether it is the other within rounding, in a range of distances.
+    pub(super) fn meets(&self, other: &Self, range: f64) -> bool {
+        let is_near = |a: f64, b: f64| (a - b).abs() <= MEET * range;
+        is_near(self.gap, other.gap) && is_near(self.distance, other.distance)
+    }
+
     fn towards(&self, other: &Self, part: f64) -> Self {
         let mix = |a: f64, b: f64| a + part * (b - a);
         Self {

@@ -356,9 +356,7 @@ impl Loop {
                     .for_each(|(sum, part)| *sum += weight * part);
                 for (column, of) in columns.iter().enumerate() {
                     let number = (of.quantity.modulated()?.of)(found)?;
-                    let zero = problem.read(x, curve, column, 0.0);
-                    let scale = problem.read(x, curve, column, 1.0) - zero;
-                    by[column] += weight * scale * number;
+                    by[column] += weight * problem.scale(x, curve, column) * number;
                 }
             }
             Some((state, by))

@@ -22,6 +22,7 @@ use crate::study::fit::data::{Column, Data, Row};
 use crate::study::fit::jumps::{Fold, Jump};
 use crate::study::fit::parameters::{Parameter, Target};
 use crate::study::fit::solve::LeastSquares;
+use crate::study::fit::statistics::span;
 use held::{HeldRow, Loop};
 pub(super) use rest::MAX_RINGING;
 use rest::Nearby;
@@ -296,6 +297,16 @@ impl Problem<'_> {
         scale * value + offset
     }
 
+    /// The change of a reading with the model's value.
+    pub(super) fn scale(&self, x: &[f64], curve: usize, column: usize) -> f64 {
+        self.read(x, curve, column, 1.0) - self.read(x, curve, column, 0.0)
+    }
+
+    /// A measured value without scale and offset.
+    pub(super) fn unread(&self, x: &[f64], curve: usize, column: usize, value: f64) -> f64 {
+        (value - self.read(x, curve, column, 0.0)) / self.scale(x, curve, column)
+    }
+
     /// The standard error of a measured value.
     pub(super) fn error(&self, row: &Row, column: usize) -> f64 {
         row.errors[column].unwrap_or(row.relative[column] * self.noise[column])
@@ -384,9 +395,7 @@ impl Problem<'_> {
             let columns = &self.data.columns;
             let named = |c: &Column| names.contains(&c.quantity.name());
             let column = columns.iter().position(named)?;
-            let zero = self.read(x, curve, column, 0.0);
-            let scale = self.read(x, curve, column, 1.0) - zero;
-            Some((row.values[column]? - zero) / scale)
+            Some(self.unread(x, curve, column, row.values[column]?))
         };
         let amplitude = known(["first_harmonic", "amplitude"])?;
         let amplitude = match self.case.physical() {
@@ -441,9 +450,7 @@ impl Problem<'_> {
                 continue;
             }
             let all = rows.iter().filter(|row| row.0 == rows[k].0);
-            let (low, high) = all.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), row| {
-                (l.min(row.1.at[0]), h.max(row.1.at[0]))
-            });
+            let [low, high] = span(all.map(|row| row.1.at[0]));
             jumps.push(Jump {
                 curve: rows[k].0,
                 rows: [before, k],
@@ -634,7 +641,7 @@ impl Problem<'_> {
         let by_key =
             Derivative::of_keys(case, model, &keys, place, observables, self.set()).ok()?;
         let scales: Vec<f64> = (0..columns.len())
-            .map(|column| self.read(x, curve, column, 1.0) - self.read(x, curve, column, 0.0))
+            .map(|column| self.scale(x, curve, column))
             .collect();
         let one = |(parameter, effects): (&Parameter, &Effects)| {
             let mut state = vec![0.0; start.len()];

@@ -16,10 +16,14 @@ use crate::study::fit::branches::Rows;
 use crate::study::fit::data::{Row, is_distance};
 use crate::study::fit::parameters::{Parameter, Target};
 use crate::study::fit::quantity::RestQuantity;
+use crate::study::fit::statistics::span;
 use crate::study::force_curve::{Chain, RestLever, StableRest};
 
 /// Margin of the range of distances, as a part of it.
 const MARGIN: f64 = 0.05;
+/// How far beyond the rows a rest is searched for first, in m, and how often four times as far.
+const REACH: f64 = 1e-9;
+const TRIES: i32 = 8;
 /// Rows after a jump that are this many standard deviations off their branch do not count, up to so
 /// many.
 const RINGING: f64 = 3.0;
@@ -30,14 +34,27 @@ const DECAY: f64 = 0.6;
 /// Change of a key for its central difference, relative.
 const STEP: f64 = 1e-5;
 
-/// The lever of a curve with its chains of rests between two distances.
+/// The lever of a curve, with the least and the largest distance of its rows.
 pub(in crate::study::fit) struct Rested {
     lever: RestLever,
-    chains: Vec<Chain>,
-    between: [f64; 2],
+    rows: [f64; 2],
 }
 
 impl Rested {
+    /// Distances that go `beyond` those of the rows on either side.
+    fn between(&self, beyond: f64) -> [f64; 2] {
+        let [near, far] = self.rows;
+        let margin = beyond + MARGIN * (far - near);
+        [near - margin, far + margin]
+    }
+
+    /// What is found first over distances that go ever farther beyond the rows.
+    fn farther<T>(&self, find: impl Fn([f64; 2]) -> Option<T>) -> Option<T> {
+        let beyond = (0..TRIES).map(|k| REACH * 4f64.powi(k));
+        let mut found = beyond.filter_map(|beyond| find(self.between(beyond)));
+        found.next()
+    }
+
     /// The distance at which a quantity has a value, nearest to the sample.
     pub(in crate::study::fit) fn distance_of(
         &self,
@@ -45,14 +62,23 @@ impl Rested {
         value: f64,
     ) -> Option<f64> {
         let of = |rest: &StableRest| reading(rest, Some(quantity));
-        let mut chains = self.chains.iter().rev();
-        chains.find_map(|chain| self.lever.distance_of(chain, of, value))
+        self.farther(|between| {
+            let chains = self.lever.chains(between);
+            let mut chains = chains.iter().rev();
+            chains.find_map(|chain| self.lever.distance_of(chain, of, value))
+        })
     }
 
-    /// A quantity where the force is lowest, of a lever that goes to the sample and back.
+    /// A quantity where the force is lowest, of a lever that goes to the sample and back. With a
+    /// strong adhesion this is far beyond the rows.
     pub(in crate::study::fit) fn pull_off(&self, quantity: RestQuantity) -> Option<f64> {
-        let rest = self.lever.pull_off(self.between)?;
+        let rest = self.farther(|between| self.lever.pull_off(between))?;
         Some(reading(&rest, Some(quantity)))
+    }
+
+    fn with_chains(self) -> (RestLever, Vec<Chain>) {
+        let chains = self.lever.chains(self.between(0.0));
+        (self.lever, chains)
     }
 }
 
@@ -69,23 +95,13 @@ impl Problem<'_> {
         Some(self.case_at(base, &self.place(x, curve, first)))
     }
 
-    /// The rests of a curve, over distances that go `beyond` those of the rows on either side.
-    pub(in crate::study::fit) fn rested(
-        &self,
-        x: &[f64],
-        curve: usize,
-        beyond: f64,
-    ) -> Option<Rested> {
+    /// The lever of a curve.
+    pub(in crate::study::fit) fn rested(&self, x: &[f64], curve: usize) -> Option<Rested> {
         self.finished(())?;
         let case = self.case_of_rests(x, curve, &self.cases(x)[curve])?;
-        let lever = RestLever::of(&case).ok()?;
-        let [near, far] = span(&self.distances(x, curve));
-        let margin = beyond + MARGIN * (far - near);
-        let between = [near - margin, far + margin];
         Some(Rested {
-            chains: lever.chains(between),
-            lever,
-            between,
+            lever: RestLever::of(&case).ok()?,
+            rows: span(self.distances(x, curve).into_iter()),
         })
     }
 
@@ -121,16 +137,16 @@ impl Problem<'_> {
         let curves = self.data.curves.par_iter().enumerate();
         let points: Vec<Vec<RowPoint>> = curves
             .map(|(curve, of)| {
-                let rested = self.rested(x, curve, 0.0);
+                let rested = self.rested(x, curve).map(Rested::with_chains);
                 let seen: Vec<Vec<Option<RowPoint>>> = self
                     .distances(x, curve)
                     .into_iter()
                     .map(|at| {
-                        let rested = rested.iter();
-                        let chains =
-                            rested.flat_map(|r| r.chains.iter().enumerate().map(move |c| (r, c)));
-                        let rests = chains.filter_map(|(r, (branch, chain))| {
-                            Some(Some(self.at_rest(branch, r.lever.at(chain, at)?)))
+                        let Some((lever, chains)) = &rested else {
+                            return Vec::new();
+                        };
+                        let rests = chains.iter().enumerate().filter_map(|(branch, chain)| {
+                            Some(Some(self.at_rest(branch, lever.at(chain, at)?)))
                         });
                         rests.collect()
                     })
@@ -214,14 +230,14 @@ impl Problem<'_> {
     /// The rests at other parameters, each on the chain of the known one.
     pub(super) fn follow_rests(&self, x: &[f64], from: &Point) -> Point {
         let curves: Vec<usize> = (0..self.data.curves.len()).collect();
-        let rested: Vec<Option<Rested>> = curves
+        let rested: Vec<Option<(RestLever, Vec<Chain>)>> = curves
             .par_iter()
-            .map(|curve| self.rested(x, *curve, 0.0))
+            .map(|curve| self.rested(x, *curve).map(Rested::with_chains))
             .collect();
         let rows = self.rows();
         let one = |((curve, row), before): (&(usize, &_), &RowPoint)| {
             let follow = || {
-                let Rested { lever, chains, .. } = rested[*curve].as_ref()?;
+                let (lever, chains) = rested[*curve].as_ref()?;
                 // A jump that is no more has joined its branches.
                 let branch = before.branch.min(chains.len().checked_sub(1)?);
                 let at = self.place(x, *curve, row)[0];
@@ -252,14 +268,6 @@ fn reading(rest: &StableRest, quantity: Option<RestQuantity>) -> f64 {
         Some(RestQuantity::Force) => rest.force,
         None => f64::NAN,
     }
-}
-
-/// Least and largest of some values.
-fn span(values: &[f64]) -> [f64; 2] {
-    let ends = [f64::INFINITY, f64::NEG_INFINITY];
-    values.iter().fold(ends, |[low, high], value| {
-        [low.min(*value), high.max(*value)]
-    })
 }
 
 /// The levers of every curve, and those with a key a little lower and higher.
@@ -349,9 +357,7 @@ impl Nearby {
                 by = parameter.direct(&point.values);
                 for (key, weight) in effects {
                     for (column, slope) in by_key(*key)?.into_iter().enumerate() {
-                        let zero = problem.read(x, curve, column, 0.0);
-                        let scale = problem.read(x, curve, column, 1.0) - zero;
-                        by[column] += weight * scale * slope;
+                        by[column] += weight * problem.scale(x, curve, column) * slope;
                     }
                 }
             }

@@ -72,7 +72,7 @@ impl ForceTable {
     ///
     /// # Errors
     /// If they are missing, have no unit, or are not a function of the gap.
-    pub(crate) fn of(table: &Table) -> Result<Self, ForceTableError> {
+    pub fn of(table: &Table) -> Result<Self, ForceTableError> {
         let gaps = column(table, &["gap", "distance", "d"], Kind::Length, "gap (nm)")?;
         let forces = column(table, &["force", "f"], Kind::Force, "force (nN)")?;
         let mut damping = if has(table, DAMPING) {
@@ -99,7 +99,7 @@ impl ForceTable {
     }
 
     /// The table as an array that is read back as the same.
-    pub(crate) fn text(&self) -> String {
+    pub fn text(&self) -> String {
         let mut header = "[\"gap (m)\", \"force (N)\"".to_owned();
         if !self.0.damping().is_empty() {
             header.push_str(", \"damping (N s/m)\"");
@@ -282,7 +282,7 @@ impl ArmTable {
     }
 
     /// The arms as an array that is read back as the same.
-    pub(crate) fn text(&self) -> String {
+    pub fn text(&self) -> String {
         let header = match self.strength {
             Strength::Modulus if self.arms.shear() => "\"time (s)\", \"shear modulus (Pa)\"",
             Strength::Modulus => "\"time (s)\", \"modulus (Pa)\"",

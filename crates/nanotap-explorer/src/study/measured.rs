@@ -1,0 +1,348 @@
+//! Measured data: over the curve of the model, fitted, or inverted to a force.
+
+use std::fmt::Write as _;
+
+use nanotap::case::file::Source;
+use nanotap::case::force_table::ForceTable;
+use nanotap::case::quantity::{Kind, format_electronvolts};
+use nanotap::case::units::prefixed;
+use nanotap::case::{Case, Key};
+use nanotap::figure::fit::fit_figure;
+use nanotap::figure::reconstruct::reconstruct_figure;
+use nanotap::study::approach::ApproachStudy;
+use nanotap::study::fit::{FitOptions, FitReport, FitStudy, FittedParameter, Table, measured};
+use nanotap::study::reconstruct::{
+    ReconstructMethod, ReconstructOptions, ReconstructReport, ReconstructStudy,
+};
+use nanotap::study::registry::{Study as _, study as study_named};
+use nanotap::study::request::read;
+use nanotap_figures::{Axis as Axes, Colour, Figure, Markers, Panel};
+use serde_json::{Map, Value, json};
+
+use super::approach::{APPROACH, APPROACH_SHOWS, Approached};
+use super::{Found, Stage, Studied, object};
+use crate::api_error::ApiError;
+use crate::clicks::Height;
+use crate::commands::CASE_FILE;
+use crate::motion_request::model_of;
+use crate::report;
+
+impl Studied<'_> {
+    /// Measured data: over the model's curve, or with the fit of the model to them.
+    pub(super) fn measured(&self) -> Result<(), ApiError> {
+        let case = self.request.case.any_distance(self.app)?;
+        model_of(&case)?;
+        let Some((name, text)) = &self.request.data else {
+            return Err(ApiError::input("no data", "drop a file on the page"));
+        };
+        let table = Table::parse(name, text).map_err(ApiError::of)?;
+        let options = |study| study_named(study).map_or_else(Map::new, |entry| self.options(entry));
+        let of_fit = options(FitStudy::NAME);
+        let mut named = object(json!({ "data": [name] }));
+        if self.field("reconstruct").is_ok() {
+            let mut of_curve = options(ReconstructStudy::NAME);
+            // The form has the fit's default where both studies have an option.
+            let given = |name: &String| of_fit.contains_key(name);
+            let fitted = serde_json::to_value(FitOptions::default()).unwrap_or_default();
+            of_curve.retain(|name, _| fitted.get(name).is_none() || given(name));
+            let mut request: ReconstructOptions = read(Value::Object(of_curve.clone()))?;
+            request.data = vec![table];
+            named.extend(of_curve);
+            return self.reconstructed(&case, &request, &named);
+        }
+        let mut request: FitOptions = read(Value::Object(of_fit.clone()))?;
+        request.data = vec![table];
+        named.extend(of_fit);
+        if self.field("fit").is_err() {
+            return self.over_model(&case, &request, &named);
+        }
+        if !request.pixels.is_empty() {
+            return self.fitted_pixels(&case, &request, named);
+        }
+        let report = self.counting(FitStudy::COUNTED, |control| {
+            FitStudy::run(&case, &request, control)
+        })?;
+        let found = Source {
+            name: CASE_FILE.to_owned(),
+            text: report.case_file.clone(),
+        };
+        let set = Case::parse(Some(found), &[]).map(|found| report::changes(&case, &found));
+        let found = Found {
+            set: set.ok(),
+            take: "Use these values",
+            file: report.case_file.clone(),
+            save: "Case file of the fit",
+            name: "best.toml",
+        };
+        let notes = report.reason.iter().chain(&report.remarks);
+        let notes: Vec<&str> = notes.map(String::as_str).collect();
+        let fits = if report.fits {
+            "The model describes the data."
+        } else {
+            "The model does not describe the data."
+        };
+        self.hand(Stage {
+            figure: Some(fit_figure(&report)),
+            words: format!("{fits} {}", notes.join(". ")).trim_end().to_owned(),
+            studies: &[("fit", &named)],
+            tables: vec![parameters(&report)],
+            found: Some(found),
+            ..Stage::default()
+        })
+    }
+
+    /// The fits of a force volume, one a pixel.
+    fn fitted_pixels(
+        &self,
+        case: &Case,
+        request: &FitOptions,
+        mut named: Map<String, Value>,
+    ) -> Result<(), ApiError> {
+        let entry = study_named(FitStudy::NAME)
+            .ok_or_else(|| ApiError::failed("this program has no fit"))?;
+        let options = serde_json::to_value(request).map_err(nanotap::Error::from)?;
+        let (summary, figure) = self.whole_dataset(entry, case, options)?;
+        named.insert("out".into(), "fit.zarr".into());
+        self.hand(Stage {
+            figure,
+            words: "One fit a pixel.".to_owned(),
+            studies: &[(FitStudy::NAME, &named)],
+            tables: report::tables(&summary, &Value::Null),
+            ..Stage::default()
+        })
+    }
+
+    /// Force and dissipation of measured data, without a contact law.
+    fn reconstructed(
+        &self,
+        case: &Case,
+        request: &ReconstructOptions,
+        named: &Map<String, Value>,
+    ) -> Result<(), ApiError> {
+        let report = self.counting(ReconstructStudy::COUNTED, |control| {
+            ReconstructStudy::run(case, request, control)
+        })?;
+        let method = match report.method {
+            ReconstructMethod::AmplitudeModulation => "amplitude and phase",
+            ReconstructMethod::FrequencyModulation => "frequency shift",
+        };
+        let set = self.table_law(case, &report);
+        let negative = report.table.damping.iter().any(|damping| *damping < 0.0);
+        let none = "as a law the force has no damping where it is negative";
+        let notes = report.remarks.iter().map(String::as_str);
+        let notes = notes.chain((set.is_some() && negative).then_some(none));
+        let mut words = format!("Force from {method} of {} rows", report.rows.len());
+        for note in notes {
+            let _ = write!(words, "; {note}");
+        }
+        self.hand(Stage {
+            figure: Some(reconstruct_figure(&report)),
+            words,
+            studies: &[(ReconstructStudy::NAME, named)],
+            tables: vec![force_values(&report)],
+            found: Some(Found {
+                set,
+                take: "Use as the sample's force table",
+                file: report.csv(),
+                save: "Force curve (CSV)",
+                name: "force.csv",
+            }),
+            ..Stage::default()
+        })
+    }
+
+    /// The changes to the case that take a reconstructed force as its contact law, where it can.
+    fn table_law(&self, case: &Case, report: &ReconstructReport) -> Option<Map<String, Value>> {
+        let change = case.law_change("table", case).ok()?;
+        let mut set = object(json!({ Key::SampleLaw.path(): change.law }));
+        for key in &change.dropped {
+            set.insert(key.path().into(), "".into());
+        }
+        let force = Table::parse("the reconstructed force", &report.csv()).ok()?;
+        let force = ForceTable::of(&force).ok()?.text();
+        set.insert(Key::SampleTable.path().into(), force.into());
+        let mut spec = self.request.case.clone();
+        for (key, text) in &set {
+            spec.put(Key::find(key)?, text.as_str()?);
+        }
+        let taken = spec.any_distance(self.app).ok()?;
+        taken.model().is_ok().then_some(set)
+    }
+
+    /// Measured data over the model's curve, where they are of the distance; otherwise alone.
+    fn over_model(
+        &self,
+        case: &Case,
+        request: &FitOptions,
+        named: &Map<String, Value>,
+    ) -> Result<(), ApiError> {
+        let data = measured(case, request)?;
+        let swept = data.swept.first().map(|swept| swept.key);
+        let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
+        for row in data.rows() {
+            let at = row.at.first().copied().unwrap_or(f64::NAN);
+            (low, high) = (low.min(at), high.max(at));
+        }
+        let length = |value: f64| Kind::Length.format_exact(value);
+        let distance = swept == Some(Key::GapTip) && case.is_physical() && low < high;
+        let (mut figure, factor) = if distance {
+            let options =
+                object(json!({ "points": APPROACH[0], "from": length(high), "to": length(low) }));
+            let report = self.report::<ApproachStudy>(case, &options)?;
+            let Approached { figure, axis, .. } = Approached::of(case, &report);
+            (figure, axis.factor)
+        } else {
+            let kind = swept.map_or(Kind::Number, Key::kind);
+            let (factor, unit) = match kind {
+                Kind::Number => (1.0, String::new()),
+                kind => prefixed(kind, 1.0, low.abs().max(high.abs())),
+            };
+            let label = swept.map_or("", Key::path);
+            let mut figure = Figure::new(1, data.columns.len());
+            for column in &data.columns {
+                let x = Axes::linear(label).unit(unit.clone());
+                figure = figure.with(Panel::new(x, Axes::linear(column.name.clone())));
+            }
+            (figure, factor)
+        };
+        let heights = Height::of(&figure, &APPROACH_SHOWS);
+        let mut left = Vec::new();
+        for (k, column) in data.columns.iter().enumerate() {
+            let place = if distance {
+                heights
+                    .iter()
+                    .position(|height| height.is(column.quantity.name()))
+            } else {
+                Some(k)
+            };
+            let Some(panel) = place.and_then(|place| figure.panels.get_mut(place)) else {
+                left.push(column.name.as_str());
+                continue;
+            };
+            let drawn = |value: f64| match place.and_then(|place| heights.get(place)) {
+                Some(height) if distance => height.of_measured(value),
+                _ => value,
+            };
+            let points = data.rows().filter_map(|row| {
+                let value = (*row.values.get(k)?)?;
+                Some((factor * row.at.first()?, drawn(value)))
+            });
+            let markers = Markers::new(points)
+                .open()
+                .colour(Colour::BLACK)
+                .label("measured");
+            panel.layers.push(markers.into());
+        }
+        let mut words = format!(
+            "{} rows. “Fit” finds the free parameters, “Force without a law” the force and the dissipation.",
+            data.rows().count()
+        );
+        if !left.is_empty() {
+            words.push_str(" Not drawn: ");
+            words.push_str(&left.join(", "));
+        }
+        self.hand(Stage {
+            figure: Some(figure),
+            words,
+            studies: &[("fit", named)],
+            ..Stage::default()
+        })
+    }
+}
+
+/// The fitted parameters with their intervals.
+fn parameters(report: &FitReport) -> Value {
+    let text = |parameter: &FittedParameter, value: Option<f64>| match value {
+        None => "not determined".to_owned(),
+        Some(value) => {
+            let of_unit = |kind: &Kind| kind.si_unit() == parameter.unit;
+            let kind = Key::find(&parameter.key).map(Key::kind);
+            let kind = kind.or_else(|| Kind::ALL.into_iter().find(of_unit));
+            kind.unwrap_or(Kind::Number).format_digits(value, 4)
+        }
+    };
+    let rows = report.parameters.iter().map(|one| {
+        let name = match &one.curve {
+            Some(curve) => format!("{} of {curve}", one.key),
+            None => one.key.clone(),
+        };
+        let [low, high] = one.interval.map(|end| text(one, end));
+        let cells = [
+            name,
+            text(one, Some(one.value)),
+            text(one, one.standard_error),
+            match one.interval {
+                [None, None] => "not determined".to_owned(),
+                _ => format!("{low} to {high}"),
+            },
+            text(one, Some(one.start)),
+        ];
+        report::row(&cells, None)
+    });
+    let heads = [
+        ("parameter", "Key of the case, or correction of a column"),
+        ("value", "Of the best fit"),
+        ("standard error", ""),
+        ("95 % interval", ""),
+        ("began at", "Initial value"),
+    ];
+    report::table("", &heads, &rows.collect::<Vec<_>>())
+}
+
+/// The values of a reconstruction.
+fn force_values(report: &ReconstructReport) -> Value {
+    let shown = |kind: Kind, value: f64, digits: usize| {
+        let kind = if report.physical { kind } else { Kind::Number };
+        kind.format_digits(value, digits)
+    };
+    let energy = |value: f64| {
+        if report.physical {
+            format_electronvolts(value)
+        } else {
+            Kind::Number.format_digits(value, 4)
+        }
+    };
+    let mut values = Vec::new();
+    if let Some(minimum) = &report.minimum {
+        let [force, error] = [(minimum.force, 4), (minimum.force_error, 2)]
+            .map(|(value, digits)| shown(Kind::Force, value, digits));
+        let at = shown(Kind::Length, minimum.distance, 4);
+        values.push([
+            "minimum of the force".to_owned(),
+            format!("{force} ± {error} at {at}"),
+        ]);
+    }
+    let dissipated = report.rows.iter().map(|row| row.dissipation);
+    let dissipated = dissipated.fold(0.0, f64::max);
+    values.extend([
+        [
+            "closest approach".to_owned(),
+            shown(Kind::Length, report.closest, 4),
+        ],
+        [
+            "largest dissipation".to_owned(),
+            if report.has_damping {
+                energy(dissipated)
+            } else {
+                "not determined".to_owned()
+            },
+        ],
+        [
+            "free amplitude and phase".to_owned(),
+            format!(
+                "{}, {}°",
+                shown(Kind::Length, report.free_amplitude, 5),
+                Kind::Number.format_digits(report.free_phase, 5)
+            ),
+        ],
+        [
+            "mean squared residual, in standard errors".to_owned(),
+            Kind::Number.format_digits(report.chi2, 3),
+        ],
+    ]);
+    let rows: Vec<Value> = values
+        .iter()
+        .map(|cells| report::row(cells, None))
+        .collect();
+    report::table("", &[("", ""), ("", "")], &rows)
+}

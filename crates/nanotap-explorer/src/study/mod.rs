@@ -1,0 +1,324 @@
+//! The terminal's studies, in stages of increasing resolution until they are cancelled.
+
+mod approach;
+mod basin;
+mod diagram;
+mod image;
+mod levers;
+mod measured;
+mod plan;
+mod registered;
+
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::{Duration, Instant};
+
+use axum::Json;
+use axum::extract::State;
+use axum::response::Response;
+use nanotap::case::Case;
+use nanotap::control::Control;
+use nanotap::dataset::{Share, Store, Work};
+use nanotap::model::Model;
+use nanotap::study::registry::{Study, StudyEntry, study as study_named};
+use nanotap::study::request::{Property, properties, read};
+use nanotap::study::sweep::Over;
+use nanotap_figures::Figure;
+use serde::{Deserialize, Serialize};
+use serde_json::{Map, Value, json};
+
+use crate::App;
+use crate::api_error::ApiError;
+use crate::commands::{CASE_FILE, case_path, quoted, study_command, study_python};
+use crate::figures::{drawn, over_pinned};
+use crate::forms;
+use crate::motion_request::model_of;
+use crate::preset::CaseSpec;
+use crate::scratch::Scratch;
+
+/// Time between messages on the progress.
+const BETWEEN: Duration = Duration::from_millis(300);
+
+/// A study as requested by the page: its fields by name.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct StudyRequest {
+    case: CaseSpec,
+    #[serde(default)]
+    start: String,
+    /// A tab of the page, or a study of the registry.
+    tab: String,
+    /// Measured data: name and text of their file.
+    #[serde(default)]
+    data: Option<(String, String)>,
+    options: Map<String, Value>,
+    /// Number of a figure whose curves are drawn behind; 0: none.
+    #[serde(default)]
+    pinned: u64,
+}
+
+pub(crate) async fn study(
+    State(app): State<Arc<App>>,
+    Json(request): Json<StudyRequest>,
+) -> Response {
+    let shared = Arc::clone(&app);
+    app.workers.stream(move |control, hand_over| {
+        Studied {
+            app: &shared,
+            request: &request,
+            control,
+            hand_over,
+        }
+        .run()
+    })
+}
+
+/// Sends a message to the page.
+type HandOver<'a> = &'a (dyn Fn(Value) + Sync);
+
+/// A running study.
+struct Studied<'a> {
+    app: &'a App,
+    request: &'a StudyRequest,
+    control: &'a Control<'a>,
+    hand_over: HandOver<'a>,
+}
+
+/// A finished stage.
+#[derive(Default)]
+struct Stage<'a> {
+    figure: Option<Figure>,
+    clicks: Value,
+    words: String,
+    /// Names and requests of the studies in its figure.
+    studies: &'a [Computed<'a>],
+    /// Lines of the case file in addition.
+    scan: Option<String>,
+    /// What the page shows below the figure.
+    tables: Vec<Value>,
+    found: Option<Found>,
+}
+
+/// What a study found, to go on from.
+#[derive(Serialize)]
+struct Found {
+    /// The changes to the case that lead to it, and the words of the button that makes them.
+    set: Option<Map<String, Value>>,
+    take: &'static str,
+    /// A file of it, the words of the button that saves it, and its name.
+    file: String,
+    save: &'static str,
+    name: &'static str,
+}
+
+/// The name of a study, and its options.
+type Computed<'a> = (&'a str, &'a Map<String, Value>);
+
+impl Studied<'_> {
+    fn run(&self) -> Result<(), ApiError> {
+        match self.request.tab.as_str() {
+            "diagram" => self.diagram(),
+            "resonance" => self.resonance(),
+            "map" => self.map(),
+            "plan" => self.plan(),
+            "image" => self.image(),
+            "branches" => self.branches(),
+            "approach" => self.approach(),
+            "basin" => self.basin(),
+            "levers" => self.levers(),
+            "data" => self.measured(),
+            name => self.any(name),
+        }
+    }
+
+    /// Runs work whose progress the page shows.
+    fn counting<T>(&self, counted: &str, work: impl FnOnce(&Control<'_>) -> T) -> T {
+        let last = Mutex::new(Instant::now());
+        let progress = |done: usize, total: usize| {
+            let mut last = last.lock().unwrap_or_else(PoisonError::into_inner);
+            if last.elapsed() > BETWEEN {
+                *last = Instant::now();
+                (self.hand_over)(json!({ "progress": format!("{done} of {total} {counted}") }));
+            }
+        };
+        work(&Control {
+            cancel: self.control.cancel,
+            progress: Some(&progress),
+        })
+    }
+
+    /// The options that the form gives, of those that a study has; a default is not stated.
+    fn options(&self, entry: &StudyEntry) -> Map<String, Value> {
+        let schema = (entry.request)();
+        let given = |property: Property<'_>| {
+            let text = self.field(property.name).ok()?;
+            let pairs = property.schema["x-value"].as_str();
+            let value = if property.allows("boolean") && !property.allows("string") {
+                (text == forms::YES).into()
+            } else if property.allows("array") && pairs.is_some_and(|form| form.contains('=')) {
+                pairs_of(text).into()
+            } else {
+                property.parsed(text)
+            };
+            (property.default() != Some(&value)).then(|| (property.name.to_owned(), value))
+        };
+        properties(&schema).filter_map(given).collect()
+    }
+
+    fn field(&self, name: &str) -> Result<&str, ApiError> {
+        let given = self.request.options.get(name).and_then(Value::as_str);
+        let given = given.map(str::trim).filter(|text| !text.is_empty());
+        given.ok_or_else(|| {
+            ApiError::input(format!("the field `{name}` is empty"), "give it a value")
+        })
+    }
+
+    /// `key=from:to:count` in the terminal's form, and the parsed range.
+    fn over(&self, case: &Case, which: &str, count: usize) -> Result<(String, Over), ApiError> {
+        let [key, from, to] =
+            ["key", "from", "to"].map(|part| self.field(&format!("{part}{which}")));
+        let text = format!("{}={}:{}:{count}", key?, from?, to?).replace(' ', "");
+        let over = Over::parse(&text, case).map_err(ApiError::of)?;
+        Ok((text, over))
+    }
+
+    fn hand(&self, stage: Stage<'_>) -> Result<(), ApiError> {
+        let case = &self.request.case;
+        let command = |(name, request): &Computed<'_>| study_command(self.app, case, name, request);
+        let commands = stage.studies.iter().map(command);
+        let commands: Vec<String> = commands.collect::<Result<_, _>>()?;
+        let mut words = stage.words;
+        let mut figure = stage.figure;
+        if let (Some(own), 1..) = (&figure, self.request.pinned) {
+            let pinned = self.app.figures.get(self.request.pinned)?;
+            let (both, any) = over_pinned(own.clone(), &pinned);
+            if !any {
+                words.push_str("; the pinned figure has other axes");
+            }
+            figure = Some(both);
+        }
+        let mut message = json!({
+            "clicks": stage.clicks,
+            "words": words,
+            "tables": stage.tables,
+            "command": match &stage.scan {
+                Some(scan) => {
+                    let path = quoted(&case_path(self.app, case)?);
+                    with_scan(scan, &commands.join("\n").replacen(&path, CASE_FILE, 1))
+                }
+                None => commands.join("\n"),
+            },
+            "python": study_python(self.app, case, stage.studies)?,
+        });
+        if let Some(figure) = figure {
+            message["figure"] = drawn(&figure)?;
+            message["number"] = self.app.figures.put(figure).into();
+        }
+        if let Some(found) = stage.found {
+            message["found"] = json!(found);
+        }
+        (self.hand_over)(message);
+        Ok(())
+    }
+
+    /// A dataset of a study, in a folder that is removed once the figure is drawn.
+    fn dataset<T>(
+        &self,
+        case: &Case,
+        entry: &StudyEntry,
+        request: Value,
+        control: &Control<'_>,
+        use_it: impl FnOnce(&Store) -> Result<T, ApiError>,
+    ) -> Result<T, ApiError> {
+        let plan = entry.plan(case, request, control)?;
+        let scratch = Scratch::within(&self.app.scratch)?;
+        let store =
+            Store::create_or_resume(&scratch.path().join("data.zarr"), plan.schema().clone())
+                .map_err(ApiError::of)?;
+        let work = Work {
+            share: Share::WHOLE,
+            threads: 0,
+            control: *control,
+        };
+        plan.compute(&store, &work).map_err(ApiError::of)?;
+        use_it(&store)
+    }
+
+    /// The dataset of a stage.
+    fn staged<T>(
+        &self,
+        case: &Case,
+        name: &str,
+        request: &Map<String, Value>,
+        use_it: impl FnOnce(&Store) -> Result<T, ApiError>,
+    ) -> Result<T, ApiError> {
+        let entry =
+            study_named(name).ok_or_else(|| ApiError::failed(format!("unknown study `{name}`")))?;
+        let request = Value::Object(request.clone());
+        self.dataset(case, entry, request, self.control, use_it)
+    }
+
+    /// Computes the stages one by one until the work is cancelled; `stage` gets its count and the
+    /// finest one.
+    fn stages(
+        &self,
+        counts: &[usize],
+        mut stage: impl FnMut(usize, usize) -> Result<(), ApiError>,
+    ) -> Result<(), ApiError> {
+        let finest = counts.last().copied().unwrap_or_default();
+        for &count in counts {
+            stage(count, finest)?;
+            if self.control.is_cancelled() {
+                break;
+            }
+        }
+        Ok(())
+    }
+
+    /// The case at its setpoint, if it is small enough for the explorer, and its model.
+    fn case(&self) -> Result<(Case, Model), ApiError> {
+        let case = self.request.case.case(self.app, self.control)?;
+        let model = model_of(&case)?;
+        Ok((case, model))
+    }
+
+    /// The report of a study.
+    fn report<S: Study>(
+        &self,
+        case: &Case,
+        options: &Map<String, Value>,
+    ) -> Result<S::Report, ApiError> {
+        let options: S::Options = read(Value::Object(options.clone()))?;
+        Ok(S::run(case, &options, self.control)?)
+    }
+}
+
+/// A command after lines that replace `[scan]`, the last table of a saved case.
+fn with_scan(table: &str, command: &str) -> String {
+    format!(
+        "sed -i.bak '/^\\[scan\\]/,$d' {CASE_FILE}\ncat >> {CASE_FILE} <<'END'\n{table}END\n{command}"
+    )
+}
+
+fn progress(done: usize, finest: usize, counted: &str) -> String {
+    let more = if done < finest { " so far" } else { "" };
+    format!("{done} {counted}{more}")
+}
+
+fn object(value: Value) -> Map<String, Value> {
+    match value {
+        Value::Object(map) => map,
+        _ => Map::new(),
+    }
+}
+
+/// The parts of a list of `NAME=VALUE`, whose values may contain commas.
+fn pairs_of(text: &str) -> Vec<String> {
+    let mut pairs: Vec<String> = Vec::new();
+    for part in text.split(',').map(str::trim) {
+        match pairs.last_mut() {
+            Some(pair) if !part.contains('=') => *pair = format!("{pair},{part}"),
+            _ => pairs.push(part.to_owned()),
+        }
+    }
+    pairs
+}

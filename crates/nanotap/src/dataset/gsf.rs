@@ -64,8 +64,11 @@ impl Field {
     /// [`FieldError`] if the format cannot represent it.
     pub fn to_gsf(&self) -> Result<Vec<u8>, FieldError> {
         let (columns, rows) = (self.x.len(), self.y.len());
-        let (width, left) = extent(&self.x, "horizontal")?;
-        let (height, bottom) = extent(&self.y, "vertical")?;
+        let (across, up) = (step(&self.x, "horizontal")?, step(&self.y, "vertical")?);
+        // The pixels of a single line or column are squares.
+        let (across, up) = (across.or(up).unwrap_or(1.0), up.or(across).unwrap_or(1.0));
+        let (width, height) = (across * columns as f64, up * rows as f64);
+        let (left, bottom) = (self.x[0] - 0.5 * across, self.y[0] - 0.5 * up);
         if columns.checked_mul(rows) != Some(self.values.len()) {
             return Err(FieldError::Size {
                 found: self.values.len(),
@@ -101,24 +104,20 @@ impl Field {
     }
 }
 
-/// Length of an axis of pixels, and its beginning: half a step before the first value.
-fn extent(values: &[f64], axis: &'static str) -> Result<(f64, f64), FieldError> {
+/// Step between the values of an axis; `None` of a single one.
+fn step(values: &[f64], axis: &'static str) -> Result<Option<f64>, FieldError> {
     let (Some(first), Some(last)) = (values.first(), values.last()) else {
         return Err(FieldError::Empty { axis });
     };
-    if values.len() == 1 {
-        return if first.is_finite() {
-            Ok((1.0, first - 0.5))
-        } else {
-            Err(FieldError::Steps { axis })
-        };
+    if values.len() == 1 && first.is_finite() {
+        return Ok(None);
     }
     let step = (last - first) / (values.len() - 1) as f64;
     let in_place =
         |(k, value): (usize, &f64)| (value - (first + step * k as f64)).abs() <= TOLERANCE * step;
     // The comparison is false for a step that is NaN.
     if step > 0.0 && step.is_finite() && values.iter().enumerate().all(in_place) {
-        Ok((step * values.len() as f64, first - 0.5 * step))
+        Ok(Some(step))
     } else {
         Err(FieldError::Steps { axis })
     }
@@ -167,6 +166,26 @@ mod tests {
         assert_eq!(values[..2], [4.0, 5.0]);
         assert!(values[2].is_nan());
         assert_eq!(values[3..], [1.0, 2.0, 3.0]);
+    }
+
+    #[test]
+    fn a_single_line_has_square_pixels() {
+        let line = Field {
+            x: vec![1e-9, 3e-9, 5e-9],
+            y: vec![0.0],
+            values: vec![1.0, 2.0, 3.0],
+            ..field()
+        };
+        let file = line.to_gsf().unwrap();
+        let end = file.iter().position(|byte| *byte == 0).unwrap();
+        let header = std::str::from_utf8(&file[..end]).unwrap();
+        let value = |key: &str| -> f64 {
+            let line = header.lines().find(|line| line.starts_with(key)).unwrap();
+            line.rsplit(' ').next().unwrap().parse().unwrap()
+        };
+        assert!((value("XReal") - 6e-9).abs() < 1e-20);
+        assert!((value("YReal") - 2e-9).abs() < 1e-20);
+        assert!((value("YOffset") + 1e-9).abs() < 1e-20);
     }
 
     #[test]

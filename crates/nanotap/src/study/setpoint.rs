@@ -914,9 +914,10 @@ impl Search<'_> {
         for &(gap, value) in values {
             if value.is_nan() || held.is_reached(value) {
                 let motion = sweep.motion_at(piece, gap);
-                let what = match motion.orbit {
-                    Some(_) => "of a long period",
-                    None => motion.classification.name(),
+                let what = match (&motion.orbit, motion.evidence.as_str()) {
+                    (Some(_), _) => "of a long period".to_owned(),
+                    (None, "") => motion.classification.name().to_owned(),
+                    (None, why) => format!("{} ({why})", motion.classification.name()),
                 };
                 self.found = Some(Err(Error::numerics(format!(
                     "on approach the motion is {what} at gap.tip = {}, before the setpoint {} is \

@@ -37,7 +37,7 @@ const OTHER_FREE: f64 = 0.02;
 /// The model's values at a distance, of each motion there.
 struct Place {
     distance: f64,
-    /// Branch and values.
+    /// Motions at this distance: the index of the branch and the model's values, one per column.
     motions: Vec<(usize, Vec<f64>)>,
 }
 

@@ -14,9 +14,9 @@ use super::statistics::{exceeding, persistence, range};
 use crate::Error;
 use crate::control::Control;
 
-/// State of the search.
+/// Problem and options of a search for the best values.
 pub(super) struct Search<'a> {
-    /// What was done to the data.
+    /// Sentences on what was done to the data before the fit.
     pub(super) preparation: &'a [String],
     pub(super) problem: Problem<'a>,
     pub(super) request: &'a FitOptions,

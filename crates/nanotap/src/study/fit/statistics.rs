@@ -10,15 +10,15 @@ pub(super) struct Direction {
     pub(super) singular_value: f64,
 }
 
-/// What follows from the Jacobian at the minimum.
+/// Standard errors and correlations that follow from the Jacobian at the minimum.
 pub(super) struct Information {
-    /// Standard errors; `None` of what the data do not determine.
+    /// Standard errors of the parameters; None for those that the data do not determine.
     pub(super) errors: Vec<Option<f64>>,
     /// Correlations of those that are determined, 0 of the others.
     pub(super) correlations: DMatrix<f64>,
     /// Covariance within what is determined.
     pub(super) covariance: DMatrix<f64>,
-    /// What is not determined.
+    /// Directions in the space of the parameters that the data do not determine.
     pub(super) undetermined: Vec<Direction>,
 }
 

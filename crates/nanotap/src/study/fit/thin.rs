@@ -20,7 +20,7 @@ use super::statistics::span;
 pub(crate) struct Scatter {
     /// Standard deviation of one row, or of one whose relative error is 1.
     pub(crate) error: f64,
-    /// Its degrees of freedom.
+    /// Degrees of freedom of that standard deviation.
     pub(crate) freedom: f64,
 }
 
@@ -185,7 +185,7 @@ struct Polynomial {
     /// the distance from the first number in units of the second.
     bend_covariance: [f64; 3],
     u: [f64; 2],
-    /// Mean of u².
+    /// Mean of u² over the rows.
     square: f64,
     /// Sum of the squared residuals, and their degrees of freedom.
     squares: f64,

@@ -7,7 +7,7 @@ use nanotap_flow::Complex;
 
 use super::nodes::Nodes;
 
-/// Phases of a period.
+/// Number of equidistant phases of a period at which the motion is known.
 const PHASES: usize = 900;
 /// Highest harmonic of the motion.
 pub(super) const HARMONICS: usize = 24;
@@ -141,7 +141,7 @@ impl Known<'_> {
 }
 
 impl Motion {
-    /// Half way to another motion of the same row.
+    /// Moves the motion half of the way to another motion of the same row.
     pub(super) fn half_way(&mut self, other: &Self) {
         let mix = |own: &mut [f64], other: &[f64]| {
             for (own, other) in own.iter_mut().zip(other) {
@@ -152,12 +152,13 @@ impl Motion {
         mix(&mut self.slope, &other.slope);
     }
 
-    /// Closest approach.
+    /// Returns the closest approach of the tip to the sample, m or model units.
     pub(super) fn closest(&self) -> f64 {
         self.distance.iter().copied().fold(f64::INFINITY, f64::min)
     }
 
-    /// What the row measures, by quadrature over the phases.
+    /// Computes the weights of force and damping in what the row measures, by quadrature over the
+    /// phases.
     pub(super) fn weights(&self, harmonics: &Harmonics, nodes: &Nodes, amplitude: f64) -> Weights {
         let zeros = vec![0.0; nodes.0.len()];
         let mut weights = [const { Vec::new() }; 6].map(|_: Vec<f64>| zeros.clone());

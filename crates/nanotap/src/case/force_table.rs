@@ -33,7 +33,7 @@ const MODEL_ARMS_SHAPE: &str = "write rows as in [[\"time\", \"stiffness\"], [0.
 pub struct ForceTableError {
     /// What is wrong, and where.
     pub message: String,
-    /// The remedy.
+    /// What to change in the rows.
     pub remedy: String,
 }
 
@@ -202,7 +202,7 @@ pub struct ArmTable {
 enum Strength {
     /// Young's or shear modulus, Pa.
     Modulus,
-    /// Stiffness, N/m.
+    /// Stiffness of a spring, N/m.
     Stiffness,
     /// Stiffness in the model's unit, as its time.
     Number,

@@ -66,7 +66,7 @@ use crate::model::oscillator::{Oscillator, OscillatorParameter, Stop};
 use crate::model::{Model, ModelTangent, Tangent, cantilever_model_tangent};
 use crate::number::shortest;
 
-/// Default number of modes.
+/// Default number of beam modes of a case.
 pub const DEFAULT_MODES: usize = 3;
 
 /// A checked case: a cantilever, dimensionless or in physical quantities, or an oscillator.
@@ -98,11 +98,11 @@ enum CaseKind {
 pub struct ParameterUnit {
     /// The quantity: "drive frequency f".
     pub quantity: &'static str,
-    /// Its SI unit.
+    /// SI unit of the quantity.
     pub unit: &'static str,
-    /// The SI value of 1.
+    /// SI value of the number 1, in the unit `unit`.
     pub si: f64,
-    /// Kind of quantity.
+    /// Kind of the quantity, which determines how it is shown.
     #[serde(skip)]
     pub kind: Kind,
 }
@@ -303,7 +303,7 @@ impl Case {
         &self.cancel
     }
 
-    /// Title of the case.
+    /// Returns the title of the case, for figures and reports.
     pub fn title(&self) -> &str {
         &self.title
     }
@@ -339,7 +339,7 @@ impl Case {
         matches!(self.what, CaseKind::Quantities(_))
     }
 
-    /// Assumptions and warnings.
+    /// Returns the assumptions made and the warnings for a physical case; empty for others.
     pub fn remarks(&self) -> Vec<Remark> {
         let (CaseKind::Quantities(quantities), Some(view)) = (&self.what, self.physical()) else {
             return Vec::new();
@@ -508,7 +508,7 @@ impl Case {
             .collect()
     }
 
-    /// Its model.
+    /// Builds the model of the case.
     ///
     /// # Errors
     /// If the case is invalid or has no solution in closed form.
@@ -609,7 +609,7 @@ impl Case {
         Ok(Some((low.scales, high.scales, width)))
     }
 
-    /// Its maps along one key.
+    /// Returns the maps of the case with one free key.
     pub fn family(&self, key: Key) -> Family {
         Family {
             case: self.clone(),
@@ -617,7 +617,7 @@ impl Case {
         }
     }
 
-    /// Units for display.
+    /// Returns the units for display: SI for a physical case, unless model units were selected.
     pub fn units(&self) -> Units {
         let view = self.physical().filter(|_| !self.model_units);
         Units::of(view.map(|view| &view.scales))

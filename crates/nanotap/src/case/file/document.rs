@@ -11,10 +11,10 @@ use crate::case::table::Table;
 use super::json;
 use super::problem::{CaseFileError, Place, Problem, Source};
 
-/// A value as written.
+/// Value of a key as written in a case file or an override.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Value {
-    /// A whole number.
+    /// A whole number, written without a decimal point.
     Integer(i64),
     /// A number; not always a finite one.
     Number(f64),
@@ -42,20 +42,20 @@ impl Value {
 /// Removes the key, in place of a value.
 const NOTHING: Value = Value::Other("nothing");
 
-/// One `key = value`.
+/// An entry `key = value` of a case file, or an override.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Entry {
     /// The table that contains it; empty at the top of a file.
     pub table: String,
     /// The key, without its table.
     pub key: String,
-    /// The value.
+    /// Parsed value of the entry.
     pub value: Value,
     /// The value as written, for messages.
     pub written: String,
-    /// Place of the key.
+    /// Place of the key in the case file or override.
     pub key_place: Place,
-    /// Place of the value.
+    /// Place of the value in the case file or override.
     pub value_place: Place,
 }
 
@@ -86,7 +86,7 @@ impl Entry {
 pub struct Header {
     /// The name between the brackets.
     pub name: String,
-    /// Place of the name.
+    /// Place of the name in the case file.
     pub place: Place,
 }
 
@@ -95,7 +95,7 @@ pub struct Header {
 pub struct Document {
     /// The file, if there is one.
     pub source: Option<Source>,
-    /// Its tables.
+    /// Headers of the tables in the file.
     pub headers: Vec<Header>,
     /// The entries of the file, then the overrides.
     pub entries: Vec<Entry>,

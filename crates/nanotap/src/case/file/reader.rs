@@ -94,7 +94,7 @@ fn described(document: &Document, problems: &mut Problems) -> Option<Described> 
     read
 }
 
-/// Which kind `[model]` is.
+/// Kind of model that `[model]` selects; the default if it states none.
 fn kind_of(document: &Document, problems: &mut Problems) -> ModelKind {
     let is_kind = |entry: &&Entry| entry.table == "model" && entry.key == Key::Kind.name();
     let Some(entry) = document.entries.iter().rev().find(is_kind) else {

@@ -11,7 +11,8 @@ use nalgebra::DMatrix;
 pub struct Tangency {
     /// Drive phase of the extremum as a fraction of the period, in `[0, 1)`.
     pub phase: f64,
-    /// Value of the switching function: its sign tells contact from a near miss.
+    /// Value of the switching function, in its own unit; its sign distinguishes contact from a near
+    /// miss.
     pub value: f64,
 }
 
@@ -86,7 +87,7 @@ pub trait StroboscopicMap: Scheduling + Clone + Send + Sync {
     /// Why a period could not be computed.
     type Error: std::error::Error + Send + Sync + 'static;
 
-    /// Dimension of the state.
+    /// Returns the number of entries of a state.
     fn dimension(&self) -> usize;
 
     /// Length of one drive period, in the system's unit of time.

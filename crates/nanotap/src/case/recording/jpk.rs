@@ -63,7 +63,7 @@ pub(super) fn parse(bytes: &[u8]) -> Option<Recording> {
 
 /// How the numbers of a channel become values.
 struct Channel {
-    /// Header of its column.
+    /// Header of the column: name of the channel with its unit.
     header: String,
     encoder: Number,
     factor: f64,

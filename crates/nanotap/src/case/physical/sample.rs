@@ -110,7 +110,7 @@ pub struct Sample {
     pub numbers: Vec<f64>,
     /// Relaxing arms of the law, in s and N/m.
     pub arms: Option<ArmTable>,
-    /// Elastic constants of the sample; `None` if the stiffness was stated.
+    /// Elastic constants of the sample; `None` unless the stiffness follows from Hertz's contact.
     pub elastic: Option<Elastic>,
     /// A nonlinear force law in place of the above.
     pub force: Option<SampleForce>,

@@ -170,7 +170,8 @@ impl Lever {
         })
     }
 
-    /// Returns the stiffness of the first mode at the tip, N/m; `None` if the beam has no solution.
+    /// Returns the stiffness of the first mode at the tip, N/m; `None` if the mode cannot be
+    /// computed.
     pub fn modal_stiffness(&self) -> Option<f64> {
         let factor = modal_factor(TipMass::Ratio(self.tip_mass_ratio), None);
         Some(self.k * factor.ok()?)

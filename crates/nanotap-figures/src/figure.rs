@@ -20,27 +20,28 @@ pub const DOUBLE_COLUMN: f64 = 178.0;
 #[serde(default)]
 #[must_use]
 pub struct Figure {
-    /// Rows of the grid.
+    /// Number of rows of the grid of panels.
     pub rows: usize,
-    /// Columns of the grid.
+    /// Number of columns of the grid of panels.
     pub cols: usize,
-    /// Width in print, mm.
+    /// Width of the figure in print, mm.
     pub width: f64,
-    /// Height in print, mm; `None`: panels are about two thirds as high as wide.
+    /// Height of the figure in print, mm; `None`: panels are about two thirds as high as wide.
     pub height: Option<f64>,
-    /// Relative widths of the columns; empty: equal.
+    /// Relative widths of the columns (dimensionless, only ratios matter); empty: equal.
     pub column_widths: Vec<f64>,
-    /// Relative heights of the rows; empty: equal.
+    /// Relative heights of the rows (dimensionless, only ratios matter); empty: equal.
     pub row_heights: Vec<f64>,
     /// Text above the whole figure, and the title of the file.
     pub title: String,
     /// Text below the whole figure.
     pub caption: String,
-    /// Whether panels are lettered.
+    /// Whether panels are lettered (a), (b), ….
     pub letters: bool,
     /// Whether the panels of a column share their horizontal range.
     pub share_x: bool,
-    /// Factor by which letters and ticks are larger than usual.
+    /// Factor by which letters and ticks are larger than usual (dimensionless), 0.2 to 10; 1 for
+    /// print.
     pub text_scale: f64,
     /// The panels, row by row.
     pub panels: Vec<Panel>,

@@ -22,7 +22,7 @@ pub enum NotProved {
     /// The case has no equations in intervals.
     #[error(transparent)]
     Equations(#[from] EnclosureError),
-    /// The test failed.
+    /// The test of the proof failed, for the reason given.
     #[error(transparent)]
     Test(#[from] ProofError),
 }
@@ -31,12 +31,12 @@ pub enum NotProved {
 #[derive(Debug)]
 pub struct Prover {
     system: Result<System, EnclosureError>,
-    /// The numbers that a theorem is about.
+    /// Parameters of the case with which a theorem begins, as text.
     about: String,
 }
 
 impl Prover {
-    /// Of a case.
+    /// Creates the prover for a case, whose equations may have no intervals.
     pub fn new(case: &Case) -> Self {
         let (system, about) = match (case.cantilever(), case.oscillator()) {
             (Some(cantilever), _) => (enclosed(cantilever), about(cantilever)),
@@ -143,7 +143,7 @@ fn about_oscillator(oscillator: &Oscillator) -> String {
     numbers.join(", ")
 }
 
-/// The theorem in words.
+/// Returns the theorem as a sentence.
 fn statement(theorem: &Theorem, about: &str) -> String {
     let radius = |interval: &Interval| interval.radius();
     let largest = |all: &mut dyn Iterator<Item = f64>| all.fold(0.0, f64::max);

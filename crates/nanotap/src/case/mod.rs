@@ -240,7 +240,7 @@ impl Case {
         self.with_flag(control.cancel.unwrap_or(&self.cancel))
     }
 
-    /// The same, whose models' motions end with an error once `flag` is set or its budget spent.
+    /// The same case, whose motions end with an error once `flag` is set or its budget is spent.
     #[must_use]
     pub(crate) fn with_flag(&self, flag: &CancelFlag) -> Self {
         Self {
@@ -334,7 +334,7 @@ impl Case {
         }
     }
 
-    /// True if it was stated in physical quantities.
+    /// Returns true if the case was stated in physical quantities.
     pub const fn is_physical(&self) -> bool {
         matches!(self.what, CaseKind::Quantities(_))
     }
@@ -364,7 +364,7 @@ impl Case {
         replaced.map(words).collect()
     }
 
-    /// Keys of the numbers of its equations.
+    /// Returns the keys of the numbers of the equations.
     pub fn keys(&self) -> Vec<Key> {
         match &self.what {
             CaseKind::Oscillator(oscillator) => crate::model::oscillator::OscillatorParameter::ALL
@@ -434,7 +434,7 @@ impl Case {
         found.unwrap_or(f64::NAN)
     }
 
-    /// The stated value of a key of a physical case.
+    /// Returns the stated value of a key of a physical case; `None` if it is not stated.
     pub fn stated(&self, key: Key) -> Option<&Value> {
         match &self.what {
             CaseKind::Quantities(quantities) => quantities.stated.get(key),
@@ -528,7 +528,7 @@ impl Case {
         Ok(model.cancelled_by(&self.cancel))
     }
 
-    /// Derivative of its map with respect to a key.
+    /// Derivative of the map of the case with respect to a key.
     ///
     /// # Errors
     /// As [`model`](Self::model).
@@ -543,7 +543,7 @@ impl Case {
         Ok(Tangent::along(cantilever, model, &slopes, &law)?)
     }
 
-    /// Derivative of its model with respect to a key.
+    /// Derivative of the model of the case with respect to a key.
     ///
     /// # Errors
     /// As [`model`](Self::model).
@@ -750,7 +750,7 @@ impl Case {
         }
     }
 
-    /// True if its stop is rigid: contacts are instantaneous.
+    /// Returns true for an oscillator with a rigid stop, whose contacts are instantaneous.
     pub fn has_rigid_stop(&self) -> bool {
         self.model_kind() == ModelKind::Impact
     }

@@ -149,11 +149,11 @@ pub(crate) struct Said {
 /// A value of the file that an override of another key replaces.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Replaced {
-    /// The key of the file.
+    /// Key in the file whose value is replaced.
     pub(crate) key: Key,
-    /// Its value, as it was written.
+    /// Value in the file, as written.
     pub(crate) written: String,
-    /// The key that was set.
+    /// Key that the override sets.
     pub(crate) by: Key,
 }
 

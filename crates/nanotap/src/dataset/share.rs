@@ -23,12 +23,12 @@ impl Share {
     /// The share of a single machine: all chunks.
     pub const WHOLE: Self = Self { index: 1, count: 1 };
 
-    /// True if `chunk` belongs to the share.
+    /// Returns true if `chunk` is in the share.
     pub fn holds(self, chunk: usize) -> bool {
         chunk % self.count == self.index - 1
     }
 
-    /// True if the share contains all chunks.
+    /// Returns true if the share contains all chunks.
     pub fn is_whole(self) -> bool {
         self.count == 1
     }

@@ -40,7 +40,7 @@ pub struct Store {
 }
 
 impl Store {
-    /// Opens the store at `path`, or creates it.
+    /// Opens the store at `path`, or creates it if it does not exist.
     ///
     /// # Errors
     /// If the path is something else, if the store has other attributes, or if the file system
@@ -211,7 +211,7 @@ impl Store {
         self.finished.len()
     }
 
-    /// True if the chunk is finished.
+    /// Returns true if the chunk is finished.
     pub fn is_finished(&self, chunk: usize) -> bool {
         self.finished
             .get(chunk)

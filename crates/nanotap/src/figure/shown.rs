@@ -30,7 +30,7 @@ impl Shown {
         Some(Self::Observable(observable))
     }
 
-    /// Every choice: name and description.
+    /// Returns all choices: name and description.
     pub fn choices() -> impl Iterator<Item = (&'static str, &'static str)> {
         crate::observe::OBSERVABLES
             .iter()

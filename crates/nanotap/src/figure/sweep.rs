@@ -332,7 +332,7 @@ fn of_direction(direction: &str) -> (f64, Colour) {
     }
 }
 
-/// Factor and unit of deflections (empty in the model's own units).
+/// Factor and unit of deflections; the unit is empty in model units.
 fn deflection(units: &str, values: impl Iterator<Item = f64>) -> (f64, String) {
     if units != "m" {
         return (1.0, String::new());
@@ -494,7 +494,7 @@ fn of_first_start(store: &Store, shown: Shown) -> Result<(Vec<f64>, bool), Store
 }
 
 impl GridAxis {
-    /// Of an axis of a dataset's grid.
+    /// The axis with index `axis` of a dataset's grid.
     pub(crate) fn of(store: &Store, axis: usize) -> Self {
         let schema = store.schema();
         let name = &schema.grid.axes[axis].name;

@@ -39,7 +39,7 @@ impl Value {
     }
 }
 
-/// Removes the key, in place of a value.
+/// Stands for an empty value, which removes the key.
 const NOTHING: Value = Value::Other("nothing");
 
 /// An entry `key = value` of a case file, or an override.
@@ -90,7 +90,7 @@ pub struct Header {
     pub place: Place,
 }
 
-/// Everything that was written, in order, before validation.
+/// Everything in a case file and its overrides, in order, before validation.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Document {
     /// The file, if there is one.
@@ -99,11 +99,11 @@ pub struct Document {
     pub headers: Vec<Header>,
     /// The entries of the file, then the overrides.
     pub entries: Vec<Entry>,
-    /// The table `[scan]`, options of a study.
+    /// Table `[scan]` of the file: options of the study `scan`.
     pub scan: Option<serde_json::Map<String, serde_json::Value>>,
 }
 
-/// The table of a case file that is options of the study of the same name.
+/// Table of a case file that contains options of the study of the same name.
 const SCAN: &str = "scan";
 
 impl Document {

@@ -23,7 +23,7 @@ pub(crate) enum Described {
     Cantilever(Cantilever),
     /// An oscillator, every number checked.
     Oscillator(Oscillator),
-    /// A physical cantilever: each value checked by itself.
+    /// A physical cantilever, each value checked separately.
     Physical(Stated),
 }
 
@@ -316,7 +316,7 @@ pub(crate) fn word<T: core::default::Default + std::str::FromStr>(
     }
 }
 
-/// How many modes are stated.
+/// Number of beam modes, stated or default.
 pub(crate) fn modes(stated: &Stated) -> usize {
     stated
         .number(Key::Modes)

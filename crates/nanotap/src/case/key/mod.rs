@@ -49,7 +49,7 @@ impl Section {
         Self::ALL.into_iter().find(|section| section.name() == name)
     }
 
-    /// Whether its keys are physical quantities.
+    /// Returns true if the keys of the table are physical quantities.
     pub const fn is_physical(self) -> bool {
         !matches!(self, Self::Model)
     }
@@ -84,7 +84,7 @@ impl ModelKind {
         Key::all().filter(move |key| key.entry().models.contains(&self))
     }
 
-    /// All names of its keys, including aliases.
+    /// Returns the names of the keys of this kind, including aliases.
     pub fn names(self) -> impl Iterator<Item = &'static str> + Clone {
         let names = self.keys().map(Key::name);
         names.chain(self.keys().filter_map(Key::alias))
@@ -382,7 +382,7 @@ impl Key {
         self.entry().meaning
     }
 
-    /// Kind of quantity of its values; a number if they are not quantities.
+    /// Returns the kind of quantity of the values; a number if they are not quantities.
     pub fn kind(self) -> Kind {
         match self.entry().takes {
             Takes::Quantity(kind) => kind,
@@ -390,12 +390,12 @@ impl Key {
         }
     }
 
-    /// True if it is a quantity of a physical case.
+    /// Returns true if the key is a quantity of a physical case.
     pub fn is_physical(self) -> bool {
         self.section().is_physical()
     }
 
-    /// The parameter of the cantilever that it sets.
+    /// Returns the parameter of the cantilever that the key sets, if any.
     pub fn parameter(self) -> Option<Parameter> {
         match self.entry().means {
             Means::Cantilever(parameter) => Some(parameter),
@@ -403,7 +403,7 @@ impl Key {
         }
     }
 
-    /// The parameter of the oscillator that it sets.
+    /// Returns the parameter of the oscillator that the key sets, if any.
     pub fn oscillator_parameter(self) -> Option<OscillatorParameter> {
         match self.entry().means {
             Means::Oscillator(parameter) => Some(parameter),
@@ -433,7 +433,7 @@ impl Key {
             .find(|key| key.name() == number.name())
     }
 
-    /// The number of a linear contact law that it states, of a key of `[sample]`.
+    /// The number of a linear contact law that the key states, if it is a key of `[sample]`.
     pub(crate) fn law_number(self) -> Option<Parameter> {
         let stated = |of: &Parameter| of.entry().stated_by.is_some() && of.name() == self.name();
         let number = Parameter::every().find(stated);

@@ -134,8 +134,8 @@ impl Blade {
     }
 }
 
-/// What is left of the first diagonal element of a symmetric matrix when all others are eliminated, from
-/// its lower half: 1/(M⁻¹)₀₀. Without pivoting: the blade dissipates, so that no pivot vanishes.
+/// Computes 1/(M⁻¹)₀₀ of a symmetric matrix from its lower half, by elimination of all other rows.
+/// Pivoting is not needed: the blade dissipates, so that no pivot vanishes.
 fn first_pivot(matrix: &mut [Complex<f64>], size: usize) -> Complex<f64> {
     for pivot in (1..size).rev() {
         let (above, below) = matrix.split_at_mut(pivot * size);

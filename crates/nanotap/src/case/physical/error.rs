@@ -14,7 +14,7 @@ pub enum PhysicalError {
         key: Key,
         /// The value as given, or as computed where it was not given.
         value: String,
-        /// What is wrong and what would be right.
+        /// What is wrong and which values are valid.
         reason: String,
     },
     /// A quantity that is needed is missing.

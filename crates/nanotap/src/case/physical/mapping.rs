@@ -41,7 +41,7 @@ pub struct Scales {
 }
 
 impl Scales {
-    /// The units for a lever whose beam stands `beam_gap` (g₀, in m) above the sample.
+    /// Computes the units for a lever whose beam is `beam_gap` (g₀, in m) above the sample.
     pub fn new(lever: &Lever, beam_gap: f64) -> Self {
         let time = lever.time_unit();
         let stiffness = lever.k / 3.0;

@@ -114,7 +114,7 @@ macro_rules! kinds {
         pub enum Kind { $($(#[$doc])* $kind),* }
 
         impl Kind {
-            /// Every kind, in the order in which a dimension is named.
+            /// All kinds; the first one with a dimension names it in messages.
             pub const ALL: [Self; [$(stringify!($kind)),*].len()] = [$(Self::$kind),*];
 
             /// Returns the exponents of kg, m, s, rad and C.

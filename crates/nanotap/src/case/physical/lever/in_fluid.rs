@@ -1,4 +1,4 @@
-//! A lever in a fluid: the mass that swings along, and the damping.
+//! A lever in a fluid: added mass and damping.
 
 use std::f64::consts::{PI, TAU};
 

@@ -1,12 +1,11 @@
-//! The lever: from what its box and its spectrum say, or from its dimensions and material,
-//! to stiffness, beam mass and tip mass.
-//!
-//! With k = 3EI/L³ and T = √(mL⁴/EI) the beam's mass is mL = kT²/3, and its first free
-//! frequency, measured with the tip on it, is f₀ = Ω₁(α1)/(2πT) with tip mass α1 = M/(mL). Ω₁ is
-//! that of the model's modes, a little above the exact beam's (without a tip mass they are the
-//! same), so that a drive at f₀ meets the resonance of the model that is solved. Any two of k, mL
-//! and f₀ give the third once the tip's mass is known; f₂/f₁ of the exact beam depends on α1
-//! alone and tells it.
+//! The lever: stiffness, beam mass and tip mass from the data sheet and the measured spectrum, or
+//! from dimensions and material.
+//! With k = 3EI/L³ and T = √(mL⁴/EI) the beam's mass is mL = kT²/3, and its first free frequency,
+//! measured with the tip on it, is f₀ = Ω₁(α1)/(2πT) with tip mass α1 = M/(mL). Ω₁ is that of the
+//! model's modes, a little above the exact beam's (without a tip mass they are the same), so that a
+//! drive at f₀ excites the resonance of the model that is solved. Any two of k, mL and f₀ give the
+//! third once the tip's mass is known. The ratio f₂/f₁ of the exact beam depends on α1 alone and
+//! therefore determines it.
 
 mod in_fluid;
 

@@ -118,7 +118,7 @@ pub(crate) async fn study(
 /// Sends a message to the page.
 type HandOver<'a> = &'a (dyn Fn(Value) + Sync);
 
-/// A running study.
+/// A study that is running, with its request and its connection to the page.
 struct Studied<'a> {
     app: &'a App,
     request: &'a StudyRequest,
@@ -126,7 +126,7 @@ struct Studied<'a> {
     hand_over: HandOver<'a>,
 }
 
-/// A finished stage.
+/// A finished stage of a study: what the page shows then.
 #[derive(Default)]
 struct Stage<'a> {
     figure: Option<Figure>,

@@ -16,7 +16,7 @@ enum Entry {
     Whole(i64),
     Number(f64),
     Word(String),
-    /// Numbers along a dimension.
+    /// Numbers along the dimension with this name.
     Row(&'static str, Vec<f64>),
 }
 

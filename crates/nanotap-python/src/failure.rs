@@ -11,7 +11,7 @@ use pyo3::exceptions::{PyOSError, PyRuntimeError, PyValueError};
 pub(crate) struct Failure(pub(crate) Error);
 
 impl Failure {
-    /// Bad input.
+    /// Creates the failure of invalid input, with a message.
     pub(crate) fn input(words: impl Into<String>) -> Self {
         Self(Error::new(ErrorKind::BadInput, words))
     }

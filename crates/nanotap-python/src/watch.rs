@@ -27,11 +27,11 @@ const PATIENCE: Duration = Duration::from_millis(900);
 /// A second Ctrl-C does not wait.
 const LONG_PATIENCE: Duration = Duration::from_secs(5);
 
-/// What came of watched work.
+/// Result of watched work.
 pub(crate) struct Watched<R> {
-    /// The result, what was done of it if it was stopped.
+    /// The result; if the work was stopped, the part that was finished.
     pub(crate) result: R,
-    /// Whether Ctrl-C stopped it.
+    /// Whether Ctrl-C stopped the work.
     pub(crate) interrupted: bool,
 }
 
@@ -238,7 +238,7 @@ fn lock<T>(shared: &Mutex<T>) -> MutexGuard<'_, T> {
     shared.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// One thread a core.
+/// Returns the thread pool of this process, with one thread per core.
 fn threads_of_this_process() -> Result<Arc<ThreadPool>, Failure> {
     static POOL: Mutex<OfThisProcess<Arc<ThreadPool>>> = Mutex::new(OfThisProcess(None));
     let make = || {

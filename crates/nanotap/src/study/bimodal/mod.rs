@@ -240,7 +240,7 @@ pub fn points_csv(report: &BimodalReport) -> String {
     csv
 }
 
-/// What [`BimodalPoint::growth`] means for the stability.
+/// Explanation of [`BimodalPoint::growth`], for reports.
 const OPEN_LOOP: &str = "growth is that of a small disturbance at constant frequency and strength of both \
                          drives: below 1 the motion is stable without loops; with loops stability \
                          also depends on their gains";

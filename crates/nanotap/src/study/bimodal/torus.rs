@@ -150,8 +150,8 @@ impl Torus {
         moved
     }
 
-    /// The same with whole numbers as the last entries from `first` on, which interpolation leaves
-    /// with rounding errors; none if they differ from phase to phase.
+    /// Rounds the last entries from `first` on to whole numbers, which interpolation leaves with
+    /// rounding errors; None if they differ from phase to phase.
     fn on_one_branch(mut self, first: usize) -> Option<Self> {
         for state in &mut self.states {
             state[first..]

@@ -66,13 +66,13 @@ pub(crate) struct Prepared {
     pub(crate) tables: Vec<Table>,
     /// The columns to use, by their present names.
     pub(crate) columns: Vec<String>,
-    /// What was done: conversions and guesses.
+    /// Sentences on conversions and guesses that were applied to the tables.
     pub(crate) notes: Vec<String>,
     /// Whether the zero of a phase was guessed.
     pub(crate) guessed_phase: bool,
 }
 
-/// What was stated of a table, which is not guessed.
+/// Properties of a table that the request states, so that they are not guessed.
 #[derive(Clone, Copy, Debug, Default)]
 #[expect(
     clippy::struct_excessive_bools,

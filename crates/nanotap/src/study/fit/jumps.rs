@@ -132,7 +132,7 @@ impl Fold {
         }
     }
 
-    /// The same fold, marked as lost.
+    /// Returns the same fold, marked as lost.
     pub(super) fn of_before(&self) -> Self {
         Self {
             lost: true,

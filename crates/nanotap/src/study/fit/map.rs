@@ -475,7 +475,8 @@ fn taken(table: &mut Table, name: &str) -> Result<(Pixels, Vec<usize>), Error> {
     Ok((pixels, places))
 }
 
-/// What tells a table from another: its columns, and the sum of the numbers of each.
+/// Returns numbers that distinguish a table from others: its columns, and the sum of the numbers of
+/// each.
 fn fingerprint(table: &Table) -> BTreeMap<String, f64> {
     let number = |entry: &Entry| match entry {
         Entry::Number(value) => *value,

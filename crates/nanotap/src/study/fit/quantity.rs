@@ -16,7 +16,7 @@ pub enum Quantity {
     Rest(RestQuantity),
 }
 
-/// What is read of a lever at rest.
+/// Reading of a lever at rest.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum RestQuantity {
     /// Deflection of the tip away from the sample.

@@ -154,8 +154,7 @@ pub struct Undetermined {
     pub words: String,
     /// Names of the parameters in the combination, those with the largest changes first.
     pub keys: Vec<String>,
-    /// Changes of these parameters relative to their sizes; the total length over all parameters is
-    /// 1.
+    /// Changes of these parameters relative to their sizes; the vector of all changes has length 1.
     pub direction: Vec<f64>,
     /// Change of all residuals for this change, in standard errors: at most 1, or zero to rounding.
     pub singular_value: f64,

@@ -1,4 +1,4 @@
-//! What the residuals say of the parameters.
+//! Standard errors, correlations and tests from the residuals of a fit.
 
 use nalgebra::{DMatrix, SymmetricEigen};
 
@@ -27,7 +27,8 @@ const ROUNDING: f64 = 1e-6;
 /// A parameter with more than this part in an undetermined direction is not determined.
 const PART: f64 = 1e-3;
 
-/// Of a weighted Jacobian (residuals in standard errors) of parameters of these sizes.
+/// Computes standard errors and correlations from a weighted Jacobian (residuals in standard
+/// errors) of parameters of these sizes.
 ///
 /// With J S = U Σ Vᵀ, S the sizes, the covariance is S V Σ⁻² Vᵀ S. A column of V whose singular
 /// value is below 1 is a change by a whole size that the data would not show; one that is zero
@@ -263,7 +264,7 @@ pub(super) fn persistence(residuals: &[f64]) -> f64 {
 pub(super) struct Sequences<'a> {
     /// Indices of the residuals, a list per sequence, grouped by column.
     pub(super) columns: &'a [Vec<Vec<usize>>],
-    /// Of the changes by parameters.
+    /// Orthonormal basis of the changes of the residuals by the parameters.
     pub(super) basis: &'a DMatrix<f64>,
 }
 

@@ -193,7 +193,7 @@ struct Polynomial {
 }
 
 impl Polynomial {
-    /// Of the given degree; `None` if the rows do not determine it.
+    /// Fits a polynomial of the given degree; `None` if the rows do not determine it.
     fn of(distance: &[f64], values: &[f64], degree: usize) -> Option<Self> {
         let count = distance.len();
         if count <= degree {
@@ -236,8 +236,8 @@ impl Polynomial {
         })
     }
 
-    /// What taking off this `part` of the bend adds to the variance of the mean of some of the rows,
-    /// for rows with standard error 1.
+    /// Returns the variance that subtracting this `part` of the bend adds to that of the mean of
+    /// some of the rows, for rows with standard error 1.
     fn variance_without_bend(&self, distance: &[f64], part: f64) -> f64 {
         let [middle, size] = self.u;
         let powers = distance.iter().map(|z| (z - middle) / size);

@@ -56,8 +56,9 @@ pub struct Averaged {
 }
 
 impl<'a> Averages<'a> {
-    /// Under the sample of `model`, whose spring `spring` is where its force is not nonlinear; of
-    /// an oscillation of `amplitude` of a lever of the modal `stiffness`.
+    /// Creates the averages for the sample of `model` and an oscillation of `amplitude` of a lever
+    /// with the modal `stiffness`, in model units. `spring` is the stiffness of the sample if its
+    /// force is not nonlinear.
     pub fn new(model: &'a Model, spring: f64, amplitude: f64, stiffness: f64) -> Self {
         let force = match &model.nonlinear {
             Some(nonlinear) => StaticForce::Nonlinear(nonlinear),

@@ -157,8 +157,8 @@ impl FreeOscillation {
 }
 
 impl FreeOscillation {
-    /// How frequency and strength change with keys of the case, each of which stands with what
-    /// the amplitude that is held changes by.
+    /// Computes the derivatives of frequency and strength (model units) by keys of the case. Each
+    /// key is given with the derivative of the controlled amplitude by it.
     ///
     /// # Errors
     /// As [`Held::changes`].

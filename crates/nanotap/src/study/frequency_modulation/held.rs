@@ -82,8 +82,8 @@ const STEPS: usize = 40;
 const SHORTEST: f64 = 1.0 / 64.0;
 /// Largest relative residual of an orbit; Newton's method fails above it.
 const CLOSED: f64 = 1e-9;
-/// How often entries of a state that are whole numbers, as whether a neck is there, are taken from
-/// the map at one place: where they do not come to rest, the residual says so.
+/// Largest number of times that whole-number entries of a state, such as whether a neck exists, are
+/// taken from the map at one place. If they still change then, the residual is large.
 const MAX_SETTINGS: usize = 3;
 /// Largest change of frequency and strength in a step, relative to themselves.
 const FARTHEST: [f64; 2] = [0.1, 0.9];

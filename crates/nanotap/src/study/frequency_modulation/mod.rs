@@ -271,7 +271,7 @@ pub struct ModulationReport {
     pub ended: Vec<Ended>,
 }
 
-/// What the multipliers say under frequency modulation, in words.
+/// Explanation of the multipliers under frequency modulation, for reports.
 pub const OPEN_LOOP: &str = "multipliers are those of the orbit at constant frequency and \
                              strength of the drive; under the loop stability is the loop's matter";
 

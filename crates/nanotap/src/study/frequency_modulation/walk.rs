@@ -198,7 +198,7 @@ impl<'a> HeldWalk<'a> {
         }
     }
 
-    /// What was found at another distance, with the amplitude of this one.
+    /// Scales the orbit of another distance to the amplitude at this one.
     fn resized(&self, (there, found): &(f64, Driven), gap: f64) -> Driven {
         let share = self.held(gap).amplitude / self.held(*there).amplitude;
         let mut driven = found.clone();

@@ -79,7 +79,7 @@ pub(super) struct Linearised {
     factor: DMatrix<f64>,
     /// Covariance that the period adds.
     added: DMatrix<f64>,
-    /// What the lock-in amplifier reads without noise.
+    /// Reading of the lock-in amplifier without noise, as a complex amplitude in model units.
     pub(super) read: Complex<f64>,
     /// Length of the orbit in the model's unit of time.
     duration: f64,

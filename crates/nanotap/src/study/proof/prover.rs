@@ -62,7 +62,8 @@ impl Prover {
         Ok(prove(system, &candidate(trajectory, period))?)
     }
 
-    /// The same as a report.
+    /// Proves one orbit of this period and returns the theorem, or the reason why it failed, as a
+    /// report.
     pub fn report(&self, orbit: &Recording, period: usize) -> ProofReport {
         match self.theorem(orbit, period) {
             Ok(theorem) => ProofReport {
@@ -102,7 +103,7 @@ pub fn candidate(trajectory: &Trajectory, period: usize) -> Candidate {
     }
 }
 
-/// What is proved of an orbit's stability, in a word.
+/// Returns the proved stability of an orbit in a word: stable, unstable or undecided.
 fn stability(theorem: &Theorem) -> &'static str {
     match theorem.multipliers.stability() {
         Stability::Stable => "stable",

@@ -53,20 +53,21 @@ pub(super) struct Motion {
     slope: Vec<f64>,
 }
 
-/// Weights of the coefficients of force and damping in what a row measures.
+/// Weights of the coefficients of force and damping in what a row measures: one vector each, an
+/// entry per coefficient.
 #[derive(Clone, Debug)]
 pub(super) struct Weights {
-    /// Of the force in C = (1/π) ∮ F cos θ dθ.
+    /// Weights of the force in C = (1/π) ∮ F cos θ dθ.
     pub(super) cosine: Vec<f64>,
-    /// Of the damping in C.
+    /// Weights of the damping in C.
     pub(super) cosine_damping: Vec<f64>,
-    /// Of the force in the work of the first harmonic, a ∮ F sin θ dθ.
+    /// Weights of the force in the work of the first harmonic, a ∮ F sin θ dθ.
     pub(super) work: Vec<f64>,
-    /// Of the damping in that work.
+    /// Weights of the damping in that work.
     pub(super) work_damping: Vec<f64>,
-    /// Of the force in its mean.
+    /// Weights of the force in its mean over a period.
     pub(super) mean: Vec<f64>,
-    /// Of the damping in the dissipated energy ∮ g d′² dθ.
+    /// Weights of the damping in the dissipated energy ∮ g d′² dθ.
     pub(super) dissipated: Vec<f64>,
 }
 

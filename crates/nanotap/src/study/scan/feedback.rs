@@ -17,7 +17,8 @@ pub(super) struct LockIn {
 }
 
 impl LockIn {
-    /// With this part and number of stages, settled at `signal`.
+    /// Creates an amplifier with `order` stages that follow `part` of the difference in a period,
+    /// settled at `signal`.
     pub(super) fn new(part: f64, order: usize, signal: Complex) -> Self {
         Self {
             part,

@@ -228,7 +228,7 @@ impl Surface {
         self
     }
 
-    /// With the heights of an image added.
+    /// Adds the heights of an image to the surface.
     pub(super) fn with_image(mut self, image: HeightImage) -> Self {
         self.image = Some(image);
         self

@@ -1,4 +1,4 @@
-//! What is recorded of a line: its statistics, its pixels, its listed periods.
+//! The record of a line: its statistics, its pixels, its listed periods.
 
 use nanotap_arithmetic::ComplexFunctions as _;
 use nanotap_flow::Complex;

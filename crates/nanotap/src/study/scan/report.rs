@@ -11,9 +11,9 @@ use super::recorder::PixelRow;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Direction {
-    /// Rising positions
+    /// From left to right: the positions rise
     Trace,
-    /// Falling positions
+    /// From right to left: the positions fall
     Retrace,
 }
 

@@ -63,7 +63,7 @@ type FreeChange = ([f64; 2], Option<f64>);
 #[derive(Clone, Debug)]
 struct FreeChanges {
     keys: Vec<Key>,
-    /// Of frequency and strength, in the model's units, and of the loss in SI.
+    /// Derivatives of frequency and strength (model units) and of the loss (J) by each key.
     by: Option<Vec<FreeChange>>,
 }
 

@@ -90,7 +90,7 @@ impl RowPoint {
         }
     }
 
-    /// The same row without a continuation of its orbit.
+    /// Returns the same row, marked as lost: its orbit has no continuation.
     pub(super) fn without_orbit(&self) -> Self {
         Self {
             lost: true,

@@ -93,9 +93,9 @@ pub trait StroboscopicMap: Scheduling + Clone + Send + Sync {
     /// Length of one drive period, in the system's unit of time.
     fn period(&self) -> f64;
 
-    /// How many of the last entries of the state are whole numbers that the map sets, such as
-    /// whether a neck of adhesion is there. They change by leaps from orbit to orbit along a
-    /// branch; Newton's method takes them from the map.
+    /// Returns the number of trailing entries of the state that are whole numbers set by the map,
+    /// such as whether an adhesive neck exists. They jump from orbit to orbit along a branch;
+    /// Newton's method takes them from the map.
     fn discrete_entries(&self) -> usize {
         0
     }

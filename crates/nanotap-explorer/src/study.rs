@@ -1,4 +1,4 @@
-//! The terminal's studies, in stages of increasing resolution until they are cancelled.
+//! The studies of the command line, in stages of increasing resolution until they are cancelled.
 
 use std::fmt::Write as _;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -76,7 +76,7 @@ const STARTS: (usize, usize) = (6, 3);
 const RECORDED: usize = 32;
 /// Pixels of a line of an image, there and back.
 const LINE_PIXELS: f64 = 512.0;
-/// Most heights of a drawn surface.
+/// Largest number of heights of a drawn surface.
 const MAX_DRAWN: usize = 1000;
 /// Time between messages on the progress.
 const BETWEEN: Duration = Duration::from_millis(300);
@@ -88,13 +88,13 @@ pub(crate) struct StudyRequest {
     case: CaseSpec,
     #[serde(default)]
     start: String,
-    /// A tab of the page, or a study of the registry.
+    /// Name of a tab of the page, or of a study of the registry.
     tab: String,
-    /// Measured data: name and text of their file.
+    /// Measured data: name and text of the file.
     #[serde(default)]
     data: Option<(String, String)>,
     options: Map<String, Value>,
-    /// Number of a figure whose curves are drawn behind; 0: none.
+    /// Number of a figure whose curves are drawn behind this one; 0: none.
     #[serde(default)]
     pinned: u64,
 }
@@ -134,20 +134,21 @@ struct Stage<'a> {
     words: String,
     /// Names and requests of the studies in its figure.
     studies: &'a [Computed<'a>],
-    /// Lines of the case file in addition.
+    /// Additional lines of the case file: its table `[scan]`.
     scan: Option<String>,
-    /// What the page shows below the figure.
+    /// Tables that the page shows below the figure.
     tables: Vec<Value>,
     found: Option<Found>,
 }
 
-/// What a study found, to go on from.
+/// A result of a study from which the user can go on.
 #[derive(Serialize)]
 struct Found {
-    /// The changes to the case that lead to it, and the words of the button that makes them.
+    /// The changes to the case that lead to this result, and the words of the button that applies
+    /// them.
     set: Option<Map<String, Value>>,
     take: &'static str,
-    /// A file of it, the words of the button that saves it, and its name.
+    /// A file with the result, the words of the button that saves it, and its name.
     file: String,
     save: &'static str,
     name: &'static str,
@@ -189,7 +190,7 @@ impl Studied<'_> {
         })
     }
 
-    /// The options that the form gives, of those that a study has; a default is not stated.
+    /// The options of a study that the form sets to another value than the default.
     fn options(&self, entry: &StudyEntry) -> Map<String, Value> {
         let schema = (entry.request)();
         let given = |property: Property<'_>| {
@@ -552,7 +553,7 @@ impl Studied<'_> {
         })
     }
 
-    /// Where, over two parameters, every motion meets the conditions of the form.
+    /// Finds where, over two parameters, every motion meets the conditions of the form.
     fn plan(&self) -> Result<(), ApiError> {
         let case = self.request.case.any_distance(self.app)?;
         let wanted = self.conditions()?;

@@ -83,43 +83,45 @@ impl Figure {
         self
     }
 
-    /// Width in print, mm ([`SINGLE_COLUMN`], [`ONE_AND_A_HALF_COLUMNS`], [`DOUBLE_COLUMN`]).
+    /// Sets the width in print, mm ([`SINGLE_COLUMN`], [`ONE_AND_A_HALF_COLUMNS`],
+    /// [`DOUBLE_COLUMN`]).
     pub fn width(mut self, mm: f64) -> Figure {
         self.width = mm;
         self
     }
 
-    /// Height in mm; without it, panels are about two thirds as high as wide.
+    /// Sets the height, mm; without it, panels are about two thirds as high as wide.
     pub fn height(mut self, mm: f64) -> Figure {
         self.height = Some(mm);
         self
     }
 
-    /// Relative widths of the columns.
+    /// Sets the relative widths of the columns.
     pub fn column_widths(mut self, shares: impl IntoIterator<Item = f64>) -> Figure {
         self.column_widths = shares.into_iter().collect();
         self
     }
 
-    /// Relative heights of the rows.
+    /// Sets the relative heights of the rows.
     pub fn row_heights(mut self, shares: impl IntoIterator<Item = f64>) -> Figure {
         self.row_heights = shares.into_iter().collect();
         self
     }
 
-    /// Text above the whole figure, and the title of the file.
+    /// Sets the text above the whole figure, and the title of the file.
     pub fn title(mut self, title: impl Into<String>) -> Figure {
         self.title = title.into();
         self
     }
 
-    /// Text below the whole figure, broken into lines.
+    /// Sets the text below the whole figure, which is broken into lines.
     pub fn caption(mut self, caption: impl Into<String>) -> Figure {
         self.caption = caption.into();
         self
     }
 
-    /// Whether panels are lettered (a), (b) …; the default is yes if there is more than one cell.
+    /// Sets whether panels are lettered (a), (b) …; the default is yes if there is more than one
+    /// cell.
     pub fn letters(mut self, letters: bool) -> Figure {
         self.letters = letters;
         self

@@ -71,7 +71,7 @@ struct Measured {
     fastest: String,
 }
 
-/// Parses divan's output.
+/// Parses the output of divan: the fastest time of each benchmark.
 fn measured(lines: &[String]) -> Vec<Measured> {
     let mut groups: Vec<String> = Vec::new();
     let mut found = Vec::new();

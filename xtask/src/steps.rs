@@ -7,7 +7,7 @@ use crate::tally::Tally;
 use crate::tools::{PYTHON, Workspace};
 use crate::{benches, book, figures, package, peers, wheel};
 
-/// A task.
+/// A task of `cargo xtask`.
 pub(crate) struct Step {
     pub(crate) name: &'static str,
     pub(crate) about: &'static str,
@@ -16,7 +16,7 @@ pub(crate) struct Step {
     pub(crate) run: fn(&Workspace, &[String]) -> Result<Tally, String>,
 }
 
-/// All checks, cheapest first.
+/// All checks, in ascending order of their time.
 pub(crate) static STEPS: &[Step] = &[
     Step {
         name: "fmt",

@@ -11,7 +11,7 @@ pub(crate) struct Tally {
 }
 
 impl Tally {
-    /// A single check.
+    /// Counts a single check, which passed or failed.
     pub(crate) fn check(passed: bool) -> Self {
         Self {
             passed: u64::from(passed),

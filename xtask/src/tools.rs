@@ -39,7 +39,7 @@ impl Workspace {
         }
     }
 
-    /// `cargo` with `arguments`.
+    /// Prepares a call of `cargo` with these arguments.
     pub(crate) fn cargo(&self, arguments: &[&str]) -> Command {
         let mut command = Command::new(&self.cargo);
         command.args(arguments);
@@ -54,7 +54,7 @@ impl Workspace {
         &self.cargo
     }
 
-    /// Cargo's build folder.
+    /// Path of Cargo's build folder.
     pub(crate) fn target(&self) -> PathBuf {
         self.target.clone()
     }
@@ -109,7 +109,7 @@ impl Workspace {
     }
 }
 
-/// A Python environment.
+/// A Python virtual environment.
 pub(crate) struct Environment {
     folder: PathBuf,
 }
@@ -162,7 +162,7 @@ impl Environment {
         Ok(Self { folder })
     }
 
-    /// `pip install`.
+    /// Prepares a call of `pip install`, without its arguments.
     pub(crate) fn pip(&self) -> Command {
         let mut command = self.program("python");
         command.args(["-m", "pip", "install", "--quiet"]);

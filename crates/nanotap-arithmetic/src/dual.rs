@@ -14,15 +14,15 @@ pub trait Scalar:
     + Add<f64, Output = Self>
     + Sub<f64, Output = Self>
 {
-    /// A number that does not vary.
+    /// Returns a constant: all its derivatives are zero.
     fn constant(value: f64) -> Self;
-    /// The plain value.
+    /// Returns the value without the derivatives.
     fn value(self) -> f64;
-    /// `f` of this number, given the value and slope of `f` at its value.
+    /// Returns `f` of this number, given the value and the slope of `f` at it.
     #[must_use]
     fn chain(self, value: f64, slope: f64) -> Self;
 
-    /// The square root; zero with no slope from zero downwards, where a contact ends.
+    /// Returns the square root; for zero and below, where a contact ends, 0 with slope 0.
     #[must_use]
     fn sqrt(self) -> Self {
         let x = self.value();
@@ -32,37 +32,37 @@ pub trait Scalar:
         let root = x.sqrt();
         self.chain(root, 0.5 / root)
     }
-    /// The cube root of a number above zero.
+    /// Returns the cube root of a number above zero.
     #[must_use]
     fn cbrt(self) -> Self {
         let root = crate::cbrt(self.value());
         self.chain(root, root / (3.0 * self.value()))
     }
-    /// `e^x`.
+    /// Returns the exponential function, `e^x`.
     #[must_use]
     fn exp(self) -> Self {
         let e = crate::exp(self.value());
         self.chain(e, e)
     }
-    /// `1/x`.
+    /// Returns the reciprocal, `1/x`.
     #[must_use]
     fn recip(self) -> Self {
         let r = self.value().recip();
         self.chain(r, -r * r)
     }
-    /// `tan x`.
+    /// Returns the tangent of an angle in rad.
     #[must_use]
     fn tan(self) -> Self {
         let t = crate::tan(self.value());
         self.chain(t, 1.0 + t * t)
     }
-    /// Sine and cosine of an angle in rad.
+    /// Returns sine and cosine of an angle in rad.
     #[must_use]
     fn sin_cos(self) -> (Self, Self) {
         let (sin, cos) = crate::sin_cos(self.value());
         (self.chain(sin, cos), self.chain(cos, -sin))
     }
-    /// `x²`.
+    /// Returns the square, `x²`.
     #[must_use]
     fn square(self) -> Self {
         self * self
@@ -81,24 +81,24 @@ impl Scalar for f64 {
     }
 }
 
-/// A value and its derivatives by `K` variables.
+/// A value and its derivatives with respect to `K` variables.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Dual<const K: usize = 1> {
-    /// The value.
+    /// Value of the number, in the unit of the quantity that it stands for.
     pub value: f64,
-    /// The derivatives.
+    /// Derivatives of the value with respect to the `K` variables, in their order.
     pub slopes: [f64; K],
 }
 
 impl<const K: usize> Dual<K> {
-    /// The variable number `index`.
+    /// Returns independent variable number `index` (from 0, below `K`): its own derivative is 1.
     pub fn variable(value: f64, index: usize) -> Self {
         let mut slopes = [0.0; K];
         slopes[index] = 1.0;
         Self { value, slopes }
     }
 
-    /// A number that no variable changes.
+    /// Returns a constant: all its derivatives are zero.
     pub const fn constant(value: f64) -> Self {
         Self {
             value,
@@ -117,7 +117,7 @@ impl<const K: usize> Dual<K> {
 }
 
 impl Dual<1> {
-    /// A value and its derivative by the one variable.
+    /// Returns a number with its derivative with respect to the one variable.
     pub const fn new(value: f64, derivative: f64) -> Self {
         Self {
             value,
@@ -125,12 +125,12 @@ impl Dual<1> {
         }
     }
 
-    /// The derivative by the one variable.
+    /// Derivative with respect to the one variable.
     pub const fn derivative(self) -> f64 {
         self.slopes[0]
     }
 
-    /// An angle in degrees, in rad.
+    /// Converts an angle from degrees to rad.
     #[must_use]
     pub const fn to_radians(self) -> Self {
         Self::new(self.value.to_radians(), self.slopes[0].to_radians())

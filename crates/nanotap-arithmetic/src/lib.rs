@@ -22,127 +22,127 @@ use nalgebra::{Complex, DMatrix};
 /// Name of the arithmetic in datasets. It changes whenever the last digits of a result may change.
 pub const VERSION: &str = "2";
 
-/// The sine.
+/// Returns the sine of `x`, an angle in rad.
 #[inline]
 pub fn sin(x: f64) -> f64 {
     libm::sin(x)
 }
 
-/// The cosine.
+/// Returns the cosine of `x`, an angle in rad.
 #[inline]
 pub fn cos(x: f64) -> f64 {
     libm::cos(x)
 }
 
-/// Sine and cosine.
+/// Returns sine and cosine of `x`, an angle in rad.
 #[inline]
 pub fn sin_cos(x: f64) -> (f64, f64) {
     libm::sincos(x)
 }
 
-/// The tangent.
+/// Returns the tangent of `x`, an angle in rad.
 #[inline]
 pub fn tan(x: f64) -> f64 {
     libm::tan(x)
 }
 
-/// The angle in `[−π/2, π/2]` whose sine is `x`.
+/// Returns the angle in `[−π/2, π/2]`, in rad, whose sine is `x`; NaN for `|x| > 1`.
 #[inline]
 pub fn asin(x: f64) -> f64 {
     libm::asin(x)
 }
 
-/// The angle in `[0, π]` whose cosine is `x`.
+/// Returns the angle in `[0, π]`, in rad, whose cosine is `x`; NaN for `|x| > 1`.
 #[inline]
 pub fn acos(x: f64) -> f64 {
     libm::acos(x)
 }
 
-/// The angle in `[−π/2, π/2]` whose tangent is `x`.
+/// Returns the angle in `[−π/2, π/2]`, in rad, whose tangent is `x`.
 #[inline]
 pub fn atan(x: f64) -> f64 {
     libm::atan(x)
 }
 
-/// The angle in `[−π, π]` of the point `(x, y)`.
+/// Returns the angle in `[−π, π]`, in rad, of the point `(x, y)`.
 #[inline]
 pub fn atan2(y: f64, x: f64) -> f64 {
     libm::atan2(y, x)
 }
 
-/// The hyperbolic sine.
+/// Returns the hyperbolic sine of `x`.
 #[inline]
 pub fn sinh(x: f64) -> f64 {
     libm::sinh(x)
 }
 
-/// The hyperbolic cosine.
+/// Returns the hyperbolic cosine of `x`.
 #[inline]
 pub fn cosh(x: f64) -> f64 {
     libm::cosh(x)
 }
 
-/// The hyperbolic tangent.
+/// Returns the hyperbolic tangent of `x`.
 #[inline]
 pub fn tanh(x: f64) -> f64 {
     libm::tanh(x)
 }
 
-/// `e^x`.
+/// Returns the exponential function, `e^x`.
 #[inline]
 pub fn exp(x: f64) -> f64 {
     libm::exp(x)
 }
 
-/// `2^x`.
+/// Returns the power of 2, `2^x`.
 #[inline]
 pub fn exp2(x: f64) -> f64 {
     libm::exp2(x)
 }
 
-/// `e^x − 1`.
+/// Returns `e^x − 1`, accurate for small `x` too.
 #[inline]
 pub fn exp_m1(x: f64) -> f64 {
     libm::expm1(x)
 }
 
-/// The natural logarithm.
+/// Returns the natural logarithm of `x`; NaN for `x < 0`.
 #[inline]
 pub fn ln(x: f64) -> f64 {
     libm::log(x)
 }
 
-/// `ln(1 + x)`.
+/// Returns `ln(1 + x)`, accurate for small `x` too.
 #[inline]
 pub fn ln_1p(x: f64) -> f64 {
     libm::log1p(x)
 }
 
-/// The logarithm to base 2.
+/// Returns the logarithm of `x` to base 2.
 #[inline]
 pub fn log2(x: f64) -> f64 {
     libm::log2(x)
 }
 
-/// The logarithm to base 10.
+/// Returns the logarithm of `x` to base 10.
 #[inline]
 pub fn log10(x: f64) -> f64 {
     libm::log10(x)
 }
 
-/// `x^y`.
+/// Returns the power `x^y`.
 #[inline]
 pub fn powf(x: f64, y: f64) -> f64 {
     libm::pow(x, y)
 }
 
-/// The cube root.
+/// Returns the real cube root of `x`, with the sign of `x`.
 #[inline]
 pub fn cbrt(x: f64) -> f64 {
     libm::cbrt(x)
 }
 
-/// `√(x² + y²)`.
+/// Returns `√(x² + y²)` without overflow or underflow on the way.
 #[inline]
 pub fn hypot(x: f64, y: f64) -> f64 {
     libm::hypot(x, y)
@@ -151,17 +151,17 @@ pub fn hypot(x: f64, y: f64) -> f64 {
 /// Functions of complex numbers. Their names differ from those of num-complex, which call the
 /// platform's functions as soon as any crate in the build requests them.
 pub trait ComplexFunctions {
-    /// `|z|`.
+    /// Returns the modulus, `|z|`.
     fn modulus(self) -> f64;
-    /// The angle of `z`, in `[−π, π]`.
+    /// Returns the angle of `z`, in `[−π, π]`, in rad.
     fn argument(self) -> f64;
-    /// `e^z`.
+    /// Returns the exponential function, `e^z`.
     #[must_use]
     fn exponential(self) -> Self;
-    /// The square root with non-negative real part.
+    /// Returns the square root with non-negative real part.
     #[must_use]
     fn square_root(self) -> Self;
-    /// The logarithm with an imaginary part in `[−π, π]`.
+    /// Returns the natural logarithm with an imaginary part in `[−π, π]`.
     #[must_use]
     fn logarithm(self) -> Self;
 }
@@ -206,7 +206,7 @@ impl ComplexFunctions for Complex<f64> {
     }
 }
 
-/// The complex number with modulus `r` and argument `theta`, in radians.
+/// Returns the complex number with modulus `r` and argument `theta`, in rad.
 #[inline]
 pub fn from_polar(r: f64, theta: f64) -> Complex<f64> {
     let (sin, cos) = sin_cos(theta);

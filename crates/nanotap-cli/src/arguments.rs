@@ -58,13 +58,13 @@ pub(crate) struct OutArgument {
 }
 
 impl OutArgument {
-    /// Refuses what is not a table's name, before anything is computed.
+    /// Checks that the path is that of a table that may be written, before anything is computed.
     pub(crate) fn check(&self) -> Result<(), Failure> {
         let path = self.out.as_deref();
         path.map_or(Ok(()), |path| file::claim(path, &["csv"]).map(drop))
     }
 
-    /// Writes the table that `csv` makes, where one is wanted.
+    /// Writes the table that `csv` makes, if `--out` was given.
     pub(crate) fn write(&self, csv: impl FnOnce() -> String) -> Result<(), Failure> {
         let path = self.out.as_deref();
         path.map_or(Ok(()), |path| file::write(path, csv().as_bytes()))
@@ -80,7 +80,7 @@ pub(crate) struct PlotArgument {
 }
 
 impl PlotArgument {
-    /// Refuses what is not a picture's name, before anything is computed.
+    /// Checks that the path is that of a picture that may be written, before anything is computed.
     pub(crate) fn check(&self) -> Result<(), Failure> {
         let path = self.plot.as_deref();
         path.map_or(Ok(()), |path| {
@@ -88,7 +88,7 @@ impl PlotArgument {
         })
     }
 
-    /// Writes the figure that `figure` makes, where one is wanted.
+    /// Writes the figure that `figure` makes, if `--plot` was given.
     pub(crate) fn draw(&self, figure: impl FnOnce() -> Figure) -> Result<(), Failure> {
         if let Some(path) = &self.plot {
             file::draw(path, &figure())?;

@@ -35,16 +35,16 @@ pub(crate) struct DatasetArguments {
     pub(crate) threads: ThreadsArgument,
 }
 
-/// Where the pieces of a dataset go.
+/// Paths of a dataset and of its table.
 pub(crate) struct Destination {
-    /// The store.
+    /// Folder of the dataset, with extension .zarr.
     pub(crate) store: PathBuf,
-    /// The table, if one is wanted.
+    /// Path of the CSV table; `None` if none was requested.
     pub(crate) table: Option<PathBuf>,
 }
 
 impl DatasetArguments {
-    /// Where the dataset goes: as given, or to `derived`.zarr. Pictures and tables need every chunk,
+    /// Resolves the destination: as given, or `derived`.zarr. Pictures and tables need every chunk,
     /// which a share does not have.
     pub(crate) fn destination(
         &self,
@@ -80,8 +80,9 @@ impl DatasetArguments {
         Ok(destination)
     }
 
-    /// Plans the dataset of a study, computes it into a new store or one to go on with, and sums it
-    /// up; `derived` names the store unless the arguments do, `noun` is what progress counts.
+    /// Plans the dataset of a study, computes it into a new or an unfinished store, and summarises
+    /// it. `derived` names the store unless the arguments do, `noun` is the name of the items in
+    /// the progress.
     #[expect(clippy::too_many_arguments, reason = "what three commands share")]
     pub(crate) fn run<S: DatasetStudy>(
         &self,
@@ -161,25 +162,26 @@ impl DatasetArguments {
     }
 }
 
-/// Work on a dataset that was done: the JSON of every command that leaves one.
+/// Report on the computation of a dataset: the JSON of every command that writes one.
 #[derive(Serialize)]
 pub(crate) struct DatasetReport<S> {
-    /// The dataset.
+    /// Path of the dataset, a folder.
     pub(crate) path: PathBuf,
-    /// Its chunks, and how many of them are finished.
+    /// Number of chunks, and the number of those that are finished.
     pub(crate) chunks: usize,
     pub(crate) finished: usize,
-    /// What it came to, once all is done.
+    /// Summary of the dataset, once all chunks are finished.
     #[serde(flatten)]
     pub(crate) summary: Option<S>,
-    /// What this command took.
+    /// Computing time of this command, s.
     pub(crate) seconds: f64,
-    /// Seed of the starts.
+    /// Seed of the initial states.
     pub(crate) seed: u64,
 }
 
 impl<S> DatasetReport<S> {
-    /// The text: `summed` of the summary, or how far the work is, and where the dataset lies.
+    /// The report as text: `summed` of the summary, or the number of finished chunks, and the path
+    /// of the dataset.
     pub(crate) fn text(&self, heading: &str, summed: impl FnOnce(&S) -> String) -> String {
         let body = self.summary.as_ref().map_or_else(
             || {

@@ -1,9 +1,9 @@
 //! The files that a command writes: checked before anything is computed, whole or not at all.
 //!
-//! What another program or a person wrote is not replaced unless `--force` says so. A file of
-//! nanotap's is known by what it holds: a picture by the program that it names, a case file by the
-//! checksum in its first line (one that was edited since is a person's), a table by its first
-//! columns.
+//! A file that another program or a person wrote is not replaced without `--force`. A file of
+//! nanotap's is recognised by its contents: a picture by the program that it names, a case file by
+//! the checksum in its first line (a file that was edited since belongs to a person), a table by
+//! its first columns.
 
 use std::collections::BTreeSet;
 use std::fs::{self, File};
@@ -17,9 +17,9 @@ use nanotap_figures::{Figure, MADE_BY};
 
 use crate::failure::Failure;
 
-/// Whether `--force` was given.
+/// True if `--force` was given: existing files of any origin are replaced.
 static FORCE: AtomicBool = AtomicBool::new(false);
-/// What this command was asked to write.
+/// Paths that this command will write; each may be claimed once.
 static CLAIMED: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
 
 /// Beginnings of the tables that commands write, and columns of those of datasets.
@@ -40,7 +40,7 @@ const TABLES: [&str; 13] = [
 ];
 const DATASETS: [&str; 3] = [",classification,", ",attractor", ",start,"];
 
-/// Replaces whatever is there from now on.
+/// Allows all existing files to be replaced from now on.
 pub(crate) fn force() {
     FORCE.store(true, Ordering::Relaxed);
 }
@@ -124,7 +124,7 @@ fn signature(rest: &[u8]) -> String {
     )
 }
 
-/// Writes `bytes` to `path`.
+/// Writes `bytes` to `path`, whole or not at all.
 pub(crate) fn write(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
     files::write(path, bytes).map_err(|error| refused(path, error))
 }
@@ -140,21 +140,21 @@ pub(crate) fn draw(path: &Path, figure: &Figure) -> Result<(), Failure> {
     write(path, &figure.file(path)?)
 }
 
-/// Where a long table goes, piece by piece.
+/// A long table that is written piece by piece.
 pub(crate) struct Rows<'a> {
     path: &'a Path,
     file: &'a mut BufWriter<File>,
 }
 
 impl Rows<'_> {
-    /// Writes a piece.
+    /// Appends one piece of text to the file.
     pub(crate) fn push(&mut self, text: &str) -> Result<(), Failure> {
         let written = self.file.write_all(text.as_bytes());
         written.map_err(|error| refused(self.path, error))
     }
 }
 
-/// Writes the table that `fill` makes piece by piece.
+/// Writes the table that `fill` produces piece by piece.
 pub(crate) fn write_rows(
     path: &Path,
     fill: impl FnOnce(&mut Rows<'_>) -> Result<(), Failure>,
@@ -182,7 +182,7 @@ fn refused(path: &Path, why: impl std::fmt::Display) -> Failure {
     Failure::files(format!("cannot write {}: {why}", path.display()))
 }
 
-/// "a, b or c".
+/// Joins the items as alternatives: "a, b or c".
 fn alternatives(list: &[String]) -> String {
     match list {
         [] => String::new(),

@@ -26,7 +26,7 @@ impl Deref for GivenCase {
     }
 }
 
-/// The case at its setpoint and how that was solved, if it leaves the distance to one.
+/// The case at its setpoint and the result of the solution, if it derives the distance from one.
 pub(crate) fn at_setpoint(case: Case) -> Result<(Case, Option<SetpointReport>), Failure> {
     if !case.leaves_distance_to_setpoint() {
         return Ok((case, None));
@@ -37,9 +37,9 @@ pub(crate) fn at_setpoint(case: Case) -> Result<(Case, Option<SetpointReport>), 
 }
 
 impl GivenCase {
-    /// The case of the arguments, for a study that takes a case at any distance or at its setpoint.
-    /// Warnings about a physical case are printed, and keys of its file that do not count; other
-    /// notes are `nanotap case`'s.
+    /// Reads the case of the arguments, for a study that takes a case at any distance or at its
+    /// setpoint. Warnings about a physical case are printed, and keys of its file that have no
+    /// effect; other notes are left to `nanotap case`.
     pub(crate) fn for_study(
         arguments: &CaseArguments,
         any_distance: bool,
@@ -56,7 +56,7 @@ impl GivenCase {
         Ok(Self::warned(case, output))
     }
 
-    /// The case of the arguments at its setpoint.
+    /// Reads the case of the arguments and solves for its setpoint.
     pub(crate) fn of(arguments: &CaseArguments, output: &Output) -> Result<Self, Failure> {
         Self::for_study(arguments, false, output)
     }
@@ -73,7 +73,8 @@ impl GivenCase {
         Self(case)
     }
 
-    /// Prints the keys that stay constant while these keys vary, as the words that reproduce a point.
+    /// Prints the keys that stay constant while these keys vary, as the arguments that reproduce a
+    /// point.
     pub(crate) fn note_constants(&self, keys: &[Key], output: &Output) {
         let words: Vec<String> = self
             .held(keys)
@@ -96,12 +97,12 @@ impl GivenCase {
         }
     }
 
-    /// Its model.
+    /// Builds the model of the case.
     pub(crate) fn model(&self) -> Result<Model, Failure> {
         Ok(self.0.model()?)
     }
 
-    /// What it is, in a few words: `3 modes at Ω = 2.6`.
+    /// Describes the case in a few words: `3 modes at Ω = 2.6`.
     pub(crate) fn summary(&self) -> String {
         if let Some(oscillator) = self.oscillator() {
             let stop = if self.has_rigid_stop() {
@@ -129,7 +130,7 @@ impl GivenCase {
     }
 }
 
-/// What the case is called in a heading: its file, or that it was typed.
+/// Name of the case in a heading: its file, or that it was typed.
 fn title(arguments: &CaseArguments) -> String {
     arguments.file.as_ref().map_or_else(
         || "case from --set".to_owned(),

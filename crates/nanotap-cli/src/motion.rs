@@ -36,7 +36,8 @@ pub(crate) fn lag(phase: f64, tone: &str, digits: usize) -> String {
     format!("{}° {way} {tone}", number::significant(phase.abs(), digits))
 }
 
-/// What was observed: tip, gap, contact, force and energy; of a choice of observables a row each.
+/// Formats the observables: tip, gap, contact, force and energy, or one row for each selected
+/// observable.
 pub(crate) fn observed(
     o: &Observables,
     chosen: Option<ObservableSet>,
@@ -75,7 +76,7 @@ fn choice(o: &Observables, chosen: ObservableSet, units: &Units) -> String {
     table.render() + &balance
 }
 
-/// Tip, gap, contact and force.
+/// Formats the table of tip, gap, contact and force.
 fn observables(o: &Observables, units: &Units, beam: bool) -> String {
     let shown = |kind, value, digits| number::quantity(units, kind, value, [digits, 4]);
     let range =
@@ -175,7 +176,7 @@ fn observables(o: &Observables, units: &Units, beam: bool) -> String {
     table.render()
 }
 
-/// What the drive feeds in and what takes it.
+/// Formats the energy balance: the work of the drive and the losses, per period.
 fn energy(o: &Observables, units: &Units) -> String {
     let balance = &o.energy_balance;
     let mut table = Table::new([("", Align::Left), ("", Align::Point), ("", Align::Left)]);
@@ -293,7 +294,7 @@ fn product(of: &[i32]) -> String {
     text
 }
 
-/// Floquet multipliers.
+/// Formats the table of Floquet multipliers, at most 8 of them.
 pub(crate) fn multipliers(multipliers: &[[f64; 2]]) -> String {
     const SHOWN: usize = 8;
     let mut table = Table::new([
@@ -319,7 +320,7 @@ pub(crate) fn multipliers(multipliers: &[[f64; 2]]) -> String {
     text
 }
 
-/// What was proved of an orbit: the theorem, and its enclosures.
+/// Formats what was proved of an orbit: the theorem, and its enclosures.
 pub(crate) fn proof(proof: &ProofReport, model: &Model) -> String {
     let Some(theorem) = &proof.theorem else {
         return paragraph(&proof.statement);
@@ -375,7 +376,7 @@ pub(crate) fn proof(proof: &ProofReport, model: &Model) -> String {
     text
 }
 
-/// Switches of a theorem that are listed.
+/// Number of switches of a theorem that are listed.
 const SWITCHES_SHOWN: usize = 12;
 
 /// The derivatives of what is observed of an orbit with respect to a key: of a physical case in
@@ -421,9 +422,9 @@ pub(crate) fn exponents(exponents: &[f64], errors: Option<&[f64]>) -> String {
     list.join(", ")
 }
 
-/// Says what puts the motion in doubt, of `which` motion, if there are several: it leaves the range
-/// of the force law, another part of the beam than the tip would touch, or Hertz's stiffness is that
-/// of another depth.
+/// Warns about a motion (`which` one, if there are several) whose result is doubtful: it leaves the
+/// range of the force law, another part of the beam than the tip would touch, or Hertz's stiffness
+/// is that of another depth.
 pub(crate) fn warn(
     o: &Observables,
     physical: Option<&PhysicalMotion>,

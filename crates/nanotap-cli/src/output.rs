@@ -1,4 +1,4 @@
-//! What a command says: results on standard output, remarks on standard error.
+//! Output of a command: results on standard output, remarks on standard error.
 
 use std::io::{BufWriter, ErrorKind, Write as _};
 
@@ -8,10 +8,10 @@ use serde::Serialize;
 use crate::failure::Failure;
 use crate::{page, progress, style};
 
-/// Bytes of JSON that are written at once.
+/// Size of the buffer in which JSON is written, bytes.
 const JSON_AT_ONCE: usize = 1 << 16;
 
-/// How results are to be shown.
+/// How results are printed.
 #[derive(Debug)]
 pub(crate) struct Output {
     json: bool,
@@ -24,7 +24,7 @@ impl Output {
         Self { json, quiet }
     }
 
-    /// Whether remarks and progress are left out.
+    /// Whether notes and progress are left out.
     pub(crate) fn is_quiet(&self) -> bool {
         self.quiet
     }
@@ -63,7 +63,7 @@ impl Output {
         self.json
     }
 
-    /// A remark worth knowing.
+    /// Prints a note on standard error, unless `--quiet` was given.
     pub(crate) fn note(&self, text: &str) {
         if !self.quiet {
             progress::clear();
@@ -71,7 +71,8 @@ impl Output {
         }
     }
 
-    /// A remark that puts the result in doubt: it is shown in any case.
+    /// Prints a warning on standard error, which `--quiet` does not suppress: the result is
+    /// doubtful.
     #[expect(
         clippy::unused_self,
         reason = "remarks go through the output, shown or not"
@@ -82,7 +83,7 @@ impl Output {
     }
 }
 
-/// Prints `text` on standard output, without colours where it is not a terminal.
+/// Prints `text` on standard output, without colours if it is not a terminal.
 pub(crate) fn print(text: &str) -> Result<(), Failure> {
     progress::end();
     let mut stream = anstream::stdout().lock();
@@ -99,7 +100,7 @@ fn print_json<R: Serialize>(result: &R) -> Result<(), Failure> {
     printed(written.and_then(|()| stream.flush()))
 }
 
-/// What came of writing to standard output.
+/// Converts the result of writing to standard output; a closed pipe is not an error.
 fn printed(written: std::io::Result<()>) -> Result<(), Failure> {
     match written {
         // The reader has closed the pipe (`| head`).

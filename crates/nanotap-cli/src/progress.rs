@@ -33,7 +33,7 @@ const STOPPING: Duration = Duration::from_millis(900);
 /// Longest time in which cancelled work that keeps finished results must end.
 const KEEPING: Duration = Duration::from_secs(5);
 
-/// The progress line.
+/// The progress line of the program, shared by its threads.
 static LINE: Mutex<Line> = Mutex::new(Line {
     work: None,
     saving: false,
@@ -41,12 +41,12 @@ static LINE: Mutex<Line> = Mutex::new(Line {
     ended: true,
 });
 
-/// The line on standard error.
+/// State of the progress line on standard error.
 struct Line {
     work: Option<Counted>,
     /// Whether results of cancelled work are being written.
     saving: bool,
-    /// Whether it is on the terminal now.
+    /// Whether the line is on the terminal now.
     written: bool,
     /// Whether the program is done, or reports nothing.
     ended: bool,
@@ -55,7 +55,7 @@ struct Line {
 /// Work with a count of finished items.
 #[derive(Clone, Copy)]
 struct Counted {
-    /// Name of the work.
+    /// Name of the work, as shown on the line.
     what: &'static str,
     /// Name of the items, in the plural.
     noun: &'static str,

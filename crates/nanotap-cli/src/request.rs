@@ -11,7 +11,7 @@ use serde_json::{Map, Value};
 
 use crate::failure::{Failure, flag};
 
-/// What was typed of a request, not yet checked.
+/// The flags that were given for a request, not yet checked.
 #[derive(Clone, Debug)]
 pub(crate) struct Request<R> {
     given: Map<String, Value>,
@@ -19,7 +19,7 @@ pub(crate) struct Request<R> {
 }
 
 impl<R: JsonSchema + DeserializeOwned> Request<R> {
-    /// The request.
+    /// Parses and checks the request.
     pub(crate) fn read(&self) -> Result<R, Failure> {
         request::read(Value::Object(self.given.clone()))
     }
@@ -54,14 +54,14 @@ pub(crate) fn arguments(schema: &Schema) -> Vec<Arg> {
     flags(schema).map(argument).collect()
 }
 
-/// What was typed of them.
+/// The options that were given as flags, as JSON by name.
 pub(crate) fn given(schema: &Schema, matches: &ArgMatches) -> Map<String, Value> {
     flags(schema)
         .filter_map(|property| Some((property.name.to_owned(), typed(property, matches)?)))
         .collect()
 }
 
-/// The options that are flags: of some the terminal has its own.
+/// The options that become flags; for some the command line has separate ones.
 fn flags(schema: &Schema) -> impl Iterator<Item = Property<'_>> {
     request::properties(schema).filter(|property| property.schema["x-own"].is_null())
 }
@@ -152,7 +152,7 @@ fn help(property: Property<'_>) -> String {
     format!("{about}{bare}{default}")
 }
 
-/// A number without the fraction that it does not have.
+/// Formats a number, without the fraction if it is whole.
 fn plain(number: &Value) -> String {
     match number.as_f64() {
         Some(value) if value.fract() == 0.0 => format!("{value}"),
@@ -160,7 +160,7 @@ fn plain(number: &Value) -> String {
     }
 }
 
-/// The option as JSON, if it was typed.
+/// The option as JSON, if it was given.
 fn typed(property: Property<'_>, matches: &ArgMatches) -> Option<Value> {
     if property.allows("boolean") {
         let set = matches.get_flag(property.name);

@@ -1,5 +1,5 @@
-//! Restrained colour. The styles are always written; the stream that prints them
-//! (`anstream`) takes them out where there is no terminal or `NO_COLOR` is set.
+//! Terminal styles. They are always written; the stream that prints them (`anstream`) removes them
+//! if there is no terminal or `NO_COLOR` is set.
 
 use anstyle::{AnsiColor, Style};
 
@@ -7,17 +7,17 @@ fn styled(style: Style, text: &str) -> String {
     format!("{style}{text}{style:#}")
 }
 
-/// A heading.
+/// Formats a heading in bold.
 pub(crate) fn bold(text: &str) -> String {
     styled(Style::new().bold(), text)
 }
 
-/// What is there when it is looked for.
+/// Formats secondary text, dimmed.
 pub(crate) fn faint(text: &str) -> String {
     styled(Style::new().dimmed(), text)
 }
 
-/// A note line.
+/// Formats a note, with the prefix "note:".
 pub(crate) fn note(text: &str) -> String {
     format!(
         "{} {text}",
@@ -25,7 +25,7 @@ pub(crate) fn note(text: &str) -> String {
     )
 }
 
-/// A warning line.
+/// Formats a warning, with the prefix "warning:".
 pub(crate) fn warning(text: &str) -> String {
     format!(
         "{} {text}",
@@ -33,7 +33,7 @@ pub(crate) fn warning(text: &str) -> String {
     )
 }
 
-/// An error line.
+/// Formats an error, with the prefix "error:".
 pub(crate) fn error(text: &str) -> String {
     format!(
         "{} {text}",
@@ -41,7 +41,7 @@ pub(crate) fn error(text: &str) -> String {
     )
 }
 
-/// What would be right.
+/// Formats advice on an error, with the prefix "help:".
 pub(crate) fn help(text: &str) -> String {
     format!(
         "{} {text}",

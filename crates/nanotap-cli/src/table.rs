@@ -6,19 +6,19 @@ use unicode_width::UnicodeWidthStr;
 
 use crate::{page, style};
 
-/// Blanks between two columns.
+/// Number of blanks between two columns.
 const BETWEEN: usize = 2;
-/// Words are not broken into columns narrower than this.
+/// Smallest width of a column in which words are broken, in characters.
 const NARROWEST: usize = 14;
 
-/// How the cells of a column stand.
+/// Alignment of the cells of a column.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Align {
-    /// Words.
+    /// To the left, for words.
     Left,
-    /// Whole numbers.
+    /// To the right, for whole numbers.
     Right,
-    /// Numbers, their decimal points beneath each other.
+    /// At the decimal point, for other numbers.
     Point,
 }
 
@@ -30,7 +30,7 @@ pub(crate) struct Table {
 }
 
 impl Table {
-    /// A table with these column headers; where all are empty no header is printed.
+    /// Creates a table with these column headers; if all are empty no header is printed.
     pub(crate) fn new<'a>(columns: impl IntoIterator<Item = (&'a str, Align)>) -> Self {
         let columns = columns
             .into_iter()
@@ -43,14 +43,14 @@ impl Table {
         }
     }
 
-    /// Adds a row; cells that are missing are empty.
+    /// Adds a row; missing cells are empty.
     pub(crate) fn row<S: Into<String>>(&mut self, cells: impl IntoIterator<Item = S>) {
         let mut row: Vec<String> = cells.into_iter().map(Into::into).collect();
         row.resize(self.columns.len(), String::new());
         self.rows.push(row);
     }
 
-    /// The table, no blanks at the ends of lines.
+    /// Formats the table for the terminal, without blanks at the ends of lines.
     pub(crate) fn render(&self) -> String {
         self.fitted(page::width())
     }

@@ -1,4 +1,4 @@
-//! How many threads work.
+//! The `--threads` argument: the number of threads of parallel work.
 
 use clap::Args;
 use nanotap::study::threads::{checked, install};
@@ -19,7 +19,7 @@ impl ThreadsArgument {
         Ok(checked(self.threads)?.unwrap_or(0))
     }
 
-    /// Does `work` on so many threads.
+    /// Runs `work` on this number of threads.
     pub(crate) fn install<R: Send>(&self, work: impl FnOnce() -> R + Send) -> Result<R, Failure> {
         install(self.threads, work)
     }

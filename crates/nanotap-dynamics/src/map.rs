@@ -11,7 +11,8 @@ use nalgebra::DMatrix;
 pub struct Tangency {
     /// Drive phase of the extremum as a fraction of the period, in `[0, 1)`.
     pub phase: f64,
-    /// Value of the switching function: its sign tells contact from a near miss.
+    /// Value of the switching function, in its own unit; its sign distinguishes contact from a near
+    /// miss.
     pub value: f64,
 }
 
@@ -86,15 +87,15 @@ pub trait StroboscopicMap: Scheduling + Clone + Send + Sync {
     /// Why a period could not be computed.
     type Error: std::error::Error + Send + Sync + 'static;
 
-    /// Dimension of the state.
+    /// Returns the number of entries of a state.
     fn dimension(&self) -> usize;
 
     /// Length of one drive period, in the system's unit of time.
     fn period(&self) -> f64;
 
-    /// How many of the last entries of the state are whole numbers that the map sets, such as
-    /// whether a neck of adhesion is there. They change by leaps from orbit to orbit along a
-    /// branch; Newton's method takes them from the map.
+    /// Returns the number of trailing entries of the state that are whole numbers set by the map,
+    /// such as whether an adhesive neck exists. They jump from orbit to orbit along a branch;
+    /// Newton's method takes them from the map.
     fn discrete_entries(&self) -> usize {
         0
     }

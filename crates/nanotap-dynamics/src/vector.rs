@@ -12,17 +12,17 @@ pub(crate) fn distance(a: &[f64], b: &[f64]) -> f64 {
         .fold(0.0, |m: f64, (x, y)| m.max((x - y).abs()))
 }
 
-/// `a − b`.
+/// Difference `a − b`, entry by entry.
 pub(crate) fn difference(a: &[f64], b: &[f64]) -> Vec<f64> {
     a.iter().zip(b).map(|(x, y)| x - y).collect()
 }
 
-/// Sum of squares.
+/// Sum of the squared entries.
 pub(crate) fn sum_of_squares(a: &[f64]) -> f64 {
     a.iter().map(|v| v * v).sum()
 }
 
-/// Scalar product.
+/// Scalar product of `a` and `b`.
 pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(x, y)| x * y).sum()
 }

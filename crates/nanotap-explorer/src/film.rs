@@ -9,9 +9,9 @@ use serde::Serialize;
 
 use crate::api_error::ApiError;
 
-/// Instants per drive period.
+/// Number of instants per drive period at which the film has a picture.
 const INSTANTS: usize = 90;
-/// Points along the beam.
+/// Number of points along the beam.
 const ALONG: usize = 33;
 /// Length of the drawn tip, relative to the range of heights.
 const TIP: f64 = 0.18;
@@ -31,9 +31,9 @@ pub(crate) struct Film {
     apex: Vec<i32>,
     surface: Vec<i32>,
     contact: Vec<u8>,
-    /// Least and greatest height.
+    /// Smallest and largest height, in the model's unit of length.
     range: [f64; 2],
-    /// Height of the undeflected beam.
+    /// Height of the undeflected beam, in the model's unit of length.
     rest: f64,
     /// Text on the scale of heights.
     scale: String,

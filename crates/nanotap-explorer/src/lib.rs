@@ -75,7 +75,7 @@ pub(crate) struct App {
     pub(crate) port: u16,
     pub(crate) presets: Vec<Preset>,
     pub(crate) workers: Workers,
-    /// Recent figures of studies.
+    /// The most recent figures of studies, which the page may request again.
     pub(crate) figures: Shelf,
     /// Folder of the datasets of studies while their figures are drawn.
     pub(crate) scratch: PathBuf,

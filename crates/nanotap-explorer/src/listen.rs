@@ -16,7 +16,7 @@ use hyper_util::service::TowerToHyperService;
 use tokio::net::TcpListener;
 use tokio::sync::Semaphore;
 
-/// Number of open connections.
+/// Largest number of connections that are open at the same time.
 const CONNECTIONS: usize = 256;
 /// Time in which the head of a request must arrive, and its body after that.
 const LONGEST_ARRIVAL: Duration = Duration::from_secs(5);

@@ -18,7 +18,7 @@ pub(crate) enum Shows {
     Motions,
     /// The largest peak force of any of them.
     Force,
-    /// The number of motions.
+    /// The number of coexisting motions.
     States,
 }
 

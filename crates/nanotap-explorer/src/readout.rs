@@ -1,4 +1,4 @@
-//! What a microscopist reads first from a motion: a few numbers, and a sentence on its regime.
+//! The readout of a motion: a few numbers, and a sentence on its regime.
 
 use nanotap::case::Case;
 use nanotap::case::quantity::Kind;
@@ -20,7 +20,7 @@ const READ: [(&str, &str); 6] = [
 /// Smallest difference of phases, in degrees, that is reported.
 const SAME_PHASE: f64 = 0.5;
 
-/// Numbers and sentence.
+/// Computes the readout as JSON: the values of the observables, the regime and the sentence.
 pub(crate) fn readout(case: &Case, observables: &Observables) -> Value {
     let line = |(name, words): &(&str, &str)| {
         let observable = Observable::named(name)?;
@@ -45,7 +45,8 @@ pub(crate) fn readout(case: &Case, observables: &Observables) -> Value {
     })
 }
 
-/// The amplitude over the free amplitude.
+/// Amplitude as a fraction of the free amplitude; `None` for a case without physical units, or
+/// without a free amplitude.
 fn ratio(case: &Case, observables: &Observables) -> Option<f64> {
     let free = case.physical()?.free_amplitude;
     let length = case.physical()?.scales.length;

@@ -19,7 +19,7 @@ impl Scratch {
         Self::within(&std::env::temp_dir())
     }
 
-    /// Creates one in `folder`.
+    /// Creates a temporary folder within `folder`.
     pub(crate) fn within(folder: &Path) -> Result<Self, Error> {
         static COUNT: AtomicU64 = AtomicU64::new(0);
         let count = COUNT.fetch_add(1, Ordering::Relaxed);

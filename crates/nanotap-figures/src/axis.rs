@@ -18,10 +18,10 @@ pub const ROUNDING: f64 = 1e-9;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Scale {
-    /// Evenly.
+    /// Values are evenly spaced.
     #[default]
     Linear,
-    /// Evenly by their logarithms.
+    /// Logarithms of the values are evenly spaced; only positive values are shown.
     Log,
 }
 
@@ -47,17 +47,17 @@ pub enum Range {
 #[serde(default)]
 #[must_use]
 pub struct Axis {
-    /// Label, without the unit.
+    /// Quantity on the axis, without the unit; may contain markup.
     pub label: String,
     /// Unit, shown in brackets after the label; empty if there is none.
     pub unit: String,
-    /// How values are spaced.
+    /// Spacing of values along the axis, linear or logarithmic.
     pub scale: Scale,
     /// Which part of the axis is drawn.
     pub range: Range,
     /// Ticks: values with their labels; `None`: round numbers.
     pub marks: Option<Vec<(f64, String)>>,
-    /// Magnitude of a value that matters: see [`Axis::natural`].
+    /// Magnitude of a value that matters, in the unit of the axis: see [`Axis::natural`].
     pub natural: Option<f64>,
 }
 

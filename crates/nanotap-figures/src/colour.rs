@@ -10,20 +10,20 @@ use serde::{Deserialize, Serialize};
 #[serde(into = "String", try_from = "String")]
 #[must_use]
 pub struct Colour {
-    /// Red, 0 to 255.
+    /// Red component in sRGB, 0 to 255.
     pub r: u8,
-    /// Green, 0 to 255.
+    /// Green component in sRGB, 0 to 255.
     pub g: u8,
-    /// Blue, 0 to 255.
+    /// Blue component in sRGB, 0 to 255.
     pub b: u8,
     /// Opacity, 0 (invisible) to 255 (opaque).
     pub a: u8,
 }
 
 impl Colour {
-    /// Black: axes and text.
+    /// Black, the colour of axes and text.
     pub const BLACK: Colour = Colour::rgb(0, 0, 0);
-    /// White: the paper.
+    /// White, the colour of the page.
     pub const WHITE: Colour = Colour::rgb(255, 255, 255);
     /// Mid grey: undecided or secondary items.
     pub const GREY: Colour = Colour::rgb(128, 128, 128);
@@ -237,7 +237,7 @@ pub fn category(index: usize) -> Colour {
     FILLS[index % FILLS.len()].tint([0.0, 0.45, 0.7][round])
 }
 
-/// A continuous colour scale.
+/// A continuous colour scale, from the smallest to the largest value.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 #[must_use]

@@ -1,6 +1,6 @@
 use std::path::PathBuf;
 
-/// Why a figure could not be drawn or written.
+/// The reason why a figure could not be drawn or written.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum FigureError {
@@ -10,13 +10,13 @@ pub enum FigureError {
         path.display()
     )]
     UnknownEnding {
-        /// The given path.
+        /// Path whose extension is unknown.
         path: PathBuf,
     },
     /// The file could not be written.
     #[error("cannot write \"{}\": {source}", path.display())]
     Write {
-        /// The given path.
+        /// Path of the file to be written.
         path: PathBuf,
         /// Error of the operating system.
         source: std::io::Error,
@@ -24,7 +24,7 @@ pub enum FigureError {
     /// The figure's SVG could not be converted to PNG or PDF.
     #[error("cannot convert the figure from SVG: {reason}")]
     Conversion {
-        /// The converter's message.
+        /// Message of the converter.
         reason: String,
     },
     /// A figure could not be read from JSON or written as JSON.

@@ -20,27 +20,28 @@ pub const DOUBLE_COLUMN: f64 = 178.0;
 #[serde(default)]
 #[must_use]
 pub struct Figure {
-    /// Rows of the grid.
+    /// Number of rows of the grid of panels.
     pub rows: usize,
-    /// Columns of the grid.
+    /// Number of columns of the grid of panels.
     pub cols: usize,
-    /// Width in print, mm.
+    /// Width of the figure in print, mm.
     pub width: f64,
-    /// Height in print, mm; `None`: panels are about two thirds as high as wide.
+    /// Height of the figure in print, mm; `None`: panels are about two thirds as high as wide.
     pub height: Option<f64>,
-    /// Relative widths of the columns; empty: equal.
+    /// Relative widths of the columns (dimensionless, only ratios matter); empty: equal.
     pub column_widths: Vec<f64>,
-    /// Relative heights of the rows; empty: equal.
+    /// Relative heights of the rows (dimensionless, only ratios matter); empty: equal.
     pub row_heights: Vec<f64>,
     /// Text above the whole figure, and the title of the file.
     pub title: String,
     /// Text below the whole figure.
     pub caption: String,
-    /// Whether panels are lettered.
+    /// Whether panels are lettered (a), (b), ….
     pub letters: bool,
     /// Whether the panels of a column share their horizontal range.
     pub share_x: bool,
-    /// Factor by which letters and ticks are larger than usual.
+    /// Factor by which letters and ticks are larger than usual (dimensionless), 0.2 to 10; 1 for
+    /// print.
     pub text_scale: f64,
     /// The panels, row by row.
     pub panels: Vec<Panel>,
@@ -82,43 +83,45 @@ impl Figure {
         self
     }
 
-    /// Width in print, mm ([`SINGLE_COLUMN`], [`ONE_AND_A_HALF_COLUMNS`], [`DOUBLE_COLUMN`]).
+    /// Sets the width in print, mm ([`SINGLE_COLUMN`], [`ONE_AND_A_HALF_COLUMNS`],
+    /// [`DOUBLE_COLUMN`]).
     pub fn width(mut self, mm: f64) -> Figure {
         self.width = mm;
         self
     }
 
-    /// Height in mm; without it, panels are about two thirds as high as wide.
+    /// Sets the height, mm; without it, panels are about two thirds as high as wide.
     pub fn height(mut self, mm: f64) -> Figure {
         self.height = Some(mm);
         self
     }
 
-    /// Relative widths of the columns.
+    /// Sets the relative widths of the columns.
     pub fn column_widths(mut self, shares: impl IntoIterator<Item = f64>) -> Figure {
         self.column_widths = shares.into_iter().collect();
         self
     }
 
-    /// Relative heights of the rows.
+    /// Sets the relative heights of the rows.
     pub fn row_heights(mut self, shares: impl IntoIterator<Item = f64>) -> Figure {
         self.row_heights = shares.into_iter().collect();
         self
     }
 
-    /// Text above the whole figure, and the title of the file.
+    /// Sets the text above the whole figure, and the title of the file.
     pub fn title(mut self, title: impl Into<String>) -> Figure {
         self.title = title.into();
         self
     }
 
-    /// Text below the whole figure, broken into lines.
+    /// Sets the text below the whole figure, which is broken into lines.
     pub fn caption(mut self, caption: impl Into<String>) -> Figure {
         self.caption = caption.into();
         self
     }
 
-    /// Whether panels are lettered (a), (b) …; the default is yes if there is more than one cell.
+    /// Sets whether panels are lettered (a), (b) …; the default is yes if there is more than one
+    /// cell.
     pub fn letters(mut self, letters: bool) -> Figure {
         self.letters = letters;
         self

@@ -45,7 +45,7 @@ const X_HEIGHT: f64 = 0.535;
 /// Depth of descenders relative to the type size.
 pub(crate) const DESCENT: f64 = 0.24;
 
-/// A letter's shape.
+/// Shape of a letter: a glyph of one of the fonts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) struct Glyph {
     pub(crate) cut: Cut,

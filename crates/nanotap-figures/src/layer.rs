@@ -10,14 +10,14 @@ use crate::numbers;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Dash {
-    /// Unbroken.
+    /// Drawn without gaps.
     #[default]
     Solid,
-    /// Dashes.
+    /// Drawn as dashes.
     Dashed,
-    /// Dots.
+    /// Drawn as dots.
     Dotted,
-    /// Dashes and dots alternately.
+    /// Drawn as dashes and dots alternately.
     DashDot,
 }
 
@@ -60,7 +60,7 @@ pub struct Line {
     /// Dash pattern of the line.
     #[serde(default)]
     pub dash: Dash,
-    /// Width in points (1/72 inch).
+    /// Width of the line in points (1/72 inch).
     pub width: f64,
     /// Colour; `None`: the next one of the palette.
     pub colour: Option<Colour>,
@@ -92,7 +92,7 @@ pub struct Points {
     /// Centres, in the units of the axes.
     #[serde(with = "numbers::points")]
     pub points: Vec<(f64, f64)>,
-    /// Diameter in mm.
+    /// Diameter of each dot, mm.
     pub diameter: f64,
     /// Colour; `None`: the next one of the palette. A translucent colour makes the density visible.
     pub colour: Option<Colour>,
@@ -112,29 +112,29 @@ impl Points {
         }
     }
 
-    /// Diameter in mm.
+    /// Sets the diameter of each dot, mm.
     pub fn diameter(mut self, mm: f64) -> Points {
         self.diameter = mm;
         self
     }
 }
 
-/// A few large marks.
+/// Markers at a few points, with one shape.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[must_use]
 pub struct Markers {
     /// Centres, in the units of the axes.
     #[serde(with = "numbers::points")]
     pub points: Vec<(f64, f64)>,
-    /// The shape of each.
+    /// Shape of all markers of the layer.
     #[serde(default)]
     pub shape: Shape,
-    /// Size in mm.
+    /// Size of each marker, mm; the diameter of a circle.
     pub size: f64,
-    /// White inside instead of filled.
+    /// Whether the markers are white inside instead of filled.
     #[serde(default)]
     pub open: bool,
-    /// A white edge around each marker.
+    /// Whether each marker has a white edge.
     #[serde(default)]
     pub edge: bool,
     /// Colour; `None`: the next one of the palette.
@@ -158,25 +158,25 @@ impl Markers {
         }
     }
 
-    /// Sets the shape.
+    /// Sets the shape of all markers.
     pub fn shape(mut self, shape: Shape) -> Markers {
         self.shape = shape;
         self
     }
 
-    /// Size in mm.
+    /// Sets the size of each marker, mm.
     pub fn size(mut self, mm: f64) -> Markers {
         self.size = mm;
         self
     }
 
-    /// White inside instead of filled; used for unstable motions.
+    /// Makes the markers white inside instead of filled; used for unstable motions.
     pub fn open(mut self) -> Markers {
         self.open = true;
         self
     }
 
-    /// A white edge around each marker, for contrast on a heatmap.
+    /// Gives each marker a white edge, for contrast on a heatmap.
     pub fn white_edge(mut self) -> Markers {
         self.edge = true;
         self
@@ -187,15 +187,15 @@ impl Markers {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[must_use]
 pub struct Rule {
-    /// The x of a vertical line, the y of a horizontal one.
+    /// The x of a vertical line, the y of a horizontal one, in the unit of the axis.
     pub at: f64,
     /// Whether the line is vertical.
     pub upright: bool,
     /// Dash pattern of the line.
     pub dash: Dash,
-    /// Width in points (1/72 inch).
+    /// Width of the line in points (1/72 inch).
     pub width: f64,
-    /// Colour; `None`: grey.
+    /// Colour of the line; `None`: grey.
     pub colour: Option<Colour>,
     /// Text in the legend; empty: no entry.
     #[serde(default)]
@@ -234,7 +234,7 @@ pub struct Band {
     pub intervals: Vec<(f64, f64)>,
     /// Whether the intervals are those of the horizontal axis.
     pub along_x: bool,
-    /// Colour; `None`: light grey.
+    /// Colour of the intervals; `None`: light grey.
     pub colour: Option<Colour>,
     /// Text in the legend; empty: no entry.
     #[serde(default)]
@@ -296,14 +296,14 @@ pub enum Side {
 pub struct Note {
     /// Position of the text, and start of the arrow.
     pub at: Place,
-    /// The text.
+    /// Text of the note; may contain markup.
     pub text: String,
     /// Side of the place on which the text lies.
     #[serde(default)]
     pub side: Side,
     /// End of the arrow; `None`: no arrow.
     pub tip: Option<Place>,
-    /// Colour; `None`: black.
+    /// Colour of text and arrow; `None`: black.
     pub colour: Option<Colour>,
 }
 
@@ -327,13 +327,13 @@ impl Note {
         }
     }
 
-    /// Sets the text.
+    /// Sets the text of the note.
     pub fn text(mut self, text: impl Into<String>) -> Note {
         self.text = text.into();
         self
     }
 
-    /// Side of the place on which the text lies.
+    /// Sets the side of the place on which the text lies.
     pub fn side(mut self, side: Side) -> Note {
         self.side = side;
         self
@@ -350,16 +350,17 @@ pub struct Heatmap {
     pub columns: usize,
     /// Number of cells along y.
     pub rows: usize,
-    /// Values, row by row; the row of the smallest y comes first.
+    /// Values, row by row, in the unit of `scale`, `rows` × `columns` of them; the row of the
+    /// smallest y comes first; NaN is white.
     #[serde(deserialize_with = "numbers::gaps")]
     pub values: Vec<f64>,
-    /// Outer edges of the grid along x.
+    /// Outer edges of the grid along x, in the unit of the horizontal axis.
     pub x: (f64, f64),
-    /// Outer edges of the grid along y.
+    /// Outer edges of the grid along y, in the unit of the vertical axis.
     pub y: (f64, f64),
     /// The axis of the colour bar.
     pub scale: Axis,
-    /// Colour scale.
+    /// Colour scale from the smallest to the largest value.
     #[serde(default)]
     pub map: Colourmap,
 }
@@ -396,9 +397,9 @@ impl Heatmap {
 /// A category of a [`CategoryMap`].
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Category {
-    /// Text in the legend.
+    /// Text of the category in the legend.
     pub label: String,
-    /// None: the palette's next colour.
+    /// Colour of the cells; `None`: the palette's next colour.
     pub colour: Option<Colour>,
 }
 
@@ -413,9 +414,9 @@ pub struct CategoryMap {
     /// Numbers of categories, from 0, row by row; the row of the smallest y comes first; `None` is
     /// white.
     pub cells: Vec<Option<usize>>,
-    /// Outer edges of the grid along x.
+    /// Outer edges of the grid along x, in the unit of the horizontal axis.
     pub x: (f64, f64),
-    /// Outer edges of the grid along y.
+    /// Outer edges of the grid along y, in the unit of the vertical axis.
     pub y: (f64, f64),
     /// The categories in the order of their numbers.
     pub categories: Vec<Category>,
@@ -468,7 +469,8 @@ pub struct Stems {
     /// The dots, in the units of the axes.
     #[serde(with = "numbers::points")]
     pub points: Vec<(f64, f64)>,
-    /// The y of the feet of the stems; `None`: 0, or the bottom of a logarithmic axis.
+    /// The y of the feet of the stems, in the unit of the vertical axis; `None`: 0, or the bottom
+    /// of a logarithmic axis.
     pub foot: Option<f64>,
     /// Colour; `None`: the next one of the palette.
     pub colour: Option<Colour>,
@@ -495,7 +497,7 @@ impl Stems {
     }
 }
 
-/// Vertical bars.
+/// Vertical bars of equal width.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[must_use]
 pub struct Bars {
@@ -547,7 +549,7 @@ pub enum Layer {
 macro_rules! shared {
     (colour: $($kind:ident)*) => {$(
         impl $kind {
-            /// Sets the colour.
+            /// Sets the colour of the layer.
             pub fn colour(mut self, colour: Colour) -> $kind {
                 self.colour = Some(colour);
                 self
@@ -556,7 +558,7 @@ macro_rules! shared {
     )*};
     (label: $($kind:ident)*) => {$(
         impl $kind {
-            /// Text in the legend.
+            /// Sets the text of the layer in the legend.
             pub fn label(mut self, label: impl Into<String>) -> $kind {
                 self.label = label.into();
                 self
@@ -565,13 +567,13 @@ macro_rules! shared {
     )*};
     (line: $($kind:ident)*) => {$(
         impl $kind {
-            /// Sets the dash pattern.
+            /// Sets the dash pattern of the line.
             pub fn dash(mut self, dash: Dash) -> $kind {
                 self.dash = dash;
                 self
             }
 
-            /// Width in points (1/72 inch).
+            /// Sets the width of the line in points (1/72 inch).
             pub fn width(mut self, points: f64) -> $kind {
                 self.width = points;
                 self

@@ -21,7 +21,8 @@ pub(crate) enum Stand {
     Right,
 }
 
-/// Positions inside, best first.
+/// Positions inside the panel that are tried, the preferred one first: fractions of the free width
+/// and height from the top left.
 const INSIDE: [(f64, f64); 8] = [
     (1.0, 0.0),
     (0.0, 0.0),

@@ -9,15 +9,15 @@ use crate::axis::{Axis, Scale, View};
 pub struct PanelMap {
     /// Letter such as "(a)"; empty if there is none.
     pub letter: String,
-    /// Title above the panel.
+    /// Title above the panel; empty if there is none.
     pub title: String,
-    /// Left edge of the box.
+    /// Left edge of the box, mm from the left edge of the figure.
     pub left: f64,
-    /// Upper edge of the box.
+    /// Upper edge of the box, mm from the upper edge of the figure.
     pub top: f64,
-    /// Width of the box.
+    /// Width of the box, mm.
     pub width: f64,
-    /// Height of the box.
+    /// Height of the box, mm.
     pub height: f64,
     /// The horizontal axis, from the left edge to the right one.
     pub x: AxisMap,
@@ -29,15 +29,15 @@ pub struct PanelMap {
 /// logarithmic axis this applies to the logarithms.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct AxisMap {
-    /// Label, without the unit.
+    /// Quantity on the axis, without the unit; may contain markup.
     pub label: String,
     /// Unit; empty if there is none.
     pub unit: String,
-    /// How values are spaced.
+    /// Spacing of values along the axis, linear or logarithmic.
     pub scale: Scale,
-    /// Value at the start of the axis.
+    /// Value at the start of the axis, in its unit.
     pub from: f64,
-    /// Value at the end of the axis.
+    /// Value at the end of the axis, in its unit.
     pub to: f64,
 }
 

@@ -6,26 +6,26 @@ use crate::axis::Axis;
 use crate::error::FigureError;
 use crate::layer::Layer;
 
-/// Position of the legend.
+/// Position of the legend of a panel.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Legend {
     /// In a corner or at an edge where it hides no data, otherwise above the panel.
     #[default]
     Auto,
-    /// Inside, top left.
+    /// Inside the panel, top left.
     TopLeft,
-    /// Inside, top right.
+    /// Inside the panel, top right.
     TopRight,
-    /// Inside, bottom left.
+    /// Inside the panel, bottom left.
     BottomLeft,
-    /// Inside, bottom right.
+    /// Inside the panel, bottom right.
     BottomRight,
     /// Outside, in rows above the panel.
     Above,
     /// Outside, in a column to the right of the panel.
     Right,
-    /// No legend.
+    /// The panel has no legend.
     Hidden,
 }
 
@@ -34,22 +34,22 @@ pub enum Legend {
 #[serde(default)]
 #[must_use]
 pub struct Panel {
-    /// Title above the panel.
+    /// Title above the panel; empty if there is none.
     pub title: String,
     /// The panel's letter, such as "(a)"; `None`: the one given by the figure.
     pub letter: Option<String>,
-    /// The horizontal axis.
+    /// The horizontal axis, with its label, unit and range.
     pub x: Axis,
-    /// The vertical axis.
+    /// The vertical axis, with its label, unit and range.
     pub y: Axis,
     /// The layers, from back to front.
     pub layers: Vec<Layer>,
-    /// Position of the legend.
+    /// Position of the legend, which lists the layers with a label.
     pub legend: Legend,
 }
 
 impl Panel {
-    /// An empty panel.
+    /// Creates a panel with these axes and without layers.
     pub fn new(x: Axis, y: Axis) -> Panel {
         Panel {
             x,
@@ -58,31 +58,31 @@ impl Panel {
         }
     }
 
-    /// Title above the panel.
+    /// Sets the title above the panel.
     pub fn title(mut self, title: impl Into<String>) -> Panel {
         self.title = title.into();
         self
     }
 
-    /// The panel's letter, such as "(a)", instead of the one given by the figure.
+    /// Sets the panel's letter, such as "(a)", instead of the one given by the figure.
     pub fn letter(mut self, letter: impl Into<String>) -> Panel {
         self.letter = Some(letter.into());
         self
     }
 
-    /// Position of the legend.
+    /// Sets the position of the legend.
     pub fn legend(mut self, legend: Legend) -> Panel {
         self.legend = legend;
         self
     }
 
-    /// Adds a layer.
+    /// Adds a layer in front of the others.
     pub fn with(mut self, layer: impl Into<Layer>) -> Panel {
         self.layers.push(layer.into());
         self
     }
 
-    /// Adds layers.
+    /// Adds layers in front of the others, from back to front.
     pub fn with_all<L: Into<Layer>>(mut self, layers: impl IntoIterator<Item = L>) -> Panel {
         self.layers.extend(layers.into_iter().map(Into::into));
         self

@@ -84,7 +84,7 @@ impl Frame {
 }
 
 impl<'a> Prepared<'a> {
-    /// Prepares a resolved panel.
+    /// Measures axes, legend and colour bars of a panel whose colours and letter are resolved.
     pub(crate) fn new(panel: &'a Panel, words_below: bool) -> Prepared<'a> {
         let bars = panel
             .layers

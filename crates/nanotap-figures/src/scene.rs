@@ -20,7 +20,7 @@ pub(crate) enum Item {
     Cloud(Cloud),
 }
 
-/// A page.
+/// A page with all its shapes and texts placed; lengths in mm.
 #[derive(Debug, Clone)]
 pub(crate) struct Scene {
     pub(crate) width: f64,

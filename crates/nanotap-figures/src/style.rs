@@ -6,21 +6,21 @@ use crate::text::MM_PER_POINT;
 /// Sizes of letters, pt, and of the lengths that scale with them, mm.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Style {
-    /// Tick labels.
+    /// Type size of tick labels, pt.
     pub(crate) marks: f64,
-    /// Labels of the axes.
+    /// Type size of the labels of the axes, pt.
     pub(crate) label: f64,
-    /// Legends, notes, captions.
+    /// Type size of legends, notes and captions, pt.
     pub(crate) legend: f64,
-    /// Panel letters and titles.
+    /// Type size of panel letters and titles, pt.
     pub(crate) title: f64,
-    /// Length of ticks, mm.
+    /// Length of labelled ticks, mm.
     pub(crate) mark: f64,
     pub(crate) minor_mark: f64,
     /// Small and large distance between neighbours, mm.
     pub(crate) pad: f64,
     pub(crate) gap: f64,
-    /// Width of axes, mm.
+    /// Width of the lines of axes and ticks, mm.
     pub(crate) axis: f64,
 }
 

@@ -5,7 +5,7 @@ use crate::layer::Shape;
 use crate::scene::Scene;
 use crate::shape::{Point, Segment, Stroke};
 
-/// A circle.
+/// Outline of a circle as four cubic arcs.
 pub(crate) fn disc(centre: Point, radius: f64) -> Vec<Segment> {
     // Four cubic arcs with the usual handle length come within 0.03 % of a circle.
     let handle = 0.552_284_75 * radius;

@@ -29,7 +29,7 @@ struct Letter {
 /// Letters of the same size on the same baseline, ready to draw.
 #[derive(Debug, Clone)]
 pub(crate) struct Run {
-    /// Type size, mm.
+    /// Type size of the letters, mm.
     pub(crate) size: f64,
     /// Letters with the positions of their origins, mm from the text's origin, y upwards.
     pub(crate) glyphs: Vec<(Glyph, f64, f64)>,
@@ -59,11 +59,11 @@ pub(crate) enum Upright {
     Top,
     Middle,
     Baseline,
-    /// Below the descenders.
+    /// At the depth of the descenders.
     Bottom,
 }
 
-/// Text on the page.
+/// A set line of text with its position on the page.
 #[derive(Debug, Clone)]
 pub(crate) struct PlacedWords {
     pub(crate) words: Words,

@@ -7,7 +7,7 @@ pub struct Ticks {
     pub positions: Vec<f64>,
     /// Labels of the ticks, with markup for powers (see [`crate::Axis`]).
     pub labels: Vec<String>,
-    /// Positions of the unlabelled minor ticks.
+    /// Positions of the unlabelled minor ticks, in data units, ascending.
     pub minor: Vec<f64>,
     /// Common factor and offset of all labels ("×10⁻⁴ + 2.6"), if any.
     pub note: Option<String>,

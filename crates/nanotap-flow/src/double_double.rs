@@ -1,5 +1,5 @@
-//! Twice double precision, for one question only: on which side of zero a
-//! signal's extremum lies when it cannot be distinguished from rounding.
+//! Arithmetic in twice double precision. It only decides on which side of zero a signal's extremum
+//! lies when double precision cannot distinguish it from rounding.
 //!
 //! Error-free sums and products after Dekker and Knuth.
 
@@ -12,7 +12,7 @@ pub(crate) struct Dd(pub(crate) f64, pub(crate) f64);
 impl Dd {
     const ZERO: Self = Self(0.0, 0.0);
 
-    /// A double.
+    /// Converts a double exactly.
     pub(crate) fn new(a: f64) -> Self {
         Self(a, 0.0)
     }
@@ -51,7 +51,7 @@ impl Dd {
     }
 }
 
-/// Real and imaginary part.
+/// A complex number in twice double precision: real and imaginary part.
 #[derive(Clone, Copy)]
 pub(crate) struct ComplexDd(pub(crate) Dd, pub(crate) Dd);
 

@@ -16,10 +16,10 @@ pub struct Drive {
 }
 
 impl Drive {
-    /// A drive of period `period` whose tones are the given harmonics of `2π/period`.
+    /// Creates a drive of period `period` whose tones are the given harmonics of `2π/period`.
     ///
     /// # Errors
-    /// When the period is not positive and finite, or a harmonic is zero.
+    /// If the period is not positive and finite, or a harmonic is zero.
     pub fn new(period: f64, harmonics: &[u32]) -> Result<Self, FlowError> {
         if !(period.is_finite() && period > 0.0) {
             return Err(FlowError::Drive {
@@ -42,10 +42,10 @@ impl Drive {
         })
     }
 
-    /// A single tone of angular frequency `omega`.
+    /// Creates a drive with a single tone of angular frequency `omega`.
     ///
     /// # Errors
-    /// When `omega` is not positive and finite.
+    /// If `omega` is not positive and finite.
     pub fn single(omega: f64) -> Result<Self, FlowError> {
         if !(omega.is_finite() && omega > 0.0) {
             return Err(FlowError::Drive {
@@ -57,11 +57,12 @@ impl Drive {
         Ok(drive)
     }
 
-    /// Two tones of angular frequencies `first` and `second` that need not repeat together: the
-    /// period is that of the first, and the second one's phase is another after it.
+    /// Creates a drive with two tones of angular frequencies `first` and `second` without a common
+    /// period. The period is that of the first tone; after it the second tone has a different
+    /// phase.
     ///
     /// # Errors
-    /// When one of them is not positive and finite.
+    /// If one of them is not positive and finite.
     pub fn unlocked(first: f64, second: f64) -> Result<Self, FlowError> {
         let mut drive = Self::single(first)?;
         let other = Self::single(second)?;
@@ -70,22 +71,22 @@ impl Drive {
         Ok(drive)
     }
 
-    /// The period `T`.
+    /// Returns the drive period `T`, in the system's unit of time.
     pub fn period(&self) -> f64 {
         self.period
     }
 
-    /// The harmonics `h_k`.
+    /// Returns the harmonics `h_k`, one per tone; 1 for each tone of [`Drive::unlocked`].
     pub fn harmonics(&self) -> &[u32] {
         &self.harmonics
     }
 
-    /// The angular frequencies `ω_k`.
+    /// Returns the angular frequencies `ω_k` of the tones, in radians per unit of time.
     pub fn frequencies(&self) -> &[f64] {
         &self.frequencies
     }
 
-    /// `e^{iω_k t}` of tone `k`.
+    /// Returns `e^{iω_k t}` of tone `k` at time `t`.
     pub fn phasor(&self, k: usize, t: f64) -> Complex {
         if t == 0.0 {
             return Complex::new(1.0, 0.0);

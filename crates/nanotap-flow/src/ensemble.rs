@@ -28,7 +28,7 @@ use crate::{FlowError, Regime};
 use std::collections::VecDeque;
 use std::sync::Arc;
 
-/// Evaluations of the guard near a switch before the lane is followed alone.
+/// Number of evaluations of the guard near a switch after which a lane is followed alone.
 const MAX_EVALUATIONS: usize = 3;
 
 /// The work space of many motions of a [`System`]. Cloning shares the system.
@@ -59,12 +59,12 @@ struct Strobe {
     now: Vec<Octet>,
 }
 
-/// Numbers of stretches from switch to switch that were followed together and alone.
+/// Numbers of stretches between switches that were followed eight at a time and alone.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Stretches {
-    /// Eight at a time.
+    /// Number of stretches that were followed eight at a time.
     pub together: u64,
-    /// One at a time, as a [`Flow`](crate::Flow) does it.
+    /// Number of stretches that were followed one at a time, as [`Flow`](crate::Flow) does.
     pub alone: u64,
 }
 
@@ -96,25 +96,25 @@ struct Pack {
 /// Sums over the amplitudes of the guard in each lane.
 #[derive(Clone, Copy, Debug, Default)]
 struct Sums {
-    /// Of sizes.
+    /// Sum of the terms' absolute values, constant included.
     size: Octet,
     /// Bound of the third derivative.
     third: Octet,
     /// The rate at the start.
     rate: Octet,
-    /// With the weights of the table.
+    /// Sums with the table's weights of the fine grid.
     weighted: [Octet; 4],
 }
 
-/// What is known of each lane's next switch.
+/// The next switch of each lane, as far as the search determined it.
 struct Switches {
-    /// Lanes that come to one.
+    /// Lanes that reach a switch, one bit each.
     found: u32,
-    /// Lanes in which it is not certain.
+    /// Lanes in which the switch is not certain, one bit each.
     uncertain: u32,
-    /// When, or where the search ended.
+    /// Time of the switch from the start of the stretch, or the time at which the search ended.
     at: Octet,
-    /// The time beyond that at which factors were evaluated.
+    /// Remaining time from the last evaluation of the exponentials to `at`.
     rest: Octet,
 }
 
@@ -133,8 +133,9 @@ impl Ensemble {
         }
     }
 
-    /// Whether motions of `system` can go side by side: one guard leads out of each regime, tabulated,
-    /// and nothing is known of it but that it starts at zero. Others are run in sequence.
+    /// Reports whether motions of `system` can be followed eight at a time: each regime must have
+    /// exactly one guard, which is tabulated and about which nothing is known except that it starts
+    /// at zero. Motions of other systems run in sequence.
     pub fn fits(system: &System) -> bool {
         let simple = |regime: usize| {
             let ([prepared], [transition]) = (
@@ -151,7 +152,7 @@ impl Ensemble {
         system.largest_angle() <= LARGEST_ANGLE && (0..system.regimes().len()).all(simple)
     }
 
-    /// Numbers of stretches so far, of systems whose motions can be followed together.
+    /// Returns the numbers of stretches so far, of systems whose motions can be followed together.
     pub fn stretches(&self) -> Stretches {
         self.stretches
     }
@@ -160,7 +161,7 @@ impl Ensemble {
     /// `periods`. If a motion cannot be followed, its state is unchanged and the reason is returned.
     ///
     /// # Panics
-    /// If there are not as many states as `periods`.
+    /// If the numbers of states and of `periods` differ.
     pub fn advance(&mut self, states: &mut [f64], periods: &[usize]) -> Vec<Result<(), FlowError>> {
         let n = self.system.dimension();
         assert_eq!(states.len(), n * periods.len(), "a state for each motion");
@@ -177,12 +178,12 @@ impl Ensemble {
         self.end(&system, states, periods)
     }
 
-    /// As [`Ensemble::advance`], and puts the states at the ends of all periods of each motion, one
-    /// after the other, into its place in `passed`; the last of them is where it came to, unless it
-    /// could not be followed to the end.
+    /// Advances the states as [`Ensemble::advance`], and writes the states of each motion at the
+    /// ends of all its periods, in sequence, to its entry of `passed`, which is cleared first. The
+    /// last of them is the final state, unless the motion could not be followed to the end.
     ///
     /// # Panics
-    /// If there are not as many states, and places in `passed`, as `periods`.
+    /// If the numbers of states, of entries in `passed` and of `periods` differ.
     pub fn advance_through(
         &mut self,
         states: &mut [f64],
@@ -211,7 +212,7 @@ impl Ensemble {
         results
     }
 
-    /// Makes members of states.
+    /// Creates one member for each state, at phase 0.
     fn begin(&mut self, system: &System, states: &[f64], periods: &[usize]) {
         self.members.clear();
         for (x, &left) in states.chunks_exact(system.dimension()).zip(periods) {
@@ -232,7 +233,7 @@ impl Ensemble {
         }
     }
 
-    /// Writes where members have come to.
+    /// Writes the states that the members have reached.
     fn end(
         &mut self,
         system: &System,
@@ -315,7 +316,7 @@ impl Ensemble {
         }
     }
 
-    /// Runs members of one regime to their next switches, or as far as it may be looked for one.
+    /// Runs members of one regime to their next switches, or to the end of the searchable time.
     #[inline(always)]
     fn run_together<W: Wide>(
         &mut self,
@@ -409,8 +410,8 @@ impl Ensemble {
         }
     }
 
-    /// Works out the states at the ends of periods within stretches of which the `known` ones end at
-    /// these times, where somebody wants them.
+    /// Computes the states at the ends of periods within stretches, if they are requested; the
+    /// lanes in `known` end at these times.
     #[inline(always)]
     fn strobe_within<W: Wide>(
         &mut self,
@@ -457,7 +458,7 @@ impl Strobe {
 }
 
 impl Member {
-    /// How far it may be looked for a switch at once, as for one motion.
+    /// Returns how far ahead a switch can be searched for at once, as for a single motion.
     #[inline(always)]
     fn reach(&self, system: &System) -> f64 {
         let period = system.drive().period();
@@ -469,7 +470,8 @@ impl Member {
         left.min(system.table_reach(self.regime))
     }
 
-    /// Takes what was computed in a lane: `length` of time passed, and a switch at its end or none.
+    /// Takes over the result of a lane: `length` of time passed, with or without a switch at its
+    /// end.
     #[inline(always)]
     fn go_on(
         &mut self,
@@ -513,7 +515,7 @@ impl Member {
         count_period(&mut self.phase, &mut self.left, period);
     }
 
-    /// Goes on to the next switch as a motion outside a batch does.
+    /// Continues to the next switch as a motion outside a batch does.
     #[inline(always)]
     fn go_on_alone<S: Simd>(&mut self, system: &System, alone: &mut Motion) {
         self.hand_to(system, alone);
@@ -531,7 +533,7 @@ impl Member {
         }
     }
 
-    /// Makes `motion` this one. Phasors follow from the phase.
+    /// Copies this member's state to `motion`. Phasors follow from the phase.
     fn hand_to(&self, system: &System, motion: &mut Motion) {
         motion.regime = self.regime;
         motion.phase = self.phase;
@@ -778,7 +780,7 @@ impl Pack {
     }
 }
 
-/// [`Ensemble::run_all`].
+/// The arguments of [`Ensemble::run_all`], for the dispatch to vector instructions.
 struct RunAll<'a>(&'a mut Ensemble, &'a System);
 
 impl WideWork for RunAll<'_> {

@@ -11,7 +11,7 @@ pub enum FlowError {
     Shape {
         /// The thing whose size is wrong.
         what: &'static str,
-        /// Its size.
+        /// Size found: a number of entries, rows or columns.
         found: usize,
         /// The size that would fit.
         expected: usize,
@@ -25,7 +25,7 @@ pub enum FlowError {
     /// The drive's period or a harmonic makes no sense.
     #[error("the drive needs a positive, finite period and harmonics of at least 1, got {what}")]
     Drive {
-        /// What was given.
+        /// Description of the invalid period or harmonic.
         what: String,
     },
     /// An undamped mode is driven at its own frequency: no bounded response exists.
@@ -34,11 +34,12 @@ pub enum FlowError {
          {mode}; the response grows without bound, so add damping or move the frequency"
     )]
     Resonance {
-        /// The regime.
+        /// Number of the regime, from 0.
         regime: usize,
-        /// Angular frequency of the drive's tone (0 for the constant force).
+        /// Angular frequency of the drive's tone, in radians per unit of time (0 for the constant
+        /// force).
         frequency: f64,
-        /// Angular frequency of the mode.
+        /// Angular frequency of the undamped mode, in radians per unit of time.
         mode: f64,
     },
     /// The eigenbasis of a regime is too ill-conditioned to carry double precision.
@@ -47,9 +48,9 @@ pub enum FlowError {
          grouped; rescale the state or move the parameters"
     )]
     IllConditioned {
-        /// The regime.
+        /// Number of the regime, from 0.
         regime: usize,
-        /// Digits lost.
+        /// Number of decimal digits lost, 0 to 16.
         digits: u32,
     },
     /// A mode is too fast, compared with the drive, to be followed over a period.
@@ -58,11 +59,11 @@ pub enum FlowError {
          period, and at most {limit:.0e} are followed; raise the drive's frequency"
     )]
     TooFast {
-        /// The regime.
+        /// Number of the regime, from 0.
         regime: usize,
-        /// Its oscillations in one period.
+        /// Number of oscillations of the fastest mode in one drive period.
         oscillations: f64,
-        /// The most that are followed.
+        /// Largest number of oscillations per period that is supported.
         limit: f64,
     },
     /// The starting state lies in no regime.
@@ -76,7 +77,7 @@ pub enum FlowError {
     /// The motion left the range of double precision.
     #[error("the motion grew beyond the range of double precision at time {time}")]
     Diverged {
-        /// When.
+        /// Time within the drive period, in the system's unit of time.
         time: f64,
     },
     /// Switches pile up at one instant and no sticking regime was given.
@@ -85,15 +86,15 @@ pub enum FlowError {
          in which the motion could go on"
     )]
     Accumulation {
-        /// When.
+        /// Time within the drive period, in the system's unit of time.
         time: f64,
     },
     /// A transition names a regime that is not there.
     #[error("a transition leads to regime {target}, but there are {regimes}")]
     Target {
-        /// The regime named.
+        /// Number of the regime that the transition names, from 0.
         target: usize,
-        /// How many there are.
+        /// Number of regimes of the system.
         regimes: usize,
     },
 }

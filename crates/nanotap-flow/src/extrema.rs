@@ -4,12 +4,13 @@
 use crate::search::sign_changes;
 use crate::trajectory::PiecewiseSignal;
 
-/// A point of a signal.
+/// A local or global extremum of a signal.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Extremum {
-    /// When.
+    /// Time of the extremum, from the start of the recording's first period, in the system's unit
+    /// of time.
     pub time: f64,
-    /// The value.
+    /// Value of the signal there, in the units of the output.
     pub value: f64,
 }
 

@@ -9,12 +9,12 @@ use crate::system::System;
 use crate::{Complex, Drive, FlowError, HarmonicVector, Regime};
 use nalgebra::{DMatrix, DVector};
 
-/// Where within a step the regime is looked at.
+/// How often in a step the guards are evaluated.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Switching {
-    /// Once a step: all four stages use the regime found at its start.
+    /// Once per step: all four stages use the regime found at its start.
     EveryStep,
-    /// At every stage: each evaluation of the field looks at the guards.
+    /// At every stage: each evaluation of the field checks the guards.
     EveryStage,
 }
 
@@ -22,7 +22,7 @@ pub enum Switching {
 #[derive(Clone, Debug)]
 pub struct FixedStep<'a> {
     system: &'a System,
-    /// Steps a drive period in each regime.
+    /// Number of steps per drive period in each regime.
     steps: Vec<u32>,
     switching: Switching,
     regime: usize,
@@ -45,7 +45,7 @@ struct WholeStep {
     length: f64,
     matrix: DMatrix<f64>,
     added: HarmonicVector,
-    /// `e^{iω_k h}`.
+    /// Factors `e^{iω_k h}` by which the tones' phasors advance in a step.
     turns: Vec<Complex>,
 }
 
@@ -100,14 +100,16 @@ impl WholeStep {
     }
 }
 
-/// What the sum of a period's steps may miss of it by rounding, in parts of it.
+/// Largest deviation, as a fraction of the period, of the sum of a period's steps from it by
+/// rounding.
 const ROUNDING: f64 = 1e-12;
 
 impl<'a> FixedStep<'a> {
-    /// Starts at state `x`, phase 0, with `steps[r]` steps a drive period in regime `r`.
+    /// Creates an integration from state `x`, phase 0, with `steps[r]` steps per drive period in
+    /// regime `r`.
     ///
     /// # Errors
-    /// When sizes do not fit, a step count is zero, or no regime holds the state.
+    /// If sizes do not fit, a step count is zero, or no regime contains the state.
     pub fn new(
         system: &'a System,
         x: &[f64],
@@ -167,13 +169,13 @@ impl<'a> FixedStep<'a> {
         })
     }
 
-    /// The state.
+    /// Returns the present state, of length `n`.
     pub fn state(&self) -> &[f64] {
         self.state.as_slice()
     }
 
-    /// One drive period; returns how many switches were noticed. `watch` sees each
-    /// step's phase and state. It ends early once the system's motions are cancelled.
+    /// Runs one drive period and returns the number of switches. `watch` receives each step's phase
+    /// and state. The run ends early once the system is cancelled.
     pub fn run_period(&mut self, mut watch: impl FnMut(f64, &[f64])) -> u32 {
         let period = self.system.drive().period();
         let mut phase = 0.0;

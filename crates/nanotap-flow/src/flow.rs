@@ -16,7 +16,7 @@ pub struct Flow {
 }
 
 impl Flow {
-    /// A flow of `system`; call [`Flow::start`] before running it.
+    /// Creates a flow of `system`; call [`Flow::start`] before running it.
     pub fn new(system: Arc<System>) -> Self {
         Self {
             motion: Motion::new(&system),
@@ -24,12 +24,12 @@ impl Flow {
         }
     }
 
-    /// The system.
+    /// Returns the system whose motion this is.
     pub fn system(&self) -> &Arc<System> {
         &self.system
     }
 
-    /// The system, to change its constants; a copy where others share it. Start the motion anew
+    /// Returns the system for a change of its constants; a copy if it is shared. Restart the motion
     /// afterwards.
     pub fn system_mut(&mut self) -> &mut System {
         Arc::make_mut(&mut self.system)
@@ -41,30 +41,30 @@ impl Flow {
         self.motion.longest_passed_touch = longest;
     }
 
-    /// What the searches for switches have cost so far.
+    /// Returns the cost of the searches for switches so far.
     pub fn statistics(&self) -> Statistics {
         self.motion.statistics
     }
 
-    /// Switches so far.
+    /// Returns the number of switches since the flow was created.
     pub fn switches(&self) -> u64 {
         self.motion.switches
     }
 
-    /// The regime the motion is in.
+    /// Returns the number of the present regime.
     pub fn regime(&self) -> usize {
         self.motion.regime
     }
 
-    /// The time within the drive period.
+    /// Returns the time within the drive period, in the system's unit of time.
     pub fn phase(&self) -> f64 {
         self.motion.phase
     }
 
-    /// Puts the motion at state `x` (length `n`) and time `phase` within the period.
+    /// Sets the motion to state `x` (length `n`) at time `phase` within the period.
     ///
     /// # Errors
-    /// When a value is not finite, the length is wrong, or no regime holds the state.
+    /// If a value is not finite, the length is wrong, or no regime contains the state.
     pub fn start(&mut self, x: &[f64], phase: f64) -> Result<(), FlowError> {
         self.motion.start_checked(&self.system, x, phase)
     }
@@ -77,7 +77,7 @@ impl Flow {
     /// Runs to the end of the drive period; the phase is then zero.
     ///
     /// # Errors
-    /// When the motion diverges, or chatters with no sticking regime to end in.
+    /// If the motion diverges, or chatters without a sticking regime to end in.
     pub fn run_period<O: Observer>(&mut self, observer: &mut O) -> Result<(), FlowError> {
         self.motion.run_period(&self.system, observer)
     }

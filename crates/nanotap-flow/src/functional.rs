@@ -7,13 +7,13 @@ use nanotap_arithmetic::Scalar;
 /// numbers in a list.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Functional<C = usize, F = f64> {
-    /// The least value.
+    /// Least value of the output along the motion, in the units of the output.
     Least(C),
-    /// The greatest value.
+    /// Greatest value of the output along the motion, in the units of the output.
     Greatest(C),
-    /// `∫ g dt`.
+    /// Integral `∫ g dt` of the output along the motion, in units of the output times time.
     Integral(C),
-    /// `∫ g h dt`; with itself, of the square.
+    /// Integral `∫ g h dt` of a product; the integral of the square if both outputs are the same.
     Product(C, C),
     /// `∫ g e^{−iωt} dt`. Twice this over the duration `D`, `c = (2/D) ∫ g e^{−iωt} dt`, is the
     /// amplitude of the component `Re(c e^{iωt})`.
@@ -38,7 +38,7 @@ impl<C, F> Functional<C, F> {
 }
 
 impl Functional {
-    /// The output of an extremum, and its sign: −1 of a least value, 1 of a greatest one.
+    /// Returns the output of an extremum and its sign: −1 for a least value, 1 for a greatest one.
     pub const fn extremum(self) -> Option<(usize, f64)> {
         match self {
             Self::Least(g) => Some((g, -1.0)),
@@ -47,7 +47,7 @@ impl Functional {
         }
     }
 
-    /// The angular frequency of a Fourier coefficient.
+    /// Returns the angular frequency of a Fourier coefficient.
     pub const fn frequency(self) -> Option<f64> {
         match self {
             Self::Fourier(_, omega) => Some(omega),
@@ -55,7 +55,7 @@ impl Functional {
         }
     }
 
-    /// Its value over no time: infinite of an extremum.
+    /// Returns the value over an empty motion: infinite for an extremum, 0 otherwise.
     pub fn initial<D: Scalar>(self) -> Complex<D> {
         let value = self
             .extremum()
@@ -63,8 +63,9 @@ impl Functional {
         Complex::new(D::constant(value), D::constant(0.0))
     }
 
-    /// Adds a node of a quadrature of this weight, where outputs have these values and a Fourier
-    /// coefficient at ω the phase `phase(ω) = ωt`, to an integral. Extrema stay as they are.
+    /// Adds a quadrature node of this weight to an integral; `values` are those of the outputs
+    /// there, and `phase(ω) = ωt` is the phase of a Fourier coefficient at ω. Extrema do not
+    /// change.
     #[inline]
     pub fn add_node<D: Scalar>(
         self,

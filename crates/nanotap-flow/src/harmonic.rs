@@ -7,15 +7,15 @@ use nalgebra::{DMatrix, DVector, RowDVector};
 /// A vector `c + Σ_k Re(z_k e^{iω_k t})`, one complex amplitude a tone of the drive.
 #[derive(Clone, Debug, PartialEq)]
 pub struct HarmonicVector {
-    /// The constant part.
+    /// Constant part `c`, of length `n`.
     pub constant: DVector<f64>,
-    /// The complex amplitude of each tone; a real part multiplies the cosine,
-    /// minus the imaginary part the sine.
+    /// Complex amplitudes `z_k`, one vector of length `n` per tone; the real part multiplies the
+    /// cosine, minus the imaginary part the sine.
     pub tones: Vec<DVector<Complex>>,
 }
 
 impl HarmonicVector {
-    /// Zero, for a state of dimension `n` and `tones` tones.
+    /// Creates a zero vector for a state of dimension `n` and `tones` tones.
     pub fn zeros(n: usize, tones: usize) -> Self {
         Self {
             constant: DVector::zeros(n),
@@ -30,14 +30,14 @@ impl HarmonicVector {
         self
     }
 
-    /// Adds a constant.
+    /// Adds `constant`, of length `n`, to the constant part.
     #[must_use]
     pub fn with_constant(mut self, constant: &DVector<f64>) -> Self {
         self.constant += constant;
         self
     }
 
-    /// The value at time `t`.
+    /// Returns the value at time `t`.
     pub fn at(&self, drive: &Drive, t: f64) -> DVector<f64> {
         let mut value = DVector::zeros(self.constant.len());
         self.write(drive, t, value.as_mut_slice());
@@ -63,7 +63,7 @@ impl HarmonicVector {
         }
     }
 
-    /// The time derivative.
+    /// Returns the time derivative, again a harmonic vector.
     #[must_use]
     pub fn rate(&self, drive: &Drive) -> Self {
         let tones = self
@@ -78,7 +78,7 @@ impl HarmonicVector {
         }
     }
 
-    /// `matrix · self`.
+    /// Returns the product `matrix · self`.
     #[must_use]
     pub fn mapped(&self, matrix: &DMatrix<f64>) -> Self {
         let complex = matrix.map(|v| Complex::new(v, 0.0));
@@ -88,7 +88,7 @@ impl HarmonicVector {
         }
     }
 
-    /// `self + factor · other`.
+    /// Returns `self + factor · other`.
     #[must_use]
     pub fn plus(&self, factor: f64, other: &Self) -> Self {
         Self {
@@ -138,20 +138,20 @@ impl HarmonicVector {
     }
 }
 
-/// A scalar `row · x + c + Σ_k Re(z_k e^{iω_k t})`: a guard, or an output that
-/// someone wants to see.
+/// A scalar `row · x + c + Σ_k Re(z_k e^{iω_k t})`: a guard or an observed output.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Output {
-    /// The row that multiplies the state.
+    /// Row that multiplies the state, of length `n`.
     pub row: RowDVector<f64>,
-    /// The constant part.
+    /// Constant part `c`, in the units of the output.
     pub constant: f64,
-    /// The complex amplitude of each tone (see [`HarmonicVector::tones`]).
+    /// Complex amplitudes `z_k`, one per tone (see [`HarmonicVector::tones`]), in the units of the
+    /// output.
     pub tones: Vec<Complex>,
 }
 
 impl Output {
-    /// `row · x` alone, for a drive of `tones` tones.
+    /// Creates `row · x` alone, for a drive of `tones` tones.
     pub fn linear(row: RowDVector<f64>, tones: usize) -> Self {
         Self {
             row,
@@ -167,14 +167,14 @@ impl Output {
         self
     }
 
-    /// Adds a constant.
+    /// Adds `constant` to the constant part.
     #[must_use]
     pub fn with_constant(mut self, constant: f64) -> Self {
         self.constant += constant;
         self
     }
 
-    /// `factor · self`.
+    /// Returns the product `factor · self`.
     #[must_use]
     pub fn scaled(&self, factor: f64) -> Self {
         Self {
@@ -184,7 +184,7 @@ impl Output {
         }
     }
 
-    /// `self + factor · other`.
+    /// Returns `self + factor · other`.
     #[must_use]
     pub fn plus(&self, factor: f64, other: &Self) -> Self {
         Self {
@@ -199,7 +199,7 @@ impl Output {
         }
     }
 
-    /// The value at state `x` and time `t`.
+    /// Returns the value at state `x` and time `t`.
     pub fn at(&self, drive: &Drive, x: &[f64], t: f64) -> f64 {
         let harmonic: f64 = self
             .tones
@@ -222,7 +222,7 @@ impl Output {
         self.row.as_slice().iter().zip(x).map(|(r, x)| r * x).sum()
     }
 
-    /// Its time derivative along `ẋ = matrix · x + forcing`, again such a scalar.
+    /// Returns the time derivative along `ẋ = matrix · x + forcing`, again such a scalar.
     #[must_use]
     pub fn rate(&self, matrix: &DMatrix<f64>, forcing: &HarmonicVector, drive: &Drive) -> Self {
         let dot = |tone: &DVector<Complex>| -> Complex {

@@ -14,7 +14,7 @@ struct Term {
     rate: Complex,
     power: u32,
     amplitude: Complex,
-    /// `e^{rate · length}`.
+    /// Value of `e^{rate · length}`.
     end: Complex,
 }
 
@@ -59,7 +59,7 @@ fn moment(rate: Complex, power: u32, length: f64, end: Complex) -> Complex {
     sum * length.powi(power as i32 + 1)
 }
 
-/// `∫₀^length g ds`.
+/// Returns `∫₀^length g ds`.
 pub fn integral(signal: &Signal, length: f64) -> f64 {
     terms(signal, length)
         .iter()
@@ -67,21 +67,21 @@ pub fn integral(signal: &Signal, length: f64) -> f64 {
         .sum()
 }
 
-/// `∫₀^length g(s) e^{−iω(start + s)} ds`.
+/// Returns `∫₀^length g(s) e^{−iω(start + s)} ds`.
 pub fn fourier_integral(signal: &Signal, start: f64, length: f64, omega: f64) -> Complex {
     Turn::new(start, length, omega).integral(&terms(signal, length))
 }
 
-/// `e^{−iωt}` over a piece, and the moments of what it was multiplied with.
+/// The factor `e^{−iωt}` over a piece, and the moments of the terms that it has been multiplied by.
 struct Turn {
-    /// `−iω`.
+    /// Rate `−iω` of the factor.
     rate: Complex,
     length: f64,
-    /// At the piece's start.
+    /// Value `e^{−iω · start}` of the factor at the start of the piece.
     start: Complex,
-    /// `e^{−iω · length}`.
+    /// Ratio `e^{−iω · length}` of the factor's values at the end and at the start.
     over: Complex,
-    /// Moments of a rate and its conjugate, turned, by rate and power.
+    /// Moments of a rate and of its conjugate, each minus `iω`, by rate and power.
     known: Vec<(Complex, u32, [Complex; 2])>,
 }
 
@@ -122,8 +122,9 @@ impl Turn {
     }
 }
 
-/// The Fourier coefficients ([`PiecewiseSignal::fourier`]) of several outputs of one trajectory
-/// (the same pieces), a row a frequency: what depends on the rates alone is computed once.
+/// Computes the Fourier coefficients ([`PiecewiseSignal::fourier`]) of several outputs of one
+/// trajectory (the same pieces), one row per frequency. Quantities that depend on the rates alone
+/// are computed once.
 pub fn fouriers(signals: &[&PiecewiseSignal], frequencies: &[f64]) -> Vec<Vec<Complex>> {
     let pieces = signals.first().map_or(0, |signal| signal.pieces.len());
     let terms: Vec<Vec<Vec<Term>>> = (0..pieces)
@@ -157,7 +158,7 @@ pub fn fouriers(signals: &[&PiecewiseSignal], frequencies: &[f64]) -> Vec<Vec<Co
         .collect()
 }
 
-/// `∫₀^length g h ds`.
+/// Returns `∫₀^length g h ds`.
 pub fn product_integral(g: &Signal, h: &Signal, length: f64) -> f64 {
     let (g, h) = (terms(g, length), terms(h, length));
     let mut sum = 0.0;
@@ -176,7 +177,7 @@ pub fn product_integral(g: &Signal, h: &Signal, length: f64) -> f64 {
 }
 
 impl PiecewiseSignal {
-    /// The integral over the whole time covered.
+    /// Returns the integral over the whole time covered.
     pub fn integral(&self) -> f64 {
         self.pieces
             .iter()
@@ -184,7 +185,7 @@ impl PiecewiseSignal {
             .sum()
     }
 
-    /// The time mean (0 of an empty signal).
+    /// Returns the time mean (0 for an empty signal).
     pub fn mean(&self) -> f64 {
         let duration = self.duration();
         if duration > 0.0 {
@@ -194,8 +195,8 @@ impl PiecewiseSignal {
         }
     }
 
-    /// The Fourier coefficient `c = (2/D) ∫ g e^{−iωt} dt` over the duration `D`, so
-    /// that the component at `ω` is `Re(c e^{iωt})`.
+    /// Returns the Fourier coefficient `c = (2/D) ∫ g e^{−iωt} dt` over the duration `D`, so that
+    /// the component at `ω` is `Re(c e^{iωt})`.
     pub fn fourier(&self, omega: f64) -> Complex {
         let sum: Complex = self
             .pieces
@@ -210,7 +211,7 @@ impl PiecewiseSignal {
         }
     }
 
-    /// `∫ g h dt` with another output of the same trajectory (the same pieces).
+    /// Returns `∫ g h dt` with another output of the same trajectory (the same pieces).
     pub fn product_integral(&self, other: &Self) -> f64 {
         self.pieces
             .iter()

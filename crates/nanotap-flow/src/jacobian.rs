@@ -12,7 +12,7 @@ use nalgebra::DMatrix;
 /// component of the initial state. The default is empty: [`Jacobian::begin`] starts it.
 #[derive(Clone, Debug, Default)]
 pub struct Jacobian {
-    /// `∂q/∂x₀`, column by column.
+    /// Derivative `∂q/∂x₀` in packed modal coordinates, column by column.
     columns: Vec<ComplexVector>,
     /// The work space of a switch.
     next: Vec<ComplexVector>,
@@ -20,7 +20,7 @@ pub struct Jacobian {
 }
 
 impl Jacobian {
-    /// At the beginning of a flow of `system` that is in `regime`.
+    /// Creates the Jacobian at the beginning of a flow of `system` that is in `regime`.
     pub fn at_start(system: &System, regime: usize) -> Self {
         let mut start = Self::default();
         start.begin(system, regime);
@@ -40,7 +40,7 @@ impl Jacobian {
         }
     }
 
-    /// `∂x/∂x₀` (`n × n`) of a flow that is in `regime` now.
+    /// Writes `∂x/∂x₀` (`n × n`) of a flow that is in `regime` now to `jacobian`.
     pub fn to_state(&mut self, regime: &Regime, jacobian: &mut DMatrix<f64>) {
         regime
             .prepared()
@@ -59,7 +59,7 @@ impl Jacobian {
         }
     }
 
-    /// A switch whose saltation depends on the state.
+    /// Applies a switch whose saltation depends on the state.
     fn saltate(&mut self, view: &SwitchView<'_>) {
         let saltation = view.saltation(&view.state());
         let (from, to) = (view.from(), &view.system.regimes()[view.switch.to]);

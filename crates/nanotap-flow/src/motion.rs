@@ -11,7 +11,7 @@ use crate::simd::{self, ComplexVector, Library, Simd, Work, layout};
 use crate::system::{ON_SURFACE, Onset, Switch, System, Transition, rounding};
 use crate::{Complex, FlowError, Output};
 
-/// Where a motion of a [`System`] is, with the work space of going on.
+/// The position of a motion of a [`System`], with its work space.
 #[derive(Clone, Debug)]
 pub(crate) struct Motion {
     pub(crate) regime: usize,
@@ -33,7 +33,7 @@ pub(crate) struct Motion {
     scratch: Vec<f64>,
     pub(crate) statistics: Statistics,
     pub(crate) switches: u64,
-    /// Longest touch of a rigid stop that is passed through; 0 for none.
+    /// Longest touch of a rigid stop that is ignored, in the system's unit of time; 0 for none.
     pub(crate) longest_passed_touch: f64,
 }
 
@@ -95,7 +95,7 @@ impl Motion {
         Ok(())
     }
 
-    /// The same of what may be no state.
+    /// Does the same as `start` for input that may be invalid.
     pub(crate) fn start_checked(
         &mut self,
         system: &System,
@@ -217,9 +217,9 @@ impl Motion {
         Ok(())
     }
 
-    /// Moves on to the next switch, or as far as it may be looked for one at once with `left`
-    /// periods, this one included, still to run: never over more than one period's end, which is
-    /// counted.
+    /// Advances to the next switch, or as far as a switch can be searched for at once, with `left`
+    /// periods (including the present one) still to run. It passes at most one end of a period,
+    /// which is counted.
     #[inline(always)]
     pub(crate) fn run_stretch<S: Simd>(
         &mut self,
@@ -260,7 +260,7 @@ impl Motion {
         Ok(())
     }
 
-    /// How far it may be looked for a switch at once on the way to `end`.
+    /// Returns how far ahead, on the way to `end`, a switch can be searched for at once.
     #[inline(always)]
     fn reach<S: Simd>(&self, system: &System, end: f64) -> f64 {
         let left = end - self.phase;
@@ -271,7 +271,7 @@ impl Motion {
         }
     }
 
-    /// Moves on to the switch that was found within `reach`, or to where the search ended.
+    /// Advances to the switch found within `reach`, or to the end of the search.
     #[inline(always)]
     fn go_on<S: Simd, O: Observer>(
         &mut self,
@@ -386,7 +386,7 @@ impl Motion {
         Ok(earliest)
     }
 
-    /// How the motion stands to the guard of transition `transition`.
+    /// Returns how the guard of transition `transition` starts.
     #[inline(always)]
     fn start_of(&self, transition: usize) -> Start {
         match self.surface {
@@ -465,7 +465,7 @@ impl Motion {
         }
     }
 
-    /// Takes transition `transition`.
+    /// Applies transition `transition`: its reset, and the change of modal coordinates.
     #[inline(always)]
     fn switch<S: Simd, O: Observer>(
         &mut self,
@@ -551,8 +551,8 @@ impl Motion {
         changes.into_iter().find(|at| *at >= 0.5 * expected)
     }
 
-    /// How the guard of the next regime starts of which something is known; `None` where
-    /// it is well inside.
+    /// Returns how a guard of the next regime starts whose initial value is known exactly; `None`
+    /// if it is well inside.
     fn onset(
         &mut self,
         system: &System,
@@ -649,7 +649,7 @@ fn in_arithmetic<W: Work>(system: &System, work: W) -> W::Output {
     }
 }
 
-/// [`Motion::run_until`].
+/// The arguments of [`Motion::run_until`], for the dispatch to an arithmetic.
 struct Until<'a, O> {
     motion: &'a mut Motion,
     system: &'a System,
@@ -667,7 +667,7 @@ impl<O: Observer> Work for Until<'_, O> {
     }
 }
 
-/// [`Motion::run_periods`].
+/// The arguments of [`Motion::run_periods`], for the dispatch to an arithmetic.
 struct Over<'a> {
     motion: &'a mut Motion,
     system: &'a System,

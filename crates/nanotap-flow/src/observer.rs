@@ -1,4 +1,4 @@
-//! What can be seen of a flow while it runs: stretches within a regime, switches, ends of periods.
+//! Views of a running flow: stretches within a regime, switches, ends of periods.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -11,17 +11,17 @@ use crate::system::{Reset, Switch, System, Transition};
 /// A stretch within one regime and one drive period.
 #[derive(Clone, Copy, Debug)]
 pub struct SegmentView<'a> {
-    /// The system.
+    /// System whose motion is observed.
     pub system: &'a System,
-    /// The regime's number.
+    /// Number of the regime, from 0.
     pub regime: usize,
-    /// When it starts, within its drive period (`0 ≤ phase < T`).
+    /// Time of its start within its drive period, `0 ≤ phase < T`, in the system's unit of time.
     pub phase: f64,
-    /// How long it lasts.
+    /// Length in time, in the system's unit of time; the stretch lies within one drive period.
     pub length: f64,
-    /// Modal coordinates at its start.
+    /// Modal coordinates at its start, of length `m`.
     pub modal: &'a [Complex],
-    /// `e^{λ_k · length}`.
+    /// Factors `e^{λ_k · length}` of the modal coordinates, of length `m`.
     pub factors: &'a [Complex],
     /// Modal coordinates and the tones' phasors at its start, and what they are multiplied by
     /// on the way.
@@ -30,12 +30,12 @@ pub struct SegmentView<'a> {
 }
 
 impl SegmentView<'_> {
-    /// The regime.
+    /// Returns the regime of the stretch.
     pub fn regime(&self) -> &Regime {
         &self.system.regimes()[self.regime]
     }
 
-    /// An output over the stretch.
+    /// Returns an output over the stretch as a signal.
     pub fn signal(&self, output: &ModalOutput) -> Signal {
         let drive = self.system.drive();
         let (regime, modal) = (self.regime(), self.modal);
@@ -46,36 +46,36 @@ impl SegmentView<'_> {
 /// A switch from one regime to another.
 #[derive(Clone, Copy, Debug)]
 pub struct SwitchView<'a> {
-    /// The system.
+    /// System whose motion is observed.
     pub system: &'a System,
     /// The change of modal coordinates.
     pub switch: &'a Switch,
     /// The number of the transition taken out of `switch.from`.
     pub transition: usize,
-    /// Whether it ended chatter: the motion continues in the sticking regime.
+    /// Whether the switch ended chatter: the motion continues in the sticking regime.
     pub stuck: bool,
-    /// When it happens, within its drive period.
+    /// Time of the switch within its drive period, in the system's unit of time.
     pub phase: f64,
-    /// The guard's rate before it.
+    /// Rate of the guard before the switch, at most 0, in units of the guard per unit of time.
     pub rate: f64,
     /// Whether the guard only grazed zero, within rounding.
     pub grazing: bool,
-    /// Modal coordinates before it.
+    /// Modal coordinates before the switch, in the regime that it leaves.
     pub modal: &'a [Complex],
 }
 
 impl SwitchView<'_> {
-    /// The regime that it leaves.
+    /// Returns the regime that the switch leaves.
     pub fn from(&self) -> &Regime {
         &self.system.regimes()[self.switch.from]
     }
 
-    /// The transition taken.
+    /// Returns the transition that was taken.
     pub fn transition(&self) -> &Transition {
         &self.system.transitions()[self.switch.from][self.transition]
     }
 
-    /// The jump of the state; none if it is continuous.
+    /// Returns the jump of the state; `None` if it is continuous.
     pub fn reset(&self) -> Option<&Reset> {
         let transition = self.transition();
         if self.stuck {
@@ -85,7 +85,7 @@ impl SwitchView<'_> {
         }
     }
 
-    /// The state before it.
+    /// Returns the state before the switch, of length `n`.
     pub fn state(&self) -> DVector<f64> {
         let mut x = DVector::zeros(self.system.dimension());
         let modal = self.modal.iter().copied();
@@ -95,7 +95,7 @@ impl SwitchView<'_> {
         x
     }
 
-    /// The saltation matrix at the state `x` before it.
+    /// Returns the saltation matrix (`n × n`) at the state `x` before the switch.
     pub fn saltation(&self, x: &DVector<f64>) -> DMatrix<f64> {
         let (from, transition) = (self.switch.from, self.transition);
         self.system
@@ -103,19 +103,19 @@ impl SwitchView<'_> {
     }
 }
 
-/// An observer of a flow: a recorder, a Jacobian, a sensitivity.
+/// An observer of a flow, such as a recorder, a Jacobian or a sensitivity.
 pub trait Observer {
-    /// Whether it observes nothing, so that nothing need be prepared for it.
+    /// Whether it ignores everything, so that the flow prepares nothing for it.
     const IDLE: bool = false;
-    /// A stretch within one regime was completed.
+    /// Called after each stretch within one regime.
     fn segment(&mut self, segment: &SegmentView<'_>) {
         let _ = segment;
     }
-    /// A switch happened.
+    /// Called at each switch from one regime to another.
     fn switch(&mut self, switch: &SwitchView<'_>) {
         let _ = switch;
     }
-    /// A drive period was completed; the phase is zero again.
+    /// Called after each drive period; the phase is zero again.
     fn period_end(&mut self) {}
 }
 

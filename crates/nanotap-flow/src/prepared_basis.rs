@@ -9,7 +9,7 @@ use crate::SpectralBasis;
 use crate::simd::linear::LinearMap;
 use crate::simd::{ComplexVector, layout};
 
-/// A [`SpectralBasis`] with its matrices laid out as the inner loop takes them.
+/// A [`SpectralBasis`] with its matrices in the layout of the inner loop.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PreparedBasis {
     basis: SpectralBasis,
@@ -38,7 +38,7 @@ impl From<SpectralBasis> for PreparedBasis {
 }
 
 impl PreparedBasis {
-    /// The basis.
+    /// Returns the spectral basis without the packed layout.
     pub fn basis(&self) -> &SpectralBasis {
         &self.basis
     }
@@ -58,7 +58,7 @@ impl PreparedBasis {
         &self.packed_left
     }
 
-    /// `[Re R, −Im R]`.
+    /// `[Re R, −Im R]` as a packed map: the state of packed `q`.
     pub(crate) fn packed_right(&self) -> &LinearMap {
         &self.packed_right
     }

@@ -3,26 +3,26 @@
 use crate::Complex;
 use nanotap_arithmetic::ComplexFunctions as _;
 
-/// A rate `λ`, and how `∫ e^{λs} ds` is worked out.
+/// A rate `λ`, and the method that computes `∫ e^{λs} ds`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Rate {
     pub(crate) value: Complex,
     primitive: Primitive,
 }
 
-/// `(e^{λs} − 1)/λ` loses digits where `|λs|` is small, but what is lost is only `ε/|λ|`. Over
-/// a period `T` this is nothing, unless `|λ|T` itself is small.
+/// The method for `(e^{λs} − 1)/λ`. This quotient loses digits where `|λs|` is small, but the loss
+/// is only `ε/|λ|`. Over a period `T` it is negligible, unless `|λ|T` itself is small.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Primitive {
-    /// `1/λ`.
+    /// The quotient, with the factor `1/λ`.
     Quotient(Complex),
-    /// The Taylor series.
+    /// The Taylor series, for small `|λ|T`.
     Series,
-    /// `λ = 0`.
+    /// The length itself, for `λ = 0`.
     Length,
 }
 
-/// `|λ|T` up to which the Taylor series is taken.
+/// Value of `|λ|T` up to which the Taylor series is used.
 const SLOW: f64 = 0.1;
 
 impl Rate {
@@ -58,10 +58,10 @@ impl Rate {
     }
 }
 
-/// The series leaves out 0.1¹⁰/11! of one.
+/// Order of the Taylor series. Its first omitted term is at most 0.1¹⁰/11! of the first.
 const ORDER: usize = 9;
 
-/// `1/(n + 1)!`.
+/// Coefficients `1/(n + 1)!` of the series of `(e^z − 1)/z`.
 const INVERSE_FACTORIALS: [f64; ORDER + 1] = {
     let mut all = [1.0; ORDER + 1];
     let mut factorial = 1.0;
@@ -74,7 +74,7 @@ const INVERSE_FACTORIALS: [f64; ORDER + 1] = {
     all
 };
 
-/// `(e^z − 1)/z`, accurate for every `z`.
+/// Computes `(e^z − 1)/z`, accurate for every `z`.
 pub(crate) fn phi1(z: Complex) -> Complex {
     if z.modulus() < 1e-5 {
         return Complex::new(1.0, 0.0) + z * 0.5 + z * z / 6.0;

@@ -19,12 +19,12 @@ pub struct Regime {
 }
 
 impl Regime {
-    /// The regime of matrix `A` (`n × n`) and forcing `f` (length `n`). `index` is
-    /// its number in the system, for messages.
+    /// Creates the regime of matrix `A` (`n × n`) and forcing `f` (length `n`). `index` is its
+    /// number in the system, for messages.
     ///
     /// # Errors
-    /// When sizes do not fit, a value is not finite, the basis is too
-    /// ill-conditioned, or an undamped mode is driven at resonance.
+    /// If sizes do not fit, a value is not finite, the basis is too ill-conditioned, or an undamped
+    /// mode is driven at resonance.
     pub fn new(
         index: usize,
         matrix: DMatrix<f64>,
@@ -36,7 +36,7 @@ impl Regime {
         Self::with_basis(index, matrix, forcing, drive, Arc::new(basis.into()))
     }
 
-    /// The same with a basis that the caller knows, and may share with other regimes.
+    /// Creates the regime with a basis that the caller knows, and may share with other regimes.
     ///
     /// # Errors
     /// As [`Regime::new`].
@@ -57,17 +57,17 @@ impl Regime {
         })
     }
 
-    /// `A`.
+    /// Returns the matrix `A`, `n × n`.
     pub fn matrix(&self) -> &DMatrix<f64> {
         &self.matrix
     }
 
-    /// `f`.
+    /// Returns the forcing `f`, of length `n`.
     pub fn forcing(&self) -> &HarmonicVector {
         &self.forcing
     }
 
-    /// The spectral basis.
+    /// Returns the spectral basis of the matrix `A`.
     pub fn basis(&self) -> &SpectralBasis {
         self.prepared.basis()
     }
@@ -77,7 +77,7 @@ impl Regime {
         &self.prepared
     }
 
-    /// The forced response `x_p`.
+    /// Returns the forced response `x_p`, of length `n`.
     pub fn response(&self) -> &HarmonicVector {
         &self.response
     }
@@ -126,7 +126,7 @@ impl Regime {
         constants.into_iter().flatten().for_each(visit);
     }
 
-    /// What an output is in this regime's modal coordinates.
+    /// Returns an output in this regime's modal coordinates.
     pub fn project(&self, output: &Output) -> ModalOutput {
         let dot = |column: &[Complex]| -> Complex {
             output.row.iter().zip(column).map(|(r, z)| z * *r).sum()
@@ -149,16 +149,16 @@ impl Regime {
 /// An output in modal coordinates: `Re(modal · q) + Re Σ tones_k e^{iω_k t} + constant`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ModalOutput {
-    /// One complex weight a modal coordinate.
+    /// Complex weights of the modal coordinates, of length `m`.
     pub modal: Vec<Complex>,
-    /// One complex amplitude a tone.
+    /// Complex amplitudes of the tones, in the units of the output.
     pub tones: Vec<Complex>,
-    /// The constant.
+    /// Constant part, forced response included, in the units of the output.
     pub constant: f64,
 }
 
 impl ModalOutput {
-    /// Its value at modal coordinates `q` and time `t`.
+    /// Returns the value at modal coordinates `q` and time `t`.
     pub fn at(&self, drive: &Drive, q: &[Complex], t: f64) -> f64 {
         let phasors = (0..self.tones.len()).map(|k| drive.phasor(k, t));
         let modes = self.modal.iter().copied().zip(q.iter().copied());
@@ -174,7 +174,7 @@ pub(crate) struct Kernel {
     pub(crate) vectors: Vec<KernelVectors>,
     pub(crate) count: usize,
     pub(crate) constant: f64,
-    /// The largest `|λ|`.
+    /// Largest `|λ|` of the terms with a non-zero weight, per unit of time.
     pub(crate) fastest: f64,
     /// Whether some `Re λ` is positive.
     pub(crate) grows: bool,
@@ -186,7 +186,7 @@ pub(crate) struct KernelVectors {
     pub(crate) decay: Vector,
     pub(crate) frequency: Vector,
     pub(crate) weight: ComplexVector,
-    /// `|λ|³`.
+    /// `|λ|³` of each term, for bounds of the third derivative.
     pub(crate) cube: Vector,
     /// Which terms each lower bound follows.
     pub(crate) masks: ComplexVector,
@@ -195,7 +195,7 @@ pub(crate) struct KernelVectors {
 /// What the kernels of all outputs of a regime have in common: the rates of their terms.
 pub(crate) struct KernelFrame {
     kernel: Kernel,
-    /// |λ| by term.
+    /// Absolute rate `|λ|` of each term.
     sizes: Vec<f64>,
 }
 
@@ -231,7 +231,7 @@ impl KernelFrame {
         Self { kernel, sizes }
     }
 
-    /// With the weights of `output`.
+    /// Returns the kernel with the weights of `output`.
     pub(crate) fn kernel(&self, output: &ModalOutput) -> Kernel {
         let mut kernel = self.kernel.clone();
         kernel.constant = output.constant;

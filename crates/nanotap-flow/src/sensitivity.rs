@@ -25,21 +25,21 @@ pub struct SystemTangent {
     pub guards: Vec<Vec<Output>>,
     /// `∂reset` of each transition of each regime, where the transition has a reset.
     pub resets: Vec<Vec<Option<Reset>>>,
-    /// `∂ ln T` of the drive period.
+    /// Derivative `∂ ln T` of the drive period, per unit of the parameter.
     pub log_period: f64,
 }
 
-/// The derivative of a regime.
+/// The derivative of a regime with respect to one parameter.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RegimeTangent {
-    /// `∂A`, `n × n`.
+    /// Derivative `∂A` of the regime's matrix, `n × n`.
     pub matrix: DMatrix<f64>,
-    /// `∂f`, of length `n`.
+    /// Derivative `∂f` of the regime's forcing, of length `n`, at fixed drive phase.
     pub forcing: HarmonicVector,
 }
 
 impl SystemTangent {
-    /// The derivative of nothing: every entry zero, to be filled in.
+    /// Creates a derivative of which every entry is zero.
     pub fn zeros(system: &System) -> Self {
         let (n, tones) = (system.dimension(), system.drive().frequencies().len());
         let regime = RegimeTangent {
@@ -62,8 +62,8 @@ impl SystemTangent {
         }
     }
 
-    /// Adds `factor · other`, the derivative of the same system with respect to another
-    /// parameter: what a parameter does through several others.
+    /// Adds `factor · other`, where `other` is the derivative with respect to another parameter:
+    /// the chain rule.
     pub fn add(&mut self, factor: f64, other: &Self) {
         for (regime, more) in self.regimes.iter_mut().zip(&other.regimes) {
             regime.matrix += factor * &more.matrix;
@@ -108,7 +108,8 @@ pub struct Sensitivity<'a> {
     phasors: Vec<Complex>,
 }
 
-/// `∂A x + ∂f` (times the period's change) in modal coordinates.
+/// The right-hand side `∂A x + ∂f` of the sensitivity (including the change of the period) in modal
+/// coordinates.
 #[derive(Clone, Debug)]
 struct Source {
     /// Multiplies `e^{λ_j s} q_j`, `m × m`.
@@ -163,7 +164,7 @@ fn driven(prepared: &PreparedBasis, matrix: &DMatrix<f64>) -> [DMatrix<Complex>;
     [entry(1.0), entry(-1.0)]
 }
 
-/// `|μ − λ| L` from which the difference of two exponentials loses no digit to speak of.
+/// Value of `|μ − λ| L` from which the difference of two exponentials loses almost no digit.
 const APART: f64 = 0.5;
 
 /// `∫₀^L e^{λ(L−τ)} e^{μτ} dτ`, without overflow or cancellation; λ and μ come with `e^{λL}` and
@@ -185,18 +186,18 @@ fn response(
     slow * phi1(apart * length) * length
 }
 
-/// The responses of all modes over one length of time to what drives sensitivities.
+/// The responses of all modes, over one length of time, to the terms that drive sensitivities.
 #[derive(Clone, Debug, Default)]
 struct Responses {
     /// A row a mode: to μ = λ_j and its conjugate, to the tones and their conjugates, to a
     /// constant. Empty where eigenvalues coincide.
     rows: Vec<Complex>,
-    /// What drives: μ and `e^{μL}`, in this order.
+    /// The exponentials that drive: μ and `e^{μL}`, in this order.
     drivers: Vec<(Complex, Complex)>,
 }
 
 impl Responses {
-    /// Those over a length of time after which modes have become `factors` times themselves.
+    /// Sets the responses for a length of time over which the modes are multiplied by `factors`.
     fn set(&mut self, regime: &Regime, drive: &Drive, length: f64, factors: &[Complex]) {
         self.rows.clear();
         self.drivers.clear();
@@ -224,7 +225,7 @@ impl Responses {
         }
     }
 
-    /// Moves `modal`, the sensitivity that belongs to `source`, on over that length; the
+    /// Advances `modal`, the sensitivity that belongs to `source`, by that length of time; the
     /// motion began at `q` and the tones at `phasors`.
     fn carry(
         &self,
@@ -254,8 +255,8 @@ impl Responses {
 }
 
 impl<'a> Sensitivity<'a> {
-    /// Zero sensitivities to the parameters of `tangents`, for a flow of `system` that
-    /// is in regime `regime` at phase 0; where the motion sticks to a rigid stop, those of the stop.
+    /// Creates zero sensitivities to the parameters of `tangents`, for a flow of `system` in regime
+    /// `regime` at phase 0; if the motion sticks to a rigid stop, those of the stop.
     pub fn new(system: &System, tangents: &'a [SystemTangent], regime: usize) -> Self {
         let sources = tangents
             .iter()
@@ -286,7 +287,7 @@ impl<'a> Sensitivity<'a> {
         start
     }
 
-    /// Begins with `∂x/∂θ_p = derivative` (length `n`) in `regime`, instead of with zero.
+    /// Sets `∂x/∂θ_p` to `derivative` (length `n`) in `regime`, instead of zero.
     pub fn begin(&mut self, regime: &Regime, p: usize, derivative: &[f64]) {
         let left = &regime.basis().left;
         self.modal[p] = (0..left.nrows())
@@ -300,12 +301,12 @@ impl<'a> Sensitivity<'a> {
             .collect();
     }
 
-    /// `∂q/∂θ_p` in the present regime.
+    /// Returns `∂q/∂θ_p` in the present regime.
     pub(crate) fn modal(&self, p: usize) -> &[Complex] {
         &self.modal[p]
     }
 
-    /// `∂q/∂θ_0` a time `s` into a stretch that was not passed yet.
+    /// Returns `∂q/∂θ_0` at time `s` of a stretch that is not completed yet.
     pub(crate) fn after(&self, segment: &SegmentView<'_>, s: f64) -> Vec<Complex> {
         let (regime, drive) = (segment.regime(), segment.system.drive());
         Propagator::new(regime, drive, s).sensitivity(
@@ -317,7 +318,7 @@ impl<'a> Sensitivity<'a> {
         )
     }
 
-    /// `∂x/∂θ_p` (length `n`) of a flow that is in `regime` now.
+    /// Writes `∂x/∂θ_p` (length `n`) of a flow that is in `regime` now to `derivative`.
     pub fn to_state(&self, regime: &Regime, p: usize, derivative: &mut [f64]) {
         derivative.fill(0.0);
         for (k, q) in self.modal[p].iter().enumerate() {
@@ -402,13 +403,13 @@ impl Observer for Sensitivity<'_> {
     }
 }
 
-/// How modal coordinates and their sensitivity go on over one length of time in one regime,
-/// wherever they begin.
+/// The map of modal coordinates and their sensitivity over one length of time in one regime, from
+/// any start.
 pub(crate) struct Propagator<'a> {
     regime: &'a Regime,
     drive: &'a Drive,
     length: f64,
-    /// `e^{λ_k · length}`.
+    /// Factors `e^{λ_k · length}` of the modal coordinates.
     factors: Vec<Complex>,
     responses: Responses,
 }

@@ -1,5 +1,5 @@
-//! What any linear output is inside a regime: a constant plus a finite sum of
-//! decaying complex exponentials, with bounds on its derivatives.
+//! The form of any linear output inside a regime: a constant plus a finite sum of decaying complex
+//! exponentials, with bounds on its derivatives.
 
 use crate::double_double::{ComplexDd, Dd};
 use crate::regime::{Kernel, ModalOutput};
@@ -14,39 +14,39 @@ use nanotap_arithmetic::ComplexFunctions as _;
 /// last sum is empty unless eigenvalues coincide (critical damping).
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Signal {
-    /// `c`.
+    /// Constant part `c`, in the units of the output.
     pub constant: f64,
     /// The terms with a power of `s`.
     pub powers: Vec<PowerTerm>,
-    /// How many terms there are without one.
+    /// Number of terms without a power of `s`.
     count: usize,
     vectors: Vec<TermVectors>,
     /// Bound on the third derivative of growing terms over the whole segment.
     third_constant: f64,
-    /// How far it will be looked at.
+    /// Length in time over which it will be evaluated.
     length: f64,
     /// `|c| + Σ|a_k| + …`, the size against which rounding is measured.
     size: f64,
-    /// The largest `|λ_k|`.
+    /// Largest `|λ_k|` of all terms, per unit of time.
     fastest: f64,
-    /// Whether terms only decay, so that their amplitudes bound what is to come.
+    /// Whether no term grows, so that the amplitudes bound later values.
     relaxes: bool,
     /// `e^{λ_k s}` of the last evaluation that kept them, and its `s`.
     factors: Vec<ComplexVector>,
     factors_at: Option<f64>,
 }
 
-/// What rounding makes of a value, in units of the terms' size.
+/// Rounding error of a value, as a fraction of the terms' size.
 pub(crate) const NOISE: f64 = 4.0 * f64::EPSILON;
 
 /// `Re(amplitude · s^power · e^{rate s})` with `power ≥ 1`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PowerTerm {
-    /// `λ`.
+    /// Complex rate `λ`, per unit of time.
     pub rate: Complex,
-    /// `p`.
+    /// Power `p` of `s`, at least 1.
     pub power: u32,
-    /// `b`.
+    /// Complex amplitude `b`, in units of the output per time to the power `p`.
     pub amplitude: Complex,
 }
 
@@ -54,13 +54,13 @@ pub struct PowerTerm {
 /// there on.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Jet {
-    /// The value.
+    /// Value of the signal, in the units of the output.
     pub value: f64,
-    /// The first derivative.
+    /// First derivative, in units of the output per unit of time.
     pub rate: f64,
-    /// The second derivative.
+    /// Second derivative, in units of the output per squared unit of time.
     pub curvature: f64,
-    /// An upper bound of the third derivative's size from here to the end of the segment.
+    /// Upper bound of the third derivative's absolute value from here to the end of the segment.
     pub third: f64,
 }
 
@@ -93,8 +93,8 @@ struct TermVectors {
 }
 
 impl Signal {
-    /// A signal from its terms (rate and amplitude); `length` is how far it will be
-    /// looked at.
+    /// Creates a signal from its terms (rate and amplitude); `length` is the time over which it
+    /// will be evaluated.
     pub fn from_terms(
         constant: f64,
         terms: &[(Complex, Complex)],
@@ -150,8 +150,8 @@ impl Signal {
         signal
     }
 
-    /// The signal of `output` over a segment of `regime` that starts at time `t`
-    /// with modal coordinates `q`.
+    /// Creates the signal of `output` over a segment of `regime` that starts at time `t` with modal
+    /// coordinates `q`.
     pub fn of(
         regime: &Regime,
         drive: &Drive,
@@ -242,7 +242,7 @@ impl Signal {
         }
     }
 
-    /// Rate and amplitude of each term without a power.
+    /// Returns rate and amplitude of each term without a power of `s`.
     pub fn terms(&self) -> impl Iterator<Item = (Complex, Complex)> + '_ {
         (0..self.count).map(|k| {
             let (vector, i) = layout::place(k);
@@ -255,7 +255,7 @@ impl Signal {
         })
     }
 
-    /// Value, rate, curvature and third-derivative bound at `s`.
+    /// Returns value, rate, curvature and third-derivative bound at `s`.
     pub fn jet(&self, s: f64) -> Jet {
         if self.fastest * s.abs() < simd::LARGEST_ANGLE {
             simd::dispatch(JetAt(self, s))
@@ -399,7 +399,7 @@ impl Signal {
         enclosure
     }
 
-    /// The jet at `s = 0`, which needs no exponential.
+    /// Returns the jet at `s = 0`, which needs no exponential.
     #[inline(always)]
     pub fn first_jet(&self) -> Jet {
         let mut jet = Jet {
@@ -423,13 +423,13 @@ impl Signal {
         jet
     }
 
-    /// The value at `s`.
+    /// Returns the value at time `s` from the start.
     pub fn at(&self, s: f64) -> f64 {
         self.jet(s).value
     }
 
-    /// The value at `s` with an error far below double precision's (about 1e-28 of
-    /// the terms' size before it is rounded): which side of zero a tangency lies on.
+    /// Returns the value at `s` with an error far below that of double precision (about 1e-28 of
+    /// the terms' size before the final rounding), to decide on which side of zero a tangency lies.
     pub fn accurate_at(&self, s: f64) -> f64 {
         let exponential = |rate: Complex| {
             ComplexDd(Dd::two_product(rate.re, s), Dd::two_product(rate.im, s)).exp()
@@ -449,7 +449,7 @@ impl Signal {
         sum.0 + sum.1
     }
 
-    /// The `order`-th derivative at `s = 0`.
+    /// Returns the `order`-th derivative at `s = 0`.
     pub fn derivative_at_start(&self, order: u32) -> f64 {
         let constant = if order == 0 { self.constant } else { 0.0 };
         let simple: f64 = self
@@ -465,7 +465,7 @@ impl Signal {
                 .sum::<f64>()
     }
 
-    /// An upper bound of the `order`-th derivative's size over `[0, length]`.
+    /// Returns an upper bound of the `order`-th derivative's absolute value over `[0, length]`.
     pub fn derivative_bound(&self, order: u32, length: f64) -> f64 {
         let constant = if order == 0 { self.constant.abs() } else { 0.0 };
         let simple: f64 = self
@@ -485,22 +485,23 @@ impl Signal {
                 .sum::<f64>()
     }
 
-    /// The largest `|λ_k|`: how fast the signal can turn.
+    /// Returns the largest `|λ_k|`, per unit of time: the greatest rate at which the signal
+    /// changes.
     pub fn fastest(&self) -> f64 {
         self.fastest
     }
 
-    /// The size of rounding errors in its value.
+    /// Returns the size of rounding errors in its value, in the units of the output.
     pub fn noise(&self) -> f64 {
         NOISE * self.size
     }
 
-    /// Whether every term is finite.
+    /// Reports whether every term is finite.
     pub fn is_finite(&self) -> bool {
         self.size.is_finite()
     }
 
-    /// The derivative as a signal.
+    /// Returns the derivative as a signal.
     #[must_use]
     pub fn differentiated(&self, length: f64) -> Self {
         let mut terms: Vec<(Complex, Complex)> = self.terms().map(|(r, a)| (r, r * a)).collect();
@@ -524,7 +525,7 @@ impl Signal {
         Self::from_terms(0.0, &terms, powers, length)
     }
 
-    /// `factor · g(start + s)` as a signal in `s`, to be looked at over `length`.
+    /// Returns `factor · g(start + s)` as a signal in `s`, to be evaluated over `length`.
     #[must_use]
     pub fn shifted(&self, start: f64, factor: f64, length: f64) -> Self {
         let mut terms: Vec<(Complex, Complex)> = self

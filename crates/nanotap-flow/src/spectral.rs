@@ -18,7 +18,7 @@ use nanotap_arithmetic::ComplexFunctions as _;
 /// `q̇ = (μ + N) q`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Cluster {
-    /// First coordinate.
+    /// Index of its first coordinate.
     pub start: usize,
     /// The coupling of the coordinates in addition to the common eigenvalue `μ`.
     pub coupling: DMatrix<Complex>,
@@ -27,12 +27,12 @@ pub struct Cluster {
 }
 
 impl Cluster {
-    /// `N^p / p!` for `p = 1, 2, …`.
+    /// Returns `N^p / p!` for `p = 1, 2, …`.
     pub fn powers(&self) -> &[DMatrix<Complex>] {
         &self.powers
     }
 
-    /// How many coordinates it holds.
+    /// Returns the number of coordinates in the cluster.
     pub fn size(&self) -> usize {
         self.coupling.nrows()
     }
@@ -43,26 +43,28 @@ impl Cluster {
 /// (with zero imaginary part) for each real eigenvalue.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SpectralBasis {
-    /// `λ_k`, of length `m`; within a cluster, its common value `μ`.
+    /// Eigenvalues `λ_k`, of length `m`, per unit of time; within a cluster, their common value
+    /// `μ`.
     pub eigenvalues: Vec<Complex>,
-    /// `R`, `n × m`: columns of pairs carry the factor 2 of `2 Re`.
+    /// Matrix `R` from modal coordinates to the state, `n × m`: columns of pairs contain the factor
+    /// 2 of `2 Re`.
     pub right: DMatrix<Complex>,
-    /// `L`, `m × n`.
+    /// Matrix `L` from the state to modal coordinates, `m × n`.
     pub left: DMatrix<Complex>,
     /// The groups of close eigenvalues; empty when every eigenvalue is simple.
     pub clusters: Vec<Cluster>,
 }
 
-/// Eigenvalues whose distance times the horizon is below this are grouped.
+/// Eigenvalues are grouped if their distance times the horizon is below this, at the first attempt.
 const FIRST_GROUPING: f64 = 0.02;
-/// Beyond this the polynomial of a cluster would lose too many digits.
+/// Largest such limit: beyond it the polynomial of a cluster would lose too many digits.
 const LAST_GROUPING: f64 = 4.0;
-/// A basis is accepted when it rebuilds the matrix to this relative accuracy.
+/// Largest relative residual with which a basis that rebuilds the matrix is accepted.
 const ACCEPTED_RESIDUAL: f64 = 1e-12;
 
 impl SpectralBasis {
-    /// The basis of a general real matrix. `horizon` is the longest time over
-    /// which the flow will be evaluated in one piece (the drive period).
+    /// Computes the basis of a general real matrix. `horizon` is the longest time over which the
+    /// flow will be evaluated in one piece (the drive period).
     ///
     /// # Errors
     /// [`FlowError::IllConditioned`] when no grouping of the eigenvalues gives a
@@ -102,11 +104,11 @@ impl SpectralBasis {
         Ok(basis)
     }
 
-    /// A basis whose simple eigenvalues and vectors the caller knows better than
-    /// a general algorithm could find them. `right` is `n × m`, `left` `m × n`.
+    /// Creates a basis from simple eigenvalues and vectors that the caller knows more accurately
+    /// than a general algorithm computes them. `right` is `n × m`, `left` `m × n`.
     ///
     /// # Errors
-    /// [`FlowError::Shape`] when the sizes do not fit.
+    /// [`FlowError::Shape`] if the sizes do not fit.
     pub fn from_simple_eigenpairs(
         eigenvalues: Vec<Complex>,
         right: DMatrix<Complex>,
@@ -133,12 +135,12 @@ impl SpectralBasis {
         })
     }
 
-    /// Number of complex coordinates.
+    /// Returns the number `m` of complex coordinates.
     pub fn len(&self) -> usize {
         self.eigenvalues.len()
     }
 
-    /// Whether there is no coordinate at all.
+    /// Reports whether there is no coordinate at all.
     pub fn is_empty(&self) -> bool {
         self.eigenvalues.is_empty()
     }

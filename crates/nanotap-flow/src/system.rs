@@ -14,9 +14,9 @@ use nanotap_arithmetic::{CancelFlag, ComplexFunctions as _};
 /// A jump of the state at a switch: `x⁺ = matrix · x⁻ + offset(t)`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Reset {
-    /// `n × n`.
+    /// Matrix that multiplies the state before the switch, `n × n`.
     pub matrix: DMatrix<f64>,
-    /// Of length `n`.
+    /// Offset that is added to the state, of length `n`.
     pub offset: HarmonicVector,
 }
 
@@ -27,7 +27,7 @@ pub struct Reset {
 pub struct Sticking {
     /// The regime in which the guard stays at zero.
     pub regime: usize,
-    /// The inelastic impact.
+    /// Jump of the perfectly inelastic impact, after which the guard and its rate are zero.
     pub reset: Reset,
 }
 
@@ -42,15 +42,16 @@ pub enum Onset {
     /// The guard of transition `transition` starts at `factor` times the rate of the guard of the transition
     /// taken: the tip reaches a damper. At a grazing touch that is zero.
     Proportional {
-        /// Which transition of the next regime.
+        /// Number of the transition of the next regime.
         transition: usize,
-        /// Zero or negative, since the rate is.
+        /// Ratio of the guard's initial value to the rate of the guard taken; zero or negative, as
+        /// that rate is, so that the guard starts at or above zero.
         factor: f64,
     },
 }
 
 impl Onset {
-    /// The transition of the next regime to which it refers.
+    /// Returns the transition of the next regime to which the onset refers.
     pub const fn transition(self) -> usize {
         match self {
             Self::AtRest(transition) | Self::Proportional { transition, .. } => transition,
@@ -62,24 +63,24 @@ impl Onset {
 /// if there is one.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Transition {
-    /// Positive inside the regime.
+    /// Guard: positive inside the regime; the transition is taken where it falls to zero.
     pub guard: Output,
-    /// The next regime.
+    /// Number of the regime in which the motion continues.
     pub target: usize,
-    /// The jump of the state, none if it is continuous.
+    /// Jump of the state; `None` if it is continuous.
     pub reset: Option<Reset>,
-    /// What ends chatter, if the transition can chatter.
+    /// Sticking regime that ends chatter; `None` if the transition cannot chatter.
     pub sticking: Option<Sticking>,
     /// Whether the next regime begins with guard, rate and acceleration all zero
     /// by definition (release from sticking).
     pub release: bool,
-    /// What is known of the next regime's guards, where none of them is this transition's own
-    /// (which is recognised and starts at zero).
+    /// Exact initial value of one of the next regime's guards, if none of them is this transition's
+    /// own (which is recognised and starts at zero).
     pub onset: Option<Onset>,
 }
 
 impl Transition {
-    /// A continuous switch to `target` when `guard` falls to zero.
+    /// Creates a continuous switch to `target` when `guard` falls to zero.
     pub fn new(guard: Output, target: usize) -> Self {
         Self {
             guard,
@@ -91,29 +92,29 @@ impl Transition {
         }
     }
 
-    /// With a jump of the state.
+    /// Adds a jump of the state.
     #[must_use]
     pub fn with_reset(mut self, reset: Reset) -> Self {
         self.reset = Some(reset);
         self
     }
 
-    /// With a sticking regime for chatter to end in.
+    /// Adds a sticking regime in which chatter ends.
     #[must_use]
     pub fn with_sticking(mut self, sticking: Sticking) -> Self {
         self.sticking = Some(sticking);
         self
     }
 
-    /// With what is known of the next regime's guards.
+    /// Adds the initial value of one of the next regime's guards.
     #[must_use]
     pub fn with_onset(mut self, onset: Onset) -> Self {
         self.onset = Some(onset);
         self
     }
 
-    /// As a release from sticking: the target's guard starts with value, rate and
-    /// acceleration zero.
+    /// Marks a release from sticking: the target's guard starts with value, rate and acceleration
+    /// zero.
     #[must_use]
     pub fn as_release(mut self) -> Self {
         self.release = true;
@@ -129,24 +130,24 @@ pub struct System {
     regimes: Vec<Regime>,
     transitions: Vec<Vec<Transition>>,
     switches: Vec<Vec<PreparedTransition>>,
-    /// How far the tables of each regime's guards reach.
+    /// Reach of the tables of each regime's guards, in the system's unit of time.
     reaches: Vec<f64>,
     /// `[Re λ, Im λ]` of each regime's modal coordinates and tones, packed.
     rates: Vec<Vec<ComplexVector>>,
     /// The largest `|λ|` of any regime or tone.
     fastest: f64,
-    /// What ends its motions from outside.
+    /// Flag that cancels its motions.
     cancel: CancelFlag,
 }
 
-/// What a transition needs at run time.
+/// A transition prepared for the inner loop.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct PreparedTransition {
     /// The guard in modal coordinates of the regime it leaves.
     pub(crate) guard: ModalOutput,
-    /// The same, packed.
+    /// The same guard in the packed layout of the inner loop.
     pub(crate) kernel: Kernel,
-    /// The points at which it is tabulated, where that can be.
+    /// Table of the guard's exponentials, if it can be tabulated.
     pub(crate) table: Option<Table>,
     /// The change of basis of the plain switch.
     pub(crate) switch: Switch,
@@ -157,7 +158,7 @@ pub(crate) struct PreparedTransition {
     pub(crate) reverse: Option<usize>,
     /// The same in the sticking regime.
     pub(crate) sticking_reverse: Option<usize>,
-    /// The guard's acceleration in the target regime, for telling chatter.
+    /// The guard's acceleration in the target regime, for the detection of chatter.
     pub(crate) acceleration: Option<Output>,
 }
 
@@ -165,9 +166,9 @@ pub(crate) struct PreparedTransition {
 /// `q⁺ = matrix · q⁻ + offset(t)` with real and imaginary parts stacked.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Switch {
-    /// The regime it leaves.
+    /// Number of the regime that the switch leaves.
     pub from: usize,
-    /// The regime it enters.
+    /// Number of the regime that the switch enters.
     pub to: usize,
     /// `2m⁺ × 2m⁻`, acting on `[Re q; Im q]`.
     pub(crate) matrix: DMatrix<f64>,
@@ -183,7 +184,7 @@ pub struct Switch {
     pub(crate) rate_after: Option<RateAfter>,
 }
 
-/// `factor · rate + constant`.
+/// The guard's rate after a switch, `factor · rate + constant`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct RateAfter {
     pub(crate) factor: f64,
@@ -202,9 +203,10 @@ impl RateAfter {
 }
 
 impl Switch {
-    /// log|det| of the saltation matrix of a switch without a reset at which the guard has this
-    /// rate: by the lemma on determinants that of the guard's rate after it over that before.
-    /// `None` where the rate after it does not follow from that before.
+    /// Returns log|det| (dimensionless) of the saltation matrix of a switch without a reset at
+    /// which the guard has this rate. By the matrix determinant lemma, the determinant is the ratio
+    /// of the guard's rates after and before the switch. `None` if the rate after the switch does
+    /// not follow from that before.
     pub fn log_determinant(&self, rate: f64) -> Option<f64> {
         self.rate_after.map(|after| {
             if after.constant == 0.0 {
@@ -215,13 +217,13 @@ impl Switch {
         })
     }
 
-    /// Whether the guard's rate jumps however slowly the guard falls: what only grazes is not near
-    /// what just misses.
+    /// Reports whether the guard's rate jumps even where the guard falls arbitrarily slowly, so
+    /// that a grazing motion is not close to one that just misses.
     pub fn breaks_grazing(&self) -> bool {
         self.rate_after.is_some_and(|after| after.constant != 0.0)
     }
 
-    /// Whether it preserves volumes at any rate.
+    /// Reports whether the switch preserves volumes at any rate.
     pub fn keeps_volume(&self) -> bool {
         self.rate_after == Some(RateAfter::SAME)
     }
@@ -255,10 +257,10 @@ fn packed_switch(
 }
 
 impl System {
-    /// Joins regimes and transitions (`transitions[r]` lead out of regime `r`).
+    /// Creates a system from regimes and transitions (`transitions[r]` lead out of regime `r`).
     ///
     /// # Errors
-    /// When sizes do not fit or a transition leads nowhere.
+    /// If sizes do not fit or a transition names a missing regime.
     pub fn new(
         drive: Drive,
         regimes: Vec<Regime>,
@@ -386,19 +388,20 @@ impl System {
         Ok(system)
     }
 
-    /// The same system, whose motions end with [`FlowError::Cancelled`] once `cancel` is set.
+    /// Returns the same system, whose motions end with [`FlowError::Cancelled`] once `cancel` is
+    /// set.
     #[must_use]
     pub fn cancelled_by(mut self, cancel: CancelFlag) -> Self {
         self.cancel = cancel;
         self
     }
 
-    /// What ends its motions from outside.
+    /// Returns the flag that cancels its motions.
     pub fn cancel(&self) -> &CancelFlag {
         &self.cancel
     }
 
-    /// An error once its motions are to end.
+    /// Returns an error once its motions are cancelled.
     #[inline]
     pub(crate) fn check_cancel(&self) -> Result<(), FlowError> {
         if self.cancel.is_cancelled() {
@@ -435,32 +438,32 @@ impl System {
         }
     }
 
-    /// Dimension of the state.
+    /// Returns the dimension `n` of the state.
     pub fn dimension(&self) -> usize {
         self.dimension
     }
 
-    /// The drive.
+    /// Returns the drive that all regimes share.
     pub fn drive(&self) -> &Drive {
         &self.drive
     }
 
-    /// The regimes.
+    /// Returns the regimes, by number.
     pub fn regimes(&self) -> &[Regime] {
         &self.regimes
     }
 
-    /// The transitions of each regime.
+    /// Returns the transitions out of each regime, by number of the regime.
     pub fn transitions(&self) -> &[Vec<Transition>] {
         &self.transitions
     }
 
-    /// The largest angle that any term turns through in a drive period.
+    /// Returns the largest angle, in radians, through which any term turns in a drive period.
     pub(crate) fn largest_angle(&self) -> f64 {
         self.fastest * self.drive.period()
     }
 
-    /// The largest `|λ|` of any regime or tone.
+    /// Returns the largest `|λ|` of any regime or tone.
     pub(crate) fn fastest(&self) -> f64 {
         self.fastest
     }
@@ -469,7 +472,7 @@ impl System {
         &self.rates
     }
 
-    /// How far the tables of a regime's guards reach.
+    /// Returns the reach of the tables of a regime's guards, in time.
     pub(crate) fn table_reach(&self, regime: usize) -> f64 {
         self.reaches[regime]
     }
@@ -482,12 +485,13 @@ impl System {
         out.find_map(|(from, out)| Some((from, out.iter().position(sticks)?)))
     }
 
-    /// Whether the motion sticks to a rigid stop in `regime`: its state is then that of the stop.
+    /// Reports whether the motion sticks to a rigid stop in `regime`: its state is then that of the
+    /// stop.
     pub fn sticks(&self, regime: usize) -> bool {
         self.stop_of(regime).is_some()
     }
 
-    /// The switch of a transition.
+    /// Returns the switch of a transition; `None` if there is no such transition.
     pub fn switch_of(&self, regime: usize, transition: usize) -> Option<&Switch> {
         let prepared = self.switches.get(regime)?.get(transition)?;
         Some(&prepared.switch)
@@ -497,15 +501,15 @@ impl System {
         &self.switches[regime]
     }
 
-    /// The regime in which a motion starts at state `x` and time `t`: the first
-    /// whose guards are all positive, a guard that is zero within rounding counting
-    /// as positive when its first non-zero derivative is. Says as well which guard
-    /// starts at zero. A sticking regime is entered only from a state that sticks. Where
-    /// no regime holds the state, it is one whose passed transition resets it to a state that
-    /// the next regime holds; the transition is taken at once.
+    /// Returns the regime in which a motion starts at state `x` and time `t`, and the transition
+    /// whose guard starts at zero. It is the first regime whose guards are all positive; a guard
+    /// that is zero within rounding counts as positive if its first non-zero derivative is. A
+    /// sticking regime is entered only from a state that sticks. If no regime contains the state,
+    /// it is one whose transition is already passed and resets the state to one that the next
+    /// regime contains; the transition is taken at once.
     ///
     /// # Errors
-    /// [`FlowError::NoRegime`] when there is none.
+    /// [`FlowError::NoRegime`] if there is none.
     pub fn regime_at(&self, x: &[f64], t: f64) -> Result<(usize, Option<usize>), FlowError> {
         let (regime, surface) = self.start_at(x, t)?;
         Ok((regime, surface.map(|(transition, _)| transition)))
@@ -918,10 +922,10 @@ fn packed_rates(regime: &Regime, drive: &Drive) -> Vec<ComplexVector> {
 /// Relative size up to which a difference counts as rounding.
 const NEGLIGIBLE: f64 = 1e-13;
 
-/// Oscillations of a mode in one drive period that are followed.
+/// Largest number of oscillations of a mode in one drive period.
 const MAX_TURNS: f64 = 1e7;
 
-/// Derivatives of a guard that are looked at where it starts at zero.
+/// Number of derivatives that are examined of a guard that starts at zero.
 const FLATTEST: usize = 6;
 
 /// A state is on a surface when its guard is within this many rounding errors of zero: a

@@ -10,36 +10,38 @@ use std::sync::Arc;
 /// A stretch of a trajectory within one regime and one drive period.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Segment {
-    /// The regime's number.
+    /// Number of the regime, from 0.
     pub regime: usize,
-    /// Time at its start, counted from the start of the recording's first period.
+    /// Time of its start, from the start of the recording's first period, in the system's unit of
+    /// time.
     pub start: f64,
-    /// Its start within the drive period.
+    /// Time of its start within the drive period, in the system's unit of time.
     pub phase: f64,
-    /// How long it lasts.
+    /// Length in time, in the system's unit of time.
     pub length: f64,
-    /// Modal coordinates at its start.
+    /// Modal coordinates at its start, of length `m`.
     pub modal: Vec<Complex>,
 }
 
 /// A switch in a trajectory.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Event {
-    /// When, counted from the start of the recording's first period.
+    /// Time from the start of the recording's first period, in the system's unit of time.
     pub time: f64,
-    /// The regime left.
+    /// Number of the regime that the switch leaves.
     pub from: usize,
-    /// The regime entered.
+    /// Number of the regime that the switch enters.
     pub to: usize,
-    /// The guard's rate before the switch.
+    /// Rate of the guard before the switch, at most 0, in units of the guard per unit of time.
     pub rate: f64,
-    /// Whether the guard only grazed zero within rounding.
+    /// Whether the guard only grazed zero, within rounding.
     pub grazing: bool,
-    /// log|det| of the saltation of a switch without a reset, where it follows from `rate`.
+    /// Logarithm log|det| of the saltation matrix, dimensionless; `None` at a reset, or if it does
+    /// not follow from `rate`.
     pub log_determinant: Option<f64>,
 }
 
-/// A recorded motion; between its switches everything is known in closed form.
+/// A recorded motion, with the state between switches in closed form.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Trajectory {
     system: Arc<System>,
@@ -48,7 +50,7 @@ pub struct Trajectory {
     end: f64,
 }
 
-/// Records a flow.
+/// Observer that records a flow as a [`Trajectory`].
 #[derive(Clone, Debug, Default)]
 pub struct Recorder {
     segments: Vec<Segment>,
@@ -61,8 +63,8 @@ impl Recorder {
         self.periods as f64 * system.drive().period()
     }
 
-    /// Takes a stretch that is known by its modal coordinates: in `regime`, from `phase` within
-    /// the drive period on, for `length`.
+    /// Appends a stretch given by its modal coordinates: in `regime`, from `phase` within the drive
+    /// period, of length `length`.
     pub fn take_stretch(&mut self, regime: usize, phase: f64, length: f64, modal: &[Complex]) {
         self.segments.push(Segment {
             regime,
@@ -73,7 +75,7 @@ impl Recorder {
         });
     }
 
-    /// The recording, of a flow of `system`.
+    /// Returns the recording, of a flow of `system`.
     pub fn finish(self, system: Arc<System>) -> Trajectory {
         let end = self.segments.last().map_or(0.0, |s| s.start + s.length);
         Trajectory {
@@ -124,11 +126,12 @@ pub struct PiecewiseSignal {
 /// One piece: `signal(s)` is the output at time `start + s`, `0 ≤ s ≤ length`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Piece {
-    /// Time at its start.
+    /// Time of its start, from the start of the recording's first period, in the system's unit of
+    /// time.
     pub start: f64,
-    /// How long it lasts.
+    /// Length in time, in the system's unit of time.
     pub length: f64,
-    /// The output.
+    /// Output as a function of the time `s` from the start of the piece.
     pub signal: Signal,
 }
 
@@ -136,7 +139,7 @@ impl Trajectory {
     /// Runs `periods` drive periods from state `x` at phase 0 and records them.
     ///
     /// # Errors
-    /// As [`Flow::start`] and [`Flow::run_period`].
+    /// As for [`Flow::start`] and [`Flow::run_period`].
     pub fn record(system: &Arc<System>, x: &[f64], periods: usize) -> Result<Self, FlowError> {
         let mut flow = Flow::new(Arc::clone(system));
         flow.start(x, 0.0)?;
@@ -147,33 +150,33 @@ impl Trajectory {
         Ok(recorder.finish(Arc::clone(system)))
     }
 
-    /// The system.
+    /// Returns the system whose motion was recorded.
     pub fn system(&self) -> &Arc<System> {
         &self.system
     }
 
-    /// The segments, in order of time.
+    /// Returns the segments, in order of time.
     pub fn segments(&self) -> &[Segment] {
         &self.segments
     }
 
-    /// The switches, in order of time.
+    /// Returns the switches, in order of time.
     pub fn events(&self) -> &[Event] {
         &self.events
     }
 
-    /// Time at the end; the start is 0.
+    /// Returns the time at the end; the start is 0.
     pub fn end(&self) -> f64 {
         self.end
     }
 
-    /// The segment that holds time `t` (the nearest one outside the recording).
+    /// Returns the segment that contains time `t` (the nearest one outside the recording).
     pub fn segment_at(&self, t: f64) -> Option<&Segment> {
         let after = self.segments.partition_point(|s| s.start <= t);
         self.segments.get(after.saturating_sub(1))
     }
 
-    /// The state at time `t`, `None` of an empty recording.
+    /// Returns the state at time `t`; `None` for an empty recording.
     pub fn state_at(&self, t: f64) -> Option<Vec<f64>> {
         let segment = self.segment_at(t)?;
         let regime = &self.system.regimes()[segment.regime];
@@ -191,7 +194,7 @@ impl Trajectory {
         Some(x)
     }
 
-    /// The piece of the signal of `output` at time `t`.
+    /// Returns the piece of the signal of `output` at time `t`.
     pub fn piece_at(&self, output: &Output, t: f64) -> Option<Piece> {
         let segment = self.segment_at(t)?;
         let modal = self.system.regimes()[segment.regime].project(output);
@@ -215,7 +218,7 @@ impl Trajectory {
         }
     }
 
-    /// How long the motion stays in `regime`.
+    /// Returns the total time in `regime`, in the system's unit of time.
     pub fn time_in(&self, regime: usize) -> f64 {
         self.segments
             .iter()
@@ -224,16 +227,16 @@ impl Trajectory {
             .sum()
     }
 
-    /// An output over the whole trajectory, the same in every regime.
+    /// Returns an output over the whole trajectory, the same in every regime.
     pub fn signal(&self, output: &Output) -> PiecewiseSignal {
         self.signal_by_regime(&vec![output.clone(); self.system.regimes().len()])
     }
 
-    /// An output that differs from regime to regime (one entry a regime), such as a
+    /// Returns an output that differs from regime to regime (one entry per regime), such as a
     /// contact force.
     ///
     /// # Panics
-    /// When there are fewer outputs than regimes.
+    /// If there are fewer outputs than regimes.
     pub fn signal_by_regime(&self, outputs: &[Output]) -> PiecewiseSignal {
         let regimes = self.system.regimes().iter().zip(outputs);
         let modal: Vec<_> = regimes.map(|(r, o)| r.project(o)).collect();
@@ -244,14 +247,14 @@ impl Trajectory {
 }
 
 impl PiecewiseSignal {
-    /// The value at time `t` (of the nearest piece outside), `None` if empty.
+    /// Returns the value at time `t` (of the nearest piece outside); `None` if empty.
     pub fn at(&self, t: f64) -> Option<f64> {
         let after = self.pieces.partition_point(|p| p.start <= t);
         let piece = self.pieces.get(after.saturating_sub(1))?;
         Some(piece.signal.at((t - piece.start).clamp(0.0, piece.length)))
     }
 
-    /// Length of time covered.
+    /// Returns the total time covered, in the system's unit of time.
     pub fn duration(&self) -> f64 {
         self.pieces.iter().map(|p| p.length).sum()
     }

@@ -1,4 +1,4 @@
-//! How what is read off a motion changes with a parameter.
+//! Derivatives of a motion's functionals with respect to a parameter.
 //!
 //! A [`Variation`] follows a motion together with its sensitivity `s = dx/dθ` (see
 //! [`sensitivity`](crate::sensitivity)), which begins with a given value: with that of a
@@ -26,18 +26,18 @@ use crate::search::sign_changes;
 use crate::sensitivity::{Propagator, Sensitivity, SystemTangent};
 use crate::{Complex, Drive, Output, Regime, System};
 
-/// An output and its derivative with respect to the parameter at constant state and drive
-/// phase; an entry a regime each.
+/// An output and its derivative with respect to the parameter at constant state and drive phase,
+/// with one entry per regime each.
 #[derive(Clone, Debug, PartialEq)]
 pub struct VariedOutput {
-    /// The output.
+    /// Output in each regime, one entry per regime.
     pub value: Vec<Output>,
-    /// Its derivative.
+    /// Derivative of the output with respect to the parameter, one entry per regime.
     pub change: Vec<Output>,
 }
 
 impl VariedOutput {
-    /// The same output in every regime, and its derivative.
+    /// Creates the same output in every regime, with its derivative.
     pub fn same(system: &System, value: &Output, change: &Output) -> Self {
         let regimes = system.regimes().len();
         Self {
@@ -46,7 +46,7 @@ impl VariedOutput {
         }
     }
 
-    /// Its rate along the motion.
+    /// Returns the output's rate along the motion.
     #[must_use]
     pub fn rate(&self, system: &System, tangent: &SystemTangent) -> Self {
         let drive = system.drive();
@@ -81,23 +81,23 @@ impl VariedOutput {
     }
 }
 
-/// Carries the derivatives along a flow.
+/// Observer that carries the functionals' derivatives along a flow.
 #[derive(Debug)]
 pub struct Variation<'a> {
     system: &'a System,
     tangent: &'a SystemTangent,
     sensitivity: Sensitivity<'a>,
     outputs: Vec<VariedOutput>,
-    /// An entry a regime, and in it one an output.
+    /// By regime and output: value and derivative in modal coordinates.
     modal: Vec<Vec<[ModalOutput; 2]>>,
     guards: Vec<Vec<Guard>>,
     functionals: Vec<Functional>,
     /// The functionals' values with their derivatives, by number; extrema of a motion of no length
     /// are infinite.
     pub values: Vec<nalgebra::Complex<Dual>>,
-    /// Pairs of regimes, and the speeds of the guard at switches between them.
+    /// Pairs of regimes, with the speeds of the guard at switches between them.
     pub speeds: Vec<((usize, usize), Speeds)>,
-    /// How long the motion lasted.
+    /// Duration of the motion, in the system's unit of time.
     pub duration: Dual,
     /// An extremum at the end of the last stretch moves with the switch there, if there is
     /// one: which, and its rate.
@@ -110,11 +110,11 @@ pub struct Variation<'a> {
 /// Speeds of a guard at switches, with their derivatives; zero where there was none.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Speeds {
-    /// The greatest.
+    /// Greatest speed, in units of the guard per unit of time.
     pub greatest: Dual,
-    /// Their sum.
+    /// Sum of the speeds, in units of the guard per unit of time.
     pub sum: Dual,
-    /// The sum of their squares.
+    /// Sum of the squared speeds.
     pub squares: Dual,
 }
 
@@ -127,10 +127,11 @@ struct Guard {
 }
 
 impl<'a> Variation<'a> {
-    /// Along a flow of `system` that is in `regime`, with `dx/dθ = start` (length `n`) there.
+    /// Creates the derivatives along a flow of `system` that is in `regime`, with `dx/dθ = start`
+    /// (length `n`) there.
     ///
     /// # Panics
-    /// When an output or the start does not fit the system.
+    /// If an output or the start does not fit the system.
     pub fn new(
         system: &'a System,
         tangent: &'a SystemTangent,
@@ -190,7 +191,7 @@ impl<'a> Variation<'a> {
         }
     }
 
-    /// `∂x/∂θ` (length `n`) now, in `regime`.
+    /// Writes `∂x/∂θ` (length `n`) now, in `regime`, to `derivative`.
     pub fn state(&self, regime: usize, derivative: &mut [f64]) {
         let regime = &self.system.regimes()[regime];
         self.sensitivity.to_state(regime, 0, derivative);
@@ -352,8 +353,8 @@ impl Observer for Variation<'_> {
 }
 
 impl Variation<'_> {
-    /// Says that the motion is over: everything was gathered at constant drive phase, and a
-    /// period that changes stretches all integrals alike.
+    /// Ends the motion. Everything was accumulated at constant drive phase; a change of the period
+    /// stretches all integrals alike.
     pub fn finish(&mut self) {
         let by = self.tangent.log_period;
         let stretch = Dual::new(1.0, by);

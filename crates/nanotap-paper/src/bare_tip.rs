@@ -172,7 +172,7 @@ fn picture(
     ))
 }
 
-/// Fig. 15.
+/// Computes the section on Fig. 15: two period-1 motions without tip mass.
 pub(super) fn fig15(runs: &Runs<'_>, section: Section) -> Result<Section, PaperError> {
     let bare = Bare::new(runs)?;
     let kinds = |r: &Reading| r.counted.kinds().join(", ");
@@ -231,7 +231,7 @@ pub(super) fn fig15(runs: &Runs<'_>, section: Section) -> Result<Section, PaperE
         ))
 }
 
-/// Fig. 16.
+/// Computes the section on Fig. 16: period 2 without tip mass.
 pub(super) fn fig16(runs: &Runs<'_>, section: Section) -> Result<Section, PaperError> {
     let bare = Bare::new(runs)?;
     let shown = match (bare.fast.best(2), bare.slow.best(2)) {
@@ -280,7 +280,7 @@ pub(super) fn fig16(runs: &Runs<'_>, section: Section) -> Result<Section, PaperE
         ))
 }
 
-/// Fig. 17.
+/// Computes the section on Fig. 17: two period-4 motions without tip mass.
 pub(super) fn fig17(runs: &Runs<'_>, section: Section) -> Result<Section, PaperError> {
     let bare = Bare::new(runs)?;
     let stable: Vec<&PeriodicOrbit> = bare

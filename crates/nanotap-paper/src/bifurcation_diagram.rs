@@ -29,7 +29,7 @@ const ENTRY: f64 = 3.5;
 /// Start of the period-2 branch around Ω = 2.6.
 const ENTRY_TWO: f64 = 2.75;
 
-/// Fig. 5.
+/// Computes the section on Fig. 5: the bifurcation diagram over Ω.
 pub(super) fn section(runs: &Runs<'_>, section: Section) -> Result<Section, PaperError> {
     let (count, starts) = (runs.either(400, 40), runs.either(8, 2));
     let case = Cantilever::paper();

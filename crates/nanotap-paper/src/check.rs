@@ -2,20 +2,20 @@
 
 use serde::Serialize;
 
-/// Verdict on a statement.
+/// Verdict on a statement of the paper.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Verdict {
-    /// The statement holds.
+    /// The statement holds for this program's result.
     Reproduced,
-    /// The statement does not hold.
+    /// The statement does not hold for this program's result.
     Differs,
     /// The paper's information is insufficient or contradictory.
     Ambiguous,
 }
 
 impl Verdict {
-    /// Every verdict.
+    /// The three verdicts: reproduced, differs, ambiguous.
     pub const ALL: [Self; 3] = [Self::Reproduced, Self::Differs, Self::Ambiguous];
 
     /// [`Reproduced`](Self::Reproduced) if the statement `holds`, otherwise
@@ -28,7 +28,7 @@ impl Verdict {
         }
     }
 
-    /// Name of the verdict.
+    /// Returns the name of the verdict in lower case.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Reproduced => "reproduced",
@@ -38,7 +38,7 @@ impl Verdict {
     }
 }
 
-/// Subject of a statement.
+/// Subject of a statement of the paper.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum About {
@@ -61,14 +61,14 @@ pub struct Check {
     pub about: About,
     /// Whether statement and result agree.
     pub verdict: Verdict,
-    /// Evidence for the verdict.
+    /// Evidence for the verdict, in words; empty if there is none.
     pub evidence: String,
     /// A command line that reproduces the result.
     pub rerun: String,
 }
 
 impl Check {
-    /// A statement with its verdict, without evidence and command.
+    /// Creates a statement with its verdict, without evidence and command.
     pub fn new(
         id: impl Into<String>,
         paper: impl Into<String>,
@@ -86,7 +86,7 @@ impl Check {
         }
     }
 
-    /// Adds the evidence.
+    /// Sets the evidence for the verdict, in words.
     #[must_use]
     pub fn evidence(mut self, evidence: impl Into<String>) -> Self {
         self.evidence = evidence.into();
@@ -100,7 +100,7 @@ impl Check {
         self
     }
 
-    /// Adds the command line.
+    /// Sets the command line that reproduces the result.
     #[must_use]
     pub fn rerun(mut self, rerun: impl Into<String>) -> Self {
         self.rerun = rerun.into();

@@ -23,7 +23,7 @@ struct Row {
     clearance: Clearance,
 }
 
-/// Fig. 2f.
+/// Computes the section on Fig. 2f: whether other parts of the beam touch the sample.
 pub(super) fn section(runs: &Runs<'_>, section: Section) -> Result<Section, PaperError> {
     let mut rows = Vec::new();
     let undamped = Cantilever::paper_eq24();

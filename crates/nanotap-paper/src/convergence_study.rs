@@ -31,7 +31,7 @@ struct Response {
     series: Vec<f64>,
 }
 
-/// Fig. 4.
+/// Computes the section on Fig. 4: the number of modes needed at Ω = 4.1.
 pub(super) fn section(runs: &Runs<'_>, section: Section) -> Result<Section, PaperError> {
     let most = runs.either(MAX_MODES, 8);
     let responses: Vec<Response> = (1..=most)

@@ -129,7 +129,7 @@ pub(super) fn cosine_term(runs: &Runs<'_>, section: Section) -> Result<Section, 
         .table(table))
 }
 
-/// Eq. (23).
+/// Computes the section on Eq. (23): frequencies of the bare beam.
 pub(super) fn bare_frequencies(_: &Runs<'_>, section: Section) -> Result<Section, PaperError> {
     let exact = exact_beam::frequencies(0.0, 0.0, 3).map_err(nanotap::model::ModelError::from)?;
     let printed = [(3.52, 2), (22.03, 2), (61.7, 1)];
@@ -155,7 +155,7 @@ const MAX_MODES: usize = 10;
 /// Numbers of Eq. (25) with their decimals.
 const EQ25: [(f64, i32); 3] = [(7.79, 2), (20.33, 2), (55.81, 2)];
 
-/// Eq. (25).
+/// Computes the section on Eq. (25): frequencies in contact.
 pub(super) fn contact_frequencies(_: &Runs<'_>, section: Section) -> Result<Section, PaperError> {
     let table_of = |modes: usize| {
         ModeTable::new(&Cantilever::paper_eq24().with_modes(modes))

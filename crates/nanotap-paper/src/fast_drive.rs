@@ -139,7 +139,7 @@ fn below(motion: Option<&GridMotion>) -> String {
     })
 }
 
-/// Fig. 8.
+/// Computes the section on Fig. 8: a period-1 motion at Ω = 20.
 pub(super) fn fig8(runs: &Runs<'_>, section: Section) -> Result<Section, PaperError> {
     let fast = Fast::new(runs)?;
     let look = fast.counted.look(&fast.attractor)?.observables;
@@ -253,7 +253,7 @@ fn less_distorted(runs: &Runs<'_>, fast: &Fast) -> Result<Check, PaperError> {
     .rerun(fast.rerun_orbit()))
 }
 
-/// Fig. 9.
+/// Computes the section on Fig. 9: another period-1 motion at Ω = 20.
 pub(super) fn fig9(runs: &Runs<'_>, section: Section) -> Result<Section, PaperError> {
     let fast = Fast::new(runs)?;
     let grid = fast.scan.subharmonic(0.148);
@@ -365,7 +365,7 @@ fn long_period(
         ))
 }
 
-/// Fig. 10.
+/// Computes the section on Fig. 10: period 11 at Ω = 20.
 pub(super) fn fig10(runs: &Runs<'_>, section: Section) -> Result<Section, PaperError> {
     let figure = LongPeriod {
         number: 10,
@@ -376,7 +376,7 @@ pub(super) fn fig10(runs: &Runs<'_>, section: Section) -> Result<Section, PaperE
     long_period(runs, section, &figure)
 }
 
-/// Fig. 11.
+/// Computes the section on Fig. 11: period 28 at Ω = 20.
 pub(super) fn fig11(runs: &Runs<'_>, section: Section) -> Result<Section, PaperError> {
     let figure = LongPeriod {
         number: 11,
@@ -387,7 +387,7 @@ pub(super) fn fig11(runs: &Runs<'_>, section: Section) -> Result<Section, PaperE
     long_period(runs, section, &figure)
 }
 
-/// Fig. 12.
+/// Computes the section on Fig. 12: period 21 at Ω = 20.
 pub(super) fn fig12(runs: &Runs<'_>, section: Section) -> Result<Section, PaperError> {
     let figure = LongPeriod {
         number: 12,
@@ -398,7 +398,7 @@ pub(super) fn fig12(runs: &Runs<'_>, section: Section) -> Result<Section, PaperE
     long_period(runs, section, &figure)
 }
 
-/// Fig. 13.
+/// Computes the section on Fig. 13: another period 21 at Ω = 20.
 pub(super) fn fig13(runs: &Runs<'_>, section: Section) -> Result<Section, PaperError> {
     let figure = LongPeriod {
         number: 13,
@@ -409,7 +409,7 @@ pub(super) fn fig13(runs: &Runs<'_>, section: Section) -> Result<Section, PaperE
     long_period(runs, section, &figure)
 }
 
-/// Fig. 14.
+/// Computes the section on Fig. 14: a nonperiodic motion at Ω = 20.
 pub(super) fn fig14(runs: &Runs<'_>, section: Section) -> Result<Section, PaperError> {
     let fast = Fast::new(runs)?;
     let grid = fast.scan.nearest(None, 1.3, 0);

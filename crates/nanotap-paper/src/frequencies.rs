@@ -12,7 +12,7 @@ use nanotap::model::exact_beam;
 use nanotap::model::parameter::Parameter;
 use nanotap::study::modes::ModeTable;
 
-/// Fig. 2e.
+/// Computes the section on Fig. 2e: the first three mode shapes.
 pub(super) fn mode_shapes(_: &Runs<'_>, section: Section) -> Result<Section, PaperError> {
     const POINTS: usize = 401;
     let beam =
@@ -67,7 +67,7 @@ const STIFFNESSES: (f64, f64) = (1e-2, 1e3);
 /// Number of points of a curve.
 const POINTS: usize = 241;
 
-/// Fig. 3.
+/// Computes the section on Fig. 3: frequencies against tip mass and contact stiffness.
 pub(super) fn maps(_: &Runs<'_>, section: Section) -> Result<Section, PaperError> {
     let failed = |error: CantileverError| PaperError::from(nanotap::model::ModelError::from(error));
     let bare = exact_beam::frequencies(0.0, 0.0, 2).map_err(failed)?;

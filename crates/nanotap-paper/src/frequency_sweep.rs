@@ -24,7 +24,7 @@ const MAX_PERIOD: usize = 32;
 /// Initial states of a column that are followed before its attractors are known.
 const INITIAL_RUNS: usize = 2;
 
-/// Kind of a motion.
+/// Kind of a motion; a periodic one with its period in drive periods.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Kind {
     Periodic(usize),

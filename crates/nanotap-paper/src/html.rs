@@ -23,7 +23,7 @@ details summary{cursor:pointer;font-size:.9rem}nav a{margin-right:.8rem}
 @media print{h2{break-after:avoid}figure,dl{break-inside:avoid}}
 ";
 
-/// The whole page.
+/// Formats the report as one HTML page.
 pub(super) fn page(report: &Report) -> Result<String, PaperError> {
     let mut page = format!(
         "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\

@@ -21,7 +21,7 @@ use nanotap::model::oscillator::{Oscillator, OscillatorParameter, Stop};
 use nanotap::observe::{ObservableSet, measure};
 use nanotap::study::start_box::default_box;
 
-/// The coefficient of restitution.
+/// Coefficient of restitution of every stop, dimensionless.
 const RESTITUTION: f64 = 0.8;
 /// Range of the drive frequency; at 1 the undamped oscillator itself resonates.
 const RANGE: (f64, f64) = (1.05, 5.0);

@@ -47,7 +47,7 @@ use runs::Runs;
 pub use section::{Picture, Section, Table};
 pub use write::{Document, Written};
 
-/// What to compute.
+/// Options of the report: its sections and the effort.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Options {
     /// Names of the requested sections; empty: all.
@@ -56,37 +56,37 @@ pub struct Options {
     pub quick: bool,
 }
 
-/// Why the report could not be computed.
+/// The reason why the report could not be computed.
 #[derive(Debug, thiserror::Error)]
 pub enum PaperError {
     /// An unknown section was requested.
     #[error("no section `{given}`{hint}; the sections are {known}")]
     UnknownSection {
-        /// The requested name.
+        /// Name of the section as requested.
         given: String,
         /// The most similar name, as a question.
         hint: String,
-        /// The known names.
+        /// Names of all sections, as text.
         known: String,
     },
-    /// The computation was cancelled.
+    /// The computation was cancelled before the report was finished.
     #[error("stopped before the report was finished")]
     Cancelled,
-    /// A case is invalid.
+    /// A case of the paper is invalid.
     #[error(transparent)]
     Model(#[from] CaseError),
     /// A computation that should succeed failed, or a picture could not be drawn.
     #[error("{what}: {why}")]
     Failed {
-        /// Description of the computation.
+        /// Name of the computation or picture that failed.
         what: String,
-        /// Reason of the failure.
+        /// Error of the computation, as text.
         why: String,
     },
     /// A file could not be written.
     #[error("cannot write {}: {source}", path.display())]
     Write {
-        /// Path of the file.
+        /// Path of the file that could not be written.
         path: std::path::PathBuf,
         /// Error of the operating system.
         source: std::io::Error,
@@ -110,7 +110,7 @@ impl From<nanotap::model::ModelError> for PaperError {
     }
 }
 
-/// The whole report.
+/// The report: the computed sections with their checks.
 #[derive(Clone, Debug)]
 pub struct Report {
     /// Its sections, in the order of the paper.
@@ -120,7 +120,7 @@ pub struct Report {
 }
 
 impl Report {
-    /// Every check of every section.
+    /// Returns every check of every section.
     pub fn checks(&self) -> impl Iterator<Item = &Check> {
         self.sections.iter().flat_map(|section| &section.checks)
     }
@@ -362,7 +362,7 @@ pub fn report_so_far(
     Ok((Report { sections, quick }, all))
 }
 
-/// Names of all sections.
+/// Returns the names of all sections, in the order of the paper.
 pub fn section_names() -> impl Iterator<Item = &'static str> {
     TOPICS.iter().map(|topic| topic.id)
 }

@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use super::Report;
 
-/// The document.
+/// Formats the report as a Markdown document.
 pub(super) fn document(report: &Report) -> String {
     let mut text = format!(
         "# The paper's statements, reproduced\n\n{} statements: {}. The page `report.html` in the same folder contains the figures \

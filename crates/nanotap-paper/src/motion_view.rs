@@ -12,12 +12,12 @@ const POINTS_PER_PERIOD: f64 = 500.0;
 /// Minimum number of points per stretch of flight or contact.
 const MIN_POINTS: f64 = 6.0;
 
-/// Colour of flight.
+/// Colour of the motion in free flight.
 pub(super) const FLIGHT: Colour = Colour::BLUE;
-/// Colour of contact.
+/// Colour of the motion in contact.
 pub(super) const CONTACT: Colour = Colour::VERMILLION;
 
-/// A motion to draw.
+/// A motion that is drawn: a trajectory of a model.
 pub(super) struct View<'a> {
     model: &'a Model,
     trajectory: Trajectory,
@@ -76,7 +76,7 @@ impl<'a> View<'a> {
             .collect()
     }
 
-    /// Tip deflection against time.
+    /// The line of tip deflection against time in drive periods.
     pub(super) fn tip_line(&self) -> Line {
         Line::new(
             self.stretches(None, &self.model.tip)
@@ -147,7 +147,7 @@ impl<'a> View<'a> {
     }
 }
 
-/// An empty phase portrait.
+/// Creates a panel for a phase portrait (W, dW/dτ), without data.
 pub(super) fn empty_portrait(title: impl Into<String>) -> Panel {
     Panel::new(
         Axis::linear("tip deflection $W$"),

@@ -203,7 +203,7 @@ pub(super) struct Chaos<'a> {
     pub(super) spectrum: &'a LyapunovSpectrum,
     pub(super) lifetime: Lifetime,
     pub(super) fraction: Fraction,
-    /// A state on it.
+    /// A state on the attractor at drive phase 0.
     pub(super) state: &'a [f64],
 }
 
@@ -217,7 +217,7 @@ pub(super) struct Counted {
 }
 
 impl Counted {
-    /// Stable orbits of `period`.
+    /// Stable orbits of this period (in drive periods), with their fractions of the initial states.
     pub(super) fn stable(&self, period: usize) -> Vec<(&PeriodicOrbit, Fraction)> {
         self.all_stable()
             .into_iter()
@@ -225,7 +225,7 @@ impl Counted {
             .collect()
     }
 
-    /// Every stable orbit.
+    /// Every stable periodic orbit, with its fraction of the initial states.
     pub(super) fn all_stable(&self) -> Vec<(&PeriodicOrbit, Fraction)> {
         self.census
             .attractors
@@ -237,7 +237,7 @@ impl Counted {
             .collect()
     }
 
-    /// Chaotic attractors.
+    /// Chaotic attractors, with their fractions of the initial states.
     pub(super) fn chaos(&self) -> Vec<Chaos<'_>> {
         self.census
             .attractors
@@ -301,7 +301,7 @@ impl Counted {
             .collect()
     }
 
-    /// All attractors as text.
+    /// Lists all attractors, and what else the initial states led to, in one sentence.
     pub(super) fn summary(&self) -> String {
         let mut parts: Vec<String> = Vec::new();
         for attractor in &self.census.attractors {

@@ -7,22 +7,22 @@ use super::check::Check;
 /// A part of the report.
 #[derive(Clone, Debug)]
 pub struct Section {
-    /// Identifier, such as `fig4`.
+    /// Identifier of the section, such as `fig4`.
     pub id: &'static str,
-    /// Its heading.
+    /// Heading of the section.
     pub title: &'static str,
-    /// Paragraphs.
+    /// Paragraphs of text, in order.
     pub text: Vec<String>,
-    /// Tables.
+    /// Tables of results, in order.
     pub tables: Vec<Table>,
-    /// Pictures.
+    /// Pictures with their captions, in order.
     pub pictures: Vec<Picture>,
-    /// Statements of the paper.
+    /// Statements of the paper with their verdicts.
     pub checks: Vec<Check>,
 }
 
 impl Section {
-    /// An empty section.
+    /// Creates a section with this identifier and heading, without contents.
     pub fn new(id: &'static str, title: &'static str) -> Self {
         Self {
             id,
@@ -34,28 +34,28 @@ impl Section {
         }
     }
 
-    /// Adds a paragraph.
+    /// Appends a paragraph of text.
     #[must_use]
     pub fn text(mut self, text: impl Into<String>) -> Self {
         self.text.push(text.into());
         self
     }
 
-    /// Adds a table.
+    /// Appends a table of results.
     #[must_use]
     pub fn table(mut self, table: Table) -> Self {
         self.tables.push(table);
         self
     }
 
-    /// Adds a picture.
+    /// Appends a picture with its caption.
     #[must_use]
     pub fn picture(mut self, picture: Picture) -> Self {
         self.pictures.push(picture);
         self
     }
 
-    /// Adds a check.
+    /// Appends a statement with its verdict.
     #[must_use]
     pub fn check(mut self, check: Check) -> Self {
         self.checks.push(check);
@@ -63,19 +63,19 @@ impl Section {
     }
 }
 
-/// A table of text.
+/// A table of texts with a caption.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Table {
-    /// Caption of the table.
+    /// Caption above the table.
     pub caption: String,
-    /// Heads of the columns.
+    /// Headings of the columns.
     pub columns: Vec<String>,
     /// Rows, with one entry per column.
     pub rows: Vec<Vec<String>>,
 }
 
 impl Table {
-    /// A table without rows.
+    /// Creates a table with these columns, without rows.
     pub fn new<'a>(caption: impl Into<String>, columns: impl IntoIterator<Item = &'a str>) -> Self {
         Self {
             caption: caption.into(),
@@ -84,7 +84,7 @@ impl Table {
         }
     }
 
-    /// Adds a row.
+    /// Appends a row; missing cells are left empty.
     pub fn row(&mut self, cells: impl IntoIterator<Item = String>) {
         let mut row: Vec<String> = cells.into_iter().collect();
         row.resize(self.columns.len(), String::new());
@@ -97,9 +97,9 @@ impl Table {
 pub struct Picture {
     /// Name of its files, without extension.
     pub name: String,
-    /// Title.
+    /// Title above the picture.
     pub title: String,
-    /// Caption.
+    /// Caption below the picture.
     pub caption: String,
     /// The panels, without title and caption.
     figure: Figure,

@@ -172,7 +172,7 @@ fn multiplier(orbit: &PeriodicOrbit) -> String {
     })
 }
 
-/// Fig. 6.
+/// Computes the section on Fig. 6: two period-1 motions at Ω = 2.6.
 pub(super) fn fig6(runs: &Runs<'_>, section: Section) -> Result<Section, PaperError> {
     let slow = Slow::new(runs)?;
     let model = &slow.counted.model;
@@ -222,7 +222,7 @@ pub(super) fn fig6(runs: &Runs<'_>, section: Section) -> Result<Section, PaperEr
         .check(check))
 }
 
-/// Fig. 7.
+/// Computes the section on Fig. 7: period 2 and period 3 at Ω = 2.6.
 pub(super) fn fig7(runs: &Runs<'_>, section: Section) -> Result<Section, PaperError> {
     let slow = Slow::new(runs)?;
     let model = &slow.counted.model;

@@ -310,7 +310,7 @@ impl Grid {
         }
     }
 
-    /// Description of the grid.
+    /// Describes the grid: its steps per drive period.
     pub(super) fn words(&self) -> String {
         let [free, contact] = self.steps;
         let steps = if free == contact {
@@ -400,7 +400,7 @@ impl GridMotion {
         rerun::on_case("simulate", case, &options)
     }
 
-    /// Description of the motion.
+    /// Describes the motion: its period in drive periods, if it has one.
     pub(super) fn words(&self) -> String {
         match self.period {
             Some(period) => format!("period {period}"),

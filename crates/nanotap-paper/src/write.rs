@@ -16,9 +16,9 @@ use super::{About, Check, PaperError, Report, Verdict, html, markdown};
 pub struct Written {
     /// The page with the whole report.
     pub html: PathBuf,
-    /// The Markdown table.
+    /// Path of the Markdown table of all statements.
     pub markdown: PathBuf,
-    /// The checks as JSON.
+    /// Path of the checks as JSON.
     pub checks: PathBuf,
     /// Pictures, SVG and PNG alternately.
     pub pictures: Vec<PathBuf>,

@@ -9,16 +9,16 @@ use crate::interval::Interval;
 /// The complex numbers whose real and imaginary parts lie in two intervals.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Rectangle {
-    /// Real parts.
+    /// Interval of the real parts.
     pub re: Interval,
-    /// Imaginary parts.
+    /// Interval of the imaginary parts.
     pub im: Interval,
 }
 
 impl Rectangle {
-    /// Zero.
+    /// The rectangle that contains 0 only.
     pub const ZERO: Self = Self::real(Interval::ZERO);
-    /// One.
+    /// The rectangle that contains 1 only.
     pub const ONE: Self = Self::real(Interval::ONE);
 
     /// The rectangle with the given real and imaginary parts.
@@ -41,19 +41,19 @@ impl Rectangle {
         Self::new(Interval::ZERO, im)
     }
 
-    /// The complex conjugates.
+    /// Returns the rectangle of the complex conjugates.
     #[must_use]
     pub fn conj(self) -> Self {
         Self::new(self.re, -self.im)
     }
 
-    /// The product with real numbers.
+    /// Returns an enclosure of the product with the real numbers of `factor`.
     #[must_use]
     pub fn scale(self, factor: Interval) -> Self {
         Self::new(self.re * factor, self.im * factor)
     }
 
-    /// The exponential function.
+    /// Returns an enclosure of the exponential function, e^z.
     #[must_use]
     pub fn exp(self) -> Self {
         let size = self.re.exp();

@@ -17,7 +17,7 @@ use crate::matrix::Matrix;
 /// real vectors are x = Re(R L x).
 #[derive(Clone, Debug)]
 pub struct Eigenbasis {
-    /// Eigenvalues λ_k.
+    /// Enclosures of the eigenvalues λ_k, one of each conjugate pair.
     pub values: Vec<Rectangle>,
     /// R, whose columns are right eigenvectors.
     pub right: Matrix<Rectangle>,

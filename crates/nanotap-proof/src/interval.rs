@@ -33,11 +33,11 @@ const LN_2: [f64; 2] = [0.6931471803691238, 1.9082149292705877e-10];
 const REMAINDER_BOUND: f64 = 1e-23;
 
 impl Interval {
-    /// Zero.
+    /// The interval that contains 0 only.
     pub const ZERO: Self = Self::point(0.0);
-    /// One.
+    /// The interval that contains 1 only.
     pub const ONE: Self = Self::point(1.0);
-    /// Every real number.
+    /// The interval of all real numbers, from −∞ to ∞.
     pub const ENTIRE: Self = Self {
         lo: f64::NEG_INFINITY,
         hi: f64::INFINITY,
@@ -70,27 +70,27 @@ impl Interval {
         Self::new(x.next_down(), x.next_up())
     }
 
-    /// `[−r, r]`.
+    /// Returns the interval `[−r, r]`; all numbers if `r` is negative or NaN.
     pub fn around_zero(r: f64) -> Self {
         Self::new(-r, r)
     }
 
-    /// `[x − r, x + r]`.
+    /// Returns an enclosure of `[x − r, x + r]`; all numbers if `r` is negative or NaN.
     pub fn around(x: f64, r: f64) -> Self {
         Self::point(x) + Self::around_zero(r)
     }
 
-    /// The lower bound.
+    /// Returns the lower bound, −∞ if there is none.
     pub const fn lo(self) -> f64 {
         self.lo
     }
 
-    /// The upper bound.
+    /// Returns the upper bound, ∞ if there is none.
     pub const fn hi(self) -> f64 {
         self.hi
     }
 
-    /// A double in the interval near its centre.
+    /// Returns a double in the interval near its centre.
     pub fn middle(self) -> f64 {
         let middle = 0.5 * self.lo + 0.5 * self.hi;
         if middle.is_finite() {
@@ -100,18 +100,18 @@ impl Interval {
         }
     }
 
-    /// A bound of the distance of all its numbers from [`middle`](Self::middle).
+    /// Returns a bound of the distance of all its numbers from [`middle`](Self::middle).
     pub fn radius(self) -> f64 {
         let middle = self.middle();
         (self.hi - middle).max(middle - self.lo).next_up()
     }
 
-    /// The largest absolute value.
+    /// Returns the largest absolute value of its numbers.
     pub fn magnitude(self) -> f64 {
         self.lo.abs().max(self.hi.abs())
     }
 
-    /// The smallest absolute value.
+    /// Returns the smallest absolute value of its numbers, 0 if it contains 0.
     pub fn mignitude(self) -> f64 {
         if self.contains(0.0) {
             0.0
@@ -159,7 +159,7 @@ impl Interval {
         if lo <= hi { Self { lo, hi } } else { self }
     }
 
-    /// The square, never negative.
+    /// Returns an enclosure of the squares; its lower bound is never negative.
     #[must_use]
     pub fn square(self) -> Self {
         let (small, large) = (self.mignitude(), self.magnitude());
@@ -172,7 +172,7 @@ impl Interval {
         Self::new(lo, hi)
     }
 
-    /// The square root; negative numbers are ignored.
+    /// Returns an enclosure of the square roots; negative numbers are ignored.
     #[must_use]
     pub fn sqrt(self) -> Self {
         let lo = if self.lo <= 0.0 {
@@ -188,19 +188,19 @@ impl Interval {
         Self::new(lo, hi)
     }
 
-    /// An enclosure of π.
+    /// Returns an enclosure of π.
     pub fn pi() -> Self {
         quarter_turn() * Self::point(2.0)
     }
 
-    /// The exponential function.
+    /// Returns an enclosure of the exponential function, e^x.
     #[must_use]
     pub fn exp(self) -> Self {
         Self::new(exp_of(self.lo).lo, exp_of(self.hi).hi)
     }
 
-    /// Sine and cosine: their values at the centre with the bound of Taylor's second term,
-    /// |f(m + d) − f(m) − f′(m) d| ≤ d²/2.
+    /// Returns enclosures of sine and cosine of angles in rad: their values at the centre with the
+    /// bound of Taylor's second term, |f(m + d) − f(m) − f′(m) d| ≤ d²/2.
     pub fn sin_cos(self) -> (Self, Self) {
         let all = Self::new(-1.0, 1.0);
         let (sin, cos) = sin_cos_of(self.middle());
@@ -220,7 +220,7 @@ impl Interval {
         )
     }
 
-    /// Hyperbolic sine and cosine.
+    /// Returns enclosures of hyperbolic sine and cosine, in this order.
     pub fn sinh_cosh(self) -> (Self, Self) {
         let (rising, falling) = (self.exp(), (-self).exp());
         let half = Self::point(0.5);
@@ -238,7 +238,7 @@ fn up(x: f64) -> f64 {
     x.next_up()
 }
 
-/// An enclosure of π/2.
+/// An enclosure of a quarter turn, π/2.
 fn quarter_turn() -> Interval {
     Interval::point(HALF_PI[0]) + Interval::point(HALF_PI[1]) + Interval::decimal(HALF_PI[2])
 }

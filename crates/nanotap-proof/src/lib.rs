@@ -28,19 +28,19 @@ pub use multipliers::{Disc, Multipliers, Stability};
 pub use orbit::{Candidate, EnclosedSwitch, Isolation, Switch, Theorem, prove};
 pub use system::{HarmonicVector, Output, RegimeParts, Reset, System, Transition};
 
-/// Why an orbit could not be proved. It may exist nevertheless.
+/// The reason why an orbit could not be proved. It may exist nevertheless.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ProofError {
     /// Eigenvalues of a regime coincide, as at critical damping.
     #[error("two eigenvalues of regime {regime} are too close to be separated")]
     Eigenvalues {
-        /// Index of the regime.
+        /// Index of the regime in the system.
         regime: usize,
     },
     /// A regime is driven at a resonance without damping.
     #[error("regime {regime} is driven at an undamped resonance")]
     Resonance {
-        /// Index of the regime.
+        /// Index of the regime in the system.
         regime: usize,
     },
     /// The existence test does not contract: there is no orbit nearby, it is not isolated (at a
@@ -68,18 +68,18 @@ pub enum ProofError {
     /// The number of equations exceeds the limit.
     #[error("its switches give {unknowns} equations; the limit is {limit}")]
     TooLarge {
-        /// Number of equations.
+        /// Number of equations of the orbit.
         unknowns: usize,
-        /// Largest number of equations.
+        /// Largest number of equations that is allowed.
         limit: usize,
     },
-    /// The computation was cancelled.
+    /// The computation was cancelled before the proof was finished.
     #[error("cancelled")]
     Cancelled,
     /// The approximate orbit is not an orbit of this system.
     #[error("the candidate is not an orbit: {what}")]
     Candidate {
-        /// Reason.
+        /// The condition that the candidate violates.
         what: &'static str,
     },
 }

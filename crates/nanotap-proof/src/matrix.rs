@@ -17,9 +17,9 @@ pub struct Matrix<T> {
 
 /// An entry of a matrix.
 pub trait Entry: Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> {
-    /// Zero.
+    /// The neutral element of addition.
     const ZERO: Self;
-    /// One.
+    /// The neutral element of multiplication.
     const ONE: Self;
 }
 
@@ -46,32 +46,32 @@ impl<T: Entry> Matrix<T> {
         }
     }
 
-    /// The zero matrix.
+    /// Creates a matrix of zeros.
     pub fn zeros(rows: usize, columns: usize) -> Self {
         Self::from_fn(rows, columns, |_, _| T::ZERO)
     }
 
-    /// The identity.
+    /// Creates the identity matrix of this size.
     pub fn identity(size: usize) -> Self {
         Self::from_fn(size, size, |i, j| if i == j { T::ONE } else { T::ZERO })
     }
 
-    /// Number of rows.
+    /// Returns the number of rows.
     pub const fn rows(&self) -> usize {
         self.rows
     }
 
-    /// Number of columns.
+    /// Returns the number of columns.
     pub const fn columns(&self) -> usize {
         self.columns
     }
 
-    /// Row `i`.
+    /// Returns row `i`, counted from 0.
     pub fn row(&self, i: usize) -> &[T] {
         &self.entries[i * self.columns..(i + 1) * self.columns]
     }
 
-    /// Column `j`.
+    /// Returns a copy of column `j`, counted from 0.
     pub fn column(&self, j: usize) -> Vec<T> {
         (0..self.rows).map(|i| self[(i, j)]).collect()
     }
@@ -96,7 +96,7 @@ impl<T: Entry> Matrix<T> {
     }
 }
 
-/// Σ a_k b_k.
+/// Returns the scalar product Σ a_k b_k.
 pub fn dot<T: Entry>(a: &[T], b: &[T]) -> T {
     a.iter().zip(b).fold(T::ZERO, |sum, (&a, &b)| sum + a * b)
 }

@@ -15,7 +15,7 @@ use crate::interval::Interval;
 use crate::matrix::Matrix;
 use crate::system::Regime;
 
-/// Enclosures of the multipliers.
+/// Enclosures of the Floquet multipliers of an orbit.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Multipliers {
     /// Pairwise disjoint discs that contain all multipliers, the largest multipliers first; empty
@@ -26,9 +26,9 @@ pub struct Multipliers {
 /// A disc of complex numbers that contains `count` multipliers and is disjoint from the others.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Disc {
-    /// Its centre.
+    /// Centre of the disc in the complex plane.
     pub center: Complex<f64>,
-    /// Its radius.
+    /// Radius of the disc, dimensionless like the multipliers.
     pub radius: f64,
     /// Number of multipliers in the disc.
     pub count: usize,
@@ -41,7 +41,7 @@ pub enum Stability {
     Stable,
     /// At least one is outside.
     Unstable,
-    /// Neither is proved.
+    /// Neither stability nor instability is proved.
     Undecided,
 }
 

@@ -21,12 +21,12 @@ use crate::matrix::{Matrix, dot};
 use crate::multipliers::{self, Multipliers};
 use crate::system::{HarmonicVector, Reset, System, Transition};
 
-/// An approximate periodic orbit.
+/// An approximate periodic orbit, near which a proof is attempted.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Candidate {
     /// Period n in drive periods.
     pub period: usize,
-    /// The regime in which the orbit stays if it has no switch.
+    /// Index of the regime in which the orbit stays if it has no switch.
     pub regime: usize,
     /// Switches in order of time.
     pub switches: Vec<Switch>,
@@ -39,9 +39,9 @@ pub struct Switch {
     pub time: f64,
     /// Index of the regime before the switch.
     pub from: usize,
-    /// Index of its transition.
+    /// Index of the transition among those of the regime `from`.
     pub transition: usize,
-    /// The state just after the switch.
+    /// The state just after the switch, d entries in the system's units.
     pub state: Vec<f64>,
 }
 
@@ -52,12 +52,12 @@ pub struct Theorem {
     pub period: usize,
     /// Enclosures of the states at drive phase 0 of each of its periods.
     pub states: Vec<Vec<Interval>>,
-    /// Enclosures of its switches.
+    /// Enclosures of all switches of the orbit, in order of time.
     pub switches: Vec<EnclosedSwitch>,
     /// The neighbourhood in which there is no other orbit; `None` without switches, where no other
     /// orbit stays in the regime.
     pub isolation: Option<Isolation>,
-    /// Enclosures of its multipliers.
+    /// Enclosures of the multipliers of the orbit.
     pub multipliers: Multipliers,
 }
 
@@ -80,7 +80,7 @@ pub struct EnclosedSwitch {
 pub struct Isolation {
     /// Largest difference in the time of any switch, in the system's unit.
     pub time: f64,
-    /// Largest difference in each entry of the state after any switch.
+    /// Largest difference in each entry of the state after any switch, in the units of the entries.
     pub state: Vec<f64>,
 }
 
@@ -291,7 +291,7 @@ impl<'a> Equations<'a> {
         weights
     }
 
-    /// The residual F.
+    /// The residual F of the equations at `at`; zero for an orbit.
     fn residual(&self, at: &Unknowns) -> Vec<Interval> {
         let mut all = Vec::with_capacity(self.size());
         for s in 0..self.legs.len() {
@@ -633,13 +633,13 @@ impl<'a> Equations<'a> {
     }
 }
 
-/// Result of a flight.
+/// Result of the flight from one switch to the next.
 struct FlightResult {
     /// The state at its end.
     end: Vec<Interval>,
     /// The derivative of the end by the state at its start, at fixed times.
     propagator: Matrix<Interval>,
-    /// ẋ at its start.
+    /// The time derivative ẋ at its start, d entries.
     departure: Vec<Interval>,
     /// The tones at its end.
     phasors: Vec<crate::Rectangle>,

@@ -16,7 +16,7 @@ use crate::matrix::{Matrix, dot};
 /// A vector `constant + Σ_k Re(tones_k e^{iω_k t})`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct HarmonicVector {
-    /// The constant part.
+    /// The part that does not depend on time.
     pub constant: Vec<Interval>,
     /// The complex amplitude of each tone.
     pub tones: Vec<Vec<Rectangle>>,
@@ -25,9 +25,9 @@ pub struct HarmonicVector {
 /// A scalar `row · x + constant + Σ_k Re(tones_k e^{iω_k t})`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Output {
-    /// Coefficients of the state.
+    /// Coefficients of the state, one for each of its entries.
     pub row: Vec<Interval>,
-    /// The constant part.
+    /// The part that depends on neither state nor time.
     pub constant: Interval,
     /// The complex amplitude of each tone.
     pub tones: Vec<Rectangle>,
@@ -56,12 +56,12 @@ pub struct Transition {
     pub starts_at_zero: Vec<(usize, usize)>,
 }
 
-/// Definition of a regime.
+/// Definition of a regime: ẋ = A x + f(t), until a guard falls to zero.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RegimeParts {
-    /// A, d × d.
+    /// The matrix A, d × d.
     pub matrix: Matrix<Interval>,
-    /// The forcing f(t).
+    /// The forcing f(t), of length d.
     pub forcing: HarmonicVector,
     /// The exits from the regime.
     pub transitions: Vec<Transition>,
@@ -85,7 +85,7 @@ pub(crate) struct ModalOutput {
     pub(crate) tones: Vec<Rectangle>,
 }
 
-/// A piecewise-linear system.
+/// A piecewise-linear system that is periodically forced, with its regimes.
 #[derive(Clone, Debug)]
 pub struct System {
     pub(crate) dimension: usize,
@@ -186,27 +186,27 @@ impl System {
         }
     }
 
-    /// Dimension d of the state.
+    /// Returns the dimension d of the state.
     pub const fn dimension(&self) -> usize {
         self.dimension
     }
 
-    /// The drive period T.
+    /// Returns an enclosure of the drive period T, in the system's unit of time.
     pub const fn period(&self) -> Interval {
         self.period
     }
 
-    /// The angular frequencies of the tones.
+    /// Returns the angular frequencies of the tones, in rad per unit of time.
     pub fn frequencies(&self) -> &[Interval] {
         &self.frequencies
     }
 
-    /// The definitions of the regimes.
+    /// Returns the definitions of the regimes.
     pub fn regimes(&self) -> impl ExactSizeIterator<Item = &RegimeParts> {
         self.regimes.iter().map(|regime| &regime.parts)
     }
 
-    /// The phasors e^{iω_k t}.
+    /// The phasors e^{iω_k t} of the tones at `time`.
     pub(crate) fn phasors(&self, time: Interval) -> Vec<Rectangle> {
         let turn = |&w: &Interval| Rectangle::imaginary(w * time).exp();
         self.frequencies.iter().map(turn).collect()
@@ -264,7 +264,7 @@ impl Regime {
         self.basis.left.apply(&difference)
     }
 
-    /// The factors e^{λ_k s}.
+    /// The factors e^{λ_k s} of the modal coordinates over a time s.
     pub(crate) fn factors(&self, duration: Interval) -> Vec<Rectangle> {
         let values = self.basis.values.iter();
         values.map(|&z| z.scale(duration).exp()).collect()

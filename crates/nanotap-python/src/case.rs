@@ -27,16 +27,16 @@ pub(crate) struct CaseCore {
     at_setpoint: OnceLock<Solved>,
 }
 
-/// A case at its setpoint, and how that was solved if it was.
+/// A case at its setpoint, and the result of the solution if it was solved for.
 type Solved = (Arc<Case>, Option<SetpointReport>);
 
 impl CaseCore {
-    /// The case, whether or not its distance is left to the setpoint.
+    /// The case, even if its distance still has to be solved for.
     pub(crate) fn at_any_distance(&self) -> Arc<Case> {
         Arc::clone(&self.case)
     }
 
-    /// The case; where its distance is left to the setpoint, that is solved for, once.
+    /// The case; if its distance follows from the setpoint, that is solved for once.
     pub(crate) fn studied(&self, py: Python<'_>) -> PyResult<Arc<Case>> {
         Ok(Arc::clone(&self.solved(py)?.0))
     }
@@ -56,7 +56,7 @@ impl CaseCore {
         Ok(self.at_setpoint.get_or_init(|| (Arc::new(case), report)))
     }
 
-    /// The case with keys that vary, of which one may be the distance itself.
+    /// The case with keys that vary; one of them may be the distance.
     pub(crate) fn variants(&self, py: Python<'_>, keys: &[String]) -> PyResult<Variants> {
         let distance = [Key::GapTip, self.case.gap_key()];
         let of_distance =
@@ -102,7 +102,7 @@ impl CaseCore {
     }
 }
 
-/// The built-in catalogue and further ones.
+/// The built-in catalogue, extended by further ones.
 fn catalogue_of(others: &[(String, String)]) -> Result<Arc<Catalogue>, Failure> {
     let mut catalogue = Catalogue::shared();
     for (origin, text) in others {
@@ -111,8 +111,8 @@ fn catalogue_of(others: &[(String, String)]) -> Result<Arc<Catalogue>, Failure> 
     Ok(catalogue)
 }
 
-/// A case with keys that vary, by the rule of every study: what is not varied stays, as
-/// [`Case::held`] says.
+/// A case with keys that vary, by the rule of every study: everything else stays constant, as
+/// described at [`Case::held`].
 pub(crate) struct Variants {
     case: Arc<Case>,
     /// The case from which numbers vary.
@@ -123,7 +123,7 @@ pub(crate) struct Variants {
 }
 
 impl Variants {
-    /// The case with these `key=value` words.
+    /// The case with these `key=value` words applied.
     pub(crate) fn with(
         &self,
         words: &[String],
@@ -139,7 +139,7 @@ impl Variants {
                 Some((key, value.ok()?))
             });
             match number {
-                // The distance follows from a setpoint anew, and a word or a table restates the case.
+                // A new setpoint changes the distance, and a word or a table restates the case.
                 Some((key, value)) if key != Key::DriveSetpoint => numbers.push((key, value)),
                 _ => stated.push((name, word.clone())),
             }
@@ -164,7 +164,7 @@ impl Variants {
             .fold(case, |case, &(key, value)| case.with(key, value)))
     }
 
-    /// What stays while keys of these names vary although it was not stated, in SI.
+    /// The quantities that stay constant, though not stated, while keys of these names vary; in SI.
     pub(crate) fn held(&self, names: &[String]) -> nanotap::case::Held {
         let keys: Vec<Key> = names
             .iter()

@@ -1,5 +1,5 @@
-//! The reports on many motions as columns: what is a number, a word or a vector of one length in
-//! every report, by the names that single results have.
+//! Reports on many motions as columns: the numbers, words and vectors of one length that every
+//! report has, under the names that single results have.
 
 use std::collections::BTreeMap;
 
@@ -9,28 +9,28 @@ use pyo3::IntoPyObjectExt as _;
 use pyo3::prelude::*;
 use serde_json::{Map, Value};
 
-/// An entry of a report.
+/// A value in a report: a number, a word or a vector.
 #[derive(Clone, Debug, PartialEq)]
 enum Entry {
     Flag(bool),
     Whole(i64),
     Number(f64),
     Word(String),
-    /// Numbers along a dimension.
+    /// Numbers along the dimension with this name.
     Row(&'static str, Vec<f64>),
 }
 
-/// The entries of one report, by name, in its order.
+/// The values of one report with their names, in the order of the report.
 #[derive(Clone, Debug)]
 pub(crate) struct Entries {
     all: Vec<(String, Entry)>,
-    /// How many numbers a state has.
+    /// Number of entries of a state.
     pub(crate) dimension: usize,
-    /// What the energies of its balance are called.
+    /// Names of the energies in the energy balance.
     pub(crate) energies: Vec<String>,
 }
 
-/// The entries of a report on a motion.
+/// Collects the values of a report on a motion.
 pub(crate) fn entries(mut report: Value) -> Entries {
     let mut all = Vec::new();
     let state = report.get("state").or_else(|| report.get("start"));
@@ -66,7 +66,8 @@ pub(crate) fn entries(mut report: Value) -> Entries {
 }
 
 impl Entries {
-    /// States of these names with room for those among `names`, not a number where they have none.
+    /// Arranges states with the entries `own` as states with the entries `names`; missing entries
+    /// are NaN.
     pub(crate) fn among(&mut self, own: &[String], names: &[String]) {
         for (_, entry) in &mut self.all {
             let Entry::Row("state" | "strobe_period", row) = entry else {
@@ -141,7 +142,8 @@ fn gather(
 /// entry after the other.
 pub(crate) type Column = (String, &'static str, Py<PyAny>);
 
-/// The columns of many reports, of which some are missing. What differs in shape is left out.
+/// Arranges many reports, some of which may be missing, as columns. Values that differ in shape are
+/// left out.
 pub(crate) fn columns(py: Python<'_>, reports: &[Option<Entries>]) -> PyResult<Vec<Column>> {
     let mut names: Vec<&str> = Vec::new();
     let mut known: BTreeMap<&str, Vec<Option<&Entry>>> = BTreeMap::new();

@@ -168,7 +168,7 @@ impl Receiver {
     }
 }
 
-/// Computes what is missing, and joins the chunks of a dataset that is finished.
+/// Computes the missing chunks, and joins the chunks of a dataset that is finished.
 fn computed(recipe: &registry::DatasetPlan, store: Store, work: &Work<'_>) -> Result<(), Failure> {
     match recipe.compute(&store, work) {
         Ok(()) => Ok(dataset::finish(store).map(drop)?),

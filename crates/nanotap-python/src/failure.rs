@@ -1,17 +1,17 @@
-//! Errors of the library as Python's: bad input is a `ValueError`, what was right and did not
-//! work out a `RuntimeError`, what the file system refused an `OSError`; with options written
-//! as the keyword arguments that they are.
+//! Errors of the library as Python exceptions: invalid input is a `ValueError`, a failed
+//! computation a `RuntimeError`, an error of the file system an `OSError`. Options are written as
+//! keyword arguments.
 
 use nanotap::{Error, ErrorKind};
 use pyo3::PyErr;
 use pyo3::exceptions::{PyOSError, PyRuntimeError, PyValueError};
 
-/// Why something could not be done.
+/// An error that is raised as a Python exception.
 #[derive(Debug)]
 pub(crate) struct Failure(pub(crate) Error);
 
 impl Failure {
-    /// Bad input.
+    /// Creates the failure of invalid input, with a message.
     pub(crate) fn input(words: impl Into<String>) -> Self {
         Self(Error::new(ErrorKind::BadInput, words))
     }
@@ -26,7 +26,7 @@ impl<E: Into<Error>> From<E> for Failure {
 impl From<Failure> for PyErr {
     fn from(Failure(error): Failure) -> Self {
         let kind = error.kind;
-        // A name that Python keeps for itself has an underscore behind it.
+        // A Python keyword gets an underscore at its end.
         let words = error
             .written(|option| match option {
                 "from" => "from_".to_owned(),

@@ -1,5 +1,5 @@
-//! Work on a separate thread, watched: progress is reported, signals are heard, panics are
-//! caught, and the interpreter is free meanwhile.
+//! Work on a separate thread: progress is reported, signals are handled, panics are caught, and the
+//! interpreter is free meanwhile.
 
 use std::io;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -15,32 +15,32 @@ use rayon::{ThreadPool, ThreadPoolBuilder};
 
 use crate::failure::Failure;
 
-/// Time between two looks at signals and progress.
+/// Time between two checks of signals and progress.
 const INTERVAL: Duration = Duration::from_millis(50);
-/// How long a message is looked for before its thread goes to sleep: to be woken takes as long as
-/// many a motion, and the next of many calls mostly comes before.
+/// Time for which a thread polls for a message before it sleeps: waking it takes as long as many a
+/// motion, and the next of many calls usually comes earlier.
 const AWAKE: Duration = Duration::from_micros(250);
-/// How long cancelled work may take to end. What takes longer is left
-/// alone to end by itself: it holds nothing of Python's.
+/// Time that cancelled work may take to end. Work that takes longer is left to end by itself: it
+/// uses no Python objects.
 const PATIENCE: Duration = Duration::from_millis(900);
-/// The same of work that reports its progress: what it has done is worth waiting for.
-/// A second Ctrl-C does not wait.
+/// The same for work that reports its progress, whose finished part is worth waiting for. A second
+/// Ctrl-C does not wait.
 const LONG_PATIENCE: Duration = Duration::from_secs(5);
 
-/// What came of watched work.
+/// Result of watched work.
 pub(crate) struct Watched<R> {
-    /// The result, what was done of it if it was stopped.
+    /// The result; if the work was stopped, the part that was finished.
     pub(crate) result: R,
-    /// Whether Ctrl-C stopped it.
+    /// Whether Ctrl-C stopped the work.
     pub(crate) interrupted: bool,
 }
 
-/// Does `work` with a control that tells `progress(done, total)` and stops at Ctrl-C; its
-/// parallel parts run on the threads of this process.
+/// Runs `work` with a control that calls `progress(done, total)` and stops at Ctrl-C; its parallel
+/// parts run on the threads of this process.
 ///
 /// # Errors
-/// Those of the work, those that `progress` raises, `KeyboardInterrupt` where the work did
-/// not hear that it was to stop, and `RuntimeError` for a panic.
+/// Those of the work, those that `progress` raises, `KeyboardInterrupt` if the work did not react
+/// to the cancellation, and `RuntimeError` for a panic.
 pub(crate) fn watched<R: Send + 'static>(
     py: Python<'_>,
     progress: Option<Py<PyAny>>,
@@ -50,7 +50,7 @@ pub(crate) fn watched<R: Send + 'static>(
     watched_alone(py, progress, work)
 }
 
-/// The same for work without parallel parts: to wake the threads of this process would cost more
+/// The same for work without parallel parts: waking the threads of this process would take longer
 /// than many a motion.
 ///
 /// # Errors
@@ -116,7 +116,7 @@ pub(crate) fn watched_alone<R: Send + 'static>(
     })
 }
 
-/// Hears signals and tells progress.
+/// Handles pending signals and reports progress to Python.
 fn look(
     py: Python<'_>,
     progress: Option<&Py<PyAny>>,
@@ -157,8 +157,7 @@ fn ended<R>(done: Outcome<R>, stopped: Option<PyErr>) -> PyResult<Watched<R>> {
     }
 }
 
-/// A message that is there already, or comes before a thread that waits would go to sleep. Other
-/// threads go first meanwhile.
+/// Waits for a message for [`AWAKE`] at most, without sleeping; other threads run meanwhile.
 fn soon<T>(messages: &Receiver<T>) -> Option<T> {
     let since = Instant::now();
     loop {
@@ -171,11 +170,11 @@ fn soon<T>(messages: &Receiver<T>) -> Option<T> {
     }
 }
 
-/// Work that ends in the message that it is done.
+/// Work that returns the call which reports its result.
 type Job = Box<dyn FnOnce() -> Box<dyn FnOnce()> + Send>;
 
-/// Does `job` on a thread that waits for work, or on a new one: to start a thread costs more than
-/// many a motion.
+/// Runs `job` on an idle thread, or on a new one: starting a thread takes longer than many a
+/// motion.
 fn elsewhere(job: Job) -> io::Result<()> {
     static IDLE: Mutex<OfThisProcess<Vec<Sender<Job>>>> = Mutex::new(OfThisProcess(None));
     const MAX_IDLE: usize = 8;
@@ -191,8 +190,8 @@ fn elsewhere(job: Job) -> io::Result<()> {
     let work = move || {
         loop {
             let tell = job();
-            // Before anybody hears of the result: a process that forks then must not find the
-            // list locked.
+            // Before the result is reported: a process that forks then must not find the list
+            // locked.
             let stays = lock(&IDLE)
                 .get_or_make(|| Ok(Vec::new()))
                 .is_ok_and(|idle| {
@@ -216,8 +215,8 @@ fn elsewhere(job: Job) -> io::Result<()> {
     Ok(())
 }
 
-/// What belongs to the threads of one process. They do not survive a fork: a child that waited
-/// for those of its parent would wait for ever, so it makes its own.
+/// A value that belongs to one process, such as its threads. Threads do not survive a fork: a child
+/// that waited for those of its parent would wait for ever, so it creates its own.
 struct OfThisProcess<T>(Option<(u32, T)>);
 
 impl<T> OfThisProcess<T> {
@@ -238,7 +237,7 @@ fn lock<T>(shared: &Mutex<T>) -> MutexGuard<'_, T> {
     shared.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// One thread a core.
+/// Returns the thread pool of this process, with one thread per core.
 fn threads_of_this_process() -> Result<Arc<ThreadPool>, Failure> {
     static POOL: Mutex<OfThisProcess<Arc<ThreadPool>>> = Mutex::new(OfThisProcess(None));
     let make = || {

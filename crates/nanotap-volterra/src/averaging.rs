@@ -20,37 +20,38 @@ use nalgebra::DVector;
 use nanotap_arithmetic::ComplexFunctions as _;
 use std::f64::consts::{PI, TAU};
 
-/// Amplitudes at which the equation is evaluated.
+/// Number of amplitudes at which the equation is evaluated.
 const AMPLITUDES: usize = 400;
-/// Phases over one oscillation, denser towards the sample.
+/// Number of phases over one oscillation, denser towards the sample.
 const PHASES: usize = 240;
-/// Harmonics of the force in the state.
+/// Number of harmonics of the force in the state.
 const HARMONICS: usize = 12;
-/// Newton steps for the mean gap.
+/// Largest number of Newton steps for the mean gap.
 const MAX_ITERATIONS: usize = 12;
-/// What may be left of the drive's amplitude at a root.
+/// Largest residual of a root, as a fraction of the drive's amplitude; beyond it the sign changes
+/// only because the force jumps.
 const MAX_RESIDUAL: f64 = 0.5;
-/// How far the force may shift the mean gap, in units of the size of gaps and amplitudes.
+/// Largest shift of the mean gap by the force, as a multiple of the size of gaps and amplitudes.
 const MAX_SHIFT: f64 = 3.0;
-/// Halvings of an interval that holds a root.
+/// Number of halvings of an interval that contains a root.
 const BISECTIONS: usize = 30;
 
 /// A guess of a periodic motion.
 #[derive(Clone, Debug, PartialEq)]
 pub struct AveragedMotion {
-    /// The state at drive phase 0.
+    /// State at drive phase 0, of length `n`, in the system's units.
     pub state: Vec<f64>,
-    /// The branch of the law there.
+    /// Branch of the law at drive phase 0.
     pub branch: usize,
-    /// Amplitude of the gap at the strongest tone.
+    /// Amplitude of the gap at the strongest tone, in the unit of the gap.
     pub amplitude: f64,
 }
 
-/// The system as averaging sees it.
+/// The linear response of a system to the strongest tone and to a force, as averaging uses it.
 struct Averaging<'a> {
     system: &'a System,
     frequency: f64,
-    /// Of the tone in the gap without the force.
+    /// Complex amplitude of the tone in the gap without the force.
     drive: Complex,
     compliance: f64,
     receptance: Complex,
@@ -71,14 +72,14 @@ struct Phase {
 #[derive(Clone, Copy, Debug, Default)]
 struct Average {
     mean: f64,
-    /// Of the mean by the mean gap.
+    /// Derivative of the mean force by the mean gap.
     slope: f64,
     first: Complex,
 }
 
 impl<'a> Averaging<'a> {
-    /// `None` without a drive that moves the gap, where a mode has no response, of a surface that
-    /// relaxes, and of a force that depends on time.
+    /// Returns `None` for a system without a drive that moves the gap, with a mode that has no
+    /// response, with a surface that relaxes, or with a force that depends on time.
     fn new(system: &'a System) -> Option<Self> {
         if system.law().surface().is_some() || system.law().takes_signal() {
             return None;
@@ -135,7 +136,7 @@ impl<'a> Averaging<'a> {
         }
     }
 
-    /// The branch at this gap and rate, coming from another.
+    /// Returns the branch at this gap and rate after the branch `branch`.
     fn next_branch(&self, mut branch: usize, gap: f64, rate: f64) -> usize {
         let law = self.system.law();
         for _ in 0..law.branches() {
@@ -164,14 +165,14 @@ impl<'a> Averaging<'a> {
         out
     }
 
-    /// With the derivative of the mean force by the mean gap.
+    /// Averages the force, with the derivative of its mean by the mean gap.
     fn average_with_slope(&self, mean: f64, amplitude: f64, step: f64) -> Average {
         let mut here = self.average(mean, amplitude);
         here.slope = (self.average(mean + step, amplitude).mean - here.mean) / step;
         here
     }
 
-    /// The mean gap at this amplitude, near a guess; not a number where it runs away.
+    /// Returns the mean gap at this amplitude, near a guess; NaN if it diverges.
     fn mean_gap(&self, amplitude: f64, guess: f64, size: f64) -> (f64, Average) {
         let rest = self.system.gap_constant;
         let (mut mean, mut average) = (guess, Average::default());
@@ -195,12 +196,12 @@ impl<'a> Averaging<'a> {
         (mean, average)
     }
 
-    /// By how much the drive's amplitude falls short of what this motion takes.
+    /// Returns the amplitude that this motion requires of the drive minus that of the drive.
     fn residual(&self, amplitude: f64, average: &Average) -> f64 {
         (amplitude - self.receptance * average.first).modulus() - self.drive.modulus()
     }
 
-    /// The state at phase 0 of the motion with this mean gap and amplitude.
+    /// Returns the motion with this mean gap and amplitude, with its state at phase 0.
     fn motion(&self, mean: f64, amplitude: f64) -> Option<AveragedMotion> {
         let average = self.average(mean, amplitude);
         // The residual may also change sign where the force jumps.
@@ -249,13 +250,13 @@ impl<'a> Averaging<'a> {
         })
     }
 
-    /// The size of gaps and amplitudes.
+    /// Returns the size of gaps and amplitudes, in the unit of the gap.
     fn size(&self) -> f64 {
         self.drive.modulus().max(self.system.gap_constant.abs())
     }
 }
 
-/// Modal response to a unit of force at a frequency.
+/// Computes the modal response to a unit force at a frequency.
 fn response(system: &System, frequency: f64) -> Result<DVector<Complex>, VolterraError> {
     let source = system.kernel().source.iter();
     let source = source.map(|b| Complex::new(*b, 0.0)).collect();
@@ -265,8 +266,8 @@ fn response(system: &System, frequency: f64) -> Result<DVector<Complex>, Volterr
         .response(frequency, &DVector::from_vec(source))
 }
 
-/// Motions of `system` by averaging, those of small amplitude first: the roots in the amplitude,
-/// with the mean gap followed from each of `rests`, gaps at which the lever can rest.
+/// Computes motions of `system` by averaging, in order of increasing amplitude: the roots in the
+/// amplitude, with the mean gap followed from each of `rests`, gaps at which the lever can rest.
 pub fn motions(system: &System, rests: &[f64]) -> Vec<AveragedMotion> {
     let Some(averaging) = Averaging::new(system) else {
         return Vec::new();
@@ -311,7 +312,8 @@ pub fn motions(system: &System, rests: &[f64]) -> Vec<AveragedMotion> {
     found
 }
 
-/// The linear response to the drive about a rest of the lever at `gap` on a branch of the law.
+/// Computes the linear response to the drive about a rest of the lever at `gap` on a branch of the
+/// law.
 pub fn about_rest(system: &System, branch: usize, gap: f64) -> Option<AveragedMotion> {
     let averaging = Averaging::new(system)?;
     let force = system.law().force(branch, gap, 0.0);

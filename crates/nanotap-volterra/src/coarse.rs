@@ -25,44 +25,45 @@ use nalgebra::DMatrix;
 use std::f64::consts::TAU;
 use std::sync::Arc;
 
-/// Tabulated step lengths; the longest is a sixteenth of the fastest tone's period.
+/// Number of tabulated step lengths; the longest is a sixteenth of the fastest tone's period.
 const LEVELS: usize = 20;
 /// The level of a period's first step.
 const FIRST_LEVEL: usize = 2;
-/// How much a step may change the gap's rate by its estimated error, as a part of the drive's
+/// Largest change of the gap's rate by a step's estimated error, as a fraction of the drive's
 /// frequency times the size of the motion.
 pub const TOLERANCE: f64 = 2e-5;
-/// A step with less than this part of the allowed error is followed by one twice as long.
+/// Fraction of the allowed error below which the next step is twice as long.
 const GROWTH: f64 = 1.0 / 12.0;
-/// Part of the amplitude that counts as the size of the motion where the gap is smaller.
+/// Fraction of the amplitude that is the size of the motion if the gap is smaller.
 const SWING: f64 = 0.3;
-/// How far beyond its level, as a part of the size of the motion, a switch is located: where
-/// the force jumps, and where it is continuous.
+/// Overshoot at which a switch is located, as a fraction of the size of the motion: if the force
+/// jumps, and if it is continuous.
 const BEYOND: [f64; 2] = [1e-8, 1e-6];
-/// Modes that turn further on half a step are not resolved by the search for switches.
+/// Angle, in radians, through which a mode may turn on half a step and still be resolved by the
+/// search for switches.
 const RESOLVED: f64 = 1.5;
-/// Amplitude of unresolved modes, as a part of the size of the motion, that shortens steps near
-/// a switch.
+/// Amplitude of unresolved modes, as a fraction of the size of the motion, above which steps near a
+/// switch are shortened.
 const UNRESOLVED: f64 = 1e-4;
-/// The most steps tried in one oscillation of the fastest tone.
+/// Largest number of steps tried in one oscillation of the fastest tone.
 const MAX_STEPS: u64 = 20_000;
-/// Evaluations of the force in an explicit step.
+/// Number of evaluations of the force in an explicit step.
 const STEP_EVALUATIONS: u64 = 4;
-/// Steps counted towards a budget, and steps between looks at the flag that cancels the work.
+/// Number of steps between two updates of the budget and checks of the cancel flag.
 const POLL: u64 = 64;
-/// Switches at one instant after which the law is reported to switch endlessly.
+/// Number of switches at one instant above which an endless sequence of switches is reported.
 const MAX_SWITCHES_AT_ONCE: usize = 64;
-/// A law of more branches that knows its branch from gap and rate is evaluated without
-/// locating the switches between them.
+/// Largest number of branches for which switches are located; a law with more, whose gap and rate
+/// determine the branch, is evaluated by lookup.
 const MAX_LOCATED_BRANCHES: usize = 8;
 /// Decay of a disturbance over a step by the force's damping, as an exponent, above which the step is
 /// implicit.
 const STIFF: f64 = 1.0;
-/// Part of the allowed error to which the forces of an implicit step are iterated.
+/// Fraction of the allowed error to which the forces of an implicit step are iterated.
 const CONVERGED: f64 = 0.02;
-/// Iterations for the forces of an implicit step.
+/// Largest number of iterations for the forces of an implicit step.
 const MAX_ITERATIONS: usize = 10;
-/// Steps of the bracketed search for a switch.
+/// Largest number of steps of the bracketed search for a switch.
 const MAX_BISECTIONS: usize = 48;
 
 /// An approximate motion of a [`System`] over drive periods, with its work space. Cloning shares
@@ -82,7 +83,7 @@ struct Work {
     stages: Stages,
     /// Derivatives of the modal coordinates, one column after another; empty if not carried.
     columns: Vec<[f64; 2]>,
-    /// The size of the motion, in the unit of the gap.
+    /// Size of the motion, in the unit of the gap.
     size: f64,
     /// Integrals of the force, where requested, with the angular frequency of the harmonic.
     sums: Option<(ForceSums, f64)>,
@@ -124,11 +125,12 @@ struct Tables {
 #[derive(Clone, Copy, Debug)]
 struct CoarseExit {
     exit: Exit,
-    /// See [`BEYOND`].
+    /// Overshoot at which the switch is located, as a fraction of the size of the motion; see
+    /// [`BEYOND`].
     beyond: f64,
 }
 
-/// Where a motion is.
+/// The position of a motion within a period, with gap, rate and force there.
 #[derive(Clone, Debug)]
 struct Motion {
     time: f64,
@@ -136,7 +138,7 @@ struct Motion {
     modal: Vec<[f64; 2]>,
     /// `(cos ωt, sin ωt)` of each tone.
     phasors: Vec<[f64; 2]>,
-    /// What is added to the gap of the tables' system.
+    /// Shift that is added to the gap of the tables' system.
     shift: f64,
     gap: f64,
     rate: f64,
@@ -152,7 +154,7 @@ struct Stages {
     /// Whether the second stage is at a third of the step, and its force unknown, as that of the
     /// last.
     implicit: bool,
-    /// Evaluations of the force and its slopes that it took.
+    /// Number of evaluations of the force and its slopes.
     evaluations: u64,
 }
 
@@ -165,21 +167,21 @@ struct ImplicitLevel {
     weights: [[[f64; 2]; 2]; 3],
 }
 
-/// The same of one block.
+/// The block's coordinates in an [`ImplicitLevel`].
 #[derive(Clone, Copy, Debug, Default)]
 struct ImplicitBlock {
-    /// `e^{Bh/3}`.
+    /// Exponential `e^{Bh/3}` of the block over a third of the step.
     third: [[f64; 2]; 2],
     /// Coordinates at the end from the two forces.
     weights: [[f64; 2]; 2],
 }
 
-/// Everything about a step that its length fixes.
+/// Quantities of a step that depend on its length only.
 #[derive(Clone, Debug, Default)]
 struct Level {
     length: f64,
     blocks: Vec<BlockStep>,
-    /// `(cos, sin)` of what each tone turns in half a step.
+    /// `(cos, sin)` of the angle through which each tone turns in half a step.
     turns: Vec<[f64; 2]>,
     /// Gap and rate in the middle from the force before.
     middle: [f64; 2],
@@ -192,13 +194,13 @@ struct Level {
     unresolved: Vec<usize>,
     implicit: ImplicitLevel,
     implicit_blocks: Vec<ImplicitBlock>,
-    /// `(cos, sin)` of what each tone turns in a third of a step.
+    /// `(cos, sin)` of the angle through which each tone turns in a third of a step.
     third_turns: Vec<[f64; 2]>,
 }
 
 #[derive(Clone, Copy, Debug, Default)]
 struct BlockStep {
-    /// `e^{Bh/2}`.
+    /// Exponential `e^{Bh/2}` of the block over half a step.
     half: [[f64; 2]; 2],
     /// Coordinates at the end from the forces at the start, in the middle (each of the two)
     /// and at the end.
@@ -260,7 +262,7 @@ fn moments(block: &Block, h: f64, exp: &[[f64; 2]; 2], b: [f64; 2]) -> [[f64; 2]
 }
 
 impl Level {
-    /// Fills what an implicit step of its length needs.
+    /// Computes the quantities of an implicit step of its length.
     fn set_implicit(&mut self, system: &System, parts: &Readouts<'_>) {
         let h = self.length;
         self.implicit_blocks.clear();
@@ -305,7 +307,7 @@ impl Level {
         }));
     }
 
-    /// Fills it for a step of length `h`.
+    /// Computes the quantities of a step of length `h`.
     fn set(&mut self, system: &System, parts: &Readouts<'_>, h: f64) {
         let kernel = system.kernel();
         self.length = h;
@@ -514,7 +516,7 @@ impl Tables {
         }
     }
 
-    /// The force on a branch; beyond the gaps where the branch holds, that at their end.
+    /// Returns the force on a branch; beyond the gaps of the branch, the force at their end.
     fn force(&self, branch: usize, gap: f64, rate: f64) -> f64 {
         let law = self.system.law();
         if self.by_lookup {
@@ -546,7 +548,7 @@ impl Tables {
         }
     }
 
-    /// The guard's derivatives by gap and rate.
+    /// Returns the guard's derivatives by gap and rate.
     fn guard_slopes(&self, guard: Guard, gap: f64, rate: f64) -> [f64; 2] {
         match guard {
             Guard::Falls(_) => [1.0, 0.0],
@@ -574,7 +576,7 @@ impl Tables {
         (motion.gap, motion.rate) = (gap, rate);
     }
 
-    /// A step, explicit or not.
+    /// Computes a step, explicit or implicit; returns the estimate of its error in the gap's rate.
     fn step_by(
         &self,
         implicit: bool,
@@ -703,7 +705,7 @@ impl Tables {
         unit * missed.abs() / (6.0 * (1.0 + unit * by_rate.abs()))
     }
 
-    /// One step; returns the estimate of its error in the gap's rate.
+    /// Computes one explicit step; returns the estimate of its error in the gap's rate.
     #[inline]
     fn step(&self, level: &Level, from: &Motion, to: &mut Motion, stages: &mut Stages) -> f64 {
         let constant = self.system.gap_constant + from.shift;
@@ -759,7 +761,7 @@ impl Tables {
         level.length * self.mobility * ((k1 - k2 - k3 + k4).abs() + (k2 - k3).abs()) / 6.0
     }
 
-    /// Whether tip and sample touch.
+    /// Reports whether tip and sample touch.
     fn touch(&self, motion: &Motion) -> bool {
         let law = self.system.law();
         if self.by_lookup {
@@ -948,7 +950,7 @@ fn solve([[a, b], [c, d]]: &[[f64; 2]; 2], [x, y]: [f64; 2]) -> Option<[f64; 2]>
     solution.iter().all(|v| v.is_finite()).then_some(solution)
 }
 
-/// A stretch of a step between two points where gap and rate are known.
+/// A part of a step between two points at which gap and rate are known.
 #[derive(Clone, Copy, Debug)]
 struct Stretch {
     start: f64,
@@ -991,7 +993,8 @@ impl Stretch {
         })
     }
 
-    /// Where the cubic falls to zero between 0 and `end`, with opposite signs there.
+    /// Returns the fraction at which the cubic falls to zero between 0 and `end`, given opposite
+    /// signs there.
     fn root(&self, end: f64) -> f64 {
         let (mut low, mut high) = (0.0, end);
         for _ in 0..20 {
@@ -1015,11 +1018,11 @@ struct Fall {
 }
 
 impl Coarse {
-    /// The approximate flow of `system` over periods of length `period`, which every tone of
-    /// its drive divides.
+    /// Creates the approximate flow of `system` over periods of length `period`, which must be a
+    /// multiple of the period of every tone.
     ///
     /// # Errors
-    /// When the period is no positive number, or a mode neither restores nor decays.
+    /// If the period is not positive and finite, or a mode neither restores nor decays.
     pub fn new(system: &Arc<System>, period: f64) -> Result<Self, VolterraError> {
         let tables = Arc::new(Tables::new(system, period)?);
         let motion = Motion {
@@ -1045,23 +1048,23 @@ impl Coarse {
         Ok(Self { tables, work })
     }
 
-    /// What the runs so far have cost.
+    /// Returns the cost of the runs so far.
     pub fn statistics(&self) -> Statistics {
         self.work.statistics
     }
 
-    /// Evaluations of the force in the runs so far, in those of an explicit step.
+    /// Returns the cost of the runs so far: evaluations of the force, in units of an explicit step.
     pub fn cost(&self) -> u64 {
         self.work.cost()
     }
 
-    /// Replaces `state` at drive phase 0 by the state so many periods later and returns the
-    /// branch of the law there. The motion begins on `branch` where gap and rate allow it,
-    /// otherwise on the branch that the law takes when nothing is known of the past.
+    /// Replaces `state` at drive phase 0 by the state after `periods` periods and returns the
+    /// branch of the law there. The motion begins on `branch` if gap and rate allow it, otherwise
+    /// on the branch that the law takes without a history.
     ///
     /// # Errors
-    /// When the state has the wrong length or is not finite, the motion diverges, takes too many
-    /// steps, or switches without end.
+    /// If the state has the wrong length or is not finite, or the motion diverges, takes too many
+    /// steps, or switches endlessly.
     pub fn run_periods(
         &mut self,
         state: &mut [f64],
@@ -1077,8 +1080,9 @@ impl Coarse {
         Ok(work.end(tables, state))
     }
 
-    /// As [`Coarse::run_periods`] over one period with `shift` added to the gap of the system; sums
-    /// the force, with its component at the angular frequency `omega`.
+    /// Runs one period as [`Coarse::run_periods`] does, with `shift` added to the gap of the
+    /// system. Integrates the force, with its component at the angular frequency `omega`, which
+    /// must be that of the first tone.
     ///
     /// # Errors
     /// As [`Coarse::run_periods`].
@@ -1484,7 +1488,7 @@ impl Work {
     }
 }
 
-/// How far beyond zero a guard is located, in its unit.
+/// Returns how far beyond zero a guard is located, in the unit of the guard.
 fn exit_tolerance(tables: &Tables, exit: &CoarseExit, motion: &Motion, size: f64) -> f64 {
     let beyond = exit.beyond * size;
     match exit.exit.guard {
@@ -1503,8 +1507,8 @@ enum Search {
     Refused,
 }
 
-/// Looks for the first fall of a guard on a step, and whether the least gap on it meets a force
-/// that the step has not seen.
+/// Searches for the first fall of a guard on a step, and reports whether the least gap on it meets
+/// a force that the step has not evaluated.
 fn search(
     tables: &Tables,
     level: &Level,

@@ -1,8 +1,8 @@
-//! Why a flow cannot be built or run.
+//! Errors in building or running a flow.
 
 use thiserror::Error;
 
-/// What can go wrong in building or running a flow under a nonlinear force.
+/// An error in building or running a flow under a nonlinear force.
 #[derive(Clone, Debug, Error, PartialEq)]
 #[non_exhaustive]
 pub enum VolterraError {
@@ -11,7 +11,7 @@ pub enum VolterraError {
     Shape {
         /// The thing whose size is wrong.
         what: &'static str,
-        /// Its size.
+        /// Size found: a number of entries, rows or columns.
         found: usize,
         /// The size that would fit.
         expected: usize,
@@ -19,21 +19,21 @@ pub enum VolterraError {
     /// A size or count is beyond its limit.
     #[error("{what} is {found}, beyond the limit of {limit}")]
     TooLarge {
-        /// The thing counted.
+        /// Description of the items counted.
         what: &'static str,
-        /// How many.
+        /// Number found.
         found: usize,
-        /// How many there may be.
+        /// Largest number allowed.
         limit: usize,
     },
     /// A number is not finite or lies outside the range in which it makes sense.
     #[error("{what} must be {needed}, got {found}")]
     Value {
-        /// The quantity.
+        /// Description of the quantity.
         what: String,
-        /// Its value.
+        /// Value found, in the unit of the quantity; NaN if a required value is missing.
         found: f64,
-        /// What would do.
+        /// Description of the values allowed.
         needed: &'static str,
     },
     /// The matrix of the modes has no basis of invariant lines and planes that double
@@ -43,7 +43,7 @@ pub enum VolterraError {
          more eigenvalues (nearly) coincide, so move the parameters"
     )]
     IllConditioned {
-        /// Relative residual of the best basis found.
+        /// Relative residual of the best basis found, dimensionless.
         residual: f64,
     },
     /// An undamped mode is driven at its own frequency: the linear response is unbounded.
@@ -52,37 +52,37 @@ pub enum VolterraError {
          nonlinear force the response grows without bound, so add damping or move the frequency"
     )]
     Resonance {
-        /// Angular frequency of the tone (0: the constant force).
+        /// Angular frequency of the tone, in radians per unit of time (0: the constant force).
         frequency: f64,
     },
-    /// The force would act on the gap's rate without inertia in between.
+    /// The force would change the gap's rate instantly, without inertia between them.
     #[error("the force changes the gap's rate at once: the gap must be a displacement")]
     Inertialess,
-    /// No law of that name.
+    /// The table of laws contains no law of that name.
     #[error("there is no law called {name:?}")]
     UnknownLaw {
-        /// The name given.
+        /// Name that was looked up.
         name: String,
     },
-    /// Laws that must not be added.
+    /// Two laws that must not be added.
     #[error("{first} and {second} cannot be added: {reason}")]
     Sum {
-        /// One law.
+        /// Name of the first law of the pair.
         first: &'static str,
-        /// The other.
+        /// Name of the second law of the pair.
         second: &'static str,
-        /// Why not.
+        /// Reason why their sum would be wrong.
         reason: &'static str,
     },
-    /// The approximate flow has no surface that relaxes.
+    /// The approximate flow does not support a surface that relaxes.
     #[error("the approximate flow does not follow a surface that relaxes")]
     Relaxing,
-    /// Maxwell arms that make no sense.
+    /// Invalid Maxwell arms.
     #[error("arm {arm} of the relaxing sample: {reason}")]
     Arms {
-        /// Counted from 1.
+        /// Number of the invalid arm, counted from 1.
         arm: usize,
-        /// What is wrong there.
+        /// Description of what is wrong with this arm.
         reason: &'static str,
     },
     /// A solid without a modulus at rest.
@@ -91,12 +91,12 @@ pub enum VolterraError {
          which its slower arms count as elastic"
     )]
     Flows,
-    /// A table of a force is no function.
+    /// The rows of a table do not define a force as a function of the gap.
     #[error("row {row} of the force table: {reason}")]
     Table {
-        /// Counted from 1.
+        /// Number of the invalid row, counted from 1.
         row: usize,
-        /// What is wrong there.
+        /// Description of what is wrong with this row.
         reason: &'static str,
     },
     /// The work was cancelled from outside.
@@ -105,17 +105,19 @@ pub enum VolterraError {
     /// The motion left the range of double precision.
     #[error("the motion grew beyond the range of double precision at time {time}")]
     Diverged {
-        /// When.
+        /// Time at which the motion diverged, in the system's unit of time; in the approximate flow
+        /// from the start of the drive period.
         time: f64,
     },
-    /// No step however short could be certified.
+    /// No step, however short, could be certified.
     #[error("no step from time {time} (gap {gap}) could be certified: {reason}")]
     Uncertified {
-        /// When.
+        /// Time at which the refused step starts, in the system's unit of time; in the approximate
+        /// flow from the start of the drive period.
         time: f64,
-        /// The gap there.
+        /// Gap at that time, in the unit of the gap.
         gap: f64,
-        /// What the last attempt failed by.
+        /// Reason why the last attempt was refused.
         reason: Refusal,
     },
     /// More steps were needed than are allowed.
@@ -125,17 +127,19 @@ pub enum VolterraError {
          `exponential-damping` raise `decay_length` or lower `damping`"
     )]
     TooManySteps {
-        /// The steps taken.
+        /// Number of steps taken.
         steps: usize,
-        /// The time reached.
+        /// Time reached, in the system's unit of time; in the approximate flow from the start of
+        /// the drive period.
         time: f64,
     },
-    /// The law switched again and again at one instant.
+    /// The law switched endlessly at one instant.
     #[error("the law switches without end at time {time} (gap {gap})")]
     Accumulation {
-        /// When.
+        /// Time of the switches, in the system's unit of time; in the approximate flow from the
+        /// start of the drive period.
         time: f64,
-        /// The gap there.
+        /// Gap at that time, in the unit of the gap.
         gap: f64,
     },
 }

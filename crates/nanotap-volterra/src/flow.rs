@@ -11,42 +11,43 @@ use crate::step::{Quality, Solver, Statistics, Step, gap_scale};
 use crate::system::System;
 use std::sync::Arc;
 
-/// Switches at one instant after which the law is reported to switch endlessly.
+/// Number of switches at one instant above which an endless sequence of switches is reported.
 const MOST_SWITCHES_AT_ONCE: usize = 64;
 /// Evaluations of the force in closed form that cost as much as a step of the approximate flow, and
 /// what a factorisation costs in such steps.
 const STEP_EVALUATIONS: u64 = 2;
 const FACTORISATION_COST: u64 = 8;
-/// The first step of a run: a quarter of the longest.
+/// Length number of the first step of a run: a quarter of the longest step.
 const FIRST_INDEX: usize = 4;
-/// Length of a step that is to pass the end of a piece of a curve, over the time to that end.
+/// Length of a step that is to pass the end of a piece of a curve, as a multiple of the time to
+/// that end.
 const PAST_END: f64 = 1.45;
-/// A guard that is not certainly positive must be resolved to this fraction of its size.
+/// Fraction of its size to which a guard that is not certainly positive must be resolved.
 const RESOLVED: f64 = 1e-11;
-/// The same on the first step after a switch.
+/// The same fraction on the first step after a switch.
 const RESOLVED_FRESH: f64 = 1e-8;
-/// What is rounding in a gap or its rate, as a part of the size of their terms: just before a
+/// Rounding error in a gap or its rate, as a fraction of the size of their terms: just before a
 /// switch a guard is hardly larger, and no shorter step resolves it better.
 const ROUNDING: f64 = 64.0 * f64::EPSILON;
 
-/// A switch of the law.
+/// A switch of the law from one branch to another.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Switch {
-    /// When.
+    /// Time of the switch, in the system's unit of time.
     pub time: f64,
-    /// The branch left.
+    /// Number of the branch that is left.
     pub from: usize,
-    /// The number of the exit taken.
+    /// Number of the exit among those of the branch that is left.
     pub exit: usize,
-    /// The branch entered.
+    /// Number of the branch that is entered.
     pub to: usize,
-    /// The gap.
+    /// Gap at the switch, in the unit of the gap; exactly the level of a guard at a gap.
     pub gap: f64,
-    /// Its rate.
+    /// Rate of the gap at the switch, in units of the gap per unit of time; negative on approach.
     pub rate: f64,
 }
 
-/// Something that follows a run.
+/// An observer of a run.
 pub(crate) trait Observer {
     /// Whether perturbations of the motion are followed: steps must then resolve what every mode
     /// does to the force, and not only the motion.
@@ -156,7 +157,7 @@ enum Attempt {
 }
 
 impl Flow {
-    /// A flow of `system`, at time 0 in the state zero.
+    /// Creates a flow of `system`, at time 0 in the state zero.
     pub fn new(system: Arc<System>) -> Self {
         let n = system.kernel().nodes;
         let zeros = vec![0.0; n];
@@ -190,23 +191,23 @@ impl Flow {
         flow
     }
 
-    /// The system.
+    /// Returns the system whose motion this is.
     pub fn system(&self) -> &Arc<System> {
         &self.system
     }
 
-    /// The system, to change its offset; a copy where others share it. Start the motion anew
+    /// Returns the system for a change of its offset; a copy if it is shared. Restart the motion
     /// afterwards.
     pub fn system_mut(&mut self) -> &mut System {
         Arc::make_mut(&mut self.system)
     }
 
-    /// What the runs so far have cost.
+    /// Returns the cost of the runs so far.
     pub fn statistics(&self) -> Statistics {
         self.solver.statistics
     }
 
-    /// Cost of the runs so far, in steps of the approximate flow.
+    /// Returns the cost of the runs so far, in steps of the approximate flow.
     pub fn cost(&self) -> u64 {
         let statistics = self.solver.statistics;
         let evaluations = self.system.law().cost() * statistics.evaluations;
@@ -215,26 +216,26 @@ impl Flow {
             + self.added_cost
     }
 
-    /// Adds the cost of work that a clone did.
+    /// Adds the cost of work done by a clone.
     pub fn add_cost(&mut self, cost: u64) {
         self.added_cost += cost;
     }
 
-    /// The time reached.
+    /// Returns the time reached, in the system's unit of time.
     pub fn time(&self) -> f64 {
         self.time
     }
 
-    /// The branch of the law.
+    /// Returns the number of the present branch of the law.
     pub fn branch(&self) -> usize {
         self.branch
     }
 
-    /// Puts the motion at state `x` at a time, on the branch that the law takes when nothing
-    /// is known of the past.
+    /// Sets the motion to state `x` at time `time`, on the branch that the law takes without a
+    /// history.
     ///
     /// # Errors
-    /// When the length is wrong or a value is not finite.
+    /// If the length is wrong or a value is not finite.
     pub fn start(&mut self, x: &[f64], time: f64) -> Result<(), VolterraError> {
         let n = self.system.dimension();
         if x.len() != n {
@@ -282,12 +283,12 @@ impl Flow {
         Ok(())
     }
 
-    /// Writes the state to `x`.
+    /// Writes the state, of length `n`, to `x`.
     pub fn state(&self, x: &mut [f64]) {
         self.system.to_state(self.time, &self.modal, x);
     }
 
-    /// The gap and its rate.
+    /// Returns the gap and its rate.
     pub fn gap(&self) -> (f64, f64) {
         self.system.gap_of(self.time, &self.modal)
     }
@@ -295,7 +296,7 @@ impl Flow {
     /// Runs to time `end`.
     ///
     /// # Errors
-    /// When no step could be certified, the motion diverges, or the law switches without end.
+    /// If no step could be certified, the motion diverges, or the law switches endlessly.
     pub fn run_until(&mut self, end: f64) -> Result<(), VolterraError> {
         self.run(end, &mut ())
     }
@@ -375,8 +376,9 @@ impl Flow {
         Ok(())
     }
 
-    /// Tries steps until one stands. Returns the exit taken on it and where, if the law
-    /// switches; the step is then in `self.step` and everything before it handed on.
+    /// Tries steps until one is accepted. Returns the exit taken on it and where, if the law
+    /// switches; the step is then in `self.step`, and all steps before it have been passed to the
+    /// observer.
     fn advance<O: Observer>(
         &mut self,
         system: &System,
@@ -620,8 +622,8 @@ impl Flow {
         observer.step(system, &mut self.solver, step, &self.step.modal);
     }
 
-    /// Cuts the step in `self.step` at `u`, hands it on and switches.
-    /// The index of a step that just passes the end of the branch, at the present rate.
+    /// Returns the length number of a step that just passes the end of the branch, at the present
+    /// rate.
     fn index_to_end(&self, system: &System) -> usize {
         let (gap, rate) = system.gap_of(self.time, &self.modal);
         let times = system
@@ -636,6 +638,7 @@ impl Flow {
         ahead.reduce(f64::min).and_then(below).unwrap_or(0)
     }
 
+    /// Cuts the step in `self.step` at `u`, passes it to the observer and takes exit `number`.
     fn switch<O: Observer>(
         &mut self,
         system: &System,

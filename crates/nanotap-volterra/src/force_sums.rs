@@ -10,30 +10,34 @@ use crate::step::{Solver, Step};
 use crate::system::System;
 use crate::{Complex, VolterraError};
 
-/// Nodes of the Gauss–Legendre rule of one step: exact for the polynomial of a step's force times
-/// the drive's phasor over a quarter of its period.
+/// Number of nodes of the Gauss–Legendre rule of one step: exact for the polynomial of a step's
+/// force times the drive's phasor over a quarter of its period.
 const NODES: usize = 16;
-/// Newton steps from the largest force at the nodes to the peak.
+/// Number of Newton steps from the largest force at the nodes to the peak.
 const REFINEMENTS: usize = 4;
 
-/// Integrals of the force `F` over a run, its peak, and the time in contact.
+/// Integrals of the force `F` over a run, its extrema, and the time in contact, in the system's
+/// units.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ForceSums {
-    /// `∫ F dt`.
+    /// Integral `∫ F dt`, in units of force times time.
     pub impulse: f64,
-    /// `∫ F e^{−iωt} dt`.
+    /// Integral `∫ F e^{−iωt} dt` with the angular frequency of the harmonic, in units of force
+    /// times time.
     pub harmonic: Complex,
-    /// `∫ F ḋ dt`, 0 of a conservative law.
+    /// Work `∫ F ḋ dt` on the gap, in units of force times length; negative over a closed motion if
+    /// the force dissipates. [`Flow`] leaves it at 0 for a conservative law; the approximate flow
+    /// always integrates it.
     pub work: f64,
-    /// The largest force, at least 0.
+    /// Largest force, at least 0, in the unit of force; repulsion is positive.
     pub peak: f64,
-    /// The lowest force, at most 0.
+    /// Lowest force, at most 0, in the unit of force; attraction is negative.
     pub lowest: f64,
-    /// Time on branches on which tip and sample touch.
+    /// Time on branches on which tip and sample touch, in the system's unit of time.
     pub contact: f64,
 }
 
-/// Sums forces along a run.
+/// Observer that integrates forces along a run.
 #[derive(Debug)]
 struct Summation {
     sums: ForceSums,
@@ -132,7 +136,8 @@ impl Observer for Summation {
 }
 
 impl Flow {
-    /// Runs to time `end` and sums the force, with its component at the angular frequency `omega`.
+    /// Runs to time `end` and integrates the force, with its component at the angular frequency
+    /// `omega`.
     ///
     /// # Errors
     /// As [`Flow::run_until`].
@@ -173,7 +178,7 @@ pub(crate) struct ParabolicStep {
 }
 
 impl ForceSums {
-    /// Widens the range between the lowest and the largest force to a force.
+    /// Extends the range from the lowest to the largest force to include `force`.
     pub const fn include(&mut self, force: f64) {
         self.peak = self.peak.max(force);
         self.lowest = self.lowest.min(force);

@@ -1,17 +1,17 @@
-//! Forces tabulated in the gap, where a law is costly to evaluate and some 1e-7 of the force is
-//! accurate enough.
+//! Forces tabulated over the gap, for laws that are costly to evaluate where a relative accuracy of
+//! about 1e-7 suffices.
 
 use crate::law::{Approach, Exit, Guard};
 use crate::system::System;
 
-/// Intervals of a table.
+/// Number of intervals of a table.
 const INTERVALS: usize = 2048;
-/// Laws of more branches are not tabulated.
+/// Largest number of branches of a law that is tabulated.
 const MAX_BRANCHES: usize = 64;
-/// Places at which a table is compared with the law, and their allowed relative difference.
+/// Number of gaps at which a table is compared with the law, and largest relative difference.
 const CHECKS: usize = 64;
 const ACCURACY: f64 = 1e-6;
-/// How far a table reaches, as a part of the size of gaps and amplitudes.
+/// Length of a table, as a multiple of the size of gaps and amplitudes.
 const REACH: f64 = 2.0;
 
 /// The force on one branch over `√|level − gap|`, in which it is analytic up to the level at
@@ -21,7 +21,7 @@ struct Curve {
     level: f64,
     /// 1 where the branch lies above the level, −1 where it lies below.
     side: f64,
-    /// Intervals a unit of the root.
+    /// Number of intervals per unit of the root.
     density: f64,
     values: Values,
 }
@@ -30,7 +30,7 @@ struct Curve {
 #[derive(Clone, Debug)]
 enum Values {
     OfGap(Vec<f64>),
-    /// At no rate, and its derivative by the rate.
+    /// Values at rate zero, and their derivatives by the rate.
     OfRate(Vec<[f64; 2]>),
 }
 
@@ -52,7 +52,7 @@ impl GapTable {
         }
     }
 
-    /// The force on a branch.
+    /// Returns the force on a branch.
     #[inline]
     pub(crate) fn force(&self, system: &System, branch: usize, gap: f64, rate: f64) -> f64 {
         let curve = self.curves.get(branch).and_then(Option::as_ref);
@@ -60,7 +60,7 @@ impl GapTable {
         tabulated.unwrap_or_else(|| system.law().value(branch, gap, rate))
     }
 
-    /// Its derivatives by gap and rate.
+    /// Returns the force's derivatives by gap and rate.
     pub(crate) fn slopes(&self, system: &System, branch: usize, gap: f64, rate: f64) -> [f64; 2] {
         let curve = self.curves.get(branch).and_then(Option::as_ref);
         let tabulated = curve.and_then(|curve| curve.slopes_at(gap, rate));
@@ -226,7 +226,7 @@ fn weights(t: f64) -> [f64; 4] {
     [-t * s * v, 3.0 * u * s * v, 3.0 * u * t * v, -u * t * s]
 }
 
-/// Their derivatives.
+/// Returns the derivatives of these weights by `t`.
 #[inline]
 fn weights_of_slope(t: f64) -> [f64; 4] {
     let square = 3.0 * t * t;

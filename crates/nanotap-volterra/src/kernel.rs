@@ -1,5 +1,5 @@
-//! What a unit of force does to the gap: the Green's function of the modes, integrated
-//! against the polynomials of a step once and for all.
+//! The response of the gap to a unit force: the Green's function of the modes, integrated once
+//! against the polynomials of a step.
 //!
 //! On a step the force is a polynomial in `u ∈ [0, 1]`, given by its values at `n` Chebyshev
 //! nodes. Its effect on the gap and the gap's rate at the nodes, at a few check points
@@ -21,33 +21,35 @@ use nalgebra::{DVector, RowDVector};
 use std::f64::consts::SQRT_2;
 use std::sync::{Arc, OnceLock};
 
-/// Step lengths tabulated: the shortest is `h₀ 2^{−(LENGTHS − 1)/2}`.
+/// Number of tabulated step lengths: the shortest is `h₀ 2^{−(LENGTHS − 1)/2}`.
 pub(crate) const LENGTHS: usize = 72;
-/// Points between the nodes at which the law is compared with the polynomial.
+/// Number of points between the nodes at which the law is compared with the polynomial.
 pub(crate) const CHECKS: usize = 4;
-/// Points of the Gauss–Legendre rule of one panel.
+/// Number of points of the Gauss–Legendre rule of one panel.
 const PANEL_POINTS: usize = 24;
 /// Points of the rule between two nodes of a trajectory's quadrature, which are so near that
 /// its error is rounding: modes turn by less than half a radian between them, and the force's
 /// polynomials by less than half a turn.
 const SHORT_POINTS: usize = 10;
-/// How far a mode turns at most where its tangent will do: half the square is far below rounding.
+/// Largest angle, in radians, of a mode that may be replaced by its tangent: half its square is far
+/// below rounding.
 const TANGENT: f64 = 3e-9;
-/// What a step may leave of a perturbation's part in the force, as a part of the perturbation.
+/// Largest error of a perturbation's part in the force on a step, as a fraction of the
+/// perturbation.
 const PERTURBATION: f64 = 1e-13;
-/// Larger than the strength of any coupling on a step: steeper forces are refused.
+/// Upper limit of the strength of any coupling on a step: steeper forces are refused.
 const STRONGEST: f64 = 1e3;
 /// Time times a decay's rate beyond which the short rule does not resolve it.
 const SHORT_DECAY: f64 = 0.5;
-/// Times a decay's rate after which nothing is left in double precision.
+/// Decay exponent above which nothing is left in double precision: e⁻⁵⁰ is 2e-22.
 const FORGOTTEN: f64 = 50.0;
-/// How far a mode may turn or decay within one panel.
+/// Largest angle or decay exponent of a mode within one panel.
 const PANEL_REACH: f64 = 8.0;
 
-/// How time runs with the step's variable `u`.
+/// The relation between time and the variable `u` of a step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum TimeMap {
-    /// `t = h u`.
+    /// `t = h u`: time is proportional to the variable.
     Plain,
     /// `t = h u²`: the force begins like a power of `√t`.
     Start,
@@ -56,7 +58,7 @@ pub enum TimeMap {
 }
 
 impl TimeMap {
-    /// Time since the step's start.
+    /// Returns the time since the step's start.
     #[inline]
     pub(crate) fn time(self, h: f64, u: f64) -> f64 {
         match self {
@@ -66,7 +68,7 @@ impl TimeMap {
         }
     }
 
-    /// Its derivative by `u`.
+    /// Returns the derivative of time by `u`.
     #[inline]
     pub(crate) fn rate(self, h: f64, u: f64) -> f64 {
         match self {
@@ -76,7 +78,7 @@ impl TimeMap {
         }
     }
 
-    /// The `u` of a time `0 ≤ t ≤ h`.
+    /// Returns the `u` of a time `0 ≤ t ≤ h`.
     #[inline]
     pub(crate) fn variable(self, h: f64, t: f64) -> f64 {
         let x = (t / h).clamp(0.0, 1.0);
@@ -89,12 +91,12 @@ impl TimeMap {
     }
 }
 
-/// The second argument of a law.
+/// The kind of the law's second argument.
 #[derive(Clone, Copy, Debug)]
 enum Second {
-    /// The gap's rate.
+    /// The rate of the gap.
     Rate,
-    /// A given signal.
+    /// A given signal, which does not depend on the state.
     Signal,
     /// The depth of a surface with this many coordinates.
     Surface(usize),
@@ -104,26 +106,26 @@ enum Second {
 #[derive(Debug)]
 pub struct Kernel {
     modes: Modes,
-    /// `row · R`.
+    /// Row `row · R` that gives the gap from the modal coordinates.
     pub(crate) readout: Vec<f64>,
-    /// `row · R B`.
+    /// Row `row · R B` that gives the gap's rate from the modal coordinates.
     pub(crate) rate_readout: Vec<f64>,
     /// The row of the law's second argument: `rate_readout`, the depth of a surface that relaxes, or 0.
     pub(crate) second_readout: Vec<f64>,
     /// Number of coordinates at the end that are the surface's.
     surface: usize,
-    /// `L p`.
+    /// Modal source `L p` of a unit force.
     pub(crate) source: Vec<f64>,
     row: RowDVector<f64>,
     column: DVector<f64>,
     pub(crate) nodes: usize,
-    /// Nodes, then check points.
+    /// Values of `u` at the nodes, then at the check points.
     pub(crate) points: Vec<f64>,
     /// From values at the nodes to coefficients, column-major.
     pub(crate) coefficients: Vec<f64>,
-    /// Its last two rows.
+    /// Last two rows of `coefficients`: they give the tail of a series.
     pub(crate) last_coefficients: [Vec<f64>; 2],
-    /// A bound of each block's rates.
+    /// Bound of the absolute eigenvalues of each block, per unit of time.
     pub(crate) rates: Vec<f64>,
     longest: f64,
     /// Bound of the amplitude in the gap that a unit impulse of force excites.
@@ -138,33 +140,34 @@ pub struct Kernel {
     tables: [Vec<OnceLock<Box<Table>>>; 3],
 }
 
-/// Everything about a step that its length and map fix. Matrices are column-major.
+/// Quantities of a step that depend on its length and map only. Matrices are column-major.
 #[derive(Debug)]
 pub(crate) struct Table {
     pub(crate) length: f64,
-    /// Times of the points.
+    /// Times of the points from the start of the step.
     pub(crate) times: Vec<f64>,
     /// Gap at the points from the modal coordinates at the start, points × dimension.
     pub(crate) gap: Vec<f64>,
-    /// The law's second argument, the gap's rate or the depth of the surface.
+    /// Second argument of the law (the gap's rate or the depth of the surface) at the points from
+    /// the modal coordinates at the start, points × dimension.
     pub(crate) rate: Vec<f64>,
     /// Gap at the points from the forces at the nodes, points × nodes.
     pub(crate) gap_force: Vec<f64>,
-    /// The law's second argument.
+    /// Second argument of the law at the points from the forces at the nodes, points × nodes.
     pub(crate) rate_force: Vec<f64>,
     /// Force at the check points from the forces at the nodes, checks × nodes.
     pub(crate) between: Vec<f64>,
     /// Modal coordinates at the end from the forces at the nodes, dimension × nodes.
     pub(crate) carry: Vec<f64>,
-    /// `e^{Bh}` of each block.
+    /// Exponentials `e^{Bh}` of the blocks over the whole step.
     pub(crate) exponentials: Vec<[[f64; 2]; 2]>,
     /// Gap at the points from a constant unit force.
     pub(crate) gap_unit: Vec<f64>,
-    /// The law's second argument.
+    /// Second argument of the law at the points from a constant unit force.
     pub(crate) rate_unit: Vec<f64>,
-    /// Sums of the sizes in the rows of `gap_force`, at the nodes.
+    /// Sums of the absolute values in the rows of `gap_force`, at the nodes.
     pub(crate) gap_sums: Vec<f64>,
-    /// The same of `rate_force`.
+    /// Sums of the absolute values in the rows of `rate_force`, at the nodes.
     pub(crate) rate_sums: Vec<f64>,
 }
 
@@ -184,11 +187,11 @@ fn rule<const POINTS: usize>() -> Rule<POINTS> {
 struct Panel<const POINTS: usize> {
     /// Time of its end since the start of the step.
     end: f64,
-    /// The points.
+    /// Values of `u` at the points of the rule.
     places: [f64; POINTS],
     /// Times from the points to its end.
     rests: [f64; POINTS],
-    /// Weights in time.
+    /// Weights of the points in integrals over time.
     weights: [f64; POINTS],
 }
 
@@ -476,22 +479,22 @@ impl Kernel {
         Ok(Arc::new(kernel))
     }
 
-    /// The modes.
+    /// Returns the linear modes of the kernel.
     pub fn modes(&self) -> &Modes {
         &self.modes
     }
 
-    /// The row of the gap.
+    /// Returns the row `row` of the gap `row · x`, of length `n`.
     pub fn row(&self) -> &RowDVector<f64> {
         &self.row
     }
 
-    /// The column of the force.
+    /// Returns the column by which the force enters, of length `n`.
     pub fn column(&self) -> &DVector<f64> {
         &self.column
     }
 
-    /// Number of coordinates at the end of the state that are the surface's.
+    /// Returns the number of coordinates at the end of the state that belong to the surface.
     pub const fn surface(&self) -> usize {
         self.surface
     }
@@ -533,7 +536,8 @@ impl Kernel {
         reach.powi(self.nodes as i32) / (std::f64::consts::TAU * n).sqrt()
     }
 
-    /// The longest tabulated step that is no longer than `length`, if there is one.
+    /// Returns the number of the longest tabulated step that is not longer than `length`, if there
+    /// is one.
     pub(crate) fn index_below(&self, length: f64) -> Option<usize> {
         if length <= 0.0 || length.is_nan() {
             return None;

@@ -1,34 +1,35 @@
-//! What a force law is to the flow: branches, on each of which the force is an analytic
-//! function of the gap and its rate, and exits between them.
+//! The interface between a force law and the flow: branches, on each of which the force is an
+//! analytic function of the gap and its rate, and exits between them.
 
 use std::fmt::Debug;
 use std::sync::Arc;
 
-/// A value with its derivatives by the gap and by the gap's rate.
+/// A force or a guard with its derivatives by the gap and by the gap's rate.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Force {
-    /// The value.
+    /// Value of the force, in the unit of force (repulsion is positive), or of a guard, in the unit
+    /// of the guard.
     pub value: f64,
-    /// By the gap.
+    /// Derivative by the gap, in units of the value per unit of the gap.
     pub by_gap: f64,
-    /// By the gap's rate.
+    /// Derivative by the gap's rate, or by the second argument that replaces the rate.
     pub by_rate: f64,
 }
 
-/// When a branch is left. A guard is positive inside its branch.
+/// The condition under which a branch is left. A guard is positive inside its branch.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Guard {
-    /// When the gap falls to this value.
+    /// The gap falls to this value.
     Falls(f64),
-    /// When the gap rises to this value.
+    /// The gap rises to this value.
     Rises(f64),
-    /// When the gap stops falling.
+    /// The gap stops falling: its rate rises to zero.
     Turns,
-    /// When a quantity of the law's own, [`ForceLaw::guard`], falls to zero.
+    /// The guard of this number in [`ForceLaw::guard`] falls to zero.
     Own(usize),
 }
 
-/// How the force comes up to a switch.
+/// The behaviour of the force near a switch.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Approach {
     /// Analytic up to the switch and beyond.
@@ -40,22 +41,22 @@ pub enum Approach {
     Half,
 }
 
-/// A way out of a branch.
+/// An exit from a branch.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Exit {
-    /// When.
+    /// Condition under which the branch is left.
     pub guard: Guard,
-    /// The branch after it.
+    /// Number of the branch that is entered.
     pub target: usize,
-    /// How the force of the branch that is left comes up to the switch. Only switches at a
+    /// Behaviour of the force of the branch that is left, up to the switch. Only switches at a
     /// value of the gap may be other than analytic.
     pub before: Approach,
-    /// How the force of the target sets in.
+    /// Behaviour of the force of the branch that is entered, from the switch on.
     pub after: Approach,
 }
 
 impl Exit {
-    /// A switch that is analytic on both sides.
+    /// Creates a switch that is analytic on both sides.
     pub const fn new(guard: Guard, target: usize) -> Self {
         Self {
             guard,
@@ -65,7 +66,7 @@ impl Exit {
         }
     }
 
-    /// The same with the behaviour of the force before and after the switch.
+    /// Sets the behaviour of the force before and after the switch.
     #[must_use]
     pub const fn with(mut self, before: Approach, after: Approach) -> Self {
         self.before = before;
@@ -74,14 +75,14 @@ impl Exit {
     }
 }
 
-/// Where a motion leaves the range for which a law was derived.
+/// A remark that a motion leaves the range for which a law was derived.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Remark {
-    /// What is out of range, as a formula: `δ/R`.
+    /// Ratio that is out of range, as a formula: `δ/R`.
     pub ratio: &'static str,
-    /// Its largest value.
+    /// Largest value of the ratio along the motion, dimensionless.
     pub value: f64,
-    /// The value up to which the law holds.
+    /// Largest value of the ratio for which the law holds, dimensionless.
     pub limit: f64,
 }
 
@@ -90,57 +91,58 @@ pub struct Remark {
 /// power of the contact law, and takes the place of the gap's rate in the law.
 #[derive(Clone, Debug)]
 pub struct Surface {
-    /// Rates of recovery.
+    /// Rates at which the coordinates decay, positive, per unit of time; one per coordinate.
     pub rates: Vec<f64>,
-    /// Growth for a unit of force.
+    /// Growth rates of the coordinates under a unit force; one per coordinate.
     pub gains: Vec<f64>,
-    /// The constant part of the force in contact that does not act on the surface.
+    /// Constant part of the force in contact that does not act on the surface, in the unit of
+    /// force; negative for an attraction.
     pub adhesion: f64,
-    /// The law of the surface at rest, when it has relaxed.
+    /// Law of the completely relaxed surface.
     pub relaxed: Arc<dyn ForceLaw>,
 }
 
 /// A scalar force of a gap and its rate, repulsive positive.
 pub trait ForceLaw: Debug + Send + Sync {
-    /// Names of the parameters that the law can be differentiated by.
+    /// Returns the names of the parameters by which the law can be differentiated.
     fn parameters(&self) -> Vec<&'static str>;
 
-    /// Number of branches.
+    /// Returns the number of branches, which are numbered from 0.
     fn branches(&self) -> usize;
 
-    /// The branch of a motion whose history is not known.
+    /// Returns the branch of a motion without a known history.
     fn branch_at(&self, gap: f64, rate: f64) -> usize;
 
-    /// The force on a branch, also a little beyond where it is left.
+    /// Returns the force on a branch, also slightly beyond the exit.
     fn force(&self, branch: usize, gap: f64, rate: f64) -> Force;
 
-    /// The force on a branch without its derivatives.
+    /// Returns the force on a branch without its derivatives.
     fn value(&self, branch: usize, gap: f64, rate: f64) -> f64 {
         self.force(branch, gap, rate).value
     }
 
-    /// Whether the force is a sum of several, so that a table in the gap takes less time.
+    /// Reports whether the force is a sum of several terms, so that a table over the gap is faster.
     fn has_terms(&self) -> bool {
         false
     }
 
-    /// Time that an evaluation takes, in that of a force in closed form.
+    /// Returns the time of an evaluation, as a multiple of that of a force in closed form.
     fn cost(&self) -> u64 {
         1
     }
 
-    /// Whether the force depends on the gap's rate.
+    /// Reports whether the force depends on the gap's rate.
     fn depends_on_rate(&self) -> bool {
         true
     }
 
-    /// Whether the second argument of the force is the signal `cos ωt` of the system's second tone, or of its
-    /// only one, in place of the gap's rate.
+    /// Reports whether the second argument of the force is the signal `cos ωt` of the system's
+    /// second tone, or of its only one, instead of the gap's rate.
     fn takes_signal(&self) -> bool {
         false
     }
 
-    /// The law averaged over the signal, of laws that take one.
+    /// Returns the law averaged over the signal; `None` for a law without one.
     fn averaged(&self) -> Option<Arc<dyn ForceLaw>> {
         None
     }
@@ -162,29 +164,29 @@ pub trait ForceLaw: Debug + Send + Sync {
         }
     }
 
-    /// The ways out of a branch.
+    /// Returns the exits of a branch.
     fn exits(&self, branch: usize) -> Vec<Exit>;
 
-    /// The law's own guard number `index`.
+    /// Returns the law's own guard number `index`.
     fn guard(&self, index: usize, gap: f64, rate: f64) -> Force {
         let _ = (index, gap, rate);
         Force::default()
     }
 
-    /// The derivatives of the force by the parameters, written to `out`.
+    /// Writes the derivatives of the force by the parameters to `out`.
     fn by_parameters(&self, branch: usize, gap: f64, rate: f64, out: &mut [f64]);
 
-    /// The derivatives by the parameters of a guard (positive inside the branch) at the
-    /// switch, written to `out`.
+    /// Writes the derivatives of a guard (positive inside the branch) by the parameters, at the
+    /// switch, to `out`.
     fn guard_by_parameters(&self, branch: usize, exit: usize, gap: f64, rate: f64, out: &mut [f64]);
 
-    /// The energy stored at this gap, zero far away; none where the law has no potential.
+    /// Returns the energy stored at this gap, zero far away; `None` for a law without a potential.
     fn energy(&self, branch: usize, gap: f64) -> Option<f64> {
         let _ = (branch, gap);
         None
     }
 
-    /// Whether tip and sample touch on a branch: of most laws all but the first.
+    /// Reports whether tip and sample touch on a branch: for most laws, on all but the first.
     fn touches(&self, branch: usize) -> bool {
         branch > 0
     }
@@ -202,28 +204,29 @@ pub trait ForceLaw: Debug + Send + Sync {
         None
     }
 
-    /// Whether branches are pieces of one smooth curve, each of little use beyond its ends.
+    /// Reports whether the branches are pieces of one smooth curve, each of little use beyond its
+    /// ends.
     fn is_piecewise(&self) -> bool {
         false
     }
 
-    /// Whether the law has a memory: gap and rate do not determine the branch.
+    /// Reports whether the law has a memory: gap and rate do not determine the branch.
     fn remembers(&self) -> bool {
         false
     }
 
-    /// Whether the force on a branch is zero at any gap.
+    /// Reports whether the force on a branch is zero at any gap.
     fn vanishes(&self, branch: usize) -> bool {
         let _ = branch;
         false
     }
 
-    /// Whether the force depends on the gap alone.
+    /// Reports whether the force depends on the gap alone.
     fn conservative(&self) -> bool {
         false
     }
 
-    /// What a motion that came as close as `least_gap` violates.
+    /// Returns the ranges of validity that a motion with the least gap `least_gap` leaves.
     fn remarks(&self, least_gap: f64) -> Vec<Remark> {
         let _ = least_gap;
         Vec::new()

@@ -79,7 +79,7 @@ widened! {
 }
 
 widened! {
-    /// The scalar product.
+    /// Returns the scalar product.
     fn dot(a: &[f64], b: &[f64]) -> f64 = dot_body
 }
 

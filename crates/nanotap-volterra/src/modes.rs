@@ -13,28 +13,29 @@ use nalgebra::linalg::balancing::balance_parlett_reinsch;
 use nalgebra::{DMatrix, DVector};
 use nanotap_arithmetic::ComplexFunctions as _;
 
-/// The largest dimension of the state.
+/// Largest dimension of the state.
 pub const MAX_DIMENSION: usize = 200;
-/// Two eigenvalues closer than this fraction of their size share a block found as a plane.
+/// Distance of two eigenvalues, as a fraction of their size, below which they share a block found
+/// as a plane.
 const CLOSE: f64 = 0.05;
-/// A basis must rebuild its matrix to this relative accuracy.
+/// Largest relative residual with which a basis that rebuilds its matrix is accepted.
 const ACCEPTED_RESIDUAL: f64 = 1e-9;
-/// Times in [`Block::short_exps`] are halved so often at most.
+/// Largest number of halvings of the times in [`Block::short_exps`].
 const MAX_DOUBLINGS: usize = 40;
 
-/// One or two coordinates that the linear flow couples to no others.
+/// One or two coordinates that the linear flow does not couple to others.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Block {
-    /// The first coordinate.
+    /// Index of its first coordinate.
     pub start: usize,
-    /// 1 or 2.
+    /// Number of its coordinates, 1 or 2.
     pub size: usize,
-    /// `ẏ = B y`, in rows; the second row and column of a single coordinate are zero.
+    /// Matrix `B` of `ẏ = B y`, in rows; the second row and column of a single coordinate are zero.
     pub matrix: [[f64; 2]; 2],
 }
 
 impl Block {
-    /// `e^{Bt}`.
+    /// Returns the exponential `e^{Bt}` for a time `t`, in rows.
     #[inline]
     pub fn exp(&self, t: f64) -> [[f64; 2]; 2] {
         let [[a, b], [c, d]] = self.matrix;
@@ -120,7 +121,7 @@ impl Block {
         ]
     }
 
-    /// A bound of the eigenvalues' sizes.
+    /// Returns a bound of the absolute eigenvalues, per unit of time.
     pub fn rate(&self) -> f64 {
         let [[a, b], [c, d]] = self.matrix;
         if self.size == 1 {
@@ -168,7 +169,7 @@ pub struct Modes {
 }
 
 impl Modes {
-    /// The modes of a general real matrix `A` (`n × n`).
+    /// Computes the modes of a general real matrix `A` (`n × n`).
     ///
     /// # Errors
     /// [`VolterraError::IllConditioned`] where three or more eigenvalues coincide;
@@ -345,7 +346,8 @@ impl Modes {
         })
     }
 
-    /// The same with coordinates `ẏ = −rate y` at the end of the state that nothing couples.
+    /// Returns the modes with additional coordinates `ẏ = −rate y` at the end of the state, which
+    /// are not coupled to others.
     ///
     /// # Errors
     /// [`VolterraError::TooLarge`].
@@ -370,27 +372,27 @@ impl Modes {
         Ok(modes)
     }
 
-    /// Dimension of the state.
+    /// Returns the dimension `n` of the state.
     pub fn dimension(&self) -> usize {
         self.right.nrows()
     }
 
-    /// The blocks, in the order of their coordinates.
+    /// Returns the blocks, in the order of their coordinates.
     pub fn blocks(&self) -> &[Block] {
         &self.blocks
     }
 
-    /// `R` (`n × n`), `x = R y`.
+    /// Returns the matrix `R` (`n × n`) of `x = R y`.
     pub fn right(&self) -> &DMatrix<f64> {
         &self.right
     }
 
-    /// `L = R⁻¹`.
+    /// Returns the matrix `L = R⁻¹` (`n × n`) of `y = L x`.
     pub fn left(&self) -> &DMatrix<f64> {
         &self.left
     }
 
-    /// `B y`, written to `out`.
+    /// Writes `B y` to `out`.
     pub fn apply(&self, y: &[f64], out: &mut [f64]) {
         for block in &self.blocks {
             let s = block.start;
@@ -491,7 +493,7 @@ enum Group {
     Pair(Complex),
     /// Two eigenvalues near this real number.
     Plane(f64),
-    /// One real eigenvalue.
+    /// A real eigenvalue without a close neighbour.
     Line(f64),
 }
 

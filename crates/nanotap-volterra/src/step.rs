@@ -9,17 +9,18 @@ use crate::linear::{
 use crate::quadrature::series;
 use crate::system::System;
 
-/// Newton steps before a shorter step is tried.
+/// Number of Newton steps after which a shorter step is tried.
 const MAX_ITERATIONS: usize = 20;
-/// Part of the allowed error that the iteration may leave.
+/// Fraction of the allowed error at which the iteration ends.
 const LEFT: f64 = 0.05;
-/// Part of a residual that its correction may leave for the next.
+/// Fraction of a residual that its correction may leave to the next one.
 const ENOUGH: f64 = 0.0003;
 /// The same on a step with a fixed end, whose place is found to rounding.
 const ENOUGH_AT_END: f64 = 1e-6;
-/// Terms of a correction's series before a factorisation is tried.
+/// Number of terms of a correction's series after which a factorisation is tried.
 const MAX_TERMS: usize = 16;
-/// How much the force may amplify an error on one step, as `∫|G| |∂F|`: by `cosh √(2κ)`, 27.
+/// Largest amplification `κ = ∫|G| |∂F|` on one step: an error of the force grows by at most
+/// `cosh √(2κ)`, which is 27.
 const STEEPEST: f64 = 8.0;
 /// A tail of the law, along the first guess of the motion and the second, that no iteration
 /// will mend.
@@ -31,7 +32,7 @@ pub(crate) struct Step {
     pub(crate) map: TimeMap,
     pub(crate) index: usize,
     pub(crate) branch: usize,
-    /// Time of its start.
+    /// Time of its start, in the system's unit of time.
     pub(crate) start: f64,
     pub(crate) length: f64,
     /// The variable at which it is cut, 1 if it is not.
@@ -42,14 +43,14 @@ pub(crate) struct Step {
     pub(crate) pinned_start: Option<f64>,
     /// The gap at the end where a switch fixes it.
     pub(crate) pinned_end: Option<f64>,
-    /// At the nodes.
+    /// Forces at the nodes.
     pub(crate) forces: Vec<f64>,
-    /// Of the force in `T_j(2u − 1)`.
+    /// Coefficients of the force in `T_j(2u − 1)`.
     pub(crate) coefficients: Vec<f64>,
-    /// At the points.
+    /// Gap at the points.
     pub(crate) gap: Vec<f64>,
     pub(crate) rate: Vec<f64>,
-    /// Of the law at the nodes.
+    /// Derivative of the law by the gap at the nodes.
     pub(crate) by_gap: Vec<f64>,
     pub(crate) by_rate: Vec<f64>,
     /// How the force's derivative is singular at the pinned end(s): see
@@ -82,7 +83,7 @@ impl Step {
         }
     }
 
-    /// Time of variable `u`.
+    /// Returns the time of variable `u`.
     pub(crate) fn time(&self, u: f64) -> f64 {
         self.start + self.map.time(self.length, u)
     }
@@ -123,7 +124,7 @@ impl Step {
     }
 }
 
-/// `e^{Bh} y`.
+/// Writes `e^{Bh} y`, the modal coordinates without a force at the end of the step, to `out`.
 pub(crate) fn advance_free(system: &System, table: &Table, y: &[f64], out: &mut [f64]) {
     for (block, e) in system
         .kernel()
@@ -142,7 +143,7 @@ pub(crate) fn advance_free(system: &System, table: &Table, y: &[f64], out: &mut 
     }
 }
 
-/// What a solved step is worth.
+/// The accuracy of a solved step.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Quality {
     /// The larger of the force's tail and its defect between the nodes, as a fraction of
@@ -156,7 +157,7 @@ pub(crate) struct Quality {
     pub(crate) steepness: f64,
 }
 
-/// Work space of the solver, and what it has cost.
+/// Work space of the solver, and its cost so far.
 #[derive(Clone, Debug)]
 pub(crate) struct Solver {
     base_gap: Vec<f64>,
@@ -173,7 +174,7 @@ pub(crate) struct Solver {
     pivots: Vec<usize>,
     column: Vec<f64>,
     slope: Vec<f64>,
-    /// The law's values.
+    /// Forces that the law gives at the nodes.
     evaluated: Vec<f64>,
     /// Whether the law needs the rate.
     pub(crate) rates: bool,
@@ -184,20 +185,20 @@ pub(crate) struct Solver {
     pub(crate) statistics: Statistics,
 }
 
-/// What a run has cost.
+/// Numbers of operations in a run.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Statistics {
-    /// Steps accepted.
+    /// Number of accepted steps.
     pub steps: u64,
-    /// Steps tried and refused.
+    /// Number of steps that were tried and refused.
     pub refused: u64,
-    /// Iterations for the forces.
+    /// Number of Newton iterations for the forces; 0 in the approximate flow.
     pub iterations: u64,
-    /// Evaluations of the law.
+    /// Number of evaluations of the law.
     pub evaluations: u64,
-    /// Factorisations, where no series would do and for derivatives.
+    /// Number of factorisations, for derivatives and where no series converges.
     pub factorisations: u64,
-    /// Switches of the law.
+    /// Number of switches between branches of the law.
     pub switches: u64,
 }
 
@@ -665,13 +666,13 @@ impl Solver {
         }
     }
 
-    /// The shifts computed last.
+    /// Returns the last result of [`Self::shift`]: the changes of gap and rate at the points.
     pub(crate) fn shifts(&self) -> (&[f64], &[f64]) {
         (&self.shift_gap, &self.shift_rate)
     }
 
-    /// What an error of the force may be: what the tolerance allows or what rounding makes,
-    /// and the latter alone.
+    /// Returns the allowed error of the force (by the tolerance or by rounding), and the part from
+    /// rounding alone.
     fn allowed(&self, system: &System, table: &Table, step: &Step) -> (f64, f64) {
         let wanted = system.options().tolerance / (table.length * system.kernel().reach);
         let slopes: [&[f64]; 2] = [&step.by_gap, &step.by_rate];

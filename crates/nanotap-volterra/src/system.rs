@@ -7,39 +7,41 @@ use nalgebra::DVector;
 use nanotap_arithmetic::{CancelFlag, ComplexFunctions as _};
 use std::sync::{Arc, OnceLock};
 
-/// The largest number of tones.
+/// Largest number of tones.
 pub const MAX_TONES: usize = 64;
-/// The largest number of branches of a law.
+/// Largest number of branches of a law.
 pub const MAX_BRANCHES: usize = 4097;
 
-/// One tone of the drive: `Re(… e^{iωt})`.
+/// One tone `Re(… e^{iωt})` of the drive.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Tone {
-    /// `ω`.
+    /// Angular frequency `ω`, in radians per unit of time.
     pub frequency: f64,
-    /// What it adds to `ẋ`, of the length of the state.
+    /// Complex amplitude of its part in `ẋ`, of the length of the state.
     pub forcing: DVector<Complex>,
-    /// What it adds to the gap (motion of the base or of the sample).
+    /// Complex amplitude of its part in the gap (motion of the base or of the sample), in the unit
+    /// of the gap.
     pub gap: Complex,
 }
 
 /// The linear forcing of state and gap.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Drive {
-    /// The constant part of `ẋ`.
+    /// Constant part of `ẋ`, of the length of the state.
     pub constant: DVector<f64>,
-    /// The constant part of the gap.
+    /// Constant part of the gap, in the unit of the gap.
     pub offset: f64,
-    /// The tones.
+    /// Tones of the drive, at most [`MAX_TONES`].
     pub tones: Vec<Tone>,
 }
 
-/// How well steps are resolved.
+/// Accuracy of the steps, and their largest number.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Options {
-    /// How much the error of one step may move the gap. Rounding sets a separate floor.
+    /// Largest change of the gap by the error of one step, in the unit of the gap. Rounding sets a
+    /// separate floor.
     pub tolerance: f64,
-    /// The largest number of steps of one run.
+    /// Largest number of steps of one run.
     pub max_steps: usize,
 }
 
@@ -74,7 +76,7 @@ pub struct System {
     /// Complex amplitudes of the gap's forced part.
     pub(crate) gap_tones: Vec<Complex>,
     pub(crate) gap_constant: f64,
-    /// The same without the offset.
+    /// Constant part of the gap's forced motion without the offset.
     forced_gap: f64,
     /// Sizes of the drive's part in the gap and in its rate.
     pub(crate) gap_sizes: [f64; 2],
@@ -86,16 +88,16 @@ pub struct System {
     cancel: CancelFlag,
 }
 
-/// A surface that relaxes.
+/// The surface of a sample that relaxes, with the lever over it.
 #[derive(Clone, Debug)]
 struct FreeSurface {
     /// The kernel with a force that acts on the lever alone.
     kernel: Arc<Kernel>,
-    /// Without the surface.
+    /// Kernel of the lever without the surface's coordinates.
     lever: Arc<Kernel>,
     rates: Vec<f64>,
     gains: Vec<f64>,
-    /// The constant part of the force in contact that does not act on the surface.
+    /// Constant part of the force in contact that does not act on the surface.
     adhesion: f64,
 }
 
@@ -164,10 +166,10 @@ impl Drive {
 }
 
 impl System {
-    /// Joins them.
+    /// Combines a kernel, a law, a drive and options into a system.
     ///
     /// # Errors
-    /// When sizes do not fit, a number is out of range, or a tone meets an undamped mode.
+    /// If sizes do not fit, a number is out of range, or a tone meets an undamped mode.
     pub fn new(
         kernel: Arc<Kernel>,
         law: Arc<dyn ForceLaw>,
@@ -179,7 +181,7 @@ impl System {
         Self::over(kernel, drive, law, surface.as_ref(), options)
     }
 
-    /// The same modes, law and options under another drive.
+    /// Returns the same modes, law and options under another drive.
     ///
     /// # Errors
     /// As [`System::new`].
@@ -190,8 +192,9 @@ impl System {
         Ok(system.cancelled_by(self.cancel.clone()))
     }
 
-    /// The same over a surface none of whose coordinates is slower than `rate`, with the same
-    /// compliance at rest: its periodic motions are about the same, and soon reached.
+    /// Returns the same system over a surface none of whose coordinates is slower than `rate`, with
+    /// the same compliance at rest: its periodic motions are nearly the same, and are reached
+    /// sooner.
     ///
     /// # Errors
     /// As [`System::new`].
@@ -325,15 +328,15 @@ impl System {
         self
     }
 
-    /// What ends its motions from outside.
+    /// Returns the flag that cancels its motions.
     pub fn cancel(&self) -> &CancelFlag {
         &self.cancel
     }
 
-    /// The same modes, drive and law with another offset of the gap; shares all tables.
+    /// Returns the same modes, drive and law with another offset of the gap; shares all tables.
     ///
     /// # Errors
-    /// When the offset is not finite.
+    /// If the offset is not finite.
     pub fn with_offset(&self, offset: f64) -> Result<Self, VolterraError> {
         let mut system = self.clone();
         system.set_offset(offset)?;
@@ -343,7 +346,7 @@ impl System {
     /// Changes the offset of the gap; allocates nothing.
     ///
     /// # Errors
-    /// When the offset is not finite.
+    /// If the offset is not finite.
     pub fn set_offset(&mut self, offset: f64) -> Result<(), VolterraError> {
         if !offset.is_finite() {
             return Err(not_finite("the offset of the gap", offset));
@@ -353,10 +356,10 @@ impl System {
         Ok(())
     }
 
-    /// Changes what a tone adds to the gap; allocates nothing.
+    /// Changes the amplitude of a tone in the gap; allocates nothing.
     ///
     /// # Errors
-    /// When there is no such tone, or the amplitude is not finite.
+    /// If there is no such tone, or the amplitude is not finite.
     pub fn set_gap_tone(&mut self, number: usize, gap: Complex) -> Result<(), VolterraError> {
         if !(gap.re.is_finite() && gap.im.is_finite()) {
             return Err(not_finite("a tone's amplitude", gap.modulus()));
@@ -375,17 +378,17 @@ impl System {
         Ok(())
     }
 
-    /// Dimension of the state.
+    /// Returns the dimension `n` of the state, the coordinates of a relaxing surface included.
     pub fn dimension(&self) -> usize {
         self.kernel.modes().dimension()
     }
 
-    /// Modes, gap and column; of a surface that relaxes those in contact.
+    /// Returns modes, gap and column; for a surface that relaxes, those in contact.
     pub fn kernel(&self) -> &Arc<Kernel> {
         &self.kernel
     }
 
-    /// The same on a branch of the law.
+    /// Returns the kernel on a branch of the law.
     pub(crate) fn kernel_on(&self, branch: usize) -> &Arc<Kernel> {
         match &self.free {
             Some(free) if !self.touches[branch] => &free.kernel,
@@ -399,8 +402,8 @@ impl System {
         pressed.map_or(0.0, |surface| surface.adhesion)
     }
 
-    /// Takes from modal coordinates, reached under a force on everything after some time on a
-    /// branch, what the adhesion has done to the surface.
+    /// Removes from modal coordinates, reached under a force on all coordinates after some time on
+    /// a branch, the effect of the adhesion on the surface.
     pub(crate) fn spare_surface(&self, branch: usize, time: f64, y: &mut [f64]) {
         let adhesion = self.adhesion(branch);
         let Some(surface) = self.free.as_ref().filter(|_| adhesion != 0.0) else {
@@ -413,7 +416,7 @@ impl System {
         }
     }
 
-    /// The same of the rates of modal coordinates.
+    /// Removes the same effect from the rates of modal coordinates.
     pub(crate) fn spare_surface_rates(&self, branch: usize, slope: &mut [f64]) {
         let adhesion = self.adhesion(branch);
         if let Some(surface) = self.free.as_ref().filter(|_| adhesion != 0.0) {
@@ -448,22 +451,22 @@ impl System {
         }
     }
 
-    /// The law.
+    /// Returns the force law.
     pub fn law(&self) -> &Arc<dyn ForceLaw> {
         &self.law
     }
 
-    /// The drive.
+    /// Returns the drive of state and gap.
     pub fn drive(&self) -> &Drive {
         &self.drive
     }
 
-    /// The options.
+    /// Returns the accuracy and the largest number of steps.
     pub fn options(&self) -> Options {
         self.options
     }
 
-    /// The ways out of a branch.
+    /// Returns the exits of a branch.
     pub fn exits(&self, branch: usize) -> &[Exit] {
         &self.exits[branch]
     }
@@ -537,21 +540,21 @@ impl System {
         [dot(y), dot(slope)]
     }
 
-    /// The gap and its rate in state `x` at a time.
+    /// Returns the gap and its rate in state `x` at a time.
     pub fn gap(&self, time: f64, x: &[f64]) -> (f64, f64) {
         let mut y = vec![0.0; self.dimension()];
         self.to_modal(time, x, &mut y);
         self.gap_of(time, &y)
     }
 
-    /// The motion of the free lever at a time, over an undeformed surface.
+    /// Returns the state of the free lever at a time, over an undeformed surface.
     pub fn free_state(&self, time: f64) -> Vec<f64> {
         let mut x = vec![0.0; self.dimension()];
         self.write_forced(time, &mut x);
         x
     }
 
-    /// The branch of the law in state `x` at a time when nothing is known of the past.
+    /// Returns the branch of the law in state `x` at a time, without a history.
     pub fn branch_at(&self, time: f64, x: &[f64]) -> usize {
         let (gap, rate) = self.gap(time, x);
         self.law.branch_at(gap, self.second_argument(time, rate, x))
@@ -592,7 +595,7 @@ impl System {
         }
     }
 
-    /// The vector field `ẋ` in state `x` at a time on a branch of the law, written to `out`.
+    /// Writes the vector field `ẋ` in state `x` at a time on a branch of the law to `out`.
     pub fn field(&self, time: f64, x: &[f64], branch: usize, out: &mut [f64]) {
         let n = self.dimension();
         let mut y = vec![0.0; n];

@@ -15,32 +15,35 @@ use crate::system::{Response, System};
 use crate::{Complex, VolterraError};
 use nalgebra::{DMatrix, DVector};
 
-/// Change of a system with a parameter: quantities that are not named are constant.
+/// The derivative of a system with respect to a parameter; quantities that are not named are
+/// constant.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Parameter {
-    /// The change of each parameter of the law (empty: none).
+    /// Changes of the law's parameters, in their own units per unit of the parameter (empty: none).
     pub law: Vec<f64>,
-    /// Of the gap's offset.
+    /// Change of the gap's offset, in the unit of the gap per unit of the parameter.
     pub offset: f64,
-    /// Of the constant forcing (empty: none).
+    /// Changes of the constant forcing, of the length of the state, in units of `ẋ` per unit of the
+    /// parameter (empty: none).
     pub constant: Vec<f64>,
-    /// Of each tone (empty: none).
+    /// Changes of the tones, one per tone (empty: none).
     pub tones: Vec<ToneChange>,
 }
 
-/// How a parameter changes a tone.
+/// The derivative of a tone with respect to a parameter.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ToneChange {
-    /// Of its angular frequency.
+    /// Change of its angular frequency, in radians per unit of time, per unit of the parameter.
     pub frequency: f64,
-    /// Of its forcing (empty: none).
+    /// Changes of its forcing, of the length of the state, per unit of the parameter (empty: none).
     pub forcing: Vec<Complex>,
-    /// Of what it adds to the gap.
+    /// Change of its complex amplitude in the gap, in the unit of the gap per unit of the
+    /// parameter.
     pub gap: Complex,
 }
 
 impl Parameter {
-    /// The offset of the gap.
+    /// Creates the derivative by the offset of the gap.
     pub fn offset() -> Self {
         Self {
             offset: 1.0,
@@ -48,7 +51,7 @@ impl Parameter {
         }
     }
 
-    /// The parameter number `index` of the system's law.
+    /// Creates the derivative by parameter number `index` of the system's law.
     pub fn of_law(system: &System, index: usize) -> Self {
         let mut law = vec![0.0; system.law().parameters().len()];
         if let Some(entry) = law.get_mut(index) {
@@ -69,9 +72,9 @@ pub(crate) struct Forced {
     /// Modal: the constant, and for each tone what grows like `1` and like `t`.
     pub(crate) constant: DVector<f64>,
     pub(crate) tones: Vec<[DVector<Complex>; 2]>,
-    /// Of each tone's angular frequency.
+    /// Change of each tone's angular frequency.
     pub(crate) frequencies: Vec<f64>,
-    /// Of the gap.
+    /// Changes of the gap's tones: the parts that grow like `1` and like `t`.
     gap_tones: Vec<[Complex; 2]>,
 }
 
@@ -224,23 +227,24 @@ fn check(system: &System, parameter: &Parameter) -> Result<(), VolterraError> {
 pub(crate) struct StepChange {
     /// Modal coordinates at its start.
     pub(crate) modal: Vec<f64>,
-    /// Coefficients of the force.
+    /// Changes of the force's coefficients.
     pub(crate) coefficients: Vec<f64>,
-    /// By how much the step moves in time.
+    /// Changes of the step's position in time.
     pub(crate) shifts: Vec<f64>,
-    /// By how much its end does, where the law switches there; else empty.
+    /// Changes of the time of its end, where the law switches there; otherwise empty.
     pub(crate) ends: Vec<f64>,
 }
 
 /// Carries the derivatives along a run, in modal coordinates.
 #[derive(Clone, Debug)]
 pub(crate) struct Tangents {
-    /// Of the last columns; those before change with their start alone.
+    /// Derivatives of the system for the last columns; the columns before change with their start
+    /// alone.
     pub(crate) parameters: Vec<Forced>,
     plain: usize,
-    /// Every step's, if they are kept.
+    /// Changes on every step, if they are kept.
     pub(crate) kept: Option<Vec<StepChange>>,
-    /// Dimension × changes, column-major.
+    /// Changes of the modal coordinates, dimension × changes, column-major.
     columns: Vec<f64>,
     /// How the time of the last switch varies, while the variation is taken relative to it.
     shifts: Vec<f64>,
@@ -312,7 +316,7 @@ impl Tangents {
         })
     }
 
-    /// The same, keeping what happens on every step.
+    /// Keeps the changes on every step.
     pub(crate) fn keeping(mut self) -> Self {
         self.kept = Some(Vec::new());
         self
@@ -598,7 +602,7 @@ impl Flow {
     /// start (`n × n`) and by each parameter (one column each, `n × p`), all at fixed times.
     ///
     /// # Errors
-    /// As [`Flow::run_until`], and when a parameter does not fit the system.
+    /// As for [`Flow::run_until`], and if a parameter does not fit the system.
     pub fn run_with_derivatives(
         &mut self,
         end: f64,

@@ -10,31 +10,31 @@ use crate::{Complex, VolterraError};
 use nalgebra::{DVector, RowDVector};
 use std::sync::Arc;
 
-/// Points of the Gauss–Legendre rule of one panel of an integral.
+/// Number of points of the Gauss–Legendre rule of one panel of an integral.
 const POINTS: usize = 24;
-/// How far the fastest mode may turn within a panel.
+/// Largest angle, in radians, through which the fastest mode turns within a panel.
 const REACH: f64 = 6.0;
 /// By how much the phase of a factor may turn in a panel: Gauss's rule of [`POINTS`] points is
 /// right to rounding up to here.
 const OSCILLATION: f64 = 36.0;
-/// The largest number of steps a trajectory keeps.
+/// Largest number of steps in a trajectory.
 pub const MAX_RECORDED_STEPS: usize = 4_000_000;
 
-/// A scalar read from the motion: `row · x + offset + Re Σ tones e^{iωt} + force F`.
+/// A scalar function of the motion: `row · x + offset + Re Σ tones e^{iωt} + force F`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Output {
-    /// Of the length of the state.
+    /// Row that multiplies the state, of the length of the state.
     pub row: RowDVector<f64>,
-    /// The constant.
+    /// Constant part, in the unit of the output.
     pub offset: f64,
-    /// One complex amplitude a tone of the drive (empty: none).
+    /// Complex amplitudes in the unit of the output, one per tone of the drive (empty: none).
     pub tones: Vec<Complex>,
-    /// How much of the law's force is added.
+    /// Factor of the law's force in the output, in units of the output per unit of force.
     pub force: f64,
 }
 
 impl Output {
-    /// A plain component of the state.
+    /// Creates a component of the state.
     pub fn component(dimension: usize, index: usize) -> Self {
         let mut row = RowDVector::zeros(dimension);
         row[index] = 1.0;
@@ -50,44 +50,45 @@ impl Output {
 /// The motion at one instant.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Sample {
-    /// When.
+    /// Time of the sample, in the system's unit of time.
     pub time: f64,
-    /// The state.
+    /// State at that time, of length `n`.
     pub state: DVector<f64>,
-    /// The gap.
+    /// Gap at that time, in the unit of the gap.
     pub gap: f64,
-    /// Its rate.
+    /// Rate of the gap, in units of the gap per unit of time.
     pub rate: f64,
-    /// The force of the law.
+    /// Force of the law, in the unit of force; repulsion is positive.
     pub force: f64,
-    /// How fast it changes; infinite where it sets in or ends like a root of time.
+    /// Rate of the force, in units of force per unit of time; infinite where the force begins or
+    /// ends like a square root of time.
     pub force_rate: f64,
-    /// The branch of the law.
+    /// Number of the present branch of the law.
     pub branch: usize,
 }
 
 /// The motion at a node of a trajectory's quadrature, or at an end of one of its steps.
 #[derive(Clone, Debug)]
 pub struct Node {
-    /// Weight in integrals over time; 0 at the ends of steps.
+    /// Weight in integrals over time, in the system's unit of time; 0 at the ends of steps.
     pub weight: f64,
-    /// The motion there.
+    /// State, gap and force at the node.
     pub sample: Sample,
-    /// How fast the state changes.
+    /// Rate `ẋ` of the state.
     field: Vec<f64>,
     piece: usize,
-    /// Where on the step.
+    /// Value of the step's variable `u`.
     u: f64,
 }
 
 /// A stretch of a trajectory on one branch of the law, one step long.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Stretch {
-    /// When it begins.
+    /// Time of its start, in the system's unit of time.
     pub start: f64,
-    /// How long it lasts.
+    /// Length in time, in the system's unit of time.
     pub length: f64,
-    /// The branch.
+    /// Number of the branch of the law.
     pub branch: usize,
 }
 
@@ -103,7 +104,7 @@ pub(crate) struct Piece {
     pub(crate) coefficients: Vec<f64>,
 }
 
-/// A recorded run.
+/// A recorded run, which can be evaluated at any time.
 #[derive(Clone, Debug)]
 pub struct Trajectory {
     pub(crate) system: Arc<System>,
@@ -135,10 +136,10 @@ impl Observer for Trajectory {
 }
 
 impl Flow {
-    /// Runs to time `end` and keeps the motion.
+    /// Runs to time `end` and records the motion.
     ///
     /// # Errors
-    /// As [`Flow::run_until`]; [`VolterraError::TooLarge`] beyond [`MAX_RECORDED_STEPS`].
+    /// As for [`Flow::run_until`]; [`VolterraError::TooLarge`] beyond [`MAX_RECORDED_STEPS`].
     pub fn record_until(&mut self, end: f64) -> Result<Trajectory, VolterraError> {
         let mut trajectory = Trajectory::empty(self.system.clone());
         self.run(end, &mut trajectory)?;
@@ -198,21 +199,21 @@ impl Piece {
 /// A local extremum of an output.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Extremum {
-    /// When.
+    /// Time of the extremum, in the system's unit of time.
     pub time: f64,
-    /// The output.
+    /// Value of the output there, in the unit of the output.
     pub value: f64,
     /// Whether it is a maximum.
     pub largest: bool,
-    /// The branch of the law there.
+    /// Number of the branch of the law there.
     pub branch: usize,
 }
 
-/// Where an output is extreme.
+/// The position of an extremum of an output.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Extreme {
     pub(crate) piece: usize,
-    /// Where on the piece.
+    /// Value of the piece's variable `u`.
     pub(crate) u: f64,
     time: f64,
     pub(crate) value: f64,
@@ -242,12 +243,12 @@ impl Trajectory {
         Ok(self)
     }
 
-    /// The switches of the law, in order.
+    /// Returns the switches of the law, in order of time.
     pub fn switches(&self) -> &[Switch] {
         &self.switches
     }
 
-    /// When it begins and ends (0 and 0 of an empty one).
+    /// Returns the times of start and end (0 and 0 for an empty trajectory).
     pub fn span(&self) -> (f64, f64) {
         match (self.pieces.first(), self.pieces.last()) {
             (Some(first), Some(last)) => (first.start, last.end_time()),
@@ -255,7 +256,7 @@ impl Trajectory {
         }
     }
 
-    /// Its stretches, in order.
+    /// Returns the stretches, one per step, in order of time.
     pub fn stretches(&self) -> impl Iterator<Item = Stretch> + '_ {
         self.pieces.iter().map(|p| Stretch {
             start: p.start,
@@ -264,12 +265,12 @@ impl Trajectory {
         })
     }
 
-    /// The number of steps.
+    /// Returns the number of recorded steps.
     pub fn steps(&self) -> usize {
         self.pieces.len()
     }
 
-    /// The motion at a time, none outside the span.
+    /// Returns the motion at a time; `None` outside the span.
     pub fn at(&self, time: f64) -> Option<Sample> {
         let (start, end) = self.span();
         if !(time >= start && time <= end) {
@@ -287,15 +288,16 @@ impl Trajectory {
         Some(piece.sample(&self.system, u))
     }
 
-    /// The motion on stretch number `index`, `after` its beginning; at its very ends too, where
-    /// the force of the next stretch may be another.
+    /// Returns the motion on stretch number `index` at a time `after` its start; also at its very
+    /// ends, where the force of the next stretch may differ.
     pub fn on_stretch(&self, index: usize, after: f64) -> Option<Sample> {
         let piece = self.pieces.get(index)?;
         let u = piece.map.variable(piece.length, after).min(piece.end);
         Some(piece.sample(&self.system, u))
     }
 
-    /// The fastest rate of modes and drive, without those of a surface that relaxes.
+    /// Returns the fastest rate of modes and drive, without those of a surface that relaxes, per
+    /// unit of time.
     pub fn fastest(&self) -> f64 {
         let kernel = self.system.kernel();
         let blocks = kernel.modes().blocks();
@@ -305,7 +307,7 @@ impl Trajectory {
         modes.chain(tones).fold(0.0, f64::max)
     }
 
-    /// The value of an output and its rate at a sample.
+    /// Returns the value of an output and its rate at a sample.
     pub fn read(&self, output: &Output, sample: &Sample) -> (f64, f64) {
         self.read_with(output, sample, &self.field(sample))
     }
@@ -334,13 +336,14 @@ impl Trajectory {
         (value, rate)
     }
 
-    /// The nodes of a quadrature of the whole motion and the ends of its steps, in order of
-    /// time: what integrals and extrema are read from.
+    /// Returns the nodes of a quadrature of the whole motion and the ends of its steps, in order of
+    /// time. Integrals and extrema are computed from them.
     pub fn nodes(&self) -> Vec<Node> {
         self.nodes_resolving(0.0)
     }
 
-    /// The same, dense enough for a factor that oscillates with the angular frequency `omega`.
+    /// Returns such nodes, dense enough for a factor that oscillates with the angular frequency
+    /// `omega`.
     pub fn nodes_resolving(&self, omega: f64) -> Vec<Node> {
         let mut all = Vec::new();
         for (index, piece) in self.pieces.iter().enumerate() {
@@ -371,7 +374,8 @@ impl Trajectory {
         all
     }
 
-    /// The integrals over time of `count` functions of the motion, which `integrand` writes.
+    /// Returns the integrals over time of `count` functions of the motion, which `integrand`
+    /// writes.
     pub fn integrate(
         &self,
         count: usize,
@@ -388,13 +392,13 @@ impl Trajectory {
         sums
     }
 
-    /// The time mean of an output.
+    /// Returns the time mean of an output.
     pub fn mean(&self, output: &Output) -> f64 {
         let (start, end) = self.span();
         self.integrate(1, |s, out| out[0] = self.read(output, s).0)[0] / (end - start)
     }
 
-    /// The Fourier coefficient `c = (2/D) ∫ g e^{−iωt} dt` over the span `D`, so that the
+    /// Returns the Fourier coefficient `c = (2/D) ∫ g e^{−iωt} dt` over the span `D`, so that the
     /// component at `ω` is `Re(c e^{iωt})`.
     pub fn fourier(&self, output: &Output, omega: f64) -> Complex {
         let (start, end) = self.span();
@@ -407,25 +411,26 @@ impl Trajectory {
         parts.sum::<Complex>() * (2.0 / (end - start))
     }
 
-    /// `∫ F ḋ dt`, the work of the law's force on the gap: what it stores and (below zero over
-    /// a closed motion) dissipates.
+    /// Returns `∫ F ḋ dt`, the work of the law's force on the gap: it contains stored energy and,
+    /// negative over a closed motion, dissipated energy.
     pub fn work(&self) -> f64 {
         self.integrate(1, |s, out| out[0] = s.force * s.rate)[0]
     }
 
-    /// The time spent on the branches that `inside` accepts.
+    /// Returns the time spent on the branches for which `inside` is true, in the system's unit of
+    /// time.
     pub fn time_on(&self, inside: impl Fn(usize) -> bool) -> f64 {
         let stretches = self.stretches().filter(|s| inside(s.branch));
         stretches.map(|s| s.length).sum()
     }
 
-    /// The same as a fraction of the span.
+    /// Returns the same time as a fraction of the span, 0 to 1.
     pub fn fraction(&self, inside: impl Fn(usize) -> bool) -> f64 {
         let (start, end) = self.span();
         self.time_on(inside) / (end - start)
     }
 
-    /// The local extrema of an output inside the span, in order.
+    /// Returns the local extrema of an output inside the span, in order of time.
     pub fn extrema(&self, output: &Output) -> Vec<Extremum> {
         let found = self.extrema_among(&self.nodes(), output).into_iter();
         found
@@ -464,14 +469,14 @@ impl Trajectory {
         found
     }
 
-    /// The least and the largest value of an output over the span, ends included.
+    /// Returns the least and the largest value of an output over the span, ends included.
     pub fn range(&self, output: &Output) -> (f64, f64) {
         let [least, largest] = self.ends_of_range(&self.nodes(), output);
         (least.1, largest.1)
     }
 
-    /// When an output is least and when it is largest, each with its value; `nodes` are the
-    /// trajectory's own ([`Trajectory::nodes`]).
+    /// Returns the times at which an output is least and largest, each with its value; `nodes` are
+    /// the trajectory's own ([`Trajectory::nodes`]).
     pub fn ends_of_range(&self, nodes: &[Node], output: &Output) -> [(f64, f64); 2] {
         self.extremes(nodes, output).map(|e| (e.time, e.value))
     }
@@ -504,7 +509,7 @@ impl Trajectory {
         ends
     }
 
-    /// The gap as an output.
+    /// Returns the gap as an output.
     pub fn gap_output(&self) -> Output {
         let drive = self.system.drive();
         Output {

@@ -1,4 +1,4 @@
-//! How what is read off a run changes with its initial state and with parameters.
+//! Derivatives of a run's outputs by its initial state and by parameters.
 //!
 //! A step's variation is a motion of the same modes under a variation of the force that is a
 //! polynomial as the force itself is, and so it has the same dense output. Integrals over the run
@@ -14,31 +14,31 @@ use crate::trajectory::{Node, Output, Trajectory};
 use crate::{Complex, VolterraError};
 use nalgebra::{DMatrix, RowDVector};
 
-/// A recorded run with how it changes, a column each change.
+/// A recorded run with its derivatives, one column per change.
 #[derive(Clone, Debug)]
 pub struct Variation {
     motion: Trajectory,
     pieces: Vec<StepChange>,
-    /// Of the last columns.
+    /// Derivatives of the system for the last columns.
     parameters: Vec<Forced>,
     count: usize,
-    /// By how much the end of the run moves.
+    /// Changes of the time of the run's end.
     end: Vec<f64>,
-    /// How the state changes there, at its time.
+    /// Changes of the state at the end of the run, at its time.
     at_end: DMatrix<f64>,
 }
 
-/// An output with how it changes at constant state and time.
+/// An output with its derivatives at constant state and time.
 #[derive(Clone, Debug, PartialEq)]
 pub struct VariedOutput {
-    /// The output.
+    /// Output whose derivatives are `changes`.
     pub value: Output,
-    /// Its change, a column each (empty: none).
+    /// Its derivatives, one per column (empty: none).
     pub changes: Vec<Output>,
 }
 
 impl VariedOutput {
-    /// An output without variation.
+    /// Creates an output without derivatives: the parameters do not enter it directly.
     pub const fn fixed(value: Output) -> Self {
         Self {
             value,
@@ -51,34 +51,34 @@ impl VariedOutput {
 /// place of it, not at a fixed time.
 #[derive(Clone, Debug)]
 pub struct Reading<'a> {
-    /// When.
+    /// Time of the place on the unvaried motion, in the system's unit of time.
     pub time: f64,
-    /// Weight in integrals over time; 0 at the ends of steps.
+    /// Weight in integrals over time, in the system's unit of time; 0 at the ends of steps.
     pub weight: f64,
     /// At the ends of a step: how much more of an integral's range the step has there as each
     /// column changes, seen from the step.
     pub widening: &'a [f64],
-    /// By how much the step moves in time, a column each.
+    /// Changes of the step's position in time, one per column.
     pub shifts: &'a [f64],
-    /// Of every output.
+    /// Values of all outputs, in the order in which they were given.
     pub values: &'a [f64],
-    /// The changes of every output, output by output.
+    /// Changes of all outputs, output by output, one per column.
     pub changes: &'a [f64],
 }
 
 impl Reading<'_> {
-    /// The change of output number `output` with column `column`.
+    /// Returns the change of output number `output` with column `column`.
     pub fn change(&self, output: usize, column: usize) -> f64 {
         self.changes[output * self.shifts.len() + column]
     }
 }
 
-/// An extremum or another number at a moment of the motion, with its changes.
+/// A number that is read at one moment of the motion, such as an extremum, with its derivatives.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Moment {
-    /// The number.
+    /// Value, in the unit of the output.
     pub value: f64,
-    /// Its change with each column.
+    /// Derivatives, one per column, in units of the output per unit of the column's change.
     pub changes: Vec<f64>,
 }
 
@@ -95,7 +95,7 @@ struct Reader {
 struct ChangeReader {
     row: Vec<f64>,
     constant: f64,
-    /// What grows like `1` and like `t`.
+    /// Parts that grow like `1` and like `t`.
     tones: Vec<[Complex; 2]>,
     force: f64,
 }
@@ -137,12 +137,12 @@ impl Flow {
 }
 
 impl Variation {
-    /// The motion.
+    /// Returns the recorded motion without variation.
     pub const fn motion(&self) -> &Trajectory {
         &self.motion
     }
 
-    /// How the state changes at the end of the run, at its time, a column each.
+    /// Returns the changes of the state at the end of the run, at its time, one column each.
     pub const fn at_end(&self) -> &DMatrix<f64> {
         &self.at_end
     }
@@ -172,8 +172,8 @@ impl Variation {
         boundary - self.pieces[piece].shifts[column]
     }
 
-    /// By how much the time that the motion spends on steps of some branches of the law changes
-    /// with a column.
+    /// Returns the change, with a column, of the time that the motion spends on steps of some
+    /// branches of the law.
     pub fn time_on(&self, column: usize, inside: impl Fn(usize) -> bool) -> f64 {
         let pieces = self.motion.pieces.iter().enumerate();
         pieces

@@ -10,16 +10,16 @@
 use std::fmt;
 use std::ops::Range;
 
-/// What kind of error it is.
+/// Kind of an error, which determines exit code and exception.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ErrorKind {
     /// The input is not valid.
     BadInput,
     /// The input is valid, and the computation failed.
     Numerics,
-    /// The file system failed.
+    /// A file or folder could not be read or written.
     Files,
-    /// The work was cancelled.
+    /// The work was cancelled before it was finished.
     Stopped,
 }
 
@@ -28,14 +28,14 @@ pub enum ErrorKind {
 pub struct SourceText {
     /// Name for messages: the path as given.
     pub name: String,
-    /// The whole text.
+    /// Whole text of the case file.
     pub text: String,
 }
 
-/// Place of a problem.
+/// Place to which a problem points.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum ErrorPlace {
-    /// Nowhere in particular, or all of the file.
+    /// The input or the file as a whole.
     Whole,
     /// An option of a study.
     Option(String),
@@ -48,24 +48,24 @@ pub enum ErrorPlace {
 /// A problem of a case.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ErrorProblem {
-    /// Where.
+    /// Place to which the problem points.
     pub place: ErrorPlace,
-    /// What is wrong.
+    /// What is wrong, with the value as given.
     pub message: String,
-    /// A few words to stand under the place in the file; may be empty.
+    /// Short label under the place in the file; may be empty.
     pub label: String,
-    /// What to do.
+    /// What to do to solve the problem, if known.
     pub remedy: Option<String>,
 }
 
 /// An error: its kind, and one or more problems with place and remedy.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Error {
-    /// What kind of error it is.
+    /// Kind of the error.
     pub kind: ErrorKind,
-    /// The file that the problems point into, where there is one.
+    /// File to which the problems point, if there is one.
     pub source: Option<SourceText>,
-    /// What is wrong: at least one problem.
+    /// Problems that cause the error, at least one.
     pub problems: Vec<ErrorProblem>,
 }
 
@@ -95,7 +95,7 @@ fn shortened(text: &str, max: usize) -> String {
 }
 
 impl Error {
-    /// An error of one problem.
+    /// Creates an error with one problem, without place and remedy.
     pub fn new(kind: ErrorKind, message: impl Into<String>) -> Self {
         Self {
             kind,
@@ -109,38 +109,38 @@ impl Error {
         }
     }
 
-    /// Input that is not valid, and a remedy.
+    /// Creates an error for invalid input, with a remedy.
     pub fn input(message: impl Into<String>, remedy: impl Into<String>) -> Self {
         Self::new(ErrorKind::BadInput, message).remedy(remedy)
     }
 
-    /// An option of a study whose value is not valid, and a remedy.
+    /// Creates an error for an invalid value of an option of a study, with a remedy.
     pub fn option(name: &str, message: impl Into<String>, remedy: impl Into<String>) -> Self {
         Self::input(message, remedy).at(name)
     }
 
-    /// A computation that failed.
+    /// Creates an error for a computation that failed although its input is valid.
     pub fn numerics(message: impl Into<String>) -> Self {
         Self::new(ErrorKind::Numerics, message)
     }
 
-    /// Work that was cancelled.
+    /// Creates an error for work that was cancelled.
     pub fn stopped() -> Self {
         Self::new(ErrorKind::Stopped, "stopped before it was done")
     }
 
-    /// An error of the file system.
+    /// Creates an error for a file or folder that could not be read or written.
     pub fn files(message: impl Into<String>) -> Self {
         Self::new(ErrorKind::Files, message)
     }
 
-    /// The first problem's message, without its place and remedy.
+    /// Returns the first problem's message, without its place and remedy.
     pub fn message(&self) -> String {
         let message = self.problems.first().map_or("", |problem| &problem.message);
         replaced(message, &str::to_owned)
     }
 
-    /// The same, at an option of a study.
+    /// The same error, with all problems at an option of a study.
     #[must_use]
     pub fn at(mut self, option: &str) -> Self {
         for problem in &mut self.problems {
@@ -149,7 +149,7 @@ impl Error {
         self
     }
 
-    /// The same, with a remedy.
+    /// The same error, with this remedy for its last problem.
     #[must_use]
     pub fn remedy(mut self, remedy: impl Into<String>) -> Self {
         if let Some(problem) = self.problems.last_mut() {
@@ -158,7 +158,7 @@ impl Error {
         self
     }
 
-    /// The same, its first message behind `words`.
+    /// The same error, with `words` and a colon before its first message.
     #[must_use]
     pub fn context(mut self, words: impl fmt::Display) -> Self {
         if let Some(problem) = self.problems.first_mut() {
@@ -167,7 +167,7 @@ impl Error {
         self
     }
 
-    /// The same, with the options in messages and remedies written as `option` writes them.
+    /// The same error, with the options in messages and remedies written as `option` writes them.
     #[must_use]
     pub fn written(mut self, option: impl Fn(&str) -> String) -> Self {
         for problem in &mut self.problems {

@@ -9,16 +9,16 @@ use crate::formula::typeset;
 
 /// A link or a picture.
 pub(crate) struct Link {
-    /// Target as written.
+    /// Target of the link as written in the page.
     pub(crate) target: String,
     /// Byte range of the link in the text, brackets included.
     range: Range<usize>,
 }
 
-/// Contents of a page.
+/// A parsed page with its links, anchors and formulas.
 pub(crate) struct Page {
     text: String,
-    /// Anchors of its headings.
+    /// Anchors of the headings, in order.
     pub(crate) anchors: Vec<String>,
     /// Links and pictures, in order.
     pub(crate) links: Vec<Link>,

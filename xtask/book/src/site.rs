@@ -26,7 +26,7 @@ const PICTURES: &str = "docs/reference/paper/";
 pub struct Trouble {
     /// Path of the page, from the repository's root.
     pub page: String,
-    /// Description of the error.
+    /// Description of the error, in words.
     pub reason: String,
 }
 
@@ -36,7 +36,7 @@ impl fmt::Display for Trouble {
     }
 }
 
-/// The site.
+/// All pages of the book, with their table of contents.
 pub struct Site {
     root: PathBuf,
     /// Pages by path from the repository's root, with `/`.
@@ -71,7 +71,7 @@ impl Site {
         })
     }
 
-    /// Number of pages.
+    /// Returns the number of pages.
     pub fn len(&self) -> usize {
         self.pages.len()
     }

@@ -46,10 +46,10 @@ pub(crate) struct Arguments {
     plot: PlotArgument,
 }
 
-/// The report, and where its table went.
+/// The report, and the path of its table.
 #[derive(Serialize)]
 struct Written<'a> {
-    /// The table, if it was written to a file.
+    /// Path of the table, if it was written to a file.
     path: Option<PathBuf>,
     #[serde(flatten)]
     report: &'a ApproachReport,
@@ -87,7 +87,7 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     output.study(&case, &written, |_| text(&case, &report))
 }
 
-/// A row a distance, there and back, then what coexists.
+/// The table as CSV: one row per distance in both directions, then the coexisting motions.
 fn csv(report: &ApproachReport, units: &Units) -> String {
     let si = matches!(units, Units::Si(_));
     let distance = if si { "zc (m)" } else { report.parameter };
@@ -136,20 +136,20 @@ fn csv(report: &ApproachReport, units: &Units) -> String {
     csv
 }
 
-/// What a column measures and its SI unit, where it has one.
+/// Quantity of a column and its SI unit, if it has one.
 fn si_of(column: &ModulatedColumn, units: &Units) -> Option<(Kind, f64)> {
     column.kind.and_then(|kind| Some((kind, units.si(kind)?)))
 }
 
-/// Rows of the table that a terminal shows of each way.
+/// Number of rows that a terminal shows in each direction.
 const SHOWN: usize = 16;
 
-/// Of how many distances one is shown.
+/// Returns n if one distance in n is shown.
 fn step_of(report: &ApproachReport) -> usize {
     (report.table.len() / (2 * SHOWN)).max(1)
 }
 
-/// The table of one distance in `step`, with a word on those that are left out.
+/// Formats the table of one distance in `step`, with a line on those that are left out.
 fn thinned(table: &Table, step: usize, report: &ApproachReport) -> String {
     let all = report.table.len();
     let left_out = if step > 1 {
@@ -284,10 +284,10 @@ fn text(case: &GivenCase, report: &ApproachReport) -> String {
     text
 }
 
-/// Uncertainty of a distance, in proportion to it, from which it is shown.
+/// Smallest relative uncertainty of a distance that is shown.
 const SHOWN_UNCERTAINTY: f64 = 1e-9;
 
-/// Where the lever jumps.
+/// Formats the table of the distances at which the motion jumps; empty if it does not.
 fn jumps(report: &ApproachReport, shown: &dyn Fn(Kind, f64) -> String) -> String {
     if report.jumps.is_empty() {
         return String::new();
@@ -335,7 +335,7 @@ fn jumps(report: &ApproachReport, shown: &dyn Fn(Kind, f64) -> String) -> String
     table.render() + "\n"
 }
 
-/// What the motion of a row is.
+/// Name of the motion of a row: its period, or its classification.
 fn motion_of(p: &ApproachPoint) -> String {
     p.period.map_or_else(
         || p.classification.name().to_owned(),
@@ -343,7 +343,7 @@ fn motion_of(p: &ApproachPoint) -> String {
     )
 }
 
-/// What is held and what was found of it.
+/// Formats the set values and the results of frequency modulation.
 fn modulated(
     report: &ApproachReport,
     modulation: &ModulationReport,

@@ -55,7 +55,7 @@ type Column = (
     fn(&BimodalPoint, usize) -> String,
 );
 
-/// What is shown of a tone, as far as its loop lets it change.
+/// The columns shown for a tone; a loop decides which of its quantities vary.
 const COLUMNS: [Column; 4] = [
     (
         "A",
@@ -108,7 +108,7 @@ fn text(case: &GivenCase, report: &BimodalReport) -> String {
     text
 }
 
-/// The free lever at both tones.
+/// The table of the free lever at both tones: amplitude, phase lag, frequency and stiffness.
 fn free(report: &BimodalReport) -> Table {
     let mut table = Table::new([
         ("free lever", Align::Left),
@@ -129,7 +129,7 @@ fn free(report: &BimodalReport) -> Table {
     table
 }
 
-/// A row a distance.
+/// The table against the distance, one row per distance.
 fn curve(report: &BimodalReport) -> Table {
     let shown: Vec<(String, usize, &Column)> = [0, 1]
         .into_iter()

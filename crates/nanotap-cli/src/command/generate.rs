@@ -40,13 +40,13 @@ enum What {
     Man,
 }
 
-/// What was made.
+/// The generated output: text, or files.
 #[derive(Serialize)]
 #[serde(rename_all = "snake_case")]
 enum Made {
-    /// A text for standard output.
+    /// Text for standard output, such as a completion script.
     Text(String),
-    /// Files in a folder.
+    /// Paths of the manual pages that were written.
     Files(Vec<PathBuf>),
 }
 

@@ -77,7 +77,7 @@ pub(crate) struct Arguments {
     pub(crate) command: Command,
 }
 
-/// The version, and the vector instructions in use.
+/// The version, and the vector instructions that the program uses.
 fn long_version() -> String {
     let version = env!("CARGO_PKG_VERSION");
     let instructions = nanotap::model::vector_instructions();
@@ -158,7 +158,7 @@ pub(crate) enum Own {
     Schema(schema::Arguments),
 }
 
-/// Runs `command`.
+/// Runs a command with its arguments and prints its result.
 pub(crate) fn run(command: &Command, output: &Output) -> Result<(), Failure> {
     let own = match command {
         Command::Own(own) => own,

@@ -92,7 +92,7 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     })
 }
 
-/// A row a harmonic.
+/// The harmonics as CSV, one row per harmonic; in SI units for a physical case.
 fn harmonics_csv(orbit: &OrbitReport, units: &Units, omega: f64) -> String {
     let harmonics = &orbit.spectrum.harmonics;
     let si = matches!(units, Units::Si(_));
@@ -128,7 +128,8 @@ fn harmonics_csv(orbit: &OrbitReport, units: &Units, omega: f64) -> String {
     csv
 }
 
-/// The smallest knock that upsets the orbit, in a sentence.
+/// Describes the smallest change of the tip's speed after which the motion leaves the orbit for
+/// another.
 fn upset(knocks: &Knocks, units: &Units) -> String {
     let speed = |value: f64| number::quantity(units, Kind::Velocity, value, [4, 4]);
     let Some(found) = &knocks.smallest else {

@@ -33,11 +33,11 @@ pub(crate) struct Arguments {
     threads: ThreadsArgument,
 }
 
-/// The names of the report's own files, and the endings of all that it may write.
+/// Names of the report's files, and the extensions of all files that it may write.
 const REPORT: [&str; 2] = ["report", "checks"];
 const ENDINGS: [&str; 5] = ["html", "md", "json", "svg", "png"];
 
-/// The JSON document.
+/// The JSON document of the report, with the computing time in s.
 #[derive(Serialize)]
 struct Timed<'a> {
     #[serde(flatten)]

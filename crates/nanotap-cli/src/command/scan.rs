@@ -122,7 +122,7 @@ fn dataset(
     })
 }
 
-/// `image-height.gsf` next to `image.gsf`.
+/// Path of one channel of the trace: `image-height.gsf` for `image.gsf`.
 fn of_channel(path: &Path, channel: &str) -> PathBuf {
     let stem = path.file_stem().unwrap_or_default().to_string_lossy();
     path.with_file_name(format!("{stem}-{channel}.gsf"))

@@ -125,7 +125,7 @@ fn text(
     })
 }
 
-/// How many runs came to what.
+/// Counts the runs by their result, in words.
 fn counts(summary: &Summary) -> String {
     const SHOWN: usize = 12;
     let mut table = Table::new([

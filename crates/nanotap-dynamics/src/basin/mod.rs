@@ -21,9 +21,9 @@ use crate::vector::norm;
 pub struct SliceAxis {
     /// Index of the coordinate in the state.
     pub coordinate: usize,
-    /// First value.
+    /// First value, in the unit of the coordinate.
     pub from: f64,
-    /// Last value.
+    /// Last value, in the unit of the coordinate; may be below `from`.
     pub to: f64,
     /// Number of values, both ends included.
     pub count: usize,
@@ -117,20 +117,20 @@ impl Slice {
     }
 }
 
-/// Fate of a start.
+/// Result for one initial state of a slice.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Label {
     /// It goes to the attractor with this index.
     Attractor(u32),
     /// It reached no attractor within the budget.
     Unsettled,
-    /// A state exceeded the bound.
+    /// A state exceeded the bound or overflowed.
     Unbounded,
-    /// The map failed.
+    /// The map returned an error, so the run could not go on.
     Failed,
 }
 
-/// Limits of the runs.
+/// Limits on the run from each initial state.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BasinOptions {
     /// Drive periods after which a start is called unsettled.
@@ -333,9 +333,9 @@ fn label_of(failure: &MapFailure) -> Label {
 
 /// A start that is being followed.
 struct Trajectory<'a> {
-    /// Index of its label.
+    /// Index of the start's label in its batch.
     number: usize,
-    /// Drive periods so far.
+    /// Drive periods run so far.
     period: usize,
     /// For each box: whether it contained all of the last states.
     inside: Vec<bool>,
@@ -353,7 +353,7 @@ impl<'a> Trajectory<'a> {
     }
 }
 
-/// Result of a check.
+/// Result of checking where a trajectory is.
 enum Check {
     Done(Label),
     /// Check again after this many periods.

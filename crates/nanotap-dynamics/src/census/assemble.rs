@@ -1,4 +1,4 @@
-//! From what every start came to, to attractors with their counts.
+//! Groups the outcomes of all starts into attractors with their counts.
 
 use crate::census::escapes::Escapes;
 use crate::census::{
@@ -157,7 +157,7 @@ pub(crate) fn assemble(
     }
 }
 
-/// Adds start `k` to a group that is there, or hands back what a new one needs.
+/// Adds start `k` to an existing group, or returns the members and the state of a new one.
 fn join(found: Option<&mut Group>, k: usize, state: &[f64]) -> Option<(Vec<usize>, Vec<f64>)> {
     if let Some(group) = found {
         group.members.push(k);
@@ -194,7 +194,7 @@ fn destinations(
         .collect()
 }
 
-/// What fractions are of.
+/// The starts that the fractions of a census refer to.
 struct Counts<'a> {
     starts: &'a StartSet,
     total: usize,
@@ -214,7 +214,7 @@ impl<'a> Counts<'a> {
         }
     }
 
-    /// The part that these starts are of all that count.
+    /// Returns the fraction of the counted starts that are in `members`.
     fn of(&self, members: &[usize]) -> Fraction {
         let uncounted = self.total - self.counted;
         let count = members.iter().filter(|&&k| k >= uncounted).count();

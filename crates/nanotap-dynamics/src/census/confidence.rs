@@ -6,25 +6,25 @@ const Z: f64 = 1.959_963_984_540_054;
 /// probability 95 %.
 const NONE_SEEN: f64 = 2.995_732_273_553_991;
 
-/// A fraction of starts with its interval.
+/// A fraction of starts with its 95 % confidence interval.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Fraction {
-    /// Starts counted.
+    /// Number of starts with this outcome.
     pub count: usize,
-    /// Out of how many.
+    /// Number of starts in all.
     pub total: usize,
-    /// count/total; 0 of none.
+    /// `count/total`, 0 to 1; 0 if `total` is 0.
     pub estimate: f64,
-    /// Lower end of the 95 % interval.
+    /// Lower end of the 95 % interval, 0 to 1.
     pub low: f64,
-    /// Upper end of the 95 % interval.
+    /// Upper end of the 95 % interval, 0 to 1.
     pub high: f64,
 }
 
 impl Fraction {
-    /// Wilson's score interval (J. Am. Stat. Assoc. 22, 209, 1927): right in
-    /// coverage for small counts too. It takes the starts as random; quasi-random
-    /// ones are spread more evenly, so it errs on the wide side.
+    /// Computes Wilson's score interval (J. Am. Stat. Assoc. 22, 209, 1927), whose coverage is
+    /// right for small counts too. It treats the starts as random; quasi-random ones are spread
+    /// more evenly, so the interval is rather too wide.
     pub fn new(count: usize, total: usize) -> Self {
         if total == 0 {
             return Self {
@@ -58,26 +58,27 @@ impl Fraction {
     }
 }
 
-/// A mean lifetime in periods, from escapes and the time without.
+/// A mean lifetime in drive periods, estimated from the number of escapes and the time observed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Lifetime {
-    /// Escapes seen.
+    /// Number of runs that escaped.
     pub escapes: usize,
-    /// Periods watched in all, over every run, up to its escape or its end.
+    /// Total time observed, in drive periods: the sum over all runs, each up to its escape or its
+    /// end.
     pub exposure: f64,
-    /// exposure/escapes, the maximum-likelihood estimate with censored runs; infinite
-    /// if none escaped.
+    /// Mean lifetime in drive periods, `exposure/escapes`: the maximum-likelihood estimate with
+    /// censored runs; infinite if none escaped.
     pub mean: f64,
-    /// Lower end of the 95 % interval; with no escape, the mean lifetime is above
+    /// Lower end of the 95 % interval, in drive periods; with no escape, the mean lifetime is above
     /// this at 95 %.
     pub low: f64,
-    /// Upper end of the 95 % interval; infinite if none escaped.
+    /// Upper end of the 95 % interval, in drive periods; infinite if none escaped.
     pub high: f64,
 }
 
 impl Lifetime {
-    /// Exponential lifetimes: the number of escapes in a given exposure is Poisson,
-    /// and the interval is Garwood's exact one (Biometrika 28, 437, 1936).
+    /// Assumes exponential lifetimes: the number of escapes in a given exposure (drive periods) is
+    /// Poisson, and the interval is Garwood's exact one (Biometrika 28, 437, 1936).
     pub fn new(escapes: usize, exposure: f64) -> Self {
         if escapes == 0 {
             return Self {
@@ -98,7 +99,7 @@ impl Lifetime {
     }
 }
 
-/// The Poisson mean under which `count` or fewer have this probability.
+/// The Poisson mean for which a count of `count` or fewer has this probability.
 fn poisson_mean(count: usize, probability: f64) -> f64 {
     let (mut low, mut high) = (0.0, 2.0 * count as f64 + 20.0);
     // The probability falls with the mean.

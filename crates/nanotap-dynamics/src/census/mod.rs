@@ -64,47 +64,48 @@ pub use start_box::{StartBox, StartBoxError};
 pub use start_set::{StartOrigin, StartSet};
 pub use undiscovered::UndiscoveredFraction;
 
-/// Pilots that are followed before anything is known at all.
+/// Number of pilots that are followed before any motion is known.
 const FIRST_PILOTS: usize = 4;
-/// Starts of the first batch after the pilots, of which all others are multiples.
+/// Number of starts in the first batch after the pilots; larger batches are multiples of it.
 const BATCH: usize = 128;
-/// Starts that a thread draws at once, each in a microsecond or two.
+/// Number of starts that a thread draws at a time; each takes a microsecond or two.
 const DRAWN_AT_ONCE: usize = 16;
-/// Periods for which a start that enters no neighbourhood is left to itself at least,
-/// once attractors are known.
+/// Smallest number of periods for which a start that enters no neighbourhood is run before it is
+/// examined, once attractors are known.
 const MIN_WAIT_PERIODS: usize = 64;
-/// Part of the expected entry for which it is, where periods are cheap.
+/// The same wait on a coarse map, as a multiple of the expected time to enter a neighbourhood.
 const COARSE_WAIT_FACTOR: f64 = 1.3;
-/// Periods for which it is at most, where periods are cheap.
+/// Longest such wait on a coarse map, in periods.
 const MAX_COARSE_WAIT_PERIODS: usize = 2048;
-/// Periods for which chaotic starts together are watched at most, where periods are cheap, and the
-/// rounds in which they are: each takes as long as all before it.
+/// Largest number of periods for which all chaotic starts together are watched on a coarse map, and
+/// the number of rounds: each takes as long as all before it.
 const WATCHED_TOGETHER: usize = 400_000;
 const WATCH_ROUNDS: u32 = 4;
-/// Steps of a census of which chaos is watched, in those after which no further batch is begun.
+/// On a coarse map chaos is watched until the whole census has taken this multiple of
+/// [`CensusOptions::max_steps`].
 const WATCHED_STEPS: u64 = 2;
-/// Escapes after which a lifetime is known well enough.
+/// Number of escapes at which a lifetime is known well enough.
 const ENOUGH_ESCAPES: usize = 16;
-/// Pilots where orbits are known from seeds and periods are cheap.
+/// Number of pilots on a coarse map when orbits are known from seeds.
 const COARSE_PILOTS: usize = 8;
-/// Part of the census's steps, as a divisor, that the search for one trapping region may take.
+/// The search for one trapping region may take the steps of the census divided by this.
 const REGION_STEPS: u64 = 4;
-/// Chaos is watched for so many times the periods after which escapes are counted.
+/// Chaos is watched for this multiple of the periods after which escapes are counted.
 const WATCHED_TRANSIENTS: f64 = 8.0;
 
-/// How a census is taken.
+/// Options of a census: how many starts are followed, and for how long.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CensusOptions {
-    /// Starts that are classified without knowledge of any orbit's neighbourhood.
+    /// Number of starts that are classified without knowledge of any orbit's neighbourhood.
     pub pilots: usize,
-    /// Budgets of each start.
+    /// Options of the classification of each start.
     pub classify: ClassifyOptions,
-    /// Drawn starts go on until the share that may lead to motions not yet found is
-    /// below this with 95 % confidence.
+    /// Drawn starts go on until the fraction of starts (0 to 1) that may lead to motions not yet
+    /// found is below this with 95 % confidence.
     pub unseen: f64,
-    /// Drawn starts at most, whatever that bound is then.
+    /// Largest number of drawn starts, even if that bound is not reached.
     pub max_starts: usize,
-    /// Periods of all starts together after which no further batch is begun.
+    /// Drive periods of all starts together after which no further batch is begun.
     pub max_periods: usize,
     /// Steps of time integration of all the work after which no further batch is begun, as the map
     /// counts them ([`Scheduling::cost`](crate::Scheduling::cost)). [`ClassifyOptions::max_steps`] limits a start.
@@ -124,10 +125,10 @@ impl Default for CensusOptions {
     }
 }
 
-/// What a census found.
+/// Result of a census: the attractors, and the fraction of the starts that goes to each.
 #[derive(Clone, Debug)]
 pub struct Census {
-    /// Attractors, most frequent first.
+    /// Attractors in descending order of their fractions.
     pub attractors: Vec<Attractor>,
     /// Chaos from which some starts escaped while it was watched.
     ///
@@ -138,24 +139,24 @@ pub struct Census {
     /// with probability below 1 % at a constant rate: then there is an attractor,
     /// with a chaotic transient near it.
     pub transient_chaos: Option<TransientChaos>,
-    /// Starts that left every bound.
+    /// Fraction of the starts that left every bound.
     pub unbounded: Fraction,
-    /// Starts left undecided, by index.
+    /// Starts left undecided: index of the start and the reason.
     pub undecided: Vec<(usize, UndecidedReason)>,
-    /// What happened to each start.
+    /// Outcome of each start, in order of the starts.
     pub outcomes_by_start: Vec<StartOutcome>,
-    /// What the fractions are of: all starts of a set of given ones, the drawn starts
-    /// of one that is drawn.
+    /// Number of starts that the fractions refer to: all starts of a given set, or the drawn starts
+    /// of a set that is drawn.
     pub counted: usize,
-    /// The same counts for every size of the set of starts; empty if none was drawn.
+    /// The same fractions for each size of the set of starts; empty if none was drawn.
     pub by_size: Vec<SizeCount>,
-    /// How much of the set of starts may lead to motions not found; `None` if no start
+    /// Bound on the fraction of the starts that may lead to motions not found; `None` if no start
     /// was drawn.
     pub unseen: Option<UndiscoveredFraction>,
-    /// Unstable orbits near seeds.
+    /// Unstable orbits that Newton's method closed near seeds.
     pub unstable: Vec<PeriodicOrbit>,
-    /// Whether starts were followed on the map's [coarse](crate::Scheduling::coarse) one: what counts
-    /// and fractions are of. Orbits and spectra are the map's own.
+    /// Whether starts were followed on the map's [coarse](crate::Scheduling::coarse) one. Counts
+    /// and fractions are then those of the coarse map; orbits and spectra are always the map's own.
     pub followed_coarsely: bool,
     /// Why no further start was followed.
     pub end: CensusEnd,
@@ -163,67 +164,67 @@ pub struct Census {
     pub cancelled: bool,
 }
 
-/// Why a census ended.
+/// The reason why a census followed no further start.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum CensusEnd {
     /// All given starts were followed, or the work was stopped.
     AllStarts,
     /// The share that may lead to motions not found is below [`CensusOptions::unseen`].
     BoundMet,
-    /// [`CensusOptions::max_starts`] were drawn.
+    /// The largest number of drawn starts, [`CensusOptions::max_starts`], was reached.
     MaxStarts,
-    /// The starts took [`CensusOptions::max_periods`].
+    /// The starts took all drive periods of [`CensusOptions::max_periods`].
     MaxPeriods,
-    /// The work took [`CensusOptions::max_steps`].
+    /// The work took all time steps of [`CensusOptions::max_steps`].
     MaxSteps,
 }
 
-/// What happened to the starts of one size.
+/// Outcomes of the starts of one size.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SizeCount {
-    /// Its scale, 1 for the largest box.
+    /// Factor by which the box of starts is shrunk; 1 for the full box.
     pub scale: f64,
-    /// Starts of this size.
+    /// Number of starts drawn with this size.
     pub starts: usize,
-    /// Part that goes to each attractor, in the order of [`Census::attractors`].
+    /// Fraction of them that goes to each attractor, in the order of [`Census::attractors`].
     pub attractors: Vec<Fraction>,
-    /// Part that left every bound.
+    /// Fraction of them that left every bound.
     pub unbounded: Fraction,
-    /// Part left undecided, or on transient chaos.
+    /// Fraction of them left undecided, or on transient chaos.
     pub undecided: Fraction,
 }
 
-/// One attractor.
+/// An attractor with the fraction of the starts that goes to it.
 #[derive(Clone, Debug)]
 pub struct Attractor {
-    /// What it is.
+    /// Kind of the attractor, with the evidence for it.
     pub kind: AttractorKind,
-    /// What part of the starts goes there.
+    /// Fraction of the starts that goes to it.
     pub fraction: Fraction,
-    /// Index of the first start that does; `None` if none does and Newton found it.
+    /// Index of the first start that goes to it; `None` if none does and Newton's method found it.
     pub first_start: Option<usize>,
-    /// A state on the attractor.
+    /// A state on the attractor at drive phase 0, of the map's dimension.
     pub state: Vec<f64>,
 }
 
-/// What an attractor is, with the evidence.
+/// Kind of an attractor, with the evidence for it.
 #[derive(Clone, Debug)]
 pub enum AttractorKind {
     /// A stable periodic orbit.
     Periodic(PeriodicOrbit),
-    /// A torus.
+    /// A torus: the motion is quasi-periodic.
     QuasiPeriodic(Torus),
-    /// Chaos, from which none escaped.
+    /// Chaos from which no start escaped.
     Chaotic {
-        /// Exponents, of the first start that found it.
+        /// Lyapunov exponents, from the first start that found it.
         spectrum: LyapunovSpectrum,
-        /// Lower bound on the mean lifetime, over all starts on it.
+        /// Mean lifetime over all starts on it; with no escape only its lower bound is finite.
         lifetime: Lifetime,
     },
 }
 
 impl AttractorKind {
-    /// Whether both are the same motion: orbits up to a cyclic shift within their error
+    /// Returns whether both are the same motion: orbits up to a cyclic shift within their error
     /// estimates; chaos and tori by exponents, means and mean squares that agree.
     pub fn is_same_as(&self, other: &Self) -> bool {
         match (self, other) {
@@ -237,42 +238,44 @@ impl AttractorKind {
     }
 }
 
-/// Chaos that ends.
+/// Chaos that ends: its lifetime, and where the starts that escaped from it went.
 #[derive(Clone, Debug)]
 pub struct TransientChaos {
-    /// Exponents while it lasts, of the first start seen on it; `None` if they were measured on the
-    /// map's [coarse](crate::Scheduling::coarse) one only.
+    /// Lyapunov exponents while it lasts, from the first start seen on it; `None` if they were
+    /// measured only on the map's [coarse](crate::Scheduling::coarse) one.
     pub spectrum: Option<LyapunovSpectrum>,
-    /// Mean lifetime in periods, by maximum likelihood with the wanderers censored.
+    /// Mean lifetime in drive periods, by maximum likelihood; starts that have not escaped are
+    /// censored.
     pub lifetime: Lifetime,
-    /// Starts still on transient chaos at the end.
+    /// Fraction of the starts that are still on transient chaos at the end.
     pub unescaped: Fraction,
-    /// Attractors (by index) that escaped starts went to, with counts.
+    /// Attractors that escaped starts went to: index into [`Census::attractors`] and number of
+    /// starts.
     pub destinations: Vec<(usize, usize)>,
 }
 
-/// What happened to a start.
+/// Outcome of one start.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum StartOutcome {
-    /// It went to this attractor, and was known to after so many periods.
+    /// It went to an attractor.
     Attractor {
         /// Index into [`Census::attractors`].
         index: usize,
-        /// Periods run.
+        /// Drive periods after which that was known.
         periods: usize,
     },
-    /// It was still on the transient chaos after so many periods.
+    /// It was still on the transient chaos at the end of its run.
     TransientChaos {
-        /// Periods run.
+        /// Drive periods run.
         periods: usize,
     },
-    /// It left every bound.
+    /// A state exceeded the bound or overflowed.
     Unbounded,
     /// Undecided; the reason is in [`Census::undecided`].
     Undecided,
 }
 
-/// What one start came to, before attractors are put together.
+/// Outcome of one start, before starts are grouped into attractors.
 #[derive(Clone)]
 enum Outcome {
     Orbit { index: usize, periods: usize },
@@ -282,7 +285,7 @@ enum Outcome {
     Undecided(UndecidedReason),
 }
 
-/// Takes the census of all `starts` (each of the map's dimension).
+/// Takes a census of `starts`, each of the map's dimension.
 pub fn census<M: StroboscopicMap>(
     map: &M,
     starts: &[Vec<f64>],
@@ -292,7 +295,7 @@ pub fn census<M: StroboscopicMap>(
     census_of(map, &StartSet::given(starts.to_vec()), options, control)
 }
 
-/// Takes the census of a set of starts.
+/// Takes a census of a set of starts, given or drawn.
 pub fn census_of<M: StroboscopicMap>(
     map: &M,
     starts: &StartSet,
@@ -308,7 +311,7 @@ pub fn census_of<M: StroboscopicMap>(
     work.finish()
 }
 
-/// A census under way.
+/// A census in progress.
 struct Work<'a, M> {
     motions: Motions<'a, M>,
     /// Budgets of each start on the map that is followed.
@@ -317,18 +320,18 @@ struct Work<'a, M> {
     options: &'a CensusOptions,
     control: &'a Control<'a>,
     done: AtomicUsize,
-    /// Starts at most.
+    /// Largest number of starts.
     last: usize,
     outcomes: Vec<Outcome>,
-    /// Least and greatest entries of the starts so far.
+    /// Smallest and largest value of each entry of the starts so far.
     ends: Vec<[f64; 2]>,
     /// Index of an orbit of the followed map and a neighbourhood of it.
     neighbourhoods: Vec<(usize, Neighbourhood)>,
-    /// Orbits whose neighbourhood was looked for.
+    /// Number of orbits of the followed map whose neighbourhood was searched for.
     searched: usize,
     /// Periods after which most starts are in a neighbourhood, or on chaos that is recognised.
     max_wait_periods: usize,
-    /// Periods run so far.
+    /// Drive periods run so far, over all starts.
     periods: usize,
     /// Cost of the starts and trapping regions so far.
     cost: u64,
@@ -404,7 +407,7 @@ impl<'a, M: StroboscopicMap> Work<'a, M> {
         2 * failed > self.outcomes.len() && !self.control.is_cancelled()
     }
 
-    /// True if the next batch is not wanted.
+    /// Returns whether no further batch is needed.
     fn is_enough(&self) -> bool {
         if self.control.is_cancelled() || self.starts.len().is_some() {
             return self.control.is_cancelled();
@@ -501,8 +504,8 @@ impl<'a, M: StroboscopicMap> Work<'a, M> {
         classified
     }
 
-    /// Finds neighbourhoods of the orbits that are new, checks all by the starts that were
-    /// `classified` without them, and says how long a start is left to itself from now on.
+    /// Finds neighbourhoods of the new orbits, checks all of them with the starts that were
+    /// `classified` without them, and updates how long a start is run before it is examined.
     fn update_trapping_regions(&mut self, classified: &[usize]) {
         // With the same trapping regions as before a run would end as it did.
         if self.find_neighbourhoods() {
@@ -539,7 +542,7 @@ impl<'a, M: StroboscopicMap> Work<'a, M> {
         trapping_regions.map(|(_, region)| region.clone()).collect()
     }
 
-    /// What a run knows from the start, with these neighbourhoods.
+    /// The motions that a run can be recognised by, with these neighbourhoods.
     fn known<'k>(&'k self, trapping_regions: &'k [Neighbourhood]) -> KnownMotions<'k> {
         KnownMotions {
             trapping_regions,

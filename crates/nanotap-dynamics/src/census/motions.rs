@@ -1,9 +1,11 @@
-//! The motions that a census has found, and what those of a coarse map are on the map itself.
+//! The motions that a census has found, and their counterparts on the map itself where starts are
+//! followed on a coarse map.
 //!
-//! Starts may be followed on a [coarse](Scheduling::coarse) map. Each motion that they come to is
-//! then confirmed once: Newton closes its orbit on the map itself, from the coarse orbit's points;
-//! where that fails, and of chaos and tori, the motion is classified on the map itself from a state
-//! that the coarse one came to. All starts that come to the same motion share the result.
+//! Starts may be followed on a [coarse](Scheduling::coarse) map. Each motion that they reach is
+//! then confirmed once: Newton's method closes its orbit on the map itself, from the coarse orbit's
+//! points. Where that fails, and for chaos and tori, the motion is classified on the map itself
+//! from a state that the coarse run reached. All starts that reach the same motion share the
+//! result.
 
 use crate::census::Outcome;
 use crate::classify::{
@@ -16,59 +18,61 @@ use crate::map::StroboscopicMap;
 use crate::orbit::search::merge;
 use crate::orbit::{PeriodicOrbit, close_orbit};
 
-/// Runs on the map itself from states that coarse runs came to, at most.
+/// Largest number of runs on the map itself from states that coarse runs reached.
 const MAX_EXACT_RUNS: usize = 8;
-/// States of a motion that does not close from which it is classified exactly, until one shows what
-/// it is.
+/// Largest number of states from which a motion that does not close is classified on the map
+/// itself, until one of them gives its kind.
 const MAX_TRIES: usize = 4;
-/// Starts on which the coarse map fails that are followed on the map itself, at most.
+/// Largest number of starts that are followed on the map itself because the coarse map fails on
+/// them.
 const MAX_RETRIES: usize = 64;
-/// The same where that fails too.
+/// Largest number of these on which the map itself fails too.
 const MAX_FAILED_RETRIES: usize = 4;
-/// Steps of all runs on the map itself together that show what a motion is, in those of a start: each
-/// serves all starts that come to the motion.
+/// Budget of all runs on the map itself that confirm motions, as a multiple of the steps of one
+/// start: each run serves all starts that reach the motion.
 const EXACT_RUN_STEPS: u64 = 8;
-/// Periods for which exponents are measured on the map itself at most.
+/// Largest number of periods over which exponents are measured on the map itself.
 const MAX_EXACT_PERIODS: usize = 4000;
 
 pub(super) struct Motions<'a, M> {
-    /// The map itself.
+    /// The map whose motions are reported.
     exact: M,
-    /// Its cost at first.
+    /// Cost of the exact map before the census.
     first_cost: u64,
-    /// The map that starts are followed on: the same, or its coarse one.
+    /// The map on which starts are followed: the exact one, or its coarse one.
     pub(super) followed: M,
     pub(super) is_coarse: bool,
-    /// Budgets on the map itself.
+    /// Budgets of runs on the exact map.
     options: &'a ClassifyOptions,
-    /// The same for a motion that a coarse one has come to.
+    /// The same with fewer periods for exponents, for a motion that a coarse run has reached.
     budgets: ClassifyOptions,
     cancel: Option<&'a CancelFlag>,
-    /// Stable orbits of the map itself, each once.
+    /// Stable orbits of the exact map, each once.
     pub(super) orbits: Vec<PeriodicOrbit>,
-    /// Unstable orbits of it to which seeds led.
+    /// Unstable orbits of the exact map that Newton's method closed from seeds.
     pub(super) unstable: Vec<PeriodicOrbit>,
-    /// Stable orbits of the followed map, and what the starts that come to each have come to.
+    /// Stable orbits of the followed map, each with the outcome of the starts that reach it.
     pub(super) followed_orbits: Vec<(PeriodicOrbit, Outcome)>,
-    /// Orbits of the map itself that were looked for on the followed one.
+    /// Number of orbits of the exact map that were searched for on the followed one.
     paired: usize,
     exact_runs: usize,
-    /// Steps that these have taken.
+    /// Steps of integration that these runs have taken.
     exact_steps: u64,
-    /// Starts on which the coarse map failed that were followed on the map itself.
+    /// Number of starts that were followed on the exact map because the coarse map failed.
     retries: usize,
     failed_retries: usize,
-    /// Spectra of chaotic motions and tori of the followed map, one of each.
+    /// Spectra of chaotic motions and tori of the followed map, each once.
     pub(super) spectra: Vec<LyapunovSpectrum>,
-    /// What each of these is.
+    /// Kind of each of these motions on the exact map, in the same order.
     irregular: Vec<Irregular>,
     /// Whether a start escaped from chaos.
     pub(super) has_transient_chaos: bool,
-    /// Spectrum of that chaos on the map itself.
+    /// Spectrum of the transient chaos on the exact map.
     pub(super) transient_spectrum: Option<LyapunovSpectrum>,
 }
 
-/// What a motion that does not close is on the map itself, once a state of it has shown that.
+/// A motion that does not close: its kind on the exact map, once a run from one of its states has
+/// shown it.
 #[derive(Default)]
 struct Irregular {
     tries: usize,
@@ -89,7 +93,7 @@ impl IrregularKind {
         }
     }
 
-    /// The outcome of a start that is on it, in a state.
+    /// The outcome of a start that is on this motion at `state`.
     fn outcome(self, state: Vec<f64>) -> Outcome {
         match self {
             Self::Chaos(chaos) => Outcome::Chaos(chaos, state),
@@ -137,13 +141,13 @@ impl<'a, M: StroboscopicMap> Motions<'a, M> {
         }
     }
 
-    /// Cost of what was closed and classified on the map itself, without the runs that show what a motion
-    /// is, which have a budget of their own.
+    /// Cost of closing and classifying orbits on the exact map, without the runs that confirm
+    /// motions, which have a separate budget.
     pub(super) fn cost(&self) -> u64 {
         self.exact.cost() - self.first_cost - self.exact_steps
     }
 
-    /// Motions found so far.
+    /// Number of motions found so far: orbits, chaotic motions and tori.
     pub(super) fn count(&self) -> usize {
         self.orbits.len() + self.spectra.len()
     }
@@ -163,8 +167,8 @@ impl<'a, M: StroboscopicMap> Motions<'a, M> {
         self.pair_orbits();
     }
 
-    /// The outcome of a start that was followed to its end: on the map itself, where the coarse one
-    /// failed.
+    /// The outcome of a start that was followed to its end; where the coarse map failed, the start
+    /// is followed again on the exact map.
     pub(super) fn outcome(&mut self, mut found: Classified, start: &[f64]) -> Outcome {
         let mut is_exact = !self.is_coarse;
         let may_retry = self.retries < MAX_RETRIES && self.failed_retries < MAX_FAILED_RETRIES;
@@ -182,7 +186,7 @@ impl<'a, M: StroboscopicMap> Motions<'a, M> {
         outcome
     }
 
-    /// The outcome of a start that came to a motion of the map itself, or of the coarse one.
+    /// The outcome of a start that reached a motion of the exact map, or of the coarse one.
     fn outcome_on(&mut self, found: Classified, is_exact: bool) -> Outcome {
         let Classified {
             kind,
@@ -216,7 +220,7 @@ impl<'a, M: StroboscopicMap> Motions<'a, M> {
         outcome
     }
 
-    /// The outcome of a start that came to an orbit.
+    /// The outcome of a start that reached a stable orbit.
     fn orbit_outcome(&mut self, orbit: PeriodicOrbit, periods: usize, is_exact: bool) -> Outcome {
         if is_exact {
             let index = merge(&mut self.orbits, orbit);
@@ -226,7 +230,7 @@ impl<'a, M: StroboscopicMap> Motions<'a, M> {
         self.arrival(index, periods)
     }
 
-    /// What a start has come to that arrived at an orbit of the followed map.
+    /// The outcome of a start that reached orbit number `index` of the followed map.
     pub(super) fn arrival(&self, index: usize, periods: usize) -> Outcome {
         match &self.followed_orbits[index].1 {
             Outcome::Orbit { index, .. } => Outcome::Orbit {
@@ -237,8 +241,8 @@ impl<'a, M: StroboscopicMap> Motions<'a, M> {
         }
     }
 
-    /// Classifies the motion from a state on the map itself, as the end of a start that has run for
-    /// so many periods.
+    /// Classifies the motion from `state` on the exact map, as the end of a start that has run for
+    /// `periods` periods.
     fn classify_exactly(&mut self, state: &[f64], periods: usize, max_steps: u64) -> Classified {
         let chaos: Vec<_> = self
             .irregular
@@ -265,8 +269,8 @@ impl<'a, M: StroboscopicMap> Motions<'a, M> {
         found
     }
 
-    /// As [`classify_exactly`](Self::classify_exactly), of a motion that starts have come to; none where
-    /// the budget of these runs is spent.
+    /// Classifies as [`classify_exactly`](Self::classify_exactly) a motion that starts have
+    /// reached; `None` if the budget of these runs is spent.
     fn confirm(&mut self, state: &[f64], periods: usize) -> Option<Classified> {
         let budget = self.options.max_steps.saturating_mul(EXACT_RUN_STEPS);
         if self.exact_runs >= MAX_EXACT_RUNS || self.exact_steps >= budget {
@@ -300,7 +304,7 @@ impl<'a, M: StroboscopicMap> Motions<'a, M> {
         self.followed_orbits.len() - 1
     }
 
-    /// Index of the followed orbit that stands for an orbit of the map itself.
+    /// Index of the followed orbit that corresponds to an orbit of the exact map.
     fn followed_index(&self, orbit: usize) -> Option<usize> {
         let mut known = self.followed_orbits.iter();
         known.position(
@@ -308,7 +312,7 @@ impl<'a, M: StroboscopicMap> Motions<'a, M> {
         )
     }
 
-    /// Finds the orbits of the map itself on the followed one, where they are not known yet.
+    /// Closes on the followed map the orbits of the exact map that have no counterpart there yet.
     fn pair_orbits(&mut self) {
         for index in self.paired..self.orbits.len() {
             if self.followed_index(index).is_some() {
@@ -329,7 +333,7 @@ impl<'a, M: StroboscopicMap> Motions<'a, M> {
         self.paired = self.orbits.len();
     }
 
-    /// Index of a spectrum among those known, after adding it if it is new.
+    /// Index of a spectrum in `spectra`, to which it is added if it is new.
     fn spectrum_index(&mut self, spectrum: &LyapunovSpectrum) -> usize {
         let known = self.spectra.iter().position(|k| k.agrees_with(spectrum));
         known.unwrap_or_else(|| {

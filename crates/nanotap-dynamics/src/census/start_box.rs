@@ -11,40 +11,40 @@
 use crate::control::Control;
 use crate::vector::mix;
 
-/// A box of initial states.
+/// A box of initial states, from a lower to an upper corner.
 #[derive(Clone, Debug, PartialEq)]
 pub struct StartBox {
     lower: Vec<f64>,
     upper: Vec<f64>,
 }
 
-/// Why a box was refused.
+/// The reason why a box is invalid.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum StartBoxError {
-    /// Bounds of different or zero length.
+    /// The corners have different lengths, or none.
     #[error("a box needs as many lower as upper bounds, one at least ({lower} and {upper} given)")]
     Length {
-        /// Lower bounds given.
+        /// Number of lower bounds.
         lower: usize,
-        /// Upper bounds given.
+        /// Number of upper bounds.
         upper: usize,
     },
-    /// A side that is not an interval.
+    /// A side that does not run upwards between finite numbers.
     #[error(
         "side {index} of the box runs from {lower} to {upper}; it must run upwards, between finite numbers"
     )]
     Side {
-        /// Which coordinate, from 0.
+        /// Index of the coordinate, from 0.
         index: usize,
-        /// Its lower bound.
+        /// Lower bound of the coordinate, in its unit.
         lower: f64,
-        /// Its upper bound.
+        /// Upper bound of the coordinate, in its unit.
         upper: f64,
     },
 }
 
 impl StartBox {
-    /// A box between two corners; a side of length zero holds its coordinate fixed.
+    /// Creates the box between two corners; a side of length zero fixes its coordinate.
     ///
     /// # Errors
     /// See [`StartBoxError`].
@@ -67,22 +67,22 @@ impl StartBox {
         Ok(Self { lower, upper })
     }
 
-    /// Dimension of the states.
+    /// Returns the dimension of the states, at least 1.
     pub fn dimension(&self) -> usize {
         self.lower.len()
     }
 
-    /// Lower corner.
+    /// Returns the lower corner: the lower bound of each coordinate, in its unit.
     pub fn lower(&self) -> &[f64] {
         &self.lower
     }
 
-    /// Upper corner.
+    /// Returns the upper corner: the upper bound of each coordinate, in its unit.
     pub fn upper(&self) -> &[f64] {
         &self.upper
     }
 
-    /// The `index`-th start of the sequence with this seed.
+    /// Returns start number `index` of the sequence with this seed.
     pub fn start(&self, seed: u64, index: u64) -> Vec<f64> {
         let mut base = 1;
         self.lower
@@ -97,12 +97,12 @@ impl StartBox {
             .collect()
     }
 
-    /// Starts 0 … count − 1.
+    /// Returns starts 0 … count − 1 of the sequence with this seed.
     pub fn starts(&self, seed: u64, count: usize) -> Vec<Vec<f64>> {
         self.starts_until(seed, count, &Control::default())
     }
 
-    /// The same, as many as there are when the work is cancelled.
+    /// Returns these starts, or those drawn before the work was cancelled.
     pub fn starts_until(&self, seed: u64, count: usize, control: &Control<'_>) -> Vec<Vec<f64>> {
         (0..count as u64)
             .take_while(|_| !control.is_cancelled())
@@ -122,7 +122,7 @@ fn next_prime(after: u64) -> u64 {
     candidate
 }
 
-/// The digits of `index` mirrored at the point, each permuted; in [0, 1).
+/// Mirrors the digits of `index` in this base at the radix point, each permuted; in [0, 1).
 fn scrambled_radical_inverse(mut index: u64, base: u64, key: u64) -> f64 {
     let mut prefix = key;
     let mut scale = 1.0 / base as f64;

@@ -1,19 +1,19 @@
 //! The starts of a census: states that were given, then seeded draws from boxes of
 //! several sizes around one centre.
 //!
-//! No single size is right. A box as wide as the resonant response holds the basin of
-//! a subharmonic a hundred times smaller as one part in a million, and a box as small
-//! as that subharmonic has none of the large motions. Sizes therefore run down
-//! logarithmically, and the drawn starts take them in turn, so that any number of
-//! starts has (nearly) as many of each. What fraction of the starts goes somewhere is
-//! a property of this set, not of the motion alone.
+//! No single size is right. A box as wide as the resonant response contains the basin of a
+//! subharmonic a hundred times smaller as one part in a million, and a box as small as that
+//! subharmonic contains none of the large motions. Sizes therefore decrease logarithmically, and
+//! the drawn starts take them in turn, so that any number of starts has (nearly) as many of each.
+//! The fraction of the starts that goes to a motion is a property of this set, not of the motion
+//! alone.
 //!
 //! The k-th start depends on the set and k alone.
 
 use crate::census::start_box::{StartBox, StartBoxError};
 use crate::vector::mix;
 
-/// Where starts come from. Every set has a first start.
+/// A set of starts, given or drawn without end; it has at least one start.
 #[derive(Clone, Debug, PartialEq)]
 pub struct StartSet {
     seeds: Vec<(usize, Vec<f64>)>,
@@ -28,17 +28,17 @@ struct Size {
     sides: StartBox,
 }
 
-/// Where one start comes from.
+/// Origin of one start.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum StartOrigin {
-    /// It was given as a state, with this index.
+    /// It was given as the state with this index.
     Given(usize),
-    /// It was drawn from the box of the size with this index.
+    /// It was drawn from the box with this index in the order of sizes.
     Drawn(usize),
 }
 
 impl StartSet {
-    /// Draws from one box.
+    /// Creates the set of starts drawn without end from one box.
     pub fn drawn(sides: StartBox, seed: u64) -> Self {
         Self {
             seeds: Vec::new(),
@@ -48,8 +48,8 @@ impl StartSet {
         }
     }
 
-    /// Draws from `sides` shrunk towards `centre` by each of `scales` (1 is the box as
-    /// it is).
+    /// Creates the set of starts drawn from `sides` shrunk towards `centre` by each of `scales` (1
+    /// is the box itself), in turn.
     ///
     /// # Errors
     /// [`StartBoxError::Length`] if the centre has another dimension than the box or
@@ -91,7 +91,7 @@ impl StartSet {
         })
     }
 
-    /// These states and no others.
+    /// Creates the set of these states and no others.
     pub fn given(states: Vec<Vec<f64>>) -> Self {
         Self {
             seeds: Vec::new(),
@@ -101,16 +101,16 @@ impl StartSet {
         }
     }
 
-    /// The same set with these states before the others. They are run, but count in no
-    /// fraction of a set that is drawn.
+    /// Puts these states before the others of the set. They are followed, but do not count in the
+    /// fractions of a set that is drawn.
     #[must_use]
     pub fn with_given(mut self, states: impl IntoIterator<Item = Vec<f64>>) -> Self {
         self.given.extend(states);
         self
     }
 
-    /// The same set with orbits that Newton closes before any start is followed, each from a period in
-    /// drive periods and a state at drive phase 0 near it. Stable ones are attractors, also where no
+    /// Adds orbits that Newton's method closes before any start is followed, each from a period in
+    /// drive periods and a state at drive phase 0 near it. Stable ones are attractors even if no
     /// start goes to them.
     #[must_use]
     pub fn with_seeds(mut self, seeds: impl IntoIterator<Item = (usize, Vec<f64>)>) -> Self {
@@ -118,42 +118,42 @@ impl StartSet {
         self
     }
 
-    /// Periods and states from which orbits are closed first.
+    /// Returns the periods (in drive periods) and states from which orbits are closed first.
     pub fn seeds(&self) -> &[(usize, Vec<f64>)] {
         &self.seeds
     }
 
-    /// How many states were given.
+    /// Returns the number of given states.
     pub fn given_count(&self) -> usize {
         self.given.len()
     }
 
-    /// The scale of every size, in the order in which they are drawn.
+    /// Returns the scale of every size, in the order in which they are drawn.
     pub fn scales(&self) -> Vec<f64> {
         self.sizes.iter().map(|s| s.scale).collect()
     }
 
-    /// The boxes of every size.
+    /// Returns the box of every size, in the order in which they are drawn.
     pub fn boxes(&self) -> impl Iterator<Item = &StartBox> {
         self.sizes.iter().map(|s| &s.sides)
     }
 
-    /// The seed of the draws.
+    /// Returns the seed of the draws.
     pub fn seed(&self) -> u64 {
         self.seed
     }
 
-    /// How many starts there are; `None` if they can be drawn without end.
+    /// Returns the number of starts; `None` if they can be drawn without end.
     pub fn len(&self) -> Option<usize> {
         self.sizes.is_empty().then_some(self.given.len())
     }
 
-    /// True if there is no start at all.
+    /// Returns true if the set contains no start.
     pub fn is_empty(&self) -> bool {
         self.len() == Some(0)
     }
 
-    /// Where the `index`-th start comes from; `None` if there is none.
+    /// Returns the origin of start number `index`; `None` if there is no such start.
     pub fn origin(&self, index: usize) -> Option<StartOrigin> {
         match index.checked_sub(self.given.len()) {
             None => Some(StartOrigin::Given(index)),
@@ -162,7 +162,7 @@ impl StartSet {
         }
     }
 
-    /// The `index`-th start; `None` if there is none.
+    /// Returns start number `index`; `None` if there is no such start.
     pub fn start(&self, index: usize) -> Option<Vec<f64>> {
         match self.origin(index)? {
             StartOrigin::Given(k) => Some(self.given[k].clone()),

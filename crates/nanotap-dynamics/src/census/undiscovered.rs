@@ -16,17 +16,18 @@
 //! the sizes' shares is below the arithmetic one). Starts left undecided are no
 //! trials: the share is of those that have one.
 
-/// Probability that the bound is wrong.
+/// Probability that the bound of a whole census is wrong, at most.
 const ERROR: f64 = 0.05;
 
-/// How much of the set of starts may lead to motions that were not found.
+/// Bound on the fraction of the starts that may lead to motions that were not found.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct UndiscoveredFraction {
-    /// Motions found.
+    /// Number of different motions found.
     pub motions: usize,
-    /// Drawn starts decided since the last of them was found.
+    /// Number of drawn starts decided since the last of them was found.
     pub starts: usize,
-    /// With 95 % confidence, at most this share of starts leads to motions not found.
+    /// Fraction of the starts, 0 to 1: with 95 % confidence at most this many lead to motions not
+    /// found.
     pub share: f64,
 }
 

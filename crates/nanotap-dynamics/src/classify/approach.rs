@@ -1,4 +1,4 @@
-//! Whether a run really goes to an orbit that Newton closed near it.
+//! Decides whether a run really approaches an orbit that Newton's method closed near it.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -8,24 +8,28 @@ use crate::neighbourhood::{AdaptedNorm, ReturnMap};
 use crate::orbit::PeriodicOrbit;
 use crate::vector::distance;
 
-/// Longest of the four stretches of returns over which the approach to a weakly
-/// stable orbit is watched.
+/// Longest of the four stretches over which the approach to a weakly stable orbit is watched, in
+/// returns.
 const LONGEST_STRETCH: f64 = 512.0;
-/// Part of its first distance, and of the orbit's size, at which a run has come to the orbit.
+/// Fraction of the first distance, and of the orbit's size, at which a run has arrived at the
+/// orbit.
 const ARRIVED: f64 = 0.01;
-/// Part of the orbit's size at which the rest of the way is looked at.
+/// Fraction of the orbit's size at which the rest of the way is examined.
 const NEARBY: f64 = 0.1;
-/// How many times longer than four such stretches a decay time is that is watched to its end.
+/// Largest ratio of a decay time to four such stretches for which the run is watched for the whole
+/// time.
 const SLOWEST: f64 = 10.0;
-/// Decay times that this takes, and more where the run comes from so many sizes away.
+/// Number of decay times for which the run is watched, and the largest initial distance, in sizes
+/// of the orbit, that prolongs it.
 const LONGEST_WATCH: f64 = 5.0;
 const FARTHEST: f64 = 1e9;
-/// Places of the rest of the way at which the map is tried.
+/// Number of points of the remaining way at which the map is tried.
 const PLACES: usize = 16;
 /// Returns after which the slowest turns near a flip or a strong resonance (of three or four
 /// returns) have come round: on one side of such an orbit a single return may lead away.
 const DOZEN: usize = 12;
-/// Phases of the slowest turns at which it is tried, at every halving of the distance.
+/// Number of phases of the slowest turns at which the map is tried, at every halving of the
+/// distance.
 const PHASES: usize = 8;
 
 /// True if the run from `state` approaches the stable `orbit` as its multipliers say: nearer by a
@@ -64,42 +68,42 @@ pub(crate) fn approaches<M: StroboscopicMap>(
     Ok(false)
 }
 
-/// What a decay time does to the distance.
+/// Change of the distance to the orbit over one decay time.
 enum Progress {
-    /// It is as small as it need be.
+    /// It is small enough: the run has arrived.
     Arrived,
-    /// It falls as the multipliers say, near the orbit.
+    /// It falls at the rate of the multipliers, near the orbit.
     Falls,
-    /// It falls by less, or far away.
+    /// It falls more slowly, or far from the orbit.
     Nearer,
-    /// It does not fall.
+    /// It does not fall, or has grown to four times the first distance.
     Gone,
 }
 
-/// A run on its way to an orbit.
+/// A run that is checked for an approach to an orbit. Distances are in the adapted norm.
 struct Approach<'a> {
     center: &'a [f64],
     period: usize,
-    /// Logarithm of the largest multiplier's modulus.
+    /// Natural logarithm of the largest multiplier's modulus, per return; negative.
     rate: f64,
     monodromy: DMatrix<f64>,
     adapted: AdaptedNorm,
-    /// Distance that rounding leaves.
+    /// Distance within the rounding of one return; smaller ones are not resolved.
     floor: f64,
     x: Vec<f64>,
-    /// Distance at first.
+    /// Distance from the orbit when the check began.
     first: f64,
-    /// Distance at which it has arrived.
+    /// Distance at which the run has arrived.
     near: f64,
-    /// Distance near the orbit, where what is far from it no longer counts.
+    /// Distance below which the map near the orbit determines the rest of the way.
     nearby: f64,
     now: f64,
-    /// Times four stretches that this takes.
+    /// Largest number of times that the run is watched for four stretches.
     longest_watch: usize,
 }
 
 impl<'a> Approach<'a> {
-    /// `None` if no norm is adapted to the orbit.
+    /// Prepares the check; `None` if no norm is adapted to the orbit.
     fn new<M: StroboscopicMap>(
         map: &mut M,
         state: &[f64],
@@ -149,7 +153,7 @@ impl<'a> Approach<'a> {
         self.now <= self.near
     }
 
-    /// Returns of one of four stretches.
+    /// Number of returns in one of the four stretches.
     fn stretch(&self) -> usize {
         (0.25 / -self.rate).ceil().clamp(16.0, LONGEST_STRETCH) as usize
     }
@@ -214,8 +218,8 @@ impl<'a> Approach<'a> {
             })
     }
 
-    /// Whether a return from so far `away` comes nearer, or else a dozen returns together; not where
-    /// they cannot be made.
+    /// Returns whether one return from the displacement `away` comes nearer, or else a dozen
+    /// returns together; false where the map fails.
     fn contracts<M: StroboscopicMap>(&self, map: &mut M, away: &DVector<f64>) -> bool {
         let mut place: Vec<f64> = self.center.iter().zip(away).map(|(c, a)| c + a).collect();
         let before = self.adapted.distance(&place, self.center);
@@ -233,8 +237,8 @@ impl<'a> Approach<'a> {
         false
     }
 
-    /// Directions all around, of length 1 in the adapted norm, in the plane in which what is left
-    /// of a decay turns; both ways along a line where it does not.
+    /// Unit vectors of the adapted norm at all phases in the plane in which the remaining
+    /// displacement `left` turns; both directions along a line if it does not turn.
     fn slowest_turns(&self, left: &DVector<f64>) -> Vec<DVector<f64>> {
         let later = self.adapted.coordinates(&(&self.monodromy * left));
         let first = self.adapted.coordinates(left).normalize();

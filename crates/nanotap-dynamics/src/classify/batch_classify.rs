@@ -1,8 +1,8 @@
-//! Many starts followed side by side until their motions are known.
+//! Many starts followed in one batch until their motions are known.
 //!
-//! Each run comes to what [`follow_start`](super::follow_start) makes of its start, but for rounding:
-//! the map passes some periods of all of them together, and each run then takes in the states that
-//! it came through, one by one. Where it ends before the last of them, the others are not looked at.
+//! Each run gives the same result as [`follow_start`](super::follow_start) from its start, but for
+//! rounding: the map advances all of them by some periods together, and each run then processes the
+//! states that it passed, one by one. If it ends before the last of them, the others are ignored.
 //! The outcome of a start does not depend on the others.
 
 use crate::classify::run::{AfterLook, ChaosMatch, MAX_DIVERGENCE_PERIODS, Run, Stop, refused};
@@ -10,41 +10,41 @@ use crate::classify::{ClassifyOptions, KnownMotions, RunEnd};
 use crate::failure::{MapFailure, finite};
 use crate::map::StroboscopicMap;
 
-/// Periods that are passed before a run takes in its states.
+/// Number of periods that are advanced before a run processes its states.
 const PERIODS_AT_ONCE: usize = 32;
 
-/// One start under way.
+/// A start that is being followed.
 struct Member<'a> {
     number: usize,
     run: Run<'a>,
-    /// The neighbour that shows whether it is on the chaos that it matches.
+    /// The neighbour that shows whether the run is on the chaos that it matches.
     companion: Option<Neighbour>,
 }
 
-/// A neighbour of a run.
+/// A neighbour of a run, which diverges from it if the run is chaotic.
 struct Neighbour {
     chaos: ChaosMatch,
     state: Vec<f64>,
-    /// Periods passed.
+    /// Periods run since the neighbour was placed.
     periods: usize,
 }
 
-/// The states at the ends of the periods that were passed, and why there are no more.
+/// The states at the ends of the periods that were advanced, and the failure that ended them.
 #[derive(Default)]
 struct Passed {
     states: Vec<f64>,
     failure: Option<MapFailure>,
 }
 
-/// What a start came to that was followed.
+/// Result of following a start.
 pub(crate) enum Followed<'a> {
     Ended(RunEnd),
-    /// Its exponents are to be measured; nothing else is left to follow side by side but what is
-    /// under way.
+    /// Its exponents must still be measured; only runs in progress remain to be followed in the
+    /// batch.
     Unmeasured(Unmeasured<'a>),
 }
 
-/// A run that does not close.
+/// A run that does not close and whose exponents must be measured.
 pub(crate) struct Unmeasured<'a>(Box<Run<'a>>);
 
 impl Unmeasured<'_> {
@@ -54,8 +54,9 @@ impl Unmeasured<'_> {
     }
 }
 
-/// Follows starts, each with its number, as many at a time as there are `places`: one that was
-/// `followed` makes place for the `next`, until there is none or the work is `cancelled`.
+/// Follows starts, each with its number, as many at a time as `places` returns. A start that is
+/// done is passed to `followed` and replaced by the `next`, until there are no more or the work is
+/// `cancelled`.
 pub(crate) fn follow_starts<'a, M: StroboscopicMap>(
     map: &mut M,
     places: impl Fn() -> usize,
@@ -114,7 +115,7 @@ pub(crate) fn follow_starts<'a, M: StroboscopicMap>(
     }
 }
 
-/// Passes some periods of every run, and of its neighbour after it where it has one.
+/// Advances every run by some periods, and its neighbour, if it has one, by as many.
 fn pass<M: StroboscopicMap>(map: &mut M, members: &[Member<'_>]) -> Vec<Passed> {
     let (mut states, mut periods) = (Vec::new(), Vec::new());
     for Member { run, companion, .. } in members {
@@ -137,7 +138,7 @@ fn pass<M: StroboscopicMap>(map: &mut M, members: &[Member<'_>]) -> Vec<Passed> 
 }
 
 impl Member<'_> {
-    /// Takes in what was passed, and looks where the run goes when it is time to.
+    /// Processes the states that were passed, and examines the run when it is time to.
     fn go_on<M: StroboscopicMap>(
         &mut self,
         map: &mut M,
@@ -175,7 +176,7 @@ impl Member<'_> {
         }
     }
 
-    /// The same with a neighbour; `None` as long as the two may still diverge.
+    /// Does the same for a run with a neighbour; `None` as long as the two may still diverge.
     fn go_on_with<M: StroboscopicMap>(
         &mut self,
         map: &mut M,

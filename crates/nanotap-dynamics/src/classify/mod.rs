@@ -1,16 +1,15 @@
-//! What the motion from one start is.
+//! Classification of the motion from one start.
 //!
-//! The run is looked at after 16, 32, 64, … periods ([`ClassifyOptions::first_look`]).
-//! Each time the best candidate periods go to Newton; a closed orbit counts only if its
-//! multipliers are stable *and* the run is seen to come to it, or to approach it at the
-//! rate those multipliers say with a free way ahead, in the norm in which every linear
-//! motion near the orbit contracts at each return. So the
-//! transient is as long as the motion needs, a slow decay towards a weakly stable
-//! orbit is recognised for what it is (Newton jumps to its end), and no tolerance on
-//! how nearly the run repeats ever decides.
+//! The run is examined after 16, 32, 64, … periods ([`ClassifyOptions::first_look`]). Each time
+//! Newton's method tries the best candidate periods. A closed orbit counts only if its multipliers
+//! are stable *and* the run is seen to arrive at it, or to approach it at the rate of those
+//! multipliers with a free way ahead, in the norm in which every linear motion near the orbit
+//! contracts at each return. So the transient is as long as the motion needs, a slow decay towards
+//! a weakly stable orbit is recognised (Newton's method jumps to its end), and no tolerance on how
+//! nearly the run repeats ever decides.
 //!
-//! What does not close is measured on: Lyapunov spectrum with error bars, still
-//! looking for an escape, then weighted Birkhoff averages. A motion is called
+//! For a motion that does not close, the Lyapunov spectrum is measured with error bars, while
+//! escapes are still searched for, and then weighted Birkhoff averages. A motion is called
 //!
 //! - periodic: closed, stable, approached;
 //! - transient chaos: the exponents were positive by more than five standard errors,
@@ -47,30 +46,31 @@ use confirm::confirm;
 pub(crate) use run::{KnownMotions, RECOGNISABLE, RunEnd, first_entry, follow_start, watch};
 pub use undecided::UndecidedReason;
 
-/// Budgets of [`classify`].
+/// Limits and tolerances of [`classify`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct ClassifyOptions {
-    /// Longest period tried at every look.
+    /// Longest period that is tried each time the run is examined, in drive periods.
     pub max_period: usize,
-    /// Longest period tried where none of these closed the motion, before it is called
-    /// anything but periodic.
+    /// Longest period, in drive periods, that is tried before a motion on which none of the shorter
+    /// ones closed is called anything but periodic.
     pub long_period: usize,
-    /// Periods after which it is looked for the first time where the motion goes. Fewer do where
-    /// it starts near its end, as on a neighbour's orbit.
+    /// Drive periods after which the run is examined for the first time. Fewer suffice if it starts
+    /// near its attractor, as on a neighbour's orbit.
     pub first_look: usize,
-    /// Periods after which exponents start to be measured (looking for periodic
-    /// orbits goes on).
+    /// Drive periods after which exponents start to be measured; the search for periodic orbits
+    /// goes on.
     pub max_transient: usize,
-    /// A state with an entry above this is called unbounded.
+    /// Largest entry of a bounded state, in units of the state; above it the motion is called
+    /// unbounded.
     pub bound: f64,
-    /// Newton's options for closing candidates.
+    /// Options of Newton's method for closing candidates.
     pub shooting: ShootingOptions,
-    /// How long exponents are measured; `max_periods` is the budget of a motion that
-    /// never closes.
+    /// Lengths and accuracy of the measurement of exponents; `max_periods` is the budget of a
+    /// motion that never closes.
     pub lyapunov: LyapunovOptions,
-    /// Length of one weighted Birkhoff stretch; two are run.
+    /// Length of one stretch of weighted Birkhoff averages, in drive periods; two are run.
     pub birkhoff_periods: usize,
-    /// Digits to which the two stretches must agree for a torus.
+    /// Number of decimal digits to which the averages of the two stretches must agree for a torus.
     pub torus_digits: f64,
     /// Steps of time integration after which a run is left undecided, as the map counts them
     /// ([`Scheduling::cost`](crate::Scheduling::cost)).
@@ -97,12 +97,12 @@ impl Default for ClassifyOptions {
     }
 }
 
-/// Residual, relative to the orbit, of Newton's method on a coarse map, whose steps change in number
-/// from state to state.
+/// Residual, as a fraction of the orbit's scale, of Newton's method on a coarse map, whose number
+/// of steps changes from state to state.
 const COARSE_RESIDUAL: f64 = 1e-5;
 
 impl ClassifyOptions {
-    /// The same budgets on a coarse map.
+    /// Returns the same options for a coarse map, with a residual that it can reach.
     #[must_use]
     pub fn on_coarse_map(&self) -> Self {
         let residual = self.shooting.residual_tolerance.max(COARSE_RESIDUAL);
@@ -116,45 +116,45 @@ impl ClassifyOptions {
     }
 }
 
-/// What the motion from a start was found to be.
+/// Result of the classification of the motion from one start.
 #[derive(Clone, Debug)]
 pub struct Classified {
-    /// What the motion is.
+    /// Kind of the motion, with the evidence for it.
     pub kind: MotionKind,
-    /// Periods run until that was known.
+    /// Drive periods run until that was known.
     pub periods: usize,
-    /// The state there.
+    /// State after these periods, at drive phase 0, in units of the state.
     pub state: Vec<f64>,
-    /// Stable orbits that Newton closed on the way and that the motion does not go to:
-    /// attractors too, of other starts.
+    /// Stable orbits that Newton's method closed on the way and to which this motion does not go:
+    /// they attract other starts.
     pub met: Vec<PeriodicOrbit>,
 }
 
-/// What a motion is.
+/// Kind of a motion, with the evidence for it.
 #[derive(Clone, Debug)]
 pub enum MotionKind {
-    /// It goes to this stable orbit.
+    /// It goes to a stable periodic orbit.
     Periodic(PeriodicOrbit),
-    /// It was chaotic for a while and then went to this stable orbit.
+    /// It was chaotic for a while and then went to a stable periodic orbit.
     TransientChaos {
-        /// Where it went.
+        /// The stable orbit to which it escaped.
         orbit: PeriodicOrbit,
-        /// The exponents before it escaped, on the map that was followed.
+        /// Lyapunov exponents before it escaped, on the map that was followed.
         spectrum: LyapunovSpectrum,
-        /// Periods after which the escape was noticed (looks are a factor 2 apart).
+        /// Drive periods after which the escape was noticed; the checks are a factor 2 apart.
         lasted: usize,
     },
-    /// It fills a torus.
+    /// It is quasi-periodic: it fills a torus.
     QuasiPeriodic(Torus),
-    /// It is chaotic for as long as it was watched.
+    /// It is chaotic for as long as it was observed.
     Chaotic(Chaos),
-    /// It left every bound.
+    /// A state exceeded the bound or overflowed.
     Unbounded,
     /// None of these could be shown.
     Undecided {
-        /// Why not.
+        /// The reason why none could be shown.
         reason: UndecidedReason,
-        /// Exponents, if they were measured.
+        /// Lyapunov exponents, if they were measured.
         spectrum: Option<LyapunovSpectrum>,
     },
 }
@@ -162,24 +162,25 @@ pub enum MotionKind {
 /// Evidence for a quasi-periodic motion.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Torus {
-    /// Exponents; the largest is zero within its error.
+    /// Lyapunov exponents; the largest is zero within its error.
     pub spectrum: LyapunovSpectrum,
-    /// Digits to which weighted Birkhoff averages of two stretches agree.
+    /// Number of decimal digits to which weighted Birkhoff averages of two stretches agree.
     pub birkhoff_digits: f64,
-    /// Smallest closure found over all periods tried, in units of the state.
+    /// Smallest closure over all periods tried, in units of the state: the largest distance between
+    /// two recent states one period apart.
     pub nearest_return: f64,
-    /// Periods run.
+    /// Drive periods run, the transient included.
     pub observed: usize,
-    /// No orbit of a period up to this one closed.
+    /// No orbit of a period up to this one (in drive periods) closed.
     pub longest_period: usize,
 }
 
 /// Evidence for a chaotic motion.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Chaos {
-    /// Exponents; the largest is positive by more than five standard errors.
+    /// Lyapunov exponents; the largest is positive by more than five standard errors.
     pub spectrum: LyapunovSpectrum,
-    /// Periods without escape, the transient included.
+    /// Drive periods without escape, the transient included.
     pub observed: usize,
     /// Mean lifetime in periods that this one run bounds from below at 95 %.
     pub lifetime_above: f64,

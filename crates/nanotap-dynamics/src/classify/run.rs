@@ -13,54 +13,56 @@ use crate::neighbourhood::Neighbourhood;
 use crate::orbit::{PeriodicOrbit, ShootingOptions, close_orbit_from_points};
 use crate::vector::{distance, norm};
 
-/// Standard errors by which a positive exponent must clear zero.
+/// Number of standard errors by which a positive exponent must exceed zero.
 const CLEAR: f64 = 5.0;
-/// Newton steps of a guess: near an orbit half as many are needed, and far from one
-/// Newton would only wander to some orbit that the run does not go to.
+/// Number of Newton steps from a guess: near an orbit half as many are needed, and far from one
+/// Newton's method would only wander to some orbit that the run does not go to.
 const CLOSING_STEPS: usize = 10;
-/// Shortest part of a Newton step of a guess: near the orbit that a run goes to full steps hold.
+/// Smallest fraction of a Newton step from a guess: near the orbit that a run goes to full steps
+/// succeed.
 const SHORTEST_STEP: f64 = 0.5;
-/// Growth over a near return beyond which it is no sign of a stable orbit: where a run does go
-/// to one, the linearised return comes to shrink.
+/// Growth of the linearised return beyond which a near return does not indicate a stable orbit:
+/// where a run does go to one, the linearised return shrinks in the end.
 const MAX_GUESS_GROWTH: f64 = 100.0;
-/// Closure, as a part of the motion's spread, up to which a period is worth trying.
+/// Largest closure, as a fraction of the motion's spread, of a period worth trying.
 const WORTH_TRYING: f64 = 0.2;
-/// The same for periods beyond [`ClassifyOptions::max_period`], where Newton costs more.
+/// The same for periods beyond [`ClassifyOptions::max_period`], where Newton's method costs more.
 const LONG_WORTH_TRYING: f64 = 1e-2;
 /// The same in the last search before a motion is called anything but periodic.
 const LAST_WORTH_TRYING: f64 = 0.1;
-/// Periods after which the means of a run may tell that it is on chaos that is known.
+/// Periods after which the means of a run may show that it is on known chaos.
 pub(crate) const RECOGNISABLE: usize = 256;
-/// Exponents are measured for so many times their budget at most, where chaotic transients end.
+/// Largest number of times their budget for which exponents are measured, where chaotic transients
+/// end.
 const LONGEST_MEASUREMENT: usize = 4;
-/// Error of an orbit, as a part of its size, that says whether a run is on it: on a coarse map it is
-/// known to less.
+/// Largest error of an orbit, as a fraction of its size, that decides whether a run is on it: a
+/// coarse map determines it less accurately.
 const DETERMINED: f64 = 1e-8;
-/// Distance of a neighbour, in standard deviations of the motion.
+/// Initial distance of a neighbour, in standard deviations of the motion.
 const NEIGHBOUR: f64 = 1e-9;
-/// How many times its distance grows on chaos.
+/// Factor by which the distance of a neighbour grows on chaos.
 const DIVERGENCE: f64 = 1e5;
-/// Periods in which it does.
+/// Largest number of periods in which it grows by this factor.
 pub(super) const MAX_DIVERGENCE_PERIODS: usize = 512;
 
-/// What is known already when a start sets out.
+/// Motions that are known before a start is followed.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct KnownMotions<'a> {
-    /// Neighbourhoods of attracting orbits.
+    /// Neighbourhoods of attracting orbits: a run that enters one is not followed further.
     pub(crate) trapping_regions: &'a [Neighbourhood],
     /// Exponents and means of chaotic motions and tori.
     pub(crate) chaos: &'a [LyapunovSpectrum],
-    /// Periods after which most runs are in one of the neighbourhoods, or on known chaos:
-    /// before that, looking where a run goes costs more than waiting.
+    /// Periods after which most runs are in one of the neighbourhoods, or on known chaos: before
+    /// that, examining a run costs more than waiting.
     pub(crate) max_wait_periods: usize,
     /// A run stops within a period after this becomes true.
     pub(crate) cancel: Option<&'a CancelFlag>,
 }
 
-/// Where a start arrives when some attractors are known already.
+/// End of a run: a known neighbourhood, or a classified motion.
 #[derive(Clone, Debug)]
 pub(crate) enum RunEnd {
-    /// In the neighbourhood of a known attractor, after so many periods.
+    /// It entered the neighbourhood of a known attractor, after this many periods.
     Entered {
         index: usize,
         periods: usize,
@@ -82,7 +84,7 @@ pub(crate) fn follow_start<M: StroboscopicMap>(
     run.ended(how)
 }
 
-/// The end of a start that is no state of dimension `d`.
+/// The end of a start that is not a state of dimension `d`; `None` if it is one.
 pub(super) fn refused(start: &[f64], d: usize) -> Option<RunEnd> {
     let reason = if start.len() != d || d == 0 {
         format!("{} numbers given, {d} needed", start.len())
@@ -98,7 +100,8 @@ pub(super) fn refused(start: &[f64], d: usize) -> Option<RunEnd> {
     })))
 }
 
-/// The first of some neighbourhoods that a start enters within so many periods, and after how many.
+/// Returns the first of the neighbourhoods that a start enters within `periods` periods, and the
+/// number of periods until then.
 pub(crate) fn first_entry<M: StroboscopicMap>(
     map: &mut M,
     start: &[f64],
@@ -113,7 +116,7 @@ pub(crate) fn first_entry<M: StroboscopicMap>(
     }
 }
 
-/// Follows a motion for so many periods more: its state then, or where it went instead.
+/// Follows a motion for `periods` more periods; returns its state then, or where it went instead.
 pub(crate) fn watch<M: StroboscopicMap>(
     map: &mut M,
     state: &[f64],
@@ -141,7 +144,7 @@ fn undecided(reason: UndecidedReason, spectrum: Option<LyapunovSpectrum>) -> Mot
     MotionKind::Undecided { reason, spectrum }
 }
 
-/// Why following a start ended early.
+/// The reason why following a start ended early.
 pub(super) enum Stop {
     Entered(usize),
     Unbounded,
@@ -163,13 +166,12 @@ pub(super) struct Run<'a> {
     pub(super) periods: usize,
     /// Cost of the map when the first period was over.
     first_cost: Option<u64>,
-    /// The latest strobe states, oldest first, at least the last twice the longest
-    /// period.
+    /// The latest strobe states, oldest first: at least as many as twice the longest period.
     recent: Vec<f64>,
     keep: usize,
-    /// Periods after which it is looked at, if no budget ends before.
+    /// Periods after which the run is examined next, unless a budget ends before.
     target: usize,
-    /// Periods before which it is not looked for in a neighbourhood.
+    /// Periods before which neighbourhoods are not checked.
     next_entry: usize,
     known: KnownMotions<'a>,
     options: &'a ClassifyOptions,
@@ -177,7 +179,8 @@ pub(super) struct Run<'a> {
     met: Vec<PeriodicOrbit>,
 }
 
-/// From where Newton is still to close orbits, and those that are none of the run's.
+/// Guesses from which Newton's method has still to close orbits, and the closed orbits that are not
+/// the run's.
 pub(super) struct Guesses {
     left: std::vec::IntoIter<(usize, Vec<f64>)>,
     tried: Vec<PeriodicOrbit>,
@@ -194,25 +197,25 @@ impl Guesses {
 
 /// An orbit that Newton closed near a run.
 pub(super) enum Closed {
-    /// Its multipliers say that it attracts.
+    /// Its multipliers show that it attracts.
     Attracting(PeriodicOrbit),
-    /// It does not, but the run is on it.
+    /// It does not attract, but the run is on it.
     Occupied(PeriodicOrbit),
 }
 
-/// What follows from a look at a run.
+/// Next action after a run was examined.
 pub(super) enum AfterLook {
-    /// It is this motion.
+    /// The motion is classified: the run ends.
     Known(MotionKind),
-    /// It may be on known chaos, which a neighbour decides.
+    /// The run may be on known chaos; a neighbour decides.
     MaybeChaos(ChaosMatch),
-    /// It goes on to the next look.
+    /// The run goes on to the next examination.
     GoOn,
-    /// It does not close: its exponents are measured.
+    /// The motion does not close: its exponents are measured.
     Measure,
 }
 
-/// Chaos whose means a run has.
+/// Known chaos whose means agree with those of a run.
 pub(super) struct ChaosMatch {
     pub(super) spectrum: LyapunovSpectrum,
     /// Standard deviations of the run's states.
@@ -220,7 +223,7 @@ pub(super) struct ChaosMatch {
 }
 
 impl ChaosMatch {
-    /// A neighbour of a state.
+    /// A state displaced by [`NEIGHBOUR`] standard deviations in each entry.
     pub(super) fn neighbour(&self, state: &[f64]) -> Vec<f64> {
         let apart = self.deviations.iter().map(|s| NEIGHBOUR * s);
         state
@@ -230,8 +233,8 @@ impl ChaosMatch {
             .collect()
     }
 
-    /// Whether a neighbour has come to be [`DIVERGENCE`] times as far away as it was, more than any
-    /// linear transient explains.
+    /// Whether a neighbour is [`DIVERGENCE`] times as far away as at first, more than any linear
+    /// transient explains.
     pub(super) fn has_diverged(&self, state: &[f64], neighbour: &[f64]) -> bool {
         let distances = neighbour.iter().zip(state).zip(&self.deviations);
         let apart = distances.fold(0.0f64, |far, ((a, b), s)| far.max((a - b).abs() / s));
@@ -312,12 +315,12 @@ impl<'a> Run<'a> {
         }
     }
 
-    /// Runs until it is time to look where it goes.
+    /// Runs until it is time to examine the motion.
     pub(super) fn run_to_look<M: StroboscopicMap>(&mut self, map: &mut M) -> Result<(), Stop> {
         self.run_to(map, self.next_look())
     }
 
-    /// Runs until so many periods are over.
+    /// Runs until `periods` periods are over.
     fn run_to<M: StroboscopicMap>(&mut self, map: &mut M, periods: usize) -> Result<(), Stop> {
         while self.periods < periods {
             self.step(map)?;
@@ -325,7 +328,7 @@ impl<'a> Run<'a> {
         Ok(())
     }
 
-    /// What a look comes to, once all that it asks for is done.
+    /// Completes an examination: the kind of the motion, or `None` if the run goes on.
     fn after_look<M: StroboscopicMap>(
         &mut self,
         map: &mut M,
@@ -344,18 +347,18 @@ impl<'a> Run<'a> {
         }
     }
 
-    /// Periods after which it is looked at next.
+    /// Number of periods after which the run is examined next.
     pub(super) fn next_look(&self) -> usize {
         self.target.min(self.options.max_transient)
     }
 
-    /// Looks where it goes.
+    /// Examines the run: tries to close its motion and to recognise known chaos.
     pub(super) fn at_look<M: StroboscopicMap>(&mut self, map: &mut M) -> Result<AfterLook, Stop> {
         let guesses = self.guesses_at_look();
         self.looked(map, guesses)
     }
 
-    /// What becomes of a look with these guesses.
+    /// Examines the run with these guesses for Newton's method.
     fn looked<M: StroboscopicMap>(
         &mut self,
         map: &mut M,
@@ -372,7 +375,7 @@ impl<'a> Run<'a> {
         Ok(self.go_on())
     }
 
-    /// What comes after a look that named nothing.
+    /// Goes on after an examination that found nothing: to the next one, or to measuring exponents.
     pub(super) fn go_on(&mut self) -> AfterLook {
         if self.target >= self.options.max_transient {
             return AfterLook::Measure;
@@ -390,7 +393,7 @@ impl<'a> Run<'a> {
         self.after_period(map)
     }
 
-    /// As [`Run::step`], to a state that is known already.
+    /// Steps as [`Run::step`], to a state that is known already.
     pub(super) fn step_to<M: StroboscopicMap>(
         &mut self,
         map: &mut M,
@@ -449,7 +452,7 @@ impl<'a> Run<'a> {
         spent.saturating_add(needed) <= self.options.max_steps
     }
 
-    /// From where Newton is to close the motion.
+    /// Guesses from which Newton's method is to close the motion.
     pub(super) fn guesses_at_look(&self) -> Guesses {
         let long = longest(self.options);
         let mut guesses = self.guesses(self.options.max_period, WORTH_TRYING);
@@ -468,7 +471,8 @@ impl<'a> Run<'a> {
         Guesses::new(guesses)
     }
 
-    /// The latest states of the periods after which they most nearly repeat.
+    /// Guesses from the latest states: the periods, up to `longest`, after which they most nearly
+    /// repeat.
     fn guesses(&self, longest: usize, worth_trying: f64) -> Vec<(usize, Vec<f64>)> {
         let allowed = worth_trying * self.recent_spread(2 * longest);
         candidate_periods(&self.recent, self.d, longest)
@@ -511,7 +515,7 @@ impl<'a> Run<'a> {
         None
     }
 
-    /// What a closed orbit makes of the motion; nothing if the run does not go to it.
+    /// Kind of the motion according to a closed orbit; `None` if the run does not go to it.
     pub(super) fn verdict<M: StroboscopicMap>(
         &mut self,
         map: &mut M,
@@ -536,7 +540,8 @@ impl<'a> Run<'a> {
         Ok(None)
     }
 
-    /// Tries to close the motion; its kind if it goes to a stable orbit or sits on another.
+    /// Tries to close the motion; returns its kind if it goes to a stable orbit or stays on
+    /// another.
     fn close<M: StroboscopicMap>(
         &mut self,
         map: &mut M,
@@ -562,7 +567,7 @@ impl<'a> Run<'a> {
         mean
     }
 
-    /// Largest distance of one of the last states from the last.
+    /// Largest distance of one of the last `count` states from the last one.
     fn recent_spread(&self, count: usize) -> f64 {
         self.recent
             .chunks_exact(self.d)
@@ -571,8 +576,8 @@ impl<'a> Run<'a> {
             .fold(0.0, |m: f64, row| m.max(distance(row, &self.state)))
     }
 
-    /// The chaotic motion that is known already, if the strobe states after the first quarter have
-    /// the means of it.
+    /// The known chaotic motion whose means agree with those of the strobe states after the first
+    /// quarter.
     fn matching_chaos(&self) -> Option<ChaosMatch> {
         let mut known = self.known.chaos.iter().filter(|k| is_chaotic(k)).peekable();
         known.peek()?;
@@ -587,8 +592,8 @@ impl<'a> Run<'a> {
         })
     }
 
-    /// Whether a neighbour of the state parts from it within [`MAX_DIVERGENCE_PERIODS`] periods. The run
-    /// goes on meanwhile.
+    /// Returns whether a neighbour of the state diverges from it within [`MAX_DIVERGENCE_PERIODS`]
+    /// periods. The run advances by these periods too.
     fn diverges_from_neighbour<M: StroboscopicMap>(
         &mut self,
         map: &mut M,
@@ -611,9 +616,9 @@ impl<'a> Run<'a> {
         MotionKind::Chaotic(Chaos::of(spectrum, self.periods, self.options))
     }
 
-    /// Exponents of what does not close, looking for an escape after every doubling. Where the last
-    /// half of the run differs from what was before, or is not chaotic where the whole run is, all
-    /// before it was a transient and is discarded.
+    /// Measures the exponents of a motion that does not close, looking for an escape after every
+    /// doubling. If the last half of the run differs from the rest, or is not chaotic although the
+    /// whole run is, everything before it was a transient and is discarded.
     pub(super) fn measure<M: StroboscopicMap>(&mut self, map: &mut M) -> Result<MotionKind, Stop> {
         let budget = &self.options.lyapunov;
         let mut exponents = LyapunovRun::new(self.d);
@@ -681,7 +686,7 @@ impl<'a> Run<'a> {
         self.neither_periodic_nor_chaotic(map, spectrum)
     }
 
-    /// Runs so many periods more, which count.
+    /// Runs for more periods, which count in the averages.
     fn record<M: StroboscopicMap>(
         &mut self,
         map: &mut M,
@@ -796,18 +801,19 @@ impl<'a> Run<'a> {
     }
 }
 
-/// The longest period that is ever tried.
+/// Longest period that is ever tried, in drive periods.
 fn longest(options: &ClassifyOptions) -> usize {
     options.long_period.max(options.max_period)
 }
 
-/// A largest exponent positive beyond doubt: by more than five standard errors, and
-/// with a total growth that no start of the frame explains.
+/// Whether the largest exponent is clearly positive: by more than five standard errors, and with a
+/// total growth that no initial frame explains.
 fn is_chaotic(spectrum: &LyapunovSpectrum) -> bool {
     is_positive(spectrum, CLEAR, 20.0)
 }
 
-/// The same of the last half of a run, whose error is larger by a root of two, and growth half.
+/// The same for the last half of a run, whose error is larger by a factor √2 and whose growth is
+/// half.
 fn stays_chaotic(last: &LyapunovSpectrum) -> bool {
     is_positive(last, CLEAR * std::f64::consts::FRAC_1_SQRT_2, 10.0)
 }

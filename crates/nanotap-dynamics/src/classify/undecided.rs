@@ -3,107 +3,109 @@
 use crate::failure::MapFailure;
 use crate::orbit::PeriodicOrbit;
 
-/// Why a motion was left undecided.
+/// The reason why a motion was left undecided.
 #[derive(Clone, Debug, thiserror::Error)]
 pub enum UndecidedReason {
     /// The start does not fit the map.
     #[error("bad start: {0}")]
     BadStart(String),
-    /// The map could not be followed.
+    /// The map failed during the run.
     #[error("after {periods} periods: {failure}")]
     Map {
-        /// Periods run.
+        /// Drive periods run before the failure.
         periods: usize,
-        /// What failed.
+        /// The failure of the map.
         failure: MapFailure,
     },
-    /// The run sits on an orbit that does not attract.
+    /// The run stays on an orbit that does not attract.
     #[error(
         "the run sits on a period-{} orbit that does not attract (largest |multiplier| {:.9})",
         .0.period, .0.spectral_radius()
     )]
     OnOrbitThatDoesNotAttract(Box<PeriodicOrbit>),
-    /// It repeats, but the orbit is not isolated.
+    /// The motion repeats, but the orbit is not isolated.
     #[error(
         "the motion repeats after {period} periods (to {closure:.1e}), but the orbit is not isolated"
     )]
     NotIsolated {
-        /// Period.
+        /// Period after which it repeats, in drive periods.
         period: usize,
-        /// How nearly it repeats.
+        /// Largest distance between two recent states one period apart, in units of the state.
         closure: f64,
     },
-    /// Largest exponent negative, but nothing closed.
+    /// The largest exponent is negative, but no orbit closed.
     #[error(
         "the largest exponent is negative ({exponent:.3e} ± {error:.1e} per period), but no orbit of period up to {max_period} closed"
     )]
     NothingCloses {
-        /// Largest exponent.
+        /// Largest Lyapunov exponent, natural logarithm per drive period.
         exponent: f64,
-        /// Its standard error.
+        /// Standard error of the exponent, per drive period.
         error: f64,
-        /// Longest period tried.
+        /// Longest period that was tried, in drive periods.
         max_period: usize,
     },
-    /// The exponent is zero within errors, but the map has no room for a torus.
+    /// The exponent is zero within errors, but the map contracts volumes, so a torus of one
+    /// dimension less than the state is impossible.
     #[error(
         "the largest exponent is zero within errors ({exponent:.3e} ± {error:.1e} per period) and no orbit of period up to {max_period} closed in {observed} periods; it is no torus, for the map shrinks all volumes by e^{contraction:.3e} a period at least"
     )]
     NoTorusHere {
-        /// Largest exponent.
+        /// Largest Lyapunov exponent, natural logarithm per drive period.
         exponent: f64,
-        /// Its standard error.
+        /// Standard error of the exponent, per drive period.
         error: f64,
-        /// How fast volumes shrink at least, natural logarithm per period.
+        /// Least contraction of volumes: natural logarithm of the factor by which they shrink per
+        /// drive period, at least; positive.
         contraction: f64,
-        /// Longest period tried.
+        /// Longest period that was tried, in drive periods.
         max_period: usize,
-        /// Periods run.
+        /// Drive periods run, the transient included.
         observed: usize,
     },
-    /// The exponent is zero within errors, but a line holds no closed curve.
+    /// The exponent is zero within errors, but the map has one variable only, so it has no torus.
     #[error(
         "the largest exponent is zero within errors ({exponent:.3e} ± {error:.1e} per period) and no orbit of period up to {max_period} closed in {observed} periods; it is no torus, for the map has one variable only"
     )]
     NoTorusOnALine {
-        /// Largest exponent.
+        /// Largest Lyapunov exponent, natural logarithm per drive period.
         exponent: f64,
-        /// Its standard error.
+        /// Standard error of the exponent, per drive period.
         error: f64,
-        /// Longest period tried.
+        /// Longest period that was tried, in drive periods.
         max_period: usize,
-        /// Periods run.
+        /// Drive periods run, the transient included.
         observed: usize,
     },
-    /// The exponent is not positive beyond doubt to the end, and averages do not converge as on a
-    /// torus.
+    /// The exponent is not clearly positive to the end, and averages do not converge as on a torus.
     #[error(
         "neither a torus nor chaos can be shown: the largest exponent is {exponent:.3e} ± {error:.1e} per period, and Birkhoff averages agree to {digits:.1} digits only"
     )]
     NeitherTorusNorChaos {
-        /// Largest exponent.
+        /// Largest Lyapunov exponent, natural logarithm per drive period.
         exponent: f64,
-        /// Its standard error.
+        /// Standard error of the exponent, per drive period.
         error: f64,
-        /// Digits of agreement.
+        /// Number of decimal digits to which Birkhoff averages of two stretches agree.
         digits: f64,
     },
-    /// The map itself does not go where its coarse map goes.
+    /// The exact map did not confirm the motion that its coarse map reached.
     #[error(
         "the approximate flow comes to a motion that the exact flow did not confirm from any state tried"
     )]
     NotConfirmed,
-    /// The budget of steps was spent.
+    /// The run took the largest number of steps.
     #[error(
         "the run was followed for {periods} periods, up to the budget of {steps} steps of the approximate flow"
     )]
     Budget {
-        /// Periods run.
+        /// Drive periods run until then.
         periods: usize,
-        /// [`ClassifyOptions::max_steps`](crate::ClassifyOptions::max_steps).
+        /// The budget, [`ClassifyOptions::max_steps`](crate::ClassifyOptions::max_steps), in steps
+        /// of time integration.
         steps: u64,
     },
-    /// The work was stopped before this start was done.
+    /// The work was cancelled before this start was done.
     #[error("stopped before it was done")]
     Cancelled,
 }

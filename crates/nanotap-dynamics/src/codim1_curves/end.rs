@@ -51,7 +51,7 @@ pub enum CurveEnd {
         first: f64,
         /// Value of the second parameter.
         second: f64,
-        /// Reason of the failure.
+        /// Reason why the corrector failed, in words.
         reason: String,
     },
     /// The largest number of points was reached.

@@ -71,9 +71,9 @@ impl CurveOptions {
 /// One point of a curve of bifurcations.
 #[derive(Clone, Debug)]
 pub struct CurvePoint {
-    /// Value of the first parameter.
+    /// Value of the first parameter, in its unit.
     pub first: f64,
-    /// Value of the second parameter.
+    /// Value of the second parameter, in its unit.
     pub second: f64,
     /// The orbit. At folds its error estimate is large, because the parameters do not determine it.
     pub orbit: PeriodicOrbit,
@@ -86,7 +86,7 @@ pub struct BifurcationCurve {
     pub kind: BifurcationKind,
     /// Points in order, from one end through the starting point to the other end.
     pub points: Vec<CurvePoint>,
-    /// Why it ends at the first and at the last point.
+    /// Reasons why it ends at the first and at the last point.
     pub ends: [CurveEnd; 2],
 }
 

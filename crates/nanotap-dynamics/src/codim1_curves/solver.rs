@@ -36,19 +36,19 @@ fn product(factors: &[DMatrix<f64>]) -> DMatrix<f64> {
 /// The trajectory of n periods from x.
 struct Trajectory {
     segments: Segments,
-    /// Pⁿ(x).
+    /// The state after n periods, Pⁿ(x).
     end: Vec<f64>,
-    /// ∂Pⁿ/∂first and ∂Pⁿ/∂second.
+    /// Derivatives of Pⁿ(x) with respect to the first and the second parameter, d entries each.
     by_parameter: [DVector<f64>; 2],
 }
 
 /// Values and derivatives of the equations at one point.
 struct Evaluation {
-    /// Pⁿ(x) − x.
+    /// The closing error Pⁿ(x) − x, d entries.
     gap: Vec<f64>,
-    /// DPⁿ.
+    /// The Jacobian DPⁿ(x), d × d.
     monodromy: DMatrix<f64>,
-    /// ∂Pⁿ/∂first and ∂Pⁿ/∂second.
+    /// Derivatives of Pⁿ(x) with respect to the first and the second parameter, d entries each.
     by_parameter: [DVector<f64>; 2],
     scalar: f64,
 }

@@ -28,7 +28,7 @@ use crate::orbit::PeriodicOrbit;
 use crate::orbit::multipliers::Multipliers;
 use crate::vector::dot;
 
-/// Kind of a bifurcation.
+/// Kind of a bifurcation, with the quantity that its kind has: an angle or a time.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum BifurcationKind {
     /// Saddle-node bifurcation: two orbits meet and vanish, a multiplier is +1 and the branch
@@ -52,12 +52,12 @@ pub enum BifurcationKind {
     },
 }
 
-/// A located bifurcation.
+/// A bifurcation located on a branch.
 #[derive(Clone, Debug)]
 pub struct Bifurcation {
-    /// Kind of the bifurcation.
+    /// Kind of the bifurcation, with its angle or time.
     pub kind: BifurcationKind,
-    /// Parameter value.
+    /// Parameter value at the bifurcation, in units of the parameter.
     pub parameter: f64,
     /// Whether the motion that a flip or a Neimark–Sacker bifurcation creates is on the unstable
     /// side; `None` for the other kinds, and where it is not known.

@@ -32,7 +32,7 @@ pub enum Criticality {
 }
 
 impl Criticality {
-    /// Its name.
+    /// Returns the name of the variant in lower case, as in reports.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Supercritical => "supercritical",

@@ -23,7 +23,7 @@ use rayon::prelude::*;
 /// Options of the assembly of a diagram.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DiagramOptions {
-    /// Options for each branch.
+    /// Options of the continuation of each branch.
     pub continuation: ContinuationOptions,
     /// Number of period doublings that are followed from each seed; 0 for none.
     pub doublings: usize,

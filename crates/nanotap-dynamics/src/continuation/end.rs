@@ -65,7 +65,7 @@ pub(crate) fn dead_end<F: MapFamily>(
     }
 }
 
-/// An orbit that grazes.
+/// The orbit at a grazing near the end of a branch.
 struct GrazingOrbit {
     node: Node,
     /// Time in drive periods, from the first state of the orbit.

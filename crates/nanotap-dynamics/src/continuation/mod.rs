@@ -55,10 +55,11 @@ pub struct ContinuationOptions {
     pub max_points: usize,
     /// Largest entry of a state inside the domain, in units of the state.
     pub bound: f64,
-    /// Unit of the state along the arc. Default: the largest entry of the present orbit, but at
-    /// least that of the first orbit.
+    /// Unit of the state along the arc, in units of the state. Default: the largest entry of the
+    /// present orbit, but at least that of the first orbit.
     pub state_scale: Option<f64>,
-    /// Unit of the parameter along the arc. Default: the length of the range.
+    /// Unit of the parameter along the arc, in units of the parameter. Default: the length of the
+    /// range.
     pub parameter_scale: Option<f64>,
     /// Residual, in units of the orbit's scale, at which a stalled Newton iteration is accepted.
     /// Set it to the accuracy of the map.
@@ -93,23 +94,23 @@ impl ContinuationOptions {
     }
 }
 
-/// Direction of continuation.
+/// Direction in which a branch is followed from its first orbit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Direction {
-    /// Towards larger parameter values.
+    /// Towards larger parameter values at the first point.
     Increasing,
-    /// Towards smaller parameter values.
+    /// Towards smaller parameter values at the first point.
     Decreasing,
 }
 
 /// One point of a branch.
 #[derive(Clone, Debug)]
 pub struct BranchPoint {
-    /// Parameter value.
+    /// Parameter value of the point, in units of the parameter.
     pub parameter: f64,
     /// The orbit at this value, with multipliers and stability.
     pub orbit: PeriodicOrbit,
-    /// Scaled arclength from the first point.
+    /// Scaled arclength from the first point, dimensionless, with the scales of each step.
     pub arclength: f64,
     /// dλ/ds: positive where the branch runs towards larger parameter values.
     pub slope: f64,
@@ -126,11 +127,11 @@ pub struct Branch {
     pub points: Vec<BranchPoint>,
     /// Bifurcations in order of arclength.
     pub bifurcations: Vec<Bifurcation>,
-    /// Why it ends; [`BranchEnd::is_failure`] tells an end from a cut.
+    /// Reason why it ends; [`BranchEnd::is_failure`] distinguishes an end from a cut.
     pub end: BranchEnd,
 }
 
-/// Why a branch ends.
+/// The reason why a branch ends.
 #[derive(Clone, Debug)]
 pub enum BranchEnd {
     /// The parameter reached an end of its range.
@@ -149,7 +150,7 @@ pub enum BranchEnd {
     /// The orbit shrank to a point at an end of the range, where the map is not differentiable: for
     /// example drive amplitude zero with a tip that touches the sample at rest.
     Vanished {
-        /// Parameter value.
+        /// Parameter value where it vanished.
         parameter: f64,
     },
     /// A state exceeded the bound.
@@ -158,13 +159,13 @@ pub enum BranchEnd {
     StepTooSmall {
         /// Parameter value of the last point.
         parameter: f64,
-        /// Reason of the failure.
+        /// Reason why the corrector failed, in words.
         reason: String,
     },
     /// An extremum of a switching function reached zero, and the orbit does not exist beyond it (a
     /// hard impact).
     Grazing {
-        /// Parameter value.
+        /// Parameter value of the grazing.
         parameter: f64,
     },
     /// The orbit is no longer stable, and [`ContinuationOptions::until_unstable`] is set. The last
@@ -175,7 +176,7 @@ pub enum BranchEnd {
     },
     /// A multiplier exceeded [`ContinuationOptions::max_multiplier`].
     Repelling {
-        /// Parameter value.
+        /// Parameter value of the last point.
         parameter: f64,
     },
     /// The largest number of points was reached.
@@ -246,18 +247,18 @@ impl fmt::Display for BranchEnd {
     }
 }
 
-/// Why a branch could not be started.
+/// The reason why a branch could not be started.
 #[derive(Clone, Debug, thiserror::Error)]
 pub enum ContinuationError {
-    /// Invalid options.
+    /// An option is invalid; the text says why.
     #[error("invalid continuation options: {0}")]
     BadOptions(String),
     /// The given orbit is not an orbit at this parameter value.
     #[error("the corrector found no orbit at parameter {parameter}: {reason}")]
     NoStart {
-        /// Parameter value.
+        /// Parameter value of the given orbit.
         parameter: f64,
-        /// Reason of the failure.
+        /// Reason why the corrector failed, in words.
         reason: String,
     },
     /// The given bifurcation is not a flip.

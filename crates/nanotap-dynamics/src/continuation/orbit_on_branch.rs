@@ -18,7 +18,7 @@ const CHORD_EXTENSION: f64 = 0.1;
 struct Passage {
     /// Step from the previous point.
     at: f64,
-    /// The solution there.
+    /// Solution of the branch at this point.
     node: Node,
     /// Strobe of the known orbit with which the branch's orbit begins.
     strobe: usize,

@@ -26,7 +26,7 @@ const MAX_ITERATIONS: usize = 12;
 pub struct OrbitTangency {
     /// Time in drive periods from the first state of the orbit: 0 ≤ time < period.
     pub time: f64,
-    /// Value of the switching function.
+    /// Value of the switching function at the extremum, in its own unit; zero at a grazing.
     pub value: f64,
 }
 
@@ -60,7 +60,7 @@ impl Node {
     }
 }
 
-/// Why the corrector found no point.
+/// The reason why the corrector found no point.
 #[derive(Clone, Debug, thiserror::Error)]
 pub(crate) enum CorrectorFailure {
     #[error(transparent)]

@@ -41,7 +41,7 @@ pub struct LyapunovOptions {
     /// The run stops between the two once every error bar is below this (per period) plus
     /// `relative_error` times its exponent.
     pub absolute_error: f64,
-    /// Fraction of the exponent; see `absolute_error`.
+    /// Allowed error bar as a fraction of the exponent (dimensionless), added to `absolute_error`.
     pub relative_error: f64,
 }
 
@@ -175,7 +175,7 @@ pub(crate) struct LyapunovRun {
     /// Logarithms of the stretches, the state and its squares, and log|det DP|.
     sample: Vec<f64>,
     average: BlockAverage,
-    /// Averages since [`Self::begin_last_stretch`].
+    /// Averages since the last call of [`Self::begin_last_stretch`].
     last: BlockAverage,
 }
 

@@ -11,7 +11,7 @@ const MAX_RELATIVE_ERROR: f64 = 0.2;
 pub struct StrobeMeans {
     /// The 2 d means, in units of the state and their squares.
     pub means: Vec<f64>,
-    /// Standard error of each mean.
+    /// Standard errors of the 2 d means, in the unit of each mean.
     pub errors: Vec<f64>,
     /// Number of drive periods in the means.
     pub periods: usize,

@@ -21,7 +21,7 @@ pub(crate) struct AdaptedNorm {
     /// Lᵀ, row major: row i has its first nonzero entry at column i.
     upper: Vec<f64>,
     upper_matrix: DMatrix<f64>,
-    /// L⁻ᵀ.
+    /// The matrix L⁻ᵀ, d × d.
     inverse: DMatrix<f64>,
     /// Contraction rate of the linearised return map in this norm.
     rate: f64,
@@ -73,7 +73,7 @@ impl AdaptedNorm {
         0.5 * (1.0 + self.rate)
     }
 
-    /// ‖a − b‖_H.
+    /// Returns the distance ‖a − b‖_H of two states.
     #[inline]
     pub(crate) fn distance(&self, a: &[f64], b: &[f64]) -> f64 {
         let mut sum = 0.0;

@@ -36,8 +36,8 @@ pub struct PeriodicOrbit {
     /// Floquet multipliers in descending order of modulus; of a pair, the one with positive
     /// imaginary part comes first.
     pub multipliers: Vec<Complex<f64>>,
-    /// log|det DPⁿ|, summed over the factors: an independent check of the multipliers and of a
-    /// trace formula.
+    /// Natural logarithm of |det DPⁿ|, summed over the factors: an independent check of the
+    /// multipliers and of a trace formula.
     pub log_determinant: f64,
     /// Stability according to the multipliers.
     pub stability: Stability,
@@ -48,7 +48,7 @@ pub struct PeriodicOrbit {
 }
 
 impl PeriodicOrbit {
-    /// Dimension of the state.
+    /// Returns the number of entries of a state; 0 if the orbit has no states.
     pub fn dimension(&self) -> usize {
         self.states.first().map_or(0, Vec::len)
     }

@@ -59,7 +59,7 @@ impl Stability {
 pub struct Multipliers {
     /// In descending order of modulus; of a pair, the one with positive imaginary part comes first.
     pub values: Vec<Complex<f64>>,
-    /// log|det| summed over the factors.
+    /// Natural logarithm of the modulus of the determinant, summed over the factors.
     pub log_determinant: f64,
     /// |Σ log|μ| − log|det||: the difference between the two computations; 0 for a singular product.
     pub determinant_defect: f64,

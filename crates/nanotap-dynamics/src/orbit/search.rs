@@ -16,7 +16,7 @@ use crate::map::StroboscopicMap;
 use crate::orbit::{PeriodicOrbit, ShootingOptions, close_orbit, close_orbit_from_points};
 use crate::vector::{distance, norm};
 
-/// Options of the search.
+/// Options of the search for periodic orbits.
 #[derive(Clone, Debug, PartialEq)]
 pub struct OrbitSearch {
     /// Longest period in drive periods.
@@ -25,7 +25,7 @@ pub struct OrbitSearch {
     pub run: usize,
     /// A run ends at a state with an entry above this, in units of the state.
     pub bound: f64,
-    /// Options of Newton's method.
+    /// Options of Newton's method for closing candidates.
     pub shooting: ShootingOptions,
 }
 

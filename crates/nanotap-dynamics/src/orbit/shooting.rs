@@ -25,7 +25,7 @@ use crate::orbit::multipliers::{MultiplierError, Multipliers};
 use crate::orbit::parallel::for_each_period;
 use crate::vector::{distance, mix, norm, sum_of_squares};
 
-/// Options of Newton's method.
+/// Options of Newton's method for periodic orbits.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ShootingOptions {
     /// Largest number of Newton steps.
@@ -36,8 +36,9 @@ pub struct ShootingOptions {
     /// (its largest entry). Set it to the accuracy of the map; the final residual is normally much
     /// smaller.
     pub residual_tolerance: f64,
-    /// Newton stops if the linearised return at the current points stretches some direction by more
-    /// than this: the orbits nearby are unstable. Infinite to find unstable orbits too.
+    /// Newton's method stops if the linearised return at the current points stretches some
+    /// direction by more than this factor (dimensionless): the orbits nearby are unstable. Infinite
+    /// to find unstable orbits too.
     pub max_growth: f64,
     /// Whether to compute the multipliers after a stall, to report a multiplier near +1 as the
     /// reason.
@@ -69,7 +70,7 @@ pub enum ShootingError {
     TooLarge {
         /// Requested period, in drive periods.
         period: usize,
-        /// Dimension of the map.
+        /// Number of entries of a state.
         dimension: usize,
         /// Longest period for this dimension.
         limit: usize,
@@ -84,11 +85,11 @@ pub enum ShootingError {
     Diverged {
         /// Requested period, in drive periods.
         period: usize,
-        /// Number of Newton steps.
+        /// Number of Newton steps until the stall.
         iterations: usize,
         /// Largest entry of the final residual, in units of the state.
         residual: f64,
-        /// Reason of the stall.
+        /// The reason why Newton's method stalled.
         reason: DivergenceReason,
     },
     /// The orbit is not isolated to rounding: a multiplier is too near +1.

@@ -11,7 +11,7 @@ use super::{Stage, Studied, object};
 use crate::api_error::ApiError;
 use crate::forms;
 
-/// Most heights of a drawn surface.
+/// Largest number of heights of a drawn surface.
 const MAX_DRAWN: usize = 1000;
 
 impl Studied<'_> {

@@ -1,4 +1,4 @@
-//! The terminal's studies, in stages of increasing resolution until they are cancelled.
+//! The studies of the command line, in stages of increasing resolution until they are cancelled.
 
 mod approach;
 mod basin;
@@ -45,13 +45,13 @@ pub(crate) struct StudyRequest {
     case: CaseSpec,
     #[serde(default)]
     start: String,
-    /// A tab of the page, or a study of the registry.
+    /// Name of a tab of the page, or of a study of the registry.
     tab: String,
-    /// Measured data: name and text of their file.
+    /// Measured data: name and text of the file.
     #[serde(default)]
     data: Option<(String, String)>,
     options: Map<String, Value>,
-    /// Number of a figure whose curves are drawn behind; 0: none.
+    /// Number of a figure whose curves are drawn behind this one; 0: none.
     #[serde(default)]
     pinned: u64,
 }
@@ -75,7 +75,7 @@ pub(crate) async fn study(
 /// Sends a message to the page.
 type HandOver<'a> = &'a (dyn Fn(Value) + Sync);
 
-/// A running study.
+/// A study that is running, with its request and its connection to the page.
 struct Studied<'a> {
     app: &'a App,
     request: &'a StudyRequest,
@@ -83,7 +83,7 @@ struct Studied<'a> {
     hand_over: HandOver<'a>,
 }
 
-/// A finished stage.
+/// A finished stage of a study: what the page shows then.
 #[derive(Default)]
 struct Stage<'a> {
     figure: Option<Figure>,
@@ -91,20 +91,21 @@ struct Stage<'a> {
     words: String,
     /// Names and requests of the studies in its figure.
     studies: &'a [Computed<'a>],
-    /// Lines of the case file in addition.
+    /// Additional lines of the case file: its table `[scan]`.
     scan: Option<String>,
-    /// What the page shows below the figure.
+    /// Tables that the page shows below the figure.
     tables: Vec<Value>,
     found: Option<Found>,
 }
 
-/// What a study found, to go on from.
+/// A result of a study from which the user can go on.
 #[derive(Serialize)]
 struct Found {
-    /// The changes to the case that lead to it, and the words of the button that makes them.
+    /// The changes to the case that lead to this result, and the words of the button that applies
+    /// them.
     set: Option<Map<String, Value>>,
     take: &'static str,
-    /// A file of it, the words of the button that saves it, and its name.
+    /// A file with the result, the words of the button that saves it, and its name.
     file: String,
     save: &'static str,
     name: &'static str,
@@ -146,7 +147,7 @@ impl Studied<'_> {
         })
     }
 
-    /// The options that the form gives, of those that a study has; a default is not stated.
+    /// The options of a study that the form sets to another value than the default.
     fn options(&self, entry: &StudyEntry) -> Map<String, Value> {
         let schema = (entry.request)();
         let given = |property: Property<'_>| {

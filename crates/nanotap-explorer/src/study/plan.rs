@@ -15,7 +15,7 @@ const PLAN: [usize; 3] = [4, 8, 16];
 const PLAN_STARTS: usize = 4;
 
 impl Studied<'_> {
-    /// Where, over two parameters, every motion meets the conditions of the form.
+    /// Finds where, over two parameters, every motion meets the conditions of the form.
     pub(super) fn plan(&self) -> Result<(), ApiError> {
         let case = self.request.case.any_distance(self.app)?;
         let wanted = self.conditions()?;

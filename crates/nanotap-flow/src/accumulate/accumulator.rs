@@ -13,18 +13,20 @@ use crate::search::table::Table;
 use crate::signal::Signal;
 use crate::simd::{self, LARGEST_ANGLE, layout};
 
-/// Switches from one regime to another.
+/// Counts and speeds of the switches from one regime to another.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Switches {
-    /// How many.
+    /// Number of switches, grazing ones included.
     pub count: u64,
-    /// How many of them only grazed, within rounding.
+    /// Number of these switches that only grazed the guard's zero, within rounding.
     pub grazing: u64,
-    /// The greatest speed at which the guard fell to zero.
+    /// Greatest speed at which the guard fell to zero, in units of the guard per unit of time; 0
+    /// without a switch.
     pub greatest_speed: f64,
-    /// `Σ v` of those speeds.
+    /// Sum `Σ v` of the speeds at these switches, in units of the guard per unit of time.
     pub speeds: f64,
-    /// `Σ v²` of those speeds.
+    /// Sum `Σ v²` of the squared speeds at these switches, in squared units of the guard per unit
+    /// of time.
     pub squared_speeds: f64,
 }
 
@@ -32,19 +34,19 @@ pub struct Switches {
 #[derive(Clone, Debug)]
 pub struct Accumulator {
     plan: Arc<Plan>,
-    /// By number of the functional.
+    /// Values of the functionals, by number.
     values: Vec<Complex>,
     times: Vec<f64>,
     switches: Vec<Switches>,
     duration: f64,
     periods: u64,
-    /// Work space.
+    /// Work space of the stretch that is added.
     stretch: Stretch,
     search: RangeWork,
 }
 
 impl Accumulator {
-    /// Of a motion that is still to run.
+    /// Creates an accumulator of no motion yet, for the functionals of `plan`.
     pub fn new(plan: &Arc<Plan>) -> Self {
         let regimes = plan.regimes();
         let mut accumulator = Self {
@@ -61,12 +63,12 @@ impl Accumulator {
         accumulator
     }
 
-    /// What it accumulates.
+    /// Returns the plan whose functionals are accumulated.
     pub fn plan(&self) -> &Arc<Plan> {
         &self.plan
     }
 
-    /// Clears all values.
+    /// Resets all sums and extrema to those of no motion.
     pub fn clear(&mut self) {
         for (value, functional) in self.values.iter_mut().zip(&self.plan.functionals) {
             *value = functional.initial();
@@ -77,22 +79,23 @@ impl Accumulator {
         self.periods = 0;
     }
 
-    /// How long the motion ran.
+    /// Returns how long the motion ran, in the system's unit of time.
     pub fn duration(&self) -> f64 {
         self.duration
     }
 
-    /// How many drive periods were completed.
+    /// Returns the number of completed drive periods.
     pub fn periods(&self) -> u64 {
         self.periods
     }
 
-    /// How long the motion was in regime `regime`; 0 where there is none of this number.
+    /// Returns the time spent in regime `regime`, in the system's unit of time; 0 if there is no
+    /// such regime.
     pub fn time_in(&self, regime: usize) -> f64 {
         self.times.get(regime).copied().unwrap_or(0.0)
     }
 
-    /// The switches from regime `from` to regime `to`; none where these do not exist.
+    /// Returns the switches from regime `from` to regime `to`; all zero if the system has none.
     pub fn switches(&self, from: usize, to: usize) -> Switches {
         let regimes = self.plan.regimes();
         if from < regimes && to < regimes {
@@ -102,13 +105,13 @@ impl Accumulator {
         }
     }
 
-    /// The functionals' values by number: real but for Fourier coefficients; extrema of no time are
-    /// infinite.
+    /// Returns the functionals' values by number. They are real except for Fourier coefficients;
+    /// extrema of an empty motion are infinite.
     pub fn values(&self) -> &[Complex] {
         &self.values
     }
 
-    /// The value of functional `number`, which begins anew.
+    /// Returns the value of functional `number` and resets it.
     pub fn take(&mut self, number: usize) -> f64 {
         let initial = self.plan.functionals[number].initial();
         std::mem::replace(&mut self.values[number], initial).re
@@ -263,7 +266,8 @@ impl Accumulator {
     }
 }
 
-/// Ends of a stretch within this part of its terms' size are zero, but for rounding.
+/// A value at an end of a stretch counts as zero below this fraction of the size of its terms: it
+/// is rounding.
 const DROWNED: f64 = 128.0 * f64::EPSILON;
 
 fn signal(plan: &Plan, segment: &SegmentView<'_>, channel: usize) -> Signal {

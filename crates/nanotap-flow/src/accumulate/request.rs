@@ -9,7 +9,7 @@ use crate::regime::{Kernel, KernelFrame, ModalOutput};
 use crate::search::table::Table;
 use crate::{Complex, Drive, FlowError, Output, Regime, System};
 
-/// An output in every regime.
+/// An output, the same in every regime or one per regime.
 #[derive(Clone, Debug, PartialEq)]
 enum Outputs {
     Same(Output),
@@ -24,12 +24,12 @@ pub struct Request {
 }
 
 impl Request {
-    /// Nothing yet.
+    /// Creates a request without outputs and functionals.
     pub fn new() -> Self {
         Self::default()
     }
 
-    /// The functionals, in the order of their numbers.
+    /// Returns the functionals, in the order of their numbers.
     pub fn functionals(&self) -> &[Functional] {
         &self.functionals
     }
@@ -54,11 +54,11 @@ impl Request {
         place(&mut self.functionals, functional)
     }
 
-    /// The request made ready for `system`.
+    /// Prepares the request for `system`.
     ///
     /// # Errors
-    /// When an output does not fit the system (its length, its tones, or its number of
-    /// regimes), or a value or frequency is not finite.
+    /// If an output does not fit the system (its length, its tones, or its number of regimes), or
+    /// if a value or frequency is not finite.
     pub fn plan(&self, system: &System) -> Result<Arc<Plan>, FlowError> {
         let (n, tones) = (system.dimension(), system.drive().frequencies().len());
         let regimes = system.regimes();
@@ -155,7 +155,7 @@ impl Request {
     }
 }
 
-/// The position of `item` in the list, to whose end it is added if it was not there.
+/// Returns the position of `item` in the list, and appends it if it is missing.
 fn place<T: PartialEq>(list: &mut Vec<T>, item: T) -> usize {
     list.iter()
         .position(|other| *other == item)
@@ -184,7 +184,8 @@ pub struct Plan {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Frequency {
     pub(super) omega: f64,
-    /// The tone that it is a multiple of, and which.
+    /// The tone of which it is a multiple, and the multiple; `None` if it is not a multiple of any
+    /// tone.
     pub(super) multiple: Option<(usize, u32)>,
 }
 

@@ -70,7 +70,7 @@ pub(super) struct Stretch {
 }
 
 impl Stretch {
-    /// Prepares [`Stretch::integral`].
+    /// Computes the integrals of all terms, from which [`Stretch::integral`] takes its sums.
     pub(super) fn integrate(&mut self, rates: &Rates) {
         let length = self.length;
         let terms = rates.single.iter().zip(&self.terms);
@@ -79,7 +79,7 @@ impl Stretch {
             .extend(terms.map(|(rate, [q, end])| q * rate.integral(length, *end)));
     }
 
-    /// `∫ g ds` of the output with these weights.
+    /// Returns `∫ g ds` of the output with these weights.
     pub(super) fn integral(&self, weights: &[Complex]) -> f64 {
         real_sum(weights, &self.integrals)
     }
@@ -100,7 +100,7 @@ impl Stretch {
             }));
     }
 
-    /// `∫ g e^{−iωt} ds`.
+    /// Returns `∫ g e^{−iωt} ds` of the output with these weights.
     pub(super) fn fourier(&self, weights: &[Complex]) -> Complex {
         let terms = weights.iter().zip(&self.turned);
         terms.fold(ZERO, |sum, (w, [direct, mirrored])| {
@@ -108,7 +108,8 @@ impl Stretch {
         })
     }
 
-    /// Prepares [`Stretch::product`].
+    /// Computes the integrals of all products of two terms, from which [`Stretch::product`] takes
+    /// its sums.
     pub(super) fn pair(&mut self, rates: &Rates) {
         let length = self.length;
         self.pairs.clear();
@@ -124,7 +125,7 @@ impl Stretch {
         }
     }
 
-    /// `∫ g h ds` of the outputs whose [`pair_weights`] these are.
+    /// Returns `∫ g h ds` of the outputs whose [`pair_weights`] these are.
     pub(super) fn product(&self, weights: &[[Complex; 2]]) -> f64 {
         let pairs = weights.iter().zip(&self.pairs);
         pairs
@@ -134,7 +135,7 @@ impl Stretch {
             .sum()
     }
 
-    /// A bound of the output's size, where no term grows.
+    /// Returns a bound of the output's absolute value, if no term grows.
     pub(super) fn size(&self, weights: &[Complex]) -> f64 {
         let terms = weights.iter().zip(&self.terms);
         terms
@@ -172,7 +173,7 @@ pub(super) fn pair_weights(g: &[Complex], h: &[Complex]) -> Vec<[Complex; 2]> {
     weights
 }
 
-/// `Re Σ a b`.
+/// Computes the real part `Re Σ a b` of the sum of products.
 fn real_sum(a: &[Complex], b: &[Complex]) -> f64 {
     a.iter()
         .zip(b)

@@ -5,7 +5,7 @@
 
 use crate::simd::{Lanes, Simd, Single};
 
-/// Value, rate and curvature.
+/// Value, rate and curvature of a signal at a point of a table.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Point {
     pub(crate) value: f64,
@@ -13,25 +13,24 @@ pub(crate) struct Point {
     pub(crate) curvature: f64,
 }
 
-/// Two neighbouring points.
+/// An interval between two neighbouring points of a table.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Interval {
-    /// Where it begins.
+    /// Time of the left end, from the start of the stretch.
     pub(crate) start: f64,
-    /// Where it ends.
+    /// Time of the right end, from the start of the stretch.
     pub(crate) end: f64,
-    /// The number of the point where it begins.
+    /// Number of the point at the left end.
     pub(crate) point: usize,
-    /// Its width.
     pub(crate) width: f64,
-    /// Its ends.
+    /// Signal at the left and at the right end.
     pub(crate) ends: [Point; 2],
-    /// Bound on the distance from the quintic to the signal within.
+    /// Bound on the distance from the quintic to the signal within the interval.
     pub(crate) error: f64,
 }
 
 impl Point {
-    /// Those in one lane of sums over terms.
+    /// Returns the points in one lane of sums over terms.
     #[inline(always)]
     pub(crate) fn of<S: Simd>(sums: &[S::Register; 3], lane: usize) -> Self {
         Self {
@@ -41,7 +40,7 @@ impl Point {
         }
     }
 
-    /// Value, rate and curvature.
+    /// Returns value, rate and curvature, in this order.
     #[inline(always)]
     pub(crate) fn numbers(self) -> [f64; 3] {
         [self.value, self.rate, self.curvature]
@@ -58,7 +57,7 @@ impl Interval {
         }
     }
 
-    /// Whether the signal is above zero at the start and below at the end, for certain.
+    /// Reports whether the signal is certainly above zero at the start and below at the end.
     #[inline(always)]
     pub(crate) fn crosses(&self) -> bool {
         self.ends[0].value > self.error && self.ends[1].value < -self.error
@@ -67,7 +66,7 @@ impl Interval {
 
 /// A quintic in an interval's Bernstein form, one a lane.
 pub(crate) struct Quintic<L: Lanes> {
-    /// The interval's width.
+    /// Width of the interval, in time.
     pub(crate) width: L::Register,
     /// Value, rate and curvature at both ends.
     pub(crate) ends: [[L::Register; 3]; 2],

@@ -1,4 +1,4 @@
-//! What an evaluation of a signal near its zero proves.
+//! Conclusions from an evaluation of a signal near its zero.
 
 use super::interval::Cubic;
 use super::steps::RESOLUTION;
@@ -10,7 +10,7 @@ pub(crate) struct Near<L: Lanes> {
     pub(crate) cubic: Cubic<L>,
     /// Bound of the third derivative from here on.
     pub(crate) third: L::Register,
-    /// The largest `|λ|`.
+    /// Largest `|λ|` of the signal's terms: the fourth derivative is at most this times `third`.
     pub(crate) fastest: L::Register,
     /// The size of rounding errors in the value.
     pub(crate) noise: L::Register,

@@ -55,8 +55,8 @@ pub(crate) fn first_crossing<S: Simd>(
     found.and_then(Decision::crossing)
 }
 
-/// All of a signal up to `length`, for a table; `None` for a start that only the Taylor
-/// series can leave.
+/// Returns the whole of a signal up to `length` as the span to search on a table; `None` for a
+/// start that only the Taylor series can leave.
 #[inline(always)]
 fn whole_span(signal: &Signal, length: f64, start: Start) -> Option<Span> {
     let surface = match start {
@@ -71,17 +71,17 @@ fn whole_span(signal: &Signal, length: f64, start: Start) -> Option<Span> {
     })
 }
 
-/// What ends a search through intervals.
+/// The result of a search through intervals.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Decision {
-    /// The crossing.
+    /// The first crossing, certified.
     Crossing(Crossing),
-    /// There is one, but beyond the end.
+    /// There is a crossing, but beyond the end of the search.
     TooLate,
 }
 
 impl Decision {
-    /// The crossing, unless it comes too late.
+    /// Returns the crossing, unless it lies beyond the end.
     fn crossing(self) -> Option<Crossing> {
         match self {
             Self::Crossing(crossing) => Some(crossing),
@@ -90,7 +90,8 @@ impl Decision {
     }
 }
 
-/// Evaluations of the signal near a quintic's zero before it is left to certified steps.
+/// Number of evaluations of the signal near a quintic's zero, after which certified steps take
+/// over.
 const MAX_EVALUATIONS: usize = 4;
 
 /// A search through the intervals of a table's fine grid.
@@ -103,7 +104,7 @@ struct IntervalSearch<'a> {
 }
 
 impl IntervalSearch<'_> {
-    /// The crossing in a span.
+    /// Searches for the crossing in a span.
     #[inline(always)]
     fn span<S: Simd>(&mut self, span: Span, followed: &Followed) -> Option<Decision> {
         let table = self.table;
@@ -123,7 +124,7 @@ impl IntervalSearch<'_> {
         found
     }
 
-    /// The crossing in an interval that may hold one.
+    /// Searches for the crossing in an interval that may contain one.
     #[inline(always)]
     fn interval<S: Simd>(&mut self, interval: &Interval, rate_error: f64) -> Option<Decision> {
         if interval.crosses()

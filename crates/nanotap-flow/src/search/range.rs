@@ -1,14 +1,14 @@
 //! The least and the greatest value of a signal over a stretch, from the tabulated points and
 //! quintics that certify a flight.
 //!
-//! Between two points the signal lies within the Bernstein coefficients of its quintic, give
-//! or take the quintic's error (see [`walk`](super::walk)). Most intervals therefore
-//! cannot hold an extremum: they do not reach what was found before, or the best of the points.
-//! In one that can, the quintic's own extremum is where Newton's method on the signal's rate
-//! begins. What it finds is proved to be the interval's extremum: with curvature `κ` there and
-//! `B` a bound of the third derivative the signal is concave (or convex) within `|κ|/B` on
-//! either side, and beyond that the quintic's coefficients are not beyond it. What cannot be
-//! proved so is left to the roots of the rate, found by certified steps.
+//! Between two points the signal lies within the Bernstein coefficients of its quintic, up to the
+//! quintic's error (see [`walk`](super::walk)). Most intervals therefore cannot contain an extremum
+//! of the stretch: they do not reach the value found before, or the best of the points. In one that
+//! can, Newton's method on the signal's rate starts at the quintic's own extremum. Its result is
+//! proved to be the interval's extremum: with curvature `κ` there and a bound `B` of the third
+//! derivative the signal is concave (or convex) within `|κ|/B` on either side, and the quintic's
+//! coefficients outside do not exceed the result. If that proof fails, certified steps find the
+//! roots of the rate.
 
 use super::interval::{Interval, Point};
 use super::sign_changes;
@@ -17,7 +17,7 @@ use crate::regime::Kernel;
 use crate::signal::Signal;
 use crate::simd::{ComplexVector, Simd, Vector, WIDTH, Work, layout};
 
-/// Least and greatest value; not looked for where it is minus or plus infinity.
+/// Least and greatest value; minus or plus infinity if that extremum is not requested.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Range {
     pub(crate) least: f64,
@@ -25,7 +25,7 @@ pub(crate) struct Range {
 }
 
 impl Range {
-    /// With one more value.
+    /// Extends the range by one more value.
     #[inline(always)]
     pub(crate) fn hold(&mut self, value: f64) {
         self.least = self.least.min(value);
@@ -41,7 +41,7 @@ const DROWNED: f64 = 32.0;
 /// Newton's method ends when its step, as an angle of the fastest term, is below this: what the
 /// series then leaves out is below rounding.
 const LAST_STEP: f64 = 3e-4;
-/// Steps before it is given up.
+/// Number of steps of Newton's method after which it is abandoned.
 const MAX_STEPS: usize = 5;
 
 /// Work space of a search for extrema.
@@ -87,7 +87,7 @@ impl Work for Extend<'_> {
     }
 }
 
-/// The same of a signal without a table.
+/// Extends the range for a signal without a table.
 #[cold]
 pub(crate) fn extend_by_certified_steps(range: &mut Range, signal: &Signal, length: f64) {
     for end in [signal.at(0.0), signal.at(length)] {
@@ -144,12 +144,12 @@ fn extend_with<S: Simd>(
 #[derive(Clone, Copy, Debug)]
 struct Open {
     interval: Interval,
-    /// Whether it may reach above, and below, what is known.
+    /// Whether the interval may reach above, and below, the known range.
     above: bool,
     below: bool,
     /// Bound of the sixth derivative, times the width's sixth power over 7200.
     sixth: f64,
-    /// What is reached already.
+    /// Range that is already reached: an extremum inside it does not count.
     reached: Range,
 }
 
@@ -160,7 +160,8 @@ struct RangeSearch<'a> {
     end: f64,
     sixth: f64,
     error: f64,
-    /// The range or, if wider, that of the points: what an interval must exceed.
+    /// The range or, if wider, that of the points; an interval is of interest only if it may exceed
+    /// it.
     reached: Range,
     vector: usize,
     vectors: usize,
@@ -340,13 +341,13 @@ fn extend_within<S: Simd>(
     }
 }
 
-/// What was proved of an interval.
+/// The conclusion about the extremum in an interval.
 enum Extremum {
     /// The signal's extremum in it.
     Value(f64),
-    /// It holds none beyond what is known.
+    /// The interval certainly contains no extremum beyond the known range.
     None,
-    /// Nothing.
+    /// No proof: the interval is left to certified steps.
     Unknown,
 }
 

@@ -1,11 +1,11 @@
 //! The walk along the points of a table for eight signals side by side, a lane each.
 //!
-//! In a separate lane a signal cannot stop early, so the proof has to be cheap everywhere. Most of a
-//! flight is far from zero, and there the slow terms' values are enough: between two points they keep
-//! above the lower one, less than what curvature takes from a chord, and every other term takes its
-//! amplitude at most. What that leaves open, mostly the first interval of a flight and the last ones,
-//! is looked at as in the walk of a single signal ([`walk`](super::walk)), with all followed terms, by
-//! the quintic's Bernstein coefficients: each lane then examines its own next open interval.
+//! A lane cannot stop early, so the proof has to be cheap everywhere. Most of a flight is far from
+//! zero, and there the values of the slow terms suffice: between two points they stay above the
+//! lower value minus the deviation of a curve from its chord, and every other term is at most its
+//! amplitude. The intervals that this leaves open, mostly the first of a flight and the last ones,
+//! are examined as in the walk of a single signal ([`walk`](super::walk)), with all followed terms,
+//! by the quintic's Bernstein coefficients. Each lane then examines its own next open interval.
 
 use super::interval::Quintic;
 use super::table::Table;
@@ -13,9 +13,9 @@ use super::walk::{Bounds, coefficients};
 use crate::regime::Kernel;
 use crate::simd::{self, ComplexOctet, LANES, Octet, WIDTH, Wide, layout};
 
-/// The most intervals that are looked at: a bit each.
+/// Largest number of intervals in a search: one bit each.
 const MAX_INTERVALS: usize = 64;
-/// The most terms that are followed; where there are fewer, the rest is zero.
+/// Number of terms that are followed; missing ones are zero.
 const TERMS: usize = 4;
 
 /// Eight guards at the start of a stretch.
@@ -27,31 +27,31 @@ pub(crate) struct Signals<'a> {
     /// Their sums with the fine grid's [`Weights`](super::table::Weights), and without.
     pub(crate) sums: [Octet; 4],
     pub(crate) size: Octet,
-    /// How far to look.
+    /// Times up to which the search goes, from the start of the stretch.
     pub(crate) reach: Octet,
     /// Lanes whose signal starts at zero by definition, and the rate with which it does.
     pub(crate) on_surface: u32,
     pub(crate) rate: Octet,
-    /// Lanes in which nothing is looked for.
+    /// Lanes without a search, one bit each.
     pub(crate) idle: u32,
 }
 
 /// In each lane the first interval that is not certified, if there is one.
 #[derive(Clone, Copy)]
 pub(crate) struct Intervals<W: Wide> {
-    /// Lanes that have one.
+    /// Lanes in which there is such an interval, one bit each.
     pub(crate) found: u32,
     pub(crate) start: W::Register,
     /// Value, rate and curvature at both ends.
     pub(crate) ends: [[W::Register; 3]; 2],
 }
 
-/// How far the signals of a table can be searched side by side.
+/// Returns the longest time over which the signals of a table can be searched side by side.
 pub(crate) fn reach(table: &Table) -> f64 {
     (table.fine.points() - 1).min(MAX_INTERVALS) as f64 * table.fine.step
 }
 
-/// Whether the signals of a table can be searched side by side.
+/// Reports whether the signals of a table can be searched side by side.
 pub(crate) fn fits(table: &Table) -> bool {
     table.coarse.is_none() && table.fine.terms <= TERMS
 }
@@ -297,7 +297,8 @@ struct Term<W: Wide> {
     squared: [W::Register; 2],
 }
 
-/// Bits by interval and lane as bits by lane and interval. The first of the intervals is none.
+/// Transposes bits by interval and lane into bits by lane and interval. The first interval is
+/// omitted.
 #[inline(always)]
 fn transposed(open: &[u8; MAX_INTERVALS + WIDTH], count: usize) -> [u64; LANES] {
     let mut lanes = [0_u64; LANES];

@@ -11,28 +11,29 @@ use crate::signal::{Amplitude, Signal};
 use crate::simd::{self, ComplexVector, Simd, Vector, WIDTH, Work, layout};
 use nanotap_arithmetic::ComplexFunctions as _;
 
-/// Angle through which the fastest followed term turns from point to point: a larger one
-/// needs fewer points, a smaller one leaves fewer intervals open.
+/// Angle, in radians, through which the fastest followed term turns from point to point: a larger
+/// angle needs fewer points, a smaller one leaves fewer intervals open.
 const ANGLE: f64 = 2.4;
-/// The least number of intervals in a period, on the fine grid and on the coarse one.
+/// Least number of intervals per period, on the fine grid and on the coarse one.
 const INTERVALS: [f64; 2] = [24.0, 8.0];
-/// The most terms that are followed, on the fine grid and on the coarse one.
+/// Largest number of followed terms, on the fine grid and on the coarse one.
 const FOLLOWED: [usize; 2] = [4, 3];
-/// The most terms that are followed on the fine grid where extrema are looked for.
+/// Largest number of followed terms on the fine grid in a search for extrema.
 const FOLLOWED_FOR_EXTREMA: usize = 32;
-/// How much faster the fine grid's fastest term must be than the coarse grid's.
+/// Least ratio of the rates of the fine grid's and the coarse grid's fastest terms, and of the
+/// steps of the coarse and the fine grid.
 const COARSER: f64 = 2.0;
-/// What a period may cost on the fine grid alone, in multiplications of vectors, before a
-/// coarse one is worth while.
+/// Cost of a period on the fine grid alone, in multiplications of vectors, above which a coarse
+/// grid is worth while.
 const CHEAP: f64 = 1500.0;
-/// The most vectors of points: longer stretches are searched in pieces.
+/// Largest number of vectors of points: longer stretches are searched in pieces.
 const LARGEST: usize = 64;
-/// The most points of the fine grid: faster terms are not followed. With that many the tables of
-/// a regime stay below 16 MiB.
+/// Largest number of points of the fine grid: faster terms are not followed. With this number the
+/// tables of a regime stay below 16 MiB.
 const MAX_POINTS: f64 = 8192.0;
-/// How far a slow term of amplitude one may keep away from its chord over an interval.
+/// Largest deviation of a slow term of amplitude one from its chord over an interval.
 const SLOW: f64 = 0.5;
-/// What rounding, in table and sums, could take from a value, in units of the terms' size.
+/// Bound of the rounding errors of a value, from table and sums, as a fraction of the terms' size.
 pub(crate) const ROUNDING: f64 = 64.0 * f64::EPSILON;
 
 /// The tabulated exponentials of a regime, as one guard or output sees them.
@@ -43,15 +44,15 @@ pub(crate) struct Table {
     /// Over the whole reach, or from one coarse point to the next.
     pub(crate) fine: Grid,
     pub(crate) coarse: Option<Coarse>,
-    /// How far it reaches.
+    /// Time from the first point to the last of the grid that covers the stretch.
     reach: f64,
 }
 
-/// The coarse grid.
+/// The coarse grid, with the exponentials of all terms followed on the fine grid at its points.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Coarse {
     pub(crate) grid: Grid,
-    /// Of every followed term, the exponential at each point.
+    /// For every term followed on the fine grid, the exponential at each point.
     powers: Vec<Column>,
 }
 
@@ -61,15 +62,15 @@ pub(crate) struct Grid {
     /// Distance of the points, `h`, and its inverse.
     pub(crate) step: f64,
     pub(crate) density: f64,
-    /// How many terms it follows.
+    /// Number of terms that it follows.
     pub(crate) terms: usize,
-    /// How many of them are slow: hardly bent over an interval.
+    /// Number of followed terms that are slow: nearly straight over an interval.
     pub(crate) slow: usize,
-    /// Whether these are all.
+    /// Whether the followed terms are all terms of the kernel.
     pub(crate) complete: bool,
     /// `[Re, Im]` of each followed term's exponential at four points, vector after vector.
     pub(crate) table: Vec<ComplexVector>,
-    /// For vectors of terms: what bounds take of their amplitudes.
+    /// For vectors of terms: the weights of their amplitudes in the bounds.
     pub(crate) weights: Vec<Weights>,
 }
 
@@ -79,17 +80,18 @@ pub(crate) struct Grid {
 pub(crate) type Weights = [Vector; 4];
 
 impl Table {
-    /// The table for the guard `kernel` over stretches of up to `period`, if one makes sense.
+    /// Creates the table for the guard `kernel` over stretches of up to `period`; `None` if a term
+    /// grows or none varies.
     pub(crate) fn new(kernel: &Kernel, period: f64) -> Option<Self> {
         Self::following(FOLLOWED[0], kernel, period)
     }
 
-    /// The table for outputs whose extrema are looked for.
+    /// Creates the table for outputs whose extrema are requested.
     pub(crate) fn for_extrema(kernel: &Kernel, period: f64) -> Option<Self> {
         Self::following(FOLLOWED_FOR_EXTREMA, kernel, period)
     }
 
-    /// The table of at most `most` terms.
+    /// Creates the table of at most `most` terms.
     fn following(most: usize, kernel: &Kernel, period: f64) -> Option<Self> {
         if kernel.grows || kernel.fastest <= 0.0 {
             return None;
@@ -155,17 +157,17 @@ impl Table {
         })
     }
 
-    /// How far from its first point it reaches.
+    /// Returns the time from its first point to its last.
     pub(crate) fn reach(&self) -> f64 {
         self.reach
     }
 
-    /// The terms that are followed, slowest first.
+    /// Returns the terms that are followed, slowest first.
     pub(crate) fn followed(&self) -> &[usize] {
         &self.followed
     }
 
-    /// Whether every term is followed, on the fine grid at least.
+    /// Reports whether every term is followed, on the fine grid at least.
     pub(crate) fn is_complete(&self) -> bool {
         self.fine.complete
     }
@@ -185,7 +187,7 @@ impl Followed {
         signal.amplitudes::<S>(&table.followed, &mut self.here);
     }
 
-    /// The amplitudes.
+    /// Returns the amplitudes of the followed terms, slowest first.
     #[inline(always)]
     pub(crate) fn amplitudes(&self) -> &[Amplitude] {
         &self.here
@@ -219,7 +221,7 @@ impl Followed {
 }
 
 impl Grid {
-    /// How many points it has.
+    /// Returns the number of points.
     pub(crate) fn points(&self) -> usize {
         self.table.len() / self.terms * WIDTH
     }

@@ -26,7 +26,7 @@ fn example(oscillators: &Oscillators, tone: f64, constant: f64) -> (Table, Signa
     (table, signal, length, side)
 }
 
-/// The drive's period.
+/// Drive period of the examples.
 const PERIOD: f64 = std::f64::consts::TAU / 1.7;
 
 /// The same output as a guard, with its table, coordinates at the start, and its sign.

@@ -27,9 +27,9 @@ const RATE_OF_SIXTH: f64 = 0.536_656_314_599_949_5;
 /// A part of a regime that is to be searched.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Span {
-    /// Where the first point lies.
+    /// Time of the first point.
     pub(crate) start: f64,
-    /// How far to look.
+    /// Time at which the search ends.
     pub(crate) end: f64,
     /// The rate at the start, if the signal is zero there by definition.
     pub(crate) surface: Option<f64>,
@@ -39,9 +39,9 @@ pub(crate) struct Span {
 /// [`Weights`](super::table::Weights).
 #[derive(Clone, Copy)]
 pub(crate) struct Bounds<L: Lanes> {
-    /// What Bernstein coefficients must not fall below.
+    /// Lower limit of the Bernstein coefficients of a certified interval.
     pub(crate) floor: L::Register,
-    /// The same for the sum of the middle two.
+    /// The same limit for the sum of the middle two.
     pub(crate) tension: L::Register,
     /// Bound on the distance from the quintic to the signal within an interval.
     pub(crate) error: L::Register,
@@ -134,7 +134,7 @@ impl<'a, S: Simd> Scan<'a, S> {
         self.bounds.rate_error
     }
 
-    /// Where a point lies.
+    /// Returns the time of a point.
     #[inline(always)]
     fn at(&self, point: usize) -> f64 {
         self.span.start + point as f64 * self.grid.step

@@ -7,7 +7,7 @@ use super::{ComplexOctet, ComplexVector, Simd, WIDTH, Wide, layout};
 pub(crate) struct AffineMap {
     /// The columns in sequence: all `a_k`, all `b_k`, then `c`.
     columns: Vec<ComplexVector>,
-    /// Vectors a column.
+    /// Number of vectors in a column.
     vectors: usize,
 }
 

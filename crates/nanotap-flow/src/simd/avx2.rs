@@ -8,19 +8,19 @@ use super::{Lanes, Simd, Twice, Vector, WideWork, Work};
 #[derive(Clone, Copy)]
 pub(crate) struct Avx2;
 
-/// Does the work compiled with these instructions.
+/// Runs the work compiled with these instructions.
 #[target_feature(enable = "avx2,fma")]
 pub(super) fn run<W: Work>(work: W) -> W::Output {
     work.run::<Avx2>()
 }
 
-/// The same for eight motions side by side.
+/// Runs the work for eight motions side by side, compiled with these instructions.
 #[target_feature(enable = "avx2,fma")]
 pub(super) fn run_wide<W: WideWork>(work: W) -> W::Output {
     work.run::<Twice<Avx2>>()
 }
 
-/// The same, never inlined.
+/// Runs the work as [`run`] does, without inlining it into the caller.
 #[target_feature(enable = "avx2,fma")]
 #[inline(never)]
 fn run_apart<W: Work>(work: W) -> W::Output {

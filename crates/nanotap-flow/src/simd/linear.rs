@@ -10,9 +10,9 @@ use super::{ComplexVector, Simd, WIDTH, Work, complex_mul, dispatch, layout};
 pub(crate) struct LinearMap {
     /// Row by row of vectors: all `a_k`, then all `b_k`.
     rows: Vec<ComplexVector>,
-    /// How many complex numbers a `z` has.
+    /// Number of complex numbers in a `z`.
     from: usize,
-    /// How many an image has.
+    /// Number of complex numbers in an image.
     to: usize,
 }
 
@@ -49,7 +49,8 @@ impl LinearMap {
         });
     }
 
-    /// The images of `COUNT` lists: as many sums at once as hide what one has to wait for.
+    /// Computes the images of `COUNT` lists, with enough independent sums to hide the latency of
+    /// one.
     #[inline(always)]
     fn images<S: Simd, const COUNT: usize>(
         &self,
@@ -80,7 +81,7 @@ impl LinearMap {
     }
 }
 
-/// [`LinearMap::apply`].
+/// The arguments of [`LinearMap::apply`], for the dispatch to vector instructions.
 struct Apply<'a> {
     map: &'a LinearMap,
     list: &'a [ComplexVector],

@@ -2,12 +2,13 @@
 
 use super::{Lanes, Simd, Vector, WIDTH, Work};
 
-/// On any machine.
+/// Arithmetic in arrays of four numbers, with fused multiply-add; it runs on any machine.
 #[derive(Clone, Copy)]
 pub(crate) struct Plain;
 
-/// With functions that reduce any angle, for those beyond
-/// [`LARGEST_ANGLE`](super::LARGEST_ANGLE). The same on every machine, it need not fuse.
+/// Arithmetic in arrays with library functions that reduce any angle, for angles beyond
+/// [`LARGEST_ANGLE`](super::LARGEST_ANGLE). It is the same on every machine and needs no fused
+/// multiply-add.
 #[derive(Clone, Copy)]
 pub(crate) struct Library;
 
@@ -72,7 +73,7 @@ macro_rules! arrays {
     };
 }
 
-/// What only four numbers side by side can do.
+/// Operations that only registers of four numbers have.
 macro_rules! four {
     () => {
         #[inline(always)]

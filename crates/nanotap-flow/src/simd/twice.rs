@@ -3,11 +3,11 @@
 use super::{Lanes, Octet, Simd, WIDTH, Wide};
 use std::marker::PhantomData;
 
-/// Two registers of `S`.
+/// Arithmetic on eight numbers in two registers of `S`.
 #[derive(Clone, Copy)]
 pub(crate) struct Twice<S>(PhantomData<S>);
 
-/// Operations of both registers.
+/// Defines operations that act on both registers in turn.
 macro_rules! both {
     ($($operation:ident($($operand:ident),+);)+) => {
         $(

@@ -15,11 +15,11 @@ use crate::laws::formula::{Edge, Formula, Way};
 use nanotap_arithmetic::Scalar;
 use std::f64::consts::PI;
 
-/// See the module.
+/// Formula of a capillary bridge between a sphere and the sample; see the module.
 #[derive(Clone, Copy, Debug)]
 pub struct Capillary;
 
-/// Its entry.
+/// Table entry `capillary`: the bridge between a sphere and the sample.
 pub static CAPILLARY: Entry = Entry {
     name: "capillary",
     words: "capillary bridge between a sphere and the sample, with hysteresis",

@@ -12,23 +12,23 @@
 use nanotap_arithmetic::sin_cos;
 use std::f64::consts::PI;
 
-/// Curve between the rows.
+/// The curve between the rows of a table.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Interpolation {
-    /// Straight lines.
+    /// Straight lines between the rows.
     #[default]
     Linear,
     /// Cubic spline that stays between the rows.
     Monotone,
-    /// Natural cubic spline.
+    /// Natural cubic spline, with two continuous derivatives.
     Natural,
 }
 
 impl Interpolation {
-    /// All of them.
+    /// All interpolations, in this order.
     pub const ALL: [Self; 3] = [Self::Linear, Self::Monotone, Self::Natural];
 
-    /// Name in case files.
+    /// Returns the name in case files.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Linear => "linear",
@@ -54,7 +54,7 @@ const CHECKS: [f64; 4] = [0.15, 0.4, 0.65, 0.9];
 pub(crate) struct Piece {
     /// Its first and last row.
     pub(crate) rows: [usize; 2],
-    /// One polynomial a curve.
+    /// Chebyshev coefficients, one polynomial per curve.
     pub(crate) curves: Vec<Vec<f64>>,
 }
 
@@ -75,7 +75,7 @@ pub(crate) fn series(coefficients: &[f64], u: f64) -> [f64; 2] {
 /// Places that [`series_at`] takes at a time.
 pub(crate) const LANES: usize = 8;
 
-/// [`series`] at several places.
+/// Evaluates [`series`] at several places: values, then slopes.
 #[inline(always)]
 pub(crate) fn series_at(coefficients: &[f64], u: &[f64; LANES]) -> [[f64; LANES]; 2] {
     let zero = [0.0; LANES];
@@ -194,9 +194,9 @@ fn through(values: &[f64]) -> Vec<f64> {
 struct Spline<'a> {
     gaps: &'a [f64],
     values: &'a [f64],
-    /// None of straight lines.
+    /// Slopes at the rows; empty for straight lines.
     slopes: Vec<f64>,
-    /// The largest value.
+    /// Largest absolute value of the rows.
     size: f64,
 }
 

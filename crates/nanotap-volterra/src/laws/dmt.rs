@@ -13,11 +13,11 @@ use crate::laws::entry::{
 use crate::laws::formula::{Formula, Way};
 use nanotap_arithmetic::Scalar;
 
-/// See the module.
+/// Formula of DMT contact with van der Waals attraction; see the module.
 #[derive(Clone, Copy, Debug)]
 pub struct Dmt;
 
-/// Its entry.
+/// Table entry `dmt`: an elastic sphere with van der Waals attraction.
 pub static DMT: Entry = Entry {
     name: "dmt",
     words: "elastic sphere with van der Waals attraction outside and constant adhesion in contact",

@@ -15,11 +15,11 @@ use nanotap_arithmetic::Scalar;
 /// The shape of the tip.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Shape {
-    /// A sphere (paraboloid).
+    /// A sphere, as a paraboloid of the same radius.
     Sphere,
-    /// A cone.
+    /// A cone, given by its half angle.
     Cone,
-    /// A flat cylinder.
+    /// A flat-ended cylinder, given by its radius.
     Punch,
 }
 
@@ -33,7 +33,7 @@ impl Shape {
         }
     }
 
-    /// `p`.
+    /// Returns the exponent `p` of the indentation in `F = k δ^p`.
     pub(crate) const fn exponent(self) -> f64 {
         match self {
             Self::Sphere => 1.5,
@@ -66,7 +66,7 @@ pub(crate) fn reduced_modulus<S: Scalar>(p: &[S]) -> S {
     (compliance(p[0], p[1]) + compliance(p[2], p[3])).recip()
 }
 
-/// `δ/R` beyond 1.
+/// Remarks that `δ/R` exceeds 1, if it does at the least gap.
 pub(crate) fn deep(radius: f64, contact: f64, least_gap: f64) -> Vec<Remark> {
     let ratio = (contact - least_gap) / radius;
     if ratio > 1.0 {
@@ -80,7 +80,7 @@ pub(crate) fn deep(radius: f64, contact: f64, least_gap: f64) -> Vec<Remark> {
     }
 }
 
-/// See the module.
+/// Formula of elastic contact of a half-space with a tip of this shape; see the module.
 #[derive(Clone, Copy, Debug)]
 pub struct Elastic(pub Shape);
 
@@ -93,7 +93,7 @@ const ROUND: &[ParameterEntry] = &[
     CONTACT_DISTANCE,
 ];
 
-/// Hertz's sphere.
+/// Table entry `hertz`: a sphere on an elastic half-space.
 pub static HERTZ: Entry = Entry {
     name: "hertz",
     words: "elastic sphere on a flat sample",
@@ -104,7 +104,7 @@ pub static HERTZ: Entry = Entry {
     conservative: true,
 };
 
-/// Sneddon's cone.
+/// Table entry `cone`: Sneddon's cone on an elastic half-space.
 pub static CONE: Entry = Entry {
     name: "cone",
     words: "conical tip on an elastic sample",
@@ -122,7 +122,7 @@ pub static CONE: Entry = Entry {
     conservative: true,
 };
 
-/// The flat punch.
+/// Table entry `punch`: a flat cylinder on an elastic half-space.
 pub static PUNCH: Entry = Entry {
     name: "punch",
     words: "flat cylindrical tip on an elastic sample",

@@ -23,11 +23,11 @@ const PERMITTIVITY: ParameterEntry = own(
     Range::Positive,
 );
 
-/// Of a biased sphere.
+/// Formula of the electrostatic attraction of a biased sphere; see the module.
 #[derive(Clone, Copy, Debug)]
 pub struct Electrostatic;
 
-/// Its entry.
+/// Table entry `electrostatic`: a biased sphere above a conducting sample.
 pub static ELECTROSTATIC: Entry = Entry {
     name: "electrostatic",
     words: "electrostatic attraction of a biased sphere and a conducting sample",
@@ -81,14 +81,14 @@ impl Formula for Electrostatic {
     }
 }
 
-/// Of a biased sphere under dc and ac voltage.
+/// Formula of the electrostatic attraction of a sphere under dc and ac voltage.
 #[derive(Clone, Copy, Debug)]
 pub struct ElectrostaticAc {
     /// Whether the force is averaged over the ac voltage.
     pub averaged: bool,
 }
 
-/// Its entry.
+/// Table entry `electrostatic-ac`: a sphere under dc and ac voltage.
 pub static ELECTROSTATIC_AC: Entry = Entry {
     name: "electrostatic-ac",
     words: "electrostatic attraction under dc and ac voltage (KPFM, EFM)",
@@ -170,11 +170,11 @@ impl Formula for ElectrostaticAc {
     }
 }
 
-/// Double layer and van der Waals attraction.
+/// Formula of double-layer force and van der Waals attraction in an electrolyte.
 #[derive(Clone, Copy, Debug)]
 pub struct Dlvo;
 
-/// Its entry.
+/// Table entry `dlvo`: a sphere in an electrolyte.
 pub static DLVO: Entry = Entry {
     name: "dlvo",
     words: "double-layer force and van der Waals attraction of a sphere in an electrolyte",

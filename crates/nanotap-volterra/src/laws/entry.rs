@@ -1,17 +1,17 @@
 //! The description of a law, for case files, help, schema and figures.
 
-/// Exponents of mass, length, time and electric charge.
+/// Exponents of mass, length, time and electric charge, with the SI unit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Dimension {
-    /// Of mass.
+    /// Exponent of mass.
     pub mass: i8,
-    /// Of length.
+    /// Exponent of length.
     pub length: i8,
-    /// Of time.
+    /// Exponent of time.
     pub time: i8,
-    /// Of charge.
+    /// Exponent of electric charge.
     pub charge: i8,
-    /// The SI unit.
+    /// Symbol of the SI unit, empty for a pure number.
     pub unit: &'static str,
 }
 
@@ -25,54 +25,54 @@ impl Dimension {
             unit,
         }
     }
-    /// A pure number.
+    /// A pure number, without a unit.
     pub const NUMBER: Self = Self::new(0, 0, 0, 0, "");
-    /// A time.
+    /// A time, s.
     pub const TIME: Self = Self::new(0, 0, 1, 0, "s");
-    /// An angle, in radians.
+    /// An angle, rad.
     pub const ANGLE: Self = Self::new(0, 0, 0, 0, "rad");
-    /// A length.
+    /// A length, m.
     pub const LENGTH: Self = Self::new(0, 1, 0, 0, "m");
-    /// A pressure or modulus.
+    /// A pressure or modulus, Pa.
     pub const PRESSURE: Self = Self::new(1, -1, -2, 0, "Pa");
-    /// An energy.
+    /// An energy, J.
     pub const ENERGY: Self = Self::new(1, 2, -2, 0, "J");
-    /// An energy an area, or a force a length.
+    /// An energy per area or a force per length, J/m².
     pub const SURFACE_ENERGY: Self = Self::new(1, 0, -2, 0, "J/m²");
-    /// A force a length.
+    /// A force per length, N/m.
     pub const STIFFNESS: Self = Self::new(1, 0, -2, 0, "N/m");
-    /// A force.
+    /// A force, N.
     pub const FORCE: Self = Self::new(1, 1, -2, 0, "N");
-    /// A force a velocity.
+    /// A force per velocity, N s/m.
     pub const DAMPING: Self = Self::new(1, 0, -1, 0, "N s/m");
-    /// A dynamic viscosity.
+    /// A dynamic viscosity, Pa s.
     pub const VISCOSITY: Self = Self::new(1, -1, -1, 0, "Pa s");
-    /// An energy a volume to the eighth power of a length (repulsive Lennard-Jones constant).
+    /// A repulsive Lennard-Jones constant, J m⁶.
     pub const REPULSION: Self = Self::new(1, 8, -2, 0, "J m⁶");
-    /// A voltage.
+    /// A voltage, V.
     pub const VOLTAGE: Self = Self::new(1, 2, -2, -1, "V");
-    /// A permittivity.
+    /// A permittivity, F/m.
     pub const PERMITTIVITY: Self = Self::new(-1, -3, 2, 2, "F/m");
-    /// A charge an area.
+    /// A charge per area, C/m².
     pub const CHARGE_DENSITY: Self = Self::new(0, -2, 0, 1, "C/m²");
 }
 
-/// A parameter of a law.
+/// A parameter of a law, with its unit, default and range.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ParameterEntry {
-    /// Its key.
+    /// Key in case files and messages.
     pub name: &'static str,
-    /// What it is.
+    /// Description in a few words, without a unit.
     pub words: &'static str,
-    /// Its dimension.
+    /// Physical dimension, with its SI unit.
     pub dimension: Dimension,
-    /// Its value in SI where none is given; none if one must be.
+    /// Default value in SI units; `None` if a value is required.
     pub default: Option<f64>,
-    /// What values make sense.
+    /// Range of the values that are accepted.
     pub range: Range,
 }
 
-/// The values that make sense.
+/// The values that a parameter accepts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Range {
     /// Above zero and finite.
@@ -83,14 +83,14 @@ pub enum Range {
     NotNegative,
     /// From −1 to ½ (Poisson's ratio).
     Poisson,
-    /// Between 0 and 90 degrees.
+    /// Above 0 and below π/2 rad (90 degrees).
     Angle,
     /// Any finite number.
     Finite,
 }
 
 impl Range {
-    /// Whether a value makes sense.
+    /// Reports whether the range contains a value.
     pub fn holds(self, value: f64) -> bool {
         match self {
             Self::Positive => value > 0.0 && value.is_finite(),
@@ -102,7 +102,7 @@ impl Range {
         }
     }
 
-    /// In words.
+    /// Returns a description of the range for messages.
     pub const fn words(self) -> &'static str {
         match self {
             Self::Positive => "positive and finite",
@@ -115,29 +115,29 @@ impl Range {
     }
 }
 
-/// What part of the interaction a law describes; two laws with the same part cannot be added.
+/// The part of the interaction that a law describes; two laws with the same part cannot be added.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Part {
     /// The elastic repulsion of the bodies in contact.
     Elasticity,
-    /// Their attraction, in contact or across the gap.
+    /// The attraction of the bodies, in contact or across the gap.
     Adhesion,
 }
 
-/// An entry of the table of laws.
+/// The description of a law in the table of laws.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Entry {
-    /// The name in a case file.
+    /// Name in case files.
     pub name: &'static str,
-    /// Description in one line.
+    /// Description of the law in one line.
     pub words: &'static str,
-    /// The force as text.
+    /// Formula of the force as text, in the symbols of the law's source.
     pub formula: &'static str,
-    /// Reference.
+    /// Publication from which the formula is taken.
     pub source: &'static str,
-    /// The parameters, in the order of the formula's own.
+    /// Parameters, in the order of the formula.
     pub parameters: &'static [ParameterEntry],
-    /// What it contributes that must not be counted twice.
+    /// Parts of the interaction that must not be counted twice in a sum of laws.
     pub parts: &'static [Part],
     /// Whether the force depends on the gap alone, without a memory.
     pub conservative: bool,
@@ -160,7 +160,7 @@ pub const fn own(
     }
 }
 
-/// Young's modulus of the sample.
+/// Young's modulus of the sample, Pa.
 pub const MODULUS: ParameterEntry = own(
     "modulus",
     "Young's modulus of the sample",
@@ -168,7 +168,7 @@ pub const MODULUS: ParameterEntry = own(
     None,
     Range::Positive,
 );
-/// Poisson's ratio of the sample.
+/// Poisson's ratio of the sample, dimensionless.
 pub const POISSON: ParameterEntry = own(
     "poisson",
     "Poisson's ratio of the sample",
@@ -176,7 +176,7 @@ pub const POISSON: ParameterEntry = own(
     Some(0.3),
     Range::Poisson,
 );
-/// Young's modulus of the tip.
+/// Young's modulus of the tip, Pa; infinite for a rigid tip.
 pub const TIP_MODULUS: ParameterEntry = own(
     "tip_modulus",
     "Young's modulus of the tip",
@@ -184,7 +184,7 @@ pub const TIP_MODULUS: ParameterEntry = own(
     Some(f64::INFINITY),
     Range::PositiveOrInfinite,
 );
-/// Poisson's ratio of the tip.
+/// Poisson's ratio of the tip, dimensionless.
 pub const TIP_POISSON: ParameterEntry = own(
     "tip_poisson",
     "Poisson's ratio of the tip",
@@ -192,7 +192,7 @@ pub const TIP_POISSON: ParameterEntry = own(
     Some(0.3),
     Range::Poisson,
 );
-/// The radius of a spherical tip or of a flat punch.
+/// Radius of a spherical tip or of a flat punch, m.
 pub const RADIUS: ParameterEntry = own(
     "radius",
     "radius of the tip",
@@ -200,7 +200,7 @@ pub const RADIUS: ParameterEntry = own(
     None,
     Range::Positive,
 );
-/// The half angle of a conical tip.
+/// Half angle of a conical tip, rad.
 pub const HALF_ANGLE: ParameterEntry = own(
     "half_angle",
     "half angle of the conical tip",
@@ -208,7 +208,7 @@ pub const HALF_ANGLE: ParameterEntry = own(
     None,
     Range::Angle,
 );
-/// The gap at which contact begins.
+/// Gap at which contact begins, m.
 pub const CONTACT_DISTANCE: ParameterEntry = own(
     "contact_distance",
     "intermolecular distance a0, the gap at which contact begins",
@@ -216,7 +216,7 @@ pub const CONTACT_DISTANCE: ParameterEntry = own(
     Some(0.165e-9),
     Range::Finite,
 );
-/// Hamaker's constant.
+/// Hamaker constant of tip, medium and sample, J.
 pub const HAMAKER: ParameterEntry = own(
     "hamaker",
     "Hamaker constant of tip, medium and sample",
@@ -224,7 +224,7 @@ pub const HAMAKER: ParameterEntry = own(
     None,
     Range::Finite,
 );
-/// The work of adhesion.
+/// Work of adhesion per area, J/m².
 pub const WORK_OF_ADHESION: ParameterEntry = own(
     "work_of_adhesion",
     "work of adhesion",
@@ -232,7 +232,7 @@ pub const WORK_OF_ADHESION: ParameterEntry = own(
     None,
     Range::Positive,
 );
-/// A dynamic viscosity of the sample.
+/// Dynamic viscosity of the sample, Pa s.
 pub const VISCOSITY: ParameterEntry = own(
     "viscosity",
     "viscosity of the sample",
@@ -240,7 +240,7 @@ pub const VISCOSITY: ParameterEntry = own(
     None,
     Range::NotNegative,
 );
-/// The thickness of the sample.
+/// Thickness of the sample, m.
 pub const THICKNESS: ParameterEntry = own(
     "thickness",
     "thickness of the sample on its rigid support",

@@ -1,4 +1,4 @@
-//! A law written once over numbers with derivatives becomes a [`ForceLaw`].
+//! A law written once for numbers with derivatives becomes a [`ForceLaw`].
 
 // Only what is inlined into a function for wide registers gets their instructions.
 #![allow(clippy::inline_always)]
@@ -10,35 +10,36 @@ use nanotap_arithmetic::{Dual, Scalar};
 use std::fmt::Debug;
 use std::sync::Arc;
 
-/// When a branch is left, with a level of the gap named by its place among the constants.
+/// The condition under which a branch is left; levels of the gap are named by their index among the
+/// constants.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Edge {
-    /// The gap falls to the constant.
+    /// The gap falls to this constant.
     Falls(usize),
-    /// The gap rises to it.
+    /// The gap rises to this constant.
     Rises(usize),
-    /// The gap stops falling.
+    /// The gap stops falling: its rate rises to zero.
     Turns,
     /// The guard of this number falls to zero.
     Own(usize),
 }
 
-/// A way out of a branch: when, to which branch, and how the force comes up to the switch on
-/// either side.
+/// An exit from a branch: condition, target, and the behaviour of the force on either side of the
+/// switch.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Way {
-    /// When.
+    /// Condition under which the branch is left.
     pub edge: Edge,
-    /// The branch after it.
+    /// Number of the branch that is entered.
     pub target: usize,
-    /// How the force comes up to it before.
+    /// Behaviour of the force of the branch that is left, up to the switch.
     pub before: Approach,
-    /// And after.
+    /// Behaviour of the force of the branch that is entered, from the switch on.
     pub after: Approach,
 }
 
 impl Way {
-    /// Analytic on both sides.
+    /// Creates a switch that is analytic on both sides.
     pub const fn new(edge: Edge, target: usize) -> Self {
         Self {
             edge,
@@ -48,14 +49,14 @@ impl Way {
         }
     }
 
-    /// With the approach of the branch that is left.
+    /// Sets the behaviour of the force of the branch that is left.
     #[must_use]
     pub const fn before(mut self, approach: Approach) -> Self {
         self.before = approach;
         self
     }
 
-    /// With the approach of the branch that is entered.
+    /// Sets the behaviour of the force of the branch that is entered.
     #[must_use]
     pub const fn after(mut self, approach: Approach) -> Self {
         self.after = approach;
@@ -65,65 +66,65 @@ impl Way {
 
 /// The formula of a law.
 pub trait Formula: Clone + Debug + Send + Sync + 'static {
-    /// Its entry in the table of laws, with the parameters in the order of `p`.
+    /// Returns the entry in the table of laws, with the parameters in the order of `p`.
     fn entry(&self) -> &'static Entry;
-    /// What the force needs of the parameters, computed once. Levels at which branches end
-    /// are among them.
+    /// Computes the constants of the force from the parameters. The gaps at which branches end are
+    /// among them.
     fn constants<S: Scalar>(&self, p: &[S]) -> Vec<S>;
-    /// The number of branches.
+    /// Returns the number of branches, which are numbered from 0.
     fn branches(&self) -> usize {
         2
     }
-    /// The branch of a motion whose past is not known.
+    /// Returns the branch of a motion without a known history.
     fn branch_at(&self, c: &[f64], gap: f64, rate: f64) -> usize {
         let _ = rate;
         usize::from(gap < c[0])
     }
-    /// The force.
+    /// Returns the force on a branch, in the unit of force; repulsion is positive.
     fn force<S: Scalar>(&self, c: &[S], branch: usize, gap: S, rate: S) -> S;
-    /// See [`ForceLaw::cost`].
+    /// Returns the time of an evaluation, as a multiple of that of a force in closed form.
     fn cost(&self) -> u64 {
         1
     }
-    /// Whether it depends on the rate.
+    /// Reports whether the force depends on the gap's rate.
     fn depends_on_rate(&self) -> bool {
         false
     }
-    /// See [`ForceLaw::takes_signal`].
+    /// Reports whether a signal replaces the gap's rate; see [`ForceLaw::takes_signal`].
     fn takes_signal(&self) -> bool {
         false
     }
-    /// See [`ForceLaw::averaged`].
+    /// Returns the law averaged over the signal; see [`ForceLaw::averaged`].
     fn averaged(&self, p: &[f64]) -> Option<Arc<dyn ForceLaw>> {
         let _ = p;
         None
     }
-    /// The ways out.
+    /// Returns the exits of a branch.
     fn ways(&self, branch: usize) -> Vec<Way>;
-    /// A guard of the law's own.
+    /// Returns the law's own guard number `index`.
     fn guard<S: Scalar>(&self, c: &[S], index: usize, gap: S, rate: S) -> S {
         let _ = (c, index, rate);
         gap
     }
-    /// See [`ForceLaw::energy`].
+    /// Returns the stored energy at a gap, if there is a potential; see [`ForceLaw::energy`].
     fn energy(&self, c: &[f64], branch: usize, gap: f64) -> Option<f64> {
         let _ = (c, branch, gap);
         None
     }
-    /// See [`ForceLaw::touches`].
+    /// Reports whether tip and sample touch on a branch; see [`ForceLaw::touches`].
     fn touches(&self, branch: usize) -> bool {
         branch > 0
     }
-    /// See [`ForceLaw::remembers`].
+    /// Reports whether the law has a memory; see [`ForceLaw::remembers`].
     fn remembers(&self) -> bool {
         false
     }
-    /// See [`ForceLaw::vanishes`].
+    /// Reports whether the force on a branch is zero; see [`ForceLaw::vanishes`].
     fn vanishes(&self, branch: usize) -> bool {
         let _ = branch;
         false
     }
-    /// See [`ForceLaw::remarks`].
+    /// Returns the ranges of validity that a motion leaves; see [`ForceLaw::remarks`].
     fn remarks(&self, p: &[f64], least_gap: f64) -> Vec<Remark> {
         let _ = (p, least_gap);
         Vec::new()
@@ -182,7 +183,7 @@ fn force_of(d: Dual<2>) -> Force {
     }
 }
 
-/// [`ForceLaw::forces`] of a formula.
+/// Evaluates [`ForceLaw::forces`] of a formula, compiled also for wide registers.
 #[inline(always)]
 fn forces_at<F: Formula>(
     law: &Law<F>,

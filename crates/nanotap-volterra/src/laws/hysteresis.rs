@@ -11,11 +11,11 @@ use crate::laws::formula::{Edge, Formula, Way};
 use nanotap_arithmetic::Scalar;
 use std::f64::consts::PI;
 
-/// See the module.
+/// Formula of adhesion with hysteresis; see the module.
 #[derive(Clone, Copy, Debug)]
 pub struct AdhesionHysteresis;
 
-/// Its entry.
+/// Table entry `adhesion-hysteresis`: constant adhesion, larger on retraction.
 pub static ADHESION_HYSTERESIS: Entry = Entry {
     name: "adhesion-hysteresis",
     words: "constant adhesion in contact, larger on the way out",

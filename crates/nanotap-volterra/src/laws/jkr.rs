@@ -15,11 +15,11 @@ use crate::laws::formula::{Edge, Formula, Way};
 use nanotap_arithmetic::Scalar;
 use std::f64::consts::PI;
 
-/// See the module.
+/// Formula of JKR contact with an adhesive neck; see the module.
 #[derive(Clone, Copy, Debug)]
 pub struct Jkr;
 
-/// Its entry.
+/// Table entry `jkr`: an elastic sphere with an adhesive neck.
 pub static JKR: Entry = Entry {
     name: "jkr",
     words: "elastic sphere with an adhesive neck; attached or not is a state",
@@ -77,7 +77,7 @@ impl Formula for Jkr {
         }
     }
 
-    /// The contact radius is the root of an equation.
+    /// Returns a higher cost than most laws: the contact radius is the root of an equation.
     fn cost(&self) -> u64 {
         2
     }

@@ -17,10 +17,10 @@ use crate::laws::entry::{
 use crate::laws::formula::{Edge, Formula, Way};
 use nanotap_arithmetic::Scalar;
 
-/// See the module.
+/// Formula of Kelvin–Voigt contact; see the module.
 #[derive(Clone, Copy, Debug)]
 pub struct KelvinVoigt {
-    /// The shape of the tip.
+    /// Shape of the tip.
     pub shape: Shape,
     /// Whether the surface can pull the tip back.
     pub pulls: bool,
@@ -54,42 +54,42 @@ const fn entry(
     }
 }
 
-/// A sphere, letting go.
+/// Table entry `voigt-sphere`: a sphere that is released where the force vanishes.
 pub static SPHERE: Entry = entry(
     "voigt-sphere",
     "Kelvin–Voigt sample under a sphere; releases where the force vanishes",
     "4/3 √(Rδ)/(1 − ν²) (Eδ + 3/2 ηδ̇), never below zero",
     ROUND,
 );
-/// A sphere, pulling.
+/// Table entry `voigt-sphere-pulling`: a sphere that the sample may pull until `d = a0`.
 pub static SPHERE_PULLING: Entry = entry(
     "voigt-sphere-pulling",
     "Kelvin–Voigt sample under a sphere that may pull the tip until d = a0",
     "4/3 √(Rδ)/(1 − ν²) (Eδ + 3/2 ηδ̇)",
     ROUND,
 );
-/// A cone, letting go.
+/// Table entry `voigt-cone`: a cone that is released where the force vanishes.
 pub static CONE: Entry = entry(
     "voigt-cone",
     "Kelvin–Voigt sample under a cone; releases where the force vanishes",
     "(2/π) tan θ/(1 − ν²) (Eδ² + 2ηδδ̇), never below zero",
     POINTED,
 );
-/// A cone, pulling.
+/// Table entry `voigt-cone-pulling`: a cone that the sample may pull until `d = a0`.
 pub static CONE_PULLING: Entry = entry(
     "voigt-cone-pulling",
     "Kelvin–Voigt sample under a cone that may pull the tip until d = a0",
     "(2/π) tan θ/(1 − ν²) (Eδ² + 2ηδδ̇)",
     POINTED,
 );
-/// A punch, letting go.
+/// Table entry `voigt-punch`: a flat punch that is released where the force vanishes.
 pub static PUNCH: Entry = entry(
     "voigt-punch",
     "Kelvin–Voigt sample under a flat cylinder; releases where the force vanishes",
     "2R/(1 − ν²) (Eδ + ηδ̇), never below zero",
     ROUND,
 );
-/// A punch, pulling.
+/// Table entry `voigt-punch-pulling`: a flat punch that the sample may pull until `d = a0`.
 pub static PUNCH_PULLING: Entry = entry(
     "voigt-punch-pulling",
     "Kelvin–Voigt sample under a flat cylinder that may pull the tip until d = a0",
@@ -98,7 +98,7 @@ pub static PUNCH_PULLING: Entry = entry(
 );
 
 impl KelvinVoigt {
-    /// `δ^{p−1}`.
+    /// Returns `δ^{p−1}`, the slope of the elastic power without its factor `p`.
     fn slope<S: Scalar>(self, indentation: S) -> S {
         match self.shape {
             Shape::Sphere => indentation.sqrt(),

@@ -29,7 +29,7 @@ const EDGES: [f64; 7] = [0.0, 0.3, 0.75, 1.5, 3.0, 6.0, 12.0];
 /// Nodes of the quadrature of the energy.
 const NODES: usize = 24;
 
-/// See the module.
+/// Formula of a bonded incompressible layer under a tip of this shape; see the module.
 #[derive(Clone, Copy, Debug)]
 pub struct Layer(pub Shape);
 
@@ -50,21 +50,21 @@ const fn entry(
     }
 }
 
-/// Under a sphere.
+/// Table entry `layer-sphere`: a sphere on a bonded layer of any thickness.
 pub static SPHERE: Entry = entry(
     "layer-sphere",
     "sphere on an incompressible layer of any thickness, bonded to a rigid support",
     "(16/9) E √R δ^(3/2) C(χ), χ = √(Rδ)/h, C by a Fredholm equation",
     &[MODULUS, RADIUS, THICKNESS, CONTACT_DISTANCE],
 );
-/// Under a cone.
+/// Table entry `layer-cone`: a cone on a bonded layer of any thickness.
 pub static CONE: Entry = entry(
     "layer-cone",
     "cone on an incompressible layer of any thickness, bonded to a rigid support",
     "(8/(3π)) E tan θ δ² C(χ), χ = δ tan θ/h, C by a Fredholm equation",
     &[MODULUS, HALF_ANGLE, THICKNESS, CONTACT_DISTANCE],
 );
-/// Under a flat punch.
+/// Table entry `layer-punch`: a flat punch on a bonded layer of any thickness.
 pub static PUNCH: Entry = entry(
     "layer-punch",
     "flat cylinder on an incompressible layer of any thickness, bonded to a rigid support",

@@ -8,11 +8,11 @@ use crate::laws::entry::{Dimension, Entry, Part, RADIUS, Range, own};
 use crate::laws::formula::{Formula, Way};
 use nanotap_arithmetic::Scalar;
 
-/// See the module.
+/// Formula of the Lennard-Jones interaction of a sphere with a half-space; see the module.
 #[derive(Clone, Copy, Debug)]
 pub struct LennardJones;
 
-/// Its entry.
+/// Table entry `lennard-jones`: a sphere above a flat sample.
 pub static LENNARD_JONES: Entry = Entry {
     name: "lennard-jones",
     words: "Lennard-Jones interaction of a sphere with a flat sample",

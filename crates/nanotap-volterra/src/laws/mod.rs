@@ -32,21 +32,21 @@ use entry::{Entry, Part};
 use formula::{Formula, Law};
 use std::sync::Arc;
 
-/// The largest number of laws in a sum.
+/// Largest number of laws in a sum.
 pub const MAX_TERMS: usize = 8;
 
-/// A law of the table.
+/// A law of the table, from which force laws are built.
 #[derive(Clone, Copy, Debug)]
 pub struct TableLaw {
-    /// Its description.
+    /// Description of the law for case files, help and schema.
     pub entry: &'static Entry,
     make: Make,
 }
 
-/// What a law is made of.
+/// The data from which a law is built.
 #[derive(Clone, Copy, Debug)]
 enum Make {
-    /// Its parameters.
+    /// Parameters alone.
     Formula(fn(Vec<f64>) -> Arc<dyn ForceLaw>),
     /// Parameters and rows of gap and force.
     Rows,
@@ -55,11 +55,11 @@ enum Make {
 }
 
 impl TableLaw {
-    /// The law with these parameters, in the order of its entry.
+    /// Builds the law with these parameters, in the order of its entry.
     ///
     /// # Errors
-    /// When the number of parameters is wrong, a value makes no sense, or the law needs the
-    /// rows of a table ([`TableLaw::through`]).
+    /// If the number of parameters is wrong, a value is out of range, or the law needs the rows of
+    /// a table ([`TableLaw::through`]).
     pub fn with(&self, parameters: &[f64]) -> Result<Arc<dyn ForceLaw>, VolterraError> {
         self.check(parameters)?;
         match self.make {
@@ -75,7 +75,7 @@ impl TableLaw {
         }
     }
 
-    /// Whether it is a table of gap and force.
+    /// Reports whether it is a table of gap and force.
     pub const fn has_rows(&self) -> bool {
         matches!(self.make, Make::Rows)
     }
@@ -155,12 +155,12 @@ pub static TABLE: &[TableLaw] = table! {
     spring_damper::SPRING_DAMPER => spring_damper::SpringDamper,
 };
 
-/// Every law.
+/// Returns every law: those of [`TABLE`], those with Maxwell arms, and the table of rows.
 pub fn all() -> impl Iterator<Item = &'static TableLaw> {
     TABLE.iter().chain(&prony::TABLE).chain([&table::TABLE])
 }
 
-/// The law of a name.
+/// Returns the law of a name.
 ///
 /// # Errors
 /// [`VolterraError::UnknownLaw`].
@@ -170,10 +170,10 @@ pub fn law(name: &str) -> Result<&'static TableLaw, VolterraError> {
         .ok_or_else(|| VolterraError::UnknownLaw { name: name.into() })
 }
 
-/// The law of a name with parameters by name, defaults for the others.
+/// Builds the law of a name with parameters by name, and defaults for the others.
 ///
 /// # Errors
-/// When there is no such law or parameter, one is missing, or a value makes no sense.
+/// If there is no such law or parameter, a parameter is missing, or a value is out of range.
 pub fn build(name: &str, values: &[(&str, f64)]) -> Result<Arc<dyn ForceLaw>, VolterraError> {
     let law = law(name)?;
     for (key, found) in values {

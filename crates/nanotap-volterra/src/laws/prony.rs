@@ -27,9 +27,9 @@ use crate::laws::formula::Law;
 use crate::laws::{Make, TableLaw};
 use std::sync::Arc;
 
-/// The largest number of arms.
+/// Largest number of arms.
 pub const MAX_ARMS: usize = 100;
-/// Relaxation times closer than this part of themselves are one.
+/// Relative difference of two relaxation times below which they count as one.
 const SAME_TIME: f64 = 1e-9;
 
 const MODULUS: ParameterEntry = own(
@@ -212,22 +212,22 @@ impl Arms {
 
 const NO_ARMS: &str = "a relaxing sample needs at least one arm";
 
-/// A Prony series.
+/// A Prony series of Young's modulus, in the units of the law.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Series {
-    /// The modulus at rest.
+    /// Modulus at rest `E∞`, in the law's unit of pressure (SI: Pa).
     pub rest: f64,
-    /// `1/τ_i` and `E_i`, the slowest first, no two rates alike.
+    /// Arms `(1/τ_i, E_i)`, the slowest first, all rates different.
     pub arms: Vec<(f64, f64)>,
 }
 
 impl Series {
-    /// The instantaneous modulus `E₀`.
+    /// Returns the instantaneous modulus `E₀ = E∞ + Σ E_i`, in the same unit.
     pub fn instantaneous(&self) -> f64 {
         self.rest + self.arms.iter().map(|(_, modulus)| modulus).sum::<f64>()
     }
 
-    /// Storage and loss modulus at an angular frequency.
+    /// Returns storage and loss modulus at an angular frequency, in the same unit.
     pub fn dynamic(&self, omega: f64) -> [f64; 2] {
         let mut moduli = [self.rest, 0.0];
         for (rate, modulus) in &self.arms {
@@ -239,7 +239,7 @@ impl Series {
         moduli
     }
 
-    /// The retardation modes, `(μ_k, g_k)`, the slowest first.
+    /// Returns the retardation modes `(μ_k, g_k)`, the slowest first.
     ///
     /// # Errors
     /// [`VolterraError::Flows`] without a modulus at rest.
@@ -306,15 +306,15 @@ impl Series {
     }
 }
 
-/// See the module.
+/// A relaxing sample under a tip, with or without an attraction; see the module.
 #[derive(Clone, Debug)]
 pub struct Prony {
     shape: Shape,
     entry: &'static Entry,
     size: f64,
-    /// `a0`.
+    /// Gap `a0` at which contact with an undeformed surface begins.
     contact: f64,
-    /// `K E₀`.
+    /// Instantaneous stiffness `K E₀` of the contact law.
     stiffness: f64,
     surface: Surface,
     attraction: Option<Attraction>,
@@ -598,15 +598,15 @@ impl ForceLaw for Prony {
 }
 
 impl TableLaw {
-    /// Whether the law has Maxwell arms.
+    /// Reports whether the law has Maxwell arms.
     pub const fn has_arms(&self) -> bool {
         matches!(self.make, Make::Arms(_))
     }
 
-    /// The law with these arms and the parameters of its entry.
+    /// Builds the law with these arms and the parameters of its entry.
     ///
     /// # Errors
-    /// As [`TableLaw::with`]; [`VolterraError::Flows`] without a modulus at rest.
+    /// As for [`TableLaw::with`]; [`VolterraError::Flows`] without a modulus at rest.
     pub fn with_arms(
         &self,
         arms: &Arms,

@@ -11,11 +11,11 @@ use crate::laws::formula::{Formula, Way};
 use nanotap_arithmetic::Scalar;
 use std::f64::consts::TAU;
 
-/// See the module.
+/// Formula of an oscillating solvation force; see the module.
 #[derive(Clone, Copy, Debug)]
 pub struct Solvation;
 
-/// Its entry.
+/// Table entry `solvation`: molecular layers of a liquid between tip and sample.
 pub static SOLVATION: Entry = Entry {
     name: "solvation",
     words: "oscillating force of a liquid's molecular layers",
@@ -54,7 +54,7 @@ impl Formula for Solvation {
         &SOLVATION
     }
 
-    /// `a0`, `F₀`, `2π/σ`, `1/λ`.
+    /// Computes `a0`, `F₀`, `2π/σ` and `1/λ`, in this order.
     fn constants<S: Scalar>(&self, p: &[S]) -> Vec<S> {
         vec![p[3], p[0], p[1].recip() * TAU, p[2].recip()]
     }

@@ -9,11 +9,11 @@ use crate::laws::entry::{CONTACT_DISTANCE, Dimension, Entry, Part, Range, own};
 use crate::laws::formula::{Formula, Way};
 use nanotap_arithmetic::Scalar;
 
-/// See the module.
+/// Formula of a spring and a damper in contact; see the module.
 #[derive(Clone, Copy, Debug)]
 pub struct SpringDamper;
 
-/// Its entry.
+/// Table entry `spring-damper`: linear spring and damper in contact.
 pub static SPRING_DAMPER: Entry = Entry {
     name: "spring-damper",
     words: "linear spring and damper in contact",

@@ -204,9 +204,9 @@ struct Branch {
     half: f64,
     force: Vec<f64>,
     damping: Vec<f64>,
-    /// `∫F` from the gap to the end of its polynomial.
+    /// Integral `∫F` from the gap to the end of its polynomial.
     integral: Vec<f64>,
-    /// `∫F` beyond that.
+    /// Integral `∫F` from that end to far away.
     beyond: f64,
 }
 
@@ -234,11 +234,11 @@ impl Branch {
     }
 }
 
-/// See the module.
+/// Law of a force given by rows; see the module.
 #[derive(Clone, Debug)]
 pub struct ForceTable {
     branches: Vec<Branch>,
-    /// Where each branch but the last ends.
+    /// Gaps at which the branches end, without the last.
     joints: Vec<f64>,
     contact_distance: f64,
     gap_factor: f64,
@@ -246,17 +246,17 @@ pub struct ForceTable {
     damping_factor: f64,
     /// The joint at which contact begins, where no two polynomials meet.
     contact: Option<usize>,
-    /// The first and the last row's gap.
+    /// Gaps of the first and of the last row.
     ends: [f64; 2],
     /// Branches at the lower ends of equal intervals, from the first joint to the last.
     lookup: Vec<usize>,
-    /// Intervals per unit of the gap.
+    /// Number of intervals per unit of the gap.
     density: f64,
     damped: bool,
     smooth: bool,
 }
 
-/// Intervals of the gap for each joint, in which branches are looked up.
+/// Number of intervals of the lookup per joint.
 const INTERVALS_PER_JOINT: usize = 4;
 
 impl ForceTable {
@@ -355,7 +355,7 @@ impl ForceTable {
     }
 }
 
-/// [`ForceLaw::forces`] of a table.
+/// Evaluates [`ForceLaw::forces`] of a table, compiled also for wide registers.
 #[inline(always)]
 fn forces_at(
     law: &ForceTable,

@@ -16,7 +16,7 @@ use crate::laws::formula::{Formula, Way};
 use nanotap_arithmetic::Scalar;
 use std::f64::consts::PI;
 
-/// See the module.
+/// Formula of a thin bonded sample under a tip of this shape; see the module.
 #[derive(Clone, Copy, Debug)]
 pub struct Thin(pub Shape);
 
@@ -37,21 +37,21 @@ const fn entry(
     }
 }
 
-/// Under a sphere.
+/// Table entry `thin-sphere`: a sphere on a thin incompressible sample.
 pub static SPHERE: Entry = entry(
     "thin-sphere",
     "sphere on a thin incompressible sample",
     "(16/9) E √R δ^(3/2) (1 + 1.133χ + 1.497χ² + 1.469χ³ + 0.755χ⁴), χ = √(Rδ)/h",
     &[MODULUS, RADIUS, THICKNESS, CONTACT_DISTANCE],
 );
-/// Under a cone.
+/// Table entry `thin-cone`: a cone on a thin incompressible sample.
 pub static CONE: Entry = entry(
     "thin-cone",
     "cone on a thin incompressible sample",
     "(8/(3π)) E tan θ δ² (1 + 0.721χ + 0.650χ² + 0.491χ³ + 0.225χ⁴), χ = δ tan θ/h",
     &[MODULUS, HALF_ANGLE, THICKNESS, CONTACT_DISTANCE],
 );
-/// Under a flat punch.
+/// Table entry `thin-punch`: a flat punch on a thin incompressible sample.
 pub static PUNCH: Entry = entry(
     "thin-punch",
     "flat cylinder on a thin incompressible sample",
@@ -72,7 +72,7 @@ fn series<S: Scalar>(coefficients: &[f64; 5], x: S) -> S {
 }
 
 impl Thin {
-    /// `χ` at which the series is off by 0.5 %.
+    /// Returns the `χ` at which the error of the series is 0.5 %.
     const fn limit(self) -> f64 {
         match self.0 {
             Shape::Sphere => 0.463,
@@ -81,7 +81,7 @@ impl Thin {
         }
     }
 
-    /// The force over that of a half-space.
+    /// Returns the force divided by that of a half-space.
     pub(crate) fn correction<S: Scalar>(self, ratio: S) -> S {
         let coefficients = match self.0 {
             Shape::Sphere => &SPHERE_SERIES,
@@ -102,7 +102,7 @@ impl Thin {
         [contact, stiffness, scale / thickness]
     }
 
-    /// `χ` at an indentation.
+    /// Returns the ratio `χ` at an indentation, dimensionless.
     pub(crate) fn ratio<S: Scalar>(self, scale: S, indentation: S) -> S {
         match self.0 {
             Shape::Sphere => indentation.sqrt() * scale,

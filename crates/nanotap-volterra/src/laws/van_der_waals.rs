@@ -10,11 +10,11 @@ use crate::laws::entry::{CONTACT_DISTANCE, Entry, HALF_ANGLE, HAMAKER, Part, RAD
 use crate::laws::formula::{Formula, Way};
 use nanotap_arithmetic::Scalar;
 
-/// See the module.
+/// Formula of the van der Waals attraction of a tip of this shape; see the module.
 #[derive(Clone, Copy, Debug)]
 pub struct VanDerWaals(pub Shape);
 
-/// Of a sphere.
+/// Table entry `van-der-waals`: the attraction of a sphere.
 pub static SPHERE: Entry = Entry {
     name: "van-der-waals",
     words: "van der Waals attraction of a sphere",
@@ -25,7 +25,7 @@ pub static SPHERE: Entry = Entry {
     conservative: true,
 };
 
-/// Of a cone.
+/// Table entry `van-der-waals-cone`: the attraction of a cone.
 pub static CONE: Entry = Entry {
     name: "van-der-waals-cone",
     words: "van der Waals attraction of a cone",
@@ -36,7 +36,7 @@ pub static CONE: Entry = Entry {
     conservative: true,
 };
 
-/// Of a flat punch.
+/// Table entry `van-der-waals-punch`: the attraction of a flat punch.
 pub static PUNCH: Entry = Entry {
     name: "van-der-waals-punch",
     words: "van der Waals attraction of a flat cylinder",

@@ -13,11 +13,11 @@ use crate::laws::entry::{CONTACT_DISTANCE, Dimension, Entry, RADIUS, Range, VISC
 use crate::laws::formula::{Formula, Way};
 use nanotap_arithmetic::Scalar;
 
-/// `−η √(Rδ) ḋ`.
+/// Formula `−η √(Rδ) ḋ` of a viscosity in contact; see the module.
 #[derive(Clone, Copy, Debug)]
 pub struct RootViscosity;
 
-/// Its entry.
+/// Table entry `viscous-contact`: a viscous force in proportion to the contact radius.
 pub static ROOT_VISCOSITY: Entry = Entry {
     name: "viscous-contact",
     words: "viscous force proportional to the contact radius",
@@ -61,11 +61,11 @@ impl Formula for RootViscosity {
 /// times that at zero gap.
 const DEEPEST: f64 = 3.0;
 
-/// `−γ₀ e^{−d/x} ḋ`.
+/// Formula `−γ₀ e^{−d/x} ḋ` of a damping that decays with the gap; see the module.
 #[derive(Clone, Copy, Debug)]
 pub struct ExponentialDamping;
 
-/// Its entry.
+/// Table entry `exponential-damping`: damping that decays exponentially with the gap.
 pub static EXPONENTIAL_DAMPING: Entry = Entry {
     name: "exponential-damping",
     words: "damping that decays with the gap",
@@ -133,11 +133,11 @@ impl Formula for ExponentialDamping {
     }
 }
 
-/// `−γ (d₀/(d − a0 + d₀))ⁿ ḋ`.
+/// Formula `−γ (d₀/(d − a0 + d₀))ⁿ ḋ` of a damping that falls like a power; see the module.
 #[derive(Clone, Copy, Debug)]
 pub struct PowerDamping;
 
-/// Its entry.
+/// Table entry `power-damping`: damping that falls like a power of the gap.
 pub static POWER_DAMPING: Entry = Entry {
     name: "power-damping",
     words: "damping that falls like a power of the gap",

@@ -23,15 +23,16 @@ pub enum CaseDocument {
     Oscillator(OscillatorDocument),
 }
 
-/// A cantilever.
+/// The case of a cantilever as a document.
 #[derive(Clone, Debug, Serialize)]
 pub struct CantileverDocument {
-    /// `cantilever`.
+    /// The word `cantilever`.
     pub kind: &'static str,
-    /// Its parameters.
+    /// Number of modes, dimensionless parameters and contact law, as keys of the document.
     #[serde(flatten)]
     pub case: Cantilever,
-    /// Drive period 2π/Ω.
+    /// Period of the drive in model units: 2π/Ω, or with several tones the time after which all
+    /// repeat.
     pub period: f64,
     /// Rest positions of the undriven lever over an attractive sample.
     #[serde(skip_serializing_if = "Vec::is_empty")]
@@ -48,7 +49,7 @@ pub struct PhysicalSummary {
     pub k: f64,
     /// First resonance, with the tip, Hz.
     pub f0: f64,
-    /// Quality factor.
+    /// Quality factor of the first free resonance, dimensionless.
     #[serde(rename = "Q")]
     pub quality_factor: f64,
     /// Mass of the beam, kg.
@@ -57,13 +58,13 @@ pub struct PhysicalSummary {
     pub tip_mass: f64,
     /// Amplitude of the base, m, or of the force on the lever, N.
     pub drive_amplitude: f64,
-    /// Drive frequency, Hz.
+    /// Frequency of the first tone of the drive, Hz.
     pub drive_frequency: f64,
     /// Free amplitude of the tip, m.
     pub free_amplitude: f64,
     /// Phase lag of the free deflection, degrees.
     pub free_phase_degrees: f64,
-    /// Reference of phases.
+    /// Quantity to which phases refer, such as "displacement of the clamped end".
     pub phase_reference: &'static str,
     /// Free amplitude of the second tone, m, if there is one.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -83,11 +84,11 @@ pub struct PhysicalSummary {
     /// Amplitude of the third tone, m or N, if there is one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub third_amplitude: Option<f64>,
-    /// Setpoint amplitude over free amplitude, if given.
+    /// Setpoint amplitude as a fraction of the free amplitude; `None` without such a setpoint.
     pub setpoint: Option<f64>,
-    /// Contact stiffness, N/m.
+    /// Contact stiffness K₁ of the sample, N/m.
     pub contact_stiffness: f64,
-    /// Contact damping, N s/m.
+    /// Contact damping C₁ of the sample, N s/m.
     pub contact_damping: f64,
     /// Further quantities of the contact law by parameter, in SI.
     #[serde(flatten, serialize_with = "as_map")]
@@ -95,7 +96,7 @@ pub struct PhysicalSummary {
     /// Parameters of a nonlinear force law, in place of contact stiffness and damping.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub force_law: Vec<LawParameterDocument>,
-    /// Tabor's parameter of an elastic sphere with adhesion.
+    /// Tabor's parameter of an elastic sphere with adhesion, dimensionless.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub tabor_parameter: Option<f64>,
     /// Dynamic moduli of a sample that relaxes, at the drive frequency.
@@ -124,24 +125,24 @@ pub struct PhysicalSummary {
 /// Young's modulus of a sample that relaxes under a small oscillation at the drive frequency.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct DynamicModulus {
-    /// Storage modulus E', Pa.
+    /// Storage modulus E' at the drive frequency, Pa.
     pub storage_modulus: f64,
-    /// Loss modulus E'', Pa.
+    /// Loss modulus E'' at the drive frequency, Pa.
     pub loss_modulus: f64,
-    /// tan δ = E''/E'.
+    /// Loss tangent tan δ = E''/E', dimensionless.
     pub loss_tangent: f64,
 }
 
 /// A parameter of a nonlinear force law.
 #[derive(Clone, Debug, Serialize)]
 pub struct LawParameterDocument {
-    /// The key of the case.
+    /// Path of the key that states the parameter.
     pub key: &'static str,
-    /// What it is.
+    /// Description of the parameter in words.
     pub what: &'static str,
-    /// Its value in SI; `null` of the modulus of a rigid tip.
+    /// Value of the parameter in the unit `unit`; `None` for the infinite modulus of a rigid tip.
     pub value: Option<f64>,
-    /// Its SI unit.
+    /// SI unit of `value`.
     pub unit: &'static str,
 }
 
@@ -236,12 +237,12 @@ impl PhysicalSummary {
 /// An oscillator, its keys those of the case file.
 #[derive(Clone, Debug, Serialize)]
 pub struct OscillatorDocument {
-    /// `vibro_impact` or `impact`.
+    /// Kind of the stop: `vibro_impact` for a soft one, `impact` for a rigid one.
     pub kind: &'static str,
-    /// Its parameters.
+    /// Parameters of the oscillator by their names in the case file, in model units.
     #[serde(flatten)]
     pub values: BTreeMap<&'static str, f64>,
-    /// Drive period 2π/ω.
+    /// Period of the drive, 2π/ω, in model units.
     pub period: f64,
 }
 
@@ -305,17 +306,17 @@ pub fn equilibria(case: &Case) -> Vec<Equilibrium> {
 /// A dimensionless parameter with its physical quantity, as a document.
 #[derive(Clone, Debug, Serialize)]
 pub struct MappingDocument {
-    /// The key of the dimensionless model.
+    /// Name of the dimensionless parameter.
     pub parameter: &'static str,
-    /// Its value there.
+    /// Value of the parameter, dimensionless.
     pub value: f64,
-    /// What it is: `M/(mL)`.
+    /// Formula of the parameter, such as `M/(mL)`.
     pub formula: &'static str,
-    /// The physical quantity.
+    /// Name of the physical quantity.
     pub quantity: &'static str,
-    /// Its value in SI.
+    /// Value of the physical quantity in the SI unit `unit`.
     pub si: f64,
-    /// Its SI unit.
+    /// SI unit of `si`.
     pub unit: &'static str,
 }
 

@@ -26,20 +26,20 @@ impl From<CantileverError> for CaseError {
 /// A name that is not a key that can vary.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum NoSuchKey {
-    /// An unknown name.
+    /// The name is not a key of the case.
     #[error("no parameter `{given}` here; there are {known}{hint}")]
     Unknown {
-        /// The given name.
+        /// Name as given.
         given: String,
-        /// The known keys.
+        /// List of the keys that can vary.
         known: String,
-        /// The nearest key, as a question.
+        /// Suggestion of the most similar key, as a question.
         hint: String,
     },
     /// A key that cannot vary.
     #[error("`{key}` cannot vary: {reason}")]
     Fixed {
-        /// The key.
+        /// Key that cannot vary.
         key: Key,
         /// The reason, and the keys that can vary.
         reason: &'static str,
@@ -49,20 +49,20 @@ pub enum NoSuchKey {
 /// Why the value of a key cannot be parsed.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ValueOfKeyError {
-    /// A dimensionless case needs a number.
+    /// A value of a dimensionless case is not a number.
     #[error("{text}: not a number")]
     NotANumber {
-        /// The given text.
+        /// Value as given.
         text: String,
     },
-    /// The quantity of the key was expected.
+    /// The text is not a quantity of the kind of the key.
     #[error("{text}: {key}: {error}")]
     Quantity {
-        /// The key.
+        /// Key whose value was parsed.
         key: Key,
-        /// The given text.
+        /// Value as given.
         text: String,
-        /// Why.
+        /// Error of parsing the quantity.
         error: Box<QuantityError>,
     },
 }

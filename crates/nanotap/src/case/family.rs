@@ -13,7 +13,7 @@ use crate::model::model_map::ModelMap;
 pub struct Family {
     /// The case; the value of its free parameter does not matter.
     pub case: Case,
-    /// The free parameter.
+    /// Key of the free parameter.
     pub key: Key,
 }
 
@@ -45,7 +45,7 @@ impl MapFamily for Family {
 pub struct PlaneFamily {
     /// The case; the values of its free parameters do not matter.
     pub case: Case,
-    /// The free parameters.
+    /// Keys of the two free parameters.
     pub keys: [Key; 2],
 }
 

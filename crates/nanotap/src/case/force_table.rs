@@ -33,7 +33,7 @@ const MODEL_ARMS_SHAPE: &str = "write rows as in [[\"time\", \"stiffness\"], [0.
 pub struct ForceTableError {
     /// What is wrong, and where.
     pub message: String,
-    /// The remedy.
+    /// What to change in the rows.
     pub remedy: String,
 }
 
@@ -67,8 +67,8 @@ impl ForceTable {
     }
 
     /// Creates a force table from the columns `gap`, `force` and, if there is one, `damping` of a
-    /// table. Where it has a column `damping error` too, as a reconstructed force, a damping below zero
-    /// is no more than its error and counts as none.
+    /// table. If the table also has a column `damping error`, as a reconstructed force has, a
+    /// damping below zero is attributed to the error and counts as zero.
     ///
     /// # Errors
     /// If they are missing, have no unit, or are not a function of the gap.
@@ -93,12 +93,12 @@ impl ForceTable {
         Ok(Self(Arc::new(rows)))
     }
 
-    /// The same rows with another curve between them.
+    /// The same rows with another interpolation between them.
     pub(crate) fn by(&self, interpolation: Interpolation) -> Self {
         Self(Arc::new(self.0.by(interpolation)))
     }
 
-    /// The table as an array that is read back as the same.
+    /// The table as the text of an array that parses to the same table.
     pub fn text(&self) -> String {
         let mut header = "[\"gap (m)\", \"force (N)\"".to_owned();
         if !self.0.damping().is_empty() {
@@ -197,14 +197,14 @@ pub struct ArmTable {
     strength: Strength,
 }
 
-/// What says how strong an arm is.
+/// Quantity that states the strength of an arm.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Strength {
     /// Young's or shear modulus, Pa.
     Modulus,
-    /// Stiffness, N/m.
+    /// Stiffness of a spring, N/m.
     Stiffness,
-    /// Stiffness in the model's unit, as its time.
+    /// Stiffness in model units; its time is in model units too.
     Number,
 }
 
@@ -281,8 +281,8 @@ impl ArmTable {
         Some(times.into_iter().zip(moduli).collect())
     }
 
-    /// The arms as an array that is read back as the same.
-    pub fn text(&self) -> String {
+    /// The arms as the text of an array that parses to the same arms.
+    pub(crate) fn text(&self) -> String {
         let header = match self.strength {
             Strength::Modulus if self.arms.shear() => "\"time (s)\", \"shear modulus (Pa)\"",
             Strength::Modulus => "\"time (s)\", \"modulus (Pa)\"",
@@ -323,7 +323,7 @@ impl Takes {
         })
     }
 
-    /// The same of a CSV file.
+    /// The value of a key that takes a table, from a CSV file.
     ///
     /// # Errors
     /// If it cannot be read or is not such a table, with the place.
@@ -331,7 +331,7 @@ impl Takes {
         self.of_table(&Table::read(path)?)
     }
 
-    /// The same of an array, or of the text of a CSV file.
+    /// The value of a key that takes a table, from the text of an array or of a CSV file.
     ///
     /// # Errors
     /// As [`of_table`](Self::of_table), and if `text` names a file, which is not opened.

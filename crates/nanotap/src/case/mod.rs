@@ -66,7 +66,7 @@ use crate::model::oscillator::{Oscillator, OscillatorParameter, Stop};
 use crate::model::{Model, ModelTangent, Tangent, cantilever_model_tangent};
 use crate::number::shortest;
 
-/// Default number of modes.
+/// Default number of beam modes of a case.
 pub const DEFAULT_MODES: usize = 3;
 
 /// A checked case: a cantilever, dimensionless or in physical quantities, or an oscillator.
@@ -98,11 +98,11 @@ enum CaseKind {
 pub struct ParameterUnit {
     /// The quantity: "drive frequency f".
     pub quantity: &'static str,
-    /// Its SI unit.
+    /// SI unit of the quantity.
     pub unit: &'static str,
-    /// The SI value of 1.
+    /// SI value of the number 1, in the unit `unit`.
     pub si: f64,
-    /// Kind of quantity.
+    /// Kind of the quantity, which determines how it is shown.
     #[serde(skip)]
     pub kind: Kind,
 }
@@ -240,7 +240,7 @@ impl Case {
         self.with_flag(control.cancel.unwrap_or(&self.cancel))
     }
 
-    /// The same, whose models' motions end with an error once `flag` is set or its budget spent.
+    /// The same case, whose motions end with an error once `flag` is set or its budget is spent.
     #[must_use]
     pub(crate) fn with_flag(&self, flag: &CancelFlag) -> Self {
         Self {
@@ -303,7 +303,7 @@ impl Case {
         &self.cancel
     }
 
-    /// Title of the case.
+    /// Returns the title of the case, for figures and reports.
     pub fn title(&self) -> &str {
         &self.title
     }
@@ -334,12 +334,12 @@ impl Case {
         }
     }
 
-    /// True if it was stated in physical quantities.
+    /// Returns true if the case was stated in physical quantities.
     pub const fn is_physical(&self) -> bool {
         matches!(self.what, CaseKind::Quantities(_))
     }
 
-    /// Assumptions and warnings.
+    /// Returns the assumptions made and the warnings for a physical case; empty for others.
     pub fn remarks(&self) -> Vec<Remark> {
         let (CaseKind::Quantities(quantities), Some(view)) = (&self.what, self.physical()) else {
             return Vec::new();
@@ -364,7 +364,7 @@ impl Case {
         replaced.map(words).collect()
     }
 
-    /// Keys of the numbers of its equations.
+    /// Returns the keys of the numbers of the equations.
     pub fn keys(&self) -> Vec<Key> {
         match &self.what {
             CaseKind::Oscillator(oscillator) => crate::model::oscillator::OscillatorParameter::ALL
@@ -434,7 +434,7 @@ impl Case {
         found.unwrap_or(f64::NAN)
     }
 
-    /// The stated value of a key of a physical case.
+    /// Returns the stated value of a key of a physical case; `None` if it is not stated.
     pub fn stated(&self, key: Key) -> Option<&Value> {
         match &self.what {
             CaseKind::Quantities(quantities) => quantities.stated.get(key),
@@ -508,7 +508,7 @@ impl Case {
             .collect()
     }
 
-    /// Its model.
+    /// Builds the model of the case.
     ///
     /// # Errors
     /// If the case is invalid or has no solution in closed form.
@@ -528,7 +528,7 @@ impl Case {
         Ok(model.cancelled_by(&self.cancel))
     }
 
-    /// Derivative of its map with respect to a key.
+    /// Derivative of the map of the case with respect to a key.
     ///
     /// # Errors
     /// As [`model`](Self::model).
@@ -543,7 +543,7 @@ impl Case {
         Ok(Tangent::along(cantilever, model, &slopes, &law)?)
     }
 
-    /// Derivative of its model with respect to a key.
+    /// Derivative of the model of the case with respect to a key.
     ///
     /// # Errors
     /// As [`model`](Self::model).
@@ -609,7 +609,7 @@ impl Case {
         Ok(Some((low.scales, high.scales, width)))
     }
 
-    /// Its maps along one key.
+    /// Returns the maps of the case with one free key.
     pub fn family(&self, key: Key) -> Family {
         Family {
             case: self.clone(),
@@ -617,7 +617,7 @@ impl Case {
         }
     }
 
-    /// Units for display.
+    /// Returns the units for display: SI for a physical case, unless model units were selected.
     pub fn units(&self) -> Units {
         let view = self.physical().filter(|_| !self.model_units);
         Units::of(view.map(|view| &view.scales))
@@ -750,7 +750,7 @@ impl Case {
         }
     }
 
-    /// True if its stop is rigid: contacts are instantaneous.
+    /// Returns true for an oscillator with a rigid stop, whose contacts are instantaneous.
     pub fn has_rigid_stop(&self) -> bool {
         self.model_kind() == ModelKind::Impact
     }

@@ -16,22 +16,22 @@ use crate::model::words::plain;
 /// A value of a key.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Value {
-    /// A number in SI, or of the dimensionless model, and what it measures.
+    /// A number with the kind of quantity that it measures, in SI or of the dimensionless model.
     Number(f64, Kind),
-    /// One of a key's words.
+    /// One of the key's words.
     Word(&'static str),
-    /// A name of the catalogue, or of nonlinear laws.
+    /// A name of the catalogue, or the names of nonlinear laws.
     Name(Arc<str>),
-    /// A ratio of frequencies.
+    /// A ratio of two frequencies of the drive.
     Ratio(FrequencyRatio),
     /// Rows of gap and force.
     Table(ForceTable),
-    /// Maxwell arms.
+    /// Maxwell arms of a sample that relaxes.
     Arms(ArmTable),
 }
 
 impl Value {
-    /// The value as text that is read back as the same.
+    /// Returns the value as text that parses to the same value.
     pub fn text(&self) -> String {
         match self {
             Self::Number(value, kind) => kind.format_exact(*value),
@@ -47,27 +47,27 @@ impl Value {
 /// Why a text is not a value of a key.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ValueError {
-    /// Not the quantity that the key takes.
+    /// The text is not the quantity that the key takes.
     #[error(transparent)]
     Quantity(#[from] QuantityError),
-    /// None of the key's words.
+    /// The text is not one of the key's words.
     #[error("\"{given}\" is not one of {}", quoted(words))]
     Word {
-        /// The given text.
+        /// Text as given.
         given: String,
-        /// What could be.
+        /// Words that the key takes.
         words: &'static [&'static str],
     },
-    /// No ratio of frequencies.
+    /// The text is not a ratio of frequencies.
     #[error(transparent)]
     Ratio(#[from] RatioError),
-    /// No force curve.
+    /// The text is not a table of the kind that the key takes.
     #[error(transparent)]
     Table(#[from] ForceTableError),
-    /// No contact law.
+    /// The text does not name a contact law.
     #[error("unknown law \"{given}\"; the laws are {}", laws().join(", "))]
     Law {
-        /// The name that is none.
+        /// Name that is not a contact law.
         given: String,
     },
 }
@@ -79,7 +79,7 @@ pub(crate) fn laws() -> Vec<&'static str> {
     linear.into_iter().chain(further).collect()
 }
 
-/// A linear contact as one of its words; nonlinear laws as their names.
+/// The linear contact that a text names as one of its words, or nonlinear laws by their names.
 fn law(text: &str) -> Result<Value, ValueError> {
     if let Ok(law) = text.parse::<ContactLaw>() {
         return Ok(Value::Word(law.name()));
@@ -94,14 +94,14 @@ fn law(text: &str) -> Result<Value, ValueError> {
     Ok(Value::Name(names.join(" + ").into()))
 }
 
-/// Words in quotes, in a row.
+/// Words in quotes, separated by commas.
 pub(crate) fn quoted(words: &[&str]) -> String {
     let quoted: Vec<String> = words.iter().map(|word| format!("\"{word}\"")).collect();
     quoted.join(", ")
 }
 
 impl Key {
-    /// The value that a text says. Numbers of `[model]` have no unit, quantities have theirs.
+    /// Parses a value of this key. Numbers of `[model]` have no unit; quantities have their own.
     ///
     /// # Errors
     /// [`ValueError`] with what was expected.
@@ -140,44 +140,42 @@ impl Key {
 pub(crate) struct Said {
     /// The name that was typed, without its table.
     pub(crate) name: String,
-    /// The value as typed.
+    /// The value as text, without any change.
     pub(crate) written: String,
-    /// Place of the key.
     pub(crate) key_place: Place,
-    /// Place of the value.
     pub(crate) value_place: Place,
 }
 
 /// A value of the file that an override of another key replaces.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Replaced {
-    /// The key of the file.
+    /// Key in the file whose value is replaced.
     pub(crate) key: Key,
-    /// Its value, as it was written.
+    /// Value in the file, as written.
     pub(crate) written: String,
-    /// The key that was set.
+    /// Key that the override sets.
     pub(crate) by: Key,
 }
 
-/// The file that places point into, and who said what there.
+/// The case file, with the places of its tables and values.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Origin {
     /// The file, if there is one.
     pub(crate) source: Option<Source>,
-    /// Its tables.
+    /// Headers of the tables in the file.
     pub(crate) headers: Vec<Header>,
-    /// Place of each value.
+    /// Name, text and place of each value, as written.
     pub(crate) said: Vec<(Key, Said)>,
-    /// What the file says and does not count.
+    /// Values of the file that overrides of other keys replace.
     pub(crate) replaced: Vec<Replaced>,
 }
 
 /// The values that are stated, by key.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Stated {
-    /// Sorted by key.
+    /// Keys and values, sorted by key.
     values: Vec<(Key, Value)>,
-    /// The keys whose values are no longer those that were written.
+    /// Keys whose values differ from those that were written.
     changed: Vec<Key>,
     pub(crate) origin: Arc<Origin>,
 }
@@ -192,7 +190,7 @@ impl Stated {
         self.get(key).is_some()
     }
 
-    /// The number of a key; of one that takes several kinds, whatever it measures.
+    /// The number of a key, in the unit of its kind; `None` if the value is not a number.
     pub(crate) fn number(&self, key: Key) -> Option<f64> {
         match self.get(key)? {
             Value::Number(value, _) => Some(*value),
@@ -200,12 +198,12 @@ impl Stated {
         }
     }
 
-    /// All values.
+    /// Iterates over keys and values in the order of the keys.
     pub(crate) fn iter(&self) -> impl Iterator<Item = (Key, &Value)> {
         self.values.iter().map(|(key, value)| (*key, value))
     }
 
-    /// States a value as it was written.
+    /// Sets a value of a key as it was written.
     pub(crate) fn put(&mut self, key: Key, value: Value) {
         match self.values.binary_search_by_key(&key, |(key, _)| *key) {
             Ok(at) => self.values[at].1 = value,
@@ -213,12 +211,12 @@ impl Stated {
         }
     }
 
-    /// Changes a number, in place of all that says the same.
+    /// Changes the number of a key and removes the alternatives of the key.
     pub(crate) fn set(&mut self, key: Key, value: f64) {
         self.set_of_kind(key, value, key.kind());
     }
 
-    /// The same of a key that takes several kinds.
+    /// As [`set`](Self::set), for a key that takes several kinds of quantities.
     pub(crate) fn set_of_kind(&mut self, key: Key, value: f64, kind: Kind) {
         for (other, _) in key.alternatives() {
             self.remove(other);
@@ -237,14 +235,14 @@ impl Stated {
         self.values.retain(|(other, _)| *other != key);
     }
 
-    /// Place of a value that is unchanged.
+    /// How and where the value of a key was written; `None` if it has changed since.
     pub(crate) fn said(&self, key: Key) -> Option<&Said> {
         let said = self.origin.said.iter().find(|(other, _)| *other == key);
         said.filter(|_| self.has(key) && !self.changed.contains(&key))
             .map(|(_, said)| said)
     }
 
-    /// A value as it was written; else as numbers are shown.
+    /// The value as it was written; after a change, formatted with its unit.
     pub(crate) fn written(&self, key: Key) -> String {
         self.said(key).map_or_else(
             || match self.get(key) {
@@ -256,7 +254,7 @@ impl Stated {
         )
     }
 
-    /// Where a complaint about a key belongs: at its value, or at its table.
+    /// The place to which an error about a key points: its value, an override, or its table.
     pub(crate) fn place(&self, key: Key) -> Place {
         if let Some(said) = self.said(key) {
             return said.value_place.clone();
@@ -269,7 +267,7 @@ impl Stated {
         header.map_or(Place::Whole, |header| header.place.clone())
     }
 
-    /// An error of one problem about a key.
+    /// Creates an error with one problem, which concerns `key`.
     pub(crate) fn refused(&self, key: Option<Key>, message: String) -> CaseFileError {
         let place = key.map_or(Place::Whole, |key| self.place(key));
         let problem = Problem::new(place, message).key(key.map(Key::path));

@@ -20,34 +20,34 @@ const MAX_BYTES: u64 = 256 << 20;
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(untagged)]
 pub enum Entry {
-    /// Nothing.
+    /// An empty field, or a number that is NaN.
     Missing,
-    /// A number.
+    /// A number in the unit of the column's header.
     Number(f64),
-    /// A text.
+    /// A text that is not a number.
     Text(String),
 }
 
 /// A table: columns of one length, each with its name and, in brackets, its unit.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Table {
-    /// What it is called.
+    /// Name of the table for messages, such as the path of its file.
     pub name: String,
-    /// Its columns: the header as it was written, and the entries.
+    /// Columns: the header as it was written, and the entries.
     pub columns: Vec<(String, Vec<Entry>)>,
-    /// Line of each row in the file that it was read from; empty where there is none.
+    /// Line of each row in its file; empty if the table was not read from a file.
     pub lines: Vec<u64>,
-    /// What an instrument's file says of the measurement, by name.
+    /// Notes on the measurement from the file of an instrument: name and text.
     pub notes: Vec<(String, String)>,
 }
 
 impl Table {
-    /// Reads an instrument's file (`.ibw`, `.jpk-force`, `.nid`), or a CSV file: fields parted by
-    /// commas, semicolons or tabs, the first line names the columns, lines that begin with `#` are
-    /// skipped.
+    /// Reads an instrument's file (`.ibw`, `.jpk-force`, `.nid`) or a CSV file. Fields of a CSV
+    /// file are separated by commas, semicolons or tabs, its first line names the columns, and
+    /// lines that begin with `#` are skipped.
     ///
     /// # Errors
-    /// When the file cannot be read or is no such table; the message has line and column.
+    /// When the file cannot be read or is not such a table; the message has line and column.
     pub fn read(path: &Path) -> Result<Self, Error> {
         let name = path.display().to_string();
         let refuse = |error: std::io::Error| Error::files(format!("cannot read {name}: {error}"));
@@ -119,7 +119,7 @@ impl Table {
         Ok(table)
     }
 
-    /// The same with its rows in the other order.
+    /// The same table with its rows in reverse order.
     #[must_use]
     pub(crate) fn reversed(&self) -> Self {
         let mut table = self.clone();
@@ -130,12 +130,12 @@ impl Table {
         table
     }
 
-    /// How many rows it has.
+    /// Returns the number of rows: the length of the longest column.
     pub fn rows(&self) -> usize {
         self.columns.iter().map(|(_, c)| c.len()).max().unwrap_or(0)
     }
 
-    /// Where an entry stands, for messages.
+    /// Text for messages that names the place of an entry: table, line, column.
     pub(crate) fn place(&self, row: Option<usize>, column: usize) -> String {
         let header = self.columns.get(column).map_or("", |(header, _)| header);
         let column = column + 1;
@@ -151,7 +151,7 @@ impl Table {
     }
 }
 
-/// The word over a column, taken apart.
+/// Header of a column, split into name and unit.
 #[derive(Clone, Debug)]
 pub(crate) struct Header {
     pub(crate) name: String,
@@ -186,8 +186,7 @@ impl Entry {
     }
 }
 
-/// What parts the fields: of comma, semicolon and tab the one that stands most often in the
-/// header.
+/// Separator of the fields: comma, semicolon or tab, whichever occurs most often in the header.
 fn delimiter(text: &str) -> u8 {
     let header = text
         .lines()

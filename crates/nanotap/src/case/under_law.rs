@@ -1,4 +1,4 @@
-//! The same instrument over a sample that answers by another contact law.
+//! The same instrument with a sample under another contact law.
 
 use super::key::{Key, Takes};
 use super::physical::drive::{FURTHER, ToneKeys};
@@ -30,7 +30,7 @@ impl LawName {
         Self(stated.get(Key::SampleLaw).cloned().unwrap_or_else(linear))
     }
 
-    /// The law's name.
+    /// The name of the law, as in a case file.
     pub(crate) fn text(&self) -> String {
         self.0.text()
     }
@@ -48,36 +48,36 @@ impl LawName {
     }
 }
 
-/// What changes in a case that takes another contact law.
+/// Changes of a case that takes another contact law.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LawChange {
-    /// The law's name.
+    /// Name of the new contact law.
     pub law: String,
-    /// The keys that were stated and that the law does not take.
+    /// Stated keys that the new law does not take.
     pub dropped: Vec<Key>,
-    /// The keys that the law needs and that were not stated, with usual values.
+    /// Keys that the new law needs and that were not stated, with usual values.
     pub added: Vec<(Key, Value)>,
 }
 
-/// A force curve of a stiff sample with attraction, to begin with: gap in m, force in N.
+/// Usual force curve of a stiff sample with attraction: gap in nm, force in nN.
 const CURVE: &str = "[[\"gap (nm)\", \"force (nN)\"], [-1, 20], [-0.5, 5], [0, -1.5], \
      [0.5, -0.6], [1, -0.3], [2, -0.1], [5, -0.02], [10, 0]]";
 
-/// Three arms of a polymer whose times are those of tapping, to begin with.
+/// Usual arms of a polymer: three, with times comparable to the period of tapping.
 const ARMS: &str = "[[\"time (us)\", \"modulus (MPa)\"], [0.38, 460], [1.7, 136], [7.2, 67]]";
 
-/// Arms of a stiffness in place of the modulus.
+/// Usual arms with a stiffness in place of the modulus.
 const SPRINGS: &str = "[[\"time (us)\", \"stiffness (N/m)\"], [0.5, 10], [4, 3]]";
 
-/// Arms of a dimensionless case.
+/// Usual arms of a dimensionless case.
 const MODEL_ARMS: &str = "[[\"time\", \"stiffness\"], [0.1, 20], [1, 5]]";
 
 impl Case {
-    /// What must be left away, and what added, for this case to take another contact law. A value to add
-    /// is that of `like` where it states one, else a usual one.
+    /// Returns the keys to remove and the values to add for this case to take another contact law.
+    /// An added value is that of `like` if it states one, otherwise a usual one.
     ///
     /// # Errors
-    /// When the case is an oscillator, the law is unknown, or a sum counts a part twice.
+    /// When the case is an oscillator, the law is unknown, or a sum of laws counts a part twice.
     pub fn law_change(&self, law: &str, like: &Self) -> Result<LawChange, Error> {
         let quantities = match &self.what {
             CaseKind::Quantities(quantities) => quantities,
@@ -133,7 +133,7 @@ impl Case {
         })
     }
 
-    /// True if the contact law, or the drive, of the case does not have a key.
+    /// Returns true if the contact law or the drive of the case does not have the key.
     pub fn is_foreign(&self, key: Key) -> bool {
         if let (CaseKind::Cantilever(cantilever), Some(parameter)) = (&self.what, key.parameter()) {
             // A measured number of a mode can always be stated.
@@ -152,11 +152,11 @@ impl Case {
         !LawName::of(stated).takes(key)
     }
 
-    /// The same under another contact law: what that law does not take is left away, and what it
-    /// needs and was not stated is taken from `more`.
+    /// The same case under another contact law. Keys that the law does not take are removed, and
+    /// values that it needs and that were not stated are taken from `more`.
     ///
     /// # Errors
-    /// When the case is not a physical one, or does not say all that the law needs.
+    /// When the case is not a physical one, or lacks a quantity that the law needs.
     pub(crate) fn under_law(&self, law: &LawName, more: &[(Key, f64)]) -> Result<Self, Error> {
         let CaseKind::Quantities(quantities) = &self.what else {
             return Err(Error::input(
@@ -222,7 +222,7 @@ fn contact_change(before: &Cantilever, law: &str, like: &Case) -> Result<LawChan
     })
 }
 
-/// A value of a key that a law needs: that of `like` if it states one, else a usual one.
+/// A value of a key that a law needs: that of `like` if it states one, otherwise a usual one.
 fn usual(key: Key, like: &Case) -> Option<Value> {
     if let Some(value) = like.stated(key) {
         return Some(value.clone());

@@ -8,15 +8,15 @@ pub enum StoreError {
     /// The path exists and is not a dataset.
     #[error("{} already exists and is not a dataset: {what}", path.display())]
     Occupied {
-        /// Path of the store.
+        /// Path that was given for the store.
         path: PathBuf,
-        /// What the path is.
+        /// Type and content of what is at the path.
         what: String,
     },
     /// The store does not exist or is not a dataset of nanotap.
     #[error("{} is not a dataset of nanotap: {what}", path.display())]
     NotAStore {
-        /// Path of the store.
+        /// Path that was given for the store.
         path: PathBuf,
         /// What is missing or wrong.
         what: String,
@@ -28,30 +28,30 @@ pub enum StoreError {
         differences.join("; ")
     )]
     Mismatch {
-        /// Path of the store.
+        /// Path of the existing store.
         path: PathBuf,
         /// The differences, one per key, as `key: there, here`.
         differences: Vec<String>,
     },
-    /// Chunks are missing.
+    /// A dataset is needed completely, but some of its chunks are missing.
     #[error(
         "{}: {missing} of {total} chunks are missing; run the same command again to finish it",
         path.display()
     )]
     Unfinished {
-        /// Path of the store.
+        /// Path of the unfinished store.
         path: PathBuf,
-        /// Number of missing chunks.
+        /// Number of unfinished chunks.
         missing: usize,
-        /// Number of all chunks.
+        /// Number of chunks of the dataset.
         total: usize,
     },
     /// The content of a file is invalid.
     #[error("{} is damaged: {what}", path.display())]
     Damaged {
-        /// Path of the file.
+        /// Path of the damaged file or store.
         path: PathBuf,
-        /// What is wrong.
+        /// What is wrong with the content.
         what: String,
     },
     /// The file system returned an error.
@@ -59,7 +59,7 @@ pub enum StoreError {
     Io {
         /// The operation: reading, writing …
         doing: &'static str,
-        /// Path of the file.
+        /// Path of the file or folder of the operation.
         path: PathBuf,
         /// Error of the operating system.
         source: std::io::Error,

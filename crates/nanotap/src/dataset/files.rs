@@ -85,7 +85,7 @@ fn put<E: From<io::Error>>(
 
 /// The target of a chain of links; for a dangling link, the missing target.
 fn followed(path: &Path) -> io::Result<PathBuf> {
-    /// Longer chains are cycles.
+    /// Largest number of links in a chain; a longer one is taken for a cycle.
     const LINKS: usize = 40;
     let mut path = path.to_path_buf();
     for _ in 0..LINKS {
@@ -114,7 +114,7 @@ fn temporary(path: &Path) -> io::Result<PathBuf> {
     Ok(path.with_file_name(hidden))
 }
 
-/// The CRC-32 of bytes.
+/// Computes the CRC-32 checksum of `bytes`.
 pub fn checksum(bytes: &[u8]) -> u32 {
     crc32fast::hash(bytes)
 }

@@ -30,10 +30,10 @@ impl Axis {
     }
 }
 
-/// A grid of chunks.
+/// The division of the dimensions of a dataset into chunks.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Grid {
-    /// The axes, slowest first.
+    /// Axes of the grid, the slowest one first (row-major order).
     pub axes: Vec<Axis>,
 }
 
@@ -49,7 +49,7 @@ pub struct Block {
 }
 
 impl Block {
-    /// Number of entries.
+    /// Returns the number of entries in the chunk.
     pub fn len(&self) -> usize {
         self.ranges.iter().map(ExactSizeIterator::len).product()
     }
@@ -88,12 +88,12 @@ impl Block {
 }
 
 impl Grid {
-    /// Number of entries over all axes.
+    /// Returns the number of entries over all axes.
     pub fn entries(&self) -> usize {
         self.axes.iter().map(|a| a.length).product()
     }
 
-    /// Number of chunks.
+    /// Returns the number of chunks over all axes.
     pub fn chunks(&self) -> usize {
         self.axes.iter().map(Axis::chunks).product()
     }

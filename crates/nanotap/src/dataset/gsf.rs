@@ -9,13 +9,13 @@ use std::fmt::Write as _;
 /// Two axes and a value at each grid point.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Field {
-    /// Title; one line.
+    /// Title of the map, on one line.
     pub title: String,
-    /// Values of the horizontal axis, equidistant and ascending.
+    /// Values of the horizontal axis in `axis_unit`, equidistant and ascending.
     pub x: Vec<f64>,
-    /// Values of the vertical axis, equidistant and ascending.
+    /// Values of the vertical axis in `axis_unit`, equidistant and ascending.
     pub y: Vec<f64>,
-    /// The values, one row per value of `y`.
+    /// Values in `value_unit`, one row per value of `y`; unknown ones are NaN.
     pub values: Vec<f64>,
     /// Unit of the axes in SI, empty if they have none.
     pub axis_unit: String,
@@ -29,7 +29,7 @@ pub enum FieldError {
     /// The values do not fill the axes.
     #[error("got {found} values, expected {columns} × {rows}")]
     Size {
-        /// Number of values.
+        /// Number of values in the field.
         found: usize,
         /// Length of the horizontal axis.
         columns: usize,
@@ -41,13 +41,13 @@ pub enum FieldError {
         "a GSF file needs equal steps, but the values of the {axis} axis are not ascending and equidistant"
     )]
     Steps {
-        /// `horizontal` or `vertical`.
+        /// Name of the axis: `horizontal` or `vertical`.
         axis: &'static str,
     },
-    /// An axis is empty.
+    /// An axis has no values.
     #[error("the {axis} axis is empty")]
     Empty {
-        /// `horizontal` or `vertical`.
+        /// Name of the axis: `horizontal` or `vertical`.
         axis: &'static str,
     },
 }

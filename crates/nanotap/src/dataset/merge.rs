@@ -6,7 +6,7 @@ use super::error::StoreError;
 use super::schema::Schema;
 use super::store::{Store, mismatch, same};
 
-/// Result of a merge.
+/// Result of merging partial datasets into one store.
 #[derive(Clone, Debug, PartialEq, Eq, serde::Serialize)]
 pub struct Merged {
     /// Path of the merged store.

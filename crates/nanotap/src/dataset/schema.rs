@@ -7,7 +7,7 @@ use super::grid::Grid;
 /// Attributes of a dataset or of a variable.
 pub type Attributes = Map<String, Value>;
 
-/// Values of one variable.
+/// Values of one variable or coordinate, all of one type.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Values {
     /// Real numbers; missing values are NaN.
@@ -16,12 +16,12 @@ pub enum Values {
     Whole(Vec<i32>),
     /// Codes for CF `flag_values`; 0 is missing.
     Code(Vec<u8>),
-    /// Texts.
+    /// Texts; missing values are empty.
     Text(Vec<String>),
 }
 
 impl Values {
-    /// Number of values.
+    /// Returns the number of values.
     pub fn len(&self) -> usize {
         match self {
             Self::Real(v) => v.len(),
@@ -36,7 +36,7 @@ impl Values {
         self.len() == 0
     }
 
-    /// The values as numbers; none of words.
+    /// Converts the values to numbers; texts give an empty vector.
     pub fn numbers(self) -> Vec<f64> {
         match self {
             Self::Real(values) => values,
@@ -78,11 +78,11 @@ impl Values {
 /// Type of the entries of a variable.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
-    /// `f64`.
+    /// Real numbers, `f64`; missing values are NaN.
     Real,
-    /// `i32`.
+    /// Integers, `i32`.
     Whole,
-    /// `u8`.
+    /// Codes of categories, `u8`; 0 is missing.
     Code,
     /// Texts of at most this many characters.
     Text(usize),
@@ -99,7 +99,7 @@ impl Kind {
         }
     }
 
-    /// So many missing values.
+    /// Creates `count` missing values of this type.
     pub(super) fn missing(self, count: usize) -> Values {
         match self {
             Self::Real => Values::Real(vec![f64::NAN; count]),
@@ -114,11 +114,11 @@ impl Kind {
 /// into chunks.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Variable {
-    /// Name of the variable.
+    /// Name of the variable in the dataset.
     pub name: String,
-    /// Type of the entries.
+    /// Type of the entries of the variable.
     pub kind: Kind,
-    /// Further dimensions: name and length.
+    /// Further dimensions after the axes of the grid: name and length.
     pub tail: Vec<(String, usize)>,
     /// `long_name`, `units` and other attributes.
     pub attributes: Attributes,
@@ -138,14 +138,14 @@ impl Variable {
         }
     }
 
-    /// Adds a dimension.
+    /// Adds a further dimension of this name and length.
     #[must_use]
     pub fn along(mut self, dimension: &str, length: usize) -> Self {
         self.tail.push((dimension.into(), length));
         self
     }
 
-    /// Adds an attribute.
+    /// Adds an attribute with this key, or replaces it.
     #[must_use]
     pub fn attribute(mut self, key: &str, value: impl Into<Value>) -> Self {
         self.attributes.insert(key.into(), value.into());
@@ -163,9 +163,9 @@ impl Variable {
 pub struct Coordinate {
     /// Name of the coordinate; if it is that of a dimension, the coordinate labels this dimension.
     pub name: String,
-    /// Names of its dimensions.
+    /// Names of the dimensions of the coordinate.
     pub dimensions: Vec<String>,
-    /// Its values, row-major.
+    /// Values of the coordinate, row-major over its dimensions.
     pub values: Values,
     /// `long_name`, `units` and other attributes.
     pub attributes: Attributes,
@@ -186,16 +186,16 @@ impl Coordinate {
     }
 }
 
-/// Content of a dataset.
+/// Content of a dataset: grid, variables, coordinates and attributes.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Schema {
-    /// The grid of chunks.
+    /// Grid of chunks that all variables share.
     pub grid: Grid,
     /// The computed variables; their names differ from those of coordinates.
     pub variables: Vec<Variable>,
-    /// The coordinates.
+    /// Coordinates, which are known before the computation.
     pub coordinates: Vec<Coordinate>,
-    /// Everything that determines the numbers.
+    /// Attributes of the dataset: everything that determines its numbers.
     pub attributes: Attributes,
 }
 
@@ -214,7 +214,7 @@ impl Schema {
         }
     }
 
-    /// The coordinate called `name`.
+    /// Returns the coordinate called `name`, if there is one.
     pub fn coordinate(&self, name: &str) -> Option<&Coordinate> {
         self.coordinates.iter().find(|c| c.name == name)
     }

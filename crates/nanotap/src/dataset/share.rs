@@ -11,24 +11,24 @@ pub struct Share {
     count: usize,
 }
 
-/// An invalid share.
+/// A text that is not a share `i/n` with 1 ≤ i ≤ n.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("`{given}` is not a share: expected i/n with 1 ≤ i ≤ n, as in 2/8 for the second of eight")]
 pub struct ShareError {
-    /// The given text.
+    /// Text as given.
     pub given: String,
 }
 
 impl Share {
-    /// All chunks.
+    /// The share of a single machine: all chunks.
     pub const WHOLE: Self = Self { index: 1, count: 1 };
 
-    /// True if `chunk` belongs to the share.
+    /// Returns true if `chunk` is in the share.
     pub fn holds(self, chunk: usize) -> bool {
         chunk % self.count == self.index - 1
     }
 
-    /// True if the share contains all chunks.
+    /// Returns true if the share contains all chunks.
     pub fn is_whole(self) -> bool {
         self.count == 1
     }

@@ -18,7 +18,7 @@ use crate::dataset::files::{self, is_temporary};
 /// The folder of markers, one per finished chunk. Zarr readers look at the metadata only and ignore
 /// it.
 const MARKERS: &str = ".chunks";
-/// The same of joined chunks.
+/// The folder of markers of a store whose chunks were joined.
 const PACKED_MARKERS: &str = ".joined";
 /// The attribute with the chunks of each axis and the names of the computed arrays.
 const LAYOUT: &str = "chunk_layout";
@@ -34,13 +34,13 @@ pub struct Store {
     path: PathBuf,
     schema: Schema,
     metadata: String,
-    /// Whether the chunks of work were joined.
+    /// Whether the chunks of the computation were joined into larger ones.
     packed: bool,
     finished: Vec<AtomicBool>,
 }
 
 impl Store {
-    /// Opens the store at `path`, or creates it.
+    /// Opens the store at `path`, or creates it if it does not exist.
     ///
     /// # Errors
     /// If the path is something else, if the store has other attributes, or if the file system
@@ -80,14 +80,14 @@ impl Store {
         Ok(store)
     }
 
-    /// The store of a schema at `path`, in whichever division into chunks, before it counts.
+    /// Creates a store object for `path` without writing anything; `packed` if chunks are joined.
     pub(super) fn beside(path: &Path, schema: Schema, packed: bool) -> Self {
         let metadata = consolidated(&documents(&schema, packed));
         Self::with(path, schema, metadata, packed)
     }
 
-    /// Writes everything but the chunks of the variables. The division into chunks counts from then
-    /// on.
+    /// Writes all documents and coordinates, but not the chunks of the variables. From then on the
+    /// store has this division into chunks.
     ///
     /// # Errors
     /// If the file system fails.
@@ -107,7 +107,7 @@ impl Store {
         )
     }
 
-    /// Whether the chunks of work were joined.
+    /// Whether the chunks of the computation were joined into larger ones.
     pub(super) const fn is_packed(&self) -> bool {
         self.packed
     }
@@ -115,7 +115,7 @@ impl Store {
     /// Removes the files of this division into chunks.
     ///
     /// # Errors
-    /// If the file system refuses.
+    /// If the file system fails.
     pub(super) fn remove_chunks(&self) -> Result<(), StoreError> {
         for chunk in 0..self.chunks() {
             let block = self.schema.grid.block(chunk);
@@ -191,12 +191,12 @@ impl Store {
         store
     }
 
-    /// Path of the store.
+    /// Returns the path of the folder of the store.
     pub fn path(&self) -> &Path {
         &self.path
     }
 
-    /// Content of the store.
+    /// Returns the content of the store: grid, variables, coordinates and attributes.
     pub fn schema(&self) -> &Schema {
         &self.schema
     }
@@ -206,19 +206,19 @@ impl Store {
         &self.metadata
     }
 
-    /// Number of chunks.
+    /// Returns the number of chunks, finished or not.
     pub fn chunks(&self) -> usize {
         self.finished.len()
     }
 
-    /// True if the chunk is finished.
+    /// Returns true if the chunk is finished.
     pub fn is_finished(&self, chunk: usize) -> bool {
         self.finished
             .get(chunk)
             .is_some_and(|f| f.load(Ordering::Acquire))
     }
 
-    /// Number of unfinished chunks.
+    /// Returns the number of unfinished chunks.
     pub fn missing(&self) -> usize {
         (0..self.chunks()).filter(|c| !self.is_finished(*c)).count()
     }
@@ -361,7 +361,7 @@ impl Store {
         })
     }
 
-    /// The same with the names in a slice.
+    /// As [`Store::each`], with the names in a slice.
     ///
     /// # Errors
     /// As [`Store::each`].
@@ -505,8 +505,8 @@ fn unpadded<T: Clone>(grid: &Grid, block: &Block, full: &[T], stride: usize) -> 
         .collect()
 }
 
-/// All metadata documents by their names in the store, except `.zmetadata`; `packed` if the chunks of
-/// work were joined.
+/// All metadata documents by their names in the store, except `.zmetadata`; `packed` if the chunks
+/// of the computation were joined.
 fn documents(schema: &Schema, packed: bool) -> Vec<(String, String)> {
     let mut root = schema.attributes.clone();
     let axes: Vec<Value> = schema

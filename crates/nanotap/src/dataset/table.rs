@@ -64,7 +64,7 @@ fn with_unit(name: &str, attributes: &Attributes) -> String {
     }
 }
 
-/// Symbols of SI units.
+/// Symbols of SI units; a unit is SI if each of its parts between slashes is one of these.
 const SI: [&str; 10] = ["m", "s", "kg", "N", "N s", "J", "W", "Hz", "Pa", "rad"];
 
 /// The coordinates along the axes of the grid: header, axis, values.

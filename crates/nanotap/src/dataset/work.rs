@@ -19,7 +19,7 @@ use super::store::Store;
 /// Options of the computation of a dataset.
 #[derive(Clone, Copy, Debug)]
 pub struct Work<'a> {
-    /// The chunks to compute.
+    /// Share of the chunks that this run computes.
     pub share: Share,
     /// Number of threads; 0: one per core.
     pub threads: usize,
@@ -33,9 +33,9 @@ pub enum WorkError {
     /// Cancelled; the finished chunks are in the store.
     #[error("stopped; {finished} of {total} chunks are finished")]
     Cancelled {
-        /// Finished chunks of the share.
+        /// Number of finished chunks of the share.
         finished: usize,
-        /// Chunks of the share.
+        /// Number of chunks of the share.
         total: usize,
     },
     /// Cancelled after the last chunk.
@@ -46,7 +46,7 @@ pub enum WorkError {
     /// A computation failed, or the threads could not be started.
     #[error(transparent)]
     Failed(Box<crate::Error>),
-    /// The store failed.
+    /// Reading or writing the store failed.
     #[error(transparent)]
     Store(#[from] StoreError),
 }
@@ -161,7 +161,7 @@ pub fn work<T: Send>(
     Ok(())
 }
 
-/// Number of threads for the option value `given`.
+/// Returns the number of threads for the option value `given`; 0 means one per core.
 pub fn threads(given: usize) -> usize {
     if given > 0 {
         return given;

@@ -10,7 +10,7 @@ use serde_json::{Value, json};
 use super::deflate::{LEVEL, deflate};
 use super::schema::{Attributes, Kind, Values};
 
-/// Names of Zarr's documents.
+/// Names of the metadata documents of Zarr.
 pub(super) const GROUP: &str = ".zgroup";
 pub(super) const ATTRIBUTES: &str = ".zattrs";
 pub(super) const ARRAY: &str = ".zarray";
@@ -18,7 +18,7 @@ pub(super) const CONSOLIDATED: &str = ".zmetadata";
 /// Separator of the numbers in the name of a chunk; a dot by default.
 pub(super) const SEPARATOR: &str = "dimension_separator";
 
-/// The `.zgroup` document.
+/// The content of a `.zgroup` document.
 pub(super) fn group() -> Value {
     json!({ "zarr_format": 2 })
 }

@@ -71,14 +71,14 @@ pub fn approach_figure(report: &ApproachReport, units: &Units) -> Figure {
 /// Curves of approach and retract in the units of the figure.
 #[derive(Clone, Debug, Deserialize)]
 pub struct ApproachCurves {
-    /// Label of the distance.
+    /// Label of the distance axis, with its unit.
     pub x_label: String,
-    /// Its range.
+    /// Closest and farthest distance of the axis, in the unit of `x_label`.
     pub x_range: [f64; 2],
-    /// Whether its values are in equal ratios, as amplitudes are.
+    /// Whether the distance axis is logarithmic, as for amplitudes at a constant least distance.
     #[serde(default)]
     pub logarithmic: bool,
-    /// One panel per quantity.
+    /// Panels, one for each quantity.
     pub panels: Vec<ApproachPanel>,
 }
 
@@ -86,25 +86,25 @@ pub struct ApproachCurves {
 #[derive(Clone, Debug, Default, Deserialize)]
 #[serde(default)]
 pub struct ApproachPanel {
-    /// Its label.
+    /// Label of the quantity, with its unit.
     pub label: String,
-    /// Its natural size, if known: see [`Axis::natural`].
+    /// Natural size of the quantity in the unit of `label`, if known: see [`Axis::natural`].
     pub natural: Option<f64>,
-    /// Whether it is a phase, in degrees.
+    /// Whether the quantity is a phase, in degrees.
     pub phase: bool,
-    /// Points of the approach.
+    /// Motions on the approach: distance and quantity, in the units of the labels.
     pub approach: Vec<(f64, f64)>,
-    /// Points of the retract.
+    /// Motions on the retract: distance and quantity, in the units of the labels.
     pub retract: Vec<(f64, f64)>,
-    /// Coexisting motions that are on neither way.
+    /// Coexisting motions that neither approach nor retract reached: distance and quantity.
     pub coexisting: Vec<(f64, f64)>,
-    /// Another curve for comparison, as a line.
+    /// Curve for comparison, drawn as a line: distance and quantity.
     pub compared: Vec<(f64, f64)>,
-    /// Label of that curve.
+    /// Legend of the curve for comparison; empty without one.
     pub comparison: String,
-    /// The branches.
+    /// Orbits of branches along the distance.
     pub branches: Vec<BranchPoint>,
-    /// Their bifurcations.
+    /// Bifurcations of the branches.
     pub bifurcations: Vec<BranchMark>,
 }
 
@@ -122,7 +122,7 @@ impl ApproachCurves {
         }
     }
 
-    /// The figure.
+    /// Returns the figure with its panels in two columns.
     pub fn figure(&self) -> Figure {
         let rows = self.panels.len().div_ceil(2).max(1);
         let mut figure = Figure::new(rows, 2)

@@ -13,7 +13,7 @@ use crate::study::lyapunov::{LyapunovReport, Section};
 
 /// Drive periods that are drawn of a motion that does not repeat.
 const WANDERING_PERIODS: usize = 48;
-/// Strobe states that are drawn of such a motion.
+/// Strobe states that are drawn of a motion that does not repeat.
 const STROBE_POINTS: usize = 3000;
 /// Largest number of attractors drawn: more cannot be distinguished.
 const MOST: usize = 8;
@@ -74,7 +74,7 @@ pub fn attractors_figure(model: &Model, found: &Attractors, units: &Units) -> Fi
     .figure()
 }
 
-/// "period 4 (37 %)".
+/// Name for the legend with the share of initial states, as "period 4 (37 %)".
 fn name(attractor: &AttractorReport) -> String {
     let what = attractor.orbit.as_ref().map_or_else(
         || attractor.classification.name().to_owned(),

@@ -21,18 +21,18 @@ pub struct BasinTable {
     pub x: String,
     /// The entry of the state that is drawn upwards.
     pub y: String,
-    /// Its values.
+    /// Values of x, evenly spaced, in SI; in model units where `si` is 1.
     #[serde(default)]
     pub x_values: Vec<f64>,
-    /// Its values.
+    /// Values of y, evenly spaced, in SI; in model units where `si` is 1.
     #[serde(default)]
     pub y_values: Vec<f64>,
-    /// The SI values of the units of x and y in the model; 1 where the values have no unit.
+    /// SI values of the model's units of x and y; 1 where the values have no unit.
     #[serde(default = "no_units")]
     pub si: [f64; 2],
-    /// The attractors.
+    /// Attractors of the dataset, with their states at drive phase 0 in model units.
     pub attractors: Vec<Known>,
-    /// The names of a state's entries.
+    /// Names of the entries of a state.
     pub entries: Vec<String>,
     /// Number of the attractor that is reached from each point, row by row from the smallest y;
     /// negative if none is.
@@ -74,7 +74,7 @@ pub fn figure(store: &Store) -> Result<Figure, StoreError> {
 }
 
 impl BasinTable {
-    /// The figure; none if the labels do not fill the slice.
+    /// Returns the figure; `None` if the labels do not fill the slice.
     pub fn figure(&self) -> Option<Figure> {
         let (columns, rows) = (self.x_values.len(), self.y_values.len());
         if columns.checked_mul(rows)? != self.labels.len() || self.labels.is_empty() {
@@ -142,11 +142,10 @@ fn motion(attractor: &Known) -> Motion {
         .map_or_else(|| motion_of(&attractor.classification), Motion::Periodic)
 }
 
-/// One side of the map.
 struct Side {
-    /// Where it begins and ends, in the unit of its label.
+    /// Outer edges of the first and last cell, in the unit of `label`.
     ends: (f64, f64),
-    /// What multiplies a number of the model.
+    /// Factor from the model's unit to the unit of `label`.
     factor: f64,
     label: String,
 }
@@ -190,7 +189,7 @@ fn edges(values: &[f64]) -> (f64, f64) {
     (from - half, to + half)
 }
 
-/// `$a_1$` of `a1`.
+/// Symbol of an entry of the state: `$a_1$` for `a1`.
 fn symbol(name: &str) -> String {
     let (letter, number) = name.split_at(1.min(name.len()));
     let letter = if letter == "v" && !number.is_empty() {

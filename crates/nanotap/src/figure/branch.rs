@@ -16,12 +16,12 @@ pub use crate::figure::shown::Shown;
 use crate::observe::{Observables, PhysicalMotion};
 use crate::study::branch::{BranchReport, PointReport};
 
-/// The parameter's axis: its label and the factor of its values.
+/// Axis of a parameter: its label and the factor of its values.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ParameterAxis {
-    /// The label, with its unit.
+    /// Label of the axis, with its unit.
     pub label: String,
-    /// The factor.
+    /// Factor from the parameter's value in a report to the unit of `label`.
     pub factor: f64,
 }
 
@@ -206,81 +206,81 @@ pub(crate) fn scale_of(size: f64, natural: Option<f64>) -> f64 {
 /// Branches in the units of the figure.
 #[derive(Clone, Debug, Deserialize)]
 pub struct BranchCurves {
-    /// Label of the parameter's axis.
+    /// Label of the parameter's axis, with its unit.
     pub x_label: String,
-    /// Label of the observable.
+    /// Label of the observable's axis, with its unit.
     pub y_label: String,
-    /// Natural size of the observable, if known: see [`Axis::natural`].
+    /// Natural size of the observable in the unit of `y_label`, if known: see [`Axis::natural`].
     #[serde(default)]
     pub natural: Option<f64>,
     /// The orbits, in the order in which they were followed.
     pub points: Vec<BranchPoint>,
-    /// The bifurcations.
+    /// Bifurcations of the branches.
     pub bifurcations: Vec<BranchMark>,
-    /// Curves of bifurcations in two parameters.
+    /// Curves of bifurcations in two parameters, if they were traced.
     pub curves: Option<BifurcationCurves>,
 }
 
 /// An orbit of a branch.
 #[derive(Clone, Copy, Debug, Deserialize)]
 pub struct BranchPoint {
-    /// Number of its branch.
+    /// Number of the branch, from 0.
     pub branch: usize,
-    /// Its period.
+    /// Period of the orbit, in drive periods.
     pub period: usize,
-    /// Whether it is stable.
+    /// Whether the orbit is stable.
     pub stable: bool,
-    /// The parameter.
+    /// Parameter, in the unit of its axis.
     pub x: f64,
-    /// The observable.
+    /// Observable of the orbit, in the unit of its axis.
     pub y: f64,
 }
 
 /// A bifurcation of a branch.
 #[derive(Clone, Debug, Deserialize)]
 pub struct BranchMark {
-    /// `fold`, `flip` …
+    /// Kind of the bifurcation: `fold`, `flip`, `neimark-sacker`, `grazing`, `crossing` or `event`.
     pub kind: String,
-    /// The parameter.
+    /// Parameter at the bifurcation, in the unit of its axis.
     pub x: f64,
-    /// The observable.
+    /// Observable of the orbit that bifurcates, in the unit of its axis.
     pub y: f64,
 }
 
 /// Curves of bifurcations in the plane of two parameters.
 #[derive(Clone, Debug, Deserialize)]
 pub struct BifurcationCurves {
-    /// Label of the second parameter's axis.
+    /// Label of the second parameter's axis, with its unit.
     pub y_label: String,
-    /// Range of the first parameter.
+    /// Smallest and largest value of the first parameter, in the unit of its axis.
     pub x_range: [f64; 2],
-    /// Range of the second parameter.
+    /// Smallest and largest value of the second parameter, in the unit of its axis.
     pub y_range: [f64; 2],
-    /// The curves.
+    /// Curves in the plane of the two parameters.
     pub curves: Vec<BifurcationCurve>,
 }
 
-/// A curve of bifurcations.
+/// A curve of bifurcations, or of events, in the plane of two parameters.
 #[derive(Clone, Debug, Deserialize)]
 pub struct BifurcationCurve {
-    /// `fold`, `flip` …
+    /// Kind of the bifurcation, such as `fold` or `flip`.
     pub kind: String,
-    /// The event of a curve of events, as the user wrote it.
+    /// Event of a curve of events, as the user wrote it; `None` for bifurcations.
     #[serde(default)]
     pub event: Option<String>,
-    /// Period of the orbit that bifurcates.
+    /// Period of the orbit that bifurcates, in drive periods.
     pub period: usize,
-    /// The first parameter along the curve.
+    /// First parameter along the curve, in the unit of its axis.
     pub x: Vec<f64>,
-    /// The second parameter along the curve.
+    /// Second parameter along the curve, in the unit of its axis; as many values as `x`.
     pub y: Vec<f64>,
-    /// The events at its first and last point; empty at the edge of the window.
+    /// Events at the first and the last point; empty at the edge of the window.
     #[serde(default)]
     pub meets: [String; 2],
 }
 
 impl BranchCurves {
-    /// The figure.
+    /// Returns the figure, with the curves in two parameters as a second panel.
     pub fn figure(&self) -> Figure {
         let branches = self.panel();
         match &self.curves {

@@ -29,7 +29,7 @@ pub fn sample_figure(comparison: &Comparison, units: &Units) -> Figure {
         .with(followed_panel(comparison, "first_harmonic", units))
 }
 
-/// Largest absolute value.
+/// Largest absolute value, 0 if there are none.
 fn largest(values: impl Iterator<Item = f64>) -> f64 {
     values.fold(0.0, |m, v| m.max(v.abs()))
 }

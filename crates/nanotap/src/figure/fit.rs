@@ -15,7 +15,7 @@ use crate::study::approach::Way;
 use crate::study::fit::{FitReport, FittedColumn, FittedRow, Reading};
 use crate::study::frequency_modulation::COLUMNS;
 
-/// Panels side by side.
+/// Number of panels side by side.
 const ACROSS: usize = 3;
 
 /// A map of each fitted parameter of a force volume; of a single row of pixels, its values.

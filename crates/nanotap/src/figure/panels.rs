@@ -19,9 +19,9 @@ const FEW_STROBES: usize = 200;
 pub struct MotionAxes {
     /// Whether the motion is that of a cantilever's tip.
     pub beam: bool,
-    /// Unit of lengths, as " (nm)"; empty in the model's own units.
+    /// Unit of lengths, as " (nm)"; empty in model units.
     pub length: String,
-    /// Unit of velocities.
+    /// Unit of velocities, as " (µm/s)"; empty in model units.
     pub velocity: String,
 }
 
@@ -45,7 +45,6 @@ impl MotionAxes {
     }
 }
 
-/// The axis of time.
 pub(crate) fn time_axis() -> Axis {
     Axis::linear("time $τ / T$ (drive periods)").tight()
 }
@@ -54,19 +53,19 @@ pub(crate) fn time_axis() -> Axis {
 #[derive(Clone, Debug, Default, Deserialize)]
 #[serde(default)]
 pub struct MotionCurves {
-    /// The axes.
+    /// Kind of motion and units of the axes.
     pub axes: MotionAxes,
-    /// Title: the class of the motion.
+    /// Title of the panels: the class of the motion.
     pub title: String,
-    /// Intervals of contact, in drive periods.
+    /// Beginning and end of each contact, in drive periods.
     pub contacts: Vec<(f64, f64)>,
-    /// The surface or stop against time.
+    /// Surface of the sample, or stop: time in drive periods and position in the unit of lengths.
     pub surface: Vec<(f64, f64)>,
-    /// The tip or mass against time.
+    /// Tip or mass: time in drive periods and deflection in the unit of lengths.
     pub tip: Vec<(f64, f64)>,
-    /// The motion in the phase plane.
+    /// Motion in the phase plane: deflection and velocity, in the units of the axes.
     pub portrait: Vec<(f64, f64)>,
-    /// Its states at drive phase 0.
+    /// States at drive phase 0: deflection and velocity, in the units of the axes.
     pub strobe: Vec<(f64, f64)>,
     /// Whether the drawn motion does not repeat: thin lines and small dots then.
     pub endless: bool,
@@ -138,13 +137,13 @@ impl MotionCurves {
 #[derive(Clone, Debug, Default, Deserialize)]
 #[serde(default)]
 pub struct OrbitCurves {
-    /// One repetition.
+    /// Motion over one repetition of the orbit.
     pub motion: MotionCurves,
-    /// Order and amplitude of the harmonics of the tip deflection, in shown units.
+    /// Harmonics of the tip deflection: order and amplitude in `harmonics_unit`.
     pub harmonics: Vec<(f64, f64)>,
-    /// Their unit, as " (nm)"; empty in the model's own units.
+    /// Unit of the amplitudes, as " (nm)"; empty in model units.
     pub harmonics_unit: String,
-    /// Floquet multipliers [Re, Im].
+    /// Floquet multipliers as [Re, Im], dimensionless.
     pub multipliers: Vec<[f64; 2]>,
 }
 
@@ -217,19 +216,19 @@ impl OrbitCurves {
     }
 }
 
-/// Curves of an attractor.
+/// Curves of one attractor in the phase plane.
 #[derive(Clone, Debug, Default, Deserialize)]
 #[serde(default)]
 pub struct AttractorCurve {
-    /// Name, with its share of the initial states.
+    /// Name for the legend, with the share of the initial states.
     pub name: String,
     /// Name of its class of motions.
     pub classification: String,
-    /// Its period, if it is an orbit.
+    /// Period in drive periods; `None` if the attractor is not an orbit.
     pub period: Option<usize>,
-    /// The motion in the phase plane.
+    /// Motion in the phase plane: deflection and velocity, in the units of the axes.
     pub portrait: Vec<(f64, f64)>,
-    /// Its states at drive phase 0.
+    /// States at drive phase 0: deflection and velocity, in the units of the axes.
     pub strobe: Vec<(f64, f64)>,
 }
 
@@ -258,15 +257,15 @@ pub(crate) fn motion_of(classification: &str) -> Motion {
     .map_or(Motion::Undecided, |found| found.1)
 }
 
-/// Attractors that coexist.
+/// Coexisting attractors in the phase plane.
 #[derive(Clone, Debug, Default, Deserialize)]
 #[serde(default)]
 pub struct AttractorCurves {
-    /// The axes.
+    /// Kind of motion and units of the axes.
     pub axes: MotionAxes,
-    /// The attractors, the largest share first.
+    /// Attractors, the largest share first.
     pub attractors: Vec<AttractorCurve>,
-    /// States of unstable orbits at drive phase 0.
+    /// States of unstable orbits at drive phase 0: deflection and velocity.
     pub unstable: Vec<(f64, f64)>,
 }
 
@@ -322,15 +321,16 @@ impl AttractorCurves {
 #[derive(Clone, Debug, Default, Deserialize)]
 #[serde(default)]
 pub struct SectionCurves {
-    /// The axes.
+    /// Kind of motion and units of the axes.
     pub axes: MotionAxes,
-    /// Drive phase of the section, in periods; none: the beginnings of contacts.
+    /// Drive phase of the section, in periods; `None` for a section at the beginnings of contacts.
     pub phase: Option<f64>,
-    /// Tip and its velocity or, at contacts, drive phase in degrees and impact speed.
+    /// Points of the section: tip deflection and velocity or, at contacts, drive phase in degrees
+    /// and impact speed.
     pub points: Vec<(f64, f64)>,
-    /// Lyapunov exponents per drive period.
+    /// Lyapunov exponents per drive period, natural logarithm, largest first.
     pub exponents: Vec<f64>,
-    /// Their standard errors.
+    /// Standard errors of the exponents, per drive period, in the same order.
     pub errors: Vec<f64>,
 }
 

@@ -12,9 +12,9 @@ use crate::study::orbit::spectral_radius;
 /// multiplier.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Shown {
-    /// An observable.
+    /// An observable that is one number.
     Observable(&'static Observable),
-    /// Largest modulus of a multiplier.
+    /// Largest modulus of a multiplier, dimensionless.
     SpectralRadius,
 }
 
@@ -30,7 +30,7 @@ impl Shown {
         Some(Self::Observable(observable))
     }
 
-    /// Every choice: name and description.
+    /// Returns all choices: name and description.
     pub fn choices() -> impl Iterator<Item = (&'static str, &'static str)> {
         crate::observe::OBSERVABLES
             .iter()
@@ -58,7 +58,7 @@ impl Shown {
         }
     }
 
-    /// Its value; NaN if the motion has none.
+    /// Value of the quantity; NaN if the motion has none.
     pub(crate) fn of(self, observables: &Observables, multipliers: &[[f64; 2]]) -> f64 {
         match self {
             Self::SpectralRadius => spectral_radius(multipliers),
@@ -73,15 +73,15 @@ impl Shown {
         }
     }
 
-    /// Whether it is an angle, which wraps around.
+    /// Whether the quantity is an angle, which wraps around.
     pub(crate) fn is_phase(self) -> bool {
         self.observable()
             .is_some_and(|o| o.dimension == Dimension::Angle)
     }
 
-    /// Label of its axis for values up to `size`, and the factor of the values. `beam`: of a
-    /// cantilever, not of an oscillator. `si` gives the SI value of 1, if known; energies are then in
-    /// electronvolts.
+    /// Label of the axis for values up to `size`, and the factor of the values. `beam` is true for
+    /// a cantilever, false for an oscillator. `si` gives the SI value of 1, if known; energies are
+    /// then in electronvolts.
     pub(crate) fn axis(
         self,
         beam: bool,

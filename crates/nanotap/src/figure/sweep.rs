@@ -19,47 +19,47 @@ use crate::study::sweep::{FromNeighbour, class_of, from_neighbours};
 
 /// Largest number of categories of a map, and of periods of a diagram, with separate colours.
 const MAX_CATEGORIES: usize = 12;
-/// Colour of all others.
+/// Colour of the categories without a separate colour.
 const OTHERS: Colour = Colour::rgb(222, 222, 222);
 
 /// An axis of a sweep's grid.
 #[derive(Clone, Debug, Deserialize)]
 pub struct GridAxis {
-    /// What it is, without the unit.
+    /// Name of the parameter, without the unit.
     pub label: String,
-    /// SI unit; empty in the model's own units.
+    /// SI unit of the values; empty in model units.
     #[serde(default)]
     pub units: String,
     /// Whether the values are evenly spaced by their logarithms.
     #[serde(default)]
     pub log: bool,
-    /// The values of the parameter.
+    /// Values of the parameter, in `units`; in model units if that is empty.
     #[serde(default)]
     pub values: Vec<f64>,
 }
 
 /// The motions of a sweep, in the order of the grid with the last index fastest: over the
-/// parameters, then the starts.
+/// parameters, then over the initial states.
 #[derive(Clone, Debug, Deserialize)]
 pub struct SweepTable {
-    /// One parameter, or two; of two the first is the vertical axis.
+    /// One parameter or two; the first of two is the vertical axis.
     pub axes: Vec<GridAxis>,
-    /// Direction in which each start was followed (`up`, `down`); empty if it was not.
+    /// Direction in which each initial state was followed (`up`, `down`); empty if it was not.
     pub directions: Vec<String>,
-    /// SI unit of the maxima; empty in the model's own units.
+    /// SI unit of the maxima; empty in model units.
     #[serde(default)]
     pub units: String,
     /// Code of each motion's classification.
     #[serde(default)]
     pub classification: Vec<u8>,
-    /// Period of each motion; 0 where it has none.
+    /// Period of each motion in drive periods; 0 if it has none.
     #[serde(default)]
     pub period: Vec<i32>,
     /// Maxima of the tip deflection in each recorded drive period, motion by motion; empty for a
     /// sweep over two parameters.
     #[serde(default)]
     pub period_max: Vec<f64>,
-    /// Orbits that no start reached, continued from neighbouring values.
+    /// Orbits that no initial state reached, continued from neighbouring values.
     #[serde(default)]
     pub neighbours: Vec<FromNeighbour>,
 }
@@ -332,7 +332,7 @@ fn of_direction(direction: &str) -> (f64, Colour) {
     }
 }
 
-/// Factor and unit of deflections (empty in the model's own units).
+/// Factor and unit of deflections; the unit is empty in model units.
 fn deflection(units: &str, values: impl Iterator<Item = f64>) -> (f64, String) {
     if units != "m" {
         return (1.0, String::new());
@@ -419,7 +419,7 @@ pub fn response(store: &Store) -> Result<Figure, StoreError> {
 }
 
 /// Maps over two parameters: the motions, and amplitude, phase, peak force, dissipation and contact
-/// time of the first start's.
+/// time of the motions of the first initial state.
 fn maps(store: &Store) -> Result<Figure, StoreError> {
     const SHOWN: [&str; 5] = [
         "first_harmonic",
@@ -460,8 +460,8 @@ fn maps(store: &Store) -> Result<Figure, StoreError> {
     Ok(figure)
 }
 
-/// A quantity of the motions of the first start over two parameters, row by row, and whether it is
-/// in SI.
+/// A quantity of the motions of the first initial state over two parameters, row by row, and
+/// whether it is in SI.
 fn of_first_start(store: &Store, shown: Shown) -> Result<(Vec<f64>, bool), StoreError> {
     let schema = store.schema();
     let [rows, columns] = [0, 1].map(|axis| schema.grid.axes[axis].length);
@@ -494,7 +494,7 @@ fn of_first_start(store: &Store, shown: Shown) -> Result<(Vec<f64>, bool), Store
 }
 
 impl GridAxis {
-    /// Of an axis of a dataset's grid.
+    /// The axis with index `axis` of a dataset's grid.
     pub(crate) fn of(store: &Store, axis: usize) -> Self {
         let schema = store.schema();
         let name = &schema.grid.axes[axis].name;
@@ -509,7 +509,7 @@ impl GridAxis {
         }
     }
 
-    /// Its values and label in the units of the figure.
+    /// Values and label of the axis in the units of the figure.
     pub(crate) fn shown(&self) -> GridScale {
         let kind = Kind::ALL
             .into_iter()
@@ -545,7 +545,6 @@ pub(crate) struct GridScale {
 }
 
 impl GridScale {
-    /// The axis.
     pub(crate) fn axis(&self) -> Axis {
         let axis = if self.log {
             Axis::log(&self.label)

@@ -57,7 +57,7 @@ pub(crate) const UNINTERRUPTED: usize = 1024;
 /// Why the map could not be created or applied.
 #[derive(Clone, Debug, thiserror::Error)]
 pub enum MapError {
-    /// The case is invalid.
+    /// The case is invalid or has no model.
     #[error(transparent)]
     Case(#[from] CaseError),
     /// The distance follows from a setpoint and has not been solved for.
@@ -66,27 +66,27 @@ pub enum MapError {
     /// The length of the input is not a multiple of the state dimension.
     #[error("{numbers} numbers are no rows of states of {dimension} numbers each")]
     Shape {
-        /// Length of the input.
+        /// Number of values in the input.
         numbers: usize,
-        /// Dimension of a state.
+        /// Number of values in a state.
         dimension: usize,
     },
     /// The number of states exceeds the limit.
     #[error("{states} states are too many; {most} at most")]
     TooMany {
-        /// Requested number of states.
+        /// Number of states that were requested.
         states: usize,
-        /// Largest number of states.
+        /// Largest number of states that one call returns.
         most: usize,
     },
     /// The time span is invalid.
     #[error("a motion from τ = {from} over {length} cannot be followed: {reason}")]
     Span {
-        /// Beginning of the span, in the model's time.
+        /// Beginning of the span, in model units of time.
         from: f64,
-        /// Length of the span, in the model's time.
+        /// Length of the span, in model units of time.
         length: f64,
-        /// What is wrong.
+        /// Reason why the span is invalid.
         reason: &'static str,
     },
     /// The flow of a state failed.
@@ -94,13 +94,13 @@ pub enum MapError {
     Motion {
         /// Index of the state, from 0.
         index: usize,
-        /// Error of the flow.
+        /// Error of the flow from this state.
         error: MotionError,
     },
-    /// Newton found no orbit.
+    /// Newton's method found no periodic orbit.
     #[error(transparent)]
     Orbit(#[from] ShootingError),
-    /// The computation was cancelled.
+    /// The computation was cancelled before its end.
     #[error("stopped before the end")]
     Stopped,
 }
@@ -120,11 +120,11 @@ pub struct Map {
 /// The linearised map at a state.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Linearised {
-    /// P(z), length n.
+    /// Image P(z) of the state z, length n, in model units.
     pub state: Vec<f64>,
-    /// ∂P/∂z, `n × n`.
+    /// Derivative ∂P/∂z, `n × n`, in model units.
     pub jacobian: DMatrix<f64>,
-    /// ∂P/∂key at constant z, `n × keys`; for a physical quantity per SI unit.
+    /// Derivative ∂P/∂key at constant z, `n × keys`; for a physical quantity per SI unit.
     pub derivatives: DMatrix<f64>,
 }
 
@@ -156,7 +156,7 @@ impl Map {
         &self.model
     }
 
-    /// Dimension of a state.
+    /// Returns the number n of values in a state.
     pub fn dimension(&self) -> usize {
         self.model.dimension()
     }

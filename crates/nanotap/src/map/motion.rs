@@ -28,20 +28,21 @@ pub struct Motion {
 /// An instant of a motion, in the model's units.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Point {
-    /// Time, 0 at drive phase 0 of the first period.
+    /// Time τ, model units; 0 at drive phase 0 of the first period.
     pub tau: f64,
-    /// State, of length n.
+    /// State, length n, model units.
     pub state: Vec<f64>,
-    /// Tip deflection W; x for an oscillator.
+    /// Tip deflection W, model units; x for an oscillator.
     pub tip: f64,
-    /// Rate of the tip deflection.
+    /// Rate of the tip deflection, dW/dτ, model units; dx/dτ for an oscillator.
     pub tip_rate: f64,
-    /// Height V_T of the tip above the undeformed surface.
+    /// Height V_T of the tip above the undeformed surface, model units; minus the indentation in
+    /// contact.
     pub gap: f64,
-    /// Force of the sample on the tip.
+    /// Force of the sample on the tip, model units; positive when it pushes the tip away.
     pub force: f64,
-    /// Guard of the present regime, which ends when the guard falls to zero: the gap in flight, the
-    /// condition of contact in contact. NaN if nothing ends the regime.
+    /// Guard of the present regime, model units: the gap in flight, the condition of contact in
+    /// contact. The regime ends when the guard falls to zero. NaN if nothing ends the regime.
     pub guard: f64,
     /// Whether tip and sample are in contact.
     pub contact: bool,

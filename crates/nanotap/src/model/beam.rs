@@ -16,7 +16,7 @@ pub const MAX_MODES: usize = 50;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{given} is not a number of beam modes: 1 to {MAX_MODES} are provided")]
 pub struct ModeCountError {
-    /// The number given.
+    /// Refused mode number or number of modes.
     pub given: usize,
 }
 
@@ -63,22 +63,23 @@ impl Mode {
         alternating(self.number)
     }
 
-    /// φ_j(1) = 2(−1)^(j+1).
+    /// Returns φ_j(1) = 2(−1)^(j+1), the tip's deflection in the mode, dimensionless.
     pub fn tip(&self) -> f64 {
         2.0 * self.sign()
     }
 
-    /// φ_j′(1) = 2(−1)^(j+1) σ_j β_j.
+    /// Returns φ_j′(1) = 2(−1)^(j+1) σ_j β_j, the slope dφ_j/dξ at the tip, dimensionless.
     pub fn tip_slope(&self) -> f64 {
         2.0 * self.sign() * self.sigma * self.beta
     }
 
-    /// ∫₀¹φ_j dξ = 2σ_j/β_j.
+    /// Returns ∫₀¹φ_j dξ = 2σ_j/β_j, by which a force spread evenly over the beam drives the mode.
     pub fn integral(&self) -> f64 {
         2.0 * self.sigma / self.beta
     }
 
-    /// ∫₀¹φ_j φ_j'''' dξ = β_j⁴: the modal stiffness, and the squared frequency.
+    /// Returns β_j⁴ = ∫₀¹φ_j φ_j'''' dξ, dimensionless: the modal stiffness, and the squared
+    /// natural frequency, because the modal mass is 1.
     pub fn stiffness(&self) -> f64 {
         (self.beta * self.beta).powi(2)
     }
@@ -148,7 +149,7 @@ impl Mode {
     }
 }
 
-/// (−1)^(number+1).
+/// Returns (−1)^(number+1): 1 for odd, −1 for even numbers.
 fn alternating(number: usize) -> f64 {
     if number % 2 == 1 { 1.0 } else { -1.0 }
 }
@@ -184,22 +185,22 @@ fn sinh_minus_sin(x: f64) -> f64 {
     x.powi(3) / 3.0 * series
 }
 
-/// The first N modes, with what the Galerkin equations need of them. Index 0 of
-/// every vector belongs to mode 1.
+/// The first N modes, with the vectors that the Galerkin equations need. Index 0 of every vector
+/// belongs to mode 1.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Modes {
     all: Vec<Mode>,
-    /// Wave numbers β_j.
+    /// Wave numbers β_j, ascending, dimensionless, length N.
     pub beta: Vec<f64>,
-    /// σ_j.
+    /// Shape coefficients σ_j = (sinh β_j − sin β_j)/(cosh β_j + cos β_j), length N.
     pub sigma: Vec<f64>,
-    /// Modal stiffnesses β_j⁴.
+    /// Modal stiffnesses β_j⁴, which are the squared natural frequencies, dimensionless, length N.
     pub stiffness: Vec<f64>,
-    /// p_j = φ_j(1).
+    /// Tip deflections p_j = φ_j(1), dimensionless, length N.
     pub tip: DVector<f64>,
-    /// φ_j′(1).
+    /// Tip slopes φ_j′(1) = dφ_j/dξ at ξ = 1, dimensionless, length N.
     pub tip_slope: DVector<f64>,
-    /// I_j = ∫₀¹φ_j dξ.
+    /// Integrals I_j = ∫₀¹φ_j dξ over the beam, dimensionless, length N.
     pub integral: DVector<f64>,
 }
 
@@ -225,8 +226,8 @@ impl Modes {
         })
     }
 
-    /// By how much these modes together are stiffer against a constant force at the tip than
-    /// the beam, as a part of its stiffness: EI/L³ over Σφ_j(1)²/β_j⁴, against 3EI/L³.
+    /// Returns by which fraction these modes are stiffer than the beam against a static force at
+    /// the tip: EI/L³ over Σφ_j(1)²/β_j⁴, relative to 3EI/L³, less 1.
     pub fn static_excess(&self) -> f64 {
         let give: f64 = self
             .iter()
@@ -235,8 +236,8 @@ impl Modes {
         1.0 / (3.0 * give) - 1.0
     }
 
-    /// The first `count` modes, computed once in the life of the program: they depend on
-    /// nothing else, and a fine sweep asks for them at each of its values.
+    /// Returns the first `count` modes, computed once per run of the program and shared: they
+    /// depend on nothing else, and a fine sweep needs them at each of its values.
     ///
     /// # Errors
     /// As [`Modes::new`].

@@ -33,12 +33,12 @@ pub(crate) struct Beam<'a> {
     forcing: HarmonicVector,
     /// What a force at the tip adds to ẋ: M⁻¹p at the velocities.
     kick: DVector<f64>,
-    /// V_T and its rate.
+    /// Height V_T of the tip over the undeformed surface, and its rate V̇_T.
     height: Output,
     height_rate: Output,
 }
 
-/// What a beam with its sample shows; see the fields of [`Model`](crate::model::Model).
+/// Outputs of a beam with its sample; see the fields of [`Model`](crate::model::Model).
 pub(crate) struct Outputs {
     pub(crate) tip: Output,
     pub(crate) gap: Output,
@@ -188,18 +188,19 @@ impl<'a> Beam<'a> {
         })
     }
 
-    /// V_T.
+    /// Returns the height V_T of the tip over the undeformed surface, in units of g₀.
     pub(crate) const fn height(&self) -> &Output {
         &self.height
     }
 
-    /// What a force at the tip adds to ẋ.
+    /// Returns the derivative of ẋ with respect to a force at the tip: M⁻¹p at the velocities, else
+    /// 0.
     pub(crate) const fn kick(&self) -> &DVector<f64> {
         &self.kick
     }
 
-    /// How much of the sample's force is in the force with which a moving clamp pushes, see
-    /// [`Beam::powers_in`].
+    /// Returns the factor of the sample's force in the force with which a moving clamp pushes, see
+    /// [`Beam::powers_in`]; 0 where the clamp is at rest.
     pub(crate) fn clamp_force(&self) -> f64 {
         if self.galerkin.case.actuation != Actuation::Base {
             return 0.0;
@@ -229,7 +230,7 @@ impl<'a> Beam<'a> {
             .with_constant(number(form.constant))
     }
 
-    /// One regime. `known` says that its spectrum is that of a beam with spring and damper
+    /// Builds one regime. `known` states that its spectrum is that of a beam with spring and damper
     /// at its tip, apart from the internal variables.
     pub(crate) fn regime(
         &self,
@@ -273,7 +274,7 @@ impl<'a> Beam<'a> {
         nanotap_flow::Regime::with_basis(r, matrix, forcing, self.drive, basis)
     }
 
-    /// The way out of flight, and out of contact.
+    /// Returns the transitions out of flight, and those out of contact.
     pub(crate) fn transitions(&self, law: &Law) -> Vec<Vec<Transition>> {
         let mut begins = Transition::new(self.combined(&law.gap), 1);
         let mut ends = Transition::new(self.combined(&law.release_guard), 0);
@@ -303,7 +304,8 @@ impl<'a> Beam<'a> {
         Reset { matrix, offset }
     }
 
-    /// Outputs of the joined system of so many regimes.
+    /// Returns the outputs of the beam on its sample, with a force for each of the `regimes`
+    /// regimes.
     pub(crate) fn outputs(&self, law: &Law, regimes: usize) -> Outputs {
         let modes = &self.galerkin.modes;
         Outputs {
@@ -443,7 +445,7 @@ impl<'a> Beam<'a> {
         }
     }
 
-    /// The rate of a measured mode, with what the base carries along.
+    /// Returns the rate of a measured mode, the part that moves with the base included.
     fn speed(&self, of: &Correction, base_rate: &Output) -> Output {
         let own = self.layout.row(&of.row, 1);
         own.plus(of.base.value, base_rate)
@@ -460,7 +462,7 @@ impl<'a> Beam<'a> {
         })
     }
 
-    /// The derivative of all this with respect to a parameter.
+    /// Computes the derivative of the beam with respect to a parameter.
     pub(crate) fn derivative(&self, parameter: Parameter) -> BeamTangent {
         let derivative = self.galerkin.derivative(parameter);
         let free = Regime::Free.index();
@@ -527,12 +529,12 @@ pub(crate) struct BeamTangent {
 }
 
 impl BeamTangent {
-    /// ∂f in flight.
+    /// Returns the derivative of the forcing f in flight.
     pub(crate) const fn forcing(&self) -> &HarmonicVector {
         &self.forcing
     }
 
-    /// ∂V_T.
+    /// Returns the derivative of the height V_T of the tip.
     pub(crate) const fn height(&self) -> &Output {
         &self.height
     }
@@ -544,12 +546,13 @@ impl BeamTangent {
             .plus(form.rate.value, &self.height_rate)
     }
 
-    /// The derivative of V_T.
+    /// Consumes the tangent and returns the derivative of the height V_T.
     pub(crate) fn into_height(self) -> Output {
         self.height
     }
 
-    /// The derivative of the base's displacement, which the height of the tip has in it.
+    /// Returns the derivative of the displacement of the base, which is a part of the tip's height;
+    /// 0 where the base is at rest.
     pub(crate) fn base(&self, beam: &Beam<'_>) -> Output {
         let mut base = self.height.scaled(0.0);
         if beam.galerkin.case.actuation == Actuation::Base {
@@ -609,7 +612,7 @@ impl BeamTangent {
     }
 }
 
-/// M⁻¹.
+/// Cholesky factor of the mass matrix M, for products with M⁻¹.
 struct Solve {
     mass: nalgebra::Cholesky<f64, nalgebra::Dyn>,
 }

@@ -26,24 +26,25 @@ words! {
     }
 }
 
-/// A dimensionless case. Fields are as given: [`validate`](Self::validate) says
-/// whether they make sense, and whatever is built from a case calls it.
+/// A dimensionless case. The fields are not checked when set: [`validate`](Self::validate) checks
+/// them, and whatever is built from a case calls it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Cantilever {
     /// Number of beam modes N, 1 to 50.
     pub modes: usize,
-    /// Tip mass over beam mass, ≥ 0.
+    /// Tip mass over beam mass, M/(mL), dimensionless, ≥ 0.
     pub alpha1: f64,
-    /// Drive amplitude over the beam's gap, ≥ 0; 0 is an undriven beam.
+    /// Drive amplitude, ≥ 0; 0 is an undriven beam. Motion of the base over the beam's gap, f/g₀,
+    /// or a force in units of EI g₀/L³.
     pub alpha2: f64,
-    /// Damping of the beam, ≥ 0.
+    /// Viscous damping of the beam, C·√(L⁴/(m·EI)), dimensionless, ≥ 0.
     pub alpha3: f64,
-    /// Contact stiffness over bending stiffness, ≥ 0.
+    /// Contact stiffness over bending stiffness, K₁L³/(EI), dimensionless, ≥ 0.
     pub alpha4: f64,
-    /// The tip's gap over the beam's gap; negative where the sample stands beyond
-    /// the tip's rest position, so that the tip presses on it at rest.
+    /// Tip gap over beam gap, g₁/g₀, dimensionless; negative where the surface is beyond the tip's
+    /// rest position, so that the tip presses on it at rest.
     pub alpha5: f64,
-    /// Damping of the contact, ≥ 0.
+    /// Viscous damping of the contact, (C₁/L)·√(L⁴/(m·EI)), dimensionless, ≥ 0.
     pub alpha6: f64,
     /// Drive frequency Ω > 0, in units of √(EI/(mL⁴)).
     pub omega: f64,
@@ -58,10 +59,10 @@ pub struct Cantilever {
     pub actuation: Actuation,
     /// Frequencies of further tones over Ω: of the second, and of a third.
     pub further_tones: Vec<FrequencyRatio>,
-    /// Time and stiffness of each relaxing arm, of a contact law with a list of these, in the model's
-    /// units.
+    /// Relaxing arms, each `[time, stiffness]` in units of √(mL⁴/(EI)) and EI/L³; empty for a
+    /// contact law without a list of arms.
     pub arms: Vec<[f64; 2]>,
-    /// The parameters that only some laws, drives and levers have; see [`get`](Self::get).
+    /// Parameters that only some laws, drives and levers have; see [`get`](Self::get).
     pub further: Numbers,
 }
 
@@ -179,7 +180,7 @@ impl Cantilever {
         self.written().filter(|of| is_of_law(*of))
     }
 
-    /// Whether modes were measured.
+    /// Returns true if a frequency, quality factor or stiffness of a higher mode was measured.
     pub fn has_measured_modes(&self) -> bool {
         Parameter::MEASURED.iter().any(|of| self.has(*of))
     }
@@ -190,7 +191,8 @@ impl Cantilever {
         own.map(|parameter| self.get(parameter)).collect()
     }
 
-    /// Stiffness and damper of the arm that its contact law has in place of α6, if it has one.
+    /// Returns stiffness and damping of the single arm that the contact law has in place of α6, in
+    /// model units; `None` for other laws.
     pub fn arm(&self) -> Option<[f64; 2]> {
         match self.contact.entry().damper {
             Damper::InArm { arm: Some(arm), .. } => Some(arm(&self.own_numbers())),
@@ -209,8 +211,8 @@ impl Cantilever {
         u32::try_from(repetition(&self.further_tones)).unwrap_or(u32::MAX)
     }
 
-    /// The period of the drive: 2π/Ω, or with several tones the time after which all
-    /// repeat.
+    /// Returns the period of the drive, in units of √(mL⁴/(EI)): 2π/Ω, or with several tones the
+    /// time after which all repeat.
     pub fn period(&self) -> f64 {
         f64::from(self.repetition()) * std::f64::consts::TAU / self.omega
     }
@@ -226,8 +228,8 @@ impl Cantilever {
         self
     }
 
-    /// What is wrong with the value of a parameter with this case's law and drive: one that does
-    /// not apply, or one that the law does not allow.
+    /// Returns why the value of a parameter is invalid with this case's law and drive: it does not
+    /// apply, or the law does not allow it. `None` if it is valid.
     pub(crate) fn misplaced(&self, parameter: Parameter) -> Option<Reason> {
         let applies = parameter.entry().applies;
         if self.has(parameter) {
@@ -255,8 +257,7 @@ impl Cantilever {
     /// Checks every field.
     ///
     /// # Errors
-    /// [`CantileverError`] for the first field that makes no sense, with its value and
-    /// what would be right.
+    /// [`CantileverError`] for the first invalid field, with its value and the remedy.
     pub fn validate(&self) -> Result<(), CantileverError> {
         if !(1..=MAX_MODES).contains(&self.modes) {
             return Err(ModeCountError { given: self.modes }.into());
@@ -279,7 +280,7 @@ impl Cantilever {
     /// Checks the relaxing arms.
     ///
     /// # Errors
-    /// [`CantileverError`] for the first value that makes no sense.
+    /// [`CantileverError`] for the first invalid value.
     pub(crate) fn check_arms(&self) -> Result<(), CantileverError> {
         let refuse = |value, reason| {
             Err(CantileverError {
@@ -342,7 +343,8 @@ impl Cantilever {
         )
     }
 
-    /// What the sample answers, with the derivative of its numbers with respect to `parameter`.
+    /// Returns the equations of the contact law, with the derivatives of its numbers with respect
+    /// to `parameter`.
     pub(crate) fn contact_law(&self, parameter: Option<Parameter>) -> Law {
         let number = |number| self.dual(number, parameter);
         self.contact.law(number, &self.arms)
@@ -357,7 +359,7 @@ fn is_of_law(parameter: Parameter) -> bool {
 /// Checks one parameter on its own.
 ///
 /// # Errors
-/// [`CantileverError`] if `value` makes no sense for `parameter`.
+/// [`CantileverError`] if `value` is not allowed for `parameter`.
 pub fn check(parameter: Parameter, value: f64) -> Result<(), CantileverError> {
     match objection(parameter, value) {
         None => Ok(()),
@@ -369,7 +371,7 @@ pub fn check(parameter: Parameter, value: f64) -> Result<(), CantileverError> {
     }
 }
 
-/// What is wrong with `value` for `parameter`, if anything.
+/// Returns why `value` is not allowed for `parameter`; `None` if it is.
 fn objection(parameter: Parameter, value: f64) -> Option<Reason> {
     if !value.is_finite() {
         return Some(Reason::NotFinite);
@@ -387,15 +389,15 @@ fn objection(parameter: Parameter, value: f64) -> Option<Reason> {
     })
 }
 
-/// A field of a [`Cantilever`] that makes no sense.
+/// An invalid field of a [`Cantilever`].
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("`{key}` = {}: {reason}", shortest(*value))]
 pub struct CantileverError {
     /// The field's name in a case file.
     pub key: &'static str,
-    /// The value given.
+    /// Refused value, in model units; a count where the number of modes or arms is invalid.
     pub value: f64,
-    /// The remedy.
+    /// Why the value is refused; its text says what is allowed.
     pub reason: Reason,
 }
 
@@ -446,19 +448,19 @@ impl From<ModeCountError> for CantileverError {
 pub enum Reason {
     /// The number of modes lies outside 1 … 50.
     Modes,
-    /// NaN or infinite.
+    /// The value is NaN or infinite.
     NotFinite,
     /// A mass, stiffness or damping below zero.
     Negative,
     /// A drive amplitude below zero.
     NegativeDrive,
-    /// A size beyond 10⁹.
+    /// The magnitude exceeds 10⁹, the limit of all α: probably a value in SI units.
     TooLarge,
-    /// Ω ≤ 0.
+    /// The drive frequency Ω is zero or negative.
     FrequencyNotPositive,
     /// Ω outside 10⁻⁶ … 10⁶.
     FrequencyOutOfRange,
-    /// What the contact law objects to.
+    /// The contact law does not allow the value, for the reason given.
     Law(&'static str),
     /// Too many relaxing arms, or none.
     Arms,
@@ -468,9 +470,9 @@ pub enum Reason {
     SpringOfLaw,
     /// A number that only this other law has.
     OtherLaw(ContactLaw),
-    /// The strength or phase of a further tone, by its number, that has no frequency.
+    /// Amplitude or phase of a further tone, by its number (2 or 3), that has no frequency.
     NoTone(usize),
-    /// Too many tones.
+    /// More than three tones, or a third tone that never repeats together with the first.
     Tones,
     /// Two tones with the same frequency.
     SameTone,

@@ -18,7 +18,7 @@ use serde::{Serialize, Serializer};
 use crate::model::words::words;
 
 words! {
-    /// Where the drive acts.
+    /// Where the drive acts: at the clamped end, at the tip, or along the beam.
     Actuation {
         /// The clamped end is moved, as in the paper.
         Base = "base",
@@ -30,9 +30,9 @@ words! {
 }
 
 words! {
-    /// What of the drive stays while another key varies.
+    /// The quantity of the drive that stays constant while another key varies.
     Hold {
-        /// Its own amplitude or force, as a piezo keeps its voltage.
+        /// The amplitude or force of the drive, as of a piezo at constant voltage.
         Drive = "drive",
         /// The free amplitude of the tip: the drive follows the key that varies.
         FreeAmplitude = "free_amplitude",
@@ -40,7 +40,7 @@ words! {
 }
 
 impl Actuation {
-    /// What it is, in a few words.
+    /// Returns a description in a few words.
     pub const fn meaning(self) -> &'static str {
         match self {
             Self::Base => "the clamped end is moved",
@@ -58,37 +58,38 @@ pub struct FrequencyRatio {
     value: f64,
 }
 
-/// Most tones of a drive.
+/// Largest number of tones of a drive, the first included.
 pub const MAX_TONES: usize = 3;
 
-/// Most periods of the first tone after which all repeat, and the largest numerator.
+/// Largest denominator and largest numerator of a ratio. The first is also the largest number of
+/// periods of the first tone after which all repeat.
 pub(crate) const LARGEST: (u32, u32) = (2_000, 20_000);
-/// How near a number must be to a ratio to count as one.
+/// Relative distance within which a number counts as a ratio of whole numbers.
 const NEAR: f64 = 1e-9;
 
-/// Why two frequencies make no two-tone drive.
+/// Why a ratio of two frequencies is refused.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum RatioError {
-    /// Not a ratio at all.
+    /// The text is not a ratio of positive numbers.
     #[error(
         "\"{given}\" is not a ratio of frequencies; write it as in \"25/4\", with whole numbers"
     )]
     Form {
-        /// The given text.
+        /// Text that was given as the ratio.
         given: String,
     },
-    /// Zero, or too large.
+    /// The numerator or the denominator is zero or too large.
     #[error(
         "{numerator}/{denominator} is out of range: the numerator goes from 1 to {}, the denominator, in \
          lowest terms, from 1 to {}", LARGEST.1, LARGEST.0
     )]
     Range {
-        /// As given.
+        /// Numerator as given, not reduced to lowest terms.
         numerator: u64,
-        /// As given.
+        /// Denominator as given, not reduced to lowest terms.
         denominator: u64,
     },
-    /// One and the same frequency.
+    /// The ratio is 1: both tones have the same frequency.
     #[error("the two tones have the same frequency: add their amplitudes to one tone")]
     One,
     /// Not a ratio of small whole numbers.
@@ -97,9 +98,9 @@ pub enum RatioError {
          would not repeat; the nearest is {nearest}", LARGEST.0
     )]
     Irrational {
-        /// The ratio.
+        /// Ratio of the frequencies as given, dimensionless.
         ratio: f64,
-        /// The nearest that would do.
+        /// Nearest ratio that is allowed.
         nearest: FrequencyRatio,
     },
 }
@@ -135,8 +136,9 @@ impl FrequencyRatio {
         })
     }
 
-    /// The ratio of two tones that need not repeat together. The map of such a drive is over one
-    /// period of the first tone, and the second one's phase is another at the beginning of the next.
+    /// Returns the ratio of two tones that need not repeat together. The map of such a drive covers
+    /// one period of the first tone, and the phase of the second tone differs from one period to
+    /// the next.
     pub(crate) const fn unlocked(value: f64) -> Self {
         Self {
             numerator: 0,
@@ -150,10 +152,10 @@ impl FrequencyRatio {
         self.numerator > 0
     }
 
-    /// The ratio that a number is.
+    /// Finds the ratio of whole numbers that `ratio` equals within a relative 10⁻⁹.
     ///
     /// # Errors
-    /// [`RatioError::Irrational`] names the nearest one where it is none.
+    /// [`RatioError::Irrational`] with the nearest allowed ratio, if there is no such ratio.
     pub fn of(ratio: f64) -> Result<Self, RatioError> {
         let mut nearest: Option<(f64, Self)> = None;
         for denominator in 1..=u64::from(LARGEST.0) {
@@ -176,17 +178,17 @@ impl FrequencyRatio {
         })
     }
 
-    /// p: the tone's periods in a repetition of it and the first.
+    /// Returns p, the number of periods of the tone in one repetition of it and the first.
     pub const fn numerator(self) -> u32 {
         self.numerator
     }
 
-    /// q: the first tone's periods in a repetition of both.
+    /// Returns q, the number of periods of the first tone in one repetition of both.
     pub const fn denominator(self) -> u32 {
         self.denominator
     }
 
-    /// p/q.
+    /// Returns the frequency of the tone over that of the first, p/q, dimensionless.
     pub const fn value(self) -> f64 {
         self.value
     }

@@ -24,10 +24,10 @@ pub enum EnclosureError {
     /// Its flow has no closed form.
     #[error("the law `{law}` is nonlinear: only piecewise-linear motion is known in closed form")]
     NonlinearLaw {
-        /// The law.
+        /// Names of the nonlinear laws, joined by ` + `.
         law: String,
     },
-    /// Modes that were measured.
+    /// The lever has measured higher modes, but proofs are of uniform beams.
     #[error("proofs are of uniform beams, and this one has measured higher modes")]
     MeasuredModes,
     /// A force that jumps where contact begins.
@@ -36,7 +36,7 @@ pub enum EnclosureError {
          \"{law}\" jumps by its adhesion"
     )]
     ForceJumps {
-        /// The contact law.
+        /// Contact law whose force jumps where contact begins.
         law: ContactLaw,
     },
     /// A motion that was integrated step by step.
@@ -45,7 +45,7 @@ pub enum EnclosureError {
     /// A wave number could not be enclosed.
     #[error("the wave number of mode {mode} could not be enclosed")]
     WaveNumber {
-        /// The mode, from 1.
+        /// Number of the mode, counted from 1.
         mode: usize,
     },
     /// The flow could not be enclosed.
@@ -53,13 +53,13 @@ pub enum EnclosureError {
     Flow(#[from] ProofError),
 }
 
-/// A mode's numbers that the equations need.
+/// Coefficients of one mode in the equations.
 struct EnclosedMode {
-    /// β⁴.
+    /// Modal stiffness β⁴, dimensionless.
     stiffness: Interval,
-    /// φ(1).
+    /// Tip deflection φ(1), dimensionless.
     tip: Interval,
-    /// ∫φ.
+    /// Integral ∫₀¹φ dξ over the beam.
     integral: Interval,
 }
 
@@ -70,13 +70,13 @@ struct EnclosedBeam {
     memory: usize,
     tones: usize,
     frequencies: Vec<Interval>,
-    /// M⁻¹p over p.
+    /// The factor 1/(1 + 4N α1) in M⁻¹p = p/(1 + 4N α1).
     give: Interval,
     alpha1: Interval,
     alpha3: Interval,
-    /// V_T.
+    /// Height V_T of the tip over the undeformed surface.
     height: Output,
-    /// V̇_T.
+    /// Rate V̇_T of that height.
     height_rate: Output,
     /// Force along p and along I of each tone.
     drives: Vec<[Rectangle; 2]>,
@@ -85,7 +85,7 @@ struct EnclosedBeam {
 /// The system of a cantilever in intervals.
 ///
 /// # Errors
-/// [`EnclosureError`] where that cannot be had.
+/// [`EnclosureError`] if the case is not piecewise linear, or cannot be enclosed.
 pub fn enclosed(case: &Cantilever) -> Result<System, EnclosureError> {
     if let Some(law) = &case.law {
         return Err(EnclosureError::NonlinearLaw { law: law.name() });
@@ -131,9 +131,9 @@ pub fn enclosed(case: &Cantilever) -> Result<System, EnclosureError> {
     Ok(System::new(period, beam.frequencies.clone(), regimes)?)
 }
 
-/// The system of an oscillator in intervals: mẍ + cẋ + kx = F cos ωt before the stop, and
+/// Builds the system of an oscillator in intervals: mẍ + cẋ + kx = F cos ωt before the stop, and
 /// behind a soft one its spring and damper too. A rigid stop has impacts; a mass that sticks to it
-/// has no place here.
+/// is not covered.
 ///
 /// # Errors
 /// [`EnclosureError::Flow`] where its flow cannot be enclosed.
@@ -233,8 +233,8 @@ impl EnclosedMode {
     }
 }
 
-/// A number of a law, which is 0, ±1 or a product or quotient of typed parameters and their
-/// sums without cancellation: it is within 8 of its last places.
+/// Encloses a number of a law, which is 0, ±1 or a product or quotient of typed parameters and
+/// their sums without cancellation: it is within 8 units of its last place.
 fn derived(value: f64) -> Interval {
     if value == 0.0 {
         return Interval::ZERO;
@@ -243,7 +243,8 @@ fn derived(value: f64) -> Interval {
     typed + typed * Interval::around_zero(8.0 * f64::EPSILON)
 }
 
-/// The same of a number that is ±1 by definition wherever it is ±1.
+/// Encloses a number of a law as [`derived`] does, but ±1 exactly, for numbers that are ±1 by
+/// definition.
 fn exact(value: f64) -> Interval {
     if value.abs() == 1.0 {
         Interval::point(value)

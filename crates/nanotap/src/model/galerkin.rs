@@ -22,15 +22,15 @@ use nanotap_arithmetic::Scalar as _;
 pub enum Regime {
     /// Free flight, V_T > 0.
     Free,
-    /// Contact, V_T ≤ 0.
+    /// Contact of tip and sample, V_T ≤ 0.
     Contact,
 }
 
 impl Regime {
-    /// Both, in the order of the arrays in this module.
+    /// Both regimes, in the order of the arrays in this module.
     pub const ALL: [Self; 2] = [Self::Free, Self::Contact];
 
-    /// The regime's place in the arrays of this module.
+    /// Returns the index of the regime in the arrays of this module.
     pub const fn index(self) -> usize {
         match self {
             Self::Free => 0,
@@ -57,9 +57,9 @@ pub struct Forcing {
 pub struct Gap {
     /// The row p in front of X.
     pub tip: DVector<f64>,
-    /// The coefficient of sin Ωτ.
+    /// Coefficient of sin Ωτ, in units of g₀.
     pub sine: f64,
-    /// The part constant in time.
+    /// Part constant in time, in units of g₀.
     pub constant: f64,
     /// Sine and cosine coefficients at the frequencies of further tones.
     pub further: Vec<[f64; 2]>,
@@ -68,9 +68,9 @@ pub struct Gap {
 /// The equations of motion of one case. Arrays are indexed by [`Regime::index`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct Galerkin {
-    /// The case.
+    /// The dimensionless case of these equations.
     pub case: Cantilever,
-    /// The beam's modes.
+    /// Modes of the bare beam, N of them.
     pub modes: Arc<Modes>,
     /// M, N×N, the same in both regimes: Eqs. (11), (15).
     pub mass: DMatrix<f64>,
@@ -78,11 +78,11 @@ pub struct Galerkin {
     pub damping: [DMatrix<f64>; 2],
     /// K, N×N: Eqs. (13), (17).
     pub stiffness: [DMatrix<f64>; 2],
-    /// F: Eqs. (14), (18).
+    /// Generalised forces F of length N, in units of EI g₀/L³: Eqs. (14), (18).
     pub forcing: [Forcing; 2],
-    /// V_T: Eq. (8).
+    /// Height V_T of the tip over the undeformed surface, in units of g₀: Eq. (8).
     pub gap: Gap,
-    /// What measured modes add, which is in the matrices.
+    /// Corrections by measured modes, which the matrices already contain.
     pub(crate) corrections: Vec<Correction>,
 }
 
@@ -90,15 +90,15 @@ pub struct Galerkin {
 /// It is that of the coefficients: Ω in the argument of sin Ωτ is not varied.
 #[derive(Clone, Debug, PartialEq)]
 pub struct GalerkinDerivative {
-    /// ∂M.
+    /// Derivative of the mass matrix M, N×N.
     pub mass: DMatrix<f64>,
-    /// ∂C.
+    /// Derivatives of the damping matrices C, N×N.
     pub damping: [DMatrix<f64>; 2],
-    /// ∂K.
+    /// Derivatives of the stiffness matrices K, N×N.
     pub stiffness: [DMatrix<f64>; 2],
-    /// ∂F.
+    /// Derivatives of the generalised forces F, of length N.
     pub forcing: [Forcing; 2],
-    /// ∂V_T.
+    /// Derivative of the coefficients of V_T.
     pub gap: Gap,
 }
 
@@ -142,8 +142,8 @@ impl Galerkin {
 }
 
 impl GalerkinDerivative {
-    /// Adds what measured modes do, or the derivative of that by `parameter`: to the matrices,
-    /// and where the base moves by y the force −(mass ÿ + damping ẏ) along each.
+    /// Adds the corrections by measured modes, or their derivatives by `parameter`: to the
+    /// matrices, and where the base moves by y, the force −(mass ÿ + damping ẏ) along each mode.
     fn correct(
         &mut self,
         case: &Cantilever,
@@ -189,16 +189,16 @@ impl Forcing {
     }
 }
 
-/// One tone of the drive, its numbers factors of the vectors that they stand at.
+/// One tone of the drive, as sine and cosine factors of the vectors p and I and in the gap.
 #[derive(Clone, Copy, Debug)]
 struct Tone<N> {
     /// Force along p: sine, cosine.
     tip: [N; 2],
-    /// Force along I.
+    /// Force along I, spread over the beam: sine, cosine.
     spread: [N; 2],
-    /// Part of the gap.
+    /// Contribution to the gap V_T: sine, cosine.
     gap: [N; 2],
-    /// What contact adds along p.
+    /// Force along p that contact adds: sine, cosine.
     contact: [N; 2],
 }
 
@@ -254,11 +254,11 @@ impl Tone<Dual> {
     }
 }
 
-/// Which tone.
+/// A tone of the drive: the first, or a further one.
 #[derive(Clone, Copy)]
 enum Which {
     First,
-    /// Its place among the further tones, and its frequency over that of the first.
+    /// Index among the further tones, and frequency over that of the first.
     Further(usize, FrequencyRatio),
 }
 
@@ -269,7 +269,7 @@ impl Which {
         std::iter::once(Self::First).chain(further.map(|(k, ratio)| Self::Further(k, *ratio)))
     }
 
-    /// Its frequency.
+    /// Returns the angular frequency, in units of √(EI/(mL⁴)).
     fn rate(self, dual: &impl Fn(Parameter) -> Dual) -> Dual {
         let omega = dual(Parameter::Omega);
         match self {
@@ -297,12 +297,12 @@ struct Coefficients {
 }
 
 impl Coefficients {
-    /// Eqs. (8) and (11)–(18).
+    /// Computes the coefficients of Eqs. (8) and (11)–(18).
     fn of(case: &Cantilever) -> Self {
         Self::numbers(case, None, |dual| dual.value)
     }
 
-    /// The derivatives of [`of`](Self::of).
+    /// Computes the derivatives of the coefficients with respect to `parameter`.
     fn derivative(case: &Cantilever, parameter: Parameter) -> Self {
         Self::numbers(case, Some(parameter), Dual::derivative)
     }

@@ -9,13 +9,13 @@
 //! M + (s − 1) uuᵀ,   C + (sω′/Q − vᵀCv) uuᵀ,   K + (sω′² − ω²) uuᵀ,
 //! ```
 //!
-//! ω′ its measured frequency, Q its quality factor, s = k (p·v)²/ω′² the modal mass that the
-//! stiffness k₂ or k₃ felt at the tip tells (otherwise 1; without Q damping stays in proportion to the
-//! modal mass). Its shape stays, and so do all other modes, but for what C, which has no part in
-//! the tip's mass, couples between them. A base that moves by y carries the mode along by
-//! (α₁p + I)·v y: mass and damping act on the sum.
+//! ω′ is its measured frequency, Q its quality factor, and s = k (p·v)²/ω′² the modal mass that
+//! follows from the stiffness k₂ or k₃ at the tip (1 without a stiffness; without Q the damping
+//! stays in proportion to the modal mass). The shape of the mode stays the same, and so do all
+//! other modes, except for the coupling by C, which has no part in the tip's mass. A base that
+//! moves by y carries the mode along by (α₁p + I)·v y: mass and damping act on the sum.
 //!
-//! Fails: numbers of a mode that the case does not have count for nothing.
+//! Limitation: measured numbers of a mode that the case does not have are ignored.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -28,22 +28,22 @@ use nanotap_arithmetic::Scalar as _;
 /// What a measured mode adds: a term of rank one to each matrix, with its derivatives.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Correction {
-    /// u = Mv.
+    /// u = Mv of the free mode v, length N.
     pub(crate) row: DVector<f64>,
-    /// ∂u.
+    /// Derivative of u by the parameter, length N.
     pub(crate) row_change: DVector<f64>,
     /// (α₁p + I)·v, by which the mode moves with the base.
     pub(crate) base: Dual,
-    /// s − 1.
+    /// Factor s − 1 of uuᵀ in M, dimensionless.
     pub(crate) mass: Dual,
-    /// Of C.
+    /// Factor of uuᵀ in C, dimensionless.
     pub(crate) damping: Dual,
-    /// Of K.
+    /// Factor of uuᵀ in K, dimensionless.
     pub(crate) stiffness: Dual,
 }
 
 impl Correction {
-    /// Those of a case; derivatives are by `parameter`.
+    /// Computes the corrections of a case, with derivatives by `parameter`.
     pub(crate) fn all(case: &Cantilever, beam: &Modes, parameter: Option<Parameter>) -> Vec<Self> {
         if !case.has_measured_modes() {
             return Vec::new();
@@ -97,9 +97,9 @@ impl Correction {
 
 /// The free modes of the uniform beam with its tip.
 struct FreeModes {
-    /// ω², ascending.
+    /// Squared natural frequencies ω², ascending, in units of EI/(mL⁴).
     squares: Vec<f64>,
-    /// v, a column each, vᵀMv = 1.
+    /// Mode shapes v as columns, normalised to vᵀMv = 1.
     shapes: DMatrix<f64>,
 }
 

@@ -1,5 +1,4 @@
-//! The model of a case as a piecewise-linear system with the outputs that someone
-//! wants to see.
+//! The model of a case: a piecewise-linear system with named outputs.
 //!
 //! State: `(a_1 … a_N, ȧ_1 … ȧ_N)` for the cantilever, after which comes the memory of a
 //! sample that recovers (see [`contact`]), zero at rest; `(x, ẋ)` for an
@@ -53,21 +52,21 @@ use crate::model::parameter::Parameter;
 /// Why a cantilever or an oscillator has no model.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ModelError {
-    /// A number of the cantilever makes no sense.
+    /// A parameter of the cantilever is invalid.
     #[error(transparent)]
     Cantilever(#[from] CantileverError),
-    /// The oscillator makes no sense.
+    /// A parameter of the oscillator is invalid.
     #[error(transparent)]
     Oscillator(#[from] crate::model::oscillator::OscillatorError),
-    /// Its equations cannot be solved in closed form.
+    /// The equations cannot be solved in closed form.
     #[error(transparent)]
     Flow(#[from] FlowError),
-    /// Its force law makes no sense, or its modes cannot be computed.
+    /// The force law is invalid, or the modes cannot be computed.
     #[error(transparent)]
     Nonlinear(#[from] nanotap_volterra::VolterraError),
 }
 
-/// A piecewise-linear system with names for what it shows.
+/// A piecewise-linear system with named outputs, such as the tip displacement and the force.
 ///
 /// ```
 /// use nanotap::model::Model;
@@ -81,9 +80,9 @@ pub enum ModelError {
 /// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Model {
-    /// The system.
+    /// Regimes, transitions and drive of the piecewise-linear system, in model units.
     pub system: Arc<System>,
-    /// Which regimes are contact.
+    /// Whether tip and sample touch in each regime; an entry per regime.
     pub contact: Vec<bool>,
     /// Tip displacement relative to the base, W (the oscillator's x).
     pub tip: Output,
@@ -92,21 +91,21 @@ pub struct Model {
     pub gap: Output,
     /// Height V_T of the tip over the undeformed surface; minus the indentation in contact.
     pub height: Output,
-    /// Force of the sample on the tip, positive when it pushes the tip away; an entry
-    /// a regime.
+    /// Force of the sample on the tip, positive when it pushes the tip away; an entry per regime.
+    /// The unit is EI g₀/L³ for a cantilever.
     pub force: Vec<Output>,
-    /// What feeds and drains energy: see [`Model::power`].
+    /// Energy flows in each regime: see [`Model::power`].
     pub(crate) power: PowersOnDemand,
     /// The rigid stop, if there is one.
     pub rigid_stop: Option<RigidStop>,
     /// The beam's modes, if it is a beam.
     pub beam: Option<BeamOutputs>,
-    /// How many numbers at the end of the state are the sample's.
+    /// Number of entries at the end of the state that belong to the sample.
     pub memory: usize,
-    /// Phases of further tones in rad.
+    /// Phases of further tones, rad; an entry per tone.
     pub tone_phases: Vec<f64>,
-    /// How an internal variable of the surface that is overwritten at the end of each contact
-    /// changes volumes of states.
+    /// Data of an internal variable of the surface that is overwritten at the end of each contact,
+    /// with which the volume change of the map is computed; `None` without such a variable.
     pub memory_reset: Option<MemoryReset>,
     /// The flow under a nonlinear force law; the system is then free flight alone.
     pub nonlinear: Option<Arc<Nonlinear>>,
@@ -117,11 +116,11 @@ pub struct Model {
 /// A rigid stop on which the tip bounces.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct RigidStop {
-    /// The mass m that bounces.
+    /// Mass m that bounces, in the oscillator's unit of mass.
     pub mass: f64,
-    /// The coefficient of restitution r.
+    /// Coefficient of restitution r, dimensionless, 0 to 1.
     pub restitution: f64,
-    /// Tip displacement at the stop.
+    /// Tip displacement x at the stop, in the oscillator's unit of length.
     pub tip: f64,
 }
 
@@ -144,8 +143,7 @@ pub struct MemoryReset {
     pub kick: nalgebra::DVector<f64>,
 }
 
-/// What feeds and drains energy in one regime, as sums of `weight · a · b` over pairs
-/// of outputs.
+/// Energy flows in one regime, as sums of `weight · a · b` over pairs of outputs.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Powers {
     /// Power that the drive delivers.
@@ -163,14 +161,14 @@ pub struct Powers {
 #[derive(Clone, Debug)]
 pub(crate) struct PowersOnDemand {
     known: OnceLock<Vec<Powers>>,
-    /// What they follow from, where they are not known from the start.
+    /// Equations from which the powers are computed; `None` if they were given.
     equations: Option<Arc<Galerkin>>,
-    /// Gap of the model, where it is another than that of the equations.
+    /// Gap of the model in units of g₀, if it differs from that of the equations.
     gap: Option<f64>,
 }
 
 impl PowersOnDemand {
-    /// Of these equations.
+    /// Prepares the powers of these equations, without computing them.
     pub(crate) fn of(equations: Galerkin) -> Self {
         Self {
             known: OnceLock::new(),
@@ -201,32 +199,32 @@ impl From<Vec<Powers>> for PowersOnDemand {
 }
 
 impl PartialEq for PowersOnDemand {
-    /// Whether they are the same, worked out or not.
+    /// Compares equations and gaps, and powers only where these were given without equations.
     fn eq(&self, other: &Self) -> bool {
         let of = |powers: &Self| (powers.equations.clone(), powers.gap);
         of(self) == of(other) && (self.equations.is_some() || self.known == other.known)
     }
 }
 
-/// `weight · a · b`.
+/// A term `weight · a · b` of a power or an energy.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Product {
-    /// The weight.
+    /// Constant factor, in model units: a mass, stiffness, damping or number.
     pub weight: f64,
-    /// One factor.
+    /// First output of the product.
     pub a: Output,
-    /// The other.
+    /// Second output of the product.
     pub b: Output,
 }
 
-/// What only a beam has.
+/// Modes and outputs that only a beam has.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BeamOutputs {
-    /// Its modes.
+    /// Modes of the bare beam, N of them.
     pub modes: Arc<Modes>,
     /// Slope ∂W/∂ξ at the tip: what an optical lever reads.
     pub slope: Output,
-    /// Displacement of the base: α2 sin Ωτ and what a second tone adds, 0 if the drive acts
+    /// Displacement of the base, in units of g₀: α2 sin Ωτ and further tones, 0 if the drive acts
     /// on the lever itself.
     pub base: Output,
 }
@@ -252,12 +250,13 @@ impl Model {
         state
     }
 
-    /// The state of the setpoint's motion at drive phase 0, or else the rest.
+    /// Returns the state at drive phase 0 from which a motion starts: that of the setpoint's motion
+    /// if it is given, else the state at rest.
     pub fn first_state(&self) -> Vec<f64> {
         self.start.clone().unwrap_or_else(|| self.rest())
     }
 
-    /// Puts a state that lies behind a rigid stop on it.
+    /// Moves a state that lies behind a rigid stop onto the stop.
     pub fn stop_at_wall(&self, state: &mut [f64]) {
         if let (Some(stop), Some(x)) = (self.rigid_stop, state.first_mut()) {
             *x = x.min(stop.tip);
@@ -341,7 +340,7 @@ impl Model {
         }
     }
 
-    /// What feeds and drains energy; an entry a regime.
+    /// Returns the energy flows; an entry per regime.
     pub fn power(&self) -> &[Powers] {
         self.power.known.get_or_init(|| {
             let Some(galerkin) = self.power.equations() else {
@@ -377,7 +376,7 @@ impl Model {
         }
     }
 
-    /// Tells what follows from the equations that the gap is another.
+    /// Sets the gap, in units of g₀, with which quantities are computed from the equations later.
     pub(crate) fn set_gap_of_equations(&mut self, gap: f64) {
         if self.power.equations.is_some() {
             self.power.known = OnceLock::new();
@@ -430,7 +429,7 @@ impl Model {
         self.clone().cancelled_by(&cancel)
     }
 
-    /// Dimension of the state.
+    /// Returns the length of the state: amplitudes, velocities and entries of the sample.
     pub fn dimension(&self) -> usize {
         self.system.dimension()
     }
@@ -451,19 +450,21 @@ impl Model {
         self.tip.plus(towards, &self.gap)
     }
 
-    /// The drive period: that of the stroboscopic map, after which every tone repeats.
+    /// Returns the drive period, in model units of time: the period of the stroboscopic map, after
+    /// which every tone repeats.
     pub fn period(&self) -> f64 {
         self.system.drive().period()
     }
 
-    /// Angular frequency of the drive, of several tones the first.
+    /// Returns the angular frequency of the drive, in model units; with several tones, that of the
+    /// first.
     pub fn frequency(&self) -> f64 {
         let drive = self.system.drive();
         let first = drive.frequencies().first().copied();
         first.unwrap_or(std::f64::consts::TAU / drive.period())
     }
 
-    /// How many periods of the first tone the drive period has.
+    /// Returns the number of periods of the first tone in the drive period.
     pub fn repetition(&self) -> usize {
         let first = self.system.drive().harmonics().first().copied();
         first.unwrap_or(1) as usize
@@ -485,11 +486,11 @@ fn drive_of(case: &Cantilever) -> Result<Drive, FlowError> {
     }
 }
 
-/// How the map of a model changes with a number.
+/// Derivative of the map of a model with respect to a number of the case.
 #[derive(Clone, Debug)]
 pub struct Tangent(pub(crate) TangentKind);
 
-/// The engines' own terms.
+/// Derivative of the map in the form of the engine that computes it.
 #[derive(Clone, Debug)]
 pub(crate) enum TangentKind {
     PiecewiseLinear(SystemTangent),
@@ -497,7 +498,7 @@ pub(crate) enum TangentKind {
 }
 
 impl Tangent {
-    /// Of a model that does not change.
+    /// Returns the zero derivative, of a model that does not change.
     pub(crate) fn zeros(model: &Model) -> Self {
         Self(match &model.nonlinear {
             None => TangentKind::PiecewiseLinear(SystemTangent::zeros(&model.system)),
@@ -505,7 +506,8 @@ impl Tangent {
         })
     }
 
-    /// Along `slopes` of a cantilever's numbers and `law` of its force law's parameters.
+    /// Computes the derivative along `slopes` of the cantilever's parameters and `law` of the force
+    /// law's parameters.
     ///
     /// # Errors
     /// As [`Model::cantilever`].

@@ -21,35 +21,35 @@ use crate::model::{Model, MotionError, RigidStop, Tangent, TangentKind};
 pub(crate) trait EngineMap: Debug + Send + Sync {
     /// A clone, whose work space is separate.
     fn boxed(&self) -> Box<dyn EngineMap>;
-    /// Dimension of the state.
+    /// Returns the dimension of the state.
     fn dimension(&self) -> usize;
-    /// The drive period.
+    /// Returns the drive period, in model units of time.
     fn period(&self) -> f64;
-    /// [`ModelMap::move_gap`].
+    /// Implements [`ModelMap::move_gap`].
     fn move_gap(&mut self, gap: f64, visit: &mut dyn FnMut(&mut f64)) -> Result<(), MotionError>;
     /// Evaluations so far: of the gap in searches for switches, or of a nonlinear force.
     fn evaluations(&self) -> u64;
-    /// [`StroboscopicMap::discrete_entries`].
+    /// Implements [`StroboscopicMap::discrete_entries`].
     fn discrete_entries(&self) -> usize {
         0
     }
-    /// [`Scheduling::is_costly`].
+    /// Implements [`Scheduling::is_costly`].
     fn is_costly(&self) -> bool {
         false
     }
-    /// [`Scheduling::cost`].
+    /// Implements [`Scheduling::cost`].
     fn cost(&self) -> u64 {
         0
     }
-    /// [`Scheduling::add_cost`].
+    /// Implements [`Scheduling::add_cost`].
     fn add_cost(&mut self, cost: u64) {
         let _ = cost;
     }
-    /// [`Scheduling::coarse`].
+    /// Implements [`Scheduling::coarse`].
     fn coarse(&self) -> Option<Box<dyn EngineMap>> {
         None
     }
-    /// [`Scheduling::batch_size`].
+    /// Implements [`Scheduling::batch_size`].
     fn batch_size(&self) -> usize {
         1
     }
@@ -57,19 +57,19 @@ pub(crate) trait EngineMap: Debug + Send + Sync {
     fn ensemble(&mut self) -> Option<&mut Ensemble> {
         None
     }
-    /// [`StroboscopicMap::advance`].
+    /// Implements [`StroboscopicMap::advance`].
     fn advance(&mut self, state: &mut [f64]) -> Result<(), MotionError> {
         self.advance_by(state, 1)
     }
-    /// [`StroboscopicMap::advance_by`].
+    /// Implements [`StroboscopicMap::advance_by`].
     fn advance_by(&mut self, state: &mut [f64], periods: usize) -> Result<(), MotionError>;
-    /// [`StroboscopicMap::advance_with_jacobian`].
+    /// Implements [`StroboscopicMap::advance_with_jacobian`].
     fn advance_with_jacobian(
         &mut self,
         state: &mut [f64],
         jacobian: &mut DMatrix<f64>,
     ) -> Result<(), MotionError>;
-    /// [`ModelMap::advance_with_derivatives`].
+    /// Implements [`ModelMap::advance_with_derivatives`]; the default has no derivatives.
     fn advance_with_derivatives(
         &mut self,
         state: &mut [f64],
@@ -79,7 +79,7 @@ pub(crate) trait EngineMap: Debug + Send + Sync {
         *derivatives = DMatrix::zeros(state.len(), 0);
         self.advance_with_jacobian(state, jacobian)
     }
-    /// [`StroboscopicMap::advance_with_jacobian_and_determinant`].
+    /// Implements [`StroboscopicMap::advance_with_jacobian_and_determinant`].
     fn advance_with_determinant(
         &mut self,
         state: &mut [f64],
@@ -88,16 +88,16 @@ pub(crate) trait EngineMap: Debug + Send + Sync {
         self.advance_with_jacobian(state, jacobian)?;
         Ok(Some(self.log_determinant_bound()).filter(|log| log.is_finite()))
     }
-    /// [`StroboscopicMap::log_determinant_bound`].
+    /// Implements [`StroboscopicMap::log_determinant_bound`].
     fn log_determinant_bound(&self) -> f64;
-    /// [`StroboscopicMap::pass_touches`].
+    /// Implements [`StroboscopicMap::pass_touches`].
     fn pass_touches(&mut self) {}
-    /// [`StroboscopicMap::across_impact`].
+    /// Implements [`StroboscopicMap::across_impact`].
     fn across_impact(&self, state: &[f64]) -> Option<Vec<f64>> {
         let _ = state;
         None
     }
-    /// [`StroboscopicMap::advance_with_tangencies`].
+    /// Implements [`StroboscopicMap::advance_with_tangencies`].
     fn advance_with_tangencies(
         &mut self,
         state: &mut [f64],
@@ -119,12 +119,12 @@ impl Clone for ModelMap {
 }
 
 impl ModelMap {
-    /// The map of `model`.
+    /// Creates the map of `model`, without derivatives by parameters.
     pub fn new(model: &Model) -> Self {
         Self::with_tangents(model, Vec::new())
     }
 
-    /// The map of `model`, which also knows how it changes with some parameters.
+    /// Creates the map of `model` with its derivatives along `tangents`, in their order.
     pub fn with_tangents(model: &Model, tangents: Vec<Tangent>) -> Self {
         let (mut exact, mut nonlinear) = (Vec::new(), Vec::new());
         for tangent in tangents {
@@ -139,9 +139,9 @@ impl ModelMap {
         })
     }
 
-    /// Changes the gap: of a piecewise-linear model by `visit`, which sets the constants of its
-    /// system in turn and then that of its gap, of one under a nonlinear force to `gap`. The next
-    /// motion starts anew.
+    /// Changes the gap. For a piecewise-linear model, calls `visit` with the constants of its
+    /// system in turn and then with that of its gap; under a nonlinear force, sets the gap to
+    /// `gap`, in units of g₀. The next motion starts anew.
     ///
     /// # Errors
     /// When the gap is not finite.
@@ -253,8 +253,8 @@ impl StroboscopicMap for ModelMap {
         self.0.advance_with_jacobian(state, jacobian)
     }
 
-    /// From the trace of the equations and the time in each regime, and from switches at which
-    /// the motion jumps or turns.
+    /// Computes log|det DP| from the trace of the equations and the time in each regime, and from
+    /// switches at which the motion jumps or turns.
     fn advance_with_jacobian_and_determinant(
         &mut self,
         state: &mut [f64],
@@ -287,20 +287,21 @@ impl StroboscopicMap for ModelMap {
 /// The longest touch of a rigid stop that is passed through near a grazing, in drive periods.
 const LONGEST_TOUCH: f64 = 0.1;
 
-/// Time from drive phase 0, in drive periods, within which an impact is carried over it.
+/// Longest time between an impact and drive phase 0, in drive periods, for which `across_impact`
+/// gives the state on the other side of the impact.
 const IMPACT_AT_STROBE: f64 = 1e-2;
 
 /// The maximum number of states that are advanced in a batch.
 const MAX_BATCH: usize = 64;
 
-/// How many of `count` states a thread of the present pool is best given at a time.
+/// Returns how many of `count` states to give a thread of the present pool at a time.
 pub(crate) fn together(map: &ModelMap, count: usize) -> usize {
     count
         .div_ceil(rayon::current_num_threads())
         .clamp(1, map.batch_size())
 }
 
-/// Steps of a budget that an evaluation of the exact motion counts, by its time.
+/// Steps that an evaluation of the exact motion takes from a budget, in proportion to its time.
 const EVALUATION_STEPS: u64 = 10;
 
 /// The exact map of a piecewise-linear model.
@@ -336,7 +337,7 @@ impl ExactMap {
         }
     }
 
-    /// Puts the flow at `state`, unless that is where it is.
+    /// Starts the flow at `state`, unless it is already there.
     fn begin(&mut self, state: &[f64]) -> Result<(), FlowError> {
         let goes_on = !self.last.is_empty() && self.last == state;
         // Whatever happens on the way, the flow is no longer there.
@@ -348,7 +349,7 @@ impl ExactMap {
         }
     }
 
-    /// Does `run` from a state and puts in its place the one reached.
+    /// Runs the flow from `state` by `run`, and replaces `state` by the state reached.
     fn run<R>(
         &mut self,
         state: &mut [f64],
@@ -379,7 +380,7 @@ impl ExactMap {
         Ok(())
     }
 
-    /// Reads where the flow has come to.
+    /// Writes the state that the flow has reached to `state`, and remembers it in `last`.
     fn end(&mut self, state: &mut [f64]) {
         self.flow.state(state);
         self.last.extend_from_slice(state);
@@ -414,8 +415,8 @@ impl EngineMap for ExactMap {
         self.flow.statistics().evaluations
     }
 
-    /// Many where the model is piecewise linear with one contact: eight at a time, and others to
-    /// fill the places of those that have come to a switch.
+    /// Returns [`MAX_BATCH`] for a piecewise-linear model with one contact, else 1: eight motions
+    /// are advanced at a time, and others take the place of those that reach a switch.
     fn batch_size(&self) -> usize {
         if Ensemble::fits(self.flow.system()) {
             MAX_BATCH
@@ -548,8 +549,8 @@ fn log_impact(transition: &Transition) -> Option<f64> {
     Some(2.0 * nanotap_arithmetic::ln(reset.matrix.determinant().abs()))
 }
 
-/// Sums log|det| over a period: tr A · t in every regime, and the switches. Not a number of a motion
-/// that sticks, by which volumes vanish.
+/// Sums log|det| over a period: tr A · t in every regime, and the switches. NaN for a motion that
+/// sticks, because volumes vanish there.
 struct LogDeterminant(f64);
 
 impl Observer for LogDeterminant {
@@ -572,18 +573,19 @@ impl Observer for LogDeterminant {
 /// Collects the local extrema of the gap over a period.
 struct GapExtrema<'a> {
     gap: &'a Output,
-    /// Whether tip and surface part at equal speeds, as from a rigid stop to which the tip stuck: the gap is then least, and zero, where they
-    /// part, which is no grazing.
+    /// Whether tip and surface part at equal speeds, as when the tip leaves a rigid stop to which
+    /// it stuck: the gap then has a minimum, zero, where they part, which is not a grazing.
     parts_at_rest: bool,
-    /// Whether nothing but a least gap can graze: the tops of ever lower flights of a chatter end in
-    /// rounding.
+    /// Whether only minima of the gap count as grazings, as at a rigid stop: the maxima of the ever
+    /// lower flights of a chatter fall below rounding.
     is_rigid: bool,
     /// Whether the stretch begins with a switch.
     switched: bool,
     tangencies: &'a mut Vec<Tangency>,
 }
 
-/// Nearer to the parting, in drive periods, an extremum of the gap is the parting itself.
+/// Time after the parting, in drive periods, within which an extremum of the gap is the parting
+/// itself.
 const PARTING: f64 = 1e-6;
 
 impl Observer for GapExtrema<'_> {
@@ -608,8 +610,9 @@ impl Observer for GapExtrema<'_> {
         }
     }
 
-    /// Where what only grazes breaks off, and at impacts, no extremum is left beyond a grazing: in its
-    /// place is the one that the gap would have had without the switch, ġ²/(2|g̈|) behind it.
+    /// Adds an extremum at impacts, and at switches that end a grazing contact: there the gap has
+    /// none beyond a grazing. It is the extremum that the gap would have had without the switch, of
+    /// the value −ġ²/(2g̈).
     fn switch(&mut self, switch: &SwitchView<'_>) {
         self.switched = true;
         let (from, to) = (switch.switch.from, switch.switch.to);
@@ -635,5 +638,5 @@ impl Observer for GapExtrema<'_> {
     }
 }
 
-/// Farther ahead, in drive periods, there is no telling what the gap would have done.
+/// Longest time ahead, in drive periods, over which the gap is extrapolated beyond a switch.
 const NEARBY: f64 = 0.1;

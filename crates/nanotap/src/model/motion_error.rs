@@ -6,24 +6,24 @@ use nanotap_volterra::VolterraError;
 /// Why a motion could not be followed.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum MotionError {
-    /// The exact flow failed.
+    /// The exact flow of a piecewise-linear model failed.
     #[error(transparent)]
     Flow(#[from] FlowError),
     /// The flow under a nonlinear force failed.
     #[error(transparent)]
     Nonlinear(#[from] VolterraError),
-    /// A time series with more rows than are made.
+    /// A time series has more rows than the maximum.
     #[error("a time series of {rows} rows is too long; {most} at most are made")]
     TooManyRows {
-        /// Rows that it would have.
+        /// Number of rows that the series would have.
         rows: usize,
-        /// Rows that it may have.
+        /// Maximum number of rows.
         most: usize,
     },
 }
 
 impl MotionError {
-    /// Whether the motion left every bound.
+    /// Returns true if the motion left every bound.
     pub const fn is_unbounded(&self) -> bool {
         matches!(
             self,

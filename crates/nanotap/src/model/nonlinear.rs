@@ -30,35 +30,35 @@ use crate::model::parameter::Parameter;
 use crate::model::sample_law::SampleLaw;
 use crate::model::{Model, ModelError, MotionError};
 
-/// Periods of a transient that leads to guesses of motions over a surface that relaxes, and the
-/// largest time of the surface there.
+/// Length, in drive periods, of the transient with which motions over a relaxing surface are
+/// guessed; and the largest relaxation time of the surface during it, in drive periods.
 const SETTLING_PERIODS: usize = 400;
 const SLOWEST_PERIODS: f64 = 15.0;
-/// Periods beyond which a surface is slow.
+/// Relaxation time, in drive periods, beyond which a surface counts as slow.
 const SLOW_PERIODS: f64 = 1000.0;
 
-/// Forces a step.
+/// Number of values of the force in a time step of the collocation method.
 const NODES: usize = 20;
-/// How much the error of a step may move the gap, as a part of what the tip swings and stands
-/// away: a few units of rounding.
+/// Largest error of the gap in a step, relative to the larger of the tip's free swing and its gap
+/// at rest: a few units of rounding.
 const TOLERANCE: f64 = 3e-15;
 
-/// Steps of a period of the drive, tens of times what tapping with twenty modes takes: a tenth of a
-/// second.
+/// Maximum number of steps in a drive period, tens of times what tapping with twenty modes takes;
+/// so many take a tenth of a second.
 const MAX_STEPS: f64 = 10_000.0;
 
 /// The lever under a nonlinear force.
 #[derive(Clone, Debug)]
 pub struct Nonlinear {
-    /// Modes, drive and law.
+    /// Lever modes, drive and force law, in model units.
     pub system: Arc<System>,
-    /// On which branches of the law tip and sample touch.
+    /// Whether tip and sample touch on each branch of the law.
     pub contact: Vec<bool>,
-    /// The drive period.
+    /// Drive period, in units of √(mL⁴/(EI)).
     pub period: f64,
-    /// How much of the sample's force is in the force of the clamp.
+    /// Factor of the sample's force in the force of the clamp, dimensionless.
     pub(crate) clamp_force: f64,
-    /// Whether the law remembers its branch.
+    /// Whether the law remembers its branch: the last entry of the state is then its number.
     pub remembers: bool,
     /// The law averaged over time, if it depends on that.
     averaged_law: Option<Arc<dyn ForceLaw>>,
@@ -130,13 +130,13 @@ impl Nonlinear {
         self
     }
 
-    /// Changes the gap.
+    /// Sets the gap to `gap`, in units of g₀.
     pub(crate) fn set_gap(&mut self, gap: f64) -> Result<(), MotionError> {
         Ok(Arc::make_mut(&mut self.system).set_offset(gap)?)
     }
 
-    /// The branch of the law in a state of the model at drive phase 0: the one that it
-    /// remembers, if that can be.
+    /// Returns the branch of the law in a state of the model at drive phase 0: the remembered one,
+    /// if the gap allows it.
     fn branch(&self, state: &[f64]) -> usize {
         let n = self.system.dimension();
         let law = self.system.law();
@@ -262,7 +262,8 @@ impl Nonlinear {
         }
     }
 
-    /// The gap at which contact begins from outside, if there is one.
+    /// Returns the gap at which contact begins from outside, in units of g₀; `None` if there is
+    /// none.
     pub(crate) fn contact_gap(&self) -> Option<f64> {
         let law = self.static_law();
         let outside = (0..law.branches()).filter(|branch| !law.touches(*branch));
@@ -274,12 +275,13 @@ impl Nonlinear {
         })
     }
 
-    /// What a motion that came as close as `least_gap` violates.
+    /// Returns the limits of the law that a motion with the smallest gap `least_gap`, in units of
+    /// g₀, violates.
     pub fn remarks(&self, least_gap: f64) -> Vec<Remark> {
         self.system.law().remarks(least_gap)
     }
 
-    /// An output of the model, with so much of the sample's force added.
+    /// Converts an output of the model, with `force` times the sample's force added.
     pub(crate) fn output(&self, output: &Output, force: f64) -> nanotap_volterra::Output {
         let n = self.system.dimension();
         nanotap_volterra::Output {
@@ -298,7 +300,7 @@ fn remembered(memory: &[f64]) -> Option<usize> {
         .map(|branch| branch.round().max(0.0) as usize)
 }
 
-/// Where the lever can rest without a drive.
+/// An equilibrium of the lever without a drive.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Equilibrium {
     /// Gap between tip and sample, in units of g₀.
@@ -316,7 +318,8 @@ pub struct Equilibrium {
     pub branch: usize,
 }
 
-/// Points at which a force is looked at, on each branch of the law.
+/// Number of intervals, on either side of the gap at which contact begins, in which an equilibrium
+/// is looked for on each branch of the law.
 const EQUILIBRIUM_POINTS: i32 = 600;
 
 impl Nonlinear {
@@ -389,7 +392,7 @@ impl Nonlinear {
         found
     }
 
-    /// How far a unit of force at the tip bends the lever.
+    /// Returns the static deflection of the tip per force at the tip, in units of L³/(EI).
     fn compliance(&self) -> f64 {
         let kernel = self.system.kernel();
         let modes = kernel.modes();
@@ -411,7 +414,8 @@ impl Nonlinear {
             .sum()
     }
 
-    /// The force at these gaps, evaluated quasi-statically, in this order.
+    /// Returns `[gap, force]` at each of these gaps, in units of g₀ and EI g₀/L³, evaluated
+    /// quasi-statically, in this order.
     pub fn force_curve(&self, gaps: impl IntoIterator<Item = f64>) -> Vec<[f64; 2]> {
         let law = self.static_law();
         let mut last: Option<(f64, usize)> = None;
@@ -440,14 +444,14 @@ impl Nonlinear {
     }
 }
 
-/// Kernels kept: a study builds many models on the same lever.
+/// Largest number of cached kernels: a study builds many models on the same lever.
 const KEPT: usize = 16;
 
-/// What a kernel is made of, as bits.
+/// The bits of the numbers from which a kernel is computed.
 type KernelKey = Vec<u64>;
 
-/// The kernel of the beam's modes, of the last ones made if it is among them: it depends on
-/// neither drive nor law.
+/// Returns the kernel of the beam's modes, from the cache if it is there: it depends on neither
+/// drive nor law.
 fn kernel(
     free: &Regime,
     row: &RowDVector<f64>,
@@ -486,13 +490,13 @@ fn kernel(
     Ok(kernel)
 }
 
-/// How the map changes with a number.
+/// Derivative of the map with respect to a number of the case.
 #[derive(Clone, Debug)]
 pub(crate) enum Variation {
     /// Through drive, distance and law: from the equations, linearised.
     Linearised {
         change: Change,
-        /// Of ln T.
+        /// Derivative of ln T, where T is the drive period.
         log_period: f64,
     },
     /// Through the modes of lever or surface: from the maps on both sides.
@@ -503,10 +507,10 @@ pub(crate) enum Variation {
     },
 }
 
-/// A step between maps on both sides, as a part of the number: the difference is good to its
-/// square.
+/// Step of central differences between maps, relative to the number: their error is of the order of
+/// its square.
 const STEP: f64 = 1e-5;
-/// The size of a number that may be zero.
+/// Smallest size that the step of a number is relative to, for numbers that may be zero.
 const SMALLEST: f64 = 1e-3;
 
 impl Variation {
@@ -600,7 +604,7 @@ impl Variation {
         }
     }
 
-    /// No change.
+    /// Returns a variation that changes nothing.
     pub(crate) fn none() -> Self {
         Self::Linearised {
             change: Change::default(),
@@ -865,7 +869,8 @@ impl EngineMap for CoarseMap {
 }
 
 impl Nonlinear {
-    /// The lever's part of a state of the model, and the rest: the branch, where it is remembered.
+    /// Splits a state of the model into the lever's part and the rest: the branch, where it is
+    /// remembered.
     fn split<'a>(
         &self,
         state: &'a mut [f64],

@@ -14,57 +14,58 @@ use crate::model::contact::dual::Dual;
 use crate::model::{Model, ModelError, ModelTangent, Powers, Product, RigidStop};
 use crate::number::shortest;
 
-/// The stop.
+/// Stop of an oscillator: soft or rigid.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Stop {
     /// A spring and a damper that act while `x ≥ gap`.
     Soft {
-        /// The stop's spring, ≥ 0.
+        /// Stiffness of the stop's spring, ≥ 0, force per length.
         stiffness: f64,
-        /// The stop's damper, ≥ 0.
+        /// Damping of the stop's damper, ≥ 0, force per velocity.
         damping: f64,
     },
     /// A rigid wall: the velocity is reversed and multiplied by the coefficient of
     /// restitution, 0 … 1.
     Rigid {
-        /// The coefficient.
+        /// Coefficient of restitution, dimensionless, 0 to 1.
         restitution: f64,
     },
 }
 
-/// An oscillator with a stop.
+/// An oscillator `m ẍ + c ẋ + k x = F cos ωt` with a stop. The numbers are in any one consistent
+/// system of units.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Oscillator {
-    /// m > 0.
+    /// Mass m > 0 of the oscillator.
     pub mass: f64,
-    /// k ≥ 0.
+    /// Stiffness k ≥ 0 of the spring, force per length.
     pub stiffness: f64,
-    /// c ≥ 0.
+    /// Damping c ≥ 0 of the damper, force per velocity.
     pub damping: f64,
-    /// F.
+    /// Amplitude F of the drive, a force of either sign.
     pub forcing: f64,
-    /// ω > 0.
+    /// Angular frequency ω > 0 of the drive, rad per unit of time.
     pub omega: f64,
-    /// Where the stop stands.
+    /// Displacement x at which the stop is, a length of either sign.
     pub gap: f64,
-    /// What the stop is.
+    /// Kind of the stop, with its numbers.
     pub stop: Stop,
 }
 
-/// A parameter of an oscillator that makes no sense.
+/// An invalid parameter of an oscillator.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("{key} = {}: {expected}", shortest(*value))]
 pub struct OscillatorError {
-    /// Its name.
+    /// Key of the parameter in a case file.
     pub key: &'static str,
-    /// Its value.
+    /// Refused value, in the unit in which it was given.
     pub value: f64,
-    /// The remedy.
+    /// What is needed instead, as a phrase of the message.
     pub expected: &'static str,
 }
 
-/// Largest size of a number; beyond it products leave no digits.
+/// Largest magnitude of a parameter; beyond it products of parameters lose all digits.
 const LARGEST: f64 = 1e12;
 const POSITIVE: (f64, f64) = (f64::MIN_POSITIVE, LARGEST);
 const NOT_NEGATIVE: (f64, f64) = (0.0, LARGEST);
@@ -78,15 +79,15 @@ macro_rules! parameters {
         pub enum OscillatorParameter { $($(#[$doc])* $parameter),* }
 
         impl OscillatorParameter {
-            /// Every parameter.
+            /// All parameters, in the order of the table.
             pub const ALL: [Self; [$($name),*].len()] = [$(Self::$parameter),*];
 
-            /// Its key in a case file.
+            /// Returns the key in a case file.
             pub const fn name(self) -> &'static str {
                 match self { $(Self::$parameter => $name),* }
             }
 
-            /// Its least and its greatest value.
+            /// Returns the least and the greatest value that is allowed.
             pub const fn range(self) -> (f64, f64) {
                 match self { $(Self::$parameter => $range),* }
             }
@@ -95,28 +96,28 @@ macro_rules! parameters {
 }
 
 parameters! {
-    /// m.
+    /// Mass m of the oscillator.
     Mass: "mass", POSITIVE;
-    /// k.
+    /// Stiffness k of the spring.
     Stiffness: "stiffness", NOT_NEGATIVE;
-    /// c.
+    /// Damping c of the damper.
     Damping: "damping", NOT_NEGATIVE;
-    /// F.
+    /// Amplitude F of the driving force.
     Forcing: "forcing", FINITE;
-    /// ω.
+    /// Angular frequency ω of the drive.
     Omega: "omega", POSITIVE;
-    /// Position of the stop.
+    /// Displacement x at which the stop is.
     Gap: "gap", FINITE;
-    /// The soft stop's spring.
+    /// Stiffness of the spring of a soft stop.
     ContactStiffness: "contact_stiffness", NOT_NEGATIVE;
-    /// The soft stop's damper.
+    /// Damping of the damper of a soft stop.
     ContactDamping: "contact_damping", NOT_NEGATIVE;
-    /// The rigid stop's coefficient.
+    /// Coefficient of restitution of a rigid stop.
     Restitution: "restitution", (0.0, 1.0);
 }
 
 impl Oscillator {
-    /// Where a parameter is stored, `None` where this stop does not have it.
+    /// Returns the place where a parameter is stored; `None` if this stop does not have it.
     fn place(&mut self, parameter: OscillatorParameter) -> Option<&mut f64> {
         use OscillatorParameter as P;
         match (parameter, &mut self.stop) {
@@ -168,7 +169,7 @@ impl Oscillator {
     /// Checks every field.
     ///
     /// # Errors
-    /// [`OscillatorError`] for the first one that makes no sense.
+    /// [`OscillatorError`] for the first invalid one.
     pub fn validate(&self) -> Result<(), OscillatorError> {
         use OscillatorParameter as P;
         for parameter in P::ALL {
@@ -193,10 +194,10 @@ impl Oscillator {
         Ok(())
     }
 
-    /// Its model: tip is `x`, gap is `gap − x`.
+    /// Builds the model: tip is `x`, gap is `gap − x`.
     ///
     /// # Errors
-    /// When a parameter makes no sense or an undamped regime is driven at resonance.
+    /// When a parameter is invalid or an undamped regime is driven at resonance.
     pub fn model(&self) -> Result<Model, ModelError> {
         self.validate()?;
         let drive = Drive::single(self.omega)?;

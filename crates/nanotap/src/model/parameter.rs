@@ -23,32 +23,32 @@ pub const OMEGA_RANGE: (f64, f64) = (1e-6, 1e6);
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct Parameter(u8);
 
-/// What the table says of a parameter.
+/// Entry of the table of parameters.
 #[derive(Clone, Copy, Debug)]
 pub struct ParameterEntry {
     /// Name in case files, messages and data.
     pub name: &'static str,
-    /// Second name.
+    /// Alternative name, as `tip_mass_ratio` of `alpha1`; `None` if there is none.
     pub alias: Option<&'static str>,
     /// Symbol in formulas and on axes.
     pub symbol: &'static str,
-    /// Meaning, in one line.
+    /// Meaning in one line, with the formula of the number.
     pub meaning: &'static str,
     /// Value where none is given; `None` if one must be.
     pub default: Option<f64>,
-    /// Value for examples.
+    /// Typical value for examples in messages, dimensionless, or degrees for a phase.
     pub example: f64,
-    /// Least and greatest value.
+    /// Least and greatest allowed value, dimensionless, or degrees for a phase.
     pub range: (f64, f64),
     /// Unit of the physical quantity behind it.
     pub unit: Unit,
-    /// How it follows from the quantity: `3 K1/k`.
+    /// Formula by which it follows from the quantity: `3 K1/k`.
     pub formula: &'static str,
-    /// The physical quantity.
+    /// Physical quantity behind the parameter, in words: `tip mass M`.
     pub quantity: &'static str,
     /// Formula and quantity where a force on the lever drives it.
     pub by_force: Option<(&'static str, &'static str)>,
-    /// When it applies.
+    /// Cases to which the parameter applies.
     pub applies: Applies,
     /// Whether documents give it where it does not apply, as 0.
     pub always_written: bool,
@@ -59,13 +59,13 @@ pub struct ParameterEntry {
 /// When a parameter applies; elsewhere it is 0.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Applies {
-    /// To every cantilever.
+    /// The parameter applies to every cantilever.
     Always,
     /// With a piecewise-linear contact law.
     Spring,
     /// With a piecewise-linear contact law that has the damper α6.
     Damper,
-    /// With this contact law.
+    /// Only with this piecewise-linear contact law.
     Law(ContactLaw),
     /// Where the drive has this further tone, 2 or 3.
     Tone(usize),
@@ -73,39 +73,40 @@ pub enum Applies {
     Measured,
 }
 
-/// What the model's unit of a parameter is in SI.
+/// Kind of physical quantity behind a parameter, with the SI unit of its values and the model's
+/// unit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Unit {
-    /// Pure number.
+    /// Pure number, the same in SI and in the model.
     Number,
-    /// Mass, kg.
+    /// Mass, kg; the model's unit is mL.
     Mass,
-    /// Length, m.
+    /// Length, m; the model's unit is g₀.
     Length,
-    /// Time, s.
+    /// Time, s; the model's unit is T = √(mL⁴/(EI)).
     Time,
-    /// Frequency, Hz.
+    /// Frequency, Hz; that of Ω = 1 is 1/(2πT), with T = √(mL⁴/(EI)).
     Frequency,
-    /// Stiffness, N/m.
+    /// Stiffness, N/m; the model's unit is EI/L³ = k/3.
     Stiffness,
-    /// Damping, N s/m.
+    /// Damping, N s/m; the model's unit is mL/T, with T = √(mL⁴/(EI)).
     Damping,
-    /// Force, N.
+    /// Force, N; the model's unit is EI g₀/L³ = k g₀/3.
     Force,
     /// Amplitude of the drive: m of a moving base, N of a force on the lever.
     Drive,
-    /// Degrees.
+    /// Angle, degrees, the same in the model.
     Degrees,
 }
 
-/// The key of `[sample]` with a law number's own name.
+/// Key of `[sample]` that states a number of a contact law, under the number's name.
 #[derive(Clone, Copy, Debug)]
 pub enum SampleKey {
     /// A key of this law alone.
     Own {
-        /// Meaning, in one line.
+        /// Meaning of the key in one line.
         meaning: &'static str,
-        /// Whether 0 is allowed.
+        /// Whether the value 0 is allowed for the key.
         zero: bool,
     },
     /// A key that nonlinear laws have, too.
@@ -207,7 +208,7 @@ const fn number(name: &'static str, symbol: &'static str, meaning: &'static str)
 
 const SIGNED: (f64, f64) = (-LARGEST_ALPHA, LARGEST_ALPHA);
 
-/// A measured number of a mode.
+/// Declares a measured number of a mode; 0 stands for none.
 const fn measured(
     name: &'static str,
     symbol: &'static str,
@@ -323,9 +324,9 @@ impl Parameter {
         [Self::Tone2Amplitude, Self::Tone2Phase],
         [Self::Tone3Amplitude, Self::Tone3Phase],
     ];
-    /// How many of them are the paper's.
+    /// Number of the paper's parameters.
     pub(crate) const PAPER: usize = Paper::ENTRIES.len();
-    /// How many parameters there are.
+    /// Number of parameters in the table.
     pub const COUNT: usize = Self::PAPER + contact::NUMBERS + Further::ENTRIES.len();
 
     /// All parameters: the paper's, those of contact laws, and the others.
@@ -344,12 +345,12 @@ impl Parameter {
         Self::every().find(|parameter| parameter.name() == name)
     }
 
-    /// Place in the table.
+    /// Returns the index in the table of parameters, from 0.
     pub const fn index(self) -> usize {
         self.0 as usize
     }
 
-    /// Entry of the table.
+    /// Returns the entry in the table of parameters.
     pub fn entry(self) -> &'static ParameterEntry {
         &TABLE[self.index()]
     }
@@ -360,12 +361,12 @@ impl Parameter {
     }
 }
 
-/// A value of each parameter.
+/// The values of all parameters, dimensionless, phases in degrees.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Numbers([f64; Parameter::COUNT]);
 
 impl Numbers {
-    /// All zero.
+    /// The value 0 for every parameter.
     pub const ZERO: Self = Self([0.0; Parameter::COUNT]);
 
     /// The value of a parameter.

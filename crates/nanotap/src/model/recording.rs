@@ -15,7 +15,7 @@ use crate::model::{Model, MotionError};
 /// A stretch of motion, of whole drive periods or less, as either flow computes it. Its time begins
 /// at 0.
 pub trait RecordedMotion: Debug {
-    /// Time at the end.
+    /// Returns the time at the end of the motion, in model units.
     fn end(&self) -> f64;
 
     /// Its smooth pieces, in order of time: in one regime, or on one branch of the force law.
@@ -40,9 +40,9 @@ pub trait RecordedMotion: Debug {
 /// A smooth piece of a recorded motion.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MotionPiece {
-    /// Time at its start.
+    /// Time at the start of the piece, from the start of the recording, in model units.
     pub start: f64,
-    /// Length of time.
+    /// Length of the piece in time, in model units.
     pub length: f64,
     /// The regime, or the branch of the force law.
     pub regime: usize,
@@ -53,20 +53,21 @@ pub struct MotionPiece {
 pub struct Instant {
     /// The state, of the model's dimension.
     pub state: Vec<f64>,
-    /// Time since drive phase 0.
+    /// Time since drive phase 0, in model units, from 0 to one drive period.
     pub phase: f64,
     /// The regime, or the branch of the force law.
     pub regime: usize,
-    /// The nonlinear force; `None` where the force follows from regime and state.
+    /// Force of the sample on the tip under a nonlinear law, in units of EI g₀/L³; `None` where the
+    /// force follows from regime and state.
     pub nonlinear_force: Option<f64>,
 }
 
-/// A recorded motion.
+/// A recorded motion of either engine.
 #[derive(Clone, Debug)]
 pub enum Recording {
     /// Of a piecewise-linear model, in closed form.
     PiecewiseLinear(Trajectory),
-    /// Under a nonlinear force.
+    /// Of a model under a nonlinear force, period by period.
     Nonlinear(Arc<NonlinearRecording>),
 }
 
@@ -132,8 +133,9 @@ impl Model {
         contact.get(regime).copied().unwrap_or(false)
     }
 
-    /// Puts the position of a surface with a memory into a state: in contact it is where the tip
-    /// holds it, of which a memory that the end of the contact sets anew knows nothing.
+    /// Writes the position of a surface with a memory into a state in contact: it is `height`,
+    /// where the tip keeps the surface. The memory does not follow the tip, because the end of the
+    /// contact sets it anew.
     pub(crate) fn set_surface(&self, state: &mut [f64], contact: bool, height: f64) {
         if self.memory_reset.is_some() && contact {
             state[self.dimension() - self.memory] = height;
@@ -159,7 +161,7 @@ impl Recording {
         model.recorder(state)?(periods)
     }
 
-    /// These periods, in sequence.
+    /// Creates the recording of these periods, in sequence.
     pub(crate) fn of_periods(nonlinear: &Arc<Nonlinear>, periods: Vec<Period>) -> Self {
         Self::Nonlinear(Arc::new(NonlinearRecording {
             nonlinear: Arc::clone(nonlinear),
@@ -302,17 +304,17 @@ impl RecordedMotion for NonlinearRecording {
 }
 
 impl NonlinearRecording {
-    /// Where a period begins.
+    /// Returns the time at the start of a period, in model units.
     fn offset(&self, period: usize) -> f64 {
         period as f64 * self.nonlinear.period
     }
 
-    /// The periods.
+    /// Returns the recorded drive periods, in order.
     pub(crate) fn periods(&self) -> &[Period] {
         &self.periods
     }
 
-    /// The engine.
+    /// Returns the engine that recorded the periods.
     pub(crate) fn nonlinear(&self) -> &Nonlinear {
         &self.nonlinear
     }
@@ -418,20 +420,20 @@ pub(crate) fn read(
 /// A scalar over a recorded motion.
 #[derive(Clone, Debug)]
 pub enum Curve {
-    /// In closed form.
+    /// Curve of a piecewise-linear model, in closed form.
     PiecewiseLinear(PiecewiseSignal),
-    /// Under a nonlinear force.
+    /// Output of a motion under a nonlinear force.
     Nonlinear(Arc<NonlinearRecording>, nanotap_volterra::Output),
 }
 
 /// A piece of a [`Curve`] on which it is smooth.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CurvePiece {
-    /// Its number.
+    /// Index of the piece in its curve, from 0.
     pub index: usize,
-    /// Time at its start.
+    /// Time at the start of the piece, from the start of the recording, in model units.
     pub start: f64,
-    /// Length of time.
+    /// Length of the piece in time, in model units.
     pub length: f64,
 }
 
@@ -455,7 +457,8 @@ impl Curve {
         }
     }
 
-    /// The value `s` after the beginning of a piece, at its very ends too.
+    /// Returns the value at the time `s` after the start of a piece, its ends included; NaN if the
+    /// curve has no such piece.
     pub fn on(&self, piece: &CurvePiece, s: f64) -> f64 {
         match self {
             Self::PiecewiseLinear(signal) => signal
@@ -476,7 +479,7 @@ impl Curve {
         }
     }
 
-    /// The fastest rate at which it may turn on a piece.
+    /// Returns an upper bound on the rate at which the curve changes on a piece, per unit of time.
     pub fn fastest(&self, piece: &CurvePiece) -> f64 {
         match self {
             Self::PiecewiseLinear(signal) => signal
@@ -498,7 +501,7 @@ impl Curve {
         }
     }
 
-    /// When it is least and when it is greatest, with the values; `None` if empty.
+    /// Returns the minimum and the maximum with their times; `None` if the curve is empty.
     pub fn range(&self) -> Option<(Extremum, Extremum)> {
         match self {
             Self::PiecewiseLinear(signal) => signal.range(),
@@ -522,7 +525,7 @@ impl Curve {
         }
     }
 
-    /// Length of time covered.
+    /// Returns the length of time covered, in model units.
     pub fn duration(&self) -> f64 {
         match self {
             Self::PiecewiseLinear(signal) => signal.duration(),

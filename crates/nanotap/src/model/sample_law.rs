@@ -42,7 +42,7 @@ impl SampleLaw {
     /// The laws that `text` names, `hertz` or `hertz + exponential-damping`.
     ///
     /// # Errors
-    /// [`VolterraError::UnknownLaw`] for the first name that is none.
+    /// [`VolterraError::UnknownLaw`] for the first unknown name.
     pub fn terms(text: &str) -> Result<Vec<&'static TableLaw>, VolterraError> {
         text.split('+').map(|name| law(&plain(name))).collect()
     }
@@ -51,7 +51,7 @@ impl SampleLaw {
     /// the rows of a table and the arms of a Prony series, if one of them has these.
     ///
     /// # Errors
-    /// When a value makes no sense, rows or arms are missing, or two of the laws cannot be added.
+    /// When a value is not allowed, rows or arms are missing, or two of the laws cannot be added.
     pub fn new(
         terms: Vec<&'static TableLaw>,
         values: Vec<f64>,
@@ -77,7 +77,7 @@ impl SampleLaw {
         self.terms.iter().map(|term| term.entry)
     }
 
-    /// The laws' names.
+    /// Returns the names of the laws, joined by ` + `.
     pub fn name(&self) -> String {
         self.names().collect::<Vec<_>>().join(" + ")
     }
@@ -88,7 +88,7 @@ impl SampleLaw {
         entries.zip(self.values.iter().copied())
     }
 
-    /// Their values alone.
+    /// Returns the values of all parameters, term by term, in model units.
     pub fn values(&self) -> &[f64] {
         &self.values
     }

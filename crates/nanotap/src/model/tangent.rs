@@ -5,28 +5,28 @@ use nanotap_flow::sensitivity::SystemTangent;
 
 use crate::model::{Model, RigidStop};
 
-/// The derivative of a [`Model`]: of its system and of what it shows, at constant state and
-/// drive phase. Tip and slope are the same for every value.
+/// The derivative of a [`Model`], of its system and its outputs, at constant state and drive phase.
+/// Tip and slope do not depend on any parameter.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ModelTangent {
-    /// Of the system.
+    /// Derivative of the piecewise-linear system.
     pub system: SystemTangent,
-    /// Of the tip's height.
+    /// Derivative of the tip's height V_T over the undeformed surface.
     pub height: Output,
-    /// Of the displacement of the base, of a beam.
+    /// Derivative of the displacement of the base of a beam.
     pub base: Output,
-    /// Of the force; an entry a regime.
+    /// Derivative of the force of the sample on the tip; an entry per regime.
     pub force: Vec<Output>,
-    /// Of the factors of what the beam's own damping takes.
+    /// Derivatives of the two factors of each product in the power lost in the beam's own damping.
     pub(crate) beam_power: Vec<[Output; 2]>,
-    /// Of the phases of further tones in rad.
+    /// Derivatives of the phases of further tones, in rad.
     pub tone_phases: Vec<f64>,
-    /// Of the rigid stop.
+    /// Derivatives of the numbers of the rigid stop.
     pub rigid_stop: RigidStop,
 }
 
 impl ModelTangent {
-    /// The derivative of nothing.
+    /// Returns the zero derivative of `model`.
     pub fn zeros(model: &Model) -> Self {
         let zero = model.tip.scaled(0.0);
         let products = model.power().first().map_or(0, |power| power.beam.len());
@@ -41,7 +41,7 @@ impl ModelTangent {
         }
     }
 
-    /// Adds `factor · other`: what a parameter does through several others.
+    /// Adds `factor · other`: the chain rule for a change of several parameters.
     pub fn add(&mut self, factor: f64, other: &Self) {
         self.system.add(factor, &other.system);
         let outputs = |of: &Self| -> Vec<Output> {

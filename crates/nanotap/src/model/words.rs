@@ -1,16 +1,17 @@
 //! Enums whose variants are words of a case file, each declared once.
 
-/// A text that is none of the words of an enum.
+/// The error of a text that is not a word of an enum.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("`{given}` is not one of {}", known.join(", "))]
 pub struct UnknownWord {
-    /// The text.
+    /// Text that was given as a word.
     pub given: String,
-    /// The words.
+    /// All words that the enum has.
     pub known: Vec<&'static str>,
 }
 
-/// A word as it is compared: case does not matter, nor do underscores and blanks for hyphens.
+/// Returns a word in the form in which words are compared: lower case, with hyphens for underscores
+/// and blanks.
 pub(crate) fn plain(word: &str) -> String {
     word.trim().to_lowercase().replace(['_', ' '], "-")
 }
@@ -35,11 +36,11 @@ macro_rules! words {
         }
 
         impl $kind {
-            /// Every one.
+            /// All variants, in the order of their declaration.
             pub const ALL: [Self; 1 + [$(stringify!($variant)),*].len()] =
                 [Self::$first, $(Self::$variant),*];
 
-            /// Name in case files.
+            /// Returns the name in case files.
             pub const fn name(self) -> &'static str {
                 match self {
                     Self::$first => $first_name,

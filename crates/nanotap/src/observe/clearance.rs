@@ -33,19 +33,21 @@ use crate::model::{BeamOutputs, Model};
 pub struct Clearance<D = f64> {
     /// Least V(ξ, τ), in units of g₀; negative if the beam would pass through the sample.
     pub height: D,
-    /// Position along the beam, 0 (clamp) to 1 (tip).
+    /// Position along the beam as a fraction of its length, 0 (clamp) to 1 (tip).
     pub xi: f64,
-    /// Time in drive periods from the start of the recording.
+    /// Time from the start of the recording, in drive periods.
     pub period: f64,
 }
 
 /// Number of grid positions per mode; the highest mode has one antinode per half wave.
 const PLACES_PER_MODE: usize = 8;
-/// Final width of the interval of positions in which the beam is lowest.
+/// Final width of the interval of positions in which the beam is lowest, as a fraction of its
+/// length.
 const PLACE: f64 = 1e-9;
-/// The position nearest to the clamp at which the slope is evaluated.
+/// The position nearest to the clamp at which the slope is evaluated, as a fraction of the beam's
+/// length.
 const CLAMP: f64 = 1e-6;
-/// Slope below which a beam is level.
+/// Magnitude of the slope dW/dξ, in units of g₀, up to which a beam counts as level.
 const LEVEL: f64 = 1e-13;
 /// Largest number of Newton steps to the time of a least height.
 const MAX_STEPS: usize = 12;
@@ -223,7 +225,7 @@ impl RecordedBeam<'_> {
 /// A grid position that is not higher than its neighbours.
 struct Valley {
     place: f64,
-    /// The neighbouring positions.
+    /// Neighbouring grid positions, as fractions of the beam's length.
     low: f64,
     high: f64,
     /// Lower bound of the height in the valley.

@@ -13,20 +13,20 @@ use crate::model::Model;
 pub struct ContactEvent {
     /// Time from the end of the transient, in the model's unit.
     pub tau: f64,
-    /// Kind of the switch.
+    /// Whether contact begins or ends, or the tip hits a rigid stop.
     pub kind: ContactEventKind,
     /// Rate of the gap just before the switch, in the model's unit. At the end of contact with a
     /// Kelvin–Voigt surface, which followed the tip, it is the rate of the tip's height.
     pub gap_rate: f64,
 }
 
-/// Kind of a switch.
+/// Kind of a switch between flight and contact.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum ContactEventKind {
-    /// Contact begins.
+    /// Contact begins: the tip reaches the surface.
     ContactStart,
-    /// Contact ends.
+    /// Contact ends: the tip leaves the surface.
     ContactEnd,
     /// Impact on a rigid stop.
     Impact,
@@ -59,7 +59,7 @@ impl<'a> Contacts<'a> {
         }
     }
 
-    /// The recorded contacts.
+    /// Returns the recorded contact events, in order of time.
     pub fn events(self) -> Vec<ContactEvent> {
         self.events
     }

@@ -41,7 +41,7 @@ pub enum DerivativeError {
     /// The case is invalid near this value of the key.
     #[error(transparent)]
     Case(#[from] CaseError),
-    /// The flow failed.
+    /// The motion could not be followed over the orbit's periods.
     #[error(transparent)]
     Flow(#[from] MotionError),
     /// A multiplier is 1: at a fold the orbit has no derivative.
@@ -49,7 +49,7 @@ pub enum DerivativeError {
     NotIsolated,
 }
 
-/// Derivatives of observables.
+/// Derivatives of observables, each next to its entry of the table.
 type Changes = Vec<(&'static Observable, Value)>;
 
 /// The derivative of a periodic orbit and of its observables.
@@ -57,11 +57,12 @@ type Changes = Vec<(&'static Observable, Value)>;
 pub struct Derivative {
     /// SI unit of the key; `None` for a number of the equations.
     pub unit: Option<&'static str>,
-    /// Derivative of the state at drive phase 0, length n.
+    /// Derivative of the state at drive phase 0, length n, in model units per unit of the key.
     pub state: Vec<f64>,
     /// Derivatives of observables in the model's units, without discontinuous ones.
     pub observables: Vec<(&'static Observable, Value)>,
-    /// What stays while the key changes although it was not stated, in SI.
+    /// Quantities that are constant while the key changes although the case does not state them, in
+    /// SI.
     pub held: Held,
     /// Derivatives of observables in SI, for a physical case.
     pub physical: Option<Vec<(&'static Observable, Value)>>,
@@ -86,7 +87,7 @@ impl Derivative {
         all.into_iter().next().ok_or(DerivativeError::NotIsolated)
     }
 
-    /// The same with respect to each of several keys, in their order, for less than one by one.
+    /// The same with respect to each of several keys, in their order, at less cost than one by one.
     ///
     /// # Errors
     /// If the case is invalid near the value of one of the keys, or the orbit is not isolated.

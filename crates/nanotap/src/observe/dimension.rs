@@ -5,36 +5,36 @@ use crate::case::physical::{Kind, Scales};
 /// The dimension of an observable.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Dimension {
-    /// Deflection, gap, depth: g₀.
+    /// Deflection, gap or depth; the model's unit is g₀, the SI unit m.
     Length,
-    /// √(mL⁴/EI).
+    /// Time; the model's unit is √(mL⁴/(EI)), the SI unit s.
     Time,
-    /// Length over time.
+    /// Velocity; the model's unit is g₀ √(EI/(mL⁴)), the SI unit m/s.
     Velocity,
-    /// EI g₀/L³.
+    /// Force; the model's unit is EI g₀/L³, the SI unit N.
     Force,
-    /// Force times length.
+    /// Energy; the model's unit is EI g₀²/L³, the SI unit J.
     Energy,
-    /// Energy over time.
+    /// Power; the model's unit is that of energy over that of time, the SI unit W.
     Power,
-    /// Slope dW/dξ: g₀/L.
+    /// Slope; dW/dξ in the model with the unit g₀/L, the pure number dw/dx in SI.
     Slope,
-    /// Degrees.
+    /// Angle in degrees, in the model and in SI.
     Angle,
     /// A pure number: a fraction or a ratio.
     Number,
-    /// A count.
+    /// A whole number of events, without a unit.
     Count,
     /// A count per drive period.
     PerPeriod,
-    /// Drive periods.
+    /// Time in drive periods, in the model and in SI.
     Periods,
-    /// A position along the beam, 0 (clamp) to 1 (tip).
+    /// A position along the beam as a fraction of its length, 0 (clamp) to 1 (tip).
     Place,
 }
 
 impl Dimension {
-    /// The model's unit.
+    /// Returns the name of the model's unit.
     pub const fn model_unit(self) -> &'static str {
         match self {
             Self::Length => "g0",
@@ -49,7 +49,7 @@ impl Dimension {
         }
     }
 
-    /// The SI unit.
+    /// Returns the name of the SI unit.
     pub const fn si_unit(self) -> &'static str {
         match self.kind() {
             Some(kind) => kind.si_unit(),

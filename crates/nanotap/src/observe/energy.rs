@@ -12,10 +12,10 @@ use super::number::Number;
 use crate::model::nonlinear::Nonlinear;
 use crate::model::{Model, ModelTangent, Powers, Product};
 
-/// Energies over a recording, in the model's units or in SI.
+/// Energies over a recording, in the model's units (EI g₀²/L³ for a beam) or in J.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct EnergyBalance<D = f64> {
-    /// Work of the drive.
+    /// Work that the drive does over the recording.
     pub drive_work: D,
     /// Loss in the beam's damping.
     pub beam_damping: D,
@@ -24,12 +24,12 @@ pub struct EnergyBalance<D = f64> {
     pub sample_damping: D,
     /// Gain of stored (kinetic and elastic) energy; zero over a period of an orbit.
     pub stored: D,
-    /// Imbalance, relative to the energy converted.
+    /// Imbalance of the energies, relative to the energy converted, dimensionless.
     pub residual: D,
 }
 
 impl EnergyBalance {
-    /// All energies unknown.
+    /// The balance of an unmeasured motion: every field is NaN.
     pub(super) const UNKNOWN: Self = Self {
         drive_work: f64::NAN,
         beam_damping: f64::NAN,
@@ -107,17 +107,17 @@ impl Sum {
 }
 
 impl PowerTerm {
-    /// Power of the drive.
+    /// Returns the terms of the power that the drive delivers.
     pub(super) fn of_drive(model: &Model) -> Vec<Self> {
         Self::all(model, Sum::Drive)
     }
 
-    /// Power lost in the beam's damping.
+    /// Returns the terms of the power lost in the beam's damping.
     pub(super) fn of_beam(model: &Model) -> Vec<Self> {
         Self::all(model, Sum::Beam)
     }
 
-    /// Power lost in the sample's damping.
+    /// Returns the terms of the power lost in the sample's damping.
     pub(super) fn of_sample(model: &Model) -> Vec<Self> {
         Self::all(model, Sum::Sample)
     }
@@ -133,7 +133,7 @@ impl PowerTerm {
         (0..lengths.max().unwrap_or(0)).map(first).collect()
     }
 
-    /// The other factor.
+    /// Returns the other factor of the same product.
     pub(super) const fn other(self) -> Self {
         Self {
             second: !self.second,

@@ -8,17 +8,17 @@ use super::table::{ObservableSet, Observables};
 use crate::model::Model;
 use crate::model::nonlinear::Nonlinear;
 
-/// A functional of signals.
+/// A functional of signals, at frequencies of the drive if it has one.
 pub(super) type Functional = accumulate::Functional<Signal, Tone>;
 
 /// A scalar along a motion.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Signal {
-    /// Tip deflection W.
+    /// Tip deflection W relative to the base.
     Tip,
     /// Height V_T of the tip above the undeformed surface.
     Height,
-    /// Its rate.
+    /// Rate V̇_T of the tip's height over the undeformed surface.
     HeightRate,
     /// Force of the sample on the tip.
     Force,
@@ -29,7 +29,8 @@ pub(super) enum Signal {
 }
 
 impl Signal {
-    /// The share of a nonlinear law's force in it, in addition to its output.
+    /// Returns the factor with which a nonlinear law's force enters the signal, in addition to its
+    /// output; dimensionless.
     pub(super) fn force_part(self, nonlinear: &Nonlinear) -> f64 {
         match self {
             Self::Force => 1.0,
@@ -67,7 +68,7 @@ impl Signal {
 pub(super) enum Tone {
     /// The drive frequency; with several tones, that of the first.
     First,
-    /// That of a further tone, by its place among these.
+    /// Frequency of a further tone, by its index among these, from 0.
     Further(usize),
     /// A multiple of the drive frequency.
     Harmonic(u32),
@@ -78,7 +79,7 @@ pub(super) enum Tone {
 }
 
 impl Tone {
-    /// Its angular frequency.
+    /// Returns the angular frequency in model units.
     pub(super) fn frequency(self, model: &Model) -> f64 {
         match self {
             Self::First => model.frequency(),

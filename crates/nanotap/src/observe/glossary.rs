@@ -10,9 +10,9 @@ use super::{Dimension, OBSERVABLES};
 /// Description and unit of an entry.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct Entry {
-    /// Description.
+    /// Description of the entry in a few words.
     pub words: &'static str,
-    /// Unit.
+    /// Name of the unit; `1` for a pure number.
     pub unit: &'static str,
 }
 
@@ -25,7 +25,7 @@ pub struct Glossary {
     pub physical: BTreeMap<String, Entry>,
 }
 
-/// Entries other than observables.
+/// Name, description and unit of the entries other than observables.
 const OTHER_ENTRIES: &[(&str, &str, &str)] = &[
     ("strobe", "state at drive phase 0", STATE),
     ("start", "state where the recording starts", STATE),
@@ -136,7 +136,7 @@ const OTHER_ENTRIES: &[(&str, &str, &str)] = &[
 const STATE: &str = "model units";
 const PERIODS: &str = Dimension::Periods.model_unit();
 
-/// Creates the glossary.
+/// Creates the glossary of all entries of results.
 pub fn glossary() -> Glossary {
     let others = OTHER_ENTRIES
         .iter()

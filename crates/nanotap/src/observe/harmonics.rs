@@ -13,20 +13,22 @@ use crate::model::recording::{Curve, Recording};
 /// One component of a periodic motion, in the model's units.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct Harmonic {
-    /// Frequency as a multiple of the drive frequency; fractional for a subharmonic motion.
+    /// Frequency as a multiple of the drive frequency, dimensionless; fractional for a subharmonic
+    /// motion.
     pub order: f64,
     /// Of several tones: the numbers a, b, … of the lowest product a f₁ + b f₂ + … at this frequency.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub product: Option<Vec<i32>>,
-    /// Amplitude of the tip deflection.
+    /// Amplitude of the tip deflection, in the model's unit of length (g₀ for a beam).
     pub tip: f64,
     /// Phase lag of the tip deflection behind sin(order · Ωτ), degrees in (−180, 180].
     pub tip_phase: f64,
-    /// Amplitude of the contact force.
+    /// Amplitude of the force of the sample on the tip, in the model's unit of force (EI g₀/L³ for
+    /// a beam).
     pub force: f64,
     /// Phase lag of the contact force, degrees in (−180, 180].
     pub force_phase: f64,
-    /// Amplitude of the slope at the tip, for a beam.
+    /// Amplitude of the slope dW/dξ at the tip, in the model's unit g₀/L, for a beam.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub slope: Option<f64>,
 }
@@ -45,7 +47,8 @@ pub struct Spectrum {
     /// [`Observables`](super::Observables).
     #[serde(skip)]
     pub phase: f64,
-    /// Amplitude of the tip deflection at the drive frequency; serialised with the observables.
+    /// Amplitude of the tip deflection at the drive frequency, in the model's unit of length;
+    /// serialised with the observables.
     #[serde(skip)]
     pub first_harmonic: f64,
 }
@@ -54,7 +57,7 @@ pub struct Spectrum {
 const DENSE: usize = 64;
 /// Largest order |a| + |b| + … of a listed product a ω₁ + b ω₂ + … of several tones.
 const MIXING: i32 = 40;
-/// Most components that are listed.
+/// Largest number of components that are listed.
 const MAX_LINES: usize = 40_000;
 
 /// A multiple of a motion's fundamental frequency, and the product of several tones that lies there.

@@ -33,7 +33,7 @@ pub(super) struct PiecewiseLinear<'a> {
 }
 
 impl<'a> PiecewiseLinear<'a> {
-    /// For the observables `set`.
+    /// Prepares the measurement of the observables `set`.
     ///
     /// # Errors
     /// If a number of the model is not finite.
@@ -92,7 +92,7 @@ impl Engine for PiecewiseLinear<'_> {
     }
 }
 
-/// A run with measurement.
+/// A run of the exact flow, which is measured.
 struct ExactRun<'a> {
     flow: Flow,
     measurement: Measurement<'a>,
@@ -130,7 +130,7 @@ struct Measurement<'a> {
 
 /// An extremum that restarts in every drive period.
 struct PerPeriodExtremum {
-    /// Index in the plan.
+    /// Index of the functional in the plan.
     number: usize,
     is_least: bool,
     /// Extremum over all finished periods.
@@ -218,7 +218,7 @@ impl Measurement<'_> {
     }
 }
 
-/// The regimes in contact.
+/// Returns the indices of the regimes in contact.
 pub(super) fn contact_regimes(model: &Model) -> impl Iterator<Item = usize> + '_ {
     (0..model.contact.len()).filter(|&regime| model.contact[regime])
 }
@@ -231,7 +231,7 @@ pub(super) fn beginnings(model: &Model) -> impl Iterator<Item = (usize, usize)> 
         .filter(|&(from, to)| begins_contact(model, from, to))
 }
 
-/// The contacts that began.
+/// Sums up the contacts that began, over all pairs of regimes.
 fn contacts(model: &Model, gathered: &Accumulator) -> Beginnings<f64> {
     let mut all = Beginnings::<f64>::default();
     for (from, to) in beginnings(model) {

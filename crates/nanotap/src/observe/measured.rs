@@ -19,14 +19,14 @@ pub(super) struct Measured<'a, D = f64> {
 pub(super) struct Found<D> {
     /// The values of the required functionals, in their order.
     pub(super) values: Vec<(Functional, Phasor<D>)>,
-    /// Duration.
+    /// Duration of the motion, in model units.
     pub(super) duration: D,
-    /// Number of drive periods.
+    /// Number of completed drive periods.
     pub(super) periods: u64,
-    /// Contact time.
+    /// Total time in contact, in model units.
     pub(super) contact_time: D,
     pub(super) contacts: Beginnings<D>,
-    /// Gain of stored energy.
+    /// Gain of stored energy over the motion, in model units.
     pub(super) stored: D,
     /// Gain of energy stored in a nonlinear law.
     pub(super) stored_by_sample: D,
@@ -37,13 +37,13 @@ pub(super) struct Found<D> {
 }
 
 impl Found<f64> {
-    /// Computes the observables.
+    /// Computes the observables of `set` from the measurements.
     pub(super) fn observables(self, model: &Model, set: ObservableSet) -> Observables {
         Observables::read(set, &mut Measured::of(model, Some(self)))
     }
 }
 
-/// The contacts that began.
+/// Number and greatest speed of the contacts that began.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Beginnings<D> {
     pub(super) count: u64,
@@ -106,12 +106,12 @@ impl<'a, D: Number> Measured<'a, D> {
         self.found.as_ref().map_or_else(D::default, read)
     }
 
-    /// Minimum of a signal.
+    /// Returns the minimum of a signal, in model units.
     pub(super) fn least(&mut self, signal: Signal) -> D {
         self.value(Functional::Least(signal)).re
     }
 
-    /// Maximum of a signal.
+    /// Returns the maximum of a signal, in model units.
     pub(super) fn greatest(&mut self, signal: Signal) -> D {
         self.value(Functional::Greatest(signal)).re
     }
@@ -126,7 +126,7 @@ impl<'a, D: Number> Measured<'a, D> {
         self.value(Functional::Integral(signal)).re / self.duration()
     }
 
-    /// `∫ a b dt`.
+    /// Returns the integral `∫ a b dt` over the motion.
     fn product(&mut self, a: Signal, b: Signal) -> D {
         self.value(Functional::Product(a, b)).re
     }
@@ -177,14 +177,14 @@ impl<'a, D: Number> Measured<'a, D> {
         }
     }
 
-    /// Duration of the motion.
+    /// Returns the duration of the motion, in model units; 1 before the run.
     pub(super) fn duration(&self) -> D {
         self.found
             .as_ref()
             .map_or(1.0.into(), |found| found.duration)
     }
 
-    /// Duration in drive periods.
+    /// Returns the duration of the motion in drive periods.
     pub(super) fn periods(&self) -> f64 {
         let whole = self.found.as_ref().map_or(0, |found| found.periods);
         if whole > 0 {
@@ -194,12 +194,12 @@ impl<'a, D: Number> Measured<'a, D> {
         }
     }
 
-    /// Contact time.
+    /// Returns the total time in contact, in model units; 0 before the run.
     pub(super) fn contact_time(&self) -> D {
         self.gathered(|found| found.contact_time)
     }
 
-    /// The contacts that began.
+    /// Returns number and greatest speed of the contacts that began; zero before the run.
     pub(super) fn contacts(&self) -> Beginnings<D> {
         self.found
             .as_ref()
@@ -309,8 +309,8 @@ impl<'a, D: Number> Measured<'a, D> {
     }
 
     /// The component of the tip deflection at a product of the first tone and so many `times` a
-    /// further one, relative to the phases of both; nothing where that tone is not, or at a
-    /// frequency below zero.
+    /// further one, relative to the phases of both; `None` without that tone, or at a frequency of
+    /// zero or less.
     fn product_of_tones(&mut self, tone: Tone, further: usize, times: f64) -> Option<Phasor<D>> {
         self.model.system.drive().frequencies().get(further + 1)?;
         if tone.frequency(self.model) <= 0.0 {

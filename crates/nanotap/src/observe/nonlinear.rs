@@ -23,12 +23,12 @@ pub(super) struct Nonlinear<'a> {
     engine: &'a Arc<nonlinear::Nonlinear>,
     required: Requirements,
     functionals: Vec<accumulate::Functional>,
-    /// The required signals.
+    /// Required signals, in the order of the requirements.
     outputs: Vec<Output>,
 }
 
 impl<'a> Nonlinear<'a> {
-    /// For the observables `set`.
+    /// Prepares the measurement of the observables `set`.
     pub(super) fn new(
         model: &'a Model,
         nonlinear: &'a Arc<nonlinear::Nonlinear>,
@@ -72,12 +72,12 @@ impl Engine for Nonlinear<'_> {
     }
 }
 
-/// A run that is measured.
+/// A run of the flow under a nonlinear force, which is measured.
 struct NonlinearRun<'a> {
     of: &'a Nonlinear<'a>,
     flow: Flow,
     state: Vec<f64>,
-    /// Values of the functionals.
+    /// Values of the functionals so far.
     values: Vec<Complex>,
     periods: usize,
     contact_time: f64,

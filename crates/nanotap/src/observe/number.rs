@@ -9,15 +9,15 @@ use nanotap_arithmetic::{Dual, Scalar};
 pub(super) trait Number: Scalar + Default + From<f64> + Div<f64, Output = Self> {
     /// Whether it has a derivative.
     const VARIES: bool;
-    /// Returns at least `low`.
+    /// Returns the larger of the number and `low`.
     fn at_least(self, low: f64) -> Self;
-    /// √(x² + y²).
+    /// Returns √(x² + y²), with x the number itself.
     fn hypotenuse(self, y: Self) -> Self;
-    /// The angle of (x, y) = (`x`, self) in degrees.
+    /// Returns the angle of the point (`x`, self) in degrees.
     fn degrees(self, x: Self) -> Self;
-    /// Sine and cosine.
+    /// Returns sine and cosine of an angle in radians.
     fn turn(self) -> (Self, Self);
-    /// The square root; its derivative at zero is infinite.
+    /// Returns the square root; its derivative at zero is infinite.
     fn root(self) -> Self;
 }
 
@@ -89,7 +89,7 @@ impl<D> From<Complex<D>> for Phasor<D> {
 }
 
 impl<D: Number> Phasor<D> {
-    /// Amplitude.
+    /// Returns the amplitude |c| of the component.
     pub(super) fn norm(self) -> D {
         self.re.hypotenuse(self.im)
     }
@@ -104,7 +104,7 @@ impl<D: Number> Phasor<D> {
         }
     }
 
-    /// Scales by `factor`.
+    /// Returns the component multiplied by `factor`.
     pub(super) fn times(self, factor: D) -> Self {
         Self {
             re: self.re * factor,

@@ -19,9 +19,9 @@ use crate::model::parameter::Parameter;
 /// names, with energies in electronvolts too.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PhysicalMotion {
-    /// The observables in SI.
+    /// Observables of the motion, in SI units.
     pub observables: Observables,
-    /// Amplitude over the free amplitude A₀: the setpoint ratio of this motion.
+    /// Amplitude over the free amplitude A₀, dimensionless: the setpoint ratio of this motion.
     pub amplitude_ratio: f64,
     /// Further entries if the motion is reported alone.
     pub setting: Option<Setting>,
@@ -30,9 +30,9 @@ pub struct PhysicalMotion {
 /// Entries that belong to the case, and the harmonics of the motion.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct Setting {
-    /// Reference of the phase.
+    /// Quantity to which phases refer, in words: a displacement or a force.
     pub phase_reference: &'static str,
-    /// Drive frequency, Hz.
+    /// Drive frequency, Hz; of several tones, that of the first.
     pub frequency: f64,
     /// If Hertz's stiffness was linearised at an indentation that this motion does not have.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -45,9 +45,9 @@ pub struct Setting {
 /// One component of a periodic motion; SI units, angles in degrees.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct PhysicalHarmonic {
-    /// Frequency as a multiple of the drive frequency.
+    /// Frequency as a multiple of the drive frequency, dimensionless.
     pub order: f64,
-    /// Frequency, Hz.
+    /// Frequency of the component, Hz.
     pub frequency: f64,
     /// Of several tones: the numbers a, b, … of the lowest product a f₁ + b f₂ + … at this frequency.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -58,9 +58,9 @@ pub struct PhysicalHarmonic {
     pub tip_phase: f64,
     /// Amplitude of the force, N.
     pub force: f64,
-    /// Phase lag of the force, degrees.
+    /// Phase lag of the force, degrees in (−180, 180].
     pub force_phase: f64,
-    /// Amplitude of the slope dw/dx at the tip, if the lever's length is known.
+    /// Amplitude of the slope dw/dx at the tip, dimensionless, if the lever's length is known.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub slope: Option<f64>,
 }

@@ -23,7 +23,7 @@ pub struct RecordOptions {
     pub each_period: bool,
 }
 
-/// A recorded motion.
+/// A recorded motion, with its observables.
 #[derive(Clone, Debug)]
 pub struct Recorded {
     /// The observables, in the model's units.
@@ -32,9 +32,9 @@ pub struct Recorded {
     pub recording: Recording,
     /// States at the ends of its last periods, in order.
     pub states: Vec<Vec<f64>>,
-    /// The final state.
+    /// State at the end of the last period, in model units.
     pub end: Vec<f64>,
-    /// The contact events.
+    /// Contact events in order of time; of a piecewise-linear model, only if they were requested.
     pub events: Vec<ContactEvent>,
     /// Smallest tip deflection of each period, in the model's units.
     pub lows: Vec<f64>,
@@ -56,7 +56,7 @@ pub(super) trait Engine {
 pub(super) trait Run {
     /// Runs one drive period and records it if `record`.
     fn period(&mut self, record: bool) -> Result<(), MotionError>;
-    /// The present state.
+    /// Returns the present state, in model units.
     fn state(&self) -> Vec<f64>;
     /// The measurements over the periods so far.
     fn finish(self: Box<Self>) -> Result<Measurements, MotionError>;

@@ -25,20 +25,20 @@ use crate::model::contact::dual::Dual;
 
 use Signal::{Height, Slope, Tip};
 
-/// An observable.
+/// An observable: an entry of the table.
 #[derive(Debug)]
 pub struct Observable {
     /// Name in JSON, CSV headers, datasets, at the terminal and in Python.
     pub name: &'static str,
     /// Name among quantities in SI, if experimenters use another one.
     pub si_name: &'static str,
-    /// Dimension.
+    /// Dimension of the value, from which its units follow.
     pub dimension: Dimension,
     /// Short description and symbol (between `$`): the label of an axis.
     pub label: &'static str,
-    /// Description.
+    /// Description in a few words, without the symbol.
     pub words: &'static str,
-    /// Returns the value.
+    /// Returns its value among measured observables.
     pub of: fn(&Observables) -> Value,
     /// Whether it is a single number, as a curve needs.
     pub is_number: bool,
@@ -72,18 +72,18 @@ impl Observable {
     }
 }
 
-/// A set of observables.
+/// A set of observables of the table.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ObservableSet(u64);
 
 impl ObservableSet {
-    /// The empty set.
+    /// The set without any observable.
     pub const NONE: Self = Self(0);
 
-    /// All observables.
+    /// The set of all observables.
     pub const ALL: Self = Self(u64::MAX >> (64 - OBSERVABLES.len()));
 
-    /// Adds an observable.
+    /// Returns the set with the observable added.
     #[must_use]
     pub const fn with(self, observable: &Observable) -> Self {
         Self(self.0 | 1 << observable.row)
@@ -120,7 +120,7 @@ macro_rules! observables {
         $name:ident $(as $si_name:literal)?: $type:ty, $dimension:ident, $where:ident,
         $label:literal, $words:literal, $read:expr;
     )*) => {
-        /// The table of observables.
+        /// The table of all observables, in the order of output.
         pub static OBSERVABLES: &[Observable] = &[$(Observable {
             name: stringify!($name),
             si_name: observables!(@si $name $($si_name)?),
@@ -133,7 +133,7 @@ macro_rules! observables {
             row: Row::$name as usize,
         }),*];
 
-        /// Rows of the table.
+        /// Row numbers of the observables in the table.
         #[allow(non_camel_case_types, reason = "the observables' own names")]
         #[derive(Clone, Copy)]
         enum Row { $($name),* }
@@ -147,7 +147,7 @@ macro_rules! observables {
         }
 
         impl Observables {
-            /// All fields unknown.
+            /// Observables of an unmeasured motion: NaN or `None`, and `periods` 0.
             pub const UNKNOWN: Self = Self {
                 periods: 0.0,
                 $($name: <$type as Measurable>::ABSENT,)*
@@ -183,7 +183,7 @@ macro_rules! observables {
                 all
             }
 
-            /// Converts to SI.
+            /// Converts to SI by the units `scales` of the model; NaN where a unit is not known.
             #[must_use]
             pub fn in_si(&self, scales: &Scales) -> Self {
                 Self {

@@ -13,9 +13,9 @@ use crate::model::Model;
 pub struct OutOfRange {
     /// The ratio, as a formula: `δ/R`.
     pub ratio: &'static str,
-    /// Its largest value.
+    /// Largest value of the ratio over the motion, dimensionless.
     pub value: f64,
-    /// The value up to which the law is valid.
+    /// Largest value of the ratio for which the law is valid, dimensionless.
     pub limit: f64,
 }
 

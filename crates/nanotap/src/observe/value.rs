@@ -11,13 +11,13 @@ use crate::model::contact::dual::Dual;
 pub enum Value {
     /// The motion has no such value, or it was not requested.
     Absent,
-    /// A number.
+    /// A single number, in the unit of the observable.
     Number(f64),
-    /// A count.
+    /// A whole number of events.
     Count(usize),
-    /// Minimum and maximum.
+    /// Minimum and maximum of a signal, in this order.
     Range([f64; 2]),
-    /// Energies.
+    /// The energies of an energy balance.
     Energies(EnergyBalance),
 }
 
@@ -53,13 +53,13 @@ impl Value {
     }
 }
 
-/// A type of observable.
+/// A type that the value of an observable has.
 pub(super) trait Measurable: Copy {
     /// Whether it is a single number.
     const IS_NUMBER: bool = false;
-    /// Not measured.
+    /// The value of an observable that was not measured.
     const ABSENT: Self;
-    /// The value.
+    /// Converts to a [`Value`], which is absent if nothing was measured.
     fn value(self) -> Value;
     /// The value in a unit whose size is `unit`; absent if that is unknown.
     fn scaled(self, unit: Option<f64>) -> Self;
@@ -143,7 +143,7 @@ impl<T: Measurable> Measurable for Option<T> {
 
 /// An observable with a derivative.
 pub(super) trait Varying {
-    /// The derivative.
+    /// Returns the derivative; absent where it does not exist.
     fn change(self) -> Value;
 }
 

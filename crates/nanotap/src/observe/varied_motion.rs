@@ -21,20 +21,20 @@ pub(super) struct Change {
     pub(super) start: Vec<f64>,
     /// Change of drive, distance and law; `None` if they are constant.
     pub(super) parameter: Option<Parameter>,
-    /// Change of ln T.
+    /// Change of ln T, where T is the drive period.
     pub(super) log_period: f64,
 }
 
 /// Measurements of a motion with their derivatives in one direction.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Varied {
-    /// Values of the functionals.
+    /// Values of the functionals, with their derivatives.
     pub(super) values: Vec<Complex<Dual>>,
     /// Largest speed at which a contact began.
     pub(super) greatest_speed: Dual,
-    /// Contact time.
+    /// Total time in contact, in model units.
     pub(super) contact_time: Dual,
-    /// Duration.
+    /// Duration of the motion, in model units.
     pub(super) duration: Dual,
 }
 

@@ -29,10 +29,10 @@ use crate::study::simulate::{Classification, largest_exponent, orbit_evidence, t
 use crate::study::start_box::{box_with, default_starts};
 use crate::study::value::Intervals;
 
-/// Results of a census.
+/// Results of a census: the attractors found by sampling initial states, with their shares.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct Attractors {
-    /// Number of initial states.
+    /// Number of initial states that were followed.
     pub starts: usize,
     /// Seed of the initial states.
     pub seed: u64,
@@ -41,7 +41,8 @@ pub struct Attractors {
     pub sides: Vec<Side>,
     /// Attractors, most frequent first.
     pub attractors: Vec<AttractorReport>,
-    /// The same shares for each size of the starts, where they were drawn at several.
+    /// Shares of the attractors by size of the initial states, where these were drawn at several
+    /// sizes.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub sizes: Vec<SizeReport>,
     /// Bound on undiscovered motions, where sampling went on until it was small.
@@ -49,12 +50,13 @@ pub struct Attractors {
     pub unseen: Option<UnseenReport>,
     /// Reason why the census ended.
     pub end: EndReport,
-    /// Relative tolerance of the approximate flow on which starts were followed, if they were: shares,
-    /// lifetimes and the bound of what was not seen are of that flow. Orbits, multipliers and exponents
-    /// are always those of the exact flow.
+    /// Relative tolerance of the approximate flow, dimensionless. `None` if all initial states were
+    /// followed on the exact flow; otherwise shares, lifetimes and the bound on undiscovered
+    /// motions are those of the approximate flow. Orbits, multipliers and exponents are always
+    /// those of the exact flow.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub followed_at: Option<f64>,
-    /// Undecided initial states.
+    /// Initial states whose motion stayed undecided, with the reason.
     pub undecided: Vec<UndecidedStart>,
     /// Fraction of the initial states that is undecided.
     pub undecided_fraction: Share,
@@ -62,7 +64,7 @@ pub struct Attractors {
     pub unbounded: Share,
     /// Transient chaos, if some initial states escaped from it and others have not yet.
     pub transient_chaos: Option<TransientChaosReport>,
-    /// Unstable orbits, if requested.
+    /// Unstable periodic orbits, if they were requested.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub unstable: Option<Vec<InSi<OrbitReport>>>,
     /// Whether the work was stopped before all starts were done.
@@ -72,28 +74,29 @@ pub struct Attractors {
 /// Results of the initial states of one size.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct SizeReport {
-    /// Size of their box, as a part of the largest.
+    /// Size of the box of these initial states, as a fraction of the largest box.
     pub scale: f64,
-    /// Number of initial states.
+    /// Number of initial states of this size that were followed.
     pub starts: usize,
-    /// Fraction that goes to each attractor, in the order of the attractors.
+    /// Fraction of these initial states that goes to each attractor, 0 to 1, in the order of the
+    /// attractors.
     pub fractions: Vec<f64>,
 }
 
 /// Fraction of the initial states that may lead to undiscovered motions.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct UnseenReport {
-    /// Number of discovered motions.
+    /// Number of different motions that were discovered.
     pub motions: usize,
     /// Initial states since the last discovery.
     pub starts: usize,
     /// Upper bound, with 95 % confidence, of the fraction that leads to undiscovered motions.
     pub fraction: f64,
-    /// Fraction below which sampling ends.
+    /// Value of `fraction`, 0 to 1, below which sampling ends.
     pub target: f64,
 }
 
-/// Why a census ended.
+/// Reason why a census ended.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
 #[serde(tag = "reason", rename_all = "snake_case")]
 pub enum EndReport {
@@ -103,31 +106,32 @@ pub enum EndReport {
     BoundMet,
     /// The limit of initial states was reached.
     MaxStarts {
-        /// The limit.
+        /// Largest number of initial states that could be followed.
         limit: usize,
     },
     /// The limit of drive periods was reached.
     MaxPeriods {
-        /// The limit.
+        /// Largest number of drive periods, of all initial states together.
         limit: usize,
     },
-    /// The work took as many steps of the approximate flow as a census takes at most.
+    /// The limit of steps of the approximate flow was reached.
     MaxSteps {
-        /// How many that is; two evaluations of the force in the exact flow count as one.
+        /// Largest number of steps, of all initial states together; two evaluations of the force in
+        /// the exact flow count as one step.
         limit: u64,
     },
-    /// The work was stopped.
+    /// The work was cancelled before the census was complete.
     Cancelled,
 }
 
 /// A side of the box of initial states.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct Side {
-    /// Name of the coordinate.
+    /// Name of the coordinate, an entry of the state such as `a1` or `v1`.
     pub coordinate: String,
-    /// Lower end.
+    /// Lower end of the coordinate's range, in the model's units.
     pub lower: f64,
-    /// Upper end.
+    /// Upper end of the coordinate's range, in the model's units.
     pub upper: f64,
     /// The ends in SI, of a physical case.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -137,9 +141,9 @@ pub struct Side {
 /// A side of the box of initial states in SI.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct SideInSi {
-    /// Lower end.
+    /// Lower end of the coordinate's range, in the SI unit that `unit` states.
     pub lower: f64,
-    /// Upper end.
+    /// Upper end of the coordinate's range, in the SI unit that `unit` states.
     pub upper: f64,
     /// The unit, `m` or `m/s`.
     pub unit: &'static str,
@@ -148,9 +152,9 @@ pub struct SideInSi {
 /// A fraction of the initial states.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct Share {
-    /// Count.
+    /// Number of initial states in this share.
     pub count: usize,
-    /// Fraction of all.
+    /// Fraction of all initial states that were followed, 0 to 1.
     pub fraction: f64,
     /// 95 % confidence interval of the fraction (Wilson).
     pub fraction_interval: [f64; 2],
@@ -166,17 +170,17 @@ impl From<Fraction> for Share {
     }
 }
 
-/// An attractor.
+/// An attractor with its share, its exponents, and its orbit or a recording.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct AttractorReport {
-    /// Class of the motion.
+    /// Class of the motion: periodic, quasi-periodic or chaotic.
     pub classification: Classification,
-    /// Fraction of the initial states that reaches it.
+    /// Share of the initial states that reach the attractor.
     #[serde(flatten)]
     pub share: Share,
     /// Lyapunov exponents per drive period, largest first; of an orbit from its multipliers.
     pub lyapunov: Vec<f64>,
-    /// Standard error of each, where measured.
+    /// Standard error of each exponent, per drive period; `None` where they were not measured.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub lyapunov_errors: Option<Vec<f64>>,
     /// Evidence for the class, in words.
@@ -193,7 +197,7 @@ pub struct AttractorReport {
 }
 
 impl Attractors {
-    /// Proves its orbits where possible.
+    /// Proves the reported orbits by interval arithmetic where possible.
     fn prove(&mut self, case: &Case) {
         let prover = Prover::new(case);
         let stable = self.attractors.iter_mut().filter_map(|a| a.orbit.as_mut());
@@ -236,55 +240,57 @@ impl Attractors {
 /// A motion that is not periodic.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct NonPeriodic {
-    /// None.
+    /// Always `None`: null in documents, where a periodic motion has its period.
     pub period: Option<usize>,
-    /// A state on it, at drive phase 0.
+    /// State on the motion at drive phase 0, in the model's units. Its entries are a_1 … a_N (or
+    /// x), their rates, then any memory of the sample.
     pub state: Vec<f64>,
-    /// What can be read off it over [`OBSERVED_PERIODS`] periods.
+    /// Observables over [`OBSERVED_PERIODS`] drive periods, in the model's units.
     #[serde(flatten)]
     pub observables: Observables,
 }
 
-/// An undecided initial state.
+/// An initial state whose motion was left undecided.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct UndecidedStart {
-    /// Number of the initial state.
+    /// Index of the initial state in the order of sampling, from 0.
     pub start: usize,
-    /// The initial state.
+    /// Initial state at drive phase 0, in the model's units. Its entries are a_1 … a_N (or x),
+    /// their rates, then any memory of the sample.
     pub state: Vec<f64>,
-    /// Why there is none.
+    /// Reason why the motion was left undecided.
     pub reason: String,
 }
 
-/// Transient chaos.
+/// Transient chaos: chaotic motion that ends after a finite lifetime on an attractor.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct TransientChaosReport {
     /// Lyapunov exponents per drive period while it lasts; empty where the exact flow was not followed
     /// on it.
     pub lyapunov: Vec<f64>,
-    /// Standard error of each.
+    /// Standard error of each Lyapunov exponent, per drive period, in the order of `lyapunov`.
     pub lyapunov_errors: Vec<f64>,
     /// Mean lifetime in drive periods.
     pub lifetime: f64,
-    /// 95 % confidence interval of the mean lifetime.
+    /// 95 % confidence interval of the mean lifetime, in drive periods.
     pub lifetime_interval: [f64; 2],
     /// Number of escapes behind the estimate.
     pub escapes: usize,
     /// Fraction of the initial states that is still on transient chaos at the end.
     #[serde(rename = "wandering")]
     pub unescaped: Share,
-    /// Attractors of the escapes: index and count.
+    /// Attractors that the escapes reached: index of the attractor and number of escapes.
     pub destinations: Vec<(usize, usize)>,
 }
 
 /// Most starts of a census: 480 MB of states at N = 3.
 pub const MAX_STARTS: usize = 1_000_000;
-/// Starts in a box that was given without their number.
+/// Number of initial states in a given box, unless the options state another.
 const STARTS_IN_A_BOX: usize = 256;
-/// Share of drawn starts that may lead to motions not found at which no more are drawn under a nonlinear
-/// law.
+/// Upper bound of the fraction of initial states that may lead to undiscovered motions at which
+/// sampling ends under a nonlinear law.
 pub const NONLINEAR_UNSEEN: f64 = 0.01;
-/// Drive periods of all starts together after which no more are drawn under a nonlinear law.
+/// Drive periods of all initial states together after which sampling ends under a nonlinear law.
 const NONLINEAR_PERIODS: usize = 600_000;
 /// Harmonics reported of each orbit.
 const HARMONICS: usize = 20;
@@ -292,7 +298,7 @@ const HARMONICS: usize = 20;
 pub const OBSERVED_PERIODS: usize = 512;
 /// Steps of the approximate flow after which a start is left undecided.
 const MAX_START_STEPS: u64 = 4_000_000;
-/// A state this many times larger than the box has left every bound.
+/// Factor over the largest coordinate of the box above which a state counts as unbounded.
 const OUT_OF_BOUNDS: f64 = 1e6;
 
 /// Finds coexisting attractors by sampling initial states.

@@ -139,13 +139,14 @@ impl SliceRange {
 /// An attractor of a basin dataset.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Known {
-    /// Class of the motion.
+    /// Class of the motion: `periodic`, `quasi-periodic` or `chaotic`.
     pub classification: String,
-    /// Its minimal period, if it is an orbit.
+    /// Minimal period in drive periods; `None` unless the motion is periodic.
     pub period: Option<usize>,
-    /// Largest |multiplier|, if it is an orbit.
+    /// Largest modulus of the Floquet multipliers, dimensionless; `None` unless the motion is
+    /// periodic.
     pub multiplier: Option<f64>,
-    /// Largest Lyapunov exponent a period, if it was measured.
+    /// Largest Lyapunov exponent per drive period; `None` of a periodic orbit.
     pub lyapunov: Option<f64>,
     /// States at drive phase 0: a whole orbit, or a stretch of another motion.
     pub states: Vec<Vec<f64>>,
@@ -275,7 +276,7 @@ impl Basin {
         &self.known
     }
 
-    /// Number of points.
+    /// Returns the number of points of the slice, the product of the counts of both axes.
     pub fn points(&self) -> usize {
         self.basins.len()
     }
@@ -429,7 +430,7 @@ impl Known {
     }
 }
 
-/// ModelMap states along a motion.
+/// Returns states at drive phase 0 along a motion, one for each period.
 fn stretch(map: &mut ModelMap, start: &[f64]) -> Vec<Vec<f64>> {
     let mut state = start.to_vec();
     let mut states = Vec::new();
@@ -520,28 +521,29 @@ fn schema(
 /// Fractions of a slice by attractor.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct Shares {
-    /// Points of the slice.
+    /// Number of points of the slice.
     pub points: usize,
     /// The attractors, each with its fraction of the points.
     pub attractors: Vec<AttractorShare>,
-    /// Fraction of the points that reached no attractor within the periods.
+    /// Fraction of the points that reached no attractor within the periods, 0 to 1.
     pub unsettled: f64,
-    /// Fraction of the points whose motion is unbounded.
+    /// Fraction of the points whose motion is unbounded, 0 to 1.
     pub unbounded: f64,
-    /// Fraction of the points that could not be computed.
+    /// Fraction of the points that could not be computed, 0 to 1.
     pub failed: f64,
 }
 
 /// An attractor and its fraction of a slice.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct AttractorShare {
-    /// Class of the motion.
+    /// Class of the motion: `periodic`, `quasi-periodic` or `chaotic`.
     pub classification: String,
-    /// Its minimal period, if it is an orbit.
+    /// Minimal period in drive periods; `None` unless the motion is periodic.
     pub period: Option<usize>,
-    /// A state on it.
+    /// State on the attractor at drive phase 0, in the model's units. Its entries are a_1 … a_N (or
+    /// x), their rates, then any memory of the sample.
     pub state: Vec<f64>,
-    /// Fraction of the points of the slice that reaches it.
+    /// Fraction of the points of the slice that reaches the attractor, 0 to 1.
     pub fraction: f64,
 }
 
@@ -559,7 +561,8 @@ pub(crate) fn known(store: &Store) -> Result<Vec<Known>, StoreError> {
         })
 }
 
-/// Where the points of a block go: numbers of attractors, or why none is known.
+/// Reads the labels of a block's points: the index of the attractor, or a negative code where none
+/// is known.
 pub(crate) fn labels(store: &Store, block: &Block) -> Result<Vec<i32>, StoreError> {
     match store.read_chunk(block, 0)? {
         Values::Whole(labels) => Ok(labels),

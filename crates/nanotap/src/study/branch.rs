@@ -28,14 +28,14 @@ use crate::study::target::Targets;
 use crate::study::value::{Amount, Interval, values};
 use crate::{Error, ErrorKind};
 
-/// A parameter and its range, in its own unit.
+/// A parameter and its range, in the unit of its key.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Range {
-    /// The parameter.
+    /// Key of the parameter that varies.
     pub key: Key,
-    /// Value at the start.
+    /// Value at the start of the range, in the unit of the key.
     pub from: f64,
-    /// The other end.
+    /// Value at the other end of the range, in the unit of the key; less than `from` or greater.
     pub to: f64,
 }
 
@@ -96,19 +96,19 @@ const MAX_BRANCHES: usize = 64;
 /// Branches with their points and bifurcations.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct BranchReport {
-    /// The parameter's key.
+    /// Path of the parameter's key in a case file.
     pub parameter: &'static str,
-    /// Value at the start.
+    /// Value of the parameter at the start of the range, in the unit of its key.
     pub from: f64,
-    /// Value at the other end of the range.
+    /// Value of the parameter at the other end of the range, in the unit of its key.
     pub to: f64,
-    /// The branches.
+    /// Branches of periodic orbits; points and bifurcations state their index in this list.
     pub branches: Vec<BranchSummary>,
     /// Points, branch by branch, in order of arc length.
     pub points: Vec<PointReport>,
     /// Number of omitted points between these.
     pub points_left_out: usize,
-    /// Bifurcations of the branches.
+    /// Bifurcations and grazings located on the branches.
     pub bifurcations: Vec<BifurcationReport>,
     /// Where the requested events happen.
     #[serde(skip_serializing_if = "Vec::is_empty")]
@@ -119,14 +119,15 @@ pub struct BranchReport {
     /// Bifurcation curves in two parameters, if requested.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub loci: Option<Loci>,
-    /// Failures.
+    /// Orbits, branches and curves that could not be followed, with the reason.
     pub failures: Vec<FailureReport>,
-    /// What stays while the parameter varies although it was not stated, in SI.
+    /// Quantities that stay constant while the parameter varies although the case does not state
+    /// them, in SI.
     #[serde(skip_serializing_if = "Held::is_empty")]
     pub held: Held,
     /// Whether the work was stopped before it was done.
     pub cancelled: bool,
-    /// The parameter, for figures.
+    /// Key of the parameter, for figures; not in documents.
     #[serde(skip)]
     pub key: Key,
     /// For a physical case, the factor from values of the parameter to SI.
@@ -149,20 +150,20 @@ impl BranchReport {
     }
 }
 
-/// A branch.
+/// Summary of one branch of periodic orbits.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct BranchSummary {
-    /// Period of its orbits.
+    /// Period of the orbits on the branch, in drive periods.
     pub period: usize,
     /// Index of the branch from which it emerges at a flip.
     pub parent: Option<usize>,
     /// Number of period doublings from a seed.
     pub depth: usize,
-    /// Number of points.
+    /// Number of points computed on the branch.
     pub points: usize,
-    /// Least and greatest parameter reached.
+    /// Least and greatest value of the parameter on the branch, in the unit of its key.
     pub range: [f64; 2],
-    /// Reason of its end.
+    /// Reason why the branch ends, in words.
     pub end: String,
     /// Whether it was followed to its end: out of the range, into another branch, or to
     /// where the motion ceases to be.
@@ -172,18 +173,19 @@ pub struct BranchSummary {
 /// One orbit of a branch.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct PointReport {
-    /// Index of the branch.
+    /// Index of the branch on which the orbit lies, from 0.
     pub branch: usize,
-    /// Period.
+    /// Minimal period in drive periods.
     pub period: usize,
-    /// Value of the parameter.
+    /// Value of the parameter, in the unit of its key.
     pub parameter: f64,
     /// The same in SI, for a number of the equations of a physical case.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub parameter_si: Option<f64>,
-    /// State at drive phase 0.
+    /// State at drive phase 0, in the model's units. Its entries are a_1 … a_N (or x), their rates,
+    /// then any memory of the sample.
     pub state: Vec<f64>,
-    /// Floquet multipliers, largest modulus first.
+    /// Floquet multipliers, real and imaginary part, largest modulus first.
     pub multipliers: Vec<[f64; 2]>,
     /// Whether every multiplier is inside the unit circle.
     pub stable: bool,
@@ -195,25 +197,26 @@ pub struct PointReport {
     pub physical: Option<PhysicalMotion>,
 }
 
-/// A bifurcation.
+/// A bifurcation or grazing of the orbits of a branch.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct BifurcationReport {
     /// fold, flip, neimark-sacker, grazing or crossing.
     pub kind: &'static str,
-    /// Index of the branch.
+    /// Index of the branch on which it was located, from 0.
     pub branch: usize,
-    /// Period of the orbit.
+    /// Period of the bifurcating orbit, in drive periods.
     pub period: usize,
-    /// Value of the parameter.
+    /// Value of the parameter at the bifurcation, in the unit of its key.
     pub parameter: f64,
     /// The same in SI, for a number of the equations of a physical case.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub parameter_si: Option<f64>,
-    /// Width of the final bracket of the parameter.
+    /// Width of the final bracket of the parameter, in the unit of its key.
     pub uncertainty: f64,
-    /// State at drive phase 0.
+    /// State of the orbit at drive phase 0, in the model's units. Its entries are a_1 … a_N (or x),
+    /// their rates, then any memory of the sample.
     pub state: Vec<f64>,
-    /// Floquet multipliers.
+    /// Floquet multipliers of the orbit, real and imaginary part, largest modulus first.
     pub multipliers: Vec<[f64; 2]>,
     /// supercritical where the new motion of a flip or Neimark–Sacker point appears on the unstable
     /// side of the orbit, subcritical where it is unstable; absent for other kinds, and where it is
@@ -240,17 +243,17 @@ pub struct AttractorShare {
     /// Number of the attractor. One that Newton's method continues from value to value keeps its
     /// number; a chaotic one and a torus have another at every value.
     pub attractor: usize,
-    /// Value of the parameter.
+    /// Value of the parameter, in the unit of its key.
     pub parameter: f64,
-    /// Class of the motion.
+    /// Class of the motion: `periodic`, `quasi-periodic` or `chaotic`.
     pub classification: &'static str,
-    /// Period of its orbit, 0 of another motion.
+    /// Period of the orbit in drive periods; 0 if the motion is not periodic.
     pub period: usize,
-    /// Share of the initial states that reach it.
+    /// Share of the initial states that reach the attractor, 0 to 1.
     pub share: f64,
-    /// Lower end of the 95 % interval of the share.
+    /// Lower end of the 95 % confidence interval of the share, 0 to 1.
     pub share_low: f64,
-    /// Upper end of the 95 % interval of the share.
+    /// Upper end of the 95 % confidence interval of the share, 0 to 1.
     pub share_high: f64,
     /// Whether no initial state reached it, but a neighbouring value leads to it.
     pub from_neighbour: bool,
@@ -259,18 +262,18 @@ pub struct AttractorShare {
 /// Bifurcation curves in two parameters.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct Loci {
-    /// The second parameter's key.
+    /// Path of the second parameter's key in a case file.
     pub second: &'static str,
-    /// Its range.
+    /// Least and greatest value of the second parameter, in the unit of its key.
     pub range: [f64; 2],
-    /// The curves.
+    /// Curves of bifurcations, and of events if any are requested.
     pub curves: Vec<CurveReport>,
     /// The second parameter, for figures.
     #[serde(skip)]
     pub key: Key,
 }
 
-/// A bifurcation curve.
+/// Curve of a bifurcation or of an event in the plane of two parameters.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct CurveReport {
     /// fold, flip, neimark-sacker, grazing, crossing or event.
@@ -278,11 +281,12 @@ pub struct CurveReport {
     /// The event, as it was given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub event: Option<String>,
-    /// Period of the orbits on it.
+    /// Period of the orbits on the curve, in drive periods.
     pub period: usize,
-    /// The first parameter along it.
+    /// Values of the first parameter along the curve, point by point, in the unit of its key.
     pub first: Vec<f64>,
-    /// The second parameter along it.
+    /// Values of the second parameter along the curve, one for each of `first`, in the unit of its
+    /// key.
     pub second: Vec<f64>,
     /// Reasons of its ends, at the first and last point.
     pub ends: [String; 2],
@@ -294,9 +298,9 @@ pub struct CurveReport {
 /// An orbit or branch that could not be followed.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct FailureReport {
-    /// Where.
+    /// Value of the parameter where following failed, in the unit of its key.
     pub parameter: f64,
-    /// Reason.
+    /// Reason of the failure, in words.
     pub reason: String,
 }
 
@@ -317,7 +321,7 @@ pub(in crate::study) struct BranchesThrough<'a> {
     range: Range,
     options: &'a BranchOptions,
     diagram: Diagram,
-    /// Orbits given so far.
+    /// Orbits given so far, each with its value of the parameter.
     given: Vec<(f64, PeriodicOrbit)>,
 }
 
@@ -367,7 +371,7 @@ impl<'a> BranchesThrough<'a> {
         self.given.is_empty()
     }
 
-    /// What was found.
+    /// Reports the branches with their points and bifurcations.
     pub(in crate::study) fn report(self, control: &Control<'_>) -> BranchReport {
         BranchReport {
             cancelled: control.is_cancelled(),
@@ -927,7 +931,7 @@ impl Measured<'_> {
 /// Periods over which Lyapunov exponents are measured at most where seeds are looked for:
 /// only what closes is followed.
 const SEED_PERIODS: usize = 1000;
-/// Longest period of seeds.
+/// Longest period of the orbits from which branches start, in drive periods.
 const SEED_MAX_PERIOD: usize = 16;
 /// Points of each half of a locus at most.
 const LOCUS_POINTS: usize = 6000;

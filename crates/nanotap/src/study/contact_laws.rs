@@ -36,7 +36,7 @@ use crate::study::{Study, cantilever};
 /// The motion under one contact law.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct SampleMotion {
-    /// The law.
+    /// Name of the contact law.
     pub contact: String,
     /// The case with this law.
     #[schemars(with = "Map<String, Value>")]
@@ -51,33 +51,34 @@ pub struct SampleMotion {
     /// Its observables in SI, for a physical case.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub physical: Option<PhysicalMotion>,
-    /// Why there is none.
+    /// Reason why there is no orbit of the requested period.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub reason: Option<String>,
     /// The branch through it in the drive frequency, if it was followed.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub branch: Option<BranchReport>,
-    /// Gap and force of a nonlinear law on a slow approach and back, over the gaps of the
-    /// orbits.
+    /// Pairs (gap, force) of a nonlinear law on a slow approach and retract over the gaps of the
+    /// orbits, in the model's units.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub force_curve: Vec<[f64; 2]>,
 }
 
-/// What an orbit looks like.
+/// State, stability and observables of a periodic orbit.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct OrbitLook {
     /// Minimal period in drive periods.
     pub period: usize,
-    /// State at drive phase 0.
+    /// State at drive phase 0, in the model's units. Its entries are a_1 … a_N (or x), their rates,
+    /// then any memory of the sample.
     pub state: Vec<f64>,
-    /// Largest |multiplier|.
+    /// Largest modulus of the Floquet multipliers, dimensionless.
     pub spectral_radius: f64,
-    /// Whether it is stable.
+    /// Whether every Floquet multiplier is inside the unit circle.
     pub stable: bool,
     /// Observables in the model's units.
     #[serde(flatten)]
     pub observables: Observables,
-    /// Indentation −V_T and force along the orbit.
+    /// Pairs (indentation −V_T, force) along the orbit, in the model's units.
     #[serde(rename = "loop")]
     pub force_loop: Vec<[f64; 2]>,
 }
@@ -85,9 +86,9 @@ pub struct OrbitLook {
 /// The motions under all contact laws.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct Comparison {
-    /// Drive frequency Ω.
+    /// Drive frequency Ω of all motions, dimensionless.
     pub omega: f64,
-    /// Period of the orbits.
+    /// Period of the compared orbits, in drive periods.
     pub period: usize,
     /// The motions, in the order of [`ContactLaw::ALL`].
     pub samples: Vec<SampleMotion>,

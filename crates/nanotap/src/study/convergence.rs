@@ -22,7 +22,7 @@ use crate::study::{Study, cantilever};
 /// The motion with each number of modes.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct Convergence {
-    /// Numbers of modes N.
+    /// Numbers of modes N that are compared, from 1 to the largest.
     pub modes: Vec<usize>,
     /// Greatest difference of the tip deflection W over the orbit to the motion with
     /// the most modes, as a part of its amplitude; null where the motions differ in
@@ -32,17 +32,17 @@ pub struct Convergence {
     pub motions: Vec<Motion>,
     /// Smallest N from which the difference stays below the tolerance.
     pub enough: Option<usize>,
-    /// The tolerance.
+    /// Tolerance of `difference`, as a fraction of the amplitude.
     pub tolerance: f64,
-    /// The verdict in words.
+    /// Verdict on the number of modes that is enough, in words.
     pub verdict: String,
     /// Instrument readings, their errors with each number of modes, and the share of each mode.
     #[serde(flatten)]
     pub readings: ReadingsReport,
-    /// The orbits, for figures.
+    /// Orbit with each number of modes, for figures; `None` where none was found.
     #[serde(skip)]
     pub orbits: Vec<Option<OrbitReport>>,
-    /// The models, one a number of modes.
+    /// Model with each number of modes, in the order of `modes`.
     #[serde(skip)]
     pub models: Vec<Model>,
 }
@@ -50,24 +50,26 @@ pub struct Convergence {
 /// The motion with one number of modes.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct Motion {
-    /// Number of modes.
+    /// Number of modes N of the model.
     pub modes: usize,
-    /// Class of the motion.
+    /// Class of the motion: periodic, or undecided if no orbit was found.
     pub classification: Classification,
-    /// Period in drive periods.
+    /// Period in drive periods; `None` if no orbit was found.
     pub period: Option<usize>,
-    /// Largest tip deflection.
+    /// Largest tip deflection W of the orbit, in the model's unit of length; `None` if no orbit was
+    /// found.
     pub tip_max: Option<f64>,
-    /// Smallest tip deflection.
+    /// Smallest tip deflection W of the orbit, in the model's unit of length; `None` if no orbit
+    /// was found.
     pub tip_min: Option<f64>,
     /// The extrema of the tip deflection in SI, for a physical case.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub physical: Option<NumbersInSi>,
-    /// Contact time / period.
+    /// Contact time / period, 0 to 1; `None` if no orbit was found.
     pub contact_fraction: Option<f64>,
-    /// Largest |multiplier|.
+    /// Largest modulus of the Floquet multipliers, dimensionless; `None` if no orbit was found.
     pub spectral_radius: Option<f64>,
-    /// Reason why it is not an orbit.
+    /// Reason why no orbit was found.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub reason: Option<String>,
 }

@@ -37,14 +37,14 @@ pub(super) struct Event {
 pub struct EventReport {
     /// The event, as it was given.
     pub event: String,
-    /// The orbit.
+    /// Orbit of the branch at which the event happens.
     #[serde(flatten)]
     pub point: PointReport,
 }
 
-/// Difference of the parameters that brackets a crossing at last, as a part of the bracket.
+/// Width of the bracket at which a crossing counts as located, as a fraction of the first bracket.
 const BRACKET: f64 = 1e-12;
-/// Trials of a regula falsi.
+/// Largest number of trials of the regula falsi.
 const TRIALS: usize = 60;
 /// Longest and shortest step along a curve, in units of the window.
 const STEPS: [f64; 2] = [0.02, 1e-4];
@@ -100,7 +100,7 @@ impl Event {
     }
 }
 
-/// An orbit, and the excess there.
+/// An orbit, and how far its observable is above the value of the event.
 struct Seen {
     orbit: PeriodicOrbit,
     excess: f64,
@@ -112,7 +112,7 @@ impl Seen {
     }
 }
 
-/// The orbit near `state`.
+/// Closes the orbit near `state` and measures its excess; `None` where either fails.
 fn seen(case: &Case, state: &[f64], period: usize, event: &Event) -> Option<Seen> {
     let model = case.model().ok()?;
     let mut map = ModelMap::new(&model);

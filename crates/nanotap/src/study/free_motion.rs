@@ -7,20 +7,21 @@ use nanotap_flow::Complex;
 use crate::model::Model;
 use crate::observe::lag;
 
-/// The free motion.
+/// Free motion of the tip far from the sample: amplitude, phase and reach, in the model's units.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FreeMotion {
-    /// Amplitude of the tip deflection at the drive's frequency, A₀.
+    /// Amplitude A₀ of the tip deflection at the drive frequency, in the model's unit of length.
     pub amplitude: f64,
     /// Phase lag behind the drive, degrees in (−180, 180].
     pub phase: f64,
-    /// How far the tip swings towards the sample, its base's motion included: contact begins
-    /// at this distance. Of two tones the sum of both.
+    /// Largest swing of the tip towards the sample, the motion of the base included, in the model's
+    /// unit of length: contact begins at this distance. For two tones it is the sum of both
+    /// amplitudes.
     pub reach: f64,
 }
 
 impl FreeMotion {
-    /// Of `model`.
+    /// Computes the free motion of `model` from the steady response of its first regime.
     pub fn of(model: &Model) -> Self {
         let Some(free) = model.system.regimes().first() else {
             return Self {

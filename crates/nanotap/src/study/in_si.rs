@@ -8,10 +8,10 @@ use crate::observe::PhysicalMotion;
 /// A motion in the model's units and, of a physical case, in SI.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct InSi<M> {
-    /// In the model's units.
+    /// The motion, with numbers in the model's units.
     #[serde(flatten)]
     pub motion: M,
-    /// In SI.
+    /// The same motion in SI; `None` unless the case is physical.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub physical: Option<PhysicalMotion>,
 }

@@ -48,13 +48,13 @@ options! {
 /// A lever on the sample, in SI.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct LeverRow {
-    /// Its name.
+    /// Name of the lever in the catalogue.
     pub lever: String,
     /// Spring constant, N/m.
     pub k: f64,
-    /// Free resonance, Hz.
+    /// Frequency of the free resonance, Hz.
     pub f0: f64,
-    /// Quality factor.
+    /// Quality factor of the free resonance, dimensionless.
     #[serde(rename = "Q")]
     pub quality_factor: f64,
     /// Quality factor in air at 20 °C by its dimensions (Sader 1998), if they are known.
@@ -88,7 +88,7 @@ pub struct LeverMotion {
     /// Why further states may be missing, if the search for them ended at its budget.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub budget: Option<String>,
-    /// The motion in SI.
+    /// Observables of the motion in SI.
     pub physical: PhysicalMotion,
 }
 
@@ -105,7 +105,7 @@ pub enum QualityFactor {
     Case,
 }
 
-/// Source of quality factors.
+/// Source of the quality factors of the compared levers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum QualityFactorSource {
@@ -145,12 +145,12 @@ const AIR: [f64; 2] = [1.204, 18.2e-6];
 const NO_DIMENSIONS: &str =
     "the quality factor in air is not known without the dimensions of the lever";
 
-/// The levers compared.
+/// Comparison of levers on the sample of a case, at its free amplitude and setpoint.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct LeverReport {
-    /// Free amplitude, m.
+    /// Free amplitude of every lever, m.
     pub free_amplitude: f64,
-    /// Drive frequency over the free resonance of each lever.
+    /// Drive frequency over the free resonance of each lever, dimensionless.
     pub frequency_ratio: f64,
     /// Source of the quality factors.
     pub quality_factor_source: QualityFactorSource,
@@ -279,7 +279,7 @@ pub fn case_with_lever(case: &Case, lever: &str, options: &LeverOptions) -> Resu
 
 /// The cases of the levers to compare.
 struct LeverCases {
-    /// In m.
+    /// Free amplitude of every lever, m.
     free_amplitude: f64,
     frequency_ratio: f64,
     source: QualityFactorSource,

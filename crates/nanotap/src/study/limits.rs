@@ -18,5 +18,5 @@ pub const MAX_SEED_STARTS: usize = 100_000;
 pub const MAX_STATE_NUMBERS: usize = 50_000_000;
 /// Maximum number of doublings that are followed: beyond, periods exceed [`MAX_PERIOD`].
 pub const MAX_DOUBLINGS: usize = 12;
-/// Maximum number of threads.
+/// Maximum number of threads that an option can request.
 pub const MAX_THREADS: usize = 1024;

@@ -18,7 +18,7 @@ use crate::study::limits::MAX_PERIODS;
 use crate::study::request::options;
 use crate::study::simulate::{Classification, Named, check_periods, check_states, starting_state};
 
-/// Poincaré section.
+/// Instants at which a Poincaré section is taken.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Section {
@@ -31,22 +31,23 @@ pub enum Section {
 /// A point of a section.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SectionPoint {
-    /// Drive phase, 0 … 1.
+    /// Drive phase as a fraction of the period, 0 … 1.
     pub phase: f64,
-    /// Tip displacement.
+    /// Tip displacement W, in the model's unit of length.
     pub tip: f64,
-    /// Its rate.
+    /// Rate of the tip displacement, in the model's unit of length per unit of time.
     pub tip_rate: f64,
-    /// Rate of the gap (negative: closing).
+    /// Rate of the gap, in the model's unit of length per unit of time; negative: closing.
     pub gap_rate: f64,
-    /// The state.
+    /// State at this instant, in the model's units. Its entries are a_1 … a_N (or x), their rates,
+    /// then any memory of the sample.
     pub state: Vec<f64>,
 }
 
 /// Lyapunov spectrum and Poincaré section.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct LyapunovReport {
-    /// Class of a motion.
+    /// Class of the motion, such as periodic or chaotic.
     pub classification: Classification,
     /// Period in drive periods, if periodic.
     pub period: Option<usize>,
@@ -58,16 +59,17 @@ pub struct LyapunovReport {
     pub periods: usize,
     /// Exponents, natural logarithm per drive period, largest first.
     pub exponents: Vec<f64>,
-    /// Standard error of each.
+    /// Standard error of each exponent, per drive period, in the order of `exponents`.
     pub errors: Vec<f64>,
-    /// Sum of the exponents: contraction rate of volumes in state space.
+    /// Sum of the exponents per drive period: contraction rate of volumes in state space.
     pub sum: f64,
     /// The same from the trace of the equations and the time in each regime, with twice the
     /// logarithm of the restitution at every impact, over the same periods: the check.
     pub sum_by_trace: f64,
-    /// Kaplan–Yorke dimension of the strobe points.
+    /// Kaplan–Yorke dimension of the strobe points, dimensionless; for a torus, its dimension.
     pub kaplan_yorke_dimension: f64,
-    /// Mean strobe state.
+    /// Mean of the states at drive phase 0, in the model's units. Its entries are a_1 … a_N (or x),
+    /// their rates, then any memory of the sample.
     pub mean: Vec<f64>,
     /// The section, for files and figures.
     #[serde(skip)]
@@ -248,7 +250,7 @@ impl LyapunovOptions {
     }
 }
 
-/// The Lyapunov spectrum.
+/// Study of the Lyapunov spectrum and a Poincaré section of any motion.
 #[derive(Clone, Copy, Debug)]
 pub struct LyapunovStudy;
 

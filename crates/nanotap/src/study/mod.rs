@@ -66,7 +66,7 @@ use crate::model::cantilever::Cantilever;
 use crate::model::sample_law::SampleLaw;
 use registry::StudyEntry;
 
-/// Every study.
+/// All studies that the enabled features contain, in the order in which front ends list them.
 pub static STUDIES: &[StudyEntry] = &[
     StudyEntry::of::<modes::ModesStudy>(),
     StudyEntry::of::<simulate::SimulateStudy>(),
@@ -110,7 +110,7 @@ pub trait Study {
     const ABOUT: &'static str;
     /// Options: what front ends show, check and pass on as JSON.
     type Options: Serialize + DeserializeOwned + JsonSchema;
-    /// Report.
+    /// Report, which front ends print and write as JSON.
     type Report: Serialize + JsonSchema + 'static;
 
     /// What its progress counts, in the plural.
@@ -209,7 +209,7 @@ pub type DatasetPlan = Box<dyn Computation>;
 /// The computation of a dataset.
 #[cfg(feature = "dataset")]
 pub trait Computation: Debug + Send + Sync {
-    /// The dataset's schema.
+    /// Returns the schema of the dataset: its grid, variables and attributes.
     fn schema(&self) -> &Schema;
 
     /// Computes the missing chunks of `store`, which was made for the schema.
@@ -226,12 +226,12 @@ pub trait Computation: Debug + Send + Sync {
 /// A report with its case.
 #[derive(Debug, Serialize, JsonSchema)]
 pub struct Document<'a, R: Serialize> {
-    /// The report.
+    /// Report of the study, whose fields come first in the document.
     #[serde(flatten)]
     pub report: &'a R,
     /// The version of the program.
     pub version: &'static str,
-    /// The case.
+    /// Case on which the study was run.
     #[schemars(with = "Map<String, Value>")]
     pub case: CaseDocument,
 }

@@ -13,13 +13,13 @@ use crate::study::orbit::OrbitReport;
 /// What an experimenter reads off an orbit, in the model's units.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct Reading {
-    /// Amplitude at the drive's frequency, A.
+    /// Amplitude A at the drive frequency, in the model's unit of length.
     pub first_harmonic: f64,
-    /// Its phase, degrees behind the drive.
+    /// Phase lag of the tip behind the drive, degrees.
     pub phase: f64,
-    /// Energy dissipated in the sample per drive period, E_dis.
+    /// Energy E_dis dissipated in the sample per drive period, in the model's unit of energy.
     pub dissipation: f64,
-    /// Greatest force, F_max.
+    /// Largest force F_max of the sample on the tip, in the model's unit of force.
     pub peak_force: f64,
     /// The same in SI, for a physical case.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -29,29 +29,30 @@ pub struct Reading {
 /// Differences of a reading to that with the most modes.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct ReadingDifference {
-    /// Of A, as a part of it.
+    /// Difference of the amplitude A, as a fraction of A with the most modes.
     pub first_harmonic: f64,
-    /// Of the phase, in degrees.
+    /// Difference of the phase, degrees in 0 … 180.
     pub phase: f64,
-    /// Of E_dis, as a part of it.
+    /// Difference of the dissipated energy E_dis, as a fraction of E_dis with the most modes.
     pub dissipation: f64,
-    /// Of F_max, as a part of it.
+    /// Difference of the peak force F_max, as a fraction of F_max with the most modes.
     pub peak_force: f64,
 }
 
-/// The least numbers of modes from which on a reading stays within the tolerance; none where
-/// the modes computed do not show it.
+/// The least numbers of modes from which on a reading stays within the tolerance; `None` where the
+/// computed modes do not show it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, JsonSchema)]
 pub struct EnoughReadings {
-    /// For A.
+    /// Least number of modes for the amplitude A.
     pub first_harmonic: Option<usize>,
-    /// For the phase (in radians within the tolerance).
+    /// Least number of modes for the phase, whose difference in radians is compared with the
+    /// tolerance.
     pub phase: Option<usize>,
-    /// For E_dis.
+    /// Least number of modes for the dissipated energy E_dis.
     pub dissipation: Option<usize>,
-    /// For F_max.
+    /// Least number of modes for the peak force F_max.
     pub peak_force: Option<usize>,
-    /// For all of them.
+    /// Least number of modes for all four readings.
     pub all: Option<usize>,
 }
 
@@ -62,33 +63,34 @@ pub struct EnoughReadings {
 pub struct ModeShare {
     /// Number of the mode, from 1.
     pub mode: usize,
-    /// In the time mean of kinetic and elastic energy of the modes, ½ȧ² + ½β⁴a².
+    /// Part in the time mean of the modes' kinetic and elastic energy, ½ȧ² + ½β⁴a², 0 to 1.
     pub energy: f64,
-    /// In the variance of the tip deflection: ⟨(W_j − ⟨W_j⟩) W⟩ over that of W, with
-    /// W_j = φ_j(1) a_j.
+    /// Part in the variance of the tip deflection: ⟨(W_j − ⟨W_j⟩) W⟩ over that of W, with W_j =
+    /// φ_j(1) a_j, dimensionless.
     pub tip: f64,
-    /// In ⟨F (W − ⟨W⟩)⟩, the part of the tip's motion that goes with the contact force;
-    /// missing without contact.
+    /// Part in ⟨F (W − ⟨W⟩)⟩, the covariance of tip motion and contact force, dimensionless;
+    /// `None` without contact.
     pub force: Option<f64>,
 }
 
 /// Which modes matter for what an experimenter reads.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct ReadingsReport {
-    /// The readings, one a number of modes; null where no orbit was found.
+    /// Readings with each number of modes, from 1; null where no orbit was found.
     pub readings: Vec<Option<Reading>>,
-    /// What each number of modes misses; null where it shows another kind of motion.
+    /// Differences of these readings to those with the most modes; null where the motion is of
+    /// another kind.
     pub reading_differences: Vec<Option<ReadingDifference>>,
     /// The least numbers of modes that are enough.
     pub enough_readings: EnoughReadings,
     /// The part of each mode, with the most modes.
     pub mode_shares: Vec<ModeShare>,
-    /// The verdict in words.
+    /// Verdict on the readings and on which modes matter, in words.
     pub reading_verdict: String,
 }
 
 impl ReadingsReport {
-    /// Of the orbits of 1, 2 … modes, as far as there are, and their models.
+    /// Compares the orbits with 1, 2 … modes, where they were found, and their models.
     pub(crate) fn of(orbits: &[Option<OrbitReport>], models: &[Model], tolerance: f64) -> Self {
         let readings: Vec<Option<Reading>> =
             orbits.iter().map(|o| o.as_ref().map(reading)).collect();
@@ -127,7 +129,7 @@ fn reading(orbit: &OrbitReport) -> Reading {
 }
 
 fn difference(of: &Reading, to: &Reading) -> ReadingDifference {
-    // Nothing differs from nothing by nothing.
+    // 0 vs 0: the relative difference is 0.
     let part = |a: f64, b: f64| {
         let apart = (a - b).abs();
         if apart == 0.0 { 0.0 } else { apart / b.abs() }
@@ -209,7 +211,7 @@ fn shares(model: &Model, recording: &Recording) -> Vec<ModeShare> {
         .collect()
 }
 
-/// Part of the energy from which on a mode is named.
+/// Fraction of the energy from which on the verdict names a mode.
 const NAMED: f64 = 0.01;
 
 fn verdict(

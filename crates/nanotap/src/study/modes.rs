@@ -23,18 +23,18 @@ use crate::study::{Study, cantilever};
 /// The modes of a case. Frequencies are Ω of the undamped equations, ascending, N of each.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct ModeTable {
-    /// Number of modes.
+    /// Number of modes N, the length of the lists of frequencies.
     pub modes: usize,
-    /// By how much these modes together are stiffer than the beam against a constant force at
-    /// the tip, as a part of its static stiffness k = 3EI/L³.
+    /// Excess stiffness of these modes together over the beam against a constant force at the tip,
+    /// as a fraction of its static stiffness k = 3EI/L³.
     pub static_excess: f64,
-    /// Free flight, Galerkin.
+    /// Frequencies Ω of the Galerkin equations in free flight, dimensionless.
     pub free: Vec<f64>,
-    /// Contact, Galerkin.
+    /// Frequencies Ω of the Galerkin equations in contact, dimensionless.
     pub contact: Vec<f64>,
-    /// Free flight, the exact beam.
+    /// Frequencies Ω of the exact beam in free flight, dimensionless.
     pub exact_free: Vec<f64>,
-    /// Contact, the exact beam.
+    /// Frequencies Ω of the exact beam in contact, dimensionless.
     pub exact_contact: Vec<f64>,
     /// Quality factors of the free modes, |λ|/(2 |Re λ|); infinite (`null`) without damping,
     /// `None` where not every mode oscillates.
@@ -42,7 +42,8 @@ pub struct ModeTable {
     /// Eigenvalues [Re, Im ≥ 0] of the damped Galerkin equations in free flight, by
     /// ascending size; `None` where they are too nearly defective to be separated.
     pub free_eigenvalues: Option<Vec<[f64; 2]>>,
-    /// The same in contact.
+    /// Eigenvalues (Re, Im ≥ 0) of the damped Galerkin equations in contact, by ascending size;
+    /// `None` where they are too nearly defective to be separated.
     pub contact_eigenvalues: Option<Vec<[f64; 2]>>,
     /// The frequencies in Hz, for a physical case.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -128,7 +129,7 @@ options! {
     }
 }
 
-/// Mode shapes and frequencies.
+/// Study of the mode shapes and frequencies of a cantilever.
 #[derive(Clone, Copy, Debug)]
 pub struct ModesStudy;
 

@@ -34,7 +34,7 @@ pub(super) struct Readout {
 }
 
 impl Readout {
-    /// Of the first `n` entries of the state, the beam's.
+    /// Prepares the readout from the first `n` entries of the state, those of the beam.
     ///
     /// # Errors
     /// When the free lever does not restore.
@@ -92,7 +92,6 @@ impl Readout {
         harmonic * (self.sign * 2.0 / self.period)
     }
 
-    /// The drive period.
     pub(super) const fn period(&self) -> f64 {
         self.period
     }
@@ -125,7 +124,6 @@ fn force_column(model: &Model, n: usize) -> DVector<f64> {
 /// How the sample depends on the rate of the gap: as on that of the tip, by a mode's rate.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct TipRate {
-    /// Modes.
     modes: usize,
     /// Shape of the first mode at the tip.
     shape: f64,
@@ -165,7 +163,7 @@ pub(super) struct SampleMotion {
 }
 
 impl SampleMotion {
-    /// States.
+    /// Returns the number of states that the motion adds.
     pub(super) const fn states(self) -> usize {
         if self.omega.is_some() { 3 } else { 1 }
     }
@@ -346,7 +344,7 @@ pub(super) fn moved_system(
 pub(super) struct LinearSums {
     /// Angular frequency of the harmonic, where it is not the drive's.
     omega: Option<f64>,
-    /// `None` in flight.
+    /// Force and height rate by regime; `None` where no force acts and nothing touches.
     regimes: Vec<Option<ContactOutputs>>,
     terms: Vec<Term>,
     pub(super) sums: ForceSums,
@@ -359,7 +357,7 @@ struct ContactOutputs {
     rate: ModalOutput,
     touches: bool,
     rates: Vec<Complex>,
-    /// The largest `|λ|`.
+    /// Largest modulus of `rates`, per unit of the model's time.
     fastest: f64,
 }
 
@@ -369,7 +367,7 @@ struct Term {
     rate: Complex,
     force: Complex,
     speed: Complex,
-    /// `e^{rate · length}`.
+    /// `e^{rate · length}`, the factor at the end of the stretch.
     end: Complex,
 }
 
@@ -409,7 +407,7 @@ impl LinearSums {
         }
     }
 
-    /// Begins a run.
+    /// Sets all sums to zero before a run.
     pub(super) const fn begin(&mut self) {
         self.sums = ForceSums {
             impulse: 0.0,
@@ -421,7 +419,7 @@ impl LinearSums {
         };
     }
 
-    /// Force and its rate, so long after the beginning of the stretch.
+    /// Returns the force and its rate at the time `after` from the beginning of the stretch.
     fn force_at(&self, after: f64, constant: f64) -> (f64, f64) {
         let mut force = (constant, 0.0);
         for term in &self.terms {

@@ -38,13 +38,14 @@ use crate::study::upset::{Knocks, upset};
 pub struct OrbitReport {
     /// Minimal period in drive periods.
     pub period: usize,
-    /// State at drive phase 0.
+    /// State at drive phase 0, in the model's units. Its entries are a_1 … a_N (or x), their rates,
+    /// then any memory of the sample.
     pub state: Vec<f64>,
     /// States at drive phase 0 of all its periods.
     pub states: Vec<Vec<f64>>,
-    /// Largest entry of Pⁿ(x) − x.
+    /// Largest entry of P(x_k) − x_{k+1} over the states of the orbit, in the model's units.
     pub residual: f64,
-    /// Estimated distance of the state from the true orbit.
+    /// Estimated distance of the states from the exact orbit (largest entry), in the model's units.
     pub error: f64,
     /// Floquet multipliers, real and imaginary part, largest modulus first.
     pub multipliers: Vec<[f64; 2]>,
@@ -57,16 +58,17 @@ pub struct OrbitReport {
     /// What the multipliers say, or what is proved, in a word: stable, unstable or marginal;
     /// undecided where the multipliers contradict the trace formula.
     pub stability: &'static str,
-    /// |log|det DPⁿ| − trace formula|: zero to rounding of an exact Jacobian, and without meaning where
-    /// the smallest multiplier is lost in rounding. Where a sample forgets at the end of each
-    /// contact, the product of the other multipliers stands for the determinant, which is zero.
+    /// |log|det DPⁿ| − trace formula|, dimensionless: zero to rounding of an exact Jacobian, and
+    /// without meaning where the smallest multiplier is lost in rounding. Where a sample forgets at
+    /// the end of each contact, the product of the other multipliers stands for the determinant,
+    /// which is zero.
     pub determinant_defect: f64,
-    /// Contacts begun and ended.
+    /// Beginnings and ends of contact during one repetition of the orbit.
     pub events: Vec<ContactEvent>,
     /// Observables in the model's units.
     #[serde(flatten)]
     pub observables: Observables,
-    /// Harmonics, distortion and phase.
+    /// Harmonics, distortion and phase of the tip deflection.
     #[serde(flatten)]
     pub spectrum: Spectrum,
     /// Derivatives by the requested keys.
@@ -78,10 +80,10 @@ pub struct OrbitReport {
     /// The smallest knock on the tip that upsets it, if requested.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub upset: Option<Knocks>,
-    /// The proof, if requested.
+    /// Result of the proof by interval arithmetic, if requested.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub proof: Option<ProofReport>,
-    /// Its full length, for figures.
+    /// Recording of one repetition of the orbit, for figures.
     #[serde(skip)]
     pub trajectory: Recording,
 }
@@ -196,7 +198,7 @@ fn at_setpoint(model: &Model, map: &mut ModelMap, start: &[f64]) -> Option<Perio
     })
 }
 
-/// How near a state is to its orbit.
+/// Distance from an orbit, as a fraction of its size, within which a state counts as on it.
 const ON_ORBIT: f64 = 1e-6;
 
 /// The orbit where a run from `start` settles, or one of the asked period: near its end, or

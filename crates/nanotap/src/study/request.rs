@@ -83,20 +83,20 @@ pub fn properties(schema: &Schema) -> impl Iterator<Item = Property<'_>> {
 /// One option, as the schema declares it.
 #[derive(Clone, Copy, Debug)]
 pub struct Property<'a> {
-    /// Its name.
+    /// Name of the option, as in a JSON request.
     pub name: &'a str,
-    /// Its schema.
+    /// JSON schema of the option's value, with its description and default.
     pub schema: &'a Value,
 }
 
 impl<'a> Property<'a> {
-    /// What it is for, on one line.
+    /// Returns the description of the option, on one line.
     pub fn description(&self) -> String {
         let text = self.schema["description"].as_str().unwrap_or_default();
         text.split_whitespace().collect::<Vec<_>>().join(" ")
     }
 
-    /// Its default, unless that is nothing.
+    /// Returns the default value; `None` if it is null or an empty list.
     pub fn default(&self) -> Option<&'a Value> {
         self.schema
             .get("default")
@@ -119,7 +119,7 @@ impl<'a> Property<'a> {
         }
     }
 
-    /// The words that it may be, each with what it means.
+    /// Returns the words that the option accepts, each with its description.
     pub fn words(&self) -> Vec<(&'a str, &'a str)> {
         let listed = |schema: &'a Value| {
             let enumerated = schema["enum"].as_array().into_iter().flatten();

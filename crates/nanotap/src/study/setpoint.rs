@@ -49,51 +49,53 @@ use crate::{Error, ErrorKind};
 pub struct SetpointSolution {
     /// The distance, in the model's unit of length.
     pub gap: f64,
-    /// The distance in m.
+    /// Distance between tip and sample at rest, m.
     pub zc: f64,
-    /// Period of the orbit.
+    /// Period of the orbit, in drive periods.
     pub period: usize,
-    /// Whether it is stable.
+    /// Whether every Floquet multiplier of the orbit is inside the unit circle.
     pub stable: bool,
-    /// Largest |multiplier|.
+    /// Largest modulus of the Floquet multipliers, dimensionless.
     pub spectral_radius: f64,
     /// Whether the approach stops at this distance.
     pub reached: bool,
     /// Whether the mean force attracts or repels: `attractive` or `repulsive`.
     pub branch: &'static str,
-    /// State at drive phase 0.
+    /// State at drive phase 0, in the model's units. Its entries are a_1 … a_N (or x), their rates,
+    /// then any memory of the sample.
     pub state: Vec<f64>,
     /// Observables in the model's units.
     #[serde(flatten)]
     pub observables: Observables,
-    /// The same in SI.
+    /// Observables in SI units.
     pub physical: PhysicalMotion,
 }
 
 /// Another stable orbit at the chosen distance.
 #[derive(Clone, Debug, Serialize)]
 pub struct SetpointState {
-    /// Period in drive periods.
+    /// Period of the orbit, in drive periods.
     pub period: usize,
-    /// Largest |multiplier|.
+    /// Largest modulus of the Floquet multipliers, dimensionless.
     pub spectral_radius: f64,
-    /// State at drive phase 0.
+    /// State at drive phase 0, in the model's units. Its entries are a_1 … a_N (or x), their rates,
+    /// then any memory of the sample.
     pub state: Vec<f64>,
     /// Observables in the model's units.
     #[serde(flatten)]
     pub observables: Observables,
-    /// The same in SI.
+    /// Observables in SI units.
     pub physical: PhysicalMotion,
 }
 
 /// The drive that keeps amplitude and phase at a frequency shift.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct SetpointDrive {
-    /// Its frequency, Hz.
+    /// Frequency of the drive, Hz.
     pub frequency: f64,
-    /// Its strength: a force, N, or the amplitude of a driven base, m.
+    /// Strength of the drive: the force in N, or the amplitude of a driven base in m.
     pub strength: f64,
-    /// Its strength over that of the free lever.
+    /// Strength of the drive over that of the free lever, dimensionless.
     pub ratio: f64,
 }
 
@@ -107,9 +109,9 @@ pub struct SetpointReport {
     /// The drive at a frequency shift.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub drive: Option<SetpointDrive>,
-    /// A/A₀ at the setpoint.
+    /// Amplitude A at the setpoint over the free amplitude A₀, dimensionless.
     pub ratio: f64,
-    /// A at the setpoint, m.
+    /// Amplitude A at the setpoint, m.
     pub amplitude: f64,
     /// All distances at which an orbit is at the setpoint, from far to near.
     pub solutions: Vec<SetpointSolution>,
@@ -448,7 +450,7 @@ fn approach(
 /// A distance at which a setpoint is first reached from far.
 #[derive(Clone, Debug, PartialEq)]
 pub(in crate::study) struct ReachedDistance {
-    /// The distance in m.
+    /// Distance at which the setpoint is reached, m.
     pub(in crate::study) zc: f64,
     /// State of the orbit at drive phase 0.
     pub(in crate::study) state: Vec<f64>,
@@ -557,7 +559,7 @@ fn cancelled() -> Error {
 /// A case as a document, with how its setpoint was solved for the distance.
 #[derive(Clone, Debug, Serialize)]
 pub struct SolvedCase {
-    /// The case.
+    /// Document of the case, with its physical quantities and the numbers of the equations.
     #[serde(flatten)]
     pub case: CaseDocument,
     /// How its setpoint was solved, if it was.
@@ -586,7 +588,7 @@ const OTHERS_STEPS: u64 = 20_000_000;
 /// Points to which each of these branches may always be followed.
 const MIN_POINTS: usize = 16;
 
-/// How much farther than the free tip swings the way begins.
+/// First distance of the approach, as a multiple of the reach of the free tip.
 const FARTHER: f64 = 2.0;
 
 /// The quantity that is held, in the model's units; a phase in degrees.
@@ -675,7 +677,7 @@ impl HeldQuantity {
         }
     }
 
-    /// The setpoint in words.
+    /// Describes the setpoint in words, as in `A/A0 = 0.8`.
     fn words(&self) -> String {
         match self.setpoint {
             Held::Amplitude(ratio) => format!("A/A0 = {ratio}"),
@@ -685,7 +687,7 @@ impl HeldQuantity {
         }
     }
 
-    /// A value in words.
+    /// Describes a value of the held quantity in words, as in `A/A0 is 0.8`.
     fn state(&self, value: f64) -> String {
         let name = match self.setpoint {
             Held::Amplitude(_) => "A/A0",
@@ -841,7 +843,7 @@ impl Search<'_> {
         }))
     }
 
-    /// The distance in words.
+    /// Formats a distance that is given in the model's unit of length.
     fn shown(&self, gap: f64) -> String {
         self.case.physical().map_or_else(
             || gap.to_string(),

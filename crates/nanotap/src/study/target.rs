@@ -65,11 +65,11 @@ impl Targets {
 /// Which force governs a motion.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Regime {
-    /// No force acts.
+    /// The mean force on the tip is zero.
     Free,
-    /// The mean force attracts.
+    /// The mean force on the tip is attractive: negative.
     Attractive,
-    /// The mean force repels.
+    /// The mean force on the tip is repulsive: positive.
     Repulsive,
     /// The motion does not repeat.
     Irregular,
@@ -94,7 +94,7 @@ impl Regime {
         }
     }
 
-    /// Its name.
+    /// Returns the name in conditions and documents, such as `attractive`.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Free => "free",
@@ -153,7 +153,7 @@ pub struct TargetPoint {
 }
 
 impl TargetPoint {
-    /// Number of different motions.
+    /// Returns the number of different motions found at the point.
     fn states(&self) -> usize {
         let mut different: Vec<&TargetMotion> = Vec::new();
         for motion in &self.motions {
@@ -164,20 +164,20 @@ impl TargetPoint {
         different.len()
     }
 
-    /// Whether all conditions hold.
+    /// Returns whether all conditions hold; false where no motion or an unclassified one was found.
     pub fn meets(&self, targets: &[Target]) -> bool {
         !self.unknown && !self.motions.is_empty() && targets.iter().all(|target| target.holds(self))
     }
 }
 
-/// A condition.
+/// A condition on the motions at a point, such as `F_max < 1 nN`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Target {
     text: String,
     condition: Condition,
 }
 
-/// What a condition compares.
+/// Quantity that a condition compares, with the comparison and the value.
 #[derive(Clone, Debug, PartialEq)]
 enum Condition {
     States(Comparison, f64),
@@ -197,7 +197,7 @@ enum Comparison {
 }
 
 impl Comparison {
-    /// Longer signs first.
+    /// Signs of the comparisons, longer ones before those that are their beginning.
     const SIGNS: [(&'static str, Self); 9] = [
         ("<=", Self::AtMost),
         (">=", Self::AtLeast),
@@ -380,21 +380,22 @@ pub struct TargetReport {
     pub conditions: Vec<String>,
     /// Whether they hold, row by row, a row a value of the second parameter.
     pub holds: Vec<Vec<bool>>,
-    /// Part of all points at which they hold.
+    /// Fraction of all points at which the conditions hold, 0 to 1.
     pub share: f64,
     /// The largest rectangle of points at all of which they hold, if there is one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub region: Option<TargetRegion>,
 }
 
-/// A rectangle of points.
+/// A rectangle of points at all of which the conditions hold.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct TargetRegion {
-    /// Lowest and highest value of each parameter.
+    /// Lowest and highest value of each parameter, in the unit of its key.
     pub ranges: Vec<[f64; 2]>,
-    /// The values at its centre, the farthest from its edges.
+    /// Value of each parameter at the centre, the point farthest from the edges, in the unit of its
+    /// key.
     pub centre: Vec<f64>,
-    /// Number of its points.
+    /// Number of points in the rectangle.
     pub points: usize,
 }
 

@@ -44,30 +44,33 @@ const ENLARGED: (f64, usize) = (1.01, 5);
 /// The smallest knock on the tip, of those tried, that makes the lever leave its orbit.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct Upset {
-    /// Change of the tip's speed, positive away from the sample.
+    /// Change of the tip's speed, in the model's unit of length per unit of time, positive away
+    /// from the sample.
     pub tip_speed: f64,
-    /// Impulse on the tip.
+    /// Impulse on the tip, in the model's unit of force times time, positive away from the sample.
     pub impulse: f64,
-    /// Energy that the impulse would give the lever at rest.
+    /// Energy that the impulse would give the lever at rest, in the model's unit of energy.
     pub energy: f64,
     /// Phase of the drive at the knock, in degrees.
     pub drive_phase: f64,
-    /// What the motion is that follows.
+    /// Class of the motion that follows the knock.
     pub leads_to: Classification,
     /// Its period in drive periods, if it is periodic.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub period: Option<usize>,
-    /// Its amplitude at the drive frequency.
+    /// Amplitude at the drive frequency of the motion that follows, in the model's unit of length,
+    /// if it is periodic.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub first_harmonic: Option<f64>,
-    /// A state of it at drive phase 0.
+    /// State at drive phase 0 of the motion that follows, in the model's units. Its entries are a_1
+    /// … a_N (or x), their rates, then any memory of the sample.
     pub state: Vec<f64>,
     /// The same knock in SI, of a physical case.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub physical: Option<UpsetInSi>,
 }
 
-/// A knock in SI.
+/// A knock on the tip in SI units.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct UpsetInSi {
     /// Change of the tip's speed in m/s, positive away from the sample.
@@ -76,7 +79,7 @@ pub struct UpsetInSi {
     pub impulse: f64,
     /// Energy in J that the impulse would give the lever at rest.
     pub energy: f64,
-    /// The same in eV.
+    /// Energy in eV that the impulse would give the lever at rest.
     #[serde(rename = "energy_eV")]
     pub energy_ev: f64,
     /// Amplitude in m at the drive frequency of the motion that follows.
@@ -87,9 +90,10 @@ pub struct UpsetInSi {
 /// What was found of the knocks on an orbit.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct Knocks {
-    /// The smallest that upsets it.
+    /// Smallest knock that makes the lever leave its orbit; `None` if none of those tried does.
     pub smallest: Option<Upset>,
-    /// The largest change of the tip's speed that was tried.
+    /// Largest change of the tip's speed that was tried, in the model's unit of length per unit of
+    /// time.
     pub largest_tried: f64,
     /// The same in m/s, of a physical case.
     #[serde(skip_serializing_if = "Option::is_none")]

@@ -133,11 +133,11 @@ pub(crate) fn implied(
 /// A name with two ends, `alpha4=5:40`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Interval {
-    /// What has the ends.
+    /// Name of the key or of the coordinate of a state.
     pub name: String,
-    /// The lower end.
+    /// Lower end of the interval, with a unit or without.
     pub low: Amount,
-    /// The upper end.
+    /// Upper end of the interval, with a unit or without.
     pub high: Amount,
 }
 

@@ -61,7 +61,7 @@ impl Condition {
         Self::Unreached,
     ];
 
-    /// The key in data.
+    /// Returns the name in data, such as `no-contact`.
     pub const fn name(self) -> &'static str {
         match self {
             Self::NoContact => "no-contact",
@@ -74,7 +74,7 @@ impl Condition {
         }
     }
 
-    /// Words for a legend.
+    /// Returns the words for a legend, such as `no contact`.
     pub const fn words(self) -> &'static str {
         match self {
             Self::NoContact => "no contact",
@@ -112,15 +112,17 @@ const FILE: &str = "window.json";
 pub struct Window {
     /// The parameters' keys, the first varies along a row.
     pub parameters: [String; 2],
-    /// Values of the first, in the units of its key.
+    /// Values of the first parameter, in the unit of its key.
     pub x: Vec<f64>,
-    /// Values of the second.
+    /// Values of the second parameter, in the unit of its key.
     pub y: Vec<f64>,
-    /// What there is, row by row, a row a value of the second.
+    /// Condition at each point, row by row, one row for each value of the second parameter.
     pub conditions: Vec<Vec<Condition>>,
-    /// Part of all points, by condition; every one is there, `setpoint-unreached` over setpoints.
+    /// Fraction of all points, 0 to 1, by condition. Every condition is listed,
+    /// `setpoint-unreached` only over setpoints.
     pub shares: BTreeMap<&'static str, f64>,
-    /// What stays while the parameters vary although it was not stated, in SI.
+    /// Quantities that stay constant while the parameters vary although the case does not state
+    /// them, in SI.
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub held: BTreeMap<String, f64>,
     /// Distance in m at each point, solved for the setpoint, row by row.

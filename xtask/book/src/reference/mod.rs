@@ -57,7 +57,7 @@ fn plain(text: &str) -> String {
     escaped
 }
 
-/// A word as code.
+/// Formats a word as Markdown code; an empty word stays empty.
 fn code(word: &str) -> String {
     if word.is_empty() {
         return String::new();

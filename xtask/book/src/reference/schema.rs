@@ -94,7 +94,7 @@ fn bound(value: &Value) -> String {
     }
 }
 
-/// A value without quotes.
+/// Formats a JSON value without quotes.
 pub(crate) fn bare(value: &Value) -> String {
     match value {
         Value::Null => String::new(),

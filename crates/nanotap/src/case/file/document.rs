@@ -11,10 +11,10 @@ use crate::case::table::Table;
 use super::json;
 use super::problem::{CaseFileError, Place, Problem, Source};
 
-/// A value as written.
+/// Value of a key as written in a case file or an override.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Value {
-    /// A whole number.
+    /// A whole number, written without a decimal point.
     Integer(i64),
     /// A number; not always a finite one.
     Number(f64),
@@ -39,23 +39,23 @@ impl Value {
     }
 }
 
-/// Removes the key, in place of a value.
+/// Stands for an empty value, which removes the key.
 const NOTHING: Value = Value::Other("nothing");
 
-/// One `key = value`.
+/// An entry `key = value` of a case file, or an override.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Entry {
     /// The table that contains it; empty at the top of a file.
     pub table: String,
     /// The key, without its table.
     pub key: String,
-    /// The value.
+    /// Parsed value of the entry.
     pub value: Value,
     /// The value as written, for messages.
     pub written: String,
-    /// Place of the key.
+    /// Place of the key in the case file or override.
     pub key_place: Place,
-    /// Place of the value.
+    /// Place of the value in the case file or override.
     pub value_place: Place,
 }
 
@@ -86,24 +86,24 @@ impl Entry {
 pub struct Header {
     /// The name between the brackets.
     pub name: String,
-    /// Place of the name.
+    /// Place of the name in the case file.
     pub place: Place,
 }
 
-/// Everything that was written, in order, before validation.
+/// Everything in a case file and its overrides, in order, before validation.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Document {
     /// The file, if there is one.
     pub source: Option<Source>,
-    /// Its tables.
+    /// Headers of the tables in the file.
     pub headers: Vec<Header>,
     /// The entries of the file, then the overrides.
     pub entries: Vec<Entry>,
-    /// The table `[scan]`, options of a study.
+    /// Table `[scan]` of the file: options of the study `scan`.
     pub scan: Option<serde_json::Map<String, serde_json::Value>>,
 }
 
-/// The table of a case file that is options of the study of the same name.
+/// Table of a case file that contains options of the study of the same name.
 const SCAN: &str = "scan";
 
 impl Document {

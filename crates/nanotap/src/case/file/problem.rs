@@ -11,7 +11,7 @@ use std::ops::Range;
 pub struct Source {
     /// Name for messages: the path as given.
     pub name: String,
-    /// The whole text.
+    /// Whole text of the case file.
     pub text: String,
 }
 
@@ -25,7 +25,7 @@ impl Source {
     }
 }
 
-/// Place of a problem.
+/// Place to which a problem of a case points.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Place {
     /// These bytes of the case file.
@@ -49,13 +49,13 @@ impl Place {
 /// A problem of a case.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Problem {
-    /// Its place.
+    /// Place to which the problem points.
     pub place: Place,
     /// What is wrong, with the key and the value as written.
     pub message: String,
     /// A short label under the place; may be empty.
     pub label: String,
-    /// The remedy.
+    /// What to do to solve the problem, if known.
     pub help: Option<String>,
     /// The key concerned, as `section.key` for a physical case.
     pub key: Option<&'static str>,
@@ -64,7 +64,7 @@ pub struct Problem {
 }
 
 impl Problem {
-    /// A problem without help.
+    /// Creates a problem without label, remedy, key and words.
     pub fn new(place: Place, message: impl Into<String>) -> Self {
         Self {
             place,
@@ -76,7 +76,7 @@ impl Problem {
         }
     }
 
-    /// Sets the key concerned.
+    /// Sets the key concerned; `None` if there is none.
     #[must_use]
     pub const fn key(mut self, key: Option<&'static str>) -> Self {
         self.key = key;
@@ -97,7 +97,7 @@ impl Problem {
         self
     }
 
-    /// Sets the remedy.
+    /// Sets the remedy, shown as help.
     #[must_use]
     pub fn help(mut self, help: impl Into<String>) -> Self {
         self.help = Some(help.into());
@@ -115,7 +115,7 @@ pub struct CaseFileError {
     pub source: Option<Source>,
     /// From one to [`SHOWN`] problems.
     pub problems: Vec<Problem>,
-    /// Number of further problems.
+    /// Number of problems beyond [`SHOWN`], which are not listed.
     pub more: usize,
 }
 

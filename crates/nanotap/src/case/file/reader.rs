@@ -23,7 +23,7 @@ pub(crate) enum Described {
     Cantilever(Cantilever),
     /// An oscillator, every number checked.
     Oscillator(Oscillator),
-    /// A physical cantilever: each value checked by itself.
+    /// A physical cantilever, each value checked separately.
     Physical(Stated),
 }
 
@@ -94,7 +94,7 @@ fn described(document: &Document, problems: &mut Problems) -> Option<Described> 
     read
 }
 
-/// Which kind `[model]` is.
+/// Kind of model that `[model]` selects; the default if it states none.
 fn kind_of(document: &Document, problems: &mut Problems) -> ModelKind {
     let is_kind = |entry: &&Entry| entry.table == "model" && entry.key == Key::Kind.name();
     let Some(entry) = document.entries.iter().rev().find(is_kind) else {
@@ -316,7 +316,7 @@ pub(crate) fn word<T: core::default::Default + std::str::FromStr>(
     }
 }
 
-/// How many modes are stated.
+/// Number of beam modes, stated or default.
 pub(crate) fn modes(stated: &Stated) -> usize {
     stated
         .number(Key::Modes)

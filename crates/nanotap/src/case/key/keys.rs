@@ -100,7 +100,7 @@ const fn oscillator(
     }
 }
 
-/// A word of `[model]`.
+/// A key of `[model]` whose value is one of `words`; the first one is the default.
 const fn word(
     name: &'static str,
     words: &'static [&'static str],
@@ -117,7 +117,7 @@ const fn word(
     }
 }
 
-/// A physical quantity.
+/// A key of a physical case whose value is a quantity of this kind.
 const fn quantity(
     section: Section,
     name: &'static str,
@@ -533,7 +533,7 @@ After from AFTER_LAWS => {
 }
 }
 
-/// Alternative quantities.
+/// Groups of keys that exclude each other, because each determines the same quantity.
 pub(super) static ALTERNATIVES: &[Alternatives] = &[
     Alternatives {
         ways: &[&[Key::LeverQ], &[Key::FluidDensity, Key::FluidViscosity]],

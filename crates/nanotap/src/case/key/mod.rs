@@ -28,17 +28,17 @@ words! {
     /// A table of a case file.
     #[derive(PartialOrd, Ord)]
     Section {
-        /// `[model]`: dimensionless numbers.
+        /// Table `[model]`: the numbers of a dimensionless case.
         Model = "model",
-        /// `[cantilever]`
+        /// Table `[cantilever]`: the lever and the fluid around it.
         Cantilever = "cantilever",
-        /// `[tip]`
+        /// Table `[tip]`: shape, mass and material of the tip.
         Tip = "tip",
-        /// `[sample]`
+        /// Table `[sample]`: contact law and material of the sample.
         Sample = "sample",
-        /// `[drive]`
+        /// Table `[drive]`: frequencies, strengths and setpoint of the drive.
         Drive = "drive",
-        /// `[gap]`
+        /// Table `[gap]`: gaps of tip and beam to the sample at rest.
         Gap = "gap",
     }
 }
@@ -49,12 +49,12 @@ impl Section {
         Self::ALL.into_iter().find(|section| section.name() == name)
     }
 
-    /// Whether its keys are physical quantities.
+    /// Returns true if the keys of the table are physical quantities.
     pub const fn is_physical(self) -> bool {
         !matches!(self, Self::Model)
     }
 
-    /// Its keys.
+    /// Returns the keys of this table.
     pub fn keys(self) -> impl Iterator<Item = Key> {
         Key::all().filter(move |key| key.section() == self)
     }
@@ -69,7 +69,7 @@ impl Section {
 words! {
     /// Kind of model, from the key `kind` of `[model]`.
     ModelKind {
-        /// The cantilever.
+        /// A cantilever with a tip over a sample.
         Cantilever = "cantilever",
         /// An oscillator with a soft stop.
         VibroImpact = "vibro_impact",
@@ -84,7 +84,7 @@ impl ModelKind {
         Key::all().filter(move |key| key.entry().models.contains(&self))
     }
 
-    /// All names of its keys, including aliases.
+    /// Returns the names of the keys of this kind, including aliases.
     pub fn names(self) -> impl Iterator<Item = &'static str> + Clone {
         let names = self.keys().map(Key::name);
         names.chain(self.keys().filter_map(Key::alias))
@@ -131,12 +131,12 @@ fn without_subscripts(symbol: &str) -> String {
 pub enum Takes {
     /// A quantity of this kind; in `[model]` a plain number.
     Quantity(Kind),
-    /// What a feedback holds: a fraction of the free amplitude, an amplitude, a peak force, a phase or a
-    /// frequency shift.
+    /// Setpoint of a feedback: a fraction of the free amplitude, an amplitude, a peak force, a
+    /// phase or a frequency shift.
     Setpoint,
     /// A whole number from 1 to this.
     Count(usize),
-    /// One of these words.
+    /// One of these words of the case file.
     Word(&'static [&'static str]),
     /// A contact law, or nonlinear force laws joined by `+`.
     Law,
@@ -156,23 +156,23 @@ pub enum Takes {
     ModelArms,
 }
 
-/// Range of a number.
+/// Range of the values of a key.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Range {
-    /// Smallest value.
+    /// Lower end of the range, in the unit of the value.
     pub low: f64,
-    /// Largest value.
+    /// Upper end of the range, in the unit of the value.
     pub high: f64,
-    /// Whether the smallest value is excluded.
+    /// Whether the lower end is excluded.
     pub above: bool,
-    /// Whether the largest value is excluded.
+    /// Whether the upper end is excluded.
     pub below: bool,
     /// Error message for a value outside the range.
     pub reason: &'static str,
 }
 
 impl Range {
-    /// Any finite number.
+    /// All finite numbers.
     pub const ANY: Self = Self {
         low: f64::NEG_INFINITY,
         high: f64::INFINITY,
@@ -180,13 +180,13 @@ impl Range {
         below: true,
         reason: "it must be a finite number",
     };
-    /// Above zero.
+    /// All finite numbers above zero.
     pub const POSITIVE: Self = Self {
         low: 0.0,
         reason: "it must be above zero",
         ..Self::ANY
     };
-    /// Zero or above.
+    /// Zero and all finite numbers above it.
     pub const NOT_NEGATIVE: Self = Self {
         low: 0.0,
         above: false,
@@ -215,16 +215,16 @@ impl Range {
 pub enum Default {
     /// It must be stated, or follows from other keys.
     None,
-    /// This number.
+    /// This number, in SI or of the dimensionless model.
     Number(f64),
-    /// This word.
+    /// This word of the case file.
     Word(&'static str),
 }
 
 /// The number of the equations that a key sets.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Means {
-    /// None: a physical quantity, a word.
+    /// None: the key is a physical quantity or a word.
     Nothing,
     /// A parameter of the cantilever.
     Cantilever(Parameter),
@@ -235,46 +235,47 @@ pub enum Means {
 /// Entry of the table of keys.
 #[derive(Clone, Copy, Debug)]
 pub struct Entry {
-    /// Its table in the case file.
+    /// Table of the case file that contains the key.
     pub section: Section,
-    /// Name in its table.
+    /// Name of the key in its table.
     pub name: &'static str,
-    /// Second name.
+    /// Alternative name of the key, if it has one.
     pub alias: Option<&'static str>,
-    /// Symbol in formulas and on axes; if empty, its path.
+    /// Symbol in formulas and on axes; if empty, the path of the key.
     pub symbol: &'static str,
-    /// Words and symbol on the axis of a figure, of a quantity; if empty, its path in words.
+    /// Words and symbol on the axis of a figure; if empty, the path of the key in words.
     pub label: &'static str,
-    /// Type of its value.
+    /// Type of the values.
     pub takes: Takes,
-    /// Range of its value.
+    /// Range of the values, in SI or of the dimensionless model.
     pub range: Range,
-    /// Default value.
+    /// Value of the key where it is not stated.
     pub default: Default,
-    /// Example value.
+    /// Example of a value for messages and forms, in SI or of the dimensionless model.
     pub example: f64,
-    /// Kinds of `[model]` to which it belongs.
+    /// Kinds of `[model]` that have the key; empty for a physical quantity.
     pub models: &'static [ModelKind],
-    /// The number of the equations that it sets.
+    /// Number of the equations that the key sets.
     pub means: Means,
-    /// The dimensionless parameter that it determines, named in error messages.
+    /// Dimensionless parameter that the key determines, named in error messages.
     pub feeds: Option<Parameter>,
-    /// Contact laws to which a quantity of tip or sample belongs.
+    /// Contact laws that have the key, for a quantity of tip or sample.
     pub laws: Laws,
-    /// The parameter of nonlinear laws that it states, if its name differs.
+    /// Name of the parameter of nonlinear laws that the key states, if it differs from its own
+    /// name.
     pub law_parameter: Option<&'static str>,
-    /// Description in one line.
+    /// Description of the key in one line.
     pub meaning: &'static str,
 }
 
 /// Contact laws to which a key belongs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Laws {
-    /// Every law, or none: it does not describe the contact.
+    /// Every law, and keys that do not describe the contact.
     All,
-    /// Some laws, linear ones among them.
+    /// Some laws, including linear ones.
     Some,
-    /// Some nonlinear laws.
+    /// Some nonlinear laws, but no linear one.
     Nonlinear,
 }
 
@@ -318,12 +319,12 @@ impl Key {
         (0..TABLE.len() as u8).map(Self)
     }
 
-    /// Entry of the table.
+    /// Returns the entry of the key in the table of keys.
     pub fn entry(self) -> &'static Entry {
         &TABLE[usize::from(self.0)]
     }
 
-    /// Its table.
+    /// Returns the table of the case file that contains the key.
     pub fn section(self) -> Section {
         self.entry().section
     }
@@ -338,7 +339,7 @@ impl Key {
         &PATHS[usize::from(self.0)]
     }
 
-    /// Second name.
+    /// Returns the alternative name of the key, if it has one.
     pub fn alias(self) -> Option<&'static str> {
         self.entry().alias
     }
@@ -376,12 +377,12 @@ impl Key {
         }
     }
 
-    /// Description in one line.
+    /// Returns the description of the key in one line.
     pub fn meaning(self) -> &'static str {
         self.entry().meaning
     }
 
-    /// Kind of quantity of its values; a number if they are not quantities.
+    /// Returns the kind of quantity of the values; a number if they are not quantities.
     pub fn kind(self) -> Kind {
         match self.entry().takes {
             Takes::Quantity(kind) => kind,
@@ -389,12 +390,12 @@ impl Key {
         }
     }
 
-    /// True if it is a quantity of a physical case.
+    /// Returns true if the key is a quantity of a physical case.
     pub fn is_physical(self) -> bool {
         self.section().is_physical()
     }
 
-    /// The parameter of the cantilever that it sets.
+    /// Returns the parameter of the cantilever that the key sets, if any.
     pub fn parameter(self) -> Option<Parameter> {
         match self.entry().means {
             Means::Cantilever(parameter) => Some(parameter),
@@ -402,7 +403,7 @@ impl Key {
         }
     }
 
-    /// The parameter of the oscillator that it sets.
+    /// Returns the parameter of the oscillator that the key sets, if any.
     pub fn oscillator_parameter(self) -> Option<OscillatorParameter> {
         match self.entry().means {
             Means::Oscillator(parameter) => Some(parameter),
@@ -432,7 +433,7 @@ impl Key {
             .find(|key| key.name() == number.name())
     }
 
-    /// The number of a linear contact law that it states, of a key of `[sample]`.
+    /// The number of a linear contact law that the key states, if it is a key of `[sample]`.
     pub(crate) fn law_number(self) -> Option<Parameter> {
         let stated = |of: &Parameter| of.entry().stated_by.is_some() && of.name() == self.name();
         let number = Parameter::every().find(stated);
@@ -445,7 +446,7 @@ impl Key {
         Self::all().find(is).unwrap_or(Self::Mass)
     }
 
-    /// Range of its value.
+    /// Returns the range of the values, in SI or of the dimensionless model.
     pub fn range(self) -> Range {
         let (low, high) = match self.entry().means {
             Means::Nothing => return self.entry().range,
@@ -471,7 +472,7 @@ impl Key {
     /// The frequency of each further tone over that of the first, in a dimensionless case.
     pub const TONE_RATIOS: [Self; MAX_TONES - 1] = [Self::Tone2Ratio, Self::Tone3Ratio];
 
-    /// The reason why it cannot vary, if it cannot.
+    /// Returns the reason why the key cannot vary; `None` if it can.
     pub fn cannot_vary(self) -> Option<&'static str> {
         match self.entry().takes {
             Takes::Quantity(_) => None,
@@ -494,7 +495,7 @@ impl Key {
         }
     }
 
-    /// Its alternatives, and the reason why they exclude each other.
+    /// Returns the keys that exclude this one, each with the reason.
     pub fn alternatives(self) -> impl Iterator<Item = (Self, &'static str)> {
         ALTERNATIVES
             .iter()
@@ -505,7 +506,7 @@ impl Key {
             })
     }
 
-    /// Its default value with a sample of this law.
+    /// The default value of the key for a sample with this law.
     pub(crate) fn default_under(self, law: ContactLaw) -> Option<f64> {
         match (
             self.parameter().map(|of| of.entry().applies),

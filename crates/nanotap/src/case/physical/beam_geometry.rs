@@ -5,11 +5,11 @@ use serde::Serialize;
 /// Dimensions of a beam of rectangular cross-section, in m.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct BeamGeometry {
-    /// Length L.
+    /// Length L of the beam, m.
     pub length: f64,
-    /// Width b.
+    /// Width b of the beam, m.
     pub width: f64,
-    /// Thickness h, in the direction of bending.
+    /// Thickness h in the direction of bending, m.
     pub thickness: f64,
 }
 

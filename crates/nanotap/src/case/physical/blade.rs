@@ -36,38 +36,38 @@ use nalgebra::Complex;
 use nanotap_arithmetic::{ComplexFunctions as _, from_polar};
 use nanotap_volterra::gauss_legendre;
 
-/// Polynomials of each stress.
+/// Number of Chebyshev polynomials of each stress.
 const ORDERS: usize = 12;
 /// Bessel functions: of even and odd order.
 const FUNCTIONS: usize = 2 * ORDERS;
 /// Where Hankel functions take over: beyond the largest order, and where their asymptotic series have
 /// all digits.
 const JOIN: f64 = 38.0;
-/// Nodes of a panel.
+/// Number of Gauss nodes in each panel of the integrals over q.
 const PANEL: usize = 12;
-/// Results that are remembered.
+/// Largest number of values of Γ that each thread keeps for reuse.
 const REMEMBERED: usize = 64;
 
 /// A blade in a fluid, without units.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Blade {
-    /// Wavenumber of the mode times the width, κ = kb.
+    /// Wavenumber of the mode times the width of the blade, κ = kb, dimensionless.
     pub wavenumber: f64,
-    /// Reynolds number ρωb²/(4η).
+    /// Reynolds number Re = ρωb²/(4η), dimensionless.
     pub reynolds: f64,
-    /// Distance to the wall over the width; `None` without a wall.
+    /// Distance to the wall as a fraction of the width, dimensionless; `None` without a wall.
     pub gap: Option<f64>,
 }
 
 impl Blade {
     /// Reynolds numbers for which Γ is accurate.
     pub const REYNOLDS: [f64; 2] = [1e-6, 1e6];
-    /// Largest κ for which it is.
+    /// Largest κ for which Γ is accurate.
     pub const MAX_WAVENUMBER: f64 = 40.0;
-    /// Smallest distance to a wall over the width for which it is.
+    /// Smallest distance to a wall, as a fraction of the width, for which Γ is accurate.
     pub const MIN_GAP: f64 = 0.025;
 
-    /// Whether Γ is accurate.
+    /// Returns true if all numbers are in the ranges for which Γ is accurate.
     pub fn is_in_range(self) -> bool {
         (Self::REYNOLDS[0]..=Self::REYNOLDS[1]).contains(&self.reynolds)
             && (0.0..=Self::MAX_WAVENUMBER).contains(&self.wavenumber)
@@ -77,7 +77,7 @@ impl Blade {
     /// Γ with time as e^{−iωt}; `None` out of range.
     pub fn hydrodynamic_function(self) -> Option<Complex<f64>> {
         thread_local! {
-            /// The latest last.
+            /// Values of Γ computed by this thread, the latest last.
             static RECENT: RefCell<Vec<(Blade, Complex<f64>)>> = const { RefCell::new(Vec::new()) };
         }
         if !self.is_in_range() {
@@ -134,8 +134,8 @@ impl Blade {
     }
 }
 
-/// What is left of the first diagonal element of a symmetric matrix when all others are eliminated, from
-/// its lower half: 1/(M⁻¹)₀₀. Without pivoting: the blade dissipates, so that no pivot vanishes.
+/// Computes 1/(M⁻¹)₀₀ of a symmetric matrix from its lower half, by elimination of all other rows.
+/// Pivoting is not needed: the blade dissipates, so that no pivot vanishes.
 fn first_pivot(matrix: &mut [Complex<f64>], size: usize) -> Complex<f64> {
     for pivot in (1..size).rev() {
         let (above, below) = matrix.split_at_mut(pivot * size);
@@ -157,7 +157,6 @@ struct Wave {
     k: f64,
     s: Complex<f64>,
     m: Complex<f64>,
-    /// 1/(m + s).
     sum: Complex<f64>,
     reynolds: f64,
 }
@@ -221,7 +220,7 @@ impl Wave {
     }
 }
 
-/// (1 − e^{−x})/x.
+/// Computes (1 − e^{−x})/x, the mean of e^{−t} for t from 0 to x.
 fn mean_decay(x: Complex<f64>) -> Complex<f64> {
     if x.modulus() > 0.3 {
         return (1.0 - (-x).exponential()) / x;

@@ -32,38 +32,38 @@ use crate::case::quantity::Kind;
 /// medium.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Lever {
-    /// Its name.
+    /// Name of the lever in the catalogue.
     pub name: String,
-    /// Alternative names.
+    /// Alternative names of the lever.
     pub aliases: Vec<String>,
-    /// Spring constant in N/m.
+    /// Spring constant of the lever, N/m.
     pub k: f64,
-    /// First free resonance in Hz, with its tip.
+    /// First free resonance with the tip, Hz.
     pub f0: f64,
-    /// Dimensions of the beam.
+    /// Dimensions of the beam, m; `None` if they are unknown.
     #[serde(flatten)]
     pub geometry: Option<BeamGeometry>,
-    /// Radius of the tip's apex in m.
+    /// Radius of the tip's apex, m; `None` if it is unknown.
     pub tip_radius: Option<f64>,
-    /// Height of the tip in m.
+    /// Height of the tip, m; `None` if it is unknown.
     pub tip_height: Option<f64>,
-    /// Source of the numbers.
+    /// Source of the numbers, such as a data sheet or a calibration.
     pub source: String,
 }
 
 /// A material of samples and tips.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Material {
-    /// Its name.
+    /// Name of the material in the catalogue.
     pub name: String,
-    /// Alternative names.
+    /// Alternative names of the material.
     pub aliases: Vec<String>,
     /// Young's modulus and Poisson's ratio.
     #[serde(flatten)]
     pub elastic: Elastic,
-    /// Density in kg/m³, if tips are made of it.
+    /// Density, kg/m³, if tips are made of the material.
     pub density: Option<f64>,
-    /// Source of the numbers.
+    /// Source of the numbers, such as a publication or a measurement.
     pub source: String,
 }
 
@@ -73,7 +73,7 @@ pub struct Material {
 pub struct CatalogueError {
     /// The file, with the entry and key at fault, if any.
     pub origin: String,
-    /// What is wrong.
+    /// What is wrong in the file or entry.
     pub reason: String,
 }
 
@@ -132,9 +132,8 @@ pub struct Catalogue {
 impl Catalogue {
     /// The built-in levers and materials.
     ///
-    /// # Errors
-    /// None as shipped (a test reads them all); [`CatalogueError`] if the file in the source
-    /// tree was edited into something faulty.
+    /// None as shipped, as a test verifies; [`CatalogueError`] if the file in the source tree is
+    /// edited and invalid.
     pub fn builtin() -> Result<Self, CatalogueError> {
         let mut catalogue = Self::default();
         catalogue.extend(include_str!("catalogue.toml"), "built in")?;
@@ -181,12 +180,12 @@ impl Catalogue {
         self.extend(&text, &origin)
     }
 
-    /// All levers by name.
+    /// Returns all levers, sorted by name.
     pub fn levers(&self) -> impl Iterator<Item = &Lever> {
         self.levers.values()
     }
 
-    /// All materials by name.
+    /// Returns all materials, sorted by name.
     pub fn materials(&self) -> impl Iterator<Item = &Material> {
         self.materials.values()
     }

@@ -10,18 +10,18 @@ use crate::model::drive_form::{Actuation, FrequencyRatio, MAX_TONES, RatioError}
 /// A quantity that one of several keys states: the key, and its value in SI.
 pub(crate) type Given = (Key, f64);
 
-/// The section `[drive]`.
+/// The drive of a physical case, from `[drive]`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Drive {
-    /// Its frequency, in Hz or over the lever's f₀.
+    /// Frequency of the first tone, Hz or as a multiple of f₀, depending on its key.
     pub(crate) frequency: Given,
-    /// Its strength: of the clamped end's motion in m, of a force on the lever in N, or the free
-    /// amplitude of the tip in m.
+    /// Strength of the first tone: amplitude of the clamped end, m, of a force on the lever, N, or
+    /// of the free tip, m, depending on its key.
     pub(crate) strength: Given,
-    /// The setpoint, for experiments that solve for the gap: a fraction of A₀, or an amplitude, a
-    /// force or an angle in SI.
+    /// Setpoint, for studies that solve for the gap: a fraction of A₀, or an amplitude, a force, a
+    /// phase or a frequency shift in SI.
     pub(crate) setpoint: Option<(Kind, f64)>,
-    /// Where it acts.
+    /// Where the drive acts: on the base, on the tip or along the lever.
     pub actuation: Actuation,
     /// The second tone, if there is one, and the third.
     pub(crate) further: [Option<FurtherTone>; MAX_TONES - 1],
@@ -30,15 +30,14 @@ pub struct Drive {
 /// The keys of a further tone.
 #[derive(Debug, PartialEq)]
 pub(crate) struct ToneKeys {
-    /// Which tone it is, as the keys have it.
+    /// Prefix of the keys of the tone: `second` or `third`.
     word: &'static str,
-    /// Its frequency.
+    /// Key of the frequency in Hz.
     pub(crate) frequency: Key,
-    /// Its frequency over that of the first.
+    /// Key of the ratio to the frequency of the first tone.
     pub(crate) ratio: Key,
-    /// Its strength: motion of the base, force on the lever, free amplitude of the tip.
+    /// Keys of the strength: motion of the base, force on the lever, free amplitude of the tip.
     pub(crate) strength: [Key; 3],
-    /// Its phase.
     pub(crate) phase: Key,
 }
 
@@ -71,22 +70,21 @@ pub(crate) static FURTHER: [ToneKeys; MAX_TONES - 1] = [
 /// A further tone of the drive.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct FurtherTone {
-    /// Its keys.
+    /// Keys of the tone, which messages name.
     pub(crate) keys: &'static ToneKeys,
-    /// Its frequency.
     frequency: ToneFrequency,
-    /// Its strength, as that of the first.
+    /// Strength of the tone, in the same units as that of the first.
     pub(crate) strength: Given,
-    /// Its phase in rad.
+    /// Phase of the tone, rad.
     pub(crate) phase: f64,
 }
 
 /// The frequency of a further tone.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum ToneFrequency {
-    /// In Hz, which must be a ratio of small whole numbers to the first one's.
+    /// Frequency, Hz; it must have a ratio of small whole numbers to that of the first tone.
     Hertz(f64),
-    /// Over that of the first.
+    /// Ratio to the frequency of the first tone.
     Ratio(FrequencyRatio),
 }
 
@@ -119,7 +117,7 @@ impl FurtherTone {
 }
 
 impl Drive {
-    /// Reads `[drive]`.
+    /// Reads `[drive]` from the stated quantities.
     pub(crate) fn read(reader: Reader<'_>) -> Result<Self, PhysicalError> {
         let keys = [Key::DriveFrequency, Key::DriveFrequencyRatio];
         let frequency = reader.first(&keys)?.ok_or_else(|| {

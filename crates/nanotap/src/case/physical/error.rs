@@ -10,29 +10,29 @@ pub enum PhysicalError {
     /// A quantity with an impossible value.
     #[error("{key} = {value}: {reason}")]
     Impossible {
-        /// The key.
+        /// Key with the impossible value.
         key: Key,
         /// The value as given, or as computed where it was not given.
         value: String,
-        /// What is wrong and what would be right.
+        /// What is wrong and which values are valid.
         reason: String,
     },
-    /// A missing quantity.
+    /// A quantity that is needed is missing.
     #[error("{key} is missing: {reason}")]
     Missing {
-        /// The key.
+        /// Key that is missing.
         key: Key,
-        /// What it is needed for, and the alternatives.
+        /// Why the quantity is needed, and its alternatives.
         reason: String,
     },
     /// A lever or material that is not in the catalogue.
     #[error("{key} = \"{name}\": no such {what} in the catalogue; {suggestion}")]
     UnknownName {
-        /// The key.
+        /// Key of the name.
         key: Key,
-        /// The name given.
+        /// Name of the lever or material, as given.
         name: String,
-        /// "lever" or "material".
+        /// Kind of the entry: "lever" or "material".
         what: &'static str,
         /// The nearest name, or all of them.
         suggestion: String,

@@ -23,11 +23,11 @@ const REYNOLDS: [f64; 2] = [1e-6, 1e4];
 /// The fluid around a lever; SI units.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Fluid {
-    /// Density ρ.
+    /// Density ρ of the fluid, kg/m³.
     pub density: f64,
-    /// Dynamic viscosity η.
+    /// Dynamic viscosity η of the fluid, Pa s.
     pub viscosity: f64,
-    /// Height of the lever over a parallel surface; `None` far from any.
+    /// Height of the lever over a parallel surface, m; `None` far from any surface.
     pub height: Option<f64>,
 }
 

@@ -30,9 +30,9 @@ const VACUUM: f64 = 8.854_187_812_8e-12;
 /// A law, or a sum of laws, with its parameters in SI.
 #[derive(Debug, Clone)]
 pub struct SampleForce {
-    /// The laws.
+    /// Laws whose forces add up.
     pub terms: Vec<&'static TableLaw>,
-    /// Their parameters, term by term.
+    /// Values of the laws' parameters in SI, law by law in the order of their tables.
     pub values: Vec<f64>,
     /// The rows of a table, in m and N.
     pub table: Option<ForceTable>,
@@ -369,13 +369,14 @@ impl SampleForce {
         ))
     }
 
-    /// The laws' names.
+    /// Returns the names of the laws, joined by `+`.
     pub fn name(&self) -> String {
         self.names().join(" + ")
     }
 
-    /// What is wrong with the laws' adhesion at a Tabor parameter: that of Derjaguin, Muller and
-    /// Toporov holds of stiff contacts, that of Johnson, Kendall and Roberts of soft ones.
+    /// Returns a hint if the adhesion of the laws does not suit the Tabor parameter: the theory of
+    /// Derjaguin, Muller and Toporov is valid for stiff contacts, that of Johnson, Kendall and
+    /// Roberts for soft ones.
     fn better_adhesion(&self, tabor: f64) -> Option<&'static str> {
         let has = |name: &str| self.names().contains(&name);
         if has("jkr") {

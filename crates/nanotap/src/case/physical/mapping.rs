@@ -41,7 +41,7 @@ pub struct Scales {
 }
 
 impl Scales {
-    /// The units for a lever whose beam stands `beam_gap` (g₀, in m) above the sample.
+    /// Computes the units for a lever whose beam is `beam_gap` (g₀, in m) above the sample.
     pub fn new(lever: &Lever, beam_gap: f64) -> Self {
         let time = lever.time_unit();
         let stiffness = lever.k / 3.0;
@@ -90,8 +90,8 @@ impl Scales {
         })
     }
 
-    /// The dimensionless case of these quantities in SI, not validated: `like` says what is no
-    /// quantity (modes, contact law, way of driving, ratio of the tones).
+    /// Returns the dimensionless case of these quantities in SI, not validated. Modes, contact law,
+    /// actuation and ratios of the tones are those of `like`.
     pub fn case(&self, quantities: &Numbers, like: &Cantilever) -> Cantilever {
         Parameter::every().fold(like.clone(), |case, parameter| {
             let unit = self.of(parameter, like.actuation);
@@ -103,17 +103,17 @@ impl Scales {
 /// One line of the mapping between physics and model.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct MappingRow {
-    /// The dimensionless parameter.
+    /// Dimensionless parameter of the model.
     pub parameter: Parameter,
-    /// Its value.
+    /// Value of the parameter, dimensionless.
     pub value: f64,
     /// Formula, such as "K1 L^3/(EI) = 3 K1/k".
     pub formula: &'static str,
-    /// The physical quantity's name.
+    /// Name of the physical quantity in words.
     pub quantity: &'static str,
-    /// Kind of quantity.
+    /// Kind of the physical quantity, which determines its SI unit.
     pub kind: Kind,
-    /// Its value in SI (a frequency in Hz).
+    /// Value of the physical quantity in SI; a frequency in Hz.
     pub si: f64,
 }
 

@@ -41,7 +41,7 @@ impl<'a> Reader<'a> {
         Ok(found)
     }
 
-    /// A word.
+    /// The word stated for a key; `None` if there is none.
     pub(crate) fn word(self, key: Key) -> Option<&'static str> {
         match self.stated.get(key)? {
             Value::Word(word) => Some(word),
@@ -49,7 +49,7 @@ impl<'a> Reader<'a> {
         }
     }
 
-    /// A ratio of frequencies.
+    /// The ratio of frequencies stated for a key; `None` if there is none.
     pub(crate) fn ratio(self, key: Key) -> Option<FrequencyRatio> {
         match self.stated.get(key)? {
             Value::Ratio(ratio) => Some(*ratio),
@@ -57,7 +57,7 @@ impl<'a> Reader<'a> {
         }
     }
 
-    /// Rows of gap and force.
+    /// The rows of gap and force stated for a key; `None` if there are none.
     pub(crate) fn table(self, key: Key) -> Option<&'a ForceTable> {
         match self.stated.get(key)? {
             Value::Table(table) => Some(table),
@@ -65,7 +65,7 @@ impl<'a> Reader<'a> {
         }
     }
 
-    /// Maxwell arms.
+    /// The Maxwell arms stated for a key; `None` if there are none.
     pub(crate) fn arms(self, key: Key) -> Option<&'a ArmTable> {
         match self.stated.get(key)? {
             Value::Arms(arms) => Some(arms),

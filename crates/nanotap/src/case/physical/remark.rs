@@ -4,7 +4,7 @@ use std::fmt;
 
 use serde::Serialize;
 
-/// Severity of a remark.
+/// Whether a remark is a note or a warning.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Severity {
@@ -17,14 +17,14 @@ pub enum Severity {
 /// A remark about a case.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Remark {
-    /// Note or warning.
+    /// Whether the remark is a note or a warning.
     pub severity: Severity,
     /// The sentence, without a full stop.
     pub text: String,
 }
 
 impl Remark {
-    /// An assumption made or a quantity inferred.
+    /// Creates a note: an assumption made or a quantity inferred.
     pub fn note(text: impl Into<String>) -> Self {
         Self {
             severity: Severity::Note,
@@ -32,7 +32,7 @@ impl Remark {
         }
     }
 
-    /// The model may not describe the intended system.
+    /// Creates a warning: the model may not describe the intended system.
     pub fn warning(text: impl Into<String>) -> Self {
         Self {
             severity: Severity::Warning,

@@ -30,7 +30,7 @@ pub fn reduced_modulus(sample: Elastic, tip: Option<Elastic>) -> f64 {
 /// Hertz's contact of a sphere on a plane, taken as a spring at one indentation.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Hertz {
-    /// E* in Pa.
+    /// Reduced modulus E* of sample and tip, Pa.
     pub reduced_modulus: f64,
     /// Radius R of the tip in m.
     pub radius: f64,
@@ -86,7 +86,7 @@ impl Hertz {
     }
 }
 
-/// Damping of a sample.
+/// Damping of a linear contact, as stated.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum SampleDamping {
     /// Damper C₁ in N s/m.
@@ -102,22 +102,22 @@ pub struct Sample {
     pub stiffness: f64,
     /// The Hertz contact from which it follows, if any.
     pub hertz: Option<Hertz>,
-    /// Damping; zero if not stated.
+    /// Damping of the contact; `None` counts as zero.
     pub damping: Option<SampleDamping>,
-    /// Contact law.
+    /// Law of the linear contact.
     pub law: ContactLaw,
-    /// Further parameters of the law, in SI.
+    /// Numbers that only this law has, in the order of the law's entry, each in its SI unit.
     pub numbers: Vec<f64>,
     /// Relaxing arms of the law, in s and N/m.
     pub arms: Option<ArmTable>,
-    /// Elastic constants, if known.
+    /// Elastic constants of the sample; `None` unless the stiffness follows from Hertz's contact.
     pub elastic: Option<Elastic>,
     /// A nonlinear force law in place of the above.
     pub force: Option<SampleForce>,
 }
 
 impl Sample {
-    /// Reads `[sample]`.
+    /// Reads `[sample]` from the stated quantities.
     pub(crate) fn read(reader: Reader<'_>, tip: &Tip) -> Result<Self, PhysicalError> {
         if let Some(force) = SampleForce::read(reader, tip)? {
             return Ok(Self {

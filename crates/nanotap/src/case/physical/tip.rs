@@ -11,27 +11,27 @@ use crate::case::key::Key;
 pub enum TipShape {
     /// A cone standing on its base.
     Cone {
-        /// Height in m.
+        /// Height of the cone, m.
         height: f64,
         /// Angle between axis and flank in rad.
         half_angle: f64,
     },
     /// A pyramid on a square base.
     Pyramid {
-        /// Height in m.
+        /// Height of the pyramid, m.
         height: f64,
         /// Angle between axis and the middle of a face in rad.
         half_angle: f64,
     },
     /// A sphere, as glued on for colloidal probes.
     Sphere {
-        /// Radius in m.
+        /// Radius of the sphere, m.
         radius: f64,
     },
 }
 
 impl TipShape {
-    /// Volume in m³.
+    /// Computes the volume, m³.
     pub fn volume(self) -> f64 {
         use std::f64::consts::PI;
         match self {
@@ -49,22 +49,22 @@ impl TipShape {
 /// Determination of the mass at the end of the beam.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum TipMass {
-    /// In kg.
+    /// Mass of the tip, kg.
     Absolute(f64),
-    /// As a fraction of the beam's mass: α1.
+    /// Mass of the tip as a fraction of the mass of the beam: α1.
     Ratio(f64),
-    /// From the frequency of the second mode in Hz.
+    /// Frequency of the second mode, Hz, from which the mass of the tip follows.
     SecondMode(f64),
 }
 
 /// The tip of a case file.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Tip {
-    /// Mass; zero if not stated.
+    /// How the mass is determined; `None` if not stated, which counts as zero.
     pub mass: Option<TipMass>,
     /// Radius of curvature of the apex in m.
     pub radius: Option<f64>,
-    /// Height in m: what separates the beam from the sample when the tip touches.
+    /// Height of the tip, m: distance of the beam from the sample when the tip touches.
     pub height: Option<f64>,
     /// Elastic constants; without them the tip counts as rigid.
     pub elastic: Option<Elastic>,

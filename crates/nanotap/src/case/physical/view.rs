@@ -25,29 +25,29 @@ use crate::model::parameter::{Numbers, Parameter, Unit};
 /// Default height of the tip; tips of silicon levers are 10 to 15 µm high.
 pub(super) const USUAL_TIP_HEIGHT: f64 = 10e-6;
 
-/// What a feedback holds, with its setpoint.
+/// Quantity that a feedback keeps constant, with its setpoint.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Held {
-    /// The amplitude, as a part of A₀.
+    /// Amplitude as a fraction of the free amplitude A₀.
     Amplitude(f64),
-    /// The largest force of a period, N.
+    /// Largest force of a period, N.
     PeakForce(f64),
-    /// The phase lag of the deflection, degrees.
+    /// Phase lag of the deflection, degrees.
     Phase(f64),
-    /// The shift of the frequency at which amplitude and phase are held, Hz.
+    /// Shift of the frequency at which amplitude and phase are constant, Hz.
     Shift(f64),
 }
 
 /// A physical case with its dimensionless parameters and the units between the two.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Physical {
-    /// The dimensionless numbers, valid.
+    /// Dimensionless parameters of the case, validated.
     pub cantilever: Cantilever,
     /// SI values of the model's units.
     pub scales: Scales,
-    /// The lever.
+    /// The lever with its stiffness, mass and resonance, in SI.
     pub lever: Lever,
-    /// The sample.
+    /// The sample with its contact or force law, in SI.
     pub sample: Sample,
     /// The physical quantities of the dimensionless numbers, in SI.
     pub parameters: Numbers,
@@ -58,15 +58,14 @@ pub struct Physical {
     /// Phase of the free deflection behind the drive (the base's displacement, or the force
     /// on the lever) in degrees: 90 at resonance.
     pub free_phase: f64,
-    /// Setpoint amplitude over A₀, if one was given: experiments solve for its gap.
+    /// Setpoint amplitude as a fraction of A₀, if one was given; studies then solve for the gap.
     pub setpoint: Option<f64>,
-    /// What the feedback holds, if a setpoint was given.
+    /// Quantity that the feedback keeps constant, if a setpoint was given.
     pub held: Option<Held>,
     /// Height of the tip, g₀ − g₁, in m.
     pub tip_height: f64,
-    /// Data of the lever.
+    /// Stated data of the lever, from which `lever` was determined.
     pub(super) data: LeverData,
-    /// The tip.
     pub(super) tip: Tip,
 }
 
@@ -109,7 +108,7 @@ impl Physical {
         mapping_table(&self.cantilever, &self.scales)
     }
 
-    /// Reference of phases.
+    /// Returns the quantity to which phases refer, in words.
     pub const fn phase_reference(&self) -> &'static str {
         match self.cantilever.actuation {
             Actuation::Base => "displacement of the clamped end",
@@ -202,11 +201,10 @@ impl Physical {
         })
     }
 
-    /// What stays while a quantity varies, said as numbers of their own. An experimenter who
-    /// turns one knob leaves the others: the drive keeps its own amplitude (a piezo its
-    /// voltage, not the lever's answer to it) unless `drive.hold` says otherwise, further tones their place among the harmonics
-    /// of the first, the sample its place, and the unit of length g₀ stays so that all values have
-    /// the same unit.
+    /// Returns the stated values, completed by those that stay constant while a quantity varies. As
+    /// with an instrument, only one control changes: the drive keeps its own amplitude (the voltage
+    /// of a piezo) unless `drive.hold` states otherwise, further tones keep their ratio to the
+    /// first, and gap and unit of length g₀ do not change, so that all values have the same unit.
     pub(crate) fn implied_constants(&self, stated: &Stated) -> Stated {
         let mut held = stated.clone();
         held.set(Key::GapBeam, self.scales.length);

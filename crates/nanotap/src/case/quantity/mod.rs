@@ -6,10 +6,9 @@
 //! to binary, so `"30 um"` is exactly the `f64` nearest to 3e-5, and
 //! [`Kind::format_exact`] followed by [`Kind::parse`] gives back the same bits.
 //!
-//! The general unit crates were tried first. `uom`'s `FromStr` knows neither `um` nor
-//! compound units such as `N s/m`; `fend-core` ignores case, so it takes `5 pn` for five
-//! peta-newtons, and works out `3 N/m m` as 3 N. Wrong by thirty orders without a word is
-//! worse than a short parser that refuses: hence this one.
+//! General unit crates are not used: `uom`'s `FromStr` knows neither `um` nor compound units such
+//! as `N s/m`, and `fend-core` ignores case, so it reads `5 pn` as five peta-newtons, and evaluates
+//! `3 N/m m` to 3 N.
 
 mod format;
 mod parser;
@@ -104,35 +103,36 @@ impl fmt::Display for Dimension {
     }
 }
 
-/// The table of kinds: dimension, noun with its article, an example, and the unit shown with the
-/// power of ten that it is away from SI and whether it takes a prefix.
+/// The table of kinds: dimension, noun with its article, an example, and the unit for display with
+/// its power of ten relative to SI and whether it takes a prefix.
 macro_rules! kinds {
     ($($(#[$doc:meta])* $kind:ident: $dimension:expr, $noun:expr, $example:expr, $unit:expr;)*) => {
-        /// What a quantity measures: fixes its dimension, its words in messages and its display unit.
+        /// What a quantity measures: determines its dimension, its words in messages and its unit
+        /// for display.
         #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize)]
         #[serde(rename_all = "snake_case")]
         pub enum Kind { $($(#[$doc])* $kind),* }
 
         impl Kind {
-            /// Every kind, in the order in which a dimension is named.
+            /// All kinds; the first one with a dimension names it in messages.
             pub const ALL: [Self; [$(stringify!($kind)),*].len()] = [$(Self::$kind),*];
 
-            /// Its exponents of kg, m, s, rad and C.
+            /// Returns the exponents of kg, m, s, rad and C.
             pub const fn dimension(self) -> Dimension {
                 match self { $(Self::$kind => $dimension),* }
             }
 
-            /// With its article, for messages: "a force per length".
+            /// Returns the description with its article, for messages: "a force per length".
             pub const fn noun(self) -> &'static str {
                 match self { $(Self::$kind => $noun),* }
             }
 
-            /// A text that would be right, for messages.
+            /// Returns the text of a valid quantity, for messages.
             pub const fn example(self) -> &'static str {
                 match self { $(Self::$kind => $example),* }
             }
 
-            /// Unit shown, power of ten that it is away from SI, and whether it takes a prefix.
+            /// Unit for display, its power of ten relative to SI, and whether it takes a prefix.
             const fn display_unit(self) -> (&'static str, i32, bool) {
                 match self { $(Self::$kind => $unit),* }
             }
@@ -143,41 +143,41 @@ macro_rules! kinds {
 kinds! {
     /// A plain number: quality factor, Poisson's ratio, setpoint ratio. Percent allowed.
     Number: Dimension::NONE, "a number without a unit", "200", ("", 0, false);
-    /// Metre.
+    /// Length, m.
     Length: Dimension::new(0, 1, 0, 0), "a length", "30 um", ("m", 0, true);
-    /// Kilogram.
+    /// Mass, kg; shown in g.
     Mass: Dimension::new(1, 0, 0, 0), "a mass", "3 ng", ("g", -3, true);
-    /// Second.
+    /// Time, s.
     Time: Dimension::new(0, 0, 1, 0), "a time", "12 us", ("s", 0, true);
-    /// Kilogram per cubic metre.
+    /// Mass density, kg/m³.
     Density: Dimension::new(1, -3, 0, 0), "a mass per volume", "2330 kg/m^3", ("kg/m^3", 0, false);
-    /// Hertz: cycles, not radians, per second.
+    /// Frequency, Hz: cycles, not radians, per second.
     Frequency: Dimension::new(0, 0, -1, 0), "a frequency", "75 kHz", ("Hz", 0, true);
-    /// Radian per second.
+    /// Angular frequency, rad/s.
     AngularFrequency: Dimension::new(0, 0, -1, 1), "an angular frequency", "4.7e5 rad/s", ("rad/s", 0, false);
-    /// Newton.
+    /// Force, N.
     Force: Dimension::new(1, 1, -2, 0), "a force", "4.2 nN", ("N", 0, true);
-    /// Newton per metre.
+    /// Stiffness, N/m.
     Stiffness: Dimension::new(1, 0, -2, 0), "a force per length", "2.8 N/m", ("N/m", 0, true);
-    /// Pascal.
+    /// Pressure or elastic modulus, Pa.
     Pressure: Dimension::new(1, -1, -2, 0), "a pressure", "4 GPa", ("Pa", 0, true);
-    /// Newton second per metre.
+    /// Damping: force per velocity, N s/m.
     Damping: Dimension::new(1, 0, -1, 0), "a force per velocity", "1e-6 N s/m", ("N s/m", 0, true);
-    /// Joule.
+    /// Energy, J.
     Energy: Dimension::new(1, 2, -2, 0), "an energy", "12 eV", ("J", 0, true);
-    /// Watt.
+    /// Power, W.
     Power: Dimension::new(1, 2, -3, 0), "a power", "1 pW", ("W", 0, true);
-    /// Metre per second.
+    /// Velocity, m/s.
     Velocity: Dimension::new(0, 1, -1, 0), "a velocity", "2 mm/s", ("m/s", 0, true);
-    /// Radian; shown in degrees.
+    /// Angle, rad; shown in degrees.
     Angle: Dimension::new(0, 0, 0, 1), "an angle", "25 deg", ("rad", 0, false);
-    /// Pascal second.
+    /// Dynamic viscosity, Pa s.
     Viscosity: Dimension::new(1, -1, -1, 0), "a viscosity", "2 Pa s", ("Pa s", 0, true);
-    /// Volt.
+    /// Voltage, V.
     Voltage: Dimension::new(1, 2, -2, 0).charged(-1), "a voltage", "0.5 V", ("V", 0, true);
-    /// Coulomb per square metre.
+    /// Charge per area, C/m².
     ChargeDensity: Dimension::new(0, -2, 0, 0).charged(1), "a charge per area", "-2.5 mC/m^2", ("C/m^2", 0, true);
-    /// Joule times metre to the sixth: what repels in a Lennard-Jones law.
+    /// Strength of the repulsion of a Lennard-Jones law, J m⁶.
     Repulsion: Dimension::new(1, 8, -2, 0), "an energy times a length to the sixth", "1e-76 J m^6", ("J m^6", 0, false);
 }
 
@@ -239,12 +239,12 @@ pub fn format_electronvolts(joules: f64) -> String {
     engineering(joules / JOULES_PER_ELECTRONVOLT, Some(4), "eV", 0, true)
 }
 
-/// A value in SI (kg, m, s, rad) with its dimension, as read from text.
+/// A value in SI (kg, m, s, rad, C) with its dimension, as read from text.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Quantity {
-    /// Value in SI.
+    /// Value in SI: kg, m, s, rad and C.
     pub value: f64,
-    /// Its dimension.
+    /// Dimension of the value, as exponents of the base units.
     pub dimension: Dimension,
 }
 
@@ -262,9 +262,9 @@ impl FromStr for Quantity {
 pub struct QuantityError {
     /// The expected kind, if known.
     pub expected: Option<Kind>,
-    /// The text.
+    /// Text that was parsed.
     pub text: String,
-    /// What is wrong with it, with its punctuation.
+    /// What is wrong with the text, with its punctuation.
     reason: String,
     /// Known units that look like an unknown one, nearest first.
     pub nearest: Vec<String>,

@@ -61,9 +61,9 @@ pub(super) fn parse(bytes: &[u8]) -> Option<Recording> {
     Some(recording)
 }
 
-/// How the numbers of a channel become values.
+/// Scaling of the numbers of a channel to values.
 struct Channel {
-    /// Header of its column.
+    /// Header of the column: name of the channel with its unit.
     header: String,
     encoder: Number,
     factor: f64,

@@ -50,7 +50,7 @@ impl<'a> Archive<'a> {
         Some(Self { bytes, entries })
     }
 
-    /// Names of the files.
+    /// Names of all files in the archive.
     pub(super) fn names(&self) -> impl Iterator<Item = &str> {
         self.entries.iter().map(|(name, _)| name.as_str())
     }

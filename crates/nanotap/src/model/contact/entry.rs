@@ -7,15 +7,15 @@ use crate::model::parameter::ParameterEntry;
 /// An entry of the table of piecewise-linear contact laws.
 #[derive(Debug)]
 pub struct Entry {
-    /// Name in case files.
+    /// Name of the law in case files, such as `kelvin-voigt`.
     pub name: &'static str,
-    /// What it is, in a few words.
+    /// Description of the law in a few words.
     pub meaning: &'static str,
     /// The force on the tip, as text.
     pub formula: &'static str,
-    /// Whether it has the damper α6.
+    /// The law's damper: α6, or one in series with a spring.
     pub damper: Damper,
-    /// The numbers that only this law has.
+    /// Parameters that only this law has.
     pub numbers: &'static [ParameterEntry],
     /// Example of the physical quantities behind these numbers, for messages that one is missing.
     pub needs: &'static str,
@@ -24,16 +24,18 @@ pub struct Entry {
     /// Whether the surface pulls a touching tip with a constant force, so that the force jumps
     /// where contact begins and the lever may rest in several places.
     pub attracts: bool,
-    /// Why number `k` of the numbers that only this law has cannot be what it is.
+    /// Returns why parameter `k` of those that only this law has is not allowed, for all their
+    /// values `numbers`; `None` if it is.
     pub objection: fn(numbers: &[f64], k: usize) -> Option<&'static str>,
-    /// These numbers for a relaxing arm of a stiffness and a damper, by which samples are
-    /// compared; `None` if they do not follow.
+    /// Returns the law's own parameters that correspond to a relaxing arm with the stiffness `arm`
+    /// and the damping `damper`, for comparisons of laws; `None` for a law without such a
+    /// correspondence.
     pub like: Option<fn(arm: f64, damper: f64) -> Vec<f64>>,
-    /// The equations.
+    /// Builds the equations of the law from its numbers.
     pub(crate) law: fn(Numbers<'_>) -> Law,
 }
 
-/// Stiffness of a relaxing arm and its damper, from the numbers that only its law has.
+/// Computes stiffness and damping of a relaxing arm, in model units, from the law's own parameters.
 pub type ArmOf = fn(&[f64]) -> [f64; 2];
 
 /// The damper of a sample.
@@ -41,7 +43,7 @@ pub type ArmOf = fn(&[f64]) -> [f64; 2];
 pub enum Damper {
     /// The damper α6 between tip and sample.
     Contact {
-        /// Note where none is given.
+        /// Note for a case that gives no damper.
         none: &'static str,
     },
     /// A damper in series with a spring, the numbers of which the law has in place of α6.
@@ -58,11 +60,11 @@ pub enum Damper {
 /// The numbers of a law, with a derivative.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Numbers<'a> {
-    /// α4.
+    /// Contact stiffness α4, dimensionless.
     pub(crate) stiffness: Dual,
-    /// α6.
+    /// Contact damping α6, dimensionless.
     pub(crate) damping: Dual,
-    /// Those that only this law has, in the order of its entry.
+    /// Parameters that only this law has, in the order of its entry.
     pub(crate) own: &'a [Dual],
     /// Relaxing arms, each a time and a stiffness.
     pub(crate) arms: &'a [[f64; 2]],

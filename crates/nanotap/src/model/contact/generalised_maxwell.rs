@@ -19,7 +19,6 @@ use crate::model::parameter::{ParameterEntry, SampleKey, Unit};
 /// Largest number of arms: sums of so many numbers keep within the rounding that proofs allow.
 pub(crate) const MAX_ARMS: usize = 12;
 
-/// Its entry.
 pub(super) static ENTRY: Entry = Entry {
     name: "generalised-maxwell",
     meaning: "spring in parallel with any number of relaxing arms, as a surface that recovers",

@@ -27,7 +27,6 @@ use super::entry::{Damper, Entry, any};
 use super::law::{Bilinear, Law, LinearForm, SampleResponse};
 use super::spring_damper;
 
-/// Its entry.
 pub(super) static ENTRY: Entry = Entry {
     name: "kelvin-voigt",
     meaning: "spring and damper as a surface that recovers by itself",
@@ -44,10 +43,11 @@ pub(super) static ENTRY: Entry = Entry {
     law: |numbers| law(numbers.stiffness, numbers.damping),
 };
 
-/// A damper below this part of the spring recovers at once.
+/// Relaxation time α6/α4, in model units, up to which the surface recovers at once: the law is then
+/// the one without a damper.
 const NO_DAMPER: f64 = 1e-30;
 
-/// The law.
+/// Builds the equations of a surface with spring α4 and damper α6.
 fn law(stiffness: Dual, damping: Dual) -> Law {
     if damping.value <= NO_DAMPER * stiffness.value {
         return spring_damper::with_idle_variables(stiffness, damping, &[1.0]);

@@ -30,7 +30,7 @@ impl LinearForm {
         }
     }
 
-    /// `factor · s_k`.
+    /// Returns the linear form `factor · s_k`.
     pub(crate) fn internal(k: usize, factor: Dual) -> Self {
         let mut internal = vec![Dual::default(); k + 1];
         internal[k] = factor;
@@ -74,7 +74,7 @@ impl LinearForm {
         }
     }
 
-    /// Whether it is a multiple of `s_k`.
+    /// Returns true if the form depends on `s_k` only, apart from its constant.
     pub(crate) fn is_internal(&self, k: usize) -> bool {
         let others = self.internal.iter().enumerate().filter(|(j, _)| *j != k);
         let zero = |dual: &Dual| dual.value == 0.0;
@@ -91,7 +91,7 @@ pub(crate) struct Bilinear {
 }
 
 impl Bilinear {
-    /// `weight · form²`.
+    /// Returns the product `weight · form · form`.
     pub(crate) fn square(weight: f64, form: &LinearForm) -> Self {
         Self {
             weight,
@@ -104,13 +104,13 @@ impl Bilinear {
 /// How the sample responds in one regime.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct SampleResponse {
-    /// Force on the tip.
+    /// Force of the sample on the tip, positive when it pushes the tip away, in units of EI g₀/L³.
     pub(crate) force: LinearForm,
     /// ṡ_k of each internal variable.
     pub(crate) rates: Vec<LinearForm>,
-    /// Dissipated power.
+    /// Power dissipated in the sample, a sum of these products, in model units.
     pub(crate) dissipated: Vec<Bilinear>,
-    /// Stored energy.
+    /// Energy stored in the sample, a sum of these products, in units of EI g₀²/L³.
     pub(crate) stored: Vec<Bilinear>,
 }
 
@@ -127,9 +127,9 @@ pub(crate) struct Law {
     pub(crate) release_reset: Option<Vec<LinearForm>>,
     /// How the guards start when contact begins and ends, if they are not each other's negatives.
     pub(crate) onsets: Option<[Onset; 2]>,
-    /// Response in flight.
+    /// Motion of the free surface in flight, where the force on the tip is zero.
     pub(crate) flight: SampleResponse,
-    /// Response in contact.
+    /// Force and motion of the surface in contact.
     pub(crate) contact: SampleResponse,
     /// Whether in contact the beam moves as one with spring α4 and damper α6 at its tip, apart
     /// from the internal variables, so that its spectrum is known.

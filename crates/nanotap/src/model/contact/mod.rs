@@ -26,13 +26,13 @@ macro_rules! laws {
         $(mod $file;)*
 
         words! {
-            /// A piecewise-linear contact law.
+            /// A piecewise-linear contact law, with its name in case files.
             #[expect(missing_docs, reason = "each entry has a meaning")]
             ContactLaw { $($law = $file::ENTRY.name),* }
         }
 
         impl ContactLaw {
-            /// Entry of the table.
+            /// Returns the law's entry of the table: names, numbers, notes and equations.
             pub const fn entry(self) -> &'static Entry {
                 match self { $(Self::$law => &$file::ENTRY),* }
             }
@@ -50,13 +50,14 @@ laws! {
 
 pub(crate) use generalised_maxwell::MAX_ARMS;
 
-/// How many numbers only one of the laws has.
+/// Number of parameters that only one of the laws has.
 pub(crate) const NUMBERS: usize = count(ContactLaw::ALL.len(), false);
 
-/// How many of these have a key of their own among physical quantities.
+/// Number of these that have a separate key among physical quantities.
 pub(crate) const OWN_KEYS: usize = count(ContactLaw::ALL.len(), true);
 
-/// How many numbers only one of the first `laws` laws has, or how many of these have their own key.
+/// Counts the parameters that only one of the first `laws` laws has, or of these, if `with_key`,
+/// those that have a separate key.
 const fn count(laws: usize, with_key: bool) -> usize {
     let (mut law, mut sum) = (0, 0);
     while law < laws {
@@ -85,17 +86,18 @@ pub(crate) fn numbers() -> Vec<ParameterEntry> {
 }
 
 impl ContactLaw {
-    /// What it is, in a few words.
+    /// Returns a description of the law in a few words.
     pub const fn meaning(self) -> &'static str {
         self.entry().meaning
     }
 
-    /// Whether it has the damper α6.
+    /// Returns true if the law has the damper α6.
     pub const fn has_damper(self) -> bool {
         matches!(self.entry().damper, Damper::Contact { .. })
     }
 
-    /// How many numbers the laws before it have for themselves.
+    /// Returns the number of parameters that belong to only one of the laws before this one in the
+    /// table.
     pub(crate) const fn first_number(self) -> usize {
         count(self as usize, false)
     }

@@ -28,7 +28,6 @@ use super::entry::{Damper, Entry};
 use super::law::{Bilinear, Law, LinearForm, SampleResponse};
 use crate::model::parameter::{ParameterEntry, SampleKey, Unit};
 
-/// Its entry.
 pub(super) static ENTRY: Entry = Entry {
     name: "moving-surface",
     meaning: "spring, damper and adhesion to a surface that moves by itself",
@@ -61,7 +60,8 @@ pub(super) static ENTRY: Entry = Entry {
     },
 };
 
-/// Least damping, and its least part of the surface's stiffness.
+/// Least damping η_s, and least ratio η_s/k_s, in model units: below it the surface recovers at
+/// once.
 const LEAST_DAMPING: f64 = 1e-15;
 
 /// Stiffness and damping of the surface are needed, and it must not recover at once.
@@ -79,7 +79,7 @@ fn objection(own: &[f64], k: usize) -> Option<&'static str> {
     )
 }
 
-/// The law.
+/// Builds the equations from `[α4, α6]` and the surface's own `[k_s, η_s, F]`.
 fn law(
     [stiffness, damping]: [Dual; 2],
     [own_stiffness, own_damping, adhesion]: [Dual; 3],

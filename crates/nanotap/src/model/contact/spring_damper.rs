@@ -7,7 +7,6 @@ use super::dual::Dual;
 use super::entry::{Damper, Entry, any};
 use super::law::{Bilinear, Law, LinearForm, SampleResponse};
 
-/// Its entry.
 pub(super) static ENTRY: Entry = Entry {
     name: "spring-damper",
     meaning: "spring and damper where the tip is below the surface",
@@ -24,7 +23,7 @@ pub(super) static ENTRY: Entry = Entry {
     law: |numbers| law(numbers.stiffness, numbers.damping),
 };
 
-/// The law.
+/// Builds the equations of a spring α4 and a damper α6 that act where V_T ≤ 0.
 pub(super) fn law(stiffness: Dual, damping: Dual) -> Law {
     let one = Dual::constant(1.0);
     Law {

@@ -17,7 +17,6 @@ use super::entry::{Damper, Entry, any};
 use super::generalised_maxwell;
 use crate::model::parameter::{ParameterEntry, SampleKey, Unit};
 
-/// Its entry.
 pub(super) static ENTRY: Entry = Entry {
     name: "standard-linear-solid",
     meaning: "spring in parallel with a relaxing arm, as a surface that recovers",

@@ -21,9 +21,9 @@ use crate::model::beam::Modes;
 use crate::model::cantilever::Cantilever;
 use crate::model::galerkin::{Galerkin, Regime};
 
-/// Smallest [`Spectrum::separation`] that is accepted. What is put together from modal
-/// coordinates is in error by about the rounding error over the separation; at this one
-/// four digits are lost.
+/// Smallest [`Spectrum::separation`] that is accepted. Quantities computed from modal coordinates
+/// have a relative error of about the rounding error over the separation; at this one four digits
+/// are lost.
 const LEAST_SEPARATION: f64 = 1e-4;
 
 /// Separation below which uᵀ(2λM + C)u is taken as a product instead of a sum.
@@ -54,9 +54,9 @@ pub enum SpectrumError {
          that needs no eigenvectors"
     )]
     Defective {
-        /// The eigenvalue.
+        /// Defective eigenvalue, in units of √(EI/(mL⁴)).
         eigenvalue: Complex<f64>,
-        /// What [`Spectrum::separation`] would be.
+        /// Value that [`Spectrum::separation`] would have, dimensionless, below the limit of 10⁻⁴.
         separation: f64,
     },
     /// The eigenvalues could not be distinguished, or the load is not valid.
@@ -76,7 +76,7 @@ pub enum SpectrumError {
 pub struct Spectrum {
     /// λ_k, with Im λ_k ≥ 0.
     pub eigenvalues: Vec<Complex<f64>>,
-    /// w_k: 2 for a conjugate pair, 1 for a real eigenvalue.
+    /// w_k, dimensionless, length m: 2 for a conjugate pair, 1 for a real eigenvalue.
     pub weights: Vec<f64>,
     /// u_k, displacement shapes as columns, N×m, their largest entry 1 in size.
     pub right: DMatrix<Complex<f64>>,

@@ -1,4 +1,4 @@
-//! The eigenbases that were worked out last.
+//! Cache of the eigenbases that were computed last.
 //!
 //! Drive and gap change no eigenvalue: along a sweep or a branch in one of them every model after
 //! the first takes its bases from here. Each thread remembers its own, by all the numbers that they
@@ -13,14 +13,14 @@ use nanotap_flow::{PreparedBasis, SpectralBasis};
 use super::{Spectrum, TipLoad};
 use crate::model::beam::Modes;
 
-/// How many are remembered: those of a lever in flight and on two samples.
+/// Largest number of cached eigenbases: those of a lever in flight and on two samples.
 const MOST: usize = 3;
 
-/// What an eigenbasis follows from: modes, and damping and load by their bits.
+/// Key of an eigenbasis: modes, and damping and load by their bits.
 type Beam = (Arc<Modes>, [u64; 4]);
 
 thread_local! {
-    /// The latest last.
+    /// Cached eigenbases of this thread, the latest last.
     static RECENT: RefCell<Vec<(Beam, Arc<PreparedBasis>)>> = const { RefCell::new(Vec::new()) };
 }
 

@@ -43,13 +43,13 @@ pub(super) enum Roots {
 /// One beam with its load.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Secular<'a> {
-    /// κ_j, ascending.
+    /// Modal stiffnesses κ_j of the bare beam, ascending, dimensionless.
     pub(super) stiffness: &'a [f64],
-    /// p_j.
+    /// Tip deflections p_j = φ_j(1) of the modes, dimensionless.
     pub(super) tip: &'a [f64],
-    /// α3.
+    /// Damping α3 of the beam, dimensionless.
     pub(super) beam_damping: f64,
-    /// What the tip carries.
+    /// Mass, damper and spring at the tip.
     pub(super) load: TipLoad,
 }
 
@@ -66,7 +66,7 @@ impl Secular<'_> {
         self.stiffness.len()
     }
 
-    /// Σ p_j².
+    /// Returns Σ p_j² over all modes.
     fn tip_squared(&self) -> f64 {
         self.tip.iter().map(|p| p * p).sum()
     }
@@ -77,7 +77,7 @@ impl Secular<'_> {
         self.load.damping - self.load.mass * self.beam_damping
     }
 
-    /// The factor's roots.
+    /// Returns the two roots of factor `k`.
     pub(super) fn roots(&self, k: usize, factor: Factor) -> Roots {
         roots_of(self.beam_damping + factor.b, self.stiffness[k] + factor.c)
     }

@@ -194,17 +194,18 @@ pub(in crate::study) enum Motion {
 /// A piece of a way.
 #[derive(Clone, Debug)]
 pub(in crate::study) struct Piece {
-    /// The distances between which it lies, in the order of the way.
+    /// Distances between which the piece lies, in the order of the way and in the model's unit of
+    /// length.
     pub(in crate::study) from: f64,
     pub(in crate::study) to: f64,
     pub(in crate::study) motion: Motion,
-    /// Where the motion was first seen.
+    /// Distance at which the motion was first seen, in the model's unit of length.
     pub(in crate::study) entered: f64,
-    /// Reason of its end.
+    /// Reason why the piece ends.
     pub(in crate::study) end: End,
     /// Whether the lever jumps there.
     pub(in crate::study) jumps: bool,
-    /// How well the place of the end is known.
+    /// Uncertainty of the distance at which the piece ends, in the model's unit of length.
     pub(in crate::study) uncertainty: f64,
 }
 

@@ -51,20 +51,21 @@ const BEYOND: f64 = 1.25;
 /// Where a curve at a kept least distance ends, as a part of the amplitude with which it begins.
 const LEAST_AMPLITUDE: f64 = 0.02;
 
-/// Direction of the sample.
+/// Direction in which the sample moves.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Way {
-    /// Towards the tip.
+    /// The sample moves towards the tip.
     Approach,
-    /// Away from it.
+    /// The sample moves away from the tip.
     Retract,
-    /// Neither way: an attractor of a neighbouring distance that is one here too.
+    /// Neither direction: an attractor found at a neighbouring distance that exists at this one
+    /// too.
     Neither,
 }
 
 impl Way {
-    /// Name in documents.
+    /// Returns the name in documents: `approach`, `retract` or `neither`.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Approach => "approach",
@@ -77,18 +78,19 @@ impl Way {
 /// The motion at one distance in one direction.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct ApproachPoint {
-    /// Direction.
+    /// Direction in which the sample moves.
     pub way: Way,
     /// The distance, in the model's unit of length.
     pub gap: f64,
     /// The distance in m, of a physical case.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub zc: Option<f64>,
-    /// Class of the motion.
+    /// Class of the motion at this distance, such as periodic or chaotic.
     pub classification: Classification,
     /// Minimal period in drive periods, if periodic.
     pub period: Option<usize>,
-    /// Largest |multiplier|, if periodic.
+    /// Largest modulus of the Floquet multipliers, dimensionless. `None` unless the motion is
+    /// periodic.
     pub spectral_radius: Option<f64>,
     /// Observables in the model's units; none if undecided or unbounded.
     #[serde(flatten)]
@@ -96,7 +98,7 @@ pub struct ApproachPoint {
     /// The same in SI, of a physical case.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub physical: Option<PhysicalMotion>,
-    /// Reason why it is undecided.
+    /// Reason why the motion is undecided; `None` of other motions.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub reason: Option<String>,
     /// Results of frequency modulation, where amplitude and phase are kept.
@@ -105,13 +107,14 @@ pub struct ApproachPoint {
     /// The same in SI, of a physical case.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub modulation_si: Option<ModulatedInSi>,
-    /// The orbit.
+    /// Periodic orbit of the motion with its multipliers; `None` of other motions.
     #[serde(skip)]
     pub orbit: Option<PeriodicOrbit>,
 }
 
 impl ApproachPoint {
-    /// A motion of `case` on a way at a distance.
+    /// Describes a motion of `case` in one direction at one distance, in the model's unit of
+    /// length.
     pub(in crate::study) fn new(
         case: &Case,
         (way, gap): (Way, f64),
@@ -142,7 +145,7 @@ impl ApproachPoint {
 /// A jump of a slowly moved lever from one motion to another.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct StateJump {
-    /// Direction.
+    /// Direction in which the sample moves at the jump.
     pub way: Way,
     /// Distance, in the model's unit of length.
     pub gap: f64,
@@ -168,10 +171,11 @@ pub struct StateJump {
 pub struct Hysteresis {
     /// Nearest distance of the interval, in the model's unit of length.
     pub near: f64,
-    /// Farthest distance.
+    /// Farthest distance of the interval, in the model's unit of length.
     pub far: f64,
-    /// Largest difference of the amplitude at the drive frequency in it; of the relative frequency
-    /// shift where the amplitude is kept.
+    /// Largest difference between approach and retract in the interval. It is that of the amplitude
+    /// at the drive frequency, in the model's unit of length, or, where the amplitude is kept
+    /// constant, that of the relative frequency shift, dimensionless.
     pub difference: f64,
     /// The lengths in SI, for a physical case.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -203,15 +207,15 @@ impl Hysteresis {
 pub struct ApproachReport {
     /// The key of the distance in a case file.
     pub parameter: &'static str,
-    /// First distance of the approach.
+    /// First and farthest distance of the approach, in the model's unit of length.
     pub from: f64,
-    /// Distance at which the approach turns back.
+    /// Distance at which the approach turns back, in the model's unit of length.
     pub to: f64,
-    /// Free amplitude A₀ at the drive's frequency.
+    /// Free amplitude A₀ of the tip at the drive frequency, in the model's unit of length.
     pub free_amplitude: f64,
-    /// Free phase lag, degrees.
+    /// Phase lag of the free tip behind the drive, degrees in (−180, 180].
     pub free_phase: f64,
-    /// Distance at which the free motion begins to touch.
+    /// Distance at which the free motion begins to touch the sample, in the model's unit of length.
     pub free_reach: f64,
     /// The motions at the requested distances: those of the approach, then those of the retract.
     pub table: Vec<ApproachPoint>,
@@ -381,7 +385,7 @@ pub(in crate::study) struct Distances {
     pub(in crate::study) from: Option<f64>,
     /// The last; `None`: 0, where the sample is at the tip's rest position.
     pub(in crate::study) to: Option<f64>,
-    /// Number of distances.
+    /// Number of distances, both ends included; at least 2 are needed.
     pub(in crate::study) points: usize,
     /// Least distance of the oscillation, if it is kept constant.
     pub(in crate::study) closest: Option<f64>,
@@ -500,7 +504,7 @@ impl Curve<'_> {
     }
 }
 
-/// Options of the continuation.
+/// Returns the options with which the branches of a curve are continued.
 fn branching(options: &ApproachOptions) -> BranchOptions {
     BranchOptions {
         switch: Some(options.switch),
@@ -672,7 +676,7 @@ impl ApproachOptions {
         Ok(())
     }
 
-    /// Those of frequency modulation.
+    /// Returns the options of frequency modulation that these options contain.
     fn modulation(&self) -> FrequencyModulationOptions {
         FrequencyModulationOptions {
             from: self.from.clone(),
@@ -685,7 +689,7 @@ impl ApproachOptions {
     }
 }
 
-/// A speed in the model's unit of length a unit of time, as it is given of a case.
+/// Reads a speed, as it is given for a case, in the model's unit of length per unit of time.
 pub(in crate::study) fn speed_of(case: &Case, amount: &Amount) -> Result<f64, Error> {
     let refused = |error: String| Error::option("speed", error, "write it as in \"500 nm/s\"");
     let (read, unit) = match case.physical() {

@@ -23,22 +23,23 @@ use crate::study::FreeMotion;
 use crate::study::frequency_modulation::{FreeOscillation, Held as Condition};
 use crate::study::value::implied;
 
-/// The first and the shortest step of the distance over the size of the motion.
+/// First and shortest step of the distance, relative to the size of the motion.
 const FIRST: f64 = 0.02;
 const SHORTEST: f64 = 5e-4;
-/// Changes of a step up to which the motion is taken for the same: amplitude over that of the free
-/// lever, phase in degrees, strength over that of the free lever.
+/// Largest changes in a step up to which two motions are taken for the same: amplitude over that of
+/// the free lever, phase in degrees, strength over that of the free lever.
 const FARTHEST: [f64; 3] = [0.1, 15.0, 0.3];
 /// Degrees from 90 up to which a drive counts as one at resonance.
 const AT_RESONANCE: f64 = 2.0;
 /// Logarithm of a tone's frequency over the resonance nearest to it, up to which its loop finds it.
 const FARTHEST_RESONANCE: f64 = 0.2;
-/// Steps towards the distance of the setpoint, and the relative error of the amplitude there.
+/// Most secant steps towards the distance of the setpoint, and the relative error of the amplitude
+/// at which they stop.
 const SECANTS: usize = 40;
 const REACHED: f64 = 1e-10;
 /// Time in which a motion settles, over the time in which a disturbance falls to 1/e.
 const FORGOTTEN: f64 = 20.0;
-/// Size of the last harmonics of the phase, above which the motion is not known.
+/// Largest relative size of the last harmonics of the phase; above it the motion is not resolved.
 const UNKNOWN: f64 = 1e-3;
 
 /// An approach: the motions, jumps between them, and why it ended early.
@@ -298,8 +299,9 @@ impl Follower<'_> {
         }
     }
 
-    /// The motion at `gap` that the lever goes to where no motion follows: the flow at the drives of
-    /// the last one, and then the loops. Nothing where they do not hold one near it.
+    /// Finds the motion at `gap` to which the lever jumps where the present one does not continue:
+    /// integrates at the drives of the last motion, then applies the loops. None if the loops hold
+    /// no motion near it.
     fn jump(&self, here: &Held, gap: f64, control: &Control<'_>) -> Result<Option<Held>, Error> {
         let mut drives = *here.drives();
         drives.gap = gap;
@@ -366,8 +368,9 @@ impl Follower<'_> {
         ))
     }
 
-    /// Why a motion is not one of the instrument, if so. Where the first tone's drive does not follow
-    /// its phase, what grows at constant drives grows under the loops too.
+    /// Returns why a motion is not one of the instrument, if so. Where the first tone's drive does
+    /// not follow its phase, a disturbance that grows at constant drives also grows under the
+    /// loops.
     fn objection(&self, held: &Held) -> Option<String> {
         if held.closed.tail > UNKNOWN {
             return Some(format!(
@@ -389,7 +392,7 @@ impl Follower<'_> {
         )
     }
 
-    /// The free lever at a tone, in SI.
+    /// Returns amplitude, phase, frequency and drive of the free lever at a tone, in SI.
     fn free(&self, index: usize) -> FreeTone {
         let (tone, scales) = (&self.loops.tones[index], &self.view.scales);
         let drives = self.loops.free_drives(0.0);
@@ -407,14 +410,15 @@ impl Follower<'_> {
         }
     }
 
-    /// The unit of the drive's strength.
+    /// Returns the SI unit of the drive's strength: what 1 in model units is in N, or in m for a
+    /// driven base.
     fn strength(&self) -> f64 {
         self.view
             .scales
             .of(Parameter::Alpha2, self.loops.lever.actuation)
     }
 
-    /// A motion in SI.
+    /// Converts a motion that the loops hold to the readings of an instrument, in SI.
     fn point(&self, held: &Held) -> Result<BimodalPoint, Error> {
         let scales = &self.view.scales;
         let forces = held.closed.forces()?;
@@ -456,7 +460,7 @@ impl Follower<'_> {
         }
     }
 
-    /// What an instrument knows of a tone.
+    /// Returns what an instrument reads and knows by calibration of tone `k`, in SI.
     fn readings(&self, held: &Held, k: usize) -> Readings {
         let (tone, scales) = (&self.loops.tones[k], &self.view.scales);
         let strength = held.drives().strength[k] / tone.free.strength;
@@ -480,7 +484,7 @@ impl Follower<'_> {
     }
 }
 
-/// Drive and torus at a distance, as two motions before it let expect.
+/// Extrapolates drives and torus to `gap`, from the last motion and, if given, the one before it.
 fn predicted(here: &Held, before: Option<&Held>, gap: f64) -> (Drives, Torus) {
     let mut drives = *here.drives();
     let Some(before) = before.filter(|before| before.drives().gap > here.drives().gap) else {

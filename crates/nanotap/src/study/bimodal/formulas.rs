@@ -1,4 +1,4 @@
-//! What software of instruments computes from the readings of both tones.
+//! Formulas by which the software of instruments evaluates the readings of both tones.
 //!
 //! All of it assumes a force that is small compared with the lever's, amplitudes A₁ ≫ A₂ and much larger than
 //! the indentation, and a sphere of radius R on an elastic half space without adhesion. Then the mean
@@ -19,40 +19,41 @@ use std::f64::consts::PI;
 use schemars::JsonSchema;
 use serde::Serialize;
 
-/// What the formulas say of one tone.
+/// Virial and dissipation of one tone by the formulas of instrument software.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct ToneEstimates {
-    /// Virial in J.
+    /// Virial of the tip–sample force in the tone, J; negative where the force repels.
     pub virial: f64,
-    /// Energy lost in a period in J.
+    /// Energy that the force takes from the tone in one of its periods, J.
     #[serde(rename = "E_dis")]
     pub dissipation: f64,
 }
 
-/// What the formulas say of the sample; nothing where the readings allow none.
+/// Estimates of sample properties from both tones; None where the readings allow none.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, JsonSchema)]
 pub struct Estimates {
     /// Reduced modulus E* in Pa.
     pub reduced_modulus: Option<f64>,
-    /// Indentation in m.
+    /// Largest indentation of the sample, m.
     pub indentation: Option<f64>,
-    /// Loss tangent from amplitude and phase of the first tone.
+    /// Loss tangent tan δ from amplitude and phase of the first tone, dimensionless; None unless
+    /// its drive is at resonance.
     pub loss_tangent: Option<f64>,
 }
 
-/// What an instrument knows of a tone: its own calibration and readings, in SI.
+/// Calibration and readings of one tone, in SI.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Readings {
-    /// Stiffness and quality factor of the mode.
+    /// Stiffness of the mode, N/m, and quality factor.
     pub(super) stiffness: f64,
     pub(super) quality: f64,
     pub(super) resonance: f64,
-    /// Shift from it, where the loop holds the phase.
+    /// Frequency of the drive less the resonance, Hz; None unless the loop holds the phase.
     pub(super) shift: Option<f64>,
     pub(super) amplitude: f64,
-    /// Free amplitude at resonance under the present strength of the drive.
+    /// Free amplitude at resonance under the present strength of the drive, m.
     pub(super) free_amplitude: f64,
-    /// Radians.
+    /// Phase lag behind the drive, rad.
     pub(super) phase: f64,
     /// Whether the constant drive is at resonance.
     pub(super) at_resonance: bool,
@@ -76,7 +77,7 @@ impl Readings {
         }
     }
 
-    /// The mean force on the tip.
+    /// Returns the mean force on the tip, N, by the formulas of the first tone.
     fn mean_force(&self) -> f64 {
         if let Some(shift) = self.shift {
             return self.stiffness * self.amplitude * shift / self.resonance;
@@ -86,7 +87,7 @@ impl Readings {
     }
 }
 
-/// What the readings of both tones say of the sample under a tip of a radius.
+/// Estimates sample properties from the readings of both tones and the radius of the tip, m.
 pub(super) fn estimates([first, second]: &[Readings; 2], radius: Option<f64>) -> Estimates {
     let (sin, cos) = nanotap_arithmetic::sin_cos(first.phase);
     let loss_tangent = (sin - first.amplitude / first.free_amplitude) / cos;

@@ -15,17 +15,17 @@ use crate::model::cantilever::Cantilever;
 use crate::observe::lag;
 use crate::study::frequency_modulation::FreeOscillation;
 
-/// Newton steps.
+/// Largest number of Newton steps.
 const STEPS: usize = 30;
-/// Relative residual of the conditions at which Newton stops.
+/// Relative residual of the conditions at which Newton's method stops.
 const HELD: f64 = 1e-11;
-/// Relative residual that must be reached.
+/// Relative residual that Newton's method must reach; above it the motion is rejected.
 const ACCEPTED: f64 = 1e-9;
 
-/// Shortest part of a Newton step that is tried.
+/// Shortest part of a Newton step that is tried, as a fraction of the step.
 const SHORTEST: f64 = 0.1;
 
-/// What an unknown is.
+/// Unknown of the equations of the loops: a quantity of the drive that a loop adjusts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Unknown {
     /// The frequency of a tone, by which its phase is held.
@@ -35,7 +35,7 @@ enum Unknown {
 }
 
 impl Unknown {
-    /// A relative change for differences, which changes what is held by a small part.
+    /// Relative change of the unknown for the differences of the Jacobian.
     const fn difference(self) -> f64 {
         match self {
             Self::Frequency(_) => 1e-7,
@@ -43,7 +43,7 @@ impl Unknown {
         }
     }
 
-    /// The largest relative change of a Newton step.
+    /// Largest relative change of the unknown in a Newton step.
     const fn farthest(self) -> f64 {
         match self {
             Self::Frequency(_) => 0.02,
@@ -52,7 +52,7 @@ impl Unknown {
     }
 }
 
-/// A tone and what its loop does.
+/// A tone with the targets of its loop, in model units.
 #[derive(Clone, Debug)]
 pub(super) struct Tone {
     /// Whether the phase is held.
@@ -63,14 +63,14 @@ pub(super) struct Tone {
     pub(super) free: FreeOscillation,
     /// The drive of the tone where nothing changes it: frequency and strength.
     pub(super) drive: [f64; 2],
-    /// Free amplitude under that drive.
+    /// Amplitude of the free lever under that drive, model units.
     pub(super) free_amplitude: f64,
-    /// Its phase behind the drive in degrees.
+    /// Phase lag of the free lever behind that drive, degrees.
     pub(super) free_phase: f64,
 }
 
 impl Tone {
-    /// The largest amplitude of the free lever.
+    /// Returns the larger of the two free amplitudes, model units.
     pub(super) fn size(&self) -> f64 {
         self.free_amplitude.max(self.free.amplitude)
     }
@@ -91,9 +91,9 @@ pub(super) struct Held {
     pub(super) closed: Closed,
     /// Components of the tip deflection at both tones.
     pub(super) tip: [Complex; 2],
-    /// How a small disturbance grows in a period at constant drives.
+    /// Factor by which a small disturbance grows in a period of the first tone at constant drives.
     pub(super) growth: f64,
-    /// Changes of what is held by the unknowns, for the next motion.
+    /// Jacobian of the conditions, reused for the next motion.
     slopes: Option<DMatrix<f64>>,
 }
 
@@ -106,14 +106,14 @@ impl Held {
         self.tip[tone].modulus()
     }
 
-    /// Degrees behind the drive.
+    /// Returns the phase lag of a tone behind its drive, degrees.
     pub(super) fn phase(&self, tone: usize) -> f64 {
         lag(self.tip[tone])
     }
 }
 
 impl Loops {
-    /// The drives of the free lever.
+    /// Returns the drives under which the free lever fulfils the conditions, at a distance `gap`.
     pub(super) fn free_drives(&self, gap: f64) -> Drives {
         let of = |tone: &Tone| {
             [
@@ -146,7 +146,7 @@ impl Loops {
         unknowns
     }
 
-    /// How far the conditions are from being held, relative or in radians.
+    /// Returns the deviations from the conditions: relative for amplitudes, rad for phases.
     fn residual(&self, unknowns: &[Unknown], held: &Held) -> DVector<f64> {
         let of = |unknown: &Unknown| match *unknown {
             Unknown::Frequency(tone) => {
@@ -176,11 +176,11 @@ impl Loops {
         })
     }
 
-    /// The motion that the loops hold near a drive and a torus. `before` is a motion near, if one is
-    /// known.
+    /// Finds the motion that the loops hold near a drive and a torus. `before` is a nearby motion,
+    /// if one is known.
     ///
     /// # Errors
-    /// When there is none near.
+    /// When no motion near them is found.
     pub(super) fn hold(
         &self,
         start: (Drives, &Torus),
@@ -265,7 +265,7 @@ impl Loops {
         Err(nothing())
     }
 
-    /// Changes of the residual by the unknowns, by differences.
+    /// Computes the Jacobian of the residual by finite differences.
     fn differences(
         &self,
         unknowns: &[Unknown],
@@ -285,7 +285,7 @@ impl Loops {
         Ok(matrix)
     }
 
-    /// The drives after changes relative to themselves.
+    /// Returns the drives after relative changes of the unknowns.
     fn moved(unknowns: &[Unknown], drives: &Drives, step: &DVector<f64>) -> Drives {
         let mut moved = *drives;
         for (unknown, step) in unknowns.iter().zip(step.iter()) {

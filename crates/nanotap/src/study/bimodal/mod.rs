@@ -54,7 +54,7 @@ impl Loop {
         matches!(self, Self::Fm | Self::Agc)
     }
 
-    /// Name in tables.
+    /// Returns the abbreviation of the loop for tables and figures, as in `AM`.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Am => "AM",
@@ -98,7 +98,7 @@ pub struct FreeTone {
     pub amplitude: f64,
     /// Phase lag behind the drive in degrees.
     pub phase: f64,
-    /// Frequency in Hz.
+    /// Frequency of the drive, Hz.
     pub frequency: f64,
     /// Strength of the drive: its force in N, or a driven base's amplitude in m.
     pub drive_strength: f64,
@@ -108,7 +108,7 @@ pub struct FreeTone {
     pub resonance: f64,
 }
 
-/// What is read at a tone. All quantities are in SI.
+/// Readings of one tone. All quantities are in SI.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct ToneReading {
     /// Amplitude of the tip deflection in m.
@@ -116,20 +116,20 @@ pub struct ToneReading {
     pub amplitude: f64,
     /// Phase lag behind the drive in degrees.
     pub phase: f64,
-    /// Frequency in Hz.
+    /// Frequency of the drive, Hz.
     pub frequency: f64,
     /// Frequency less that of the free lever in Hz.
     pub frequency_shift: f64,
     /// Strength of the drive: its force in N, or a driven base's amplitude in m.
     pub drive_strength: f64,
-    /// The strength over that of the free lever.
+    /// Strength of the drive over that of the free lever, dimensionless.
     pub drive_ratio: f64,
     /// Mean of the force times the tone's part of the deflection, in J.
     pub virial: f64,
     /// Energy that the force takes from the tone's part of the motion in a period of the tone, in J.
     #[serde(rename = "E_dis")]
     pub dissipation: f64,
-    /// What the usual formulas say of this tone.
+    /// Virial and dissipation that the usual formulas give for this tone.
     pub estimates: ToneEstimates,
 }
 
@@ -145,25 +145,26 @@ pub struct BimodalPoint {
     /// Largest force on the tip in N, over the phases that are computed.
     #[serde(rename = "F_max")]
     pub peak_force: f64,
-    /// Lowest force on the tip in N, likewise.
+    /// Lowest force on the tip in N, over the phases that are computed.
     #[serde(rename = "F_min")]
     pub least_force: f64,
-    /// Least height of the tip over the undeformed surface in m, likewise.
+    /// Least height of the tip over the undeformed surface in m, over the phases that are computed.
     pub closest: f64,
-    /// How much a small disturbance grows in a period of the first tone at constant drives.
+    /// Factor by which a small disturbance grows in a period of the first tone at constant drives.
     pub growth: f64,
-    /// Size of what the phases of the second tone leave out, relative to the motion.
+    /// Largest of the last two harmonics of the second tone's phase, relative to the motion: an
+    /// estimate of the truncation error.
     pub error: f64,
-    /// What the usual formulas say of the sample.
+    /// Sample properties that the usual formulas give at this distance.
     pub estimates: Estimates,
 }
 
 /// A jump from one motion to another. All quantities are in SI.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct BimodalJump {
-    /// The last distance of the motion before it in m.
+    /// Last distance of the motion before the jump, m.
     pub from: f64,
-    /// The first distance of the motion behind it in m.
+    /// First distance of the motion after the jump, m.
     pub to: f64,
 }
 
@@ -172,7 +173,7 @@ pub struct BimodalJump {
 pub struct BimodalReport {
     /// The loops of both tones.
     pub loops: [Loop; 2],
-    /// The free lever.
+    /// Amplitude, phase and drive of the free lever at both tones.
     pub free: [FreeTone; 2],
     /// Amplitude of the first tone at which the approach ends, in m, if the case has a setpoint.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -185,13 +186,13 @@ pub struct BimodalReport {
     pub dynamic_moduli: Option<[[f64; 2]; 2]>,
     /// The motion at each distance, from far on; with a setpoint, the last is where it is reached.
     pub table: Vec<BimodalPoint>,
-    /// Where no motion followed and the lever went to another.
+    /// Jumps to another motion, at distances where the previous one does not continue.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub jumps: Vec<BimodalJump>,
     /// Why the approach ended before its last distance.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub ended: Option<String>,
-    /// What the growth says.
+    /// Sentence that explains [`BimodalPoint::growth`]: below 1 the motion is stable without loops.
     pub stability: &'static str,
 }
 
@@ -239,12 +240,12 @@ pub fn points_csv(report: &BimodalReport) -> String {
     csv
 }
 
-/// What [`BimodalPoint::growth`] means for the stability.
+/// Explanation of [`BimodalPoint::growth`], for reports.
 const OPEN_LOOP: &str = "growth is that of a small disturbance at constant frequency and strength of both \
                          drives: below 1 the motion is stable without loops; with loops stability \
                          also depends on their gains";
 
-/// Bimodal operation.
+/// Study of bimodal operation against the distance.
 ///
 /// ```
 /// use nanotap::case::Case;

@@ -28,21 +28,21 @@ use crate::model::model_map::ModelMap;
 use crate::model::parameter::Parameter;
 use crate::model::recording::{Curve, Recording};
 
-/// Newton steps.
+/// Largest number of Newton steps.
 const STEPS: usize = 10;
-/// Shortest part of a Newton step that is tried.
+/// Shortest part of a Newton step that is tried, as a fraction of the step.
 const SHORTEST: f64 = 0.2;
-/// Relative residual at which Newton stops.
+/// Relative residual at which Newton's method stops.
 const CLOSED: f64 = 1e-13;
-/// Relative residual that must be reached.
+/// Relative residual that Newton's method must reach; above it the torus is rejected.
 const ACCEPTED: f64 = 1e-10;
 /// Size of the last harmonics over that of the motion, above which there are too few phases.
 const RESOLVED: f64 = 1e-6;
-/// Phases at first, and at most.
+/// Initial number of phases, which is also the smallest, and largest number.
 const PHASES: [usize; 2] = [9, 129];
-/// Phases that are fitted to a motion in time.
+/// Number of phases at which the torus is fitted to a computed motion.
 const SETTLED_PHASES: usize = 33;
-/// Size of the last harmonics below which half as many phases do.
+/// Size of the last harmonics over that of the motion, below which half as many phases suffice.
 pub(super) const OVER_RESOLVED: f64 = 1e-9;
 
 /// The drive of both tones and the distance, in the model's units.
@@ -67,7 +67,7 @@ impl Drives {
             .with(Parameter::Tone2Phase, phase.to_degrees())
     }
 
-    /// Turns of the second tone in a period of the first.
+    /// Returns the turns of the second tone in a period of the first.
     fn rotation(&self) -> f64 {
         self.frequency[1] / self.frequency[0]
     }
@@ -80,14 +80,14 @@ pub(super) struct Torus {
 }
 
 impl Torus {
-    /// The lever at rest.
+    /// Returns the torus of the lever at rest: zero states at the smallest number of phases.
     pub(super) fn at_rest(dimension: usize) -> Self {
         Self {
             states: vec![vec![0.0; dimension]; PHASES[0]],
         }
     }
 
-    /// The same with more phases.
+    /// Interpolates the torus to `count` phases.
     fn with_phases(&self, count: usize) -> Self {
         let states = (0..count).map(|k| {
             let weights = weights(self.states.len(), k as f64 / count as f64);
@@ -98,8 +98,8 @@ impl Torus {
         }
     }
 
-    /// The motion that a state goes to at constant drives, from many periods and a fit of
-    /// trigonometric polynomials in the phase to the last of them.
+    /// Computes the motion that a state goes to at constant drives: integrates many periods and
+    /// fits trigonometric polynomials in the phase to the last of them.
     ///
     /// # Errors
     /// When the flow fails.
@@ -138,7 +138,8 @@ impl Torus {
         })
     }
 
-    /// The same after part of a step relative to the sizes of the state's continuous entries.
+    /// Returns the torus after part of a step relative to the sizes of the state's continuous
+    /// entries.
     fn moved(&self, step: &DVector<f64>, part: f64, sizes: &[f64]) -> Self {
         let mut moved = self.clone();
         for (k, state) in moved.states.iter_mut().enumerate() {
@@ -149,8 +150,8 @@ impl Torus {
         moved
     }
 
-    /// The same with whole numbers as the last entries from `first` on, which interpolation leaves
-    /// with rounding errors; none if they differ from phase to phase.
+    /// Rounds the last entries from `first` on to whole numbers, which interpolation leaves with
+    /// rounding errors; None if they differ from phase to phase.
     fn on_one_branch(mut self, first: usize) -> Option<Self> {
         for state in &mut self.states {
             state[first..]
@@ -165,12 +166,12 @@ impl Torus {
             .then_some(self)
     }
 
-    /// The same with half as many phases.
+    /// Returns the torus with half as many phases, or the smallest number.
     pub(super) fn coarser(&self) -> Self {
         self.with_phases(((self.states.len() / 2) | 1).max(PHASES[0]))
     }
 
-    /// What a step from `before` to this one leads to when `share` of it is repeated.
+    /// Extrapolates the torus: adds `share` of the change from `before` to this one.
     pub(super) fn extrapolated(&self, before: &Self, share: f64) -> Self {
         let before = before.with_phases(self.states.len());
         let states = self.states.iter().zip(&before.states);
@@ -185,7 +186,8 @@ impl Torus {
         }
     }
 
-    /// The largest of the last two harmonics of the phase, over the sizes of the state's entries.
+    /// Returns the largest of the last two harmonics of the phase, over the sizes of the state's
+    /// entries.
     fn tail(&self, sizes: &[f64]) -> f64 {
         let count = self.states.len();
         let last = count / 2;
@@ -229,7 +231,7 @@ fn combined(weights: &[f64], states: &[Vec<f64>]) -> Vec<f64> {
     sum
 }
 
-/// A closed torus.
+/// A torus that Newton's method has closed, with its drives.
 #[derive(Clone, Debug)]
 pub(super) struct Closed {
     pub(super) torus: Torus,
@@ -237,7 +239,7 @@ pub(super) struct Closed {
     /// The largest of the last harmonics of the phase, relative to the motion.
     pub(super) tail: f64,
     models: Vec<Model>,
-    /// Factors of Newton's matrix here or near.
+    /// LU factors of Newton's matrix, of this torus or a nearby one.
     factors: Arc<LU<f64, Dyn, Dyn>>,
 }
 
@@ -249,7 +251,7 @@ pub(super) struct Forces {
     pub(super) mean: f64,
     pub(super) largest: f64,
     pub(super) lowest: f64,
-    /// Least height of the tip over the undeformed surface.
+    /// Least height of the tip over the undeformed surface, model units.
     pub(super) closest: f64,
 }
 
@@ -409,7 +411,8 @@ fn newton(
     })
 }
 
-/// Newton's matrix in sizes of the state's entries: what turns less what the periods carry.
+/// Returns Newton's matrix in sizes of the state's entries: the turned torus minus the Jacobians of
+/// the periods.
 fn newton_matrix(shift: &[Vec<f64>], jacobians: &[DMatrix<f64>], sizes: &[f64]) -> DMatrix<f64> {
     let (count, dimension) = (shift.len(), sizes.len());
     DMatrix::from_fn(count * dimension, count * dimension, |row, column| {
@@ -425,7 +428,7 @@ fn newton_matrix(shift: &[Vec<f64>], jacobians: &[DMatrix<f64>], sizes: &[f64]) 
     })
 }
 
-/// What size of each number of the state matters.
+/// Returns the scale of each entry of the state.
 fn sizes(model: &Model, amplitude: f64, frequency: f64) -> Vec<f64> {
     let moving = model.dimension() - model.memory;
     let size = |k: usize| match k {
@@ -438,8 +441,8 @@ fn sizes(model: &Model, amplitude: f64, frequency: f64) -> Vec<f64> {
 }
 
 impl Closed {
-    /// What a lock-in amplifier on each tone reads: c of the component Re(c e^{iωt}) of the tip
-    /// deflection.
+    /// Returns the readings of a lock-in amplifier on each tone: c of the component Re(c e^{iωt})
+    /// of the tip deflection, model units.
     ///
     /// # Errors
     /// When the flow fails.
@@ -452,7 +455,7 @@ impl Closed {
         Ok(sum)
     }
 
-    /// The forces on the way.
+    /// Computes force on the tip and height along the motion.
     ///
     /// # Errors
     /// When the flow fails.
@@ -480,8 +483,8 @@ impl Closed {
         Ok(found)
     }
 
-    /// Adds the share of the phase of this index in the components of a curve at both tones. The
-    /// mean over the phases keeps of each what turns with the tone.
+    /// Adds the share of the phase with this index in the components of a curve at both tones. The
+    /// mean over the phases keeps the component that turns with each tone.
     fn add_tones(&self, sum: &mut [Complex; 2], phase: usize, curve: &Curve) {
         let count = self.models.len() as f64;
         let (sin, cos) = nanotap_arithmetic::sin_cos(TAU * phase as f64 / count);
@@ -492,8 +495,8 @@ impl Closed {
         }
     }
 
-    /// How a small disturbance grows in a period of the first tone at constant drives, in the mean
-    /// over many: a factor.
+    /// Returns the factor by which a small disturbance grows in a period of the first tone at
+    /// constant drives, as the mean over many periods.
     ///
     /// # Errors
     /// When the flow fails.

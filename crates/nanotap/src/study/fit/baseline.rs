@@ -67,7 +67,7 @@ pub(super) fn baseline_rows(distance: &[f64], values: &[f64]) -> [Vec<usize>; 2]
     [sorted, doubtful]
 }
 
-/// What a fit of a force curve assumes.
+/// Returns the assumptions of a fit of a force curve, as sentences.
 ///
 /// # Errors
 /// When the case has no lever at rest.

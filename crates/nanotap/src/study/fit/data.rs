@@ -27,7 +27,7 @@ use crate::case::table::{Entry, Header, Table};
 /// All curves, and the meaning of their columns.
 #[derive(Clone, Debug)]
 pub struct Data {
-    /// The curves.
+    /// The measured curves, in the order of the data.
     pub curves: Vec<Curve>,
     /// The measured quantities, each once.
     pub columns: Vec<Column>,
@@ -37,10 +37,10 @@ pub struct Data {
     pub left_out: usize,
 }
 
-/// A measured quantity.
+/// A column of measured values: quantity, unit and scatter.
 #[derive(Clone, Debug)]
 pub struct Column {
-    /// The quantity.
+    /// Quantity that the column contains: an observable, or a reading of a loop or a force curve.
     pub quantity: Quantity,
     /// Name of the column in the data.
     pub name: String,
@@ -48,7 +48,8 @@ pub struct Column {
     pub unit: String,
     /// Factor from the unit of the data to SI, or to the model's unit for a dimensionless case.
     pub factor: f64,
-    /// Standard deviation of the values: the scale of residuals without a model.
+    /// Standard deviation of the values, in SI or the model's units: the scale of residuals without
+    /// a model.
     pub spread: f64,
     /// Scatter of the values about smooth curves, where it is known.
     pub(crate) scatter: Option<Scatter>,
@@ -57,7 +58,7 @@ pub struct Column {
 /// A key that rows set.
 #[derive(Clone, Debug)]
 pub struct SweptKey {
-    /// The key.
+    /// Key of the case that the rows set.
     pub key: Key,
     /// Name of the column in the data.
     pub name: String,
@@ -70,7 +71,7 @@ pub struct SweptKey {
 /// Rows that were measured in sequence.
 #[derive(Clone, Debug)]
 pub struct Curve {
-    /// Name of the curve.
+    /// Name of the curve, from the `curve` column or the table; unique among the curves.
     pub name: String,
     /// The rows, in order of measurement.
     pub rows: Vec<Row>,
@@ -83,7 +84,8 @@ pub struct Row {
     pub at: Vec<f64>,
     /// The measured values, one per column, in SI or the model's units; phases in degrees.
     pub values: Vec<Option<f64>>,
-    /// Their standard errors, if given.
+    /// Standard errors of the values, one per column, in the units of `values`; None where none is
+    /// given.
     pub errors: Vec<Option<f64>>,
     /// Standard errors of the values relative to those of a single row, which are estimated where
     /// none are given.
@@ -97,7 +99,7 @@ pub struct Row {
 }
 
 impl Data {
-    /// Number of measured values.
+    /// Returns the number of measured values of all rows and columns, without missing ones.
     pub fn count(&self) -> usize {
         self.rows().flat_map(|row| &row.values).flatten().count()
     }
@@ -116,7 +118,7 @@ impl Data {
             .any(|column| column.quantity.rest().is_some())
     }
 
-    /// The rows of all curves, curve by curve.
+    /// Returns the rows of all curves, curve by curve.
     pub fn rows(&self) -> impl Iterator<Item = &Row> {
         self.curves.iter().flat_map(|curve| &curve.rows)
     }

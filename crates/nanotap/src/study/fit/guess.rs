@@ -22,7 +22,8 @@ const POINTS: usize = 60;
 const OFFSETS: usize = 81;
 /// Range of the scan on each side: a part of the free amplitude, and at least this, in m.
 const REACH: (f64, f64) = (0.3, 3e-9);
-/// Beyond this many free amplitudes from the case's offset the knee tells where to scan.
+/// If the knee of the curve is more than this many free amplitudes from the case's offset, the scan
+/// is centred on the knee.
 const FAR: f64 = 2.0;
 /// Factors of the stiffness of the contact.
 const FACTORS: [f64; 4] = [1.0 / 16.0, 0.25, 4.0, 16.0];
@@ -37,7 +38,7 @@ const OTHER_FREE: f64 = 0.02;
 /// The model's values at a distance, of each motion there.
 struct Place {
     distance: f64,
-    /// Branch and values.
+    /// Motions at this distance: the index of the branch and the model's values, one per column.
     motions: Vec<(usize, Vec<f64>)>,
 }
 
@@ -211,7 +212,7 @@ impl Search<'_> {
         (!self.control.is_cancelled()).then_some(places)
     }
 
-    /// What a row costs at an offset: of the motions there the nearest.
+    /// Returns the cost of a row at an offset: that of the nearest motion there.
     fn cost(&self, x: &[f64], curve: usize, row: &Row, offset: f64, model: &[Place]) -> f64 {
         let at = row.at[0] + offset;
         let count = model.len() - 1;
@@ -309,7 +310,7 @@ pub(super) fn begin_from_free_rows(
     })
 }
 
-/// Parameters of which one has another value.
+/// Returns the parameters with the one at `index` set to `value`.
 pub(super) fn with(x: &[f64], index: usize, value: f64) -> Vec<f64> {
     let mut x = x.to_vec();
     x[index] = value;

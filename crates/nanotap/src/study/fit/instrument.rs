@@ -66,13 +66,13 @@ pub(crate) struct Prepared {
     pub(crate) tables: Vec<Table>,
     /// The columns to use, by their present names.
     pub(crate) columns: Vec<String>,
-    /// What was done: conversions and guesses.
+    /// Sentences on conversions and guesses that were applied to the tables.
     pub(crate) notes: Vec<String>,
     /// Whether the zero of a phase was guessed.
     pub(crate) guessed_phase: bool,
 }
 
-/// What was stated of a table, which is not guessed.
+/// Properties of a table that the request states, so that they are not guessed.
 #[derive(Clone, Copy, Debug, Default)]
 #[expect(
     clippy::struct_excessive_bools,
@@ -180,17 +180,16 @@ fn leave_out(case: &Case, table: &mut Table, columns: &[String], notes: &mut Vec
     }
 }
 
-/// What is done to a column.
+/// Conversion of a column, from the option `convert`.
 #[derive(Clone, Debug, PartialEq)]
 struct Conversion {
-    /// Name of the column.
     name: String,
     /// Value = `offset` + `factor` · x.
     factor: f64,
     offset: f64,
     /// Units from and to, where the rule states them.
     units: Option<[String; 2]>,
-    /// Another name.
+    /// New name of the column, if the rule renames it.
     renamed: Option<String>,
 }
 
@@ -799,7 +798,7 @@ fn is_reversed(distance: &[f64], amplitude: &[f64]) -> bool {
     level(&sorted[..end]) > level(&sorted[sorted.len() - end..])
 }
 
-/// Rows by increasing distance.
+/// Returns the indices of the rows, sorted by increasing distance.
 fn by_distance(distance: &[f64]) -> Vec<usize> {
     let mut sorted: Vec<usize> = (0..distance.len()).collect();
     sorted.sort_by(|a, b| distance[*a].total_cmp(&distance[*b]));

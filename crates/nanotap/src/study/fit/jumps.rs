@@ -29,7 +29,7 @@ use super::data::SweptKey;
 /// Two neighbouring rows of a curve on different branches.
 #[derive(Clone, Debug)]
 pub(super) struct Jump {
-    /// Index of the curve.
+    /// Index of the curve on which the jump lies.
     pub(super) curve: usize,
     /// The rows, counted over all curves.
     pub(super) rows: [usize; 2],
@@ -42,12 +42,13 @@ pub(super) struct Jump {
 }
 
 impl Jump {
-    /// The measured location.
+    /// Returns the measured location of the jump: the middle of its rows, in the unit of the swept
+    /// key.
     pub(super) fn at(&self) -> f64 {
         0.5 * (self.between[0] + self.between[1])
     }
 
-    /// Standard error of the measured location.
+    /// Returns the standard error of the measured location, in the unit of the swept key.
     pub(super) fn error(&self) -> f64 {
         (self.between[1] - self.between[0]).abs() / 12f64.sqrt()
     }
@@ -131,7 +132,7 @@ impl Fold {
         }
     }
 
-    /// The same fold, marked as lost.
+    /// Returns the same fold, marked as lost.
     pub(super) fn of_before(&self) -> Self {
         Self {
             lost: true,

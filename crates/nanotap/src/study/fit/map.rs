@@ -22,18 +22,19 @@ use crate::dataset::{
 };
 use crate::study::{Computation, DatasetPlan, DatasetStudy, Study as _};
 
-/// Most pixels of a map.
+/// Largest number of pixels of a map.
 const MAX_PIXELS: usize = 1 << 18;
-/// Pixels in which a fit is looked for that tells the parameters and their units.
+/// Number of first pixels in which a fit is searched for that determines the parameters and their
+/// units.
 const FIRST: usize = 8;
 /// Chunks of a map with one axis.
 const CHUNKS: usize = 64;
 
-/// What came of a pixel, by its code: the curve is described; the residuals are not noise, or nothing
-/// describes it; there is no result.
+/// Results of a pixel, by code: the curve is described; the residuals are not noise, or nothing
+/// describes the curve; there is no result.
 const RESULTS: [&str; 3] = ["fits", "misfit", "failed"];
 
-/// The variable with the code.
+/// Name of the variable with the code of the result.
 const RESULT: &str = "result";
 
 /// Fits of a map of curves ([`FitOptions::pixels`]).
@@ -65,33 +66,34 @@ impl DatasetStudy for FitMap {
     }
 }
 
-/// A map of fits in short.
+/// Summary of a map of fits.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct FitMapReport {
-    /// Pixels with data.
+    /// Number of pixels with data.
     pub pixels: usize,
-    /// Pixels whose curve is described.
+    /// Number of pixels whose curve is described.
     pub fits: usize,
-    /// Pixels whose curve is not described: the residuals of the best values are not noise.
+    /// Number of pixels whose curve is not described: the residuals of the best values are not
+    /// noise.
     pub misfits: usize,
-    /// Pixels without a result.
+    /// Number of pixels for which the fit has no result.
     pub failed: usize,
-    /// The parameters over the pixels whose curve is described.
+    /// The free parameters, each over the pixels whose curve is described.
     pub parameters: Vec<MappedParameter>,
 }
 
-/// A parameter over a map.
+/// Median and range of a parameter over a map.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct MappedParameter {
-    /// Name, as in a fit.
+    /// Name of the parameter, as in the report of a fit.
     pub key: String,
-    /// Unit.
+    /// Unit of the values in SI, `1` if there is none.
     pub unit: String,
-    /// Median.
+    /// Median over the pixels whose curve is described, in `unit`; None if there are none.
     pub median: Option<f64>,
-    /// Quantiles of 5 % and 95 %.
+    /// Quantiles of 5 % and 95 % over these pixels, in `unit`.
     pub range: [Option<f64>; 2],
-    /// Median of its standard errors.
+    /// Median of the standard errors over these pixels, in `unit`; None if no pixel has one.
     pub standard_error: Option<f64>,
 }
 
@@ -162,7 +164,7 @@ struct Pixels {
 #[derive(Debug)]
 struct Map {
     case: Case,
-    /// Without data and pixels.
+    /// Options of the fit of one pixel; data and pixels are empty.
     options: FitOptions,
     table: Table,
     /// Rows of the table of each pixel, by the number of its entry in the grid.
@@ -473,7 +475,8 @@ fn taken(table: &mut Table, name: &str) -> Result<(Pixels, Vec<usize>), Error> {
     Ok((pixels, places))
 }
 
-/// What tells a table from another: its columns, and the sum of the numbers of each.
+/// Returns numbers that distinguish a table from others: its columns, and the sum of the numbers of
+/// each.
 fn fingerprint(table: &Table) -> BTreeMap<String, f64> {
     let number = |entry: &Entry| match entry {
         Entry::Number(value) => *value,

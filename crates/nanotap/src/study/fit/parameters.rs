@@ -13,7 +13,7 @@ use super::laws::between;
 use super::quantity::Quantity;
 use super::statistics::span;
 
-/// What a parameter changes.
+/// Quantity that a free parameter changes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Target {
     /// A key of the case.
@@ -26,18 +26,17 @@ pub(super) enum Target {
     Scale(usize),
 }
 
-/// A free parameter.
+/// A free parameter of a fit.
 #[derive(Clone, Debug)]
 pub(super) struct Parameter {
-    /// Name: `sample.stiffness`, `gap.offset`.
+    /// Name of the parameter, as in `sample.stiffness` or `gap.offset`.
     pub(super) name: String,
-    /// What it changes.
     pub(super) target: Target,
     /// Index of its curve; `None`: all curves.
     pub(super) curve: Option<usize>,
-    /// Initial value.
+    /// Initial value, in SI or the model's units.
     pub(super) start: f64,
-    /// Its bounds.
+    /// Lower and upper bound, in SI or the model's units; infinite where there is none.
     pub(super) bounds: (f64, f64),
     /// Scale of the range of initial values.
     pub(super) size: f64,
@@ -48,7 +47,7 @@ pub(super) struct Parameter {
 }
 
 impl Parameter {
-    /// Its unit in SI, `1` for none.
+    /// Returns the unit in SI, `1` if there is none.
     pub(super) fn unit(&self, data: &Data, case: &Case) -> &'static str {
         match self.target {
             Target::Key(key) => unit_of(key),
@@ -64,17 +63,17 @@ impl Parameter {
         }
     }
 
-    /// Whether this is its name, or another one of its key.
+    /// Returns whether this is the name of the parameter, or another name of its key.
     fn is_called(&self, name: &str) -> bool {
         self.name == name || matches!(self.target, Target::Key(key) if Key::find(name) == Some(key))
     }
 
-    /// Whether it is one of these keys, with no initial value given.
+    /// Returns whether it is one of these keys, with no initial value given.
     pub(super) fn is_unknown_of(&self, keys: &[Key]) -> bool {
         !self.is_given && keys.iter().any(|key| self.target == Target::Key(*key))
     }
 
-    /// Whether it counts for a curve.
+    /// Returns whether the parameter applies to a curve.
     pub(super) fn is_of(&self, curve: usize) -> bool {
         self.curve.is_none_or(|own| own == curve)
     }

@@ -16,7 +16,7 @@ const MIN_GAIN: f64 = 1e-3;
 /// Accuracy of the quantile, in standard errors.
 const QUANTILE_TOLERANCE: f64 = 0.01;
 
-/// Result of the profiles.
+/// Result of the profiles of the likelihood for all parameters.
 pub(super) enum Profile {
     /// The interval of each parameter; an end is missing if it is undetermined or beyond a bound.
     Intervals(Vec<[Option<f64>; 2]>),

@@ -5,10 +5,10 @@ use crate::case::physical::Kind;
 use crate::observe::{Dimension, OBSERVABLES, Observable};
 use crate::study::frequency_modulation::{COLUMNS, ModulatedColumn};
 
-/// A measured quantity.
+/// A quantity in a column of measured values.
 #[derive(Clone, Copy, Debug)]
 pub enum Quantity {
-    /// An observable.
+    /// An observable of a periodic orbit.
     Observed(&'static Observable),
     /// A reading of frequency modulation.
     Modulated(&'static ModulatedColumn),
@@ -16,7 +16,7 @@ pub enum Quantity {
     Rest(RestQuantity),
 }
 
-/// What is read of a lever at rest.
+/// Reading of a lever at rest.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum RestQuantity {
     /// Deflection of the tip away from the sample.
@@ -60,7 +60,7 @@ impl Quantity {
             .or_else(|| observed.map(Self::Observed))
     }
 
-    /// Its name.
+    /// Returns the name of the quantity, as in a report or a header.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Observed(observable) => observable.name,
@@ -70,7 +70,7 @@ impl Quantity {
         }
     }
 
-    /// Name in SI.
+    /// Returns the name of the quantity in SI, which differs for some observables.
     pub(super) const fn si_name(self) -> &'static str {
         match self {
             Self::Observed(observable) => observable.si_name,

@@ -15,13 +15,13 @@ use crate::study::approach::Way;
 )]
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 pub struct FitReport {
-    /// The free parameters.
+    /// The free parameters with values and standard errors, in the order of the request.
     pub parameters: Vec<FittedParameter>,
-    /// Sum of the squared residuals in standard errors.
+    /// Sum of the squared residuals of values and jumps, each in standard errors; dimensionless.
     pub chi2: f64,
     /// Number of measured values and jumps minus number of parameters.
     pub degrees_of_freedom: usize,
-    /// Probability of a larger chi2 by chance, if all standard errors were given.
+    /// Probability of a larger chi2 by chance, 0 to 1, if all standard errors were given.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub p_value: Option<f64>,
     /// Akaike's criterion, −2 ln L + 2 p. Of two laws fitted to the same data, the one with the
@@ -50,7 +50,7 @@ pub struct FitReport {
     /// Whether the rows were read in the other order.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub turned: bool,
-    /// Warnings about the result.
+    /// Sentences that warn of what makes the result doubtful.
     pub remarks: Vec<String>,
     /// What was done to the data before the fit: conversions, guesses, fixed corrections, averages.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
@@ -72,7 +72,7 @@ pub struct FitReport {
     pub jumps: Vec<FittedJump>,
     /// Orbits at the rows on which the data are not.
     pub others: Vec<OtherOrbit>,
-    /// Number of Levenberg–Marquardt steps.
+    /// Number of Levenberg–Marquardt steps of the final fit, after the search for branches.
     pub iterations: usize,
     /// Number of initial values that were tried.
     pub starts: usize,
@@ -88,108 +88,108 @@ pub struct FitReport {
 /// A contact law among others that were fitted to the same data.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 pub struct ComparedLaw {
-    /// Name of the law.
+    /// Name of the contact law, as in `sample.law`.
     pub law: String,
-    /// Whether it describes the data.
+    /// Whether the law describes the data.
     pub fits: bool,
     /// Reason if it does not, or if it could not be fitted.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub reason: Option<String>,
     /// Akaike's criterion; missing if nothing was fitted.
     pub aic: Option<f64>,
-    /// Schwarz's criterion.
+    /// Schwarz's criterion, −2 ln L + p ln n; missing if nothing was fitted.
     pub bic: Option<f64>,
     /// Difference of Akaike's criterion from the smallest one.
     pub above_best: Option<f64>,
     /// Akaike's weight, exp(−above/2) over the sum of all: the share of the evidence, if one of
     /// these laws is right.
     pub weight: Option<f64>,
-    /// Sum of the squared residuals in standard errors.
+    /// Sum of the squared residuals, each in standard errors; dimensionless.
     pub chi2: Option<f64>,
     /// Number of measured values minus number of parameters.
     pub degrees_of_freedom: Option<usize>,
-    /// Its free parameters.
+    /// The free parameters of this law with values and standard errors.
     pub parameters: Vec<FittedParameter>,
-    /// Warnings about its fit.
+    /// Sentences that warn of what makes the fit of this law doubtful.
     pub remarks: Vec<String>,
-    /// Its best case as a file.
+    /// Case of the best fit with this law, as a file.
     pub case_file: Option<String>,
 }
 
 /// The best case of one curve among several.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 pub struct CurveCase {
-    /// The curve.
+    /// Name of the curve.
     pub curve: String,
-    /// Its case as a file.
+    /// Case of the best fit for this curve, as a file.
     pub case_file: String,
 }
 
-/// A free parameter.
+/// A free parameter with its best value and standard error.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 pub struct FittedParameter {
     /// The key of the case, or `NAME.offset`, `NAME.scale` of a column.
     pub key: String,
-    /// Its curve; without it, all curves.
+    /// Name of the curve to which the parameter applies; without it, all curves.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub curve: Option<String>,
-    /// The best value.
+    /// Best value, in `unit`.
     pub value: f64,
-    /// Its standard error; missing if the data do not determine it.
+    /// Standard error of the best value, in `unit`; missing if the data do not determine it.
     pub standard_error: Option<f64>,
-    /// 95 % interval; an end is missing if it is not within the bounds.
+    /// Ends of the 95 % interval, in `unit`; an end is missing if it is not within the bounds.
     pub interval: [Option<f64>; 2],
-    /// Its unit in SI, `1` if there is none.
+    /// Unit of the values in SI, `1` if there is none.
     pub unit: String,
-    /// Initial value of the fit.
+    /// Initial value of the fit, in `unit`.
     pub start: f64,
-    /// Whether it ended at a bound.
+    /// Whether the best value is at a bound.
     pub at_bound: bool,
 }
 
 /// A combination of parameters that the data do not determine.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 pub struct Undetermined {
-    /// Description of the combination.
+    /// Sentence that describes the combination.
     pub words: String,
-    /// The parameters in it.
+    /// Names of the parameters in the combination, those with the largest changes first.
     pub keys: Vec<String>,
-    /// Their changes relative to their sizes, with total length 1.
+    /// Changes of these parameters relative to their sizes; the vector of all changes has length 1.
     pub direction: Vec<f64>,
-    /// Change of the residuals for this change, in standard errors: below 1.
+    /// Change of all residuals for this change, in standard errors: at most 1, or zero to rounding.
     pub singular_value: f64,
 }
 
-/// A measured quantity.
+/// A column of measured values with the size of its residuals.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 pub struct FittedColumn {
-    /// Name in the data.
+    /// Name of the column in the data.
     pub name: String,
-    /// Name of the observable.
+    /// Name of the observable or reading that the column contains.
     pub observable: String,
     /// Unit of the values here.
     pub unit: String,
-    /// Root mean square of its residuals.
+    /// Root mean square of measured minus model values, in `unit`.
     pub residual: f64,
-    /// Standard error of the values for which the rows give none.
+    /// Standard error of the values for which the rows give none, in `unit`.
     pub standard_error: f64,
-    /// Whether it was estimated from the residuals.
+    /// Whether a standard error of the column was estimated from the residuals.
     pub estimated: bool,
 }
 
 /// A row of the data with the model's values.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 pub struct FittedRow {
-    /// Name of its curve.
+    /// Name of the curve to which the row belongs.
     pub curve: String,
-    /// Its line in the file, or its number from 1.
+    /// Line in the file, or number of the row from 1.
     pub line: u64,
     /// Direction of the abscissa, if given.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub way: Option<Way>,
-    /// Position of the row, with its offset.
+    /// Value of the swept key with its offset, in [`FitReport::swept_unit`].
     pub at: f64,
-    /// Index of its branch.
+    /// Index of the branch on which the orbit lies; missing if the row has no orbit.
     pub branch: Option<usize>,
     /// Period of the orbit, in drive periods.
     pub period: Option<usize>,
@@ -197,12 +197,13 @@ pub struct FittedRow {
     pub readings: BTreeMap<String, Reading>,
 }
 
-/// One measured value.
+/// A measured value with the value of the model.
 #[derive(Clone, Copy, Debug, Serialize, Deserialize, JsonSchema)]
 pub struct Reading {
-    /// Measured value.
+    /// Measured value, in [`FittedColumn::unit`]; missing if nothing was measured.
     pub measured: Option<f64>,
-    /// Model value, with scale and offset.
+    /// Model value with scale and offset, in [`FittedColumn::unit`]; missing if the row has no
+    /// orbit.
     pub model: Option<f64>,
     /// Measured minus model value, in standard errors.
     pub residual: Option<f64>,
@@ -211,29 +212,32 @@ pub struct Reading {
 /// A jump of the data from a branch that ends in a fold.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 pub struct FittedJump {
-    /// Name of the curve.
+    /// Name of the curve on which the data jump.
     pub curve: String,
     /// The lines of the rows before and after it.
     pub lines: [u64; 2],
-    /// Positions of these rows, with offsets.
+    /// Values of the swept key in the rows before and after the jump, with offsets, in
+    /// [`FitReport::swept_unit`].
     pub between: [f64; 2],
     /// The branches before and after it.
     pub branches: [usize; 2],
-    /// Location of the end of the model's branch.
+    /// Value of the swept key at the fold where the model's branch ends, in
+    /// [`FitReport::swept_unit`].
     pub fold: f64,
-    /// Middle of the rows minus that, in standard errors: their distance over √12.
+    /// Middle of the rows minus the fold, in standard errors, which are the distance of the rows
+    /// over √12.
     pub residual: f64,
 }
 
 /// An orbit at a row on which the data are not.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 pub struct OtherOrbit {
-    /// The curve.
+    /// Name of the curve to which the row belongs.
     pub curve: String,
-    /// Position of the row.
+    /// Value of the swept key in the row, with its offset, in [`FitReport::swept_unit`].
     pub at: f64,
-    /// Its branch.
+    /// Index of the branch on which this orbit lies.
     pub branch: usize,
-    /// Values on it, by the names of the columns.
+    /// Model values on this orbit with scales and offsets, by the names of the columns.
     pub readings: BTreeMap<String, f64>,
 }

@@ -14,9 +14,9 @@ use super::statistics::{exceeding, persistence, range};
 use crate::Error;
 use crate::control::Control;
 
-/// State of the search.
+/// Problem and options of a search for the best values.
 pub(super) struct Search<'a> {
-    /// What was done to the data.
+    /// Sentences on what was done to the data before the fit.
     pub(super) preparation: &'a [String],
     pub(super) problem: Problem<'a>,
     pub(super) request: &'a FitOptions,
@@ -50,7 +50,7 @@ const MAX_CORRELATION: f64 = 2.0;
 pub(super) const MIN_PROBABILITY: f64 = 1e-6;
 /// Relative difference below which two misfits are equal.
 const MISFIT_TOLERANCE: f64 = 1e-3;
-/// The same of rough fits.
+/// Relative difference below which two misfits of rough fits are equal.
 const ROUGH_TOLERANCE: f64 = 0.02;
 /// Mean cost of a value up to which rough fits are not converged well enough to be compared.
 const MIN_ROUGH: f64 = 0.01;
@@ -399,8 +399,8 @@ impl<'a> Search<'a> {
             && (!self.all_given() || self.probability(found) > MIN_PROBABILITY)
     }
 
-    /// True if no test tells the residuals from noise and no parameter ended at a limit of what is
-    /// physical.
+    /// True if no test distinguishes the residuals from noise and no parameter ended at a limit of
+    /// what is physical.
     fn is_trusted(&self, found: &Found) -> bool {
         let all = self.problem.parameters.iter().zip(&found.solution.x);
         let mut limited = all.filter(|(p, _)| p.is_limited);

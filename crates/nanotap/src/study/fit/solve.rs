@@ -20,18 +20,18 @@ pub(super) trait LeastSquares {
     /// parameters.
     fn point(&self, x: &[f64], from: (&[f64], &Self::Point)) -> Option<Self::Point>;
 
-    /// The residuals.
+    /// Computes the residuals at `x`.
     fn residuals(&self, x: &[f64], point: &Self::Point) -> DVector<f64>;
 
     /// Derivatives of the residuals, one column per parameter; `None` if they do not exist.
     fn jacobian(&self, x: &[f64], point: &mut Self::Point) -> Option<DMatrix<f64>>;
 }
 
-/// Result of a minimisation.
+/// Best values of a minimisation, with residuals and Jacobian there.
 pub(super) struct Solution<P> {
     pub(super) x: Vec<f64>,
     pub(super) point: P,
-    /// |r|².
+    /// Sum of the squared residuals, |r|².
     pub(super) cost: f64,
     pub(super) residuals: DVector<f64>,
     pub(super) jacobian: DMatrix<f64>,
@@ -40,7 +40,7 @@ pub(super) struct Solution<P> {
 
 /// Largest number of steps, accepted or rejected.
 const MAX_STEPS: usize = 60;
-/// Largest damping.
+/// Largest damping; if no step with it lowers the cost, the minimisation stops.
 const MAX_DAMPING: f64 = 1e16;
 /// Largest change of a logarithm in one step.
 const MAX_LOG_CHANGE: f64 = 2.0;

@@ -1,4 +1,4 @@
-//! What the residuals say of the parameters.
+//! Standard errors, correlations and tests from the residuals of a fit.
 
 use nalgebra::{DMatrix, SymmetricEigen};
 
@@ -10,15 +10,15 @@ pub(super) struct Direction {
     pub(super) singular_value: f64,
 }
 
-/// What follows from the Jacobian at the minimum.
+/// Standard errors and correlations that follow from the Jacobian at the minimum.
 pub(super) struct Information {
-    /// Standard errors; `None` of what the data do not determine.
+    /// Standard errors of the parameters; None for those that the data do not determine.
     pub(super) errors: Vec<Option<f64>>,
     /// Correlations of those that are determined, 0 of the others.
     pub(super) correlations: DMatrix<f64>,
     /// Covariance within what is determined.
     pub(super) covariance: DMatrix<f64>,
-    /// What is not determined.
+    /// Directions in the space of the parameters that the data do not determine.
     pub(super) undetermined: Vec<Direction>,
 }
 
@@ -27,7 +27,8 @@ const ROUNDING: f64 = 1e-6;
 /// A parameter with more than this part in an undetermined direction is not determined.
 const PART: f64 = 1e-3;
 
-/// Of a weighted Jacobian (residuals in standard errors) of parameters of these sizes.
+/// Computes standard errors and correlations from a weighted Jacobian (residuals in standard
+/// errors) of parameters of these sizes.
 ///
 /// With J S = U Σ Vᵀ, S the sizes, the covariance is S V Σ⁻² Vᵀ S. A column of V whose singular
 /// value is below 1 is a change by a whole size that the data would not show; one that is zero
@@ -263,7 +264,7 @@ pub(super) fn persistence(residuals: &[f64]) -> f64 {
 pub(super) struct Sequences<'a> {
     /// Indices of the residuals, a list per sequence, grouped by column.
     pub(super) columns: &'a [Vec<Vec<usize>>],
-    /// Of the changes by parameters.
+    /// Orthonormal basis of the changes of the residuals by the parameters.
     pub(super) basis: &'a DMatrix<f64>,
 }
 

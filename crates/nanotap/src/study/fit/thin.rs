@@ -20,7 +20,7 @@ use super::statistics::span;
 pub(crate) struct Scatter {
     /// Standard deviation of one row, or of one whose relative error is 1.
     pub(crate) error: f64,
-    /// Its degrees of freedom.
+    /// Degrees of freedom of that standard deviation.
     pub(crate) freedom: f64,
 }
 
@@ -185,7 +185,7 @@ struct Polynomial {
     /// the distance from the first number in units of the second.
     bend_covariance: [f64; 3],
     u: [f64; 2],
-    /// Mean of u².
+    /// Mean of u² over the rows.
     square: f64,
     /// Sum of the squared residuals, and their degrees of freedom.
     squares: f64,
@@ -193,7 +193,7 @@ struct Polynomial {
 }
 
 impl Polynomial {
-    /// Of the given degree; `None` if the rows do not determine it.
+    /// Fits a polynomial of the given degree; `None` if the rows do not determine it.
     fn of(distance: &[f64], values: &[f64], degree: usize) -> Option<Self> {
         let count = distance.len();
         if count <= degree {
@@ -236,8 +236,8 @@ impl Polynomial {
         })
     }
 
-    /// What taking off this `part` of the bend adds to the variance of the mean of some of the rows,
-    /// for rows with standard error 1.
+    /// Returns the variance that subtracting this `part` of the bend adds to that of the mean of
+    /// some of the rows, for rows with standard error 1.
     fn variance_without_bend(&self, distance: &[f64], part: f64) -> f64 {
         let [middle, size] = self.u;
         let powers = distance.iter().map(|z| (z - middle) / size);

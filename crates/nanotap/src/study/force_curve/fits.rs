@@ -1,4 +1,4 @@
-//! Moduli that fits of the unloading part give.
+//! Moduli from fits of contact models to the unloading part.
 //!
 //! Each model makes the separation a straight line in a known function of the force, so that the
 //! fit is a linear regression: with the adhesion force `P` of the curve,
@@ -27,7 +27,7 @@ pub enum ContactModel {
 impl ContactModel {
     const ALL: [Self; 3] = [Self::Hertz, Self::Dmt, Self::Jkr];
 
-    /// Name in tables.
+    /// Returns the name of the model for tables and figures, as in `DMT`.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Hertz => "Hertz",
@@ -37,24 +37,25 @@ impl ContactModel {
     }
 }
 
-/// A fit of a contact model to the unloading part.
+/// A fit of a contact model to the unloading part of a force curve.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct ContactFit {
-    /// Model.
+    /// Contact model that is fitted.
     pub model: ContactModel,
-    /// Reduced modulus E*, Pa.
+    /// Reduced modulus E* of tip and sample, Pa.
     pub reduced_modulus: f64,
-    /// Young's modulus of the sample with the case's Poisson ratio and tip, Pa.
+    /// Young's modulus of the sample, Pa, with the case's Poisson ratio and tip; None if these are
+    /// unknown.
     pub modulus: Option<f64>,
     /// Separation at which the indentation begins, m.
     pub contact_point: f64,
-    /// Root mean square of the separation less that of the fit, m.
+    /// Root mean square of the separation minus that of the fit, m.
     pub residual: f64,
-    /// Points of the fit.
+    /// Number of points of the curve that are fitted.
     pub points: usize,
 }
 
-/// Fits of every model to `(separation, force)` in m and N, with the tip's radius and the adhesion
+/// Fits every model to `(separation, force)` in m and N, with the tip's radius and the adhesion
 /// force. A model without a fit is left out.
 pub(super) fn fits(
     points: &[(f64, f64)],
@@ -105,7 +106,8 @@ pub(super) fn fits(
     ContactModel::ALL.into_iter().filter_map(fit).collect()
 }
 
-/// Least squares of `y = slope x + offset`: slope, offset and root mean square of the rest.
+/// Fits `y = slope x + offset` by least squares: returns slope, offset and root mean square of the
+/// residuals.
 fn line(points: &[(f64, f64)]) -> Option<(f64, f64, f64)> {
     let n = points.len() as f64;
     if points.len() < 3 {

@@ -29,7 +29,7 @@ pub(super) struct Lever {
     engine: Engine,
     model: Model,
     readout: Readout,
-    /// State of the model.
+    /// State vector of the model at the end of the last stretch.
     state: Vec<f64>,
     before: Vec<f64>,
 }
@@ -46,7 +46,7 @@ struct Linear {
     flow: Flow,
     sums: LinearSums,
     state: Vec<f64>,
-    /// Gap of the model.
+    /// Gap of the model, model units: the first distance, from which the motion is counted.
     gap: f64,
     height: Output,
     forces: Vec<Output>,
@@ -57,9 +57,9 @@ struct Linear {
 struct Law {
     flow: nanotap_volterra::Flow,
     nonlinear: Arc<Nonlinear>,
-    /// Offset of the gap at distance 0.
+    /// Offset of the gap at distance 0, model units.
     offset: f64,
-    /// Number of the added tone.
+    /// Index of the added tone among the tones of the drive.
     tone: usize,
 }
 
@@ -223,7 +223,7 @@ impl Lever {
     }
 }
 
-/// `e^{i angle}`.
+/// Returns `e^{i angle}`, with the angle in rad.
 fn turn(angle: f64) -> Complex {
     let (sin, cos) = nanotap_arithmetic::sin_cos(angle);
     Complex::new(cos, sin)

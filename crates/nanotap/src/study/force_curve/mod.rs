@@ -81,7 +81,7 @@ options! {
     }
 }
 
-/// A force curve.
+/// Study of force curves: approach and retract at a finite speed.
 ///
 /// ```
 /// use nanotap::case::Case;

@@ -13,7 +13,7 @@ use crate::study::approach::speed_of;
 use crate::study::value::{Amount, implied};
 use crate::study::without_signal;
 
-/// Most stretches of flow of a curve.
+/// Largest number of stretches of flow of a curve; more are refused.
 const MAX_STRETCHES: f64 = 50e6;
 /// Phase that the slow sine of a ramp passes in a drive period.
 const RAMP_PHASE: f64 = 1e-5;
@@ -27,26 +27,27 @@ const SPEED: f64 = 1e-6;
 pub(super) struct Plan<'a> {
     pub(super) case: &'a Case,
     pub(super) view: &'a Physical,
-    /// At the first distance.
+    /// Model of the case at the first distance.
     pub(super) model: Model,
     pub(super) statics: StaticCurve,
     pub(super) path: Path,
-    /// Time between two points.
+    /// Time between two points, model units.
     pub(super) step: f64,
-    /// Points after the first.
+    /// Number of points of both directions; the start is not one of them.
     pub(super) points: usize,
-    /// Drive periods before the curve.
+    /// Number of drive periods at the first distance before the curve.
     pub(super) settle: usize,
     /// Whether the lever is driven.
     pub(super) driven: bool,
-    /// Range of the fits.
+    /// Lowest and highest force of the fits, as fractions of the span from the lowest force of the
+    /// retract (0) to the peak force (1).
     pub(super) fit: [f64; 2],
 }
 
-/// The motion of the sample.
+/// Distance of the sample against time, in model units.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Path {
-    /// Largest and least distance.
+    /// Largest distance, at the beginning, and least distance, at the turn.
     pub(super) from: f64,
     pub(super) to: f64,
     /// Angular frequency of the added tone.
@@ -58,7 +59,7 @@ pub(super) struct Path {
 }
 
 impl Path {
-    /// Direction at a time.
+    /// Returns the direction of the motion at a time.
     pub(super) fn way(&self, time: f64) -> Way {
         // A point at the turn may be off by rounding.
         if time < self.turn * (1.0 - 1e-12) {
@@ -84,7 +85,7 @@ impl Path {
         [middle, amplitude * cos, -amplitude * sin]
     }
 
-    /// The distance at a time.
+    /// Returns the distance at a time.
     pub(super) fn distance(&self, time: f64) -> f64 {
         let [c, s, _] = self.at(time);
         c + s
@@ -113,10 +114,10 @@ fn kind(
     )))
 }
 
-/// The physical quantities of a case, which a force curve needs.
+/// Returns the physical quantities of a case, which a force curve needs.
 ///
 /// # Errors
-/// When there are none.
+/// When the case is dimensionless.
 pub(crate) fn physical(case: &Case) -> Result<&Physical, Error> {
     case.physical().ok_or_else(|| {
         Error::input(
@@ -130,7 +131,7 @@ pub(crate) fn physical(case: &Case) -> Result<&Physical, Error> {
 }
 
 impl<'a> Plan<'a> {
-    /// The plan of these options for a case.
+    /// Checks these options for a case.
     ///
     /// # Errors
     /// When an option or the case is not valid.

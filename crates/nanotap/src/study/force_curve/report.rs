@@ -16,7 +16,7 @@ use crate::case::physical::sample::Elastic;
 use crate::number::shortest;
 use crate::observe::OutOfRange;
 
-/// How the distance changes.
+/// Waveform of the distance against time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Waveform {
@@ -26,10 +26,10 @@ pub enum Waveform {
     Cosine,
 }
 
-/// A point of the curve.
+/// A point of the force curve, in SI.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct CurvePoint {
-    /// Direction.
+    /// Direction of the motion at this point.
     pub way: Way,
     /// Time from the start, s.
     pub time: f64,
@@ -46,21 +46,22 @@ pub struct CurvePoint {
     /// Amplitude of the deflection at the drive's frequency over the drive period before, m.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub amplitude: Option<f64>,
-    /// Its phase lag behind the drive, degrees.
+    /// Phase lag of the deflection behind the drive over the drive period before, degrees.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub phase: Option<f64>,
 }
 
-/// The lever at rest.
+/// An equilibrium of the lever against the sample, in SI.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct StaticPoint {
-    /// Distance, m.
+    /// Distance z between tip and undeformed surface with the lever at deflection 0, m.
     pub distance: f64,
-    /// Separation, m.
+    /// Separation of tip and undeformed surface, z + deflection, m; negative: minus the
+    /// indentation.
     pub separation: f64,
-    /// Deflection, m.
+    /// Deflection of the tip, positive away from the sample, m.
     pub deflection: f64,
-    /// Force, N.
+    /// Force of the sample on the tip, positive if it repels, N.
     pub force: f64,
 }
 
@@ -69,20 +70,20 @@ pub struct StaticPoint {
 pub struct StaticBranch {
     /// Whether tip and sample touch.
     pub contact: bool,
-    /// Whether the rest is stable.
+    /// Whether the equilibrium is stable.
     pub stable: bool,
-    /// Its points, by falling separation.
+    /// Equilibria of the branch, by falling separation.
     pub points: Vec<StaticPoint>,
 }
 
 /// A jump of the lever at rest from the end of a branch, a fold or the end of the law's branch.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct StaticJump {
-    /// Direction.
+    /// Direction in which the distance changes at the jump.
     pub way: Way,
-    /// End of the branch.
+    /// Last equilibrium before the jump, at the end of the branch.
     pub before: StaticPoint,
-    /// Where the lever rests after the jump.
+    /// Equilibrium after the jump; None if there is no stable one.
     pub after: Option<StaticPoint>,
 }
 
@@ -97,14 +98,14 @@ pub struct Statics {
     pub pull_off: Option<StaticPoint>,
 }
 
-/// What a force curve says.
+/// Results of a force curve, in SI.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct ForceCurveSummary {
     /// Distance at which the tip first touches on the approach, m.
     pub contact_begin: Option<f64>,
     /// Distance at which the tip last touches on the retract, m.
     pub contact_end: Option<f64>,
-    /// Largest force, N.
+    /// Largest force of the sample on the tip, N; 0 if it never repels.
     pub peak_force: f64,
     /// Adhesion force: minus the lowest force of the retract, N.
     pub adhesion_force: f64,
@@ -117,26 +118,27 @@ pub struct ForceCurveSummary {
     pub adhesion_energy: f64,
     /// Energy lost in the cycle, −∮F dz, J.
     pub energy_lost: f64,
-    /// Part of it that the tip gives to the sample, J; the rest rings down in the lever.
+    /// Part of the lost energy that the tip gives to the sample, J; the rest rings down in the
+    /// lever.
     pub dissipation: f64,
 }
 
 /// A force curve with its static branches.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct ForceCurveReport {
-    /// How the distance changes.
+    /// Waveform of the distance against time.
     pub waveform: Waveform,
-    /// First distance, m.
+    /// Distance at the start, m.
     pub from: f64,
     /// Distance at which the approach turns, m.
     pub to: f64,
-    /// Speed, of a cosine the largest, m/s.
+    /// Speed of the ramp, or largest speed of the cosine, m/s.
     pub speed: f64,
     /// Duration of the cycle, s.
     pub duration: f64,
     /// Whether the lever is driven.
     pub driven: bool,
-    /// Stretches of the exact flow.
+    /// Number of stretches of the exact flow.
     pub stretches: usize,
     /// Adhesion force: minus the lowest force of the retract, N.
     pub adhesion: f64,
@@ -144,9 +146,9 @@ pub struct ForceCurveReport {
     pub snap_in: Option<f64>,
     /// Distance at which the tip last touches on the retract, m.
     pub pull_off: Option<f64>,
-    /// Largest force, N.
+    /// Largest force of the sample on the tip, N; 0 if it never repels.
     pub peak_force: f64,
-    /// All results.
+    /// Contact distances, adhesion, energies and indentation.
     pub summary: ForceCurveSummary,
     /// Reduced modulus E* of tip and sample of the case, Pa, if its law has one.
     pub reduced_modulus: Option<f64>,
@@ -156,17 +158,17 @@ pub struct ForceCurveReport {
     pub fits: Vec<ContactFit>,
     /// Branches of the lever at rest.
     pub statics: Statics,
-    /// The points.
+    /// Points of approach and retract, in order of time.
     #[serde(rename = "table")]
     pub points: Vec<CurvePoint>,
-    /// What puts the results in doubt.
+    /// Sentences on what makes the results doubtful.
     pub warnings: Vec<String>,
 }
 
-/// Part of a resonance frequency from which the inertia of a moving base matters.
+/// Fraction of the resonance frequency above which the inertia of a moving base matters.
 const FAST: f64 = 0.1;
 
-/// The report of a run.
+/// Creates the report of a run.
 pub(super) fn report(plan: &Plan<'_>, statics: &StaticsFound, run: &Run) -> ForceCurveReport {
     let scales = &plan.view.scales;
     let rest = |rest: &Rest| StaticPoint {
@@ -304,7 +306,7 @@ pub(super) fn report(plan: &Plan<'_>, statics: &StaticsFound, run: &Run) -> Forc
     }
 }
 
-/// A row a point, in SI.
+/// Formats the points as CSV, one row per point, in SI.
 pub fn points_csv(report: &ForceCurveReport) -> String {
     let mut csv =
         String::from("way,time (s),distance (m),separation (m),deflection (m),force (N),contact");

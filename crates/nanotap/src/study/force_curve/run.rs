@@ -22,25 +22,25 @@ pub(super) struct Row {
     pub(super) oscillation: Option<[f64; 2]>,
 }
 
-/// What a run gives, in the model's units.
+/// Results of a run, in model units.
 #[derive(Clone, Debug)]
 pub(super) struct Run {
     pub(super) rows: Vec<Row>,
     pub(super) peak_force: f64,
-    /// Of approach and retract.
+    /// Lowest force of approach and of retract, at most 0.
     pub(super) lowest: [f64; 2],
     /// Least height of the tip at points and ends of stretches.
     pub(super) least_gap: f64,
     /// Distance at which the tip first touches on the approach, and last on the retract.
     pub(super) contact_begin: Option<f64>,
     pub(super) contact_end: Option<f64>,
-    /// `−∮ F dz`.
+    /// Energy lost in the cycle, `−∮ F dz`.
     pub(super) energy_lost: f64,
-    /// `−∫ F dz` where the force attracts on the retract.
+    /// Work of adhesion, `−∫ F dz` where the force attracts on the retract.
     pub(super) adhesion_energy: f64,
     /// Energy that the tip gives to the sample.
     pub(super) dissipation: f64,
-    /// Stretches followed.
+    /// Number of stretches of flow that were followed.
     pub(super) stretches: usize,
 }
 

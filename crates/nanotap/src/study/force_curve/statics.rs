@@ -57,7 +57,7 @@ pub(super) struct StaticsFound {
 pub(super) enum StaticCurve {
     /// Of a piecewise-linear sample: rests and guards are linear in the distance.
     Linear(Vec<LinearRests>),
-    /// Under a nonlinear law.
+    /// Under a nonlinear law: rests are followed in the separation.
     Law(Box<LawRests>),
 }
 
@@ -72,7 +72,7 @@ pub(super) struct LinearRests {
     gap: [f64; 2],
     force: [f64; 2],
     guards: Vec<[f64; 2]>,
-    /// State, with its slope.
+    /// State of the lever at rest, and its derivative by the distance.
     state: [DVector<f64>; 2],
 }
 
@@ -87,7 +87,7 @@ pub(super) struct LawRests {
     state: [DVector<f64>; 2],
 }
 
-/// Points of a branch on each side of the gap at which contact begins.
+/// Number of points of a branch on each side of the gap at which contact begins.
 const POINTS: usize = 1200;
 /// Smallest step from there, as a part of the range.
 const NEAR: f64 = 1e-9;

@@ -24,9 +24,9 @@ use std::f64::consts::{PI, TAU};
 
 use crate::model::Model;
 
-/// Points around the oscillation.
+/// Number of equidistant phases of the oscillation for the first-order shift.
 const AROUND: u32 = 4096;
-/// Points of the integral over the distance, for large amplitudes.
+/// Number of points of the integral over the distance, for large amplitudes.
 const OUTWARDS: u32 = 4096;
 
 /// The static force of a model's sample against the distance.
@@ -43,20 +43,22 @@ pub struct Averages<'a> {
     stiffness: f64,
 }
 
-/// What they are at one distance.
+/// Approximations of the frequency shift at one distance.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Averaged {
-    /// Δf/f₀ to first order in the force.
+    /// Relative shift Δf/f₀ to first order in the force, dimensionless.
     pub first_order: f64,
-    /// Δf/f₀ for a large amplitude.
+    /// Relative shift Δf/f₀ by Giessibl's formula for a large amplitude, dimensionless.
     pub giessibl: f64,
-    /// The force where the tip is closest, on the way there.
+    /// Static force at the closest approach, on the way to the sample, model units; positive if it
+    /// repels.
     pub force: f64,
 }
 
 impl<'a> Averages<'a> {
-    /// Under the sample of `model`, whose spring `spring` is where its force is not nonlinear; of
-    /// an oscillation of `amplitude` of a lever of the modal `stiffness`.
+    /// Creates the averages for the sample of `model` and an oscillation of `amplitude` of a lever
+    /// with the modal `stiffness`, in model units. `spring` is the stiffness of the sample if its
+    /// force is not nonlinear.
     pub fn new(model: &'a Model, spring: f64, amplitude: f64, stiffness: f64) -> Self {
         let force = match &model.nonlinear {
             Some(nonlinear) => StaticForce::Nonlinear(nonlinear),
@@ -69,7 +71,7 @@ impl<'a> Averages<'a> {
         }
     }
 
-    /// The force at these distances, evaluated quasi-statically, in this order.
+    /// Computes the force at these distances, evaluated quasi-statically, in this order.
     fn forces(&self, gaps: impl Iterator<Item = f64>) -> Vec<f64> {
         match self.force {
             StaticForce::Nonlinear(nonlinear) => {
@@ -80,7 +82,7 @@ impl<'a> Averages<'a> {
         }
     }
 
-    /// With the tip at rest at the distance `gap`.
+    /// Computes the approximations with the tip at rest at the distance `gap`, model units.
     pub fn at(&self, gap: f64) -> Averaged {
         let (a, k) = (self.amplitude, self.stiffness);
         // From the far side to the near one and back; the trapezoid rule is exact to rounding

@@ -204,23 +204,23 @@ fn curve(
     Ok(report.in_si(&case.units()))
 }
 
-/// Distances at which no orbit may be found before a way ends.
+/// Largest number of successive distances without an orbit; more of them end a direction.
 const MISSED: usize = 3;
 
 struct Curve<'a> {
     case: &'a Case,
-    /// At the first distance.
+    /// Free lever at the amplitude of the first distance.
     free: &'a FreeOscillation,
     model: crate::model::Model,
-    /// The least distance that is kept.
+    /// Least distance that is kept, model units; None if the amplitude is kept.
     closest: Option<f64>,
 }
 
-/// Steps of regula falsi at most.
+/// Largest number of steps of regula falsi.
 const STEPS: usize = 60;
 
 impl Curve<'_> {
-    /// Where the shift has a value, between the points of each way.
+    /// Finds the distances at which the shift has a value, between the points of each direction.
     fn setpoints(
         &self,
         held: Held,
@@ -241,7 +241,7 @@ impl Curve<'_> {
         found.collect()
     }
 
-    /// The orbit between two points of a way that has the shift.
+    /// Finds the orbit with the shift between two points of a direction.
     fn crossing(
         &self,
         held: Held,
@@ -283,7 +283,7 @@ impl Curve<'_> {
         (off.abs() <= 1e-6 * shift.abs()).then(|| (gap, walk.held(gap), orbit))
     }
 
-    /// The numbers of frequency modulation of an orbit of this amplitude.
+    /// Returns the quantities of frequency modulation for an orbit of this amplitude.
     fn modulated(&self, orbit: &HeldOrbit, amplitude: f64, gap: f64) -> Modulated {
         // A rigid stop has no static force; that of a surface that attracts depends on where it is.
         let cantilever = self.case.cantilever();
@@ -304,7 +304,7 @@ impl Curve<'_> {
         Averages::new(&self.model, spring, swing, self.free.stiffness)
     }
 
-    /// Adds the numbers of frequency modulation in SI.
+    /// Adds the quantities of frequency modulation in SI.
     fn add_si(&self, point: &mut ApproachPoint) {
         if let Some(view) = self.case.physical() {
             point.modulation_si = point.modulation.map(|m| m.in_si(view));
@@ -334,7 +334,7 @@ impl Curve<'_> {
     }
 }
 
-/// A point's distance, and the drive and state there.
+/// Returns the distance of a point with its drive and state.
 fn driven(point: &ApproachPoint) -> Option<(f64, Driven)> {
     let modulation = point.modulation?;
     let driven = Driven {
@@ -345,12 +345,13 @@ fn driven(point: &ApproachPoint) -> Option<(f64, Driven)> {
     Some((point.gap, driven))
 }
 
-/// By how much the frequency has shifted more than asked.
+/// Returns the frequency shift of a point minus the requested one, model units.
 fn excess(point: &ApproachPoint, shift: f64) -> f64 {
     point.modulation.map_or(f64::NAN, |m| m.frequency_shift) - shift
 }
 
-/// Adds the force that each way's shifts tell.
+/// Adds the force that follows from the shifts of each direction by the formula of Sader and
+/// Jarvis.
 fn invert(table: &mut [ApproachPoint], free: &FreeOscillation) {
     for way in [Way::Approach, Way::Retract] {
         let of_way = |p: &&mut ApproachPoint| p.way == way;
@@ -371,10 +372,10 @@ fn invert(table: &mut [ApproachPoint], free: &FreeOscillation) {
     }
 }
 
-/// Difference of relative shifts that is no longer rounding.
+/// Difference of relative shifts above which they differ; below it is rounding.
 const DIFFERENT: f64 = 1e-9;
 
-/// By how much two shifts at one distance differ, if they do.
+/// Returns the difference of two relative shifts at one distance, if they differ.
 fn difference(a: &ApproachPoint, b: &ApproachPoint) -> Option<f64> {
     let shift = |p: &ApproachPoint| Some(p.modulation?.relative_shift);
     let difference = (shift(a)? - shift(b)?).abs();

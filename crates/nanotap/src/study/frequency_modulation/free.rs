@@ -18,37 +18,39 @@ use crate::study::FreeMotion;
 /// The free lever at the amplitude and phase that are held; in the model's units.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FreeOscillation {
-    /// Amplitude of the tip's deflection at the drive's frequency.
+    /// Amplitude of the tip's deflection at the drive's frequency, model units.
     pub amplitude: f64,
     /// Phase lag behind the drive, degrees.
     pub phase: f64,
-    /// The frequency at which the lever lags by that phase.
+    /// Angular frequency at which the lever lags by that phase, model units.
     pub frequency: f64,
-    /// Strength of the drive that gives the amplitude there.
+    /// Strength of the drive that gives the amplitude at this frequency, model units.
     pub strength: f64,
-    /// Amplitude of the tip's own motion at the drive's frequency, a driven base's included.
+    /// Amplitude of the tip's own motion at the drive's frequency, a driven base's included, model
+    /// units.
     pub swing: f64,
-    /// How far the tip swings towards the sample.
+    /// Largest excursion of the tip towards the sample from its rest position, model units.
     pub reach: f64,
-    /// What the lever's own damping takes in a period.
+    /// Energy that the lever's own damping takes in a period, model units.
     pub loss: f64,
-    /// Stiffness k by which the frequency answers a force F₁ cos at the tip that is in phase with
-    /// the tip's own motion of amplitude Z: Δf/f₀ = −F₁/(2kZ) to first order. Where the base is at
-    /// rest and the phase 90° that is −(ω/2) ∂Re(1/G)/∂ω of the answer G to such a force, the
-    /// stiffness of the mode.
+    /// Stiffness k by which the frequency responds to a force F₁ cos at the tip that is in phase
+    /// with the tip's own motion of amplitude Z, model units: Δf/f₀ = −F₁/(2kZ) to first order. If
+    /// the base is at rest and the phase 90°, it is −(ω/2) ∂Re(1/G)/∂ω with the response G to such
+    /// a force, the stiffness of the mode.
     pub stiffness: f64,
-    /// State at drive phase 0.
+    /// State vector of the equations at drive phase 0, model units.
     pub state: Vec<f64>,
 }
 
-/// Steps of the secant method.
+/// Largest number of steps of the secant method.
 const STEPS: usize = 60;
 
 impl FreeOscillation {
-    /// Of the lever of `case`, near the resonance that is nearest to the case's own frequency.
+    /// Finds the free oscillation of the lever of `case`, near the resonance nearest to the case's
+    /// drive frequency.
     ///
     /// # Errors
-    /// When the case makes no sense, or the lever has no such phase there.
+    /// When the case is not valid, or the lever has no such phase there.
     pub fn of(case: &Case, held: Held) -> Result<Self, Error> {
         let alone = alone(&equations_of(case), held);
         let own = alone.omega();
@@ -129,7 +131,7 @@ impl FreeOscillation {
 }
 
 impl FreeOscillation {
-    /// The same with another amplitude: the free lever is linear.
+    /// Returns the oscillation with another amplitude: the free lever is linear.
     #[must_use]
     pub fn with_amplitude(&self, amplitude: f64) -> Self {
         let share = amplitude / self.amplitude;
@@ -144,7 +146,7 @@ impl FreeOscillation {
         }
     }
 
-    /// Its drive and state.
+    /// Returns drive and state of the free oscillation.
     pub fn driven(&self) -> Driven {
         Driven {
             frequency: self.frequency,
@@ -155,8 +157,8 @@ impl FreeOscillation {
 }
 
 impl FreeOscillation {
-    /// How frequency and strength change with keys of the case, each of which stands with what
-    /// the amplitude that is held changes by.
+    /// Computes the derivatives of frequency and strength (model units) by keys of the case. Each
+    /// key is given with the derivative of the controlled amplitude by it.
     ///
     /// # Errors
     /// As [`Held::changes`].
@@ -201,7 +203,7 @@ impl FreeOscillation {
     }
 }
 
-/// The lever of `case` without a sample, in the exact engine.
+/// Returns the lever of `case` without a sample, in the exact engine.
 fn alone(case: &Case, held: Held) -> Case {
     let far = 1e3 * held.amplitude;
     match case.cantilever() {
@@ -216,7 +218,7 @@ fn alone(case: &Case, held: Held) -> Case {
     }
 }
 
-/// The free resonance nearest to a frequency.
+/// Returns the free resonance nearest to a frequency.
 fn nearest_resonance(model: &Model, frequency: f64) -> f64 {
     let free = model.system.regimes().first();
     let rates = free.map_or(&[][..], |free| &free.basis().eigenvalues);
@@ -231,7 +233,7 @@ fn nearest_resonance(model: &Model, frequency: f64) -> f64 {
     found.unwrap_or(frequency)
 }
 
-/// Strength of the drive over the amplitude of the free tip, with its phase.
+/// Returns the strength of the drive over the amplitude of the free tip, with its phase.
 fn inverse_response(case: &Case, frequency: f64) -> Result<Complex, Error> {
     let free = FreeMotion::of(&case.with_drive(frequency, 1.0).model()?);
     let (sin, cos) = nanotap_arithmetic::sin_cos(free.phase.to_radians());
@@ -270,7 +272,7 @@ fn stiffness(
     Ok(-0.5 * held.amplitude / strength * held.amplitude / swing * slope / answer.im)
 }
 
-/// The steady motion of a linear system, at drive phase 0.
+/// Computes the steady motion of a linear system, at drive phase 0.
 fn steady_state(model: &Model) -> Result<Vec<f64>, Error> {
     let n = model.dimension();
     let mut map = ModelMap::new(model);

@@ -19,7 +19,7 @@ use crate::model::Model;
 use crate::model::model_map::ModelMap;
 use crate::observe::{ObservableSet, first_harmonic_changes, measure};
 
-/// Setpoint of the loop.
+/// Setpoint of the loop: amplitude and phase of the tip's oscillation.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Held {
     /// Amplitude of the tip's deflection at the drive's frequency, in the model's unit of length.
@@ -31,31 +31,31 @@ pub struct Held {
 /// A drive and a state at its phase 0; in the model's units.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Driven {
-    /// The frequency.
+    /// Angular frequency of the drive, model units.
     pub frequency: f64,
-    /// The strength.
+    /// Strength of the drive, model units: its force, or a driven base's amplitude.
     pub strength: f64,
-    /// The state.
+    /// State vector of the equations at drive phase 0, model units.
     pub state: Vec<f64>,
 }
 
-/// An orbit with the amplitude and phase that are held.
+/// An orbit at the setpoint of the loop, with its drive.
 #[derive(Clone, Debug)]
 pub struct HeldOrbit {
-    /// The drive's frequency, in the model's unit.
+    /// Angular frequency of the drive, model units.
     pub frequency: f64,
-    /// Its strength, in the model's unit.
+    /// Strength of the drive, model units: its force, or a driven base's amplitude.
     pub strength: f64,
     /// The orbit; its multipliers are those at constant frequency and strength.
     pub orbit: PeriodicOrbit,
-    /// The case with this drive, in numbers of the equations.
+    /// The case with this drive, as parameters of the equations (model units).
     pub case: Case,
-    /// Its model.
+    /// Model of `case`, for which the orbit is closed.
     pub model: Model,
 }
 
 impl HeldOrbit {
-    /// Its drive and state.
+    /// Returns drive and state of the orbit.
     pub fn driven(&self) -> Driven {
         Driven {
             frequency: self.frequency,
@@ -65,8 +65,8 @@ impl HeldOrbit {
     }
 }
 
-/// The case as numbers of the equations, in which frequency and strength of the drive stand
-/// alone.
+/// Returns the case as parameters of the equations, in which frequency and strength of the drive
+/// are independent.
 pub(crate) fn equations_of(case: &Case) -> Case {
     if case.is_physical()
         && let Some(cantilever) = case.cantilever()
@@ -76,23 +76,23 @@ pub(crate) fn equations_of(case: &Case) -> Case {
     case.clone()
 }
 
-/// Newton steps.
+/// Largest number of Newton steps.
 const STEPS: usize = 40;
-/// Shortest part of a step that is tried.
+/// Shortest part of a Newton step that is tried, as a fraction of the step.
 const SHORTEST: f64 = 1.0 / 64.0;
-/// A residual above this, relative, is no orbit.
+/// Largest relative residual of an orbit; Newton's method fails above it.
 const CLOSED: f64 = 1e-9;
-/// How often entries of a state that are whole numbers, as whether a neck is there, are taken from
-/// the map at one place: where they do not come to rest, the residual says so.
+/// Largest number of times that whole-number entries of a state, such as whether a neck exists, are
+/// taken from the map at one place. If they still change then, the residual is large.
 const MAX_SETTINGS: usize = 3;
-/// A step may change frequency and strength by this part of themselves.
+/// Largest change of frequency and strength in a step, relative to themselves.
 const FARTHEST: [f64; 2] = [0.1, 0.9];
 
 impl Held {
-    /// Whether it can be held.
+    /// Checks that the loop can hold the setpoint.
     ///
     /// # Errors
-    /// When amplitude or phase make no sense.
+    /// When amplitude or phase are out of range.
     pub fn check(self) -> Result<Self, Error> {
         let Self { amplitude, phase } = self;
         if !(amplitude > 0.0 && amplitude.is_finite()) {
@@ -112,10 +112,10 @@ impl Held {
         Ok(self)
     }
 
-    /// The orbit of `case` near `guess`. The drive of the case does not matter.
+    /// Finds the orbit of `case` near `guess`. The drive of the case does not matter.
     ///
     /// # Errors
-    /// When there is none near, with the reason.
+    /// When no orbit is found near it, with the reason.
     pub fn close(self, case: &Case, guess: &Driven) -> Result<HeldOrbit, Error> {
         self.check()?;
         let case = equations_of(case);
@@ -256,8 +256,7 @@ impl Held {
         })
     }
 
-    /// What size of each number of the state matters: the amplitude, of speeds times the
-    /// frequency.
+    /// Returns the scale of each entry of the state: the amplitude, for speeds times the frequency.
     fn sizes(self, model: &Model, frequency: f64) -> Vec<f64> {
         let n = model.dimension() - model.memory;
         let half = n / 2;
@@ -296,12 +295,12 @@ fn turn(degrees: f64) -> f64 {
 struct At {
     driven: Driven,
     case: Case,
-    /// Those of frequency and strength, and more that derivatives are taken by.
+    /// Keys of frequency and strength, and others by which derivatives are taken.
     keys: Vec<Key>,
     model: Model,
     jacobian: DMatrix<f64>,
     by: DMatrix<f64>,
-    /// Relative to the sizes.
+    /// Residuals of the equations, relative to the sizes of the unknowns.
     residual: DVector<f64>,
     sizes: Vec<f64>,
 }

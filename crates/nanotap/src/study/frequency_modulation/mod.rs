@@ -44,43 +44,45 @@ use crate::study::limits::MAX_DISTANCES;
 use crate::study::request::options;
 use crate::study::value::Amount;
 
-/// Frequency modulation at one distance.
+/// Readings of frequency modulation at one distance, in model units.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct Modulated {
-    /// Frequency of the drive, in the model's unit.
+    /// Angular frequency of the drive, model units.
     pub drive_frequency: f64,
-    /// Strength of the drive, in the model's unit.
+    /// Strength of the drive, model units: its force, or a driven base's amplitude.
     pub drive_strength: f64,
-    /// Frequency shift Δf, in the model's unit.
+    /// Shift 2πΔf of the angular frequency from that of the free lever, model units.
     pub frequency_shift: f64,
-    /// Frequency shift Δf over the free lever's frequency f₀.
+    /// Frequency shift Δf over the free lever's frequency f₀, dimensionless.
     pub relative_shift: f64,
-    /// Strength of the drive over that of the free lever: the excitation channel.
+    /// Strength of the drive over that of the free lever, dimensionless: the excitation channel.
     pub drive_ratio: f64,
-    /// Energy that the sample takes in a period, from the excitation,
-    /// E₀ (drive ratio − f/f₀) with what the free lever loses in a period, in the model's unit.
+    /// Energy that the sample takes in a period, from the excitation: E₀ (drive ratio − f/f₀) with
+    /// the loss E₀ of the free lever in a period, model units.
     pub drive_dissipation: f64,
-    /// Least distance of a sinusoidal oscillation, a driven base's motion included, in the model's
-    /// unit of length.
+    /// Least distance of a sinusoidal oscillation, a driven base's motion included, model units.
     pub closest: f64,
-    /// Δf/f₀ to first order in the law's static force, of which a rigid stop and a surface that
-    /// moves have none.
+    /// Relative shift Δf/f₀ to first order in the law's static force, dimensionless; None for a
+    /// rigid stop and a surface that moves, which have no static force.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub first_order_shift: Option<f64>,
-    /// Δf/f₀ by Giessibl's formula for an amplitude that is large against the force's range.
+    /// Relative shift Δf/f₀ by Giessibl's formula for an amplitude that is large against the
+    /// force's range, dimensionless.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub giessibl_shift: Option<f64>,
-    /// The law's static force where the oscillation is closest, in the model's unit.
+    /// Static force of the law where the oscillation is closest, model units; positive if it
+    /// repels.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub static_force: Option<f64>,
-    /// The force there as Sader and Jarvis find it from the shifts of the curve.
+    /// Force where the oscillation is closest, by the formula of Sader and Jarvis from the shifts
+    /// of the curve, model units; positive if it repels.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sader_jarvis_force: Option<f64>,
 }
 
 #[cfg(feature = "fm")]
 impl Modulated {
-    /// Of an orbit with the tip at rest at `gap`.
+    /// Computes the readings of an orbit with the tip at rest at `gap`, model units.
     pub fn of(
         orbit: &HeldOrbit,
         free: &FreeOscillation,
@@ -98,7 +100,8 @@ impl Modulated {
         }
     }
 
-    /// Of a drive's frequency and strength, against those of the free lever and its loss.
+    /// Computes the readings of a drive's frequency and strength, compared with those of the free
+    /// lever and its loss.
     pub(in crate::study) fn of_drive(
         [frequency, strength]: [f64; 2],
         [free_frequency, free_strength, free_loss]: [f64; 3],
@@ -121,32 +124,33 @@ impl Modulated {
     }
 }
 
-/// The same in SI.
+/// Readings of frequency modulation at one distance, in SI.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct ModulatedInSi {
     /// Frequency of the drive, Hz.
     pub frequency: f64,
     /// Strength of the drive: its force, N, or a driven base's amplitude, m.
     pub drive_strength: f64,
-    /// Frequency shift Δf, Hz.
+    /// Frequency shift Δf from the free lever, Hz.
     pub frequency_shift: f64,
     /// Energy dissipated in the sample per period, from the excitation, J.
     pub drive_dissipation: f64,
-    /// The same in eV.
+    /// Energy dissipated in the sample per period, from the excitation, eV.
     #[serde(rename = "drive_dissipation_eV")]
     pub drive_dissipation_ev: f64,
     /// Least distance of a sinusoidal oscillation, m.
     pub closest: f64,
-    /// The law's static force where the oscillation is closest, N.
+    /// Static force of the law where the oscillation is closest, N; positive if it repels.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub static_force: Option<f64>,
-    /// The force there as Sader and Jarvis find it, N.
+    /// Force where the oscillation is closest, by the formula of Sader and Jarvis, N; positive if
+    /// it repels.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sader_jarvis_force: Option<f64>,
 }
 
 impl Modulated {
-    /// In SI.
+    /// Converts the readings to SI.
     pub fn in_si(&self, view: &Physical) -> ModulatedInSi {
         let scales = &view.scales;
         let strength = scales.of(Parameter::Alpha2, view.cantilever.actuation);
@@ -164,20 +168,20 @@ impl Modulated {
     }
 }
 
-/// One of the numbers of frequency modulation, as a column of a table or an axis.
+/// A reading of frequency modulation, as a column of a table or an axis.
 #[derive(Clone, Copy, Debug)]
 pub struct ModulatedColumn {
-    /// Its name in tables.
+    /// Name of the column in tables.
     pub name: &'static str,
-    /// The label of an axis.
+    /// Label of an axis, without unit.
     pub label: &'static str,
-    /// What it measures; `None` of a ratio.
+    /// Kind of quantity that the column contains; None for a ratio.
     pub kind: Option<Kind>,
-    /// Its value in the model's unit.
+    /// Returns the value of the column in model units, if there is one.
     pub of: fn(&Modulated) -> Option<f64>,
 }
 
-/// The columns.
+/// Columns of a curve under frequency modulation.
 pub const COLUMNS: [ModulatedColumn; 8] = [
     ModulatedColumn {
         name: "frequency_shift",
@@ -232,65 +236,65 @@ pub const COLUMNS: [ModulatedColumn; 8] = [
 /// Frequency modulation along a curve.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct ModulationReport {
-    /// The amplitude that is held, in the model's unit of length.
+    /// Amplitude of the tip's deflection that the loop keeps, model units.
     pub amplitude: f64,
     /// Phase lag kept by the feedback, degrees.
     pub phase: f64,
-    /// Frequency of the free lever at this phase, in the model's unit.
+    /// Angular frequency of the free lever at this phase, model units.
     pub free_frequency: f64,
-    /// The same in Hz, of a physical case.
+    /// Frequency of the free lever at this phase, Hz; only of a physical case.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub free_frequency_hz: Option<f64>,
-    /// Strength of its drive, in the model's unit.
+    /// Strength of the drive of the free lever, model units.
     pub free_strength: f64,
-    /// Stiffness by which the frequency answers the sample: of the mode at the tip, where the base
-    /// is at rest, in the model's unit.
+    /// Stiffness by which the frequency responds to the sample, model units: of the mode at the
+    /// tip, if the base is at rest.
     pub stiffness: f64,
-    /// What the free lever loses in a period at this amplitude, in the model's unit.
+    /// Energy that the free lever loses in a period at this amplitude, model units.
     pub free_loss: f64,
-    /// The least distance that is kept, in the model's unit of length: amplitude and what belongs
-    /// to it are then those of the first distance.
+    /// Least distance that is kept, model units: the amplitude changes with the distance, and
+    /// amplitude, strength and loss here are those of the first distance.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub closest: Option<f64>,
-    /// What the multipliers are of.
+    /// Sentence that explains the multipliers: they are those at constant frequency and strength.
     pub multipliers: &'static str,
-    /// The distances at which the frequency shift has the asked value, on each way in the order
-    /// in which they are met, with the motion there: the first is where a loop that holds the shift
+    /// Distances at which the frequency shift has the requested value, in each direction in the
+    /// order of the curve, with the motion there: the first is where a loop that keeps the shift
     /// stops.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub setpoints: Option<Vec<ApproachPoint>>,
-    /// Where it changed by a jump.
+    /// Ranges of distances over which the motion changed by a jump.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub jumps: Vec<Jump>,
-    /// Where a way ended before its time, and why.
+    /// Early ends of a direction, with the reason.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub ended: Vec<Ended>,
 }
 
-/// What the multipliers say under frequency modulation, in words.
+/// Explanation of the multipliers under frequency modulation, for reports.
 pub const OPEN_LOOP: &str = "multipliers are those of the orbit at constant frequency and \
                              strength of the drive; under the loop stability is the loop's matter";
 
-/// A stretch over which no orbit that has the amplitude and phase could be followed, though there
-/// is one at its end.
+/// A range of distances over which no orbit with the amplitude and phase could be followed, with an
+/// orbit at its end.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct Jump {
-    /// Direction.
+    /// Direction in which the distance changes.
     pub way: Way,
-    /// The last distance before it, in the model's unit of length.
+    /// Last distance with an orbit before the range, model units.
     pub from: f64,
-    /// The first behind it.
+    /// First distance with an orbit after the range, model units.
     pub to: f64,
 }
 
 /// An early end of a curve.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct Ended {
-    /// Direction.
+    /// Direction that ended early.
     pub way: Way,
-    /// The last distance, in the model's unit of length.
+    /// Last distance with an orbit, model units.
     pub gap: f64,
-    /// Reason of the end.
+    /// Reason of the end, as a sentence.
     pub reason: String,
 }
 
@@ -336,7 +340,7 @@ pub fn frequency_modulation(
     ))
 }
 
-/// Approach and retract curve under frequency modulation.
+/// Study of approach and retract curves under frequency modulation.
 ///
 /// ```
 /// use nanotap::case::Case;

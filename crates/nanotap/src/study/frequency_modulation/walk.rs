@@ -10,29 +10,30 @@ use crate::case::Case;
 pub(crate) struct HeldWalk<'a> {
     case: &'a Case,
     held: Held,
-    /// The least distance that is kept, and how far the tip swings at the amplitude 1.
+    /// Least distance that is kept, and the excursion of the tip towards the sample at amplitude 1,
+    /// model units.
     closest: Option<(f64, f64)>,
-    /// How many numbers at the end of the state are the sample's.
+    /// Number of entries at the end of the state that belong to the sample.
     memory: usize,
-    /// Where the walk began.
+    /// Distance and orbit at the beginning of the walk.
     first: (f64, Driven),
     /// The last two orbits, each with its distance.
     last: Option<(f64, Driven)>,
     before: Option<(f64, Driven)>,
 }
 
-/// The end of a step.
+/// Result of a step.
 pub(crate) struct Stepped {
-    /// The orbit there.
+    /// Orbit at the end of the step.
     pub(crate) orbit: HeldOrbit,
-    /// The stretches on the way over which the curve broke off, each from its last distance to the
-    /// first at which another orbit goes on.
+    /// Ranges of distances in the step over which the curve broke off, each from its last distance
+    /// to the first at which another orbit continues.
     pub(crate) breaks: Vec<[f64; 2]>,
 }
 
-/// Halvings of a step before the curve is given up.
+/// Largest number of halvings of a step; then the curve is given up.
 const HALVINGS: i32 = 14;
-/// Breaks of the curve that are passed in one step.
+/// Largest number of breaks of the curve that are passed in one step.
 const BREAKS: usize = 4;
 /// A step that changes the state by more than this part of the amplitude, or frequency and
 /// strength by more than this part of themselves, beyond what was foreseen is made shorter.
@@ -62,7 +63,7 @@ impl<'a> HeldWalk<'a> {
         }
     }
 
-    /// What is held at a distance.
+    /// Returns the setpoint at a distance.
     pub(crate) fn held(&self, gap: f64) -> Held {
         let amplitude = self
             .closest
@@ -75,7 +76,7 @@ impl<'a> HeldWalk<'a> {
         }
     }
 
-    /// Where the curve has come to.
+    /// Returns the distance that the curve has reached.
     pub(crate) fn gap(&self) -> f64 {
         self.last.as_ref().map_or(f64::NAN, |(gap, _)| *gap)
     }
@@ -87,10 +88,10 @@ impl<'a> HeldWalk<'a> {
         self.before = None;
     }
 
-    /// The orbit at `target`.
+    /// Finds the orbit at `target`.
     ///
     /// # Errors
-    /// Why there is none.
+    /// The reason why there is none.
     pub(crate) fn step(&mut self, target: f64, control: &Control<'_>) -> Result<Stepped, Error> {
         let start = self.last.as_ref().map_or(target, |(gap, _)| *gap);
         let whole = target - start;
@@ -197,7 +198,7 @@ impl<'a> HeldWalk<'a> {
         }
     }
 
-    /// What was found at another distance, with the amplitude of this one.
+    /// Scales the orbit of another distance to the amplitude at this one.
     fn resized(&self, (there, found): &(f64, Driven), gap: f64) -> Driven {
         let share = self.held(gap).amplitude / self.held(*there).amplitude;
         let mut driven = found.clone();

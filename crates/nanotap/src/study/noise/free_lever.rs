@@ -1,4 +1,5 @@
-//! Thermal motion of the free lever: its spectrum, and what the usual calibrations make of it.
+//! Thermal motion of the free lever: its spectrum, and the spring constants by the usual
+//! calibrations.
 
 use nalgebra::{DMatrix, DVector};
 use schemars::JsonSchema;
@@ -20,18 +21,18 @@ const AIR: Fluid = Fluid {
 /// with its static calibration (Butt and Jaschke, Nanotechnology 6, 1, 1995).
 const OPTICAL: f64 = 0.817;
 
-/// What calibrations of the spring constant would give from the free lever's thermal motion, in N/m.
+/// Spring constants that the usual calibrations give from the free lever's thermal motion, N/m.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct Calibrations {
-    /// The spring constant of the case, static at the tip.
+    /// Spring constant of the case, static at the tip, N/m.
     pub k: f64,
-    /// The thermal method: from the first mode's peak, read by an optical lever that was calibrated
-    /// against a hard surface, with the factor 0.817 of a uniform beam.
+    /// Spring constant by the thermal method, N/m: from the first mode's peak, read by an optical
+    /// lever that was calibrated against a hard surface, with the factor 0.817 of a uniform beam.
     pub thermal: f64,
-    /// The same without this factor.
+    /// Spring constant by the thermal method without this factor, N/m.
     pub thermal_without_factor: f64,
-    /// Sader's method from width, length, f0 and Q in air, if the dimensions are known and no other fluid
-    /// is given.
+    /// Spring constant by Sader's method from width, length, f0 and Q in air, N/m; None if the
+    /// dimensions are unknown or another fluid is given.
     pub sader: Option<f64>,
 }
 
@@ -52,7 +53,7 @@ struct Resonance {
 }
 
 impl Thermal {
-    /// The resonances, in ascending order.
+    /// Returns the resonances of the free lever, in ascending order.
     fn resonances(&self) -> Vec<Resonance> {
         let [mass, stiffness, damping] = [
             &self.equations.mass,
@@ -80,7 +81,7 @@ impl Thermal {
         found
     }
 
-    /// What calibrations would give.
+    /// Computes the spring constants that the usual calibrations give; None without a resonance.
     pub(super) fn calibrations(&self, view: &Physical) -> Option<Calibrations> {
         let first = self.resonances().into_iter().next()?;
         let scales = &view.scales;
@@ -151,12 +152,12 @@ impl Thermal {
     }
 }
 
-/// vᵀ A v.
+/// Returns the quadratic form vᵀ A v.
 fn product(matrix: &DMatrix<f64>, vector: &DVector<f64>) -> f64 {
     vector.dot(&(matrix * vector))
 }
 
-/// The spectrum as CSV.
+/// Formats the spectrum as CSV, with frequency in Hz and density in m²/Hz.
 pub fn spectrum_csv(spectrum: &ThermalSpectrum) -> String {
     use crate::number::shortest;
     let mut csv = String::from("frequency (Hz),density (m^2/Hz)\n");

@@ -18,13 +18,13 @@ use crate::model::Model;
 use crate::model::stepper::Stepper;
 use crate::study::orbit::OrbitReport;
 
-/// Instants in a drive period at least.
+/// Smallest number of instants in a drive period.
 const STEPS: usize = 128;
 /// Instants in a period of the fastest mode.
 const STEPS_OF_FASTEST: f64 = 32.0;
-/// Instants in a drive period at most.
+/// Largest number of instants in a drive period.
 const MOST_STEPS: usize = 20_000;
-/// Size of a disturbance over that of the motion.
+/// Size of a disturbance for finite differences, relative to that of the motion.
 const DISTURBANCE: f64 = 1e-5;
 /// Doublings of the time over which covariance is gathered: 2⁶⁰ periods.
 const DOUBLINGS: usize = 60;
@@ -38,16 +38,16 @@ const LOWEST: f64 = 0.02;
 /// half the frequency of the orbit. Their integrals are the squares of the noise.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct ReadingSpectrum {
-    /// Distance from the drive's frequency in Hz.
+    /// Distances from the drive's frequency, Hz.
     pub frequency: Vec<f64>,
-    /// Density of the amplitude in m²/Hz.
+    /// Density of the amplitude at these frequencies, m²/Hz.
     pub amplitude: Vec<f64>,
-    /// Density of the phase in degrees²/Hz.
+    /// Density of the phase at these frequencies, degrees²/Hz.
     pub phase: Vec<f64>,
 }
 
 impl ReadingSpectrum {
-    /// The same in SI, with these units of length and time.
+    /// Converts the spectrum to SI, with these units of length and time.
     pub(super) fn in_si(&self, length: f64, time: f64) -> Self {
         let scaled = |values: &[f64], by: f64| values.iter().map(|value| by * value).collect();
         Self {
@@ -66,7 +66,7 @@ pub(super) struct LockIn {
 }
 
 impl LockIn {
-    /// Its noise bandwidth.
+    /// Returns the noise bandwidth of the filter, in the model's unit of frequency (1/time).
     pub(super) fn bandwidth(self) -> f64 {
         0.25 / self.time_constant
     }
@@ -74,11 +74,12 @@ impl LockIn {
 
 /// One period of an orbit, linearised.
 pub(super) struct Linearised {
-    /// What multiplies a disturbance of the state, and of the lock-in amplifier's two parts.
+    /// Matrix that multiplies a disturbance of the state and of the lock-in amplifier's two
+    /// components.
     factor: DMatrix<f64>,
-    /// The covariance that the period adds.
+    /// Covariance that the period adds.
     added: DMatrix<f64>,
-    /// What the lock-in amplifier reads without noise.
+    /// Reading of the lock-in amplifier without noise, as a complex amplitude in model units.
     pub(super) read: Complex<f64>,
     /// Length of the orbit in the model's unit of time.
     duration: f64,

@@ -40,11 +40,11 @@ pub const BOLTZMANN: f64 = 1.380_649e-23;
 /// Thermal noise at a working point. All quantities are in SI.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct NoiseReport {
-    /// Temperature in K.
+    /// Temperature of the lever and its surroundings, K.
     pub temperature: f64,
     /// Time constant of the lock-in amplifier's first-order filter in s.
     pub time_constant: f64,
-    /// Its noise bandwidth in Hz, 1 over four time constants.
+    /// Noise bandwidth of this filter in Hz, 1 over four time constants.
     pub bandwidth: f64,
     /// Root mean square of the tip deflection of the lever alone, without a drive, in m.
     pub thermal_rms: f64,
@@ -59,25 +59,26 @@ pub struct NoiseReport {
     pub phase: f64,
     /// Root mean square of the noise of this phase in degrees.
     pub phase_rms: f64,
-    /// Drive frequency in Hz.
+    /// Frequency of the drive, Hz.
     pub frequency: f64,
     /// Root mean square of the noise with which frequency modulation reads the frequency at this
     /// working point, in the bandwidth, while it holds the amplitude and the phase, in Hz.
     pub frequency_rms: f64,
-    /// The same as `amplitude_rms` of the free lever under the same drive, in m.
+    /// Root mean square of the noise of the amplitude of the free lever under the same drive, m.
     pub free_amplitude_rms: f64,
-    /// The same of its phase, in degrees.
+    /// Root mean square of the noise of the phase of the free lever under the same drive, degrees.
     pub free_phase_rms: f64,
     /// Root mean square of the noise with which frequency modulation reads the free lever's frequency,
     /// in the bandwidth and at the amplitude of this drive, in Hz.
     pub free_frequency_rms: f64,
-    /// Force gradient in N/m that turns the phase of the free lever by its noise.
+    /// Force gradient that shifts the phase of the free lever by the root mean square of its noise,
+    /// N/m.
     pub force_gradient_min: f64,
     /// The unstable orbit on the boundary of the basin, if one was found.
     pub saddle: Option<SaddleDistance>,
     /// Spectrum of the noise that the lock-in amplifier reads.
     pub reading_spectrum: ReadingSpectrum,
-    /// What calibrations of the spring constant would give.
+    /// Spring constants that the usual calibrations would give.
     pub calibrations: Option<Calibrations>,
     /// Thermal spectrum of the free lever.
     pub spectrum: ThermalSpectrum,
@@ -108,7 +109,7 @@ const SLOW_PERIODS: f64 = 1e5;
 const TIME_CONSTANT: f64 = 0.25e-3;
 
 impl NoiseOptions {
-    /// The time constant in s.
+    /// Returns the time constant of the filter, s.
     fn time_constant(&self) -> Result<f64, Error> {
         let positive = |option, kind: Kind, amount: &Amount| {
             let value = kind.parse(amount.text());
@@ -136,7 +137,7 @@ impl NoiseOptions {
     }
 }
 
-/// Thermal noise.
+/// Study of thermal noise at a working point.
 ///
 /// ```
 /// use nanotap::case::Case;
@@ -244,7 +245,7 @@ impl Study for NoiseStudy {
     }
 }
 
-/// The same lever under the same drive, so far from the sample that it never touches.
+/// Returns the same lever under the same drive, so far from the sample that it never touches.
 fn free(lever: &Cantilever) -> Case {
     let mut free = lever.clone();
     free.law = None;
@@ -255,18 +256,18 @@ fn free(lever: &Cantilever) -> Case {
 /// The lever's equations with the thermal force on them, in the model's units.
 struct Thermal {
     equations: Galerkin,
-    /// k_B T.
+    /// Thermal energy k_B T, model units.
     energy: f64,
     /// Mode shapes at the tip.
     tip: DVector<f64>,
 }
 
-/// What a lock-in amplifier reads.
+/// Readings of a lock-in amplifier and their noise, in model units.
 struct Reading {
     model: Model,
     orbit: OrbitReport,
     amplitude_rms: f64,
-    /// Radians.
+    /// Root mean square of the noise of the phase, rad.
     phase_rms: f64,
     /// Covariance of the continuous entries of the state.
     covariance: DMatrix<f64>,

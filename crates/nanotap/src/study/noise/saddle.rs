@@ -34,7 +34,7 @@ const BEYOND: f64 = 2.0;
 /// The unstable orbit that the noise reaches first on its way to another state.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct SaddleDistance {
-    /// Distance of the boundary of the basin in standard deviations of the noise.
+    /// Distance of the boundary of the basin in standard deviations of the noise, dimensionless.
     pub deviations: f64,
     /// Amplitude of the unstable orbit in m.
     #[serde(rename = "A")]
@@ -43,7 +43,7 @@ pub struct SaddleDistance {
     pub phase: f64,
 }
 
-/// The nearest saddle to an orbit with this state at drive phase 0 and the covariance of its
+/// Finds the nearest saddle to an orbit with this state at drive phase 0 and the covariance of its
 /// continuous entries; amplitudes are multiplied by `length`.
 pub(super) fn nearest(
     case: &Case,
@@ -87,7 +87,8 @@ pub(super) fn nearest(
     Ok(nearest)
 }
 
-/// The saddles at the case's own distance on the branch of an orbit, which turns back at its folds.
+/// Finds the saddles at the case's own distance on the branch of an orbit, which turns back at its
+/// folds.
 fn beyond_folds(
     case: &Case,
     model: &Model,
@@ -129,7 +130,7 @@ fn beyond_folds(
     found
 }
 
-/// The left eigenvector of the unstable multiplier of a saddle, of the continuous entries.
+/// Returns the left eigenvector of the unstable multiplier of a saddle, for the continuous entries.
 fn normal(model: &Model, saddle: &PeriodicOrbit) -> Option<DVector<f64>> {
     let multiplier = saddle
         .multipliers

@@ -26,19 +26,20 @@ pub struct ProofReport {
     pub theorem: Option<TheoremReport>,
 }
 
-/// A theorem's numbers. An interval is its lower and its upper bound, both exact.
+/// The enclosures of a theorem, in model units. An interval is its lower and its upper bound, both
+/// exact.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct TheoremReport {
     /// Minimal period in drive periods.
     pub period: usize,
-    /// State at drive phase 0, entry by entry.
+    /// State at drive phase 0 in model units, an interval for each entry.
     pub state: Vec<[f64; 2]>,
-    /// When contact begins and ends.
+    /// Switches between flight and contact in the period, in order of time.
     pub switches: Vec<SwitchReport>,
     /// Neighbourhood without another orbit of the same contacts.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub unique_within: Option<UniqueWithin>,
-    /// Discs that hold the multipliers.
+    /// Discs in the complex plane that contain the multipliers.
     pub multipliers: Vec<DiscReport>,
     /// Proved stability: stable, unstable or undecided.
     pub stability: &'static str,
@@ -47,27 +48,29 @@ pub struct TheoremReport {
 /// A switch between flight and contact.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct SwitchReport {
-    /// Time from drive phase 0 on.
+    /// Interval of the time of the switch, counted from drive phase 0, model units.
     pub time: [f64; 2],
-    /// Whether contact begins or ends; an impact on a rigid stop begins one that lasts no time.
+    /// True if contact begins, false if it ends; an impact on a rigid stop begins one that lasts no
+    /// time.
     pub begins: bool,
 }
 
-/// No other orbit of the same period and contacts has every switch so near.
+/// Neighbourhood of the orbit without another one: no other orbit of the same period and contacts
+/// has all its switches within these differences.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct UniqueWithin {
-    /// Difference of the time of every switch.
+    /// Largest difference of the time of every switch, model units.
     pub time: f64,
-    /// Difference of each entry of the state at every switch.
+    /// Largest difference of each entry of the state at every switch, model units.
     pub state: Vec<f64>,
 }
 
-/// A disc of complex numbers.
+/// A disc of complex numbers that contains multipliers.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct DiscReport {
-    /// Its centre: real and imaginary part.
+    /// Centre of the disc: real and imaginary part, dimensionless.
     pub center: [f64; 2],
-    /// Its radius.
+    /// Radius of the disc, dimensionless.
     pub radius: f64,
     /// How many multipliers it holds.
     pub count: usize,

@@ -22,7 +22,7 @@ pub enum NotProved {
     /// The case has no equations in intervals.
     #[error(transparent)]
     Equations(#[from] EnclosureError),
-    /// The test failed.
+    /// The test of the proof failed, for the reason given.
     #[error(transparent)]
     Test(#[from] ProofError),
 }
@@ -31,12 +31,12 @@ pub enum NotProved {
 #[derive(Debug)]
 pub struct Prover {
     system: Result<System, EnclosureError>,
-    /// The numbers that a theorem is about.
+    /// Parameters of the case with which a theorem begins, as text.
     about: String,
 }
 
 impl Prover {
-    /// Of a case.
+    /// Creates the prover for a case, whose equations may have no intervals.
     pub fn new(case: &Case) -> Self {
         let (system, about) = match (case.cantilever(), case.oscillator()) {
             (Some(cantilever), _) => (enclosed(cantilever), about(cantilever)),
@@ -62,7 +62,8 @@ impl Prover {
         Ok(prove(system, &candidate(trajectory, period))?)
     }
 
-    /// The same as a report.
+    /// Proves one orbit of this period and returns the theorem, or the reason why it failed, as a
+    /// report.
     pub fn report(&self, orbit: &Recording, period: usize) -> ProofReport {
         match self.theorem(orbit, period) {
             Ok(theorem) => ProofReport {
@@ -102,7 +103,7 @@ pub fn candidate(trajectory: &Trajectory, period: usize) -> Candidate {
     }
 }
 
-/// What is proved of an orbit's stability, in a word.
+/// Returns the proved stability of an orbit in a word: stable, unstable or undecided.
 fn stability(theorem: &Theorem) -> &'static str {
     match theorem.multipliers.stability() {
         Stability::Stable => "stable",
@@ -143,7 +144,7 @@ fn about_oscillator(oscillator: &Oscillator) -> String {
     numbers.join(", ")
 }
 
-/// The theorem in words.
+/// Returns the theorem as a sentence.
 fn statement(theorem: &Theorem, about: &str) -> String {
     let radius = |interval: &Interval| interval.radius();
     let largest = |all: &mut dyn Iterator<Item = f64>| all.fold(0.0, f64::max);

@@ -22,7 +22,7 @@ use super::smooth::Smooth;
 use crate::Error;
 use crate::control::Control;
 
-/// Passes, the harmonic one first.
+/// Number of passes; the first one takes the motion as sinusoidal.
 pub(super) const PASSES: usize = 8;
 /// Passes from which on the nodes stay and the penalty is adapted, and motions are averaged with
 /// those before.
@@ -32,36 +32,37 @@ const AVERAGED: usize = 3;
 const WINDOW: usize = 6;
 /// Part of the mean squared curvature that is added to the local one.
 const BACKGROUND: f64 = 0.1;
-/// Part of the way that a row's values move in a pass.
+/// Fraction of its change by which a row's values move in a pass.
 const MOVE: f64 = 0.6;
 
-/// A measured row.
+/// Measured values of a row, in SI or model units.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Measured {
-    /// Distance at rest.
+    /// Distance of the tip at rest from the sample, m or model units.
     pub(super) distance: f64,
-    /// What the method measures.
+    /// Measured values: amplitude (m) and phase (degrees), or relative frequency shift and
+    /// dissipated energy (J).
     pub(super) values: [f64; 2],
-    /// Standard errors.
+    /// Standard errors of `values`, in the same units.
     pub(super) errors: [f64; 2],
     /// Whether the sample is felt, so that the force there is to be resolved.
     pub(super) informative: bool,
 }
 
-/// Rows, and how they were measured.
+/// Measured rows with the method of measurement.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Inversion<'a> {
     pub(super) rows: &'a [Measured],
     pub(super) method: &'a Method,
-    /// Displacement of the tip a unit of force, of the harmonics 0, 1, ….
+    /// Displacements of the tip by a unit of force, m/N or model units, for the harmonics 0, 1, ….
     pub(super) gains: &'a [Complex],
     /// Whether the second value was measured.
     pub(super) has_damping: bool,
-    /// Upper limit of the spacing of the nodes.
+    /// Upper limit of the spacing of the nodes, m or model units.
     pub(super) widest: f64,
 }
 
-/// Force and damping, and what they say of each row.
+/// Force and damping, with the values that follow from them for each row.
 #[derive(Clone, Debug)]
 pub(super) struct Inverted {
     pub(super) nodes: Nodes,
@@ -71,13 +72,13 @@ pub(super) struct Inverted {
 }
 
 impl Inverted {
-    /// The resolved distances, from and to.
+    /// Returns the ends of the range of distances that is resolved, m or model units.
     pub(super) fn range(&self) -> [f64; 2] {
         let even = super::report::even_nodes(&self.nodes.0);
         [self.nodes.0[1], self.nodes.0[even - 1]]
     }
 
-    /// The force at a distance, with its standard error.
+    /// Returns the force at a distance and its standard error, N or model units.
     pub(super) fn force_at(&self, x: f64) -> [f64; 2] {
         let (at, upper) = self.nodes.place(x);
         let mut weights = vec![0.0; self.nodes.0.len()];
@@ -88,20 +89,20 @@ impl Inverted {
     }
 }
 
-/// What force and damping say of a row.
+/// Values of a row that follow from force and damping.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct InvertedRow {
-    /// Closest approach.
+    /// Closest approach of the tip to the sample, m or model units; negative inside the sample.
     pub(super) closest: f64,
-    /// Amplitude of the tip.
+    /// Amplitude of the tip's first harmonic, m or model units.
     pub(super) amplitude: f64,
-    /// Dissipated energy a period, with its standard error.
+    /// Energy dissipated in a period and its standard error, J or model units.
     pub(super) dissipated: [f64; 2],
     /// Residual of the conservative part in standard errors.
     pub(super) residual: f64,
 }
 
-/// A row at its estimated values.
+/// Estimated values of a row, with what follows from them.
 #[derive(Clone, Copy, Debug)]
 struct Estimate {
     values: [f64; 2],
@@ -110,7 +111,7 @@ struct Estimate {
     conservative_by: [f64; 2],
     work_by: [f64; 2],
     amplitude_by: [f64; 2],
-    /// Mean deflection.
+    /// Mean deflection of the tip, m or model units.
     mean: f64,
     /// Derivative of the conservative part by the distance, in the known force.
     slope: f64,
@@ -293,7 +294,7 @@ impl Inversion<'_> {
         Nodes::new(low, fine, far.fold(fine, f64::max), self.widest)
     }
 
-    /// Each row's conservative part at its measured values, with its standard error.
+    /// Returns the conservative part of each row at its measured values, with its standard error.
     fn observed(&self, rows: &[Estimate]) -> Vec<[f64; 2]> {
         let both = rows.iter().zip(self.rows);
         both.map(|(estimate, row)| {
@@ -305,7 +306,7 @@ impl Inversion<'_> {
         .collect()
     }
 
-    /// The damping.
+    /// Solves for the damping, with the force known.
     fn solve_damping(
         &self,
         rows: &[Estimate],
@@ -327,7 +328,7 @@ impl Inversion<'_> {
         Smooth::of(&matrix, &values, &errors, &nodes.roughness())
     }
 
-    /// Mean deflections, slopes and values of the rows for the next pass.
+    /// Updates mean deflections, slopes and values of the rows for the next pass.
     fn advance(
         &self,
         pass: usize,
@@ -356,7 +357,7 @@ impl Inversion<'_> {
     }
 }
 
-/// What a row measures of a sinusoidal motion.
+/// Returns the weights of force and damping in what a row measures of a sinusoidal motion.
 fn sinusoidal(nodes: &Nodes, row: &Estimate) -> Weights {
     let (closest, amplitude) = (row.closest, row.at.amplitude);
     let zeros = vec![0.0; nodes.unknowns()];
@@ -401,7 +402,7 @@ fn adapt(roughness: &mut DMatrix<f64>, force: &[f64]) {
     }
 }
 
-/// The force of the conservative parts that the known damping leaves.
+/// Solves for the force, from the conservative parts less the share of the known damping.
 fn solve_force(
     observed: &[[f64; 2]],
     weights: &[Weights],

@@ -21,42 +21,43 @@ use crate::study::frequency_modulation::{FreeOscillation, Held};
 pub(super) struct Lever {
     cantilever: Cantilever,
     scales: Option<Scales>,
-    /// Response of the tip's deflection to a unit of the base's motion, if the base is driven.
+    /// Response of the tip's deflection to the base's motion, dimensionless; None unless the base
+    /// is driven.
     base: Option<Complex>,
     /// Phase of the free deflection behind the drive, degrees.
     pub(super) free_phase: f64,
-    /// Free amplitude that the case states.
+    /// Free amplitude that the case states, m or model units.
     pub(super) free_amplitude: f64,
 }
 
-/// First harmonic of the force, and the tip's amplitude.
+/// First harmonic of the force and amplitude of the tip, in SI or model units.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct FirstHarmonic {
-    /// (1/π) ∮ F cos θ dθ, where the tip's first harmonic is cos θ.
+    /// (1/π) ∮ F cos θ dθ, N or model units, where the tip's first harmonic is cos θ.
     pub(super) conservative: f64,
-    /// Work of the first harmonic on the tip's first harmonic, a ∮ F sin θ dθ.
+    /// Work of the first harmonic on the tip's first harmonic, a ∮ F sin θ dθ, J or model units.
     pub(super) work: f64,
-    /// Amplitude of the tip's first harmonic, a driven base's motion included.
+    /// Amplitude of the tip's first harmonic, m or model units, a driven base's motion included.
     pub(super) amplitude: f64,
 }
 
-/// What a row's two measured values say.
+/// Relation between a row's two measured values and the first harmonic of the force.
 #[derive(Clone, Debug)]
 pub(super) enum Method {
     /// Amplitude and phase (degrees) at a constant drive.
     Amplitude {
-        /// Free deflection.
+        /// Deflection of the free lever, m or model units; its argument is minus the phase lag.
         free: Complex,
-        /// Motion of the base.
+        /// Amplitude of the driven base, m or model units; 0 if the base is at rest.
         base: f64,
-        /// Displacement a unit of force at the drive's frequency.
+        /// Displacement by a unit of force at the frequency of the drive, m/N or model units.
         gain: Complex,
     },
     /// Relative frequency shift and dissipated energy at a constant amplitude.
     Frequency {
-        /// Stiffness by which the frequency responds.
+        /// Stiffness by which force changes frequency, N/m or model units.
         stiffness: f64,
-        /// Amplitude of the tip.
+        /// Amplitude of the tip, m or model units.
         amplitude: f64,
     },
 }
@@ -117,7 +118,7 @@ impl Lever {
         self.scales.map_or(1.0, |scales| scales.length)
     }
 
-    /// Angular frequency of the drive, in rad/s or the model's unit.
+    /// Returns the angular frequency of the drive, rad/s or model units.
     pub(super) fn angular_frequency(&self) -> f64 {
         self.angular(self.cantilever.omega)
     }
@@ -126,8 +127,8 @@ impl Lever {
         omega / self.scales.map_or(1.0, |scales| scales.time)
     }
 
-    /// Displacement of the tip a unit of force at these multiples of a frequency, in the model's
-    /// unit.
+    /// Returns the displacements of the tip by a unit of force, m/N or model units, at the
+    /// multiples 0, 1, … of the frequency `omega` (model units).
     fn gains(&self, omega: f64) -> Result<Vec<Complex>, Error> {
         let driven = Cantilever {
             actuation: Actuation::Tip,
@@ -200,10 +201,10 @@ impl Lever {
 /// The free lever in the loop of frequency modulation.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct FreeLoop {
-    /// Frequency.
+    /// Frequency, Hz or model units.
     pub(super) frequency: f64,
-    /// The same in rad per unit of time.
+    /// Angular frequency, rad/s or model units.
     pub(super) angular_frequency: f64,
-    /// Energy lost in a period.
+    /// Energy lost in a period, J or model units.
     pub(super) loss: f64,
 }

@@ -42,18 +42,20 @@ use lever::{Lever, Method};
 use nodes::Kernel;
 use rows::{Excitation, Kind, Readings, floors};
 
-/// Fewest rows that feel the sample; fewer than [`FEW_ROWS`] are warned of.
+/// Fewest rows that feel the sample; below [`FEW_ROWS`] a warning is given.
 const MIN_ROWS: usize = 8;
 const FEW_ROWS: usize = 25;
-/// Greatest spacing of the nodes, in m; of a dimensionless case a part of the free amplitude.
+/// Greatest spacing of the nodes: in m, or for a dimensionless case as a fraction of the free
+/// amplitude.
 const WIDEST: [f64; 2] = [30e-12, 1.0 / 600.0];
-/// Part of the free amplitude, or of the largest shift, that tells whether a row feels the sample.
+/// Decrease of the amplitude, or frequency shift, above which a row feels the sample, as a fraction
+/// of the free amplitude or the largest shift.
 const FELT: f64 = 0.05;
 /// Fewest rows that feel the sample in a direction that is inverted alone.
 const ROWS_OF_A_WAY: usize = 15;
-/// A mean squared residual above this is reported.
+/// Mean squared residual, in standard errors, above which a warning is given.
 const WORST_CHI2: f64 = 4.0;
-/// Most rows of the inversion.
+/// Largest number of rows of the inversion.
 const MAX_ROWS: usize = 2000;
 
 /// Options of a reconstruction.
@@ -106,7 +108,7 @@ impl Default for ReconstructOptions {
     }
 }
 
-/// Reconstruction of force and dissipation.
+/// Study that reconstructs force and dissipation from measured curves.
 #[derive(Clone, Copy, Debug)]
 pub struct ReconstructStudy;
 
@@ -138,7 +140,7 @@ struct Prepared {
     free_rows: usize,
     errors: [f64; 2],
     widest: f64,
-    /// Angular frequency of the drive, in the unit of the damping.
+    /// Angular frequency of the drive, rad/s or model units.
     angular_frequency: f64,
     remarks: Vec<String>,
 }
@@ -368,8 +370,8 @@ impl Prepared {
         .run(control)
     }
 
-    /// Approach and retract alone, if both have enough rows and their forces differ by more than
-    /// three standard errors.
+    /// Inverts approach and retract separately, if both have enough rows and their forces differ by
+    /// more than three standard errors.
     fn ways(&self, control: &Control<'_>) -> Result<Vec<WayCurve>, Error> {
         let both = [Way::Approach, Way::Retract];
         let felt = |way: Way| {
@@ -415,7 +417,7 @@ impl Prepared {
         Ok(curves.collect())
     }
 
-    /// Force and dissipation from the closest approach outwards.
+    /// Returns force and dissipation from the closest approach outwards.
     fn curve(&self, inverted: &Inverted) -> ForceCurve {
         let nodes = &inverted.nodes;
         let (force, damping) = (&inverted.force, &inverted.damping);
@@ -590,7 +592,7 @@ fn inflections(table: &ForceCurve, closest: f64, amplitude: f64) -> Vec<Inflecti
     found
 }
 
-/// The most attractive force, where it is larger than its standard error.
+/// Returns the most attractive force, if it is larger than its standard error.
 fn minimum(table: &ForceCurve) -> Option<ForceMinimum> {
     let least =
         (0..table.force.len()).min_by(|a, b| table.force[*a].total_cmp(&table.force[*b]))?;
@@ -602,14 +604,14 @@ fn minimum(table: &ForceCurve) -> Option<ForceMinimum> {
     })
 }
 
-/// Whether the dissipation is above three standard errors somewhere.
+/// Returns whether the dissipation is above three standard errors somewhere.
 fn damped(table: &ForceCurve) -> bool {
     let both = table.dissipation.iter().zip(&table.dissipation_error);
     both.into_iter()
         .any(|(value, error)| *error > 0.0 && *value > 3.0 * error)
 }
 
-/// Averages of long curves.
+/// Averages curves that are longer than `rows`, and adds a remark.
 fn averaged(
     readings: Readings,
     rows: usize,
@@ -635,7 +637,7 @@ fn averaged(
     Ok(readings)
 }
 
-/// A length in m, or a plain number of a dimensionless case.
+/// Parses a length: in m, or a plain number for a dimensionless case.
 fn length_of(case: &Case, amount: &Amount) -> Result<f64, Error> {
     let value = if case.is_physical() {
         Quantity::Length
@@ -683,7 +685,7 @@ fn errors(
     Ok(errors)
 }
 
-/// Rows for the inversion.
+/// Converts readings to rows for the inversion, with their standard errors.
 fn measured(
     readings: &Readings,
     errors: [f64; 2],

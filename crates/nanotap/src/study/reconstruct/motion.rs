@@ -7,7 +7,7 @@ use nanotap_flow::Complex;
 
 use super::nodes::Nodes;
 
-/// Phases of a period.
+/// Number of equidistant phases of a period at which the motion is known.
 const PHASES: usize = 900;
 /// Highest harmonic of the motion.
 pub(super) const HARMONICS: usize = 24;
@@ -53,20 +53,21 @@ pub(super) struct Motion {
     slope: Vec<f64>,
 }
 
-/// Weights of the coefficients of force and damping in what a row measures.
+/// Weights of the coefficients of force and damping in what a row measures: one vector each, an
+/// entry per coefficient.
 #[derive(Clone, Debug)]
 pub(super) struct Weights {
-    /// Of the force in C = (1/π) ∮ F cos θ dθ.
+    /// Weights of the force in C = (1/π) ∮ F cos θ dθ.
     pub(super) cosine: Vec<f64>,
-    /// Of the damping in C.
+    /// Weights of the damping in C.
     pub(super) cosine_damping: Vec<f64>,
-    /// Of the force in the work of the first harmonic, a ∮ F sin θ dθ.
+    /// Weights of the force in the work of the first harmonic, a ∮ F sin θ dθ.
     pub(super) work: Vec<f64>,
-    /// Of the damping in that work.
+    /// Weights of the damping in that work.
     pub(super) work_damping: Vec<f64>,
-    /// Of the force in its mean.
+    /// Weights of the force in its mean over a period.
     pub(super) mean: Vec<f64>,
-    /// Of the damping in the dissipated energy ∮ g d′² dθ.
+    /// Weights of the damping in the dissipated energy ∮ g d′² dθ.
     pub(super) dissipated: Vec<f64>,
 }
 
@@ -141,7 +142,7 @@ impl Known<'_> {
 }
 
 impl Motion {
-    /// Half way to another motion of the same row.
+    /// Moves the motion half of the way to another motion of the same row.
     pub(super) fn half_way(&mut self, other: &Self) {
         let mix = |own: &mut [f64], other: &[f64]| {
             for (own, other) in own.iter_mut().zip(other) {
@@ -152,12 +153,13 @@ impl Motion {
         mix(&mut self.slope, &other.slope);
     }
 
-    /// Closest approach.
+    /// Returns the closest approach of the tip to the sample, m or model units.
     pub(super) fn closest(&self) -> f64 {
         self.distance.iter().copied().fold(f64::INFINITY, f64::min)
     }
 
-    /// What the row measures, by quadrature over the phases.
+    /// Computes the weights of force and damping in what the row measures, by quadrature over the
+    /// phases.
     pub(super) fn weights(&self, harmonics: &Harmonics, nodes: &Nodes, amplitude: f64) -> Weights {
         let zeros = vec![0.0; nodes.0.len()];
         let mut weights = [const { Vec::new() }; 6].map(|_: Vec<f64>| zeros.clone());

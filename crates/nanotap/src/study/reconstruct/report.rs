@@ -1,4 +1,4 @@
-//! What a reconstruction found.
+//! Report of a reconstruction.
 
 use std::fmt::Write as _;
 
@@ -9,51 +9,53 @@ use crate::case::physical::quantity::JOULES_PER_ELECTRONVOLT;
 use crate::number::shortest;
 use crate::study::approach::Way;
 
-/// Force and dissipation from a measured curve. Values are in SI of a physical case, else in the
-/// model's units; phases in degrees.
+/// Force and dissipation from a measured curve. Values are in SI for a physical case, otherwise in
+/// model units; phases in degrees.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 pub struct ReconstructReport {
-    /// How the curve was measured.
+    /// Method by which the curve was measured.
     pub method: ReconstructMethod,
-    /// Whether values are in SI.
+    /// Whether values are in SI: true for a physical case.
     pub physical: bool,
     /// Force and dissipation against distance.
     pub table: ForceCurve,
-    /// The most attractive force.
+    /// Lowest force of `table`; missing unless it is attractive by more than its standard error.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub minimum: Option<ForceMinimum>,
-    /// Closest approach of all rows.
+    /// Closest approach of all rows, m or model units; negative inside the sample.
     pub closest: f64,
-    /// Whether the damping is larger than its standard error somewhere.
+    /// Whether the dissipation is above three standard errors somewhere.
     pub has_damping: bool,
-    /// Free amplitude: of the tip's deflection, or in frequency modulation of the tip.
+    /// Free amplitude, m or model units: of the tip's deflection, or in frequency modulation of the
+    /// tip.
     pub free_amplitude: f64,
     /// Free phase as measured, in degrees; in frequency modulation the phase that is held.
     pub free_phase: f64,
-    /// Rows from which the free level is known; 0 where it was given or is the case's.
+    /// Number of rows from which the free level is known; 0 if it was given or is the case's.
     pub free_rows: usize,
-    /// Standard errors of a row's two values: amplitude and phase in degrees, or relative frequency
-    /// shift and energy.
+    /// Standard errors of a row's two values: amplitude (m or model units) and phase (degrees), or
+    /// relative frequency shift and energy (J or model units).
     pub errors: [f64; 2],
     /// Effective number of parameters of the force.
     pub freedom: f64,
-    /// Mean squared residual of the rows in standard errors.
+    /// Mean squared residual of the rows in standard errors, dimensionless.
     pub chi2: f64,
     /// The rows, or averages of several.
     pub rows: Vec<ReconstructedRow>,
-    /// Approach and retract alone, where they differ by more than three standard errors.
+    /// Force from approach and retract separately, if they differ by more than three standard
+    /// errors.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub ways: Vec<WayCurve>,
     /// Inflection points at which the force is not determined by a curve of this amplitude.
     pub inflections: Vec<Inflection>,
-    /// The force by the formula of Sader and Jarvis, of frequency modulation.
+    /// Force by the formula of Sader and Jarvis; only in frequency modulation.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sader_jarvis: Option<PlainCurve>,
-    /// Assumptions and warnings.
+    /// Sentences on assumptions and on what makes the result doubtful.
     pub remarks: Vec<String>,
 }
 
-/// How a curve was measured.
+/// Method by which a curve was measured.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum ReconstructMethod {
@@ -63,58 +65,60 @@ pub enum ReconstructMethod {
     FrequencyModulation,
 }
 
-/// Force and dissipation at increasing distances: linear between them.
+/// Force and dissipation at increasing distances, linear between them. All vectors have the same
+/// length.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 pub struct ForceCurve {
-    /// Distance between tip and sample, the closest first.
+    /// Distances between tip and sample, m or model units, the closest first.
     pub distance: Vec<f64>,
-    /// Conservative force on the tip, positive when it pushes the tip away.
+    /// Conservative force on the tip, N or model units, positive when it pushes the tip away.
     pub force: Vec<f64>,
-    /// Its standard error.
+    /// Standard errors of the force, N or model units.
     pub force_error: Vec<f64>,
-    /// Energy that a sinusoidal oscillation with the free amplitude loses in a period when it comes
-    /// as near as this distance.
+    /// Energy that a sinusoidal oscillation with the free amplitude loses in a period when its
+    /// closest approach is this distance, J or model units.
     pub dissipation: Vec<f64>,
-    /// Its standard error.
+    /// Standard errors of the dissipation, J or model units.
     pub dissipation_error: Vec<f64>,
-    /// Coefficient of the force's part that is against the tip's velocity.
+    /// Damping coefficient of the force against the tip's velocity, N s/m or model units.
     pub damping: Vec<f64>,
-    /// Its standard error.
+    /// Standard errors of the damping coefficient, N s/m or model units.
     pub damping_error: Vec<f64>,
 }
 
-/// The most attractive force.
+/// The lowest force of a curve, which is attractive.
 #[derive(Clone, Copy, Debug, Serialize, Deserialize, JsonSchema)]
 pub struct ForceMinimum {
-    /// Force.
+    /// Lowest force, N or model units; negative.
     pub force: f64,
-    /// Its standard error.
+    /// Standard error of the lowest force, N or model units.
     pub force_error: f64,
-    /// Where it is.
+    /// Distance at which the force is lowest, m or model units.
     pub distance: f64,
 }
 
 /// A row, or the average of several.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 pub struct ReconstructedRow {
-    /// Its curve.
+    /// Name of the curve to which the row belongs.
     pub curve: String,
-    /// Its direction, where the data have one.
+    /// Direction of the row, if the data have one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub way: Option<Way>,
-    /// Line of its file, or row from 1; of several the first.
+    /// Line in the file, or number of the row from 1; for an average, of the first row.
     pub line: u64,
-    /// How many rows were averaged.
+    /// Number of rows that were averaged.
     pub count: usize,
-    /// Distance at rest.
+    /// Distance of the tip at rest from the sample, m or model units.
     pub distance: f64,
-    /// Closest approach.
+    /// Closest approach of the tip in the oscillation, m or model units; negative inside the
+    /// sample.
     pub closest: f64,
-    /// Amplitude of the tip, a driven base's motion included.
+    /// Amplitude of the tip, m or model units, a driven base's motion included.
     pub amplitude: f64,
-    /// Energy that the sample takes in a period.
+    /// Energy that the sample takes in a period, J or model units.
     pub dissipation: f64,
-    /// Its standard error.
+    /// Standard error of this energy, J or model units.
     pub dissipation_error: f64,
     /// Residual of the force's in-phase part, in standard errors.
     pub residual: f64,
@@ -123,11 +127,11 @@ pub struct ReconstructedRow {
 /// The force from one direction alone.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 pub struct WayCurve {
-    /// Which direction.
+    /// Direction of the rows that were used.
     pub way: Way,
-    /// Force and dissipation.
+    /// Force and dissipation from the rows in this direction.
     pub table: ForceCurve,
-    /// The most attractive force.
+    /// Lowest force of `table`; missing unless it is attractive by more than its standard error.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub minimum: Option<ForceMinimum>,
 }
@@ -135,27 +139,27 @@ pub struct WayCurve {
 /// An inflection point of the force that fails the test of Sader and others (2018).
 #[derive(Clone, Copy, Debug, Serialize, Deserialize, JsonSchema)]
 pub struct Inflection {
-    /// Where it is.
+    /// Distance of the inflection point, m or model units.
     pub distance: f64,
-    /// (d²/4) F‴/F′ with d counted from the closest approach: below −1 amplitudes exist for which
-    /// the force is not determined.
+    /// (d²/4) F‴/F′, dimensionless, with d counted from the closest approach: below −1 amplitudes
+    /// exist for which the force is not determined.
     pub factor: f64,
-    /// These amplitudes, from and to.
+    /// Smallest and largest of these amplitudes, m or model units.
     pub amplitudes: [f64; 2],
 }
 
-/// A force without errors.
+/// A force against distance without standard errors. Both vectors have the same length.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 pub struct PlainCurve {
-    /// Distance between tip and sample.
+    /// Distances between tip and sample at the closest approach, m or model units.
     pub distance: Vec<f64>,
-    /// Force.
+    /// Force on the tip, N or model units, positive when it pushes the tip away.
     pub force: Vec<f64>,
 }
 
 impl ReconstructReport {
-    /// How many rows of the table are worth showing: up to where the force has fallen to 3 % of
-    /// its largest value or to its standard error.
+    /// Returns how many rows of the table are worth showing: up to where the force has fallen to 3
+    /// % of its largest value or to its standard error.
     pub fn shown_rows(&self) -> usize {
         let table = &self.table;
         let even = even_nodes(&table.distance);
@@ -170,7 +174,8 @@ impl ReconstructReport {
         last.max(even).min(table.distance.len())
     }
 
-    /// The table as CSV, which `sample.law = "table"` reads.
+    /// Formats the table as CSV, which `sample.law = "table"` reads: in nm, nN, eV and N s/m, or in
+    /// model units.
     pub fn csv(&self) -> String {
         let (length, force, energy) = if self.physical {
             (
@@ -204,7 +209,7 @@ impl ReconstructReport {
     }
 }
 
-/// How many distances from the first on are evenly spaced.
+/// Returns how many distances from the first one on are evenly spaced.
 pub(super) fn even_nodes(distance: &[f64]) -> usize {
     let steps = distance.windows(2).map(|w| w[1] - w[0]);
     let first = steps.clone().next().unwrap_or(0.0);

@@ -1,5 +1,5 @@
-//! The rows of a measured curve: what counts of the columns, the free level, the noise, and
-//! averages of many rows.
+//! The rows of a measured curve: the columns that are used, the free level, the noise, and averages
+//! of many rows.
 
 use crate::Error;
 use crate::observe::table::shown_phase;
@@ -17,26 +17,26 @@ const FREE_RANGE: f64 = 0.01;
 /// Least standard errors: relative to the free amplitude or the largest shift, and in degrees.
 const FLOORS: [f64; 2] = [1e-4, 0.01];
 
-/// What the columns measure.
+/// Quantities that the columns contain.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Kind {
-    /// Amplitude and phase.
+    /// Amplitude and phase at a constant drive.
     Amplitude,
     /// Frequency shift, and perhaps the excitation.
     Frequency {
         /// Whether the shift is relative to the free frequency.
         relative: bool,
-        /// What the excitation is measured by.
+        /// Quantity by which the excitation is measured, if it is.
         excitation: Option<Excitation>,
     },
 }
 
-/// What the excitation of frequency modulation is measured by.
+/// Quantity by which the excitation of frequency modulation is measured.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Excitation {
     /// The drive's strength over that of the free lever.
     Ratio,
-    /// The dissipated energy.
+    /// Dissipated energy per period.
     Energy,
 }
 
@@ -47,12 +47,12 @@ pub(super) struct Reading {
     pub(super) way: Option<Way>,
     /// Line of the file, or row from 1.
     pub(super) line: u64,
-    /// How many rows it is the average of.
+    /// Number of rows that were averaged.
     pub(super) count: usize,
     pub(super) distance: f64,
     /// Amplitude and phase (degrees), or shift and excitation; NaN where not measured.
     pub(super) values: [f64; 2],
-    /// Standard errors, where they are given.
+    /// Standard errors of `values`, if they are given.
     pub(super) errors: [Option<f64>; 2],
 }
 
@@ -61,9 +61,9 @@ pub(super) struct Reading {
 pub(super) struct Readings {
     pub(super) kind: Kind,
     pub(super) rows: Vec<Reading>,
-    /// Names of the curves.
+    /// Names of the curves, by index.
     pub(super) curves: Vec<String>,
-    /// Rows without all values.
+    /// Number of rows that lack a value and are left out.
     pub(super) incomplete: usize,
 }
 
@@ -160,7 +160,8 @@ impl Readings {
             .chunk_by(|a, b| a.curve == b.curve && a.way == b.way)
     }
 
-    /// The level far from the sample: median amplitude and phase, and how many rows have it.
+    /// Returns the level far from the sample: median amplitude and phase, and the number of rows
+    /// with it.
     pub(super) fn free_level(&self) -> Option<FreeLevel> {
         let mut free: Vec<Reading> = Vec::new();
         for segment in self.segments() {
@@ -244,14 +245,14 @@ impl Readings {
     }
 }
 
-/// The level of the free rows.
+/// Amplitude and phase of the rows far from the sample.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct FreeLevel {
-    /// Amplitude.
+    /// Median amplitude, m or model units.
     pub(super) amplitude: f64,
-    /// Phase in degrees.
+    /// Median phase lag, degrees.
     pub(super) phase: f64,
-    /// How many rows have it.
+    /// Number of rows with this level.
     pub(super) rows: usize,
 }
 

@@ -15,13 +15,13 @@ const RIDGE: f64 = 1e-11;
 /// A smooth function that describes measured values.
 #[derive(Clone, Debug)]
 pub(super) struct Smooth {
-    /// Coefficients.
+    /// Coefficients of the function: its values at all nodes but the last, where it is zero.
     pub(super) coefficients: Vec<f64>,
-    /// Their covariance.
+    /// Covariance of the coefficients.
     pub(super) covariance: DMatrix<f64>,
     /// Effective number of parameters: trace of the hat matrix.
     pub(super) freedom: f64,
-    /// Mean squared residual in standard errors.
+    /// Mean squared residual in standard errors, dimensionless.
     pub(super) chi2: f64,
 }
 
@@ -33,11 +33,11 @@ struct Equations<'a> {
     projected: DVector<f64>,
     roughness: &'a DMatrix<f64>,
     penalty: DMatrix<f64>,
-    /// Weight at which both have the same trace.
+    /// Weight at which normal equations and penalty have the same trace.
     balanced: f64,
 }
 
-/// Solution at one weight.
+/// Solution at one weight of the penalty.
 struct Trial {
     coefficients: DVector<f64>,
     factor: Cholesky<f64, Dyn>,

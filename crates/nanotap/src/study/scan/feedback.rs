@@ -17,7 +17,8 @@ pub(super) struct LockIn {
 }
 
 impl LockIn {
-    /// With this part and number of stages, settled at `signal`.
+    /// Creates an amplifier with `order` stages that follow `part` of the difference in a period,
+    /// settled at `signal`.
     pub(super) fn new(part: f64, order: usize, signal: Complex) -> Self {
         Self {
             part,
@@ -36,7 +37,7 @@ impl LockIn {
     }
 }
 
-/// The time constant of a stage for a bandwidth at −3 dB of `order` stages.
+/// Returns the time constant of a stage, s, for a bandwidth at −3 dB of `order` stages, Hz.
 pub(super) fn time_constant(bandwidth: f64, order: usize) -> f64 {
     let stretch = nanotap_arithmetic::powf(2.0, 1.0 / order as f64) - 1.0;
     stretch.sqrt() / (TAU * bandwidth)
@@ -45,15 +46,15 @@ pub(super) fn time_constant(bandwidth: f64, order: usize) -> f64 {
 /// Gains and limits of the controller, lengths in m.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Gains {
-    /// Kp.
+    /// Proportional gain Kp, dimensionless: the command falls by Kp times the error.
     pub(super) proportional: f64,
-    /// Ki T: of one period.
+    /// Integral gain times the drive period, Ki T, dimensionless.
     pub(super) integral: f64,
-    /// Largest change of the command in a period.
+    /// Largest change of the command in a period, m.
     pub(super) slew: f64,
-    /// Lowest and highest command.
+    /// Lowest and highest command, m; infinite where there is no limit.
     pub(super) range: [f64; 2],
-    /// Periods by which the controller is late.
+    /// Number of drive periods by which the controller is late.
     pub(super) delay: usize,
 }
 
@@ -62,11 +63,11 @@ pub(super) struct Gains {
 pub(super) struct Controller {
     gains: Gains,
     start: f64,
-    /// The command of the present period.
+    /// Command of the present period, m.
     command: f64,
     sum: f64,
     late: VecDeque<f64>,
-    /// Periods whose command was limited by the range.
+    /// Number of periods whose command was limited by the range.
     pub(super) at_range: usize,
 }
 
@@ -82,7 +83,7 @@ impl Controller {
         }
     }
 
-    /// The command of the present period.
+    /// Returns the command of the present period, m.
     pub(super) const fn command(&self) -> f64 {
         self.command
     }

@@ -11,7 +11,7 @@ use super::plan::Plan;
 use super::quasi_static::SteadyLever;
 use crate::Error;
 
-/// Which force governs the motion of a drive period.
+/// Force that governs the motion of a drive period.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Interaction {
@@ -19,7 +19,7 @@ pub enum Interaction {
     Free,
     /// The component of the force in phase with the deflection attracts
     Attractive,
-    /// It repels
+    /// The component of the force in phase with the deflection repels
     Repulsive,
     /// The motion differs from period to period
     Irregular,
@@ -118,7 +118,7 @@ impl<'a> Instrument<'a> {
         }
     }
 
-    /// The same instrument, whose periods are exact from now on.
+    /// Returns the same instrument, whose periods are computed exactly from now on.
     ///
     /// # Errors
     /// When a case has no model.

@@ -26,26 +26,28 @@ use crate::study::moving_sample::{LinearSums, Readout, SampleMotion, moved_syste
 /// Signals of one drive period, in the model's units.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct PeriodSignals {
-    /// Complex amplitude of the deflection at the drive's frequency, counted from drive phase 0.
+    /// Complex amplitude of the deflection at the drive's frequency, with the phase relative to
+    /// drive phase 0.
     pub(super) deflection: Complex,
-    /// Complex amplitude of the force, counted likewise.
+    /// Complex amplitude of the force at the drive's frequency, with the phase relative to drive
+    /// phase 0.
     pub(super) force: Complex,
-    /// Mean force.
+    /// Mean force of the sample on the tip over the period, model units; positive if it repels.
     pub(super) mean_force: f64,
-    /// Mean deflection.
+    /// Mean deflection of the tip over the period, model units.
     pub(super) mean_deflection: f64,
-    /// Largest force, at least 0.
+    /// Largest force of the sample on the tip, model units, at least 0.
     pub(super) peak_force: f64,
-    /// Time in contact over the period.
+    /// Time in contact over the period, 0 to 1.
     pub(super) contact: f64,
-    /// Energy that the tip gives to the sample.
+    /// Energy that the tip gives to the sample in the period, model units.
     pub(super) dissipation: f64,
 }
 
-/// How drive periods are computed.
+/// Method by which drive periods are computed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Engine {
-    /// Exactly.
+    /// By the exact flow of the equations.
     Exact,
     /// Under a nonlinear law by the approximate flow for transients.
     Fast,
@@ -78,29 +80,29 @@ struct LinearLever {
     flow: Flow,
     sums: LinearSums,
     state: Vec<f64>,
-    /// Gap of the model.
+    /// Gap of the model, model units, from which its change is counted.
     gap: f64,
 }
 
-/// A nonlinear law, exactly.
+/// A lever under a nonlinear law, with the exact flow.
 #[derive(Clone, Debug)]
 struct NonlinearLever {
     flow: nanotap_volterra::Flow,
     law: LawState,
-    /// Offset of the gap at distance 0.
+    /// Offset of the gap at distance 0, model units.
     offset: f64,
 }
 
-/// A nonlinear law, approximately.
+/// A lever under a nonlinear law, with the approximate flow for transients.
 #[derive(Clone, Debug)]
 struct CoarseLever {
     flow: Coarse,
     law: LawState,
-    /// Gap of the model.
+    /// Gap of the model, model units, from which its change is counted.
     gap: f64,
 }
 
-/// What a step of the period needs of a nonlinear model.
+/// Properties of a nonlinear model that a step of one period uses.
 #[derive(Clone, Copy, Debug)]
 struct LawState {
     dimension: usize,
@@ -124,7 +126,7 @@ impl LawState {
 }
 
 impl Lever {
-    /// The lever of `case`.
+    /// Creates the lever of `case`.
     ///
     /// # Errors
     /// When the case has no model, a second tone, or a rigid sample.
@@ -196,7 +198,7 @@ impl Lever {
         })
     }
 
-    /// Whether the periods are exact.
+    /// Returns whether the periods are computed exactly.
     pub(super) const fn is_exact(&self) -> bool {
         !matches!(self.flow, LeverFlow::Coarse(_))
     }

@@ -361,7 +361,7 @@ fn numbers_of(line: Recorded, directions: usize, pixels: usize) -> Numbers {
     numbers
 }
 
-/// What was recorded of a line, from its numbers.
+/// Returns the record of a line from its numbers.
 fn line_of(numbers: &Numbers, line: usize, y: f64, directions: usize) -> Option<Recorded> {
     // The part of a variable that belongs to a direction.
     let part = |name: &str, direction: usize| {

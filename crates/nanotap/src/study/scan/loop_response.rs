@@ -32,7 +32,7 @@ const FREQUENCIES: usize = 300;
 struct SteadyMotion {
     gap: f64,
     signals: PeriodSignals,
-    /// Of state and deflection (re, im) by state and gap.
+    /// Jacobian of state and deflection (re, im) by state and gap, model units.
     derivative: DMatrix<f64>,
 }
 
@@ -209,7 +209,7 @@ struct LinearLoop<'a> {
     plan: &'a Plan,
     n: usize,
     derivative: &'a DMatrix<f64>,
-    /// Of the amplitude by the real and imaginary part of the lock-in's output.
+    /// Derivatives of the amplitude by the real and imaginary part of the lock-in's output.
     direction: [f64; 2],
     scanner: Option<[[f64; 2]; 2]>,
 }

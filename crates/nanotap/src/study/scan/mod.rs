@@ -265,7 +265,7 @@ fn warnings(
     warnings
 }
 
-/// What the image shows, in a sentence.
+/// Returns a sentence on what the image shows.
 fn verdict(mode: Mode, lines: &[LineStatistics], changes: &[report::BranchChange]) -> String {
     let nm = |length: f64| format!("{:.3} nm", 1e9 * length);
     let largest = changes

@@ -10,19 +10,19 @@ use crate::Error;
 use crate::case::Case;
 use crate::case::physical::Kind;
 
-/// Most drive periods of one line and direction.
+/// Largest number of drive periods of a line in one direction.
 pub const MAX_LINE_PERIODS: usize = 10_000_000;
-/// Most drive periods of a scan.
+/// Largest number of drive periods of a scan.
 pub const MAX_PERIODS: usize = 2_000_000_000;
-/// Most pixels of a line.
+/// Largest number of pixels of a line.
 pub const MAX_PIXELS: usize = 65_536;
-/// Most lines.
+/// Largest number of lines of a scan.
 pub const MAX_LINES: usize = 65_536;
-/// Most pixels of an image.
+/// Largest number of pixels of an image.
 pub const MAX_IMAGE: usize = 4_194_304;
-/// Most periods that are listed.
+/// Largest number of drive periods that are listed.
 pub const MAX_LISTED: usize = 100_000;
-/// Most features of a surface, and most materials.
+/// Largest number of features of a surface, and of materials.
 pub const MAX_FEATURES: usize = 10_000;
 
 /// A number in SI, or a text with a unit.
@@ -36,7 +36,7 @@ pub enum Quantity {
 }
 
 impl Quantity {
-    /// The value in SI.
+    /// Returns the value in SI.
     ///
     /// # Errors
     /// When the text is not a quantity of this kind, or the number is not finite.

@@ -19,52 +19,52 @@ use crate::case::key::Key;
 use crate::case::physical::{Kind, Physical};
 use crate::study::setpoint::at_setpoint;
 
-/// A scan, checked. Lengths in m, times in s.
+/// The checked options of a scan. Lengths in m, times in s.
 #[derive(Clone, Debug)]
 pub(super) struct Plan {
     pub(super) method: Method,
     pub(super) mode: Mode,
-    /// Periods to list, sorted.
+    /// Numbers of the drive periods to list, sorted, counted from the start of settling.
     pub(super) list: Vec<usize>,
     pub(super) size: [f64; 2],
     pub(super) lines: usize,
     pub(super) pixels: usize,
     pub(super) settle: usize,
-    /// Of a line in one direction.
+    /// Number of drive periods of a line in one direction.
     pub(super) periods: usize,
     pub(super) retrace: bool,
     pub(super) line_settle: Option<usize>,
-    /// Drive period.
+    /// Duration of a drive period, s.
     pub(super) period: f64,
     pub(super) free_amplitude: f64,
-    /// Setpoint over free amplitude.
+    /// Setpoint amplitude as a fraction of the free amplitude, 0 to 1.
     pub(super) setpoint: f64,
-    /// Ki in 1/s.
+    /// Integral gain Ki, 1/s.
     pub(super) integral_gain: f64,
     pub(super) gains: Gains,
     pub(super) z0: f64,
-    /// Time constant of a stage of the lock-in amplifier, and the number of stages.
+    /// Time constant of a stage of the lock-in amplifier, s, and the number of stages.
     pub(super) lock_in: (f64, usize),
-    /// Frequency and quality factor.
+    /// Resonance frequency, Hz, and quality factor of the z scanner; None if it is rigid.
     pub(super) z_scanner: Option<[f64; 2]>,
-    /// Threshold over free amplitude, and gain.
+    /// Threshold of the amplified error as a fraction of the free amplitude, and its gain.
     pub(super) dynamic: Option<[f64; 2]>,
     pub(super) surface: Surface,
     /// The case of each material, the case's own first.
     pub(super) materials: Vec<Case>,
     /// Stretches of the line with their material.
     pub(super) segments: Vec<(f64, f64, usize)>,
-    /// The model's unit of length, force and energy.
+    /// SI values of the model's units of length (m), force (N) and energy (J).
     pub(super) length_unit: f64,
     pub(super) force_unit: f64,
     pub(super) energy_unit: f64,
 }
 
-/// Settling periods where none are given: this many time constants of the lever.
+/// Number of time constants of the lever for which it settles, if no number of periods is given.
 const SETTLE_CONSTANTS: f64 = 20.0;
 
 impl Plan {
-    /// The plan of these options for a case.
+    /// Checks these options for a case.
     ///
     /// # Errors
     /// When an option or the case is not valid.
@@ -164,17 +164,18 @@ impl Plan {
         })
     }
 
-    /// Lines a second, trace and retrace together.
+    /// Returns the lines a second, trace and retrace together, Hz.
     pub(super) fn line_rate(&self) -> f64 {
         1.0 / (2.0 * self.periods as f64 * self.period)
     }
 
-    /// Speed of the tip along a line in m/s.
+    /// Returns the speed of the tip along a line, m/s.
     pub(super) fn speed(&self) -> f64 {
         self.size[0] / (self.periods as f64 * self.period)
     }
 
-    /// Part of the difference that a stage of the lock-in amplifier follows in a period.
+    /// Returns the fraction of the difference that a stage of the lock-in amplifier follows in a
+    /// period.
     pub(super) fn lock_in_part(&self) -> f64 {
         let (time_constant, _) = self.lock_in;
         if time_constant > 0.0 {
@@ -184,7 +185,7 @@ impl Plan {
         }
     }
 
-    /// The error that the controller takes in, of an error of the amplitude.
+    /// Returns the error that the controller receives for an error of the amplitude.
     pub(super) fn amplified(&self, amplitude: f64, error: f64) -> f64 {
         match self.dynamic {
             Some([threshold, gain]) => {
@@ -194,28 +195,28 @@ impl Plan {
         }
     }
 
-    /// Drive periods that belong to a line.
+    /// Returns the number of drive periods that belong to a line.
     pub(super) fn periods_per_line(&self) -> usize {
         self.periods * (1 + usize::from(self.retrace)) + self.line_settle.unwrap_or(0)
     }
 
-    /// Drive periods of the scan.
+    /// Returns the number of drive periods of the scan.
     pub(super) fn total_periods(&self) -> usize {
         self.settle + self.lines * self.periods_per_line()
     }
 
-    /// Position of a period along the line.
+    /// Returns the position of a period along the line, m.
     pub(super) fn position(&self, index: usize, retrace: bool) -> f64 {
         let part = (index as f64 + 0.5) / self.periods as f64;
         self.size[0] * if retrace { 1.0 - part } else { part }
     }
 
-    /// Position of a line across the lines.
+    /// Returns the position of a line across the lines, m.
     pub(super) fn line_position(&self, line: usize) -> f64 {
         (line as f64 + 0.5) * self.size[1] / self.lines as f64
     }
 
-    /// Pixel of a period of a line.
+    /// Returns the index of the pixel to which a period of a line belongs.
     pub(super) fn pixel(&self, index: usize, retrace: bool) -> usize {
         let pixel = (2 * index + 1) * self.pixels / (2 * self.periods);
         if retrace {
@@ -225,7 +226,7 @@ impl Plan {
         }
     }
 
-    /// Material at a position along the line.
+    /// Returns the index of the material at a position along the line.
     pub(super) fn material(&self, x: f64) -> usize {
         let here = |&&(from, to, _): &&(f64, f64, usize)| x >= from && x < to;
         self.segments
@@ -275,7 +276,7 @@ fn count(
     ))
 }
 
-/// Periods of a line in one direction.
+/// Returns the number of periods of a line in one direction.
 fn periods_of_line(options: &ScanOptions, frequency: f64, size: f64) -> Result<usize, Error> {
     let given = [
         options.periods.is_some(),
@@ -313,7 +314,7 @@ fn periods_of_line(options: &ScanOptions, frequency: f64, size: f64) -> Result<u
     ))
 }
 
-/// Setpoint over free amplitude.
+/// Returns the setpoint as a fraction of the free amplitude, from a number or a length.
 fn setpoint(options: &ScanOptions, view: &Physical) -> Result<f64, Error> {
     let given = match &options.setpoint {
         None => view
@@ -335,7 +336,8 @@ fn setpoint(options: &ScanOptions, view: &Physical) -> Result<f64, Error> {
     ))
 }
 
-/// The distance at which the amplitude of a lever that comes from far has fallen to the setpoint.
+/// Finds the distance at which the amplitude of a lever that approaches from far has fallen to the
+/// setpoint.
 fn found_distance(case: &Case, setpoint: f64, control: &Control<'_>) -> Result<f64, Error> {
     let words = [
         format!("drive.setpoint={setpoint:?}"),
@@ -408,7 +410,7 @@ fn gains(options: &ScanOptions, frequency: f64) -> Result<(f64, Gains), Error> {
     Ok((integral, gains))
 }
 
-/// A gain in 1/s from a text.
+/// Parses a gain in 1/s.
 fn per_second(text: &str) -> Result<f64, Error> {
     let text = text.trim();
     let unit = ["1/s", "/s", "s^-1"]

@@ -24,7 +24,7 @@ pub(super) struct Surface {
     image: Option<HeightImage>,
 }
 
-/// A feature in SI.
+/// A feature of the surface with lengths in m.
 #[derive(Clone, Copy, Debug)]
 enum Shape {
     Step {
@@ -222,13 +222,13 @@ impl Surface {
         })
     }
 
-    /// With sampled heights added.
+    /// Adds sampled heights to the surface.
     pub(super) fn with_samples(mut self, samples: Samples) -> Self {
         self.samples = Some(samples);
         self
     }
 
-    /// With the heights of an image added.
+    /// Adds the heights of an image to the surface.
     pub(super) fn with_image(mut self, image: HeightImage) -> Self {
         self.image = Some(image);
         self

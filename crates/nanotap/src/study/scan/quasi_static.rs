@@ -7,13 +7,14 @@ use std::collections::BTreeMap;
 use super::lever::{Lever, PeriodSignals};
 use crate::model::MotionError;
 
-/// Distances at which motions are kept, a free amplitude.
+/// Number of distances per free amplitude at which motions are stored.
 const DENSITY: f64 = 500.0;
-/// Most periods until a motion is taken as it is.
+/// Largest number of periods until a motion is taken as steady.
 const MAX_SETTLING: usize = 4000;
-/// Change of the deflection in a period at which a motion is steady, as a part of the free amplitude.
+/// Change of the deflection in a period below which a motion is steady, as a fraction of the free
+/// amplitude.
 const STEADY: f64 = 2e-6;
-/// Distances kept.
+/// Largest number of distances at which motions are stored.
 const MAX_KEPT: usize = 100_000;
 
 /// A lever that is steady at every distance, followed from the last.
@@ -22,7 +23,7 @@ pub(super) struct SteadyLever {
     lever: Lever,
     state: Vec<f64>,
     free_amplitude: f64,
-    /// Signals by the number of the distance, of the branch that the lever is on.
+    /// Signals on the branch of the lever, by the number of the distance.
     known: BTreeMap<i64, PeriodSignals>,
     at: i64,
 }

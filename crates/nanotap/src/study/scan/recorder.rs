@@ -1,4 +1,4 @@
-//! What is recorded of a line: its statistics, its pixels, its listed periods.
+//! The record of a line: its statistics, its pixels, its listed periods.
 
 use nanotap_arithmetic::ComplexFunctions as _;
 use nanotap_flow::Complex;
@@ -47,7 +47,7 @@ pub(super) struct LineRecord {
     pub(super) statistics: LineStatistics,
     pub(super) pixels: PixelRow,
     pub(super) comparison: Comparison,
-    /// Periods at an end of the range of z.
+    /// Number of periods whose command was limited by the range of z.
     pub(super) at_range: usize,
 }
 
@@ -214,7 +214,7 @@ impl<'a> LineRecorder<'a> {
         pixel.irregular += u32::from(irregular);
     }
 
-    /// The record of the line.
+    /// Returns statistics and pixels of the line.
     pub(super) fn finish(mut self) -> (LineStatistics, PixelRow) {
         self.end_flight();
         let plan = self.plan;
@@ -300,7 +300,7 @@ fn extend(range: &mut [f64; 2], value: f64) {
     range[1] = range[1].max(value);
 }
 
-/// A listed period.
+/// Converts a period to an entry of the list.
 pub(super) fn listed(k: usize, period: &Period) -> ListedPeriod {
     ListedPeriod {
         k,
@@ -320,10 +320,10 @@ pub(super) fn listed(k: usize, period: &Period) -> ListedPeriod {
     }
 }
 
-/// Follows which force governs the motion, and notes where that changes for good.
+/// Follows which force governs the motion, and records where it changes permanently.
 #[derive(Clone, Debug)]
 pub(super) struct BranchTracker {
-    /// Periods after which a change counts, and over which the height is compared.
+    /// Number of periods after which a change counts, and over which the height is compared.
     patience: usize,
     established: Option<Interaction>,
     /// The other interaction, since how many periods, and the change that it may be.
@@ -337,11 +337,11 @@ pub(super) struct BranchTracker {
     pub(super) changes: Vec<BranchChange>,
 }
 
-/// Most changes that are noted.
+/// Largest number of changes that are recorded.
 const MAX_CHANGES: usize = 10_000;
 
 impl BranchTracker {
-    /// With a lever that forgets in so many periods.
+    /// Creates the tracker for a lever whose disturbances decay in so many periods.
     pub(super) fn new(lever_memory: f64) -> Self {
         Self {
             patience: lever_memory.ceil().clamp(10.0, 1e5) as usize,
@@ -355,7 +355,7 @@ impl BranchTracker {
         }
     }
 
-    /// Takes in a period.
+    /// Records the interaction of a period, and a change if it persists.
     pub(super) fn add(&mut self, k: usize, line: usize, direction: Direction, period: &Period) {
         let here = period.z - period.surface;
         if self.level.is_nan() {
@@ -407,7 +407,7 @@ impl BranchTracker {
         }
     }
 
-    /// The changes, those included whose height had no time to settle.
+    /// Returns the changes, including those whose height had no time to settle.
     pub(super) fn finish(mut self) -> Vec<BranchChange> {
         for (mut change, _) in self.pending {
             change.height_change = self.level - change.height_change;

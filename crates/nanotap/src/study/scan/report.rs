@@ -7,13 +7,13 @@ use super::instrument::Interaction;
 use super::options::{Method, Mode};
 use super::recorder::PixelRow;
 
-/// Direction of a line.
+/// Direction in which a line is scanned.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Direction {
-    /// Rising positions
+    /// From left to right: the positions rise
     Trace,
-    /// Falling positions
+    /// From right to left: the positions fall
     Retrace,
 }
 
@@ -30,36 +30,36 @@ pub struct ListedPeriod {
     pub z: f64,
     /// Amplitude of the deflection at the drive's frequency, m.
     pub amplitude: f64,
-    /// Its phase behind the drive, degrees.
+    /// Phase lag of the deflection behind the drive, degrees.
     pub phase: f64,
     /// Amplitude at the output of the lock-in amplifier, m.
     pub amplitude_lockin: f64,
-    /// Phase there, degrees.
+    /// Phase lag at the output of the lock-in amplifier, degrees.
     pub phase_lockin: f64,
-    /// Amplitude at the output less the setpoint, m.
+    /// Amplitude at the output of the lock-in amplifier minus the setpoint, m.
     pub error: f64,
     /// Largest force of the sample on the tip, N.
     pub peak_force: f64,
-    /// Mean deflection, m.
+    /// Mean deflection of the tip over the period, m.
     pub mean_deflection: f64,
-    /// Time in contact over the period.
+    /// Time in contact over the period, 0 to 1.
     pub contact_fraction: f64,
-    /// Energy that the tip gives to the sample, J.
+    /// Energy that the tip gives to the sample in the period, J.
     pub dissipation: f64,
-    /// Which force governs the motion.
+    /// Force that governs the motion in the period.
     pub state: Interaction,
 }
 
 /// A stretch on which the tip flies above the surface.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Parachuting {
-    /// Its first drive period.
+    /// Number of the first drive period of the stretch, from the start of settling.
     pub first_period: usize,
-    /// Drive periods.
+    /// Number of drive periods of the stretch.
     pub periods: usize,
-    /// Its duration, s.
+    /// Duration of the stretch, s.
     pub time: f64,
-    /// Its length along the line, m.
+    /// Length of the stretch along the line, m.
     pub length: f64,
 }
 
@@ -68,39 +68,40 @@ pub struct Parachuting {
 pub struct LineStatistics {
     /// Number of the line, from 0.
     pub line: usize,
-    /// Direction.
+    /// Direction in which the line was scanned.
     pub direction: Direction,
     /// Position across the lines, m.
     pub y: f64,
-    /// First drive period.
+    /// Number of the first drive period of the line, from the start of settling.
     pub first_period: usize,
-    /// Mean height, m.
+    /// Mean height of the lever's base, m.
     pub height_mean: f64,
-    /// Standard deviation of the height, m.
+    /// Standard deviation of this height, m.
     pub height_rms: f64,
-    /// Largest height, m.
+    /// Largest height of the lever's base, m.
     pub height_max: f64,
-    /// Least height, m.
+    /// Least height of the lever's base, m.
     pub height_min: f64,
-    /// Root mean square of the amplitude error, m.
+    /// Root mean square of the amplitude error, m: the amplitude minus the setpoint.
     pub error_rms: f64,
-    /// Largest amplitude error, m.
+    /// Largest amplitude error, m: above the setpoint, if positive.
     pub error_max: f64,
-    /// Least amplitude error, m.
+    /// Least amplitude error, m: below the setpoint, if negative.
     pub error_min: f64,
-    /// Largest force, N.
+    /// Largest force of the sample on the tip in the line, N.
     pub peak_force_max: f64,
-    /// Drive period of the largest force.
+    /// Number of the drive period with the largest force.
     pub peak_force_max_period: usize,
-    /// Position of the largest force, m.
+    /// Position of the largest force along the line, m.
     pub peak_force_max_x: f64,
     /// Mean of the periods' largest forces, N.
     pub peak_force_mean: f64,
     /// Mean energy that the tip gives to the sample in a period, J.
     pub dissipation_mean: f64,
-    /// Standard deviation of the height less that of the surface, m.
+    /// Standard deviation of the height minus that of the surface, m.
     pub tracking_rms: f64,
-    /// How far the height exceeds the highest point of the surface, m.
+    /// Excess of the largest height over the highest point of the surface, m, beyond their mean
+    /// difference where the error is small; at least 0.
     pub overshoot: f64,
     /// Stretches on which the tip flies above the surface.
     pub parachuting: Vec<Parachuting>,
@@ -109,30 +110,30 @@ pub struct LineStatistics {
 /// Channels of an image: a row a line, an entry a pixel; `null` where no period falls on a pixel.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Channels {
-    /// Mean height of the surface itself, m.
+    /// Mean height of the surface itself in a pixel, m.
     pub surface: Vec<Vec<f64>>,
-    /// Mean height, m.
+    /// Mean height of the lever's base in a pixel, m.
     pub height: Vec<Vec<f64>>,
-    /// Mean amplitude error, m.
+    /// Mean of amplitude minus setpoint in a pixel, m.
     pub amplitude_error: Vec<Vec<f64>>,
     /// Phase of the mean output of the lock-in amplifier, degrees.
     pub phase: Vec<Vec<f64>>,
     /// Mean of the periods' largest forces, N.
     pub peak_force: Vec<Vec<f64>>,
-    /// Largest force, N.
+    /// Largest force of the sample on the tip in a pixel, N.
     pub peak_force_max: Vec<Vec<f64>>,
     /// Mean energy that the tip gives to the sample in a period, J.
     pub dissipation: Vec<Vec<f64>>,
-    /// Mean part of a period in contact.
+    /// Mean fraction of a period in contact, 0 to 1.
     pub contact_fraction: Vec<Vec<f64>>,
-    /// Mean deflection, m.
+    /// Mean deflection of the tip in a pixel, m.
     pub mean_deflection: Vec<Vec<f64>>,
-    /// Which force governs the motion.
+    /// Force that governs the motion in most periods of a pixel.
     pub state: Vec<Vec<Option<Interaction>>>,
 }
 
 impl Channels {
-    /// An image without a scanned line.
+    /// Returns an image without a scanned line.
     pub(super) fn missing(lines: usize, pixels: usize) -> Self {
         let none = vec![vec![f64::NAN; pixels]; lines];
         Self {
@@ -149,7 +150,7 @@ impl Channels {
         }
     }
 
-    /// Puts the pixels of a line in its place.
+    /// Replaces a line of the image.
     pub(super) fn set_line(&mut self, line: usize, pixels: PixelRow) {
         for (rows, row) in [
             (&mut self.surface, pixels.surface),
@@ -175,26 +176,26 @@ impl Channels {
 /// A jump of the motion onto another branch.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct BranchChange {
-    /// Drive period.
+    /// Number of the drive period, from the start of settling.
     pub k: usize,
-    /// Line.
+    /// Number of the line, from 0.
     pub line: usize,
-    /// Direction.
+    /// Direction in which the line is scanned.
     pub direction: Direction,
-    /// Position, m.
+    /// Position along the line, m.
     pub x: f64,
-    /// The force that governed the motion before.
+    /// Force that governed the motion before.
     pub from: Interaction,
-    /// The force that governs it from there on.
+    /// Force that governs the motion from there on.
     pub to: Interaction,
-    /// Change of the height less that of the surface, m.
+    /// Change of the height minus that of the surface, m.
     pub height_change: f64,
 }
 
-/// How a fast scan compares with an exact one, on parts of the scan that both run.
+/// Differences of a fast scan from an exact one, on parts of the scan that both run.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct MethodError {
-    /// Drive periods compared.
+    /// Number of drive periods compared.
     pub periods: usize,
     /// Largest difference of the height, m.
     pub height_max: f64,
@@ -211,21 +212,22 @@ pub struct MethodError {
 pub struct LoopReport {
     /// Distance at which the motion has the setpoint amplitude, m.
     pub distance: f64,
-    /// Which force governs the motion there.
+    /// Force that governs the motion there.
     pub state: Interaction,
-    /// Slope of the amplitude over the distance.
+    /// Slope of the amplitude over the distance, m/m.
     pub slope: f64,
-    /// Periods in which a disturbance of the lever falls by the factor e.
+    /// Number of periods in which a disturbance of the lever falls by the factor e.
     pub lever_memory: f64,
-    /// Largest modulus of the multipliers of the whole loop; above 1 it oscillates.
+    /// Largest modulus of the multipliers of the whole loop, dimensionless; above 1 the loop
+    /// oscillates.
     pub spectral_radius: f64,
-    /// Integral gain at which the loop starts to oscillate, 1/s; `null` where none does so.
+    /// Integral gain at which the loop starts to oscillate, 1/s; `null` if none makes it oscillate.
     pub largest_stable_gain: Option<f64>,
     /// Frequency in Hz at which the height lags the surface by 45°.
     pub bandwidth_45: Option<f64>,
     /// Frequency in Hz at which the height follows with 1/√2 of the surface's amplitude.
     pub bandwidth_3db: Option<f64>,
-    /// Largest ratio of the height to the surface over all frequencies.
+    /// Largest ratio of the height to the surface over all frequencies, dimensionless.
     pub peaking: f64,
     /// Rule of thumb for the bandwidth in Hz: 1/16 of the inverse of all delays.
     pub rule_of_thumb: f64,
@@ -235,48 +237,48 @@ pub struct LoopReport {
     pub suggested_bandwidth: Option<f64>,
 }
 
-/// A scan.
+/// Report of a scan, in SI.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct ScanReport {
-    /// How the drive periods were computed.
+    /// Method by which the drive periods were computed.
     pub method: Method,
-    /// What the feedback did.
+    /// Mode of the feedback.
     pub mode: Mode,
-    /// Part of the drive periods that was computed exactly.
+    /// Fraction of the drive periods that was computed exactly, 0 to 1.
     pub exact_share: f64,
     /// Difference from an exact scan, where the method is not exact.
     pub error: Option<MethodError>,
     /// Extent along and across the lines, m.
     pub size: [f64; 2],
-    /// Drive periods of a line in one direction.
+    /// Number of drive periods of a line in one direction.
     pub periods_per_line: usize,
-    /// Drive periods in all.
+    /// Number of drive periods of the scan, with settling.
     pub total_periods: usize,
-    /// Lines a second, trace and retrace together.
+    /// Lines a second, trace and retrace together, Hz.
     pub line_rate: f64,
-    /// Speed of the tip, m/s.
+    /// Speed of the tip along a line, m/s.
     pub speed: f64,
-    /// Free amplitude, m.
+    /// Amplitude of the free lever at the drive's frequency, m.
     pub free_amplitude: f64,
-    /// Setpoint amplitude, m.
+    /// Amplitude that the feedback keeps, m.
     pub setpoint_amplitude: f64,
-    /// Height at the start, m.
+    /// Height of the lever's base at the start, m.
     pub z0: f64,
-    /// Integral gain, 1/s.
+    /// Integral gain of the feedback, 1/s.
     pub integral_gain: f64,
     /// Whether each line settled anew, so that lines are independent.
     pub independent_lines: bool,
-    /// Largest force, N.
+    /// Largest force of the sample on the tip in the scan, N.
     pub peak_force_max: f64,
-    /// Listed drive periods.
+    /// Signals of the drive periods that the options list.
     pub periods: Vec<ListedPeriod>,
-    /// Statistics of lines.
+    /// Statistics of each line and direction.
     pub lines: Vec<LineStatistics>,
     /// Root mean square of the difference between the heights of trace and retrace, m.
     pub trace_retrace_rms: Option<f64>,
-    /// Image of the trace.
+    /// Image of the trace: lines in the direction of rising positions.
     pub trace: Channels,
-    /// Image of the retrace.
+    /// Image of the retrace; None if lines are scanned in one direction only.
     pub retrace: Option<Channels>,
     /// Jumps of the motion onto another branch.
     pub branch_changes: Vec<BranchChange>,
@@ -285,6 +287,6 @@ pub struct ScanReport {
     pub feedback: Option<LoopReport>,
     /// Reasons to doubt the image.
     pub warnings: Vec<String>,
-    /// What the image shows, in a sentence.
+    /// Sentence on what the image shows.
     pub verdict: String,
 }

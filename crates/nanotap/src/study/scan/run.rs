@@ -12,13 +12,13 @@ use super::recorder::{BranchTracker, LineRecord, LineRecorder, listed};
 use super::report::{BranchChange, Direction, ListedPeriod, MethodError};
 use crate::{Error, ErrorKind};
 
-/// What a scan recorded.
+/// Lines, listed periods and branch changes that a scan recorded.
 #[derive(Debug, Default)]
 pub(super) struct Recorded {
     pub(super) lines: Vec<LineRecord>,
     pub(super) listed: Vec<ListedPeriod>,
     pub(super) changes: Vec<BranchChange>,
-    /// Periods at an end of the range of z before the first line.
+    /// Number of periods before the first line whose command was limited by the range of z.
     pub(super) at_range: usize,
 }
 
@@ -26,7 +26,7 @@ pub(super) struct Recorded {
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Comparison {
     pub(super) periods: usize,
-    /// Largest, and sum of squares.
+    /// Largest difference of the height, m, and sum of its squares, m².
     pub(super) height: [f64; 2],
     pub(super) amplitude: [f64; 2],
 }
@@ -80,28 +80,30 @@ impl Recorded {
     }
 }
 
-/// Stretches of a line and direction on which a fast run is compared, the steepest place apart.
+/// Number of stretches of a line and direction on which a fast run is compared, in addition to the
+/// steepest place.
 const COMPARED_STRETCHES: usize = 4;
 /// Part of a line that one such stretch is, and the fewest periods of it.
 const COMPARED_PART: usize = 250;
 const COMPARED_PERIODS: usize = 60;
-/// Periods after which the flag that cancels the work is looked at, and progress reported.
+/// Number of periods between two checks of the flag that cancels the work; progress is reported
+/// then.
 const POLL: usize = 256;
 
-/// A run over lines.
+/// State of a run over lines in sequence.
 struct Runner<'a, 'c> {
     plan: &'a Plan,
     control: &'c Control<'c>,
     done: &'c AtomicUsize,
     total: usize,
     instrument: Instrument<'a>,
-    /// An exact instrument for comparisons.
+    /// Exact instrument for comparisons, if the method is fast.
     exact: Option<Instrument<'a>>,
     tracker: BranchTracker,
     recorded: Recorded,
     /// Number of the next period.
     k: usize,
-    /// Periods at an end of the range of z up to the last line.
+    /// Number of periods, up to the last line, whose command was limited by the range of z.
     at_range: usize,
 }
 
@@ -186,7 +188,7 @@ impl Runner<'_, '_> {
     }
 }
 
-/// Where comparisons begin on a line, and their length.
+/// Returns where comparisons begin on a line, and their length.
 fn compared_stretches(plan: &Plan, y: f64, retrace: bool) -> (Vec<usize>, usize) {
     let n = plan.periods;
     let length = (n / COMPARED_PART).max(COMPARED_PERIODS).min(n);
@@ -215,13 +217,13 @@ fn compared_stretches(plan: &Plan, y: f64, retrace: bool) -> (Vec<usize>, usize)
 #[derive(Debug)]
 pub(super) struct Settled<'a> {
     plan: &'a Plan,
-    /// Periods in which a disturbance of the lever decays.
+    /// Number of periods in which a disturbance of the lever falls by the factor e.
     lever_memory: f64,
     pub(super) instrument: Instrument<'a>,
-    /// An exact instrument for comparisons.
+    /// Exact instrument for comparisons, if the method is fast.
     exact: Option<Instrument<'a>>,
     listed: Vec<ListedPeriod>,
-    /// Periods that were run, for the progress.
+    /// Number of periods that were run, for the progress.
     done: AtomicUsize,
 }
 
@@ -255,7 +257,7 @@ impl<'a> Settled<'a> {
         })
     }
 
-    /// What goes on from here with a drive period.
+    /// Creates a runner that continues from here with drive period `k`.
     fn runner<'c>(&'c self, k: usize, control: &'c Control<'c>) -> Runner<'a, 'c> {
         Runner {
             plan: self.plan,
@@ -271,7 +273,7 @@ impl<'a> Settled<'a> {
         }
     }
 
-    /// A line that settles by itself before it.
+    /// Runs a line that settles separately before it.
     pub(super) fn independent_line(
         &self,
         line: usize,

@@ -12,15 +12,15 @@ use crate::number::shortest;
 pub struct Channel {
     /// Name in tables, files and Python.
     pub name: &'static str,
-    /// Title with its unit.
+    /// Title of the channel, without the unit.
     pub title: &'static str,
-    /// SI unit; empty of a number.
+    /// SI unit; empty for a number without unit.
     pub unit: &'static str,
-    /// The values.
+    /// Returns the values from the channels of an image: one vector per line, one entry per pixel.
     pub values: fn(&Channels) -> &Vec<Vec<f64>>,
 }
 
-/// Every channel but the state.
+/// All channels except the state.
 pub const CHANNELS: [Channel; 9] = [
     Channel {
         name: "surface",
@@ -78,25 +78,25 @@ pub const CHANNELS: [Channel; 9] = [
     },
 ];
 
-/// Centres of `count` pixels over a length, along or across the lines.
+/// Returns the centres of `count` pixels over a length, along or across the lines.
 pub(super) fn centres(count: usize, size: f64) -> Vec<f64> {
     let step = size / count.max(1) as f64;
     (0..count).map(|k| (k as f64 + 0.5) * step).collect()
 }
 
 impl ScanReport {
-    /// Positions of the pixels along a line, in m.
+    /// Returns the positions of the pixels along a line, m.
     pub fn pixel_positions(&self) -> Vec<f64> {
         centres(self.trace.height.first().map_or(0, Vec::len), self.size[0])
     }
 
-    /// Both directions, those that were scanned.
+    /// Returns the image of each direction that was scanned, with its name.
     pub fn directions(&self) -> impl Iterator<Item = (&'static str, &Channels)> {
         let retrace = self.retrace.iter().map(|image| ("retrace", image));
         std::iter::once(("trace", &self.trace)).chain(retrace)
     }
 
-    /// A channel of the trace as a field for programs for AFM data.
+    /// Returns a channel of the trace as a field for programs for AFM data.
     #[cfg(feature = "dataset")]
     pub fn field(&self, channel: &Channel) -> Field {
         let rows = (channel.values)(&self.trace);
@@ -111,7 +111,7 @@ impl ScanReport {
     }
 }
 
-/// A row a pixel: line, direction, position and every channel, in SI.
+/// Formats the pixels as CSV, a row per pixel: line, direction, position and every channel, in SI.
 pub fn pixels_csv(report: &ScanReport) -> String {
     let mut csv = String::from("line,direction,x (m)");
     for channel in CHANNELS {

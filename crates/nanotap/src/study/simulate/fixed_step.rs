@@ -30,39 +30,41 @@ const TRANSIENT: usize = 500;
 /// A switch, where the grid noticed it.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct GridEvent {
-    /// When, counted from the end of the transient.
+    /// Time of the grid point from the end of the transient, in the model's unit of time.
     pub tau: f64,
-    /// `contact_start` or `contact_end`.
+    /// Kind of the switch: `contact_start` or `contact_end`.
     pub kind: &'static str,
 }
 
-/// A finished run.
+/// Result of a finished run with fixed time steps.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct FixedStepRun {
-    /// `rk4`.
+    /// Method of integration, always `rk4`.
     pub method: &'static str,
     /// Steps a drive period in free flight and in contact.
     pub steps: [u32; 2],
-    /// `every_step` or `every_stage`.
+    /// Where within a step the regime is checked: `every_step` or `every_stage`.
     pub switching: &'static str,
-    /// Drive periods recorded.
+    /// Number of drive periods recorded.
     pub periods: usize,
     /// Drive periods of the discarded transient.
     pub transient: usize,
-    /// The state at the end of the transient.
+    /// State at the end of the transient, in the model's units. Its entries are a_1 … a_N (or x),
+    /// their rates, then any memory of the sample.
     pub start: Vec<f64>,
     /// Smallest n for which the strobe points repeat after n periods to
     /// [`APPARENT_CLOSURE`] of their size; proves nothing.
     pub apparent_period: Option<usize>,
-    /// How nearly they repeat, as a part of their size.
+    /// Largest difference of strobe points one apparent period apart, as a fraction of their size.
+    /// Without an apparent period it is the smallest for any period that was tried.
     pub closure: f64,
     /// Longest apparent period looked for: half of the recording, 64 at most.
     pub longest_apparent: usize,
-    /// Largest tip displacement on the grid.
+    /// Largest tip displacement on the grid, in the model's unit of length.
     pub tip_max: f64,
-    /// Least tip displacement on the grid.
+    /// Least tip displacement on the grid, in the model's unit of length.
     pub tip_min: f64,
-    /// Half of peak to peak.
+    /// Half of the peak-to-peak tip displacement, in the model's unit of length.
     pub amplitude: f64,
     /// Contact time / period, from the lengths of the steps.
     pub contact_fraction: f64,
@@ -88,11 +90,11 @@ pub struct FixedStepRun {
 /// Classification by the exact flow.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct ExactVerdict {
-    /// Class.
+    /// Class of the motion according to the exact flow.
     pub classification: Classification,
-    /// Period in drive periods.
+    /// Period in drive periods; `None` unless the motion is periodic.
     pub period: Option<usize>,
-    /// Reason.
+    /// Evidence for the class, in words.
     pub evidence: String,
 }
 

@@ -32,20 +32,20 @@ use fixed_step::{FixedStepRun, fixed_step_run};
 pub enum Classification {
     /// Converges to a stable periodic orbit, closed by Newton's method.
     Periodic,
-    /// Quasi-periodic: on a torus.
+    /// Quasi-periodic: the motion covers a torus and does not repeat.
     QuasiPeriodic,
     /// Chaotic during the whole run.
     Chaotic,
-    /// Unbounded.
+    /// Grows beyond every bound.
     Unbounded,
     /// Measured during a transient, as where the distance changes at a finite speed.
     Transient,
-    /// Undecided.
+    /// Could not be assigned to a class.
     Undecided,
 }
 
 impl Classification {
-    /// Name in documents.
+    /// Returns the name in documents, such as `quasi-periodic`.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Periodic => "periodic",
@@ -58,20 +58,21 @@ impl Classification {
     }
 }
 
-/// A finished run.
+/// Result of a finished run of the exact flow.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct Simulation {
-    /// Drive periods recorded.
+    /// Number of drive periods recorded.
     pub periods: usize,
     /// Drive periods of the discarded transient.
     pub transient: usize,
-    /// The state at the end of the transient, where the recording starts.
+    /// State at the end of the transient, where the recording starts, in the model's units. Its
+    /// entries are a_1 … a_N (or x), their rates, then any memory of the sample.
     pub start: Vec<f64>,
     /// Class of the motion, followed on from the end of the transient.
     pub classification: Classification,
     /// Its minimal period in drive periods, if periodic.
     pub period: Option<usize>,
-    /// Why it was named so, in words.
+    /// Evidence for the class, in words.
     pub evidence: String,
     /// Lyapunov exponents per drive period, if they were measured.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -116,7 +117,7 @@ pub(crate) const fn is_none(count: &usize) -> bool {
 
 /// Periods recorded for figures; bounds the memory of long runs.
 const SHOWN: usize = 512;
-/// A run this near to a periodic orbit, as a part of its size, has arrived.
+/// Distance from a periodic orbit, as a fraction of its size, at which the transient ends.
 const ARRIVED: f64 = 1e-11;
 
 /// Runs `model`.
@@ -337,18 +338,18 @@ pub(crate) fn torus_evidence(torus: &Torus) -> String {
 /// A verdict in the words of the output.
 #[derive(Clone, Debug)]
 pub struct Named {
-    /// The class.
+    /// Class of the motion.
     pub classification: Classification,
     /// The orbit, if it is periodic.
     pub orbit: Option<PeriodicOrbit>,
     /// Exponents, if they were measured.
     pub spectrum: Option<LyapunovSpectrum>,
-    /// Why, in words.
+    /// Evidence for the class, in words.
     pub evidence: String,
 }
 
 impl Named {
-    /// Names a verdict.
+    /// Translates a verdict into class, orbit, exponents and evidence.
     pub fn of(verdict: &MotionKind) -> Self {
         let (exponent, periodic) = (largest_exponent, orbit_evidence);
         let (classification, orbit, spectrum, evidence) = match verdict {
@@ -482,17 +483,17 @@ impl SimulateOptions {
     }
 }
 
-/// Result of a simulation.
+/// Result of a simulation by one of the two methods.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
 #[serde(untagged)]
 pub enum SimulateReport {
-    /// From the exact flow.
+    /// Result of the exact flow, for a physical case also in SI.
     Exact(Box<InSi<Simulation>>),
-    /// From fixed time steps.
+    /// Result of fixed time steps, in the model's units.
     FixedStep(Box<FixedStepRun>),
 }
 
-/// Simulates a motion.
+/// Study that simulates one motion and classifies it.
 #[derive(Clone, Copy, Debug)]
 pub struct SimulateStudy;
 

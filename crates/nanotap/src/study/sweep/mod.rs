@@ -130,7 +130,7 @@ impl Sweep {
         })
     }
 
-    /// The options.
+    /// Returns the options with which the sweep was made.
     pub fn options(&self) -> &SweepOptions {
         &self.runs.options
     }
@@ -140,7 +140,7 @@ impl Sweep {
         &self.runs.over
     }
 
-    /// Number of runs.
+    /// Returns the number of runs, one for each entry of the grid.
     pub fn runs(&self) -> usize {
         self.schema.grid.entries()
     }

@@ -41,17 +41,18 @@ const FILE: &str = "neighbours.json";
 pub struct FromNeighbour {
     /// Index of the value of each parameter, in the order in which they were given.
     pub at: Vec<usize>,
-    /// The values.
+    /// Value of each parameter, in the unit of its key and in the order in which they were given.
     pub values: Vec<f64>,
-    /// Period; 0 of a motion that does not repeat.
+    /// Period in drive periods; 0 for a motion that does not repeat.
     pub period: usize,
-    /// A state on it, at drive phase 0.
+    /// State on the motion at drive phase 0, in the model's units. Its entries are a_1 … a_N (or
+    /// x), their rates, then any memory of the sample.
     pub state: Vec<f64>,
     /// Amplitude at the drive's frequency, in the dataset's unit of length.
     pub first_harmonic: f64,
-    /// Greatest tip deflection.
+    /// Largest tip deflection, in the dataset's unit of length.
     pub tip_max: f64,
-    /// Contact time / period.
+    /// Contact time / period, 0 to 1.
     pub contact_fraction: f64,
     /// Its observables by name, in the dataset's units.
     #[serde(default)]

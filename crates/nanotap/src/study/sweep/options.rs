@@ -76,7 +76,7 @@ impl SweepOptions {
         values * self.starts.unwrap_or(1) * self.follow.directions().len().max(1)
     }
 
-    /// Where motions start.
+    /// Returns the initial states that the options request.
     pub(super) fn starts(&self, units: &Units) -> Result<Starts, Error> {
         match (self.starts, &self.state) {
             (Some(_), Some(_)) => Err(Error::input(

@@ -13,36 +13,36 @@ use crate::study::value::Axes;
 /// Most values of one parameter.
 const MOST: usize = 1_000_000;
 
-/// How values are spaced.
+/// Spacing of the values of a parameter.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Spacing {
-    /// Equal steps.
+    /// Equal differences between neighbouring values.
     #[default]
     Linear,
-    /// Equal ratios.
+    /// Equal ratios of neighbouring values.
     Log,
-    /// As they are listed.
+    /// Values that are listed one by one.
     Listed,
 }
 
 /// A parameter and the values that it takes, both ends included.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Over {
-    /// The parameter.
+    /// Key of the parameter that varies.
     pub key: Key,
     /// Kind of its values: of the key, or of a setpoint that is an amplitude, a force, a phase or a shift.
     #[serde(skip)]
     pub kind: Kind,
-    /// First and least value.
+    /// First and least value, in the unit of the key.
     pub from: f64,
-    /// Last and greatest value.
+    /// Last and greatest value, in the unit of the key.
     pub to: f64,
-    /// How many values.
+    /// Number of values, both ends included.
     pub count: usize,
-    /// How they are spaced.
+    /// Spacing of the values between the ends.
     pub spacing: Spacing,
-    /// The values, where they are listed.
+    /// Values in the unit of the key, ascending; empty unless they are listed one by one.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub listed: Vec<f64>,
 }
@@ -125,7 +125,7 @@ impl Over {
         Ok(over)
     }
 
-    /// `key` with these values.
+    /// Makes the axis of `key` with these values.
     fn listed(key: Key, kind: Kind, listed: Vec<f64>) -> Self {
         Self {
             key,
@@ -204,7 +204,7 @@ impl Over {
         }
     }
 
-    /// All values.
+    /// Returns all values, in ascending order and in the unit of the key.
     pub fn values(&self) -> Vec<f64> {
         (0..self.count).map(|k| self.value(k)).collect()
     }
@@ -218,7 +218,7 @@ impl Over {
         case.with(self.key, value)
     }
 
-    /// Label of an axis.
+    /// Returns the label of the parameter's axis in figures.
     pub fn label(&self) -> String {
         match self.kind {
             Kind::Length if self.key == Key::DriveSetpoint => "setpoint $A$".to_owned(),

@@ -21,18 +21,19 @@ use crate::study::short_run::short_run;
 use crate::study::simulate::{Classification, Named};
 use crate::study::start_box::{box_with, default_starts};
 
-/// Where motions start.
+/// Initial states of the runs at each value of the parameters.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Starts {
     /// At rest, or in the motion of the setpoint.
     Rest,
-    /// In one state.
+    /// In one given state, in the model's units. Its entries are a_1 … a_N (or x), their rates,
+    /// then any memory of the sample.
     Given(Vec<f64>),
-    /// In seeded quasi-random states.
+    /// In quasi-random states of a box, drawn with a seed.
     Seeded {
-        /// Count.
+        /// Number of initial states at each value.
         count: usize,
-        /// Their seed.
+        /// Seed of the quasi-random states.
         seed: u64,
         /// Sides of the box they are in, by the name of the entry of the state; the others
         /// [fit the case](crate::study::start_box) at each value.
@@ -41,15 +42,15 @@ pub enum Starts {
     /// Rest, the linear responses, and draws of every size
     /// ([`default_starts`](crate::study::start_box::default_starts)).
     Spread {
-        /// Count.
+        /// Number of initial states at each value.
         count: usize,
-        /// Seed of the draws.
+        /// Seed of the states that are drawn.
         seed: u64,
     },
 }
 
 impl Starts {
-    /// How many there are.
+    /// Returns the number of initial states at each value.
     pub fn count(&self) -> usize {
         match self {
             Self::Rest | Self::Given(_) => 1,
@@ -73,13 +74,13 @@ impl Starts {
     }
 }
 
-/// Result of a simulation.
+/// Result of one run, as a row of the dataset.
 #[derive(Clone, Debug)]
 pub(super) struct Outcome {
     pub(super) classification: Classification,
     /// Minimal period, 0 if it is not periodic.
     pub(super) period: usize,
-    /// Periods discarded.
+    /// Drive periods of the discarded transient.
     pub(super) transient: usize,
     pub(super) observables: Observables,
     /// Largest modulus of a multiplier of the orbit.

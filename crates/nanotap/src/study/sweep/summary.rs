@@ -12,19 +12,20 @@ use crate::observe::ObservableSet;
 use crate::study::simulate::Classification;
 use crate::study::target::{Target, TargetMotion, TargetPoint, TargetReport, Targets};
 
-/// How many runs came to what.
+/// Counts of the runs by class and by period, with what else a finished dataset shows.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, JsonSchema)]
 pub struct Summary {
-    /// All of them.
+    /// Number of runs in the dataset.
     pub runs: usize,
-    /// By classification; every one is there, also with 0.
+    /// Number of runs by classification; every class is listed, also with 0.
     pub counts: BTreeMap<&'static str, usize>,
-    /// Periodic ones by period.
+    /// Number of periodic runs by their period in drive periods.
     pub periods: BTreeMap<i32, usize>,
     /// Motions that no run met, but that those of neighbouring values lead to.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub from_neighbours: Vec<FromNeighbour>,
-    /// What stays while the parameters vary although it was not stated, in SI.
+    /// Quantities that stay constant while the parameters vary although the case does not state
+    /// them, in SI.
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub held: BTreeMap<String, f64>,
     /// Where the conditions of `where` hold.
@@ -38,7 +39,7 @@ pub struct Summary {
 /// Values of the parameters at which the setpoint is not reached.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct Unreached {
-    /// The values, in the order in which the parameters were given.
+    /// Value of each parameter, in the unit of its key and in the order in which they were given.
     pub values: Vec<f64>,
     /// Why it is not reached.
     pub reason: String,

@@ -1,4 +1,4 @@
-//! A lever in a fluid: the mass that swings along, and the damping.
+//! A lever in a fluid: added mass and damping.
 
 use std::f64::consts::{PI, TAU};
 
@@ -92,7 +92,7 @@ impl Fluid {
         Ok(found)
     }
 
-    /// Note about the fluid.
+    /// Note that reports resonance and quality factor in the fluid, with their source.
     pub(crate) fn remark(self, lever: &Lever, width: f64) -> Remark {
         let (over, source) = self.height.map_or((String::new(), "Sader 1998"), |height| {
             let height = Kind::Length.format(height);

@@ -1,12 +1,11 @@
-//! The lever: from what its box and its spectrum say, or from its dimensions and material,
-//! to stiffness, beam mass and tip mass.
-//!
-//! With k = 3EI/L³ and T = √(mL⁴/EI) the beam's mass is mL = kT²/3, and its first free
-//! frequency, measured with the tip on it, is f₀ = Ω₁(α1)/(2πT) with tip mass α1 = M/(mL). Ω₁ is
-//! that of the model's modes, a little above the exact beam's (without a tip mass they are the
-//! same), so that a drive at f₀ meets the resonance of the model that is solved. Any two of k, mL
-//! and f₀ give the third once the tip's mass is known; f₂/f₁ of the exact beam depends on α1
-//! alone and tells it.
+//! The lever: stiffness, beam mass and tip mass from the data sheet and the measured spectrum, or
+//! from dimensions and material.
+//! With k = 3EI/L³ and T = √(mL⁴/EI) the beam's mass is mL = kT²/3, and its first free frequency,
+//! measured with the tip on it, is f₀ = Ω₁(α1)/(2πT) with tip mass α1 = M/(mL). Ω₁ is that of the
+//! model's modes, a little above the exact beam's (without a tip mass they are the same), so that a
+//! drive at f₀ excites the resonance of the model that is solved. Any two of k, mL and f₀ give the
+//! third once the tip's mass is known. The ratio f₂/f₁ of the exact beam depends on α1 alone and
+//! therefore determines it.
 
 mod in_fluid;
 
@@ -27,9 +26,10 @@ use crate::model::exact_beam;
 /// Data of a lever; SI units.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LeverData {
-    /// Static spring constant at the tip, k.
+    /// Static spring constant k at the tip, N/m; `None` if it is unknown.
     pub k: Option<f64>,
-    /// Modal stiffness of the first mode at the tip, from which k follows.
+    /// Modal stiffness of the first mode at the tip, from which k follows, N/m; `None` if not
+    /// stated.
     pub k1: Option<f64>,
     /// First free resonance in Hz, with the tip, f₀.
     pub f0: Option<f64>,
@@ -37,25 +37,25 @@ pub struct LeverData {
     pub quality_factor: Option<f64>,
     /// The fluid around it, which determines Q; f₀ and f₂ are then those in vacuum.
     pub fluid: Option<Fluid>,
-    /// Dimensions.
+    /// Dimensions of the beam, m; `None` if they are unknown.
     pub geometry: Option<BeamGeometry>,
-    /// Young's modulus along the beam.
+    /// Young's modulus along the beam, Pa.
     pub modulus: Option<f64>,
-    /// Density.
+    /// Density of the beam, kg/m³; `None` if not stated.
     pub density: Option<f64>,
-    /// The mass at its end.
+    /// Mass at the end of the beam.
     pub tip_mass: TipMass,
-    /// Modes of the model.
+    /// Number of beam modes of the model.
     pub modes: usize,
 }
 
 impl LeverData {
-    /// The spring constant that dimensions and modulus give.
+    /// The spring constant that follows from dimensions and modulus, N/m.
     fn bending(&self) -> Option<f64> {
         Some(self.geometry?.stiffness(self.modulus?))
     }
 
-    /// The beam's mass that dimensions and density give.
+    /// The mass of the beam that follows from dimensions and density, kg.
     fn weight(&self) -> Option<f64> {
         Some(self.geometry?.mass(self.density?))
     }
@@ -68,26 +68,26 @@ pub struct Lever {
     pub k: f64,
     /// Mass of the beam without the tip, mL, in kg.
     pub beam_mass: f64,
-    /// Mass of the tip over mass of the beam, α1.
+    /// Mass of the tip as a fraction of the mass of the beam, α1, dimensionless.
     pub tip_mass_ratio: f64,
     /// First free resonance in Hz, with the tip.
     pub f0: f64,
     /// Quality factor of the first free resonance.
     pub quality_factor: f64,
-    /// Its length in m, if known: only slopes need it.
+    /// Length of the beam, m, if known; only slopes need it.
     pub length: Option<f64>,
-    /// Modes of the model whose resonance and quality factor are those above.
+    /// Number of beam modes of the model.
     #[serde(skip)]
     pub modes: usize,
 }
 
 /// A free mode of the exact beam.
 struct Mode {
-    /// In Hz.
+    /// Frequency of the mode, Hz.
     frequency: f64,
-    /// β, times the length.
+    /// Wavenumber times the length of the beam, β, dimensionless.
     wavenumber: f64,
-    /// φ(1)²/∫φ².
+    /// Square of the mode at the tip over its mean square along the beam, φ(1)²/∫φ².
     tip_share: f64,
 }
 
@@ -169,7 +169,8 @@ impl Lever {
         })
     }
 
-    /// Stiffness of the first mode at the tip.
+    /// Returns the stiffness of the first mode at the tip, N/m; `None` if the mode cannot be
+    /// computed.
     pub fn modal_stiffness(&self) -> Option<f64> {
         let factor = modal_factor(TipMass::Ratio(self.tip_mass_ratio), None);
         Some(self.k * factor.ok()?)

@@ -26,12 +26,12 @@ use crate::study::fit::parameters::Target;
 use crate::study::frequency_modulation::walk::{HeldWalk, Stepped};
 use crate::study::frequency_modulation::{Driven, FreeOscillation, Held, HeldOrbit, Modulated};
 
-/// Settings of a loop.
+/// Setpoint of the loop of frequency modulation.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::study::fit) struct Loop {
     /// Amplitude at the drive frequency, in m, or in the unit of a dimensionless case.
     amplitude: f64,
-    /// Phase lag in degrees.
+    /// Phase lag that the loop maintains, degrees.
     phase: f64,
 }
 
@@ -63,7 +63,7 @@ type FreeChange = ([f64; 2], Option<f64>);
 #[derive(Clone, Debug)]
 struct FreeChanges {
     keys: Vec<Key>,
-    /// Of frequency and strength, in the model's units, and of the loss in SI.
+    /// Derivatives of frequency and strength (model units) and of the loss (J) by each key.
     by: Option<Vec<FreeChange>>,
 }
 

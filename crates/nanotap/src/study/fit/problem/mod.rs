@@ -57,7 +57,7 @@ pub(super) struct RowPoint {
     pub(super) orbit: Option<PeriodicOrbit>,
     /// True if the orbit has no continuation here; its values are then the previous ones.
     pub(super) lost: bool,
-    /// Its branch.
+    /// Index of the branch on which the orbit lies.
     pub(super) branch: usize,
     /// The model's values, one per column, without scales and offsets.
     pub(super) values: Vec<f64>,
@@ -90,7 +90,7 @@ impl RowPoint {
         }
     }
 
-    /// The same row without a continuation of its orbit.
+    /// Returns the same row, marked as lost: its orbit has no continuation.
     pub(super) fn without_orbit(&self) -> Self {
         Self {
             lost: true,
@@ -125,7 +125,7 @@ impl Problem<'_> {
         (!self.case.cancel().is_cancelled()).then_some(computed)
     }
 
-    /// The requested observables.
+    /// Returns the set of the observables in the columns.
     fn set(&self) -> ObservableSet {
         let columns = self.data.columns.iter();
         let observed = columns.filter_map(|column| column.quantity.observable());

@@ -6,7 +6,7 @@
 //! forms, so that their central differences are accurate to ten digits; the slope of the rest gives
 //! the derivatives at a fixed distance.
 //!
-//! What moves does not count: viscous forces, ringing after the jumps, inertia.
+//! The dynamics of the lever is neglected: viscous forces, ringing after the jumps, inertia.
 
 use rayon::prelude::*;
 
@@ -48,7 +48,7 @@ impl Rested {
         [near - margin, far + margin]
     }
 
-    /// What is found first over distances that go ever farther beyond the rows.
+    /// Returns the first result of `find` over ranges that extend ever farther beyond the rows.
     fn farther<T>(&self, find: impl Fn([f64; 2]) -> Option<T>) -> Option<T> {
         let beyond = (0..TRIES).map(|k| REACH * 4f64.powi(k));
         let mut found = beyond.filter_map(|beyond| find(self.between(beyond)));

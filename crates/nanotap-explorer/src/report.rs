@@ -115,7 +115,8 @@ impl<'a> Field<'a> {
     /// Its words without the unit, which the value has.
     fn title(&self, name: &str) -> String {
         let unit = self.kind.map_or("", Kind::si_unit);
-        let words = self.words.trim_end_matches(unit);
+        let words = self.words.trim_end_matches(", dimensionless");
+        let words = words.trim_end_matches(unit);
         let words = match self.kind {
             Some(_) => words.trim_end_matches(", ").trim_end_matches(" in "),
             None => words,

@@ -11,17 +11,16 @@ use nanotap::figure::approach::approach_figure;
 use nanotap::number::shortest;
 use nanotap::observe::table::shown_phase;
 use nanotap::observe::{ObservableSet, Observables, columns};
-use nanotap::study::approach::{ApproachOptions, ApproachPoint, ApproachReport, ApproachStudy};
+use nanotap::study::approach::{ApproachPoint, ApproachReport, ApproachStudy};
 use nanotap::study::frequency_modulation::{COLUMNS, ModulatedColumn, ModulationReport};
 use nanotap::study::simulate::Classification;
 use serde::Serialize;
 
-use crate::arguments::{CaseArguments, OutArgument, PlotArgument};
 use crate::command::branch::PointsArgument;
 use crate::failure::Failure;
 use crate::given_case::GivenCase;
 use crate::output::Output;
-use crate::request::Request;
+use crate::study_arguments::StudyArguments;
 use crate::table::{Align, Table};
 use crate::threads::ThreadsArgument;
 use crate::{motion, number, progress, style};
@@ -31,19 +30,11 @@ use crate::{motion, number, progress, style};
 #[derive(Args, Debug)]
 pub(crate) struct Arguments {
     #[command(flatten)]
-    case: CaseArguments,
-
-    #[command(flatten)]
-    request: Request<ApproachOptions>,
-
+    study: StudyArguments<ApproachStudy>,
     #[command(flatten)]
     points: PointsArgument,
     #[command(flatten)]
     threads: ThreadsArgument,
-    #[command(flatten)]
-    out: OutArgument,
-    #[command(flatten)]
-    plot: PlotArgument,
 }
 
 /// The report, and the path of its table.
@@ -56,10 +47,7 @@ struct Written<'a> {
 }
 
 pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure> {
-    let request = arguments.request.read()?;
-    arguments.out.check()?;
-    arguments.plot.check()?;
-    let case = GivenCase::for_study(&arguments.case, true, output)?;
+    let (request, case) = arguments.study.read(output)?;
     let mut report = progress::study::<ApproachStudy>(&case, &request, &arguments.threads)?;
     if report.cancelled {
         output.warning("stopped before it was done");
@@ -73,15 +61,16 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
              sample: the model does not hold there",
         );
     }
-    arguments.out.write(|| csv(&report, &case.units()))?;
+    arguments.study.out.write(|| csv(&report, &case.units()))?;
     arguments
+        .study
         .plot
         .draw(|| approach_figure(&report, &case.units()))?;
     if let Some(branches) = &mut report.branches {
         arguments.points.shorten(branches, output);
     }
     let written = Written {
-        path: arguments.out.out.clone(),
+        path: arguments.study.out.out.clone(),
         report: &report,
     };
     output.study(&case, &written, |_| text(&case, &report))

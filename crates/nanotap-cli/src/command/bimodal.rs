@@ -1,17 +1,13 @@
 //! `nanotap bimodal`: two tones with their loops against the distance.
 
-use clap::Args;
 use nanotap::case::physical::Kind;
 use nanotap::figure::bimodal::bimodal_figure;
-use nanotap::study::bimodal::{
-    BimodalOptions, BimodalPoint, BimodalReport, BimodalStudy, Loop, points_csv,
-};
+use nanotap::study::bimodal::{BimodalPoint, BimodalReport, BimodalStudy, Loop, points_csv};
 
-use crate::arguments::{CaseArguments, OutArgument, PlotArgument};
 use crate::failure::Failure;
 use crate::given_case::GivenCase;
 use crate::output::Output;
-use crate::request::Request;
+use crate::study_arguments::StudyArguments;
 use crate::table::{Align, Table};
 use crate::threads::ThreadsArgument;
 use crate::{motion, number, progress, style};
@@ -19,25 +15,10 @@ use crate::{motion, number, progress, style};
 /// Bimodal operation against the distance: amplitude, phase, frequency and drive of both tones as their
 /// loops hold them (AM–FM by default), and what the usual formulas make of them. The frequencies need
 /// no common period.
-#[derive(Args, Debug)]
-pub(crate) struct Arguments {
-    #[command(flatten)]
-    case: CaseArguments,
-
-    #[command(flatten)]
-    request: Request<BimodalOptions>,
-
-    #[command(flatten)]
-    out: OutArgument,
-    #[command(flatten)]
-    plot: PlotArgument,
-}
+pub(crate) type Arguments = StudyArguments<BimodalStudy>;
 
 pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure> {
-    let request = arguments.request.read()?;
-    arguments.out.check()?;
-    arguments.plot.check()?;
-    let case = GivenCase::for_study(&arguments.case, true, output)?;
+    let (request, case) = arguments.read(output)?;
     let report = progress::study::<BimodalStudy>(&case, &request, &ThreadsArgument::default())?;
     arguments.out.write(|| points_csv(&report))?;
     arguments.plot.draw(|| bimodal_figure(&report))?;

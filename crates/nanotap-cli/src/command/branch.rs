@@ -9,16 +9,13 @@ use nanotap::case::units::Units;
 use nanotap::figure::branch::{Shown, case_figure};
 use nanotap::number::shortest;
 use nanotap::observe::{ObservableSet, columns, time_series};
-use nanotap::study::branch::{
-    AttractorShare, BranchOptions, BranchReport, BranchStudy, PointReport,
-};
+use nanotap::study::branch::{AttractorShare, BranchReport, BranchStudy, PointReport};
 use nanotap::study::orbit::spectral_radius;
 
-use crate::arguments::{CaseArguments, OutArgument, PlotArgument};
 use crate::failure::Failure;
 use crate::given_case::GivenCase;
 use crate::output::Output;
-use crate::request::Request;
+use crate::study_arguments::StudyArguments;
 use crate::table::{Align, Table};
 use crate::threads::ThreadsArgument;
 use crate::{file, motion, number, progress, style};
@@ -30,10 +27,7 @@ const LONGEST_DOCUMENT: usize = 900_000;
 #[derive(Args, Debug)]
 pub(crate) struct Arguments {
     #[command(flatten)]
-    case: CaseArguments,
-
-    #[command(flatten)]
-    request: Request<BranchOptions>,
+    study: StudyArguments<BranchStudy>,
 
     /// Observable that --plot shows against the parameter
     #[arg(long, value_name = "OBSERVABLE", value_parser = shown())]
@@ -43,10 +37,6 @@ pub(crate) struct Arguments {
     points: PointsArgument,
     #[command(flatten)]
     threads: ThreadsArgument,
-    #[command(flatten)]
-    out: OutArgument,
-    #[command(flatten)]
-    plot: PlotArgument,
 }
 
 /// The names of what can be shown.
@@ -57,10 +47,7 @@ fn shown() -> impl TypedValueParser<Value = Shown> {
 }
 
 pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure> {
-    let mut options = arguments.request.read()?;
-    arguments.out.check()?;
-    arguments.plot.check()?;
-    let case = GivenCase::of(&arguments.case, output)?;
+    let (mut options, case) = arguments.study.read(output)?;
     case.note_constants(&[options.range(&case)?.key], output);
     if let Some(shown) = arguments.show.and_then(Shown::observable) {
         options.observables = options.observables.with(shown);
@@ -70,12 +57,13 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
         output.warning("stopped before it was done");
     }
     let model = case.model()?;
-    if let Some(path) = &arguments.out.out {
+    if let Some(path) = &arguments.study.out.out {
         let names = time_series::state_names(&model);
         let table = csv(&report, options.observables, &names, &case.units());
         file::write(path, table.as_bytes())?;
     }
     arguments
+        .study
         .plot
         .draw(|| case_figure(&case, &report, arguments.show))?;
     arguments.points.shorten(&mut report, output);

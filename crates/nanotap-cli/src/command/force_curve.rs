@@ -5,14 +5,13 @@ use nanotap::case::physical::Kind;
 use nanotap::figure::force_curve::force_curve_figure;
 use nanotap::study::approach::Way;
 use nanotap::study::force_curve::{
-    ForceCurveOptions, ForceCurveReport, ForceCurveStudy, StaticJump, Waveform, points_csv,
+    ForceCurveReport, ForceCurveStudy, StaticJump, Waveform, points_csv,
 };
 
-use crate::arguments::{CaseArguments, OutArgument, PlotArgument};
 use crate::failure::Failure;
 use crate::given_case::GivenCase;
 use crate::output::Output;
-use crate::request::Request;
+use crate::study_arguments::StudyArguments;
 use crate::table::{Align, Table};
 use crate::threads::ThreadsArgument;
 use crate::{motion, number, progress, style};
@@ -22,30 +21,19 @@ use crate::{motion, number, progress, style};
 #[derive(Args, Debug)]
 pub(crate) struct Arguments {
     #[command(flatten)]
-    case: CaseArguments,
-
-    #[command(flatten)]
-    request: Request<ForceCurveOptions>,
-
+    study: StudyArguments<ForceCurveStudy>,
     #[command(flatten)]
     threads: ThreadsArgument,
-    #[command(flatten)]
-    out: OutArgument,
-    #[command(flatten)]
-    plot: PlotArgument,
 }
 
 pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure> {
-    let request = arguments.request.read()?;
-    arguments.out.check()?;
-    arguments.plot.check()?;
-    let case = GivenCase::for_study(&arguments.case, true, output)?;
+    let (request, case) = arguments.study.read(output)?;
     let report = progress::study::<ForceCurveStudy>(&case, &request, &arguments.threads)?;
     for warning in &report.warnings {
         output.warning(warning);
     }
-    arguments.out.write(|| points_csv(&report))?;
-    arguments.plot.draw(|| force_curve_figure(&report))?;
+    arguments.study.out.write(|| points_csv(&report))?;
+    arguments.study.plot.draw(|| force_curve_figure(&report))?;
     output.study(&case, &report, |report| text(&case, report))
 }
 

@@ -6,15 +6,13 @@ use clap::Args;
 use nanotap::case::physical::Kind;
 use nanotap::case::quantity::format_electronvolts;
 use nanotap::figure::reconstruct::reconstruct_figure;
-use nanotap::study::reconstruct::{
-    ReconstructMethod, ReconstructOptions, ReconstructReport, ReconstructStudy,
-};
+use nanotap::study::reconstruct::{ReconstructMethod, ReconstructReport, ReconstructStudy};
 
-use crate::arguments::{CaseArguments, OutArgument, PlotArgument, measured};
+use crate::arguments::measured;
 use crate::failure::Failure;
 use crate::given_case::GivenCase;
 use crate::output::Output;
-use crate::request::Request;
+use crate::study_arguments::StudyArguments;
 use crate::table::{Align, Table};
 use crate::threads::ThreadsArgument;
 use crate::{motion, number, progress, style};
@@ -31,34 +29,22 @@ pub(crate) struct Arguments {
     data: PathBuf,
 
     #[command(flatten)]
-    case: CaseArguments,
+    study: StudyArguments<ReconstructStudy>,
 
     /// A further measured curve of the same sample; may be repeated
     #[arg(long, value_name = "DATA")]
     also: Vec<PathBuf>,
 
     #[command(flatten)]
-    request: Request<ReconstructOptions>,
-
-    #[command(flatten)]
     threads: ThreadsArgument,
-
-    #[command(flatten)]
-    out: OutArgument,
-
-    #[command(flatten)]
-    plot: PlotArgument,
 }
 
 pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure> {
-    let mut options = arguments.request.read()?;
-    arguments.out.check()?;
-    arguments.plot.check()?;
+    let (mut options, case) = arguments.study.read(output)?;
     options.data = measured(&arguments.data, &arguments.also, "reconstruct")?;
-    let case = GivenCase::for_study(&arguments.case, true, output)?;
     let report = progress::study::<ReconstructStudy>(&case, &options, &arguments.threads)?;
-    arguments.out.write(|| report.csv())?;
-    arguments.plot.draw(|| reconstruct_figure(&report))?;
+    arguments.study.out.write(|| report.csv())?;
+    arguments.study.plot.draw(|| reconstruct_figure(&report))?;
     for remark in &report.remarks {
         output.warning(remark);
     }

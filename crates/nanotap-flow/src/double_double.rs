@@ -17,14 +17,14 @@ impl Dd {
         Self(a, 0.0)
     }
 
-    /// The exact sum of two doubles.
+    /// Returns the exact sum of two doubles.
     fn two_sum(a: f64, b: f64) -> Self {
         let s = a + b;
         let t = s - a;
         Self(s, (a - (s - t)) + (b - t))
     }
 
-    /// The exact product of two doubles.
+    /// Returns the exact product of two doubles.
     pub(crate) fn two_product(a: f64, b: f64) -> Self {
         let p = a * b;
         Self(p, a.mul_add(b, -p))
@@ -73,7 +73,8 @@ impl ComplexDd {
         )
     }
 
-    /// `e^z` by halving the argument, a Taylor sum, and squaring back.
+    /// Computes `e^z` by halving the argument, summing a Taylor series, and squaring the result
+    /// back.
     pub(crate) fn exp(self) -> Self {
         let size = self.0.0.abs() + self.1.0.abs();
         let halvings = if size > 0.02 {

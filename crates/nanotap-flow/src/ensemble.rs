@@ -35,12 +35,12 @@ const MAX_EVALUATIONS: usize = 3;
 #[derive(Clone, Debug)]
 pub struct Ensemble {
     system: Arc<System>,
-    /// Whether its motions can be followed together.
+    /// Whether its motions can be followed eight at a time.
     fits: bool,
-    /// Follows single lanes, starts and ends.
+    /// Motion that follows single lanes, and starts and ends all of them.
     alone: Motion,
     members: Vec<Member>,
-    /// Members that wait in each regime.
+    /// Members waiting in each regime, by number.
     waiting: Vec<VecDeque<usize>>,
     pack: Pack,
     stretches: Stretches,
@@ -51,11 +51,11 @@ pub struct Ensemble {
 /// The states of all members at the ends of their periods.
 #[derive(Clone, Debug)]
 struct Strobe {
-    /// Those of each member, in sequence.
+    /// States of each member, in sequence.
     passed: Vec<Vec<f64>>,
-    /// Of each regime its forced response at phase 0.
+    /// Forced response of each regime at phase 0.
     responses: Vec<Vec<f64>>,
-    /// States at the end of the period in which the present stretch begins, a lane each.
+    /// States at the end of the period in which the present stretch begins, one lane each.
     now: Vec<Octet>,
 }
 
@@ -68,20 +68,20 @@ pub struct Stretches {
     pub alone: u64,
 }
 
-/// One motion, as [`Motion`] has it.
+/// One motion: the lane's part of a [`Motion`].
 #[derive(Clone, Debug)]
 struct Member {
     regime: usize,
     phase: f64,
     packed: Vec<ComplexVector>,
     surface: Option<(usize, Start)>,
-    /// Periods still to run, this one included.
+    /// Number of periods still to run, the present one included.
     left: usize,
     stalled: u32,
     failure: Option<FlowError>,
 }
 
-/// The work space of eight motions in one regime, a lane each.
+/// The work space of eight motions in one regime, one lane each.
 #[derive(Clone, Debug, Default)]
 struct Pack {
     /// Modal coordinates and phasors, and those after the switch.
@@ -98,9 +98,9 @@ struct Pack {
 struct Sums {
     /// Sum of the terms' absolute values, constant included.
     size: Octet,
-    /// Bound of the third derivative.
+    /// Bound of the third derivative of the guard.
     third: Octet,
-    /// The rate at the start.
+    /// Rate of the guard at the start.
     rate: Octet,
     /// Sums with the table's weights of the fine grid.
     weighted: [Octet; 4],
@@ -119,7 +119,7 @@ struct Switches {
 }
 
 impl Ensemble {
-    /// An ensemble of motions of `system`.
+    /// Creates an ensemble of motions of `system`.
     pub fn new(system: Arc<System>) -> Self {
         Self {
             fits: Self::fits(&system),
@@ -305,7 +305,7 @@ impl Ensemble {
         }
     }
 
-    /// Ends all motions that are under way.
+    /// Cancels all motions that are still running.
     fn cancel(&mut self) {
         for member in self
             .waiting
@@ -441,7 +441,8 @@ impl Ensemble {
 }
 
 impl Strobe {
-    /// For members of `system` whose states go where `passed` has room for them.
+    /// Creates the storage for members of `system`; it takes the vectors of `passed` and clears
+    /// them.
     fn new(system: &System, passed: &mut [Vec<f64>]) -> Self {
         let emptied = |passed: &mut Vec<f64>| {
             passed.clear();
@@ -544,7 +545,7 @@ impl Member {
 }
 
 impl Pack {
-    /// Gives each member a lane.
+    /// Assigns a lane to each member.
     #[inline(always)]
     fn gather<W: Wide>(
         &mut self,
@@ -575,7 +576,7 @@ impl Pack {
         }
     }
 
-    /// Works out the amplitudes of the guard's terms.
+    /// Computes the amplitudes of the guard's terms, and sums over them.
     #[inline(always)]
     fn amplitudes<W: Wide>(&mut self, kernel: &Kernel, table: &Table) -> Sums {
         let zero = W::splat(0.0);
@@ -615,9 +616,9 @@ impl Pack {
         }
     }
 
-    /// The switches within the intervals: by Newton's method with two more derivatives from where
-    /// the interval's quintic falls through zero. Where a lane has none, factors are those of the
-    /// search's end.
+    /// Locates the switches within the intervals by Newton's method with two more derivatives,
+    /// starting at the zero of the interval's quintic. In lanes without an interval, the factors
+    /// are those of the end of the search.
     #[inline(always)]
     fn switches<W: Wide>(
         &mut self,
@@ -699,7 +700,8 @@ impl Pack {
         }
     }
 
-    /// The guard and its first three derivatives at time `at`, whose exponentials are kept.
+    /// Evaluates the guard and its first three derivatives at time `at`, and keeps the
+    /// exponentials.
     #[inline(always)]
     fn evaluate<W: Wide>(&mut self, kernel: &Kernel, at: W::Register) -> Cubic<W> {
         let zero = W::splat(0.0);
@@ -727,7 +729,7 @@ impl Pack {
         }
     }
 
-    /// Moves on by the times that were evaluated and what is left beyond them.
+    /// Advances the lanes by the last evaluated times and the remaining times `rest`.
     #[inline(always)]
     fn pass<W: Wide>(&mut self, kernel: &Kernel, rest: Octet) {
         let rest = W::load(&rest);
@@ -742,8 +744,8 @@ impl Pack {
         }
     }
 
-    /// The states a time `ahead`, at phase 0 of the drive, in a regime whose forced response is known
-    /// there.
+    /// Computes the states after the times `ahead`, at phase 0 of the drive, where the forced
+    /// response of the regime is known.
     #[inline(always)]
     fn states_after<W: Wide>(
         &self,

@@ -2,27 +2,27 @@
 
 use thiserror::Error;
 
-/// What can go wrong in building or running a piecewise-linear flow.
+/// An error in building or running a piecewise-linear flow.
 #[derive(Clone, Debug, Error, PartialEq)]
 #[non_exhaustive]
 pub enum FlowError {
     /// Sizes of matrices, vectors or tone lists do not fit together.
     #[error("{what} has {found} entries where {expected} are needed")]
     Shape {
-        /// The thing whose size is wrong.
+        /// Description of the object whose size is wrong.
         what: &'static str,
         /// Size found: a number of entries, rows or columns.
         found: usize,
-        /// The size that would fit.
+        /// Size that fits.
         expected: usize,
     },
     /// A number is not finite.
     #[error("{what} holds a value that is not a finite number")]
     NotFinite {
-        /// The thing that holds it.
+        /// Description of the object that contains it.
         what: &'static str,
     },
-    /// The drive's period or a harmonic makes no sense.
+    /// The drive's period or a harmonic is invalid.
     #[error("the drive needs a positive, finite period and harmonics of at least 1, got {what}")]
     Drive {
         /// Description of the invalid period or harmonic.
@@ -80,7 +80,7 @@ pub enum FlowError {
         /// Time within the drive period, in the system's unit of time.
         time: f64,
     },
-    /// Switches pile up at one instant and no sticking regime was given.
+    /// Switches accumulate at one instant, and no sticking regime was given.
     #[error(
         "switches accumulate at time {time} (chatter) and the transition names no sticking regime \
          in which the motion could go on"
@@ -89,7 +89,7 @@ pub enum FlowError {
         /// Time within the drive period, in the system's unit of time.
         time: f64,
     },
-    /// A transition names a regime that is not there.
+    /// A transition names a regime that does not exist.
     #[error("a transition leads to regime {target}, but there are {regimes}")]
     Target {
         /// Number of the regime that the transition names, from 0.

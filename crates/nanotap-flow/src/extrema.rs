@@ -15,8 +15,8 @@ pub struct Extremum {
 }
 
 impl PiecewiseSignal {
-    /// Every local extremum inside the pieces (zeros of the derivative), in order of
-    /// time. Kinks at switches are not among them; see [`PiecewiseSignal::range`].
+    /// Returns every local extremum inside the pieces (zeros of the derivative), in order of time.
+    /// Kinks at switches are not included; see [`PiecewiseSignal::range`].
     pub fn local_extrema(&self) -> Vec<Extremum> {
         let mut out = Vec::new();
         for piece in &self.pieces {
@@ -31,7 +31,7 @@ impl PiecewiseSignal {
         out
     }
 
-    /// The least and the greatest value, ends and switches included; `None` if empty.
+    /// Returns the least and the greatest value, ends and switches included; `None` if empty.
     pub fn range(&self) -> Option<(Extremum, Extremum)> {
         let ends = self.pieces.iter().flat_map(|p| {
             [0.0, p.length].map(|s| Extremum {

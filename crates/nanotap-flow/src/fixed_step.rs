@@ -27,9 +27,9 @@ pub struct FixedStep<'a> {
     switching: Switching,
     regime: usize,
     state: DVector<f64>,
-    /// The whole step of each regime; none where the stages look at the guards.
+    /// Combined whole step of each regime; empty if every stage checks the guards.
     whole: Vec<WholeStep>,
-    /// `e^{iω_k t}` at the state's phase.
+    /// Phasors `e^{iω_k t}` of the tones at the state's phase.
     phasors: Vec<Complex>,
     next: DVector<f64>,
     /// Work space of a step taken stage by stage: where the field is taken, and the field.
@@ -83,7 +83,7 @@ impl WholeStep {
         }
     }
 
-    /// The state after the step from `x`, where the tones are at `phasors`, written to `next`.
+    /// Writes the state after the step from `x`, where the tones are at `phasors`, to `next`.
     fn take(&self, phasors: &mut [Complex], x: &DVector<f64>, next: &mut DVector<f64>) {
         let next = next.as_mut_slice();
         self.added
@@ -208,8 +208,8 @@ impl<'a> FixedStep<'a> {
         switches
     }
 
-    /// The regime that a guard of the present one sends the state `x` to, where the tones are at
-    /// `phasors`.
+    /// Returns the regime to which a guard of the present one sends the state `x`, where the tones
+    /// are at `phasors`.
     fn target(&self, x: &[f64], phasors: &[Complex]) -> Option<usize> {
         self.system.transitions()[self.regime]
             .iter()
@@ -233,7 +233,7 @@ impl<'a> FixedStep<'a> {
         self.rate.gemv(1.0, regime.matrix(), &self.stage, 1.0);
     }
 
-    /// A step of length `h` from phase `t`, stage by stage.
+    /// Takes a step of length `h` from phase `t`, stage by stage.
     fn step(&mut self, t: f64, h: f64) {
         let drive = self.system.drive();
         let tones = 0..drive.frequencies().len();

@@ -82,9 +82,9 @@ impl Flow {
         self.motion.run_period(&self.system, observer)
     }
 
-    /// Runs from phase 0 over `periods` drive periods without stopping at the ends of those
-    /// in between: a flight that lasts from one period into the next is one flight, so that
-    /// this is faster than [`Flow::run_period`] and agrees with it to rounding.
+    /// Runs from phase 0 over `periods` drive periods without stopping at the ends of those in
+    /// between. A flight that lasts from one period into the next is then a single stretch, so this
+    /// is faster than [`Flow::run_period`] and agrees with it up to rounding.
     ///
     /// # Errors
     /// As [`Flow::run_period`].

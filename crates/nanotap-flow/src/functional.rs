@@ -15,13 +15,13 @@ pub enum Functional<C = usize, F = f64> {
     Integral(C),
     /// Integral `∫ g h dt` of a product; the integral of the square if both outputs are the same.
     Product(C, C),
-    /// `∫ g e^{−iωt} dt`. Twice this over the duration `D`, `c = (2/D) ∫ g e^{−iωt} dt`, is the
-    /// amplitude of the component `Re(c e^{iωt})`.
+    /// Fourier integral `∫ g e^{−iωt} dt`. Over a duration `D`, `c = (2/D) ∫ g e^{−iωt} dt` is the
+    /// complex amplitude of the component `Re(c e^{iωt})`.
     Fourier(C, F),
 }
 
 impl<C, F> Functional<C, F> {
-    /// The same functional of other outputs and frequencies.
+    /// Returns the same functional with outputs and frequencies converted.
     pub fn map<D, G>(
         self,
         mut output: impl FnMut(C) -> D,

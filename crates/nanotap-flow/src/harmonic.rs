@@ -4,7 +4,7 @@
 use crate::{Complex, Drive, FlowError};
 use nalgebra::{DMatrix, DVector, RowDVector};
 
-/// A vector `c + Σ_k Re(z_k e^{iω_k t})`, one complex amplitude a tone of the drive.
+/// A vector `c + Σ_k Re(z_k e^{iω_k t})`, with one complex amplitude per tone of the drive.
 #[derive(Clone, Debug, PartialEq)]
 pub struct HarmonicVector {
     /// Constant part `c`, of length `n`.
@@ -49,7 +49,7 @@ impl HarmonicVector {
         self.write_where_tones_are((0..self.tones.len()).map(|k| drive.phasor(k, t)), value);
     }
 
-    /// Writes the value where `e^{iω_k t}` of the tones are `phasors` to `value` (length `n`).
+    /// Writes the value for the phasors `e^{iω_k t}` of the tones to `value` (length `n`).
     pub(crate) fn write_where_tones_are(
         &self,
         phasors: impl IntoIterator<Item = Complex>,
@@ -211,7 +211,7 @@ impl Output {
         self.linear_at(x) + self.constant + harmonic
     }
 
-    /// The value at state `x`, where `e^{iω_k t}` of the tones are `phasors`.
+    /// Returns the value at state `x` for the phasors `e^{iω_k t}` of the tones.
     pub(crate) fn where_tones_are(&self, phasors: &[Complex], x: &[f64]) -> f64 {
         let tones = self.tones.iter().zip(phasors);
         let harmonic: f64 = tones.map(|(z, p)| z.re * p.re - z.im * p.im).sum();

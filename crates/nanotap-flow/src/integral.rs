@@ -7,8 +7,8 @@ use crate::signal::Signal;
 use crate::trajectory::PiecewiseSignal;
 use nanotap_arithmetic::ComplexFunctions as _;
 
-/// `amplitude · s^power · e^{rate s}` over a length of time; a signal is the real part of a sum of
-/// these.
+/// A term `amplitude · s^power · e^{rate s}` over a length of time; a signal is the real part of a
+/// sum of such terms.
 #[derive(Clone, Copy)]
 struct Term {
     rate: Complex,
@@ -39,7 +39,7 @@ fn terms(signal: &Signal, length: f64) -> Vec<Term> {
         .collect()
 }
 
-/// `∫₀^length s^power e^{rate s} ds` with `end = e^{rate · length}`.
+/// Computes `∫₀^length s^power e^{rate s} ds`, given `end = e^{rate · length}`.
 fn moment(rate: Complex, power: u32, length: f64, end: Complex) -> Complex {
     let z = rate * length;
     if power == 0 || z.modulus() > f64::from(power) + 1.0 {
@@ -97,7 +97,7 @@ impl Turn {
         }
     }
 
-    /// The integral of its product with a sum of terms.
+    /// Returns the integral of the factor times a sum of terms.
     fn integral(&mut self, terms: &[Term]) -> Complex {
         let sum: Complex = terms
             .iter()

@@ -8,8 +8,8 @@ use crate::system::System;
 use crate::{Complex, Flow, FlowError};
 use nalgebra::DMatrix;
 
-/// Carries `∂q/∂x₀` along a flow, in modal coordinates: a column for each
-/// component of the initial state. The default is empty: [`Jacobian::begin`] starts it.
+/// Observer that carries `∂q/∂x₀` along a flow, in modal coordinates: one column per component of
+/// the initial state. The default is empty; [`Jacobian::begin`] initialises it.
 #[derive(Clone, Debug, Default)]
 pub struct Jacobian {
     /// Derivative `∂q/∂x₀` in packed modal coordinates, column by column.
@@ -27,8 +27,8 @@ impl Jacobian {
         start
     }
 
-    /// Becomes the identity, for a flow of `system` that is in `regime`; zero where the motion
-    /// sticks to a rigid stop, to which every neighbour returns.
+    /// Sets the identity, for a flow of `system` that is in `regime`; zero if the motion sticks to
+    /// a rigid stop, to which every neighbour returns.
     pub fn begin(&mut self, system: &System, regime: usize) {
         let identity = system.regimes()[regime].prepared().packed_left();
         self.columns.clear();

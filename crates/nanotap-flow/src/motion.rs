@@ -20,16 +20,16 @@ pub(crate) struct Motion {
     pub(crate) packed: Vec<ComplexVector>,
     /// The work space of a switch.
     next: Vec<ComplexVector>,
-    /// `e^{λ_k s}` of the stretch that is passed.
+    /// Factors `e^{λ_k s}` of the present stretch.
     turns: Vec<ComplexVector>,
-    /// The transition whose guard starts at zero, and how.
+    /// Transition whose guard starts at zero, and how it starts.
     pub(crate) surface: Option<(usize, Start)>,
     signal: Signal,
     followed: Followed,
     /// For observers: modal coordinates and `e^{λ_k s}` as plain numbers.
     modal: Vec<Complex>,
     factors: Vec<Complex>,
-    /// A state's length of work space.
+    /// Work space of the length of a state.
     scratch: Vec<f64>,
     pub(crate) statistics: Statistics,
     pub(crate) switches: u64,
@@ -37,19 +37,19 @@ pub(crate) struct Motion {
     pub(crate) longest_passed_touch: f64,
 }
 
-/// Largest number of consecutive switches within [`BRIEF`] before chatter is refused.
+/// Largest number of consecutive switches within [`BRIEF`] before chatter is reported as an error.
 const STALLED_SWITCHES: u32 = 1000;
-/// Interval between switches that counts as chatter, as a part of the fastest time scale.
+/// Interval between switches that counts as chatter, as a fraction of the fastest time scale.
 pub(crate) const BRIEF: f64 = 1e-6;
-/// A touch shorter than this part of the fastest time scale lasts as long as its rate and
-/// acceleration determine.
+/// Duration, as a fraction of the fastest time scale, below which a touch is computed from its rate
+/// and acceleration alone.
 const SHORTEST_TOUCH: f64 = 1e-6;
-/// An impact sequence ends in sticking when its flights last less than this part
-/// of the fastest time scale: what is left of it is below rounding (second order).
+/// Duration of a flight, as a fraction of the fastest time scale, below which an impact sequence
+/// ends in sticking: the rest of the sequence is below rounding (second order).
 const CHATTER_RESOLUTION: f64 = 1e-8;
 
 impl Motion {
-    /// The work space of a motion of `system`; call [`Motion::start`] before running it.
+    /// Creates the work space of a motion of `system`; call [`Motion::start`] before running it.
     pub(crate) fn new(system: &System) -> Self {
         let largest = system
             .regimes()
@@ -75,7 +75,7 @@ impl Motion {
         }
     }
 
-    /// Puts the motion at state `x` (length `n`) and time `phase` within the period.
+    /// Sets the motion to state `x` (length `n`) at time `phase` within the period.
     pub(crate) fn start(
         &mut self,
         system: &System,
@@ -198,7 +198,8 @@ impl Motion {
         }
     }
 
-    /// Sets phase and phasors, which are carried from switch to switch, right.
+    /// Begins a drive period: sets phase and phasors, which are carried from switch to switch, to
+    /// their exact values at phase 0.
     #[inline(always)]
     fn begin_period(&mut self, system: &System) {
         self.phase = 0.0;
@@ -314,8 +315,8 @@ impl Motion {
         Ok(())
     }
 
-    /// The earliest transition within `left`. Compiled once for each arithmetic, not again for
-    /// every observer: it is the largest part of the inner loop.
+    /// Returns the earliest transition within `left`. It is compiled once per arithmetic, not for
+    /// every observer, since it is the largest part of the inner loop.
     #[inline(always)]
     fn next_crossing<S: Simd>(
         &mut self,
@@ -395,7 +396,7 @@ impl Motion {
         }
     }
 
-    /// Moves on by `length` within the regime.
+    /// Advances by `length` within the regime.
     #[inline(always)]
     fn pass<S: Simd, O: Observer>(&mut self, system: &System, length: f64, observer: &mut O) {
         let basis = system.regimes()[self.regime].basis();
@@ -435,8 +436,8 @@ impl Motion {
         }
     }
 
-    /// Sets `turns` to `e^{λ_k · length}`, from what the search for the switch evaluated last
-    /// if that was near enough.
+    /// Sets `turns` to `e^{λ_k · length}`, from the last evaluation of the search for the switch if
+    /// that was close enough.
     #[inline(always)]
     fn set_turns<S: Simd>(&mut self, system: &System, length: f64) {
         let rates = &system.packed_rates()[self.regime];
@@ -519,8 +520,8 @@ impl Motion {
         self.regime = switch.to;
     }
 
-    /// How long the guard of a rigid stop would stay below zero without the stop, if it rises again
-    /// within `longest`.
+    /// Returns how long the guard of a rigid stop would stay below zero without the stop, if it
+    /// rises again within `longest`.
     fn touch(
         &mut self,
         system: &System,
@@ -581,8 +582,8 @@ impl Motion {
         found
     }
 
-    /// Whether this impact is so slow, and pressed so firmly, that the rest of the
-    /// sequence is below rounding.
+    /// Reports whether this impact is so slow, and the acceleration towards the stop so large, that
+    /// the rest of the sequence is below rounding.
     fn chatter_ends(&mut self, system: &System, transition: usize, crossing: Crossing) -> bool {
         let prepared = &system.prepared(self.regime)[transition];
         let Some(acceleration) = &prepared.acceleration else {
@@ -600,8 +601,8 @@ impl Motion {
         pressed > 0.0 && -crossing.rate * fastest <= CHATTER_RESOLUTION * pressed
     }
 
-    /// Puts a motion that comes to rest on a rigid stop exactly on it: all sticking motions are then
-    /// equal, without the rounding of their past.
+    /// Sets a motion that comes to rest on a rigid stop exactly on it: all sticking motions are
+    /// then equal, independent of earlier rounding errors.
     fn set_on_stop(&mut self, system: &System, guard: &Output, to: usize) {
         let (regime, drive) = (&system.regimes()[to], system.drive());
         let mut state = std::mem::take(&mut self.scratch);
@@ -627,8 +628,8 @@ impl Motion {
     }
 }
 
-/// Whether a drive period has ended at `phase`; it is counted then, and the phase that of the next
-/// one. After the last it is zero.
+/// Reports whether a drive period has ended at `phase`. If so, counts it and sets the phase to that
+/// in the next period; after the last period the phase is zero.
 #[inline(always)]
 pub(crate) fn count_period(phase: &mut f64, left: &mut usize, period: f64) -> bool {
     let ended = *phase >= period;
@@ -639,8 +640,8 @@ pub(crate) fn count_period(phase: &mut f64, left: &mut usize, period: f64) -> bo
     ended
 }
 
-/// Does the work in the arithmetic that serves the system: the library's functions where angles
-/// are too large for our own.
+/// Runs the work in the arithmetic that suits the system: with library functions if angles are too
+/// large for the built-in ones.
 fn in_arithmetic<W: Work>(system: &System, work: W) -> W::Output {
     if system.largest_angle() > simd::LARGEST_ANGLE {
         work.run::<Library>()
@@ -683,7 +684,7 @@ impl Work for Over<'_> {
     }
 }
 
-/// The earliest transition within `left`.
+/// The arguments of the search for the earliest transition, for the dispatch to an arithmetic.
 struct NextCrossing<'a> {
     motion: &'a mut Motion,
     system: &'a System,

@@ -23,8 +23,8 @@ pub struct SegmentView<'a> {
     pub modal: &'a [Complex],
     /// Factors `e^{λ_k · length}` of the modal coordinates, of length `m`.
     pub factors: &'a [Complex],
-    /// Modal coordinates and the tones' phasors at its start, and what they are multiplied by
-    /// on the way.
+    /// Modal coordinates and the tones' phasors at its start, and the factors by which the stretch
+    /// multiplies them.
     pub(crate) packed: &'a [ComplexVector],
     pub(crate) turns: &'a [ComplexVector],
 }
@@ -48,9 +48,9 @@ impl SegmentView<'_> {
 pub struct SwitchView<'a> {
     /// System whose motion is observed.
     pub system: &'a System,
-    /// The change of modal coordinates.
+    /// Change of modal coordinates at the switch.
     pub switch: &'a Switch,
-    /// The number of the transition taken out of `switch.from`.
+    /// Number of the transition, among those out of `switch.from`.
     pub transition: usize,
     /// Whether the switch ended chatter: the motion continues in the sticking regime.
     pub stuck: bool,

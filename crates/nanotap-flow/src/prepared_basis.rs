@@ -43,12 +43,13 @@ impl PreparedBasis {
         &self.basis
     }
 
-    /// `[Re L; Im L]` (`2m × n`): `[Re q; Im q]` of the state.
+    /// `[Re L; Im L]` (`2m × n`): the matrix from the state to `[Re q; Im q]`.
     pub(crate) fn stacked_left(&self) -> &DMatrix<f64> {
         &self.stacked_left
     }
 
-    /// `[Re R, −Im R]` (`n × 2m`): the state of `[Re q; Im q]`, since `x = Re(R q)`.
+    /// `[Re R, −Im R]` (`n × 2m`): the matrix from `[Re q; Im q]` to the state, since
+    /// `x = Re(R q)`.
     pub(crate) fn stacked_right(&self) -> &DMatrix<f64> {
         &self.stacked_right
     }

@@ -26,7 +26,7 @@ enum Primitive {
 const SLOW: f64 = 0.1;
 
 impl Rate {
-    /// For stretches of up to `period`.
+    /// Selects the method for stretches of up to `period`.
     pub(crate) fn new(value: Complex, period: f64) -> Self {
         let square = value.re * value.re + value.im * value.im;
         let primitive = if square == 0.0 {
@@ -39,7 +39,7 @@ impl Rate {
         Self { value, primitive }
     }
 
-    /// `∫₀^length e^{λs} ds` with `end = e^{λ · length}`.
+    /// Returns `∫₀^length e^{λs} ds`, given `end = e^{λ · length}`.
     #[inline(always)]
     pub(crate) fn integral(&self, length: f64, end: Complex) -> Complex {
         match self.primitive {

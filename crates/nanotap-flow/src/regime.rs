@@ -72,7 +72,7 @@ impl Regime {
         self.prepared.basis()
     }
 
-    /// The spectral basis as the inner loop takes it.
+    /// Returns the spectral basis in the layout of the inner loop.
     pub(crate) fn prepared(&self) -> &PreparedBasis {
         &self.prepared
     }
@@ -82,8 +82,8 @@ impl Regime {
         &self.response
     }
 
-    /// Modal coordinates of state `x` at time `t`, written to `q`; `rest` is work space, as
-    /// long as the state.
+    /// Writes the modal coordinates of state `x` at time `t` to `q`; `rest` is work space of the
+    /// length of the state.
     pub(crate) fn to_modal(
         &self,
         drive: &Drive,
@@ -103,7 +103,7 @@ impl Regime {
         }
     }
 
-    /// The state of modal coordinates `q` at time `t`, written to `x`.
+    /// Writes the state of modal coordinates `q` at time `t` to `x`.
     pub(crate) fn to_state(
         &self,
         drive: &Drive,
@@ -188,11 +188,11 @@ pub(crate) struct KernelVectors {
     pub(crate) weight: ComplexVector,
     /// `|λ|³` of each term, for bounds of the third derivative.
     pub(crate) cube: Vector,
-    /// Which terms each lower bound follows.
+    /// Masks of the terms that each lower bound follows.
     pub(crate) masks: ComplexVector,
 }
 
-/// What the kernels of all outputs of a regime have in common: the rates of their terms.
+/// The part that the kernels of all outputs of a regime share: the rates of their terms.
 pub(crate) struct KernelFrame {
     kernel: Kernel,
     /// Absolute rate `|λ|` of each term.
@@ -250,7 +250,7 @@ impl KernelFrame {
 }
 
 impl Kernel {
-    /// The rate `λ` of term `k`.
+    /// Returns the rate `λ` of term `k`.
     pub(crate) fn rate(&self, k: usize) -> Complex {
         let (vector, lane) = layout::place(k);
         let vector = &self.vectors[vector];
@@ -282,7 +282,7 @@ fn check(matrix: &DMatrix<f64>, forcing: &HarmonicVector, drive: &Drive) -> Resu
     forcing.check("a regime's forcing", n, drive.frequencies().len())
 }
 
-/// `x_p`: each tone's complex amplitude solves `(iω − A) X = F`, mode by mode.
+/// Computes `x_p`: each tone's complex amplitude solves `(iω − A) X = F`, mode by mode.
 fn forced_response(
     index: usize,
     forcing: &HarmonicVector,

@@ -19,11 +19,12 @@ use nanotap_arithmetic::ComplexFunctions as _;
 /// fixed drive phase.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SystemTangent {
-    /// `∂A`, `∂f` of each regime.
+    /// Derivatives `∂A` and `∂f` of each regime.
     pub regimes: Vec<RegimeTangent>,
-    /// `∂guard` of each transition of each regime.
+    /// Derivatives of the guards, by regime and transition.
     pub guards: Vec<Vec<Output>>,
-    /// `∂reset` of each transition of each regime, where the transition has a reset.
+    /// Derivatives of the resets, by regime and transition; `None` for a transition without a
+    /// reset.
     pub resets: Vec<Vec<Option<Reset>>>,
     /// Derivative `∂ ln T` of the drive period, per unit of the parameter.
     pub log_period: f64,
@@ -95,11 +96,11 @@ impl SystemTangent {
     }
 }
 
-/// Carries `∂x/∂θ` of several parameters along a flow.
+/// Observer that carries `∂x/∂θ` of several parameters along a flow.
 #[derive(Clone, Debug)]
 pub struct Sensitivity<'a> {
     tangents: &'a [SystemTangent],
-    /// `source[p][r]`: what drives the sensitivity to parameter `p` in regime `r`.
+    /// `source[p][r]`: right-hand side of the sensitivity to parameter `p` in regime `r`.
     sources: Vec<Vec<Source>>,
     /// `∂q/∂θ_p` in the present regime.
     modal: Vec<Vec<Complex>>,
@@ -148,7 +149,7 @@ impl Source {
     }
 }
 
-/// `½ L ∂A R` and `½ L ∂A R̄`, from products of real matrices.
+/// Computes `½ L ∂A R` and `½ L ∂A R̄` from products of real matrices.
 fn driven(prepared: &PreparedBasis, matrix: &DMatrix<f64>) -> [DMatrix<Complex>; 2] {
     let m = prepared.basis().len();
     // [Re R, −Im R], and [Re L; Im L] ∂A of it.
@@ -167,8 +168,8 @@ fn driven(prepared: &PreparedBasis, matrix: &DMatrix<f64>) -> [DMatrix<Complex>;
 /// Value of `|μ − λ| L` from which the difference of two exponentials loses almost no digit.
 const APART: f64 = 0.5;
 
-/// `∫₀^L e^{λ(L−τ)} e^{μτ} dτ`, without overflow or cancellation; λ and μ come with `e^{λL}` and
-/// `e^{μL}`.
+/// Computes `∫₀^L e^{λ(L−τ)} e^{μτ} dτ` without overflow or cancellation; λ and μ are given with
+/// `e^{λL}` and `e^{μL}`.
 fn response(
     (lambda, from): (Complex, Complex),
     (mu, to): (Complex, Complex),
@@ -189,8 +190,8 @@ fn response(
 /// The responses of all modes, over one length of time, to the terms that drive sensitivities.
 #[derive(Clone, Debug, Default)]
 struct Responses {
-    /// A row a mode: to μ = λ_j and its conjugate, to the tones and their conjugates, to a
-    /// constant. Empty where eigenvalues coincide.
+    /// One row per mode: the responses to μ = λ_j and its conjugate, to the tones and their
+    /// conjugates, and to a constant. Empty where eigenvalues coincide.
     rows: Vec<Complex>,
     /// The exponentials that drive: μ and `e^{μL}`, in this order.
     drivers: Vec<(Complex, Complex)>,
@@ -429,7 +430,7 @@ impl<'a> Propagator<'a> {
         }
     }
 
-    /// Modal coordinates that were `q`.
+    /// Returns the modal coordinates at the end of a stretch that starts at `q`.
     pub(crate) fn modal(&self, q: &[Complex]) -> Vec<Complex> {
         let mut later = q.to_vec();
         self.regime
@@ -438,8 +439,8 @@ impl<'a> Propagator<'a> {
         later
     }
 
-    /// The sensitivity to the first parameter, which was `s` where the coordinates were `q` at `phase`; `number`
-    /// is the regime's.
+    /// Returns the sensitivity to the first parameter at the end of a stretch; it is `s` at the
+    /// start, where the coordinates are `q` and the phase is `phase`. `number` is the regime's.
     pub(crate) fn sensitivity(
         &self,
         of: &Sensitivity<'_>,
@@ -470,8 +471,8 @@ impl<'a> Propagator<'a> {
     }
 }
 
-/// The exponential of the state, its sensitivity and the drive as one linear system,
-/// for regimes whose eigenvalues coincide.
+/// Advances the state, its sensitivity and the drive by the exponential of one linear system, for
+/// regimes whose eigenvalues coincide.
 fn augmented_stretch(
     modal: &mut [Complex],
     source: &Source,
@@ -508,7 +509,8 @@ fn augmented_stretch(
     }
 }
 
-/// The matrix of `(s, x, cos, sin, …, 1)` and its start with `s` and `x` left zero.
+/// Returns the matrix of `(s, x, cos, sin, …, 1)` and its initial value, with zeros for `s` and
+/// `x`.
 fn augmented(
     a: &DMatrix<f64>,
     f: &HarmonicVector,

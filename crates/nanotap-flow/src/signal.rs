@@ -16,7 +16,7 @@ use nanotap_arithmetic::ComplexFunctions as _;
 pub struct Signal {
     /// Constant part `c`, in the units of the output.
     pub constant: f64,
-    /// The terms with a power of `s`.
+    /// Terms with a power of `s`; empty unless eigenvalues coincide.
     pub powers: Vec<PowerTerm>,
     /// Number of terms without a power of `s`.
     count: usize,
@@ -193,8 +193,8 @@ impl Signal {
         Self::from_terms(output.constant, &terms, powers, length)
     }
 
-    /// The signal of a regime without clusters, from packed modal coordinates and
-    /// phasors, reusing this signal's memory.
+    /// Sets the signal of a regime without clusters, from packed modal coordinates and phasors, and
+    /// reuses its memory.
     #[inline(always)]
     pub(crate) fn refill<S: Simd>(&mut self, kernel: &Kernel, q: &[ComplexVector], length: f64) {
         self.constant = kernel.constant;
@@ -269,7 +269,7 @@ impl Signal {
         self.enclosure::<S>(s).jet
     }
 
-    /// The jet at `s` and the third derivative itself; the exponentials are kept for
+    /// Returns the jet at `s` and the third derivative, and keeps the exponentials for
     /// [`Signal::kept_factors`].
     #[inline(always)]
     pub(crate) fn jet_keeping_factors<S: Simd>(&mut self, s: f64) -> (Jet, f64) {
@@ -301,13 +301,13 @@ impl Signal {
         (jet, simd::sum::<S>(jerk))
     }
 
-    /// The exponentials `e^{λ_k s}` that were kept last, and `s`.
+    /// Returns the last exponentials `e^{λ_k s}` that were kept, and their `s`.
     #[inline(always)]
     pub(crate) fn kept_factors(&self) -> Option<(f64, &[ComplexVector])> {
         self.factors_at.map(|s| (s, &self.factors[..]))
     }
 
-    /// The amplitudes of some terms, each the same in every lane.
+    /// Writes the amplitudes of some terms, each the same in every lane, to `out`.
     #[inline(always)]
     pub(crate) fn amplitudes<S: Simd>(&self, terms: &[usize], out: &mut Vec<Amplitude>) {
         out.resize(terms.len(), Amplitude::default());
@@ -324,7 +324,7 @@ impl Signal {
         }
     }
 
-    /// Sums of the terms' amplitudes, weighted in four ways.
+    /// Returns the sums of the terms' amplitudes with four kinds of weights.
     #[inline(always)]
     pub(crate) fn weighted_amplitudes<S: Simd>(&self, weights: &[[Vector; 4]]) -> [f64; 4] {
         let mut sums = [S::splat(0.0); 4];
@@ -336,13 +336,13 @@ impl Signal {
         simd::sums::<S>(sums)
     }
 
-    /// The sum of all terms' sizes.
+    /// Returns the sum of the absolute values of all terms.
     #[inline(always)]
     pub(crate) fn size(&self) -> f64 {
         self.size
     }
 
-    /// The jet at `s` with the jets of the lower bounds.
+    /// Returns the jet at `s` with the jets of the lower bounds.
     #[inline(always)]
     pub(crate) fn enclosure<S: Simd>(&self, s: f64) -> Enclosure {
         let zero = S::splat(0.0);
@@ -578,7 +578,7 @@ impl PowerTerm {
         self.bound_from(order, 0.0, length)
     }
 
-    /// Bound on the size of the `order`-th derivative between `start` and `end`.
+    /// Returns a bound of the `order`-th derivative's absolute value between `start` and `end`.
     fn bound_from(self, order: u32, start: f64, end: f64) -> f64 {
         let decay = -self.rate.re;
         let sum: f64 = (0..=order.min(self.power))
@@ -600,7 +600,7 @@ impl PowerTerm {
     }
 }
 
-/// A signal's jet at an instant, in the arithmetic that this machine is fastest in.
+/// The arguments of [`Signal::jet`], for the dispatch to vector instructions.
 struct JetAt<'a>(&'a Signal, f64);
 
 impl Work for JetAt<'_> {

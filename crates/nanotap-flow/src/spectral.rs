@@ -20,7 +20,7 @@ use nanotap_arithmetic::ComplexFunctions as _;
 pub struct Cluster {
     /// Index of its first coordinate.
     pub start: usize,
-    /// The coupling of the coordinates in addition to the common eigenvalue `μ`.
+    /// Coupling `N` of the coordinates in addition to the common eigenvalue `μ`, `size × size`.
     pub coupling: DMatrix<Complex>,
     /// `N^p / p!` for `p = 1, 2, …`, as many as double precision can see over the horizon.
     powers: Vec<DMatrix<Complex>>,
@@ -38,9 +38,9 @@ impl Cluster {
     }
 }
 
-/// Modal coordinates `q = L x`, `x = Re(R q)` with `q̇_k = λ_k q_k` (apart from what
-/// clusters couple). One complex coordinate stands for each conjugate pair, one
-/// (with zero imaginary part) for each real eigenvalue.
+/// Modal coordinates `q = L x`, `x = Re(R q)` with `q̇_k = λ_k q_k` (apart from the coupling within
+/// clusters). One complex coordinate represents each conjugate pair, one (with zero imaginary part)
+/// each real eigenvalue.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SpectralBasis {
     /// Eigenvalues `λ_k`, of length `m`, per unit of time; within a cluster, their common value
@@ -206,7 +206,7 @@ impl SpectralBasis {
         Ok(y)
     }
 
-    /// How badly the basis rebuilds `matrix` and the identity, relative.
+    /// Returns the relative error with which the basis rebuilds `matrix` and the identity.
     fn residual(&self, matrix: &DMatrix<f64>) -> f64 {
         let n = matrix.nrows();
         let mut generator = DMatrix::from_diagonal(&DVector::from_column_slice(&self.eigenvalues));
@@ -242,8 +242,8 @@ impl SpectralBasis {
     }
 }
 
-/// Eigenvalues (with both members of every pair) in groups closer than `distance`;
-/// of two conjugate groups only the one with positive imaginary parts.
+/// Returns the eigenvalues (with both members of every pair) in groups closer than `distance`; of
+/// two conjugate groups only the one with positive imaginary parts.
 fn groups(eigenvalues: &[Complex], distance: f64) -> Vec<Vec<Complex>> {
     let n = eigenvalues.len();
     let mut label: Vec<usize> = (0..n).collect();

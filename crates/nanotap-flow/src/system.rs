@@ -25,22 +25,22 @@ pub struct Reset {
 /// in `regime`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Sticking {
-    /// The regime in which the guard stays at zero.
+    /// Number of the regime in which the guard stays at zero.
     pub regime: usize,
     /// Jump of the perfectly inelastic impact, after which the guard and its rate are zero.
     pub reset: Reset,
 }
 
 /// Exact initial value of a guard of the next regime at a switch. Sums of exponentials give it only
-/// to rounding, so that the guard would cross at once or never.
+/// up to rounding, so that the guard would cross immediately or never.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Onset {
-    /// The guard of this transition starts with value and rate zero: two bodies part that no
-    /// longer press on each other. (Of a start beyond the guard of the transition taken, with
-    /// value zero only.)
+    /// The guard of this transition starts with value and rate zero, as when two bodies part that
+    /// no longer press on each other. (If the motion starts beyond the guard of the transition
+    /// taken, only the value is zero.)
     AtRest(usize),
-    /// The guard of transition `transition` starts at `factor` times the rate of the guard of the transition
-    /// taken: the tip reaches a damper. At a grazing touch that is zero.
+    /// The guard of `transition` starts at `factor` times the rate of the guard of the transition
+    /// taken, as when the tip reaches a damper. At a grazing touch this is zero.
     Proportional {
         /// Number of the transition of the next regime.
         transition: usize,
@@ -153,10 +153,10 @@ pub(crate) struct PreparedTransition {
     pub(crate) switch: Switch,
     /// The change of basis into the sticking regime.
     pub(crate) sticking: Option<Switch>,
-    /// In the target regime, the transition whose guard is this one reversed (or the
-    /// same, at an impact), so that it starts at zero.
+    /// Transition of the target regime whose guard is the negative of this one (or the same, at an
+    /// impact), so that it starts at zero.
     pub(crate) reverse: Option<usize>,
-    /// The same in the sticking regime.
+    /// Such a transition of the sticking regime.
     pub(crate) sticking_reverse: Option<usize>,
     /// The guard's acceleration in the target regime, for the detection of chatter.
     pub(crate) acceleration: Option<Output>,
@@ -172,15 +172,16 @@ pub struct Switch {
     pub to: usize,
     /// `2m⁺ × 2m⁻`, acting on `[Re q; Im q]`.
     pub(crate) matrix: DMatrix<f64>,
-    /// The same with what the tones' phasors and the constant add, packed.
+    /// The same change of coordinates with the parts of the tones' phasors and of the constant,
+    /// packed.
     pub(crate) packed: AffineMap,
     /// The constant saltation `1 + u hᵀ` where the vector field's jump is
     /// proportional to the guard's rate; then the map is smooth through grazing.
     pub(crate) saltation: Option<DVector<f64>>,
     /// `matrix` with the constant saltation in it: the switch of a Jacobian.
     pub(crate) tangent: Option<LinearMap>,
-    /// Where the state is continuous: the guard's rate after the switch from that before it,
-    /// `factor · rate + constant`, where it follows from it alone.
+    /// For a continuous state: the guard's rate after the switch, `factor · rate + constant`, if it
+    /// follows from the rate before it alone.
     pub(crate) rate_after: Option<RateAfter>,
 }
 
@@ -229,7 +230,7 @@ impl Switch {
     }
 }
 
-/// The switch of packed coordinates: modal coordinates first, then phasors.
+/// Creates the switch of packed coordinates: modal coordinates first, then phasors.
 fn packed_switch(
     matrix: &DMatrix<f64>,
     to_modal: &DMatrix<f64>,
@@ -477,8 +478,8 @@ impl System {
         self.reaches[regime]
     }
 
-    /// The transition of a rigid stop, with the regime that it leaves, that ends in sticking in
-    /// `regime`; `None` where `regime` is not one in which the motion sticks.
+    /// Returns the regime and the transition of the rigid stop that ends in sticking in `regime`;
+    /// `None` if the motion does not stick in `regime`.
     pub(crate) fn stop_of(&self, regime: usize) -> Option<(usize, usize)> {
         let sticks = |e: &Transition| e.sticking.as_ref().is_some_and(|s| s.regime == regime);
         let mut out = self.transitions.iter().enumerate();
@@ -515,7 +516,7 @@ impl System {
         Ok((regime, surface.map(|(transition, _)| transition)))
     }
 
-    /// The same, with how the guard that starts at zero rises.
+    /// As [`System::regime_at`], and returns how the guard that starts at zero rises.
     pub(crate) fn start_at(
         &self,
         x: &[f64],
@@ -547,7 +548,7 @@ impl System {
             .ok_or(FlowError::NoRegime)
     }
 
-    /// The first regime that holds the state, outputs within `tolerance` being zero.
+    /// Returns the first regime that contains the state; outputs within `tolerance` count as zero.
     fn regime_within(
         &self,
         x: &[f64],
@@ -575,7 +576,8 @@ impl System {
             })
     }
 
-    /// The regime whose passed transition resets the state to one that the next regime holds.
+    /// Returns the regime whose transition is already passed and resets the state to one that the
+    /// next regime contains.
     fn left_at_once(
         &self,
         x: &[f64],
@@ -599,7 +601,7 @@ impl System {
         (0..self.regimes.len()).find(|&r| self.transitions[r].iter().any(leads_on))
     }
 
-    /// Whether regime `r` is no sticking regime, or one in which this state sticks:
+    /// Reports whether regime `r` is not a sticking regime, or is one in which this state sticks:
     /// guard and rate of the impact are zero.
     fn may_stick(
         &self,
@@ -632,7 +634,8 @@ impl System {
             .all(|output| output.at(&self.drive, x, t).abs() <= 2.0 * tolerance(from, output))
     }
 
-    /// How a guard that is zero rises, if it does: by its first derivative that does not vanish.
+    /// Returns how a guard that is zero rises, if it does, by its first derivative that does not
+    /// vanish.
     fn rises(
         &self,
         r: usize,
@@ -661,8 +664,8 @@ impl System {
         Some(Start::Surface { rate: None })
     }
 
-    /// The size of rounding errors that an output has along the motion through this state:
-    /// that of all its modal terms, which cancel in the output itself.
+    /// Returns the rounding error of an output along the motion through this state: that of all its
+    /// modal terms, which cancel in the output itself.
     fn motion_rounding(&self, r: usize, output: &Output, x: &[f64], t: f64) -> f64 {
         let regime = &self.regimes[r];
         let modal = regime.project(output);
@@ -726,7 +729,7 @@ impl System {
         }
     }
 
-    /// The transition of `target` whose guard is `guard` or its negative.
+    /// Returns the transition of `target` whose guard is `guard` or its negative.
     fn reverse(&self, guard: &Output, target: usize) -> Option<usize> {
         let reversed = guard.scaled(-1.0);
         self.transitions[target]
@@ -770,8 +773,8 @@ impl System {
         }
     }
 
-    /// `u` with `f⁺(x⁺) − R f⁻(x⁻) − ρ̇ = u ġ` for every state on the guard's zero
-    /// set, where such a `u` exists.
+    /// Returns `u` with `f⁺(x⁺) − R f⁻(x⁻) − ρ̇ = u ġ` for every state on the guard's zero set, if
+    /// such a `u` exists.
     fn constant_saltation(
         &self,
         from: usize,
@@ -810,7 +813,7 @@ impl System {
         Some(u)
     }
 
-    /// The guard's rate in `to` as a function of that in `from`, on the guard's zero set.
+    /// Returns the guard's rate in `to` as a function of that in `from`, on the guard's zero set.
     fn rate_after(&self, from: usize, to: usize, guard: &Output) -> Option<RateAfter> {
         let rate = |r: usize| {
             let regime = &self.regimes[r];
@@ -852,7 +855,7 @@ impl System {
         })
     }
 
-    /// `f⁺(Rx + ρ, t) − R f⁻(x, t) − ρ̇` as an affine function of the state.
+    /// Returns `f⁺(Rx + ρ, t) − R f⁻(x, t) − ρ̇` as an affine function of the state.
     fn field_jump(
         &self,
         from: usize,
@@ -919,7 +922,7 @@ fn packed_rates(regime: &Regime, drive: &Drive) -> Vec<ComplexVector> {
     layout::list(&rates)
 }
 
-/// Relative size up to which a difference counts as rounding.
+/// Relative size below which a difference counts as rounding.
 const NEGLIGIBLE: f64 = 1e-13;
 
 /// Largest number of oscillations of a mode in one drive period.
@@ -928,18 +931,18 @@ const MAX_TURNS: f64 = 1e7;
 /// Number of derivatives that are examined of a guard that starts at zero.
 const FLATTEST: usize = 6;
 
-/// A state is on a surface when its guard is within this many rounding errors of zero: a
-/// state computed a moment after a switch is no nearer.
+/// Number of rounding errors within which a guard counts as zero, and the state as on its surface:
+/// a state computed just after a switch is no closer.
 pub(crate) const ON_SURFACE: f64 = 32.0;
 
-/// The size of rounding errors in an output's value.
+/// Returns the size of rounding errors in an output's value.
 pub(crate) fn rounding(output: &Output, x: &[f64]) -> f64 {
     let linear: f64 = output.row.iter().zip(x).map(|(r, x)| (r * x).abs()).sum();
     let harmonic: f64 = output.tones.iter().map(|z| z.modulus()).sum();
     f64::EPSILON * (linear + output.constant.abs() + harmonic)
 }
 
-/// An affine-harmonic scalar as one vector, for projections.
+/// Returns an affine-harmonic scalar as one vector, for projections.
 fn flat<'a>(
     row: impl ExactSizeIterator<Item = &'a f64>,
     constant: f64,

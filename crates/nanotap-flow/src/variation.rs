@@ -99,10 +99,10 @@ pub struct Variation<'a> {
     pub speeds: Vec<((usize, usize), Speeds)>,
     /// Duration of the motion, in the system's unit of time.
     pub duration: Dual,
-    /// An extremum at the end of the last stretch moves with the switch there, if there is
-    /// one: which, and its rate.
+    /// Extrema at the end of the last stretch, which move with a switch there: number and rate of
+    /// each.
     at_end: Vec<(usize, f64)>,
-    /// By how much the start of the stretch moved, where it began with a switch.
+    /// Change of the time of the stretch's start, if it began with a switch.
     moved: Option<f64>,
     periods: f64,
 }
@@ -197,7 +197,8 @@ impl<'a> Variation<'a> {
         self.sensitivity.to_state(regime, 0, derivative);
     }
 
-    /// Adds a node of this weight, where outputs have these values, at a time within the period.
+    /// Adds a quadrature node of this weight, with these values of the outputs, at a time within
+    /// the period.
     fn add_node(&mut self, weight: Dual, time: f64, values: &[Dual]) {
         let time = self.periods * self.system.drive().period() + time;
         for (sum, functional) in self.values.iter_mut().zip(&self.functionals) {
@@ -205,7 +206,7 @@ impl<'a> Variation<'a> {
         }
     }
 
-    /// The extrema over a stretch.
+    /// Finds the extrema over a stretch.
     fn look_for_extrema(&mut self, segment: &SegmentView<'_>) {
         let (r, drive) = (segment.regime, segment.system.drive());
         let regime = segment.regime();
@@ -244,7 +245,7 @@ impl<'a> Variation<'a> {
     }
 }
 
-/// An output's value and total derivative at modal coordinates `q` with derivative `s`.
+/// Returns an output's value and total derivative at modal coordinates `q` with derivative `s`.
 fn varied(
     [value, change]: &[ModalOutput; 2],
     q: &[Complex],
@@ -367,8 +368,8 @@ impl Variation<'_> {
     }
 }
 
-/// Nodes of a panel, and how far its fastest exponential turns over it: the quadrature's
-/// relative error, (θ/2)³² 16!⁴/(33 · 32!³) at θ = 12, is below 1e-17.
+/// Number of nodes of a panel, and angle in radians through which its fastest exponential turns
+/// over it: the quadrature's relative error, (θ/2)³² 16!⁴/(33 · 32!³) at θ = 12, is below 1e-17.
 const NODES: usize = 16;
 const PANEL: f64 = 12.0;
 

@@ -30,7 +30,7 @@ pub struct Switches {
     pub squared_speeds: f64,
 }
 
-/// Accumulates what a [`Plan`] asks for. See the [module](super).
+/// Accumulates the functionals that a [`Plan`] requests. See the [module](super).
 #[derive(Clone, Debug)]
 pub struct Accumulator {
     plan: Arc<Plan>,
@@ -170,7 +170,7 @@ impl Accumulator {
         }
     }
 
-    /// The same where eigenvalues coincide, from signals.
+    /// Adds a stretch of a regime with coinciding eigenvalues, from signals.
     #[cold]
     fn add_clustered_stretch(&mut self, plan: &Plan, segment: &SegmentView<'_>) {
         let length = segment.length;
@@ -250,7 +250,7 @@ impl Accumulator {
         }
     }
 
-    /// The table for the outputs of a regime: its guards', or its own.
+    /// Returns the table for the outputs of a regime: that of its guards, or a separate one.
     #[inline(always)]
     fn table<'a>(regime: &'a RegimePlan, segment: &SegmentView<'a>) -> Option<&'a Table> {
         if segment.system.largest_angle() > LARGEST_ANGLE {

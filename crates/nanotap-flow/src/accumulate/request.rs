@@ -39,7 +39,7 @@ impl Request {
         place(&mut self.outputs, Outputs::Same(output.clone()))
     }
 
-    /// Adds an output that differs from regime to regime, such as a contact force (one entry a
+    /// Adds an output that differs from regime to regime, such as a contact force (one entry per
     /// regime), and returns its number.
     pub fn output_by_regime(&mut self, outputs: &[Output]) -> usize {
         place(&mut self.outputs, Outputs::ByRegime(outputs.to_vec()))
@@ -165,7 +165,7 @@ fn place<T: PartialEq>(list: &mut Vec<T>, item: T) -> usize {
         })
 }
 
-/// A [`Request`] made ready for one [`System`].
+/// A [`Request`] prepared for one [`System`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct Plan {
     pub(super) functionals: Vec<Functional>,
@@ -180,7 +180,7 @@ pub struct Plan {
     pub(super) regimes: Vec<RegimePlan>,
 }
 
-/// The frequency of a Fourier coefficient.
+/// The angular frequency of a Fourier coefficient.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Frequency {
     pub(super) omega: f64,
@@ -207,7 +207,7 @@ impl Frequency {
     }
 }
 
-/// The extrema of one channel: their numbers among the functionals, where requested.
+/// The requested extrema of one channel, by their numbers among the functionals.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct RangePlan {
     pub(super) channel: usize,
@@ -226,18 +226,18 @@ pub(super) enum Sign {
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct RegimePlan {
     pub(super) outputs: Vec<ModalOutput>,
-    /// Of each channel the weights of modes, tones and constant; none where it is zero.
+    /// Weights of modes, tones and constant for each channel; empty where the channel is zero.
     pub(super) weights: Vec<Vec<Complex>>,
-    /// Of each product the weights of pairs of terms; none where a channel is zero.
+    /// Weights of the pairs of terms for each product; empty where a channel is zero.
     pub(super) products: Vec<Vec<[Complex; 2]>>,
     pub(super) kernels: Vec<Kernel>,
     pub(super) rates: Rates,
-    /// The rates as each frequency sees them.
+    /// Rates `λ − iω` and `λ̄ − iω` of the terms, for each frequency.
     pub(super) turned: Vec<Vec<[Rate; 2]>>,
-    /// Of each channel, whether it is a guard of the regime, hence not negative, or one's
-    /// negative.
+    /// For each channel, its sign if it is a guard of the regime (not negative) or the negative of
+    /// one.
     pub(super) signs: Vec<Option<Sign>>,
-    /// The table of a regime whose guards have none that follows every term.
+    /// Table of the channels, if the tables of the guards do not follow every term.
     pub(super) table: Option<Table>,
 }
 
@@ -293,7 +293,7 @@ fn weights(output: &ModalOutput) -> Vec<Complex> {
 }
 
 impl Plan {
-    /// How many regimes the system has.
+    /// Returns the number of regimes of the system.
     pub(super) fn regimes(&self) -> usize {
         self.regimes.len()
     }

@@ -18,7 +18,7 @@ pub(super) struct Rates {
 }
 
 impl Rates {
-    /// Of the modes' eigenvalues and the tones' frequencies.
+    /// Computes the rates from the modes' eigenvalues and the tones' frequencies.
     pub(super) fn new(eigenvalues: &[Complex], drive: &Drive, products: bool) -> Self {
         let period = drive.period();
         let tones = drive.frequencies().iter().map(|&w| Complex::new(0.0, w));
@@ -45,7 +45,8 @@ impl Rates {
         }
     }
 
-    /// The rates as a Fourier coefficient at `omega` sees them: `λ − iω` and `λ̄ − iω`.
+    /// Returns the rates of the integrands of a Fourier coefficient at `omega`: `λ − iω` and
+    /// `λ̄ − iω`.
     pub(super) fn turned(&self, omega: f64) -> Vec<[Rate; 2]> {
         let turn = Complex::new(0.0, omega);
         let turned = |r: &Rate| {
@@ -58,7 +59,7 @@ impl Rates {
     }
 }
 
-/// A stretch: of each term its amplitude `q` at the start and `e^{λ · length}`.
+/// A stretch within a regime: the amplitude `q` of each term at the start, and `e^{λ · length}`.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Stretch {
     pub(super) length: f64,
@@ -84,7 +85,7 @@ impl Stretch {
         real_sum(weights, &self.integrals)
     }
 
-    /// Prepares [`Stretch::fourier`] at the frequency whose turned rates these are, with
+    /// Computes the integrals of [`Stretch::fourier`] at the frequency of these turned rates, with
     /// `e^{−iωt}` at the start and `e^{−iω · length}`.
     pub(super) fn turn(&mut self, rates: &[[Rate; 2]], start: Complex, over: Complex) {
         let length = self.length;
@@ -143,7 +144,7 @@ impl Stretch {
             .sum()
     }
 
-    /// The output's values at the start and at the end.
+    /// Returns the output's values at the start and at the end.
     pub(super) fn ends(&self, weights: &[Complex]) -> [f64; 2] {
         let mut ends = [0.0; 2];
         for (w, [q, end]) in weights.iter().zip(&self.terms) {
@@ -155,9 +156,9 @@ impl Stretch {
     }
 }
 
-/// The weights of the pairs of terms in the product of two outputs with these weights: for
-/// `j ≤ k` half of `g_j h_k + g_k h_j` and of `g_j h̄_k + ḡ_k h_j`, once where `j = k`; the
-/// crossed pairs of the other order are their conjugates.
+/// Computes the weights of the pairs of terms in the product of two outputs with these weights: for
+/// `j ≤ k` half of `g_j h_k + g_k h_j` and of `g_j h̄_k + ḡ_k h_j`, once where `j = k`. The crossed
+/// pairs in the other order are their conjugates and need no weights.
 pub(super) fn pair_weights(g: &[Complex], h: &[Complex]) -> Vec<[Complex; 2]> {
     let mut weights = Vec::new();
     for (j, (gj, hj)) in g.iter().zip(h).enumerate() {

@@ -48,7 +48,7 @@ impl Point {
 }
 
 impl Interval {
-    /// The quintic that agrees with value, rate and curvature at both ends.
+    /// Returns the quintic that agrees with value, rate and curvature at both ends.
     #[inline(always)]
     pub(crate) fn quintic(&self) -> Quintic<Single> {
         Quintic {
@@ -64,7 +64,7 @@ impl Interval {
     }
 }
 
-/// A quintic in an interval's Bernstein form, one a lane.
+/// A quintic in an interval's Bernstein form, one per lane.
 pub(crate) struct Quintic<L: Lanes> {
     /// Width of the interval, in time.
     pub(crate) width: L::Register,
@@ -73,8 +73,8 @@ pub(crate) struct Quintic<L: Lanes> {
 }
 
 impl<L: Lanes> Quintic<L> {
-    /// Bounds of its rate: the least and the greatest Bernstein coefficient of the rate, which are
-    /// five times the differences of the quintic's own over the width.
+    /// Returns bounds of its rate: the least and the greatest Bernstein coefficient of the rate,
+    /// which are five times the differences of the quintic's own over the width.
     #[inline(always)]
     pub(crate) fn rates(&self) -> [L::Register; 2] {
         let [[p, u, a], [q, v, b]] = self.ends;
@@ -96,8 +96,8 @@ impl<L: Lanes> Quintic<L> {
         [L::mul(factor, least), L::mul(factor, greatest)]
     }
 
-    /// Where it falls through zero, as a part of the width from the start, if it falls all the
-    /// way from above zero to below.
+    /// Returns the place at which it falls through zero, as a fraction of the width from the start,
+    /// for a quintic that falls throughout from above zero to below.
     #[inline(always)]
     pub(crate) fn zero(&self) -> L::Register {
         let [[p, u, a], [q, v, b]] = self.ends;
@@ -137,7 +137,7 @@ impl<L: Lanes> Quintic<L> {
     }
 }
 
-/// Value and first three derivatives near a zero, one signal a lane.
+/// Value and first three derivatives near a zero, one signal per lane.
 pub(crate) struct Cubic<L: Lanes> {
     pub(crate) value: L::Register,
     pub(crate) rate: L::Register,
@@ -146,8 +146,8 @@ pub(crate) struct Cubic<L: Lanes> {
 }
 
 impl<L: Lanes> Cubic<L> {
-    /// How far its zero is: the parabola's zero, and one step of Newton's method from there. Not
-    /// a number where the parabola has none.
+    /// Returns the distance to its zero: that of the parabola, improved by one step of Newton's
+    /// method; NaN if the parabola has no zero.
     #[inline(always)]
     pub(crate) fn step(&self) -> L::Register {
         let doubled = L::mul(L::splat(2.0), self.value);
@@ -158,14 +158,14 @@ impl<L: Lanes> Cubic<L> {
         L::sub(first, L::div(cubed, slope))
     }
 
-    /// Its slope a distance `h` further.
+    /// Returns its slope at a distance `h`.
     #[inline(always)]
     pub(crate) fn slope(&self, h: L::Register) -> L::Register {
         let half = L::mul(L::splat(0.5), self.jerk);
         L::fma(h, L::fma(half, h, self.curvature), self.rate)
     }
 
-    /// Its value a distance `h` further.
+    /// Returns its value at a distance `h`.
     #[inline(always)]
     pub(crate) fn at(&self, h: L::Register) -> L::Register {
         let sixth = L::mul(L::splat(1.0 / 6.0), self.jerk);

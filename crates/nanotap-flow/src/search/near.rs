@@ -4,7 +4,7 @@ use super::interval::Cubic;
 use super::steps::RESOLUTION;
 use crate::simd::Lanes;
 
-/// A signal near a zero, one a lane.
+/// A signal near a zero, one per lane.
 pub(crate) struct Near<L: Lanes> {
     /// The signal and its first three derivatives.
     pub(crate) cubic: Cubic<L>,
@@ -19,9 +19,9 @@ pub(crate) struct Near<L: Lanes> {
 }
 
 impl<L: Lanes> Near<L> {
-    /// Bits of the lanes where the signal may have another zero in an interval in which a quintic
-    /// within `error` of it falls at least as fast as `gentlest`: every zero there is near, and
-    /// otherwise the rate keeps its sign up to there.
+    /// Returns the lanes, one bit each, in which the signal may have another zero in an interval
+    /// where a quintic within `error` of it falls at least as fast as `gentlest`. Every zero there
+    /// is near; in the other lanes the rate keeps its sign up to it.
     #[inline(always)]
     pub(crate) fn not_unique(&self, gentlest: L::Register, error: L::Register) -> u32 {
         let value = L::fma(L::splat(2.0), error, L::abs(self.cubic.value));
@@ -32,8 +32,8 @@ impl<L: Lanes> Near<L> {
             | L::below(L::sub(L::splat(0.0), change), self.cubic.rate)
     }
 
-    /// Bits of the lanes where a step to the cubic's zero, at which it has this slope, is not
-    /// certain to end at the signal's own.
+    /// Returns the lanes, one bit each, in which a step to the cubic's zero, where the cubic has
+    /// this slope, is not certain to end at the signal's zero.
     #[inline(always)]
     pub(crate) fn goes_on(&self, step: L::Register, slope: L::Register) -> u32 {
         // |g(at + step)| ≤ B₄ step⁴ / 24 where the cubic vanishes, and B₄ ≤ B max|λ|.

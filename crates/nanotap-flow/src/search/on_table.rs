@@ -9,7 +9,8 @@ use super::{BySteps, Crossing, Start, Statistics};
 use crate::signal::Signal;
 use crate::simd::{Simd, Single, Work};
 
-/// The first crossing of a signal whose exponentials are tabulated. Exponentials of the last evaluation are kept in the signal.
+/// Returns the first crossing of a signal whose exponentials are tabulated. The signal keeps the
+/// exponentials of the last evaluation.
 #[inline(always)]
 pub(crate) fn first_crossing<S: Simd>(
     table: &Table,
@@ -143,9 +144,9 @@ impl IntervalSearch<'_> {
         .map(Decision::Crossing)
     }
 
-    /// The signal's zero near that of an interval's quintic, by steps of Newton's method with two
-    /// more derivatives, if it is certain to be the only one. The exponentials of the last
-    /// evaluation are kept.
+    /// Returns the signal's zero near that of an interval's quintic, by Newton's method with two
+    /// more derivatives, if it is certain to be the only one. The signal keeps the exponentials of
+    /// the last evaluation.
     #[inline(always)]
     fn zero<S: Simd>(&mut self, interval: &Interval, rate_error: f64) -> Option<Decision> {
         let quintic = interval.quintic();

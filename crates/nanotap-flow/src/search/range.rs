@@ -36,10 +36,10 @@ impl Range {
 /// Value, rate and curvature at the points of a stretch, four to a vector.
 pub(crate) type Points = Vec<[Vector; 3]>;
 
-/// The rounding of a value that is known to be zero, in units of a signal's noise.
+/// Limit below which a value counts as zero, as a multiple of a signal's noise.
 const DROWNED: f64 = 32.0;
-/// Newton's method ends when its step, as an angle of the fastest term, is below this: what the
-/// series then leaves out is below rounding.
+/// Newton's method ends when its step, as an angle of the fastest term in radians, is below this:
+/// the error of the series is then below rounding.
 const LAST_STEP: f64 = 3e-4;
 /// Number of steps of Newton's method after which it is abandoned.
 const MAX_STEPS: usize = 5;
@@ -52,8 +52,8 @@ pub(crate) struct RangeWork {
     points: Points,
 }
 
-/// A search for the extrema in `(0, length)` of an output that starts with these coordinates
-/// and phasors: `range` is extended by them.
+/// The arguments of a search for the extrema in `(0, length)` of an output that starts with these
+/// coordinates and phasors; the search extends `range` by them.
 pub(crate) struct Extend<'a> {
     pub(crate) range: &'a mut Range,
     pub(crate) table: &'a Table,
@@ -140,14 +140,14 @@ fn extend_with<S: Simd>(
     *points = aside;
 }
 
-/// An interval that may hold an extremum.
+/// An interval that may contain an extremum.
 #[derive(Clone, Copy, Debug)]
 struct Open {
     interval: Interval,
     /// Whether the interval may reach above, and below, the known range.
     above: bool,
     below: bool,
-    /// Bound of the sixth derivative, times the width's sixth power over 7200.
+    /// Bound of the sixth derivative, times the sixth power of the width, over 7200.
     sixth: f64,
     /// Range that is already reached: an extremum inside it does not count.
     reached: Range,
@@ -234,7 +234,7 @@ impl<'a> RangeSearch<'a> {
         }
     }
 
-    /// The next interval that may reach beyond `range` or the points.
+    /// Returns the next interval that may reach beyond `range` or the points.
     #[inline(always)]
     fn next_open<S: Simd>(&mut self, points: &Points, range: &Range) -> Option<Open> {
         self.reached.least = self.reached.least.min(range.least);
@@ -317,7 +317,7 @@ impl<'a> RangeSearch<'a> {
     }
 }
 
-/// Extends `range` by the extrema of an interval that may hold some.
+/// Extends `range` by the extrema of an interval that may contain some.
 #[inline(always)]
 fn extend_within<S: Simd>(
     open: &Open,
@@ -351,7 +351,7 @@ enum Extremum {
     Unknown,
 }
 
-/// The greatest value in an interval (`side` 1), or the least (`side` −1).
+/// Determines the greatest value in an interval (`side` 1), or the least (`side` −1).
 #[inline(always)]
 fn extremum<S: Simd>(
     open: &Open,
@@ -446,7 +446,7 @@ fn extremum<S: Simd>(
     Extremum::Unknown
 }
 
-/// The greatest Bernstein coefficient on the part from `from` to `to` of the unit interval.
+/// Returns the greatest Bernstein coefficient on the part from `from` to `to` of the unit interval.
 fn part(hull: &[f64; 6], from: f64, to: f64) -> f64 {
     let mut right = *hull;
     // De Casteljau's triangle: its last entries are the coefficients beyond `from` …
@@ -471,7 +471,8 @@ fn part(hull: &[f64; 6], from: f64, to: f64) -> f64 {
     highest
 }
 
-/// The same from every root of the rate between `start` and `end`, found by certified steps.
+/// Extends `range` by all extrema between `start` and `end`, from the roots of the rate found by
+/// certified steps.
 #[cold]
 fn by_certified_steps(start: f64, end: f64, signal: &Signal, length: f64, range: &mut Range) {
     let start = start.max(0.0);

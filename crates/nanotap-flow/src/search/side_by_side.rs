@@ -24,7 +24,8 @@ pub(crate) struct Signals<'a> {
     pub(crate) table: &'a Table,
     /// The amplitudes of all terms.
     pub(crate) amplitudes: &'a [ComplexOctet],
-    /// Their sums with the fine grid's [`Weights`](super::table::Weights), and without.
+    /// Sums of the amplitudes' absolute values with the fine grid's
+    /// [`Weights`](super::table::Weights); `size` is that without weights.
     pub(crate) sums: [Octet; 4],
     pub(crate) size: Octet,
     /// Times up to which the search goes, from the start of the stretch.
@@ -36,7 +37,7 @@ pub(crate) struct Signals<'a> {
     pub(crate) idle: u32,
 }
 
-/// In each lane the first interval that is not certified, if there is one.
+/// The first interval in each lane that is not certified, if there is one.
 #[derive(Clone, Copy)]
 pub(crate) struct Intervals<W: Wide> {
     /// Lanes in which there is such an interval, one bit each.
@@ -57,8 +58,8 @@ pub(crate) fn fits(table: &Table) -> bool {
 }
 
 impl Signals<'_> {
-    /// The first interval in each lane that is not certified, and what bounds the signals on the
-    /// table's grid.
+    /// Finds the first interval in each lane that is not certified, and the bounds of the signals
+    /// on the table's grid.
     #[inline(always)]
     pub(crate) fn first_open<W: Wide>(&self) -> (Intervals<W>, Bounds<W>) {
         let grid = &self.table.fine;
@@ -92,13 +93,14 @@ impl Signals<'_> {
         (found, bounds)
     }
 
-    /// Number `j` of the terms that are followed.
+    /// Returns the number of the `j`-th followed term in the kernel.
     #[inline(always)]
     fn term(&self, j: usize) -> usize {
         self.table.followed()[j]
     }
 
-    /// The intervals that the `SLOW` slowest terms do not certify, a bit each, lane by lane.
+    /// Returns the intervals that the `SLOW` slowest terms do not certify, one bit each, lane by
+    /// lane.
     #[inline(always)]
     fn open_intervals<W: Wide, const SLOW: usize>(&self, bounds: &Bounds<W>) -> [u64; LANES] {
         let grid = &self.table.fine;
@@ -143,7 +145,7 @@ impl Signals<'_> {
         transposed(&open, points)
     }
 
-    /// The followed terms, with zeros where there are fewer.
+    /// Returns the followed terms, filled up with zeros.
     #[inline(always)]
     fn followed<W: Wide>(&self) -> [Term<W>; TERMS] {
         let zero = [W::splat(0.0); 2];
@@ -167,7 +169,7 @@ impl Signals<'_> {
         terms
     }
 
-    /// Exponentials of the followed terms at a point of each lane.
+    /// Returns the exponentials of the followed terms at one point per lane.
     #[inline(always)]
     fn exponentials(&self, points: &[usize; LANES]) -> [ComplexOctet; TERMS] {
         let grid = &self.table.fine;
@@ -183,7 +185,7 @@ impl Signals<'_> {
         exponentials
     }
 
-    /// Looks at the next open interval of each lane that has one.
+    /// Examines the next open interval of each lane that has one.
     #[inline(always)]
     fn look_at_next<W: Wide>(
         &self,
@@ -252,7 +254,7 @@ impl Signals<'_> {
         found.set(here, start, [low, high]);
     }
 
-    /// Value, rate and curvature where the followed terms are these.
+    /// Returns value, rate and curvature from these terms.
     #[inline(always)]
     fn sums_of<W: Wide>(
         &self,

@@ -36,12 +36,12 @@ const SLOW: f64 = 0.5;
 /// Bound of the rounding errors of a value, from table and sums, as a fraction of the terms' size.
 pub(crate) const ROUNDING: f64 = 64.0 * f64::EPSILON;
 
-/// The tabulated exponentials of a regime, as one guard or output sees them.
+/// The tabulated exponentials of a regime's slowest terms, for one guard or output.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Table {
-    /// Which terms are followed, slowest first.
+    /// Numbers of the terms that are followed, slowest first.
     followed: Vec<usize>,
-    /// Over the whole reach, or from one coarse point to the next.
+    /// Grid over the whole reach, or from one coarse point to the next.
     pub(crate) fine: Grid,
     pub(crate) coarse: Option<Coarse>,
     /// Time from the first point to the last of the grid that covers the stretch.
@@ -74,9 +74,9 @@ pub(crate) struct Grid {
     pub(crate) weights: Vec<Weights>,
 }
 
-/// Of four terms the weights of their amplitudes in `M₆h⁶/7200`; 1 where a term is not followed;
-/// its `|λ|`, or what rounding takes of that where it is followed; and how far a term keeps away
-/// from its chord over an interval, or 1 where it is not slow.
+/// Weights of four terms' amplitudes in the bounds: `(|λ|h)⁶/7200` of a followed term; 1 of a term
+/// that is not followed; `|λ|` of such a term, or the rounding of a followed one; and the deviation
+/// of a slow term from its chord over an interval, or 1 of any other.
 pub(crate) type Weights = [Vector; 4];
 
 impl Table {
@@ -181,7 +181,7 @@ pub(crate) struct Followed {
 }
 
 impl Followed {
-    /// Lays out the amplitudes of the terms that `table` follows.
+    /// Copies the amplitudes of the terms that `table` follows.
     #[inline(always)]
     pub(crate) fn follow<S: Simd>(&mut self, table: &Table, signal: &Signal) {
         signal.amplitudes::<S>(&table.followed, &mut self.here);
@@ -193,7 +193,7 @@ impl Followed {
         &self.here
     }
 
-    /// Lays them out as they are at the start of a coarse interval, until [`Followed::move_back`].
+    /// Moves them to the start of a coarse interval, until [`Followed::move_back`].
     #[inline(always)]
     pub(crate) fn move_to<S: Simd>(&mut self, table: &Table, interval: &Interval) {
         self.other.clear();
@@ -213,7 +213,7 @@ impl Followed {
         std::mem::swap(&mut self.here, &mut self.other);
     }
 
-    /// Goes back to the amplitudes at the signal's own start.
+    /// Restores the amplitudes at the signal's start.
     #[inline(always)]
     pub(crate) fn move_back(&mut self) {
         std::mem::swap(&mut self.here, &mut self.other);
@@ -226,7 +226,7 @@ impl Grid {
         self.table.len() / self.terms * WIDTH
     }
 
-    /// The exponential of followed term `j` at a point, `[Re, Im]`.
+    /// Returns the exponential of followed term `j` at a point, `[Re, Im]`.
     #[inline(always)]
     pub(crate) fn exponential(&self, j: usize, point: usize) -> [f64; 2] {
         let (vector, lane) = layout::place(point);
@@ -234,7 +234,7 @@ impl Grid {
         [re[lane], im[lane]]
     }
 
-    /// The grid that follows the terms `followed`, from a column of exponentials for each
+    /// Creates the grid that follows the terms `followed`, from a column of exponentials for each
     /// (of at least as many terms).
     fn new(kernel: &Kernel, followed: &[usize], step: f64, columns: &[Column]) -> Self {
         let terms = followed.len();
@@ -275,8 +275,8 @@ impl Grid {
     }
 }
 
-/// How far a term of amplitude one keeps away from its chord over an interval of width `step`: at
-/// most an eighth of the width squared times its curvature.
+/// Returns the deviation of a term of amplitude one from its chord over an interval of width
+/// `step`: at most an eighth of the squared width times its curvature.
 fn chord(rate: f64, step: f64) -> f64 {
     (rate * step).powi(2) / 8.0
 }
@@ -294,9 +294,9 @@ struct Columns {
 impl Work for Columns {
     type Output = Vec<Column>;
 
-    /// The first vector is evaluated, and so are the powers by which 1, 2, 4, … vectors are moved on to
-    /// the next as many: each number is a product of few factors, and rounding does not pile up along
-    /// the table.
+    /// Computes the columns. The first vector is evaluated, and so are the powers that carry 1, 2,
+    /// 4, … vectors to the next as many: each number is a product of few factors, and rounding
+    /// errors do not accumulate along the table.
     #[inline(always)]
     fn run<S: Simd>(self) -> Vec<Column> {
         let mut columns = Vec::with_capacity(self.rates.len());

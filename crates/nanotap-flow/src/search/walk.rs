@@ -21,7 +21,7 @@ use super::table::{Grid, ROUNDING, Table};
 use crate::signal::{Amplitude, Signal};
 use crate::simd::{Lanes, Simd, Single, WIDTH};
 
-/// `7200 √5/30000`: the bound of a quintic's rate error from that of its value.
+/// `7200 √5/30000`: factor from `M₆h⁶/7200` to `h` times the bound of a quintic's rate error.
 const RATE_OF_SIXTH: f64 = 0.536_656_314_599_949_5;
 
 /// A part of a regime that is to be searched.
@@ -35,7 +35,7 @@ pub(crate) struct Span {
     pub(crate) surface: Option<f64>,
 }
 
-/// What bounds a signal on a grid, from the sums of its amplitudes with the grid's
+/// Bounds for a signal on a grid, from the sums of its amplitudes with the grid's
 /// [`Weights`](super::table::Weights).
 #[derive(Clone, Copy)]
 pub(crate) struct Bounds<L: Lanes> {
@@ -45,12 +45,12 @@ pub(crate) struct Bounds<L: Lanes> {
     pub(crate) tension: L::Register,
     /// Bound on the distance from the quintic to the signal within an interval.
     pub(crate) error: L::Register,
-    /// The same for their rates.
+    /// Bound on the distance of their rates.
     pub(crate) rate_error: L::Register,
 }
 
 impl<L: Lanes> Bounds<L> {
-    /// From the sums, and the size of all terms.
+    /// Computes the bounds from these sums, and the size of all terms.
     #[inline(always)]
     pub(crate) fn new(
         [sixth, outside, outside_rate]: [L::Register; 3],
@@ -74,8 +74,8 @@ impl<L: Lanes> Bounds<L> {
     }
 }
 
-/// The inner Bernstein coefficients that a point gives to the interval on its right, b₁ and b₂, and
-/// to that on its left, b₄ and b₃.
+/// Returns the inner Bernstein coefficients that a point gives to the interval on its right, b₁ and
+/// b₂, and to that on its left, b₄ and b₃.
 #[inline(always)]
 pub(crate) fn coefficients<L: Lanes>(
     [g, v, c]: [L::Register; 3],
@@ -95,16 +95,16 @@ pub(crate) struct Scan<'a, S: Simd> {
     constant: f64,
     bounds: Bounds<Single>,
     span: Span,
-    /// The next vector of points, and how many there are to look at.
+    /// Next vector of points to examine, and number of vectors.
     vector: usize,
     vectors: usize,
     /// Intervals that end at the last vector's points and are not certified, a bit each.
     open: u32,
     /// Value, rate and curvature at the last two vectors of points.
     ends: [[S::Register; 3]; 2],
-    /// Of the last vector's intervals, what their left ends give: the smallest coefficient, and b₂.
+    /// Of the last vector's intervals, the smallest coefficient from their left ends, and b₂.
     lefts: [S::Register; 2],
-    /// Points looked at so far.
+    /// Number of points examined.
     pub(crate) points: u64,
 }
 
@@ -128,7 +128,8 @@ impl<'a, S: Simd> Scan<'a, S> {
         }
     }
 
-    /// Bound on the distance from an interval's quintic's rate to the signal's.
+    /// Returns a bound on the distance from the rate of an interval's quintic to that of the
+    /// signal.
     #[inline(always)]
     pub(crate) fn rate_error(&self) -> f64 {
         self.bounds.rate_error
@@ -140,7 +141,7 @@ impl<'a, S: Simd> Scan<'a, S> {
         self.span.start + point as f64 * self.grid.step
     }
 
-    /// The next interval that is not certified.
+    /// Returns the next interval that is not certified.
     #[inline(always)]
     pub(crate) fn next_open(&mut self, amplitudes: &[Amplitude]) -> Option<Interval> {
         while self.open == 0 {
@@ -173,7 +174,7 @@ impl<'a, S: Simd> Scan<'a, S> {
         })
     }
 
-    /// Certifies the intervals that end at the next vector's points, or finds which are open.
+    /// Certifies the intervals that end at the next vector's points, or marks them as open.
     #[inline(always)]
     fn look_at_next(&mut self, amplitudes: &[Amplitude]) {
         let [g, v, c] = self.sums(amplitudes);
@@ -199,7 +200,7 @@ impl<'a, S: Simd> Scan<'a, S> {
         self.points += WIDTH as u64;
     }
 
-    /// Value, rate and curvature at the next vector's points.
+    /// Returns value, rate and curvature at the next vector's points.
     #[inline(always)]
     fn sums(&self, amplitudes: &[Amplitude]) -> [S::Register; 3] {
         let zero = S::splat(0.0);
@@ -222,15 +223,15 @@ impl<'a, S: Simd> Scan<'a, S> {
 }
 
 impl Table {
-    /// A walk along the intervals of the coarse grid, if there is one; what it leaves open is
-    /// to be looked at in [`Table::fine`].
+    /// Starts a walk along the intervals of the coarse grid, if there is one; the intervals that it
+    /// leaves open must be examined with [`Table::fine`].
     #[inline(always)]
     pub(crate) fn coarse<S: Simd>(&self, signal: &Signal, span: Span) -> Option<Scan<'_, S>> {
         let coarse = self.coarse.as_ref()?;
         Some(Scan::new(&coarse.grid, signal, span))
     }
 
-    /// A walk along the intervals of the fine grid.
+    /// Starts a walk along the intervals of the fine grid.
     #[inline(always)]
     pub(crate) fn fine<S: Simd>(&self, signal: &Signal, span: Span) -> Scan<'_, S> {
         Scan::new(&self.fine, signal, span)
@@ -238,7 +239,7 @@ impl Table {
 }
 
 impl Span {
-    /// The part within a coarse interval.
+    /// Returns the part of the span within a coarse interval.
     #[inline(always)]
     pub(crate) fn within(self, interval: &Interval) -> Self {
         Self {

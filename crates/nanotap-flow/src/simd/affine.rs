@@ -12,7 +12,7 @@ pub(crate) struct AffineMap {
 }
 
 impl AffineMap {
-    /// An empty map to `rows` numbers with capacity for `columns` columns.
+    /// Creates an empty map to `rows` numbers with capacity for `columns` columns.
     pub(crate) fn with_capacity(rows: usize, columns: usize) -> Self {
         let vectors = layout::vectors_for(rows);
         Self {
@@ -21,8 +21,8 @@ impl AffineMap {
         }
     }
 
-    /// Adds a column: real parts, then as many imaginary parts, and zero in the rows left over
-    /// but for a one in the real (0) or imaginary (1) part of a row.
+    /// Adds a column: real parts, then as many imaginary parts, then zeros, with a one in the real
+    /// (0) or imaginary (1) part of one row if requested.
     pub(crate) fn push(&mut self, column: &[f64], one: Option<(usize, usize)>) {
         let start = self.columns.len();
         let end = start + self.vectors;

@@ -17,9 +17,9 @@ pub(crate) struct LinearMap {
 }
 
 impl LinearMap {
-    /// The map of `matrix`, whose columns belong to all `Re z_k`, then all `Im z_k`. The first half
-    /// of its rows are real parts of the image, the others imaginary parts; of an odd number the
-    /// last imaginary part is zero.
+    /// Creates the map of `matrix`, whose columns belong to all `Re z_k`, then all `Im z_k`. The
+    /// first half of its rows gives real parts of the image, the rest imaginary parts; if their
+    /// number is odd, the last imaginary part is zero.
     pub(crate) fn of(matrix: &DMatrix<f64>) -> Self {
         let (from, to) = (matrix.ncols() / 2, matrix.nrows().div_ceil(2));
         let mut rows = vec![ComplexVector::default(); layout::vectors_for(to) * 2 * from];
@@ -35,7 +35,7 @@ impl LinearMap {
         Self { rows, from, to }
     }
 
-    /// How many vectors an image takes.
+    /// Returns the number of vectors in an image.
     pub(crate) fn vectors(&self) -> usize {
         layout::vectors_for(self.to)
     }
@@ -93,7 +93,7 @@ impl Work for Apply<'_> {
 
     #[inline(always)]
     fn run<S: Simd>(self) {
-        /// Lists whose images are computed at once.
+        /// Number of lists whose images are computed at once.
         const SEVERAL: usize = 4;
         let (length, vectors) = (layout::vectors_for(self.map.from), self.map.vectors());
         let count = self.list.len() / length;

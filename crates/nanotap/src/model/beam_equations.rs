@@ -31,7 +31,7 @@ pub(crate) struct Beam<'a> {
     /// `ẋ = A x + f` in flight, the memory's row zero.
     matrix: DMatrix<f64>,
     forcing: HarmonicVector,
-    /// What a force at the tip adds to ẋ: M⁻¹p at the velocities.
+    /// Derivative of ẋ with respect to a force at the tip: M⁻¹p at the velocities, else 0.
     kick: DVector<f64>,
     /// Height V_T of the tip over the undeformed surface, and its rate V̇_T.
     height: Output,

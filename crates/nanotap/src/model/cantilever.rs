@@ -54,7 +54,7 @@ pub struct Cantilever {
     pub contact: ContactLaw,
     /// A nonlinear force law in place of spring and damper, in the model's units.
     pub law: Option<SampleLaw>,
-    /// Where the drive acts; α2 is an amplitude of motion or of force accordingly, see
+    /// Where the drive acts: α2 is an amplitude of motion at the base, else one of force; see
     /// [`drive_form`](crate::model::drive_form).
     pub actuation: Actuation,
     /// Frequencies of further tones over Ω: of the second, and of a third.
@@ -98,7 +98,7 @@ impl Cantilever {
         }
     }
 
-    /// The value of a parameter.
+    /// Returns the value of a parameter, dimensionless, or degrees for a phase.
     pub const fn get(&self, parameter: Parameter) -> f64 {
         match parameter {
             Parameter::Alpha1 => self.alpha1,
@@ -112,7 +112,7 @@ impl Cantilever {
         }
     }
 
-    /// The same case with one parameter changed.
+    /// Returns the case with one parameter changed.
     #[must_use]
     pub fn with(mut self, parameter: Parameter, value: f64) -> Self {
         match parameter {
@@ -128,8 +128,8 @@ impl Cantilever {
         self
     }
 
-    /// The same case with another contact law and the numbers that only this law has, in the order
-    /// of [`Parameter::of_law`]; those of the law before become 0.
+    /// Returns the case with another contact law and the numbers that only this law has, in the
+    /// order of [`Parameter::of_law`]; those of the previous law become 0.
     #[must_use]
     pub fn on(mut self, contact: ContactLaw, numbers: &[f64]) -> Self {
         for parameter in Parameter::of_law(self.contact) {
@@ -144,7 +144,7 @@ impl Cantilever {
         Self { contact, ..self }
     }
 
-    /// The same case with another number of modes.
+    /// Returns the case with another number of modes.
     #[must_use]
     pub const fn with_modes(mut self, modes: usize) -> Self {
         self.modes = modes;
@@ -185,7 +185,7 @@ impl Cantilever {
         Parameter::MEASURED.iter().any(|of| self.has(*of))
     }
 
-    /// The numbers that only its contact law has.
+    /// Returns the values of the parameters that only the contact law has.
     pub(crate) fn own_numbers(&self) -> Vec<f64> {
         let own = Parameter::of_law(self.contact);
         own.map(|parameter| self.get(parameter)).collect()
@@ -206,7 +206,7 @@ impl Cantilever {
         self.law.is_none() && self.contact.entry().attracts
     }
 
-    /// Periods of the first tone after which all tones repeat.
+    /// Returns the number of periods of the first tone after which all tones repeat.
     pub fn repetition(&self) -> u32 {
         u32::try_from(repetition(&self.further_tones)).unwrap_or(u32::MAX)
     }
@@ -217,7 +217,7 @@ impl Cantilever {
         f64::from(self.repetition()) * std::f64::consts::TAU / self.omega
     }
 
-    /// The same case under its first tone alone.
+    /// Returns the case under its first tone alone.
     #[must_use]
     pub fn under_one_tone(mut self) -> Self {
         self.further_tones.clear();

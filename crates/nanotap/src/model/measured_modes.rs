@@ -1,4 +1,4 @@
-//! Measured modes in the Galerkin equations, in place of what the uniform beam has.
+//! Measured modes in the Galerkin equations, in place of those of the uniform beam.
 //!
 //! Damping proportional to mass gives the higher modes a quality factor in proportion to their
 //! frequency, several times that of real levers in air; and no lever is uniform. With the free
@@ -25,7 +25,7 @@ use crate::model::contact::dual::Dual;
 use crate::model::parameter::Parameter;
 use nanotap_arithmetic::Scalar as _;
 
-/// What a measured mode adds: a term of rank one to each matrix, with its derivatives.
+/// Correction by a measured mode: a term of rank one in each matrix, with its derivatives.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Correction {
     /// u = Mv of the free mode v, length N.

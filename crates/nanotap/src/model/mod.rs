@@ -5,8 +5,8 @@
 //! oscillator. Regime 0 is free flight. Everything that analyses or shows a motion works on a
 //! [`Model`].
 //!
-//! A sample with a [nonlinear] force law is no regime: such a model has free flight alone as a
-//! linear system, and a separate flow under the force.
+//! A sample with a [nonlinear] force law has no contact regime: the linear system of such a model
+//! is free flight alone, and a separate flow computes the motion under the force.
 
 pub mod beam;
 mod beam_equations;
@@ -243,7 +243,7 @@ impl BeamOutputs {
 }
 
 impl Model {
-    /// The state at rest: at deflection 0, or on a rigid stop that stands before it.
+    /// Returns the state at rest: at deflection 0, or on a rigid stop if that lies before it.
     pub fn rest(&self) -> Vec<f64> {
         let mut state = vec![0.0; self.dimension()];
         self.stop_at_wall(&mut state);
@@ -384,8 +384,9 @@ impl Model {
         }
     }
 
-    /// Where the undriven system can rest, the tip farthest away first: of a piecewise-linear one
-    /// at the constant part of each regime's response, where no guard of that regime is passed.
+    /// Returns the equilibria of the undriven system, the tip farthest away first. For a
+    /// piecewise-linear system an equilibrium is the constant part of a regime's response, if no
+    /// guard of that regime is passed there.
     pub fn equilibria(&self) -> Vec<Equilibrium> {
         if let Some(nonlinear) = &self.nonlinear {
             return nonlinear.equilibria();
@@ -411,7 +412,7 @@ impl Model {
         found
     }
 
-    /// The same model, whose motions end with an error once `cancel` is set.
+    /// Returns the model with motions that end with an error once `cancel` is set.
     #[must_use]
     pub fn cancelled_by(mut self, cancel: &CancelFlag) -> Self {
         let system = Arc::unwrap_or_clone(self.system);
@@ -422,7 +423,7 @@ impl Model {
         self
     }
 
-    /// The same model, whose motions may go on for a moment after the work was cancelled.
+    /// Returns the model with motions that may continue for a moment after the work was cancelled.
     #[must_use]
     pub(crate) fn with_grace(&self) -> Self {
         let cancel = self.system.cancel().with_grace();
@@ -434,7 +435,7 @@ impl Model {
         self.system.dimension()
     }
 
-    /// Speed of the tip displacement, Ẇ (the oscillator's ẋ).
+    /// Returns the velocity of the tip displacement, Ẇ (the oscillator's ẋ), in model units.
     pub fn tip_rate(&self) -> Output {
         // The state holds the velocities, so that every regime says the same.
         let free = &self.system.regimes()[0];
@@ -442,9 +443,9 @@ impl Model {
             .rate(free.matrix(), free.forcing(), self.system.drive())
     }
 
-    /// Displacement of the tip at which it touches: −(α2 sin Ωτ + α5) for the cantilever,
-    /// which moves up from the sample, more or less where a surface recovers; where the stop
-    /// stands for an oscillator.
+    /// Returns the displacement of the tip at which it touches the surface: −(α2 sin Ωτ + α5) for
+    /// the cantilever, which moves up from the sample, changed by the position of a surface that
+    /// recovers; the position of the stop for an oscillator.
     pub fn surface(&self) -> Output {
         let towards = if self.beam.is_some() { -1.0 } else { 1.0 };
         self.tip.plus(towards, &self.gap)

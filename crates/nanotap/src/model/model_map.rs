@@ -542,8 +542,8 @@ impl EngineMap for ExactMap {
     }
 }
 
-/// log|det| of what an impact does to volumes: the reset itself, and once more as much
-/// for the times at which neighbouring motions meet the stop. `None` of a continuous switch.
+/// Returns log|det| of the volume change by an impact: that of the reset, and the same again for
+/// the times at which neighbouring motions meet the stop. `None` for a continuous switch.
 fn log_impact(transition: &Transition) -> Option<f64> {
     let reset = transition.reset.as_ref()?;
     Some(2.0 * nanotap_arithmetic::ln(reset.matrix.determinant().abs()))

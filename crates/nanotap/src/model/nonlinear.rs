@@ -71,8 +71,8 @@ impl PartialEq for Nonlinear {
 }
 
 impl Nonlinear {
-    /// The beam in flight, `free`, under `law`; `height` is the gap, `kick` what a unit of force
-    /// adds to ẋ.
+    /// Prepares the beam in flight, `free`, under `law`, with the gap and the effect of the force
+    /// from `beam`.
     pub(crate) fn new(
         law: &SampleLaw,
         beam: &Beam<'_>,
@@ -123,7 +123,7 @@ impl Nonlinear {
         })
     }
 
-    /// The same, whose motions end with an error once `cancel` is set.
+    /// Returns the engine with motions that end with an error once `cancel` is set.
     pub(crate) fn cancelled_by(mut self, cancel: &CancelFlag) -> Self {
         let system = Arc::unwrap_or_clone(self.system);
         self.system = Arc::new(system.cancelled_by(cancel.clone()));
@@ -165,21 +165,22 @@ impl Nonlinear {
         self.system.dimension() + self.discrete_entries()
     }
 
-    /// How many of the last entries of a state are whole numbers: the branch of the law, where it
-    /// is remembered.
+    /// Returns the number of last entries of a state that are whole numbers: 1 for the branch of
+    /// the law, where it is remembered, else 0.
     pub(crate) fn discrete_entries(&self) -> usize {
         usize::from(self.remembers)
     }
 
-    /// Rates of decay of the sample's entries at the end of a state: in flight those of a surface that
-    /// relaxes; 1 for whole numbers.
+    /// Returns the rates of decay of the sample's entries at the end of a state, in model units: in
+    /// flight those of a surface that relaxes; 1 for whole numbers.
     pub(crate) fn memory_rates(&self) -> Vec<f64> {
         let surface = self.system.law().surface().map(|surface| &*surface.rates);
         let whole = vec![1.0; self.discrete_entries()];
         [surface.unwrap_or_default(), &whole].concat()
     }
 
-    /// The law at rest: of a surface that relaxes, when it has; of a force that depends on time, averaged.
+    /// Returns the law at rest: that of the relaxed surface, or the time average of a force that
+    /// depends on time.
     pub(crate) fn static_law(&self) -> &Arc<dyn ForceLaw> {
         let law = self.system.law();
         let averaged = self.averaged_law.as_ref().unwrap_or(law);
@@ -253,7 +254,7 @@ impl Nonlinear {
         Ok(())
     }
 
-    /// Reads the state of the model off `flow`.
+    /// Writes the state that `flow` has reached to `state`.
     pub(crate) fn end(&self, flow: &Flow, state: &mut [f64]) {
         let n = self.system.dimension();
         flow.state(&mut state[..n]);
@@ -514,7 +515,8 @@ const STEP: f64 = 1e-5;
 const SMALLEST: f64 = 1e-3;
 
 impl Variation {
-    /// Along `slopes` of the case's numbers and `law` of its law's parameters (empty: none).
+    /// Computes the derivative along `slopes` of the case's numbers and `law` of its law's
+    /// parameters (empty: none).
     pub(crate) fn along(
         case: &Cantilever,
         model: &Model,
@@ -745,7 +747,7 @@ impl EngineMap for NonlinearMap {
         true
     }
 
-    /// By the Runge–Kutta method of [`nanotap_volterra::coarse`].
+    /// Returns the map computed by the Runge–Kutta method of [`nanotap_volterra::coarse`].
     fn coarse(&self) -> Option<Box<dyn EngineMap>> {
         // None of a surface that relaxes.
         Some(Box::new(CoarseMap {
@@ -909,8 +911,8 @@ impl Nonlinear {
         known.filter(|_| !self.remembers).unwrap_or(f64::INFINITY)
     }
 
-    /// log|det DP| of the lever's state over a recorded period, from the trace of the equations
-    /// and what the force jumps at turning points add.
+    /// Computes log|det DP| of the lever's state over a recorded period, from the trace of the
+    /// equations and the jumps of the force at turning points.
     pub(crate) fn log_determinant(&self, period: &Trajectory) -> f64 {
         if let Some(known) = self.constant_log_determinant() {
             return known;

@@ -134,14 +134,14 @@ impl Oscillator {
         }
     }
 
-    /// The value of a parameter, `None` where this stop does not have it.
+    /// Returns the value of a parameter; `None` if this stop does not have it.
     pub fn get(&self, parameter: OscillatorParameter) -> Option<f64> {
         let mut copy = *self;
         copy.place(parameter).map(|value| *value)
     }
 
-    /// The same oscillator with one parameter changed (unchanged where this stop does
-    /// not have it).
+    /// Returns the oscillator with one parameter changed, or unchanged if this stop does not have
+    /// it.
     #[must_use]
     pub fn with(mut self, parameter: OscillatorParameter, value: f64) -> Self {
         if let Some(place) = self.place(parameter) {

@@ -56,12 +56,12 @@ pub struct ParameterEntry {
     pub stated_by: Option<SampleKey>,
 }
 
-/// When a parameter applies; elsewhere it is 0.
+/// Cases to which a parameter applies; elsewhere it is 0.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Applies {
     /// The parameter applies to every cantilever.
     Always,
-    /// With a piecewise-linear contact law.
+    /// With any piecewise-linear contact law.
     Spring,
     /// With a piecewise-linear contact law that has the damper α6.
     Damper,
@@ -138,7 +138,7 @@ impl ParameterEntry {
         }
     }
 
-    /// With a quantity and its formula.
+    /// Sets the unit, the quantity and its formula.
     pub(crate) const fn of(
         self,
         unit: Unit,
@@ -153,7 +153,7 @@ impl ParameterEntry {
         }
     }
 
-    /// With quantity and formula where a force drives the lever.
+    /// Sets quantity and formula for a lever that a force drives.
     const fn by_force(self, quantity: &'static str, formula: &'static str) -> Self {
         Self {
             by_force: Some((formula, quantity)),
@@ -379,7 +379,7 @@ impl Numbers {
         self.0[parameter.index()] = value;
     }
 
-    /// The same with another value of a parameter.
+    /// Returns the values with that of one parameter changed.
     #[must_use]
     pub const fn with(mut self, parameter: Parameter, value: f64) -> Self {
         self.set(parameter, value);

@@ -65,9 +65,9 @@ pub struct Instant {
 /// A recorded motion of either engine.
 #[derive(Clone, Debug)]
 pub enum Recording {
-    /// Of a piecewise-linear model, in closed form.
+    /// Motion of a piecewise-linear model, in closed form.
     PiecewiseLinear(Trajectory),
-    /// Of a model under a nonlinear force, period by period.
+    /// Motion of a model under a nonlinear force, period by period.
     Nonlinear(Arc<NonlinearRecording>),
 }
 

@@ -18,9 +18,9 @@ pub struct SampleLaw {
     terms: Vec<&'static TableLaw>,
     /// The parameters of all terms, in sequence.
     values: Vec<f64>,
-    /// The rows of a table, in whatever units its factors are measured in.
+    /// The rows of a table, in the units to which the table's factors refer.
     rows: Option<Arc<Rows>>,
-    /// The arms of a sample that relaxes, in whatever units their factors are measured in.
+    /// The arms of a sample that relaxes, in the units to which their factors refer.
     arms: Option<Arc<Arms>>,
 }
 
@@ -93,7 +93,7 @@ impl SampleLaw {
         &self.values
     }
 
-    /// The same with each value changed by `step` times its entry of `slopes`.
+    /// Returns the law with each value changed by `step` times its entry of `slopes`.
     #[must_use]
     pub(crate) fn moved(&self, slopes: &[f64], step: f64) -> Self {
         let values = self.values.iter().zip(slopes);

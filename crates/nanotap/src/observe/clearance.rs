@@ -313,7 +313,7 @@ struct Candidate {
 }
 
 impl ClearanceSearch {
-    /// For a motion of `model`; `None` if it is not a beam.
+    /// Prepares the search for a motion of `model`; `None` if it is not a beam.
     pub(super) fn new(model: &Model) -> Option<Self> {
         let beam = model.beam.as_ref()?;
         let shares = shares(&beam.modes);
@@ -502,7 +502,7 @@ impl LowestPeriod {
 const BETWEEN_SAMPLES: f64 = 0.01;
 
 impl SampledClearance {
-    /// For motions of `model`; `None` if it is not a beam.
+    /// Prepares the search for motions of `model`; `None` if it is not a beam.
     pub(super) fn new(model: &Model, nonlinear: &Nonlinear) -> Option<Self> {
         let beam = model.beam.as_ref()?;
         let count = PLACES_PER_MODE * beam.modes.count();

@@ -42,7 +42,7 @@ pub struct Contacts<'a> {
 }
 
 impl<'a> Contacts<'a> {
-    /// For a motion of `model` that is about to run.
+    /// Prepares the record of a motion of `model` that is about to run.
     pub fn of(model: &'a Model) -> Self {
         let drive = model.system.drive();
         let gap = if model.memory_reset.is_some() {

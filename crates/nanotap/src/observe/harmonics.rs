@@ -16,7 +16,8 @@ pub struct Harmonic {
     /// Frequency as a multiple of the drive frequency, dimensionless; fractional for a subharmonic
     /// motion.
     pub order: f64,
-    /// Of several tones: the numbers a, b, … of the lowest product a f₁ + b f₂ + … at this frequency.
+    /// With several tones, the numbers a, b, … of the lowest product a f₁ + b f₂ + … at this
+    /// frequency.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub product: Option<Vec<i32>>,
     /// Amplitude of the tip deflection, in the model's unit of length (g₀ for a beam).

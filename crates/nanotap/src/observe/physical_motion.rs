@@ -49,7 +49,8 @@ pub struct PhysicalHarmonic {
     pub order: f64,
     /// Frequency of the component, Hz.
     pub frequency: f64,
-    /// Of several tones: the numbers a, b, … of the lowest product a f₁ + b f₂ + … at this frequency.
+    /// With several tones, the numbers a, b, … of the lowest product a f₁ + b f₂ + … at this
+    /// frequency.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub product: Option<Vec<i32>>,
     /// Amplitude of the tip deflection, m.

@@ -378,7 +378,7 @@ pub fn attractors(
     described(model, &found, &set, (options, &budgets), sides, unstable)
 }
 
-/// How the census is taken. A smaller bound than the default has larger budgets.
+/// Returns the options of the census; a smaller bound than the default has larger budgets.
 fn budgets(model: &Model, options: &AttractorsOptions, start_box: &StartBox) -> CensusOptions {
     let default = CensusOptions::default();
     let (usual, periods) = if model.nonlinear.is_some() {

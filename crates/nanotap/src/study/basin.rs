@@ -339,7 +339,7 @@ impl Computation for Basin {
     }
 }
 
-/// Points of a row between two looks at whether to stop.
+/// Number of points of a row between two checks for cancellation.
 const UNSTOPPED: usize = 64;
 
 /// Rows of the slice in a chunk.

@@ -110,7 +110,7 @@ pub struct BranchReport {
     pub points_left_out: usize,
     /// Bifurcations and grazings located on the branches.
     pub bifurcations: Vec<BifurcationReport>,
-    /// Where the requested events happen.
+    /// Orbits of the branches at which the requested events happen.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub events: Vec<EventReport>,
     /// With `diagram`: the attractors of the census at each value, in the order of the values.
@@ -165,8 +165,8 @@ pub struct BranchSummary {
     pub range: [f64; 2],
     /// Reason why the branch ends, in words.
     pub end: String,
-    /// Whether it was followed to its end: out of the range, into another branch, or to
-    /// where the motion ceases to be.
+    /// Whether the branch was followed to its end: out of the range, into another branch, or to
+    /// where the motion ceases to exist.
     pub complete: bool,
 }
 
@@ -290,8 +290,8 @@ pub struct CurveReport {
     pub second: Vec<f64>,
     /// Reasons of its ends, at the first and last point.
     pub ends: [String; 2],
-    /// What it meets at its first and last point: grazing, codimension two, or cut where it could
-    /// not be followed; nothing at the edge of the window.
+    /// What the curve meets at its first and last point: grazing, codimension two, or cut where it
+    /// could not be followed; nothing at the edge of the window.
     pub meets: [Option<&'static str>; 2],
 }
 
@@ -619,7 +619,7 @@ fn census_seeds(
     Ok((found, shares))
 }
 
-/// Where an event happens on the branches of a report.
+/// Finds the orbits at which an event happens on the branches of a report.
 fn events_of(
     case: &Case,
     key: Key,
@@ -774,7 +774,7 @@ fn end_of(case: &Case, key: Key, branch: &Branch) -> String {
 
 /// Whether the last orbit of a branch hits a rigid stop just where a drive period begins.
 fn hits_at_phase_0(case: &Case, key: Key, branch: &Branch) -> bool {
-    /// Part of a drive period.
+    /// Fraction of a drive period within which a hit counts as at its beginning.
     const JUST: f64 = 1e-6;
     let hits = || {
         let point = branch.points.last()?;
@@ -789,7 +789,7 @@ fn hits_at_phase_0(case: &Case, key: Key, branch: &Branch) -> bool {
     hits().unwrap_or(false)
 }
 
-/// Whether two branches pass through just the same bifurcations, of which there are some.
+/// Whether two branches pass through the same bifurcations, at least one.
 fn are_one(a: &Branch, b: &Branch, span: f64) -> bool {
     let same = |x: &Bifurcation, y: &Bifurcation| {
         kind_name(x.kind) == kind_name(y.kind) && (x.parameter - y.parameter).abs() <= 1e-7 * span
@@ -933,7 +933,7 @@ impl Measured<'_> {
 const SEED_PERIODS: usize = 1000;
 /// Longest period of the orbits from which branches start, in drive periods.
 const SEED_MAX_PERIOD: usize = 16;
-/// Points of each half of a locus at most.
+/// Largest number of points of each half of a bifurcation curve.
 const LOCUS_POINTS: usize = 6000;
 
 /// Curves of all bifurcations, each once: one that lies on a curve already traced is left.

@@ -48,7 +48,7 @@ pub struct SampleMotion {
     /// The orbit of the requested period, if any.
     #[serde(flatten)]
     pub orbit: Option<OrbitLook>,
-    /// Its observables in SI, for a physical case.
+    /// Observables of the orbit in SI, for a physical case.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub physical: Option<PhysicalMotion>,
     /// Reason why there is no orbit of the requested period.
@@ -213,9 +213,9 @@ fn add_force_curves(samples: &mut [SampleMotion]) -> Result<(), Error> {
     Ok(())
 }
 
-/// Points of a force curve each way.
+/// Number of steps of a force curve in each direction.
 const CURVE_POINTS: u32 = 400;
-/// How far it reaches outwards, in greatest indentations.
+/// Outward reach of a force curve, in units of the greatest indentation.
 const CURVE_REACH: f64 = 2.0;
 
 fn motion(

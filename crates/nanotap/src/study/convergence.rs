@@ -24,9 +24,9 @@ use crate::study::{Study, cantilever};
 pub struct Convergence {
     /// Numbers of modes N that are compared, from 1 to the largest.
     pub modes: Vec<usize>,
-    /// Greatest difference of the tip deflection W over the orbit to the motion with
-    /// the most modes, as a part of its amplitude; null where the motions differ in
-    /// kind (another period, or none).
+    /// Greatest difference of the tip deflection W over the orbit to the motion with the most
+    /// modes, as a fraction of its amplitude; null where the motions differ in kind (another
+    /// period, or none).
     pub difference: Vec<Option<f64>>,
     /// Motion with each number of modes.
     pub motions: Vec<Motion>,
@@ -77,8 +77,8 @@ pub struct Motion {
 /// Points of an orbit at which two motions are compared.
 const COMPARED_POINTS: usize = 400;
 
-/// The motion of `case` with 1 … `largest` modes: the orbit of the asked period (or
-/// where a run from rest settles).
+/// Computes the motion of `case` with 1 … `largest` modes: the orbit of the requested period, or
+/// the one to which a run from rest converges.
 ///
 /// ```
 /// use nanotap::control::Control;

@@ -1,4 +1,4 @@
-//! A motion with what it is in SI.
+//! A motion in the model's units and, for a physical case, in SI.
 
 use schemars::JsonSchema;
 use serde::Serialize;

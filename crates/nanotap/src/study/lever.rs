@@ -109,7 +109,7 @@ pub enum QualityFactor {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum QualityFactorSource {
-    /// That of the case, the same for every lever.
+    /// Quality factor of the case, the same for every lever.
     Case,
     /// The fluid of the case and the dimensions of each lever.
     Fluid,
@@ -258,7 +258,7 @@ pub fn compare_levers(
     })
 }
 
-/// The case with a lever of the catalogue in place of its own, as it is compared.
+/// Returns the case with a lever of the catalogue in place of its own, as it is compared.
 ///
 /// # Errors
 /// As [`compare_levers`], and when the lever cannot be computed.

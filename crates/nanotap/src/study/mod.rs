@@ -113,9 +113,9 @@ pub trait Study {
     /// Report, which front ends print and write as JSON.
     type Report: Serialize + JsonSchema + 'static;
 
-    /// What its progress counts, in the plural.
+    /// Noun for what the progress counts, in the plural.
     const COUNTED: &'static str = "steps";
-    /// Whether it chooses the distance itself, so that none is solved for a setpoint.
+    /// Whether the study chooses distances itself, so that none is solved for a setpoint.
     const ANY_DISTANCE: bool = false;
     /// Whether the report of cancelled work holds the finished part, and states that it is a part.
     const PARTIAL: bool = false;
@@ -155,9 +155,9 @@ pub trait DatasetStudy {
     const NAME: &'static str;
     /// Help text of one line.
     const ABOUT: &'static str;
-    /// What its progress counts, in the plural.
+    /// Noun for what the progress counts, in the plural.
     const COUNTED: &'static str;
-    /// What the progress of its plan counts, in the plural.
+    /// Noun for what the progress of the plan counts, in the plural.
     const PLANNED: &'static str = "approaches to the setpoints";
     /// Options: what front ends show, check and pass on as JSON.
     type Options: Serialize + DeserializeOwned + JsonSchema;

@@ -10,7 +10,7 @@ use crate::model::Model;
 use crate::model::recording::Recording;
 use crate::study::orbit::OrbitReport;
 
-/// What an experimenter reads off an orbit, in the model's units.
+/// Instrument readings of an orbit, in the model's units.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct Reading {
     /// Amplitude A at the drive frequency, in the model's unit of length.

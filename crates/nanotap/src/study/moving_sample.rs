@@ -121,7 +121,7 @@ fn force_column(model: &Model, n: usize) -> DVector<f64> {
     best.1
 }
 
-/// How the sample depends on the rate of the gap: as on that of the tip, by a mode's rate.
+/// Derivatives by the rate of the gap, from those by the rate of the first mode.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct TipRate {
     modes: usize,
@@ -142,7 +142,8 @@ impl TipRate {
         output.row[self.modes] / self.shape
     }
 
-    /// Of the equations in a regime: those of the beam itself are the same in flight.
+    /// Returns the derivative of the equations in a regime, less the part of the beam itself, which
+    /// is the same in flight.
     fn of_matrix(self, matrix: &DMatrix<f64>, flight: &DMatrix<f64>) -> DVector<f64> {
         let mut change = matrix.column(self.modes) / self.shape;
         for row in 0..2 * self.modes {
@@ -152,7 +153,7 @@ impl TipRate {
     }
 }
 
-/// How a sample moves, as states after those of the model.
+/// Motion of a sample, as further states after those of the model.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct SampleMotion {
     /// −1 where the flow begins half a period before drive phase 0, else 1.
@@ -372,8 +373,9 @@ struct Term {
 }
 
 impl LinearSums {
-    /// Of the forces of a model, which change so with the gap, along motions of `moved`; the harmonic
-    /// at the drive's frequency or at `omega`.
+    /// Prepares the sums of the forces of a model along motions of `moved`. The force changes with
+    /// the gap by `force_by_gap` in each regime; the harmonic is at `omega`, or without it at the
+    /// drive frequency.
     pub(super) fn new(
         model: &Model,
         moved: &System,

@@ -55,13 +55,13 @@ pub struct OrbitReport {
     /// multiplier.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub decay_periods: Option<f64>,
-    /// What the multipliers say, or what is proved, in a word: stable, unstable or marginal;
-    /// undecided where the multipliers contradict the trace formula.
+    /// Stability by the multipliers, or as it is proved: stable, unstable or marginal; undecided
+    /// where the multipliers contradict the trace formula.
     pub stability: &'static str,
     /// |log|det DPⁿ| − trace formula|, dimensionless: zero to rounding of an exact Jacobian, and
-    /// without meaning where the smallest multiplier is lost in rounding. Where a sample forgets at
-    /// the end of each contact, the product of the other multipliers stands for the determinant,
-    /// which is zero.
+    /// without meaning where the smallest multiplier is lost in rounding. Where the memory of a
+    /// sample is reset at the end of each contact, the determinant is zero, and the product of the
+    /// other multipliers is used.
     pub determinant_defect: f64,
     /// Beginnings and ends of contact during one repetition of the orbit.
     pub events: Vec<ContactEvent>,
@@ -201,8 +201,8 @@ fn at_setpoint(model: &Model, map: &mut ModelMap, start: &[f64]) -> Option<Perio
 /// Distance from an orbit, as a fraction of its size, within which a state counts as on it.
 const ON_ORBIT: f64 = 1e-6;
 
-/// The orbit where a run from `start` settles, or one of the asked period: near its end, or
-/// anywhere.
+/// Finds the orbit to which a run from `start` converges, or one of the requested period: near the
+/// end of the run, or else anywhere.
 fn settled(
     model: &Model,
     map: &mut ModelMap,
@@ -374,8 +374,8 @@ pub const MAX_DETERMINANT_DEFECT: f64 = 1e-8;
 /// A bound of what rounding leaves in a multiplier.
 const MULTIPLIER_ROUNDING: f64 = 1e-11;
 
-/// How far the multipliers may be from the trace formula: rounding weighs in the smallest multiplier
-/// that is not zero.
+/// Returns the allowed difference of the multipliers from the trace formula: rounding matters most
+/// in the smallest multiplier that is not zero.
 fn allowed_defect(orbit: &PeriodicOrbit) -> f64 {
     let moduli = orbit.multipliers.iter().map(|m| m.modulus());
     let smallest = moduli.filter(|m| *m > 0.0).fold(1.0, f64::min);
@@ -387,8 +387,8 @@ pub(super) fn pairs(multipliers: &[Complex<f64>]) -> Vec<[f64; 2]> {
     multipliers.iter().map(|m| [m.re, m.im]).collect()
 }
 
-/// How far the multipliers of an orbit under a nonlinear force are from Liouville's formula; a
-/// law's memory has the multiplier zero.
+/// Returns the difference of the multipliers of an orbit under a nonlinear force from Liouville's
+/// formula; a law's memory has the multiplier zero.
 fn nonlinear_defect(orbit: &PeriodicOrbit, recording: &NonlinearRecording) -> f64 {
     let nonlinear = recording.nonlinear();
     let periods = recording.periods().iter();
@@ -406,7 +406,7 @@ fn nonlinear_defect(orbit: &PeriodicOrbit, recording: &NonlinearRecording) -> f6
     (found - expected).abs()
 }
 
-/// How far the multipliers are from Liouville's formula.
+/// Returns the difference of the multipliers from Liouville's formula.
 fn determinant_defect(model: &Model, orbit: &PeriodicOrbit, trajectory: &Trajectory) -> f64 {
     let expected = log_determinant(model, trajectory);
     match &model.memory_reset {
@@ -425,7 +425,7 @@ fn determinant_defect(model: &Model, orbit: &PeriodicOrbit, trajectory: &Traject
     }
 }
 
-/// What a memory that is set anew at the end of each contact adds to log|det| of the rest.
+/// Returns what a memory that is reset at the end of each contact adds to log|det| of the rest.
 ///
 /// With S the saltation where contact begins, Φ the flow of a flight of length t and p the
 /// tip's row, a contact, a flight and the next contact's beginning map the beam's state by

@@ -103,7 +103,7 @@ impl<'a> Property<'a> {
             .filter(|value| !value.is_null() && **value != Value::Array(Vec::new()))
     }
 
-    /// Whether it must be given.
+    /// Returns whether the option must be given.
     pub fn is_required(&self) -> bool {
         self.schema.get("x-required") == Some(&Value::Bool(true))
     }
@@ -146,8 +146,8 @@ impl<'a> Property<'a> {
         of(self.schema).chain(of(self.schema).flat_map(of))
     }
 
-    /// A text, as typed at a terminal, as the JSON that it stands for. What it cannot be stays a
-    /// text, and [`read`] refuses it in words.
+    /// Parses a text, as typed at a terminal, as JSON of a type that the option allows. Any other
+    /// text stays a string, which [`read`] refuses with the reason.
     pub fn parsed(&self, text: &str) -> Value {
         let text = text.trim();
         let number = || {
@@ -249,7 +249,7 @@ impl<'a> Property<'a> {
         self.least().is_none_or(above) && self.most().is_none_or(below)
     }
 
-    /// What would be right, in words.
+    /// Describes in words what a valid value is.
     fn wanted(&self) -> String {
         let noun = if self.allows("integer") {
             "a whole number"
@@ -292,7 +292,7 @@ fn shown(value: &Value) -> String {
     }
 }
 
-/// The request that a JSON object states; what it leaves out has its default.
+/// Reads a request from a JSON object; missing options have their defaults.
 ///
 /// # Errors
 /// An option that there is not, with the nearest name; a value of the wrong type or out of
@@ -350,7 +350,7 @@ fn known_schema<R: JsonSchema>() -> Arc<Schema> {
     Arc::clone(of.or_insert_with(|| Arc::new(schema::<R>())))
 }
 
-/// The same with whole numbers written as such: 1e3 is one, and 20.0.
+/// Returns the request with whole numbers such as 1e3 or 20.0 written as integers.
 fn whole_numbers(schema: &Schema, mut given: Map<String, Value>) -> Map<String, Value> {
     for property in properties(schema).filter(|p| p.allows("integer") && !p.allows("number")) {
         if let Some(value) = given.get_mut(property.name)

@@ -102,9 +102,9 @@ pub struct SetpointDrive {
 /// Solution of a setpoint for the distance.
 #[derive(Clone, Debug, Serialize)]
 pub struct SetpointReport {
-    /// What is held: `amplitude`, `peak_force`, `phase` or `frequency_shift`.
+    /// Quantity that is held: `amplitude`, `peak_force`, `phase` or `frequency_shift`.
     pub held: &'static str,
-    /// Its setpoint: the amplitude over A₀, the force in N, the phase in degrees, the shift in Hz.
+    /// Setpoint of that quantity: amplitude over A₀, force in N, phase in degrees, or shift in Hz.
     pub setpoint: f64,
     /// The drive at a frequency shift.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -115,7 +115,7 @@ pub struct SetpointReport {
     pub amplitude: f64,
     /// All distances at which an orbit is at the setpoint, from far to near.
     pub solutions: Vec<SetpointSolution>,
-    /// Index of the one that the approach reaches.
+    /// Index in `solutions` of the one that the approach reaches.
     pub chosen: usize,
     /// Other stable orbits at the distance that the approach reaches.
     pub other_states: Vec<SetpointState>,
@@ -130,7 +130,7 @@ impl SetpointReport {
         self.solutions.get(self.chosen).map_or(f64::NAN, |s| s.zc)
     }
 
-    /// What is held and its value, as in "the peak force is 1 nN".
+    /// Describes the held quantity with its value, as in "the peak force is 1 nN".
     pub fn held_value(&self) -> String {
         match self.held {
             "peak_force" => format!("the peak force is {}", Kind::Force.format(self.setpoint)),
@@ -507,7 +507,7 @@ pub(in crate::study) fn reached_distances(
         .collect())
 }
 
-/// The same of frequency shifts.
+/// Finds the distances at which frequency shifts are reached, on an approach for each case.
 fn shifted_distances(
     cases: &[Case],
     control: &Control<'_>,
@@ -562,7 +562,7 @@ pub struct SolvedCase {
     /// Document of the case, with its physical quantities and the numbers of the equations.
     #[serde(flatten)]
     pub case: CaseDocument,
-    /// How its setpoint was solved, if it was.
+    /// Solution of the setpoint for the distance, if it was solved.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub setpoint_solved: Option<SetpointReport>,
     /// Excursions of the rest position beyond the range of a nonlinear force law.
@@ -582,8 +582,8 @@ impl SolvedCase {
     }
 }
 
-/// Steps of the approximate flow after which other states at the setpoint are looked for no longer,
-/// and which their branches may take.
+/// Steps of the approximate flow after which the search for other states at the setpoint ends, and
+/// which their branches may take.
 const OTHERS_STEPS: u64 = 20_000_000;
 /// Points to which each of these branches may always be followed.
 const MIN_POINTS: usize = 16;
@@ -596,7 +596,7 @@ const FARTHER: f64 = 2.0;
 struct HeldQuantity {
     setpoint: Held,
     target: f64,
-    /// Its value far from the sample.
+    /// Value of the quantity far from the sample.
     far: f64,
     /// A₀, and the unit of force in N.
     free_amplitude: f64,
@@ -726,9 +726,9 @@ struct Search<'a> {
 
 /// Distances along a piece of the way with the values there.
 enum Trace {
-    /// Of the orbits of a branch.
+    /// Distance, orbit and value for each orbit of a branch.
     Orbits(Vec<(f64, PeriodicOrbit, f64)>),
-    /// Of a motion without a branch, averaged.
+    /// Distance and averaged value of a motion without a branch.
     Averages(Vec<(f64, f64)>),
 }
 
@@ -754,7 +754,8 @@ fn value_at(
     value_from(held, sweep, gap, start, orbit.period)
 }
 
-/// The same over so many periods from a state.
+/// Returns the held quantity over `periods` drive periods from a state; NaN where it cannot be
+/// measured.
 fn value_from(
     held: &HeldQuantity,
     sweep: &DistanceSweep<'_>,
@@ -905,7 +906,7 @@ impl Search<'_> {
         false
     }
 
-    /// The same of a motion that is not periodic.
+    /// Whether the search ends in a piece of the way whose motion is not periodic.
     fn ends_without_orbit(
         &mut self,
         sweep: &DistanceSweep<'_>,

@@ -293,7 +293,7 @@ impl Target {
         })
     }
 
-    /// Whether it compares the number of motions.
+    /// Returns whether the condition is on the number of motions.
     pub const fn counts_states(&self) -> bool {
         matches!(self.condition, Condition::States(..))
     }
@@ -326,7 +326,7 @@ impl Target {
 /// Names that can be compared in addition to observables.
 const OWN: [&str; 3] = ["states", "regime", "period"];
 
-/// What is wrong with a name that is neither an observable nor one of these.
+/// Describes the error of a name that is neither an observable nor one of these.
 pub(super) fn unknown(name: &str, own: &[&'static str]) -> String {
     let observables = ObservableSet::COMMON.iter().map(|o| o.si_name);
     let names: Vec<&str> = own.iter().copied().chain(observables).collect();
@@ -378,7 +378,8 @@ pub struct TargetReport {
     /// The conditions, which must all hold for every motion that was found at a point.
     #[serde(rename = "where")]
     pub conditions: Vec<String>,
-    /// Whether they hold, row by row, a row a value of the second parameter.
+    /// Whether the conditions hold at each point, row by row, one row for each value of the second
+    /// parameter.
     pub holds: Vec<Vec<bool>>,
     /// Fraction of all points at which the conditions hold, 0 to 1.
     pub share: f64,

@@ -55,7 +55,7 @@ pub struct Upset {
     pub drive_phase: f64,
     /// Class of the motion that follows the knock.
     pub leads_to: Classification,
-    /// Its period in drive periods, if it is periodic.
+    /// Period in drive periods of the motion that follows, if it is periodic.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub period: Option<usize>,
     /// Amplitude at the drive frequency of the motion that follows, in the model's unit of length,
@@ -87,7 +87,7 @@ pub struct UpsetInSi {
     pub amplitude: Option<f64>,
 }
 
-/// What was found of the knocks on an orbit.
+/// Result of the knocks on an orbit.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct Knocks {
     /// Smallest knock that makes the lever leave its orbit; `None` if none of those tried does.
@@ -95,7 +95,7 @@ pub struct Knocks {
     /// Largest change of the tip's speed that was tried, in the model's unit of length per unit of
     /// time.
     pub largest_tried: f64,
-    /// The same in m/s, of a physical case.
+    /// Largest change of the tip's speed that was tried in a physical case, m/s.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub largest_tried_in_si: Option<f64>,
 }
@@ -256,7 +256,7 @@ impl Knocked<'_> {
         Ok(None)
     }
 
-    /// Those of some knocks that are followed by another motion.
+    /// Returns those of some knocks that are followed by another motion.
     fn upsetting(&mut self, knocks: &[Knock], control: &Control<'_>) -> Result<Vec<Knock>, Error> {
         let starts = knocks.iter().map(|knock| self.after(*knock));
         let starts = starts.collect::<Result<Vec<_>, _>>()?;
@@ -311,7 +311,8 @@ impl Knocked<'_> {
         (periods as usize, periods.fract() * self.model.period())
     }
 
-    /// What follows a knock by the flow itself, if it is another motion.
+    /// Follows a knock by the flow itself; `None` if the lever returns to its orbit or stays
+    /// undecided.
     fn confirmed(&mut self, knock: Knock) -> Result<Option<Upset>, Error> {
         let state = self.after(knock)?;
         let end = classify(&mut self.map, &state, &ClassifyOptions::default());

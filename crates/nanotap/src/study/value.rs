@@ -43,7 +43,7 @@ macro_rules! inline_schema {
 pub struct Amount(String);
 
 impl Amount {
-    /// As it was written; a number in the fewest digits that give it back.
+    /// Returns the text as it was written; of a number, the fewest digits that reproduce it.
     pub fn text(&self) -> &str {
         &self.0
     }
@@ -304,7 +304,7 @@ impl Axes {
     }
 }
 
-/// What stands before the values.
+/// Returns the name in front of the values.
 fn name_of(axis: &str) -> &str {
     axis.split_once('=').map_or(axis, |(name, _)| name).trim()
 }

@@ -30,7 +30,7 @@ use crate::study::target::{TargetReport, Targets};
 use crate::study::value::Axes;
 use crate::study::{DatasetPlan, DatasetStudy};
 
-/// What there is at one point, from the safest to the least.
+/// Condition of the lever at one point, from the safest to the least safe.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Condition {
     /// Only one motion, that repeats each drive period and does not touch.
@@ -104,7 +104,7 @@ impl JsonSchema for Condition {
     }
 }
 
-/// The file of a window's dataset that says what there is at each point.
+/// File of a window's dataset that states the condition at each point.
 const FILE: &str = "window.json";
 
 /// The operating window over two parameters.
@@ -128,7 +128,7 @@ pub struct Window {
     /// Distance in m at each point, solved for the setpoint, row by row.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub distances: Vec<Vec<Option<f64>>>,
-    /// Where the setpoint is not reached.
+    /// Values at which the setpoint is not reached, with the reason.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub unreached: Vec<Unreached>,
     /// Where the conditions of `where` hold.
@@ -164,7 +164,7 @@ impl From<&FromNeighbour> for Seen {
 }
 
 impl Window {
-    /// Of the finished dataset of a sweep over two parameters.
+    /// Evaluates the finished dataset of a sweep over two parameters.
     ///
     /// # Errors
     /// When a chunk is missing or damaged, or the dataset is no such sweep.
@@ -253,7 +253,7 @@ impl Window {
         })
     }
 
-    /// The same, stored with the dataset in `window.json`.
+    /// Evaluates the dataset and stores the window with it in `window.json`.
     ///
     /// # Errors
     /// As [`Window::of`], and when the file system refuses.
@@ -265,7 +265,8 @@ impl Window {
     }
 }
 
-/// What the motions of one point come to. What is there counts before what could not be named.
+/// Returns the condition of a point by its motions. Motions that were found count before those that
+/// could not be classified.
 fn condition(motions: &[Seen]) -> Condition {
     let any = |wanted: &[Classification]| {
         motions

@@ -1,4 +1,4 @@
-//! What a contact law's file declares, for whatever reads the table of laws.
+//! What the file of a contact law declares: the entry of the law in the table.
 
 use super::dual::Dual;
 use super::law::Law;
@@ -46,7 +46,7 @@ pub enum Damper {
         /// Note for a case that gives no damper.
         none: &'static str,
     },
-    /// A damper in series with a spring, the numbers of which the law has in place of α6.
+    /// A damper in series with a spring. The law has numbers of this arm in place of α6.
     InArm {
         /// Why α6 must be 0.
         not_alpha6: &'static str,

@@ -5,11 +5,10 @@
 //! undeformed surface. From there the surface recovers freely, α6 u̇ + α4 u = 0, until the
 //! tip meets it again, V_T = u.
 //!
-//! The internal variable is `s = u` in flight. In contact, where u is known, `s` goes on
-//! recovering as if nothing touched, and is set to V_T when contact ends: so both regimes have
-//! the same simple eigenvalue −α4/α6, the gap V_T − s is one smooth function that is negative
-//! throughout contact, and every state lies in one regime. With f the force, in either
-//! regime
+//! The internal variable is `s = u` in flight. In contact, where u is known, `s` continues to
+//! recover as if nothing touched, and is set to V_T when contact ends. Both regimes then have the
+//! same simple eigenvalue −α4/α6, the gap V_T − s is one smooth function that is negative
+//! throughout contact, and every state lies in one regime. With f the force, in either regime
 //!
 //! `α6 ġ + α4 g = −(α4 V_T + α6 V̇_T)`, `g = V_T − s`,
 //!

@@ -20,8 +20,9 @@
 //! A touch that only grazes is pulled in by a force that does not begin at zero: the map has a
 //! square root there, and an orbit does not survive its grazing.
 //!
-//! Stored in contact is ½ α4 g² + F g in addition to the surface's ½ k_s s²; the adhesion gives
-//! on the way in what it takes on the way out, and all energy is lost in the two dampers.
+//! The energy stored in contact is ½ α4 g² + F g in addition to the surface's ½ k_s s². The
+//! adhesion takes on the way out the energy that it gives on the way in, and all energy is lost in
+//! the two dampers.
 
 use super::dual::Dual;
 use super::entry::{Damper, Entry};

@@ -44,7 +44,7 @@ impl TipLoad {
     }
 }
 
-/// Why there is no eigenbasis.
+/// Why a regime has no usable eigenbasis.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum SpectrumError {
     /// An eigenvector is missing, or nearly so.

@@ -1,9 +1,10 @@
 //! Cache of the eigenbases that were computed last.
 //!
-//! Drive and gap change no eigenvalue: along a sweep or a branch in one of them every model after
-//! the first takes its bases from here. Each thread remembers its own, by all the numbers that they
-//! follow from, so that what a model is does not depend on those before it. (Neighbours' eigenvalues
-//! as first guesses would: iteration ends within rounding of the same numbers, not at the same.)
+//! Drive and gap do not change the eigenvalues: along a sweep or a branch in one of them every
+//! model after the first takes its bases from here. Each thread has a separate cache. The key is
+//! all numbers from which a basis is computed, so that a model does not depend on those before it.
+//! (With neighbours' eigenvalues as first guesses it would: iteration ends within rounding of the
+//! same numbers, not at the same.)
 
 use std::cell::RefCell;
 use std::sync::Arc;

@@ -13,7 +13,7 @@ use nanotap_arithmetic::ComplexFunctions as _;
 
 type C = Complex<f64>;
 
-/// What the tip carries: the factors of p pᵀ in M, C and K.
+/// Load at the tip: the factors of p pᵀ in M, C and K.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TipLoad {
     /// Factor in the mass matrix, α1.
@@ -71,8 +71,8 @@ impl Secular<'_> {
         self.tip.iter().map(|p| p * p).sum()
     }
 
-    /// What remains of the tip's damping when the part proportional to M is taken
-    /// off: g = α1 D + (α4 − α1 κ) + (α6 − α1 α3) λ.
+    /// Returns α6 − α1 α3, the part of the tip's damping that is not proportional to M, for which g
+    /// = α1 D + (α4 − α1 κ) + (α6 − α1 α3) λ.
     fn excess_damping(&self) -> f64 {
         self.load.damping - self.load.mass * self.beam_damping
     }
@@ -417,7 +417,8 @@ impl Secular<'_> {
     }
 }
 
-/// Keeps a denominator off zero, by a rounding error of what it is the difference of.
+/// Keeps a denominator, the difference of two numbers of size `scale`, at least ε²·`scale` away
+/// from zero, which is far below their rounding error.
 fn apart(distance: C, scale: f64) -> C {
     let least = f64::EPSILON * f64::EPSILON * scale;
     if distance.re.abs() + distance.im.abs() < least {

@@ -102,12 +102,12 @@ impl fmt::Display for End {
     }
 }
 
-/// In words that a budget of steps was spent.
+/// Describes in words that a budget of steps was spent.
 pub(in crate::study) fn budget_text(steps: u64) -> String {
     format!("the lever was followed {}", up_to_budget(steps))
 }
 
-/// The same of other work.
+/// Describes in words that any work reached its budget of steps.
 pub(in crate::study) fn up_to_budget(steps: u64) -> String {
     let millions = steps as f64 / 1e6;
     format!("up to the budget of {} million steps", shortest(millions))
@@ -141,9 +141,9 @@ pub(in crate::study) struct FoundMotion {
     pub(in crate::study) state: Vec<f64>,
     /// Whether the motion from the start could not be computed.
     failed: bool,
-    /// Whether it is on an orbit, stable or not.
+    /// Whether the motion is on an orbit, stable or not.
     closes: bool,
-    /// Whether it was only looked for an orbit.
+    /// Whether only an orbit was searched for, so that the class is not known otherwise.
     only_searched: bool,
 }
 
@@ -172,7 +172,8 @@ impl FoundMotion {
         }
     }
 
-    /// Where the motion at the next distance starts: rest, where this one ran off.
+    /// Returns the state in which the motion at the next distance starts: rest if this motion is
+    /// unbounded.
     fn next_start(&self) -> Vec<f64> {
         match self.classification {
             Classification::Unbounded => vec![0.0; self.state.len()],
@@ -233,7 +234,7 @@ pub(in crate::study) struct DistanceSweep<'a> {
     scale: f64,
     classify: ClassifyOptions,
     control: &'a Control<'a>,
-    /// What cancels the work: the caller, or the budget.
+    /// Flag that cancels the work: when the caller does, or when the budget is spent.
     flag: CancelFlag,
     is_nonlinear: bool,
     /// Steps and points of the stretches that were continued.
@@ -244,7 +245,8 @@ pub(in crate::study) struct DistanceSweep<'a> {
 }
 
 impl<'a> DistanceSweep<'a> {
-    /// Of a case between two distances. `reach` is how far the free tip swings.
+    /// Prepares the sweep of a case between two distances. `reach` is how far the free tip swings,
+    /// in the model's unit of length.
     pub(in crate::study) fn new(
         case: &Case,
         (near, far): (f64, f64),
@@ -297,7 +299,8 @@ impl<'a> DistanceSweep<'a> {
         self.family = self.case.family(self.case.gap_key());
     }
 
-    /// What cancels the work: the caller, or the budget.
+    /// Returns the control that cancels the work: when the caller does, or when the budget is
+    /// spent.
     pub(in crate::study) fn limited(&self) -> Control<'_> {
         Control {
             cancel: Some(&self.flag),
@@ -310,8 +313,8 @@ impl<'a> DistanceSweep<'a> {
         self.flag.budget().filter(|_| self.flag.is_spent())
     }
 
-    /// Points of branches for which so many steps suffice, by the average so far; no end of them
-    /// where steps are not counted.
+    /// Returns the number of points of branches for which `steps` suffice, by the average so far;
+    /// `usize::MAX` where steps are not counted.
     pub(in crate::study) fn points_in(&self, steps: u64) -> usize {
         let (taken, points) = self.continued;
         let points = steps.saturating_mul(points as u64).checked_div(taken);
@@ -352,8 +355,9 @@ impl<'a> DistanceSweep<'a> {
         Ok(self.arrive(gap, &start))
     }
 
-    /// Where a run from a state at a distance goes. Under a nonlinear law a motion that does not close
-    /// on the approximate map is classified exactly only where it is reported.
+    /// Returns the place that a run from a state at a distance reaches. Under a nonlinear law a
+    /// motion that does not close on the approximate map is classified exactly only where it is
+    /// reported.
     fn arrive(&mut self, gap: f64, start: &[f64]) -> Place {
         let searched = self.is_nonlinear.then(|| {
             let options = self.classify.clone();
@@ -375,7 +379,7 @@ impl<'a> DistanceSweep<'a> {
         }
     }
 
-    /// What a run from a state at a distance goes to.
+    /// Classifies the motion that a run from a state at a distance reaches.
     fn run_from(&self, gap: f64, start: &[f64], max_transient: usize) -> FoundMotion {
         let options = ClassifyOptions {
             max_transient,
@@ -702,7 +706,7 @@ impl<'a> DistanceSweep<'a> {
         }
     }
 
-    /// Where the lever goes from the end of a stretch, and whether by a jump.
+    /// Finds where the lever goes from the end of a stretch, and whether it jumps.
     fn beyond(&mut self, stretch: usize, direction: Direction, to: f64) -> (Place, bool) {
         let (at, end) = self.stretches[stretch].end(direction).clone();
         let (side, scale) = (sign(direction), self.scale);
@@ -935,7 +939,7 @@ fn reachable(model: &Model, state: &[f64]) -> Vec<f64> {
     state
 }
 
-/// What a run of a map goes to.
+/// Classifies the motion that a run of a map reaches.
 fn named(map: &mut ModelMap, start: &[f64], options: &ClassifyOptions) -> FoundMotion {
     let classified = classify(map, start, options);
     let named = Named::of(&classified.kind);

@@ -48,7 +48,7 @@ pub use quasistatic::{states_at, states_near};
 /// free motion, and branches that reach beyond it.
 const BEYOND: f64 = 1.25;
 
-/// Where a curve at a kept least distance ends, as a part of the amplitude with which it begins.
+/// Amplitude at which a curve with a constant least distance ends, as a fraction of its first one.
 const LEAST_AMPLITUDE: f64 = 0.02;
 
 /// Direction in which the sample moves.
@@ -157,7 +157,7 @@ pub struct StateJump {
     /// Uncertainty of the distance in m, for a physical case.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub zc_uncertainty: Option<f64>,
-    /// What ends the motion before it: fold, flip, neimark-sacker, grazing, crossing, or a
+    /// What ends the motion before the jump: fold, flip, neimark-sacker, grazing, crossing, or a
     /// sentence.
     pub reason: String,
     /// The motion before the jump, at its end.
@@ -221,8 +221,9 @@ pub struct ApproachReport {
     pub table: Vec<ApproachPoint>,
     /// Jumps of the lever from one motion to another, in order.
     pub jumps: Vec<StateJump>,
-    /// Stable orbits of the same distances on neither way, that lie on stretches of stable orbits
-    /// on which a way is at other distances, by descending distance.
+    /// Stable orbits at these distances that neither approach nor retract reaches, by descending
+    /// distance. They lie on stretches of stable orbits of which approach or retract reaches other
+    /// distances.
     pub coexisting: Vec<ApproachPoint>,
     /// Least height of the beam above the sample in the motion at the nearest distance, in the
     /// model's unit of length: where it is not above zero, another part than the tip touches.
@@ -462,7 +463,8 @@ pub(in crate::study) fn no_drive() -> Error {
 struct Curve<'a> {
     case: &'a Case,
     options: &'a ApproachOptions,
-    /// In the model's unit of length a unit of time; `None`: so slow that the lever settles.
+    /// Speed of the sample, in the model's unit of length per unit of time; `None`: so slow that
+    /// the lever settles at each distance.
     speed: Option<f64>,
 }
 
@@ -574,7 +576,8 @@ pub(in crate::study) fn beam_clearance(case: &Case, table: &[ApproachPoint]) -> 
     Some(clearance.height + moved)
 }
 
-/// Part of the free amplitude within which a lever that is moved fast has returned.
+/// Difference of amplitudes, as a fraction of the free amplitude, within which a lever that is
+/// moved fast has returned to its first motion.
 const RETURNED: f64 = 1e-2;
 
 fn returned(table: &[ApproachPoint], speed: Option<f64>, free_amplitude: f64) -> bool {
@@ -585,9 +588,9 @@ fn returned(table: &[ApproachPoint], speed: Option<f64>, free_amplitude: f64) ->
     })
 }
 
-/// How much two motions at one distance differ; `None` if they are one as far as is known.
-/// Recordings of one chaotic band never agree to the digit, so that only what both periodic
-/// motions are, or the class, counts.
+/// Returns the difference of the amplitudes of two motions at one distance; `None` if they are the
+/// same motion as far as is known. Recordings of one chaotic band never agree exactly: amplitudes
+/// are compared only where both motions are periodic, otherwise the class is.
 fn difference(a: &ApproachPoint, b: &ApproachPoint, free_amplitude: f64) -> Option<f64> {
     let (x, y) = (a.observables.as_ref()?, b.observables.as_ref()?);
     let amplitudes = (x.first_harmonic - y.first_harmonic).abs();

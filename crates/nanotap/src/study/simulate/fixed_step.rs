@@ -218,7 +218,7 @@ fn check(model: &Model, state: &[f64], period: usize) -> Result<(), Error> {
     }
 }
 
-/// What is read off the grid.
+/// Quantities that are read off the grid.
 struct Observed<'a> {
     model: &'a Model,
     rate: nanotap_flow::Output,
@@ -228,7 +228,7 @@ struct Observed<'a> {
     contact: bool,
     before: f64,
     events: Vec<GridEvent>,
-    /// How many events are listed, and how many more there were.
+    /// Largest number of listed events, and the number of those that are not listed.
     most_events: usize,
     events_left_out: usize,
     curve: Vec<[f64; 3]>,

@@ -26,7 +26,7 @@ use crate::study::request::options;
 use crate::study::value::Steps;
 use fixed_step::{FixedStepRun, fixed_step_run};
 
-/// What a motion was found to be.
+/// Class of a motion.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Classification {
@@ -77,8 +77,8 @@ pub struct Simulation {
     /// Lyapunov exponents per drive period, if they were measured.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub lyapunov: Option<Vec<f64>>,
-    /// Of a periodic motion, how far the end of the recording is from the orbit, as a part of
-    /// the orbit's size: what is recorded is the orbit only where this is rounding.
+    /// Distance of the end of the recording from the orbit of a periodic motion, as a fraction of
+    /// its size. The recording is the orbit itself only where this is of the order of rounding.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub distance_to_orbit: Option<f64>,
     /// States at the end of each of the last requested periods.
@@ -287,8 +287,8 @@ fn measured_transient(map: &mut ModelMap, state: &mut [f64], options: &ClassifyO
     classified.periods + rest.next_multiple_of(orbit.period)
 }
 
-/// Speed of the bare propagation and evaluations of gap or force a period, of the first
-/// periods: a long run is not made longer by them.
+/// Measures the speed of the propagation alone, in drive periods per second, and the evaluations of
+/// gap or force per period, over the first periods: a long run does not become longer by them.
 fn speed(model: &Model, state: &[f64], periods: usize) -> Result<(f64, f64), MotionError> {
     let periods = periods.min(SHOWN);
     let mut map = ModelMap::new(model);

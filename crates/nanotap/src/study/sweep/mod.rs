@@ -98,7 +98,7 @@ impl Sweep {
         Self::from(case, options, starts, control)
     }
 
-    /// The same from other starts than those of the options.
+    /// Makes the sweep with other initial states than those of the options.
     pub(in crate::study) fn from(
         case: &Case,
         options: SweepOptions,
@@ -135,7 +135,7 @@ impl Sweep {
         &self.runs.options
     }
 
-    /// The parameters with their values; a line of the first is what is followed.
+    /// Returns the parameters with their values; motions are followed along the first.
     pub fn over(&self) -> &[Over] {
         &self.runs.over
     }
@@ -147,7 +147,7 @@ impl Sweep {
 }
 
 impl Runs {
-    /// The same, whose motions end once `control` cancels the work.
+    /// Returns the runs with motions that end once `control` cancels the work.
     fn cancelled_by(&self, control: &Control<'_>) -> Self {
         Self {
             case: self.case.cancelled_by(control),

@@ -33,7 +33,7 @@ use crate::observe::{ObservableSet, measure};
 use crate::study::approach::{states_at, states_near};
 use crate::study::short_run::short_run;
 
-/// The file of a sweep's dataset that keeps them.
+/// File of a sweep's dataset that holds these motions.
 const FILE: &str = "neighbours.json";
 
 /// A stable orbit that no start met at a value.
@@ -54,7 +54,7 @@ pub struct FromNeighbour {
     pub tip_max: f64,
     /// Contact time / period, 0 to 1.
     pub contact_fraction: f64,
-    /// Its observables by name, in the dataset's units.
+    /// Observables by name, in the dataset's units.
     #[serde(default)]
     pub observables: BTreeMap<String, f64>,
 }

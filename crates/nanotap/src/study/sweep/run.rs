@@ -243,9 +243,9 @@ struct Runner<'a> {
     known: Vec<PeriodicOrbit>,
     /// Exponents of chaotic motions that starts went to.
     chaos: Vec<LyapunovSpectrum>,
-    /// What every motion is measured with.
+    /// Recorder that measures every motion.
     recorder: Result<Recorder<'a>, MotionError>,
-    /// Units to tell observables in, where physical quantities vary.
+    /// Units that convert observables to SI; `None` where they stay in the model's units.
     scales: Option<Scales>,
 }
 
@@ -352,8 +352,8 @@ impl<'a> Runner<'a> {
         }
     }
 
-    /// What the motion from `state` is: one that has come to an orbit which an earlier start
-    /// went to, that orbit.
+    /// Classifies the motion from `state`. If it is on an orbit that an earlier start reached, that
+    /// orbit is the result.
     fn kind_of(&mut self, state: &[f64]) -> Named {
         if let Some(orbit) = self.known.iter().find(|orbit| is_on(orbit, state)) {
             return Named::of(&MotionKind::Periodic(orbit.clone()));
@@ -363,7 +363,8 @@ impl<'a> Runner<'a> {
         named
     }
 
-    /// What the motion from `state` is, which may be chaos that an earlier start went to.
+    /// Classifies the motion from `state`, in comparison with the chaos that earlier starts
+    /// reached.
     fn beside_known(&mut self, state: &[f64]) -> Classified {
         let classified = classify_beside(&mut self.map, state, &self.chaos, &self.classify);
         if let MotionKind::Chaotic(chaos) = &classified.kind
@@ -384,8 +385,8 @@ impl<'a> Runner<'a> {
         recorder.record(from, periods, kept)
     }
 
-    /// Records the motion from `from`; with `period`, one turn of that orbit stands for
-    /// all.
+    /// Records the motion from `from`; with `period`, one repetition of that orbit is recorded and
+    /// used for all periods.
     fn recorded(
         &self,
         mut outcome: Outcome,
@@ -421,8 +422,8 @@ impl<'a> Runner<'a> {
     }
 }
 
-/// Distance from an orbit, as a part of its size, at which a motion has come to it: what is
-/// recorded then differs by no more.
+/// Distance from an orbit, as a fraction of its size, below which a motion is on it: the recording
+/// then differs by no more.
 const ARRIVED: f64 = 1e-10;
 
 /// Whether a motion that goes to an orbit has come to it.
@@ -430,7 +431,7 @@ pub(super) fn is_on(orbit: &PeriodicOrbit, state: &[f64]) -> bool {
     orbit.nearest(state).1 <= (ARRIVED * orbit.scale()).max(10.0 * orbit.error)
 }
 
-/// What a motion is that the flow could not follow.
+/// Returns the class of a motion that the flow could not follow.
 fn class_of(error: &MotionError) -> Classification {
     if error.is_unbounded() {
         Classification::Unbounded

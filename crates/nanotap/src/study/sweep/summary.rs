@@ -21,7 +21,7 @@ pub struct Summary {
     pub counts: BTreeMap<&'static str, usize>,
     /// Number of periodic runs by their period in drive periods.
     pub periods: BTreeMap<i32, usize>,
-    /// Motions that no run met, but that those of neighbouring values lead to.
+    /// Motions that no run reached, but that motions at neighbouring values lead to.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub from_neighbours: Vec<FromNeighbour>,
     /// Quantities that stay constant while the parameters vary although the case does not state
@@ -31,7 +31,7 @@ pub struct Summary {
     /// Where the conditions of `where` hold.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub targets: Option<TargetReport>,
-    /// Where a setpoint is not reached.
+    /// Values at which a setpoint is not reached, with the reason.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub unreached: Vec<Unreached>,
 }
@@ -166,7 +166,8 @@ fn points(store: &Store) -> Result<Vec<TargetPoint>, StoreError> {
     Ok(points)
 }
 
-/// What stays while the parameters of a sweep vary, as its dataset states it.
+/// Returns the quantities that stay constant while the parameters of a sweep vary, as its dataset
+/// states them.
 pub(crate) fn held(store: &Store) -> BTreeMap<String, f64> {
     let text = store.schema().attributes.get(HELD);
     text.and_then(|text| serde_json::from_str(text.as_str()?).ok())

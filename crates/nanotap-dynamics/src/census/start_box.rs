@@ -29,6 +29,17 @@ pub enum StartBoxError {
         /// Number of upper bounds.
         upper: usize,
     },
+    /// The centre is no state of the box.
+    #[error("the centre has {centre} coordinates, the box {dimension}")]
+    Centre {
+        /// Number of coordinates of the centre.
+        centre: usize,
+        /// Number of coordinates of the box.
+        dimension: usize,
+    },
+    /// No scale is given.
+    #[error("expected one scale of the box or more, got none")]
+    NoScale,
     /// A side that does not run upwards between finite numbers.
     #[error(
         "side {index} of the box runs from {lower} to {upper}; it must run upwards, between finite numbers"

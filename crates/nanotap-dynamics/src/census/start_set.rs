@@ -52,20 +52,23 @@ impl StartSet {
     /// is the box itself), in turn.
     ///
     /// # Errors
-    /// [`StartBoxError::Length`] if the centre has another dimension than the box or
-    /// there is no scale, [`StartBoxError::Side`] if a shrunk side is no interval
-    /// between finite numbers.
+    /// [`StartBoxError::Centre`] if the centre has another dimension than the box,
+    /// [`StartBoxError::NoScale`] without a scale, [`StartBoxError::Side`] if a shrunk
+    /// side does not run upwards between finite numbers.
     pub fn spread(
         sides: &StartBox,
         centre: &[f64],
         scales: &[f64],
         seed: u64,
     ) -> Result<Self, StartBoxError> {
-        if centre.len() != sides.dimension() || scales.is_empty() {
-            return Err(StartBoxError::Length {
-                lower: sides.dimension(),
-                upper: centre.len().min(scales.len()),
+        if centre.len() != sides.dimension() {
+            return Err(StartBoxError::Centre {
+                centre: centre.len(),
+                dimension: sides.dimension(),
             });
+        }
+        if scales.is_empty() {
+            return Err(StartBoxError::NoScale);
         }
         let towards = |side: &[f64], scale: f64| -> Vec<f64> {
             side.iter()

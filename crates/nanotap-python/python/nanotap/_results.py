@@ -349,7 +349,7 @@ class Orbit(_Observed, Result):
         period: Minimal period in drive periods.
         state: State at drive phase 0 (n).
         states: States at phase 0 of all its periods (period × n).
-        residual: Largest entry of Pⁿ(x) − x.
+        residual: Largest entry of P(x_k) − x_(k+1) over the states of the orbit.
         error: Estimated distance of the state from the true orbit.
         multipliers: Floquet multipliers, largest modulus first (n).
         stable: Whether every multiplier is inside the unit circle.

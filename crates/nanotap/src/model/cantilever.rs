@@ -524,7 +524,10 @@ impl fmt::Display for Reason {
                     "no {word} tone: give tone{number}_ratio, as in \"25/4\", or leave this out"
                 )
             }
-            Self::Tones => write!(formatter, "expected at most {MAX_TONES} tones"),
+            Self::Tones => write!(
+                formatter,
+                "expected at most {MAX_TONES} tones, and ratios of whole numbers for all of three"
+            ),
             Self::SameTone => formatter
                 .write_str("two tones have the same frequency: add their amplitudes to one tone"),
             Self::Repetition => write!(

@@ -36,7 +36,7 @@ const MAX_SHIFT: f64 = 3.0;
 /// Number of halvings of an interval that contains a root.
 const BISECTIONS: usize = 30;
 
-/// A guess of a periodic motion.
+/// A guess of a periodic motion, to start Newton's method from.
 #[derive(Clone, Debug, PartialEq)]
 pub struct AveragedMotion {
     /// State at drive phase 0, of length `n`, in the system's units.

@@ -27,7 +27,7 @@ use std::sync::Arc;
 
 /// Number of tabulated step lengths; the longest is a sixteenth of the fastest tone's period.
 const LEVELS: usize = 20;
-/// The level of a period's first step.
+/// Level of the step length with which a period starts.
 const FIRST_LEVEL: usize = 2;
 /// Largest change of the gap's rate by a step's estimated error, as a fraction of the drive's
 /// frequency times the size of the motion.
@@ -56,8 +56,8 @@ const MAX_SWITCHES_AT_ONCE: usize = 64;
 /// Largest number of branches for which switches are located; a law with more, whose gap and rate
 /// determine the branch, is evaluated by lookup.
 const MAX_LOCATED_BRANCHES: usize = 8;
-/// Decay of a disturbance over a step by the force's damping, as an exponent, above which the step is
-/// implicit.
+/// Decay exponent of a disturbance over a step, by the damping of the force, above which the step
+/// is implicit.
 const STIFF: f64 = 1.0;
 /// Fraction of the allowed error to which the forces of an implicit step are iterated.
 const CONVERGED: f64 = 0.02;
@@ -78,14 +78,14 @@ pub struct Coarse {
 struct Work {
     now: Motion,
     next: Motion,
-    /// A step of any length.
+    /// Level of a partial step, recomputed for each length.
     part: Level,
     stages: Stages,
-    /// Derivatives of the modal coordinates, one column after another; empty if not carried.
+    /// Derivatives of the modal coordinates, column after column; empty if they are not computed.
     columns: Vec<[f64; 2]>,
     /// Size of the motion, in the unit of the gap.
     size: f64,
-    /// Integrals of the force, where requested, with the angular frequency of the harmonic.
+    /// Integrals of the force, if requested, with the angular frequency of the harmonic.
     sums: Option<(ForceSums, f64)>,
     statistics: Statistics,
 }
@@ -96,28 +96,28 @@ struct Tables {
     period: f64,
     levels: Vec<Level>,
     table: GapTable,
-    /// The gap, its rate and its acceleration from each block's coordinates.
+    /// Rows that give the gap, its rate and its acceleration from each block's coordinates.
     readout: Vec<[f64; 2]>,
     rate_readout: Vec<[f64; 2]>,
     acceleration_readout: Vec<[f64; 2]>,
     source: Vec<[f64; 2]>,
-    /// Acceleration of the gap by a unit of force.
+    /// Acceleration of the gap under a unit force.
     mobility: f64,
-    /// Change of the gap's rate by the forces up to which they are iterated.
+    /// Change of the gap's rate by the forces at which their iteration ends.
     converged: f64,
-    /// The forced response at phase 0 as a state.
+    /// State of the forced response at phase 0.
     forced: Vec<f64>,
-    /// Frequency that scales the allowed error.
+    /// Angular frequency that scales the allowed error.
     frequency: f64,
-    /// Gaps between which each branch holds.
+    /// Lowest and highest gap of each branch.
     bounds: Vec<[f64; 2]>,
-    /// Exits of each branch, none where switches are not located.
+    /// Exits of each branch; empty if switches are not located.
     exits: Vec<Vec<CoarseExit>>,
-    /// Whether each branch is left at values of the gap alone.
+    /// Whether the exits of each branch depend on the gap alone.
     by_gap_alone: Vec<bool>,
-    /// Whether the branch is looked up at each evaluation.
+    /// Whether the branch is determined anew at each evaluation.
     by_lookup: bool,
-    /// On which branches tip and sample touch.
+    /// Whether tip and sample touch, by branch.
     touches: Vec<bool>,
     max_steps: u64,
 }
@@ -145,25 +145,25 @@ struct Motion {
     force: f64,
 }
 
-/// Where a step evaluates the force, and what it finds.
+/// The stages of a step: gap, rate and force at each.
 #[derive(Clone, Copy, Debug, Default)]
 struct Stages {
     gaps: [f64; 4],
     rates: [f64; 4],
     forces: [f64; 4],
-    /// Whether the second stage is at a third of the step, and its force unknown, as that of the
-    /// last.
+    /// Whether the second stage is at a third of the step and its force unknown, as in an
+    /// [`ImplicitLevel`].
     implicit: bool,
     /// Number of evaluations of the force and its slopes.
     evaluations: u64,
 }
 
-/// A step in which the force is a straight line in time through its values at a third and at the end
-/// of the step, both unknown: the Radau IIA method of order 3 with exponentials of the modes. It
-/// remains stable where a damping acts that is much faster than the step.
+/// An implicit step. The force is a straight line in time through its values at a third and at the
+/// end of the step, both unknown: the Radau IIA method of order 3 with exponentials of the modes.
+/// It remains stable under a damping that is much faster than the step.
 #[derive(Clone, Copy, Debug, Default)]
 struct ImplicitLevel {
-    /// Gap and rate at a third, in the middle and at the end from the two forces.
+    /// Weights of the two forces in gap and rate at a third, in the middle and at the end.
     weights: [[[f64; 2]; 2]; 3],
 }
 
@@ -172,7 +172,7 @@ struct ImplicitLevel {
 struct ImplicitBlock {
     /// Exponential `e^{Bh/3}` of the block over a third of the step.
     third: [[f64; 2]; 2],
-    /// Coordinates at the end from the two forces.
+    /// Weights of the two forces in the coordinates at the end.
     weights: [[f64; 2]; 2],
 }
 
@@ -183,14 +183,14 @@ struct Level {
     blocks: Vec<BlockStep>,
     /// `(cos, sin)` of the angle through which each tone turns in half a step.
     turns: Vec<[f64; 2]>,
-    /// Gap and rate in the middle from the force before.
+    /// Gap and rate in the middle from a unit force in the stage before.
     middle: [f64; 2],
-    /// Gap and rate of the fourth stage from the first force; that from the third is twice
-    /// `middle`.
+    /// Gap and rate of the fourth stage from a unit force in the first stage; for the third stage
+    /// they are twice `middle`.
     fourth: [f64; 2],
-    /// Gap and rate at the end from the three weights of the forces.
+    /// Gap and rate at the end from the three weighted forces.
     end: [[f64; 2]; 3],
-    /// The blocks that the search for switches cannot resolve.
+    /// Blocks that the search for switches cannot resolve.
     unresolved: Vec<usize>,
     implicit: ImplicitLevel,
     implicit_blocks: Vec<ImplicitBlock>,
@@ -202,8 +202,8 @@ struct Level {
 struct BlockStep {
     /// Exponential `e^{Bh/2}` of the block over half a step.
     half: [[f64; 2]; 2],
-    /// Coordinates at the end from the forces at the start, in the middle (each of the two)
-    /// and at the end.
+    /// Weights in the coordinates at the end of the forces at the start, in the middle (each of the
+    /// two) and at the end.
     weights: [[f64; 2]; 3],
 }
 
@@ -222,7 +222,7 @@ fn dot([a, b]: [f64; 2], [x, y]: [f64; 2]) -> f64 {
     a * x + b * y
 }
 
-/// `∫₀¹ e^{Bhσ} σʲ dσ b` for `j = 0, 1, 2`, given `e^{Bh}`.
+/// Computes `∫₀¹ e^{Bhσ} σʲ dσ b` for `j = 0, 1, 2`, given `e^{Bh}`.
 fn moments(block: &Block, h: f64, exp: &[[f64; 2]; 2], b: [f64; 2]) -> [[f64; 2]; 3] {
     let mut out = [[0.0; 2]; 3];
     let reach = block.rate() * h;
@@ -354,7 +354,7 @@ impl Level {
     }
 }
 
-/// Components of a [`Level`] in addition to the system.
+/// The tables from which a [`Level`] is computed, in addition to the system.
 struct Readouts<'a> {
     readout: &'a [[f64; 2]],
     rate_readout: &'a [[f64; 2]],
@@ -527,7 +527,8 @@ impl Tables {
             .force(&self.system, branch, gap.clamp(low, high), rate)
     }
 
-    /// Derivatives of [`Self::force`] by gap and rate; at the end of a branch those inside.
+    /// Returns the derivatives of [`Self::force`] by gap and rate; at the end of a branch those
+    /// inside it.
     fn slopes(&self, branch: usize, gap: f64, rate: f64) -> [f64; 2] {
         let law = self.system.law();
         if self.by_lookup {
@@ -561,7 +562,7 @@ impl Tables {
         }
     }
 
-    /// Gap and rate at `motion`, from its coordinates and phasors.
+    /// Sets gap and rate of `motion` from its coordinates and phasors.
     fn read(&self, motion: &mut Motion) {
         let (mut gap, mut rate) = (self.system.gap_constant + motion.shift, 0.0);
         let tones = self.system.drive().tones.iter().zip(&self.system.gap_tones);
@@ -592,15 +593,15 @@ impl Tables {
         }
     }
 
-    /// How much a disturbance of the rate would decay in a step by the damping of the force, as an
-    /// exponent.
+    /// Returns the exponent by which the damping of the force reduces a disturbance of the rate in
+    /// a step.
     fn stiffness(&self, level: &Level, from: &Motion) -> f64 {
         let [_, by_rate] = self.slopes(from.branch, from.gap, from.rate);
         -by_rate * self.mobility * level.length
     }
 
-    /// As [`step`](Self::step), with the two forces of [`ImplicitLevel`] by Newton's method; infinite
-    /// where that does not converge.
+    /// Computes an implicit step as [`step`](Self::step) does an explicit one, with the two forces
+    /// of [`ImplicitLevel`] by Newton's method. The error is infinite if that does not converge.
     fn implicit_step(
         &self,
         level: &Level,
@@ -808,9 +809,9 @@ impl Tables {
         }
     }
 
-    /// Carries derivatives of the modal coordinates along the step with these stages to
-    /// `end_gap`. Where the slope by the gap is infinite at an end of the step, its mean over the
-    /// step stands for it at all stages.
+    /// Carries derivatives of the modal coordinates along the step with these stages to `end_gap`.
+    /// If the slope by the gap is infinite at an end of the step, its mean over the step replaces
+    /// it at all stages.
     fn carry(
         &self,
         level: &Level,
@@ -871,7 +872,8 @@ impl Tables {
         }
     }
 
-    /// [`carry`](Self::carry) over an implicit step with these slopes at its two forces.
+    /// Carries derivatives as [`carry`](Self::carry) does, over an implicit step with these slopes
+    /// at its two forces.
     fn carry_implicitly(&self, level: &Level, slopes: [[f64; 2]; 2], columns: &mut [[f64; 2]]) {
         let weights = &level.implicit.weights;
         let matrix =
@@ -898,7 +900,7 @@ impl Tables {
         }
     }
 
-    /// The saltation of derivatives at a switch from `branch` with force `before`.
+    /// Applies to the derivatives the saltation of a switch before which the force is `before`.
     fn saltate(&self, guard: Guard, motion: &Motion, before: f64, columns: &mut [[f64; 2]]) {
         let jump = motion.force - before;
         if jump == 0.0 {
@@ -932,8 +934,8 @@ impl Tables {
         }
     }
 
-    /// Twice the amplitude in the gap of the modes that the search for switches on a step of
-    /// this length does not resolve.
+    /// Returns twice the amplitude in the gap of the modes that the search for switches on a step
+    /// of this length does not resolve.
     fn unresolved(&self, level: &Level, motion: &Motion) -> f64 {
         let norm = |[x, y]: [f64; 2]| (x * x + y * y).sqrt();
         let modes = level.unresolved.iter();
@@ -943,7 +945,7 @@ impl Tables {
     }
 }
 
-/// The solution of two linear equations, if there is one.
+/// Solves two linear equations; `None` if they are singular.
 fn solve([[a, b], [c, d]]: &[[f64; 2]; 2], [x, y]: [f64; 2]) -> Option<[f64; 2]> {
     let determinant = a * d - b * c;
     let solution = [(d * x - b * y) / determinant, (a * y - c * x) / determinant];
@@ -961,7 +963,7 @@ struct Stretch {
 }
 
 impl Stretch {
-    /// The cubic through values and slopes, at a fraction of the stretch.
+    /// Returns the cubic through values and slopes, at a fraction of the stretch.
     fn at(&self, x: f64) -> f64 {
         let (y, s) = (1.0 - x, self.length);
         let [a, b] = self.values;
@@ -969,8 +971,8 @@ impl Stretch {
             + x * x * ((1.0 + 2.0 * y) * b - y * s * self.slopes[1])
     }
 
-    /// Where the cubic is least, if that lies inside with values falling before and rising
-    /// after it.
+    /// Returns the fraction at which the cubic is least, if it lies inside, with values falling
+    /// before and rising after it.
     fn minimum(&self) -> Option<f64> {
         if !(self.slopes[0] < 0.0 && self.slopes[1] > 0.0) {
             return None;
@@ -1009,7 +1011,8 @@ impl Stretch {
     }
 }
 
-/// Where a guard is expected to fall on a step, and a later time at which it has fallen.
+/// The time at which a guard is expected to fall on a step, and a later time at which it has
+/// fallen.
 #[derive(Clone, Copy, Debug)]
 struct Fall {
     exit: CoarseExit,
@@ -1239,12 +1242,12 @@ impl Work {
         result
     }
 
-    /// Evaluations of the force so far, in those of an explicit step.
+    /// Returns the evaluations of the force so far, in units of an explicit step.
     const fn cost(&self) -> u64 {
         self.statistics.evaluations / STEP_EVALUATIONS
     }
 
-    /// The steps of a period; `spent` is the cost that was counted towards the budget.
+    /// Runs the steps of a period; `spent` is the cost already charged to the budget.
     fn steps(&mut self, tables: &Tables, spent: &mut u64) -> Result<(), VolterraError> {
         self.rewind(tables);
         let end = tables.period;
@@ -1386,7 +1389,7 @@ impl Work {
         Ok(())
     }
 
-    /// The exit through which the motion has already left its branch.
+    /// Returns the exit through which the motion has already left its branch, if there is one.
     fn fallen(&self, tables: &Tables) -> Option<Fall> {
         let now = &self.now;
         let exits = tables.exits[now.branch].iter();
@@ -1401,9 +1404,9 @@ impl Work {
         })
     }
 
-    /// Goes to where the guard of `fall` has just fallen, on partial steps, and switches.
-    /// Returns whether it has switched: where the guard does not fall after all, the motion
-    /// only goes on to the end of the search.
+    /// Advances by partial steps to the time at which the guard of `fall` has just fallen, and
+    /// switches. Returns whether it has switched: if the guard does not fall, the motion only
+    /// advances to the end of the search.
     fn switch(
         &mut self,
         tables: &Tables,

@@ -9,11 +9,11 @@ pub enum VolterraError {
     /// Sizes of matrices, vectors or lists do not fit together.
     #[error("{what} has {found} entries where {expected} are needed")]
     Shape {
-        /// The thing whose size is wrong.
+        /// Description of the object whose size is wrong.
         what: &'static str,
         /// Size found: a number of entries, rows or columns.
         found: usize,
-        /// The size that would fit.
+        /// Size that fits.
         expected: usize,
     },
     /// A size or count is beyond its limit.
@@ -26,7 +26,7 @@ pub enum VolterraError {
         /// Largest number allowed.
         limit: usize,
     },
-    /// A number is not finite or lies outside the range in which it makes sense.
+    /// A number is not finite or lies outside its range.
     #[error("{what} must be {needed}, got {found}")]
     Value {
         /// Description of the quantity.
@@ -85,7 +85,7 @@ pub enum VolterraError {
         /// Description of what is wrong with this arm.
         reason: &'static str,
     },
-    /// A solid without a modulus at rest.
+    /// The modulus of the solid relaxes to zero.
     #[error(
         "the sample relaxes to nothing: give it a modulus at rest above zero, or a horizon beyond \
          which its slower arms count as elastic"
@@ -120,7 +120,7 @@ pub enum VolterraError {
         /// Reason why the last attempt was refused.
         reason: Refusal,
     },
-    /// More steps were needed than are allowed.
+    /// The run needs more steps than are allowed.
     #[error(
         "the limit of {steps} steps was reached at time {time}: the force changes too fast for the \
          modes, as under a damping that grows without bound in the contact: with \
@@ -144,17 +144,16 @@ pub enum VolterraError {
     },
 }
 
-/// Why a step was not accepted.
+/// The reason why a step was not accepted.
 #[derive(Clone, Copy, Debug, Error, PartialEq, Eq)]
 pub enum Refusal {
     /// Newton's iteration for the forces did not converge.
     #[error("Newton's iteration for the forces does not converge")]
     Newton,
-    /// The force's Chebyshev series does not fall off, or it disagrees with the law between
-    /// the nodes.
+    /// The force's Chebyshev series does not decay, or it disagrees with the law between the nodes.
     #[error("the force is not resolved by the step's polynomial")]
     Unresolved,
-    /// The force could amplify an error beyond what the defect allows for.
+    /// The force could amplify an error by more than the error bound allows.
     #[error("the force is so steep that another solution may lie close by")]
     Steep,
     /// A guard is too close to zero to decide whether the law switches.

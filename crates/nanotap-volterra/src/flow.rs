@@ -13,8 +13,8 @@ use std::sync::Arc;
 
 /// Number of switches at one instant above which an endless sequence of switches is reported.
 const MOST_SWITCHES_AT_ONCE: usize = 64;
-/// Evaluations of the force in closed form that cost as much as a step of the approximate flow, and
-/// what a factorisation costs in such steps.
+/// Number of evaluations of the force in closed form that cost as much as a step of the approximate
+/// flow; below it, the cost of a factorisation in such steps.
 const STEP_EVALUATIONS: u64 = 2;
 const FACTORISATION_COST: u64 = 8;
 /// Length number of the first step of a run: a quarter of the longest step.
@@ -49,12 +49,12 @@ pub struct Switch {
 
 /// An observer of a run.
 pub(crate) trait Observer {
-    /// Whether perturbations of the motion are followed: steps must then resolve what every mode
-    /// does to the force, and not only the motion.
+    /// Whether perturbations of the motion are followed: steps must then resolve the effect of
+    /// every mode on the force, not only of those that move.
     const PERTURBS: bool = false;
-    /// A step was completed, up to `step.end`, where the modal coordinates are `end`.
+    /// Called after each step, up to `step.end`, with the modal coordinates `end` there.
     fn step(&mut self, system: &System, solver: &mut Solver, step: &Step, end: &[f64]);
-    /// The law switched after that step, at modal coordinates `modal`.
+    /// Called when the law switches after that step, at modal coordinates `modal`.
     fn switch(&mut self, system: &System, switch: &Switch, exit: &Exit, modal: &[f64]);
 }
 
@@ -82,30 +82,30 @@ pub struct Flow {
     time: f64,
     branch: usize,
     modal: Vec<f64>,
-    /// The gap at the last switch, if nothing has been stepped since.
+    /// Gap at the last switch, until the next step.
     pinned: Option<f64>,
-    /// How the force sets in after the switch that has just happened.
+    /// Behaviour of the force after the switch that has just happened.
     onset: Option<Approach>,
     solver: Solver,
     step: Step,
-    /// The last accepted step, not yet handed on: a step that ends a contact may cut it.
+    /// Last accepted step, not yet passed to the observer: a step that ends a contact may cut it.
     pending: Step,
     has_pending: bool,
-    /// Whether `work.modal` are the modal coordinates at its end.
+    /// Whether `work.modal` holds the modal coordinates at its end.
     reached: bool,
-    /// Length numbers that were accepted last on each branch.
+    /// Length numbers that were accepted last, by branch.
     hints: Vec<usize>,
-    /// Those of the first steps after a switch, where contact begins and ends on a moving surface: the
-    /// last steps before may be so short that rounding hides the gap.
+    /// Length numbers of the first steps after a switch, for contact with a moving surface: the
+    /// last steps before a switch may be so short that rounding hides the gap.
     first_hints: Vec<usize>,
     work: Work,
-    /// Cost of work that clones did.
+    /// Cost of work done by clones.
     added_cost: u64,
 }
 
 impl Clone for Flow {
-    /// With a separate system: threads that counted references to one at every period would wait for
-    /// each other.
+    /// Clones the flow with a separate system: threads that share one would wait for each other at
+    /// its reference count in every period.
     fn clone(&self) -> Self {
         Self {
             system: Arc::new(System::clone(&self.system)),
@@ -137,7 +137,7 @@ struct Work {
     modal: Vec<f64>,
 }
 
-/// Where a guard falls on a step.
+/// The place at which a guard falls on a step.
 #[derive(Clone, Copy, Debug)]
 struct Found {
     exit: usize,
@@ -145,14 +145,13 @@ struct Found {
 }
 
 enum Attempt {
-    /// The step stands, with nothing happening on it; the next may be longer by this many
-    /// numbers.
+    /// The step is accepted without an event; the next length number may be lower by this.
     Whole(usize),
-    /// The law switches on it.
+    /// The law switches on the step.
     Falls(Found),
-    /// A shorter one of this length number must be tried.
+    /// A shorter step, of this length number, must be tried.
     Shorter(usize, Refusal),
-    /// A singular exit is reached about this time after the start.
+    /// A singular exit of this number is reached about this time after the start.
     Ends(usize, f64),
 }
 
@@ -312,7 +311,7 @@ impl Flow {
         result
     }
 
-    /// The steps to time `end`; `spent` is the cost that was counted towards the budget.
+    /// Runs the steps to time `end`; `spent` is the cost already charged to the budget.
     fn run_steps<O: Observer>(
         &mut self,
         end: f64,
@@ -592,7 +591,7 @@ impl Flow {
         Ok(())
     }
 
-    /// Hands on the pending step, cut at time `until` if that lies on it.
+    /// Passes the pending step to the observer, cut at time `until` if that lies on it.
     fn commit_pending<O: Observer>(&mut self, system: &System, until: f64, observer: &mut O) {
         if !self.has_pending {
             return;
@@ -611,7 +610,7 @@ impl Flow {
         observer.step(system, &mut self.solver, step, &self.work.modal);
     }
 
-    /// Hands on the pending step, cut where the step in `self.step` begins on it.
+    /// Passes the pending step to the observer, cut at the start of the step in `self.step`.
     fn commit_to_step<O: Observer>(&mut self, system: &System, observer: &mut O) {
         self.has_pending = false;
         let step = &mut self.pending;
@@ -709,8 +708,8 @@ impl Flow {
         Ok(())
     }
 
-    /// Tries the step that ends the branch through the singular exit `number`, about `after`
-    /// from now, beginning somewhere on the pending step. It is left in `self.step`.
+    /// Tries the step that ends the branch through the singular exit `number`, about `after` from
+    /// now, starting somewhere on the pending step. The step is left in `self.step`.
     fn end_step(&mut self, system: &System, number: usize, after: f64, perturbs: bool) -> bool {
         let kernel = system.kernel();
         let exit = system.exits(self.branch)[number];
@@ -762,7 +761,7 @@ impl Flow {
             })
     }
 
-    /// The values of a guard at the nodes, in `self.work.values`.
+    /// Computes the values of a guard at the nodes, in `self.work.values`.
     fn guard_values(&mut self, system: &System, exit: &Exit, n: usize) {
         let step = &self.step;
         for i in 0..n {
@@ -775,7 +774,7 @@ impl Flow {
         }
     }
 
-    /// The Chebyshev series of `self.work.values`.
+    /// Computes the Chebyshev series of `self.work.values`.
     fn guard_series(&mut self, system: &System) {
         self.work.series.fill(0.0);
         add_product(
@@ -785,7 +784,7 @@ impl Flow {
         );
     }
 
-    /// The first switch on the step in `self.step`.
+    /// Returns the first switch on the step in `self.step`.
     fn first_switch(&mut self, system: &System) -> Result<Option<Found>, Refusal> {
         let n = self.step.forces.len();
         let fresh = self.onset.is_some();
@@ -831,7 +830,7 @@ impl Flow {
         Ok(found)
     }
 
-    /// What is rounding in a guard of the law's own: a difference of what gap and rate make.
+    /// Returns the rounding error in a guard of the law's own, from those of gap and rate.
     fn own_rounding(&self, system: &System, index: usize) -> f64 {
         let (gap, rate) = gap_scale(system, &self.step.modal);
         let own = system
@@ -840,7 +839,7 @@ impl Flow {
         ROUNDING * (own.by_gap.abs() * gap + own.by_rate.abs() * rate)
     }
 
-    /// Divides a guard that starts at zero by the time since, and takes its series again.
+    /// Divides a guard that starts at zero by the time since the start, and recomputes its series.
     fn deflate(&mut self, system: &System) {
         let table = system.kernel().table(self.step.map, self.step.index);
         let work = &mut self.work;
@@ -859,7 +858,7 @@ impl Flow {
         self.guard_series(system);
     }
 
-    /// Twice the amplitude in the gap of the modes too fast for the step's polynomial.
+    /// Returns twice the amplitude in the gap of the modes too fast for the step's polynomial.
     fn unresolved(&self, system: &System, exit: &Exit) -> f64 {
         if !matches!(exit.guard, Guard::Falls(_) | Guard::Rises(_)) {
             return 0.0;

@@ -152,7 +152,7 @@ impl Flow {
     }
 }
 
-/// `∫₀¹ σʲ e^{−iθσ} dσ` for `j = 0, 1, 2` and `0 ≤ θ ≤ π/4`.
+/// Computes `∫₀¹ σʲ e^{−iθσ} dσ` for `j = 0, 1, 2` and `0 ≤ θ ≤ π/4`.
 fn turned_moments(theta: f64) -> [Complex; 3] {
     debug_assert!(theta <= TAU / 8.0);
     let mut term = Complex::new(1.0, 0.0);
@@ -184,7 +184,7 @@ impl ForceSums {
         self.lowest = self.lowest.min(force);
     }
 
-    /// Adds a step of the approximate flow under a tone of angular frequency `omega`.
+    /// Adds a step of the approximate flow; `omega` is the angular frequency of `step.phasor`.
     pub(crate) fn add(&mut self, step: &ParabolicStep, omega: f64) {
         let h = step.length;
         if step.touches {

@@ -14,8 +14,8 @@ const ACCURACY: f64 = 1e-6;
 /// Length of a table, as a multiple of the size of gaps and amplitudes.
 const REACH: f64 = 2.0;
 
-/// The force on one branch over `√|level − gap|`, in which it is analytic up to the level at
-/// which the branch ends. A force may be affine in the gap's rate.
+/// The force on one branch as a function of `√|level − gap|`, in which it is analytic up to the
+/// level at which the branch ends. The force may be affine in the gap's rate.
 #[derive(Clone, Debug)]
 struct Curve {
     level: f64,
@@ -72,7 +72,7 @@ impl GapTable {
 }
 
 impl Curve {
-    /// Of a branch that ends where its slope is infinite, or at a gap under a law of several terms.
+    /// Tabulates a branch that ends at an infinite slope, or at a gap under a law of several terms.
     fn new(system: &System, branch: usize, reach: f64) -> Option<Self> {
         let law = system.law();
         let end = |exit: &Exit| match exit.guard {
@@ -143,8 +143,8 @@ impl Curve {
         agrees.then_some(curve)
     }
 
-    /// Whether it is accurate between its points: for the sizes of the force and of its derivative by
-    /// the rate, and the size of the force near an interval at a rate.
+    /// Reports whether the table is accurate between its points, given the sizes of the force and
+    /// of its derivative by the rate, and the size of the force near an interval at a rate.
     fn agrees_with(
         &self,
         sizes: [f64; 2],
@@ -168,15 +168,15 @@ impl Curve {
         })
     }
 
-    /// The cubics through the four nearest values; `None` outside the table.
+    /// Returns the cubic through the four nearest values; `None` outside the table.
     #[inline]
     fn at(&self, gap: f64, rate: f64) -> Option<f64> {
         let (k, t) = self.place(gap);
         self.read(k, weights(t), rate)
     }
 
-    /// The derivatives of these cubics by gap and rate; `None` also in the first interval, where the
-    /// root has none.
+    /// Returns the derivatives of this cubic by gap and rate; `None` also in the first interval,
+    /// where the square root has no derivative.
     #[inline]
     fn slopes_at(&self, gap: f64, rate: f64) -> Option<[f64; 2]> {
         let (k, t) = self.place(gap);
@@ -195,7 +195,7 @@ impl Curve {
         Some([by_root * self.side * self.density / (2.0 * root), by_rate])
     }
 
-    /// The interval of a gap, and the place in it.
+    /// Returns the interval of a gap, and the fraction within it.
     #[inline]
     fn place(&self, gap: f64) -> (usize, f64) {
         let x = (self.side * (gap - self.level)).max(0.0).sqrt() * self.density;
@@ -203,7 +203,7 @@ impl Curve {
         (k, x - k as f64)
     }
 
-    /// The force by some weights of the four nearest values.
+    /// Returns the force as a weighted sum of the four nearest values.
     #[inline]
     fn read(&self, k: usize, weights: [f64; 4], rate: f64) -> Option<f64> {
         match &self.values {
@@ -219,7 +219,7 @@ impl Curve {
     }
 }
 
-/// Six times the weights of the values at −1, 0, 1 and 2 in their cubic at `t`.
+/// Returns six times the weights of the values at −1, 0, 1 and 2 in their cubic at `t`.
 #[inline]
 fn weights(t: f64) -> [f64; 4] {
     let (s, u, v) = (1.0 - t, 1.0 + t, 2.0 - t);

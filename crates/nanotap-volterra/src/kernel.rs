@@ -27,8 +27,8 @@ pub(crate) const LENGTHS: usize = 72;
 pub(crate) const CHECKS: usize = 4;
 /// Number of points of the Gauss–Legendre rule of one panel.
 const PANEL_POINTS: usize = 24;
-/// Points of the rule between two nodes of a trajectory's quadrature, which are so near that
-/// its error is rounding: modes turn by less than half a radian between them, and the force's
+/// Number of points of the rule between two nodes of a trajectory's quadrature. These are so close
+/// that its error is rounding: modes turn by less than half a radian between them, and the force's
 /// polynomials by less than half a turn.
 const SHORT_POINTS: usize = 10;
 /// Largest angle, in radians, of a mode that may be replaced by its tangent: half its square is far
@@ -39,7 +39,7 @@ const TANGENT: f64 = 3e-9;
 const PERTURBATION: f64 = 1e-13;
 /// Upper limit of the strength of any coupling on a step: steeper forces are refused.
 const STRONGEST: f64 = 1e3;
-/// Time times a decay's rate beyond which the short rule does not resolve it.
+/// Time over the decay time above which the short rule does not resolve a decay.
 const SHORT_DECAY: f64 = 0.5;
 /// Decay exponent above which nothing is left in double precision: e⁻⁵⁰ is 2e-22.
 const FORGOTTEN: f64 = 50.0;
@@ -98,11 +98,11 @@ enum Second {
     Rate,
     /// A given signal, which does not depend on the state.
     Signal,
-    /// The depth of a surface with this many coordinates.
+    /// The depth of a surface with this number of coordinates.
     Surface(usize),
 }
 
-/// The modes with a gap read from them and a column by which the force enters.
+/// The modes, with a row that gives the gap and a column by which the force enters.
 #[derive(Debug)]
 pub struct Kernel {
     modes: Modes,
@@ -110,9 +110,10 @@ pub struct Kernel {
     pub(crate) readout: Vec<f64>,
     /// Row `row · R B` that gives the gap's rate from the modal coordinates.
     pub(crate) rate_readout: Vec<f64>,
-    /// The row of the law's second argument: `rate_readout`, the depth of a surface that relaxes, or 0.
+    /// Row of the law's second argument: `rate_readout`, that of the depth of a surface that
+    /// relaxes, or 0.
     pub(crate) second_readout: Vec<f64>,
-    /// Number of coordinates at the end that are the surface's.
+    /// Number of coordinates at the end of the state that belong to the surface.
     surface: usize,
     /// Modal source `L p` of a unit force.
     pub(crate) source: Vec<f64>,
@@ -121,19 +122,19 @@ pub struct Kernel {
     pub(crate) nodes: usize,
     /// Values of `u` at the nodes, then at the check points.
     pub(crate) points: Vec<f64>,
-    /// From values at the nodes to coefficients, column-major.
+    /// Matrix from values at the nodes to Chebyshev coefficients, column-major.
     pub(crate) coefficients: Vec<f64>,
     /// Last two rows of `coefficients`: they give the tail of a series.
     pub(crate) last_coefficients: [Vec<f64>; 2],
     /// Bound of the absolute eigenvalues of each block, per unit of time.
     pub(crate) rates: Vec<f64>,
     longest: f64,
-    /// Bound of the amplitude in the gap that a unit impulse of force excites.
+    /// Bound of the amplitude in the gap under a unit impulse of force.
     pub(crate) reach: f64,
-    /// How strongly a force with a unit slope by the gap, and by its rate, couples each block to
-    /// the others, a unit of time.
+    /// Strength, per unit of time, with which a force with a unit slope by the gap, and by its
+    /// rate, couples each block to the others.
     couplings: Vec<[f64; 2]>,
-    /// From this length number on, steps resolve perturbations under any force that they take.
+    /// Length number from which on steps resolve perturbations under any force.
     always_resolving: usize,
     panel: Rule<PANEL_POINTS>,
     short: Rule<SHORT_POINTS>,
@@ -207,7 +208,7 @@ impl<const POINTS: usize> Panel<POINTS> {
         }
     }
 
-    /// The weights times a series in the step's variable.
+    /// Returns the weights times a series in the step's variable.
     fn weighted(&self, coefficients: &[f64]) -> [f64; POINTS] {
         wide_registers!([const POINTS: usize] weighted(
             panel: &Panel<POINTS> = self,
@@ -215,7 +216,7 @@ impl<const POINTS: usize> Panel<POINTS> {
         ) -> [f64; POINTS])
     }
 
-    /// `∫ (C, S) F` over the panel for a force times its weights, `C` and `S` as in
+    /// Returns `∫ (C, S) F` over the panel for a force times its weights, with `C` and `S` as in
     /// [`Block::short_exps`].
     fn response(&self, block: &Block, force: &[f64; POINTS]) -> [f64; 2] {
         wide_registers!([const POINTS: usize] response(
@@ -225,7 +226,7 @@ impl<const POINTS: usize> Panel<POINTS> {
         ) -> [f64; 2])
     }
 
-    /// `(C, S)` of [`Block::short_exps`] from the points to the end.
+    /// Returns `(C, S)` of [`Block::short_exps`] from the points to the end.
     fn exponentials(&self, block: &Block) -> ([f64; POINTS], [f64; POINTS]) {
         wide_registers!([const POINTS: usize] exponentials(
             panel: &Panel<POINTS> = self,
@@ -233,7 +234,8 @@ impl<const POINTS: usize> Panel<POINTS> {
         ) -> ([f64; POINTS], [f64; POINTS]))
     }
 
-    /// The same for each polynomial `T_j` of the step's variable instead of the force.
+    /// Computes `∫ (C, S) T_j` over the panel for each polynomial `T_j` of the step's variable,
+    /// weights included.
     fn moments(&self, block: &Block, out: &mut [[f64; 2]]) {
         wide_registers!([const POINTS: usize] moments(
             panel: &Panel<POINTS> = self,
@@ -252,7 +254,7 @@ fn weighted<const POINTS: usize>(panel: &Panel<POINTS>, coefficients: &[f64]) ->
     values
 }
 
-/// A block's exponential applied to its coordinates.
+/// Applies a block's exponential to its coordinates.
 #[inline(always)]
 fn applied(e: [[f64; 2]; 2], y: &[f64]) -> [f64; 2] {
     let second = y.get(1).copied().unwrap_or(0.0);
@@ -300,8 +302,8 @@ fn moments<const POINTS: usize>(panel: &Panel<POINTS>, block: &Block, out: &mut 
     }
 }
 
-/// `√(g_k g)` of each block, with `g_k` the amplitude in the gap, and in its rate, that a unit
-/// impulse of force excites in the block, and `g` the largest.
+/// Computes `√(g_k g)` of each block, where `g_k` is the amplitude in the gap, and in its rate,
+/// under a unit impulse of force on the block, and `g` the largest.
 fn couplings(modes: &Modes, gap: &[f64], rate: &[f64], source: &[f64]) -> Vec<[f64; 2]> {
     let excited: Vec<[f64; 2]> = modes
         .blocks()
@@ -338,15 +340,15 @@ impl Kernel {
         Self::with_second(modes, row, column, longest, nodes, Second::Rate)
     }
 
-    /// The same lever with a second argument of the law that is no function of the state.
+    /// Returns the same lever with a second argument of the law that does not depend on the state.
     pub(crate) fn with_signal(&self) -> Result<Arc<Self>, VolterraError> {
         let (row, column) = (self.row.clone(), self.column.clone());
         let modes = self.modes.clone();
         Self::with_second(modes, row, column, self.longest, self.nodes, Second::Signal)
     }
 
-    /// The same lever over a surface whose modes decay at `rates` and grow with the force at
-    /// `gains`; their sum is the second argument of the law.
+    /// Returns the same lever over a surface whose modes decay at `rates` and grow with the force
+    /// at `gains`; the sum of these modes is the second argument of the law.
     pub(crate) fn over_surface(
         &self,
         rates: &[f64],
@@ -499,13 +501,13 @@ impl Kernel {
         self.surface
     }
 
-    /// Whether the modal coordinates follow their tangent to rounding for this time.
+    /// Reports whether the modal coordinates follow their tangent, up to rounding, over this time.
     pub(crate) fn along_tangent(&self, time: f64) -> bool {
         let fastest = self.rates.iter().copied().fold(0.0, f64::max);
         time.abs() * fastest < TANGENT
     }
 
-    /// Length of the steps number `index`.
+    /// Returns the length of the steps number `index`.
     pub(crate) fn length(&self, index: usize) -> f64 {
         let half = if index % 2 == 1 { 1.0 / SQRT_2 } else { 1.0 };
         self.longest * half * 0.5_f64.powi((index / 2) as i32)
@@ -529,7 +531,8 @@ impl Kernel {
             })
     }
 
-    /// A bound of what the nodes leave of a mode that turns by this angle, with Stirling's `n!`.
+    /// Returns a bound of the error of the nodes for a mode that turns by this angle, with
+    /// Stirling's `n!`.
     fn beyond(&self, angle: f64) -> f64 {
         let n = self.nodes as f64;
         let reach = std::f64::consts::E * angle / (4.0 * n);
@@ -547,7 +550,7 @@ impl Kernel {
         (first..LENGTHS).find(|&k| self.length(k) <= length)
     }
 
-    /// The table of steps of length number `index` under `map`.
+    /// Returns the table of steps of length number `index` under `map`.
     pub(crate) fn table(&self, map: TimeMap, index: usize) -> &Table {
         self.tables[map as usize][index].get_or_init(|| Box::new(self.build(map, index)))
     }
@@ -628,13 +631,14 @@ impl Kernel {
         table
     }
 
-    /// How many panels the integral of a block over `[0, u]` needs.
+    /// Returns the number of panels for the integral of a block over `[0, u]`.
     fn panels(block: &Block, map: TimeMap, h: f64, u: f64) -> usize {
         let fastest = map.rate(h, 0.0).max(map.rate(h, u)) * u;
         ((block.rate() * fastest / PANEL_REACH).ceil() as usize).max(1)
     }
 
-    /// The first panel of these whose force a decaying coordinate still knows at their end.
+    /// Returns the first of these panels whose force still affects a decaying coordinate at their
+    /// end.
     fn first_panel(block: &Block, map: TimeMap, h: f64, width: f64, panels: usize) -> usize {
         let rate = block.matrix[0][0];
         if block.size == 2 || rate >= 0.0 {
@@ -653,7 +657,7 @@ impl Kernel {
         low
     }
 
-    /// `∫₀^{t(u)} e^{B(t(u) − s)} b T_j(s) ds` of one block for all `j`, in `out`.
+    /// Computes `∫₀^{t(u)} e^{B(t(u) − s)} b T_j(s) ds` of one block for all `j`, in `out`.
     pub(crate) fn moments(
         &self,
         block: &Block,
@@ -694,8 +698,8 @@ impl Kernel {
         [self.source[s], second]
     }
 
-    /// Modal coordinates at `u` of a step that starts from `y` and whose force has the given
-    /// coefficients, written to `out`.
+    /// Writes to `out` the modal coordinates at `u` of a step that starts from `y` and whose force
+    /// has the given coefficients.
     pub(crate) fn partial(
         &self,
         map: TimeMap,
@@ -738,14 +742,14 @@ impl Kernel {
         }
     }
 
-    /// What the read-out sees of a complex state.
+    /// Returns the gap of a complex state in modal coordinates.
     pub(crate) fn read(&self, state: &DVector<Complex>) -> Complex {
         let terms = self.readout.iter().zip(state.iter());
         terms.map(|(r, z)| z * *r).sum()
     }
 
-    /// Takes motions in modal coordinates, a column each, from one place of a step to the next of a
-    /// trajectory's quadrature; the coefficients of their forces are empty where these vanish.
+    /// Advances motions in modal coordinates, one per column, from one place of a step to the next
+    /// of a trajectory's quadrature; the coefficients of their forces are empty if these vanish.
     pub(crate) fn between(
         &self,
         map: TimeMap,
@@ -794,7 +798,8 @@ impl Kernel {
         }
     }
 
-    /// What the force between two places of a step leaves in a coordinate that decays.
+    /// Returns the contribution of the force between two places of a step to a coordinate that
+    /// decays.
     fn decayed(
         &self,
         block: &Block,
@@ -821,7 +826,7 @@ impl Kernel {
             .sum()
     }
 
-    /// `∂y(u)/∂forces` (dimension × nodes, column-major) of a step cut at `u`.
+    /// Computes `∂y(u)/∂forces` (dimension × nodes, column-major) of a step cut at `u`.
     pub(crate) fn partial_carry(&self, map: TimeMap, h: f64, u: f64, out: &mut [f64]) {
         let (n, dimension) = (self.nodes, self.modes.dimension());
         let mut moments = [[0.0; 2]; MAX_NODES];

@@ -32,12 +32,12 @@ pub enum Guard {
 /// The behaviour of the force near a switch.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Approach {
-    /// Analytic up to the switch and beyond.
+    /// The force is analytic up to the switch and beyond.
     Analytic,
-    /// As a power 3/2 of the distance from the switch: twice the square root of time is the
-    /// right variable, and the derivative of the force by the gap stays finite.
+    /// The force behaves like a power 3/2 of the distance from the switch: it is analytic in the
+    /// square root of time, and its derivative by the gap stays finite.
     ThreeHalves,
-    /// As a power 1/2: the derivative of the force by the gap is infinite at the switch.
+    /// The force behaves like a power 1/2: its derivative by the gap is infinite at the switch.
     Half,
 }
 
@@ -102,7 +102,7 @@ pub struct Surface {
     pub relaxed: Arc<dyn ForceLaw>,
 }
 
-/// A scalar force of a gap and its rate, repulsive positive.
+/// A scalar force as a function of a gap and its rate; repulsion is positive.
 pub trait ForceLaw: Debug + Send + Sync {
     /// Returns the names of the parameters by which the law can be differentiated.
     fn parameters(&self) -> Vec<&'static str>;
@@ -147,8 +147,8 @@ pub trait ForceLaw: Debug + Send + Sync {
         None
     }
 
-    /// The force at the nodes of a step and its derivatives by gap and rate, as
-    /// [`ForceLaw::force`] at each. All slices are of one length.
+    /// Computes the force at the nodes of a step and its derivatives by gap and rate, as
+    /// [`ForceLaw::force`] at each. All slices have the same length.
     fn forces(
         &self,
         branch: usize,
@@ -191,14 +191,14 @@ pub trait ForceLaw: Debug + Send + Sync {
         branch > 0
     }
 
-    /// The surface, if it relaxes: the second argument of force and guards is then its depth to the
-    /// power of the contact law, in place of the gap's rate.
+    /// Returns the surface, if it relaxes: the second argument of force and guards is then its
+    /// depth to the power of the contact law, instead of the gap's rate.
     fn surface(&self) -> Option<&Surface> {
         None
     }
 
-    /// The same law with an attraction across the gap to its surface, if it can have one; of laws
-    /// with a surface of their own.
+    /// Returns the law with an attraction across the gap to its moving surface; `None` if the law
+    /// has no such surface or cannot take this attraction.
     fn with_attraction(&self, law: &Arc<dyn ForceLaw>) -> Option<Arc<dyn ForceLaw>> {
         let _ = law;
         None

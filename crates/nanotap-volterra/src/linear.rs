@@ -6,11 +6,11 @@
 // Only what is inlined into a function for wide registers gets their instructions.
 #![allow(clippy::inline_always)]
 
-/// The largest number of nodes of a step.
+/// Largest number of nodes of a step.
 pub const MAX_NODES: usize = 32;
 
-/// Calls a function (after its generic parameters, in brackets), where the machine has them
-/// compiled for wide registers.
+/// Calls the version of a function (after its generic parameters, in brackets) compiled for wide
+/// registers, on machines that have them.
 macro_rules! wide_registers {
     ([$($generics:tt)*] $body:ident(
         $($arg:ident: $ty:ty = $value:expr),* $(,)?
@@ -42,29 +42,29 @@ macro_rules! widened {
 }
 
 widened! {
-    /// `out += M x` of a column-major matrix of which the first `out.len()` of `rows` rows are
-    /// taken.
+    /// Computes `out += M x` with the first `out.len()` of the `rows` rows of a column-major
+    /// matrix.
     fn add_rows(matrix: &[f64], rows: usize, x: &[f64], out: &mut [f64]) = add_rows_body
 }
 
 widened! {
-    /// Factors a column-major `n × n` matrix with row pivoting, the pivots in `pivots`; false
-    /// where it is singular. The diagonal is left inverted.
+    /// Factors a column-major `n × n` matrix with row pivoting, with the pivots in `pivots`;
+    /// returns false if it is singular. The diagonal is left inverted.
     fn factor(matrix: &mut [f64], n: usize, pivots: &mut [usize]) -> bool = factor_body
 }
 
 widened! {
-    /// The largest size; not finite where a value is not.
+    /// Returns the largest absolute value; not finite if a value is not.
     fn largest(values: &[f64]) -> f64 = largest_body
 }
 
 widened! {
-    /// The largest `|a_i| p_i + |b_i| q_i`.
+    /// Returns the largest `|a_i| p_i + |b_i| q_i`.
     fn largest_sum(a: &[f64], p: &[f64], b: &[f64], q: &[f64]) -> f64 = largest_sum_body
 }
 
 widened! {
-    /// The largest `|v_i| + |a_i| p + |b_i| q`.
+    /// Returns the largest `|v_i| + |a_i| p + |b_i| q`.
     fn largest_terms(values: &[f64], ab: [&[f64]; 2], pq: [f64; 2]) -> f64 = largest_terms_body
 }
 
@@ -88,7 +88,7 @@ widened! {
     fn solve(factors: &[f64], n: usize, pivots: &[usize], x: &mut [f64]) = solve_body
 }
 
-/// `out += M x` of a column-major matrix with `out.len()` rows.
+/// Computes `out += M x` of a column-major matrix with `out.len()` rows.
 pub(crate) fn add_product(matrix: &[f64], x: &[f64], out: &mut [f64]) {
     add_rows(matrix, out.len(), x, out);
 }
@@ -110,7 +110,7 @@ fn add_rows_body(matrix: &[f64], rows: usize, x: &[f64], out: &mut [f64]) {
     }
 }
 
-/// [`add_rows`] for the first `R` rows. Returns `R`.
+/// Computes [`add_rows`] for the first `R` rows. Returns `R`.
 #[inline(always)]
 fn add_block<const R: usize>(matrix: &[f64], rows: usize, x: &[f64], out: &mut [f64]) -> usize {
     let Some((out, _)) = out.split_first_chunk_mut::<R>() else {
@@ -136,7 +136,7 @@ fn add_block<const R: usize>(matrix: &[f64], rows: usize, x: &[f64], out: &mut [
     R
 }
 
-/// Numbers that are worked on together.
+/// Number of values that are processed together.
 const LANES: usize = 4;
 
 #[inline(always)]
@@ -164,7 +164,7 @@ fn largest_terms_body(values: &[f64], [a, b]: [&[f64]; 2], [p, q]: [f64; 2]) -> 
     largest_of(n, |_, i| values[i].abs() + a[i].abs() * p + b[i].abs() * q)
 }
 
-/// The largest of `count` values, zero if all are less.
+/// Returns the largest of `count` values, zero if all are less.
 #[inline(always)]
 fn largest_of(count: usize, mut value: impl FnMut(usize, usize) -> f64) -> f64 {
     let mut most = [0.0; LANES];

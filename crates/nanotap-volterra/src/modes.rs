@@ -107,7 +107,7 @@ impl Block {
         (even, odd)
     }
 
-    /// `(C + S N) b`, where `B = μ + N` with the mean `μ` of its diagonal.
+    /// Returns `(C + S N) b`, where `B = μ + N` with the mean `μ` of its diagonal.
     #[inline]
     pub(crate) fn turn(&self, even: f64, odd: f64, [x, y]: [f64; 2]) -> [f64; 2] {
         let [[a, b], [c, d]] = self.matrix;
@@ -137,7 +137,7 @@ impl Block {
     }
 }
 
-/// `e^{μt} cosh(√D t)` and `e^{μt} sinh(√D t)/√D`, for any sign of `D`.
+/// Computes `e^{μt} cosh(√D t)` and `e^{μt} sinh(√D t)/√D`, for any sign of `D`.
 #[inline]
 fn even_and_odd(discriminant: f64, t: f64, mean: f64, decay: f64) -> (f64, f64) {
     let size = discriminant.abs() * t * t;
@@ -304,8 +304,8 @@ impl Modes {
         Ok(modes)
     }
 
-    /// Uncoupled oscillators `z̈_k + c_k ż_k + κ_k z_k = …`, given as `(κ_k, c_k)`; the state
-    /// is `(z_1 … z_N, ż_1 … ż_N)`.
+    /// Creates uncoupled oscillators `z̈_k + c_k ż_k + κ_k z_k = …`, given as `(κ_k, c_k)`; the
+    /// state is `(z_1 … z_N, ż_1 … ż_N)`.
     ///
     /// # Errors
     /// [`VolterraError::TooLarge`] or [`VolterraError::Value`] (a negative or infinite `κ`).
@@ -486,7 +486,7 @@ fn check_square(matrix: &DMatrix<f64>) -> Result<usize, VolterraError> {
     Ok(n)
 }
 
-/// Eigenvalues whose invariant subspace becomes one block.
+/// A group of eigenvalues whose invariant subspace becomes one block.
 #[derive(Clone, Copy, Debug)]
 enum Group {
     /// A conjugate pair, `Im λ > 0`.
@@ -523,7 +523,7 @@ fn groups(eigenvalues: &[Complex]) -> Vec<Group> {
 }
 
 impl Group {
-    /// A basis of the invariant subspace by inverse iteration.
+    /// Computes a basis of the invariant subspace by inverse iteration.
     fn basis(self, a: &DMatrix<f64>) -> Result<DMatrix<f64>, VolterraError> {
         let n = a.nrows();
         let unusable = VolterraError::IllConditioned {

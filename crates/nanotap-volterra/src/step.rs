@@ -15,15 +15,15 @@ const MAX_ITERATIONS: usize = 20;
 const LEFT: f64 = 0.05;
 /// Fraction of a residual that its correction may leave to the next one.
 const ENOUGH: f64 = 0.0003;
-/// The same on a step with a fixed end, whose place is found to rounding.
+/// The same fraction on a step with a fixed end, whose place is found to rounding.
 const ENOUGH_AT_END: f64 = 1e-6;
 /// Number of terms of a correction's series after which a factorisation is tried.
 const MAX_TERMS: usize = 16;
 /// Largest amplification `κ = ∫|G| |∂F|` on one step: an error of the force grows by at most
 /// `cosh √(2κ)`, which is 27.
 const STEEPEST: f64 = 8.0;
-/// A tail of the law, along the first guess of the motion and the second, that no iteration
-/// will mend.
+/// Size of the tail of the law, as a multiple of the allowed error, above which the step is given
+/// up: along the first guess of the motion, and along the second.
 const HOPELESS: [f64; 2] = [1e7, 1e4];
 
 /// A step with its forces. Points are the nodes, then the check points.
@@ -35,13 +35,13 @@ pub(crate) struct Step {
     /// Time of its start, in the system's unit of time.
     pub(crate) start: f64,
     pub(crate) length: f64,
-    /// The variable at which it is cut, 1 if it is not.
+    /// Value of the variable at which it is cut, 1 if it is not.
     pub(crate) end: f64,
     /// Modal coordinates at its start.
     pub(crate) modal: Vec<f64>,
-    /// The gap at the start where a switch fixed it.
+    /// Gap at the start, if a switch fixed it.
     pub(crate) pinned_start: Option<f64>,
-    /// The gap at the end where a switch fixes it.
+    /// Gap at the end, if a switch fixes it.
     pub(crate) pinned_end: Option<f64>,
     /// Forces at the nodes.
     pub(crate) forces: Vec<f64>,
@@ -88,22 +88,22 @@ impl Step {
         self.start + self.map.time(self.length, u)
     }
 
-    /// Time of its (cut) end.
+    /// Returns the time of its (cut) end.
     pub(crate) fn end_time(&self) -> f64 {
         self.time(self.end)
     }
 
-    /// Bounds of the law's derivatives by the gap and by its rate, at the nodes.
+    /// Returns bounds of the law's derivatives by the gap and by its rate, at the nodes.
     pub(crate) fn slopes(&self) -> [f64; 2] {
         [largest(&self.by_gap), largest(&self.by_rate)]
     }
 
-    /// The force at variable `u`.
+    /// Returns the force at variable `u`.
     pub(crate) fn force_at(&self, u: f64) -> f64 {
         series(&self.coefficients, u)
     }
 
-    /// Modal coordinates at variable `u`, written to `out`.
+    /// Writes the modal coordinates at variable `u` to `out`.
     pub(crate) fn modal_at(&self, system: &System, u: f64, out: &mut [f64]) {
         let kernel = system.kernel_on(self.branch);
         if u >= 1.0 {
@@ -146,14 +146,14 @@ pub(crate) fn advance_free(system: &System, table: &Table, y: &[f64], out: &mut 
 /// The accuracy of a solved step.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Quality {
-    /// The larger of the force's tail and its defect between the nodes, as a fraction of
-    /// what is allowed.
+    /// Larger value of the force's tail and its defect between the nodes, as a fraction of the
+    /// allowed error.
     pub(crate) error: f64,
-    /// The part of it that a longer step would make larger: what the iteration left is none.
+    /// Part of the error that grows with the step's length; what the iteration left does not.
     pub(crate) truncation: f64,
     /// Whether the error is at the level of rounding.
     pub(crate) rounding: bool,
-    /// How much the force may amplify an error, as a part of what is allowed.
+    /// Amplification of an error by the force, as a fraction of the largest allowed.
     pub(crate) steepness: f64,
 }
 
@@ -162,11 +162,12 @@ pub(crate) struct Quality {
 pub(crate) struct Solver {
     base_gap: Vec<f64>,
     base_rate: Vec<f64>,
-    /// How the base changes as the start moves along the motion.
+    /// Change of the gap at the points as the start moves along the motion; below it, that of the
+    /// rate.
     shift_gap: Vec<f64>,
     shift_rate: Vec<f64>,
     residual: Vec<f64>,
-    /// A term of [`Solver::correct`], what it does to gap and rate, and the sums of these.
+    /// Term of [`Solver::correct`], its effect on gap and rate, and the sums of these.
     term: Vec<f64>,
     image: [Vec<f64>; 2],
     change: [Vec<f64>; 2],
@@ -227,7 +228,7 @@ impl Solver {
         }
     }
 
-    /// The gap and its rate at the points without the step's force.
+    /// Computes the gap and its rate at the points without the step's force.
     fn free(&mut self, system: &System, table: &Table, step: &Step) {
         let rows = self.base_gap.len();
         self.base_gap.fill(system.gap_constant);
@@ -265,7 +266,7 @@ impl Solver {
         }
     }
 
-    /// The gap and its rate at the nodes for the step's present forces.
+    /// Computes the gap and its rate at the nodes for the step's present forces.
     fn follow(&self, table: &Table, step: &mut Step) {
         let n = step.forces.len();
         let rows = n + CHECKS;
@@ -296,8 +297,8 @@ impl Solver {
         }
     }
 
-    /// The law at the nodes for the step's present gap and rate; the law's values less the
-    /// forces go to `residual`. Returns the gap's excess over the pinned end.
+    /// Evaluates the law at the nodes for the step's present gap and rate; `residual` becomes the
+    /// law's values minus the forces. Returns by how much the gap exceeds the pinned end.
     fn evaluate(&mut self, system: &System, step: &mut Step) -> f64 {
         let n = step.forces.len();
         let law = system.law();
@@ -334,7 +335,7 @@ impl Solver {
         excess
     }
 
-    /// Gap and rate at all points for forces that have been found.
+    /// Computes gap and rate at all points for the solved forces.
     fn complete(&mut self, system: &System, table: &Table, step: &mut Step) {
         let n = step.forces.len();
         step.gap.copy_from_slice(&self.base_gap);
@@ -537,7 +538,7 @@ impl Solver {
         }
     }
 
-    /// The size of the last two coefficients of the law's values at the nodes.
+    /// Returns the size of the last two coefficients of the law's values at the nodes.
     fn tail_of_law(&self, system: &System) -> f64 {
         let [one, other] = &system.kernel().last_coefficients;
         dot(one, &self.evaluated).abs() + dot(other, &self.evaluated).abs()
@@ -620,7 +621,7 @@ impl Solver {
         Err(Refusal::Newton)
     }
 
-    /// The tests of a step with a fixed end, after the last correction of its forces.
+    /// Tests a step with a fixed end after the last correction of its forces.
     fn assess_end(
         &mut self,
         system: &System,
@@ -638,8 +639,8 @@ impl Solver {
         self.assess(system, table, step, allowed, rounding)
     }
 
-    /// How gap and rate at the points change as the start of the step moves along the motion,
-    /// on which the force at the start is `force`.
+    /// Computes the changes of gap and rate at the points as the start of the step moves along the
+    /// motion, on which the force at the start is `force`.
     pub(crate) fn shift(&mut self, system: &System, table: &Table, step: &Step, force: f64) {
         let kernel = system.kernel_on(step.branch);
         kernel.modes().apply(&step.modal, &mut self.slope);
@@ -651,7 +652,7 @@ impl Solver {
         add_product(&table.rate, &self.slope, &mut self.shift_rate);
     }
 
-    /// The part of [`Self::shift`] that the drive makes, the modal coordinates held.
+    /// Computes the part of [`Self::shift`] due to the drive, at fixed modal coordinates.
     pub(crate) fn tone_shift(&mut self, system: &System, table: &Table, step: &Step) {
         for (i, time) in table.times.iter().enumerate() {
             let forced = system.forced_gap(step.start + time);
@@ -681,7 +682,7 @@ impl Solver {
         (wanted.max(rounding), rounding)
     }
 
-    /// The tests that a solved step must pass.
+    /// Tests a solved step and returns its accuracy, or why it is refused.
     fn assess(
         &mut self,
         system: &System,
@@ -729,7 +730,7 @@ impl Solver {
     }
 }
 
-/// `max |∂F_d| ∫|G| + |∂F_v| ∫|G'|` over the nodes.
+/// Computes `max |∂F_d| ∫|G| + |∂F_v| ∫|G'|` over the nodes.
 fn steepness(table: &Table, step: &Step) -> f64 {
     largest_sum(
         &step.by_gap,
@@ -739,8 +740,8 @@ fn steepness(table: &Table, step: &Step) -> f64 {
     )
 }
 
-/// Bounds of the gap and the law's second argument over the motion to come, for what rounding makes
-/// of them.
+/// Returns bounds of the gap and of the law's second argument over the following motion, for
+/// estimates of rounding errors.
 pub(crate) fn gap_scale(system: &System, y: &[f64]) -> (f64, f64) {
     let kernel = system.kernel();
     let [tones, rate] = system.gap_sizes;

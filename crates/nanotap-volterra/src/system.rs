@@ -46,8 +46,9 @@ pub struct Options {
 }
 
 impl Options {
-    /// A tolerance in the unit of the gap, and at most a hundred thousand steps a run: a motion
-    /// takes some hundred a period, and a recorded one that takes more fills gigabytes.
+    /// Creates options with a tolerance in the unit of the gap, and at most a hundred thousand
+    /// steps per run: a motion takes some hundred per period, and a longer recording fills
+    /// gigabytes.
     pub const fn new(tolerance: f64) -> Self {
         Self {
             tolerance,
@@ -60,9 +61,9 @@ impl Options {
 #[derive(Clone, Debug)]
 pub struct System {
     kernel: Arc<Kernel>,
-    /// The kernel and the forced response of the surface where it is free, if it relaxes.
+    /// Kernel and forced response of the surface while it is free, if it relaxes.
     free: Option<Box<FreeSurface>>,
-    /// On which branches tip and sample touch.
+    /// Whether tip and sample touch, by branch.
     touches: Vec<bool>,
     law: Arc<dyn ForceLaw>,
     drive: Drive,
@@ -71,7 +72,7 @@ pub struct System {
     vanishes: Vec<bool>,
     /// Modal coordinates of the forced response.
     response: Response,
-    /// The forced response in the state.
+    /// State of the forced response.
     forced: Response,
     /// Complex amplitudes of the gap's forced part.
     pub(crate) gap_tones: Vec<Complex>,
@@ -80,18 +81,18 @@ pub struct System {
     forced_gap: f64,
     /// Sizes of the drive's part in the gap and in its rate.
     pub(crate) gap_sizes: [f64; 2],
-    /// Whether a step needs the gap's rate: the law or a guard does.
+    /// Whether a step needs the gap's rate, for the law or a guard.
     pub(crate) needs_rate: bool,
     takes_signal: bool,
     phasors: Arc<[Vec<OnceLock<Phasors>>; 3]>,
-    /// What ends its motions from outside.
+    /// Flag that cancels its motions.
     cancel: CancelFlag,
 }
 
 /// The surface of a sample that relaxes, with the lever over it.
 #[derive(Clone, Debug)]
 struct FreeSurface {
-    /// The kernel with a force that acts on the lever alone.
+    /// Kernel with a force that acts on the lever alone.
     kernel: Arc<Kernel>,
     /// Kernel of the lever without the surface's coordinates.
     lever: Arc<Kernel>,
@@ -112,7 +113,7 @@ pub(crate) struct Response {
 }
 
 impl Response {
-    /// The modal response of the kernel's modes to a forcing.
+    /// Computes the modal response of the kernel's modes to a forcing.
     pub(crate) fn of(
         kernel: &Kernel,
         constant: &DVector<f64>,
@@ -154,7 +155,8 @@ impl Response {
 }
 
 impl Drive {
-    /// The same of a state of `n` entries: those of a surface, at the end, are not driven.
+    /// Returns the same drive for a state of `n` entries: those of a surface, at the end, are not
+    /// driven.
     fn resized(mut self, n: usize) -> Self {
         self.constant = self.constant.resize_vertically(n, 0.0);
         let none = Complex::new(0.0, 0.0);
@@ -219,7 +221,7 @@ impl System {
         Ok(system.cancelled_by(self.cancel.clone()))
     }
 
-    /// Joins a lever with the surface, if there is one.
+    /// Combines a lever with the surface, if there is one.
     fn over(
         lever: Arc<Kernel>,
         drive: Drive,
@@ -321,7 +323,8 @@ impl System {
         })
     }
 
-    /// The same system, whose motions end with [`VolterraError::Cancelled`] once `cancel` is set.
+    /// Returns the same system, whose motions end with [`VolterraError::Cancelled`] once `cancel`
+    /// is set.
     #[must_use]
     pub fn cancelled_by(mut self, cancel: CancelFlag) -> Self {
         self.cancel = cancel;
@@ -396,7 +399,7 @@ impl System {
         }
     }
 
-    /// The constant part of the force on a branch that does not act on the surface.
+    /// Returns the constant part of the force on a branch that does not act on the surface.
     pub(crate) fn adhesion(&self, branch: usize) -> f64 {
         let pressed = self.free.as_ref().filter(|_| self.touches[branch]);
         pressed.map_or(0.0, |surface| surface.adhesion)
@@ -427,20 +430,20 @@ impl System {
         }
     }
 
-    /// Whether the second argument of the law is the gap's rate.
+    /// Reports whether the second argument of the law is the gap's rate.
     pub(crate) fn second_is_rate(&self) -> bool {
         self.free.is_none() && self.signal().is_none()
     }
 
-    /// Number and frequency of the tone whose signal the law takes, if it takes one.
+    /// Returns number and frequency of the tone whose signal the law takes, if it takes one.
     pub(crate) fn signal(&self) -> Option<(usize, f64)> {
         let tone = self.drive.tones.len().min(2).checked_sub(1)?;
         self.takes_signal
             .then(|| (tone, self.drive.tones[tone].frequency))
     }
 
-    /// The second argument of the law at a time, in a state in which the gap has this rate: a signal, the
-    /// depth of a surface that relaxes, or the rate.
+    /// Returns the second argument of the law at a time, in a state in which the gap has this rate:
+    /// a signal, the depth of a surface that relaxes, or the rate.
     pub fn second_argument(&self, time: f64, rate: f64, x: &[f64]) -> f64 {
         if let Some((_, frequency)) = self.signal() {
             return nanotap_arithmetic::cos(frequency * time);
@@ -479,7 +482,7 @@ impl System {
         &self.forced
     }
 
-    /// `cos ωt` at the points of a table, then `sin ωt`, tone after tone.
+    /// Returns `cos ωt` at the points of a table, then `sin ωt`, tone after tone.
     pub(crate) fn phasors(&self, map: TimeMap, index: usize) -> &[f64] {
         self.phasors[map as usize][index].get_or_init(|| {
             let table = self.kernel.table(map, index);
@@ -496,7 +499,7 @@ impl System {
         })
     }
 
-    /// The forced part of the gap at a time, and its first two derivatives.
+    /// Returns the forced part of the gap at a time, and its first two derivatives.
     pub(crate) fn forced_gap(&self, time: f64) -> [f64; 3] {
         let mut out = [self.gap_constant, 0.0, 0.0];
         for (tone, amplitude) in self.drive.tones.iter().zip(&self.gap_tones) {
@@ -509,7 +512,7 @@ impl System {
         out
     }
 
-    /// The gap and its rate at modal coordinates `y`.
+    /// Returns the gap and its rate at modal coordinates `y`.
     pub(crate) fn gap_of(&self, time: f64, y: &[f64]) -> (f64, f64) {
         let forced = self.forced_gap(time);
         let dot = |row: &[f64]| row.iter().zip(y).map(|(r, y)| r * y).sum::<f64>();
@@ -519,8 +522,8 @@ impl System {
         )
     }
 
-    /// The second argument of the law and its rate at a time, at modal coordinates `y` that change like
-    /// `slope`, where the gap has this rate and acceleration.
+    /// Returns the second argument of the law and its rate at a time, at modal coordinates `y` with
+    /// rates `slope`, where the gap has this rate and acceleration.
     pub(crate) fn second_of(
         &self,
         time: f64,
@@ -560,7 +563,7 @@ impl System {
         self.law.branch_at(gap, self.second_argument(time, rate, x))
     }
 
-    /// The forced response at a time, written to `x`.
+    /// Writes the forced response at a time to `x`.
     pub(crate) fn write_forced(&self, time: f64, x: &mut [f64]) {
         x.copy_from_slice(self.forced.constant.as_slice());
         for (tone, response) in self.drive.tones.iter().zip(&self.forced.tones) {
@@ -571,7 +574,7 @@ impl System {
         }
     }
 
-    /// Modal coordinates (without the forced response) of state `x`.
+    /// Writes the modal coordinates (without the forced response) of state `x` to `y`.
     pub(crate) fn to_modal(&self, time: f64, x: &[f64], y: &mut [f64]) {
         let mut rest = vec![0.0; x.len()];
         self.write_forced(time, &mut rest);
@@ -584,7 +587,7 @@ impl System {
         }
     }
 
-    /// The state of modal coordinates `y`.
+    /// Writes the state of modal coordinates `y` to `x`.
     pub(crate) fn to_state(&self, time: f64, y: &[f64], x: &mut [f64]) {
         self.write_forced(time, x);
         let right = self.kernel.modes().right();
@@ -625,13 +628,13 @@ impl System {
         }
     }
 
-    /// Modal coordinates of the forced response.
+    /// Returns the modal coordinates of the forced response.
     pub(crate) fn response(&self) -> &Response {
         &self.response
     }
 }
 
-/// Sizes of the drive's part in the gap and in its rate.
+/// Computes the sizes of the drive's part in the gap and in its rate.
 fn gap_sizes(drive: &Drive, gap_tones: &[Complex]) -> [f64; 2] {
     let mut sizes = [0.0; 2];
     for (tone, amplitude) in drive.tones.iter().zip(gap_tones) {

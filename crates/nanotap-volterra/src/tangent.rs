@@ -64,12 +64,13 @@ impl Parameter {
     }
 }
 
-/// The change of the linear forced motion.
+/// The derivative of the linear forced motion with respect to a parameter.
 #[derive(Clone, Debug)]
 pub(crate) struct Forced {
     law: Vec<f64>,
     gap_constant: f64,
-    /// Modal: the constant, and for each tone what grows like `1` and like `t`.
+    /// Modal coordinates: the constant, and for each tone the parts that grow like `1` and like
+    /// `t`.
     pub(crate) constant: DVector<f64>,
     pub(crate) tones: Vec<[DVector<Complex>; 2]>,
     /// Change of each tone's angular frequency.
@@ -144,7 +145,7 @@ impl Forced {
         })
     }
 
-    /// The change of the gap and of its rate at a time.
+    /// Returns the change of the gap and of its rate at a time.
     fn gap(&self, system: &System, time: f64) -> (f64, f64) {
         let mut out = (self.gap_constant, 0.0);
         for (tone, [own, secular]) in system.drive().tones.iter().zip(&self.gap_tones) {
@@ -158,7 +159,7 @@ impl Forced {
         out
     }
 
-    /// The change of the law's arguments at a time.
+    /// Returns the change of the law's arguments at a time.
     fn arguments(&self, system: &System, time: f64) -> (f64, f64) {
         let (gap, rate) = self.gap(system, time);
         if system.second_is_rate() {
@@ -170,7 +171,7 @@ impl Forced {
         (gap, second)
     }
 
-    /// The change of the forced response's modal coordinates at a time.
+    /// Returns the change of the forced response's modal coordinates at a time.
     fn modal(&self, system: &System, time: f64) -> DVector<f64> {
         let mut out = self.constant.clone();
         for (tone, [own, secular]) in system.drive().tones.iter().zip(&self.tones) {
@@ -222,7 +223,7 @@ fn check(system: &System, parameter: &Parameter) -> Result<(), VolterraError> {
     Ok(())
 }
 
-/// How the motion changes on a step, a column each: relative to the step, which may move.
+/// The changes of the motion on a step, one column each, relative to the step, which may move.
 #[derive(Clone, Debug)]
 pub(crate) struct StepChange {
     /// Modal coordinates at its start.
@@ -235,7 +236,7 @@ pub(crate) struct StepChange {
     pub(crate) ends: Vec<f64>,
 }
 
-/// Carries the derivatives along a run, in modal coordinates.
+/// Observer that carries the derivatives along a run, in modal coordinates.
 #[derive(Clone, Debug)]
 pub(crate) struct Tangents {
     /// Derivatives of the system for the last columns; the columns before change with their start
@@ -246,7 +247,7 @@ pub(crate) struct Tangents {
     pub(crate) kept: Option<Vec<StepChange>>,
     /// Changes of the modal coordinates, dimension × changes, column-major.
     columns: Vec<f64>,
-    /// How the time of the last switch varies, while the variation is taken relative to it.
+    /// Changes of the time of the last switch, while the variation is taken relative to it.
     shifts: Vec<f64>,
     moving: bool,
     carry: Vec<f64>,
@@ -257,8 +258,8 @@ pub(crate) struct Tangents {
 }
 
 impl Tangents {
-    /// Of a run that begins at time `start`, where the state changes by `starts`, a column a change;
-    /// the last of them come with the parameters.
+    /// Creates the derivatives of a run that begins at time `start`, where the state changes by
+    /// `starts`, one column per change; the last columns belong to the parameters.
     pub(crate) fn new(
         system: &System,
         starts: &DMatrix<f64>,
@@ -322,7 +323,7 @@ impl Tangents {
         self
     }
 
-    /// How the state changes at the end of the run, at time `end`.
+    /// Returns the changes of the state at the end of the run, at time `end`.
     pub(crate) fn at_end(&self, system: &System, end: f64) -> DMatrix<f64> {
         let dimension = system.dimension();
         let count = self.shifts.len();
@@ -334,7 +335,7 @@ impl Tangents {
         system.kernel().modes().right() * modal
     }
 
-    /// `ẏ` at modal coordinates `modal` under a force on a branch of the law.
+    /// Returns `ẏ` at modal coordinates `modal` under a force on a branch of the law.
     pub(crate) fn slope(system: &System, branch: usize, modal: &[f64], force: f64) -> Vec<f64> {
         let kernel = system.kernel_on(branch);
         let mut slope = vec![0.0; modal.len()];
@@ -569,7 +570,7 @@ impl Observer for Tangents {
     }
 }
 
-/// How the gap at which a step ends changes with a parameter of the law.
+/// Returns the change, with a parameter of the law, of the gap at which a step ends.
 fn level_change(system: &System, step: &Step, parameter: &Forced, scratch: &mut [f64]) -> f64 {
     if parameter.law.is_empty() {
         return 0.0;

@@ -14,8 +14,8 @@ use std::sync::Arc;
 const POINTS: usize = 24;
 /// Largest angle, in radians, through which the fastest mode turns within a panel.
 const REACH: f64 = 6.0;
-/// By how much the phase of a factor may turn in a panel: Gauss's rule of [`POINTS`] points is
-/// right to rounding up to here.
+/// Largest angle, in radians, through which the phase of a factor turns in a panel: up to it
+/// Gauss's rule of [`POINTS`] points is accurate to rounding.
 const OSCILLATION: f64 = 36.0;
 /// Largest number of steps in a trajectory.
 pub const MAX_RECORDED_STEPS: usize = 4_000_000;
@@ -152,7 +152,7 @@ impl Piece {
         self.start + self.map.time(self.length, self.end)
     }
 
-    /// The derivative of the force's series by `u`.
+    /// Returns the derivative of the force's series by `u`.
     fn force_slope(&self) -> Vec<f64> {
         let mut slope = vec![0.0; self.coefficients.len()];
         derivative(&self.coefficients, &mut slope);
@@ -173,7 +173,7 @@ impl Piece {
         self.sample_of(system, u, &modal, &self.force_slope())
     }
 
-    /// The motion at `u`, where the modal coordinates are `modal`.
+    /// Returns the motion at `u`, where the modal coordinates are `modal`.
     fn sample_of(&self, system: &System, u: f64, modal: &[f64], force_slope: &[f64]) -> Sample {
         let time = self.start + self.map.time(self.length, u);
         let mut state = DVector::zeros(system.dimension());
@@ -203,7 +203,7 @@ pub struct Extremum {
     pub time: f64,
     /// Value of the output there, in the unit of the output.
     pub value: f64,
-    /// Whether it is a maximum.
+    /// Whether it is a maximum; otherwise it is a minimum.
     pub largest: bool,
     /// Number of the branch of the law there.
     pub branch: usize,
@@ -217,7 +217,7 @@ pub(crate) struct Extreme {
     pub(crate) u: f64,
     time: f64,
     pub(crate) value: f64,
-    /// Whether the output falls after it; meaningless at the ends of steps.
+    /// Whether the output falls after it; without meaning at the ends of steps.
     falls_after: bool,
 }
 
@@ -231,7 +231,7 @@ impl Trajectory {
         }
     }
 
-    /// The trajectory itself, if it is complete.
+    /// Returns the trajectory, or an error if it has too many steps.
     pub(crate) fn whole(self) -> Result<Self, VolterraError> {
         if self.overflow {
             return Err(VolterraError::TooLarge {
@@ -312,7 +312,7 @@ impl Trajectory {
         self.read_with(output, sample, &self.field(sample))
     }
 
-    /// How fast the state changes at a sample.
+    /// Returns the rate of the state at a sample.
     fn field(&self, sample: &Sample) -> Vec<f64> {
         let mut field = vec![0.0; self.system.dimension()];
         let state = sample.state.as_slice();
@@ -481,7 +481,7 @@ impl Trajectory {
         self.extremes(nodes, output).map(|e| (e.time, e.value))
     }
 
-    /// The same with their places.
+    /// Returns the least and the largest value with their places.
     pub(crate) fn extremes(&self, nodes: &[Node], output: &Output) -> [Extreme; 2] {
         let mut ends = [f64::INFINITY, f64::NEG_INFINITY].map(|value| Extreme {
             piece: 0,
@@ -520,8 +520,9 @@ impl Trajectory {
         }
     }
 
-    /// The places `u` of a quadrature of a piece, with their weights by `u`, and its ends with weight
-    /// 0, in order: dense enough for a factor that oscillates with the angular frequency `omega`.
+    /// Returns the places `u` of a quadrature of a piece, with their weights by `u`, and its ends
+    /// with weight 0, in order: dense enough for a factor that oscillates with the angular
+    /// frequency `omega`.
     pub(crate) fn places(&self, piece: &Piece, omega: f64) -> Vec<(f64, f64)> {
         let (places, weights) = gauss_legendre(POINTS);
         let fastest = self
@@ -543,7 +544,7 @@ impl Trajectory {
     }
 }
 
-/// The zero between two points of opposite sign: the Illinois rule, then halving.
+/// Finds the zero between two points of opposite sign: the Illinois rule, then halving.
 fn bisect(f: &impl Fn(f64) -> f64, mut a: (f64, f64), mut b: (f64, f64)) -> f64 {
     for _ in 0..60 {
         let u = (a.0 * b.1 - b.0 * a.1) / (b.1 - a.1);

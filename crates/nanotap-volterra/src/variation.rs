@@ -55,8 +55,8 @@ pub struct Reading<'a> {
     pub time: f64,
     /// Weight in integrals over time, in the system's unit of time; 0 at the ends of steps.
     pub weight: f64,
-    /// At the ends of a step: how much more of an integral's range the step has there as each
-    /// column changes, seen from the step.
+    /// Changes, one per column, of the length of time that the step covers in an integral, from its
+    /// movement at this end relative to the step; 0 inside a step.
     pub widening: &'a [f64],
     /// Changes of the step's position in time, one per column.
     pub shifts: &'a [f64],
@@ -91,7 +91,7 @@ struct Reader {
     changes: Vec<ChangeReader>,
 }
 
-/// Its change with one column, apart from that through the motion.
+/// The derivative of an output with one column, apart from that through the motion.
 struct ChangeReader {
     row: Vec<f64>,
     constant: f64,
@@ -101,9 +101,9 @@ struct ChangeReader {
 }
 
 impl Flow {
-    /// Runs to time `end`, which moves by `moves` as the columns change, and keeps the motion and
-    /// how it changes: with `starts` (a column a change of the state at the start), the last of
-    /// which come with `parameters`.
+    /// Runs to time `end`, which moves by `moves` as the columns change, and records the motion and
+    /// its derivatives. `starts` has one column per change of the state at the start; the last
+    /// columns belong to `parameters`.
     ///
     /// # Errors
     /// As [`Flow::record_until`], and when sizes do not fit.
@@ -147,13 +147,13 @@ impl Variation {
         &self.at_end
     }
 
-    /// The changes of parameter and drive of a column.
+    /// Returns the changes of parameter and drive for a column.
     fn forced(&self, column: usize) -> Option<&Forced> {
         let plain = self.count - self.parameters.len();
         column.checked_sub(plain).map(|k| &self.parameters[k])
     }
 
-    /// By how much the boundary after piece number `piece` moves with a column.
+    /// Returns the change, with a column, of the time of the boundary after piece number `piece`.
     fn boundary(&self, piece: usize, column: usize) -> f64 {
         if piece + 1 == self.pieces.len() {
             return self.end[column];
@@ -162,7 +162,7 @@ impl Variation {
         ends.get(column).copied().unwrap_or(0.0)
     }
 
-    /// By how much the start (0) or the end (1) of a piece moves, seen from the piece.
+    /// Returns the movement of the start or the end of a piece relative to the piece.
     fn edge(&self, piece: usize, end: bool, column: usize) -> f64 {
         let boundary = match (end, piece) {
             (true, _) => self.boundary(piece, column),
@@ -281,7 +281,7 @@ impl Variation {
         }
     }
 
-    /// The start of a step.
+    /// Returns the start of a step.
     fn start_of(&self, index: usize) -> Place {
         let (piece, of) = (&self.motion.pieces[index], &self.pieces[index]);
         let coefficients = if of.coefficients.is_empty() {
@@ -299,7 +299,7 @@ impl Variation {
         }
     }
 
-    /// Moves on to another place of the same step.
+    /// Moves to another place of the same step.
     fn move_to(&self, place: &mut Place, u: f64) {
         let (system, piece) = (&self.motion.system, &self.motion.pieces[place.index]);
         let range = [place.u, u];
@@ -322,7 +322,7 @@ impl Variation {
         }));
     }
 
-    /// The value of an output at a place; writes its change with every column.
+    /// Returns the value of an output at a place; writes its changes with all columns.
     fn read(&self, reader: &Reader, place: &Place, changes: &mut [f64]) -> f64 {
         let (piece, of) = (&self.motion.pieces[place.index], &self.pieces[place.index]);
         let kernel = self.motion.system.kernel();
@@ -351,7 +351,7 @@ impl Variation {
         reader.value(own, &place.phasors, force)
     }
 
-    /// The least and the largest value of an output over the run, ends included, with their
+    /// Returns the least and the largest value of an output over the run, ends included, with their
     /// changes; `nodes` are those of the motion ([`Trajectory::nodes`]).
     pub fn range(&self, nodes: &[Node], output: &VariedOutput) -> [Moment; 2] {
         let reader = self.reader(output);
@@ -363,8 +363,8 @@ impl Variation {
             })
     }
 
-    /// An output just before every switch of the law that `wanted` selects by the branches before and
-    /// after it.
+    /// Returns an output just before every switch of the law that `wanted` selects by the branches
+    /// before and after it.
     pub fn before_switches(
         &self,
         output: &VariedOutput,
@@ -386,7 +386,8 @@ impl Variation {
             .collect()
     }
 
-    /// The change with every column of an output where it is extreme, or at an end of a step.
+    /// Returns the changes, one per column, of an output where it is extreme, or at an end of a
+    /// step.
     fn changes_at(&self, reader: &Reader, index: usize, u: f64) -> Vec<f64> {
         let mut changes = vec![f64::NAN; self.count];
         let Some(piece) = self.motion.pieces.get(index) else {
@@ -413,7 +414,7 @@ impl Variation {
         changes
     }
 
-    /// How fast an output changes in time at an end of a step.
+    /// Returns the rate in time of an output at an end of a step.
     fn rate(&self, reader: &Reader, place: &Place) -> f64 {
         let (system, piece) = (&self.motion.system, &self.motion.pieces[place.index]);
         let (u, modal) = (place.u, &place.modal[..system.dimension()]);

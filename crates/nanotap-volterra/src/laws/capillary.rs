@@ -63,7 +63,8 @@ impl Formula for Capillary {
         &CAPILLARY
     }
 
-    /// `a0, 2h`, rupture, `−4πγR`, `1/h`, the force in contact.
+    /// Computes `a0`, `2h`, the gap of rupture, `−4πγR`, `1/h` and the force in contact, in this
+    /// order.
     fn constants<S: Scalar>(&self, p: &[S]) -> Vec<S> {
         let (radius, contact, tension, film, solid) = (p[4], p[5], p[6], p[7], p[8]);
         let cube = radius.square() * solid / reduced_modulus(p) * (3.0 * PI);
@@ -112,7 +113,8 @@ impl Formula for Capillary {
         }
     }
 
-    /// Across the bridge of branch 1 they do not touch.
+    /// Reports contact on branch 2 only: across the bridge of branch 1, tip and sample do not
+    /// touch.
     fn touches(&self, branch: usize) -> bool {
         branch == 2
     }

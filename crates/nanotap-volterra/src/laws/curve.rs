@@ -40,25 +40,25 @@ impl Interpolation {
 
 /// Largest degree of a piece.
 const DEGREE: usize = FREE + 3;
-/// Nodes of a piece besides the values and slopes at its ends.
+/// Number of nodes of a piece in addition to the values and slopes at its ends.
 const FREE: usize = 7;
-/// Difference of a piece from its spline, over the largest value of its rows.
+/// Largest difference of a piece from its spline, relative to the largest value of its rows.
 const ACCURACY: f64 = 1e-6;
-/// The same over the largest value of all rows, where a piece's own are small.
+/// The same limit relative to the largest value of all rows, for pieces with small values.
 const FLOOR: f64 = 1e-9;
-/// Places in each interval at which a piece is compared with its spline.
+/// Fractions of each interval at which a piece is compared with its spline.
 const CHECKS: [f64; 4] = [0.15, 0.4, 0.65, 0.9];
 
 /// Polynomials over one interval, each as the coefficients of `T_k(u)`, `u` from −1 to 1.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Piece {
-    /// Its first and last row.
+    /// Numbers of its first and last row.
     pub(crate) rows: [usize; 2],
     /// Chebyshev coefficients, one polynomial per curve.
     pub(crate) curves: Vec<Vec<f64>>,
 }
 
-/// The value of a Chebyshev series at `u`, and its slope by `u` (Clenshaw).
+/// Returns the value of a Chebyshev series at `u`, and its slope by `u` (Clenshaw).
 #[inline]
 pub(crate) fn series(coefficients: &[f64], u: f64) -> [f64; 2] {
     let Some((first, rest)) = coefficients.split_first() else {
@@ -72,7 +72,7 @@ pub(crate) fn series(coefficients: &[f64], u: f64) -> [f64; 2] {
     [first + u * b - b_next, b + u * d - d_next]
 }
 
-/// Places that [`series_at`] takes at a time.
+/// Number of places that [`series_at`] evaluates at a time.
 pub(crate) const LANES: usize = 8;
 
 /// Evaluates [`series`] at several places: values, then slopes.
@@ -99,7 +99,7 @@ pub(crate) fn series_at(coefficients: &[f64], u: &[f64; LANES]) -> [[f64; LANES]
     out
 }
 
-/// The integral of a Chebyshev series by `u`, zero at `u = 1`.
+/// Returns the integral of a Chebyshev series by `u`, zero at `u = 1`.
 pub(crate) fn integral(coefficients: &[f64]) -> Vec<f64> {
     let at = |k: usize| coefficients.get(k).copied().unwrap_or(0.0);
     let mut sum: Vec<f64> = (0..=coefficients.len())
@@ -113,7 +113,8 @@ pub(crate) fn integral(coefficients: &[f64]) -> Vec<f64> {
     sum
 }
 
-/// The pieces of the curves through rows: `columns` each have one value for each of `gaps`.
+/// Computes the pieces of the curves through rows: each of `columns` has one value for each of
+/// `gaps`.
 pub(crate) fn pieces(gaps: &[f64], columns: &[(&[f64], Interpolation)]) -> Vec<Piece> {
     let smooth = columns.iter().any(|(_, by)| *by != Interpolation::Linear);
     let splines: Vec<Spline> = columns
@@ -173,7 +174,7 @@ impl Nodes {
     }
 }
 
-/// The series through values at the Chebyshev nodes of their number.
+/// Computes the series through values at as many Chebyshev nodes.
 fn through(values: &[f64]) -> Vec<f64> {
     let n = values.len();
     let coefficient = |j: usize| {
@@ -190,7 +191,7 @@ fn through(values: &[f64]) -> Vec<f64> {
     (0..n).map(coefficient).collect()
 }
 
-/// A cubic between each two rows, by values and slopes.
+/// A spline with a cubic between each two rows, given by values and slopes.
 struct Spline<'a> {
     gaps: &'a [f64],
     values: &'a [f64],
@@ -217,7 +218,7 @@ impl<'a> Spline<'a> {
         }
     }
 
-    /// The cubic after row `k` as a series: exact.
+    /// Returns the cubic after row `k` as a series, exactly.
     fn exact(&self, k: usize) -> Vec<f64> {
         let [a, b] = [self.values[k], self.values[k + 1]];
         if self.slopes.is_empty() {
@@ -227,7 +228,7 @@ impl<'a> Spline<'a> {
         ends([a, b], [half * self.slopes[k], half * self.slopes[k + 1]])
     }
 
-    /// One polynomial from row `first` to row `last`, if it is accurate.
+    /// Fits one polynomial from row `first` to row `last`; `None` if it is not accurate.
     fn fit(&self, nodes: &Nodes, first: usize, last: usize) -> Option<Vec<f64>> {
         let (low, high) = (self.gaps[first], self.gaps[last]);
         let (middle, half) = (0.5 * (low + high), 0.5 * (high - low));
@@ -276,7 +277,7 @@ impl<'a> Spline<'a> {
         close.then_some(whole)
     }
 
-    /// The cubic after row `k`.
+    /// Returns the value of the cubic after row `k`.
     fn at(&self, k: usize, gap: f64) -> f64 {
         let width = self.gaps[k + 1] - self.gaps[k];
         let t = (gap - self.gaps[k]) / width;
@@ -287,7 +288,7 @@ impl<'a> Spline<'a> {
     }
 }
 
-/// The cubic with these values and slopes by `u` at `u = −1` and 1.
+/// Returns the cubic with these values and slopes by `u` at `u = −1` and 1.
 fn ends([a, b]: [f64; 2], [p, q]: [f64; 2]) -> Vec<f64> {
     // f = m + d u + (1 − u²)(e + g u), with f(±1) and f'(±1).
     let (m, d) = (0.5 * (a + b), 0.5 * (b - a));
@@ -301,7 +302,7 @@ fn largest(values: &[f64]) -> f64 {
     values.iter().fold(0.0, |m: f64, v| m.max(v.abs()))
 }
 
-/// Slopes at the rows of the cubic spline without curvature at both ends.
+/// Computes the slopes at the rows of the cubic spline without curvature at both ends.
 fn natural_slopes(gaps: &[f64], values: &[f64]) -> Vec<f64> {
     let n = gaps.len();
     let width = |k: usize| gaps[k + 1] - gaps[k];

@@ -24,7 +24,7 @@ pub enum Shape {
 }
 
 impl Shape {
-    /// `δ^p` of this shape's elastic law.
+    /// Returns `δ^p` of this shape's elastic law.
     pub(crate) fn power<S: Scalar>(self, indentation: S) -> S {
         match self {
             Self::Sphere => indentation * indentation.sqrt(),
@@ -42,7 +42,7 @@ impl Shape {
         }
     }
 
-    /// How `δ^p` comes up to the end of the contact.
+    /// Returns how `δ^p` behaves at the end of the contact.
     pub(crate) const fn approach(self) -> Approach {
         match self {
             Self::Sphere => Approach::ThreeHalves,
@@ -50,7 +50,7 @@ impl Shape {
         }
     }
 
-    /// `k/E*` from the radius or the half angle.
+    /// Returns `k/E*` from the radius or the half angle.
     pub(crate) fn factor<S: Scalar>(self, size: S) -> S {
         match self {
             Self::Sphere => size.sqrt() * (4.0 / 3.0),
@@ -60,7 +60,7 @@ impl Shape {
     }
 }
 
-/// `1/((1 − ν_s²)/E_s + (1 − ν_t²)/E_t)`.
+/// Computes the reduced modulus `1/((1 − ν_s²)/E_s + (1 − ν_t²)/E_t)`.
 pub(crate) fn reduced_modulus<S: Scalar>(p: &[S]) -> S {
     let compliance = |modulus: S, poisson: S| (-poisson.square() + 1.0) * modulus.recip();
     (compliance(p[0], p[1]) + compliance(p[2], p[3])).recip()
@@ -179,7 +179,8 @@ impl Formula for Elastic {
     }
 }
 
-/// Branch 0 is away, branch 1 in contact; the constant 0 is where it begins and ends.
+/// Returns the exits of a law with branch 0 away and branch 1 in contact; contact begins and ends
+/// at constant 0.
 pub(crate) fn contact_ways(branch: usize, approach: Approach) -> Vec<Way> {
     if branch == 0 {
         vec![Way::new(Edge::Falls(0), 1).after(approach)]

@@ -131,7 +131,7 @@ impl Formula for ElectrostaticAc {
         &ELECTROSTATIC_AC
     }
 
-    /// `a0`, `−π ε R²`, `R`, its value at `a0`, `U − U_c`, `V`.
+    /// Computes `a0`, `−π ε R²`, `R`, `−π ε R²/(a0 (a0 + R))`, `U − U_c` and `V`, in this order.
     fn constants<S: Scalar>(&self, p: &[S]) -> Vec<S> {
         let strength = p[5] * p[3].square() * (-PI);
         let contact = strength / (p[4] * (p[4] + p[3]));
@@ -216,7 +216,8 @@ impl Formula for Dlvo {
         &DLVO
     }
 
-    /// `a0`, the double layer's strength, `−1/λ_D`, `H R/6`, the force in contact.
+    /// Computes `a0`, the strength of the double layer, `−1/λ_D`, `H R/6` and the force in contact,
+    /// in this order.
     fn constants<S: Scalar>(&self, p: &[S]) -> Vec<S> {
         let layer = p[1] / p[6] * p[3] * p[4] * p[5] * (4.0 * PI);
         let decay = -p[5].recip();

@@ -143,7 +143,7 @@ pub struct Entry {
     pub conservative: bool,
 }
 
-/// A parameter of the table of laws.
+/// Creates an entry for a parameter.
 pub const fn own(
     name: &'static str,
     words: &'static str,

@@ -131,21 +131,21 @@ pub trait Formula: Clone + Debug + Send + Sync + 'static {
     }
 }
 
-/// A formula with values of its parameters.
+/// A law: a formula with values of its parameters.
 #[derive(Clone, Debug)]
 pub struct Law<F: Formula> {
     formula: F,
     parameters: Vec<f64>,
     constants: Vec<f64>,
     lifted: Vec<Dual<2>>,
-    /// For laws that depend on the gap alone.
+    /// The constants as numbers with one derivative, for laws that depend on the gap alone.
     lifted_gap: Vec<Dual<1>>,
     /// The constants with their derivatives by each parameter.
     varied: Vec<Vec<Dual<1>>>,
 }
 
 impl<F: Formula> Law<F> {
-    /// The law with these values of its parameters, in the order of its entry.
+    /// Creates the law with these values of its parameters, in the order of its entry.
     pub(crate) fn new(formula: F, parameters: Vec<f64>) -> Self {
         let constants = formula.constants(&parameters);
         let varied = (0..parameters.len())

@@ -43,7 +43,8 @@ impl Formula for Jkr {
         &JKR
     }
 
-    /// `a0, 1/R, √(2πw/E*), √a` at the end, the gap there, `4E*/(3R)`, `√(8πwE*)`.
+    /// Computes `a0`, `1/R`, `√(2πw/E*)`, `√a` at the end, the gap there, `4E*/(3R)` and
+    /// `√(8πwE*)`, in this order.
     fn constants<S: Scalar>(&self, p: &[S]) -> Vec<S> {
         let (modulus, radius, contact, work) = (reduced_modulus(p), p[4], p[5], p[6]);
         let tension = (work / modulus * (2.0 * PI)).sqrt();
@@ -95,9 +96,9 @@ impl Formula for Jkr {
     }
 }
 
-/// `√a`, the larger root of `s⁴/R − s √(2πw/E*) = δ`; that of the end beyond it. The
-/// end is recognized by the gap itself: from `δ` rounding would at times put it on the root's side,
-/// where the slope has no bound, and derivatives by parameters with it.
+/// Returns `√a`, the larger root of `s⁴/R − s √(2πw/E*) = δ`; beyond the end of contact, its value
+/// at the end. The end is detected by the gap itself: from `δ`, rounding would sometimes put it on
+/// the side of the root, where the slope, and with it the derivatives by parameters, is unbounded.
 fn contact_radius_root<S: Scalar>(c: &[S], gap: S) -> S {
     if gap.value() >= c[4].value() {
         return c[3];

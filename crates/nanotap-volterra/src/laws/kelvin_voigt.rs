@@ -26,7 +26,7 @@ pub struct KelvinVoigt {
     pub pulls: bool,
 }
 
-/// Takes the place of Young's modulus, so that it is elongational.
+/// Viscosity in the place of Young's modulus, and therefore elongational.
 const ELONGATIONAL: ParameterEntry = ParameterEntry {
     words: "elongational viscosity of the sample: 2(1 + ν) times the shear viscosity, and (1 − ν²)/2 \
             times García's η in η √(Rδ) dδ/dt under a sphere",
@@ -120,7 +120,7 @@ impl Formula for KelvinVoigt {
         }
     }
 
-    /// `a0`, then what multiplies `δ^{p−1} δ` and `δ^{p−1} δ̇`.
+    /// Computes `a0`, and the factors of `δ^{p−1} δ` and `δ^{p−1} δ̇`.
     fn constants<S: Scalar>(&self, p: &[S]) -> Vec<S> {
         let plane = (-p[1].square() + 1.0).recip();
         let factor = self.shape.factor(p[3]) * plane;
@@ -167,13 +167,13 @@ impl Formula for KelvinVoigt {
         }
     }
 
-    /// The force without the power of `δ` that vanishes where contact begins.
+    /// Returns the force without the power of `δ` that vanishes where contact begins.
     fn guard<S: Scalar>(&self, c: &[S], index: usize, gap: S, rate: S) -> S {
         let sum = c[1] * (c[0] - gap) - c[2] * rate;
         if index == 0 { sum } else { -sum }
     }
 
-    /// A released tip is free.
+    /// Reports contact on branch 1 only: a released tip is free.
     fn touches(&self, branch: usize) -> bool {
         branch == 1
     }

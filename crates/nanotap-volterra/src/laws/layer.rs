@@ -26,7 +26,7 @@ use nanotap_arithmetic::Scalar;
 
 /// Ends of the intervals of `χ` on which `C` is expanded.
 const EDGES: [f64; 7] = [0.0, 0.3, 0.75, 1.5, 3.0, 6.0, 12.0];
-/// Nodes of the quadrature of the energy.
+/// Number of nodes of the quadrature of the energy.
 const NODES: usize = 24;
 
 /// Formula of a bonded incompressible layer under a tip of this shape; see the module.
@@ -73,7 +73,7 @@ pub static PUNCH: Entry = entry(
 );
 
 impl Layer {
-    /// `C(χ)`; beyond the last edge it goes on as `(1 + χ)³`.
+    /// Returns `C(χ)`; beyond the last edge it continues as `(1 + χ)³`.
     pub(crate) fn correction<S: Scalar>(self, ratio: S) -> S {
         let series = match self.0 {
             Shape::Sphere => &SPHERE_SERIES,
@@ -103,7 +103,7 @@ impl Formula for Layer {
         }
     }
 
-    /// `a0`, what multiplies `δ^p`, and what `χ` is made with.
+    /// Computes `a0`, the factor of `δ^p`, and the scale of `χ`.
     fn constants<S: Scalar>(&self, p: &[S]) -> Vec<S> {
         let [contact, stiffness, scale] = Thin(self.0).half_space(p);
         let stiffness = match self.0 {
@@ -138,7 +138,8 @@ impl Formula for Layer {
         contact_ways(branch, self.0.approach())
     }
 
-    /// By quadrature in the square root of the indentation, of which `C` is a function.
+    /// Computes the energy by quadrature in the square root of the indentation, of which `C` is a
+    /// function.
     fn energy(&self, c: &[f64], branch: usize, gap: f64) -> Option<f64> {
         let delta = c[0] - gap;
         if branch == 0 || delta <= 0.0 {

@@ -205,8 +205,8 @@ pub fn build(name: &str, values: &[(&str, f64)]) -> Result<Arc<dyn ForceLaw>, Vo
     law.with(&parameters)
 }
 
-/// The sum of laws of the table, with what must not be counted twice refused: two elastic
-/// repulsions, or two laws that each hold the adhesion.
+/// Builds the sum of laws of the table. It refuses contributions that would count twice: two
+/// elastic repulsions, or two laws that each contain the adhesion.
 ///
 /// # Errors
 /// [`VolterraError::Sum`] for such a pair, [`VolterraError::TooLarge`] for more than

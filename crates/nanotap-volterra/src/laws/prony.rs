@@ -112,7 +112,7 @@ static PUNCH: Entry = entry(
     &ROUND,
 );
 
-/// The laws; their arms are given in addition.
+/// Table of the relaxing laws; their arms are given in addition to the parameters.
 pub static TABLE: [TableLaw; 3] = [
     TableLaw {
         entry: &SPHERE,
@@ -137,8 +137,8 @@ pub struct Arms {
 }
 
 impl Arms {
-    /// Arms `(time, modulus)` in any order, an infinite time for a modulus at rest; with `shear` the
-    /// moduli are shear moduli.
+    /// Creates arms from `(time, modulus)` in any order, an infinite time for a modulus at rest;
+    /// with `shear` the moduli are shear moduli.
     ///
     /// # Errors
     /// [`VolterraError::Arms`] for no arms, a time that is not positive, or a modulus
@@ -173,18 +173,18 @@ impl Arms {
         Ok(Self { arms, shear })
     }
 
-    /// The arms `(time, modulus)`, the shortest time first.
+    /// Returns the arms `(time, modulus)`, the shortest time first.
     pub fn points(&self) -> &[(f64, f64)] {
         &self.arms
     }
 
-    /// Whether the moduli are shear moduli.
+    /// Reports whether the moduli are shear moduli.
     pub const fn shear(&self) -> bool {
         self.shear
     }
 
-    /// Modulus at rest and arms `(rate, modulus)`, the slowest first, with these values of a law's
-    /// parameters: Young's moduli, in the law's units.
+    /// Returns the modulus at rest and the arms `(rate, modulus)`, the slowest first, with these
+    /// values of a law's parameters: Young's moduli, in the law's units.
     pub fn series(&self, parameters: &[f64; 7]) -> Series {
         let [rest, poisson, _, _, by_modulus, by_time, horizon] = *parameters;
         let by_modulus = if self.shear {
@@ -273,8 +273,8 @@ impl Series {
         (near + offset) * sum - self.rest
     }
 
-    /// The zero between the rate of arm `k` and that of the next slower one, or 0, as an offset from
-    /// the nearer end, so that small distances from a pole keep their digits.
+    /// Returns the zero between the rate of arm `k` and that of the next slower one, or 0, as an
+    /// offset from the nearer end, so that small distances from a pole keep their digits.
     fn zero_below(&self, k: usize) -> (f64, f64) {
         let high = self.arms[k].0;
         let low = k.checked_sub(1).map_or(0.0, |k| self.arms[k].0);
@@ -320,22 +320,24 @@ pub struct Prony {
     attraction: Option<Attraction>,
 }
 
-/// A force across the gap to the surface, with the branches of the whole law: constant in contact.
+/// An attraction across the gap to the surface; it is constant in contact.
 #[derive(Clone, Debug)]
 struct Attraction {
     law: Arc<dyn ForceLaw>,
-    /// The branches of contact and of flight at the end of a contact.
+    /// Branches of contact, and of flight at the end of a contact.
     contact: usize,
     flight: usize,
-    /// Ways out of its branches in flight, and whether the gap falls or rises to a level there.
+    /// Levels of the exits of its branches in flight, with 1 if the gap falls to the level and −1
+    /// if it rises to it.
     guards: Vec<(f64, f64)>,
 }
 
-/// The first guard of an attraction, after those of contact.
+/// Number of the first guard of an attraction, after those of contact.
 const FIRST_GUARD: usize = 2;
 
 impl Attraction {
-    /// Of a law that depends on the gap alone and is constant in contact, which begins at this gap.
+    /// Accepts a law that depends on the gap alone and is constant in contact, which begins at this
+    /// gap; `None` for any other.
     fn of(law: &Arc<dyn ForceLaw>, contact_gap: f64) -> Option<Self> {
         if law.depends_on_rate() || law.surface().is_some() {
             return None;
@@ -376,7 +378,7 @@ impl Attraction {
         })
     }
 
-    /// The number of a guard.
+    /// Returns the number of a guard.
     fn guard(&self, guard: Guard) -> usize {
         let same = |(level, sign): &(f64, f64)| match guard {
             Guard::Falls(other) => *sign > 0.0 && *level == other,
@@ -417,7 +419,7 @@ impl Prony {
         })
     }
 
-    /// `s^{1/m}` and its slope; a virgin surface has no slope.
+    /// Returns the depth `s^{1/m}` and its slope by `s`; both are 0 for an undeformed surface.
     fn depth(&self, s: f64) -> [f64; 2] {
         if s <= 0.0 {
             return [0.0; 2];
@@ -433,7 +435,7 @@ impl Prony {
         [depth, depth / (self.shape.exponent() * s)]
     }
 
-    /// `δ^{m−1}`, continued beyond `δ = 0` so that `δ^m` stays smooth for Newton's method.
+    /// Returns `δ^{m−1}`, continued beyond `δ = 0` so that `δ^m` stays smooth for Newton's method.
     fn root(&self, delta: f64) -> f64 {
         match self.shape {
             Shape::Sphere => delta.abs().sqrt(),
@@ -514,8 +516,8 @@ impl ForceLaw for Prony {
         }
     }
 
-    /// In flight the gap to the surface; in contact `δ − s/δ^{m−1}`, which rises like `δ` on a virgin
-    /// surface.
+    /// Returns the gap to the surface in flight, and `δ − s/δ^{m−1}` in contact, which rises like
+    /// `δ` on an undeformed surface.
     fn guard(&self, index: usize, gap: f64, s: f64) -> Force {
         if let (Some(of), Some(number)) = (&self.attraction, index.checked_sub(FIRST_GUARD)) {
             let [depth, slope] = self.depth(s);
@@ -550,7 +552,7 @@ impl ForceLaw for Prony {
         }
     }
 
-    /// Not numbers: the arms change the surface's modes, which no derivative of the force describes.
+    /// Writes NaN: the arms change the surface's modes, which no derivative of the force describes.
     fn by_parameters(&self, _branch: usize, _gap: f64, _s: f64, out: &mut [f64]) {
         out.fill(f64::NAN);
     }

@@ -17,11 +17,11 @@ use crate::linear::wide_registers;
 use crate::system::MAX_BRANCHES;
 use std::sync::Arc;
 
-/// Largest number of rows: each is a branch, as is what lies below the first, and contact may begin
-/// between two of them.
+/// Largest number of rows: each row is a branch, as is the range below the first, and contact may
+/// begin between two of them.
 pub const MAX_ROWS: usize = MAX_BRANCHES - 2;
 
-/// The law; its rows are given in addition.
+/// Table entry of a force given by rows, which are given in addition to the parameters.
 pub static TABLE: TableLaw = TableLaw {
     entry: &Entry {
         name: "table",
@@ -64,7 +64,7 @@ pub static TABLE: TableLaw = TableLaw {
     make: Make::Rows,
 };
 
-/// Rows of gap and force, and of damping if there is one, that are a function: each gap once, the
+/// Rows of gap and force, and of damping if given, that define a function: each gap once, the
 /// smallest first.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Rows {
@@ -75,7 +75,7 @@ pub struct Rows {
 }
 
 impl Rows {
-    /// The rows `(gap, force)`, the gap rising or falling from each to the next, with straight lines
+    /// Creates the rows `(gap, force)`, with gaps that rise or fall throughout, and straight lines
     /// between them.
     ///
     /// # Errors
@@ -86,7 +86,7 @@ impl Rows {
         Self::damped(points, &[])
     }
 
-    /// The same with a damping `γ` for each row, or none at all: the force is `P(d) − γ(d) ḋ`.
+    /// Creates the rows with a damping `γ` for each, or none at all: the force is `P(d) − γ(d) ḋ`.
     ///
     /// # Errors
     /// As [`new`](Self::new), and for a damping that is negative.
@@ -151,7 +151,7 @@ impl Rows {
         Ok(Self::interpolated(points, damping, Interpolation::Linear))
     }
 
-    /// The same rows with another curve between them.
+    /// Returns the same rows with another curve between them.
     #[must_use]
     pub fn by(&self, interpolation: Interpolation) -> Self {
         Self::interpolated(self.points.clone(), self.damping.clone(), interpolation)
@@ -181,23 +181,23 @@ impl Rows {
         }
     }
 
-    /// The rows of gap and force, the smallest gap first.
+    /// Returns the rows of gap and force, the smallest gap first.
     pub fn points(&self) -> &[(f64, f64)] {
         &self.points
     }
 
-    /// The damping of each row; empty without damping.
+    /// Returns the damping of each row; empty without damping.
     pub fn damping(&self) -> &[f64] {
         &self.damping
     }
 
-    /// The curve between the rows.
+    /// Returns the curve between the rows.
     pub const fn interpolation(&self) -> Interpolation {
         self.interpolation
     }
 }
 
-/// A branch: a polynomial of the gap, in the rows' unit.
+/// A branch: a polynomial in the gap, in the unit of the rows.
 #[derive(Clone, Debug)]
 struct Branch {
     middle: f64,
@@ -211,7 +211,7 @@ struct Branch {
 }
 
 impl Branch {
-    /// The values `intercept + slope (gap − at)` of force and damping.
+    /// Creates the straight line `intercept + slope (gap − at)` of force and damping.
     fn line(at: f64, values: [[f64; 2]; 2], beyond: f64) -> Self {
         let [force, damping] = values.map(|[value, slope]| vec![value, slope]);
         Self {
@@ -244,7 +244,7 @@ pub struct ForceTable {
     gap_factor: f64,
     force_factor: f64,
     damping_factor: f64,
-    /// The joint at which contact begins, where no two polynomials meet.
+    /// Joint at which contact begins, if no two polynomials meet there.
     contact: Option<usize>,
     /// Gaps of the first and of the last row.
     ends: [f64; 2],
@@ -260,12 +260,12 @@ pub struct ForceTable {
 const INTERVALS_PER_JOINT: usize = 4;
 
 impl ForceTable {
-    /// The curve through rows, touching at gap 0.
+    /// Creates the law of the curve through rows, with contact below gap 0.
     pub fn new(rows: &Rows) -> Self {
         Self::through(rows, &[0.0, 1.0, 1.0, 1.0])
     }
 
-    /// The curve through rows, with the parameters of its entry.
+    /// Creates the law of the curve through rows, with the parameters of its entry.
     pub(crate) fn through(rows: &Rows, parameters: &[f64; 4]) -> Self {
         let [contact_distance, gap_factor, force_factor, damping_factor] = *parameters;
         let gap = |row: usize| rows.points[row].0;
@@ -340,7 +340,7 @@ impl ForceTable {
         }
     }
 
-    /// Force and damping of the rows' own curves, each with its slope by the rows' gap.
+    /// Returns force and damping of the rows' own curves, each with its slope by the rows' gap.
     #[inline]
     fn curves(&self, branch: usize, gap: f64) -> [[f64; 2]; 2] {
         let branch = &self.branches[branch];
@@ -459,8 +459,8 @@ impl ForceLaw for ForceTable {
         down.into_iter().chain(up).collect()
     }
 
-    /// With the table's own curves P and γ it is
-    /// F = force_factor P(d / gap_factor) − damping_factor γ(d / gap_factor) ḋ.
+    /// Differentiates `F = force_factor P(d / gap_factor) − damping_factor γ(d / gap_factor) ḋ`
+    /// with the table's own curves `P` and `γ`.
     fn by_parameters(&self, branch: usize, gap: f64, rate: f64, out: &mut [f64]) {
         let [by_distance, by_gap, by_force, by_damping] = out else {
             return;
@@ -504,7 +504,7 @@ impl ForceLaw for ForceTable {
         Some((branch.beyond + inside) * self.force_factor * self.gap_factor)
     }
 
-    /// Where the whole branch lies below the contact distance.
+    /// Reports whether the whole branch lies below the contact distance.
     fn touches(&self, branch: usize) -> bool {
         let above = self.joints.get(branch);
         above.is_some_and(|joint| *joint <= self.contact_distance)

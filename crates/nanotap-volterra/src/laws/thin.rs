@@ -91,7 +91,7 @@ impl Thin {
         series(coefficients, ratio)
     }
 
-    /// `a0`, what multiplies `δ^p` on a half-space, and what `χ` is made with.
+    /// Computes `a0`, the factor of `δ^p` on a half-space, and the scale of `χ`.
     pub(crate) fn half_space<S: Scalar>(self, p: &[S]) -> [S; 3] {
         let (modulus, size, thickness, contact) = (p[0], p[1], p[2], p[3]);
         let (stiffness, scale) = match self.0 {
@@ -121,7 +121,7 @@ impl Formula for Thin {
         }
     }
 
-    /// `a0`, what multiplies `δ^p`, and what `χ` is made with.
+    /// Computes `a0`, the factor of `δ^p`, and the scale of `χ`.
     fn constants<S: Scalar>(&self, p: &[S]) -> Vec<S> {
         let [contact, stiffness, scale] = self.half_space(p);
         let stiffness = match self.0 {

@@ -47,7 +47,7 @@ pub static PUNCH: Entry = Entry {
     conservative: true,
 };
 
-/// `1/d^m` with `m` 2, 1, 3 for sphere, cone, punch.
+/// Returns `1/d^m` with `m` 2, 1, 3 for sphere, cone, punch.
 fn fall<S: Scalar>(shape: Shape, gap: S) -> S {
     let r = gap.recip();
     match shape {

@@ -57,8 +57,8 @@ impl Formula for RootViscosity {
     }
 }
 
-/// Decay lengths below zero gap from which exponential damping is out of range: there it is twenty
-/// times that at zero gap.
+/// Depth below zero gap, in decay lengths, from which exponential damping is out of range: there it
+/// is twenty times that at zero gap.
 const DEEPEST: f64 = 3.0;
 
 /// Formula `−γ₀ e^{−d/x} ḋ` of a damping that decays with the gap; see the module.
@@ -120,7 +120,7 @@ impl Formula for ExponentialDamping {
         Vec::new()
     }
 
-    /// The law is one of a gap; deep in a contact its damping has no meaning.
+    /// Remarks a contact so deep that the damping, which is derived for a gap, has no meaning.
     fn remarks(&self, p: &[f64], least_gap: f64) -> Vec<Remark> {
         let value = -least_gap / p[1];
         let deep = value > DEEPEST;

@@ -197,7 +197,7 @@ async function census(longest) {
       const item = document.createElement("li");
       const button = document.createElement("button");
       button.type = "button";
-      button.textContent = `${one.words}, amplitude ${one.shown}`;
+      button.textContent = `${one.words}, ${one.shown}`;
       button.dataset.amplitude = one.amplitude;
       button.addEventListener("click", () => {
         state.start = one.start;

@@ -72,18 +72,20 @@ fn listed(app: &App, census: &Census, control: &Control<'_>) -> Result<Value, Ap
     Ok(json!({ "motions": motions, "bound": bound(&found) }))
 }
 
-/// The amplitude as text; of a lever with its unit, and the peak force.
+/// The amplitude and the peak force of a lever, as an instrument reads them; without units half of
+/// peak to peak, which differs between motions of other periods too.
 fn shown(observables: &Observables, units: &Units) -> String {
     let text = |kind: Kind, value: f64| match units.si(kind) {
         Some(unit) => kind.format_digits(unit * value, 4),
         None => Kind::Number.format_digits(value, 4),
     };
-    let amplitude = text(Kind::Length, observables.amplitude);
     if units.si(Kind::Force).is_none() {
-        return amplitude;
+        let half = text(Kind::Length, observables.amplitude);
+        return format!("half of peak to peak {half}");
     }
+    let amplitude = text(Kind::Length, observables.first_harmonic);
     let force = text(Kind::Force, observables.peak_force);
-    format!("{amplitude}, peak force {force}")
+    format!("amplitude A {amplitude}, peak force {force}")
 }
 
 fn entry(orbit: &OrbitReport, period: Option<usize>, remark: &str, units: &Units) -> Value {

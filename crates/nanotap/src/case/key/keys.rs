@@ -315,13 +315,13 @@ Before from Parameter::COUNT => {
         ..PLAIN
     };
 
-    LeverName = other(Cantilever, "lever", Takes::LeverName, "a lever of the catalogue, for what is not said");
+    LeverName = other(Cantilever, "lever", Takes::LeverName, "a lever of the catalogue, whose values hold where none are given");
     LeverK = quantity(Cantilever, "k", Stiffness, R::POSITIVE, "static spring constant at the tip, 3EI/L³")
         .label("spring constant $k$");
     LeverK1 = quantity(Cantilever, "k1", Stiffness, R::POSITIVE, "stiffness of the first mode at the tip, as thermal tunes and point-mass models give it: 1.0302 k without a tip's mass");
     LeverF0 = quantity(Cantilever, "f0", Frequency, R::POSITIVE, "first free resonance, with the tip")
         .label("resonance frequency $f_0$");
-    LeverF2 = quantity(Cantilever, "f2", Frequency, R::POSITIVE, "second free resonance; without a tip's mass it tells that mass")
+    LeverF2 = quantity(Cantilever, "f2", Frequency, R::POSITIVE, "second free resonance, from which a tip mass that is not given follows")
         .feeds(Parameter::Mode2Frequency);
     LeverF3 = quantity(Cantilever, "f3", Frequency, R::POSITIVE, "third free resonance")
         .feeds(Parameter::Mode3Frequency);
@@ -353,7 +353,7 @@ Before from Parameter::COUNT => {
         .feeds(Parameter::Alpha1);
     TipShape = other(Tip, "shape", Takes::Word(&["cone", "pyramid", "sphere"]), "a solid tip, whose mass follows from its density")
         .feeds(Parameter::Alpha1);
-    TipHeight = quantity(Tip, "height", Length, R::POSITIVE, "height of the tip: what separates the beam from the sample when it touches");
+    TipHeight = quantity(Tip, "height", Length, R::POSITIVE, "height of the tip, which separates beam and sample when the tip touches");
     TipHalfAngle = quantity(Tip, "half_angle", Angle, FLANK, "angle between the tip's axis and its flank").called("half_angle")
         .such_as(0.35);
     TipDensity = quantity(Tip, "density", Density, R::POSITIVE, "density of the tip");
@@ -410,7 +410,7 @@ After from AFTER_LAWS => {
     SampleHamaker = quantity(Sample, "hamaker", Energy, R::ANY, "Hamaker constant of tip, medium and sample").under(Laws::Nonlinear).called("attraction")
         .label("Hamaker constant $H$")
         .such_as(6e-20);
-    SampleWorkOfAdhesion = quantity(Sample, "work_of_adhesion", Stiffness, R::NOT_NEGATIVE, "work of adhesion, an energy an area").under(Laws::Nonlinear)
+    SampleWorkOfAdhesion = quantity(Sample, "work_of_adhesion", Stiffness, R::NOT_NEGATIVE, "work of adhesion, an energy per area").under(Laws::Nonlinear)
         .label("work of adhesion $w$")
         .such_as(0.02);
     SampleWorkOfRetraction = quantity(
@@ -452,7 +452,7 @@ After from AFTER_LAWS => {
     SampleRepulsion = quantity(Sample, "repulsion", Repulsion, R::NOT_NEGATIVE, "constant of the repulsion (lennard-jones)").under(Laws::Nonlinear)
         .such_as(1e-78);
 
-    SampleDampingDistance = quantity(Sample, "damping_distance", Length, R::POSITIVE, "distance over which damping falls like a power of the gap (power-damping)").under(Laws::Nonlinear)
+    SampleDampingDistance = quantity(Sample, "damping_distance", Length, R::POSITIVE, "distance over which damping falls as a power of the gap (power-damping)").under(Laws::Nonlinear)
         .such_as(1e-9);
     SampleDampingExponent = quantity(Sample, "damping_exponent", Number, R::NOT_NEGATIVE, "power by which damping falls with the gap (power-damping)").under(Laws::Nonlinear)
         .such_as(3.0);

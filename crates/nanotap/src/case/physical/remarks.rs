@@ -10,8 +10,19 @@ use crate::model::drive_form::Actuation;
 use crate::model::exact_beam;
 use crate::model::parameter::Parameter;
 
-/// Largest gap or amplitude that is believed, in metres.
-const MOST_LENGTH: f64 = 1e-3;
+/// Quantities by section, their values in SI on real instruments, and the unit in which they are
+/// usually given.
+const PLAUSIBLE: [(Section, Kind, [f64; 2], &str); 9] = [
+    (Section::Cantilever, Kind::Stiffness, [0.0, 1e4], "N/m"),
+    (Section::Cantilever, Kind::Frequency, [500.0, 1e8], "kHz"),
+    (Section::Cantilever, Kind::Length, [0.0, 0.05], "um"),
+    (Section::Tip, Kind::Length, [0.0, 1e-3], "nm"),
+    (Section::Tip, Kind::Pressure, [1e3, 2e12], "GPa"),
+    (Section::Sample, Kind::Pressure, [1.0, 2e12], "GPa"),
+    (Section::Drive, Kind::Frequency, [1.0, 1e9], "kHz"),
+    (Section::Drive, Kind::Length, [0.0, 1e-3], "nm"),
+    (Section::Gap, Kind::Length, [0.0, 1e-3], "nm"),
+];
 
 impl Physical {
     /// All remarks, in the order in which the case is read.
@@ -60,24 +71,28 @@ impl Physical {
             )));
         }
         remarks.extend(self.clearance_remarks());
-        remarks.extend(Self::length_remarks(reader));
+        remarks.extend(Self::plausibility_remarks(reader));
         remarks
     }
 
-    /// Gaps and amplitudes that are too large for any lever: most likely a number in nanometres
-    /// without its unit.
-    fn length_remarks(reader: Reader<'_>) -> impl Iterator<Item = Remark> {
-        let sections = [Section::Gap, Section::Drive];
-        let keys = Key::all().filter(move |key| sections.contains(&key.section()));
-        keys.filter_map(move |key| match reader.stated.get(key)? {
-            Value::Number(value, Kind::Length) if *value > MOST_LENGTH => {
-                let value = Kind::Length.format(*value);
-                let meant = value.replace(" m", " nm").replace(" mm", " nm");
-                Some(Remark::warning(format!(
-                    "{key} is {value}; did you mean {meant}?"
-                )))
+    /// Values that no lever or sample has: most likely numbers without their unit, or with another
+    /// prefix.
+    fn plausibility_remarks(reader: Reader<'_>) -> impl Iterator<Item = Remark> {
+        Key::all().filter_map(move |key| {
+            let Value::Number(value, kind) = reader.stated.get(key)? else {
+                return None;
+            };
+            let rows = PLAUSIBLE.iter();
+            let mut rows = rows.filter(|(section, of, ..)| of == kind && *section == key.section());
+            let (.., [low, high], unit) = rows.next()?;
+            if *value == 0.0 || (*low..=*high).contains(&value.abs()) {
+                return None;
             }
-            _ => None,
+            let shown = kind.format(*value);
+            let number = shown.split(' ').next().unwrap_or_default();
+            Some(Remark::warning(format!(
+                "{key} is {shown}; did you mean {number} {unit}?"
+            )))
         })
     }
 

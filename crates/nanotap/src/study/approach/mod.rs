@@ -47,6 +47,9 @@ pub use quasistatic::{states_at, states_near};
 /// Where the default curve begins, in units of the tip's free reach: far enough to see the
 /// free motion, and branches that reach beyond it.
 const BEYOND: f64 = 1.25;
+/// Largest first distance of a sample that acts in contact only, in reaches of the free tip: a
+/// farther one takes its number of steps and shows nothing.
+const MAX_REACHES: f64 = 1e3;
 
 /// Amplitude at which a curve with a constant least distance ends, as a fraction of its first one.
 const LEAST_AMPLITUDE: f64 = 0.02;
@@ -293,7 +296,7 @@ pub fn approach(
         closest: None,
     };
     let free = FreeMotion::of(&case.model()?);
-    let distances = distances.values(&free)?;
+    let distances = distances.values(case, &free)?;
     let (from, to) = (distances[0], distances[distances.len() - 1]);
     let curve = Curve {
         case,
@@ -397,8 +400,13 @@ impl Distances {
     ///
     /// # Errors
     /// When there are fewer than two, or they do not descend.
-    pub(in crate::study) fn values(&self, free: &FreeMotion) -> Result<Vec<f64>, Error> {
+    pub(in crate::study) fn values(
+        &self,
+        case: &Case,
+        free: &FreeMotion,
+    ) -> Result<Vec<f64>, Error> {
         let closest = self.closest;
+        let shown = |distance| case.shown(case.gap_key(), distance);
         if self.points < 2 {
             return Err(Error::input(
                 format!(
@@ -420,10 +428,24 @@ impl Distances {
         if !(from.is_finite() && to.is_finite() && from > to) {
             return Err(Error::input(
                 format!(
-                    "an approach goes from far to near: it cannot go from {from} to {to}; the \
-                     first distance must be the greater, both finite"
+                    "an approach goes from far to near: it cannot go from {} to {}; the first \
+                     distance must be the greater, both finite",
+                    shown(from),
+                    shown(to)
                 ),
                 "change {from} or {to}",
+            ));
+        }
+        let reach = free.reach.max(to.abs());
+        if reach > 0.0 && from > MAX_REACHES * reach && case.model()?.nonlinear.is_none() {
+            return Err(Error::input(
+                format!(
+                    "the first distance is {}, but nothing acts on the tip beyond {}: it may be at \
+                     most {MAX_REACHES} times as far",
+                    shown(from),
+                    shown(reach)
+                ),
+                "leave out {from}, or give its unit",
             ));
         }
         if let Some(closest) = closest
@@ -431,8 +453,10 @@ impl Distances {
         {
             return Err(Error::input(
                 format!(
-                    "an oscillation that comes as near as {closest} has no amplitude at the \
-                     distance {to}: the last distance must be the greater"
+                    "an oscillation that comes as near as {} has no amplitude at the distance {}: \
+                     the last distance must be the greater",
+                    shown(closest),
+                    shown(to)
                 ),
                 "change {to} or {closest}",
             ));

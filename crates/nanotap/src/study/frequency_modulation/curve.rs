@@ -70,7 +70,7 @@ fn curve(
         points,
         closest,
     };
-    let distances = distances.values(&far)?;
+    let distances = distances.values(case, &far)?;
     let (from, to) = (distances[0], distances[distances.len() - 1]);
     let reach = free.reach / free.amplitude;
     // Where the least distance is kept, the amplitude of the first distance is held up to there.

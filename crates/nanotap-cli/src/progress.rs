@@ -248,10 +248,12 @@ fn words(work: Option<(Counted, Duration)>, elapsed: Duration, stopping: bool) -
                 noun,
                 ..
             } = work;
-            format!(
-                "{what}: {done} of {total} {noun}, about {} left",
-                duration(left)
-            )
+            let left = match done {
+                // What follows on all of them is not counted.
+                done if done >= total => format!("finishing, {so_far}"),
+                _ => format!("about {} left", duration(left)),
+            };
+            format!("{what}: {done} of {total} {noun}, {left}")
         }
         Some((work, _)) if work.total > 0 => {
             format!("{}: 0 of {} {}, {so_far}", work.what, work.total, work.noun)
@@ -312,6 +314,10 @@ mod tests {
             (
                 Some(counted(10, 40)),
                 "attractors: 10 of 40 starts, about 12 s left",
+            ),
+            (
+                Some(counted(40, 40)),
+                "attractors: 40 of 40 starts, finishing, 12 s so far",
             ),
         ] {
             let work = work.map(|work| (work, seconds(4)));

@@ -209,7 +209,11 @@ fn text(case: &GivenCase, report: &ApproachReport) -> String {
         .iter()
         .any(|p| p.classification == Classification::Transient);
     if report.hysteresis.is_empty() && settles && !report.cancelled {
-        text.push_str("  both ways show the same motions\n");
+        text.push_str(if report.compared {
+            "  both ways show the same motions\n"
+        } else {
+            "  no difference between the ways was found, but some motions are chaotic or undecided\n"
+        });
     }
     if let (Some(first), Some(last)) = (report.coexisting.first(), report.coexisting.last()) {
         let periods: BTreeSet<usize> = report.coexisting.iter().filter_map(|p| p.period).collect();

@@ -82,6 +82,10 @@ fn text(case: &GivenCase, report: &LeverReport) -> String {
             report.levers.len()
         )));
     }
+    text.push_str(&paragraph(
+        "states: stable motions found on the way of a slowly moved lever to the setpoint; `nanotap \
+         attractors` samples initial states and may find more",
+    ));
     text.push_str(&paragraph(&quality_factors(report)));
     // Levers with the same reason share a sentence.
     let mut reasons: Vec<(String, Vec<&str>)> = Vec::new();

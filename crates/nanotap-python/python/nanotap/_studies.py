@@ -257,6 +257,7 @@ def _approach_dataset(case: Case, report: dict[str, Any]) -> "xr.Dataset":
         parameter=name,
         hysteresis=json.dumps(report["hysteresis"]),
         jumps=json.dumps(report["jumps"]),
+        compared=int(report["compared"]),
         returned=int(report["returned"]),
     )
     if "modulation" in report:

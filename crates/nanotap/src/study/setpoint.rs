@@ -33,7 +33,7 @@ use super::FreeMotion;
 use super::approach::distance_sweep::{
     DistanceSweep, FoundMotion, Motion, Piece, Place, budget_text, is_same,
 };
-use super::approach::{MAX_MULTIPLIER, SETPOINT_PERIODS, Way, no_drive};
+use super::approach::{MAX_MULTIPLIER, SETPOINT_PERIODS, Way};
 use super::frequency_modulation::{self, FrequencyModulationOptions};
 use super::value::Amount;
 use crate::case::document::CaseDocument;
@@ -253,7 +253,7 @@ pub fn solve_setpoint(case: &Case, control: &Control<'_>) -> Result<SetpointRepo
     let setpoint = view.held.ok_or_else(none)?;
     let free = FreeMotion::of(&case.model()?);
     if !(free.reach > 0.0 && free.reach.is_finite()) {
-        return Err(no_drive());
+        return Err(nothing_to_hold());
     }
     if let Held::Shift(shift) = setpoint {
         return solve_shift(case, shift, &free, control);
@@ -473,7 +473,7 @@ pub(in crate::study) fn reached_distances(
     };
     let free = FreeMotion::of(&case.model()?);
     if !(free.reach > 0.0 && free.reach.is_finite()) {
-        return Err(no_drive());
+        return Err(nothing_to_hold());
     }
     let held = case.physical().and_then(|view| view.held);
     if matches!(held, Some(Held::Shift(_))) {
@@ -505,6 +505,14 @@ pub(in crate::study) fn reached_distances(
             Err(error) => Err(error.message()),
         })
         .collect())
+}
+
+/// The error of a setpoint where the drive does not move the tip.
+fn nothing_to_hold() -> Error {
+    Error::input(
+        "the drive does not move the tip, so that no setpoint can be held",
+        "give drive.free_amplitude",
+    )
 }
 
 /// Finds the distances at which frequency shifts are reached, on an approach for each case.

@@ -443,6 +443,52 @@ fn chaotic_motions_are_reported_as_chaotic() {
     assert_eq!(report.table.len(), 8);
 }
 
+/// On the way back the lever leaves a motion of period 5, which no branch follows, for the repulsive
+/// branch: rows at 2 and 2.45 nm show phases of 177° and 6.6°. A long table does not take the steps
+/// of the comparison.
+#[test]
+fn ways_that_differ_are_never_said_to_be_the_same() {
+    let lever = studied(
+        "[model]\nmodes = 2\n[cantilever]\nlever = \"PPP-FM\"\nQ = 180\n[sample]\nlaw = \"dmt\"\n\
+         modulus = \"2 GPa\"\npoisson = 0.35\nhamaker = \"8e-20 J\"\n\
+         intermolecular_distance = \"0.165 nm\"\n[drive]\nfrequency_ratio = 1\n\
+         free_amplitude = \"30 nm\"\n[gap]\ntip = \"10 nm\"\n",
+        &[],
+    );
+    let options = ApproachOptions {
+        from: Some("11 nm".into()),
+        to: Some("2 nm".into()),
+        points: 21,
+        branches: false,
+        ..ApproachOptions::default()
+    };
+    let report = curve(&lever, &options);
+    // Both ways are on no branch from 2 nm to the jump, and were not compared there.
+    assert!(!report.compared);
+    let nanometres = report.parameter_unit.as_ref().unwrap().si * 1e9;
+    let [interval] = report.hysteresis.as_slice() else {
+        panic!("{:?}", report.hysteresis);
+    };
+    let (near, far) = (nanometres * interval.near, nanometres * interval.far);
+    assert!(
+        (near - 2.04).abs() < 0.01 && (far - 11.0).abs() < 1e-9,
+        "{near} {far}"
+    );
+    let back: Vec<_> = report
+        .jumps
+        .iter()
+        .filter(|jump| jump.way == Way::Retract)
+        .collect();
+    let [jump] = back.as_slice() else {
+        panic!("{:?}", report.jumps);
+    };
+    assert_eq!((jump.before.period, jump.after.period), (Some(5), Some(1)));
+    let at = nanometres * jump.gap;
+    assert!(at > 2.0 && at <= near + 1e-9, "{at}");
+    let phase = |point: &ApproachPoint| point.observables.as_ref().unwrap().phase;
+    assert!(phase(&jump.before) > 170.0 && phase(&jump.after) < 10.0);
+}
+
 /// Invalid requests are refused.
 #[test]
 fn invalid_curves_are_refused() {

@@ -233,6 +233,9 @@ pub struct ApproachReport {
     pub beam_clearance: Option<f64>,
     /// Intervals in which approach and retract differ, with ends as exact as those of the branches.
     pub hysteresis: Vec<Hysteresis>,
+    /// Whether approach and retract were compared at all distances. If not, as where the motions are
+    /// chaotic or undecided, they may differ at others than those of `hysteresis`.
+    pub compared: bool,
     /// Whether the retract ends in the motion with which the approach began; if not, the approach
     /// began too near.
     pub returned: bool,
@@ -322,6 +325,7 @@ pub fn approach(
         free_reach: free.reach,
         beam_clearance: beam_clearance(case, &found.table),
         hysteresis: found.hysteresis,
+        compared: found.compared,
         returned: returned(&found.table, speed, free.amplitude),
         table: found.table,
         jumps: found.jumps,
@@ -417,7 +421,11 @@ impl Distances {
             ));
         }
         if self.from.is_none() && !(free.reach > 0.0 && free.reach.is_finite()) {
-            return Err(no_drive());
+            return Err(Error::input(
+                "the drive does not move the tip, so that no distance says where the curve should \
+                 begin; give it",
+                "give {from}",
+            ));
         }
         let from = self.from.unwrap_or(BEYOND * free.reach);
         let to = match (self.to, closest) {
@@ -472,15 +480,6 @@ impl Distances {
         };
         Ok((0..self.points).map(|k| between(k as f64 / last)).collect())
     }
-}
-
-/// The error of a drive that does not move the tip.
-pub(in crate::study) fn no_drive() -> Error {
-    Error::input(
-        "the drive does not move the tip, so that no distance says where the curve should begin; \
-         give it",
-        "give {from}",
-    )
 }
 
 /// Distances and speed of a curve.

@@ -22,6 +22,8 @@ pub(super) struct Found {
     pub(super) jumps: Vec<StateJump>,
     pub(super) coexisting: Vec<ApproachPoint>,
     pub(super) hysteresis: Vec<Hysteresis>,
+    /// Whether the two ways were compared everywhere.
+    pub(super) compared: bool,
     pub(super) branches: Option<BranchReport>,
     /// Why less was followed than there is.
     pub(super) limits: Vec<String>,
@@ -30,6 +32,8 @@ pub(super) struct Found {
 /// Steps of the approximate flow after which no more rows are measured, for every hundred distances,
 /// so that a longer table is measured as completely.
 const ROW_STEPS: u64 = 30_000_000;
+/// Steps that finding jumps and comparing the two ways may take.
+const COMPARISON_STEPS: u64 = 10_000_000;
 /// Steps that branches may take.
 const BRANCH_STEPS: u64 = 10_000_000;
 /// Points that the branches through a curve have all together, mostly; where steps suffice for fewer,
@@ -101,15 +105,29 @@ pub(super) fn found(
         (none, place)
     };
     let not_followed = sweep.spent_budget().map(budget_text);
+    let not_followed_text = not_followed.as_deref().unwrap_or(NOT_FOLLOWED);
+    // A long table must not take the steps that tell whether the two ways differ.
+    sweep.allow_steps(COMPARISON_STEPS);
+    let written = Written {
+        curve,
+        sweep: &sweep,
+        ways: &ways,
+        distances,
+        not_followed: not_followed_text,
+    };
+    let jumps = written.jumps(free.amplitude)?;
+    let (hysteresis, compared) = written.hysteresis(free.amplitude)?;
+    let not_compared = sweep
+        .spent_budget()
+        .map(|steps| format!("the two ways were compared {}", up_to_budget(steps)));
     sweep.allow_steps(ROW_STEPS * (distances.len() as u64).div_ceil(100));
     let written = Written {
         curve,
         sweep: &sweep,
         ways: &ways,
         distances,
-        not_followed: not_followed.as_deref().unwrap_or(NOT_FOLLOWED),
+        not_followed: not_followed_text,
     };
-    let jumps = written.jumps()?;
     let table = match curve.speed {
         Some(speed) => ramp(curve, speed, distances, &sweep.state(&first), control)?,
         None => written.table(control)?,
@@ -118,13 +136,14 @@ pub(super) fn found(
         None => written.coexisting(&table)?,
         Some(_) => Vec::new(),
     };
-    let hysteresis = written.hysteresis(free.amplitude)?;
     let not_measured = sweep.spent_budget().map(Written::not_measured);
     let (branches, cut) = branches(curve, &mut sweep, range, control)?;
-    let limits = [not_followed, not_measured, cut].into_iter().flatten();
+    let limits = [not_followed, not_compared, not_measured, cut].into_iter();
+    let limits = limits.flatten();
     Ok(Found {
         jumps,
         hysteresis,
+        compared,
         branches,
         table,
         coexisting,
@@ -343,25 +362,34 @@ impl Written<'_> {
         Ok(rows.filter(|_| complete).collect())
     }
 
-    fn jumps(&self) -> Result<Vec<StateJump>, CaseError> {
+    fn jumps(&self, free_amplitude: f64) -> Result<Vec<StateJump>, CaseError> {
         let mut jumps = Vec::new();
         for (way, pieces) in self.ways.each() {
             for pair in pieces.windows(2).filter(|pair| pair[0].jumps) {
                 let (before, after) = (&pair[0], &pair[1]);
                 let view = self.curve.case.physical();
                 let row = |piece: &Piece, gap| self.row(way, gap, self.sweep.motion_at(piece, gap));
-                let (from, to) = (row(before, before.to)?, row(after, after.entered)?);
-                // What did not close on the grid may have come to the same orbit already.
+                let (mut from, mut to) = (row(before, before.to)?, row(after, after.entered)?);
+                let (mut gap, mut uncertainty) = (before.to, before.uncertainty);
+                // What did not close on the grid may have come to the same orbit already, at once
+                // or by a jump on the way.
                 let orbits = from.orbit.as_ref().zip(to.orbit.as_ref());
                 if from.gap == to.gap && orbits.is_some_and(|(a, b)| is_same(a, b)) {
-                    continue;
+                    let Some([last, next]) = self.parting(before, after) else {
+                        continue;
+                    };
+                    (from, to) = (row(before, last)?, row(before, next)?);
+                    (gap, uncertainty) = (next, (next - last).abs());
+                    if apart(&from, &to) <= JUMP * free_amplitude {
+                        continue;
+                    }
                 }
                 jumps.push(StateJump {
                     way,
-                    gap: before.to,
-                    zc: view.map(|view| before.to * view.scales.length),
-                    uncertainty: before.uncertainty,
-                    zc_uncertainty: view.map(|view| before.uncertainty * view.scales.length),
+                    gap,
+                    zc: view.map(|view| gap * view.scales.length),
+                    uncertainty,
+                    zc_uncertainty: view.map(|view| uncertainty * view.scales.length),
                     reason: before.end.to_string(),
                     before: from,
                     after: to,
@@ -371,27 +399,52 @@ impl Written<'_> {
         Ok(jumps)
     }
 
-    /// The intervals in which the two ways show different motions.
-    fn hysteresis(&self, free_amplitude: f64) -> Result<Vec<Hysteresis>, CaseError> {
+    /// The last distance on the grid at which the motion of a piece is not yet on the stretch that
+    /// comes after it, and the next; `None` if it is there from the first.
+    fn parting(&self, before: &Piece, after: &Piece) -> Option<[f64; 2]> {
+        let (Motion::OnGrid(found), Motion::Periodic(stretch)) = (&before.motion, &after.motion)
+        else {
+            return None;
+        };
+        let arrived = |(gap, _): &(f64, FoundMotion)| {
+            let orbit = self.sweep.stretches[*stretch].holds(*gap);
+            let orbit = orbit.then(|| self.sweep.orbit_at(*stretch, *gap)).flatten();
+            let here = self.sweep.motion_at(before, *gap).orbit;
+            here.zip(orbit).is_some_and(|(a, b)| is_same(&a, &b))
+        };
+        let first = found.partition_point(|place| !arrived(place));
+        let last = found.get(first.checked_sub(1)?)?.0;
+        Some([last, found.get(first).map_or(before.to, |(gap, _)| *gap)])
+    }
+
+    /// The intervals in which the two ways show different motions, and whether the ways were
+    /// compared everywhere.
+    fn hysteresis(&self, free_amplitude: f64) -> Result<(Vec<Hysteresis>, bool), CaseError> {
         let (from, to) = (self.distances[0], self.distances[self.distances.len() - 1]);
         let pieces = || self.ways.each().into_iter().flat_map(|(_, pieces)| pieces);
         let mut ends: Vec<f64> = pieces().flat_map(|p| [p.from, p.to]).collect();
         ends.sort_by(|a, b| b.total_cmp(a));
         ends.dedup_by(|a, b| (*a - *b).abs() <= 1e-9 * (from - to));
-        let intervals: Result<Vec<_>, CaseError> = ends
-            .par_windows(2)
-            .with_max_len(1)
-            .map(|pair| {
-                Ok((
-                    pair,
-                    self.difference_between(pair[1], pair[0], free_amplitude)?,
-                ))
-            })
+        // Intervals on branches take few steps and come first. Those compared before the budget is
+        // spent do not depend on threads, since they are compared in turn.
+        let mut intervals: Vec<_> = ends
+            .windows(2)
+            .map(|pair| (pair, Comparison::Unknown))
             .collect();
+        intervals.sort_by_key(|(pair, _)| !self.is_on_branches(0.5 * (pair[0] + pair[1])));
+        for (pair, comparison) in &mut intervals {
+            let compared = self.compared(pair[1], pair[0], free_amplitude)?;
+            if self.sweep.spent_budget().is_some() {
+                break;
+            }
+            *comparison = compared;
+        }
+        intervals.sort_by(|(a, _), (b, _)| b[0].total_cmp(&a[0]));
+        let unknown = |(_, one): &(_, Comparison)| matches!(one, Comparison::Unknown);
+        let compared = !intervals.is_empty() && !intervals.iter().any(unknown);
         let mut found: Vec<Hysteresis> = Vec::new();
-        let complete = self.sweep.spent_budget().is_none();
-        for (pair, difference) in intervals?.into_iter().filter(|_| complete) {
-            let Some(difference) = difference else {
+        for (pair, comparison) in intervals {
+            let Comparison::Different(difference) = comparison else {
                 continue;
             };
             match found.last_mut() {
@@ -407,25 +460,36 @@ impl Written<'_> {
                 }),
             }
         }
-        Ok(found)
+        Ok((found, compared))
     }
 
-    /// How much the two ways differ between two distances, on each of which they are on one piece.
-    fn difference_between(
-        &self,
-        near: f64,
-        far: f64,
-        free_amplitude: f64,
-    ) -> Result<Option<f64>, CaseError> {
-        let middle = 0.5 * (near + far);
-        let on = |(_, pieces): (Way, &[Piece])| pieces.iter().find(|p| p.holds(middle)).cloned();
-        let [Some(there), Some(back)] = self.ways.each().map(on) else {
-            return Ok(None);
+    /// The pieces of the two ways at a distance.
+    fn pieces_at(&self, gap: f64) -> [Option<&Piece>; 2] {
+        let at = |(_, pieces): (Way, &'_ [Piece])| pieces.iter().position(|p| p.holds(gap));
+        let [there, back] = self.ways.each().map(at);
+        [
+            there.map(|k| &self.ways.approach[k]),
+            back.map(|k| &self.ways.retract[k]),
+        ]
+    }
+
+    /// Whether both ways are on branches at a distance.
+    fn is_on_branches(&self, gap: f64) -> bool {
+        let is_on = |piece: Option<&Piece>| {
+            piece.is_some_and(|piece| matches!(piece.motion, Motion::Periodic(_)))
+        };
+        self.pieces_at(gap).into_iter().all(is_on)
+    }
+
+    /// Compares the two ways between two distances, where each is on one piece.
+    fn compared(&self, near: f64, far: f64, free_amplitude: f64) -> Result<Comparison, CaseError> {
+        let [Some(there), Some(back)] = self.pieces_at(0.5 * (near + far)) else {
+            return Ok(Comparison::Unknown);
         };
         let on_grid = |piece: &Piece| matches!(piece.motion, Motion::OnGrid(_));
-        let shares: Vec<f64> = match (on_grid(&there), on_grid(&back)) {
-            (true, true) => return Ok(None),
-            (false, false) if there.is_on_stretch_of(&back) => return Ok(None),
+        let shares: Vec<f64> = match (on_grid(there), on_grid(back)) {
+            (true, true) => return Ok(Comparison::Unknown),
+            (false, false) if there.is_on_stretch_of(back) => return Ok(Comparison::Same),
             (false, false) => (0..COMPARED)
                 .map(|k| k as f64 / (COMPARED - 1) as f64)
                 .collect(),
@@ -433,16 +497,52 @@ impl Written<'_> {
                 .map(|k| (k as f64 + 0.5) / COMPARED_ON_GRID as f64)
                 .collect(),
         };
-        let gaps = shares.into_iter().map(|t| near * (1.0 - t) + far * t);
-        let mut largest: Option<f64> = None;
-        for gap in gaps {
-            let row = |way, piece| self.row(way, gap, self.sweep.motion_at(piece, gap));
-            let (a, b) = (row(Way::Approach, &there)?, row(Way::Retract, &back)?);
-            let apart = difference(&a, &b, free_amplitude);
-            largest = apart.map_or(largest, |x| Some(largest.map_or(x, |y| y.max(x))));
-        }
-        Ok(largest)
+        let rows: Result<Vec<_>, CaseError> = shares
+            .into_par_iter()
+            .with_max_len(1)
+            .map(|share| {
+                let gap = near * (1.0 - share) + far * share;
+                let row = |way, piece| self.row(way, gap, self.sweep.motion_at(piece, gap));
+                Ok((row(Way::Approach, there)?, row(Way::Retract, back)?))
+            })
+            .collect();
+        let rows = rows?;
+        let apart = rows
+            .iter()
+            .filter_map(|(a, b)| difference(a, b, free_amplitude));
+        let undecided = |row: &ApproachPoint| row.classification == Classification::Undecided;
+        Ok(match apart.reduce(f64::max) {
+            Some(largest) => Comparison::Different(largest),
+            None if rows.iter().any(|(a, b)| undecided(a) || undecided(b)) => Comparison::Unknown,
+            None => Comparison::Same,
+        })
     }
+}
+
+/// Least change of the lock-in's reading, in free amplitudes, that is a jump where a motion comes to
+/// an orbit between two distances of the grid.
+const JUMP: f64 = 0.02;
+
+/// The distance between two motions in the plane of a lock-in amplifier; 0 where one is undecided.
+fn apart(a: &ApproachPoint, b: &ApproachPoint) -> f64 {
+    let reading = |point: &ApproachPoint| {
+        let seen = point.observables.as_ref()?;
+        let (sin, cos) = nanotap_arithmetic::sin_cos(seen.phase.to_radians());
+        Some((seen.first_harmonic * cos, seen.first_harmonic * sin))
+    };
+    let readings = reading(a).zip(reading(b));
+    readings.map_or(0.0, |((x, y), (u, v))| {
+        nanotap_arithmetic::hypot(x - u, y - v)
+    })
+}
+
+/// What is known of the two ways between two distances.
+enum Comparison {
+    Same,
+    /// The amplitudes differ by up to this, in the model's unit of length.
+    Different(f64),
+    /// A motion is undecided, or neither way is on a branch.
+    Unknown,
 }
 
 /// Why a row is undecided.

@@ -176,6 +176,7 @@ fn curve(
         free_reach: free.reach,
         beam_clearance: beam_clearance(case, &table),
         hysteresis: hysteresis(&table, difference),
+        compared: ended.is_empty() && !control.is_cancelled(),
         returned: returned(&table),
         table,
         coexisting: Vec::new(),

@@ -11,6 +11,7 @@ use nanotap::figure::approach::approach_figure;
 use nanotap::number::shortest;
 use nanotap::observe::table::shown_phase;
 use nanotap::observe::{ObservableSet, Observables, columns};
+use nanotap::study::Study;
 use nanotap::study::approach::{ApproachPoint, ApproachReport, ApproachStudy};
 use nanotap::study::frequency_modulation::{COLUMNS, ModulatedColumn, ModulationReport};
 use nanotap::study::simulate::Classification;
@@ -47,8 +48,20 @@ struct Written<'a> {
 }
 
 pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure> {
-    let (request, case) = arguments.study.read(output)?;
-    let mut report = progress::study::<ApproachStudy>(&case, &request, &arguments.threads)?;
+    let study = &arguments.study;
+    let (request, case) = study.read(output)?;
+    let report = progress::study::<ApproachStudy>(&case, &request, &arguments.threads)?;
+    print(report, &case, study, arguments.points, output)
+}
+
+/// Writes table and figure of a curve of distances and prints it.
+pub(super) fn print<S: Study>(
+    mut report: ApproachReport,
+    case: &GivenCase,
+    study: &StudyArguments<S>,
+    points: PointsArgument,
+    output: &Output,
+) -> Result<(), Failure> {
     if report.cancelled {
         output.warning("stopped before it was done");
     }
@@ -61,19 +74,18 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
              sample: the model does not hold there",
         );
     }
-    arguments.study.out.write(|| csv(&report, &case.units()))?;
-    arguments
-        .study
+    study.out.write(|| csv(&report, &case.units()))?;
+    study
         .plot
         .draw(|| approach_figure(&report, &case.units()))?;
     if let Some(branches) = &mut report.branches {
-        arguments.points.shorten(branches, output);
+        points.shorten(branches, output);
     }
     let written = Written {
-        path: arguments.study.out.out.clone(),
+        path: study.out.out.clone(),
         report: &report,
     };
-    output.study(&case, &written, |_| text(&case, &report))
+    output.study(case, &written, |_| text(case, &report))
 }
 
 /// The table as CSV: one row per distance in both directions, then the coexisting motions.
@@ -218,11 +230,15 @@ fn text(case: &GivenCase, report: &ApproachReport) -> String {
     if let (Some(first), Some(last)) = (report.coexisting.first(), report.coexisting.last()) {
         let periods: BTreeSet<usize> = report.coexisting.iter().filter_map(|p| p.period).collect();
         let periods: Vec<String> = periods.iter().map(ToString::to_string).collect();
+        let [near, far] = [last, first].map(|p| shown(Kind::Length, p.gap));
+        let place = if near == far {
+            format!("at {near}")
+        } else {
+            format!("from {near} to {far}")
+        };
         text.push_str(&motion::paragraph(&format!(
-            "from {} to {} further motions attract that neither way met (period {}): --out and \
-             --plot have them",
-            shown(Kind::Length, last.gap),
-            shown(Kind::Length, first.gap),
+            "{place} further motions attract that neither way met (period {}): --out and --plot \
+             have them",
             periods.join(", ")
         )));
     }

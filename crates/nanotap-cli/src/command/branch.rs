@@ -77,7 +77,7 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
 }
 
 /// How many points of branches a document lists.
-#[derive(Args, Clone, Copy, Debug)]
+#[derive(Args, Clone, Copy, Debug, Default)]
 pub(crate) struct PointsArgument {
     /// List every point of the branches in the JSON document, whatever its length
     #[arg(long)]

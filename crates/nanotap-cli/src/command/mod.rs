@@ -11,6 +11,7 @@ mod contact_laws;
 mod convergence;
 mod explore;
 mod fit;
+mod fm;
 mod force_curve;
 mod generate;
 mod lever;
@@ -117,6 +118,8 @@ pub(crate) enum Own {
     Branch(branch::Arguments),
     /// Compute amplitude, phase, force and energy against the distance, both ways
     Approach(approach::Arguments),
+    /// Compute frequency shift and excitation against the distance, both ways
+    Fm(fm::Arguments),
     /// Compute a force curve at a finite speed, with its static branches
     ForceCurve(force_curve::Arguments),
     /// Compare levers of the catalogue on the sample of a case
@@ -172,6 +175,7 @@ pub(crate) fn run(command: &Command, output: &Output) -> Result<(), Failure> {
         Own::Attractors(arguments) => attractors::run(arguments, output),
         Own::Branch(arguments) => branch::run(arguments, output),
         Own::Approach(arguments) => approach::run(arguments, output),
+        Own::Fm(arguments) => fm::run(arguments, output),
         Own::ForceCurve(arguments) => force_curve::run(arguments, output),
         Own::Lever(arguments) => lever::run(arguments, output),
         Own::Noise(arguments) => noise::run(arguments, output),

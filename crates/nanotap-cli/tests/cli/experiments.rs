@@ -71,6 +71,27 @@ fn an_approach_curve_has_approach_and_retract() {
 }
 
 #[test]
+fn frequency_modulation_is_a_command_with_the_curve_of_an_approach() {
+    let folder = Folder::new();
+    folder.write("lever.toml", STIFF);
+    let range = ["--from", "22 nm", "--to", "20.5 nm", "--points", "4"];
+    let run = |first: &[&str], name: &str| {
+        let [table, figure] = ["csv", "svg"].map(|ending| format!("{name}.{ending}"));
+        let files = ["--out", &table, "--plot", &figure, "--threads", "1"];
+        let said = folder.run(&[first, &["lever.toml"], &range, &files].concat());
+        assert_eq!(said.code, 0, "{}", said.stderr);
+        let [table, figure] = [table, figure].map(|path| {
+            let path = folder.path().join(path);
+            std::fs::read_to_string(path).unwrap()
+        });
+        (said.stdout, table, figure)
+    };
+    let fm = run(&["fm"], "fm");
+    assert_eq!(fm, run(&["approach", "--fm"], "approach"));
+    assert!(fm.0.contains("first order"), "{}", fm.0);
+}
+
+#[test]
 fn invalid_approach_requests_are_refused() {
     let folder = Folder::new();
     folder.write("lever.toml", STIFF);

@@ -16,6 +16,7 @@
 
 use crate::Error;
 use crate::case::near_name::near_name;
+use crate::case::physical::Kind;
 use crate::case::{Case, Key};
 use crate::observe::OBSERVABLES;
 use crate::study::approach::Way;
@@ -204,7 +205,7 @@ impl Data {
         let headers: Vec<Header> = table.columns.iter().map(|(h, _)| Header::of(h)).collect();
         let chosen = |header: &Header, written: &str| {
             only.is_empty()
-                || matches!(header.name.as_str(), "direction" | "way" | "curve")
+                || header.label().is_some()
                 || only.iter().any(|name| {
                     name == written || *name == header.name || header.error_of() == Some(name)
                 })
@@ -222,8 +223,9 @@ impl Data {
                 ));
             }
         }
-        let has = |name: &str| headers.iter().any(|header| header.name == name);
-        let own_amplitude = has("first_harmonic") || has("A");
+        let own_amplitude = headers.iter().any(|header| {
+            Quantity::named(&header.name, true).is_some_and(|q| q.name() == "first_harmonic")
+        });
         let mut roles: Vec<Role> = Vec::new();
         for (index, header) in headers.iter().enumerate() {
             let counts = if of_approach(&headers) {
@@ -539,15 +541,47 @@ impl Role {
 }
 
 impl Header {
-    fn error_of(&self) -> Option<&str> {
-        self.name.strip_suffix(" error").map(str::trim)
+    /// The quantity whose standard errors the column contains.
+    pub(super) fn error_of(&self) -> Option<&str> {
+        let start = self.name.len().checked_sub(" error".len())?;
+        let (of, end) = self.name.split_at_checked(start)?;
+        end.eq_ignore_ascii_case(" error").then(|| of.trim())
+    }
+
+    /// The role of a column that tells rows apart.
+    fn label(&self) -> Option<Role> {
+        match self.name.to_lowercase().as_str() {
+            "direction" | "way" => Some(Role::Way),
+            "curve" => Some(Role::Curve),
+            _ => None,
+        }
+    }
+
+    /// Whether the column is understood: a label, a quantity or a key of the case.
+    pub(super) fn is_known(&self, case: &Case) -> bool {
+        let name = self.error_of().unwrap_or(&self.name);
+        self.label().is_some() || Quantity::named(name, true).is_some() || set(name, case).is_ok()
+    }
+
+    /// Whether the column sets the position of its rows.
+    pub(super) fn is_position(&self, case: &Case) -> bool {
+        self.label().is_none()
+            && Quantity::named(&self.name, true).is_none()
+            && set(&self.name, case).is_ok()
+    }
+
+    /// Whether its values are lengths.
+    pub(super) fn is_length(&self, case: &Case) -> bool {
+        let kind = match Quantity::named(&self.name, true) {
+            Some(quantity) => quantity.kind(),
+            None => set(&self.name, case).ok().map(Key::kind),
+        };
+        case.is_physical() && kind == Some(Kind::Length)
     }
 
     fn role(&self, case: &Case, own_amplitude: bool) -> Result<Role, Error> {
-        match self.name.as_str() {
-            "direction" | "way" => return Ok(Role::Way),
-            "curve" => return Ok(Role::Curve),
-            _ => {}
+        if let Some(label) = self.label() {
+            return Ok(label);
         }
         if let Some(of) = self.error_of() {
             let column = Self {

@@ -164,15 +164,12 @@ fn leave_out(case: &Case, table: &mut Table, columns: &[String], notes: &mut Vec
     }
     let mut lost = Vec::new();
     table.columns.retain(|(written, _)| {
-        let name = Header::of(written).name;
-        let plain = name.strip_suffix(" error").unwrap_or(&name).trim();
-        let known = matches!(plain, "direction" | "way" | "curve")
-            || Quantity::named(plain, true).is_some()
-            || data::set(plain, case).is_ok();
-        if !known {
-            lost.push(format!("`{name}`"));
+        let header = Header::of(written);
+        let is_known = header.is_known(case);
+        if !is_known {
+            lost.push(format!("`{}`", header.name));
         }
-        known
+        is_known
     });
     if !lost.is_empty() {
         let (name, lost) = (&table.name, lost.join(", "));
@@ -493,8 +490,9 @@ fn force_curve(
 ) -> Result<(), Error> {
     let remove = |table: &mut Table, names: &[&str]| {
         table.columns.retain(|(written, _)| {
-            let name = Header::of(written).name.to_lowercase();
-            !names.contains(&name.strip_suffix(" error").unwrap_or(&name).trim())
+            let header = Header::of(written);
+            let name = header.error_of().unwrap_or(&header.name).to_lowercase();
+            !names.contains(&name.as_str())
         });
     };
     if columns.is_empty() && oscillates(table) {
@@ -774,12 +772,11 @@ fn is_curve(case: &Case, table: &Table, places: &Places) -> bool {
     };
     varies(places.distance)
         && columns.all(|(place, (written, _))| {
-            let name = Header::of(written).name;
+            let header = Header::of(written);
+            let name = header.name.to_lowercase();
             place == places.distance
                 || !matches!(name.as_str(), "curve" | "classification")
-                    && (Quantity::named(&name, true).is_some()
-                        || data::set(&name, case).is_err()
-                        || !varies(place))
+                    && (!header.is_position(case) || !varies(place))
         })
 }
 

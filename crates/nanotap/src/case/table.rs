@@ -164,8 +164,14 @@ impl Header {
         let parts = [('(', ')'), ('[', ']')]
             .into_iter()
             .find_map(|(open, close)| {
-                let (name, rest) = written.split_once(open)?;
-                Some((name, rest.strip_suffix(close)?))
+                let inner = written.strip_suffix(close)?;
+                let mut depth = 0;
+                let (place, _) = inner.char_indices().rev().find(|(_, c)| {
+                    let found = *c == open && depth == 0;
+                    depth += i32::from(*c == close) - i32::from(*c == open);
+                    found
+                })?;
+                Some((&inner[..place], &inner[place + 1..]))
             });
         let (name, unit) = parts.unwrap_or((written, ""));
         Self {
@@ -218,6 +224,7 @@ impl Serialize for Table {
 impl<'de> Deserialize<'de> for Table {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         #[derive(Deserialize)]
+    /// The last pair of brackets contains the unit, as in `Height (measured) (m)`.
         #[serde(deny_unknown_fields)]
         struct Given {
             #[serde(default)]
@@ -232,6 +239,11 @@ impl<'de> Deserialize<'de> for Table {
                 .map_err(|_| D::Error::custom(format!("{header}: a list is needed")))?;
             Ok((header, entries))
         };
+
+    /// Whether a column with the header `written` is called `name`, with or without its unit.
+    pub(crate) fn is_called(written: &str, name: &str) -> bool {
+        written == name || Self::of(written).name == name
+    }
         let columns = given.columns.into_iter().map(column);
         Ok(Self {
             name: given.name.unwrap_or_else(|| "data".to_owned()),

@@ -151,7 +151,7 @@ pub(crate) fn prepared(
 /// Keeps the selection of a column that is renamed.
 fn follow(columns: &mut [String], before: &str, after: &str) {
     for column in columns {
-        if Header::of(column).name == before {
+        if Header::is_called(column, before) || Header::is_called(before, column) {
             after.clone_into(column);
         }
     }
@@ -198,7 +198,7 @@ impl Conversion {
         let (name, rule) = text
             .split_once('=')
             .ok_or_else(|| wrong(format!("`{text}` has no `=`")))?;
-        let (name, rule) = (Header::of(name).name, rule.trim());
+        let (name, rule) = (name.trim().to_owned(), rule.trim());
         if name.is_empty() || rule.is_empty() {
             return Err(wrong(format!("`{text}` has an empty side")));
         }
@@ -241,7 +241,7 @@ impl Conversion {
 
     /// Notes what the conversion states.
     fn note(&self, stated: &mut Stated) {
-        let plain = plain(&self.name);
+        let plain = plain(&Header::of(&self.name).name);
         let known = NAMES.iter().find(|(own, _)| *own == plain);
         let name = self.renamed.as_deref().or(known.map(|(_, name)| *name));
         stated.any = true;
@@ -258,10 +258,12 @@ impl Conversion {
 
     /// Converts the column of `table` that has the name, if one does.
     fn apply(&self, table: &mut Table) -> Result<bool, Error> {
-        let is = |(written, _): &(String, Vec<Entry>)| {
-            *written == self.name || Header::of(written).name == self.name
+        let place = |name: &str| {
+            let mut columns = table.columns.iter();
+            columns.position(|(written, _)| Header::is_called(written, name))
         };
-        let Some(place) = table.columns.iter().position(is) else {
+        let place = place(&self.name).or_else(|| place(&Header::of(&self.name).name));
+        let Some(place) = place else {
             return Ok(false);
         };
         let header = Header::of(&table.columns[place].0);

@@ -9,6 +9,7 @@ use serde::de::Error as _;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use serde_json::{Map, Value, json};
 
+use super::quantity::Quantity;
 use crate::Error;
 
 /// Most rows of a table.
@@ -42,9 +43,11 @@ pub struct Table {
 }
 
 impl Table {
-    /// Reads an instrument's file (`.ibw`, `.jpk-force`, `.nid`) or a CSV file. Fields of a CSV
-    /// file are separated by commas, semicolons or tabs, its first line names the columns, and
-    /// lines that begin with `#` are skipped.
+    /// Reads an instrument's file (`.ibw`, `.jpk-force`, `.nid`) or a CSV file, in UTF-8 or in
+    /// UTF-16 with a byte order mark. Fields of a CSV file are separated by commas, semicolons or
+    /// tabs, its first line names the columns, the next may contain their units, and lines that
+    /// begin with `#` are skipped. Where commas in numbers cannot be separators, they are decimal
+    /// commas, which `notes` states.
     ///
     /// # Errors
     /// When the file cannot be read or is not such a table; the message has line and column.
@@ -63,9 +66,9 @@ impl Table {
         if let Some(recorded) = super::recording::parse(&name, &bytes) {
             return recorded;
         }
-        let text = String::from_utf8(bytes).map_err(|_| {
+        let text = text_of(bytes).ok_or_else(|| {
             Error::input(
-                format!("{name} is not a text (UTF-8)"),
+                format!("{name} is not a text (UTF-8, or UTF-16 with a byte order mark)"),
                 "export the curve as text, with the names of the columns in the first line",
             )
         })?;
@@ -80,31 +83,41 @@ impl Table {
         let mut reader = csv::ReaderBuilder::new()
             .comment(Some(b'#'))
             .trim(csv::Trim::All)
-            .delimiter(delimiter(text))
+            .delimiter(separator)
             .from_reader(text.trim_start_matches('\u{feff}').as_bytes());
         let refuse = |error: &csv::Error| {
             let line = error.position().map_or(1, csv::Position::line);
             let what = match error.kind() {
                 csv::ErrorKind::UnequalLengths {
+        // The reader counts line feeds alone as lines.
+        let text = &text.replace("\r\n", "\n").replace('\r', "\n");
+        let separator = delimiter(text);
                     expected_len, len, ..
                 } => format!("{len} fields where the header names {expected_len} columns"),
                 _ => error.to_string(),
             };
             Error::input(
                 format!("{name}, line {line}: {what}"),
-                "give each row a field for every column",
+                "give each row a field for every column, and separate columns by semicolons if \
+                 numbers have decimal commas",
             )
         };
         let header = reader.headers().map_err(|error| refuse(&error))?.clone();
-        let named = header.iter().map(|word| (word.to_owned(), Vec::new()));
-        let mut table = Self {
-            name: name.to_owned(),
-            columns: named.collect(),
-            ..Self::default()
-        };
-        for record in reader.records() {
-            let record = record.map_err(|error| refuse(&error))?;
-            if table.lines.len() == MAX_ROWS {
+        if header.is_empty() {
+            return Err(Error::input(
+                format!("{name} is empty"),
+                "give a table with the names of the columns in the first line",
+            ));
+        }
+        if header.iter().all(|word| decimal(word).is_some()) {
+            return Err(Error::input(
+                format!("{name} begins with numbers, without names of columns"),
+                "name the columns in the first line, each with its unit, as in `distance (nm)`",
+            ));
+        }
+        let mut records = Vec::new();
+        for record in reader.into_records() {
+            if records.len() == MAX_ROWS {
                 return Err(Error::input(
                     format!("{name} has more than {MAX_ROWS} rows"),
                     "keep fewer",
@@ -112,13 +125,40 @@ impl Table {
             }
             let line = record.position().map_or(0, csv::Position::line);
             table.lines.push(line);
-            for ((_, column), field) in table.columns.iter_mut().zip(&record) {
-                column.push(Entry::of(field));
+            for ((_, column), field) in table.columns.iter_mut().zip(record) {
+                let number = decimal(field).filter(|_| has_commas && field.contains(','));
+                column.push(number.map_or_else(|| Entry::of(field), Entry::Number));
             }
         }
         Ok(table)
     }
 
+            records.push(record.map_err(|error| refuse(&error))?);
+        }
+        let has_units = records.first().is_some_and(is_units);
+        let unit_of = |column: usize| {
+            let units = records.first().filter(|_| has_units)?;
+            units.get(column).map(unit)
+        };
+        let named = header.iter().enumerate().map(|(column, word)| {
+            let own = Header::of(word).unit;
+            match unit_of(column).filter(|unit| own.is_empty() && !unit.is_empty()) {
+                Some(unit) => (format!("{word} ({unit})"), Vec::new()),
+                None => (word.to_owned(), Vec::new()),
+            }
+        });
+        let mut table = Self {
+            name: name.to_owned(),
+            columns: named.collect(),
+            ..Self::default()
+        };
+        let rows = &records[usize::from(has_units)..];
+        let has_commas = has_decimal_commas(rows, separator);
+        if has_commas {
+            let note = "numbers are read with decimal commas".to_owned();
+            table.notes.push((DECIMAL_COMMAS.to_owned(), note));
+        }
+        for record in rows {
     /// The same table with its rows in reverse order.
     #[must_use]
     pub(crate) fn reversed(&self) -> Self {
@@ -184,6 +224,7 @@ impl Header {
 impl Entry {
     pub(crate) fn of(field: &str) -> Self {
         match field.parse::<f64>() {
+    /// The last pair of brackets contains the unit, as in `Height (measured) (m)`.
             _ if field.is_empty() => Self::Missing,
             Ok(number) if number.is_nan() => Self::Missing,
             Ok(number) => Self::Number(number),
@@ -198,6 +239,11 @@ fn delimiter(text: &str) -> u8 {
         .lines()
         .find(|line| !line.starts_with('#') && !line.trim().is_empty());
     let count = |mark: u8| header.map_or(0, |line| line.bytes().filter(|b| *b == mark).count());
+
+    /// Whether a column with the header `written` is called `name`, with or without its unit.
+    pub(crate) fn is_called(written: &str, name: &str) -> bool {
+        written == name || Self::of(written).name == name
+    }
     [b'\t', b';', b',']
         .into_iter()
         .max_by_key(|mark| count(*mark))
@@ -211,6 +257,63 @@ impl Serialize for Table {
             .iter()
             .map(|(header, column)| (header.clone(), json!(column)))
             .collect();
+/// Name of the note that numbers were read with decimal commas.
+pub(crate) const DECIMAL_COMMAS: &str = "DecimalCommas";
+
+/// The text in bytes of UTF-8, or of UTF-16 with a byte order mark.
+fn text_of(bytes: Vec<u8>) -> Option<String> {
+    let wide = |bytes: &[u8], unit: fn([u8; 2]) -> u16| {
+        let (pairs, rest) = bytes.as_chunks();
+        let units: Vec<u16> = pairs.iter().map(|pair| unit(*pair)).collect();
+        String::from_utf16(&units).ok().filter(|_| rest.is_empty())
+    };
+    match &bytes[..] {
+        [0xff, 0xfe, rest @ ..] => wide(rest, u16::from_le_bytes),
+        [0xfe, 0xff, rest @ ..] => wide(rest, u16::from_be_bytes),
+        _ => String::from_utf8(bytes).ok(),
+    }
+}
+
+/// The number that a field contains, with a decimal point or a decimal comma.
+fn decimal(field: &str) -> Option<f64> {
+    field.replacen(',', ".", 1).parse().ok()
+}
+
+/// Whether commas in the numbers of these rows are decimal commas. They are not if another number
+/// has a decimal point, or if all of them may group thousands in a table whose separator is a comma.
+fn has_decimal_commas(rows: &[csv::StringRecord], separator: u8) -> bool {
+    let may_group = |field: &str| {
+        let unsigned = field.trim_start_matches(['-', '+']);
+        let (whole, part) = unsigned.split_once(',')?;
+        Some((1..=3).contains(&whole.len()) && !whole.starts_with('0') && part.len() == 3)
+    };
+    let has_point =
+        |field: &str| field.contains('.') && field.replace(',', "").parse::<f64>().is_ok();
+    let fields = || rows.iter().flatten();
+    let mut commas = fields()
+        .filter(|f| decimal(f).is_some())
+        .filter_map(may_group);
+    let is_decimal = if separator == b',' {
+        commas.any(|may_group| !may_group)
+    } else {
+        commas.next().is_some()
+    };
+    is_decimal && !fields().any(has_point)
+}
+
+/// A unit in the row under the header, without brackets.
+fn unit(field: &str) -> &str {
+    let inner = |open, close| field.strip_prefix(open)?.strip_suffix(close);
+    inner('[', ']').or(inner('(', ')')).unwrap_or(field).trim()
+}
+
+/// Whether a row contains units: no number, and at least one unit that is known.
+fn is_units(row: &csv::StringRecord) -> bool {
+    let is_known = |unit: &str| unit == "°" || format!("1 {unit}").parse::<Quantity>().is_ok();
+    let mut fields = row.iter().map(unit).filter(|field| !field.is_empty());
+    row.iter().all(|field| decimal(field).is_none()) && fields.any(is_known)
+}
+
         let mut table = json!({"name": self.name, "columns": columns});
         if !self.notes.is_empty() {
             let notes = self.notes.iter();
@@ -224,7 +327,6 @@ impl Serialize for Table {
 impl<'de> Deserialize<'de> for Table {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         #[derive(Deserialize)]
-    /// The last pair of brackets contains the unit, as in `Height (measured) (m)`.
         #[serde(deny_unknown_fields)]
         struct Given {
             #[serde(default)]
@@ -239,11 +341,6 @@ impl<'de> Deserialize<'de> for Table {
                 .map_err(|_| D::Error::custom(format!("{header}: a list is needed")))?;
             Ok((header, entries))
         };
-
-    /// Whether a column with the header `written` is called `name`, with or without its unit.
-    pub(crate) fn is_called(written: &str, name: &str) -> bool {
-        written == name || Self::of(written).name == name
-    }
         let columns = given.columns.into_iter().map(column);
         Ok(Self {
             name: given.name.unwrap_or_else(|| "data".to_owned()),

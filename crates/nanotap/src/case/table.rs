@@ -179,6 +179,16 @@ impl Table {
     pub(crate) fn place(&self, row: Option<usize>, column: usize) -> String {
         let header = self.columns.get(column).map_or("", |(header, _)| header);
         let column = column + 1;
+    /// Keeps the rows, by their index, for which `keeps` is true.
+    pub(crate) fn retain_rows(&mut self, keeps: impl Fn(usize) -> bool) {
+        let mut row = 0..;
+        self.lines.retain(|_| row.next().is_some_and(&keeps));
+        for (_, column) in &mut self.columns {
+            let mut row = 0..;
+            column.retain(|_| row.next().is_some_and(&keeps));
+        }
+    }
+
         let line = match row {
             None => Some(1),
             Some(row) => self.lines.get(row).copied(),
@@ -214,6 +224,7 @@ impl Header {
                 Some((&inner[..place], &inner[place + 1..]))
             });
         let (name, unit) = parts.unwrap_or((written, ""));
+    /// The last pair of brackets contains the unit, as in `Height (measured) (m)`.
         Self {
             name: name.trim().to_owned(),
             unit: unit.trim().to_owned(),
@@ -224,11 +235,15 @@ impl Header {
 impl Entry {
     pub(crate) fn of(field: &str) -> Self {
         match field.parse::<f64>() {
-    /// The last pair of brackets contains the unit, as in `Height (measured) (m)`.
             _ if field.is_empty() => Self::Missing,
             Ok(number) if number.is_nan() => Self::Missing,
             Ok(number) => Self::Number(number),
             Err(_) => Self::Text(field.to_owned()),
+
+    /// Whether a column with the header `written` is called `name`, with or without its unit.
+    pub(crate) fn is_called(written: &str, name: &str) -> bool {
+        written == name || Self::of(written).name == name
+    }
         }
     }
 }
@@ -239,24 +254,9 @@ fn delimiter(text: &str) -> u8 {
         .lines()
         .find(|line| !line.starts_with('#') && !line.trim().is_empty());
     let count = |mark: u8| header.map_or(0, |line| line.bytes().filter(|b| *b == mark).count());
-
-    /// Whether a column with the header `written` is called `name`, with or without its unit.
-    pub(crate) fn is_called(written: &str, name: &str) -> bool {
-        written == name || Self::of(written).name == name
-    }
     [b'\t', b';', b',']
         .into_iter()
         .max_by_key(|mark| count(*mark))
-        .unwrap_or(b',')
-}
-
-impl Serialize for Table {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        let columns: Map<String, Value> = self
-            .columns
-            .iter()
-            .map(|(header, column)| (header.clone(), json!(column)))
-            .collect();
 /// Name of the note that numbers were read with decimal commas.
 pub(crate) const DECIMAL_COMMAS: &str = "DecimalCommas";
 
@@ -314,6 +314,16 @@ fn is_units(row: &csv::StringRecord) -> bool {
     row.iter().all(|field| decimal(field).is_none()) && fields.any(is_known)
 }
 
+        .unwrap_or(b',')
+}
+
+impl Serialize for Table {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let columns: Map<String, Value> = self
+            .columns
+            .iter()
+            .map(|(header, column)| (header.clone(), json!(column)))
+            .collect();
         let mut table = json!({"name": self.name, "columns": columns});
         if !self.notes.is_empty() {
             let notes = self.notes.iter();

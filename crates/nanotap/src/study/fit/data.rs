@@ -476,7 +476,7 @@ fn way(word: &str) -> Option<Way> {
 }
 
 /// True if a table was written by `approach`.
-fn of_approach(headers: &[Header]) -> bool {
+pub(super) fn of_approach(headers: &[Header]) -> bool {
     let names: Vec<&str> = headers.iter().map(|h| h.name.as_str()).take(5).collect();
     matches!(
         names[..],

@@ -138,18 +138,29 @@ impl Data {
         for table in tables {
             data.add(case, table, only)?;
         }
+        let files: Vec<&str> = tables.iter().map(|table| table.name.as_str()).collect();
+        let files = files.join(", ");
         if data.columns.is_empty() {
             return Err(Error::option(
                 "data",
-                "no column is a measured quantity",
-                "name them as in: distance (nm), amplitude (nm), phase (deg)",
+                format!("{files}: no column is a measured quantity"),
+                "name them as in `distance (nm)`, `amplitude (nm)`, `phase (deg)`, or with \
+                 {convert} NAME=amplitude",
             ));
         }
         if data.swept.is_empty() {
             return Err(Error::option(
                 "data",
-                "no column gives the positions of the measured values",
-                "give `distance (nm)`, or another key of the case such as `drive.frequency (kHz)`",
+                format!("{files}: no column gives the positions of the measured values"),
+                "give `distance (nm)` or another key of the case such as `drive.frequency (kHz)`, or \
+                 say which column it is with {convert} NAME=distance",
+            ));
+        }
+        if data.rows().next().is_none() {
+            return Err(Error::option(
+                "data",
+                format!("{files}: no rows"),
+                "give rows with the position and the measured values",
             ));
         }
         let observed = data
@@ -369,7 +380,8 @@ impl Data {
                 (_, Entry::Text(text)) => {
                     return refuse(
                         format!("`{text}` is not a number"),
-                        "write numbers with a decimal point, and leave missing values empty",
+                        "write all numbers with a decimal point, or all with a decimal comma and \
+                         semicolons between the columns; leave missing values empty",
                     );
                 }
                 (_, Entry::Number(number)) if !number.is_finite() => {
@@ -663,11 +675,12 @@ pub(super) fn set(name: &str, case: &Case) -> Result<Key, Error> {
         if name.contains('.') {
             return error.into();
         }
+        let others = "or select the others with {columns}";
         Error::input(
             format!("`{name}` is neither an observable nor a key of the case"),
             match near {
-                Some(near) => format!("did you mean `{near}`? or select {{columns}}"),
-                None => "select {columns}".to_owned(),
+                Some(near) => format!("did you mean {{convert}} \"{name}={near}\"? {others}"),
+                None => format!("say what it is, as in {{convert}} \"{name}=distance\", {others}"),
             },
         )
     })

@@ -53,8 +53,17 @@ impl Table {
     /// When the file cannot be read or is not such a table; the message has line and column.
     pub fn read(path: &Path) -> Result<Self, Error> {
         let name = path.display().to_string();
-        let refuse = |error: std::io::Error| Error::files(format!("cannot read {name}: {error}"));
+        let refuse = |error: std::io::Error| {
+            let why = match error.kind() {
+                std::io::ErrorKind::NotFound => "there is no such file".to_owned(),
+                _ => error.to_string(),
+            };
+            Error::files(format!("cannot read {name}: {why}"))
+        };
         let size = std::fs::metadata(path).map_err(refuse)?.len();
+        if path.is_dir() {
+            return Err(Error::files(format!("cannot read {name}: it is a folder")));
+        }
         if size > MAX_BYTES {
             return Err(Error::input(
                 format!("{name} has {size} bytes; {MAX_BYTES} at most"),
@@ -80,6 +89,9 @@ impl Table {
     /// # Errors
     /// As [`read`](Self::read).
     pub fn parse(name: &str, text: &str) -> Result<Self, Error> {
+        // The reader counts line feeds alone as lines.
+        let text = &text.replace("\r\n", "\n").replace('\r', "\n");
+        let separator = delimiter(text);
         let mut reader = csv::ReaderBuilder::new()
             .comment(Some(b'#'))
             .trim(csv::Trim::All)
@@ -89,9 +101,6 @@ impl Table {
             let line = error.position().map_or(1, csv::Position::line);
             let what = match error.kind() {
                 csv::ErrorKind::UnequalLengths {
-        // The reader counts line feeds alone as lines.
-        let text = &text.replace("\r\n", "\n").replace('\r', "\n");
-        let separator = delimiter(text);
                     expected_len, len, ..
                 } => format!("{len} fields where the header names {expected_len} columns"),
                 _ => error.to_string(),
@@ -123,16 +132,6 @@ impl Table {
                     "keep fewer",
                 ));
             }
-            let line = record.position().map_or(0, csv::Position::line);
-            table.lines.push(line);
-            for ((_, column), field) in table.columns.iter_mut().zip(record) {
-                let number = decimal(field).filter(|_| has_commas && field.contains(','));
-                column.push(number.map_or_else(|| Entry::of(field), Entry::Number));
-            }
-        }
-        Ok(table)
-    }
-
             records.push(record.map_err(|error| refuse(&error))?);
         }
         let has_units = records.first().is_some_and(is_units);
@@ -159,6 +158,16 @@ impl Table {
             table.notes.push((DECIMAL_COMMAS.to_owned(), note));
         }
         for record in rows {
+            let line = record.position().map_or(0, csv::Position::line);
+            table.lines.push(line);
+            for ((_, column), field) in table.columns.iter_mut().zip(record) {
+                let number = decimal(field).filter(|_| has_commas && field.contains(','));
+                column.push(number.map_or_else(|| Entry::of(field), Entry::Number));
+            }
+        }
+        Ok(table)
+    }
+
     /// The same table with its rows in reverse order.
     #[must_use]
     pub(crate) fn reversed(&self) -> Self {
@@ -170,15 +179,6 @@ impl Table {
         table
     }
 
-    /// Returns the number of rows: the length of the longest column.
-    pub fn rows(&self) -> usize {
-        self.columns.iter().map(|(_, c)| c.len()).max().unwrap_or(0)
-    }
-
-    /// Text for messages that names the place of an entry: table, line, column.
-    pub(crate) fn place(&self, row: Option<usize>, column: usize) -> String {
-        let header = self.columns.get(column).map_or("", |(header, _)| header);
-        let column = column + 1;
     /// Keeps the rows, by their index, for which `keeps` is true.
     pub(crate) fn retain_rows(&mut self, keeps: impl Fn(usize) -> bool) {
         let mut row = 0..;
@@ -189,6 +189,15 @@ impl Table {
         }
     }
 
+    /// Returns the number of rows: the length of the longest column.
+    pub fn rows(&self) -> usize {
+        self.columns.iter().map(|(_, c)| c.len()).max().unwrap_or(0)
+    }
+
+    /// Text for messages that names the place of an entry: table, line, column.
+    pub(crate) fn place(&self, row: Option<usize>, column: usize) -> String {
+        let header = self.columns.get(column).map_or("", |(header, _)| header);
+        let column = column + 1;
         let line = match row {
             None => Some(1),
             Some(row) => self.lines.get(row).copied(),
@@ -209,6 +218,7 @@ pub(crate) struct Header {
 }
 
 impl Header {
+    /// The last pair of brackets contains the unit, as in `Height (measured) (m)`.
     pub(crate) fn of(written: &str) -> Self {
         let written = written.trim();
         let parts = [('(', ')'), ('[', ']')]
@@ -224,11 +234,15 @@ impl Header {
                 Some((&inner[..place], &inner[place + 1..]))
             });
         let (name, unit) = parts.unwrap_or((written, ""));
-    /// The last pair of brackets contains the unit, as in `Height (measured) (m)`.
         Self {
             name: name.trim().to_owned(),
             unit: unit.trim().to_owned(),
         }
+    }
+
+    /// Whether a column with the header `written` is called `name`, with or without its unit.
+    pub(crate) fn is_called(written: &str, name: &str) -> bool {
+        written == name || Self::of(written).name == name
     }
 }
 
@@ -239,24 +253,10 @@ impl Entry {
             Ok(number) if number.is_nan() => Self::Missing,
             Ok(number) => Self::Number(number),
             Err(_) => Self::Text(field.to_owned()),
-
-    /// Whether a column with the header `written` is called `name`, with or without its unit.
-    pub(crate) fn is_called(written: &str, name: &str) -> bool {
-        written == name || Self::of(written).name == name
-    }
         }
     }
 }
 
-/// Separator of the fields: comma, semicolon or tab, whichever occurs most often in the header.
-fn delimiter(text: &str) -> u8 {
-    let header = text
-        .lines()
-        .find(|line| !line.starts_with('#') && !line.trim().is_empty());
-    let count = |mark: u8| header.map_or(0, |line| line.bytes().filter(|b| *b == mark).count());
-    [b'\t', b';', b',']
-        .into_iter()
-        .max_by_key(|mark| count(*mark))
 /// Name of the note that numbers were read with decimal commas.
 pub(crate) const DECIMAL_COMMAS: &str = "DecimalCommas";
 
@@ -314,6 +314,15 @@ fn is_units(row: &csv::StringRecord) -> bool {
     row.iter().all(|field| decimal(field).is_none()) && fields.any(is_known)
 }
 
+/// Separator of the fields: comma, semicolon or tab, whichever occurs most often in the header.
+fn delimiter(text: &str) -> u8 {
+    let header = text
+        .lines()
+        .find(|line| !line.starts_with('#') && !line.trim().is_empty());
+    let count = |mark: u8| header.map_or(0, |line| line.bytes().filter(|b| *b == mark).count());
+    [b'\t', b';', b',']
+        .into_iter()
+        .max_by_key(|mark| count(*mark))
         .unwrap_or(b',')
 }
 

@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 
+use nanotap::ErrorKind;
 use nanotap::study::fit::Table;
 use nanotap_figures::Figure;
 
@@ -44,7 +45,11 @@ pub(crate) fn measured(
                 format!("name the data first, then the case: nanotap {command} DATA CASE"),
             ));
         }
-        Table::read(path)
+        // A file that cannot be read is bad input, as a case file is.
+        Table::read(path).map_err(|error| Failure {
+            kind: ErrorKind::BadInput,
+            ..error
+        })
     };
     std::iter::once(first).chain(also).map(read).collect()
 }

@@ -34,9 +34,12 @@ pub(crate) fn report(mut error: Failure) -> u8 {
     code
 }
 
-/// The flag of an option.
+/// The flag of an option; measured data are an argument without a flag.
 pub(crate) fn flag(option: &str) -> String {
-    format!("--{}", option.replace('_', "-"))
+    match option {
+        "data" => "DATA".to_owned(),
+        _ => format!("--{}", option.replace('_', "-")),
+    }
 }
 
 /// A problem without a text that it points into.

@@ -5,6 +5,7 @@ use std::ops::Deref;
 use std::path::PathBuf;
 use std::sync::Arc;
 
+use nanotap::case::file::Source;
 use nanotap::case::physical::{Catalogue, Kind, Severity};
 use nanotap::case::{Case, Key};
 use nanotap::model::Model;
@@ -61,16 +62,40 @@ impl GivenCase {
         Self::for_study(arguments, false, output)
     }
 
+    /// Reads the case of the arguments without printing anything.
+    pub(crate) fn silent(arguments: &CaseArguments) -> Result<Self, Failure> {
+        case_of(arguments).map(Self)
+    }
+
     fn warned(case: Case, output: &Output) -> Self {
-        for remark in case.remarks() {
-            if remark.severity == Severity::Warning {
-                output.warning(&remark.text);
-            }
-        }
-        for replaced in case.replaced() {
+        warn(&case, output);
+        let case = Self(case);
+        case.note_replaced(output);
+        case
+    }
+
+    /// Prints the keys of the file that have no effect.
+    pub(crate) fn note_replaced(&self, output: &Output) {
+        for replaced in self.replaced() {
             output.note(&replaced.text);
         }
-        Self(case)
+    }
+
+    /// Prints the warnings about the case with this text, which a fit of this one found.
+    pub(crate) fn warn_of_result(
+        &self,
+        found: &str,
+        arguments: &CaseArguments,
+        output: &Output,
+    ) -> Result<(), Failure> {
+        let catalogue = catalogue(&arguments.catalogue)?;
+        let source = Source {
+            name: "the best fit".to_owned(),
+            text: found.to_owned(),
+        };
+        let found = Case::parse_with(Some(source), &[], &catalogue).ok();
+        warn(found.as_ref().unwrap_or(self), output);
+        Ok(())
     }
 
     /// Prints the keys that stay constant while these keys vary, as the arguments that reproduce a
@@ -127,6 +152,15 @@ impl GivenCase {
         );
         let modes = number::counted(cantilever.modes, "mode", "modes");
         format!("{modes} at {at}")
+    }
+}
+
+/// Prints the warnings about a case.
+fn warn(case: &Case, output: &Output) {
+    for remark in case.remarks() {
+        if remark.severity == Severity::Warning {
+            output.warning(&remark.text);
+        }
     }
 }
 

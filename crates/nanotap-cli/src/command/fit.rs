@@ -83,8 +83,11 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     };
     arguments.plot.check()?;
     request.data = measured(&arguments.data, &arguments.also, "fit")?;
-    let case = GivenCase::for_study(&arguments.case, true, output)?;
+    let case = GivenCase::silent(&arguments.case)?;
+    case.note_replaced(output);
     let report = progress::study::<FitStudy>(&case, &request, &arguments.threads)?;
+    // Values that a fit starts from are not those of the sample.
+    case.warn_of_result(&report.case_file, &arguments.case, output)?;
     if let (Some(path), Some(ending)) = (&arguments.out, ending) {
         match ending {
             "toml" if !report.case_files.is_empty() => {

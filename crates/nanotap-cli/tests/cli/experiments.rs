@@ -400,3 +400,66 @@ fn values_that_the_data_do_not_determine_are_in_brackets() {
     assert!(!line("gap.offset").contains('('));
     assert!(run.stdout.contains("A value in brackets is no result"));
 }
+
+#[test]
+fn unusable_data_and_parameters_are_refused_with_the_remedy() {
+    let folder = Folder::new();
+    folder.write("lever.toml", STIFF);
+    folder.write("empty.csv", "");
+    folder.write("curve.csv", "distance (nm),phase (deg)\n10,80\n11,81\n");
+    folder.write("volts.csv", "ZSnsr (nm),Defl (V)\n10,0.8\n11,0.1\n");
+    let fit = |data: &str, free: &str| folder.run(&["fit", data, "lever.toml", "--free", free]);
+    let modulus = "sample.modulus";
+    fit("none.csv", modulus).refused(&["none.csv", "there is no such file"]);
+    fit(".", modulus).refused(&["it is a folder"]);
+    fit("empty.csv", modulus).refused(&["empty.csv is empty"]);
+    fit("volts.csv", modulus).refused(&["InvOLS", "--convert \"Defl=58 nm/V\""]);
+    let slip = fit("curve.csv", "sample.modulsu");
+    slip.refused(&[
+        "--free: no parameter `sample.modulsu`",
+        "did you mean `sample.modulus`?",
+    ]);
+    assert!(!slip.stderr.contains("drive.frequency"), "{}", slip.stderr);
+    let unknown = fit("curve.csv", "sample.zzzzzzzzzzzz");
+    unknown.refused(&["there are", "sample.modulus"]);
+    assert!(!unknown.stderr.contains("tip.radius"), "{}", unknown.stderr);
+    folder.write("none.csv", "mass (pg),colour\n1,2\n");
+    fit("none.csv", modulus).refused(&["`mass`", "--convert \"mass=distance\""]);
+    folder.write("none.csv", "distance (nm)\n1\n");
+    fit("none.csv", modulus).refused(&["DATA: none.csv: no column is a measured quantity"]);
+}
+
+/// The law of Johnson, Kendall and Roberts does not hold at the modulus that the fit starts from,
+/// but does at that of the soft sample.
+#[test]
+fn a_fit_warns_of_the_case_that_it_finds() {
+    let folder = Folder::new();
+    for (name, text) in [
+        (
+            "lever.toml",
+            include_str!("../../../../docs/cases/force-curve-jkr.toml"),
+        ),
+        (
+            "curve.csv",
+            include_str!("../../../../docs/cases/silicone-force-curve.csv"),
+        ),
+    ] {
+        folder.write(name, text);
+    }
+    let stiff = ["sample.modulus=1 GPa", "sample.work_of_adhesion=1 mJ/m^2"];
+    let stiff = ["--set", stiff[0], "--set", stiff[1]];
+    let warned = folder.run(&[&["case", "lever.toml"], &stiff[..]].concat());
+    assert!(warned.stdout.contains("Tabor"), "{}", warned.stdout);
+    let free = "sample.modulus,sample.work_of_adhesion,gap.offset,deflection.offset";
+    let fit = [
+        "fit",
+        "curve.csv",
+        "lever.toml",
+        "--no-profile",
+        "--free",
+        free,
+    ];
+    let run = folder.run(&[&fit[..], &stiff].concat());
+    assert_eq!(run.code, 0, "{}", run.stderr);
+    assert!(!run.stderr.contains("Tabor"), "{}", run.stderr);
+}

@@ -27,13 +27,13 @@ impl From<CantileverError> for CaseError {
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum NoSuchKey {
     /// The name is not a key of the case.
-    #[error("no parameter `{given}` here; there are {known}{hint}")]
+    #[error("no parameter `{given}` here: {hint}")]
     Unknown {
         /// Name as given.
         given: String,
         /// List of the keys that can vary.
         known: String,
-        /// Suggestion of the most similar key, as a question.
+        /// Suggestion of the most similar key, or the list of those that may be meant.
         hint: String,
     },
     /// A key that cannot vary.
@@ -78,16 +78,15 @@ impl From<CaseError> for crate::Error {
 
 impl From<NoSuchKey> for crate::Error {
     fn from(error: NoSuchKey) -> Self {
-        let remedy = match &error {
-            NoSuchKey::Fixed { .. } => {
-                "name a quantity of the case file as section.key, as in drive.frequency"
+        match error {
+            NoSuchKey::Fixed { .. } => Self::input(
+                error.to_string(),
+                "name a quantity of the case file as section.key, as in drive.frequency",
+            ),
+            NoSuchKey::Unknown { given, hint, .. } => {
+                Self::input(format!("no parameter `{given}` here"), hint)
             }
-            NoSuchKey::Unknown { .. } => {
-                "name a parameter of the dimensionless model, or a quantity of a physical case \
-                 as section.key"
-            }
-        };
-        Self::input(error.to_string(), remedy)
+        }
     }
 }
 

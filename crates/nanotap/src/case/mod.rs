@@ -868,8 +868,16 @@ impl Serialize for Case {
 impl NoSuchKey {
     fn unknown(given: &str, keys: &[Key]) -> Self {
         let names: Vec<&'static str> = keys.iter().map(|key| key.path()).collect();
-        let hint = near_name(given, names.iter().copied())
-            .map_or_else(String::new, |name| format!(" (did you mean `{name}`?)"));
+        let section = given.split_once('.').map_or("", |(section, _)| section);
+        let of_section = |name: &&&str| name.split_once('.').is_some_and(|(of, _)| of == section);
+        let mut listed: Vec<&str> = names.iter().filter(of_section).copied().collect();
+        if listed.is_empty() {
+            listed.clone_from(&names);
+        }
+        let hint = near_name(given, names.iter().copied()).map_or_else(
+            || format!("there are {}", listed.join(", ")),
+            |name| format!("did you mean `{name}`?"),
+        );
         Self::Unknown {
             given: given.to_owned(),
             known: names.join(", "),

@@ -9,6 +9,7 @@ use serde::de::Error as _;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use serde_json::{Map, Value, json};
 
+use super::quantity::Quantity;
 use crate::Error;
 
 /// Most rows of a table.
@@ -42,16 +43,27 @@ pub struct Table {
 }
 
 impl Table {
-    /// Reads an instrument's file (`.ibw`, `.jpk-force`, `.nid`) or a CSV file. Fields of a CSV
-    /// file are separated by commas, semicolons or tabs, its first line names the columns, and
-    /// lines that begin with `#` are skipped.
+    /// Reads an instrument's file (`.ibw`, `.jpk-force`, `.nid`) or a CSV file, in UTF-8 or in
+    /// UTF-16 with a byte order mark. Fields of a CSV file are separated by commas, semicolons or
+    /// tabs, its first line names the columns, the next may contain their units, and lines that
+    /// begin with `#` are skipped. Where commas in numbers cannot be separators, they are decimal
+    /// commas, which `notes` states.
     ///
     /// # Errors
     /// When the file cannot be read or is not such a table; the message has line and column.
     pub fn read(path: &Path) -> Result<Self, Error> {
         let name = path.display().to_string();
-        let refuse = |error: std::io::Error| Error::files(format!("cannot read {name}: {error}"));
+        let refuse = |error: std::io::Error| {
+            let why = match error.kind() {
+                std::io::ErrorKind::NotFound => "there is no such file".to_owned(),
+                _ => error.to_string(),
+            };
+            Error::files(format!("cannot read {name}: {why}"))
+        };
         let size = std::fs::metadata(path).map_err(refuse)?.len();
+        if path.is_dir() {
+            return Err(Error::files(format!("cannot read {name}: it is a folder")));
+        }
         if size > MAX_BYTES {
             return Err(Error::input(
                 format!("{name} has {size} bytes; {MAX_BYTES} at most"),
@@ -63,9 +75,9 @@ impl Table {
         if let Some(recorded) = super::recording::parse(&name, &bytes) {
             return recorded;
         }
-        let text = String::from_utf8(bytes).map_err(|_| {
+        let text = text_of(bytes).ok_or_else(|| {
             Error::input(
-                format!("{name} is not a text (UTF-8)"),
+                format!("{name} is not a text (UTF-8, or UTF-16 with a byte order mark)"),
                 "export the curve as text, with the names of the columns in the first line",
             )
         })?;
@@ -77,10 +89,13 @@ impl Table {
     /// # Errors
     /// As [`read`](Self::read).
     pub fn parse(name: &str, text: &str) -> Result<Self, Error> {
+        // The reader counts line feeds alone as lines.
+        let text = &text.replace("\r\n", "\n").replace('\r', "\n");
+        let separator = delimiter(text);
         let mut reader = csv::ReaderBuilder::new()
             .comment(Some(b'#'))
             .trim(csv::Trim::All)
-            .delimiter(delimiter(text))
+            .delimiter(separator)
             .from_reader(text.trim_start_matches('\u{feff}').as_bytes());
         let refuse = |error: &csv::Error| {
             let line = error.position().map_or(1, csv::Position::line);
@@ -92,28 +107,62 @@ impl Table {
             };
             Error::input(
                 format!("{name}, line {line}: {what}"),
-                "give each row a field for every column",
+                "give each row a field for every column, and separate columns by semicolons if \
+                 numbers have decimal commas",
             )
         };
         let header = reader.headers().map_err(|error| refuse(&error))?.clone();
-        let named = header.iter().map(|word| (word.to_owned(), Vec::new()));
-        let mut table = Self {
-            name: name.to_owned(),
-            columns: named.collect(),
-            ..Self::default()
-        };
-        for record in reader.records() {
-            let record = record.map_err(|error| refuse(&error))?;
-            if table.lines.len() == MAX_ROWS {
+        if header.is_empty() {
+            return Err(Error::input(
+                format!("{name} is empty"),
+                "give a table with the names of the columns in the first line",
+            ));
+        }
+        if header.iter().all(|word| decimal(word).is_some()) {
+            return Err(Error::input(
+                format!("{name} begins with numbers, without names of columns"),
+                "name the columns in the first line, each with its unit, as in `distance (nm)`",
+            ));
+        }
+        let mut records = Vec::new();
+        for record in reader.into_records() {
+            if records.len() == MAX_ROWS {
                 return Err(Error::input(
                     format!("{name} has more than {MAX_ROWS} rows"),
                     "keep fewer",
                 ));
             }
+            records.push(record.map_err(|error| refuse(&error))?);
+        }
+        let has_units = records.first().is_some_and(is_units);
+        let unit_of = |column: usize| {
+            let units = records.first().filter(|_| has_units)?;
+            units.get(column).map(unit)
+        };
+        let named = header.iter().enumerate().map(|(column, word)| {
+            let own = Header::of(word).unit;
+            match unit_of(column).filter(|unit| own.is_empty() && !unit.is_empty()) {
+                Some(unit) => (format!("{word} ({unit})"), Vec::new()),
+                None => (word.to_owned(), Vec::new()),
+            }
+        });
+        let mut table = Self {
+            name: name.to_owned(),
+            columns: named.collect(),
+            ..Self::default()
+        };
+        let rows = &records[usize::from(has_units)..];
+        let has_commas = has_decimal_commas(rows, separator);
+        if has_commas {
+            let note = "numbers are read with decimal commas".to_owned();
+            table.notes.push((DECIMAL_COMMAS.to_owned(), note));
+        }
+        for record in rows {
             let line = record.position().map_or(0, csv::Position::line);
             table.lines.push(line);
-            for ((_, column), field) in table.columns.iter_mut().zip(&record) {
-                column.push(Entry::of(field));
+            for ((_, column), field) in table.columns.iter_mut().zip(record) {
+                let number = decimal(field).filter(|_| has_commas && field.contains(','));
+                column.push(number.map_or_else(|| Entry::of(field), Entry::Number));
             }
         }
         Ok(table)
@@ -128,6 +177,16 @@ impl Table {
         }
         table.lines.reverse();
         table
+    }
+
+    /// Keeps the rows, by their index, for which `keeps` is true.
+    pub(crate) fn retain_rows(&mut self, keeps: impl Fn(usize) -> bool) {
+        let mut row = 0..;
+        self.lines.retain(|_| row.next().is_some_and(&keeps));
+        for (_, column) in &mut self.columns {
+            let mut row = 0..;
+            column.retain(|_| row.next().is_some_and(&keeps));
+        }
     }
 
     /// Returns the number of rows: the length of the longest column.
@@ -159,19 +218,31 @@ pub(crate) struct Header {
 }
 
 impl Header {
+    /// The last pair of brackets contains the unit, as in `Height (measured) (m)`.
     pub(crate) fn of(written: &str) -> Self {
         let written = written.trim();
         let parts = [('(', ')'), ('[', ']')]
             .into_iter()
             .find_map(|(open, close)| {
-                let (name, rest) = written.split_once(open)?;
-                Some((name, rest.strip_suffix(close)?))
+                let inner = written.strip_suffix(close)?;
+                let mut depth = 0;
+                let (place, _) = inner.char_indices().rev().find(|(_, c)| {
+                    let found = *c == open && depth == 0;
+                    depth += i32::from(*c == close) - i32::from(*c == open);
+                    found
+                })?;
+                Some((&inner[..place], &inner[place + 1..]))
             });
         let (name, unit) = parts.unwrap_or((written, ""));
         Self {
             name: name.trim().to_owned(),
             unit: unit.trim().to_owned(),
         }
+    }
+
+    /// Whether a column with the header `written` is called `name`, with or without its unit.
+    pub(crate) fn is_called(written: &str, name: &str) -> bool {
+        written == name || Self::of(written).name == name
     }
 }
 
@@ -184,6 +255,63 @@ impl Entry {
             Err(_) => Self::Text(field.to_owned()),
         }
     }
+}
+
+/// Name of the note that numbers were read with decimal commas.
+pub(crate) const DECIMAL_COMMAS: &str = "DecimalCommas";
+
+/// The text in bytes of UTF-8, or of UTF-16 with a byte order mark.
+fn text_of(bytes: Vec<u8>) -> Option<String> {
+    let wide = |bytes: &[u8], unit: fn([u8; 2]) -> u16| {
+        let (pairs, rest) = bytes.as_chunks();
+        let units: Vec<u16> = pairs.iter().map(|pair| unit(*pair)).collect();
+        String::from_utf16(&units).ok().filter(|_| rest.is_empty())
+    };
+    match &bytes[..] {
+        [0xff, 0xfe, rest @ ..] => wide(rest, u16::from_le_bytes),
+        [0xfe, 0xff, rest @ ..] => wide(rest, u16::from_be_bytes),
+        _ => String::from_utf8(bytes).ok(),
+    }
+}
+
+/// The number that a field contains, with a decimal point or a decimal comma.
+fn decimal(field: &str) -> Option<f64> {
+    field.replacen(',', ".", 1).parse().ok()
+}
+
+/// Whether commas in the numbers of these rows are decimal commas. They are not if another number
+/// has a decimal point, or if all of them may group thousands in a table whose separator is a comma.
+fn has_decimal_commas(rows: &[csv::StringRecord], separator: u8) -> bool {
+    let may_group = |field: &str| {
+        let unsigned = field.trim_start_matches(['-', '+']);
+        let (whole, part) = unsigned.split_once(',')?;
+        Some((1..=3).contains(&whole.len()) && !whole.starts_with('0') && part.len() == 3)
+    };
+    let has_point =
+        |field: &str| field.contains('.') && field.replace(',', "").parse::<f64>().is_ok();
+    let fields = || rows.iter().flatten();
+    let mut commas = fields()
+        .filter(|f| decimal(f).is_some())
+        .filter_map(may_group);
+    let is_decimal = if separator == b',' {
+        commas.any(|may_group| !may_group)
+    } else {
+        commas.next().is_some()
+    };
+    is_decimal && !fields().any(has_point)
+}
+
+/// A unit in the row under the header, without brackets.
+fn unit(field: &str) -> &str {
+    let inner = |open, close| field.strip_prefix(open)?.strip_suffix(close);
+    inner('[', ']').or(inner('(', ')')).unwrap_or(field).trim()
+}
+
+/// Whether a row contains units: no number, and at least one unit that is known.
+fn is_units(row: &csv::StringRecord) -> bool {
+    let is_known = |unit: &str| unit == "°" || format!("1 {unit}").parse::<Quantity>().is_ok();
+    let mut fields = row.iter().map(unit).filter(|field| !field.is_empty());
+    row.iter().all(|field| decimal(field).is_none()) && fields.any(is_known)
 }
 
 /// Separator of the fields: comma, semicolon or tab, whichever occurs most often in the header.

@@ -6,7 +6,9 @@ use nanotap::control::Control;
 use nanotap::model::model_map::ModelMap;
 use nanotap::observe::{ObservableSet, measure};
 use nanotap::study::approach::{ApproachOptions, Way, approach};
-use nanotap::study::fit::{Entry, FitOptions, FitReport, FittedParameter, Table, fit, residuals};
+use nanotap::study::fit::{
+    Data, Entry, FitOptions, FitReport, FittedParameter, Table, fit, residuals,
+};
 use nanotap::study::orbit::{OrbitOptions, orbit};
 use nanotap_dynamics::{ClassifyOptions, MotionKind, classify};
 
@@ -814,7 +816,23 @@ fn invalid_tables_are_refused_with_their_place() {
             "distance (nm),zc (nm),phase\n10,9,1\n",
             &["column 2", "column 1"],
         ),
-        ("distance (nm),phase\n,9\n", &["line 2", "column 1"]),
+        ("distance (nm),phase\n,9\n", &["curve.csv", "no rows"]),
+        ("distance (nm),phase\n", &["curve.csv", "no rows"]),
+        ("# only a comment\n", &["curve.csv is empty"]),
+        ("10,9\n11,10\n", &["begins with numbers", "first line"]),
+        (
+            "Abstand [nm];phase\n10;9\n",
+            &["`Abstand`", "convert \"Abstand=distance\""],
+        ),
+        (
+            "distance (nm),deflection (mV)\n10,9\n",
+            &["in mV", "convert \"deflection=58 nm/mV\""],
+        ),
+        (
+            "ZSnsr (nm),Defl (V)\n10,9\n",
+            &["in V", "convert \"Defl=58 nm/V\""],
+        ),
+        ("Z (V),phase\n10,9\n", &["convert \"Z=58 nm/V\""]),
         (
             "distance (nm),frequency shift (Hz),phase\n1,9,3\n",
             &["phase", "frequency modulation"],
@@ -840,6 +858,146 @@ fn invalid_tables_are_refused_with_their_place() {
     let text = "# measured\n distance [nm]; amplitude [nm] ; phase\n10;;12\n11;10;\n";
     let table = Table::parse("curve.csv", text).unwrap();
     assert_eq!(table.columns[1].1, [Entry::Missing, Entry::Number(10.0)]);
+}
+
+/// The data in a text, as the model reads them.
+fn data_of(text: &str, convert: &[&str]) -> Data {
+    let table = Table::parse("curve.csv", text).unwrap();
+    let options = FitOptions {
+        convert: convert.iter().map(|rule| (*rule).to_owned()).collect(),
+        ..request(vec![table], &[])
+    };
+    nanotap::study::fit::measured(&case(LEVER, &[]), &options).unwrap()
+}
+
+fn quantities(data: &Data) -> Vec<&'static str> {
+    data.columns.iter().map(|c| c.quantity.name()).collect()
+}
+
+#[test]
+fn capitals_in_a_column_name_do_not_change_its_meaning() {
+    for (name, quantity) in [
+        ("amplitude (nm)", "first_harmonic"),
+        ("Amplitude (nm)", "first_harmonic"),
+        ("AMPLITUDE [nm]", "first_harmonic"),
+        ("First Harmonic (nm)", "first_harmonic"),
+        ("a (nm)", "first_harmonic"),
+        ("Phase (deg)", "phase"),
+        ("Mean-Deflection (nm)", "mean_deflection"),
+        ("e_dis (eV)", "dissipation"),
+        ("F_MAX (nN)", "peak_force"),
+        ("Frequency Shift (Hz)", "frequency_shift"),
+        ("Deflection (nm)", "deflection"),
+        ("FORCE (nN)", "force"),
+    ] {
+        let text = format!("Distance (nm),{name},Direction\n10,9,Approach\n11,10,approach\n");
+        let data = data_of(&text, &[]);
+        assert_eq!(quantities(&data), [quantity], "{name}");
+        assert!(data.rows().all(|row| row.way.is_some()), "{name}");
+    }
+    let both = data_of(
+        "distance (nm),Amplitude (nm),First harmonic (nm)\n10,9,8\n",
+        &[],
+    );
+    assert_eq!(quantities(&both), ["amplitude", "first_harmonic"]);
+    let error = data_of(
+        "distance (nm),Amplitude (nm),Amplitude Error (nm)\n10,9,1\n",
+        &[],
+    );
+    assert_eq!(error.rows().next().unwrap().errors, [Some(1e-9)]);
+}
+
+#[test]
+fn the_last_brackets_of_a_header_contain_the_unit() {
+    let text = "Height (measured) (nm)\tvDeflection (nN)\n10\t9\n11\t10\n";
+    for convert in [
+        &[][..],
+        &["Height (measured)=distance"],
+        &["vDeflection=force"],
+    ] {
+        let data = data_of(text, convert);
+        assert_eq!(quantities(&data), ["force"], "{convert:?}");
+        assert_eq!(data.swept[0].key.path(), "gap.tip");
+        let row = data.rows().next().unwrap();
+        assert!((row.at[0] - 10e-9).abs() < 1e-20 && row.values == [Some(9.0 * 1e-9)]);
+    }
+}
+
+#[test]
+fn rows_without_a_position_are_left_out_and_counted() {
+    let text = "Zsnsr (nm),Amp (nm),Phase (deg)\nNaN,NaN,NaN\n10,9,80\n,8,70\n12,,85\n";
+    let table = Table::parse("curve.csv", text).unwrap();
+    let data = data_of(text, &[]);
+    let lines: Vec<u64> = data.rows().map(|row| row.line).collect();
+    assert_eq!(lines, [3, 5]);
+    let options = FitOptions {
+        profile: false,
+        ..request(vec![table], &["sample.stiffness"])
+    };
+    let report = fitted(&case(LEVER, &[]), &options);
+    let note = "curve.csv: rows without `distance`, left out: 2";
+    assert!(report.preparation.iter().any(|done| done == note));
+}
+
+#[test]
+fn texts_are_read_as_instruments_write_them() {
+    let numbers = |text: &str| -> Vec<Vec<Entry>> {
+        let table = Table::parse("curve.csv", text).unwrap();
+        let has_comma = table.notes.iter().any(|(name, _)| name == "DecimalCommas");
+        let is_converted = text.contains(',') && table.columns[0].1[0] == Entry::Number(1.234);
+        assert_eq!(has_comma, is_converted, "{text}");
+        table
+            .columns
+            .into_iter()
+            .map(|(_, column)| column)
+            .collect()
+    };
+    let number = |x: f64| Entry::Number(x);
+    let word = |text: &str| Entry::Text(text.into());
+    for text in [
+        "a;b\n1,234;-5e-9\n",
+        "a\tb\n1,234\t-5,0E-9\n",
+        "a,b\n\"1,234\",\"-5,0e-9\"\n",
+    ] {
+        assert_eq!(numbers(text), [[number(1.234)], [number(-5e-9)]], "{text}");
+    }
+    // Commas that may group thousands, or that stand next to decimal points, are not guessed.
+    for (text, first) in [
+        ("a,b\n\"1,234\",5\n", "1,234"),
+        ("a;b\n1,234;1.5\n", "1,234"),
+        ("a;b\n1,234;1,234.5\n", "1,234"),
+        ("a;b\n1.234,5;1,5\n", "1.234,5"),
+    ] {
+        assert_eq!(numbers(text)[0], [word(first)], "{text}");
+    }
+    let headers = |text: &str| -> Vec<String> {
+        let table = Table::parse("curve.csv", text).unwrap();
+        assert_eq!(table.lines, [3], "{text}");
+        table
+            .columns
+            .into_iter()
+            .map(|(header, _)| header)
+            .collect()
+    };
+    assert_eq!(
+        headers("z;Amp (nm);Phase;name\nnm;V;[deg];\n1;2;3;x\n"),
+        ["z (nm)", "Amp (nm)", "Phase (deg)", "name"]
+    );
+    // A row of words is not a row of units.
+    let words = Table::parse("curve.csv", "direction,z\napproach,\nretract,2\n").unwrap();
+    assert_eq!(words.lines, [2, 3]);
+    // Line ends of old Macintosh programs, and comments.
+    let mac = Table::parse("curve.csv", "#\rz,a\r1,2\r3,4\r").unwrap();
+    assert_eq!(mac.lines, [3, 4]);
+    let path = std::env::temp_dir().join(format!("nanotap-utf16-{}.csv", std::process::id()));
+    for encode in [u16::to_le_bytes, u16::to_be_bytes] {
+        let units = "\u{feff}z (µm)\n1\n".encode_utf16();
+        let bytes: Vec<u8> = units.flat_map(encode).collect();
+        std::fs::write(&path, bytes).unwrap();
+        let table = Table::read(&path).unwrap();
+        assert_eq!(table.columns, [("z (µm)".to_owned(), vec![number(1.0)])]);
+    }
+    std::fs::remove_file(&path).unwrap();
 }
 
 /// A lever over a sample with attraction and repulsion.

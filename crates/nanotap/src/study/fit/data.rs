@@ -16,6 +16,7 @@
 
 use crate::Error;
 use crate::case::near_name::near_name;
+use crate::case::physical::Kind;
 use crate::case::{Case, Key};
 use crate::observe::OBSERVABLES;
 use crate::study::approach::Way;
@@ -137,18 +138,29 @@ impl Data {
         for table in tables {
             data.add(case, table, only)?;
         }
+        let files: Vec<&str> = tables.iter().map(|table| table.name.as_str()).collect();
+        let files = files.join(", ");
         if data.columns.is_empty() {
             return Err(Error::option(
                 "data",
-                "no column is a measured quantity",
-                "name them as in: distance (nm), amplitude (nm), phase (deg)",
+                format!("{files}: no column is a measured quantity"),
+                "name them as in `distance (nm)`, `amplitude (nm)`, `phase (deg)`, or with \
+                 {convert} NAME=amplitude",
             ));
         }
         if data.swept.is_empty() {
             return Err(Error::option(
                 "data",
-                "no column gives the positions of the measured values",
-                "give `distance (nm)`, or another key of the case such as `drive.frequency (kHz)`",
+                format!("{files}: no column gives the positions of the measured values"),
+                "give `distance (nm)` or another key of the case such as `drive.frequency (kHz)`, or \
+                 say which column it is with {convert} NAME=distance",
+            ));
+        }
+        if data.rows().next().is_none() {
+            return Err(Error::option(
+                "data",
+                format!("{files}: no rows"),
+                "give rows with the position and the measured values",
             ));
         }
         let observed = data
@@ -204,7 +216,7 @@ impl Data {
         let headers: Vec<Header> = table.columns.iter().map(|(h, _)| Header::of(h)).collect();
         let chosen = |header: &Header, written: &str| {
             only.is_empty()
-                || matches!(header.name.as_str(), "direction" | "way" | "curve")
+                || header.label().is_some()
                 || only.iter().any(|name| {
                     name == written || *name == header.name || header.error_of() == Some(name)
                 })
@@ -222,8 +234,9 @@ impl Data {
                 ));
             }
         }
-        let has = |name: &str| headers.iter().any(|header| header.name == name);
-        let own_amplitude = has("first_harmonic") || has("A");
+        let own_amplitude = headers.iter().any(|header| {
+            Quantity::named(&header.name, true).is_some_and(|q| q.name() == "first_harmonic")
+        });
         let mut roles: Vec<Role> = Vec::new();
         for (index, header) in headers.iter().enumerate() {
             let counts = if of_approach(&headers) {
@@ -367,7 +380,8 @@ impl Data {
                 (_, Entry::Text(text)) => {
                     return refuse(
                         format!("`{text}` is not a number"),
-                        "write numbers with a decimal point, and leave missing values empty",
+                        "write all numbers with a decimal point, or all with a decimal comma and \
+                         semicolons between the columns; leave missing values empty",
                     );
                 }
                 (_, Entry::Number(number)) if !number.is_finite() => {
@@ -474,7 +488,7 @@ fn way(word: &str) -> Option<Way> {
 }
 
 /// True if a table was written by `approach`.
-fn of_approach(headers: &[Header]) -> bool {
+pub(super) fn of_approach(headers: &[Header]) -> bool {
     let names: Vec<&str> = headers.iter().map(|h| h.name.as_str()).take(5).collect();
     matches!(
         names[..],
@@ -539,15 +553,47 @@ impl Role {
 }
 
 impl Header {
-    fn error_of(&self) -> Option<&str> {
-        self.name.strip_suffix(" error").map(str::trim)
+    /// The quantity whose standard errors the column contains.
+    pub(super) fn error_of(&self) -> Option<&str> {
+        let start = self.name.len().checked_sub(" error".len())?;
+        let (of, end) = self.name.split_at_checked(start)?;
+        end.eq_ignore_ascii_case(" error").then(|| of.trim())
+    }
+
+    /// The role of a column that tells rows apart.
+    fn label(&self) -> Option<Role> {
+        match self.name.to_lowercase().as_str() {
+            "direction" | "way" => Some(Role::Way),
+            "curve" => Some(Role::Curve),
+            _ => None,
+        }
+    }
+
+    /// Whether the column is understood: a label, a quantity or a key of the case.
+    pub(super) fn is_known(&self, case: &Case) -> bool {
+        let name = self.error_of().unwrap_or(&self.name);
+        self.label().is_some() || Quantity::named(name, true).is_some() || set(name, case).is_ok()
+    }
+
+    /// Whether the column sets the position of its rows.
+    pub(super) fn is_position(&self, case: &Case) -> bool {
+        self.label().is_none()
+            && Quantity::named(&self.name, true).is_none()
+            && set(&self.name, case).is_ok()
+    }
+
+    /// Whether its values are lengths.
+    pub(super) fn is_length(&self, case: &Case) -> bool {
+        let kind = match Quantity::named(&self.name, true) {
+            Some(quantity) => quantity.kind(),
+            None => set(&self.name, case).ok().map(Key::kind),
+        };
+        case.is_physical() && kind == Some(Kind::Length)
     }
 
     fn role(&self, case: &Case, own_amplitude: bool) -> Result<Role, Error> {
-        match self.name.as_str() {
-            "direction" | "way" => return Ok(Role::Way),
-            "curve" => return Ok(Role::Curve),
-            _ => {}
+        if let Some(label) = self.label() {
+            return Ok(label);
         }
         if let Some(of) = self.error_of() {
             let column = Self {
@@ -629,11 +675,12 @@ pub(super) fn set(name: &str, case: &Case) -> Result<Key, Error> {
         if name.contains('.') {
             return error.into();
         }
+        let others = "or select the others with {columns}";
         Error::input(
             format!("`{name}` is neither an observable nor a key of the case"),
             match near {
-                Some(near) => format!("did you mean `{near}`? or select {{columns}}"),
-                None => "select {columns}".to_owned(),
+                Some(near) => format!("did you mean {{convert}} \"{name}={near}\"? {others}"),
+                None => format!("say what it is, as in {{convert}} \"{name}=distance\", {others}"),
             },
         )
     })

@@ -9,7 +9,7 @@ use nanotap_arithmetic::ComplexFunctions as _;
 use crate::Error;
 use crate::case::physical::Kind;
 use crate::case::physical::free_response::free_response;
-use crate::case::table::{Entry, Header, Table};
+use crate::case::table::{DECIMAL_COMMAS, Entry, Header, Table};
 use crate::case::{Case, Key};
 use crate::number::shortest;
 
@@ -129,16 +129,26 @@ pub(crate) fn prepared(
     }
     let mut guessed_phase = false;
     for (table, stated) in tables.iter_mut().zip(stated) {
-        let foreign = rename(table, &mut columns, &mut notes) || stated.any;
+        let comma = table.notes.iter().find(|(name, _)| name == DECIMAL_COMMAS);
+        notes.extend(comma.map(|(_, note)| format!("{}: {note}", table.name)));
+        let renamed = rename(table, &mut columns, &mut notes);
+        let foreign = !renamed.is_empty() || stated.any;
         from_header(case, table, &mut notes);
+        force_of_deflection(table, &mut columns, &mut notes);
+        leave_out_rows(case, table, &columns, &mut notes);
         if is_force_curve(table) {
-            force_curve(case, table, &columns, &mut notes)?;
+            force_curve(case, table, &columns, &renamed, &mut notes)?;
         }
         if foreign {
             leave_out(case, table, &columns, &mut notes);
         }
-        guessed_phase |= guess(case, table, foreign, stated, &mut notes)?;
+        guessed_phase |= guess(case, table, &renamed, foreign, stated, &mut notes)?;
         guess_force_curve(case, table, stated, &mut notes);
+        for (place, (written, _)) in table.columns.iter().enumerate() {
+            if is_chosen(written, &columns) && Header::of(written).is_length(case) {
+                check_volts(table, place, &renamed)?;
+            }
+        }
     }
     Ok(Prepared {
         tables,
@@ -151,10 +161,74 @@ pub(crate) fn prepared(
 /// Keeps the selection of a column that is renamed.
 fn follow(columns: &mut [String], before: &str, after: &str) {
     for column in columns {
-        if Header::of(column).name == before {
+        if Header::is_called(column, before) || Header::is_called(before, column) {
             after.clone_into(column);
         }
     }
+}
+
+/// Whether a column is used.
+fn is_chosen(written: &str, columns: &[String]) -> bool {
+    columns.is_empty() || columns.iter().any(|name| Header::is_called(written, name))
+}
+
+/// Leaves out the rows without a position.
+fn leave_out_rows(case: &Case, table: &mut Table, columns: &[String], notes: &mut Vec<String>) {
+    let headers: Vec<Header> = table.columns.iter().map(|(h, _)| Header::of(h)).collect();
+    if data::of_approach(&headers) {
+        return;
+    }
+    for (place, header) in headers.iter().enumerate() {
+        let (written, values) = &table.columns[place];
+        if !is_chosen(written, columns) || !header.is_position(case) {
+            continue;
+        }
+        let is_missing = |row| matches!(values.get(row), None | Some(Entry::Missing));
+        let is_given: Vec<bool> = (0..table.rows()).map(|row| !is_missing(row)).collect();
+        let count = is_given.iter().filter(|is_given| !**is_given).count();
+        if count > 0 {
+            table.retain_rows(|row| is_given[row]);
+            let (table, name) = (&table.name, &header.name);
+            notes.push(format!("{table}: rows without `{name}`, left out: {count}"));
+        }
+    }
+}
+
+/// A deflection in a unit of force is the force.
+fn force_of_deflection(table: &mut Table, columns: &mut [String], notes: &mut Vec<String>) {
+    let Some(place) = place_of(table, &["deflection"]) else {
+        return;
+    };
+    let Header { name, unit } = Header::of(&table.columns[place].0);
+    let is_force = !unit.is_empty() && Kind::Force.parse(&format!("1 {unit}")).is_ok();
+    if is_force && place_of(table, &["force"]).is_none() {
+        follow(columns, &name, "force");
+        table.columns[place].0 = written("force", &unit);
+        let table = &table.name;
+        notes.push(format!("{table}: `{name}` is in {unit}: it is the force"));
+    }
+}
+
+/// Refuses a column in V, with the conversion that it needs.
+fn check_volts(table: &Table, place: usize, renamed: &[(String, String)]) -> Result<(), Error> {
+    let Header { name, unit } = Header::of(&table.columns[place].0);
+    if unit.is_empty() || Kind::Voltage.parse(&format!("1 {unit}")).is_err() {
+        return Ok(());
+    }
+    let place = table.place(None, place);
+    Err(Error::input(
+        format!("{place}: it is in {unit}, and a length is needed"),
+        sensitivity(&name, &unit, renamed),
+    ))
+}
+
+/// How to state the sensitivity of a column in V.
+fn sensitivity(name: &str, unit: &str, renamed: &[(String, String)]) -> String {
+    let own = renamed.iter().find(|(present, _)| present == name);
+    let own = own.map_or(name, |(_, own)| own);
+    let deflects = name.eq_ignore_ascii_case("deflection");
+    let of = if deflects { " (InvOLS)" } else { "" };
+    format!("give its sensitivity{of}, as in {{convert}} \"{own}=58 nm/{unit}\"")
 }
 
 /// Leaves out an instrument's columns that are not understood, if no selection was made.
@@ -164,15 +238,12 @@ fn leave_out(case: &Case, table: &mut Table, columns: &[String], notes: &mut Vec
     }
     let mut lost = Vec::new();
     table.columns.retain(|(written, _)| {
-        let name = Header::of(written).name;
-        let plain = name.strip_suffix(" error").unwrap_or(&name).trim();
-        let known = matches!(plain, "direction" | "way" | "curve")
-            || Quantity::named(plain, true).is_some()
-            || data::set(plain, case).is_ok();
-        if !known {
-            lost.push(format!("`{name}`"));
+        let header = Header::of(written);
+        let is_known = header.is_known(case);
+        if !is_known {
+            lost.push(format!("`{}`", header.name));
         }
-        known
+        is_known
     });
     if !lost.is_empty() {
         let (name, lost) = (&table.name, lost.join(", "));
@@ -201,7 +272,7 @@ impl Conversion {
         let (name, rule) = text
             .split_once('=')
             .ok_or_else(|| wrong(format!("`{text}` has no `=`")))?;
-        let (name, rule) = (Header::of(name).name, rule.trim());
+        let (name, rule) = (name.trim().to_owned(), rule.trim());
         if name.is_empty() || rule.is_empty() {
             return Err(wrong(format!("`{text}` has an empty side")));
         }
@@ -244,7 +315,7 @@ impl Conversion {
 
     /// Notes what the conversion states.
     fn note(&self, stated: &mut Stated) {
-        let plain = plain(&self.name);
+        let plain = plain(&Header::of(&self.name).name);
         let known = NAMES.iter().find(|(own, _)| *own == plain);
         let name = self.renamed.as_deref().or(known.map(|(_, name)| *name));
         stated.any = true;
@@ -261,10 +332,12 @@ impl Conversion {
 
     /// Converts the column of `table` that has the name, if one does.
     fn apply(&self, table: &mut Table) -> Result<bool, Error> {
-        let is = |(written, _): &(String, Vec<Entry>)| {
-            *written == self.name || Header::of(written).name == self.name
+        let place = |name: &str| {
+            let mut columns = table.columns.iter();
+            columns.position(|(written, _)| Header::is_called(written, name))
         };
-        let Some(place) = table.columns.iter().position(is) else {
+        let place = place(&self.name).or_else(|| place(&Header::of(&self.name).name));
+        let Some(place) = place else {
             return Ok(false);
         };
         let header = Header::of(&table.columns[place].0);
@@ -357,9 +430,14 @@ fn plain(name: &str) -> String {
     name.to_lowercase().replace([' ', '_'], "")
 }
 
-/// Gives instruments' columns the names that are known here, and says whether there are any.
-fn rename(table: &mut Table, columns: &mut [String], notes: &mut Vec<String>) -> bool {
-    let before = notes.len();
+/// Gives instruments' columns the names that are known here. Returns these, each with the name in
+/// the file.
+fn rename(
+    table: &mut Table,
+    columns: &mut [String],
+    notes: &mut Vec<String>,
+) -> Vec<(String, String)> {
+    let mut renamed = Vec::new();
     let called = |written: &str| Header::of(written).name;
     for (own, name) in NAMES {
         let is_known = |(written, _): &(String, Vec<Entry>)| called(written).to_lowercase() == name;
@@ -383,8 +461,9 @@ fn rename(table: &mut Table, columns: &mut [String], notes: &mut Vec<String>) ->
         ));
         follow(columns, &header.name, name);
         table.columns[place].0 = written(name, &header.unit);
+        renamed.push((name.to_owned(), header.name));
     }
-    notes.len() > before
+    renamed
 }
 
 /// Sensitivities by the column that they convert from V, in the file's header, in m/V.
@@ -489,12 +568,14 @@ fn force_curve(
     case: &Case,
     table: &mut Table,
     columns: &[String],
+    renamed: &[(String, String)],
     notes: &mut Vec<String>,
 ) -> Result<(), Error> {
     let remove = |table: &mut Table, names: &[&str]| {
         table.columns.retain(|(written, _)| {
-            let name = Header::of(written).name.to_lowercase();
-            !names.contains(&name.strip_suffix(" error").unwrap_or(&name).trim())
+            let header = Header::of(written);
+            let name = header.error_of().unwrap_or(&header.name).to_lowercase();
+            !names.contains(&name.as_str())
         });
     };
     if columns.is_empty() && oscillates(table) {
@@ -507,7 +588,7 @@ fn force_curve(
         return Ok(());
     }
     if place_of(table, &["distance", "zc", "gap", "gap.tip"]).is_none() {
-        distance_of_separation(case, table, notes)?;
+        distance_of_separation(case, table, renamed, notes)?;
     }
     if columns.is_empty() {
         remove(table, &OF_FORCE_CURVE);
@@ -523,6 +604,7 @@ fn force_curve(
 fn distance_of_separation(
     case: &Case,
     table: &mut Table,
+    renamed: &[(String, String)],
     notes: &mut Vec<String>,
 ) -> Result<(), Error> {
     let place = |name: &str| place_of(table, &[name]);
@@ -532,6 +614,9 @@ fn distance_of_separation(
     ) else {
         return Ok(());
     };
+    for place in [separation, of] {
+        check_volts(table, place, renamed)?;
+    }
     let size = |place: usize, kind: Kind| {
         let unit = Header::of(&table.columns[place].0).unit;
         let size = kind.parse(&format!("1 {unit}"));
@@ -659,6 +744,7 @@ fn places(table: &Table) -> Option<Places> {
 fn guess(
     case: &Case,
     table: &mut Table,
+    renamed: &[(String, String)],
     foreign: bool,
     stated: Stated,
     remarks: &mut Vec<String>,
@@ -709,7 +795,7 @@ fn guess(
                         table.place(None, places.amplitude),
                         header.unit
                     ),
-                    format!("state it, as in {}=58 nm/{}", header.name, header.unit),
+                    sensitivity(&header.name, &header.unit, renamed),
                 ));
             }
         }
@@ -774,12 +860,11 @@ fn is_curve(case: &Case, table: &Table, places: &Places) -> bool {
     };
     varies(places.distance)
         && columns.all(|(place, (written, _))| {
-            let name = Header::of(written).name;
+            let header = Header::of(written);
+            let name = header.name.to_lowercase();
             place == places.distance
                 || !matches!(name.as_str(), "curve" | "classification")
-                    && (Quantity::named(&name, true).is_some()
-                        || data::set(&name, case).is_err()
-                        || !varies(place))
+                    && (!header.is_position(case) || !varies(place))
         })
 }
 

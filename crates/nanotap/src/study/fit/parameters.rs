@@ -237,7 +237,7 @@ fn nuisance(
     let own = data
         .columns
         .iter()
-        .any(|c| c.name == "A" || c.name == "first_harmonic");
+        .any(|c| c.quantity.name() == "amplitude");
     let column = Quantity::named(of, own)
         .and_then(|quantity| data.columns.iter().position(|c| c.quantity == quantity));
     let swept = || {

@@ -35,29 +35,28 @@ const RECORDED: [&str; 4] = [
 ];
 
 impl Quantity {
-    /// Parses a name; `own_amplitude` if another column is the reading of a lock-in amplifier.
+    /// Parses a name, with capitals or without; `own_amplitude` if another column is the reading of
+    /// a lock-in amplifier.
     pub(super) fn named(name: &str, own_amplitude: bool) -> Option<Self> {
-        let plain = name.replace([' ', '-'], "_");
+        let plain = name.to_lowercase().replace([' ', '-'], "_");
         let name = match plain.as_str() {
             "amplitude" if !own_amplitude => "first_harmonic",
             other => other,
         };
-        let numbers = || OBSERVABLES.iter().filter(|o| o.is_number);
-        let lower = name.to_lowercase();
         let modulated = COLUMNS
             .iter()
-            .find(|c| c.name == lower && RECORDED.contains(&c.name));
-        let rest = match lower.as_str() {
+            .find(|c| c.name == name && RECORDED.contains(&c.name));
+        let rest = match name {
             "deflection" => Some(RestQuantity::Deflection),
             "force" => Some(RestQuantity::Force),
             _ => None,
         };
-        let exact = numbers().find(|o| o.name == name || o.si_name == name);
-        let observed = exact.or_else(|| numbers().find(|o| o.name == lower));
+        let is_called = |o: &&Observable| o.name == name || o.si_name.eq_ignore_ascii_case(name);
+        let mut numbers = OBSERVABLES.iter().filter(|o| o.is_number);
         modulated
             .map(Self::Modulated)
             .or_else(|| rest.map(Self::Rest))
-            .or_else(|| observed.map(Self::Observed))
+            .or_else(|| numbers.find(is_called).map(Self::Observed))
     }
 
     /// Returns the name of the quantity, as in a report or a header.

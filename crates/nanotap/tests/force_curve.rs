@@ -16,6 +16,7 @@ use nanotap::study::approach::Way;
 use nanotap::study::force_curve::{
     ContactModel, ForceCurveOptions, ForceCurveReport, ForceCurveStudy, points_csv,
 };
+use nanotap::study::orbit::{OrbitOptions, OrbitStudy};
 use serde_json::{Value, json};
 
 const K: f64 = 2.0;
@@ -505,6 +506,47 @@ fn a_driven_lever_keeps_its_amplitude_far_away_and_its_points_end_periods() {
     assert!((periods - periods.round()).abs() < 1e-9);
     assert!(report.from >= 30e-9 && report.from < 31e-9);
     assert!((report.to - 5e-9).abs() < 1e-20);
+}
+
+/// A ramp so slow that the lever always settles: its points have the means of the orbit at their
+/// distance, whatever the drive phase at which a period ends.
+#[test]
+fn points_of_a_driven_lever_are_means_over_drive_periods() {
+    let mut words = words("hertz", 2);
+    words.retain(|word| !word.starts_with("drive."));
+    for word in ["drive.free_amplitude=2 nm", "drive.frequency=68 kHz"] {
+        words.push(word.to_owned());
+    }
+    let options = json!({"from": "1.6 nm", "to": "1.5 nm", "speed": "50 nm/s", "points": 20});
+    let report = curve_of(&words, options);
+    for point in report.points.iter().skip(5).step_by(7) {
+        let at = point.distance;
+        words.push(format!("gap.tip={at:e} m"));
+        let case = Case::parse(None, &words).unwrap();
+        words.pop();
+        let options = OrbitOptions::default();
+        let orbit = OrbitStudy::run(&case, &options, &Control::default()).unwrap();
+        let seen = orbit.physical.unwrap().observables;
+        // The lever settles in 6 periods, in which the distance changes by 4 pm.
+        assert!(seen.mean_deflection > 10e-12, "{:e}", seen.mean_deflection);
+        assert!(
+            (point.deflection / seen.mean_deflection - 1.0).abs() < 0.02,
+            "{point:?}"
+        );
+        assert!(
+            (point.force / seen.mean_force - 1.0).abs() < 0.02,
+            "{point:?}"
+        );
+        assert!((point.separation - at - point.deflection).abs() < 1e-20);
+        assert!(point.contact);
+    }
+    let free = curve_of(
+        &words,
+        json!({"from": "5 nm", "to": "4 nm", "speed": "200 um/s"}),
+    );
+    for point in &free.points {
+        assert!(point.deflection.abs() < 1e-20, "{point:?}");
+    }
 }
 
 #[test]

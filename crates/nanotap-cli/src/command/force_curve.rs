@@ -89,7 +89,11 @@ fn text(case: &GivenCase, report: &ForceCurveReport) -> String {
     row(
         "indentation",
         length(summary.indentation),
-        "minus the least separation",
+        if report.driven {
+            "minus the least separation at drive phase 0"
+        } else {
+            "minus the least separation"
+        },
     );
     row(
         "work of adhesion",

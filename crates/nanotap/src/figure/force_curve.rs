@@ -23,16 +23,17 @@ const DEFLECTION: Coordinates = (
 );
 
 /// Approach and retract with the branches of the lever at rest, stable and unstable, and the ends
-/// from which it jumps: force against separation, and deflection against distance.
+/// from which it jumps: force against separation, and deflection against distance. Those of a driven
+/// lever are means over drive periods.
 pub fn force_curve_figure(report: &ForceCurveReport) -> Figure {
+    let mean = if report.driven { "mean " } else { "" };
+    let [separation, force, deflection] = ["separation $d$ (nm)", "force (nN)", "deflection (nm)"]
+        .map(|label| format!("{mean}{label}"));
     Figure::new(1, 2)
         .width(DOUBLE_COLUMN)
         .height(80.0)
-        .with(panel(report, FORCE, "separation $d$ (nm)", "force (nN)").legend(Legend::Above))
-        .with(
-            panel(report, DEFLECTION, "distance $z$ (nm)", "deflection (nm)")
-                .legend(Legend::Hidden),
-        )
+        .with(panel(report, FORCE, &separation, &force).legend(Legend::Above))
+        .with(panel(report, DEFLECTION, "distance $z$ (nm)", &deflection).legend(Legend::Hidden))
 }
 
 fn panel(report: &ForceCurveReport, (of, rest): Coordinates, x: &str, y: &str) -> Panel {

@@ -13,9 +13,9 @@ use crate::model::parameter::Parameter;
 use crate::model::{Model, MotionError, cantilever_model_tangent};
 use crate::study::moving_sample::{LinearSums, Readout, SampleMotion, moved_system};
 
-/// Signals at an instant, in the model's units.
+/// Signals at an instant, or their means over a drive period, in the model's units.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(super) struct Instant {
+pub(super) struct Signals {
     /// Height of the tip over the undeformed surface.
     pub(super) gap: f64,
     pub(super) deflection: f64,
@@ -186,13 +186,13 @@ impl Lever {
     }
 
     /// Signals at the end of the last stretch, which was at drive phase `phase`.
-    pub(super) fn instant(&self, phase: f64) -> Instant {
+    pub(super) fn instant(&self, phase: f64) -> Signals {
         let drive = self.model.system.drive();
         match &self.engine {
             Engine::Linear(lever) => {
                 let regime = lever.flow.regime();
                 let at = |output: &Output| output.at(drive, &lever.state, phase);
-                Instant {
+                Signals {
                     gap: at(&lever.height),
                     deflection: self.model.tip.at(drive, &self.state, phase),
                     force: at(&lever.forces[regime]),
@@ -204,7 +204,7 @@ impl Lever {
                 let branch = lever.flow.branch();
                 let system = &lever.nonlinear.system;
                 let second = system.second_argument(phase, rate, &self.state[..system.dimension()]);
-                Instant {
+                Signals {
                     gap,
                     deflection: self.model.tip.at(drive, &self.state, phase),
                     force: system.law().force(branch, gap, second).value,
@@ -215,11 +215,11 @@ impl Lever {
     }
 
     /// Complex amplitude of the deflection at the drive's frequency over the last stretch, a whole
-    /// drive period.
-    pub(super) fn amplitude(&self, sums: &ForceSums) -> Complex {
+    /// drive period, and its mean.
+    pub(super) fn deflection(&self, sums: &ForceSums) -> (Complex, f64) {
         let ends = self.state.iter().zip(&self.before);
         let change: Vec<f64> = ends.map(|(after, before)| after - before).collect();
-        self.readout.deflection(&change, sums).0
+        self.readout.deflection(&change, sums)
     }
 }
 

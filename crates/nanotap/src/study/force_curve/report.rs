@@ -26,7 +26,8 @@ pub enum Waveform {
     Cosine,
 }
 
-/// A point of the force curve, in SI.
+/// A point of the force curve, in SI. Of a driven lever separation, deflection and force are means
+/// over the drive period before, as the slow channels of an instrument show them.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct CurvePoint {
     /// Direction of the motion at this point.
@@ -41,7 +42,7 @@ pub struct CurvePoint {
     pub deflection: f64,
     /// Force of the sample on the tip, positive if it repels, N.
     pub force: f64,
-    /// Whether tip and sample touch.
+    /// Whether tip and sample touch; of a driven lever, at any time of the drive period before.
     pub contact: bool,
     /// Amplitude of the deflection at the drive's frequency over the drive period before, m.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -111,7 +112,8 @@ pub struct ForceCurveSummary {
     pub adhesion_force: f64,
     /// Minus the lowest force of the approach, N.
     pub attraction: f64,
-    /// Indentation: minus the least separation at points and ends of drive periods, m.
+    /// Indentation: minus the least separation at points and ends of drive periods, m; of a driven
+    /// lever that at drive phase 0.
     pub indentation: f64,
     /// Work of adhesion of the curve, −∫F dz over the parts of the retract where the sample
     /// attracts, J.

@@ -5,7 +5,7 @@ use nanotap_dynamics::Control;
 use nanotap_flow::Complex;
 
 use super::Way;
-use super::lever::{Instant, Lever};
+use super::lever::{Lever, Signals};
 use super::path::Plan;
 use crate::Error;
 use crate::model::MotionError;
@@ -17,7 +17,8 @@ pub(super) struct Row {
     pub(super) way: Way,
     pub(super) time: f64,
     pub(super) distance: f64,
-    pub(super) signals: Instant,
+    /// Means over the drive period before, of a driven lever.
+    pub(super) signals: Signals,
     /// Amplitude and phase lag in degrees over the drive period before, of a driven lever.
     pub(super) oscillation: Option<[f64; 2]>,
 }
@@ -88,7 +89,7 @@ pub(super) fn run(plan: &Plan<'_>, control: &Control<'_>) -> Result<Run, Error> 
     let (mut time, mut periods) = (0.0, 0_u64);
     for point in 1..=plan.points {
         let end = point as f64 * plan.step;
-        let mut oscillation = None;
+        let mut over_period = None;
         while time < end {
             let start = periods as f64 * period;
             let next_period = (periods + 1) as f64 * period;
@@ -138,8 +139,14 @@ pub(super) fn run(plan: &Plan<'_>, control: &Control<'_>) -> Result<Run, Error> 
                 }
             }
             if plan.driven && whole && phase == 0.0 {
-                let z = lever.amplitude(&sums);
-                oscillation = Some([z.modulus(), lag(z)]);
+                let (z, deflection) = lever.deflection(&sums);
+                let means = Signals {
+                    gap: path.distance(until) + deflection,
+                    deflection,
+                    force: sums.impulse / period,
+                    contact: sums.contact > 0.0,
+                };
+                over_period = Some(([z.modulus(), lag(z)], means));
             }
             let here = lever.instant(if whole { 0.0 } else { phase + length });
             run.least_gap = run.least_gap.min(here.gap);
@@ -155,8 +162,8 @@ pub(super) fn run(plan: &Plan<'_>, control: &Control<'_>) -> Result<Run, Error> 
             way: path.way(time - 0.5 * plan.step),
             time,
             distance: path.distance(time),
-            signals: lever.instant(phase.max(0.0)),
-            oscillation,
+            signals: over_period.map_or_else(|| lever.instant(phase.max(0.0)), |(_, means)| means),
+            oscillation: over_period.map(|(oscillation, _)| oscillation),
         });
         if let Some(progress) = control.progress {
             progress(point, plan.points);

@@ -185,14 +185,16 @@ fn readings(report: &FitReport, column: &FittedColumn) -> Panel {
         .fold(0.0, |size: f64, value| size.max(value.abs()));
     let si = |_| (column.unit != "1" && Key::find(&report.swept).is_some()).then_some(1.0);
     let modulated = COLUMNS.iter().find(|c| c.name == column.observable);
-    let (label, factor) = match (shown, modulated.map(|c| (c.label, c.kind))) {
+    let name = modulated.map_or(column.name.as_str(), |c| c.label);
+    let unit = || Kind::ALL.into_iter().find(|k| k.si_unit() == column.unit);
+    let kind = modulated.map_or_else(unit, |c| c.kind);
+    let (label, factor) = match (shown, kind) {
         (Some(shown), _) => shown.axis(true, si, size),
-        (None, Some((label, Some(kind)))) if column.unit != "1" => {
+        (None, Some(kind)) if column.unit != "1" => {
             let (factor, unit) = prefixed(kind, 1.0, size);
-            (format!("{label} ({unit})"), factor)
+            (format!("{name} ({unit})"), factor)
         }
-        (None, Some((label, _))) => (label.to_owned(), 1.0),
-        (None, None) => (column.name.clone(), 1.0),
+        (None, _) => (name.to_owned(), 1.0),
     };
     let y = |value: f64| factor * if phase { shown_phase(value) } else { value };
     let points = |rows: &[&FittedRow], of: fn(&Reading) -> Option<f64>| -> Vec<(f64, f64)> {

@@ -3,6 +3,7 @@
 
 use nanotap::case::Case;
 use nanotap::control::Control;
+use nanotap::figure::fit::fit_figure;
 use nanotap::study::Study as _;
 use nanotap::study::fit::{Entry, FitOptions, FitReport, Table, fit};
 use nanotap::study::force_curve::{
@@ -124,6 +125,15 @@ const EXAMPLES: [Example; 3] = [
         truth: &[20e6, 20e-3],
     },
 ];
+
+#[test]
+fn the_figure_shows_the_deflection_in_nanometres() {
+    let curve = curve(&case("hertz", HERTZ));
+    let free = ["sample.modulus", "gap.offset", "deflection.offset"];
+    let report = fitted(&case("hertz", HERTZ), recorded(&curve, NOISE, 1), &free);
+    let readings = &fit_figure(&report).panels[0];
+    assert_eq!(readings.y.label, "deflection (nm)");
+}
 
 #[test]
 fn intervals_hold_the_truth_under_every_law() {

@@ -429,7 +429,6 @@ impl<'a> Beam<'a> {
         stored.extend(
             (0..case.modes).map(|j| product(0.5 * modes.stiffness[j], &unit(j, 0), &unit(j, 0))),
         );
-        stored.extend(self.products(response.stored.iter()));
         let mut beam: Vec<Product> = weighted(case.alpha3).collect();
         for (each, speed) in corrections.iter().zip(&speeds) {
             let bent = self.layout.row(&each.row, 0);
@@ -442,6 +441,7 @@ impl<'a> Beam<'a> {
             beam,
             sample: self.products(response.dissipated.iter()).collect(),
             stored,
+            stored_by_sample: self.products(response.stored.iter()).collect(),
         }
     }
 

@@ -152,8 +152,10 @@ pub struct Powers {
     pub beam: Vec<Product>,
     /// Power that the sample's damping takes.
     pub sample: Vec<Product>,
-    /// Kinetic and elastic energy stored (an energy, not a power).
+    /// Kinetic and elastic energy stored in the lever (an energy, not a power).
     pub stored: Vec<Product>,
+    /// Energy stored in the sample.
+    pub stored_by_sample: Vec<Product>,
 }
 
 /// [`Powers`] of every regime, computed on first use: few of the thousands of models that a sweep
@@ -368,7 +370,8 @@ impl Model {
         }
         for powers in self.power.known.get_mut().into_iter().flatten() {
             let products = [&mut powers.drive, &mut powers.beam, &mut powers.sample];
-            let products = products.into_iter().chain([&mut powers.stored]).flatten();
+            let stored = [&mut powers.stored, &mut powers.stored_by_sample];
+            let products = products.into_iter().chain(stored).flatten();
             for product in products {
                 visit(&mut product.a.constant);
                 visit(&mut product.b.constant);

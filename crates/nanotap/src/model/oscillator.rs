@@ -282,8 +282,8 @@ impl Oscillator {
             stored: vec![
                 product(0.5 * self.mass, &speed, &speed),
                 product(0.5 * self.stiffness, &tip, &tip),
-                product(0.5 * contact_stiffness, &gap, &gap),
             ],
+            stored_by_sample: vec![product(0.5 * contact_stiffness, &gap, &gap)],
         };
         let (contact_stiffness, contact_damping, rigid_stop) = match self.stop {
             Stop::Soft { stiffness, damping } => (stiffness, damping, None),

@@ -180,12 +180,20 @@ impl PowerTerm {
 
 /// Energy stored in the lever for a state at drive phase 0.
 pub(super) fn stored_by_lever(model: &Model, state: &[f64]) -> f64 {
-    let at = |output: &Output| output.at(model.system.drive(), state, 0.0);
-    let stored = model
-        .power()
-        .first()
-        .map_or(&[][..], |powers| &powers.stored);
-    stored.iter().map(|p| p.weight * at(&p.a) * at(&p.b)).sum()
+    let powers = model.power().first();
+    powers.map_or(0.0, |powers| total(&powers.stored, model, state, 0.0))
+}
+
+/// Energy stored in the sample for a state at drive phase 0 in a regime.
+pub(super) fn stored_by_sample(model: &Model, regime: usize, state: &[f64]) -> f64 {
+    total(&model.power()[regime].stored_by_sample, model, state, 0.0)
+}
+
+/// Sum of products for a state at a drive phase (as a time).
+fn total(products: &[Product], model: &Model, state: &[f64], phase: f64) -> f64 {
+    let at = |output: &Output| output.at(model.system.drive(), state, phase);
+    let values = products.iter().map(|p| p.weight * at(&p.a) * at(&p.b));
+    values.sum()
 }
 
 /// The first and the last segment of a motion.
@@ -214,18 +222,16 @@ impl Stretch {
 
     /// Energy stored at time `s` in the segment.
     fn stored(&self, model: &Model, s: f64) -> f64 {
-        let drive = model.system.drive();
         let mut recorder = Recorder::default();
         recorder.take_stretch(self.regime, self.phase, self.length, &self.modal);
         let stretch = recorder.finish(std::sync::Arc::clone(&model.system));
         let Some(state) = stretch.state_at(self.phase + s) else {
             return 0.0;
         };
-        let at = |output: &Output| output.at(drive, &state, self.phase + s);
-        model.power()[self.regime]
-            .stored
+        let powers = &model.power()[self.regime];
+        [&powers.stored, &powers.stored_by_sample]
+            .map(|products| total(products, model, &state, self.phase + s))
             .iter()
-            .map(|p| p.weight * at(&p.a) * at(&p.b))
             .sum()
     }
 }

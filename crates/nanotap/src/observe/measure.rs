@@ -14,7 +14,7 @@ use nanotap_flow::{Flow, FlowError};
 use super::begins_contact;
 use super::clearance::ClearanceSearch;
 use super::contact_event::Contacts;
-use super::energy::Ends;
+use super::energy::{Ends, stored_by_sample};
 use super::functional::{Functional, Requirements, Signal};
 use super::measured::{Beginnings, Found, Impacts};
 use super::number::Phasor;
@@ -88,12 +88,21 @@ impl Engine for PiecewiseLinear<'_> {
             measurement.restart_each_period(Functional::Least(Signal::Tip));
             measurement.restart_each_period(Functional::Greatest(Signal::Tip));
         }
-        Ok(Box::new(ExactRun { flow, measurement }))
+        Ok(Box::new(ExactRun {
+            start: (flow.regime(), state.to_vec()),
+            flow,
+            measurement,
+        }))
     }
 }
 
+/// Relative difference of states below which a motion has closed.
+const CLOSED: f64 = 1e-9;
+
 /// A run of the exact flow, which is measured.
 struct ExactRun<'a> {
+    /// Regime and state at the start.
+    start: (usize, Vec<f64>),
     flow: Flow,
     measurement: Measurement<'a>,
 }
@@ -111,7 +120,18 @@ impl Run for ExactRun<'_> {
     }
 
     fn finish(self: Box<Self>) -> Result<Measurements, MotionError> {
-        Ok(self.measurement.finish()?)
+        let model = self.measurement.of.model;
+        let (before, after) = (&self.start.1, self.state());
+        let size = before.iter().fold(0.0, |m: f64, v| m.max(v.abs()));
+        let changes = before.iter().zip(&after).map(|(a, b)| (a - b).abs());
+        // A closed orbit gains nothing, and needs no powers.
+        let gain = if changes.fold(0.0, f64::max) <= CLOSED * size {
+            0.0
+        } else {
+            stored_by_sample(model, self.flow.regime(), &after)
+                - stored_by_sample(model, self.start.0, before)
+        };
+        Ok(self.measurement.finish(gain)?)
     }
 }
 
@@ -175,7 +195,7 @@ impl Measurement<'_> {
         known.map_or_else(Vec::new, |known| known.each.clone())
     }
 
-    fn finish(mut self) -> Result<Measurements, FlowError> {
+    fn finish(mut self, stored_by_sample: f64) -> Result<Measurements, FlowError> {
         let (lows, highs) = (
             self.each(Functional::Least(Signal::Tip)),
             self.each(Functional::Greatest(Signal::Tip)),
@@ -200,7 +220,7 @@ impl Measurement<'_> {
                 contact_time: contact_regimes(model).map(|r| gathered.time_in(r)).sum(),
                 contacts: contacts(model, gathered),
                 stored: self.ends.as_ref().map_or(0.0, |ends| ends.gain(model)),
-                stored_by_sample: 0.0,
+                stored_by_sample,
                 clearance: clearance.flatten(),
                 impacts: impacts(model, gathered),
                 tone_phases: model.tone_phases.clone(),

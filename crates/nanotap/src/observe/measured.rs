@@ -28,7 +28,7 @@ pub(super) struct Found<D> {
     pub(super) contacts: Beginnings<D>,
     /// Gain of stored energy over the motion, in model units.
     pub(super) stored: D,
-    /// Gain of energy stored in a nonlinear law.
+    /// Gain of energy stored in the sample.
     pub(super) stored_by_sample: D,
     pub(super) clearance: Option<Clearance<D>>,
     pub(super) impacts: Impacts<D>,

@@ -6,7 +6,8 @@ use std::f64::consts::TAU;
 use nanotap::case::physical::free_response::free_response;
 use nanotap::model::Model;
 use nanotap::model::cantilever::Cantilever;
-use nanotap::observe::Spectrum;
+use nanotap::model::contact::ContactLaw;
+use nanotap::observe::{ObservableSet, Spectrum, measure};
 use nanotap::study::orbit::{OrbitOptions, OrbitReport, orbit};
 use nanotap_dynamics::Complex;
 
@@ -223,6 +224,40 @@ fn an_optical_lever_reads_a_static_deflection_correctly() {
     let phase = o.optical_phase.unwrap();
     let turn = (phase - o.phase).rem_euclid(360.0);
     assert!(turn.min(360.0 - turn) < 0.01, "{phase} {}", o.phase);
+}
+
+/// The work on the sample of a motion that does not close, less what the contact stores, is the loss
+/// in its damping; without damping it is zero.
+#[test]
+fn a_recording_dissipates_what_the_damping_takes() {
+    const PERIODS: usize = 3;
+    let elastic = Cantilever {
+        alpha6: 0.0,
+        ..Cantilever::paper()
+    };
+    let laws = [
+        elastic.clone(),
+        Cantilever::paper(),
+        elastic
+            .clone()
+            .on(ContactLaw::StandardLinearSolid, &[8.0, 0.05]),
+        Cantilever::paper().on(ContactLaw::MovingSurface, &[60.0, 8.0, 0.4]),
+    ];
+    for case in laws {
+        let model = Model::cantilever(&case).unwrap();
+        let mut stores = false;
+        for depth in [0.5, 0.2, -0.3] {
+            let mut state = vec![0.0; model.dimension()];
+            state[0] = -depth;
+            let o = measure(&model, &state, PERIODS, ObservableSet::ALL).unwrap();
+            let lost = o.dissipation * PERIODS as f64;
+            let damping = o.energy_balance.sample_damping;
+            assert!((lost - damping).abs() < 1e-10, "{lost} {damping}");
+            assert!(case != elastic || o.dissipation == 0.0, "{}", o.dissipation);
+            stores |= o.energy_balance.stored.abs() > 1e-3;
+        }
+        assert!(stores);
+    }
 }
 
 /// The observables of a run over many blocks are those of one orbit.

@@ -226,11 +226,15 @@ fn text(case: &GivenCase, report: &ApproachReport) -> String {
     if let (Some(first), Some(last)) = (report.coexisting.first(), report.coexisting.last()) {
         let periods: BTreeSet<usize> = report.coexisting.iter().filter_map(|p| p.period).collect();
         let periods: Vec<String> = periods.iter().map(ToString::to_string).collect();
+        let [near, far] = [last, first].map(|p| shown(Kind::Length, p.gap));
+        let place = if near == far {
+            format!("at {near}")
+        } else {
+            format!("from {near} to {far}")
+        };
         text.push_str(&motion::paragraph(&format!(
-            "from {} to {} further motions attract that neither way met (period {}): --out and \
-             --plot have them",
-            shown(Kind::Length, last.gap),
-            shown(Kind::Length, first.gap),
+            "{place} further motions attract that neither way met (period {}): --out and --plot \
+             have them",
             periods.join(", ")
         )));
     }

@@ -10,10 +10,11 @@ use serde::Deserialize;
 use crate::case::physical::Kind;
 use crate::case::units::Units;
 use crate::figure::branch::{
-    BranchMark, BranchPoint, Shown, natural_of, runs, scale_of, with_marks,
+    BranchMark, BranchPoint, Shown, natural_of, runs, scale_of, with_corners, with_marks,
 };
 use crate::observe::Observables;
 use crate::study::approach::{ApproachReport, Way};
+use crate::study::branch::BifurcationReport;
 use crate::study::frequency_modulation::{COLUMNS, Modulated, ModulatedColumn};
 
 /// Amplitude, phase, dissipation and peak force against the distance; under frequency modulation the
@@ -219,7 +220,19 @@ impl ApproachPanel {
             on.filter_map(|p| Some(place(p.gap, p.observables.as_ref()?)))
                 .collect()
         };
-        let bifurcations = report.branches.iter().flat_map(|b| &b.bifurcations);
+        let bifurcations = report.branches.as_ref();
+        let bifurcations = bifurcations.map_or(&[][..], |b| &b.bifurcations);
+        let mark = |b: &BifurcationReport| place(b.parameter, &b.observables);
+        let orbits = points().map(|p| {
+            let (x, y) = place(p.parameter, &p.observables);
+            BranchPoint {
+                branch: p.branch,
+                period: p.period,
+                stable: p.stable,
+                x,
+                y,
+            }
+        });
         Self {
             label,
             natural: natural.map(|size| factor * size),
@@ -227,23 +240,13 @@ impl ApproachPanel {
             approach: way(Way::Approach),
             retract: way(Way::Retract),
             coexisting: way(Way::Neither),
-            branches: points()
-                .map(|p| {
-                    let (x, y) = place(p.parameter, &p.observables);
-                    BranchPoint {
-                        branch: p.branch,
-                        period: p.period,
-                        stable: p.stable,
-                        x,
-                        y,
-                    }
-                })
-                .collect(),
+            branches: with_corners(orbits.collect(), bifurcations, mark),
             compared: Vec::new(),
             comparison: String::new(),
             bifurcations: bifurcations
+                .iter()
                 .map(|b| {
-                    let (x, y) = place(b.parameter, &b.observables);
+                    let (x, y) = mark(b);
                     BranchMark {
                         kind: b.kind.to_owned(),
                         x,

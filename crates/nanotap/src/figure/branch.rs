@@ -14,7 +14,7 @@ use crate::case::units::{Units, prefixed};
 use crate::case::{Case, Key};
 pub use crate::figure::shown::Shown;
 use crate::observe::{Observables, PhysicalMotion};
-use crate::study::branch::{BranchReport, PointReport};
+use crate::study::branch::{BifurcationReport, BranchReport, PointReport};
 
 /// Axis of a parameter: its label and the factor of its values.
 #[derive(Clone, Debug, PartialEq)]
@@ -135,28 +135,32 @@ pub fn branch_figure(
         size,
     );
     let [first, second] = axes;
+    let points = report.points.iter().map(|p| BranchPoint {
+        branch: p.branch,
+        period: p.period,
+        stable: p.stable,
+        x: first.factor * p.parameter,
+        y: factor * value(shown, p),
+    });
+    let place = |b: &BifurcationReport| {
+        let value = of(shown, &b.observables, b.physical.as_ref(), &b.multipliers);
+        (first.factor * b.parameter, factor * value)
+    };
     BranchCurves {
         x_label: first.label.clone(),
         y_label: label,
         natural: natural.map(|size| factor * size),
-        points: report
-            .points
-            .iter()
-            .map(|p| BranchPoint {
-                branch: p.branch,
-                period: p.period,
-                stable: p.stable,
-                x: first.factor * p.parameter,
-                y: factor * value(shown, p),
-            })
-            .collect(),
+        points: with_corners(points.collect(), &report.bifurcations, place),
         bifurcations: report
             .bifurcations
             .iter()
-            .map(|b| BranchMark {
-                kind: b.kind.to_owned(),
-                x: first.factor * b.parameter,
-                y: factor * of(shown, &b.observables, b.physical.as_ref(), &b.multipliers),
+            .map(|b| {
+                let (x, y) = place(b);
+                BranchMark {
+                    kind: b.kind.to_owned(),
+                    x,
+                    y,
+                }
             })
             .chain(report.events.iter().map(|found| BranchMark {
                 kind: "event".to_owned(),
@@ -402,6 +406,29 @@ const ENDS: [(&str, Shape); 3] = [
     ("codimension two", Shape::Diamond),
     ("cut", Shape::Cross),
 ];
+
+/// Makes each located grazing, where observables have a corner, a vertex of its branch. `place` gives
+/// its coordinates.
+pub(crate) fn with_corners(
+    mut points: Vec<BranchPoint>,
+    bifurcations: &[BifurcationReport],
+    place: impl Fn(&BifurcationReport) -> (f64, f64),
+) -> Vec<BranchPoint> {
+    for grazing in bifurcations.iter().filter(|b| b.kind == "grazing") {
+        let (x, y) = place(grazing);
+        let is_around = |k: &usize| {
+            let [a, b] = [points[*k], points[k + 1]];
+            let on = a.branch == grazing.branch && b.branch == grazing.branch;
+            on && (a.x - x) * (b.x - x) < 0.0
+        };
+        let detour = |k: usize| (points[k].y - y).abs() + (points[k + 1].y - y).abs();
+        let around = (0..points.len().saturating_sub(1)).filter(is_around);
+        if let Some(k) = around.min_by(|a, b| detour(*a).total_cmp(&detour(*b))) {
+            points.insert(k + 1, BranchPoint { x, y, ..points[k] });
+        }
+    }
+    points
+}
 
 /// Stretches of one stability, each beginning where the last one ended.
 pub(crate) fn runs<'a, P>(

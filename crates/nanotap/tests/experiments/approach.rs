@@ -3,6 +3,7 @@
 use nanotap::case::Case;
 use nanotap::case::file::Source;
 use nanotap::control::{CancelFlag, Control};
+use nanotap::figure::approach::approach_figure;
 use nanotap::model::cantilever::Cantilever;
 use nanotap::model::model_map::ModelMap;
 use nanotap::study::approach::{
@@ -11,6 +12,9 @@ use nanotap::study::approach::{
 use nanotap::study::simulate::{Classification, SimulateOptions, simulate};
 use nanotap::study::threads::install;
 use nanotap_dynamics::StroboscopicMap as _;
+use nanotap_figures::Layer;
+
+use super::branches::paper;
 
 /// An NCHR-class lever of high Q on polystyrene, driven a little above its resonance.
 pub(crate) const STIFF: &str = "\
@@ -515,4 +519,21 @@ fn contact_of_the_beam_is_detected() {
         "{:?}",
         report.beam_clearance
     );
+}
+
+/// The peak force of the paper's case at Ω = 20 is zero up to the grazing and rises like a root from
+/// there: a branch drawn without this point would lie above zero in front of it.
+#[test]
+fn a_grazing_is_a_vertex_of_its_branch() {
+    let case = studied(&paper(20.0, 3), &["alpha1=0"]);
+    let report = curve(&case, &ApproachOptions::default());
+    let grazing = &report.branches.as_ref().unwrap().bifurcations[0];
+    assert_eq!(grazing.kind, "grazing");
+    let figure = approach_figure(&report, &case.units());
+    let forces = figure.panels.last().unwrap();
+    let is_vertex = |layer: &Layer| match layer {
+        Layer::Line(line) => line.points.contains(&(grazing.parameter, 0.0)),
+        _ => false,
+    };
+    assert!(forces.layers.iter().any(is_vertex));
 }

@@ -66,7 +66,7 @@ fn a_branch_ends_at_zero_drive() {
 }
 
 /// Equation 26 of the paper, contact damping 0.2.
-fn paper(omega: f64, modes: usize) -> String {
+pub(crate) fn paper(omega: f64, modes: usize) -> String {
     format!(
         "[model]\nmodes = {modes}\nalpha1 = 0.1\nalpha2 = 0.1\nalpha3 = 0.1\nalpha4 = 20.0\n\
          alpha5 = 0.0\nalpha6 = 0.2\nomega = {omega}\n"

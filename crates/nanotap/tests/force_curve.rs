@@ -521,7 +521,7 @@ fn points_of_a_driven_lever_are_means_over_drive_periods() {
     let report = curve_of(&words, options);
     for point in report.points.iter().skip(5).step_by(7) {
         let at = point.distance;
-        words.push(format!("gap.tip={:e} m", at));
+        words.push(format!("gap.tip={at:e} m"));
         let case = Case::parse(None, &words).unwrap();
         words.pop();
         let options = OrbitOptions::default();

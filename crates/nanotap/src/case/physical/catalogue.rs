@@ -132,6 +132,7 @@ pub struct Catalogue {
 impl Catalogue {
     /// The built-in levers and materials.
     ///
+    /// # Errors
     /// None as shipped, as a test verifies; [`CatalogueError`] if the file in the source tree is
     /// edited and invalid.
     pub fn builtin() -> Result<Self, CatalogueError> {

@@ -87,9 +87,9 @@ pub(super) fn run(plan: &Plan<'_>, control: &Control<'_>) -> Result<Run, Error> 
         stretches: 0,
     };
     let (mut time, mut periods) = (0.0, 0_u64);
+    let mut over_period = None;
     for point in 1..=plan.points {
         let end = point as f64 * plan.step;
-        let mut over_period = None;
         while time < end {
             let start = periods as f64 * period;
             let next_period = (periods + 1) as f64 * period;

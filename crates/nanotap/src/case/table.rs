@@ -43,8 +43,8 @@ pub struct Table {
 }
 
 impl Table {
-    /// Reads an instrument's file (`.ibw`, `.jpk-force`, `.nid`) or a CSV file, in UTF-8 or in
-    /// UTF-16 with a byte order mark. Fields of a CSV file are separated by commas, semicolons or
+    /// Reads an instrument's file (`.ibw`, `.jpk-force`, `.nid`) or a CSV file, in UTF-8, in
+    /// UTF-16 with a byte order mark, or in Latin-1. Fields of a CSV file are separated by commas, semicolons or
     /// tabs, its first line names the columns, the next may contain their units, and lines that
     /// begin with `#` are skipped. Where commas in numbers cannot be separators, they are decimal
     /// commas, which `notes` states.
@@ -77,7 +77,7 @@ impl Table {
         }
         let text = text_of(bytes).ok_or_else(|| {
             Error::input(
-                format!("{name} is not a text (UTF-8, or UTF-16 with a byte order mark)"),
+                format!("{name} is not a text (UTF-8, UTF-16 with a byte order mark, or Latin-1)"),
                 "export the curve as text, with the names of the columns in the first line",
             )
         })?;
@@ -260,7 +260,7 @@ impl Entry {
 /// Name of the note that numbers were read with decimal commas.
 pub(crate) const DECIMAL_COMMAS: &str = "DecimalCommas";
 
-/// The text in bytes of UTF-8, or of UTF-16 with a byte order mark.
+/// The text in bytes of UTF-8, of UTF-16 with a byte order mark, or of Latin-1.
 fn text_of(bytes: Vec<u8>) -> Option<String> {
     let wide = |bytes: &[u8], unit: fn([u8; 2]) -> u16| {
         let (pairs, rest) = bytes.as_chunks();
@@ -270,8 +270,15 @@ fn text_of(bytes: Vec<u8>) -> Option<String> {
     match &bytes[..] {
         [0xff, 0xfe, rest @ ..] => wide(rest, u16::from_le_bytes),
         [0xfe, 0xff, rest @ ..] => wide(rest, u16::from_be_bytes),
-        _ => String::from_utf8(bytes).ok(),
+        _ => String::from_utf8(bytes).map_or_else(|error| latin(error.as_bytes()), Some),
     }
+}
+
+/// The text of Latin-1, in which a byte is a character, unless some are control characters.
+fn latin(bytes: &[u8]) -> Option<String> {
+    let is_text = |byte: &u8| b"\t\r\n".contains(byte) || !char::from(*byte).is_control();
+    let is_latin = bytes.iter().all(is_text);
+    is_latin.then(|| bytes.iter().map(|byte| char::from(*byte)).collect())
 }
 
 /// The number that a field contains, with a decimal point or a decimal comma.

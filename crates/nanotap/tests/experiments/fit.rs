@@ -997,6 +997,12 @@ fn texts_are_read_as_instruments_write_them() {
         let table = Table::read(&path).unwrap();
         assert_eq!(table.columns, [("z (µm)".to_owned(), vec![number(1.0)])]);
     }
+    // Latin-1, where µ is one byte; bytes of other data are no text.
+    std::fs::write(&path, b"z (\xb5m)\n1\n").unwrap();
+    let table = Table::read(&path).unwrap();
+    assert_eq!(table.columns, [("z (µm)".to_owned(), vec![number(1.0)])]);
+    std::fs::write(&path, b"z (\xb5m)\n\x00\x01\n").unwrap();
+    assert!(Table::read(&path).is_err());
     std::fs::remove_file(&path).unwrap();
 }
 

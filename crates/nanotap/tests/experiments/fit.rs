@@ -45,7 +45,7 @@ impl Noise {
 }
 
 /// Distance (nm), amplitude (nm), phase (deg) and direction of an approach curve, without noise.
-fn curve(case: &Case, from: f64, to: f64, points: usize) -> Vec<(f64, f64, f64, Way)> {
+pub(crate) fn curve(case: &Case, from: f64, to: f64, points: usize) -> Vec<(f64, f64, f64, Way)> {
     let options = ApproachOptions {
         from: Some((from * 1e-9).into()),
         to: Some((to * 1e-9).into()),
@@ -63,7 +63,7 @@ fn curve(case: &Case, from: f64, to: f64, points: usize) -> Vec<(f64, f64, f64, 
 }
 
 /// The same as a table, with noise of these sizes, which the table states if `stated`.
-fn measured(
+pub(crate) fn measured(
     curve: &[(f64, f64, f64, Way)],
     noise: &mut Noise,
     [of_amplitude, of_phase]: [f64; 2],

@@ -10,7 +10,7 @@ use nanotap::study::orbit::{OrbitOptions, orbit};
 use nanotap::study::reconstruct::{ReconstructOptions, ReconstructReport, reconstruct};
 use serde_json::Value;
 
-use crate::fit::Noise;
+use crate::fit::{Noise, curve, measured};
 
 /// Curves that another program made, with the laws' own forces.
 fn references() -> Vec<Value> {
@@ -263,6 +263,100 @@ fn the_table_is_a_law_that_gives_the_curve_back() {
     let again = Case::parse(None, &words).unwrap();
     let found = orbit(&again.model().unwrap(), &OrbitOptions::default()).unwrap();
     assert!(found.stable && found.observables.peak_force > 0.0);
+}
+
+/// A lever of 42 N/m with Q = 400 over a DMT sample of 2 GPa, or another law.
+fn stiff_lever(sample: &str) -> Case {
+    let text = format!(
+        "[cantilever]\nk = \"42 N/m\"\nf0 = \"330 kHz\"\nQ = 400\n[model]\nmodes = 1\n[tip]\n\
+         radius = \"10 nm\"\n[sample]\n{sample}\n[drive]\nfrequency_ratio = 0.999\n\
+         free_amplitude = \"12 nm\"\n[gap]\ntip = \"10 nm\"\n"
+    );
+    let source = Source {
+        name: "lever.toml".into(),
+        text,
+    };
+    Case::parse(Some(source), &[]).unwrap()
+}
+
+const DMT: &str = "law = \"dmt\"\nmodulus = \"2 GPa\"\npoisson = 0.35\nhamaker = \"8e-20 J\"\n\
+                   intermolecular_distance = \"0.165 nm\"";
+const HERTZ: &str = "law = \"hertz\"\nmodulus = \"1 GPa\"\npoisson = 0.4";
+
+/// The DMT law, N.
+fn dmt(d: f64) -> f64 {
+    let (radius, hamaker, contact) = (10e-9_f64, 8e-20, 0.165e-9);
+    let attraction = -hamaker * radius / 6.0 / d.max(contact).powi(2);
+    let depth = (contact - d).max(0.0);
+    attraction + 4.0 / 3.0 * 2e9 / (1.0 - 0.35 * 0.35) * radius.sqrt() * depth.powf(1.5)
+}
+
+fn hertz(d: f64) -> f64 {
+    let depth = (-d).max(0.0);
+    4.0 / 3.0 * 1e9 / (1.0 - 0.4 * 0.4) * 10e-9_f64.sqrt() * depth.powf(1.5)
+}
+
+/// Standard deviations of amplitude (nm) and phase (deg).
+const LOW_NOISE: [f64; 2] = [0.01, 0.05];
+
+/// A low-noise curve over a conservative sample, whose force was once found at tens of nN beyond the
+/// closest approach: the iteration did not converge, and errors followed an oscillating force.
+#[test]
+fn standard_errors_hold_and_no_force_is_beyond_the_closest_approach() {
+    for (sample, law) in [(DMT, dmt as fn(f64) -> f64), (HERTZ, hertz)] {
+        let case = stiff_lever(sample);
+        let rows = curve(&case, 16.0, 3.0, 100);
+        let (mut held, mut all) = (0, 0);
+        for seed in 1..=5 {
+            let data = measured(&rows, &mut Noise(seed), LOW_NOISE, false);
+            let report = reconstructed(&case, data, ReconstructOptions::default());
+            let found = &report.table;
+            assert!(found.distance[0] >= report.closest);
+            assert!(report.ways.is_empty() && report.chi2 < 2.0);
+            let near = found.distance.iter().enumerate();
+            for (k, d) in near.filter(|(_, d)| **d < 1.5e-9) {
+                let deviation = (found.force[k] - law(*d)).abs() / found.force_error[k];
+                assert!(deviation < 5.0, "{seed}: {deviation} at {d:e}");
+                held += i32::from(deviation < 2.0);
+                all += 1;
+            }
+            match report.minimum {
+                Some(minimum) => {
+                    assert!((minimum.force + 4.9e-9).abs() < 3.0 * minimum.force_error);
+                    let mut remarks = report.remarks.iter();
+                    assert!(remarks.any(|remark| remark.contains("no row has")));
+                }
+                None => assert_eq!(sample, HERTZ),
+            }
+        }
+        assert!(f64::from(held) > 0.9 * f64::from(all), "{held} of {all}");
+    }
+}
+
+#[test]
+fn a_curve_that_begins_in_contact_does_not_determine_the_force() {
+    let case = stiff_lever(DMT);
+    let rows = curve(&case, 12.8, 3.0, 100);
+    let options = ReconstructOptions {
+        data: vec![measured(&rows, &mut Noise(1), LOW_NOISE, false)],
+        free_amplitude: Some("12 nm".into()),
+        free_phase: Some(51.47),
+        ..ReconstructOptions::default()
+    };
+    let error = reconstruct(&case, &options, &Control::default()).unwrap_err();
+    assert!(error.to_string().contains("undecided"), "{error}");
+}
+
+#[test]
+fn a_sample_that_moves_between_approach_and_retract_is_reported() {
+    let case = stiff_lever(DMT);
+    let mut rows = curve(&case, 16.0, 3.0, 100);
+    for row in rows.iter_mut().filter(|row| row.3 == Way::Retract) {
+        row.0 += 0.15;
+    }
+    let data = measured(&rows, &mut Noise(1), LOW_NOISE, false);
+    let report = reconstructed(&case, data, ReconstructOptions::default());
+    assert_eq!(report.ways.len(), 2, "{:?}", report.remarks);
 }
 
 #[test]

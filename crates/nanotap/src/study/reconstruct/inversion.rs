@@ -3,27 +3,30 @@
 //! Both are piecewise linear in the distance. A first pass takes the motion as sinusoidal, where
 //! the averages of a linear piece have a closed form. Further passes take the tip's motion in
 //! the force and damping of the pass before, with its higher harmonics, and solve for both in
-//! turn. Each row's measured values are moved towards what the force says, by their share of the
-//! residual (orthogonal distance regression), since an error of the amplitude moves the
-//! distance too.
+//! turn. An error of the amplitude moves the distance too, so the error of a row depends on the slope
+//! of the force: averaged over neighbouring rows, because a force that oscillates would enlarge the
+//! errors and thereby justify itself. Once the force is stable, each row's measured values are moved
+//! towards it, by their share of the residual (orthogonal distance regression).
 //!
-//! Fails where the force is much steeper than the lever is stiff: the fixed point of the motion
-//! does not converge.
+//! Where the force is much steeper than the lever is stiff, the fixed point of the motion does not
+//! converge. A force that still changes in the last pass is refused.
 
 use nalgebra::{DMatrix, DVector};
 use nanotap_arithmetic::{exp, ln};
 use nanotap_flow::Complex;
 use rayon::prelude::*;
 
+use super::bias;
 use super::lever::{FirstHarmonic, Method};
 use super::motion::{Harmonics, Known, Motion, Weights};
 use super::nodes::{Kernel, Nodes};
 use super::smooth::Smooth;
 use crate::Error;
 use crate::control::Control;
+use crate::study::fit::instrument::median;
 
 /// Number of passes; the first one takes the motion as sinusoidal.
-pub(super) const PASSES: usize = 8;
+pub(super) const PASSES: usize = 12;
 /// Passes from which on the nodes stay and the penalty is adapted, and motions are averaged with
 /// those before.
 const ADAPTED: usize = 2;
@@ -32,8 +35,21 @@ const AVERAGED: usize = 3;
 const WINDOW: usize = 6;
 /// Part of the mean squared curvature that is added to the local one.
 const BACKGROUND: f64 = 0.1;
-/// Fraction of its change by which a row's values move in a pass.
-const MOVE: f64 = 0.6;
+/// Fraction of its change by which a row's values move in a pass, from the pass on in which the force
+/// is stable, and the largest residual that counts, in standard errors.
+const MOVE: f64 = 0.3;
+const MOVED: usize = 4;
+const MAX_MOVED_RESIDUAL: f64 = 3.0;
+/// Distance over which slopes are averaged for the errors: in spacings of the nodes plus in standard
+/// errors of the amplitude.
+const AVERAGED_SLOPES: [f64; 2] = [2.0, 3.0];
+/// Change of the force in the last pass, in standard errors, above which it has not converged.
+const CONVERGED: f64 = 2.0;
+/// Mean squared residual, in standard errors, above which no force describes the rows.
+const MAX_CHI2: f64 = 25.0;
+/// Force beyond the closest approach of the farthest row, as a fraction of the largest, above which
+/// the curve does not begin far enough from the sample.
+const MAX_BEYOND: f64 = 0.2;
 
 /// Measured values of a row, in SI or model units.
 #[derive(Clone, Copy, Debug)]
@@ -69,23 +85,23 @@ pub(super) struct Inverted {
     pub(super) force: Smooth,
     pub(super) damping: Smooth,
     pub(super) rows: Vec<InvertedRow>,
+    /// Least distance at which the force is resolved, m or model units.
+    pub(super) low: f64,
+    /// Part of the standard errors of the force that follows from the noise, N or model units.
+    pub(super) noise: Vec<f64>,
 }
 
 impl Inverted {
-    /// Returns the ends of the range of distances that is resolved, m or model units.
-    pub(super) fn range(&self) -> [f64; 2] {
-        let even = super::report::even_nodes(&self.nodes.0);
-        [self.nodes.0[1], self.nodes.0[even - 1]]
-    }
-
-    /// Returns the force at a distance and its standard error, N or model units.
-    pub(super) fn force_at(&self, x: f64) -> [f64; 2] {
-        let (at, upper) = self.nodes.place(x);
-        let mut weights = vec![0.0; self.nodes.0.len()];
-        weights[at] = 1.0 - upper;
-        weights[at + 1] = upper;
-        weights.truncate(self.nodes.unknowns());
-        self.force.sum(&weights)
+    /// # Errors
+    /// When the residuals are too large for one force.
+    pub(super) fn check_residuals(&self) -> Result<(), Error> {
+        if self.force.chi2 <= MAX_CHI2 {
+            return Ok(());
+        }
+        let factor = self.force.chi2.sqrt();
+        Err(undetermined(&format!(
+            "the residuals of the smooth force that fits best are {factor:.1} times the standard errors"
+        )))
     }
 }
 
@@ -115,6 +131,9 @@ struct Estimate {
     mean: f64,
     /// Derivative of the conservative part by the distance, in the known force.
     slope: f64,
+    /// Derivatives of the residual by both values, averaged over neighbouring rows; None before the
+    /// slope is known.
+    local_by: Option<[f64; 2]>,
     closest: f64,
 }
 
@@ -128,6 +147,7 @@ impl Estimate {
             amplitude_by: [0.0; 2],
             mean: 0.0,
             slope: 0.0,
+            local_by: None,
             closest: 0.0,
         };
         estimate.update(method, row);
@@ -152,8 +172,12 @@ impl Estimate {
     }
 
     /// Derivatives of the residual by both values: they change the distance too.
-    fn by(&self) -> [f64; 2] {
+    fn own_by(&self) -> [f64; 2] {
         [0, 1].map(|k| self.conservative_by[k] + self.slope * self.amplitude_by[k])
+    }
+
+    fn by(&self) -> [f64; 2] {
+        self.local_by.unwrap_or_else(|| self.own_by())
     }
 }
 
@@ -182,6 +206,7 @@ impl Inversion<'_> {
         let mut motions: Vec<Motion> = Vec::new();
         let mut weights: Vec<Weights> = Vec::new();
         let mut residuals = Vec::new();
+        let mut before = Vec::new();
         for pass in 0..PASSES {
             if control.is_cancelled() {
                 return Err(Error::stopped());
@@ -237,6 +262,7 @@ impl Inversion<'_> {
             if pass >= ADAPTED {
                 adapt(&mut roughness, &force.coefficients);
             }
+            before = std::mem::take(&mut force.coefficients);
             force = solve_force(&observed, &weights, &roughness, &damping)?;
             if self.has_damping {
                 damping = self.solve_damping(&rows, &weights, &nodes, &force)?;
@@ -259,9 +285,23 @@ impl Inversion<'_> {
                     motions[k].shift_slope(&harmonics, &nodes, &force.coefficients)
                 }
             });
+            self.average_slopes(pass, &mut rows, nodes.spacing());
             if let Some(progress) = control.progress {
                 progress(pass + 1, PASSES);
             }
+        }
+        let mut closest: Vec<f64> = rows.iter().map(|row| row.closest).collect();
+        closest.sort_by(f64::total_cmp);
+        let low = self.resolved(&rows);
+        let noise = (0..before.len()).map(|k| force.error(k)).collect();
+        bias::widen(&mut force, &nodes, &closest);
+        let inside = (0..before.len()).filter(|k| nodes.0[*k] >= low);
+        let changes = inside.map(|k| {
+            (force.coefficients[k] - before[k]).abs() / force.error(k).max(f64::MIN_POSITIVE)
+        });
+        let change = changes.fold(0.0, f64::max);
+        if let Some(reason) = undecided(&force, &nodes, change, [low, closest[closest.len() - 1]]) {
+            return Err(undetermined(&reason));
         }
         let rows = rows.iter().zip(&weights).zip(&residuals);
         let rows = rows.map(|((estimate, weights), [residual, error])| InvertedRow {
@@ -275,7 +315,60 @@ impl Inversion<'_> {
             nodes,
             force,
             damping,
+            low,
+            noise,
         })
+    }
+
+    /// Returns the least distance at which the force is resolved: that of the row with the closest
+    /// approach, but without those few that may be nearest because of their noise.
+    fn resolved(&self, rows: &[Estimate]) -> f64 {
+        let both = rows.iter().zip(self.rows);
+        let felt = both.filter(|(_, row)| row.informative);
+        let mut closest: Vec<f64> = felt.map(|(estimate, _)| estimate.closest).collect();
+        closest.sort_by(f64::total_cmp);
+        closest[closest.len() / 30] + self.amplitude_error(rows)
+    }
+
+    /// Median standard error of the amplitude of the tip, m or model units.
+    fn amplitude_error(&self, rows: &[Estimate]) -> f64 {
+        let both = rows.iter().zip(self.rows);
+        median(
+            both.map(|(e, row)| spread(e.amplitude_by, row.errors))
+                .collect(),
+        )
+    }
+
+    /// Averages the derivatives of the residuals over rows with nearly the same closest approach:
+    /// first with their signs, so that an oscillation cancels, then their squares, so that no row
+    /// at an extremum weighs too much.
+    fn average_slopes(&self, pass: usize, rows: &mut [Estimate], spacing: f64) {
+        let [spacings, errors] = AVERAGED_SLOPES;
+        let reach = spacings * spacing + errors * self.amplitude_error(rows);
+        let closest: Vec<f64> = rows.iter().map(|row| row.closest).collect();
+        let average = |values: &[[f64; 2]], at: f64| {
+            let (mut sum, mut total) = ([0.0; 2], 0.0);
+            for (x, value) in closest.iter().zip(values) {
+                let part = (x - at) / reach;
+                let weight = exp(-0.5 * part * part);
+                total += weight;
+                for (sum, value) in sum.iter_mut().zip(value) {
+                    *sum += weight * value;
+                }
+            }
+            sum.map(|sum| sum / total)
+        };
+        let by: Vec<[f64; 2]> = rows.iter().map(Estimate::own_by).collect();
+        let means: Vec<[f64; 2]> = closest.iter().map(|at| average(&by, *at)).collect();
+        let squares: Vec<[f64; 2]> = means.iter().map(|mean| mean.map(|m| m * m)).collect();
+        for ((row, at), mean) in rows.iter_mut().zip(&closest).zip(&means) {
+            let square = average(&squares, *at);
+            let known = row.local_by.filter(|_| pass >= ADAPTED);
+            row.local_by = Some([0, 1].map(|k| {
+                let before = known.map_or(square[k], |by| by[k] * by[k]);
+                (0.5 * (square[k] + before)).sqrt().copysign(mean[k])
+            }));
+        }
     }
 
     /// Nodes for the range of the closest approaches.
@@ -341,8 +434,10 @@ impl Inversion<'_> {
         let compliance = self.gains[0].re;
         for (k, (estimate, row)) in rows.iter_mut().zip(self.rows).enumerate() {
             let [residual, error] = residuals[k];
-            if pass + 1 < PASSES {
+            if (MOVED..PASSES - 1).contains(&pass) {
                 let by = estimate.by();
+                let most = MAX_MOVED_RESIDUAL * error;
+                let residual = residual.clamp(-most, most);
                 for index in 0..2 {
                     let share = row.errors[index].powi(2) * by[index] / error.powi(2);
                     let there = row.values[index] - share * residual;
@@ -355,6 +450,39 @@ impl Inversion<'_> {
             estimate.mean += part * (mean - estimate.mean);
         }
     }
+}
+
+/// Error for data that do not determine the force.
+fn undetermined(reason: &str) -> Error {
+    Error::input(
+        format!("undecided: the data do not determine the force: {reason}"),
+        "start the curve farther from the sample; check the free level, the lever and the standard \
+         errors; leave out rows of another motion",
+    )
+}
+
+/// Returns why the data do not determine the force, if they do not: `change` is the largest one in the
+/// last pass, in standard errors, and `range` goes from the least distance that is resolved to the
+/// closest approach of the farthest row.
+fn undecided(force: &Smooth, nodes: &Nodes, change: f64, range: [f64; 2]) -> Option<String> {
+    if change.is_nan() || change > CONVERGED {
+        return Some(format!(
+            "it still changes by {change:.2} standard errors after {PASSES} passes"
+        ));
+    }
+    let largest = |within: &dyn Fn(f64) -> bool| {
+        let both = nodes.0.iter().zip(&force.coefficients);
+        let within = both.filter(|(x, _)| within(**x));
+        within.fold(0.0, |size: f64, (_, force)| size.max(force.abs()))
+    };
+    let [low, high] = range;
+    let beyond = largest(&|x| x > high) / largest(&|x| (low..=high).contains(&x));
+    (beyond.is_nan() || beyond > MAX_BEYOND).then(|| {
+        format!(
+            "beyond the closest approach of the farthest row it is {:.0} % of its largest value",
+            100.0 * beyond
+        )
+    })
 }
 
 /// Returns the weights of force and damping in what a row measures of a sinusoidal motion.

@@ -6,9 +6,10 @@
 //! penalty on their roughness whose weight follows from the evidence. Rows of both branches and
 //! directions go into one system of equations; none is differentiated or joined across a jump.
 //!
-//! Standard errors are those of the penalised least squares. They cover the truth as they should
-//! at noise up to some 0.02 nm; at more noise over stiff samples they are too small.
+//! Standard errors are those of the penalised least squares and the bias of the smoothing (module
+//! `bias`). No force is reported beyond the closest approach, and none that the data do not determine.
 
+mod bias;
 mod inversion;
 mod lever;
 mod motion;
@@ -17,6 +18,7 @@ mod report;
 mod rows;
 mod smooth;
 
+use nanotap_arithmetic::powf;
 use nanotap_dynamics::Control;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -55,6 +57,14 @@ const FELT: f64 = 0.05;
 const ROWS_OF_A_WAY: usize = 15;
 /// Mean squared residual, in standard errors, above which a warning is given.
 const WORST_CHI2: f64 = 4.0;
+/// Least force, in standard errors of the noise, above which it is reported as a minimum.
+const SIGNIFICANT: f64 = 3.0;
+/// Range of distances without a row, in spacings of the nodes, that is a gap.
+const GAP: f64 = 8.0;
+/// Least number of rows of a bin in which approach and retract are compared.
+const ROWS_OF_A_BIN: usize = 12;
+/// Normal deviate above which the residuals of approach and retract differ: one curve in a thousand.
+const DIFFERENT: f64 = 3.09;
 /// Largest number of rows of the inversion.
 const MAX_ROWS: usize = 2000;
 
@@ -180,7 +190,10 @@ pub fn reconstruct(
     let data = Data::read(case, &measured.tables, &measured.columns)?;
     let prepared = Prepared::of(case, &data, options, measured.notes)?;
     let inverted = prepared.invert(None, control)?;
-    let ways = prepared.ways(control)?;
+    let ways = prepared.ways(&inverted, control)?;
+    if ways.is_empty() {
+        inverted.check_residuals()?;
+    }
     Ok(prepared.report(case, &inverted, ways))
 }
 
@@ -370,16 +383,58 @@ impl Prepared {
         .run(control)
     }
 
-    /// Inverts approach and retract separately, if both have enough rows and their forces differ by
-    /// more than three standard errors.
-    fn ways(&self, control: &Control<'_>) -> Result<Vec<WayCurve>, Error> {
+    /// Returns whether the residuals of the common force differ between approach and retract: in bins
+    /// of the closest approach, where both have rows, their means differ by more than the scatter.
+    fn ways_differ(&self, inverted: &Inverted) -> bool {
+        let both = self
+            .measured
+            .iter()
+            .zip(&self.readings.rows)
+            .zip(&inverted.rows);
+        let felt = both.filter(|((measured, row), _)| measured.informative && row.way.is_some());
+        let mut rows: Vec<(f64, Option<Way>, f64)> = felt
+            .map(|((_, row), inverted)| (inverted.closest, row.way, inverted.residual))
+            .collect();
+        rows.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let (mut bins, mut within, mut freedom) = (Vec::new(), 0.0, 0.0);
+        for bin in rows.chunks(ROWS_OF_A_BIN.max(rows.len() / 12)) {
+            let mut difference = [0.0; 2];
+            let mut parts = [0.0; 2];
+            for (k, way) in [Way::Approach, Way::Retract].into_iter().enumerate() {
+                let of = bin.iter().filter(|row| row.1 == Some(way));
+                let residuals: Vec<f64> = of.map(|row| row.2).collect();
+                let count = residuals.len() as f64;
+                difference[k] = residuals.iter().sum::<f64>() / count;
+                parts[k] = 1.0 / count;
+                within += residuals
+                    .iter()
+                    .map(|r| (r - difference[k]).powi(2))
+                    .sum::<f64>();
+                freedom += (count - 1.0).max(0.0);
+            }
+            let [approach, retract] = difference;
+            let squared = (approach - retract).powi(2) / (parts[0] + parts[1]);
+            if squared.is_finite() {
+                bins.push(squared);
+            }
+        }
+        // Wilson and Hilferty: the cube root of χ²/n is nearly normal.
+        let count = bins.len() as f64;
+        let ratio = bins.iter().sum::<f64>() / count / (within / freedom);
+        let variance = 2.0 / (9.0 * count);
+        (powf(ratio, 1.0 / 3.0) - 1.0 + variance) / variance.sqrt() > DIFFERENT
+    }
+
+    /// Inverts approach and retract separately, if both have enough rows and the residuals of the common
+    /// force differ between them.
+    fn ways(&self, common: &Inverted, control: &Control<'_>) -> Result<Vec<WayCurve>, Error> {
         let both = [Way::Approach, Way::Retract];
         let felt = |way: Way| {
             let rows = self.measured.iter().zip(&self.readings.rows);
             rows.filter(|(m, row)| m.informative && row.way == Some(way))
                 .count()
         };
-        if both.iter().any(|way| felt(*way) < ROWS_OF_A_WAY) {
+        if both.iter().any(|way| felt(*way) < ROWS_OF_A_WAY) || !self.ways_differ(common) {
             return Ok(Vec::new());
         }
         let silent = Control {
@@ -388,26 +443,16 @@ impl Prepared {
         };
         let mut alone = Vec::new();
         for way in both {
-            alone.push(self.invert(Some(way), &silent)?);
-        }
-        let (first, second) = (&alone[0], &alone[1]);
-        let (low, high) = [first, second]
-            .map(Inverted::range)
-            .into_iter()
-            .fold((f64::NEG_INFINITY, f64::INFINITY), |(low, high), range| {
-                (low.max(range[0]), high.min(range[1]))
-            });
-        let nodes = first.nodes.0.iter().filter(|x| (low..=high).contains(*x));
-        let apart = nodes.filter(|x| {
-            let [[a, b], [c, d]] = [first, second].map(|one| one.force_at(**x));
-            (a - c).abs() > 3.0 * (b * b + d * d).sqrt()
-        });
-        if apart.count() < 3 {
-            return Ok(Vec::new());
+            let inverted = self.invert(Some(way), &silent);
+            match inverted.and_then(|one| one.check_residuals().map(|()| one)) {
+                Ok(inverted) => alone.push(inverted),
+                Err(_) if !control.is_cancelled() => return Ok(Vec::new()),
+                Err(error) => return Err(error),
+            }
         }
         let curves = both.into_iter().zip(&alone).map(|(way, inverted)| {
             let table = self.curve(inverted);
-            let minimum = minimum(&table);
+            let minimum = minimum(&table, inverted);
             WayCurve {
                 way,
                 table,
@@ -417,33 +462,35 @@ impl Prepared {
         Ok(curves.collect())
     }
 
-    /// Returns force and dissipation from the closest approach outwards.
+    /// Returns force and dissipation from the least distance that is resolved outwards.
     fn curve(&self, inverted: &Inverted) -> ForceCurve {
         let nodes = &inverted.nodes;
         let (force, damping) = (&inverted.force, &inverted.damping);
         let amplitude = self.free[0];
         let factor = std::f64::consts::PI * amplitude * amplitude;
-        let dissipated: Vec<[f64; 2]> = nodes
-            .0
+        let count = nodes.0.len();
+        let first = nodes.0.partition_point(|x| *x < inverted.low);
+        let dissipated: Vec<[f64; 2]> = nodes.0[first..]
             .iter()
             .map(|x| {
                 let weights = nodes.average(Kernel::Damping, *x, amplitude);
                 damping.sum(&weights).map(|value| factor * value)
             })
             .collect();
-        let count = nodes.0.len();
         let coefficient =
             |of: &smooth::Smooth, k: usize| of.coefficients.get(k).copied().unwrap_or(0.0);
         let error = |of: &smooth::Smooth, k: usize| if k + 1 < count { of.error(k) } else { 0.0 };
         let unit = 1.0 / self.angular_frequency;
         ForceCurve {
-            distance: nodes.0.clone(),
-            force: (0..count).map(|k| coefficient(force, k)).collect(),
-            force_error: (0..count).map(|k| error(force, k)).collect(),
+            distance: nodes.0[first..].to_vec(),
+            force: (first..count).map(|k| coefficient(force, k)).collect(),
+            force_error: (first..count).map(|k| error(force, k)).collect(),
             dissipation: dissipated.iter().map(|pair| pair[0]).collect(),
             dissipation_error: dissipated.iter().map(|pair| pair[1]).collect(),
-            damping: (0..count).map(|k| unit * coefficient(damping, k)).collect(),
-            damping_error: (0..count).map(|k| unit * error(damping, k)).collect(),
+            damping: (first..count)
+                .map(|k| unit * coefficient(damping, k))
+                .collect(),
+            damping_error: (first..count).map(|k| unit * error(damping, k)).collect(),
         }
     }
 
@@ -452,9 +499,8 @@ impl Prepared {
         let mut remarks = self.remarks.clone();
         if !ways.is_empty() {
             remarks.push(
-                "the forces of approach and retract differ by more than three standard errors: the sample \
-                 or the instrument changed, or the force depends on the past. Both are reported; the common \
-                 force is their compromise"
+                "approach and retract contradict a common force: the sample or the instrument changed, or the \
+                 force depends on the past. Both are reported; the common force is their compromise"
                     .to_owned(),
             );
         }
@@ -466,7 +512,15 @@ impl Prepared {
         }
         let closest = inverted.rows.iter().map(|row| row.closest);
         let closest = closest.fold(f64::INFINITY, f64::min);
-        let minimum = minimum(&table);
+        let minimum = minimum(&table, inverted);
+        if let Some(minimum) = minimum
+            && let Some([low, high]) = gap(inverted, minimum.distance)
+        {
+            remarks.push(format!(
+                "no row has its closest approach between {low:.3e} and {high:.3e}, where the minimum of the \
+                 force lies: other rows determine it, and its depth and distance are uncertain"
+            ));
+        }
         let inflections = inflections(&table, closest, inverted.rows[0].amplitude);
         for inflection in &inflections {
             remarks.push(format!(
@@ -592,12 +646,29 @@ fn inflections(table: &ForceCurve, closest: f64, amplitude: f64) -> Vec<Inflecti
     found
 }
 
-/// Returns the most attractive force, if it is larger than its standard error.
-fn minimum(table: &ForceCurve) -> Option<ForceMinimum> {
+/// Returns the range about a distance in which no row has its closest approach, if it is wide.
+fn gap(inverted: &Inverted, distance: f64) -> Option<[f64; 2]> {
+    let closest = inverted.rows.iter().map(|row| row.closest);
+    let low = closest
+        .clone()
+        .filter(|x| *x <= distance)
+        .fold(f64::NEG_INFINITY, f64::max);
+    let high = closest
+        .filter(|x| *x > distance)
+        .fold(f64::INFINITY, f64::min);
+    let width = high - low;
+    (width.is_finite() && width > GAP * inverted.nodes.spacing()).then_some([low, high])
+}
+
+/// Returns the most attractive force, if it exceeds its standard error, and the part of it that follows
+/// from the noise three times.
+fn minimum(table: &ForceCurve, inverted: &Inverted) -> Option<ForceMinimum> {
     let least =
         (0..table.force.len()).min_by(|a, b| table.force[*a].total_cmp(&table.force[*b]))?;
     let (force, force_error) = (table.force[least], table.force_error[least]);
-    (force < -force_error).then(|| ForceMinimum {
+    let beyond = inverted.nodes.0.len() - table.force.len();
+    let noise = inverted.noise.get(beyond + least)?;
+    (force < -force_error && force < -SIGNIFICANT * noise).then(|| ForceMinimum {
         force,
         force_error,
         distance: table.distance[least],

@@ -6,7 +6,9 @@ use std::f64::consts::PI;
 
 /// Growth of the spacing beyond the finely resolved range.
 const GROWTH: f64 = 1.08;
-/// Upper limit of the number of evenly spaced nodes.
+/// Limits of the number of evenly spaced nodes. With fewer, the penalty on the roughness would hold
+/// for less than the range over which a force changes.
+const MIN_EVEN_NODES: f64 = 60.0;
 const MAX_EVEN_NODES: f64 = 200.0;
 /// Upper limit of the number of nodes beyond them.
 const MAX_OUTER_NODES: usize = 200;
@@ -17,11 +19,12 @@ const MAX_OUTER_NODES: usize = 200;
 pub(super) struct Nodes(pub(super) Vec<f64>);
 
 impl Nodes {
-    /// Nodes from one spacing below `low`, evenly spaced up to `fine` (at most `widest` apart),
+    /// Nodes from one spacing below `low`, evenly spaced up to `fine` (`widest` apart, or more
+    /// over a long range),
     /// then with growing spacing to beyond `far`.
     pub(super) fn new(low: f64, fine: f64, far: f64, widest: f64) -> Self {
-        let width = (fine - low).max(10.0 * widest);
-        let mut spacing = (width / 60.0).min(widest).max(width / MAX_EVEN_NODES);
+        let width = (fine - low).max(MIN_EVEN_NODES * widest);
+        let mut spacing = widest.max(width / MAX_EVEN_NODES);
         let count = (width / spacing).ceil() as usize + 2;
         let mut nodes: Vec<f64> = (0..count)
             .map(|k| low + (k as f64 - 1.0) * spacing)

@@ -17,9 +17,10 @@ pub struct ReconstructReport {
     pub method: ReconstructMethod,
     /// Whether values are in SI: true for a physical case.
     pub physical: bool,
-    /// Force and dissipation against distance.
+    /// Force and dissipation against distance, from the least distance that is resolved on.
     pub table: ForceCurve,
-    /// Lowest force of `table`; missing unless it is attractive by more than its standard error.
+    /// Lowest force of `table`; missing unless it is attractive by more than its
+    /// standard error, and than three of the noise.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub minimum: Option<ForceMinimum>,
     /// Closest approach of all rows, m or model units; negative inside the sample.
@@ -42,8 +43,7 @@ pub struct ReconstructReport {
     pub chi2: f64,
     /// The rows, or averages of several.
     pub rows: Vec<ReconstructedRow>,
-    /// Force from approach and retract separately, if they differ by more than three standard
-    /// errors.
+    /// Force from approach and retract separately, if the residuals of `table` differ between them.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub ways: Vec<WayCurve>,
     /// Inflection points at which the force is not determined by a curve of this amplitude.
@@ -131,7 +131,8 @@ pub struct WayCurve {
     pub way: Way,
     /// Force and dissipation from the rows in this direction.
     pub table: ForceCurve,
-    /// Lowest force of `table`; missing unless it is attractive by more than its standard error.
+    /// Lowest force of `table`; missing unless it is attractive by more than its
+    /// standard error, and than three of the noise.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub minimum: Option<ForceMinimum>,
 }

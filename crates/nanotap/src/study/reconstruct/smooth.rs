@@ -19,6 +19,8 @@ pub(super) struct Smooth {
     pub(super) coefficients: Vec<f64>,
     /// Covariance of the coefficients.
     pub(super) covariance: DMatrix<f64>,
+    /// What the coefficients are of the true ones without noise: each row is an average of them.
+    pub(super) averages: DMatrix<f64>,
     /// Effective number of parameters: trace of the hat matrix.
     pub(super) freedom: f64,
     /// Mean squared residual in standard errors, dimensionless.
@@ -83,11 +85,13 @@ impl Smooth {
         let trial = trial.ok_or_else(|| Error::numerics("the force has no smooth solution"))?;
         let residuals = equations.residuals(&trial.coefficients);
         let mut covariance = trial.factor.inverse();
-        let freedom = covariance.component_mul(&equations.normal).sum();
+        let averages = &covariance * &equations.normal;
+        let freedom = averages.trace();
         covariance *= trial.scale;
         Ok(Self {
             coefficients: trial.coefficients.iter().copied().collect(),
             covariance,
+            averages,
             freedom,
             chi2: residuals.norm_squared() / residuals.len() as f64,
         })
@@ -98,6 +102,7 @@ impl Smooth {
         Self {
             coefficients: vec![0.0; unknowns],
             covariance: DMatrix::zeros(unknowns, unknowns),
+            averages: DMatrix::zeros(unknowns, unknowns),
             freedom: 0.0,
             chi2: 0.0,
         }

@@ -1,0 +1,54 @@
+//! Bias of a smoothed force, added to its standard errors.
+//!
+//! The standard errors of the penalised least squares hold for a force that is as smooth everywhere as
+//! it is on average. At a kink, and between rows that are far apart, it is not resolved.
+
+use nanotap_arithmetic::exp;
+
+use super::nodes::Nodes;
+use super::smooth::Smooth;
+
+/// Part of a range of distances without rows that counts as the width of the average.
+const GAP: f64 = 0.6;
+/// Distance over which a bias decays, in such widths.
+const DECAY: f64 = 1.0 / 3.0;
+
+/// Adds the bias to the variances of the force: its largest curvature near a node times 3/4 of the
+/// variance of a uniform average that is as wide as the node's own, or as a gap between the sorted
+/// closest approaches. Beyond the last of them the force is an assumption, and its bias the force.
+/// A bias acts on the nodes nearby, too.
+pub(super) fn widen(force: &mut Smooth, nodes: &Nodes, closest: &[f64]) {
+    let (x, values) = (&nodes.0, &force.coefficients);
+    let count = values.len();
+    let value = |k: usize| values.get(k).copied().unwrap_or(0.0);
+    let slope = |k: usize| (value(k + 1) - value(k)) / (x[k + 1] - x[k]);
+    let curvature = |k: usize| 2.0 * (slope(k) - slope(k - 1)) / (x[k + 1] - x[k - 1]);
+    let curvatures: Vec<f64> = (1..count).map(|k| curvature(k).abs()).collect();
+    let biases: Vec<[f64; 2]> = (0..count)
+        .map(|k| {
+            let above = closest.partition_point(|at| *at <= x[k]);
+            let spacing = 0.5 * (x[k + 1] - x[k.saturating_sub(1)]);
+            let own = spacing / force.averages.row(k).norm_squared();
+            if above == closest.len() {
+                return [value(k), own];
+            }
+            let gap = if above == 0 {
+                0.0
+            } else {
+                closest[above] - closest[above - 1]
+            };
+            let width = own.max(GAP * gap);
+            let near = (1..count).filter(|j| (x[*j] - x[k]).abs() <= 0.5 * width);
+            let largest = near.map(|j| curvatures[j - 1]).fold(0.0, f64::max);
+            [largest * width * width / 16.0, width]
+        })
+        .collect();
+    for k in 0..count {
+        let decayed = biases
+            .iter()
+            .zip(x)
+            .map(|([bias, width], at)| bias.abs() * exp(-(x[k] - at).abs() / (DECAY * width)));
+        let bias = decayed.fold(0.0, f64::max);
+        force.covariance[(k, k)] += bias * bias;
+    }
+}

@@ -347,6 +347,26 @@ fn a_curve_that_begins_in_contact_does_not_determine_the_force() {
     assert!(error.to_string().contains("undecided"), "{error}");
 }
 
+/// Noise of 0.05 nm over a stiff sample: some curves gave minima of hundreds of nN.
+#[test]
+fn noise_over_a_stiff_sample_gives_no_large_force() {
+    let case = stiff_lever(&DMT.replace("2 GPa", "10 GPa"));
+    let rows = curve(&case, 14.0, 4.0, 100);
+    for seed in [1, 2, 48, 84] {
+        let options = ReconstructOptions {
+            data: vec![measured(&rows, &mut Noise(seed), [0.05, 0.25], false)],
+            ..ReconstructOptions::default()
+        };
+        match reconstruct(&case, &options, &Control::default()) {
+            Ok(report) => {
+                let least = report.minimum.map_or(0.0, |minimum| minimum.force);
+                assert!(least > -15e-9, "{seed}: {least:e}");
+            }
+            Err(error) => assert!(error.to_string().contains("undecided"), "{error}"),
+        }
+    }
+}
+
 #[test]
 fn a_sample_that_moves_between_approach_and_retract_is_reported() {
     let case = stiff_lever(DMT);

@@ -47,6 +47,8 @@ const AVERAGED_SLOPES: [f64; 2] = [2.0, 3.0];
 const CONVERGED: f64 = 2.0;
 /// Mean squared residual, in standard errors, above which no force describes the rows.
 const MAX_CHI2: f64 = 25.0;
+/// Largest force, in its standard errors, below which the force is not determined.
+const DETERMINED: f64 = 2.0;
 /// Force beyond the closest approach of the farthest row, as a fraction of the largest, above which
 /// the curve does not begin far enough from the sample.
 const MAX_BEYOND: f64 = 0.2;
@@ -471,16 +473,28 @@ fn undecided(force: &Smooth, nodes: &Nodes, change: f64, range: [f64; 2]) -> Opt
         ));
     }
     let largest = |within: &dyn Fn(f64) -> bool| {
-        let both = nodes.0.iter().zip(&force.coefficients);
-        let within = both.filter(|(x, _)| within(**x));
-        within.fold(0.0, |size: f64, (_, force)| size.max(force.abs()))
+        let values = force.coefficients.iter().enumerate();
+        let within = values.filter(|(k, _)| within(nodes.0[*k]));
+        let sizes = within.map(|(k, value)| [value.abs(), force.error(k)]);
+        sizes
+            .max_by(|a, b| a[0].total_cmp(&b[0]))
+            .unwrap_or_default()
     };
     let [low, high] = range;
-    let beyond = largest(&|x| x > high) / largest(&|x| (low..=high).contains(&x));
-    (beyond.is_nan() || beyond > MAX_BEYOND).then(|| {
+    let ([size, error], [beyond, _]) = (
+        largest(&|x| (low..=high).contains(&x)),
+        largest(&|x| x > high),
+    );
+    if size < DETERMINED * error {
+        return Some(format!(
+            "its largest value is only {:.1} times its standard error",
+            size / error
+        ));
+    }
+    (size == 0.0 || beyond > MAX_BEYOND * size).then(|| {
         format!(
             "beyond the closest approach of the farthest row it is {:.0} % of its largest value",
-            100.0 * beyond
+            100.0 * beyond / size
         )
     })
 }

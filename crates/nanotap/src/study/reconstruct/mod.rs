@@ -512,22 +512,31 @@ impl Prepared {
         }
         let closest = inverted.rows.iter().map(|row| row.closest);
         let closest = closest.fold(f64::INFINITY, f64::min);
+        let length = if case.is_physical() {
+            Quantity::Length
+        } else {
+            Quantity::Number
+        };
+        let shown = |distance: f64| length.format_digits(distance, 3);
         let minimum = minimum(&table, inverted);
         if let Some(minimum) = minimum
             && let Some([low, high]) = gap(inverted, minimum.distance)
         {
             remarks.push(format!(
-                "no row has its closest approach between {low:.3e} and {high:.3e}, where the minimum of the \
-                 force lies: other rows determine it, and its depth and distance are uncertain"
+                "no row has its closest approach between {} and {}, where the minimum of the force lies: \
+                 other rows determine it, and its depth and distance are uncertain",
+                shown(low),
+                shown(high)
             ));
         }
         let inflections = inflections(&table, closest, inverted.rows[0].amplitude);
         for inflection in &inflections {
             remarks.push(format!(
-                "near the distance {:.3e} the force has an inflection at which this amplitude does not \
+                "near the distance {} the force has an inflection at which this amplitude does not \
                  determine it (the test of Sader and others, 2018, gives {:.2}, below -1): measure with a \
                  smaller or larger amplitude",
-                inflection.distance, inflection.factor
+                shown(inflection.distance),
+                inflection.factor
             ));
         }
         if self.has_damping && inverted.force.chi2 > WORST_CHI2 {

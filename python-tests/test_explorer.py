@@ -1842,7 +1842,7 @@ def test_measured_data_are_bounded_and_refused_in_words(address: str) -> None:
     form = motion(address, "stiff-lever")["forms"]["data"]
     options = {field["name"]: field["value"] for field in form}
     wanted = {"case": {"preset": "stiff-lever"}, "tab": "data", "options": options}
-    for text, words in (("a,b\n1", "fields"), ("a,b\n1,2\n", "observable")):
+    for text, words in (("p,q\n1", "fields"), ("p,q\n1,2\n", "observable")):
         answer = studied(address, **wanted, data=["x.csv", text])[-1]
         assert words in answer["error"], answer
     with pytest.raises(urllib.error.HTTPError) as refused:

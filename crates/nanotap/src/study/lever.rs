@@ -258,7 +258,7 @@ pub fn compare_levers(
     })
 }
 
-/// Returns the case with a lever of the catalogue in place of its own, as it is compared.
+/// Returns the case with its lever replaced by one of the catalogue, as it is compared.
 ///
 /// # Errors
 /// As [`compare_levers`], and when the lever cannot be computed.

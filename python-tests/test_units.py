@@ -295,6 +295,20 @@ def test_an_oscillator_takes_its_keys_as_keywords():
 def test_lengths_without_a_unit_are_remarked_upon():
     case = nanotap.Case(**{**CASE, "gap": {"tip": 18}})
     assert any("did you mean 18 nm" in text for _, text in case.remarks)
+    # Other quantities, and another prefix.
+    for section, key, value, meant in (
+        ("cantilever", "f0", 325.0, "325 kHz"),
+        ("cantilever", "k", "40 kN/m", "40 N/m"),
+        ("gap", "tip", "15 mm", "15 nm"),
+    ):
+        given = {**CASE, section: {**CASE.get(section, {}), key: value}}
+        remarks = [text for _, text in nanotap.Case(**given).remarks]
+        assert any(f"did you mean {meant}?" in text for text in remarks), remarks
+
+
+def test_a_curve_from_metres_away_is_refused():
+    with pytest.raises(ValueError, match="5 m, but nothing acts"):
+        nanotap.approach(nanotap.Case(**CASE), from_=5)
 
 
 def test_without_bifurcations_their_columns_are_empty(lever):

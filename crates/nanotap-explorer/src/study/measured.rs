@@ -255,9 +255,8 @@ fn parameters(report: &FitReport) -> Value {
     let text = |parameter: &FittedParameter, value: Option<f64>| match value {
         None => "not determined".to_owned(),
         Some(value) => {
-            let of_unit = |kind: &Kind| kind.si_unit() == parameter.unit;
             let kind = Key::find(&parameter.key).map(Key::kind);
-            let kind = kind.or_else(|| Kind::ALL.into_iter().find(of_unit));
+            let kind = kind.or_else(|| Kind::of_si_unit(&parameter.unit));
             kind.unwrap_or(Kind::Number).format_digits(value, 4)
         }
     };

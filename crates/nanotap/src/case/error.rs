@@ -31,8 +31,6 @@ pub enum NoSuchKey {
     Unknown {
         /// Name as given.
         given: String,
-        /// List of the keys that can vary.
-        known: String,
         /// Suggestion of the most similar key, or the list of those that may be meant.
         hint: String,
     },
@@ -83,7 +81,7 @@ impl From<NoSuchKey> for crate::Error {
                 error.to_string(),
                 "name a quantity of the case file as section.key, as in drive.frequency",
             ),
-            NoSuchKey::Unknown { given, hint, .. } => {
+            NoSuchKey::Unknown { given, hint } => {
                 Self::input(format!("no parameter `{given}` here"), hint)
             }
         }

@@ -382,7 +382,7 @@ impl Case {
     /// or a quantity of a physical case.
     ///
     /// # Errors
-    /// [`NoSuchKey`] with the known names and the nearest one.
+    /// [`NoSuchKey`] with the nearest name, or the names that may be meant.
     pub fn key(&self, name: &str) -> Result<Key, NoSuchKey> {
         let plain = name.strip_prefix("model.").unwrap_or(name);
         let keys = self.keys();
@@ -880,7 +880,6 @@ impl NoSuchKey {
         );
         Self::Unknown {
             given: given.to_owned(),
-            known: names.join(", "),
             hint,
         }
     }

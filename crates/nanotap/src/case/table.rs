@@ -60,10 +60,11 @@ impl Table {
             };
             Error::files(format!("cannot read {name}: {why}"))
         };
-        let size = std::fs::metadata(path).map_err(refuse)?.len();
-        if path.is_dir() {
+        let metadata = std::fs::metadata(path).map_err(refuse)?;
+        if metadata.is_dir() {
             return Err(Error::files(format!("cannot read {name}: it is a folder")));
         }
+        let size = metadata.len();
         if size > MAX_BYTES {
             return Err(Error::input(
                 format!("{name} has {size} bytes; {MAX_BYTES} at most"),

@@ -186,8 +186,7 @@ fn readings(report: &FitReport, column: &FittedColumn) -> Panel {
     let si = |_| (column.unit != "1" && Key::find(&report.swept).is_some()).then_some(1.0);
     let modulated = COLUMNS.iter().find(|c| c.name == column.observable);
     let name = modulated.map_or(column.name.as_str(), |c| c.label);
-    let unit = || Kind::ALL.into_iter().find(|k| k.si_unit() == column.unit);
-    let kind = modulated.map_or_else(unit, |c| c.kind);
+    let kind = modulated.map_or_else(|| Kind::of_si_unit(&column.unit), |c| c.kind);
     let (label, factor) = match (shown, kind) {
         (Some(shown), _) => shown.axis(true, si, size),
         (None, Some(kind)) if column.unit != "1" => {

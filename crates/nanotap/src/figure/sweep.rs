@@ -511,10 +511,7 @@ impl GridAxis {
 
     /// Values and label of the axis in the units of the figure.
     pub(crate) fn shown(&self) -> GridScale {
-        let kind = Kind::ALL
-            .into_iter()
-            .find(|kind| *kind != Kind::Number && kind.si_unit() == self.units);
-        let (factor, unit) = match kind {
+        let (factor, unit) = match Kind::of_si_unit(&self.units) {
             Some(kind) => {
                 let size = self
                     .values

@@ -182,6 +182,12 @@ kinds! {
 }
 
 impl Kind {
+    /// Returns the kind whose SI unit this is; `None` for a pure number and for any other unit.
+    pub fn of_si_unit(unit: &str) -> Option<Self> {
+        let mut kinds = Self::ALL.into_iter();
+        kinds.find(|kind| *kind != Self::Number && kind.si_unit() == unit)
+    }
+
     /// SI unit of the result of [`Kind::parse`].
     pub const fn si_unit(self) -> &'static str {
         match self {

@@ -13,6 +13,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, PoisonError};
 
 use nanotap::dataset::files;
+use nanotap::input;
 use nanotap_figures::{Figure, MADE_BY};
 
 use crate::failure::Failure;
@@ -40,6 +41,10 @@ const TABLES: [&str; 13] = [
 ];
 const DATASETS: [&str; 3] = [",classification,", ",attractor", ",start,"];
 
+/// Bytes from which a file of nanotap's is recognised: a picture names its program within them, and a
+/// case file is shorter.
+const RECOGNISED_BYTES: u64 = 256 << 20;
+
 /// Allows all existing files to be replaced from now on.
 pub(crate) fn force() {
     FORCE.store(true, Ordering::Relaxed);
@@ -64,7 +69,8 @@ pub(crate) fn claim<'a>(path: &Path, endings: &[&'a str]) -> Result<&'a str, Fai
         return Err(refused(path, "it is not a regular file"));
     }
     if !FORCE.load(Ordering::Relaxed) && path.is_file() {
-        let there = fs::read(path).map_err(|error| refused(path, error))?;
+        let there =
+            input::start(path, RECOGNISED_BYTES).map_err(|error| refused(path, error.fault))?;
         if !is_ours(ending, &there) {
             return Err(Failure::input(
                 format!("{} was not written by nanotap", path.display()),

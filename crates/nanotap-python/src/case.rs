@@ -9,6 +9,7 @@ use nanotap::case::key::{ModelKind, Section};
 use nanotap::case::physical::{Catalogue, Kind, Physical, Severity};
 use nanotap::case::{Case, Key};
 use nanotap::control::Control;
+use nanotap::input::{self, MAX_CASE_BYTES, Origin};
 use nanotap::observe::time_series::state_names;
 use nanotap::study::setpoint::{SetpointReport, SolvedCase, at_setpoint};
 use pyo3::prelude::*;
@@ -339,9 +340,15 @@ impl CaseCore {
     }
 }
 
+/// The text of a catalogue.
 fn text_of(path: &Path) -> Result<String, Failure> {
-    std::fs::read_to_string(path)
-        .map_err(|error| Failure::input(format!("{}: cannot be read: {error}", path.display())))
+    Ok(input::text(path, MAX_CASE_BYTES, Origin::User)?)
+}
+
+/// The text of a catalogue.
+#[pyfunction]
+pub(crate) fn catalogue_text(path: PathBuf) -> PyResult<String> {
+    Ok(text_of(&path)?)
 }
 
 /// A key of a case file: its name, its second name, and its SI unit (empty without a unit).

@@ -1,14 +1,13 @@
 //! Sweeps and basins: plans whose chunks are computed here or elsewhere, and the stores that hold
 //! them.
 
-use std::fs::File;
-use std::io::{BufWriter, Write as _};
+use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use nanotap::control::Control;
 use nanotap::dataset::gsf::Field;
-use nanotap::dataset::{self, Share, Store, Work, WorkError, table};
+use nanotap::dataset::{self, Share, Store, StoreError, Work, WorkError, files, table};
 use nanotap::figure as figures;
 use nanotap::study::DatasetStudy as _;
 use nanotap::study::basin;
@@ -261,19 +260,30 @@ pub(crate) fn write_table(path: PathBuf, out: PathBuf) -> PyResult<()> {
         let refuse = |error: std::io::Error| -> Failure {
             nanotap::Error::files(format!("cannot write {}: {error}", out.display())).into()
         };
-        let temporary = out.with_file_name(format!(".{}.csv.tmp", std::process::id()));
-        let written = File::create(&temporary).map_err(refuse).and_then(|file| {
-            let mut file = BufWriter::new(file);
-            table::csv::<Failure>(&store, |piece| {
-                file.write_all(piece.as_bytes()).map_err(refuse)
-            })?;
-            file.flush().map_err(refuse)?;
-            std::fs::rename(&temporary, &out).map_err(refuse)
-        });
-        if written.is_err() {
-            let _ = std::fs::remove_file(&temporary);
+        // Its errors and those of the store.
+        enum Stopped {
+            System(std::io::Error),
+            Store(StoreError),
         }
-        written
+        impl From<std::io::Error> for Stopped {
+            fn from(error: std::io::Error) -> Self {
+                Self::System(error)
+            }
+        }
+        impl From<StoreError> for Stopped {
+            fn from(error: StoreError) -> Self {
+                Self::Store(error)
+            }
+        }
+        let written = files::write_with(&out, |file| {
+            table::csv(&store, |piece| {
+                Ok::<_, Stopped>(file.write_all(piece.as_bytes())?)
+            })
+        });
+        written.map_err(|stopped| match stopped {
+            Stopped::System(error) => refuse(error),
+            Stopped::Store(error) => error.into(),
+        })
     };
     Ok(write()?)
 }

@@ -40,6 +40,7 @@ fn _nanotap(module: &Bound<'_, PyModule>) -> PyResult<()> {
         wrap_pyfunction!(run_command_line, module)?,
         wrap_pyfunction!(case::case_keys, module)?,
         wrap_pyfunction!(case::catalogue, module)?,
+        wrap_pyfunction!(case::catalogue_text, module)?,
         wrap_pyfunction!(case::in_si, module)?,
         wrap_pyfunction!(case::label, module)?,
         wrap_pyfunction!(motion::modes, module)?,

@@ -38,6 +38,7 @@ pub mod dataset;
 pub mod error;
 #[cfg(feature = "figures")]
 pub mod figure;
+pub mod input;
 pub mod map;
 pub mod model;
 pub mod number;

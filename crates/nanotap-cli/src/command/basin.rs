@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use nanotap::figure::basin::figure;
+use nanotap::input::{self, MAX_DOCUMENT_BYTES, Origin};
 use nanotap::study::DatasetStudy as _;
 use nanotap::study::basin::{BasinOptions, BasinStudy, Shares, SliceRange};
 
@@ -65,7 +66,8 @@ fn states(path: &Path) -> Result<Vec<Vec<f64>>, Failure> {
             "make it with `nanotap attractors CASE --json > FILE`",
         )
     };
-    let text = std::fs::read_to_string(path).map_err(|error| refuse(error.to_string()))?;
+    let text = input::text(path, MAX_DOCUMENT_BYTES, Origin::User)
+        .map_err(|error| refuse(error.fault.to_string()))?;
     let document: serde_json::Value =
         serde_json::from_str(&text).map_err(|error| refuse(format!("not JSON: {error}")))?;
     let list = document["attractors"]

@@ -74,7 +74,10 @@ class Case:
         model_units: bool = False,
         **keys: Value,
     ) -> None:
-        texts = [(os.fspath(path), _text(path)) for path in _paths(catalogue)]
+        texts = [
+            (os.fspath(path), _nanotap.catalogue_text(existing(path)))
+            for path in _paths(catalogue)
+        ]
         self._make(None, key_words(keys), texts, model_units)
 
     @classmethod
@@ -365,15 +368,6 @@ def existing(path: Path) -> str:
     if not os.path.exists(path):
         raise missing(path)
     return os.fspath(path)
-
-
-def _text(path: Path) -> str:
-    try:
-        with open(path, encoding="utf-8") as file:
-            return file.read()
-    except UnicodeDecodeError as error:
-        message = f"{os.fspath(path)}: cannot be read: {error}"
-        raise ValueError(message) from None
 
 
 def key_words(keys: Mapping[str, Any], kind: str = "cantilever") -> dict[str, str]:

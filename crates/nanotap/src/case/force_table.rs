@@ -18,6 +18,7 @@ use super::quantity::Kind;
 use super::stated::Value;
 use crate::Error;
 use crate::case::table::{Entry, Header, Table};
+use crate::input::Origin;
 
 /// Syntax of a table, for remedies.
 const SHAPE: &str = "write rows as in [[\"gap (nm)\", \"force (nN)\"], [-1, 8.5], [0, 0], [9, 0]]";
@@ -327,8 +328,8 @@ impl Takes {
     ///
     /// # Errors
     /// If it cannot be read or is not such a table, with the place.
-    pub(crate) fn read_table(self, path: &Path) -> Result<Value, ForceTableError> {
-        self.of_table(&Table::read(path)?)
+    pub(crate) fn read_table(self, path: &Path, origin: Origin) -> Result<Value, ForceTableError> {
+        self.of_table(&Table::read_from(path, origin)?)
     }
 
     /// The value of a key that takes a table, from the text of an array or of a CSV file.

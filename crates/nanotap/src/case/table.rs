@@ -10,12 +10,15 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use serde_json::{Map, Value, json};
 
 use super::quantity::Quantity;
+#[cfg(feature = "fit")]
+use super::recording::{self, Recording};
 use crate::Error;
+use crate::input::{self, MAX_TABLE_BYTES, Origin};
 
 /// Most rows of a table.
 pub const MAX_ROWS: usize = 1_000_000;
-/// Most bytes of a file.
-const MAX_BYTES: u64 = 256 << 20;
+/// Most entries of a table, in all columns: 24 bytes of memory each.
+const MAX_ENTRIES: usize = 16_000_000;
 
 /// An entry of a table.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -52,29 +55,23 @@ impl Table {
     /// # Errors
     /// When the file cannot be read or is not such a table; the message has line and column.
     pub fn read(path: &Path) -> Result<Self, Error> {
+        Self::read_from(path, Origin::User)
+    }
+
+    /// As [`read`](Self::read), of a file that the user or another file names.
+    pub(crate) fn read_from(path: &Path, origin: Origin) -> Result<Self, Error> {
         let name = path.display().to_string();
-        let refuse = |error: std::io::Error| {
-            let why = match error.kind() {
-                std::io::ErrorKind::NotFound => "there is no such file".to_owned(),
-                _ => error.to_string(),
-            };
-            Error::files(format!("cannot read {name}: {why}"))
-        };
-        let metadata = std::fs::metadata(path).map_err(refuse)?;
-        if metadata.is_dir() {
-            return Err(Error::files(format!("cannot read {name}: it is a folder")));
-        }
-        let size = metadata.len();
-        if size > MAX_BYTES {
-            return Err(Error::input(
-                format!("{name} has {size} bytes; {MAX_BYTES} at most"),
-                "keep fewer rows",
-            ));
-        }
-        let bytes = std::fs::read(path).map_err(refuse)?;
+        let bytes = input::read(path, MAX_TABLE_BYTES, origin)?;
         #[cfg(feature = "fit")]
-        if let Some(recorded) = super::recording::parse(&name, &bytes) {
-            return recorded;
+        if let Some(recorded) = recording::parse(&name, &bytes) {
+            return recorded
+                .map(|recorded| Self::of_recording(&name, recorded))
+                .map_err(|error| {
+                    Error::input(
+                        format!("{name}: {error}"),
+                        "export the curve as text, with the names of the columns in the first line",
+                    )
+                });
         }
         let text = text_of(bytes).ok_or_else(|| {
             Error::input(
@@ -85,13 +82,37 @@ impl Table {
         Self::parse(&name, &text)
     }
 
+    /// The table of an instrument's file.
+    #[cfg(feature = "fit")]
+    fn of_recording(name: &str, recorded: Recording) -> Self {
+        let column = |(header, numbers): (String, Vec<f64>)| {
+            (header, numbers.into_iter().map(Entry::Number).collect())
+        };
+        let mut columns: Vec<_> = recorded.columns.into_iter().map(column).collect();
+        if !recorded.directions.is_empty() {
+            let words = recorded.directions.into_iter();
+            let words = words.map(|word| Entry::Text(word.to_owned()));
+            columns.push(("direction".to_owned(), words.collect()));
+        }
+        Self {
+            name: name.to_owned(),
+            columns,
+            lines: Vec::new(),
+            notes: recorded.notes,
+        }
+    }
+
     /// Reads the text of such a file.
     ///
     /// # Errors
     /// As [`read`](Self::read).
     pub fn parse(name: &str, text: &str) -> Result<Self, Error> {
         // The reader counts line feeds alone as lines.
-        let text = &text.replace("\r\n", "\n").replace('\r', "\n");
+        let text = &if text.contains('\r') {
+            Cow::Owned(text.replace("\r\n", "\n").replace('\r', "\n"))
+        } else {
+            Cow::Borrowed(text)
+        };
         let separator = delimiter(text);
         let mut reader = csv::ReaderBuilder::new()
             .comment(Some(b'#'))
@@ -127,6 +148,12 @@ impl Table {
         }
         let mut records = Vec::new();
         for record in reader.into_records() {
+            if (records.len() + 1) * header.len() > MAX_ENTRIES {
+                return Err(Error::input(
+                    format!("{name} has more than {MAX_ENTRIES} entries"),
+                    "keep fewer columns or rows",
+                ));
+            }
             if records.len() == MAX_ROWS {
                 return Err(Error::input(
                     format!("{name} has more than {MAX_ROWS} rows"),

@@ -18,7 +18,6 @@ mod problem;
 mod reader;
 mod refusal;
 
-use std::io::Read as _;
 use std::path::Path;
 
 pub use document::{Document, Entry, Header};
@@ -30,12 +29,10 @@ use toml::de::{DeTable, DeValue};
 use super::force_table::file_named;
 use super::{Case, CaseKind, Kind, Value};
 use crate::case::key::{Key, Takes};
+use crate::input::{self, MAX_CASE_BYTES, Origin};
 use crate::model::cantilever::{Cantilever, CosineTerm};
 use crate::model::contact::ContactLaw;
 use crate::model::drive_form::Actuation;
-
-/// Case files are much smaller.
-const LARGEST_FILE: u64 = 1 << 20;
 
 /// A dimensionless cantilever as a case file, every key written out.
 pub fn to_toml(case: &Cantilever) -> String {
@@ -164,7 +161,7 @@ pub fn read(path: &Path) -> Result<Source, CaseFileError> {
         };
         let folder = path.parent().unwrap_or_else(|| Path::new(""));
         let place = Place::Span(span.clone());
-        let table = table(key, &folder.join(name), place)
+        let table = table(key, &folder.join(name), Origin::File, place)
             .map_err(|problem| CaseFileError::one(Some(source.clone()), problem))?;
         source.text.replace_range(span, &table.text());
     }
@@ -190,7 +187,7 @@ pub fn with_tables(words: &[String]) -> Result<Vec<String>, CaseFileError> {
             return Ok(word.clone());
         };
         let place = Place::Override(word.clone());
-        let table = table(key, Path::new(name), place);
+        let table = table(key, Path::new(name), Origin::User, place);
         let table = table.map_err(|problem| CaseFileError::one(None, problem))?;
         Ok(format!("{}={}", key.path(), table.text()))
     };
@@ -198,8 +195,8 @@ pub fn with_tables(words: &[String]) -> Result<Vec<String>, CaseFileError> {
 }
 
 /// Reads the table of a key in a file, named at `place`.
-fn table(key: Key, path: &Path, place: Place) -> Result<Value, Problem> {
-    key.entry().takes.read_table(path).map_err(|error| {
+fn table(key: Key, path: &Path, origin: Origin, place: Place) -> Result<Value, Problem> {
+    key.entry().takes.read_table(path, origin).map_err(|error| {
         let help = if error.remedy.is_empty() {
             match key.entry().takes {
                 Takes::Arms => "name a CSV file with columns of time and modulus",
@@ -232,58 +229,13 @@ fn table_named(key: Key, text: &str) -> Option<(std::ops::Range<usize>, String)>
     Some((value.span(), file_named(name)?.to_owned()))
 }
 
-/// The text of a file of at most so many bytes.
-///
-/// # Errors
-/// When it cannot be read, is longer, or is not text.
-pub(crate) fn text_within(path: &Path, limit: u64) -> Result<String, crate::Error> {
-    let name = path.display();
-    let mut bytes = Vec::new();
-    std::fs::File::open(path)
-        .and_then(|file| file.take(limit + 1).read_to_end(&mut bytes))
-        .map_err(|error| crate::Error::files(format!("{name}: cannot be read: {error}")))?;
-    let refuse = |what: String| crate::Error::input(format!("{name}: {what}"), "name a CSV file");
-    if bytes.len() as u64 > limit {
-        return Err(refuse(format!("longer than {limit} bytes")));
-    }
-    String::from_utf8(bytes).map_err(|_| refuse("not text in UTF-8".into()))
-}
-
 fn text_of(path: &Path) -> Result<Source, CaseFileError> {
+    let text = input::text(path, MAX_CASE_BYTES, Origin::User).map_err(|error| {
+        let problem = Problem::new(Place::Whole, error.to_string());
+        CaseFileError::one(None, problem.help("name a TOML file with a case in it"))
+    })?;
     let name = path.display().to_string();
-    let refuse = |why: String, help: &str| {
-        CaseFileError::one(
-            None,
-            Problem::new(Place::Whole, format!("{name}: {why}")).help(help.to_owned()),
-        )
-    };
-    let what = "name a TOML file with a case in it";
-    if path.is_dir() {
-        return Err(refuse("is a folder".into(), what));
-    }
-    let mut bytes = Vec::new();
-    let read = std::fs::File::open(path)
-        .and_then(|file| file.take(LARGEST_FILE + 1).read_to_end(&mut bytes));
-    match read {
-        Err(error) if error.kind() == std::io::ErrorKind::NotFound => {
-            return Err(refuse("no such file".into(), what));
-        }
-        Err(error) => return Err(refuse(format!("cannot be read: {error}"), what)),
-        Ok(_) if bytes.len() as u64 > LARGEST_FILE => {
-            return Err(refuse("longer than 1 MiB, so not a case file".into(), what));
-        }
-        Ok(_) => {}
-    }
-    match String::from_utf8(bytes) {
-        Ok(text) => Ok(Source { name, text }),
-        Err(error) => {
-            let offset = error.utf8_error().valid_up_to();
-            Err(refuse(
-                format!("not text: byte {offset} is not UTF-8"),
-                what,
-            ))
-        }
-    }
+    Ok(Source { name, text })
 }
 
 #[cfg(test)]

@@ -27,6 +27,7 @@ use super::error::PhysicalError;
 use crate::case::key::Key;
 use crate::case::near_name::near_names;
 use crate::case::quantity::Kind;
+use crate::input::{self, MAX_CASE_BYTES, Origin};
 
 /// A lever as in its data sheet. The quality factor is not included, because it depends on the
 /// medium.
@@ -176,8 +177,8 @@ impl Catalogue {
     /// [`CatalogueError`] if the file cannot be opened or read.
     pub fn extend_from_file(&mut self, path: &Path) -> Result<(), CatalogueError> {
         let origin = path.display().to_string();
-        let text =
-            std::fs::read_to_string(path).map_err(|error| CatalogueError::new(&*origin, error))?;
+        let text = input::text(path, MAX_CASE_BYTES, Origin::User)
+            .map_err(|error| CatalogueError::new(&*origin, error.fault))?;
         self.extend(&text, &origin)
     }
 

@@ -1,6 +1,7 @@
 //! Igor binary waves of version 5, in which Asylum Research writes curves (WaveMetrics, Technical
 //! Note 003): a header, one column of numbers per channel, a note, the names of the channels.
 
+use super::limits::{Budget, MAX_CHANNELS, MAX_TEXT};
 use super::{Number, Recording, latin, slice};
 
 /// Size of the header without the data.
@@ -10,7 +11,7 @@ const LABEL: usize = 32;
 /// Beginnings of the names of Asylum Research's channels in m.
 const LENGTHS: [&str; 5] = ["amp", "defl", "lvdt", "raw", "zsnsr"];
 
-pub(super) fn parse(bytes: &[u8]) -> Option<Recording> {
+pub(super) fn parse(bytes: &[u8], budget: &mut Budget) -> Option<Recording> {
     let is_big = *bytes.first()? == 0;
     let whole = |at: usize, size: usize| -> Option<usize> {
         let number = Number::Signed(size).all(slice(bytes, at, size)?, is_big);
@@ -43,6 +44,11 @@ pub(super) fn parse(bytes: &[u8]) -> Option<Recording> {
     if rows == 0 || whole(140, 4)? > 1 {
         return None;
     }
+    budget.at_most(channels, MAX_CHANNELS, "channels")?;
+    for _ in 0..channels {
+        budget.column(rows)?;
+    }
+    budget.at_most(note?, MAX_TEXT, "bytes in its note")?;
     let size = rows.checked_mul(channels)?.checked_mul(number.size())?;
     let values = number.all(slice(bytes, HEADER, size)?, is_big);
     let after = HEADER.checked_add(size)?.checked_add(formula?)?;

@@ -8,26 +8,30 @@
 
 use std::collections::BTreeMap;
 
+use super::limits::{Budget, MAX_CHANNELS, MAX_CONVERSIONS, MAX_SEGMENTS};
 use super::zip::Archive;
 use super::{Number, Recording, SENSITIVITY, SPRING_CONSTANT, in_usual_unit};
 
 type Properties = BTreeMap<String, String>;
 
-/// Most segments of a curve, and most conversions of a channel in sequence.
-const MAX_SEGMENTS: usize = 1000;
-const MAX_CONVERSIONS: usize = 8;
-
-pub(super) fn parse(bytes: &[u8]) -> Option<Recording> {
-    let archive = Archive::open(bytes)?;
-    let shared = archive.text("shared-data/header.properties");
-    let shared = shared.as_deref().map(properties).unwrap_or_default();
+pub(super) fn parse(bytes: &[u8], budget: &mut Budget) -> Option<Recording> {
+    let archive = Archive::open(bytes, budget)?;
+    let of_file = |name: &str, budget: &mut Budget| -> Option<Option<Properties>> {
+        if archive.size(name).is_none() {
+            return Some(None);
+        }
+        let text = archive.text(name, budget)?;
+        properties(&text, budget).map(Some)
+    };
+    let shared = of_file("shared-data/header.properties", budget)?.unwrap_or_default();
     let mut recording = Recording::default();
     for segment in 0..MAX_SEGMENTS {
         let folder = format!("segments/{segment}/");
-        let Some(header) = archive.text(&format!("{folder}segment-header.properties")) else {
+        let name = format!("{folder}segment-header.properties");
+        let Some(header) = of_file(&name, budget)? else {
             break;
         };
-        let header = with_shared(properties(&header), &shared);
+        let header = with_shared(header, &shared, budget)?;
         let style = [
             "force-segment-header.settings.segment-settings.style",
             "force-segment-header.settings.style",
@@ -48,6 +52,8 @@ pub(super) fn parse(bytes: &[u8]) -> Option<Recording> {
             let Some(found) = Channel::of(&header, &channel) else {
                 continue;
             };
+            budget.at_most(channels.len() + 1, MAX_CHANNELS, "channels")?;
+            budget.column(archive.size(&file)? / found.encoder.size())?;
             let numbers = found.encoder.all(&archive.file(&file)?, true);
             let values = numbers
                 .iter()
@@ -56,7 +62,7 @@ pub(super) fn parse(bytes: &[u8]) -> Option<Recording> {
             channels.push((found.header.clone(), values));
             found.add_notes(&mut recording.notes);
         }
-        recording.extend(&channels, direction);
+        recording.extend(&channels, direction, budget)?;
     }
     Some(recording)
 }
@@ -160,20 +166,26 @@ impl Channel {
 }
 
 /// Java properties: lines `KEY=VALUE`; `#` begins a comment.
-fn properties(text: &str) -> Properties {
+fn properties(text: &str, budget: &mut Budget) -> Option<Properties> {
     let lines = text
         .lines()
         .map(str::trim)
         .filter(|line| !line.starts_with(['#', '!']));
     let pairs = lines.filter_map(|line| line.split_once('='));
-    pairs
-        .map(|(key, value)| (key.trim().to_owned(), value.trim().to_owned()))
-        .collect()
+    let counted = pairs.map(|(key, value)| {
+        budget.property(key.len(), value.len())?;
+        Some((key.trim().to_owned(), value.trim().to_owned()))
+    });
+    counted.collect()
 }
 
 /// The properties with those that they refer to: `channel.X.lcd-info.*=2` stands for
 /// `channel.X.KEY=VALUE` of all shared `lcd-info.2.KEY=VALUE`.
-fn with_shared(mut own: Properties, shared: &Properties) -> Properties {
+fn with_shared(
+    mut own: Properties,
+    shared: &Properties,
+    budget: &mut Budget,
+) -> Option<Properties> {
     let references: Vec<(String, String)> = own
         .iter()
         .filter_map(|(key, number)| Some((key.strip_suffix(".*")?.to_owned(), number.clone())))
@@ -185,6 +197,8 @@ fn with_shared(mut own: Properties, shared: &Properties) -> Properties {
             .range(first.clone()..)
             .take_while(|(name, _)| name.starts_with(&first));
         for (name, value) in found {
+            // Many references to many properties would be their product.
+            budget.property(place.len() + name.len(), value.len())?;
             let rest = &name[first.len()..];
             let key = if place.is_empty() {
                 rest.to_owned()
@@ -194,5 +208,5 @@ fn with_shared(mut own: Properties, shared: &Properties) -> Properties {
             own.entry(key).or_insert_with(|| value.clone());
         }
     }
-    own
+    Some(own)
 }

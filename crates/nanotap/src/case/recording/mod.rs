@@ -5,49 +5,74 @@
 //! the file does. The notes of the file are kept by name, with the names of Asylum Research for what
 //! all of them have: `SpringConstant` in N/m, `InvOLS` in m/V, `ThermalFrequency` in Hz, `ThermalQ`.
 //!
-//! A file may have any bytes: sizes are checked before anything is taken from them.
+//! A file may have any bytes: sizes are checked, and kept within the [limits], before memory is taken.
+//! Nothing here depends on cases or models.
 
 mod igor;
 mod jpk;
+mod limits;
 mod nanosurf;
 mod zip;
 
-use super::table::{Entry, MAX_ROWS, Table};
-use crate::Error;
+use limits::{Budget, MAX_ROWS};
 
 /// Stiffness of the lever, N/m.
 const SPRING_CONSTANT: &str = "SpringConstant";
 /// Deflection per volt of the detector, m/V.
 const SENSITIVITY: &str = "InvOLS";
 
+/// Why an instrument's file is not read.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub(super) enum RecordingError {
+    /// It is of another kind than its name says, or incomplete.
+    #[error("it is not {0}, or it is damaged")]
+    Damaged(&'static str),
+    /// It exceeds one of the limits.
+    #[error("it has more than {most} {items}")]
+    TooMany {
+        /// The limit.
+        most: usize,
+        /// What there are too many of.
+        items: &'static str,
+    },
+    /// Two files of an archive have this name.
+    #[error("its archive has two files called `{0}`")]
+    Repeated(String),
+    /// A stored file of an archive has another length than it states.
+    #[error("the file `{0}` in its archive is not as long as stated")]
+    Unequal(String),
+    /// Two files of an archive share bytes.
+    #[error("two files in its archive share bytes")]
+    Overlapping,
+}
+
 /// Reads the bytes of a file with a known extension; `None` if it is read as text.
-pub(super) fn parse(name: &str, bytes: &[u8]) -> Option<Result<Table, Error>> {
+pub(super) fn parse(name: &str, bytes: &[u8]) -> Option<Result<Recording, RecordingError>> {
     let extension = std::path::Path::new(name).extension()?.to_str()?;
+    let budget = &mut Budget::default();
     let (parsed, kind) = match extension.to_lowercase().as_str() {
         "ibw" => (
-            igor::parse(bytes),
+            igor::parse(bytes, budget),
             "a curve of Asylum Research (Igor binary wave 5)",
         ),
-        "jpk-force" => (jpk::parse(bytes), "a force curve of JPK"),
-        "nid" => (nanosurf::parse(bytes), "a spectroscopy of Nanosurf"),
+        "jpk-force" => (jpk::parse(bytes, budget), "a force curve of JPK"),
+        "nid" => (nanosurf::parse(bytes, budget), "a spectroscopy of Nanosurf"),
         _ => return None,
     };
-    let table = parsed.and_then(|table| table.finish(name));
-    Some(table.ok_or_else(|| {
-        Error::input(
-            format!("{name} is not {kind}, or it is damaged"),
-            "export the curve as text, with the names of the columns in the first line",
-        )
-    }))
+    let whole = parsed.and_then(Recording::finish);
+    let refusal = std::mem::take(budget).refusal();
+    Some(whole.ok_or_else(|| refusal.unwrap_or(RecordingError::Damaged(kind))))
 }
 
 /// Columns of numbers of one length, with the directions of their rows.
 #[derive(Debug, Default)]
-struct Recording {
-    columns: Vec<(String, Vec<f64>)>,
-    /// `approach` or `retract`; empty if the file does not say.
-    directions: Vec<&'static str>,
-    notes: Vec<(String, String)>,
+pub(super) struct Recording {
+    /// Header of each column, with its unit, and its numbers.
+    pub(super) columns: Vec<(String, Vec<f64>)>,
+    /// `approach` or `retract` for each row; empty if the file does not say.
+    pub(super) directions: Vec<&'static str>,
+    /// Notes of the file: name and text.
+    pub(super) notes: Vec<(String, String)>,
 }
 
 impl Recording {
@@ -59,42 +84,38 @@ impl Recording {
             .unwrap_or(0)
     }
 
-    /// The table; `None` without rows.
-    fn finish(self, name: &str) -> Option<Table> {
+    /// The rows that were recorded; `None` if there are none.
+    fn finish(mut self) -> Option<Self> {
         let rows = self.rows();
-        if rows == 0 || rows > MAX_ROWS {
-            return None;
-        }
+        let is_whole = |row: usize| self.columns.iter().all(|(_, of)| of[row].is_finite());
         // Rows that were not recorded are not numbers.
-        let is_whole = |row: &usize| self.columns.iter().all(|(_, of)| of[*row].is_finite());
-        let kept: Vec<usize> = (0..rows).filter(is_whole).collect();
-        if kept.is_empty() {
+        let kept: Vec<bool> = (0..rows).map(is_whole).collect();
+        if !kept.contains(&true) {
             return None;
         }
-        let column = |(header, of): &(String, Vec<f64>)| {
-            let entries = kept.iter().map(|row| Entry::Number(of[*row]));
-            (header.clone(), entries.collect())
-        };
-        let mut columns: Vec<(String, Vec<Entry>)> = self.columns.iter().map(column).collect();
-        if self.directions.len() == rows {
-            let words = kept
-                .iter()
-                .map(|row| Entry::Text(self.directions[*row].to_owned()));
-            columns.push(("direction".to_owned(), words.collect()));
+        if self.directions.len() != rows {
+            self.directions.clear();
         }
-        Some(Table {
-            name: name.to_owned(),
-            columns,
-            lines: Vec::new(),
-            notes: self.notes,
-        })
+        for (_, column) in &mut self.columns {
+            let mut row = kept.iter();
+            column.retain(|_| row.next() == Some(&true));
+        }
+        let mut row = kept.iter();
+        self.directions.retain(|_| row.next() == Some(&true));
+        Some(self)
     }
 
     /// Adds rows of some channels, by name, in this direction. Channels that the rows before have not
     /// are left out, as are those that these rows have not.
-    fn extend(&mut self, channels: &[(String, Vec<f64>)], direction: &'static str) {
+    fn extend(
+        &mut self,
+        channels: &[(String, Vec<f64>)],
+        direction: &'static str,
+        budget: &mut Budget,
+    ) -> Option<()> {
         let rows = channels.iter().map(|(_, of)| of.len()).min().unwrap_or(0);
         let before = self.directions.len();
+        budget.at_most(before + rows, MAX_ROWS, "rows")?;
         if before == 0 {
             self.columns = channels
                 .iter()
@@ -109,6 +130,7 @@ impl Recording {
             })
         });
         self.directions.extend(std::iter::repeat_n(direction, rows));
+        Some(())
     }
 }
 

@@ -6,12 +6,10 @@
 
 use std::collections::BTreeMap;
 
+use super::limits::{Budget, MAX_CHANNELS, MAX_SEGMENTS, MAX_TEXT};
 use super::{Number, Recording, SENSITIVITY, SPRING_CONSTANT, in_usual_unit, latin};
 
 type Section = BTreeMap<String, String>;
-
-/// Most groups of channels, and most channels of one.
-const MAX_CHANNELS: usize = 1000;
 
 /// A channel's place and scale.
 struct Channel<'a> {
@@ -34,19 +32,21 @@ impl Channel<'_> {
     }
 }
 
-pub(super) fn parse(bytes: &[u8]) -> Option<Recording> {
+pub(super) fn parse(bytes: &[u8], budget: &mut Budget) -> Option<Recording> {
     // The header ends before the first mark of the numbers.
     let mark = bytes.windows(2).position(|two| two == b"#!")?;
-    let sections = sections(&latin(&bytes[..mark]));
+    budget.at_most(mark, MAX_TEXT, "bytes in its header")?;
+    let sections = sections(&latin(&bytes[..mark]), budget)?;
     let all = sections.get("DataSet")?;
     let count = |key: &str| -> Option<usize> { all.get(key)?.parse().ok() };
     let mut channels = Vec::new();
-    for group in 0..count("GroupCount")?.min(MAX_CHANNELS) {
+    for group in 0..count("GroupCount")?.min(MAX_SEGMENTS) {
         let size = count(&format!("Gr{group}-Count")).unwrap_or(0);
         for channel in 0..size.min(MAX_CHANNELS) {
             let Some(name) = all.get(&format!("Gr{group}-Ch{channel}")) else {
                 continue;
             };
+            budget.at_most(channels.len() + 1, MAX_CHANNELS, "channels")?;
             let section = sections.get(name)?;
             let whole = |key: &str| -> Option<usize> { section.get(key)?.parse().ok() };
             channels.push(Channel {
@@ -100,21 +100,21 @@ pub(super) fn parse(bytes: &[u8]) -> Option<Recording> {
             let (low, range) = (channel.number("Dim2Min")?, channel.number("Dim2Range")?);
             let levels = 2f64.powi(8 * channel.bytes as i32);
             let value = |n: f64| size * (low + range * (n + 0.5 * levels) / levels);
+            if columns.iter().any(|(known, _)| *known == header) {
+                continue;
+            }
+            budget.column(points)?;
             if columns.is_empty() && !has_z && channel.text("Dim0Unit") == "m" {
                 let (low, range) = (channel.number("Dim0Min")?, channel.number("Dim0Range")?);
                 let step = range / (channel.points.max(2) - 1) as f64;
                 let places = (0..points).map(|k| 1e9 * (low + step * k as f64));
                 columns.push(("Z (nm)".to_owned(), places.collect()));
             }
-            if !columns.iter().any(|(known, _)| *known == header) {
-                columns.push((
-                    header,
-                    numbers.all(raw, false).into_iter().map(value).collect(),
-                ));
-            }
+            let values = numbers.all(raw, false).into_iter().map(value);
+            columns.push((header, values.collect()));
         }
         if !columns.is_empty() {
-            recording.extend(&columns, direction);
+            recording.extend(&columns, direction, budget)?;
         }
     }
     recording.notes = notes(&sections);
@@ -122,7 +122,7 @@ pub(super) fn parse(bytes: &[u8]) -> Option<Recording> {
 }
 
 /// Sections of lines `KEY=VALUE`, by their names.
-fn sections(text: &str) -> BTreeMap<String, Section> {
+fn sections(text: &str, budget: &mut Budget) -> Option<BTreeMap<String, Section>> {
     let mut sections: BTreeMap<String, Section> = BTreeMap::new();
     let mut name = String::new();
     for line in text.lines().map(str::trim) {
@@ -132,11 +132,12 @@ fn sections(text: &str) -> BTreeMap<String, Section> {
         {
             of.clone_into(&mut name);
         } else if let Some((key, value)) = line.split_once('=') {
+            budget.property(name.len() + key.len(), value.len())?;
             let section = sections.entry(name.clone()).or_default();
             section.insert(key.trim().to_owned(), value.trim().to_owned());
         }
     }
-    sections
+    Some(sections)
 }
 
 /// Stiffness of the lever and sensitivity of the detector.

@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use crate::Error;
+use crate::input::{self, MAX_IMAGE_BYTES, Origin};
 
 /// Most pixels of an image.
 const MAX_PIXELS: usize = 16_777_216;
@@ -26,9 +27,8 @@ impl HeightImage {
         let name = path.display();
         let refuse =
             |what: String| Error::input(format!("{name}: {what}"), "name a greyscale image in PNG");
-        let file = std::fs::File::open(path)
-            .map_err(|error| Error::files(format!("{name}: cannot be read: {error}")))?;
-        let mut decoder = png::Decoder::new(std::io::BufReader::new(file));
+        let file = input::read(path, MAX_IMAGE_BYTES, Origin::File)?;
+        let mut decoder = png::Decoder::new(std::io::Cursor::new(file));
         decoder.set_transformations(png::Transformations::EXPAND);
         let mut reader = decoder
             .read_info()

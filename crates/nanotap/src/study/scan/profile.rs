@@ -8,11 +8,10 @@ use super::table::centres;
 use crate::Error;
 use crate::case::Case;
 use crate::case::physical::Kind;
+use crate::input::{self, MAX_TABLE_BYTES, Origin};
 
 /// Most samples of a profile.
 const MAX_SAMPLES: usize = 1_000_000;
-/// Largest CSV file of a profile in bytes.
-const LARGEST_FILE: u64 = 64 << 20;
 /// Steepest slope between two samples of a profile.
 const STEEPEST: f64 = 1000.0;
 
@@ -250,7 +249,7 @@ impl Samples {
             ProfileOptions::Heights(heights) => Self::evenly(heights.clone(), size),
             ProfileOptions::File(name) => {
                 let path = case.relative_file(name)?;
-                let text = crate::case::file::text_within(&path, LARGEST_FILE)?;
+                let text = input::text(&path, MAX_TABLE_BYTES, Origin::File)?;
                 Self::parse(&text, &path.display().to_string(), size)
             }
         }

@@ -84,7 +84,7 @@ impl Table {
 
     /// The table of an instrument's file.
     #[cfg(feature = "fit")]
-    fn of_recording(name: &str, recorded: Recording) -> Self {
+    pub(super) fn of_recording(name: &str, recorded: Recording) -> Self {
         let column = |(header, numbers): (String, Vec<f64>)| {
             (header, numbers.into_iter().map(Entry::Number).collect())
         };

@@ -197,4 +197,6 @@ fn latin(bytes: &[u8]) -> String {
 }
 
 #[cfg(test)]
+mod samples;
+#[cfg(test)]
 mod tests;

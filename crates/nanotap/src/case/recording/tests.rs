@@ -1,9 +1,15 @@
 //! Files made here in the instruments' formats, and files with any bytes.
 
-use std::fmt::Write as _;
+use super::samples::{bombs, ibw, jpk, nid};
+use crate::case::table::{Entry, Table};
 
-use super::*;
-use crate::case::table::Entry;
+fn parse(name: &str, bytes: &[u8]) -> Option<Result<Table, String>> {
+    let parsed = super::parse(name, bytes)?;
+    Some(match parsed {
+        Ok(recorded) => Ok(Table::of_recording(name, recorded)),
+        Err(error) => Err(error.to_string()),
+    })
+}
 
 fn numbers(table: &Table, header: &str) -> Vec<f64> {
     let (_, column) = table
@@ -28,31 +34,6 @@ fn close(found: &[f64], expected: &[f64]) {
     }
 }
 
-/// An Igor binary wave of version 5 (WaveMetrics, Technical Note 003: `BinHeader5` of 64 bytes,
-/// `WaveHeader5` of 320, data, note, labels).
-fn ibw() -> Vec<u8> {
-    let mut header = vec![0_u8; 384];
-    let mut put = |at: usize, bytes: &[u8]| header[at..at + bytes.len()].copy_from_slice(bytes);
-    let note = b"AmpInvOLS: 5.8e-08\rSpringConstant: 42\rImagingMode: AC\r";
-    put(0, &5_i16.to_le_bytes());
-    put(12, &(note.len() as i32).to_le_bytes());
-    put(40, &(4 * 32_i32).to_le_bytes());
-    put(64 + 16, &4_i16.to_le_bytes());
-    put(64 + 68, &2_i32.to_le_bytes());
-    put(64 + 72, &3_i32.to_le_bytes());
-    let mut file = header;
-    for value in [1e-8, 2e-8, 3e-8, 4e-8, 30.0, 31.0_f64] {
-        file.extend(value.to_le_bytes());
-    }
-    file.extend(note);
-    for name in ["", "ZSnsr", "Amp", "Phase"] {
-        let mut label = [0_u8; 32];
-        label[..name.len()].copy_from_slice(name.as_bytes());
-        file.extend(label);
-    }
-    file
-}
-
 #[test]
 fn a_wave_of_asylum_research_is_read() {
     let table = parse("curve.IBW", &ibw()).unwrap().unwrap();
@@ -64,115 +45,6 @@ fn a_wave_of_asylum_research_is_read() {
             .notes
             .contains(&("AmpInvOLS".to_owned(), "5.8e-08".to_owned()))
     );
-}
-
-/// A zip archive (PKWARE, APPNOTE 6.3.10): local headers, central directory, end record. Files of
-/// odd places are deflated.
-fn zip(files: &[(String, Vec<u8>)]) -> Vec<u8> {
-    let mut archive = Vec::new();
-    let mut directory = Vec::new();
-    for (k, (name, bytes)) in files.iter().enumerate() {
-        let (method, packed) = if k % 2 == 1 {
-            (8_u16, miniz_oxide::deflate::compress_to_vec(bytes, 6))
-        } else {
-            (0, bytes.clone())
-        };
-        let at = archive.len() as u32;
-        let mut common = Vec::new();
-        common.extend([20, 0, 0, 0]);
-        common.extend(method.to_le_bytes());
-        // Time and checksum, which are not read.
-        common.extend([0; 8]);
-        common.extend((packed.len() as u32).to_le_bytes());
-        common.extend((bytes.len() as u32).to_le_bytes());
-        common.extend((name.len() as u16).to_le_bytes());
-        common.extend([0, 0]);
-        archive.extend(b"PK\x03\x04");
-        archive.extend(&common);
-        archive.extend(name.as_bytes());
-        archive.extend(&packed);
-        directory.extend(b"PK\x01\x02\x14\x00");
-        directory.extend(&common);
-        directory.extend([0; 10]);
-        directory.extend(at.to_le_bytes());
-        directory.extend(name.as_bytes());
-    }
-    let place = archive.len() as u32;
-    archive.extend(&directory);
-    archive.extend(b"PK\x05\x06\0\0\0\0");
-    for _ in 0..2 {
-        archive.extend((files.len() as u16).to_le_bytes());
-    }
-    archive.extend((directory.len() as u32).to_le_bytes());
-    archive.extend(place.to_le_bytes());
-    archive.extend([0, 0]);
-    archive
-}
-
-/// A force curve of JPK as the readers afmformats and jpkfile describe it: properties that segments
-/// share, shorts for the deflection, integers for the height.
-fn jpk() -> Vec<u8> {
-    let shared = "#shared\n\
-        lcd-info.0.encoder.type=signedshort\n\
-        lcd-info.0.encoder.scaling.offset=0.5\n\
-        lcd-info.0.encoder.scaling.multiplier=1.0E-3\n\
-        lcd-info.0.encoder.scaling.unit.unit=V\n\
-        lcd-info.0.conversion-set.conversions.base=volts\n\
-        lcd-info.0.conversion-set.conversions.default=force\n\
-        lcd-info.0.conversion-set.conversion.distance.base-calibration-slot=volts\n\
-        lcd-info.0.conversion-set.conversion.distance.scaling.offset=0.0\n\
-        lcd-info.0.conversion-set.conversion.distance.scaling.multiplier=7.0E-8\n\
-        lcd-info.0.conversion-set.conversion.distance.scaling.unit.unit=m\n\
-        lcd-info.0.conversion-set.conversion.force.base-calibration-slot=distance\n\
-        lcd-info.0.conversion-set.conversion.force.scaling.offset=0.0\n\
-        lcd-info.0.conversion-set.conversion.force.scaling.multiplier=0.043\n\
-        lcd-info.0.conversion-set.conversion.force.scaling.unit.unit=N\n\
-        lcd-info.1.encoder.type=signedinteger\n\
-        lcd-info.1.encoder.scaling.offset=0.0\n\
-        lcd-info.1.encoder.scaling.multiplier=1.0E-9\n\
-        lcd-info.1.encoder.scaling.unit.unit=V\n\
-        lcd-info.1.conversion-set.conversions.base=volts\n\
-        lcd-info.1.conversion-set.conversions.default=nominal\n\
-        lcd-info.1.conversion-set.conversion.nominal.base-calibration-slot=volts\n\
-        lcd-info.1.conversion-set.conversion.nominal.scaling.offset=1.0E-6\n\
-        lcd-info.1.conversion-set.conversion.nominal.scaling.multiplier=-2.0E-6\n\
-        lcd-info.1.conversion-set.conversion.nominal.scaling.unit.unit=m\n\
-        force-segment-header-info.0.settings.segment-settings.style=extend\n\
-        force-segment-header-info.1.settings.segment-settings.style=retract\n";
-    let mut files = vec![
-        (
-            "header.properties".to_owned(),
-            b"jpk-data-file=jpk-force\n".to_vec(),
-        ),
-        (
-            "shared-data/header.properties".to_owned(),
-            shared.as_bytes().to_vec(),
-        ),
-    ];
-    for segment in 0..2_i32 {
-        let folder = format!("segments/{segment}/");
-        let header = format!(
-            "force-segment-header.force-segment-header-info.*={segment}\n\
-             channel.vDeflection.lcd-info.*=0\nchannel.measuredHeight.lcd-info.*=1\n"
-        );
-        files.push((
-            format!("{folder}segment-header.properties"),
-            header.into_bytes(),
-        ));
-        let shorts = [0_i16, -500, 1500 + segment as i16];
-        let shorts = shorts.iter().flat_map(|of| of.to_be_bytes());
-        files.push((
-            format!("{folder}channels/vDeflection.dat"),
-            shorts.collect(),
-        ));
-        let heights = [0_i32, 100_000_000, 200_000_000 + segment];
-        let heights = heights.iter().flat_map(|of| of.to_be_bytes());
-        files.push((
-            format!("{folder}channels/measuredHeight.dat"),
-            heights.collect(),
-        ));
-    }
-    zip(&files)
 }
 
 #[test]
@@ -194,40 +66,6 @@ fn a_force_curve_of_jpk_is_read() {
         let (_, value) = table.notes.iter().find(|(name, _)| name == note.0).unwrap();
         assert_eq!(value.parse::<f64>().unwrap(), note.1);
     }
-}
-
-/// A spectroscopy of Nanosurf as its reader NSFopen describes it: two channels there and back, 16
-/// bits.
-fn nid() -> Vec<u8> {
-    let mut text = String::from("[DataSet]\r\nGroupCount=1\r\nGr0-Name=Spec\r\nGr0-Count=4\r\n");
-    let channels = [
-        ("Spec forward", "Z-Axis", "m"),
-        ("Spec forward", "Deflection", "V"),
-        ("Spec backward", "Z-Axis", "m"),
-        ("Spec backward", "Deflection", "V"),
-    ];
-    for k in 0..4 {
-        let _ = write!(text, "Gr0-Ch{k}=DataSet-0:{k}\r\n");
-    }
-    for (k, (frame, name, unit)) in channels.iter().enumerate() {
-        let range = if *unit == "m" { "2.0E-6" } else { "20" };
-        let _ = write!(
-            text,
-            "\r\n[DataSet-0:{k}]\r\nFrame={frame}\r\nPoints=3\r\nLines=1\r\nSaveBits=16\r\n\
-             Dim0Min=0\r\nDim0Range=1E-6\r\nDim0Unit=m\r\n\
-             Dim2Name={name}\r\nDim2Min=0\r\nDim2Range={range}\r\nDim2Unit={unit}\r\n"
-        );
-    }
-    text +=
-        "\r\n[DataSet\\Calibration\\Cantilever]\r\nName=X\r\nPropCount=1\r\nProp0=D[0.2]*[N/m]\r\n";
-    text += "\r\n[DataSet\\Calibration\\Scanhead]\r\nIn5=0,1,2,3,1E-6,5\r\n\r\n#!";
-    let mut file = text.into_bytes();
-    for raw in [
-        -32768_i16, 0, 16384, 0, 0, 8192, 16384, 0, -32768, 8192, 0, 0,
-    ] {
-        file.extend(raw.to_le_bytes());
-    }
-    file
 }
 
 #[test]
@@ -283,4 +121,55 @@ fn damaged_files_are_refused_or_read() {
     }
     assert!((100..9000).contains(&read), "{read}");
     assert!(parse("a.csv", b"x").is_none());
+}
+
+/// Of each bomb the reason, so that it is not refused for another one; none is unpacked.
+#[test]
+fn bombs_are_refused_with_the_reason() {
+    let reasons = [
+        ("product", "it has more than 67108864 bytes of properties"),
+        (
+            "repeated",
+            "its archive has two files called `segments/0/channels/x.dat`",
+        ),
+        ("misplaced", "or it is damaged"),
+        (
+            "unequal",
+            "the file `segments/0/channels/c0.dat` in its archive is not as long as stated",
+        ),
+        ("nested", "two files in its archive share bytes"),
+        (
+            "long",
+            "it has more than 67108864 bytes in the files of its archive",
+        ),
+        ("wide", "it has more than 8000000 numbers"),
+        (
+            "heading",
+            "it has more than 67108864 bytes in the files of its archive",
+        ),
+    ];
+    for ((name, bytes), (expected, reason)) in bombs().into_iter().zip(reasons) {
+        assert_eq!(name, expected);
+        let refused = parse("bomb.jpk-force", &bytes).unwrap().unwrap_err();
+        assert!(refused.contains(reason), "{name}: {refused}");
+    }
+}
+
+/// Sizes that a file only states cost nothing, and many empty channels little.
+#[test]
+fn stated_sizes_take_no_memory() {
+    let mut wave = ibw();
+    wave[64 + 68..64 + 72].copy_from_slice(&i32::MAX.to_le_bytes());
+    let refused = parse("a.ibw", &wave).unwrap().unwrap_err();
+    assert!(refused.contains("more than 1000000 rows"), "{refused}");
+    let mut text = String::from("[DataSet]\nGroupCount=1000\n");
+    for group in 0..1000 {
+        text += &format!("Gr{group}-Count=1000\nGr{group}-Ch0=E\nGr{group}-Ch1=E\n");
+    }
+    text += "[E]\nPoints=0\nLines=0\nSaveBits=16\n#!";
+    let refused = parse("a.nid", text.as_bytes()).unwrap().unwrap_err();
+    assert!(refused.contains("more than 1000 channels"), "{refused}");
+    let long = format!("[A]\n{}#!", "k=v\n".repeat(2 << 20));
+    let refused = parse("a.nid", long.as_bytes()).unwrap().unwrap_err();
+    assert!(refused.contains("bytes in its header"), "{refused}");
 }

@@ -186,7 +186,10 @@ fn features(workspace: &Workspace) -> Result<Tally, String> {
 /// Writes Python's functions from the schemas that the program prints, or checks that they are up
 /// to date.
 fn signatures(workspace: &Workspace, further: &[&str]) -> Result<Tally, String> {
-    let mut build = workspace.cargo(&["build", "--release"]);
+    // In one call with the Python package: each alone gives the crates that both use other features,
+    // so that everything would be compiled twice.
+    let mut build = workspace.cargo(&["build", "--release", "--package", "nanotap-cli"]);
+    build.args(["--package", "nanotap-python"]);
     must(
         &workspace.root,
         &mut build,

@@ -15,7 +15,6 @@
 
 use crate::VolterraError;
 use crate::error::Refusal;
-use crate::force_sums::{ForceSums, ParabolicStep};
 use crate::gap_table::GapTable;
 use crate::law::{Approach, Exit, Guard};
 use crate::modes::Block;
@@ -85,8 +84,6 @@ struct Work {
     columns: Vec<[f64; 2]>,
     /// Size of the motion, in the unit of the gap.
     size: f64,
-    /// Integrals of the force, if requested, with the angular frequency of the harmonic.
-    sums: Option<(ForceSums, f64)>,
     statistics: Statistics,
 }
 
@@ -117,8 +114,6 @@ struct Tables {
     by_gap_alone: Vec<bool>,
     /// Whether the branch is determined anew at each evaluation.
     by_lookup: bool,
-    /// Whether tip and sample touch, by branch.
-    touches: Vec<bool>,
     max_steps: u64,
 }
 
@@ -138,8 +133,6 @@ struct Motion {
     modal: Vec<[f64; 2]>,
     /// `(cos ωt, sin ωt)` of each tone.
     phasors: Vec<[f64; 2]>,
-    /// Shift that is added to the gap of the tables' system.
-    shift: f64,
     gap: f64,
     rate: f64,
     force: f64,
@@ -502,7 +495,6 @@ impl Tables {
                 .collect(),
             exits,
             by_lookup,
-            touches: (0..law.branches()).map(|b| law.touches(b)).collect(),
             max_steps: MAX_STEPS.saturating_mul(oscillations as u64),
             system: Arc::clone(system),
         })
@@ -564,7 +556,7 @@ impl Tables {
 
     /// Sets gap and rate of `motion` from its coordinates and phasors.
     fn read(&self, motion: &mut Motion) {
-        let (mut gap, mut rate) = (self.system.gap_constant + motion.shift, 0.0);
+        let (mut gap, mut rate) = (self.system.gap_constant, 0.0);
         let tones = self.system.drive().tones.iter().zip(&self.system.gap_tones);
         for ((tone, z), [cos, sin]) in tones.zip(&motion.phasors) {
             gap += z.re * cos - z.im * sin;
@@ -709,7 +701,7 @@ impl Tables {
     /// Computes one explicit step; returns the estimate of its error in the gap's rate.
     #[inline]
     fn step(&self, level: &Level, from: &Motion, to: &mut Motion, stages: &mut Stages) -> f64 {
-        let constant = self.system.gap_constant + from.shift;
+        let constant = self.system.gap_constant;
         let (mut mid, mut end) = ([constant, 0.0], [constant, 0.0]);
         let tones = self.system.drive().tones.iter().zip(&self.system.gap_tones);
         for (k, (tone, z)) in tones.enumerate() {
@@ -760,53 +752,6 @@ impl Tables {
             evaluations: 3,
         };
         level.length * self.mobility * ((k1 - k2 - k3 + k4).abs() + (k2 - k3).abs()) / 6.0
-    }
-
-    /// Reports whether tip and sample touch.
-    fn touch(&self, motion: &Motion) -> bool {
-        let law = self.system.law();
-        if self.by_lookup {
-            law.touches(law.branch_at(motion.gap, motion.rate))
-        } else {
-            self.touches[motion.branch]
-        }
-    }
-
-    /// Adds a completed step to the integrals of the force.
-    fn add_force(
-        &self,
-        sums: &mut ForceSums,
-        omega: f64,
-        length: f64,
-        from: &Motion,
-        to: &Motion,
-        stages: &Stages,
-    ) {
-        let [k1, k2, k3, k4] = stages.forces;
-        let [_, r2, r3, _] = stages.rates;
-        sums.add(
-            &ParabolicStep {
-                length,
-                forces: [k1, 0.5 * (k2 + k3), k4],
-                rates: [from.rate, 0.5 * (r2 + r3), to.rate],
-                phasor: from.phasors.first().copied().unwrap_or([1.0, 0.0]),
-                touches: self.touch(from),
-            },
-            omega,
-        );
-        if from.rate < 0.0 && to.rate > 0.0 {
-            // The force at the least gap, with the gap as a cubic between start and end.
-            let stretch = Stretch {
-                start: 0.0,
-                length,
-                values: [from.gap, to.gap],
-                slopes: [from.rate, to.rate],
-            };
-            if let Some(x) = stretch.minimum() {
-                let peak = self.force(from.branch, stretch.at(x), 0.0);
-                sums.peak = sums.peak.max(peak);
-            }
-        }
     }
 
     /// Carries derivatives of the modal coordinates along the step with these stages to `end_gap`.
@@ -1033,7 +978,6 @@ impl Coarse {
             branch: 0,
             modal: vec![[0.0; 2]; tables.source.len()],
             phasors: vec![[1.0, 0.0]; system.drive().tones.len()],
-            shift: 0.0,
             gap: 0.0,
             rate: 0.0,
             force: 0.0,
@@ -1045,7 +989,6 @@ impl Coarse {
             stages: Stages::default(),
             columns: Vec::new(),
             size: 1.0,
-            sums: None,
             statistics: Statistics::default(),
         };
         Ok(Self { tables, work })
@@ -1081,31 +1024,6 @@ impl Coarse {
             work.period(tables)?;
         }
         Ok(work.end(tables, state))
-    }
-
-    /// Runs one period as [`Coarse::run_periods`] does, with `shift` added to the gap of the
-    /// system. Integrates the force, with its component at the angular frequency `omega`, which
-    /// must be that of the first tone.
-    ///
-    /// # Errors
-    /// As [`Coarse::run_periods`].
-    pub fn run_with_force_sums(
-        &mut self,
-        state: &mut [f64],
-        branch: Option<usize>,
-        shift: f64,
-        omega: f64,
-    ) -> Result<(usize, ForceSums), VolterraError> {
-        let Self { tables, work } = self;
-        work.columns.clear();
-        (work.now.shift, work.next.shift) = (shift, shift);
-        work.sums = Some((ForceSums::default(), omega));
-        let result = work.begin(tables, state, branch);
-        let result = result.and_then(|()| work.period(tables));
-        (work.now.shift, work.next.shift) = (0.0, 0.0);
-        let (sums, _) = work.sums.take().unwrap_or_default();
-        result?;
-        Ok((work.end(tables, state), sums))
     }
 
     /// As [`Coarse::run_periods`] over one period, with the Jacobian (`n × n`) by the state, from
@@ -1210,7 +1128,7 @@ impl Work {
         for (y, r) in now.modal.iter().zip(&tables.readout) {
             amplitude += (dot(*y, *y) * dot(*r, *r)).sqrt();
         }
-        let offset = tables.system.drive().offset + now.shift;
+        let offset = tables.system.drive().offset;
         let size = (SWING * amplitude).max(offset.abs());
         self.size = if size > 0.0 { size } else { 1.0 };
     }
@@ -1342,16 +1260,6 @@ impl Work {
                         let branch = self.now.branch;
                         tables.carry(level, branch, &self.stages, to, &mut self.columns);
                     }
-                    if let Some((sums, omega)) = &mut self.sums {
-                        tables.add_force(
-                            sums,
-                            *omega,
-                            level.length,
-                            &self.now,
-                            &self.next,
-                            &self.stages,
-                        );
-                    }
                     std::mem::swap(&mut self.now, &mut self.next);
                     self.now.force = tables.force(self.now.branch, self.now.gap, self.now.rate);
                     self.statistics.evaluations += 1;
@@ -1469,10 +1377,6 @@ impl Work {
                 let steep = steep || exit.before == Approach::Half;
                 let (to, branch) = (steep.then_some(self.next.gap), self.now.branch);
                 tables.carry(&self.part, branch, &self.stages, to, &mut self.columns);
-            }
-            if let Some((sums, omega)) = &mut self.sums {
-                let length = self.part.length;
-                tables.add_force(sums, *omega, length, &self.now, &self.next, &self.stages);
             }
             std::mem::swap(&mut self.now, &mut self.next);
             self.statistics.steps += 1;

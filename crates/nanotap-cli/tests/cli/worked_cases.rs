@@ -243,7 +243,7 @@ follows! {
     the_limit_of_the_force: "force-limit.md", 6 commands, 29 numbers;
     the_thermal_noise: "noise.md", 3 commands, 13 numbers;
     bimodal_operation: "bimodal.md", 5 commands, 18 numbers;
-    the_scan: "scan.md", 4 commands, 19 numbers;
+    the_scan: "scan.md", 3 commands, 25 numbers;
     the_force_table: "table.md", 3 commands, 8 numbers;
     the_stiff_lever: "stiff-lever.md", 3 commands, 4 numbers;
     the_tip_mass: "tip-mass.md", 3 commands, 6 numbers;

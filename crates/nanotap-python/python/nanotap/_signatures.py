@@ -1391,10 +1391,10 @@ def scan(
     `height`, `amplitude_error`, `phase`, `peak_force`, `dissipation`, `state` …
     over `direction` (trace, retrace), `y` and `x`; the listed drive periods over
     `k` (`period_z`, `period_amplitude` …). The attributes hold the `verdict`, the
-    `warnings`, and as JSON the statistics of the `lines`, the `branch_changes` and
-    the analysis of the feedback `loop`. With `out`, the lines are written into a
-    dataset as they are finished (this needs `line_settle`), and a later call goes
-    on with it.
+    `warnings`, and as JSON the `causes` that the verdict names, the statistics of
+    the `lines`, the `branch_changes` and the analysis of the feedback `loop`. With
+    `out`, the lines are written into a dataset as they are finished (this needs
+    `line_settle`), and a later call goes on with it.
 
     Raises
     ------

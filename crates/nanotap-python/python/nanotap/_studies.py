@@ -282,8 +282,11 @@ _SCANNED = {
     "height": ("height: the scanner's extension", "m"),
     "amplitude_error": ("amplitude less setpoint", "m"),
     "phase": ("phase lag", "degree"),
-    "peak_force": ("mean over the pixel of the largest force in each period", "N"),
-    "peak_force_max": ("largest force in the pixel", "N"),
+    "peak_force": (
+        "mean peak force: mean over the pixel of the largest force in each period",
+        "N",
+    ),
+    "peak_force_max": ("largest peak force in the pixel", "N"),
     "dissipation": ("energy dissipated in the sample in one drive period", "J"),
     "contact_fraction": ("contact time / period", "1"),
     "mean_deflection": ("time mean of the tip deflection", "m"),

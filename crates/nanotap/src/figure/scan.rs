@@ -13,16 +13,19 @@ type Shown = (&'static str, f64, fn(&Channels) -> &Vec<Vec<f64>>);
 const HEIGHT: Shown = ("height $z$ (nm)", 1e9, |image| &image.height);
 const ERROR: Shown = ("amplitude error (nm)", 1e9, |image| &image.amplitude_error);
 const PHASE: Shown = ("phase lag (°)", 1.0, |image| &image.phase);
-const FORCE: Shown = ("peak force (nN)", 1e9, |image| &image.peak_force_max);
+const FORCE: Shown = ("largest peak force (nN)", 1e9, |image| {
+    &image.peak_force_max
+});
 
-/// Height, amplitude error, phase and peak force: of one line against the position, in both
-/// directions; of more lines as pictures of the trace.
+/// Height, amplitude error, phase and largest peak force: of one line against the position, in both
+/// directions; of more lines as pictures of the trace. The caption is the verdict.
 pub fn scan_figure(report: &ScanReport) -> Figure {
-    if report.trace.height.len() == 1 {
+    let figure = if report.trace.height.len() == 1 {
         line_figure(report)
     } else {
         image_figure(report)
-    }
+    };
+    figure.caption(&report.verdict)
 }
 
 /// Positions in µm where lines are long, else in nm, with the unit.
@@ -43,8 +46,8 @@ fn line_figure(report: &ScanReport) -> Figure {
     };
     let mut figure = Figure::new(4, 1)
         .width(ONE_AND_A_HALF_COLUMNS)
-        .height(170.0)
-        .row_heights([1.6, 1.0, 1.0, 1.0])
+        .height(180.0)
+        .row_heights([1.6, 1.0, 1.0, 1.3])
         .share_x();
     for (k, (title, scale, values)) in [HEIGHT, ERROR, PHASE, FORCE].into_iter().enumerate() {
         let x = Axis::linear(label).range(0.0, factor * report.size[0]);

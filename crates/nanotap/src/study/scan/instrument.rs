@@ -5,7 +5,7 @@ use nanotap_flow::Complex;
 use serde::{Deserialize, Serialize};
 
 use super::feedback::{Controller, LockIn, Scanner};
-use super::lever::{Engine, Lever};
+use super::lever::{Lever, PeriodSignals};
 use super::options::{Method, Mode};
 use super::plan::Plan;
 use super::quasi_static::SteadyLever;
@@ -25,10 +25,22 @@ pub enum Interaction {
     Irregular,
 }
 
+impl Interaction {
+    /// The force that governs a period: whether its component in phase with the deflection attracts.
+    pub(super) fn governing(signals: &PeriodSignals) -> Self {
+        if (signals.force * signals.deflection.conj()).re > 0.0 {
+            Self::Attractive
+        } else {
+            Self::Repulsive
+        }
+    }
+}
+
 /// One drive period of a scan, in SI.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Period {
     pub(super) x: f64,
+    pub(super) material: usize,
     pub(super) surface: f64,
     pub(super) z: f64,
     pub(super) deflection: Complex,
@@ -72,15 +84,7 @@ impl<'a> Instrument<'a> {
     /// # Errors
     /// When a case has no model.
     pub(super) fn new(plan: &'a Plan) -> Result<Self, Error> {
-        let engine = match plan.method {
-            Method::Fast => Engine::Fast,
-            Method::Exact | Method::QuasiStatic => Engine::Exact,
-        };
-        let levers: Result<Vec<Lever>, Error> = plan
-            .materials
-            .iter()
-            .map(|case| Lever::new(case, engine))
-            .collect();
+        let levers: Result<Vec<Lever>, Error> = plan.materials.iter().map(Lever::new).collect();
         let mut levers = levers?;
         let first = &mut levers[0];
         let (state, free, free_force) = (
@@ -110,48 +114,25 @@ impl<'a> Instrument<'a> {
         })
     }
 
-    /// Whether every period is exact.
-    pub(super) fn is_exact(&self) -> bool {
+    /// A copy of the lever above a material.
+    pub(super) fn lever_above(&self, material: usize) -> Lever {
         match &self.levers {
-            Levers::Moving(levers) => levers.iter().all(Lever::is_exact),
-            Levers::Steady(_) => false,
+            Levers::Moving(levers) => levers[material].clone(),
+            Levers::Steady(levers) => levers[material].lever(),
         }
     }
 
-    /// Returns the same instrument, whose periods are computed exactly from now on.
-    ///
-    /// # Errors
-    /// When a case has no model.
-    pub(super) fn exact(&self) -> Result<Self, Error> {
-        let levers: Result<Vec<Lever>, Error> = self
-            .plan
-            .materials
-            .iter()
-            .map(|case| Lever::new(case, Engine::Exact))
-            .collect();
-        Ok(Self {
-            levers: Levers::Moving(levers?),
-            ..self.clone()
-        })
+    /// The lever's state after the last period, in the model's units.
+    pub(super) fn lever_state(&self) -> &[f64] {
+        match &self.levers {
+            Levers::Moving(_) => &self.state,
+            Levers::Steady(levers) => levers[self.material].state(),
+        }
     }
 
-    /// Goes on from where another instrument is, with its own levers.
-    pub(super) fn go_on_from(&mut self, other: &Self) {
-        self.material = other.material;
-        self.state.clone_from(&other.state);
-        self.lock_in.clone_from(&other.lock_in);
-        self.controller.clone_from(&other.controller);
-        self.scanner.clone_from(&other.scanner);
-    }
-
-    /// The exact lever above the present material, its state, and the gap of the next period, in
-    /// the model's units.
-    ///
-    /// # Errors
-    /// When the case has no model.
-    pub(super) fn exact_lever(&self) -> Result<(Lever, Vec<f64>), Error> {
-        let lever = Lever::new(&self.plan.materials[self.material], Engine::Exact)?;
-        Ok((lever, self.state.clone()))
+    /// Index of the material of the last period.
+    pub(super) const fn material(&self) -> usize {
+        self.material
     }
 
     /// Height that the feedback asks for in the next period, m.
@@ -203,16 +184,14 @@ impl<'a> Instrument<'a> {
         if feeds_back {
             self.controller.update(plan.amplified(amplitude, error));
         }
-        let in_phase = (signals.force * signals.deflection.conj()).re;
         let interaction = if signals.force.modulus() < FREE * self.free_force {
             Interaction::Free
-        } else if in_phase > 0.0 {
-            Interaction::Attractive
         } else {
-            Interaction::Repulsive
+            Interaction::governing(&signals)
         };
         Ok(Period {
             x,
+            material,
             surface,
             z,
             deflection,

@@ -14,7 +14,7 @@ use std::sync::Arc;
 use nalgebra::{DMatrix, DVector};
 use nanotap_arithmetic::ComplexFunctions as _;
 use nanotap_flow::{Complex, Flow};
-use nanotap_volterra::{Coarse, ForceSums};
+use nanotap_volterra::ForceSums;
 
 use crate::Error;
 use crate::case::Case;
@@ -44,15 +44,6 @@ pub(super) struct PeriodSignals {
     pub(super) dissipation: f64,
 }
 
-/// Method by which drive periods are computed.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Engine {
-    /// By the exact flow of the equations.
-    Exact,
-    /// Under a nonlinear law by the approximate flow for transients.
-    Fast,
-}
-
 /// The lever above one material.
 #[derive(Clone, Debug)]
 pub(super) struct Lever {
@@ -71,7 +62,6 @@ pub(super) struct Lever {
 enum LeverFlow {
     Linear(Box<LinearLever>),
     Nonlinear(Box<NonlinearLever>),
-    Coarse(Box<CoarseLever>),
 }
 
 /// A piecewise-linear sample: the change of the gap is one more state, which stays constant.
@@ -91,15 +81,6 @@ struct NonlinearLever {
     law: LawState,
     /// Offset of the gap at distance 0, model units.
     offset: f64,
-}
-
-/// A lever under a nonlinear law, with the approximate flow for transients.
-#[derive(Clone, Debug)]
-struct CoarseLever {
-    flow: Coarse,
-    law: LawState,
-    /// Gap of the model, model units, from which its change is counted.
-    gap: f64,
 }
 
 /// Properties of a nonlinear model that a step of one period uses.
@@ -130,7 +111,7 @@ impl Lever {
     ///
     /// # Errors
     /// When the case has no model, a second tone, or a rigid sample.
-    pub(super) fn new(case: &Case, engine: Engine) -> Result<Self, Error> {
+    pub(super) fn new(case: &Case) -> Result<Self, Error> {
         let model = case.model()?;
         let cantilever = crate::study::cantilever(case, "scan")?;
         crate::study::without_signal(case, "a scan")?;
@@ -146,8 +127,8 @@ impl Lever {
         let response = model.system.regimes()[0].response();
         let free: DVector<f64> = &response.constant - response.tones[0].map(|z| z.re);
         let free_deflection = model.system.regimes()[0].project(&model.tip).tones[0];
-        let flow = match (&model.nonlinear, engine) {
-            (None, _) => {
+        let flow = match &model.nonlinear {
+            None => {
                 let tangent = cantilever_model_tangent(cantilever, &model, Parameter::Alpha5)?;
                 let motion = SampleMotion {
                     sign: -1.0,
@@ -162,7 +143,7 @@ impl Lever {
                     gap,
                 }))
             }
-            (Some(nonlinear), engine) => {
+            Some(nonlinear) => {
                 let system = turned_system(nonlinear)?;
                 let law = LawState {
                     dimension: system.dimension(),
@@ -170,24 +151,17 @@ impl Lever {
                     period: nonlinear.period,
                     omega: model.frequency(),
                 };
-                let coarse = match engine {
-                    Engine::Fast => Coarse::new(&system, nonlinear.period).ok(),
-                    Engine::Exact => None,
-                };
-                match coarse {
-                    Some(flow) => LeverFlow::Coarse(Box::new(CoarseLever { flow, law, gap })),
-                    None => LeverFlow::Nonlinear(Box::new(NonlinearLever {
-                        offset: system.drive().offset - gap,
-                        flow: nanotap_volterra::Flow::new(system),
-                        law,
-                    })),
-                }
+                LeverFlow::Nonlinear(Box::new(NonlinearLever {
+                    offset: system.drive().offset - gap,
+                    flow: nanotap_volterra::Flow::new(system),
+                    law,
+                }))
             }
         };
         Ok(Self {
             continuous: match flow {
                 LeverFlow::Linear(_) => model.dimension(),
-                LeverFlow::Nonlinear(_) | LeverFlow::Coarse(_) => beam,
+                LeverFlow::Nonlinear(_) => beam,
             },
             flow,
             readout,
@@ -196,11 +170,6 @@ impl Lever {
             free_start: free.as_slice().to_vec(),
             free_deflection,
         })
-    }
-
-    /// Returns whether the periods are computed exactly.
-    pub(super) const fn is_exact(&self) -> bool {
-        !matches!(self.flow, LeverFlow::Coarse(_))
     }
 
     /// State of the steady motion far from the sample, at drive phase 180°.
@@ -227,7 +196,7 @@ impl Lever {
         let memory = match &self.flow {
             LeverFlow::Linear(_) => 0.0,
             // No branch is remembered.
-            LeverFlow::Nonlinear(_) | LeverFlow::Coarse(_) => -1.0,
+            LeverFlow::Nonlinear(_) => -1.0,
         };
         state[beam..].fill(memory);
     }
@@ -248,7 +217,6 @@ impl Lever {
         let sums = match &mut self.flow {
             LeverFlow::Linear(lever) => lever.advance(state, gap)?,
             LeverFlow::Nonlinear(lever) => lever.advance(state, gap)?,
-            LeverFlow::Coarse(lever) => lever.advance(state, gap)?,
         };
         for (before, after) in change.iter_mut().zip(&*state) {
             *before = after - *before;
@@ -348,19 +316,6 @@ impl NonlinearLever {
         let sums = self.flow.run_with_force_sums(law.period, law.omega)?;
         self.flow.state(&mut state[..law.dimension]);
         law.remember(state, self.flow.branch());
-        Ok(sums)
-    }
-}
-
-impl CoarseLever {
-    fn advance(&mut self, state: &mut [f64], gap: f64) -> Result<ForceSums, MotionError> {
-        let law = self.law;
-        let branch = law.branch(state);
-        let beam = &mut state[..law.dimension];
-        let (branch, sums) =
-            self.flow
-                .run_with_force_sums(beam, branch, gap - self.gap, law.omega)?;
-        law.remember(state, branch);
         Ok(sums)
     }
 }

@@ -16,9 +16,9 @@ use serde_json::{Value, json};
 use super::instrument::Interaction;
 use super::options::ScanOptions;
 use super::plan::Plan;
-use super::recorder::{LineRecord, PixelRow};
-use super::report::{Channels, Direction, LineStatistics, Parachuting, ScanReport};
-use super::run::{Comparison, Recorded, Settled};
+use super::recorder::{KEPT, LineRecord, PixelRow};
+use super::report::{Channels, Direction, LineStatistics, OffSetpoint, Parachuting, ScanReport};
+use super::run::{Recorded, Settled};
 use super::table::{CHANNELS, centres};
 use super::{ScanStudy, header, lever_memory, with_lines};
 use crate::Error;
@@ -29,9 +29,6 @@ use crate::dataset::{
     attributes, chunk_files, work,
 };
 use crate::study::{Computation, DatasetPlan, DatasetStudy, Study as _};
-
-/// Flights and jumps that a line keeps in each direction.
-const KEPT: usize = 8;
 
 /// Attribute with the report before its lines, as JSON.
 const HEADER: &str = "scan";
@@ -44,7 +41,7 @@ const STATES: [Interaction; 4] = [
 ];
 
 /// The statistics of a line that are numbers, with their units.
-const STATISTICS: [(&str, &str); 15] = [
+const STATISTICS: [(&str, &str); 16] = [
     ("first_period", PERIODS),
     ("height_mean", "m"),
     ("height_rms", "m"),
@@ -59,35 +56,49 @@ const STATISTICS: [(&str, &str); 15] = [
     ("peak_force_mean", "N"),
     ("dissipation_mean", "J"),
     ("tracking_rms", "m"),
+    ("surface_rms", "m"),
     ("overshoot", "m"),
 ];
 const PERIODS: &str = "drive periods";
 
-/// Periods compared with exact ones, the largest differences and the sums of their squares; periods at
-/// an end of the range of z.
-const SUMS: [(&str, &str); 6] = [
-    ("compared_periods", PERIODS),
-    ("height_max", "m"),
-    ("height_squares", "m2"),
-    ("amplitude_max", "m"),
-    ("amplitude_squares", "m2"),
-    ("at_range", PERIODS),
-];
+/// Number of periods at an end of the range of z.
+const SUMS: [(&str, &str); 1] = [("at_range", PERIODS)];
 
-/// The numbers of a flight and of a jump, with their units.
+/// The numbers of a flight, of a stretch off the setpoint, and of a change of the state, with their
+/// units.
 const FLIGHT: [(&str, &str); 4] = [
     ("first_period", PERIODS),
     ("periods", PERIODS),
     ("time", "s"),
     ("length", "m"),
 ];
-const JUMP: [(&str, &str); 5] = [
+const OFF: [(&str, &str); 8] = [
+    ("first_period", PERIODS),
+    ("periods", PERIODS),
+    ("x", "m"),
+    ("until_x", "m"),
+    ("error", "m"),
+    ("height", "m"),
+    ("material", NUMBER),
+    ("moved", FLAG),
+];
+const JUMP: [(&str, &str); 10] = [
     ("k", PERIODS),
     ("x", "m"),
-    ("from", "1"),
-    ("to", "1"),
+    ("from", STATE),
+    ("to", STATE),
     ("height_change", "m"),
+    ("distance_from", "m"),
+    ("distance_to", "m"),
+    ("material", NUMBER),
+    ("until_k", PERIODS),
+    ("until_x", "m"),
 ];
+/// The unit of a governing force, stored as its code, and of a number of a list.
+const STATE: &str = "1";
+const NUMBER: &str = "count";
+/// The unit of what holds (1) or does not (0).
+const FLAG: &str = "flag";
 
 /// The scan of an image whose lines settle by themselves, as a dataset. Listed periods
 /// ([`ScanOptions::list`]) are not in it.
@@ -182,7 +193,7 @@ impl Image {
             ));
         }
         let settled = Settled::new(&plan, lever_memory(case), control)?;
-        let header = header(&plan, case, &settled)?;
+        let header = header(&plan, case, &settled);
         drop(settled);
         let schema = schema(case, options, &plan, &header)?;
         Ok(Self {
@@ -276,7 +287,9 @@ fn fields(entry: &impl Serialize, table: &[(&str, &str)]) -> Vec<f64> {
     let number = |(name, _): &(&str, &str)| {
         let value = &entry[*name];
         let state = || serde_json::from_value(value.clone()).ok().map(code);
-        value.as_f64().or_else(state).unwrap_or(f64::NAN)
+        let flag = || value.as_bool().map(f64::from);
+        let number = value.as_f64().or_else(flag).or_else(state);
+        number.unwrap_or(f64::NAN)
     };
     table.iter().map(number).collect()
 }
@@ -290,8 +303,10 @@ fn entry<T: DeserializeOwned>(
     let mut entry = more;
     for ((name, unit), number) in table.iter().zip(numbers) {
         entry[*name] = match *unit {
-            PERIODS => json!(number as u64),
-            "1" => json!(state(number)?),
+            _ if number.is_nan() => Value::Null,
+            PERIODS | NUMBER => json!(number as u64),
+            STATE => json!(state(number)?),
+            FLAG => json!(number != 0.0),
             _ => json!(number),
         };
     }
@@ -323,18 +338,9 @@ fn numbers_of(line: Recorded, directions: usize, pixels: usize) -> Numbers {
         let LineRecord {
             statistics,
             pixels,
-            comparison,
             at_range,
         } = record;
-        let sums = vec![
-            comparison.periods as f64,
-            comparison.height[0],
-            comparison.height[1],
-            comparison.amplitude[0],
-            comparison.amplitude[1],
-            at_range as f64,
-        ];
-        put("sums", &SUMS, vec![sums]);
+        put("sums", &SUMS, vec![vec![at_range as f64]]);
         put("line", &STATISTICS, vec![fields(&statistics, &STATISTICS)]);
         let mut flights: Vec<&Parachuting> = statistics.parachuting.iter().collect();
         flights.sort_by(|a, b| b.length.total_cmp(&a.length));
@@ -343,6 +349,10 @@ fn numbers_of(line: Recorded, directions: usize, pixels: usize) -> Numbers {
         let mut rows: Vec<Vec<f64>> = flights.iter().map(|f| fields(f, &FLIGHT)).collect();
         rows.resize(KEPT, Vec::new());
         put("flight", &FLIGHT, rows);
+        let stretches = statistics.off_setpoint.iter();
+        let mut rows: Vec<Vec<f64>> = stretches.map(|off| fields(off, &OFF)).collect();
+        rows.resize(KEPT, Vec::new());
+        put("off", &OFF, rows);
         let own = line
             .changes
             .iter()
@@ -391,7 +401,14 @@ fn line_of(numbers: &Numbers, line: usize, y: f64, directions: usize) -> Option<
             .into_iter()
             .map(|row| entry(&FLIGHT, row.into_iter(), json!({})))
             .collect();
-        let more = json!({"line": line, "direction": direction, "y": y, "parachuting": flights?});
+        let stretches: Option<Vec<OffSetpoint>> = rows("off", &OFF, at)?
+            .into_iter()
+            .map(|row| entry(&OFF, row.into_iter(), json!({})))
+            .collect();
+        let more = json!({
+            "line": line, "direction": direction, "y": y, "parachuting": flights?,
+            "off_setpoint": stretches?,
+        });
         let statistics = rows("line", &STATISTICS, at)?.into_iter().next()?;
         let statistics: LineStatistics = entry(&STATISTICS, statistics.into_iter(), more)?;
         for row in rows("jump", &JUMP, at)? {
@@ -412,18 +429,12 @@ fn line_of(numbers: &Numbers, line: usize, y: f64, directions: usize) -> Option<
             state: part("state", at)?.iter().map(|code| state(*code)).collect(),
         };
         let sums = rows("sums", &SUMS, at)?.into_iter().next()?;
-        let [periods, h, hh, a, aa, at_range] = sums[..] else {
+        let [at_range] = sums[..] else {
             return None;
-        };
-        let comparison = Comparison {
-            periods: periods as usize,
-            height: [h, hh],
-            amplitude: [a, aa],
         };
         recorded.lines.push(LineRecord {
             statistics,
             pixels,
-            comparison,
             at_range: at_range as usize,
         });
     }
@@ -468,14 +479,15 @@ fn schema(
         ("line", &STATISTICS[..], "of the line"),
         ("sums", &SUMS[..], "of the line"),
         ("flight", &FLIGHT[..], "of a flight above the surface"),
-        ("jump", &JUMP[..], "of a jump onto another branch"),
+        ("off", &OFF[..], "of a stretch off the setpoint"),
+        ("jump", &JUMP[..], "of a permanent change of the state"),
     ] {
         for (name, unit) in names {
             let about = format!("{} {about}", name.replace('_', " "));
             let variable = Variable::new(&named(table, name), Kind::Real, &about, unit);
             variables.push(match table {
                 "line" | "sums" => variable,
-                _ if *unit == "1" => of_states(variable.along(table, KEPT)),
+                _ if *unit == STATE => of_states(variable.along(table, KEPT)),
                 _ => variable.along(table, KEPT),
             });
         }

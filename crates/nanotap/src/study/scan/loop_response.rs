@@ -13,7 +13,6 @@ use super::lever::{Lever, PeriodSignals};
 use super::options::Mode;
 use super::plan::Plan;
 use super::report::LoopReport;
-use crate::Error;
 
 /// Newton steps to the steady motion at the setpoint.
 const MAX_ITERATIONS: usize = 40;
@@ -30,52 +29,101 @@ const FREQUENCIES: usize = 300;
 
 /// A steady motion with the setpoint amplitude, and its derivatives.
 struct SteadyMotion {
+    /// State at drive phase 180°, model units.
+    state: Vec<f64>,
     gap: f64,
     signals: PeriodSignals,
     /// Jacobian of state and deflection (re, im) by state and gap, model units.
     derivative: DMatrix<f64>,
 }
 
-/// The loop at the setpoint; `None` where no steady motion was found.
-///
-/// # Errors
-/// When a case has no model.
+/// A stable steady motion of the lever with the setpoint amplitude.
+#[derive(Clone, Debug)]
+pub(super) struct SetpointState {
+    pub(super) interaction: Interaction,
+    /// State at drive phase 180°, model units.
+    pub(super) state: Vec<f64>,
+    /// Distance, model units.
+    pub(super) gap: f64,
+}
+
+impl SetpointState {
+    /// The one that Newton's method finds from a state and a distance, in the model's units.
+    pub(super) fn near(plan: &Plan, lever: &mut Lever, state: &[f64], gap: f64) -> Option<Self> {
+        let motion = steady_motion(lever, state.to_vec(), gap, plan.setpoint)?;
+        let n = lever.continuous_dimension();
+        let map = motion.derivative.view((0, 0), (n, n)).into_owned();
+        let is_stable = spectral_radius(&map).is_some_and(|radius| radius < 1.0);
+        is_stable.then(|| Self {
+            interaction: Interaction::governing(&motion.signals),
+            state: motion.state,
+            gap: motion.gap,
+        })
+    }
+}
+
+/// Stability of the loop above one material.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct LoopStability {
+    pub(super) material: usize,
+    /// Largest modulus of the multipliers of the whole loop.
+    pub(super) spectral_radius: f64,
+    /// Integral gain at which the loop starts to oscillate, 1/s; `None` if none does.
+    pub(super) largest_stable_gain: Option<f64>,
+}
+
+impl LoopStability {
+    fn of(response: &LinearLoop<'_>, material: usize) -> Self {
+        let plan = response.plan;
+        let radius = |gain: f64| spectral_radius(&response.matrix(gain));
+        let stable = |gain: f64| radius(gain).is_some_and(|radius| radius < 1.0);
+        Self {
+            material,
+            spectral_radius: radius(plan.gains.integral).unwrap_or(f64::NAN),
+            largest_stable_gain: largest_gain(stable).map(|gain| gain / plan.period),
+        }
+    }
+}
+
+/// Largest modulus of the eigenvalues.
+fn spectral_radius(matrix: &DMatrix<f64>) -> Option<f64> {
+    let all = eigenvalues(matrix)?.into_iter();
+    Some(all.map(Complex::modulus).fold(0.0, f64::max))
+}
+
+/// Most materials above which the loop is examined.
+const MAX_MATERIALS: usize = 16;
+
+/// The loop at the setpoint above the first material, and its stability above each material; `None`
+/// where no steady motion was found.
 pub(super) fn loop_report(
     plan: &Plan,
     settled: &Instrument<'_>,
     gap: f64,
     quality_factor: f64,
-) -> Result<Option<LoopReport>, Error> {
+) -> Option<(LoopReport, Vec<LoopStability>)> {
     if plan.mode == Mode::ConstantHeight || plan.gains.delay > MAX_DELAY {
-        return Ok(None);
+        return None;
     }
-    let (mut lever, state) = settled.exact_lever()?;
+    let own = settled.material();
+    let mut lever = settled.lever_above(own);
     // From where the scan is, and for a loop that hunts from the free motion at the start.
     let starts = [
-        (state, gap),
+        (settled.lever_state().to_vec(), gap),
         (lever.free_start(), plan.z0 / plan.length_unit),
     ];
     let mut found = starts
         .into_iter()
         .filter_map(|(state, gap)| steady_motion(&mut lever, state, gap, plan.setpoint));
-    let Some(motion) = found.next() else {
-        return Ok(None);
-    };
+    let motion = found.next()?;
     drop(found);
     let n = lever.continuous_dimension();
     let map = motion.derivative.view((0, 0), (n, n)).into_owned();
-    let moduli = |matrix: &DMatrix<f64>| {
-        let all = eigenvalues(matrix)?.into_iter();
-        Some(all.map(Complex::modulus).fold(0.0, f64::max))
-    };
-    let Some(radius) = moduli(&map) else {
-        return Ok(None);
-    };
+    let radius = spectral_radius(&map)?;
     let response = LinearLoop::new(plan, &motion, n);
-    let spectral_radius = moduli(&response.matrix(plan.gains.integral)).unwrap_or(f64::NAN);
+    let stability = LoopStability::of(&response, own);
     let slope = response.slope();
-    let stable = |gain: f64| moduli(&response.matrix(gain)).is_some_and(|radius| radius < 1.0);
-    let largest = largest_gain(stable);
+    let largest = stability.largest_stable_gain.map(|gain| gain * plan.period);
     let response_now = response.bandwidths(plan.gains.integral);
     let suggested = largest.and_then(|largest| response.suggested(largest));
     let period = plan.period;
@@ -86,25 +134,31 @@ pub(super) fn loop_report(
             .z_scanner
             .map_or(0.0, |[f, q]| q / (std::f64::consts::PI * f))
         + plan.gains.delay as f64 * period;
-    let force = motion.signals.force * motion.signals.deflection.conj();
-    Ok(Some(LoopReport {
+    let report = LoopReport {
         distance: motion.gap * plan.length_unit,
-        state: if force.re > 0.0 {
-            Interaction::Attractive
-        } else {
-            Interaction::Repulsive
-        },
+        state: Interaction::governing(&motion.signals),
         slope,
         lever_memory: -1.0 / nanotap_arithmetic::ln(radius),
-        spectral_radius,
-        largest_stable_gain: largest.map(|gain| gain / period),
+        spectral_radius: stability.spectral_radius,
+        largest_stable_gain: stability.largest_stable_gain,
         bandwidth_45: response_now.lag_45,
         bandwidth_3db: response_now.half_power,
         peaking: response_now.peaking,
         rule_of_thumb: 1.0 / (16.0 * delays),
         suggested_gain: suggested.map(|gain| gain / period),
         suggested_bandwidth: suggested.and_then(|gain| response.bandwidths(gain).lag_45),
-    }))
+    };
+    let others = (0..plan.materials.len()).filter(|material| *material != own);
+    let others = others.take(MAX_MATERIALS).filter_map(|material| {
+        let mut lever = settled.lever_above(material);
+        let mut state = motion.state.clone();
+        lever.take_over(&mut state);
+        let motion = steady_motion(&mut lever, state, motion.gap, plan.setpoint)?;
+        let response = LinearLoop::new(plan, &motion, lever.continuous_dimension());
+        Some(LoopStability::of(&response, material))
+    });
+    let all = std::iter::once(stability).chain(others).collect();
+    Some((report, all))
 }
 
 /// Newton's method on state and gap for `P(x, g) = x` and the setpoint amplitude.
@@ -140,6 +194,7 @@ fn steady_motion(
         residual[n] = amplitude - wanted;
         if residual.amax() < TOLERANCE * free {
             return Some(SteadyMotion {
+                state,
                 gap,
                 signals,
                 derivative,

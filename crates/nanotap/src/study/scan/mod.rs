@@ -26,7 +26,9 @@ mod quasi_static;
 mod recorder;
 pub mod report;
 mod run;
+mod state_tracker;
 mod table;
+mod verdict;
 
 use nanotap_dynamics::Control;
 
@@ -34,7 +36,10 @@ pub use instrument::Interaction;
 #[cfg(feature = "dataset")]
 pub use lines::ScanLines;
 pub use options::{Method, Mode, ScanOptions};
-pub use report::{Channels, Direction, LineStatistics, ListedPeriod, ScanReport};
+pub use report::{
+    BranchChange, Cause, Channels, Direction, ImageCause, LineStatistics, ListedPeriod,
+    OffSetpoint, ScanReport,
+};
 pub use table::{CHANNELS, Channel, pixels_csv};
 
 use crate::Error;
@@ -42,7 +47,7 @@ use crate::case::Case;
 use crate::study::Study;
 use plan::Plan;
 use recorder::LineRecord;
-use run::{Comparison, Recorded, Settled};
+use run::{Recorded, Settled};
 
 /// A scan under feedback.
 ///
@@ -82,7 +87,7 @@ impl Study for ScanStudy {
         let plan = Plan::new(case, options, control)?;
         let settled = Settled::new(&plan, lever_memory(case), control)?;
         let recorded = settled.lines(control)?;
-        let header = header(&plan, case, &settled)?;
+        let header = header(&plan, case, &settled);
         Ok(with_lines(header, recorded, [plan.lines, plan.pixels]))
     }
 }
@@ -98,17 +103,21 @@ fn quality_factor(case: &Case) -> f64 {
 }
 
 /// The report of a plan before its lines.
-fn header(plan: &Plan, case: &Case, settled: &Settled<'_>) -> Result<ScanReport, Error> {
+fn header(plan: &Plan, case: &Case, settled: &Settled<'_>) -> ScanReport {
     let quality_factor = quality_factor(case);
     let first = (plan.position(0, false), plan.line_position(0));
     let gap = settled.instrument.height() - plan.surface.height(first.0, first.1);
     let gap = gap / plan.length_unit;
-    let feedback = loop_response::loop_report(plan, &settled.instrument, gap, quality_factor)?;
-    Ok(ScanReport {
+    let found = loop_response::loop_report(plan, &settled.instrument, gap, quality_factor);
+    let (feedback, loops) =
+        found.map_or((None, Vec::new()), |(report, loops)| (Some(report), loops));
+    ScanReport {
         method: plan.method,
         mode: plan.mode,
-        exact_share: 0.0,
-        error: None,
+        exact_share: match plan.method {
+            Method::Exact | Method::Fast => 1.0,
+            Method::QuasiStatic => 0.0,
+        },
         size: plan.size,
         periods_per_line: plan.periods,
         total_periods: plan.total_periods(),
@@ -128,8 +137,9 @@ fn header(plan: &Plan, case: &Case, settled: &Settled<'_>) -> Result<ScanReport,
         branch_changes: Vec::new(),
         warnings: warnings(plan, feedback.as_ref(), quality_factor),
         feedback,
+        causes: verdict::ringing(plan, &loops),
         verdict: String::new(),
-    })
+    }
 }
 
 /// The report with its lines, of an image of so many lines and pixels.
@@ -138,19 +148,8 @@ fn with_lines(header: ScanReport, recorded: Recorded, [lines, pixels]: [usize; 2
     let image = Channels::missing(lines, pixels);
     report.retrace = report.retrace.map(|_| image.clone());
     report.trace = image;
-    let mut comparison = Comparison::default();
-    let mut at_range = recorded.at_range;
-    for line in &recorded.lines {
-        comparison.join(&line.comparison);
-        at_range += line.at_range;
-    }
-    report.error = comparison.report();
-    report.exact_share = match (report.method, report.error) {
-        (Method::QuasiStatic, _) => 0.0,
-        (Method::Fast, Some(error)) => error.periods as f64 / report.total_periods as f64,
-        // A piecewise-linear sample is exact by either method.
-        _ => 1.0,
-    };
+    let in_lines = recorded.lines.iter().map(|line| line.at_range);
+    let at_range = recorded.at_range + in_lines.sum::<usize>();
     for line in recorded.lines {
         let LineRecord {
             statistics, pixels, ..
@@ -178,7 +177,8 @@ fn with_lines(header: ScanReport, recorded: Recorded, [lines, pixels]: [usize; 2
         .iter()
         .map(|line| line.peak_force_max)
         .fold(0.0, f64::max);
-    report.verdict = verdict(report.mode, &report.lines, &recorded.changes);
+    report.causes = verdict::causes(&report, &recorded.changes);
+    report.verdict = verdict::verdict(&report);
     let traces = report.lines.iter();
     let scanned = traces.filter(|l| l.direction == Direction::Trace).count();
     if scanned < lines {
@@ -193,7 +193,7 @@ fn with_lines(header: ScanReport, recorded: Recorded, [lines, pixels]: [usize; 2
     }
     if !recorded.changes.is_empty() {
         report.warnings.push(
-            "the motion jumps onto another branch: a change of the height there is not one of \
+            "the lever changes its state permanently: the change of the height there is not one of \
              the surface"
                 .into(),
         );
@@ -212,9 +212,6 @@ fn stable(feedback: &report::LoopReport) -> String {
     }
 }
 
-/// Largest part of the largest stable gain at which a loop does not hunt after large errors.
-const HUNTING: f64 = 0.7;
-
 /// Reasons to doubt the image that are known before it.
 fn warnings(
     plan: &Plan,
@@ -228,10 +225,7 @@ fn warnings(
                 "the feedback loop oscillates at the setpoint{}",
                 stable(feedback)
             ));
-        } else if feedback
-            .largest_stable_gain
-            .is_some_and(|largest| plan.integral_gain > HUNTING * largest)
-        {
+        } else if verdict::is_near_limit(plan.integral_gain, feedback.largest_stable_gain) {
             warnings.push(format!(
                 "the feedback loop may hunt after large errors: its gain is near the limit{}",
                 stable(feedback)
@@ -253,6 +247,11 @@ fn warnings(
                 .into(),
         );
     }
+    if plan.names_fast {
+        warnings.push(
+            "the method `fast` no longer exists: every drive period is computed exactly".into(),
+        );
+    }
     if plan.method == Method::QuasiStatic {
         warnings.push("a preview: the lever is steady in every drive period".into());
     }
@@ -263,49 +262,4 @@ fn warnings(
         );
     }
     warnings
-}
-
-/// Returns a sentence on what the image shows.
-fn verdict(mode: Mode, lines: &[LineStatistics], changes: &[report::BranchChange]) -> String {
-    let nm = |length: f64| format!("{:.3} nm", 1e9 * length);
-    let largest = changes
-        .iter()
-        .max_by(|a, b| a.height_change.abs().total_cmp(&b.height_change.abs()));
-    if let Some(change) = largest {
-        let word = |interaction| match interaction {
-            Interaction::Attractive => "attractive",
-            _ => "repulsive",
-        };
-        return format!(
-            "At x = {} the lever jumps from the {} to the {} state, and the height changes by {} \
-             that are not the surface's.",
-            nm(change.x),
-            word(change.from),
-            word(change.to),
-            nm(change.height_change)
-        );
-    }
-    let flights = lines.iter().flat_map(|line| &line.parachuting);
-    let longest = flights.max_by(|a, b| a.length.total_cmp(&b.length));
-    if let Some(flight) = longest {
-        return format!(
-            "The tip flies above the surface over up to {} of a line: there the height is that of \
-             the flight.",
-            nm(flight.length)
-        );
-    }
-    let worst = lines.iter().map(|l| l.tracking_rms).fold(0.0, f64::max);
-    match mode {
-        Mode::ConstantAmplitude => format!(
-            "The height follows the surface to {} (root mean square of a line).",
-            nm(worst)
-        ),
-        Mode::ConstantHeight => format!(
-            "The height is constant; the amplitude error shows the surface, to {} at most.",
-            nm(lines
-                .iter()
-                .map(|l| l.error_max.abs().max(l.error_min.abs()))
-                .fold(0.0, f64::max))
-        ),
-    }
 }

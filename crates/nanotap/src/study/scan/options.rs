@@ -78,7 +78,7 @@ pub enum Method {
     /// Every period exactly
     #[default]
     Exact,
-    /// Nonlinear laws by an approximate flow, compared with the exact one on parts of the scan
+    /// The same as exact; earlier versions computed nonlinear laws approximately
     Fast,
     /// The lever's steady motion at each distance: a preview
     QuasiStatic,

@@ -22,7 +22,10 @@ use crate::study::setpoint::at_setpoint;
 /// The checked options of a scan. Lengths in m, times in s.
 #[derive(Clone, Debug)]
 pub(super) struct Plan {
+    /// Exact or quasi-static.
     pub(super) method: Method,
+    /// Whether the options name the method `fast`, which is exact.
+    pub(super) names_fast: bool,
     pub(super) mode: Mode,
     /// Numbers of the drive periods to list, sorted, counted from the start of settling.
     pub(super) list: Vec<usize>,
@@ -125,6 +128,7 @@ impl Plan {
         let (integral_gain, gains) = gains(&options, frequency)?;
         let surface = surface(&options, case, [size, size_y])?;
         let (materials, segments) = materials(&options, case)?;
+        let method = options.method.unwrap_or_default();
         let mut list = options.list.clone();
         list.sort_unstable();
         list.dedup();
@@ -136,7 +140,11 @@ impl Plan {
             ));
         }
         Ok(Self {
-            method: options.method.unwrap_or_default(),
+            method: match method {
+                Method::Exact | Method::Fast => Method::Exact,
+                Method::QuasiStatic => Method::QuasiStatic,
+            },
+            names_fast: method == Method::Fast,
             mode,
             list,
             size: [size, size_y],
@@ -214,6 +222,12 @@ impl Plan {
     /// Returns the position of a line across the lines, m.
     pub(super) fn line_position(&self, line: usize) -> f64 {
         (line as f64 + 0.5) * self.size[1] / self.lines as f64
+    }
+
+    /// Returns the amplitude error, m, beyond which the amplitude is off the setpoint: half of the way
+    /// from the setpoint to the free amplitude or to 0, whichever is shorter.
+    pub(super) fn off_setpoint(&self) -> f64 {
+        0.5 * self.setpoint.min(1.0 - self.setpoint) * self.free_amplitude
     }
 
     /// Returns the index of the pixel to which a period of a line belongs.

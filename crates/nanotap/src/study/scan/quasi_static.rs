@@ -42,6 +42,16 @@ impl SteadyLever {
         }
     }
 
+    /// A copy of the lever.
+    pub(super) fn lever(&self) -> Lever {
+        self.lever.clone()
+    }
+
+    /// State of the steady motion that was computed last, model units.
+    pub(super) fn state(&self) -> &[f64] {
+        &self.state
+    }
+
     /// The signals at a distance, linear between the numbered ones.
     ///
     /// # Errors

@@ -4,9 +4,10 @@ use nanotap_arithmetic::ComplexFunctions as _;
 use nanotap_flow::Complex;
 
 use super::instrument::{Interaction, Period, lag};
+use super::options::Mode;
 use super::plan::Plan;
-use super::report::{BranchChange, Direction, LineStatistics, ListedPeriod, Parachuting};
-use super::run::Comparison;
+use super::report::{Direction, LineStatistics, ListedPeriod, OffSetpoint, Parachuting};
+use super::state_tracker::StateTracker;
 
 /// Sums over the periods of a pixel.
 #[derive(Clone, Copy, Debug, Default)]
@@ -46,7 +47,6 @@ pub(super) struct PixelRow {
 pub(super) struct LineRecord {
     pub(super) statistics: LineStatistics,
     pub(super) pixels: PixelRow,
-    pub(super) comparison: Comparison,
     /// Number of periods whose command was limited by the range of z.
     pub(super) at_range: usize,
 }
@@ -76,6 +76,21 @@ impl Deviation {
 /// in an irregular motion.
 const IRREGULAR: f64 = 0.01;
 
+/// Number of stays at the setpoint (see [`StateTracker`]) for which a motion of the surface acts on the
+/// amplitude.
+const AFTER_MOTION: usize = 10;
+
+/// Most stretches of each kind that a line keeps in each direction, where their number is limited.
+pub(super) const KEPT: usize = 8;
+
+impl OffSetpoint {
+    /// Deviation of the height, m, by which stretches are compared: that of the amplitude where the
+    /// height's is not known.
+    pub(super) fn size(&self) -> f64 {
+        self.height.map_or(self.error, |height| height).abs()
+    }
+}
+
 /// Records a line in one direction.
 #[derive(Debug)]
 pub(super) struct LineRecorder<'a> {
@@ -89,6 +104,7 @@ pub(super) struct LineRecorder<'a> {
     height: Deviation,
     height_range: [f64; 2],
     tracking: Deviation,
+    surface: Deviation,
     /// Height less that of the surface where the error is small.
     level: Deviation,
     highest_surface: f64,
@@ -100,6 +116,11 @@ pub(super) struct LineRecorder<'a> {
     count: usize,
     flight: Option<(usize, usize, bool)>,
     parachuting: Vec<Parachuting>,
+    off: Option<OffSetpoint>,
+    /// Surface and material of the period before, and number of the period in which they changed last.
+    under_tip: Option<(f64, usize)>,
+    moved_at: Option<usize>,
+    off_setpoint: Vec<OffSetpoint>,
     before: [Complex; 2],
 }
 
@@ -124,6 +145,7 @@ impl<'a> LineRecorder<'a> {
             height: Deviation::default(),
             height_range: [f64::INFINITY, f64::NEG_INFINITY],
             tracking: Deviation::default(),
+            surface: Deviation::default(),
             level: Deviation::default(),
             highest_surface: f64::NEG_INFINITY,
             error_squares: 0.0,
@@ -134,12 +156,16 @@ impl<'a> LineRecorder<'a> {
             count: 0,
             flight: None,
             parachuting: Vec::new(),
+            off: None,
+            under_tip: None,
+            moved_at: None,
+            off_setpoint: Vec::new(),
             before: [Complex::new(0.0, 0.0); 2],
         }
     }
 
-    /// Takes in the period of this index within the line.
-    pub(super) fn add(&mut self, index: usize, period: &Period) {
+    /// Takes in the period of this index within the line, after the tracker has.
+    pub(super) fn add(&mut self, index: usize, period: &Period, tracker: &StateTracker<'_>) {
         let plan = self.plan;
         let k = self.first_period + index;
         let error = period.error;
@@ -147,6 +173,7 @@ impl<'a> LineRecorder<'a> {
         self.height.add(period.z);
         extend(&mut self.height_range, period.z);
         self.tracking.add(period.z - period.surface);
+        self.surface.add(period.surface);
         self.highest_surface = self.highest_surface.max(period.surface);
         self.error_squares += error * error;
         extend(&mut self.error_range, error);
@@ -165,6 +192,7 @@ impl<'a> LineRecorder<'a> {
             period.contact == 0.0
         };
         self.follow_flight(flies, k, error > limit);
+        self.follow_error(k, period, tracker);
         self.add_to_pixel(index, period);
     }
 
@@ -192,6 +220,77 @@ impl<'a> LineRecorder<'a> {
         });
     }
 
+    /// Extends the stretch on which the amplitude is off the setpoint, or starts or ends one.
+    fn follow_error(&mut self, k: usize, period: &Period, tracker: &StateTracker<'_>) {
+        let plan = self.plan;
+        let under_tip = (period.surface, period.material);
+        // A line starts where the one before ends, or after settling there.
+        if self
+            .under_tip
+            .replace(under_tip)
+            .is_some_and(|before| before != under_tip)
+        {
+            self.moved_at = Some(k);
+        }
+        let error = period.error;
+        let is_off = plan.mode == Mode::ConstantAmplitude && error.abs() > plan.off_setpoint();
+        let goes_on =
+            |off: &OffSetpoint| is_off && off.error.is_sign_positive() == error.is_sign_positive();
+        if !self.off.as_ref().is_some_and(goes_on) {
+            self.end_error();
+        }
+        if !is_off {
+            return;
+        }
+        let height = tracker
+            .distance(period.material)
+            .map(|distance| period.z - period.surface - distance);
+        let off = self.off.get_or_insert(OffSetpoint {
+            first_period: k,
+            periods: 0,
+            x: period.x,
+            until_x: period.x,
+            error,
+            height,
+            material: period.material,
+            moved: false,
+        });
+        off.periods += 1;
+        let shortly_before = off
+            .first_period
+            .saturating_sub(AFTER_MOTION * tracker.stay());
+        off.moved |= self
+            .moved_at
+            .is_some_and(|moved_at| moved_at >= shortly_before);
+        off.until_x = period.x;
+        off.material = period.material;
+        if error.abs() > off.error.abs() {
+            off.error = error;
+        }
+        // The deviation on the side of the error: above the setpoint the height is too large.
+        let side = |height: &f64| height * error.signum();
+        off.height = off
+            .height
+            .into_iter()
+            .chain(height)
+            .max_by(|a, b| side(a).total_cmp(&side(b)));
+    }
+
+    fn end_error(&mut self) {
+        let Some(off) = self.off.take() else {
+            return;
+        };
+        self.off_setpoint.push(off);
+        if self.off_setpoint.len() > KEPT {
+            let mut order: Vec<usize> = (0..self.off_setpoint.len()).collect();
+            order.sort_by(|a, b| {
+                let [a, b] = [a, b].map(|index| self.off_setpoint[*index].size());
+                b.total_cmp(&a)
+            });
+            self.off_setpoint.remove(order[KEPT]);
+        }
+    }
+
     fn add_to_pixel(&mut self, index: usize, period: &Period) {
         let plan = self.plan;
         let [before, last] = self.before;
@@ -217,6 +316,7 @@ impl<'a> LineRecorder<'a> {
     /// Returns statistics and pixels of the line.
     pub(super) fn finish(mut self) -> (LineStatistics, PixelRow) {
         self.end_flight();
+        self.end_error();
         let plan = self.plan;
         let count = self.count.max(1) as f64;
         let level = if self.level.count > 0.0 {
@@ -242,8 +342,10 @@ impl<'a> LineRecorder<'a> {
             peak_force_mean: self.peak_sum / count,
             dissipation_mean: self.dissipation / count,
             tracking_rms: self.tracking.rms(),
+            surface_rms: self.surface.rms(),
             overshoot: (self.height_range[1] - self.highest_surface - level).max(0.0),
             parachuting: std::mem::take(&mut self.parachuting),
+            off_setpoint: std::mem::take(&mut self.off_setpoint),
         };
         (statistics, self.pixel_row())
     }
@@ -317,102 +419,5 @@ pub(super) fn listed(k: usize, period: &Period) -> ListedPeriod {
         contact_fraction: period.contact,
         dissipation: period.dissipation,
         state: period.interaction,
-    }
-}
-
-/// Follows which force governs the motion, and records where it changes permanently.
-#[derive(Clone, Debug)]
-pub(super) struct BranchTracker {
-    /// Number of periods after which a change counts, and over which the height is compared.
-    patience: usize,
-    established: Option<Interaction>,
-    /// The other interaction, since how many periods, and the change that it may be.
-    candidate: usize,
-    change: Option<BranchChange>,
-    /// Slow mean of the height less that of the surface.
-    level: f64,
-    level_before: f64,
-    /// Changes whose height is compared once this many periods have passed.
-    pending: Vec<(BranchChange, usize)>,
-    pub(super) changes: Vec<BranchChange>,
-}
-
-/// Largest number of changes that are recorded.
-const MAX_CHANGES: usize = 10_000;
-
-impl BranchTracker {
-    /// Creates the tracker for a lever whose disturbances decay in so many periods.
-    pub(super) fn new(lever_memory: f64) -> Self {
-        Self {
-            patience: lever_memory.ceil().clamp(10.0, 1e5) as usize,
-            established: None,
-            candidate: 0,
-            change: None,
-            level: f64::NAN,
-            level_before: f64::NAN,
-            pending: Vec::new(),
-            changes: Vec::new(),
-        }
-    }
-
-    /// Records the interaction of a period, and a change if it persists.
-    pub(super) fn add(&mut self, k: usize, line: usize, direction: Direction, period: &Period) {
-        let here = period.z - period.surface;
-        if self.level.is_nan() {
-            self.level = here;
-        }
-        self.level += (here - self.level) / self.patience as f64;
-        for (change, left) in &mut self.pending {
-            *left -= 1;
-            if *left == 0 && self.changes.len() < MAX_CHANGES {
-                change.height_change = self.level - change.height_change;
-                self.changes.push(*change);
-            }
-        }
-        self.pending.retain(|(_, left)| *left > 0);
-        let to = period.interaction;
-        if !matches!(to, Interaction::Attractive | Interaction::Repulsive) {
-            return;
-        }
-        let Some(from) = self.established else {
-            self.established = Some(to);
-            return;
-        };
-        if to == from {
-            self.candidate = 0;
-            return;
-        }
-        if self.candidate == 0 {
-            self.level_before = self.level;
-            self.change = Some(BranchChange {
-                k,
-                line,
-                direction,
-                x: period.x,
-                from,
-                to,
-                // The level before, until the level after is known.
-                height_change: self.level_before,
-            });
-        }
-        self.candidate += 1;
-        if self.candidate >= self.patience {
-            self.candidate = 0;
-            self.established = Some(to);
-            self.pending.extend(
-                self.change
-                    .take()
-                    .map(|change| (change, 10 * self.patience)),
-            );
-        }
-    }
-
-    /// Returns the changes, including those whose height had no time to settle.
-    pub(super) fn finish(mut self) -> Vec<BranchChange> {
-        for (mut change, _) in self.pending {
-            change.height_change = self.level - change.height_change;
-            self.changes.push(change);
-        }
-        self.changes
     }
 }

@@ -63,6 +63,30 @@ pub struct Parachuting {
     pub length: f64,
 }
 
+/// A stretch on which the feedback lags: the amplitude is off the setpoint by more than half of the way
+/// from the setpoint to the free amplitude or to 0, whichever is shorter.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct OffSetpoint {
+    /// Number of the first drive period of the stretch, from the start of settling.
+    pub first_period: usize,
+    /// Number of drive periods of the stretch.
+    pub periods: usize,
+    /// Position along the line where the stretch starts, m.
+    pub x: f64,
+    /// Position along the line of the last period of the stretch, m.
+    pub until_x: f64,
+    /// Amplitude minus setpoint where its modulus is largest, m: above the setpoint the tip flies,
+    /// below it presses.
+    pub error: f64,
+    /// Largest deviation of the height from that of the surface and the distance of the lever's state
+    /// at the setpoint, m; `null` where that distance is not known.
+    pub height: Option<f64>,
+    /// Number of the material in the last period of the stretch: 0 is the case's own sample.
+    pub material: usize,
+    /// Whether the surface or the sample changed under the tip in the stretch or shortly before it.
+    pub moved: bool,
+}
+
 /// Statistics of a line in one direction, in SI.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct LineStatistics {
@@ -100,11 +124,15 @@ pub struct LineStatistics {
     pub dissipation_mean: f64,
     /// Standard deviation of the height minus that of the surface, m.
     pub tracking_rms: f64,
+    /// Standard deviation of the height of the surface, m.
+    pub surface_rms: f64,
     /// Excess of the largest height over the highest point of the surface, m, beyond their mean
     /// difference where the error is small; at least 0.
     pub overshoot: f64,
     /// Stretches on which the tip flies above the surface.
     pub parachuting: Vec<Parachuting>,
+    /// Stretches on which the feedback lags, the 8 with the largest deviation of the height.
+    pub off_setpoint: Vec<OffSetpoint>,
 }
 
 /// Channels of an image: a row a line, an entry a pixel; `null` where no period falls on a pixel.
@@ -118,9 +146,9 @@ pub struct Channels {
     pub amplitude_error: Vec<Vec<f64>>,
     /// Phase of the mean output of the lock-in amplifier, degrees.
     pub phase: Vec<Vec<f64>>,
-    /// Mean of the periods' largest forces, N.
+    /// Mean peak force in a pixel, N: the mean of the periods' largest forces.
     pub peak_force: Vec<Vec<f64>>,
-    /// Largest force of the sample on the tip in a pixel, N.
+    /// Largest peak force in a pixel, N.
     pub peak_force_max: Vec<Vec<f64>>,
     /// Mean energy that the tip gives to the sample in a period, J.
     pub dissipation: Vec<Vec<f64>>,
@@ -173,7 +201,7 @@ impl Channels {
     }
 }
 
-/// A jump of the motion onto another branch.
+/// A permanent change of the lever's state: from there on it stays at the setpoint in the other state.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct BranchChange {
     /// Number of the drive period, from the start of settling.
@@ -188,23 +216,59 @@ pub struct BranchChange {
     pub from: Interaction,
     /// Force that governs the motion from there on.
     pub to: Interaction,
-    /// Change of the height minus that of the surface, m.
+    /// Change of the height that is not the surface's, m: `distance_to` minus `distance_from`.
     pub height_change: f64,
+    /// Distance of the state before at the setpoint, m.
+    pub distance_from: f64,
+    /// Distance of the state after it at the setpoint, m.
+    pub distance_to: f64,
+    /// Number of the material above which both distances are: 0 is the case's own sample; `null` where
+    /// each state exists above another material.
+    pub material: Option<usize>,
+    /// Number of the drive period in which the lever leaves the state again; `null` if it stays in it
+    /// to the end of the scan, or of the line if lines are independent.
+    pub until_k: Option<usize>,
+    /// Position along the line where the lever leaves the state again, m.
+    pub until_x: Option<f64>,
 }
 
-/// Differences of a fast scan from an exact one, on parts of the scan that both run.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-pub struct MethodError {
-    /// Number of drive periods compared.
-    pub periods: usize,
-    /// Largest difference of the height, m.
-    pub height_max: f64,
-    /// Root mean square of the difference of the height, m.
-    pub height_rms: f64,
-    /// Largest difference of the amplitude, m.
-    pub amplitude_max: f64,
-    /// Root mean square of the difference of the amplitude, m.
-    pub amplitude_rms: f64,
+/// Why the image shows something that is not the surface's.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Cause {
+    /// The loop oscillates, or is so near its limit of stability that it hunts after large errors
+    LoopRings,
+    /// The lever changes its state permanently
+    StateChange,
+    /// The amplitude is off the setpoint while the surface moves
+    FeedbackLags,
+}
+
+/// A cause with the place where its effect is largest.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct ImageCause {
+    /// Why the image shows something that is not the surface's.
+    pub cause: Cause,
+    /// Number of the line, from 0; `null` where the cause acts in the whole image.
+    pub line: Option<usize>,
+    /// Direction in which the line is scanned; `null` where the cause acts in both.
+    pub direction: Option<Direction>,
+    /// Number of the drive period in which it starts, from the start of settling.
+    pub k: Option<usize>,
+    /// Position along the line where it starts, m.
+    pub x: Option<f64>,
+    /// Number of the drive period with which it ends; `null` if it lasts.
+    pub until_k: Option<usize>,
+    /// Position along the line where it ends, m; `null` if it lasts.
+    pub until_x: Option<f64>,
+    /// Change of the height that is not the surface's, m; `null` where it is not known.
+    pub height: Option<f64>,
+    /// Number of the material above which it acts: 0 is the case's own sample.
+    pub material: Option<usize>,
+    /// Largest modulus of the multipliers of the loop that rings; `null` for another cause.
+    pub multiplier: Option<f64>,
+    /// The cause in words.
+    pub sentence: String,
 }
 
 /// The feedback loop linearised at the setpoint, on the flat surface.
@@ -246,8 +310,6 @@ pub struct ScanReport {
     pub mode: Mode,
     /// Fraction of the drive periods that was computed exactly, 0 to 1.
     pub exact_share: f64,
-    /// Difference from an exact scan, where the method is not exact.
-    pub error: Option<MethodError>,
     /// Extent along and across the lines, m.
     pub size: [f64; 2],
     /// Number of drive periods of a line in one direction.
@@ -280,13 +342,15 @@ pub struct ScanReport {
     pub trace: Channels,
     /// Image of the retrace; None if lines are scanned in one direction only.
     pub retrace: Option<Channels>,
-    /// Jumps of the motion onto another branch.
+    /// Permanent changes of the lever's state at the setpoint.
     pub branch_changes: Vec<BranchChange>,
     /// The feedback loop at the setpoint; `null` where no steady motion has it.
     #[serde(rename = "loop")]
     pub feedback: Option<LoopReport>,
     /// Reasons to doubt the image.
     pub warnings: Vec<String>,
-    /// Sentence on what the image shows.
+    /// Why the image shows something that is not the surface's: of each cause the largest effect.
+    pub causes: Vec<ImageCause>,
+    /// What the image shows, in sentences: those of the causes.
     pub verdict: String,
 }

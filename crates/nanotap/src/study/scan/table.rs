@@ -48,7 +48,7 @@ pub const CHANNELS: [Channel; 9] = [
     },
     Channel {
         name: "peak_force",
-        title: "peak force",
+        title: "mean peak force",
         unit: "N",
         values: |image| &image.peak_force,
     },

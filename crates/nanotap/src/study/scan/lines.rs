@@ -130,7 +130,7 @@ impl DatasetStudy for ScanLines {
         let schema = store.schema();
         let not_a_scan = || StoreError::NotAStore {
             path: store.path().into(),
-            what: "it holds no scan".into(),
+            what: "it holds no scan, or one of another version of nanotap".into(),
         };
         let text = schema.attributes.get(HEADER).and_then(Value::as_str);
         let header: ScanReport = text

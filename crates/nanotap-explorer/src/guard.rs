@@ -11,6 +11,8 @@ use axum::http::{HeaderMap, HeaderValue, StatusCode, header};
 use axum::middleware::Next;
 use axum::response::{IntoResponse as _, Response};
 
+use nanotap::Error;
+
 use crate::App;
 
 /// The header that carries the token.
@@ -21,9 +23,13 @@ const CONTENT_POLICY: &str = "default-src 'none'; script-src 'self'; style-src '
     frame-ancestors 'none'";
 
 /// 128 random bits in hexadecimal.
-pub(crate) fn new_token() -> Result<String, String> {
+///
+/// # Errors
+/// If the system has no random numbers.
+pub(crate) fn new_token() -> Result<String, Error> {
     let mut bytes = [0_u8; 16];
-    getrandom::fill(&mut bytes).map_err(|error| error.to_string())?;
+    getrandom::fill(&mut bytes)
+        .map_err(|error| Error::files(format!("no random numbers: {error}")))?;
     Ok(format!("{:032x}", u128::from_be_bytes(bytes)))
 }
 
@@ -51,8 +57,21 @@ fn refusal(app: &App, request: &Request) -> Option<(StatusCode, &'static str)> {
         format!("127.0.0.1:{}", app.port),
         format!("localhost:{}", app.port),
     ];
+    // Of two values a server and a proxy may each believe another one.
+    let names = [header::HOST.as_str(), header::ORIGIN.as_str(), TOKEN_HEADER];
+    if names
+        .iter()
+        .any(|name| headers.get_all(*name).iter().count() > 1)
+    {
+        return Some((
+            StatusCode::BAD_REQUEST,
+            "expected one Host header, and at most one Origin and one token",
+        ));
+    }
     let host = text(headers, header::HOST.as_str()).unwrap_or_default();
-    if !own.iter().any(|own| own == host) {
+    // The target of a request to a proxy names a host, too.
+    let named = request.uri().authority();
+    if !own.iter().any(|own| own == host) || named.is_some_and(|named| named.as_str() != host) {
         return Some((
             StatusCode::MISDIRECTED_REQUEST,
             "the explorer has another address",

@@ -37,8 +37,9 @@ mod scratch;
 mod study;
 mod work;
 
+use std::io::Write as _;
 use std::net::{Ipv4Addr, SocketAddr};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use axum::Router;
@@ -81,11 +82,47 @@ pub(crate) struct App {
     pub(crate) scratch: PathBuf,
 }
 
+/// The address of a running explorer.
+#[derive(Debug)]
+pub struct Address<'a> {
+    /// The address, with its token. Other users can read the command lines of programs: it does not
+    /// belong on one.
+    pub url: String,
+    folder: &'a Path,
+}
+
+impl Address<'_> {
+    /// Writes a page that opens the address, for the command line of a browser. Only the user who
+    /// started the explorer can read it; it is removed when the explorer ends.
+    ///
+    /// # Errors
+    /// If the file system fails.
+    pub fn page(&self) -> Result<PathBuf, Error> {
+        let path = self.folder.join("open.html");
+        let mut options = std::fs::OpenOptions::new();
+        options.write(true).create_new(true);
+        #[cfg(unix)]
+        std::os::unix::fs::OpenOptionsExt::mode(&mut options, 0o600);
+        let url = &self.url;
+        let page = format!(
+            "<!doctype html>\n<meta charset=\"utf-8\">\n<title>nanotap</title>\n\
+             <meta name=\"referrer\" content=\"no-referrer\">\n\
+             <meta http-equiv=\"refresh\" content=\"0; url={url}\">\n\
+             <p><a href=\"{url}\">Open the explorer</a></p>\n"
+        );
+        let written = options
+            .open(&path)
+            .and_then(|mut file| file.write_all(page.as_bytes()));
+        written.map_err(|error| Error::files(format!("{}: {error}", path.display())))?;
+        Ok(path)
+    }
+}
+
 /// Serves the explorer until Ctrl-C or SIGTERM; `ready` receives the address to open.
 ///
 /// # Errors
 /// If the case cannot be read or the port cannot be opened.
-pub fn serve(options: &Options, ready: impl FnOnce(&str)) -> Result<(), Error> {
+pub fn serve(options: &Options, ready: impl FnOnce(&Address<'_>)) -> Result<(), Error> {
     let presets = preset::all(options.case.as_deref(), &options.set)?;
     let failed = |error: std::io::Error| Error::files(format!("the server stopped: {error}"));
     let runtime = tokio::runtime::Builder::new_multi_thread()
@@ -105,9 +142,11 @@ pub fn serve(options: &Options, ready: impl FnOnce(&str)) -> Result<(), Error> {
                 Error::option("port", message, "give another, or 0 for any that is free")
             })?;
         let port = listener.local_addr().map_err(failed)?.port();
-        let token = guard::new_token()
-            .map_err(|error| Error::files(format!("no random numbers for the token: {error}")))?;
-        ready(&format!("http://127.0.0.1:{port}/?token={token}"));
+        let token = guard::new_token()?;
+        ready(&Address {
+            url: format!("http://127.0.0.1:{port}/?token={token}"),
+            folder: scratch.path(),
+        });
         let app = Arc::new(App {
             token,
             port,

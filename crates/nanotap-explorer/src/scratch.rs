@@ -1,16 +1,17 @@
 //! A folder that is removed when it is no longer needed.
 
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 
 use nanotap::Error;
+
+use crate::guard;
 
 /// Number of attempts to remove a folder, and the pause between them.
 const ATTEMPTS: usize = 20;
 const PAUSE: Duration = Duration::from_millis(25);
 
-/// A temporary folder of this process.
+/// A temporary folder with a name that cannot be predicted, which only its owner may enter.
 pub(crate) struct Scratch(PathBuf);
 
 impl Scratch {
@@ -21,10 +22,13 @@ impl Scratch {
 
     /// Creates a temporary folder within `folder`.
     pub(crate) fn within(folder: &Path) -> Result<Self, Error> {
-        static COUNT: AtomicU64 = AtomicU64::new(0);
-        let count = COUNT.fetch_add(1, Ordering::Relaxed);
-        let path = folder.join(format!("nanotap-explorer-{}-{count}", std::process::id()));
-        std::fs::create_dir(&path)
+        let path = folder.join(format!("nanotap-explorer-{}", guard::new_token()?));
+        let mut builder = std::fs::DirBuilder::new();
+        #[cfg(unix)]
+        std::os::unix::fs::DirBuilderExt::mode(&mut builder, 0o700);
+        // Refused if something has the name.
+        builder
+            .create(&path)
             .map_err(|error| Error::files(format!("{}: {error}", path.display())))?;
         Ok(Self(path))
     }

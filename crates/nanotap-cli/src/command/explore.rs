@@ -44,10 +44,19 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     serve(&options, |address| {
         // A reader of the pipe waits for this line.
         let mut out = std::io::stdout().lock();
-        let _ = writeln!(out, "{address}");
+        let _ = writeln!(out, "{}", address.url);
         let _ = out.flush();
-        if !arguments.no_browser && open::that_detached(address).is_err() {
-            output.note("no browser could be opened; open the address above in one");
+        if arguments.no_browser {
+            return;
         }
+        // A page, because other users can read the command line of the program that opens it.
+        let opened = address
+            .page()
+            .is_ok_and(|page| open::that_detached(page).is_ok());
+        output.note(if opened {
+            "if no page opens, open the address above in a browser"
+        } else {
+            "no browser could be opened; open the address above in one"
+        });
     })
 }

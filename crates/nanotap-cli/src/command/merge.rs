@@ -30,18 +30,18 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
             style::bold(&format!(
                 "{}: {} of {} chunks, {} copied now",
                 merged.path.display(),
-                merged.chunks - merged.missing.len(),
+                merged.chunks - merged.missing_count,
                 merged.chunks,
                 merged.copied
             ))
         )
     })?;
-    if merged.missing.is_empty() {
+    if merged.missing_count == 0 {
         return Ok(());
     }
     Err(Failure::numerics(format!(
         "{} missing; merge the other shares too, or give the sweep's or basin's command with --out {}",
-        number::counted(merged.missing.len(), "chunk is", "chunks are"),
+        number::counted(merged.missing_count, "chunk is", "chunks are"),
         arguments.out.display()
     )))
 }

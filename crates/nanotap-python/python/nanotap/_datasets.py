@@ -146,7 +146,8 @@ def merge(sources: Iterable[Path], out: Path) -> Record:
         out: The merged dataset, identical to that of a single machine.
 
     Returns:
-        `path`, `chunks`, `copied` and `missing` (chunks in none of the sources).
+        `path`, `chunks`, `copied`, `missing_count` (chunks in none of the sources) and `missing`
+        (the first 100,000 of these).
 
     Raises:
         ValueError: one is not a dataset, or two do not belong together.

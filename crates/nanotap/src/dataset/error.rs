@@ -2,6 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
+use crate::input::{InputError, InputFault};
+
 /// Why a store could not be used.
 #[derive(Debug, thiserror::Error)]
 pub enum StoreError {
@@ -74,6 +76,24 @@ impl StoreError {
             doing,
             path,
             source,
+        }
+    }
+}
+
+impl From<InputError> for StoreError {
+    fn from(InputError { path, fault }: InputError) -> Self {
+        let io = |source| Self::Io {
+            doing: "read",
+            path: path.clone(),
+            source,
+        };
+        match fault {
+            InputFault::System(source) => io(source),
+            InputFault::Missing => io(std::io::ErrorKind::NotFound.into()),
+            other => Self::Damaged {
+                path,
+                what: other.to_string(),
+            },
         }
     }
 }

@@ -15,9 +15,14 @@ pub struct Merged {
     pub chunks: usize,
     /// Number of chunks copied in this merge.
     pub copied: usize,
-    /// Indices of chunks that are in none of the stores.
+    /// Number of chunks that are in none of the stores.
+    pub missing_count: usize,
+    /// Indices of the first of these, at most [`MAX_LISTED`].
     pub missing: Vec<usize>,
 }
+
+/// Largest number of missing chunks that are listed.
+pub const MAX_LISTED: usize = 100_000;
 
 /// Copies the finished chunks of `sources` into the store at `target`, which is created if
 /// necessary; the bytes are those that one machine would have written. A chunk that is damaged in
@@ -71,11 +76,13 @@ pub fn merge(sources: &[PathBuf], target: &Path) -> Result<Merged, StoreError> {
     merged.tidy()?;
     let missing = (0..merged.chunks())
         .filter(|c| !merged.is_finished(*c))
+        .take(MAX_LISTED)
         .collect();
     Ok(Merged {
         path: target.into(),
         chunks: merged.chunks(),
         copied,
+        missing_count: merged.missing(),
         missing,
     })
 }

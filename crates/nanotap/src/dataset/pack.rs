@@ -14,13 +14,13 @@ use std::ops::Range;
 use std::path::Path;
 
 use super::error::StoreError;
-use super::grid::Block;
+use super::grid::{Axis, Block};
 use super::schema::{Schema, Values};
 use super::store::{Store, encoded};
 
 /// Files of chunks that are not worth joining.
 const FEW_FILES: usize = 100;
-/// Bytes that a chunk of one variable should not exceed.
+/// Most bytes of a joined chunk of one variable.
 const CHUNK_BYTES: usize = 256 << 20;
 
 /// The same content in larger chunks; `None` if there are few files.
@@ -32,7 +32,11 @@ pub(super) fn packed(schema: &Schema) -> Option<Schema> {
     let variables = schema.variables.iter();
     let widest = variables.map(|v| v.stride() * v.kind.size()).max();
     let (first, others) = packed.grid.axes.split_first_mut()?;
-    let row = widest? * others.iter().map(|axis| axis.length).product::<usize>();
+    let lengths = others.iter().map(|axis| axis.length);
+    let row = lengths.fold(widest?, usize::saturating_mul);
+    if row > CHUNK_BYTES {
+        return None;
+    }
     for axis in others {
         axis.chunk = axis.length;
     }
@@ -87,9 +91,21 @@ fn replaced(store: &Store, schema: Schema, packed: bool) -> Result<Store, StoreE
 
 /// The chunks of a store that share entries with a block of another division.
 fn parts<'a>(store: &'a Store, block: &'a Block) -> impl Iterator<Item = Block> + 'a {
-    let apart = |(a, b): (&Range<usize>, &Range<usize>)| a.end <= b.start || b.end <= a.start;
-    let blocks = (0..store.chunks()).map(|chunk| store.schema().grid.block(chunk));
-    blocks.filter(move |part| !part.ranges.iter().zip(&block.ranges).any(apart))
+    let grid = &store.schema().grid;
+    let touched = |(axis, range): (&Axis, &Range<usize>)| {
+        range.start / axis.chunk..range.end.div_ceil(axis.chunk)
+    };
+    let places: Vec<Range<usize>> = grid.axes.iter().zip(&block.ranges).map(touched).collect();
+    let count: usize = places.iter().map(ExactSizeIterator::len).product();
+    (0..count).map(move |mut flat| {
+        let (mut chunk, mut stride) = (0, 1);
+        for (axis, place) in grid.axes.iter().zip(&places).rev() {
+            chunk += stride * (place.start + flat % place.len());
+            flat /= place.len();
+            stride *= axis.chunks();
+        }
+        grid.block(chunk)
+    })
 }
 
 /// The values of a variable for the entries of a block of another division into chunks.

@@ -14,6 +14,7 @@ use super::pack;
 use super::schema::{Attributes, Coordinate, Kind, Schema, Values, Variable};
 use super::zarr;
 use crate::dataset::files::{self, is_temporary};
+use crate::input::{self, InputError, MAX_DOCUMENT_BYTES, MAX_TABLE_BYTES, Origin};
 
 /// The folder of markers, one per finished chunk. Zarr readers look at the metadata only and ignore
 /// it.
@@ -50,7 +51,7 @@ impl Store {
         let metadata = consolidated(&documents);
         if let Some(packed) = pack::packed(&schema) {
             let metadata = consolidated(&self::documents(&packed, true));
-            let there = fs::read_to_string(path.join(zarr::CONSOLIDATED));
+            let there = document(&path.join(zarr::CONSOLIDATED));
             if there.is_ok_and(|there| same(&there, &metadata)) {
                 refuse_links(path)?;
                 let store = Self::with(path, packed, metadata, true);
@@ -141,14 +142,14 @@ impl Store {
     /// # Errors
     /// If it does not exist or is not a store of nanotap.
     pub fn open(path: &Path) -> Result<Self, StoreError> {
-        let document = path.join(zarr::CONSOLIDATED);
+        let consolidated = path.join(zarr::CONSOLIDATED);
         let refuse = |what: &str| StoreError::NotAStore {
             path: path.into(),
             what: what.into(),
         };
-        let metadata = match fs::read_to_string(&document) {
+        let metadata = match document(&consolidated) {
             Ok(text) => text,
-            Err(error) if error.kind() == std::io::ErrorKind::NotFound => {
+            Err(error) if error.is_missing() => {
                 return Err(refuse(if path.exists() {
                     "it has no .zmetadata"
                 } else {
@@ -156,7 +157,7 @@ impl Store {
                 }));
             }
             Err(_) if path.is_file() => return Err(refuse("it is a file, not a folder")),
-            Err(error) => return Err(StoreError::io("read", &document)(error)),
+            Err(error) => return Err(error.into()),
         };
         let (parsed, metadata) = if let Ok(parsed) = serde_json::from_str::<Value>(&metadata) {
             (parsed, metadata)
@@ -185,10 +186,26 @@ impl Store {
             packed,
             finished: Vec::new(),
         };
-        store.finished = (0..chunks)
-            .map(|chunk| AtomicBool::new(store.is_whole(chunk)))
-            .collect();
+        store.finished = (0..chunks).map(|_| AtomicBool::new(false)).collect();
+        // What the metadata declare costs nothing; only chunks with a marker are looked at.
+        for chunk in store.marked() {
+            store.finished[chunk].store(store.is_whole(chunk), Ordering::Release);
+        }
         store
+    }
+
+    /// The chunks that have a marker.
+    fn marked(&self) -> Vec<usize> {
+        let Ok(listing) = fs::read_dir(self.markers()) else {
+            return Vec::new();
+        };
+        let names = listing.flatten().map(|entry| entry.file_name());
+        let chunk = |name: std::ffi::OsString| {
+            let name = name.to_str()?;
+            let chunk: usize = name.parse().ok()?;
+            (chunk < self.chunks() && chunk.to_string() == name).then_some(chunk)
+        };
+        names.filter_map(chunk).collect()
     }
 
     /// Returns the path of the folder of the store.
@@ -225,20 +242,31 @@ impl Store {
 
     /// True if the marker and every file of a chunk exist and agree.
     fn is_whole(&self, chunk: usize) -> bool {
-        let Ok(marker) = fs::read_to_string(self.marker(chunk)) else {
+        let Ok(marker) = document(&self.marker(chunk)) else {
             return false;
         };
         let block = self.schema.grid.block(chunk);
         let mut lines = marker.lines();
         self.schema.variables.iter().all(|variable| {
-            let file = fs::read(self.file(variable, &block));
+            let file = self.read_file(variable, &block);
             file.is_ok_and(|bytes| lines.next() == Some(&marker_line(&variable.name, &bytes)))
         }) && lines.next().is_none()
     }
 
-    fn marker(&self, chunk: usize) -> PathBuf {
+    fn markers(&self) -> PathBuf {
         let folder = if self.packed { PACKED_MARKERS } else { MARKERS };
-        self.path.join(folder).join(chunk.to_string())
+        self.path.join(folder)
+    }
+
+    fn marker(&self, chunk: usize) -> PathBuf {
+        self.markers().join(chunk.to_string())
+    }
+
+    /// Reads the file of a chunk, which is not longer than zlib makes it.
+    fn read_file(&self, variable: &Variable, block: &Block) -> Result<Vec<u8>, InputError> {
+        let entries = self.schema.grid.chunk_entries() * variable.stride();
+        let limit = longest_stream(entries * variable.kind.size());
+        input::read(&self.file(variable, block), limit, Origin::File)
     }
 
     fn file(&self, variable: &Variable, block: &Block) -> PathBuf {
@@ -309,8 +337,7 @@ impl Store {
         let block = self.schema.grid.block(chunk);
         let mut files = Vec::new();
         for variable in &self.schema.variables {
-            let file = from.file(variable, &block);
-            files.push(fs::read(&file).map_err(StoreError::io("read", &file))?);
+            files.push(from.read_file(variable, &block)?);
         }
         self.write_files(&block, &files)
     }
@@ -324,15 +351,15 @@ impl Store {
         let index = variable;
         let variable = &self.schema.variables[variable];
         let path = self.file(variable, block);
-        let bytes = match fs::read(&path) {
+        let bytes = match self.read_file(variable, block) {
             Ok(bytes) => bytes,
             Err(error) => {
                 // Another process may have joined the chunks.
                 let there = Self::open(&self.path)?;
-                if error.kind() == ErrorKind::NotFound && there.packed && !self.packed {
+                if error.is_missing() && there.packed && !self.packed {
                     return pack::column(&there, block, index);
                 }
-                return Err(StoreError::io("read", &path)(error));
+                return Err(error.into());
             }
         };
         let (grid, stride) = (&self.schema.grid, variable.stride());
@@ -381,7 +408,10 @@ impl Store {
                 let variable = self.schema.index_of(name).ok_or_else(missing)?;
                 Ok(self.read_chunk(&block, variable)?.numbers())
             };
-            let columns = names.iter().map(column).collect::<Result<Vec<_>, _>>()?;
+            let columns = names
+                .iter()
+                .map(column)
+                .collect::<Result<Vec<_>, StoreError>>()?;
             let number = |k: usize, flat: usize| columns[k].get(flat).copied();
             for (flat, entry) in block.entries().enumerate() {
                 for (k, value) in row.iter_mut().enumerate() {
@@ -422,10 +452,10 @@ impl Store {
     /// If the file system fails.
     pub fn read_beside(&self, name: &str) -> Result<Option<Vec<u8>>, StoreError> {
         let path = self.path.join(name);
-        match fs::read(&path) {
+        match input::read(&path, MAX_TABLE_BYTES, Origin::File) {
             Ok(bytes) => Ok(Some(bytes)),
-            Err(error) if error.kind() == ErrorKind::NotFound => Ok(None),
-            Err(error) => Err(StoreError::io("read", &path)(error)),
+            Err(error) if error.is_missing() => Ok(None),
+            Err(error) => Err(error.into()),
         }
     }
 
@@ -629,7 +659,7 @@ fn refuse_strangers(
     metadata: &str,
     documents: &[(String, String)],
 ) -> Result<(), StoreError> {
-    match fs::read_to_string(path.join(zarr::CONSOLIDATED)) {
+    match document(&path.join(zarr::CONSOLIDATED)) {
         Ok(there) if same(&there, metadata) => return Ok(()),
         Ok(there) if is_whole(&there) => return Err(mismatch(path, &there, metadata)),
         // Incomplete after a power failure: rewritten if the attributes show that the same command
@@ -639,14 +669,14 @@ fn refuse_strangers(
                 let all: Value = serde_json::from_str(text).unwrap_or_default();
                 all["metadata"][zarr::ATTRIBUTES].to_string()
             };
-            let there = fs::read_to_string(path.join(zarr::ATTRIBUTES)).unwrap_or_default();
+            let there = document(&path.join(zarr::ATTRIBUTES)).unwrap_or_default();
             if same(&there, &root(metadata)) {
                 return Ok(());
             }
             return Err(torn(path));
         }
-        Err(error) if error.kind() == std::io::ErrorKind::NotFound => {}
-        Err(error) => return Err(StoreError::io("read", path)(error)),
+        Err(error) if error.is_missing() => {}
+        Err(error) => return Err(error.into()),
     }
     // Without that document the folder may be a store whose creation was interrupted.
     let listing = fs::read_dir(path).map_err(StoreError::io("list", path))?;
@@ -691,12 +721,12 @@ fn is_whole(text: &str) -> bool {
 
 /// The consolidated metadata, rebuilt from their parts; `None` if one of these is damaged too.
 fn rebuilt(path: &Path) -> Option<Value> {
-    let document = |name: &str| -> Option<Value> {
-        serde_json::from_str(&fs::read_to_string(path.join(name)).ok()?).ok()
+    let parsed = |name: &str| -> Option<Value> {
+        serde_json::from_str(&document(&path.join(name)).ok()?).ok()
     };
     let mut all = Map::new();
     for name in [zarr::GROUP, zarr::ATTRIBUTES] {
-        all.insert(name.into(), document(name)?);
+        all.insert(name.into(), parsed(name)?);
     }
     let mut arrays: Vec<String> = fs::read_dir(path)
         .ok()?
@@ -708,7 +738,7 @@ fn rebuilt(path: &Path) -> Option<Value> {
     for array in arrays {
         for part in [zarr::ARRAY, zarr::ATTRIBUTES] {
             let name = format!("{array}/{part}");
-            let document = document(&name)?;
+            let document = parsed(&name)?;
             all.insert(name, document);
         }
     }
@@ -735,12 +765,38 @@ pub(super) fn mismatch(path: &Path, there: &str, here: &str) -> StoreError {
     }
 }
 
-/// Largest number of entries of an array and of characters of a text: larger ones were not written
-/// by nanotap and would fill the memory.
+/// Largest number of entries of an array: larger ones were not written by nanotap.
 const MAX_ENTRIES: u64 = 1 << 32;
+/// Largest number of bytes of a text.
 const LONGEST_WORD: usize = 1 << 16;
-/// Largest number of chunks: each one is checked when a store is opened.
+/// Largest number of chunks: an open store has a byte for each.
 const MAX_CHUNKS: usize = 10_000_000;
+/// Largest number of bytes in memory of a chunk of one variable, or of all coordinates.
+pub(crate) const MAX_CHUNK_BYTES: usize = 1 << 30;
+/// Bytes in memory of a text, besides its characters.
+const TEXT_BYTES: usize = 32;
+
+/// Bytes in memory of so many entries, if they are not too many.
+fn memory(kind: Kind, entries: usize) -> Option<usize> {
+    let each = match kind {
+        Kind::Text(_) => TEXT_BYTES + kind.size(),
+        _ => kind.size(),
+    };
+    entries
+        .checked_mul(each)
+        .filter(|bytes| *bytes <= MAX_CHUNK_BYTES)
+}
+
+/// Largest length of a zlib stream of so many bytes: those that cannot be compressed take a few bytes
+/// more for each block.
+fn longest_stream(bytes: usize) -> u64 {
+    (bytes + bytes / 64 + 4096) as u64
+}
+
+/// The text of one of the store's documents.
+fn document(path: &Path) -> Result<String, InputError> {
+    input::text(path, MAX_DOCUMENT_BYTES, Origin::File)
+}
 
 /// True if `name` is a valid name of an array: a folder inside the store.
 fn is_name(name: &str) -> bool {
@@ -818,7 +874,8 @@ fn schema_of(path: &Path, documents: &Value) -> Result<Option<Schema>, StoreErro
         };
         let skip = schema.grid.axes.len();
         let chunk = schema.grid.axes.iter().map(|axis| axis.chunk);
-        if entries(chunk.chain(array.shape.iter().copied().skip(skip))).is_none() {
+        let in_chunk = entries(chunk.chain(array.shape.iter().copied().skip(skip)));
+        if in_chunk.and_then(|n| memory(array.kind, n)).is_none() {
             return Err(too_large(name));
         }
         let tail = array
@@ -834,6 +891,7 @@ fn schema_of(path: &Path, documents: &Value) -> Result<Option<Schema>, StoreErro
             attributes: array.attributes,
         });
     }
+    let mut coordinate_bytes = 0;
     for name in documents
         .as_object()
         .into_iter()
@@ -850,7 +908,12 @@ fn schema_of(path: &Path, documents: &Value) -> Result<Option<Schema>, StoreErro
             .join(name)
             .join(zarr::chunk_name(&[], array.shape.len()));
         let count = entries(array.shape.iter().copied()).ok_or_else(|| too_large(name))?;
-        let bytes = fs::read(&file).map_err(StoreError::io("read", &file))?;
+        coordinate_bytes += memory(array.kind, count).ok_or_else(|| too_large(name))?;
+        if coordinate_bytes > MAX_CHUNK_BYTES {
+            return Err(too_large(name));
+        }
+        let limit = longest_stream(count * array.kind.size());
+        let bytes = input::read(&file, limit, Origin::File)?;
         let values = zarr::decode(&bytes, array.kind, count)
             .map_err(|what| StoreError::Damaged { path: file, what })?;
         schema.coordinates.push(Coordinate {
@@ -893,7 +956,7 @@ impl ArrayDocument {
         Some(Self {
             shape: numbers(&array["shape"])?,
             kind: zarr::kind(array["dtype"].as_str()?)
-                .filter(|kind| kind.size() <= LONGEST_WORD)?,
+                .filter(|kind| (1..=LONGEST_WORD).contains(&kind.size()))?,
             dimensions,
             attributes,
         })
@@ -905,7 +968,8 @@ fn make_folder(path: &Path) -> Result<(), StoreError> {
 }
 
 fn write_if_other(path: &Path, bytes: &[u8]) -> Result<(), StoreError> {
-    if fs::read(path).is_ok_and(|there| there == bytes) {
+    let there = input::read(path, bytes.len() as u64, Origin::File);
+    if there.is_ok_and(|there| there == bytes) {
         Ok(())
     } else {
         in_folder(path, || files::write(path, bytes))

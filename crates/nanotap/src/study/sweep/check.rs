@@ -7,13 +7,14 @@ use super::over::Over;
 use super::run::Starts;
 use crate::Error;
 use crate::case::{Case, Key};
+use crate::dataset::store::MAX_CHUNK_BYTES;
 use crate::model::Model;
 use crate::study::simulate::starting_state;
 use crate::study::start_box::box_with;
 use crate::study::target::Target;
 
 /// Most bytes that one chunk may take in memory.
-pub(super) const LARGEST_CHUNK: usize = 1 << 30;
+pub(super) const LARGEST_CHUNK: usize = MAX_CHUNK_BYTES;
 /// Most runs of a sweep, and most periods of a run.
 const MAX_RUNS: usize = 1_000_000_000;
 const MAX_PERIODS: usize = 100_000_000;

@@ -16,6 +16,13 @@ pub(crate) struct Scratch(PathBuf);
 
 impl Scratch {
     /// Creates one in the system's folder of temporary files.
+    #[cfg_attr(
+        not(test),
+        expect(
+            clippy::disallowed_methods,
+            reason = "the folder that is made in it is this user's alone"
+        )
+    )]
     pub(crate) fn new() -> Result<Self, Error> {
         Self::within(&std::env::temp_dir())
     }

@@ -514,9 +514,10 @@ impl Tables {
         if self.by_lookup {
             return law.value(law.branch_at(gap, rate), gap, rate);
         }
+        // The bounds of a law with extreme constants may be in reverse order or not numbers.
         let [low, high] = self.bounds[branch];
         self.table
-            .force(&self.system, branch, gap.clamp(low, high), rate)
+            .force(&self.system, branch, gap.max(low).min(high), rate)
     }
 
     /// Returns the derivatives of [`Self::force`] by gap and rate; at the end of a branch those
@@ -529,7 +530,7 @@ impl Tables {
         }
         let [low, high] = self.bounds[branch];
         self.table
-            .slopes(&self.system, branch, gap.clamp(low, high), rate)
+            .slopes(&self.system, branch, gap.max(low).min(high), rate)
     }
 
     fn guard(&self, guard: Guard, gap: f64, rate: f64) -> f64 {

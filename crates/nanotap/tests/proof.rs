@@ -1,6 +1,8 @@
 //! Proofs of periodic orbits: theorems enclose the orbit to 60 digits, and false statements are not
 //! proved.
 
+#![allow(clippy::disallowed_methods, reason = "files and folders of a test")]
+
 use nanotap::case::Case;
 use nanotap::case::file::Source;
 use nanotap::control::Control;

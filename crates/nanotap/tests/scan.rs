@@ -1,6 +1,7 @@
 //! The study `scan` against an independent program, whose numbers are in `tests/scan/*.json`
 //! (80-bit arithmetic; lengths nm, forces nN, energies aJ, angles degrees).
 
+#![allow(clippy::disallowed_methods, reason = "files and folders of a test")]
 #![allow(
     clippy::format_push_string,
     reason = "case files are written piece by piece"

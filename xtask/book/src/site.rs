@@ -1,5 +1,10 @@
 //! The pages of the site, their errors, and their layout for mdBook.
 
+#![expect(
+    clippy::disallowed_methods,
+    reason = "it reads files of this repository"
+)]
+
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
 use std::fs;

@@ -1,6 +1,8 @@
 //! The documents of this repository: every page is in the summary, every link and anchor has a
 //! target, every formula can be typeset.
 
+#![expect(clippy::disallowed_methods, reason = "a folder of a test")]
+
 use std::path::Path;
 
 use nanotap::control::Control;

@@ -439,7 +439,8 @@ impl Inversion<'_> {
             if (MOVED..PASSES - 1).contains(&pass) {
                 let by = estimate.by();
                 let most = MAX_MOVED_RESIDUAL * error;
-                let residual = residual.clamp(-most, most);
+                // Of a row without an error bound nothing is cut.
+                let residual = residual.max(-most).min(most);
                 for index in 0..2 {
                     let share = row.errors[index].powi(2) * by[index] / error.powi(2);
                     let there = row.values[index] - share * residual;

@@ -63,6 +63,20 @@ impl Observer for () {
     fn switch(&mut self, _: &System, _: &Switch, _: &Exit, _: &[f64]) {}
 }
 
+impl<A: Observer> Observer for Option<A> {
+    const PERTURBS: bool = A::PERTURBS;
+    fn step(&mut self, system: &System, solver: &mut Solver, step: &Step, end: &[f64]) {
+        if let Some(observer) = self {
+            observer.step(system, solver, step, end);
+        }
+    }
+    fn switch(&mut self, system: &System, switch: &Switch, exit: &Exit, modal: &[f64]) {
+        if let Some(observer) = self {
+            observer.switch(system, switch, exit, modal);
+        }
+    }
+}
+
 impl<A: Observer, B: Observer> Observer for (&mut A, &mut B) {
     const PERTURBS: bool = A::PERTURBS || B::PERTURBS;
     fn step(&mut self, system: &System, solver: &mut Solver, step: &Step, end: &[f64]) {

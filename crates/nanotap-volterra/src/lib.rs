@@ -129,7 +129,7 @@ pub type Complex = nalgebra::Complex<f64>;
 pub use coarse::Coarse;
 pub use error::{Refusal, VolterraError};
 pub use flow::{Flow, Switch};
-pub use force_sums::ForceSums;
+pub use force_sums::{ForceSums, SurfaceRun, SurfaceSums};
 pub use kernel::Kernel;
 pub use law::{Approach, Exit, Force, ForceLaw, Guard, Remark, Surface};
 pub use modes::Modes;

@@ -545,7 +545,7 @@ impl Trajectory {
 }
 
 /// Finds the zero between two points of opposite sign: the Illinois rule, then halving.
-fn bisect(f: &impl Fn(f64) -> f64, mut a: (f64, f64), mut b: (f64, f64)) -> f64 {
+pub(crate) fn bisect(f: &impl Fn(f64) -> f64, mut a: (f64, f64), mut b: (f64, f64)) -> f64 {
     for _ in 0..60 {
         let u = (a.0 * b.1 - b.0 * a.1) / (b.1 - a.1);
         let u = if u > a.0.min(b.0) && u < a.0.max(b.0) {

@@ -89,11 +89,7 @@ fn text(case: &GivenCase, report: &ForceCurveReport) -> String {
     row(
         "indentation",
         length(summary.indentation),
-        if report.driven {
-            "minus the least separation at drive phase 0"
-        } else {
-            "minus the least separation"
-        },
+        "minus the least separation",
     );
     row(
         "work of adhesion",

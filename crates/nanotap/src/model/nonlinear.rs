@@ -443,6 +443,84 @@ impl Nonlinear {
         }
         curve
     }
+
+    /// Returns the pieces of a quasi-static motion of the gap, in units of g₀, from the first of
+    /// these values to the next and so on: on each the law is on one branch, and smooth.
+    pub(crate) fn sweep(&self, gaps: &[f64]) -> Vec<SweepPiece> {
+        let law = self.static_law();
+        let mut pieces = Vec::new();
+        let Some(first) = gaps.first() else {
+            return pieces;
+        };
+        let mut branch = law.branch_at(*first, -1.0);
+        for pair in gaps.windows(2) {
+            let (mut from, to) = (pair[0], pair[1]);
+            let rises = to > from;
+            // At most every branch is passed on the way.
+            for _ in 0..=law.branches() {
+                let exits = law.exits(branch).into_iter().filter_map(|exit| {
+                    let at = match exit.guard {
+                        Guard::Falls(level) => (!rises && level > to).then(|| level.min(from)),
+                        Guard::Rises(level) => (rises && level < to).then(|| level.max(from)),
+                        Guard::Turns => rises.then_some(from),
+                        Guard::Own(index) => first_negative(&**law, index, [from, to]),
+                    };
+                    Some((at?, exit.target))
+                });
+                let away = |exit: &(f64, usize)| (exit.0 - from).abs();
+                let Some((at, target)) = exits.min_by(|a, b| away(a).total_cmp(&away(b))) else {
+                    break;
+                };
+                if at != from {
+                    pieces.push(SweepPiece {
+                        branch,
+                        gaps: [from, at],
+                    });
+                }
+                (from, branch) = (at, target);
+            }
+            pieces.push(SweepPiece {
+                branch,
+                gaps: [from, to],
+            });
+        }
+        pieces
+    }
+}
+
+/// A piece of a quasi-static motion of the gap on one branch of the law.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct SweepPiece {
+    /// Number of the branch.
+    pub(crate) branch: usize,
+    /// Gaps at which it begins and ends, in units of g₀.
+    pub(crate) gaps: [f64; 2],
+}
+
+/// Number of gaps between two at which a law's own guard is evaluated.
+const GUARD_POINTS: u32 = 400;
+
+/// Returns the first gap between two at which a law's own guard is negative at rest.
+fn first_negative(law: &dyn ForceLaw, index: usize, [from, to]: [f64; 2]) -> Option<f64> {
+    let value = |gap: f64| law.guard(index, gap, 0.0).value;
+    let at = |k: u32| from + (to - from) * f64::from(k) / f64::from(GUARD_POINTS);
+    let k = (0..=GUARD_POINTS).find(|k| value(at(*k)) < 0.0)?;
+    let Some(before) = k.checked_sub(1) else {
+        return Some(from);
+    };
+    let (mut inside, mut outside) = (at(before), at(k));
+    for _ in 0..200 {
+        let middle = 0.5 * (inside + outside);
+        if middle == inside || middle == outside {
+            break;
+        }
+        if value(middle) < 0.0 {
+            outside = middle;
+        } else {
+            inside = middle;
+        }
+    }
+    Some(outside)
 }
 
 /// Largest number of cached kernels: a study builds many models on the same lever.

@@ -8,11 +8,12 @@ use nanotap_arithmetic::ComplexFunctions as _;
 use nanotap_flow::flow::{Observer, SegmentView};
 use nanotap_flow::regime::ModalOutput;
 use nanotap_flow::sensitivity::SystemTangent;
+use nanotap_flow::trajectory::{Piece, PiecewiseSignal};
 use nanotap_flow::{
     Complex, Drive, HarmonicVector, Output, PreparedBasis, Regime, Reset, SpectralBasis, System,
     Transition,
 };
-use nanotap_volterra::ForceSums;
+use nanotap_volterra::{ForceSums, SurfaceSums};
 
 use crate::Error;
 use crate::model::Model;
@@ -343,12 +344,21 @@ pub(super) fn moved_system(
 /// Integrals of the force of a piecewise-linear sample, in closed form.
 #[derive(Clone, Debug)]
 pub(super) struct LinearSums {
-    /// Angular frequency of the harmonic, where it is not the drive's.
-    omega: Option<f64>,
     /// Force and height rate by regime; `None` where no force acts and nothing touches.
     regimes: Vec<Option<ContactOutputs>>,
     terms: Vec<Term>,
     pub(super) sums: ForceSums,
+    /// Height of the tip by regime, and the motion of the surface: what [`SurfaceSums`] are of.
+    surface: Option<MovingSurface>,
+}
+
+/// A surface that moves as `Re(amplitude · e^{iωt})`, with `t` from drive phase 0.
+#[derive(Clone, Debug)]
+struct MovingSurface {
+    heights: Vec<ModalOutput>,
+    frequency: f64,
+    amplitude: Complex,
+    sums: SurfaceSums,
 }
 
 /// Force and rate of the tip's height in contact.
@@ -358,8 +368,6 @@ struct ContactOutputs {
     rate: ModalOutput,
     touches: bool,
     rates: Vec<Complex>,
-    /// Largest modulus of `rates`, per unit of the model's time.
-    fastest: f64,
 }
 
 /// `e^{rate · s}` with its amplitudes in force and height rate.
@@ -374,14 +382,12 @@ struct Term {
 
 impl LinearSums {
     /// Prepares the sums of the forces of a model along motions of `moved`. The force changes with
-    /// the gap by `force_by_gap` in each regime; the harmonic is at `omega`, or without it at the
-    /// drive frequency.
+    /// the gap by `force_by_gap` in each regime; the harmonic is at the drive frequency.
     pub(super) fn new(
         model: &Model,
         moved: &System,
         force_by_gap: &[f64],
         motion: SampleMotion,
-        omega: Option<f64>,
     ) -> Self {
         let drive = moved.drive();
         let height = motion.output(model, &model.height, 1.0);
@@ -397,74 +403,136 @@ impl LinearSums {
                 force: regime.project(&force),
                 rate: regime.project(&rate),
                 touches: model.contact[r],
-                fastest: rates.iter().map(|z| z.modulus()).fold(0.0, f64::max),
                 rates,
             })
         });
         Self {
-            omega,
             regimes: regimes.collect(),
             terms: Vec::new(),
             sums: ForceSums::default(),
+            surface: None,
+        }
+    }
+
+    /// Adds [`SurfaceSums`] of a surface that moves at an angular frequency.
+    pub(super) fn over_surface(
+        self,
+        model: &Model,
+        moved: &System,
+        motion: SampleMotion,
+        frequency: f64,
+    ) -> Self {
+        let height = motion.output(model, &model.height, 1.0);
+        let regimes = moved.regimes().iter();
+        Self {
+            surface: Some(MovingSurface {
+                heights: regimes.map(|regime| regime.project(&height)).collect(),
+                frequency,
+                amplitude: Complex::new(0.0, 0.0),
+                sums: SurfaceSums::default(),
+            }),
+            ..self
         }
     }
 
     /// Sets all sums to zero before a run.
-    pub(super) const fn begin(&mut self) {
-        self.sums = ForceSums {
-            impulse: 0.0,
-            harmonic: Complex::new(0.0, 0.0),
-            work: 0.0,
-            peak: 0.0,
-            lowest: 0.0,
-            contact: 0.0,
-        };
+    pub(super) fn begin(&mut self) {
+        self.sums = ForceSums::default();
     }
 
-    /// Returns the force and its rate at the time `after` from the beginning of the stretch.
-    fn force_at(&self, after: f64, constant: f64) -> (f64, f64) {
-        let mut force = (constant, 0.0);
-        for term in &self.terms {
-            let value = term.force * exponential(term.rate * after);
-            force.0 += value.re;
-            force.1 += (value * term.rate).re;
+    /// As [`Self::begin`], over a surface that moves with this complex amplitude, counted from drive
+    /// phase 0.
+    pub(super) fn begin_over(&mut self, amplitude: Complex) {
+        self.begin();
+        if let Some(surface) = &mut self.surface {
+            surface.sums = SurfaceSums::default();
+            surface.amplitude = amplitude;
         }
-        force
     }
 
-    /// Raises the peak to the largest force on a stretch, and lowers the lowest likewise.
-    fn widen(&mut self, length: f64, fastest: f64, constant: f64) {
-        let pieces = (1.5 * fastest * length).ceil().clamp(1.0, 200.0) as usize;
-        let width = length / pieces as f64;
-        let mut before = self.force_at(0.0, constant);
-        self.sums.include(before.0);
-        for k in 1..=pieces {
-            let end = width * k as f64;
-            let here = self.force_at(end, constant);
-            self.sums.include(here.0);
-            if before.1 * here.1 < 0.0 {
-                let sign = before.1.signum();
-                let (mut low, mut high) = (end - width, end);
-                let (mut at_low, mut at_high) = (sign * before.1, sign * here.1);
-                // Secant steps, kept inside.
-                for _ in 0..20 {
-                    let at = low + (high - low) * at_low / (at_low - at_high);
-                    let (force, rate) = self.force_at(at, constant);
-                    self.sums.include(force);
-                    if rate.abs() * (high - low) <= 1e-15 * force.abs() {
+    /// Returns the sums of the surface that moves; empty without one.
+    pub(super) fn surface(&self) -> SurfaceSums {
+        self.surface
+            .as_ref()
+            .map_or_else(SurfaceSums::default, |surface| surface.sums)
+    }
+
+    /// Returns the force at the time `after` from the beginning of the stretch.
+    fn force_at(&self, after: f64, constant: f64) -> f64 {
+        let terms = self.terms.iter();
+        let of = |term: &Term| (term.force * exponential(term.rate * after)).re;
+        constant + terms.map(of).sum::<f64>()
+    }
+
+    /// Returns `∫ F e^{−iωt} dt` between two times after the beginning of the stretch, which is at
+    /// drive phase `phase`.
+    fn harmonic(&self, [from, to]: [f64; 2], phase: f64, constant: f64, omega: f64) -> Complex {
+        let minus = Complex::new(0.0, -omega);
+        let length = to - from;
+        let own = |rate: Complex| moment(rate, length, exponential(rate * length));
+        let mut sum = own(minus) * constant;
+        for term in &self.terms {
+            let force = term.force * exponential(term.rate * from);
+            let mirrored = own(term.rate.conj() + minus);
+            sum += (force * own(term.rate + minus) + force.conj() * mirrored) * 0.5;
+        }
+        sum * exponential(minus * (phase + from))
+    }
+
+    /// Adds the work of the force on the surface over a stretch, split where the force changes its
+    /// sign; `turns` are the times after its beginning at which the force has extrema.
+    fn add_work(&mut self, length: f64, phase: f64, constant: f64, turns: &[f64]) {
+        let Some(surface) = &self.surface else {
+            return;
+        };
+        let (omega, mut sums) = (surface.frequency, surface.sums);
+        let by_rate = surface.amplitude * Complex::new(0.0, omega);
+        let mut ends = Vec::new();
+        let mut last = (0.0, self.force_at(0.0, constant));
+        for end in turns.iter().copied().chain([length]) {
+            let here = (end, self.force_at(end, constant));
+            if last.1 * here.1 < 0.0 {
+                let (mut low, mut high) = (last.0, here.0);
+                loop {
+                    let middle = 0.5 * (low + high);
+                    if middle <= low || middle >= high {
                         break;
                     }
-                    if sign * rate > 0.0 {
-                        (low, at_low) = (at, sign * rate);
-                        at_high *= 0.5;
+                    if self.force_at(middle, constant) * last.1 > 0.0 {
+                        low = middle;
                     } else {
-                        (high, at_high) = (at, sign * rate);
-                        at_low *= 0.5;
+                        high = middle;
                     }
                 }
+                ends.push(high);
             }
-            before = here;
+            last = here;
         }
+        ends.push(length);
+        let mut from = 0.0;
+        for end in ends {
+            let harmonic = self.harmonic([from, end], phase, constant, omega);
+            let work = (by_rate * harmonic.conj()).re;
+            sums.work += work;
+            if self.force_at(0.5 * (from + end), constant) < 0.0 {
+                sums.attracted_work += work;
+            }
+            from = end;
+        }
+        if let Some(surface) = &mut self.surface {
+            surface.sums = sums;
+        }
+    }
+}
+
+/// Returns an output of a stretch, to find its extrema.
+fn signal(segment: &SegmentView<'_>, output: &ModalOutput) -> PiecewiseSignal {
+    PiecewiseSignal {
+        pieces: vec![Piece {
+            start: 0.0,
+            length: segment.length,
+            signal: segment.signal(output),
+        }],
     }
 }
 
@@ -490,13 +558,24 @@ fn moment(rate: Complex, length: f64, end: Complex) -> Complex {
 
 impl Observer for LinearSums {
     fn segment(&mut self, segment: &SegmentView<'_>) {
-        let Some(outputs) = &self.regimes[segment.regime] else {
-            return;
-        };
         let length = segment.length;
         if length <= 0.0 {
             return;
         }
+        let outputs = self.regimes[segment.regime].as_ref();
+        if let Some(surface) = &mut self.surface {
+            let height = signal(segment, &surface.heights[segment.regime]);
+            if let Some((least, _)) = height.range() {
+                surface.sums.least_gap = surface.sums.least_gap.min(least.value);
+            }
+            if outputs.is_some_and(|outputs| outputs.touches) {
+                let end = segment.phase + length;
+                surface.sums.add_touch([segment.phase, end]);
+            }
+        }
+        let Some(outputs) = outputs else {
+            return;
+        };
         if outputs.touches {
             self.sums.contact += length;
         }
@@ -519,27 +598,18 @@ impl Observer for LinearSums {
             speed: outputs.rate.tones[0] * phasor,
             end: turn,
         });
-        let (constant, fastest) = (outputs.force.constant, outputs.fastest);
+        let constant = outputs.force.constant;
         let moving = outputs.rate.constant;
-        let harmonic_turn = self
-            .omega
-            .map(|omega| exponential(Complex::new(0.0, omega * length)));
-        let harmonic_turn = harmonic_turn.unwrap_or(turn);
-        let omega = self.omega.unwrap_or(drive.frequencies()[0]);
-        let minus = Complex::new(0.0, -omega);
+        let minus = Complex::new(0.0, -drive.frequencies()[0]);
         let mut impulse = constant * length;
-        let mut harmonic = moment(minus, length, harmonic_turn.conj()) * constant;
+        let mut harmonic = moment(minus, length, turn.conj()) * constant;
         let mut work = constant * moving * length;
         for (k, a) in self.terms.iter().enumerate() {
             let own = moment(a.rate, length, a.end);
             impulse += (a.force * own).re;
             work += constant * (a.speed * own).re + moving * (a.force * own).re;
-            let direct = moment(a.rate + minus, length, a.end * harmonic_turn.conj());
-            let mirrored = moment(
-                a.rate.conj() + minus,
-                length,
-                a.end.conj() * harmonic_turn.conj(),
-            );
+            let direct = moment(a.rate + minus, length, a.end * turn.conj());
+            let mirrored = moment(a.rate.conj() + minus, length, a.end.conj() * turn.conj());
             harmonic += (a.force * direct + a.force.conj() * mirrored) * 0.5;
             // ∫ Re(a e^{λs}) Re(b e^{μs}), the pairs (a, b) and (b, a) together.
             for b in &self.terms[k..] {
@@ -554,11 +624,16 @@ impl Observer for LinearSums {
             }
         }
         self.sums.impulse += impulse;
-        let start = self
-            .omega
-            .map(|omega| exponential(Complex::new(0.0, omega * segment.phase)));
-        self.sums.harmonic += harmonic * start.unwrap_or(phasor).conj();
+        self.sums.harmonic += harmonic * phasor.conj();
         self.sums.work += work;
-        self.widen(length, fastest, constant);
+        let force = signal(segment, &outputs.force);
+        let extrema = force.local_extrema();
+        self.sums.include(self.force_at(0.0, constant));
+        self.sums.include(self.force_at(length, constant));
+        for extremum in &extrema {
+            self.sums.include(extremum.value);
+        }
+        let turns: Vec<f64> = extrema.iter().map(|extremum| extremum.time).collect();
+        self.add_work(length, segment.phase, constant, &turns);
     }
 }

@@ -421,7 +421,7 @@ impl Follower<'_> {
     /// Converts a motion that the loops hold to the readings of an instrument, in SI.
     fn point(&self, held: &Held) -> Result<BimodalPoint, Error> {
         let scales = &self.view.scales;
-        let forces = held.closed.forces()?;
+        let forces = held.closed.forces(&self.loops.lever)?;
         let readings = [0, 1].map(|k| self.readings(held, k));
         let touches = forces.largest > 0.0;
         Ok(BimodalPoint {

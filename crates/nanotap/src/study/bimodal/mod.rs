@@ -142,13 +142,13 @@ pub struct BimodalPoint {
     pub tones: [ToneReading; 2],
     /// Time mean of the force on the tip in N.
     pub mean_force: f64,
-    /// Largest force on the tip in N, over the phases that are computed.
+    /// Largest force on the tip in N.
     #[serde(rename = "F_max")]
     pub peak_force: f64,
-    /// Lowest force on the tip in N, over the phases that are computed.
+    /// Lowest force on the tip in N.
     #[serde(rename = "F_min")]
     pub least_force: f64,
-    /// Least height of the tip over the undeformed surface in m, over the phases that are computed.
+    /// Least height of the tip over the undeformed surface in m.
     pub closest: f64,
     /// Factor by which a small disturbance grows in a period of the first tone at constant drives.
     pub growth: f64,

@@ -42,6 +42,13 @@ const RESOLVED: f64 = 1e-6;
 const PHASES: [usize; 2] = [9, 129];
 /// Number of phases at which the torus is fitted to a computed motion.
 const SETTLED_PHASES: usize = 33;
+/// Least number of phases at which extrema are looked for.
+const SCANNED: usize = 33;
+/// Part of the range of a quantity over the phases by which a local extremum may fall short of the
+/// extreme and still be refined.
+const CONTENDING: f64 = 0.1;
+/// Golden sections of the phases around an extremum: an error of the phase enters squared.
+const SECTIONS: usize = 18;
 /// Size of the last harmonics over that of the motion, below which half as many phases suffice.
 pub(super) const OVER_RESOLVED: f64 = 1e-9;
 
@@ -455,11 +462,12 @@ impl Closed {
         Ok(sum)
     }
 
-    /// Computes force on the tip and height along the motion.
+    /// Computes force on the tip and height along the motion of `lever`, the one of the torus. The
+    /// extrema are those over all phases, not only those of the torus.
     ///
     /// # Errors
     /// When the flow fails.
-    pub(super) fn forces(&self) -> Result<Forces, Error> {
+    pub(super) fn forces(&self, lever: &Cantilever) -> Result<Forces, Error> {
         let mut found = Forces {
             tones: [Complex::new(0.0, 0.0); 2],
             mean: 0.0,
@@ -472,15 +480,37 @@ impl Closed {
             let force = recording.force(model);
             self.add_tones(&mut found.tones, k, &force);
             found.mean += force.mean() / self.models.len() as f64;
-            if let Some((least, most)) = force.range() {
-                found.largest = found.largest.max(most.value);
-                found.lowest = found.lowest.min(least.value);
-            }
-            if let Some((least, _)) = recording.curve(&model.height).range() {
-                found.closest = found.closest.min(least.value);
-            }
         }
+        let count = self.models.len();
+        let scanned = count * SCANNED.div_ceil(count);
+        let phases = (0..scanned).map(|k| k as f64 / scanned as f64);
+        let seen = phases
+            .map(|turns| self.extremes(lever, turns))
+            .collect::<Result<Vec<_>, _>>()?;
+        let of = |quantity: usize| {
+            let values: Vec<f64> = seen.iter().map(|extremes| extremes[quantity]).collect();
+            refined(&values, |turns| Ok(self.extremes(lever, turns)?[quantity]))
+        };
+        (found.largest, found.lowest, found.closest) = (of(0)?, -of(1)?, -of(2)?);
         Ok(found)
+    }
+
+    /// Returns largest force, minus the lowest force and minus the least height in the period that
+    /// begins at a phase of the second tone, in turns.
+    fn extremes(&self, lever: &Cantilever, turns: f64) -> Result<[f64; 3], Error> {
+        let count = self.models.len();
+        let model = Model::cantilever(&self.drives.on(lever, TAU * turns))
+            .map_err(|error| Error::numerics(error.to_string()))?;
+        let mut state = combined(&weights(count, turns), &self.torus.states);
+        let first = state.len() - ModelMap::new(&model).discrete_entries();
+        state[first..]
+            .iter_mut()
+            .for_each(|entry| *entry = entry.round());
+        let recording = Recording::of(&model, &state, 1)?;
+        let none = || Error::numerics("the motion under two tones is empty");
+        let (least, most) = recording.force(&model).range().ok_or_else(none)?;
+        let height = recording.curve(&model.height).range().ok_or_else(none)?;
+        Ok([most.value, -least.value, -height.0.value])
     }
 
     /// Adds the share of the phase with this index in the components of a curve at both tones. The
@@ -540,9 +570,56 @@ impl Closed {
     }
 }
 
+/// Returns the maximum of a function of the phase in turns with these values at equidistant phases
+/// from 0 on: golden sections around every local maximum that may be the largest.
+fn refined(values: &[f64], of: impl Fn(f64) -> Result<f64, Error>) -> Result<f64, Error> {
+    let golden = 0.5 * (5.0_f64.sqrt() - 1.0);
+    let count = values.len();
+    let largest = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    let least = values.iter().copied().fold(f64::INFINITY, f64::min);
+    let floor = largest - CONTENDING * (largest - least);
+    let mut found = largest;
+    for (k, value) in values.iter().enumerate() {
+        let (before, after) = (values[(k + count - 1) % count], values[(k + 1) % count]);
+        if *value < floor || !(*value >= before && *value > after) {
+            continue;
+        }
+        let [mut low, mut high] = [k as f64 - 1.0, k as f64 + 1.0].map(|k| k / count as f64);
+        let mut left = high - golden * (high - low);
+        let mut right = low + golden * (high - low);
+        let (mut at_left, mut at_right) = (of(left)?, of(right)?);
+        for _ in 0..SECTIONS {
+            if at_left > at_right {
+                (high, right, at_right) = (right, left, at_left);
+                left = high - golden * (high - low);
+                at_left = of(left)?;
+            } else {
+                (low, left, at_left) = (left, right, at_right);
+                right = low + golden * (high - low);
+                at_right = of(right)?;
+            }
+        }
+        found = found.max(at_left).max(at_right);
+    }
+    Ok(found)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_maximum_between_equidistant_phases_is_found() {
+        // Two maxima, the higher one at 0.234 of a turn between the phases.
+        let of = |turns: f64| {
+            let angle = TAU * (turns - 0.234);
+            (2.0 * angle).cos() + 0.02 * angle.cos()
+        };
+        let values: Vec<f64> = (0..33).map(|k| of(f64::from(k) / 33.0)).collect();
+        let found = refined(&values, |turns| Ok(of(turns))).unwrap();
+        assert!((found - 1.02).abs() < 1e-8, "{found}");
+        assert_eq!(refined(&[0.5; 9], |_| Ok(0.5)).unwrap(), 0.5);
+    }
 
     #[test]
     fn trigonometric_polynomials_are_interpolated_exactly() {

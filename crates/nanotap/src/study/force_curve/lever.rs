@@ -3,10 +3,11 @@
 use std::sync::Arc;
 
 use nalgebra::DVector;
+use nanotap_flow::trajectory::Recorder;
 use nanotap_flow::{Complex, Flow, Output};
-use nanotap_volterra::{ForceSums, Tone};
+use nanotap_volterra::{ForceSums, SurfaceSums, Tone};
 
-use super::path::Plan;
+use super::path::{Plan, Stretch};
 use crate::Error;
 use crate::model::nonlinear::Nonlinear;
 use crate::model::parameter::Parameter;
@@ -29,9 +30,22 @@ pub(super) struct Lever {
     engine: Engine,
     model: Model,
     readout: Readout,
+    /// Angular frequency at which the sample moves, model units.
+    omega: f64,
     /// State vector of the model at the end of the last stretch.
     state: Vec<f64>,
+    /// The beam's part of it at the last beginning of a drive period.
     before: Vec<f64>,
+}
+
+/// Results of a stretch.
+#[derive(Clone, Debug)]
+pub(super) struct Sums {
+    pub(super) force: ForceSums,
+    /// Of the sample's motion; times are those of the drive period.
+    pub(super) surface: SurfaceSums,
+    /// The requested signals, in order.
+    pub(super) signals: Vec<Signals>,
 }
 
 #[derive(Clone, Debug)]
@@ -65,11 +79,11 @@ struct Law {
 
 impl Lever {
     /// The lever of a plan, at rest at the first distance; in the free steady motion about it, if it
-    /// is driven. The harmonic of forces is that at `omega`.
+    /// is driven.
     ///
     /// # Errors
     /// When the flow cannot be set up.
-    pub(super) fn new(plan: &Plan<'_>, omega: Option<f64>) -> Result<Self, Error> {
+    pub(super) fn new(plan: &Plan<'_>) -> Result<Self, Error> {
         let model = &plan.model;
         let cantilever = &plan.view.cantilever;
         let beam = 2 * cantilever.modes;
@@ -86,8 +100,9 @@ impl Lever {
                 let system = moved_system(model, &tangent.system, motion)?;
                 let by_gap: Vec<f64> = tangent.force.iter().map(|f| f.constant).collect();
                 let forces = model.force.iter().zip(&by_gap);
+                let sums = LinearSums::new(model, &system, &by_gap, motion);
                 Engine::Linear(Box::new(Linear {
-                    sums: LinearSums::new(model, &system, &by_gap, motion, omega),
+                    sums: sums.over_surface(model, &system, motion, plan.path.omega),
                     height: motion.output(model, &model.height, 1.0),
                     forces: forces
                         .map(|(force, by)| motion.output(model, force, *by))
@@ -115,7 +130,7 @@ impl Lever {
                 }))
             }
         };
-        let mut state = plan.statics.rest_state(gap)?;
+        let mut state = plan.moving_statics.rest_state(gap)?;
         if plan.driven {
             let tone = &model.system.regimes()[0].response().tones[0];
             for (entry, z) in state.iter_mut().zip(tone.iter()) {
@@ -126,100 +141,130 @@ impl Lever {
             engine,
             readout: Readout::new(model, beam, 1.0)?,
             model: model.clone(),
+            omega: plan.path.omega,
             before: vec![0.0; beam],
             state,
         })
     }
 
-    /// Advances by `length` from drive phase `phase` (as a time), at most to the end of the drive
-    /// period, while the distance is `c + Re((s − i u) e^{iωt})` from now on.
+    /// Advances by a stretch, while the distance is `c + Re((s − i u) e^{iωt})` from its start on,
+    /// and reads the signals at the times `at`, in order, from the start of the curve.
     ///
     /// # Errors
     /// When the flow fails.
     pub(super) fn advance(
         &mut self,
-        phase: f64,
-        length: f64,
+        stretch: &Stretch,
         [c, s, u]: [f64; 3],
-        omega: f64,
-        harmonic: f64,
-    ) -> Result<ForceSums, MotionError> {
+        at: &[f64],
+    ) -> Result<Sums, MotionError> {
+        let Stretch { phase, length, .. } = *stretch;
         let beam = self.before.len();
-        self.before.copy_from_slice(&self.state[..beam]);
+        if phase == 0.0 {
+            self.before.copy_from_slice(&self.state[..beam]);
+        }
+        let end = phase + length;
+        let within = |time: &f64| (time - stretch.start + phase).clamp(phase, end);
+        let recorded = !at.is_empty();
+        let turned = Complex::new(s, -u) * turn(-self.omega * phase);
+        let Self { model, state, .. } = self;
         match &mut self.engine {
             Engine::Linear(lever) => {
-                let n = self.state.len();
-                lever.state[..n].copy_from_slice(&self.state);
+                let n = state.len();
+                lever.state[..n].copy_from_slice(state);
                 lever.state[n..].copy_from_slice(&[c - lever.gap, s, u]);
                 lever.flow.start(&lever.state, phase)?;
-                lever.sums.begin();
-                let end = phase + length;
-                let period = self.model.period();
-                if end >= period * (1.0 - 1e-13) {
-                    lever.flow.run_period(&mut lever.sums)?;
-                } else {
-                    lever.flow.run_until(end, &mut lever.sums)?;
+                lever.sums.begin_over(turned);
+                let whole = end >= model.period() * (1.0 - 1e-13);
+                let mut recorder = Recorder::default();
+                let mut both = (&mut lever.sums, &mut recorder);
+                match (whole, recorded) {
+                    (true, true) => lever.flow.run_period(&mut both)?,
+                    (true, false) => lever.flow.run_period(both.0)?,
+                    (false, true) => lever.flow.run_until(end, &mut both)?,
+                    (false, false) => lever.flow.run_until(end, both.0)?,
                 }
                 lever.flow.state(&mut lever.state);
-                self.state.copy_from_slice(&lever.state[..n]);
-                Ok(lever.sums.sums)
+                state.copy_from_slice(&lever.state[..n]);
+                let signals = if recorded {
+                    let trajectory = recorder.finish(Arc::clone(lever.flow.system()));
+                    let read = |time: &f64| {
+                        let phase = within(time);
+                        let regime = trajectory.segment_at(phase)?.regime;
+                        Some(lever.signals(model, regime, &trajectory.state_at(phase)?, phase))
+                    };
+                    at.iter().filter_map(read).collect()
+                } else {
+                    Vec::new()
+                };
+                Ok(Sums {
+                    force: lever.sums.sums,
+                    surface: lever.sums.surface(),
+                    signals,
+                })
             }
             Engine::Nonlinear(lever) => {
-                let turned = Complex::new(s, -u) * turn(-omega * phase);
                 let system = lever.flow.system_mut();
                 system.set_offset(lever.offset + c)?;
                 system.set_gap_tone(lever.tone, turned)?;
                 let n = system.dimension();
-                let memory = self.state.get(n).filter(|memory| **memory >= 0.0);
+                let memory = state.get(n).filter(|memory| **memory >= 0.0);
                 match memory.map(|memory| memory.round() as usize) {
-                    Some(branch) => lever.flow.start_on(&self.state[..n], phase, branch)?,
-                    None => lever.flow.start(&self.state[..n], phase)?,
+                    Some(branch) => lever.flow.start_on(&state[..n], phase, branch)?,
+                    None => lever.flow.start(&state[..n], phase)?,
                 }
-                let sums = lever.flow.run_with_force_sums(phase + length, harmonic)?;
-                lever.flow.state(&mut self.state[..n]);
-                if let Some(memory) = self.state.get_mut(n) {
+                let omega = model.frequency();
+                let run = lever
+                    .flow
+                    .run_with_surface_sums(end, omega, lever.tone, recorded)?;
+                lever.flow.state(&mut state[..n]);
+                if let Some(memory) = state.get_mut(n) {
                     *memory = lever.flow.branch() as f64;
                 }
-                Ok(sums)
+                let drive = model.system.drive();
+                let trajectory = run.trajectory.as_ref();
+                let read = |time: &f64| {
+                    let phase = within(time);
+                    let sample = trajectory?.at(phase)?;
+                    // A law's memory has no part in the deflection.
+                    let mut state = sample.state.as_slice().to_vec();
+                    state.resize(model.dimension(), 0.0);
+                    Some(Signals {
+                        gap: sample.gap,
+                        deflection: model.tip.at(drive, &state, phase),
+                        force: sample.force,
+                        contact: lever.nonlinear.contact[sample.branch],
+                    })
+                };
+                Ok(Sums {
+                    force: run.force,
+                    surface: run.surface,
+                    signals: at.iter().filter_map(read).collect(),
+                })
             }
         }
     }
 
-    /// Signals at the end of the last stretch, which was at drive phase `phase`.
-    pub(super) fn instant(&self, phase: f64) -> Signals {
-        let drive = self.model.system.drive();
-        match &self.engine {
-            Engine::Linear(lever) => {
-                let regime = lever.flow.regime();
-                let at = |output: &Output| output.at(drive, &lever.state, phase);
-                Signals {
-                    gap: at(&lever.height),
-                    deflection: self.model.tip.at(drive, &self.state, phase),
-                    force: at(&lever.forces[regime]),
-                    contact: self.model.contact[regime],
-                }
-            }
-            Engine::Nonlinear(lever) => {
-                let (gap, rate) = lever.flow.gap();
-                let branch = lever.flow.branch();
-                let system = &lever.nonlinear.system;
-                let second = system.second_argument(phase, rate, &self.state[..system.dimension()]);
-                Signals {
-                    gap,
-                    deflection: self.model.tip.at(drive, &self.state, phase),
-                    force: system.law().force(branch, gap, second).value,
-                    contact: lever.nonlinear.contact[branch],
-                }
-            }
-        }
-    }
-
-    /// Complex amplitude of the deflection at the drive's frequency over the last stretch, a whole
-    /// drive period, and its mean.
+    /// Complex amplitude of the deflection at the drive's frequency over the last drive period, and
+    /// its mean.
     pub(super) fn deflection(&self, sums: &ForceSums) -> (Complex, f64) {
         let ends = self.state.iter().zip(&self.before);
         let change: Vec<f64> = ends.map(|(after, before)| after - before).collect();
         self.readout.deflection(&change, sums)
+    }
+}
+
+impl Linear {
+    /// The signals in a regime at a state with the motion of the sample.
+    fn signals(&self, model: &Model, regime: usize, state: &[f64], phase: f64) -> Signals {
+        let drive = model.system.drive();
+        let at = |output: &Output| output.at(drive, state, phase);
+        Signals {
+            gap: at(&self.height),
+            deflection: model.tip.at(drive, &state[..model.dimension()], phase),
+            force: at(&self.forces[regime]),
+            contact: model.contact[regime],
+        }
     }
 }
 

@@ -15,8 +15,10 @@ use crate::study::without_signal;
 
 /// Largest number of stretches of flow of a curve; more are refused.
 const MAX_STRETCHES: f64 = 50e6;
-/// Phase that the slow sine of a ramp passes in a drive period.
+/// Phase that the slow sine of a ramp passes in a stretch.
 const RAMP_PHASE: f64 = 1e-5;
+/// Two times nearer than this part of a stretch are one.
+const SAME: f64 = 1e-9;
 /// Settling periods where none are given: this many time constants of the lever.
 const SETTLE_CONSTANTS: f64 = 20.0;
 /// Speed of a ramp where none is given, m/s.
@@ -29,11 +31,17 @@ pub(super) struct Plan<'a> {
     pub(super) view: &'a Physical,
     /// Model of the case at the first distance.
     pub(super) model: Model,
+    /// The lever at rest with all of its compliance.
     pub(super) statics: StaticCurve,
+    /// The lever at rest as it moves, with the compliance of its modes alone.
+    pub(super) moving_statics: StaticCurve,
     pub(super) path: Path,
-    /// Time between two points, model units.
-    pub(super) step: f64,
-    /// Number of points of both directions; the start is not one of them.
+    /// Length of a stretch of flow, model units: a drive period of a driven lever, else a part of
+    /// one that is near the lever's own period.
+    pub(super) stretch: f64,
+    /// Number of stretches in a drive period.
+    pub(super) parts: u64,
+    /// Number of points in each direction; the start is not one of them.
     pub(super) points: usize,
     /// Number of drive periods at the first distance before the curve.
     pub(super) settle: usize,
@@ -89,6 +97,79 @@ impl Path {
     pub(super) fn distance(&self, time: f64) -> f64 {
         let [c, s, _] = self.at(time);
         c + s
+    }
+}
+
+/// A stretch of flow.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Stretch {
+    /// Times of its start and end from the start of the curve, model units.
+    pub(super) start: f64,
+    pub(super) end: f64,
+    /// Time of its start within the drive period, model units.
+    pub(super) phase: f64,
+    /// Length in time, to the bit that of the flow.
+    pub(super) length: f64,
+    /// Whether the next one begins a drive period.
+    pub(super) ends_period: bool,
+}
+
+impl Plan<'_> {
+    /// Returns the duration of the curve.
+    pub(super) fn duration(&self) -> f64 {
+        2.0 * self.path.turn
+    }
+
+    /// Returns the stretches from a time to the end: they end with the parts of drive periods, at
+    /// the turn and at the end, whatever the points.
+    pub(super) fn stretches(&self, from: f64) -> impl Iterator<Item = Stretch> {
+        let (length, parts) = (self.stretch, self.parts);
+        let corners = [self.path.turn, self.duration()];
+        let mut time = from;
+        let mut index = (from / length + SAME).floor().max(0.0) as u64;
+        std::iter::from_fn(move || {
+            let corner = corners.into_iter().find(|corner| time < *corner)?;
+            let own = index as f64 * length;
+            let after = if time - own <= SAME * length {
+                0.0
+            } else {
+                time - own
+            };
+            let next = (index + 1) as f64 * length;
+            // An end that rounding alone keeps from a corner is the corner.
+            let near = (next - corner).abs() <= SAME * length;
+            let whole = near || next < corner;
+            let end = if near { corner } else { next.min(corner) };
+            let stretch = Stretch {
+                start: time,
+                end,
+                phase: (index % parts) as f64 * length + after,
+                length: if whole { length - after } else { end - time },
+                ends_period: whole && (index + 1).is_multiple_of(parts),
+            };
+            time = end;
+            index += u64::from(whole);
+            Some(stretch)
+        })
+    }
+
+    /// Returns the times of the points, in order: of a driven lever ends of drive periods.
+    pub(super) fn times(&self) -> impl Iterator<Item = f64> {
+        let count = 2 * self.points;
+        let (turn, end, period) = (self.path.turn, self.duration(), self.stretch);
+        let periods = (end / period + SAME).floor();
+        let driven = self.driven;
+        (1..=count).map(move |point| {
+            let part = point as f64 / count as f64;
+            if !driven {
+                return if point == self.points {
+                    turn
+                } else {
+                    part * end
+                };
+            }
+            (part * periods).round() * period
+        })
     }
 }
 
@@ -173,10 +254,12 @@ impl<'a> Plan<'a> {
                 "give one of them",
             ));
         }
-        let statics = StaticCurve::new(&there, &model)?;
+        let [statics, moving_statics] =
+            [true, false].map(|whole| StaticCurve::new(&there, &model, whole));
+        let (statics, moving_statics) = (statics?, moving_statics?);
         let to = match (near, force) {
             (Some(to), _) => to,
-            (None, Some(force)) => statics
+            (None, Some(force)) => moving_statics
                 .distance_of_force(from, force / view.scales.force)
                 .ok_or_else(|| {
                     Error::option(
@@ -240,7 +323,13 @@ impl<'a> Plan<'a> {
                 "change {points}",
             ));
         }
-        let omega = frequency.map_or(RAMP_PHASE / period, |f| TAU * f * view.scales.time);
+        let parts = if driven {
+            1
+        } else {
+            (period * view.lever.f0 * view.scales.time).round().max(1.0) as u64
+        };
+        let stretch = period / parts as f64;
+        let omega = frequency.map_or(RAMP_PHASE / stretch, |f| TAU * f * view.scales.time);
         let mut path = Path {
             from,
             to,
@@ -248,22 +337,13 @@ impl<'a> Plan<'a> {
             speed,
             turn: speed.map_or(PI / omega, |speed| (from - to) / speed),
         };
-        let mut step = path.turn / points as f64;
-        let mut count = 2 * points;
-        if driven {
-            // Points at ends of drive periods.
-            step = period * (step / period).round().max(1.0);
-            match speed {
-                Some(speed) => {
-                    let each = ((from - to) / (speed * step)).ceil().max(1.0);
-                    path.from = to + each * speed * step;
-                    path.turn = each * step;
-                    count = 2 * each as usize;
-                }
-                None => count = (2.0 * path.turn / step).ceil() as usize,
-            }
+        if let (true, Some(speed)) = (driven, speed) {
+            // It turns at the end of a drive period.
+            let periods = ((from - to) / (speed * period) - SAME).ceil().max(1.0);
+            path.from = to + periods * speed * period;
+            path.turn = periods * period;
         }
-        let stretches = count as f64 * (1.0 + step / period);
+        let stretches = 2.0 * path.turn / stretch;
         if stretches.is_nan() || stretches > MAX_STRETCHES {
             return Err(Error::input(
                 format!(
@@ -277,14 +357,22 @@ impl<'a> Plan<'a> {
             let constant = view.lever.quality_factor / PI;
             (SETTLE_CONSTANTS * constant).ceil().min(1e6) as usize
         });
+        let points = if driven {
+            // No more of them than drive periods.
+            points.min((path.turn / period + SAME).floor().max(1.0) as usize)
+        } else {
+            points
+        };
         Ok(Self {
             model: case.with(key, path.from).model()?,
             case,
             view,
             statics,
+            moving_statics,
             path,
-            step,
-            points: count,
+            stretch,
+            parts,
+            points,
             settle: if driven { settle } else { 0 },
             driven,
             fit: [options.fit_from, options.fit_to],

@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use super::Way;
 use super::fits::{ContactFit, fits};
+use super::lever::Signals;
 use super::path::Plan;
 use super::run::Run;
 use super::statics::{Rest, StaticsFound};
@@ -112,11 +113,10 @@ pub struct ForceCurveSummary {
     pub adhesion_force: f64,
     /// Minus the lowest force of the approach, N.
     pub attraction: f64,
-    /// Indentation: minus the least separation at points and ends of drive periods, m; of a driven
-    /// lever that at drive phase 0.
+    /// Indentation: minus the least separation, m.
     pub indentation: f64,
     /// Work of adhesion of the curve, −∫F dz over the parts of the retract where the sample
-    /// attracts, J.
+    /// attracts, J; of a driven lever over the drive periods in which it attracts on the mean.
     pub adhesion_energy: f64,
     /// Energy lost in the cycle, −∮F dz, J.
     pub energy_lost: f64,
@@ -216,10 +216,12 @@ pub(super) fn report(plan: &Plan<'_>, statics: &StaticsFound, run: &Run) -> Forc
     };
     let span = peak + adhesion;
     let [low, high] = plan.fit.map(|part| part * span - adhesion);
-    let unloading = points.iter().filter(|point| {
-        point.way == Way::Retract && point.contact && (low..=high).contains(&point.force)
-    });
-    let unloading: Vec<(f64, f64)> = unloading.map(|p| (p.separation, p.force)).collect();
+    let in_si = |signals: &Signals| (signals.gap * scales.length, signals.force * scales.force);
+    let unloading = run.unloading.iter().filter(|signals| signals.contact);
+    let unloading: Vec<(f64, f64)> = unloading
+        .map(in_si)
+        .filter(|(_, force)| (low..=high).contains(force))
+        .collect();
     let fits = match radius {
         Some(radius) if !plan.driven => fits(&unloading, radius, adhesion, sample_modulus),
         _ => Vec::new(),
@@ -238,8 +240,7 @@ pub(super) fn report(plan: &Plan<'_>, statics: &StaticsFound, run: &Run) -> Forc
             frequency / plan.view.lever.f0
         ));
     }
-    let ends_in_contact = points.last().is_some_and(|point| point.contact);
-    if ends_in_contact {
+    if run.ends_in_contact {
         warnings.push(
             "the tip still touches at the end of the retract: the adhesion force and the energies \
              are those of an open curve; give a larger {from}"
@@ -247,8 +248,11 @@ pub(super) fn report(plan: &Plan<'_>, statics: &StaticsFound, run: &Run) -> Forc
         );
     }
     if fits.is_empty() && !plan.driven && radius.is_some() && peak > 0.0 {
-        warnings
-            .push("too few points of the unloading part for a fit: give more {points}".to_owned());
+        warnings.push(
+            "no fits: the forces of the unloading part do not span the range of {fit_from} to \
+             {fit_to}"
+                .to_owned(),
+        );
     }
     let distance = |z: Option<f64>| z.map(|z| z * scales.length);
     let (snap_in, pull_off) = (distance(run.contact_begin), distance(run.contact_end));
@@ -261,7 +265,7 @@ pub(super) fn report(plan: &Plan<'_>, statics: &StaticsFound, run: &Run) -> Forc
         from: plan.path.from * scales.length,
         to: plan.path.to * scales.length,
         speed: speed * scales.velocity,
-        duration: plan.points as f64 * plan.step * scales.time,
+        duration: plan.duration() * scales.time,
         driven: plan.driven,
         stretches: run.stretches,
         adhesion,

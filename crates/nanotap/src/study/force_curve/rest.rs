@@ -36,7 +36,7 @@ impl RestLever {
     pub(crate) fn of(case: &Case) -> Result<Self, Error> {
         let view = physical(case)?;
         Ok(Self {
-            statics: StaticCurve::new(case, &case.model()?)?,
+            statics: StaticCurve::new(case, &case.model()?, true)?,
             length: view.scales.length,
             force: view.scales.force,
         })

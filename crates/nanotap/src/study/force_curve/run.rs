@@ -1,15 +1,19 @@
-//! The run along the path: points, extrema and energies.
+//! The run along the path: points, extrema, events and energies. All but the points follow from the
+//! motion itself, whose stretches do not depend on the points.
 
 use nanotap_arithmetic::ComplexFunctions as _;
 use nanotap_dynamics::Control;
-use nanotap_flow::Complex;
+use nanotap_volterra::ForceSums;
 
 use super::Way;
-use super::lever::{Lever, Signals};
-use super::path::Plan;
+use super::lever::{Lever, Signals, Sums};
+use super::path::{Plan, Stretch};
 use crate::Error;
 use crate::model::MotionError;
 use crate::observe::lag;
+
+/// Number of instants between the turn and the end of contact to which the fits go.
+const FIT_POINTS: usize = 500;
 
 /// A point of the curve, in the model's units.
 #[derive(Clone, Copy, Debug)]
@@ -30,19 +34,85 @@ pub(super) struct Run {
     pub(super) peak_force: f64,
     /// Lowest force of approach and of retract, at most 0.
     pub(super) lowest: [f64; 2],
-    /// Least height of the tip at points and ends of stretches.
+    /// Least height of the tip.
     pub(super) least_gap: f64,
     /// Distance at which the tip first touches on the approach, and last on the retract.
     pub(super) contact_begin: Option<f64>,
     pub(super) contact_end: Option<f64>,
+    /// Whether the tip touches at the end; of a driven lever, in the last drive period.
+    pub(super) ends_in_contact: bool,
     /// Energy lost in the cycle, `−∮ F dz`.
     pub(super) energy_lost: f64,
-    /// Work of adhesion, `−∫ F dz` where the force attracts on the retract.
+    /// Work of adhesion, `−∫ F dz` where the force attracts on the retract; of a driven lever over
+    /// the drive periods in which it does so on the mean.
     pub(super) adhesion_energy: f64,
     /// Energy that the tip gives to the sample.
     pub(super) dissipation: f64,
+    /// Signals at equally spaced times between the turn and the end of contact; empty for a driven
+    /// lever.
+    pub(super) unloading: Vec<Signals>,
     /// Number of stretches of flow that were followed.
     pub(super) stretches: usize,
+}
+
+/// The lever on its path.
+#[derive(Clone)]
+struct Course<'a> {
+    plan: &'a Plan<'a>,
+    control: &'a Control<'a>,
+    lever: Lever,
+}
+
+impl Course<'_> {
+    /// Advances by a stretch at the distance `at` of [`Path::at`](super::path::Path::at).
+    fn advance(&mut self, stretch: &Stretch, at: [f64; 3], times: &[f64]) -> Result<Sums, Error> {
+        if self.control.is_cancelled() {
+            return Err(Error::stopped());
+        }
+        self.lever
+            .advance(stretch, at, times)
+            .map_err(|error: MotionError| {
+                let distance = (at[0] + at[1]) * self.plan.view.scales.length;
+                Error::numerics(format!("at the distance {distance:.6e} m: {error}"))
+            })
+    }
+
+    /// Settles at the first distance.
+    fn settle(&mut self) -> Result<(), Error> {
+        let length = self.plan.model.period();
+        let period = Stretch {
+            start: 0.0,
+            end: length,
+            phase: 0.0,
+            length,
+            ends_period: true,
+        };
+        for _ in 0..self.plan.settle {
+            self.advance(&period, [self.plan.path.from, 0.0, 0.0], &[])?;
+        }
+        Ok(())
+    }
+
+    /// Reads the signals at equally spaced times from the turn, where the lever is, to `end`.
+    fn unloading(mut self, end: f64) -> Result<Vec<Signals>, Error> {
+        let turn = self.plan.path.turn;
+        let time = |k: usize| turn + (end - turn) * k as f64 / (FIT_POINTS - 1) as f64;
+        let mut next = 0;
+        let mut signals = Vec::with_capacity(FIT_POINTS);
+        for stretch in self.plan.stretches(turn) {
+            let first = next;
+            while next < FIT_POINTS && time(next) <= stretch.end {
+                next += 1;
+            }
+            let times: Vec<f64> = (first..next).map(time).collect();
+            let at = self.plan.path.at(stretch.start);
+            signals.extend(self.advance(&stretch, at, &times)?.signals);
+            if next == FIT_POINTS {
+                break;
+            }
+        }
+        Ok(signals)
+    }
 }
 
 /// Runs along the path of a plan.
@@ -52,122 +122,116 @@ pub(super) struct Run {
 pub(super) fn run(plan: &Plan<'_>, control: &Control<'_>) -> Result<Run, Error> {
     let path = &plan.path;
     let period = plan.model.period();
-    // Of a cosine without a drive the force's component at its frequency is its work.
-    let exact_work = !plan.driven && path.speed.is_none();
-    let harmonic = if exact_work {
-        path.omega
-    } else {
-        plan.model.frequency()
+    let mut course = Course {
+        plan,
+        control,
+        lever: Lever::new(plan)?,
     };
-    let mut lever = Lever::new(plan, exact_work.then_some(path.omega))?;
-    let failed = |distance: f64| {
-        let distance = distance * plan.view.scales.length;
-        move |error: MotionError| {
-            Error::numerics(format!("at the distance {distance:.6e} m: {error}"))
-        }
-    };
-    for _ in 0..plan.settle {
-        lever
-            .advance(0.0, period, [path.from, 0.0, 0.0], path.omega, harmonic)
-            .map_err(failed(path.from))?;
-        if control.is_cancelled() {
-            return Err(Error::stopped());
-        }
-    }
+    course.settle()?;
     let mut run = Run {
-        rows: Vec::with_capacity(plan.points + 1),
+        rows: Vec::with_capacity(2 * plan.points),
         peak_force: 0.0,
         lowest: [0.0; 2],
         least_gap: f64::INFINITY,
         contact_begin: None,
         contact_end: None,
+        ends_in_contact: false,
         energy_lost: 0.0,
         adhesion_energy: 0.0,
         dissipation: 0.0,
+        unloading: Vec::new(),
         stretches: 0,
     };
-    let (mut time, mut periods) = (0.0, 0_u64);
-    let mut over_period = None;
-    for point in 1..=plan.points {
-        let end = point as f64 * plan.step;
-        while time < end {
-            let start = periods as f64 * period;
-            let next_period = (periods + 1) as f64 * period;
-            // An end of a period that rounding alone keeps from the point is the point.
-            let near = (next_period - end).abs() <= 1e-9 * period;
-            let until = if near { end } else { end.min(next_period) };
-            // As is a start that rounding alone keeps from that of a period.
-            let phase = if time - start <= 1e-9 * period {
-                0.0
-            } else {
-                time - start
-            };
-            let whole = near || until == next_period;
-            let length = if whole { period - phase } else { until - time };
-            let at = path.at(time);
-            let sums = lever
-                .advance(phase, length, at, path.omega, harmonic)
-                .map_err(failed(at[0] + at[1]))?;
-            let retract = path.way(time) == Way::Retract;
-            // The mean of the distance's rate over the stretch, but exactly for a cosine.
-            let work = if exact_work {
-                let rotation = phase * path.omega;
-                let (sin, cos) = nanotap_arithmetic::sin_cos(rotation);
-                let rate = Complex::new(at[1], -at[2]) * Complex::new(cos, -sin);
-                -(rate * Complex::new(0.0, path.omega) * sums.harmonic.conj()).re
-            } else {
-                let moved = match path.speed {
-                    Some(speed) => (if retract { speed } else { -speed }) * length,
-                    None => path.distance(until) - (at[0] + at[1]),
-                };
-                -sums.impulse * moved / length
-            };
-            run.energy_lost += work;
-            if retract && sums.impulse < 0.0 {
-                run.adhesion_energy += work;
+    let total = 2 * plan.points;
+    let mut points = plan.times().peekable();
+    let mut at_turn = None;
+    let mut unloaded_at = None;
+    // Force over the drive period so far, of a driven lever.
+    let mut so_far = ForceSums::default();
+    for stretch in plan.stretches(0.0) {
+        let retract = path.way(stretch.start) == Way::Retract;
+        if retract && at_turn.is_none() && !plan.driven {
+            at_turn = Some(course.clone());
+        }
+        let mut times = Vec::new();
+        while let Some(time) = points.next_if(|time| *time <= stretch.end * (1.0 + 1e-12)) {
+            times.push(time);
+        }
+        let read = if plan.driven { &[] } else { &times[..] };
+        let sums = course.advance(&stretch, path.at(stretch.start), read)?;
+        run.add(&sums, retract, plan.driven);
+        if let Some(touch) = sums.surface.touch {
+            let [first, last] = touch.map(|time| stretch.start + (time - stretch.phase));
+            if !retract && run.contact_begin.is_none() {
+                run.contact_begin = Some(path.distance(first));
             }
-            run.dissipation -= sums.work;
-            run.peak_force = run.peak_force.max(sums.peak);
-            let lowest = &mut run.lowest[usize::from(retract)];
-            *lowest = lowest.min(sums.lowest);
-            if sums.contact > 0.0 {
-                if !retract && run.contact_begin.is_none() {
-                    run.contact_begin = Some(at[0] + at[1]);
-                }
-                if retract {
-                    run.contact_end = Some(path.distance(until));
-                }
-            }
-            if plan.driven && whole && phase == 0.0 {
-                let (z, deflection) = lever.deflection(&sums);
-                let means = Signals {
-                    gap: path.distance(until) + deflection,
-                    deflection,
-                    force: sums.impulse / period,
-                    contact: sums.contact > 0.0,
-                };
-                over_period = Some(([z.modulus(), lag(z)], means));
-            }
-            let here = lever.instant(if whole { 0.0 } else { phase + length });
-            run.least_gap = run.least_gap.min(here.gap);
-            run.stretches += 1;
-            periods += u64::from(whole);
-            time = until;
-            if control.is_cancelled() {
-                return Err(Error::stopped());
+            if retract {
+                unloaded_at = Some(last);
+                run.contact_end = Some(path.distance(last));
             }
         }
-        let phase = time - periods as f64 * period;
-        run.rows.push(Row {
-            way: path.way(time - 0.5 * plan.step),
-            time,
-            distance: path.distance(time),
-            signals: over_period.map_or_else(|| lever.instant(phase.max(0.0)), |(_, means)| means),
-            oscillation: over_period.map(|(oscillation, _)| oscillation),
-        });
-        if let Some(progress) = control.progress {
-            progress(point, plan.points);
+        let end = stretch.phase + stretch.length;
+        run.ends_in_contact = sums
+            .surface
+            .touch
+            .is_some_and(|[_, last]| plan.driven || last >= end * (1.0 - 1e-12));
+        let mut signals = sums.signals;
+        let mut oscillation = None;
+        if plan.driven {
+            if stretch.phase == 0.0 {
+                so_far = ForceSums::default();
+            }
+            so_far.impulse += sums.force.impulse;
+            so_far.harmonic += sums.force.harmonic;
+            so_far.contact += sums.force.contact;
+            if stretch.ends_period {
+                let (z, deflection) = course.lever.deflection(&so_far);
+                oscillation = Some([z.modulus(), lag(z)]);
+                signals = vec![Signals {
+                    gap: path.distance(stretch.end) + deflection,
+                    deflection,
+                    force: so_far.impulse / period,
+                    contact: so_far.contact > 0.0,
+                }];
+            }
+        }
+        for (time, signals) in times.into_iter().zip(signals) {
+            run.rows.push(Row {
+                // The point at the turn ends the approach.
+                way: if retract { Way::Retract } else { Way::Approach },
+                time,
+                distance: path.distance(time),
+                signals,
+                oscillation,
+            });
+            if let Some(progress) = control.progress {
+                progress(run.rows.len(), total);
+            }
         }
     }
+    if let (Some(course), Some(end)) = (at_turn, unloaded_at) {
+        run.unloading = course.unloading(end)?;
+    }
     Ok(run)
+}
+
+impl Run {
+    /// Adds a stretch of the approach or retract.
+    fn add(&mut self, sums: &Sums, retract: bool, driven: bool) {
+        let (force, surface) = (&sums.force, &sums.surface);
+        self.stretches += 1;
+        self.peak_force = self.peak_force.max(force.peak);
+        let lowest = &mut self.lowest[usize::from(retract)];
+        *lowest = lowest.min(force.lowest);
+        self.least_gap = self.least_gap.min(surface.least_gap);
+        self.dissipation -= force.work;
+        self.energy_lost -= surface.work;
+        if retract {
+            self.adhesion_energy -= match driven {
+                true if force.impulse < 0.0 => surface.work,
+                true => 0.0,
+                false => surface.attracted_work,
+            };
+        }
+    }
 }

@@ -1,5 +1,9 @@
 //! Static branches: where the lever rests against the sample, followed in the separation, with the
 //! folds at which it jumps.
+//!
+//! The modes of a model have only part of the beam's static compliance `1/k`. The rest of it,
+//! `1/k − Σ 1/kᵢ`, acts as a massless spring in series: at a rest with the force `F` it takes
+//! `(1/k − Σ 1/kᵢ) F` of the distance, so that `F = k d` for any number of modes.
 
 use nalgebra::DVector;
 
@@ -87,6 +91,8 @@ pub(super) struct LawRests {
     state: [DVector<f64>; 2],
 }
 
+/// Static compliance of a uniform beam at its tip, 1/k = L³/(3 EI), in units of L³/(EI).
+const BEAM_COMPLIANCE: f64 = 1.0 / 3.0;
 /// Number of points of a branch on each side of the gap at which contact begins.
 const POINTS: usize = 1200;
 /// Smallest step from there, as a part of the range.
@@ -95,11 +101,13 @@ const NEAR: f64 = 1e-9;
 const MEET: f64 = 1e-9;
 
 impl StaticCurve {
-    /// The rests of the lever of `case` with its model.
+    /// The rests of the lever of `case` with its model: with the compliance of the whole beam, or of
+    /// the modes alone, as it moves.
     ///
     /// # Errors
     /// When the case has no model at another distance, or the lever does not restore.
-    pub(super) fn new(case: &Case, model: &Model) -> Result<Self, Error> {
+    pub(super) fn new(case: &Case, model: &Model, whole: bool) -> Result<Self, Error> {
+        let beam = if whole { BEAM_COMPLIANCE } else { 0.0 };
         let origin = case.get(case.gap_key());
         if let Some(nonlinear) = &model.nonlinear {
             let system = &nonlinear.system;
@@ -116,7 +124,8 @@ impl StaticCurve {
             ];
             let row = system.kernel().row();
             return Ok(Self::Law(Box::new(LawRests {
-                compliance: (row * &state[1])[0],
+                // Measured modes may have more than the beam: then there is nothing to add.
+                compliance: (row * &state[1])[0].max(beam),
                 offset: system.drive().offset - origin + (row * &state[0])[0],
                 nonlinear: Arc::clone(nonlinear),
                 state,
@@ -134,7 +143,7 @@ impl StaticCurve {
                 [a, b - a]
             };
             let regime = &model.system.regimes()[r];
-            LinearRests {
+            let rests = LinearRests {
                 contact: model.contact[r],
                 stable: regime.basis().eigenvalues.iter().all(|z| z.re < 0.0),
                 origin,
@@ -144,7 +153,9 @@ impl StaticCurve {
                     .map(|e| line(&|model| model.system.transitions()[r][e].guard.clone()))
                     .collect(),
                 state: [states[0].clone(), &states[1] - &states[0]],
-            }
+            };
+            let own = rests.compliance().unwrap_or(beam);
+            rests.with_compliance((beam - own).max(0.0))
         });
         Ok(Self::Linear(rests.collect()))
     }
@@ -263,10 +274,7 @@ impl StaticCurve {
     /// Compliance of the lever at rest, in the model's units.
     pub(super) fn compliance(&self) -> Option<f64> {
         match self {
-            Self::Linear(regimes) => {
-                let pressed = regimes.iter().find(|regime| regime.force[1] != 0.0)?;
-                Some((pressed.gap[1] - 1.0) / pressed.force[1])
-            }
+            Self::Linear(regimes) => regimes.iter().find_map(LinearRests::compliance),
             Self::Law(law) => Some(law.compliance),
         }
     }
@@ -386,6 +394,29 @@ impl Piece {
 }
 
 impl LinearRests {
+    /// Compliance of the lever; `None` where no force changes with the distance.
+    fn compliance(&self) -> Option<f64> {
+        (self.force[1] != 0.0).then(|| (self.gap[1] - 1.0) / self.force[1])
+    }
+
+    /// The rests of a lever on a spring with so much more compliance: at the same gap and force the
+    /// distance is smaller by `compliance` times the force.
+    fn with_compliance(mut self, compliance: f64) -> Self {
+        let [force, slope] = self.force.map(|f| compliance * f);
+        let by_distance = 1.0 / (1.0 - slope);
+        self.stable &= by_distance > 0.0;
+        let lines = [&mut self.gap, &mut self.force].into_iter();
+        for [value, slope] in lines.chain(&mut self.guards) {
+            *slope *= by_distance;
+            *value += *slope * force;
+        }
+        let by_state = &mut self.state;
+        by_state[1] *= by_distance;
+        let moved = &by_state[1] * force;
+        by_state[0] += moved;
+        self
+    }
+
     /// Whether the lever can rest in the regime at a distance.
     fn holds(&self, distance: f64) -> bool {
         let moved = distance - self.origin;

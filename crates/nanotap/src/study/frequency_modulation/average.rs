@@ -23,17 +23,45 @@
 use std::f64::consts::{PI, TAU};
 
 use crate::model::Model;
-
-/// Number of equidistant phases of the oscillation for the first-order shift.
-const AROUND: u32 = 4096;
-/// Number of points of the integral over the distance, for large amplitudes.
-const OUTWARDS: u32 = 4096;
+use crate::model::nonlinear::{Nonlinear, SweepPiece};
 
 /// The static force of a model's sample against the distance.
 enum StaticForce<'a> {
-    Nonlinear(&'a crate::model::nonlinear::Nonlinear),
+    Nonlinear(&'a Nonlinear),
     /// A spring that begins at zero.
     Spring(f64),
+}
+
+impl StaticForce<'_> {
+    /// Returns the smooth pieces of a quasi-static motion between these distances, in this order.
+    fn pieces(&self, gaps: &[f64]) -> Vec<SweepPiece> {
+        if let Self::Nonlinear(nonlinear) = self {
+            return nonlinear.sweep(gaps);
+        }
+        let mut pieces = Vec::new();
+        for pair in gaps.windows(2) {
+            let mut from = pair[0];
+            if pair[0] * pair[1] < 0.0 {
+                pieces.push([from, 0.0]);
+                from = 0.0;
+            }
+            pieces.push([from, pair[1]]);
+        }
+        let piece = |gaps: [f64; 2]| SweepPiece {
+            branch: usize::from(gaps[0].min(gaps[1]) < 0.0),
+            gaps,
+        };
+        pieces.into_iter().map(piece).collect()
+    }
+
+    /// Returns the force on a branch at a distance.
+    fn value(&self, branch: usize, gap: f64) -> f64 {
+        match self {
+            Self::Nonlinear(nonlinear) => nonlinear.static_law().value(branch, gap, 0.0),
+            Self::Spring(_) if branch == 0 => 0.0,
+            Self::Spring(stiffness) => -stiffness * gap,
+        }
+    }
 }
 
 /// Averages of a force over a sinusoidal oscillation.
@@ -71,49 +99,108 @@ impl<'a> Averages<'a> {
         }
     }
 
-    /// Computes the force at these distances, evaluated quasi-statically, in this order.
-    fn forces(&self, gaps: impl Iterator<Item = f64>) -> Vec<f64> {
-        match self.force {
-            StaticForce::Nonlinear(nonlinear) => {
-                let curve = nonlinear.force_curve(gaps);
-                curve.into_iter().map(|[_, force]| force).collect()
-            }
-            StaticForce::Spring(stiffness) => gaps.map(|gap| stiffness * (-gap).max(0.0)).collect(),
-        }
-    }
-
     /// Computes the approximations with the tip at rest at the distance `gap`, model units.
     pub fn at(&self, gap: f64) -> Averaged {
         let (a, k) = (self.amplitude, self.stiffness);
-        // From the far side to the near one and back; the trapezoid rule is exact to rounding
-        // for a smooth force.
-        let step = TAU / f64::from(AROUND);
-        let cosines: Vec<f64> = (0..AROUND)
-            .map(|n| nanotap_arithmetic::cos((f64::from(n) + 0.5) * step))
-            .collect();
-        let forces = self.forces(cosines.iter().map(|c| gap + a * c));
-        let sum: f64 = forces.iter().zip(&cosines).map(|(f, c)| f * c).sum();
-        let first_order = -sum * step / (TAU * k * a);
+        let (farthest, closest) = (gap + a, gap - a);
+        // Over the phase θ from the far side to the near one and back, piece by smooth piece.
+        let phase = |at: f64| nanotap_arithmetic::acos(((at - gap) / a).clamp(-1.0, 1.0));
+        let around = self.force.pieces(&[farthest, closest, farthest]);
+        let of_piece = |piece: &SweepPiece| {
+            let [one, other] = piece.gaps.map(phase);
+            integral([one.min(other), one.max(other)], |angle| {
+                let cos = nanotap_arithmetic::cos(angle);
+                self.force.value(piece.branch, gap + a * cos) * cos
+            })
+        };
+        let sum: f64 = around.iter().map(of_piece).sum();
+        let first_order = -sum / (TAU * k * a);
         // x = A s² with s = u/(1 − u), so that 0 ≤ u < 1 reaches all distances.
-        let closest = gap - a;
-        let share = |n: u32| (f64::from(n) + 0.5) / f64::from(OUTWARDS);
+        let inwards = self.force.pieces(&[closest + FAR * a, closest]);
         let place = |u: f64| {
             let s = u / (1.0 - u);
             closest + a * s * s
         };
-        let inwards = (0..OUTWARDS).rev().map(share);
-        let forces = self.forces(inwards.clone().map(place));
-        let weighted = inwards.zip(&forces);
-        let sum: f64 = weighted.map(|(u, f)| f / ((1.0 - u) * (1.0 - u))).sum();
-        let integral = 2.0 * a.sqrt() * sum / f64::from(OUTWARDS);
+        let share = |at: f64| {
+            let s = ((at - closest) / a).max(0.0).sqrt();
+            s / (1.0 + s)
+        };
+        let numbered = inwards.iter().enumerate();
+        let of_piece = |(number, piece): (usize, &SweepPiece)| {
+            let [far, near] = piece.gaps.map(share);
+            let far = if number == 0 { 1.0 } else { far };
+            integral([near, far], |u| {
+                let rest = 1.0 - u;
+                if rest <= f64::EPSILON {
+                    return 0.0;
+                }
+                self.force.value(piece.branch, place(u)) / (rest * rest)
+            })
+        };
+        let sum: f64 = numbered.map(of_piece).sum();
         let large = a * a.sqrt();
-        let last = self.forces([gap + a, closest].into_iter());
+        let last = inwards.last();
         Averaged {
             first_order,
-            giessibl: integral / (PI * 2_f64.sqrt() * k * large),
-            force: last.last().copied().unwrap_or(0.0),
+            giessibl: 2.0 * a.sqrt() * sum / (PI * 2_f64.sqrt() * k * large),
+            force: last.map_or(0.0, |piece| self.force.value(piece.branch, closest)),
         }
     }
+}
+
+/// Distance at which the integral outwards begins, in amplitudes: its first piece goes on to
+/// infinity.
+const FAR: f64 = 1e6;
+/// Halvings of the step of the quadrature, and its relative error at which they end.
+const HALVINGS: u32 = 9;
+const INTEGRATED: f64 = 1e-13;
+/// Largest variable of the quadrature: beyond it the weights are below rounding.
+const WIDEST: f64 = 3.2;
+
+/// Computes the integral of a function that is smooth between two ends, by the double exponential
+/// formula (Takahasi and Mori, Publ. RIMS 9, 721, 1974): roots and steep slopes at the ends do no
+/// harm.
+fn integral([low, high]: [f64; 2], of: impl Fn(f64) -> f64) -> f64 {
+    let half = 0.5 * (high - low);
+    if half <= 0.0 {
+        return 0.0;
+    }
+    // x = tanh(π/2 sinh t); 1 − |x| without cancellation.
+    let term = |t: f64| {
+        let inner = 0.5 * PI * nanotap_arithmetic::sinh(t.abs());
+        let away = 1.0 / (nanotap_arithmetic::exp(inner) * nanotap_arithmetic::cosh(inner));
+        let at = if t < 0.0 {
+            low + half * away
+        } else {
+            high - half * away
+        };
+        let cosh = nanotap_arithmetic::cosh(inner);
+        let weight = 0.5 * PI * nanotap_arithmetic::cosh(t) / (cosh * cosh);
+        weight * of(at)
+    };
+    let (mut sum, mut size) = (term(0.0), 0.0);
+    let mut step = 1.0;
+    let mut last = f64::NAN;
+    for halving in 0..=HALVINGS {
+        // The odd multiples of the step; at first all.
+        let stride = if halving == 0 { 1 } else { 2 };
+        let mut k = 1;
+        while f64::from(k) * step <= WIDEST {
+            for t in [-f64::from(k) * step, f64::from(k) * step] {
+                let term = term(t);
+                sum += term;
+                size += term.abs();
+            }
+            k += stride;
+        }
+        let value = sum * step;
+        if halving > 3 && (value - last).abs() <= INTEGRATED * size * step {
+            return half * value;
+        }
+        last = value;
+        step *= 0.5;
+    }
+    half * last
 }
 
 /// The force at each distance of a curve of relative shifts, as Sader and Jarvis find it from

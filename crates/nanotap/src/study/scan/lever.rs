@@ -137,7 +137,7 @@ impl Lever {
                 let system = moved_system(&model, &tangent.system, motion)?;
                 let forces: Vec<f64> = tangent.force.iter().map(|f| f.constant).collect();
                 LeverFlow::Linear(Box::new(LinearLever {
-                    sums: LinearSums::new(&model, &system, &forces, motion, None),
+                    sums: LinearSums::new(&model, &system, &forces, motion),
                     flow: Flow::new(Arc::new(system)),
                     state: vec![0.0; model.dimension() + 1],
                     gap,

@@ -57,6 +57,11 @@ fn words(law: &str, modes: usize) -> Vec<String> {
         "dmt" => &["sample.modulus=1 GPa", "sample.hamaker=1e-19 J"],
         "jkr" => &["sample.modulus=1 GPa", "sample.work_of_adhesion=50 mJ/m^2"],
         "hertz" => &["sample.modulus=1 GPa"],
+        "hertz + capillary" => &[
+            "sample.modulus=1 GPa",
+            "sample.film_thickness=0.3 nm",
+            "sample.surface_energy=70 mJ/m^2",
+        ],
         _ => &["sample.stiffness=8 N/m", "sample.damping=2e-7 N s/m"],
     };
     if law != "linear" {
@@ -402,8 +407,8 @@ fn the_snap_in_at_rest_is_the_fold_of_van_der_waals() {
         let report = curve("dmt", modes, json!({"speed": "0.2 mm/s", "points": 10}));
         let jump = report.statics.jumps[0];
         assert_eq!(jump.way, Way::Approach);
-        // c F′ = 1 with F = −H R/(6 d²).
-        let c = compliance(modes);
+        // c F′ = 1 with F = −H R/(6 d²) and the compliance of the whole lever.
+        let c = 1.0 / K;
         let gap = (c * HAMAKER * RADIUS / 3.0).cbrt();
         let force = -HAMAKER * RADIUS / (6.0 * gap * gap);
         // A fold is known to the root of rounding.
@@ -445,7 +450,126 @@ fn a_slow_curve_follows_the_branches_at_rest_between_the_jumps() {
     assert!(compared > 50);
     let expected = 1.5 * PI * WORK * RADIUS;
     assert!((report.summary.adhesion_force / expected - 1.0).abs() < 1e-6);
+    // The moving lever has one mode; at the force at which it leaves, those that it lacks would take
+    // so much more of the distance.
+    let off = off + (1.0 / K - c) * -expected;
     assert!((report.summary.contact_end.unwrap() - off).abs() < 5e-11);
+}
+
+/// F = k d against the sample, whatever the number of modes, the tip's mass and the damping.
+#[test]
+fn the_lever_at_rest_has_its_whole_compliance() {
+    for law in ["linear", "hertz", "jkr"] {
+        for modes in [1, 2, 3] {
+            for own in ["tip.mass_ratio=0", "tip.mass_ratio=0.2"] {
+                let mut words = words(law, modes);
+                words.push(own.to_owned());
+                let options = json!({"to": "-5 nm", "speed": "0.2 mm/s", "points": 10});
+                let report = curve_of(&words, options);
+                let mut largest: f64 = 0.0;
+                let branches = report.statics.branches.iter();
+                for point in branches.flat_map(|branch| &branch.points) {
+                    let off = K * point.deflection - point.force;
+                    assert!(off.abs() < 1e-12 * K * 8e-9, "{law}, {modes}: {off:e}");
+                    assert!((point.separation - point.distance - point.deflection).abs() < 1e-20);
+                    largest = largest.max(point.force);
+                }
+                assert!(largest > 2e-9, "{law}: {largest:e}");
+            }
+        }
+    }
+}
+
+/// Every figure follows from the motion, not from the points that are listed.
+#[test]
+fn figures_do_not_depend_on_the_points() {
+    let motions = [
+        json!({"speed": "0.2 mm/s"}),
+        json!({"speed": "20 um/s"}),
+        json!({"frequency": "5 kHz"}),
+    ];
+    for law in ["dmt", "jkr", "hertz", "hertz + capillary", "linear"] {
+        for (modes, amplitude) in [(1, 0), (3, 0), (1, 2)] {
+            let mut words = words(law, modes);
+            words.retain(|word| !word.starts_with("drive.free_amplitude"));
+            words.push(format!("drive.free_amplitude={amplitude} nm"));
+            for motion in &motions {
+                let with_points = |points: usize| {
+                    let mut options = json!({"to": "-2 nm", "points": points});
+                    let own = options.as_object_mut().unwrap();
+                    own.extend(motion.as_object().unwrap().clone());
+                    curve_of(&words, options)
+                };
+                let report = with_points(50);
+                assert!(report.summary.contact_begin.is_some());
+                assert!(report.summary.energy_lost != 0.0);
+                for points in [500, 777] {
+                    let other = with_points(points);
+                    let place = format!("{law}, {modes} modes, {amplitude} nm, {motion}");
+                    assert_eq!(report.summary, other.summary, "{place}");
+                    assert_eq!(report.fits, other.fits, "{place}");
+                    assert_eq!(report.statics, other.statics, "{place}");
+                    assert_eq!([report.from, report.to], [other.from, other.to], "{place}");
+                    assert_eq!(report.driven, amplitude > 0);
+                }
+            }
+        }
+    }
+}
+
+/// A driven lever of one mode, by the same integration as below, its drive at the phase of the
+/// case. From 8 nm the curve begins a whole number of drive periods before the turn.
+#[test]
+fn figures_of_a_driven_lever_are_those_of_an_independent_integration() {
+    let mut words = words("dmt", 1);
+    words.retain(|word| !word.starts_with("drive.free_amplitude"));
+    for word in ["drive.free_amplitude=2 nm", "drive.actuation=tip"] {
+        words.push(word.to_owned());
+    }
+    let options = json!({"to": "-2 nm", "speed": "0.2 mm/s", "settle": 0});
+    let report = curve_of(&words, options);
+    let found = &report.summary;
+    assert!((report.from - 9.428_571_428_571_43e-9).abs() < 1e-22);
+    for (name, found, expected) in [
+        ("begin", found.contact_begin.unwrap(), 1.297_099_507_92e-9),
+        ("end", found.contact_end.unwrap(), 1.667_843_395_65e-9),
+        ("indentation", found.indentation, 2.438_833_033_07e-9),
+        ("peak", found.peak_force, 1.334_598_317_39e-8),
+        ("adhesion", found.adhesion_energy, 7.821_094_344_7e-19),
+        ("lost", found.energy_lost, 3.149_201_835_2e-18),
+    ] {
+        let off = (found / expected - 1.0).abs();
+        assert!(off < 1e-9, "{name}: {found:e} {expected:e}");
+    }
+}
+
+/// The curve of docs/cases/force-curve.md with every event and extremum located by SciPy's DOP853
+/// (rtol 1e-13, steps of at most 2 us): two modes of a uniform beam with the damping of the first
+/// under DMT's force, its energies integrated as further states. At 0.165 nm contact begins.
+#[test]
+fn figures_are_those_of_an_independent_integration() {
+    let source = nanotap::case::file::Source {
+        name: "force-curve.toml".into(),
+        text: include_str!("../../../docs/cases/force-curve.toml").into(),
+    };
+    let case = Case::parse(Some(source), &[]).unwrap();
+    let options = json!({"to": "-2 nm", "speed": "10 um/s", "points": 7});
+    let options: ForceCurveOptions = serde_json::from_value(options).unwrap();
+    let report = ForceCurveStudy::run(&case, &options, &Control::default()).unwrap();
+    let found = &report.summary;
+    for (name, found, expected) in [
+        ("begin", found.contact_begin.unwrap(), 6.609_168_375_91e-10),
+        ("end", found.contact_end.unwrap(), 1.901_234_459_203e-9),
+        ("indentation", found.indentation, 5.199_449_358_23e-10),
+        ("peak", found.peak_force, 6.443_637_202_58e-9),
+        ("adhesion", found.adhesion_energy, 4.647_815_027_10e-18),
+        ("lost", found.energy_lost, 3.259_318_966_94e-18),
+    ] {
+        let off = (found / expected - 1.0).abs();
+        assert!(off < 1e-9, "{name}: {found:e} {expected:e}");
+    }
+    assert_eq!(report.snap_in, found.contact_begin);
+    assert_eq!(report.pull_off, found.contact_end);
 }
 
 #[test]

@@ -4,7 +4,8 @@ use nanotap::case::{Case, Key};
 use nanotap::control::Control;
 use nanotap::study::approach::{ApproachOptions, ApproachPoint, ApproachReport, Way, approach};
 use nanotap::study::frequency_modulation::{
-    Driven, FreeOscillation, FrequencyModulationOptions, Held, Modulated, frequency_modulation,
+    Averages, Driven, FreeOscillation, FrequencyModulationOptions, Held, Modulated,
+    frequency_modulation,
 };
 use nanotap::study::orbit::{OrbitOptions, OrbitReport, orbit};
 use nanotap::study::request::read;
@@ -84,6 +85,38 @@ fn shifts_under_van_der_waals_are_those_of_the_reference() {
             found.relative_shift
         );
     }
+}
+
+/// First order and large amplitudes where the force has kinks, at an amplitude of 10 nm, a distance
+/// of 9.9 nm and 0.9 N/m: under DMT's law by mpmath with 30 digits, split at the contact (its force
+/// is 4/3 E* √R (a₀ − d)^{3/2} − HR/(6a₀²) there, −HR/(6d²) beyond); over a spring κ in closed form,
+/// κ (φ − sin φ cos φ)/(2πk) with cos φ = z/A.
+#[test]
+fn averages_are_exact_where_the_tip_touches() {
+    let case = air(10.0, 9.9, &DMT);
+    let scales = case.physical().unwrap().scales;
+    let model = case.model().unwrap();
+    let [swing, gap] = [10e-9, 9.9e-9].map(|z| z / scales.length);
+    let stiffness = 0.9 * scales.length / scales.force;
+    let found = Averages::new(&model, 0.0, swing, stiffness).at(gap);
+    let near = |value: f64, reference: f64| (value / reference - 1.0).abs();
+    let references = [
+        (found.first_order, -6.504_043_615_655_633e-3),
+        (found.giessibl, -6.623_809_096_864_456e-3),
+    ];
+    for (found, reference) in references {
+        assert!(near(found, reference) < 1e-11, "{found} {reference}");
+    }
+    let linear = lever(
+        (0.9, 200.0, "100 kHz"),
+        (10.0, 9.9),
+        &["sample.stiffness=8 N/m"],
+    );
+    let model = linear.model().unwrap();
+    let half = (9.9_f64 / 10.0).acos();
+    let expected = 8.0 * (half - half.sin() * half.cos()) / (std::f64::consts::TAU * 0.9);
+    let found = Averages::new(&model, 8.0, 10.0, 0.9).at(9.9).first_order;
+    assert!(near(found, expected) < 1e-11, "{found} {expected}");
 }
 
 /// A conservative force dissipates nothing, and the drive compensates only the lever's own damping:

@@ -38,8 +38,6 @@ const MIN_POWER: f64 = 0.2;
 const MEETINGS: usize = 2;
 /// Cost of a row without a rest.
 const LOST: f64 = 100.0;
-/// Compliance of the modes at rest, relative to that of the beam, below which it is reported.
-const COMPLIANT: f64 = 0.99;
 /// A baseline this part of the range of the values off zero is reported.
 const OFF_ZERO: f64 = 0.01;
 
@@ -72,24 +70,13 @@ pub(super) fn baseline_rows(distance: &[f64], values: &[f64]) -> [Vec<usize>; 2]
 /// # Errors
 /// When the case has no lever at rest.
 pub(super) fn assumptions(case: &Case, data: &Data) -> Result<Vec<String>, Error> {
-    let mut notes = vec![
+    let first = data.rows().next().map_or(0.0, |row| row.at[0]);
+    RestLever::of(&case.with(data.swept[0].key, first))?;
+    Ok(vec![
         "force curve: the lever is at rest at every row; its drive, viscous forces and the ringing \
          after jumps do not count"
             .to_owned(),
-    ];
-    let first = data.rows().next().map_or(0.0, |row| row.at[0]);
-    let lever = RestLever::of(&case.with(data.swept[0].key, first))?;
-    let ratio = lever
-        .compliance()
-        .map(|compliance| compliance * case.get(Key::LeverK));
-    if let Some(ratio) = ratio.filter(|ratio| *ratio < COMPLIANT) {
-        notes.push(format!(
-            "at rest the modes of the case are {:.1} % stiffer than cantilever.k: raise `modes` if k \
-             is the static stiffness",
-            100.0 * (1.0 / ratio - 1.0)
-        ));
-    }
-    Ok(notes)
+    ])
 }
 
 /// The baseline of a force curve as the first value of its offset; says where it is not zero and no

@@ -11,10 +11,12 @@
 //! separation `d` that of the tip as it is: `d = z + deflection`. Forces are positive where the
 //! sample pushes the tip away.
 //!
-//! Static branches are the solutions of `d − z = c F(d)` with the lever's static compliance `c`,
-//! followed in `d`; they end in folds where `c F′(d) = 1`, and where the law's branch ends.
+//! Static branches are the solutions of `d − z = c F(d)` with the lever's static compliance
+//! `c = 1/k`, followed in `d`; they end in folds where `c F′(d) = 1`, and where the law's branch ends.
 //!
-//! Limits: the sample moves, not the base, so that the inertia of the lever under the motion of its
+//! Limits: the moving lever has the modes of the case, and no spring for those that are left out. A
+//! slow curve is therefore off the static branches by `(1/k − Σ 1/kᵢ) F` in the distance: 3 % of the
+//! deflection with one mode, 0.5 % with two, 0.14 % with three. The sample moves, not the base, so that the inertia of the lever under the motion of its
 //! base is left out. It adds `(f / f0)²` of the amplitude at the frequency `f` of a cosine.
 
 mod fits;

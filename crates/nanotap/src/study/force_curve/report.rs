@@ -10,7 +10,7 @@ use super::fits::{ContactFit, fits};
 use super::lever::Signals;
 use super::path::Plan;
 use super::run::Run;
-use super::statics::{Rest, StaticsFound};
+use super::statics::{Rest, StaticCurve, StaticsFound};
 use crate::case::key::Key;
 use crate::case::physical::force::SampleForce;
 use crate::case::physical::sample::Elastic;
@@ -170,6 +170,9 @@ pub struct ForceCurveReport {
 /// Fraction of the resonance frequency above which the inertia of a moving base matters.
 const FAST: f64 = 0.1;
 
+/// Compliance at rest over that of the modes above which the difference is reported.
+const STIFFER: f64 = 1.01;
+
 /// Creates the report of a run.
 pub(super) fn report(plan: &Plan<'_>, statics: &StaticsFound, run: &Run) -> ForceCurveReport {
     let scales = &plan.view.scales;
@@ -238,6 +241,16 @@ pub(super) fn report(plan: &Plan<'_>, statics: &StaticsFound, run: &Run) -> Forc
             "the cosine's frequency is {:.2} of f0: the inertia of a moving base is left out, the \
              sample moves instead",
             frequency / plan.view.lever.f0
+        ));
+    }
+    let compliances = [&plan.statics, &plan.moving_statics].map(StaticCurve::compliance);
+    if let [Some(whole), Some(modes)] = compliances
+        && whole > STIFFER * modes
+    {
+        warnings.push(format!(
+            "the moving lever is {:.1} % stiffer than the lever at rest: it lacks the modes that are \
+             left out; raise `modes`",
+            100.0 * (whole / modes - 1.0)
         ));
     }
     if run.ends_in_contact {

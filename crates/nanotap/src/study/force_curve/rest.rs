@@ -42,11 +42,6 @@ impl RestLever {
         })
     }
 
-    /// Compliance of the lever, m/N.
-    pub(crate) fn compliance(&self) -> Option<f64> {
-        Some(self.statics.compliance()? * self.length / self.force)
-    }
-
     /// Chains of stable rests between two distances in m, first the one farthest from the sample.
     pub(crate) fn chains(&self, between: [f64; 2]) -> Vec<Chain> {
         let [near, far] = between.map(|z| z / self.length);

@@ -199,7 +199,7 @@ pub(super) fn report(plan: &Plan<'_>, statics: &StaticsFound, run: &Run) -> Forc
             phase: row.oscillation.map(|[_, phase]| phase),
         })
         .collect();
-    let (peak, adhesion) = (run.peak_force * scales.force, -run.lowest[1] * scales.force);
+    let (peak, adhesion) = (run.peak_force * scales.force, 0.0 - run.lowest[1] * scales.force);
     let force = plan.view.sample.force.as_ref();
     let hertz = plan.view.sample.hertz.map(|hertz| hertz.reduced_modulus);
     let reduced_modulus = force.and_then(SampleForce::reduced_modulus).or(hertz);
@@ -290,7 +290,8 @@ pub(super) fn report(plan: &Plan<'_>, statics: &StaticsFound, run: &Run) -> Forc
             contact_end: pull_off,
             peak_force: peak,
             adhesion_force: adhesion,
-            attraction: -run.lowest[0] * scales.force,
+            // Not −0 where nothing attracts.
+            attraction: 0.0 - run.lowest[0] * scales.force,
             indentation: -run.least_gap * scales.length,
             adhesion_energy: run.adhesion_energy * scales.energy,
             energy_lost: run.energy_lost * scales.energy,

@@ -199,7 +199,10 @@ pub(super) fn report(plan: &Plan<'_>, statics: &StaticsFound, run: &Run) -> Forc
             phase: row.oscillation.map(|[_, phase]| phase),
         })
         .collect();
-    let (peak, adhesion) = (run.peak_force * scales.force, 0.0 - run.lowest[1] * scales.force);
+    let (peak, adhesion) = (
+        run.peak_force * scales.force,
+        0.0 - run.lowest[1] * scales.force,
+    );
     let force = plan.view.sample.force.as_ref();
     let hertz = plan.view.sample.hertz.map(|hertz| hertz.reduced_modulus);
     let reduced_modulus = force.and_then(SampleForce::reduced_modulus).or(hertz);

@@ -528,7 +528,9 @@ impl LawRests {
                 Guard::Turns | Guard::Own(_) => {}
             }
         }
+        // A branch may begin or end before contact, as at a bridge of liquid.
         let contact = self.nonlinear.contact_gap().unwrap_or(0.0);
+        let contact = contact.max(low).min(high);
         let range = (far - near).max((far + self.offset - contact).abs());
         // To separations whose distances are outside the range.
         let reach = |sign: f64, outside: &dyn Fn(f64) -> bool| {

@@ -14,7 +14,7 @@ use std::fs::{self, File, FileType};
 use std::io::{self, Read as _};
 use std::path::{Path, PathBuf};
 
-use crate::Error;
+use crate::{Error, ErrorKind};
 
 /// Most bytes of a case file or a catalogue. The largest cases, with their tables in them, have some
 /// hundred kilobytes.
@@ -91,7 +91,7 @@ impl From<InputError> for Error {
         let message = error.to_string();
         match error.fault {
             InputFault::Missing | InputFault::Folder | InputFault::NotRegular => {
-                Self::input(message, "name a file")
+                Self::new(ErrorKind::BadInput, message)
             }
             InputFault::TooLong(_) => Self::input(message, "name a shorter file"),
             InputFault::NotText(_) => Self::input(message, "name a file of text in UTF-8"),

@@ -410,8 +410,8 @@ fn unusable_data_and_parameters_are_refused_with_the_remedy() {
     folder.write("volts.csv", "ZSnsr (nm),Defl (V)\n10,0.8\n11,0.1\n");
     let fit = |data: &str, free: &str| folder.run(&["fit", data, "lever.toml", "--free", free]);
     let modulus = "sample.modulus";
-    fit("none.csv", modulus).refused(&["none.csv", "there is no such file"]);
-    fit(".", modulus).refused(&["it is a folder"]);
+    fit("none.csv", modulus).refused(&["none.csv: no such file"]);
+    fit(".", modulus).refused(&[".: is a folder"]);
     fit("empty.csv", modulus).refused(&["empty.csv is empty"]);
     fit("volts.csv", modulus).refused(&["InvOLS", "--convert \"Defl=58 nm/V\""]);
     let slip = fit("curve.csv", "sample.modulsu");

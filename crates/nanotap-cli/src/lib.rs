@@ -55,7 +55,12 @@ pub fn run(arguments: impl IntoIterator<Item = impl Into<OsString> + Clone>) -> 
     let result = listening.and_then(|()| command::run(&arguments.command, &output));
     progress::end();
     match result {
-        Err(error) => failure::report(error),
+        Err(error) => {
+            if !progress::is_stopped() {
+                output.failed(&error);
+            }
+            failure::report(error)
+        }
         // What was finished has been shown.
         Ok(()) if progress::is_stopped() => progress::INTERRUPTED,
         Ok(()) => 0,

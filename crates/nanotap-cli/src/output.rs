@@ -1,15 +1,30 @@
 //! Output of a command: results on standard output, remarks on standard error.
 
 use std::io::{BufWriter, ErrorKind, Write as _};
+use std::sync::atomic::{AtomicBool, Ordering};
 
+use nanotap::error::ErrorDocument;
 use nanotap::study::registry::Document;
+use schemars::JsonSchema;
 use serde::Serialize;
 
-use crate::failure::Failure;
+use crate::failure::{Failure, flag};
 use crate::{page, progress, style};
 
 /// Size of the buffer in which JSON is written, bytes.
 const JSON_AT_ONCE: usize = 1 << 16;
+
+/// Whether something was printed on standard output.
+static HAS_PRINTED: AtomicBool = AtomicBool::new(false);
+
+/// Document of a command that failed.
+#[derive(Serialize, JsonSchema)]
+pub(crate) struct FailureDocument {
+    /// Why there is no result.
+    error: ErrorDocument,
+    /// The version of the program.
+    version: &'static str,
+}
 
 /// How results are printed.
 #[derive(Debug)]
@@ -63,6 +78,20 @@ impl Output {
         self.json
     }
 
+    /// Prints the error of a computation that failed as the JSON document, if JSON is requested and no
+    /// document was printed.
+    pub(crate) fn failed(&self, error: &Failure) {
+        let is_printed = HAS_PRINTED.load(Ordering::Relaxed);
+        if self.json && !is_printed && error.kind == nanotap::ErrorKind::Numerics {
+            let document = FailureDocument {
+                error: error.clone().written(flag).document(),
+                version: env!("CARGO_PKG_VERSION"),
+            };
+            // The error itself is printed on standard error.
+            let _ = print_json(&document);
+        }
+    }
+
     /// Prints a note on standard error, unless `--quiet` was given.
     pub(crate) fn note(&self, text: &str) {
         if !self.quiet {
@@ -86,6 +115,7 @@ impl Output {
 /// Prints `text` on standard output, without colours if it is not a terminal.
 pub(crate) fn print(text: &str) -> Result<(), Failure> {
     progress::end();
+    HAS_PRINTED.store(true, Ordering::Relaxed);
     let mut stream = anstream::stdout().lock();
     let written = stream.write_all(style::safe(text).as_bytes());
     printed(written.and_then(|()| stream.flush()))
@@ -94,6 +124,7 @@ pub(crate) fn print(text: &str) -> Result<(), Failure> {
 /// Prints a result as JSON, which has no colours, on standard output.
 fn print_json<R: Serialize>(result: &R) -> Result<(), Failure> {
     progress::end();
+    HAS_PRINTED.store(true, Ordering::Relaxed);
     let mut stream = BufWriter::with_capacity(JSON_AT_ONCE, std::io::stdout().lock());
     let written = serde_json::to_writer_pretty(&mut stream, result).map_err(std::io::Error::from);
     let written = written.and_then(|()| writeln!(stream));

@@ -120,10 +120,10 @@ pub(crate) fn keys(case: &Case) -> impl Iterator<Item = Key> {
     Key::all().filter(move |key| {
         // Another kind of model is a separate case.
         let takes = key.entry().models.contains(&kind) && *key != Key::Kind;
-        // A table has no control.
+        // A table or a state has no control.
         let curve = matches!(
             key.entry().takes,
-            Takes::Table | Takes::Arms | Takes::Springs | Takes::ModelArms
+            Takes::Table | Takes::Arms | Takes::Springs | Takes::ModelArms | Takes::State
         );
         let in_addition = [Key::Modes, Key::CosineTerm].contains(key);
         if physical {

@@ -25,6 +25,8 @@ pub(crate) struct CaseCore {
     source: Option<Source>,
     overrides: Vec<String>,
     catalogues: Vec<(String, String)>,
+    /// Folder to which names of files in `[scan]` are relative.
+    folder: PathBuf,
     at_setpoint: OnceLock<Solved>,
 }
 
@@ -73,6 +75,7 @@ impl CaseCore {
             source: self.source.clone(),
             overrides: self.overrides.clone(),
             catalogue: catalogue_of(&self.catalogues)?,
+            folder: self.folder.clone(),
         })
     }
 
@@ -82,6 +85,7 @@ impl CaseCore {
             source: self.source.clone(),
             overrides: self.overrides.clone(),
             catalogues: self.catalogues.clone(),
+            folder: self.folder.clone(),
             at_setpoint: OnceLock::new(),
         }
     }
@@ -90,14 +94,16 @@ impl CaseCore {
         source: Option<Source>,
         overrides: Vec<String>,
         catalogues: Vec<(String, String)>,
+        folder: PathBuf,
     ) -> Result<Self, Failure> {
         let catalogue = catalogue_of(&catalogues)?;
         let case = Case::parse_with(source.clone(), &overrides, &catalogue)?;
         Ok(Self {
-            case: Arc::new(case),
+            case: Arc::new(case.in_folder(&folder)),
             source,
             overrides,
             catalogues,
+            folder,
             at_setpoint: OnceLock::new(),
         })
     }
@@ -121,6 +127,7 @@ pub(crate) struct Variants {
     source: Option<Source>,
     overrides: Vec<String>,
     catalogue: Arc<Catalogue>,
+    folder: PathBuf,
 }
 
 impl Variants {
@@ -157,6 +164,7 @@ impl Variants {
                 .chain(stated.iter().map(|(_, word)| word.clone()))
                 .collect();
             let case = Case::parse_with(self.source.clone(), &words, &self.catalogue)?;
+            let case = case.in_folder(&self.folder);
             let case = case.in_model_units(self.case.is_in_model_units());
             at_setpoint(case, control)?.0
         };
@@ -177,17 +185,18 @@ impl Variants {
 
 #[pymethods]
 impl CaseCore {
-    /// From the name and text of a case file, if there is one, `key=value` words for it,
-    /// and names and texts of catalogues.
+    /// From the name and text of a case file, if there is one, `key=value` words for it, names and
+    /// texts of catalogues, and the folder to which names of files in `[scan]` are relative.
     #[new]
     fn new(
         source: Option<(String, String)>,
         overrides: Vec<String>,
         catalogues: Vec<(String, String)>,
+        folder: PathBuf,
     ) -> PyResult<Self> {
         let source = source.map(|(name, text)| Source { name, text });
         let overrides = file::with_tables(&overrides).map_err(Failure::from)?;
-        Ok(Self::make(source, overrides, catalogues)?)
+        Ok(Self::make(source, overrides, catalogues, folder)?)
     }
 
     /// The same with other values of `keys`, as `key=value` words, by the rule of arrays.
@@ -230,7 +239,9 @@ impl CaseCore {
             .iter()
             .map(|path| Ok((path.display().to_string(), text_of(path)?)))
             .collect::<Result<_, Failure>>()?;
-        Ok(Self::make(Some(source), overrides, catalogues)?)
+        let folder = path.parent().unwrap_or_else(|| Path::new(""));
+        let folder = std::path::absolute(folder).unwrap_or_else(|_| folder.to_owned());
+        Ok(Self::make(Some(source), overrides, catalogues, folder)?)
     }
 
     /// The texts that it was made of.
@@ -239,16 +250,25 @@ impl CaseCore {
         clippy::type_complexity,
         reason = "the arguments of `new`, as they are"
     )]
-    fn made_of(&self) -> (Option<(String, String)>, Vec<String>, Vec<(String, String)>) {
+    fn made_of(
+        &self,
+    ) -> (
+        Option<(String, String)>,
+        Vec<String>,
+        Vec<(String, String)>,
+        PathBuf,
+    ) {
         let source = self.source.as_ref();
         (
             source.map(|source| (source.name.clone(), source.text.clone())),
             self.overrides.clone(),
             self.catalogues.clone(),
+            self.folder.clone(),
         )
     }
 
-    /// The document of the case, JSON.
+    /// The document of the case, JSON; where the distance is left to a setpoint, the numbers that depend
+    /// on it are not those that are studied.
     #[getter]
     fn document(&self) -> PyResult<String> {
         Ok(serde_json::to_string(&CaseDocument::of(&self.case)).map_err(Failure::from)?)
@@ -276,11 +296,11 @@ impl CaseCore {
         Ok(report.transpose().map_err(Failure::from)?)
     }
 
-    /// Of a physical case, every parameter with its physical quantity, JSON.
+    /// Of a physical case, every parameter with its physical quantity, JSON, at the setpoint.
     #[getter]
-    fn mapping(&self) -> PyResult<String> {
-        let rows: Vec<MappingDocument> = self
-            .case
+    fn mapping(&self, py: Python<'_>) -> PyResult<String> {
+        let case = self.studied(py)?;
+        let rows: Vec<MappingDocument> = case
             .physical()
             .map(Physical::mapping)
             .into_iter()
@@ -306,10 +326,26 @@ impl CaseCore {
             .collect()
     }
 
-    /// The dimensionless case file; `None` of an oscillator.
+    /// The case file, with the distance of a setpoint; `dimensionless` with the numbers of the
+    /// equations in place of physical quantities.
+    fn toml(&self, py: Python<'_>, dimensionless: bool) -> PyResult<String> {
+        let case = self.studied(py)?;
+        let Some(numbers) = case.cantilever().filter(|_| dimensionless) else {
+            return Ok(case.to_toml());
+        };
+        if numbers.law.is_some() {
+            return Err(Failure::input(
+                "a nonlinear force law has no dimensionless case file; leave dimensionless out",
+            )
+            .into());
+        }
+        Ok(file::to_toml(numbers))
+    }
+
+    /// Tables and keys of the case as it was stated, JSON.
     #[getter]
-    fn toml(&self) -> Option<String> {
-        self.case.cantilever().map(file::to_toml)
+    fn inputs(&self) -> PyResult<String> {
+        Ok(serde_json::to_string(&self.case.inputs()).map_err(Failure::from)?)
     }
 
     /// Whether its distance is left to a setpoint.

@@ -10,8 +10,12 @@
 use std::fmt;
 use std::ops::Range;
 
+use schemars::JsonSchema;
+use serde::Serialize;
+
 /// Kind of an error, which determines exit code and exception.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
 pub enum ErrorKind {
     /// The input is not valid.
     BadInput,
@@ -67,6 +71,18 @@ pub struct Error {
     pub source: Option<SourceText>,
     /// Problems that cause the error, at least one.
     pub problems: Vec<ErrorProblem>,
+}
+
+/// An error as an entry of a document.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, JsonSchema)]
+pub struct ErrorDocument {
+    /// Kind of the error.
+    pub kind: ErrorKind,
+    /// What is wrong, one problem per line.
+    pub message: String,
+    /// What to do to solve the problem, if known.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub remedy: Option<String>,
 }
 
 /// A text for a message, which may quote input of any length: long words and long texts are shortened.
@@ -138,6 +154,18 @@ impl Error {
     pub fn message(&self) -> String {
         let message = self.problems.first().map_or("", |problem| &problem.message);
         replaced(message, &str::to_owned)
+    }
+
+    /// The error as an entry of a document.
+    pub fn document(&self) -> ErrorDocument {
+        let plain = self.clone().written(str::to_owned);
+        let remedy = plain.problems.iter().find_map(|problem| problem.remedy.clone());
+        let messages = plain.problems.into_iter().map(|problem| problem.message);
+        ErrorDocument {
+            kind: self.kind,
+            message: messages.collect::<Vec<_>>().join("\n"),
+            remedy,
+        }
     }
 
     /// The same error, with all problems at an option of a study.

@@ -1,5 +1,7 @@
 //! `nanotap case`: check a case and print it resolved.
 
+use std::path::PathBuf;
+
 use clap::Args;
 use nanotap::ErrorKind;
 use nanotap::case::document::equilibria;
@@ -17,50 +19,57 @@ use nanotap::model::parameter::Parameter;
 use nanotap::observe::table::shown_phase;
 use nanotap::study::cantilever as cantilever_of;
 use nanotap::study::modes::ModeTable;
-use nanotap::study::setpoint::{SetpointReport, SolvedCase};
+use nanotap::study::setpoint::{
+    CaseReport, SetpointReport, SolvedCase, UnsolvedCase, note_of_several_tones,
+};
 
-use crate::arguments::{CaseArguments, OutArgument};
-use crate::failure::Failure;
+use crate::arguments::CaseArguments;
+use crate::failure::{Failure, flag};
 use crate::given_case::{at_setpoint, case_of};
 use crate::output::Output;
 use crate::table::{Align, Table};
 use crate::{file, motion, number, style};
 
 /// Check a case and print it resolved.
-#[derive(Args, Debug)]
+#[derive(Args, Clone, Debug)]
 pub(crate) struct Arguments {
     #[command(flatten)]
     case: CaseArguments,
-    #[command(flatten)]
-    out: OutArgument,
+    /// Write the case to this file (.toml) with its units, what --set changes and the distance of a
+    /// setpoint; with --model-units as numbers of the equations
+    #[arg(long, value_name = "PATH")]
+    out: Option<PathBuf>,
 }
 
 pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure> {
     let read = case_of(&arguments.case)?;
+    if let Some(path) = &arguments.out {
+        file::claim(path, &["toml"])?;
+    }
+    if let Some(note) = note_of_several_tones(&read) {
+        output.note(&note);
+        let note = Some(note);
+        return unsolved(&read, UnsolvedCase { note, ..UnsolvedCase::of(&read) }, arguments, output);
+    }
     // The case is shown also where no distance has the setpoint, which ends every study of it.
-    let (case, setpoint_solved, unreached) = match at_setpoint(read.clone()) {
-        Ok((case, solved)) => (case, solved, None),
-        Err(error) if error.kind == ErrorKind::Numerics => (read, None, Some(error)),
+    let (case, setpoint_solved) = match at_setpoint(read.clone()) {
+        Ok(solved) => solved,
+        Err(error) if error.kind == ErrorKind::Numerics => {
+            let document = Some(error.clone().written(flag).document());
+            let document = UnsolvedCase { error: document, ..UnsolvedCase::of(&read) };
+            let arguments = Arguments { out: None, ..arguments.clone() };
+            unsolved(&read, document, &arguments, output)?;
+            return Err(error);
+        }
         Err(other) => return Err(other),
     };
     let document = SolvedCase::of(&case, setpoint_solved);
+    write_out(arguments, &case)?;
     if let Some(given) = case.oscillator() {
-        if let Some(path) = &arguments.out.out {
-            return Err(Failure::input(
-                format!("--out {}: an oscillator is not written out", path.display()),
-                "omit --out, or use --json",
-            ));
-        }
         return output.result(&document, |_| oscillator(&case, given));
     }
     let numbers = cantilever_of(&case, "nanotap case")?;
-    write_out(&arguments.out, numbers)?;
-    for remark in case.remarks() {
-        match remark.severity {
-            Severity::Note => output.note(&remark.text),
-            Severity::Warning => output.warning(&remark.text),
-        }
-    }
+    remarks(&case, output);
     remark(numbers, output);
     for beyond in &document.out_of_range {
         output.warning(&format!("where the lever rests, {beyond}"));
@@ -72,27 +81,64 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
                 let solved = &document.setpoint_solved;
                 let solved = solved.as_ref().map_or_else(String::new, setpoint);
                 let rest = equilibria_table(&equilibria(&case), view);
-                format!("{}{rest}{solved}", physical(case.title(), view))
+                format!("{}{rest}{solved}", physical(case.title(), view, true))
             },
         )
-    })?;
-    unreached.map_or(Ok(()), Err)
+    })
 }
 
-/// Writes the dimensionless case where `--out` says.
-fn write_out(out: &OutArgument, case: &Cantilever) -> Result<(), Failure> {
-    let Some(path) = &out.out else { return Ok(()) };
-    file::claim(path, &["toml"])?;
-    if case.law.is_some() {
+/// Prints and writes a case whose setpoint was not solved for, as far as it is known.
+fn unsolved(
+    case: &Case,
+    document: UnsolvedCase,
+    arguments: &Arguments,
+    output: &Output,
+) -> Result<(), Failure> {
+    write_out(arguments, case)?;
+    remarks(case, output);
+    output.result(&CaseReport::Unsolved(document), |_| {
+        let view = case.physical();
+        view.map_or_else(String::new, |view| physical(case.title(), view, false))
+    })
+}
+
+/// Prints the notes and warnings about a case.
+fn remarks(case: &Case, output: &Output) {
+    for remark in case.remarks() {
+        match remark.severity {
+            Severity::Note => output.note(&remark.text),
+            Severity::Warning => output.warning(&remark.text),
+        }
+    }
+}
+
+/// Writes the case where `--out` says: a physical one in its quantities, or with `--model-units` as
+/// numbers of the equations.
+fn write_out(arguments: &Arguments, case: &Case) -> Result<(), Failure> {
+    let Some(path) = &arguments.out else { return Ok(()) };
+    let Some(numbers) = case.cantilever().filter(|_| case.is_in_model_units()) else {
+        return file::write_case(path, &case.to_toml());
+    };
+    if numbers.law.is_some() {
         return Err(Failure::input(
             format!(
                 "--out {}: a nonlinear force law has no dimensionless case file",
                 path.display()
             ),
-            "omit --out, or use --json, which has the law in the model's units",
+            "omit --model-units, which writes the physical case, or use --json, which has the law in \
+             the model's units",
         ));
     }
-    file::write_case(path, &case_file::to_toml(case))
+    if case.leaves_distance_to_setpoint() {
+        return Err(Failure::input(
+            format!(
+                "--out {}: a case without a distance has no numbers of the equations",
+                path.display()
+            ),
+            "omit --model-units, which writes the physical case, or give gap.tip",
+        ));
+    }
+    file::write_case(path, &case_file::to_toml(numbers))
 }
 
 fn remark(case: &Cantilever, output: &Output) {
@@ -150,7 +196,8 @@ fn cantilever(title: &str, case: &Cantilever) -> String {
     )
 }
 
-fn physical(title: &str, view: &Physical) -> String {
+/// The quantities of the case; those that depend on the distance where it is `solved`.
+fn physical(title: &str, view: &Physical, solved: bool) -> String {
     let Physical {
         cantilever: case,
         lever,
@@ -234,11 +281,13 @@ fn physical(title: &str, view: &Physical) -> String {
         }
         Some(Held::Amplitude(_)) | None => {}
     }
-    given.row([
-        "g0",
-        &Kind::Length.format(scales.length),
-        "gap of the beam, the unit of length",
-    ]);
+    if solved {
+        given.row([
+            "g0",
+            &Kind::Length.format(scales.length),
+            "gap of the beam, the unit of length",
+        ]);
+    }
     given.row([
         "T",
         &format!("{:.4e} s", scales.time),
@@ -278,12 +327,11 @@ fn physical(title: &str, view: &Physical) -> String {
         "{title}: a physical cantilever, {}",
         number::counted(case.modes, "mode", "modes")
     );
-    format!(
-        "{}\n\n{}\n{}",
-        style::bold(&heading),
-        given.render(),
-        mapping.render()
-    )
+    let heading = style::bold(&heading);
+    if !solved {
+        return format!("{heading}\n\n{}", given.render());
+    }
+    format!("{heading}\n\n{}\n{}", given.render(), mapping.render())
 }
 
 /// By how much so many modes are stiffer than the beam, see [`Modes::static_excess`].

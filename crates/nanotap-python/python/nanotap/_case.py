@@ -34,6 +34,9 @@ _OTHER_NAMES = {
 # Entries of `to_dict` that follow from the keys.
 _FOLLOWS = {"period", "physical"}
 
+# Entries of the document that do not depend on the distance.
+_WITHOUT_DISTANCE = {"kind", "modes", "contact", "actuation", "cosine_term"}
+
 
 class Case:
     """A checked case: a cantilever (dimensionless or in physical units) or an oscillator.
@@ -62,10 +65,11 @@ class Case:
         TypeError: a value is neither number nor text.
     """
 
-    __slots__ = ("_core", "_document", "_keys", "_remarks_said")
+    __slots__ = ("_core", "_document", "_is_at_setpoint", "_keys", "_remarks_said")
     _core: _nanotap.CaseCore
     _keys: dict[str, str]
     _document: Record
+    _is_at_setpoint: bool
 
     def __init__(
         self,
@@ -78,7 +82,7 @@ class Case:
             (os.fspath(path), _nanotap.catalogue_text(existing(path)))
             for path in _paths(catalogue)
         ]
-        self._make(None, key_words(keys), texts, model_units)
+        self._make(None, key_words(keys), texts, "", model_units)
 
     @classmethod
     def from_file(
@@ -109,7 +113,7 @@ class Case:
         if not isinstance(text, str):
             message = f"text: expected a TOML text, got {text!r}"
             raise TypeError(message)
-        return _again(cls, (name, text), key_words(keys), [], False)
+        return _again(cls, (name, text), key_words(keys), [], "", False)
 
     @classmethod
     def paper(cls, **keys: Value) -> "Case":
@@ -124,7 +128,7 @@ class Case:
             "alpha6": 0.2,
             "omega": 2.6,
         }
-        return _again(cls, None, key_words(own) | key_words(keys), [], False)
+        return _again(cls, None, key_words(own) | key_words(keys), [], "", False)
 
     def with_(self, *, model_units: bool | None = None, **keys: Value) -> "Case":
         """The same case with some keys changed; `None` removes a key. Numbers that are not stated
@@ -135,9 +139,11 @@ class Case:
             model_units = self._core.model_units
         if not keys and model_units == self._core.model_units:
             return self
-        source, _, catalogues = self._core.made_of
+        source, _, catalogues, folder = self._core.made_of
         texts = self._keys | key_words(keys, self.kind)
-        return _again(type(self), source, texts, catalogues, model_units)
+        return _again(
+            type(self), source, texts, catalogues, os.fspath(folder), model_units
+        )
 
     def _varied(self, keys: Mapping[str, Value]) -> "Case":
         """The same case with keys varied as studies vary them: what is not varied stays, the
@@ -157,15 +163,25 @@ class Case:
         source: tuple[str, str] | None,
         words: dict[str, str],
         catalogues: list[tuple[str, str]],
+        folder: str,
         model_units: bool,
     ) -> None:
         self._keys = words
-        core = _nanotap.CaseCore(source, list(words.values()), catalogues)
+        core = _nanotap.CaseCore(source, list(words.values()), catalogues, folder)
         self._core = core.in_model_units(model_units)
         self._read()
 
     def _read(self) -> None:
         self._document = Record(json.loads(self._core.document))
+        self._is_at_setpoint = not self._core.leaves_distance_to_setpoint
+
+    @property
+    def _solved(self) -> Record:
+        """The document of the case; where the distance is left to a setpoint, it is solved for."""
+        if not self._is_at_setpoint:
+            self._document = Record(json.loads(self._core.document_at_setpoint))
+            self._is_at_setpoint = True
+        return self._document
 
     @property
     def kind(self) -> str:
@@ -175,7 +191,7 @@ class Case:
     @property
     def period(self) -> float:
         """The period of the drive, 2π/Ω, in the model's unit of time."""
-        return float(self._document["period"])
+        return float(self["period"])
 
     @property
     def physical(self) -> Record | None:
@@ -183,10 +199,7 @@ class Case:
 
         Where the distance is left to a setpoint, it is solved for.
         """
-        document = self._document
-        if self._core.leaves_distance_to_setpoint:
-            document = Record(json.loads(self._core.document_at_setpoint))
-        physical = document.get("physical")
+        physical = self._solved.get("physical")
         return physical if isinstance(physical, Record) else None
 
     @property
@@ -217,7 +230,8 @@ class Case:
     def mapping(self) -> "pd.DataFrame":
         """Every dimensionless parameter and the physical quantity that it represents.
 
-        Columns: parameter, value, formula, quantity, si, unit. Empty without physical units.
+        Columns: parameter, value, formula, quantity, si, unit. Empty without physical units. Where the
+        distance is left to a setpoint, it is solved for.
         """
         import pandas as pd
 
@@ -225,21 +239,29 @@ class Case:
         table = pd.DataFrame(json.loads(self._core.mapping), columns=columns)
         return table.set_index("parameter")
 
-    def to_toml(self) -> str:
-        """The equivalent dimensionless case file.
+    def to_toml(self, *, dimensionless: bool = False) -> str:
+        """The case file, which gives the same bytes of every result: a physical case with its units,
+        its law and the distance at its setpoint, which is solved for. `dimensionless` writes the
+        numbers of the equations in place of physical quantities.
 
         Raises:
-            ValueError: the case is an oscillator.
+            ValueError: a nonlinear law has no dimensionless case file.
+            RuntimeError: the setpoint is not reached.
         """
-        text = self._core.toml
-        if text is None:
-            message = "an oscillator cannot be written as a case file"
-            raise ValueError(message)
-        return text
+        return self._core.toml(dimensionless)
+
+    @property
+    def inputs(self) -> dict[str, Any]:
+        """What was stated, by table and key: `Case(**case.inputs)` is the same case."""
+        stated: dict[str, Any] = json.loads(self._core.inputs)
+        if self._core.model_units:
+            stated["model_units"] = True
+        return stated
 
     def to_dict(self) -> dict[str, Any]:
         """The whole document, as the terminal's `nanotap case --json`."""
-        return self._document.to_dict()
+        document: dict[str, Any] = json.loads(self._core.document_at_setpoint)
+        return document
 
     def __getattr__(self, name: str) -> Any:
         if name.startswith("_"):
@@ -257,8 +279,10 @@ class Case:
         super().__setattr__(name, value)
 
     def __getitem__(self, name: str) -> Any:
-        own = name in self._document
-        return self._document[name if own else _OTHER_NAMES.get(name, name)]
+        name = name if name in self._document else _OTHER_NAMES.get(name, name)
+        if name in _WITHOUT_DISTANCE or name not in self._document:
+            return self._document[name]
+        return self._solved[name]
 
     def __iter__(self) -> Iterator[str]:
         return iter(self._document)
@@ -276,9 +300,16 @@ class Case:
         return hash(self._core.document)
 
     def __reduce__(self) -> tuple[Any, ...]:
-        source, _, catalogues = self._core.made_of
+        source, _, catalogues, folder = self._core.made_of
         flag = self._core.model_units
-        return _again, (type(self), source, self._keys, catalogues, flag)
+        return _again, (
+            type(self),
+            source,
+            self._keys,
+            catalogues,
+            os.fspath(folder),
+            flag,
+        )
 
     def __repr__(self) -> str:
         if self.is_physical:
@@ -314,7 +345,8 @@ class Case:
             if key not in {"kind", "physical"} and value is not None
         )
         numbers = f"<table><caption>{escape(self.kind)}</caption>{rows}</table>"
-        return self._quantities_html() + numbers
+        # The numbers are those of the distance.
+        return self._quantities_html() + (numbers if self._is_at_setpoint else "")
 
     def _quantities_html(self) -> str:
         """Lever, sample and drive of a physical case with their units."""
@@ -343,10 +375,11 @@ def _again(
     source: tuple[str, str] | None,
     words: dict[str, str],
     catalogues: list[tuple[str, str]],
+    folder: str,
     model_units: bool,
 ) -> Case:
     case = kind.__new__(kind)
-    case._make(source, words, catalogues, model_units)
+    case._make(source, words, catalogues, folder, model_units)
     return case
 
 
@@ -415,6 +448,9 @@ def _written(name: str, value: Any) -> str:
     if value is None:
         # The key is removed.
         return ""
+    if name.startswith("scan."):
+        # Options of the study `scan`, as JSON.
+        return json.dumps(value)
     value = in_si(name, value)
     if isinstance(value, np.generic | np.ndarray) and np.ndim(value) == 0:
         value = value.item()

@@ -108,18 +108,23 @@ pub struct PhysicalSummary {
     /// Gaps and forces of a tabulated law, m and N.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub force_table: Vec<(f64, f64)>,
-    /// Gap of the tip, m.
-    pub tip_gap: f64,
-    /// Gap of the beam, m.
-    pub beam_gap: f64,
-    /// The model's unit of length, m.
-    pub length_unit: f64,
+    /// Gap of the tip, m; `None` while the distance is left to a setpoint.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub tip_gap: Option<f64>,
+    /// Gap of the beam, m; `None` while the distance is left to a setpoint.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub beam_gap: Option<f64>,
+    /// The model's unit of length, m; `None` while the distance is left to a setpoint.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub length_unit: Option<f64>,
     /// The model's unit of time, s.
     pub time_unit: f64,
-    /// The model's unit of force, N.
-    pub force_unit: f64,
-    /// The model's unit of energy, J.
-    pub energy_unit: f64,
+    /// The model's unit of force, N; `None` while the distance is left to a setpoint.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub force_unit: Option<f64>,
+    /// The model's unit of energy, J; `None` while the distance is left to a setpoint.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub energy_unit: Option<f64>,
 }
 
 /// Young's modulus of a sample that relaxes under a small oscillation at the drive frequency.
@@ -224,12 +229,24 @@ impl PhysicalSummary {
                 .as_ref()
                 .and_then(|force| force.table.as_ref())
                 .map_or_else(Vec::new, |table| table.rows().points().to_vec()),
-            tip_gap: quantity(Parameter::Alpha5),
-            beam_gap: scales.length,
-            length_unit: scales.length,
+            tip_gap: Some(quantity(Parameter::Alpha5)),
+            beam_gap: Some(scales.length),
+            length_unit: Some(scales.length),
             time_unit: scales.time,
-            force_unit: scales.force,
-            energy_unit: scales.energy,
+            force_unit: Some(scales.force),
+            energy_unit: Some(scales.energy),
+        }
+    }
+
+    /// The quantities of a physical case that do not depend on a distance that is left to a setpoint.
+    pub fn without_distance(view: &Physical) -> Self {
+        Self {
+            tip_gap: None,
+            beam_gap: None,
+            length_unit: None,
+            force_unit: None,
+            energy_unit: None,
+            ..Self::of(view)
         }
     }
 }

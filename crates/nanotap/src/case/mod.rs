@@ -31,6 +31,7 @@ pub mod quantity;
 #[cfg(feature = "fit")]
 mod recording;
 pub mod schema;
+pub mod state;
 mod stated;
 pub mod table;
 pub(crate) mod under_law;
@@ -183,10 +184,7 @@ impl Case {
         let overrides = file::with_tables(overrides)?;
         let case = Self::parse_with(path.map(file::read).transpose()?, &overrides, catalogue)?;
         let folder = path.and_then(Path::parent).unwrap_or_else(|| Path::new(""));
-        Ok(Self {
-            folder: Some(folder.into()),
-            ..case
-        })
+        Ok(case.in_folder(folder))
     }
 
     /// Parses a case from a text and `key=value` words, with the built-in levers and materials.
@@ -262,6 +260,15 @@ impl Case {
     /// The table `[scan]` of its file, as JSON: options of the study `scan`.
     pub fn scan(&self) -> Option<&serde_json::Map<String, serde_json::Value>> {
         self.scan.as_deref()
+    }
+
+    /// The same case, read in `folder`, to which the names of files in `[scan]` are relative.
+    #[must_use]
+    pub fn in_folder(self, folder: &Path) -> Self {
+        Self {
+            folder: Some(folder.into()),
+            ..self
+        }
     }
 
     /// The path of a file that `[scan]` names, relative to the case file.
@@ -517,12 +524,10 @@ impl Case {
             CaseKind::Cantilever(cantilever) => Model::cantilever(cantilever)?,
             CaseKind::Oscillator(oscillator) => oscillator.model()?,
             CaseKind::Quantities(quantities) => {
-                let model = Model::cantilever(&quantities.view()?.cantilever)?;
-                let start = quantities.start.as_ref();
-                Model {
-                    start: start.map(|state| with_modes(state, &model)),
-                    ..model
-                }
+                let view = quantities.view()?;
+                let model = Model::cantilever(&view.cantilever)?;
+                let start = quantities.start(&model, &Units::Si(view.scales))?;
+                Model { start, ..model }
             }
         };
         Ok(model.cancelled_by(&self.cancel))
@@ -778,6 +783,7 @@ impl Case {
         }
         let mut quantities = quantities.clone();
         quantities.stated.remove(Key::GapTip);
+        quantities.stated.remove(Key::DriveStart);
         quantities.stated.put(Key::DriveSetpoint, setpoint.clone());
         Self {
             what: CaseKind::Quantities(Box::new(quantities.mapped(true))),
@@ -787,9 +793,9 @@ impl Case {
 
     /// The same case whose motions start from `state` at drive phase 0.
     #[must_use]
-    pub(crate) fn starting_from(mut self, state: Vec<f64>) -> Self {
+    pub(crate) fn starting_from(mut self, state: &[f64]) -> Self {
         if let CaseKind::Quantities(quantities) = &mut self.what {
-            quantities.start = Some(state);
+            quantities.put_start(state);
         }
         self
     }
@@ -806,7 +812,7 @@ impl Case {
         distance: f64,
         drive: Option<[f64; 2]>,
         note: Remark,
-        state: Vec<f64>,
+        state: &[f64],
     ) -> Result<Self, CaseFileError> {
         let CaseKind::Quantities(quantities) = &self.what else {
             return Ok(self.clone());
@@ -824,8 +830,9 @@ impl Case {
             quantities.stated.set(view.strength_key(FIRST), strength);
         }
         quantities.notes.push(note);
-        quantities.start = Some(state);
-        Ok(self.with_quantities(quantities.mapped(true).validated()?))
+        let mut quantities = quantities.mapped(true).validated()?;
+        quantities.put_start(state);
+        Ok(self.with_quantities(quantities))
     }
 
     /// The same case with other quantities.
@@ -835,20 +842,6 @@ impl Case {
             ..self.clone()
         }
     }
-}
-
-/// A state with the number of modes of a model: additional modes are at rest, others are left out.
-fn with_modes(state: &[f64], model: &Model) -> Vec<f64> {
-    let dimension = model.dimension();
-    let [own, wanted] = [state.len(), dimension].map(|n| n.saturating_sub(model.memory) / 2);
-    let mut resized = vec![0.0; dimension];
-    let shared = own.min(wanted);
-    resized[..shared].copy_from_slice(&state[..shared]);
-    resized[wanted..wanted + shared].copy_from_slice(&state[own..own + shared]);
-    for (to, from) in resized[2 * wanted..].iter_mut().zip(&state[2 * own..]) {
-        *to = *from;
-    }
-    resized
 }
 
 impl Serialize for Case {

@@ -9,7 +9,10 @@ use super::Key;
 use super::file::{self, CaseFileError};
 use super::key::Section;
 use super::physical::{Catalogue, Kind, Physical, Reader, Remark};
+use super::state::WrittenState;
 use super::stated::{Stated, Value};
+use super::units::Units;
+use crate::model::Model;
 use crate::model::cantilever::Cantilever;
 use crate::model::parameter::Parameter;
 
@@ -25,8 +28,6 @@ pub(super) struct Quantities {
     pub(super) view: Result<Box<Physical>, Box<CaseFileError>>,
     /// Notes of a study about the case.
     pub(super) notes: Vec<Remark>,
-    /// State at drive phase 0 of the orbit at the setpoint, from which motions start.
-    pub(super) start: Option<Vec<f64>>,
 }
 
 impl Quantities {
@@ -39,7 +40,6 @@ impl Quantities {
             held: false,
             view: Err(Box::new(empty)),
             notes: Vec::new(),
-            start: None,
         };
         quantities.mapped(false)
     }
@@ -86,6 +86,48 @@ impl Quantities {
     pub(super) fn get(&self, key: Key) -> Option<f64> {
         let inferred = || self.view.as_ref().ok()?.value(key);
         self.stated.number(key).or_else(inferred)
+    }
+
+    /// The stated state from which motions start, in the model's units; `None` if there is none, or
+    /// while the distance is left to a setpoint.
+    ///
+    /// # Errors
+    /// If it does not fit the model.
+    pub(super) fn start(
+        &self,
+        model: &Model,
+        units: &Units,
+    ) -> Result<Option<Vec<f64>>, Box<CaseFileError>> {
+        let Some(Value::State(written)) = self.stated.get(Key::DriveStart) else {
+            return Ok(None);
+        };
+        if !self.stated.has(Key::GapTip) {
+            return Ok(None);
+        }
+        let refused = |message: String| Box::new(self.stated.refused(Some(Key::DriveStart), message));
+        let state = written.read(model, units);
+        let mut state = state.map_err(|error| refused(format!("drive.start: {error}")))?;
+        if state.len() + model.memory == model.dimension() {
+            state.resize(model.dimension(), 0.0);
+        }
+        let moving = state.len().saturating_sub(model.memory);
+        if state.len() < model.memory || moving == 0 || moving % 2 == 1 {
+            return Err(refused(format!(
+                "drive.start has {} entries; the model has {}: {}",
+                state.len(),
+                model.dimension(),
+                model.state_names().join(", "),
+            )));
+        }
+        Ok(Some(with_modes(&state, model)))
+    }
+
+    /// States the state from which motions start, given in the model's units.
+    pub(super) fn put_start(&mut self, state: &[f64]) {
+        if let Ok(view) = &self.view {
+            let written = WrittenState::in_si(state, view.cantilever.modes, &view.scales);
+            self.stated.put(Key::DriveStart, Value::State(written));
+        }
     }
 
     pub(super) fn with(&self, key: Key, value: f64) -> Self {
@@ -180,6 +222,20 @@ impl Quantities {
                 .collect(),
         }
     }
+}
+
+/// A state with the number of modes of a model: additional modes are at rest, others are left out.
+fn with_modes(state: &[f64], model: &Model) -> Vec<f64> {
+    let dimension = model.dimension();
+    let [own, wanted] = [state.len(), dimension].map(|n| n.saturating_sub(model.memory) / 2);
+    let mut resized = vec![0.0; dimension];
+    let shared = own.min(wanted);
+    resized[..shared].copy_from_slice(&state[..shared]);
+    resized[wanted..wanted + shared].copy_from_slice(&state[own..own + shared]);
+    for (to, from) in resized[2 * wanted..].iter_mut().zip(&state[2 * own..]) {
+        *to = *from;
+    }
+    resized
 }
 
 /// Derivatives of the numbers that change, and of a nonlinear law's parameters in order.

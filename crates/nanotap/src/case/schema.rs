@@ -98,6 +98,11 @@ fn taken(key: Key, entry: &Entry) -> Map<String, Value> {
             say("type", "string".into());
             return schema;
         }
+        Takes::State => {
+            say("type", "string".into());
+            say("examples", json!(["tip=5 nm"]));
+            return schema;
+        }
         Takes::Table => {
             say("type", json!(["string", "array"]));
             say(

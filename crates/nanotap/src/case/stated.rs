@@ -6,6 +6,7 @@ use super::file::{CaseFileError, Header, Place, Problem, Source};
 use super::force_table::{ArmTable, ForceTable, ForceTableError};
 use super::key::{Key, Takes};
 use super::quantity::{Kind, Quantity, QuantityError};
+use super::state::WrittenState;
 use nanotap_volterra::VolterraError;
 
 use crate::model::contact::ContactLaw;
@@ -28,6 +29,8 @@ pub enum Value {
     Table(ForceTable),
     /// Maxwell arms of a sample that relaxes.
     Arms(ArmTable),
+    /// A state at drive phase 0.
+    State(WrittenState),
 }
 
 impl Value {
@@ -40,6 +43,7 @@ impl Value {
             Self::Ratio(ratio) => ratio.to_string(),
             Self::Table(table) => table.text(),
             Self::Arms(arms) => arms.text(),
+            Self::State(state) => state.text(),
         }
     }
 }
@@ -64,6 +68,9 @@ pub enum ValueError {
     /// The text is not a table of the kind that the key takes.
     #[error(transparent)]
     Table(#[from] ForceTableError),
+    /// The text is not a state.
+    #[error(transparent)]
+    State(#[from] crate::Error),
     /// The text does not name a contact law.
     #[error("unknown law \"{given}\"; the laws are {}", laws().join(", "))]
     Law {
@@ -128,6 +135,7 @@ impl Key {
             Takes::Law => law(text)?,
             Takes::LeverName | Takes::MaterialName => Value::Name(text.into()),
             Takes::FrequencyRatio => Value::Ratio(text.parse()?),
+            Takes::State => Value::State(WrittenState::parse(text)?),
             takes @ (Takes::Table | Takes::Arms | Takes::Springs | Takes::ModelArms) => {
                 takes.parse_table(text)?
             }

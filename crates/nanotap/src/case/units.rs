@@ -97,10 +97,13 @@ impl Units {
             return Kind::Number.parse(text).map_err(words);
         };
         let value = kind.parse(text).map_err(words)?;
-        if kind == Kind::Length && value.abs() > MOST_DEFLECTION {
+        // A tip that is deflected by more than the beam's gap is a number in the model's units.
+        let is_bare = text.trim().parse::<f64>().is_ok();
+        let most = if is_bare { si } else { MOST_DEFLECTION };
+        if kind == Kind::Length && value.abs() > most {
             return Err(format!(
                 "expected a length below {}, got {}; write the unit, as in \"10 nm\"",
-                kind.format(MOST_DEFLECTION),
+                kind.format(most),
                 kind.format(value)
             ));
         }

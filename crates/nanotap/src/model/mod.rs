@@ -245,6 +245,20 @@ impl BeamOutputs {
 }
 
 impl Model {
+    /// Names of the entries of a state: a1 … aN, v1 … vN, then s1, s2, … of the sample's memory; of an
+    /// oscillator x and v.
+    pub fn state_names(&self) -> Vec<String> {
+        if self.beam.is_none() {
+            return vec!["x".to_owned(), "v".to_owned()];
+        }
+        let n = (self.dimension() - self.memory) / 2;
+        let named = |letter: char, count: usize| (1..=count).map(move |i| format!("{letter}{i}"));
+        named('a', n)
+            .chain(named('v', n))
+            .chain(named('s', self.memory))
+            .collect()
+    }
+
     /// Returns the state at rest: at deflection 0, or on a rigid stop if that lies before it.
     pub fn rest(&self) -> Vec<f64> {
         let mut state = vec![0.0; self.dimension()];

@@ -50,15 +50,7 @@ pub fn scaled<'a>(row: &'a [f64], units: &'a Units) -> impl Iterator<Item = f64>
 
 /// Names of the entries of a state.
 pub fn state_names(model: &Model) -> Vec<String> {
-    if model.beam.is_none() {
-        return vec!["x".to_owned(), "v".to_owned()];
-    }
-    let n = (model.dimension() - model.memory) / 2;
-    let named = |letter: char, count: usize| (1..=count).map(move |i| format!("{letter}{i}"));
-    named('a', n)
-        .chain(named('v', n))
-        .chain(named('s', model.memory))
-        .collect()
+    model.state_names()
 }
 
 /// Converts a state of a beam to `modes` modes: additional modes are at rest, others are cut off.

@@ -140,6 +140,9 @@ impl Study for ModesStudy {
     type Options = ModesOptions;
     type Report = ModeTable;
 
+    // The frequencies do not depend on it.
+    const ANY_DISTANCE: bool = true;
+
     fn compute(case: &Case, _: &ModesOptions, _: &Control<'_>) -> Result<ModeTable, Error> {
         let mut table = ModeTable::new(cantilever(case, Self::NAME)?)?;
         table.physical = case.units().si(Kind::Frequency).map(|unit| {

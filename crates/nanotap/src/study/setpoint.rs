@@ -36,12 +36,13 @@ use super::approach::distance_sweep::{
 use super::approach::{MAX_MULTIPLIER, SETPOINT_PERIODS, Way};
 use super::frequency_modulation::{self, FrequencyModulationOptions};
 use super::value::Amount;
-use crate::case::document::CaseDocument;
+use crate::case::document::{CaseDocument, PhysicalSummary};
 use crate::case::physical::{Held, Kind, Remark};
 use crate::case::{Case, Key};
 use crate::model::model_map::ModelMap;
 use crate::observe::table::{Observable, shown_phase};
 use crate::observe::{ObservableSet, Observables, OutOfRange, PhysicalMotion, measure};
+use crate::error::ErrorDocument;
 use crate::{Error, ErrorKind};
 
 /// A distance at which an orbit has the setpoint amplitude.
@@ -549,7 +550,7 @@ pub fn at_setpoint(
         return Ok((case, None));
     }
     let report = solve_setpoint(&case.cancelled_by(control), control)?;
-    let state = report.solutions.get(report.chosen).map(|s| s.state.clone());
+    let state = report.solutions.get(report.chosen).map(|s| &s.state[..]);
     let drive = report.drive.map(|drive| [drive.frequency, drive.strength]);
     let state = state.unwrap_or_default();
     let there = case.at_distance(report.zc(), drive, report.remark(), state)?;
@@ -576,6 +577,59 @@ pub struct SolvedCase {
     /// Excursions of the rest position beyond the range of a nonlinear force law.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub out_of_range: Vec<OutOfRange>,
+}
+
+/// A case whose distance is left to a setpoint that was not solved for: what does not depend on the
+/// distance.
+#[derive(Clone, Debug, Serialize)]
+pub struct UnsolvedCase {
+    /// The word `cantilever`.
+    pub kind: &'static str,
+    /// Number of beam modes.
+    pub modes: usize,
+    /// Quantities in SI, without those that depend on the distance.
+    pub physical: Option<PhysicalSummary>,
+    /// Why the setpoint is not solved for here.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub note: Option<String>,
+    /// Why the setpoint is not reached.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub error: Option<ErrorDocument>,
+}
+
+/// A case as a document, at its setpoint or without a distance.
+#[derive(Clone, Debug, Serialize)]
+#[serde(untagged)]
+pub enum CaseReport {
+    /// A case with its distance.
+    Solved(SolvedCase),
+    /// A case whose setpoint was not solved for.
+    Unsolved(UnsolvedCase),
+}
+
+impl UnsolvedCase {
+    /// The document of a case whose setpoint is not solved for, with the reason.
+    pub fn of(case: &Case) -> Self {
+        Self {
+            kind: "cantilever",
+            modes: case.cantilever().map_or(0, |cantilever| cantilever.modes),
+            physical: case.physical().map(PhysicalSummary::without_distance),
+            note: None,
+            error: None,
+        }
+    }
+}
+
+/// Why the setpoint of a case is not solved for where nothing else needs its distance: a drive with
+/// several tones has loops for them. `None` for a case with a distance or one tone.
+pub fn note_of_several_tones(case: &Case) -> Option<String> {
+    let tones = case.cantilever().map_or(0, |lever| lever.further_tones.len());
+    let is_left = case.leaves_distance_to_setpoint() && tones > 0;
+    is_left.then(|| {
+        "the distance is left to the setpoint and the drive has several tones: `bimodal` follows \
+         them with their loops and finds the distance; with gap.tip the case is shown at a distance"
+            .to_owned()
+    })
 }
 
 impl SolvedCase {

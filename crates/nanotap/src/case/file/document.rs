@@ -169,14 +169,16 @@ impl Document {
             return Err(Problem::new(place, "no key before the `=`").help(shape));
         }
         if table.trim() == SCAN {
-            let read = DeValue::parse(value).map_or_else(
-                |_| {
-                    value
-                        .parse()
-                        .map_or_else(|_| value.into(), |x: f64| x.into())
-                },
-                |value| json::json(value.get_ref()),
-            );
+            let toml = |value: &str| {
+                DeValue::parse(value).map_or_else(
+                    |_| {
+                        let number = value.parse().map(|x: f64| x.into());
+                        number.unwrap_or_else(|_| value.into())
+                    },
+                    |value| json::json(value.get_ref()),
+                )
+            };
+            let read = serde_json::from_str(value).unwrap_or_else(|_| toml(value));
             let options = self.scan.get_or_insert_default();
             json::put(options, key, (!value.is_empty()).then_some(read));
             return Ok(());

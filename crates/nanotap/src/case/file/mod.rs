@@ -17,128 +17,21 @@ mod json;
 mod problem;
 mod reader;
 mod refusal;
+mod writer;
 
 use std::path::Path;
 
 pub use document::{Document, Entry, Header};
 pub use problem::{CaseFileError, Place, Problem, SHOWN, Source};
 pub(crate) use reader::{Described, modes, parse_with_scan, word};
+pub use writer::{scan_table, to_toml};
 
 use toml::de::{DeTable, DeValue};
 
 use super::force_table::file_named;
-use super::{Case, CaseKind, Kind, Value};
+use super::Value;
 use crate::case::key::{Key, Takes};
 use crate::input::{self, MAX_CASE_BYTES, Origin};
-use crate::model::cantilever::{Cantilever, CosineTerm};
-use crate::model::contact::ContactLaw;
-use crate::model::drive_form::Actuation;
-
-/// A dimensionless cantilever as a case file, every key written out.
-pub fn to_toml(case: &Cantilever) -> String {
-    use std::fmt::Write as _;
-    let mut text = format!("[model]\nmodes = {}\n", case.modes);
-    for parameter in case.parameters() {
-        let (key, value) = (Key::of(parameter), case.get(parameter));
-        let _ = writeln!(text, "{key} = {value:?}  # {}", key.meaning());
-    }
-    if case.cosine_term == CosineTerm::Printed {
-        text.push_str("cosine_term = \"printed\"\n");
-    }
-    if case.actuation != Actuation::default() {
-        let (name, meaning) = (case.actuation.name(), case.actuation.meaning());
-        let _ = writeln!(text, "actuation = \"{name}\"  # {meaning}");
-    }
-    for (ratio, key) in case.further_tones.iter().zip(Key::TONE_RATIOS) {
-        let meaning = key.meaning();
-        let _ = writeln!(text, "{key} = \"{ratio}\"  # {meaning}");
-    }
-    if case.contact != ContactLaw::default() {
-        let _ = writeln!(
-            text,
-            "contact = \"{}\"  # {}",
-            case.contact,
-            case.contact.meaning()
-        );
-    }
-    if !case.arms.is_empty() {
-        let arms = case.arms.iter();
-        let arms = arms.map(|[time, stiffness]| format!(", [{time:?}, {stiffness:?}]"));
-        let arms: String = arms.collect();
-        let key = Key::RelaxationArms;
-        let _ = writeln!(text, "{key} = [[\"time\", \"stiffness\"]{arms}]");
-    }
-    text
-}
-
-impl Case {
-    /// The case as a file that is read back as the same case: all numbers of the equations, or the
-    /// stated physical quantities with `[scan]`.
-    pub fn to_toml(&self) -> String {
-        use std::fmt::Write as _;
-        let quantities = match &self.what {
-            CaseKind::Cantilever(cantilever) => return to_toml(cantilever),
-            CaseKind::Oscillator(oscillator) => {
-                let mut text = format!("[model]\nkind = \"{}\"\n", self.model_kind().name());
-                for (key, value) in self
-                    .keys()
-                    .into_iter()
-                    .filter_map(|key| Some((key, oscillator.get(key.oscillator_parameter()?)?)))
-                {
-                    let _ = writeln!(text, "{} = {value:?}  # {}", key.name(), key.meaning());
-                }
-                return text;
-            }
-            CaseKind::Quantities(quantities) => quantities,
-        };
-        let mut text = String::new();
-        let mut section = None;
-        // Keys are sorted as in their table, section by section.
-        for (key, value) in quantities.stated.iter() {
-            if section != Some(key.section()) {
-                section = Some(key.section());
-                let gap = if text.is_empty() { "" } else { "\n" };
-                let _ = writeln!(text, "{gap}[{}]", key.section().name());
-            }
-            let plain = matches!(
-                value,
-                Value::Number(_, Kind::Number) | Value::Table(_) | Value::Arms(_)
-            );
-            let quote = if plain { "" } else { "\"" };
-            let _ = writeln!(text, "{} = {quote}{}{quote}", key.name(), value.text());
-        }
-        if let Some(scan) = self.scan() {
-            let _ = write!(text, "\n{}", scan_table(scan));
-        }
-        text
-    }
-}
-
-/// The table `[scan]` of a case file.
-pub fn scan_table(scan: &serde_json::Map<String, serde_json::Value>) -> String {
-    let lines = scan
-        .iter()
-        .map(|(name, value)| format!("{name} = {}\n", inline(value)));
-    format!("[scan]\n{}", lines.collect::<String>())
-}
-
-/// A value of JSON on one line of TOML.
-fn inline(value: &serde_json::Value) -> String {
-    use serde_json::Value;
-    match value {
-        Value::Object(map) => {
-            let entries = map
-                .iter()
-                .map(|(name, value)| format!("{name} = {}", inline(value)));
-            format!("{{ {} }}", entries.collect::<Vec<_>>().join(", "))
-        }
-        Value::Array(values) => {
-            let values: Vec<String> = values.iter().map(inline).collect();
-            format!("[{}]", values.join(", "))
-        }
-        other => other.to_string(),
-    }
-}
 
 /// The keys that take a table.
 const TABLES: [Key; 4] = [

@@ -264,6 +264,7 @@ fn physical_value(key: Key, entry: &Entry) -> Result<Value, Problem> {
             ValueError::Quantity(error) => at(format!("{key}: {error}")),
             ValueError::Table(error) => at(format!("{key}: {error}")).help(error.remedy),
             ValueError::Ratio(error) => at(format!("{key} = {text}: {error}")),
+            ValueError::State(error) => at(format!("{key}: {error}")),
             ValueError::Law { given } => {
                 refusal::not_among(entry, &given, &crate::case::stated::laws())
             }

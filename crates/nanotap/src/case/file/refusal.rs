@@ -169,9 +169,13 @@ pub(super) fn mixed(
 
 /// Refuses alternatives that are stated together.
 pub(super) fn twice(known: &BTreeMap<Key, &Entry>, problems: &mut Problems) {
+    // A setpoint that was solved for has its distance and its motion.
+    let solved = |key: Key| {
+        [Key::GapTip, Key::DriveSetpoint].contains(&key) && known.contains_key(&Key::DriveStart)
+    };
     for (&key, entry) in known {
         for (other, reason) in key.alternatives() {
-            if other > key && known.contains_key(&other) {
+            if other > key && known.contains_key(&other) && !(solved(key) && solved(other)) {
                 problems.add(|| {
                     let message = format!("{key} and {other} cannot both be given: {reason}");
                     Problem::new(entry.value_place.clone(), message).key(Some(key.path()))

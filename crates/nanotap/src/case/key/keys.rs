@@ -497,6 +497,11 @@ After from AFTER_LAWS => {
          frequency modulation a frequency shift; it tells the distance",
     ).feeds(Parameter::Alpha5)
         .label("setpoint $A/A_0$");
+    DriveStart = other(
+        Drive, "start", Takes::State,
+        "state at drive phase 0 from which motions start: a1,…,aN,v1,…,vN with units, or by name as in tip=5nm; \
+         together with gap.tip and setpoint it is the motion at that setpoint",
+    );
     DriveActuation = other(Drive, "actuation", Takes::Word(words!(Actuation)), "where the drive acts");
     DriveHold = other(
         Drive, "hold", Takes::Word(words!(Hold)),

@@ -146,6 +146,8 @@ pub enum Takes {
     MaterialName,
     /// A ratio of two frequencies: `25/4`, `6.25`.
     FrequencyRatio,
+    /// A state at drive phase 0.
+    State,
     /// Rows of gap and force, or the name of a CSV file of them.
     Table,
     /// Rows of time and modulus, or the name of a CSV file of them.
@@ -480,6 +482,7 @@ impl Key {
                 "each setpoint has its own distance; vary gap.tip, or see A/A0 in the curve of \
                  an approach",
             ),
+            Takes::State => Some("it is a state; vary one entry by a basin or a sweep's starts"),
             Takes::Count(_) => Some("it is a whole number"),
             Takes::FrequencyRatio => Some("it is a ratio of whole numbers"),
             Takes::Table => Some("it is a curve; vary sample.force_factor or sample.gap_factor"),

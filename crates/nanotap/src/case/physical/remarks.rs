@@ -53,15 +53,9 @@ impl Physical {
         remarks.extend(self.lever.remarks(&self.data));
         remarks.extend(self.sample.remarks(reader, &self.tip));
         if !reader.has(Key::GapTip) {
-            remarks.push(Remark::note(format!(
-                "gap.tip is not given: {}, the {} amplitude, until the setpoint is solved for",
-                Kind::Length.format(self.parameters.get(Parameter::Alpha5)),
-                if self.setpoint.is_some() {
-                    "setpoint"
-                } else {
-                    "free"
-                }
-            )));
+            remarks.push(Remark::note(
+                "gap.tip is not given: it follows from the setpoint",
+            ));
         }
         if !reader.has(Key::GapBeam) && self.tip.height.is_none() {
             remarks.push(Remark::note(format!(

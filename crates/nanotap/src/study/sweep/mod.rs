@@ -209,7 +209,7 @@ impl Runs {
                 .with(Key::DriveFrequency, drive.frequency)
                 .with(strength, drive.strength);
         }
-        Some(case.starting_from(reached.state.clone()))
+        Some(case.starting_from(&reached.state))
     }
 
     /// The distance with the values of this number, solved for a setpoint, in m; otherwise NaN.

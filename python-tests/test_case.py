@@ -52,6 +52,45 @@ def test_a_case_comes_back_from_its_own_file(tmp_path):
     assert nanotap.Case.from_file(path, omega=20) == case.with_(omega=20)
 
 
+FOLDERS = ["docs/cases", "crates/nanotap-explorer/cases"]
+FILES = sorted(path for folder in FOLDERS for path in (ROOT / folder).glob("*.toml"))
+
+
+@pytest.mark.parametrize(
+    "path", FILES, ids=lambda path: f"{path.parent.name}-{path.stem}"
+)
+def test_a_case_is_the_same_from_its_own_inputs(path):
+    case = nanotap.Case.from_file(path)
+    again = nanotap.Case(**case.inputs)
+    assert again == case and again.inputs == case.inputs
+    if not case._core.leaves_distance_to_setpoint:
+        assert nanotap.Case.from_toml(case.to_toml()) == case
+        assert again.to_toml() == case.to_toml()
+
+
+def test_a_solved_setpoint_is_part_of_the_case():
+    # The distance of docs/cases/stiff-lever.md: 15.201 nm.
+    case = nanotap.Case.from_file(ROOT / "docs" / "cases" / "stiff-lever.toml")
+    distance = case.setpoint_distances.solutions[0].zc
+    assert distance == pytest.approx(15.201e-9, rel=1e-4)
+    assert (
+        case.mapping.si["alpha5"] == distance == case.to_dict()["physical"]["tip_gap"]
+    )
+    assert case.alpha5 == pytest.approx(distance / case.physical.beam_gap, rel=1e-14)
+    saved = nanotap.Case.from_toml(case.to_toml())
+    assert saved.physical.tip_gap == distance
+    assert (
+        nanotap.orbit(saved).document.to_dict()
+        == nanotap.orbit(case).document.to_dict()
+    )
+    # A state of a physical case is in SI; a motion stands for its own state.
+    found = nanotap.orbit(case)
+    same = nanotap.orbit(case, state=found, period=1)
+    assert same.first_harmonic == pytest.approx(found.first_harmonic, rel=1e-12)
+    with pytest.raises(ValueError, match="write the unit"):
+        nanotap.orbit(case, state=found.state)
+
+
 def test_a_case_does_not_need_its_file_again(tmp_path):
     path, levers = tmp_path / "case.toml", tmp_path / "levers.toml"
     levers.write_text(
@@ -167,8 +206,9 @@ def test_an_oscillator_is_a_case_too():
     assert case.with_(restitution=0.5).restitution == 0.5
     ds = nanotap.simulate(case, periods=5, transient=0, strobe=5)
     assert ds.strobe.shape == (5, 2)
+    assert nanotap.Case.from_toml(case.to_toml()) == case
+    assert nanotap.Case(**case.inputs) == case
     for refused in (
-        case.to_toml,
         lambda: nanotap.modes(case),
         lambda: nanotap.convergence(case),
     ):

@@ -46,7 +46,20 @@ impl GivenCase {
         any_distance: bool,
         output: &Output,
     ) -> Result<Self, Failure> {
-        let case = case_of(arguments)?;
+        // A study that chooses the distance needs none of the case.
+        let distance = any_distance.then(|| ANY_DISTANCE.to_owned());
+        Self::with_implied(arguments, distance.as_slice(), any_distance, output)
+    }
+
+    /// As [`for_study`](Self::for_study), for a study that gives values to the keys of the `implied`
+    /// `key=value` words: the case may lack these keys.
+    pub(crate) fn with_implied(
+        arguments: &CaseArguments,
+        implied: &[String],
+        any_distance: bool,
+        output: &Output,
+    ) -> Result<Self, Failure> {
+        let case = case_lacking(arguments, implied)?;
         if any_distance {
             return Ok(Self::warned(case, output));
         }
@@ -183,8 +196,28 @@ pub(crate) fn catalogue(files: &[PathBuf]) -> Result<Arc<Catalogue>, Failure> {
 
 /// The case of the arguments, with the built-in catalogue and those that they add.
 pub(crate) fn case_of(arguments: &CaseArguments) -> Result<Case, Failure> {
+    case_lacking(arguments, &[])
+}
+
+/// The distance of a case that states none, for a study that chooses distances itself: the tip at the
+/// sample.
+const ANY_DISTANCE: &str = "gap.tip=0 m";
+
+/// The case of the arguments, which may lack the keys of the `implied` `key=value` words.
+fn case_lacking(arguments: &CaseArguments, implied: &[String]) -> Result<Case, Failure> {
     let catalogue = catalogue(&arguments.catalogue)?;
-    let case = Case::load(arguments.file.as_deref(), &arguments.set, &catalogue)?;
+    let mut set = arguments.set.clone();
+    let mut loaded = Case::load(arguments.file.as_deref(), &set, &catalogue);
+    for word in implied {
+        let Err(error) = &loaded else { break };
+        let name = word.split('=').next().unwrap_or_default();
+        if error.missing() != Some(name) {
+            continue;
+        }
+        set.push(word.clone());
+        loaded = Case::load(arguments.file.as_deref(), &set, &catalogue);
+    }
+    let case = loaded?;
     let case = case.cancelled_by(&progress::control());
     let case = case.called(&title(arguments));
     Ok(case.in_model_units(arguments.model_units))

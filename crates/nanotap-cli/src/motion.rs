@@ -180,15 +180,8 @@ fn observables(o: &Observables, units: &Units, beam: bool) -> String {
 fn energy(o: &Observables, units: &Units) -> String {
     let balance = &o.energy_balance;
     let mut table = Table::new([("", Align::Left), ("", Align::Point), ("", Align::Left)]);
-    // What is no more than rounding of the largest term is zero, without a sign.
-    let moved = balance.drive_work.abs().max(balance.beam_damping.abs());
-    let noise = moved * balance.residual.abs().max(1e-12);
     let mut row = |name: &str, value: f64, in_electronvolts: bool| {
-        let value = if value.abs() <= noise {
-            0.0
-        } else {
-            value / o.periods
-        };
+        let value = balance.resolved(value) / o.periods;
         let joules = units.si(Kind::Energy).map(|unit| unit * value);
         let shown = joules.map_or_else(
             || number::significant(value, 6),

@@ -33,7 +33,9 @@ pub(crate) fn command(app: &App, request: &MotionRequest, study: &str) -> Result
         let _ = write!(line, " --period {period}");
     }
     if let Some(state) = &start.state {
-        let _ = write!(line, " --state={}", Start::text(None, state));
+        let is_physical = request.case.any_distance(app)?.is_physical();
+        let units = if is_physical { "model_units=" } else { "" };
+        let _ = write!(line, " --state={units}{}", Start::text(None, state));
     }
     Ok(line)
 }
@@ -110,7 +112,12 @@ pub(crate) fn python(app: &App, request: &MotionRequest, study: &str) -> Result<
     }
     if let Some(state) = &start.state {
         let numbers = Start::text(None, state).replace(',', ", ");
-        let _ = write!(options, ", state=[{numbers}]");
+        let is_physical = request.case.any_distance(app)?.is_physical();
+        let _ = if is_physical {
+            write!(options, ", state={{\"model_units\": [{numbers}]}}")
+        } else {
+            write!(options, ", state=[{numbers}]")
+        };
     }
     Ok(format!(
         "import nanotap\n\ncase = nanotap.Case.from_file({path:?})\nmotion = nanotap.{study}(case{options})\n"

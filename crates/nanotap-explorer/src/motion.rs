@@ -49,14 +49,14 @@ impl Motion {
     pub(crate) fn find(model: &Model, start: &Start) -> Result<Self, ApiError> {
         let request = OrbitOptions {
             period: start.period,
-            state: start.state.clone(),
+            state: start.state.clone().map(Into::into),
             ..OrbitOptions::default()
         };
         match orbit(model, &request) {
             Ok(found) => Ok(Self::Orbit(Box::new(found))),
             Err(error) if start.period.is_none() && error.kind == ErrorKind::Numerics => {
                 let request = SimulateOptions {
-                    state: start.state.clone(),
+                    state: start.state.clone().map(Into::into),
                     ..SimulateOptions::default()
                 };
                 let run = simulate(model, &request).map_err(ApiError::of)?;
@@ -240,7 +240,7 @@ fn near(
     for tried in [*period, None] {
         let options = OrbitOptions {
             period: tried,
-            state: Some(state.to_vec()),
+            state: Some(state.to_vec().into()),
             ..OrbitOptions::default()
         };
         match orbit(model, &options) {
@@ -279,18 +279,27 @@ pub(crate) fn shown(
     observable: &Observable,
     observables: &Observables,
 ) -> Option<String> {
-    let value = (observable.of)(observables).number()?;
+    let mut value = (observable.of)(observables).number()?;
+    let balance = &observables.energy_balance;
+    // A conservative force loses no energy.
+    if observable.name == "dissipation" && balance.resolved(balance.sample_damping) == 0.0 {
+        value = 0.0;
+    }
     let dimension = observable.dimension;
     let units = case.units();
     let si = dimension
         .kind()
         .and_then(|kind| Some((kind, units.si(kind)?)));
     Some(match (dimension, si) {
+        // Harmonics have their lags as in the data, in (−180°, 180°].
+        (Dimension::Angle, _) if observable.name != "phase" => format!("{value:.2}°"),
         (Dimension::Angle, _) => format!("{:.2}°", shown_phase(value)),
         (_, Some((kind, unit))) => kind.format_digits(unit * value, 5),
         (_, None) => {
             let number = Kind::Number.format_digits(value, 5);
+            // The numbers of an oscillator have the units of its equation, which are not named.
             match dimension.model_unit() {
+                _ if case.oscillator().is_some() => number,
                 "1" => number,
                 "1/drive period" => format!("{number} per drive period"),
                 unit => format!("{number} {unit}"),
@@ -312,7 +321,7 @@ fn fixed_step(
     }
     let request = json!({ "method": "rk4", "steps": steps, "periods": FIXED_PERIODS });
     let mut request: SimulateOptions = read(request).map_err(|e| ApiError::of(e).about("steps"))?;
-    request.state = state;
+    request.state = state.map(Into::into);
     let run = match SimulateStudy::run(case, &request, control) {
         Ok(SimulateReport::FixedStep(run)) => run,
         Ok(SimulateReport::Exact(_)) => return Ok(None),

@@ -21,7 +21,7 @@ const MAX_MODES: usize = 20;
 #[serde(deny_unknown_fields)]
 pub(crate) struct MotionRequest {
     pub(crate) case: CaseSpec,
-    /// Initial state; empty: rest; `n:state`: an orbit of period n near the state.
+    /// Initial state in the model's units; empty: rest; `n:state`: an orbit of period n near the state.
     #[serde(default)]
     pub(crate) start: String,
     /// The case of the motion that starts at `start`, which is followed from there to `case`.
@@ -62,15 +62,12 @@ impl Start {
         let number = |text: &str| text.trim().parse::<f64>().ok().filter(|x| x.is_finite());
         let numbers = state.split(',').map(number).collect::<Option<Vec<f64>>>();
         let period = period.map(|period| period.trim().parse::<u64>().map_err(|_| wrong()));
-        // The terminal's options, with their limits.
-        let options = json!({
-            "period": period.transpose()?,
-            "state": numbers.ok_or_else(wrong)?,
-        });
+        // The terminal's option, with its limits.
+        let options = json!({ "period": period.transpose()? });
         let options: OrbitOptions = read(options).map_err(|e| ApiError::of(e).about("start"))?;
         Ok(Self {
             period: options.period,
-            state: options.state,
+            state: Some(numbers.ok_or_else(wrong)?),
         })
     }
 

@@ -159,7 +159,10 @@ impl Error {
     /// The error as an entry of a document.
     pub fn document(&self) -> ErrorDocument {
         let plain = self.clone().written(str::to_owned);
-        let remedy = plain.problems.iter().find_map(|problem| problem.remedy.clone());
+        let remedy = plain
+            .problems
+            .iter()
+            .find_map(|problem| problem.remedy.clone());
         let messages = plain.problems.into_iter().map(|problem| problem.message);
         ErrorDocument {
             kind: self.kind,

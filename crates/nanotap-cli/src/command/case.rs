@@ -49,15 +49,29 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     if let Some(note) = note_of_several_tones(&read) {
         output.note(&note);
         let note = Some(note);
-        return unsolved(&read, UnsolvedCase { note, ..UnsolvedCase::of(&read) }, arguments, output);
+        return unsolved(
+            &read,
+            UnsolvedCase {
+                note,
+                ..UnsolvedCase::of(&read)
+            },
+            arguments,
+            output,
+        );
     }
     // The case is shown also where no distance has the setpoint, which ends every study of it.
     let (case, setpoint_solved) = match at_setpoint(read.clone()) {
         Ok(solved) => solved,
         Err(error) if error.kind == ErrorKind::Numerics => {
             let document = Some(error.clone().written(flag).document());
-            let document = UnsolvedCase { error: document, ..UnsolvedCase::of(&read) };
-            let arguments = Arguments { out: None, ..arguments.clone() };
+            let document = UnsolvedCase {
+                error: document,
+                ..UnsolvedCase::of(&read)
+            };
+            let arguments = Arguments {
+                out: None,
+                ..arguments.clone()
+            };
             unsolved(&read, document, &arguments, output)?;
             return Err(error);
         }
@@ -115,7 +129,9 @@ fn remarks(case: &Case, output: &Output) {
 /// Writes the case where `--out` says: a physical one in its quantities, or with `--model-units` as
 /// numbers of the equations.
 fn write_out(arguments: &Arguments, case: &Case) -> Result<(), Failure> {
-    let Some(path) = &arguments.out else { return Ok(()) };
+    let Some(path) = &arguments.out else {
+        return Ok(());
+    };
     let Some(numbers) = case.cantilever().filter(|_| case.is_in_model_units()) else {
         return file::write_case(path, &case.to_toml());
     };

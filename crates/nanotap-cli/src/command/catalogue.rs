@@ -6,6 +6,7 @@ use clap::Args;
 use nanotap::case::Key;
 use nanotap::case::physical::catalogue::{Lever, Material};
 use nanotap::case::physical::{Catalogue, Kind};
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::failure::Failure;
@@ -26,8 +27,8 @@ pub(crate) struct Arguments {
 }
 
 /// The requested entry, in SI.
-#[derive(Serialize)]
-struct Listed<'a> {
+#[derive(Serialize, JsonSchema)]
+pub(super) struct Listed<'a> {
     levers: Vec<&'a Lever>,
     materials: Vec<&'a Material>,
 }

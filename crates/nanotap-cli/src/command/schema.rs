@@ -2,11 +2,40 @@
 
 use clap::Args;
 use nanotap::case::schema;
+use nanotap::dataset::Merged;
 use nanotap::study::registry::{STUDIES, StudyEntry};
+use nanotap::study::request::answer_schema;
+use nanotap::study::setpoint::CaseReport;
+use schemars::Schema;
 use serde_json::{Map, Value, json};
 
+use super::catalogue::Listed;
 use crate::failure::Failure;
-use crate::output;
+use crate::output::{self, FailureDocument};
+
+/// Documents that are not those of a study: name, description and schema.
+const COMMANDS: &[(&str, &str, fn() -> Schema)] = &[
+    (
+        "case-report",
+        "The document of the command `case`",
+        answer_schema::<CaseReport>,
+    ),
+    (
+        "catalogue",
+        "List the levers and materials that a case can name",
+        answer_schema::<Listed<'static>>,
+    ),
+    (
+        "merge",
+        "Merge partial datasets of a sweep or basin",
+        answer_schema::<Merged>,
+    ),
+    (
+        "failure",
+        "The document of any command whose computation failed",
+        answer_schema::<FailureDocument>,
+    ),
+];
 
 /// The name of the schema of a case.
 const CASE: &str = "case";
@@ -14,7 +43,8 @@ const CASE: &str = "case";
 /// Print the JSON schema of a study's options and report, or of a case.
 #[derive(Args, Debug)]
 pub(crate) struct Arguments {
-    /// A study, or `case` for the keys of a case; without it, all of them by name
+    /// A study, `case` for the keys of a case, or the document of another command; without it, all of
+    /// them by name
     #[arg(value_name = "STUDY")]
     study: Option<String>,
 }
@@ -25,6 +55,10 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         .map(|entry| (entry.name.to_owned(), described(entry)))
         .collect();
     all.insert(CASE.to_owned(), schema::schema().to_value());
+    for (name, about, report) in COMMANDS {
+        let described = json!({ "name": name, "about": about, "report": report() });
+        all.insert((*name).to_owned(), described);
+    }
     let document = match &arguments.study {
         None => all.into(),
         Some(name) => all.remove(name).ok_or_else(|| {

@@ -39,7 +39,8 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     let options = arguments.request.read()?;
     let names = options.over.names();
     let any_distance = options.over.solves_distance();
-    let case = GivenCase::for_study(&arguments.case, any_distance, output)?;
+    let implied = options.over.first_values();
+    let case = GivenCase::with_implied(&arguments.case, &implied, any_distance, output)?;
     let over = options.over.parse(&case)?;
     let keys: Vec<Key> = over.iter().map(|over| over.key).collect();
     case.note_constants(&keys, output);

@@ -20,6 +20,7 @@ mod motions;
 mod paper;
 mod physical;
 mod samples;
+mod saving;
 mod schema;
 mod sweeps;
 mod terminal;

@@ -254,7 +254,8 @@ pub enum ContinuationError {
     #[error("invalid continuation options: {0}")]
     BadOptions(String),
     /// The given orbit is not an orbit at this parameter value.
-    #[error("the corrector found no orbit at parameter {parameter}: {reason}")]
+    // Callers state the value, in their units.
+    #[error("the corrector found no orbit at the first value of the parameter: {reason}")]
     NoStart {
         /// Parameter value of the given orbit.
         parameter: f64,

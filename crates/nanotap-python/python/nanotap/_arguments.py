@@ -76,11 +76,35 @@ def number(name: str, value: Any) -> float:
         raise TypeError(message) from None
 
 
-def state(value: Any) -> Floats | None:
-    """A state: one row of real numbers."""
-    if value is None:
-        return None
-    return row("state", value)
+def state(value: Any) -> Any:
+    """A state as the extension reads it: a row of numbers (of a physical case in m and m/s) or of
+    texts with units, a text, entries by name; a motion with a state stands for its own state.
+    """
+    if isinstance(value, str):
+        return value
+    if isinstance(value, Mapping):
+        named = {str(name): written(entry) for name, entry in value.items()}
+        return {
+            name: row("state", entry).tolist()
+            if np.ndim(entry)
+            else entry
+            if isinstance(entry, str)
+            else number(f"state: {name}", entry)
+            for name, entry in named.items()
+        }
+    if hasattr(value, "state"):
+        return {"model_units": row("state", value.state).tolist()}
+    if isinstance(value, list | tuple) and any(_is_quantity(one) for one in value):
+        texts = [written(one) for one in value]
+        return [one if isinstance(one, str) else number("state", one) for one in texts]
+    return [_finite(one) for one in row("state", value).tolist()]
+
+
+def _is_quantity(value: Any) -> bool:
+    """Whether a value is a text that begins with a number, or a quantity of a units package."""
+    if isinstance(value, str):
+        return value[:1].isdigit() or value[:1] in {"-", "+", "."}
+    return hasattr(value, "to")
 
 
 def row(name: str, value: Any) -> Floats:
@@ -260,6 +284,8 @@ def _kinds(schema: Mapping[str, Any]) -> set[str]:
 def _plain(name: str, value: Any, takes: _Option) -> Any:
     """A value in JSON."""
     kinds = takes.kinds
+    if name == "state":
+        return state(value)
     if "string" in kinds:
         value = written(value)
     if "boolean" in kinds:

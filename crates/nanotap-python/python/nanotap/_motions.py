@@ -270,9 +270,12 @@ def _fixed_step(
 
 def _states(options: Mapping[str, Any]) -> Floats | None:
     """Several initial states, one per row; `None` if there is one or none."""
-    if options["state"] is None:
+    given = options["state"]
+    if given is None or isinstance(given, str | Mapping) or hasattr(given, "state"):
         return None
-    states = _arguments.real(options["state"], "state")
+    if isinstance(given, list | tuple) and any(isinstance(one, str) for one in given):
+        return None
+    states = _arguments.real(given, "state")
     if states.ndim < 2:
         return None
     if states.ndim != 2 or states.size == 0:
@@ -348,7 +351,9 @@ def _over(
         attrs = {"long_name": "initial state, from 0", "units": "1"}
         coords["start"] = ("start", np.arange(len(states)), attrs)
         if states.shape[1] == len(entries):
-            attrs = {"long_name": "initial state", "units": "model units"}
+            in_si = case.is_physical and not case._core.model_units
+            units = "m, m/s" if in_si else "model units"
+            attrs = {"long_name": "initial state", "units": units}
             variables["initial_state"] = (("start", "state"), states, attrs)
             coords["state"] = words(entries)
     # The value in the case of a parameter that varies does not matter.

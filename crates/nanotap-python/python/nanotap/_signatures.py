@@ -78,7 +78,7 @@ def simulate(
     *,
     periods: int = 50,
     transient: int | None = None,
-    state: Any = None,
+    state: Mapping[str, tuple[float | str, float | str]] | str | None = None,
     strobe: int = 1,
     events: int = 50_000,
     max_period: int = 64,
@@ -103,9 +103,10 @@ def simulate(
     transient : int | None
         Drive periods of the discarded transient; default: until the motion has
         settled; 0: none (0 to 100000000).
-    state : Any
-        Initial state at drive phase 0: a1,…,aN,v1,…,vN (oscillator: x,v); default:
-        rest.
+    state : Mapping[str, tuple[float | str, float | str]] | str | None
+        Initial state at drive phase 0: a1,…,aN,v1,…,vN (oscillator: x,v), or some
+        by name, as in tip=5nm; of a physical case in m and m/s, or with units;
+        default: rest.
     strobe : int
         Number of last states at drive phase 0 to keep (0 to 1000000).
     events : int
@@ -168,7 +169,7 @@ def orbit(  # type: ignore[overload-overlap]
     case: Case,
     *,
     period: int | None = None,
-    state: Any = None,
+    state: Mapping[str, tuple[float | str, float | str]] | str | None = None,
     harmonics: int = 20,
     observables: Sequence[str] | None = None,
     resolution: int = 200,
@@ -184,7 +185,7 @@ def orbit(
     case: Case,
     *,
     period: int | None = None,
-    state: Any = None,
+    state: Mapping[str, tuple[float | str, float | str]] | str | None = None,
     harmonics: int = 20,
     observables: Sequence[str] | None = None,
     resolution: int = 200,
@@ -199,7 +200,7 @@ def orbit(
     case: Case,
     *,
     period: int | None = None,
-    state: Any = None,
+    state: Mapping[str, tuple[float | str, float | str]] | str | None = None,
     harmonics: int = 20,
     observables: Sequence[str] | None = None,
     resolution: int = 200,
@@ -219,8 +220,10 @@ def orbit(
     period : int | None
         Period in drive periods; default: that of the motion to which a run
         converges (1 to 10000).
-    state : Any
-        State near the orbit, at drive phase 0: a1,…,aN,v1,…,vN (oscillator: x,v).
+    state : Mapping[str, tuple[float | str, float | str]] | str | None
+        State near the orbit, at drive phase 0: a1,…,aN,v1,…,vN (oscillator: x,v),
+        or some by name, as in tip=5nm; of a physical case in m and m/s, or with
+        units.
     harmonics : int
         Number of reported harmonics of the drive frequency (0 to 100000).
     observables : Sequence[str] | None
@@ -347,7 +350,7 @@ def branch(
     from_: float | str,
     to: float | str,
     period: int | None = None,
-    state: Any = None,
+    state: Mapping[str, tuple[float | str, float | str]] | str | None = None,
     switch: int | None = None,
     diagram: bool = False,
     values: int = 65,
@@ -378,8 +381,9 @@ def branch(
     period : int | None
         Period of the orbit at the start; default: that of the motion to which a run
         converges (1 to 10000).
-    state : Any
-        State near the orbit at the start: a1,…,aN,v1,…,vN.
+    state : Mapping[str, tuple[float | str, float | str]] | str | None
+        State near the orbit at the start: a1,…,aN,v1,…,vN, or some by name, as in
+        tip=5nm; of a physical case in m and m/s, or with units.
     switch : int | None
         Also follow doubled branches at flips, up to this number of doublings (0 to
         12).
@@ -753,7 +757,7 @@ def sweep(
     starts: int | None = None,
     seed: int = 1,
     box: Box = None,
-    state: Any = None,
+    state: Mapping[str, tuple[float | str, float | str]] | str | None = None,
     follow: Literal["off", "up", "down", "both"] = "off",
     periods: int = 100,
     strobe: int | None = None,
@@ -787,8 +791,10 @@ def sweep(
     box : Box
         Sides of the box, as in {"a1": (-1, 1)} or {"v2": (-4, 4)}; other sides
         follow from the linear response to the drive.
-    state : Any
-        Start from this state at drive phase 0: a1,…,aN,v1,…,vN (oscillator: x,v).
+    state : Mapping[str, tuple[float | str, float | str]] | str | None
+        Start from this state at drive phase 0: a1,…,aN,v1,…,vN (oscillator: x,v),
+        or some by name, as in tip=5nm; of a physical case in m and m/s, or with
+        units.
     follow : Literal["off", "up", "down", "both"]
         Start each value from the last state of the previous one, along the first
         parameter: up, down or both. An interrupted line is lost; `off`: Every value
@@ -919,7 +925,7 @@ def basin(
     *,
     x: str | Mapping[str, Any],
     y: str | Mapping[str, Any],
-    state: Any = None,
+    state: Mapping[str, tuple[float | str, float | str]] | str | None = None,
     attractors: Iterable[Any] | None = None,
     starts: int = 64,
     seed: int = 1,
@@ -942,8 +948,9 @@ def basin(
         the state (a1…aN, v1…vN; oscillator: x, v), first value, last value, count.
     y : str | Mapping[str, Any]
         Vertical axis, in the same form.
-    state : Any
-        State with the other entries: a1,…,aN,v1,…,vN; default: 0.
+    state : Mapping[str, tuple[float | str, float | str]] | str | None
+        State with the other entries: a1,…,aN,v1,…,vN, or some by name, as in
+        tip=5nm; of a physical case in m and m/s, or with units; default: 0.
     attractors : Iterable[Any] | None
         States on the attractors, or the result of a census; default: a census in
         the slice.
@@ -995,7 +1002,7 @@ def lyapunov(
     *,
     periods: int = 20_000,
     transient: int = 1000,
-    state: Any = None,
+    state: Mapping[str, tuple[float | str, float | str]] | str | None = None,
     section: Literal["phase", "contact"] = "phase",
     phase: float = 0.0,
     points: int = 5000,
@@ -1010,9 +1017,10 @@ def lyapunov(
         Drive periods of the average (1 to 100000000).
     transient : int
         Drive periods of the discarded transient (0 to 100000000).
-    state : Any
-        Initial state at drive phase 0: a1,…,aN,v1,…,vN (oscillator: x,v); default:
-        rest.
+    state : Mapping[str, tuple[float | str, float | str]] | str | None
+        Initial state at drive phase 0: a1,…,aN,v1,…,vN (oscillator: x,v), or some
+        by name, as in tip=5nm; of a physical case in m and m/s, or with units;
+        default: rest.
     section : Literal["phase", "contact"]
         Poincaré section; `phase`: Once a drive period, at one phase; `contact`: At
         the beginning of every contact.
@@ -1138,7 +1146,7 @@ def noise(
     temperature: float = 295.0,
     time_constant: float | str | None = None,
     bandwidth: float | str | None = None,
-    state: Any = None,
+    state: Mapping[str, tuple[float | str, float | str]] | str | None = None,
     threads: int | None = None,
     progress: Progress = None,
 ) -> Record:
@@ -1156,8 +1164,9 @@ def noise(
     bandwidth : float | str | None
         Noise bandwidth of the lock-in amplifier, 1 over four time constants, in
         place of it.
-    state : Any
-        State near the orbit, at drive phase 0: a1,…,aN,v1,…,vN.
+    state : Mapping[str, tuple[float | str, float | str]] | str | None
+        State near the orbit, at drive phase 0: a1,…,aN,v1,…,vN, or some by name, as
+        in tip=5nm; of a physical case in m and m/s, or with units.
     threads : int | None
         Number of threads; default: one per core.
     progress : Progress

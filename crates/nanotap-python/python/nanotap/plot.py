@@ -227,11 +227,11 @@ def attractors(found: Attractors, **where: Unpack[Where]) -> "Figure":
     shown = []
     for one in list(found)[:_MOST]:
         if one.period:
-            series = _signatures.orbit(case, period=one.period, state=one.state).series
+            series = _signatures.orbit(case, period=one.period, state=one).series
         else:
             series = _signatures.simulate(
                 case,
-                state=one.state,
+                state=one,
                 transient=0,
                 periods=_ENDLESS_PERIODS,
                 max_period=1,

@@ -3,7 +3,9 @@
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 
+use schemars::JsonSchema;
 use serde::{Serialize, Serializer};
+use serde_json::{Map, Value};
 
 use crate::case::Case;
 use crate::case::physical::force::SampleForce;
@@ -14,7 +16,7 @@ use crate::model::oscillator::{Oscillator, OscillatorParameter, Stop};
 use crate::model::parameter::Parameter;
 
 /// A checked case as a document.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, JsonSchema)]
 #[serde(untagged)]
 pub enum CaseDocument {
     /// A cantilever: `kind`, the case's keys, `period` and, of a physical case, `physical`.
@@ -24,12 +26,13 @@ pub enum CaseDocument {
 }
 
 /// The case of a cantilever as a document.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct CantileverDocument {
     /// The word `cantilever`.
     pub kind: &'static str,
     /// Number of modes, dimensionless parameters and contact law, as keys of the document.
     #[serde(flatten)]
+    #[schemars(with = "Map<String, Value>")]
     pub case: Cantilever,
     /// Period of the drive in model units: 2π/Ω, or with several tones the time after which all
     /// repeat.
@@ -43,7 +46,7 @@ pub struct CantileverDocument {
 }
 
 /// The physical quantities of a case in SI, frequencies in Hz.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct PhysicalSummary {
     /// Spring constant at the tip, N/m.
     pub k: f64,
@@ -92,6 +95,7 @@ pub struct PhysicalSummary {
     pub contact_damping: f64,
     /// Further quantities of the contact law by parameter, in SI.
     #[serde(flatten, serialize_with = "as_map")]
+    #[schemars(with = "BTreeMap<String, f64>")]
     pub contact_law: Vec<(Parameter, f64)>,
     /// Parameters of a nonlinear force law, in place of contact stiffness and damping.
     #[serde(skip_serializing_if = "Vec::is_empty")]
@@ -128,7 +132,7 @@ pub struct PhysicalSummary {
 }
 
 /// Young's modulus of a sample that relaxes under a small oscillation at the drive frequency.
-#[derive(Clone, Copy, Debug, Serialize)]
+#[derive(Clone, Copy, Debug, Serialize, JsonSchema)]
 pub struct DynamicModulus {
     /// Storage modulus E' at the drive frequency, Pa.
     pub storage_modulus: f64,
@@ -139,7 +143,7 @@ pub struct DynamicModulus {
 }
 
 /// A parameter of a nonlinear force law.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct LawParameterDocument {
     /// Path of the key that states the parameter.
     pub key: &'static str,
@@ -252,7 +256,7 @@ impl PhysicalSummary {
 }
 
 /// An oscillator, its keys those of the case file.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct OscillatorDocument {
     /// Kind of the stop: `vibro_impact` for a soft one, `impact` for a rigid one.
     pub kind: &'static str,
@@ -321,7 +325,7 @@ pub fn equilibria(case: &Case) -> Vec<Equilibrium> {
 }
 
 /// A dimensionless parameter with its physical quantity, as a document.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct MappingDocument {
     /// Name of the dimensionless parameter.
     pub parameter: &'static str,

@@ -59,6 +59,7 @@ use near_name::near_name;
 use physical::drive::FIRST;
 use physical::{Catalogue, Kind, Physical, Remark, Scales};
 use quantities::{Quantities, Slopes};
+use state::WrittenState;
 use stated::Replaced;
 use units::Units;
 
@@ -303,6 +304,17 @@ impl Case {
             what: restated.what,
             ..self.clone()
         })
+    }
+
+    /// A written state, if there is one, in the model's units.
+    ///
+    /// # Errors
+    /// As [`WrittenState::read`].
+    pub(crate) fn state_of(
+        &self,
+        written: Option<&WrittenState>,
+    ) -> Result<Option<WrittenState>, crate::Error> {
+        written.map(|state| state.of_case(self)).transpose()
     }
 
     /// Flag that cancels the motions of its models.
@@ -678,6 +690,25 @@ impl Case {
             },
             |unit| unit.kind.format_digits(unit.si * value, DIGITS),
         )
+    }
+
+    /// A key with its value, as in `gap.tip = 20.32 nm`: of a physical case in SI, a number of the
+    /// equations as the quantity of the case file that it represents.
+    pub fn named(&self, key: Key, value: f64) -> String {
+        let unit = self.parameter_unit(key);
+        let quantity = key.parameter().zip(unit).and_then(|(parameter, _)| {
+            let represents = |of: &Key| {
+                let feeds = of.entry().feeds.or_else(|| of.law_number());
+                of.is_physical()
+                    && of.cannot_vary().is_none()
+                    && feeds == Some(parameter)
+                    && Some(of.kind()) == unit.map(|unit| unit.kind)
+                    && self.get(*of).is_finite()
+            };
+            Key::all().find(represents)
+        });
+        let shown = self.shown(key, value);
+        format!("{} = {shown}", quantity.unwrap_or(key).path())
     }
 
     /// Parses a value of a key that an option implies, as `from` of an approach curve: of a

@@ -8,7 +8,7 @@ use serde::Serialize;
 use super::Key;
 use super::file::{self, CaseFileError};
 use super::key::Section;
-use super::physical::{Catalogue, Kind, Physical, Reader, Remark};
+use super::physical::{Catalogue, Kind, Physical, PhysicalError, Reader, Remark};
 use super::state::WrittenState;
 use super::stated::{Stated, Value};
 use super::units::Units;
@@ -65,7 +65,14 @@ impl Quantities {
                 numbers => view.with_numbers(numbers),
             })
             .map(Box::new)
-            .map_err(|error| Box::new(self.stated.refused(error.key(), error.to_string())));
+            .map_err(|error| {
+                let mut refused = self.stated.refused(error.key(), error.to_string());
+                if let (PhysicalError::Missing { .. }, [problem]) = (&error, &mut *refused.problems)
+                {
+                    problem.is_missing = true;
+                }
+                Box::new(refused)
+            });
         self.view = view;
         self
     }
@@ -104,7 +111,8 @@ impl Quantities {
         if !self.stated.has(Key::GapTip) {
             return Ok(None);
         }
-        let refused = |message: String| Box::new(self.stated.refused(Some(Key::DriveStart), message));
+        let refused =
+            |message: String| Box::new(self.stated.refused(Some(Key::DriveStart), message));
         let state = written.read(model, units);
         let mut state = state.map_err(|error| refused(format!("drive.start: {error}")))?;
         if state.len() + model.memory == model.dimension() {

@@ -15,6 +15,7 @@ use serde::ser::SerializeMap as _;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use serde_json::Value;
 
+use super::Case;
 use super::physical::Scales;
 use super::quantity::Kind;
 use super::units::Units;
@@ -89,8 +90,7 @@ impl WrittenState {
     /// # Errors
     /// With what was expected.
     pub fn parse(text: &str) -> Result<Self, Error> {
-        let refused =
-            |what: String| Error::input(format!("`{}`: {what}", shortened(text)), SHAPE);
+        let refused = |what: String| Error::input(format!("`{}`: {what}", shortened(text)), SHAPE);
         if let Some((name, row)) = text.split_once('=')
             && name.trim() == MODEL_UNITS
         {
@@ -118,9 +118,12 @@ impl WrittenState {
         let joined = |parts: Vec<String>| parts.join(", ");
         match self {
             Self::Row(row) => joined(row.iter().map(ToString::to_string).collect()),
-            Self::Named(named) => {
-                joined(named.iter().map(|(of, value)| format!("{of}={value}")).collect())
-            }
+            Self::Named(named) => joined(
+                named
+                    .iter()
+                    .map(|(of, value)| format!("{of}={value}"))
+                    .collect(),
+            ),
             Self::Model(row) => {
                 let row = row.iter().map(|number| format!("{number:?}")).collect();
                 format!("{MODEL_UNITS}={}", joined(row))
@@ -137,6 +140,18 @@ impl WrittenState {
             _ => WrittenEntry::Number(*value),
         };
         Self::Row(state.iter().enumerate().map(entry).collect())
+    }
+
+    /// This state in the model's units, of a model of `case`; as it is if it is in them already.
+    ///
+    /// # Errors
+    /// As [`read`](Self::read).
+    pub fn of_case(&self, case: &Case) -> Result<Self, Error> {
+        if let Self::Model(_) = self {
+            return Ok(self.clone());
+        }
+        let read = self.read(&case.model()?, &case.units());
+        read.map(Self::Model).map_err(|error| error.at("state"))
     }
 
     /// The state in the model's units, as far as it is written: of a row, the sample's memory may be
@@ -159,7 +174,9 @@ impl WrittenState {
                     _ => format!("s{}", k + 1 - 2 * own),
                 };
                 let entries = row.iter().enumerate();
-                entries.map(|(k, value)| value.read(&name(k), units)).collect()
+                entries
+                    .map(|(k, value)| value.read(&name(k), units))
+                    .collect()
             }
             Self::Named(named) => {
                 let mut state = vec![0.0; names.len()];
@@ -231,14 +248,24 @@ impl<'de> Deserialize<'de> for WrittenState {
         let entry = |value: &Value| WrittenEntry::of_json(value).ok_or_else(|| wrong(value));
         match Value::deserialize(deserializer)? {
             Value::String(text) => Self::parse(&text).map_err(D::Error::custom),
-            Value::Array(row) => row.iter().map(entry).collect::<Result<_, _>>().map(Self::Row),
+            Value::Array(row) => row
+                .iter()
+                .map(entry)
+                .collect::<Result<_, _>>()
+                .map(Self::Row),
             Value::Object(named) => {
                 if let (1, Some(row)) = (named.len(), named.get(MODEL_UNITS)) {
                     let row = row.as_array().ok_or_else(|| wrong(row))?;
                     let number = |value: &Value| value.as_f64().ok_or_else(|| wrong(value));
-                    return row.iter().map(number).collect::<Result<_, _>>().map(Self::Model);
+                    return row
+                        .iter()
+                        .map(number)
+                        .collect::<Result<_, _>>()
+                        .map(Self::Model);
                 }
-                let named = named.iter().map(|(name, value)| Ok((name.clone(), entry(value)?)));
+                let named = named
+                    .iter()
+                    .map(|(name, value)| Ok((name.clone(), entry(value)?)));
                 named.collect::<Result<_, _>>().map(Self::Named)
             }
             other => Err(wrong(&other)),
@@ -302,7 +329,10 @@ mod tests {
         let close = |text: &str, expected: [f64; 4]| {
             let state = read(&case, text).unwrap();
             for (value, expected) in state.iter().zip(expected) {
-                assert!((value - expected).abs() <= 1e-15 + 1e-12 * expected.abs(), "{text}: {state:?}");
+                assert!(
+                    (value - expected).abs() <= 1e-15 + 1e-12 * expected.abs(),
+                    "{text}: {state:?}"
+                );
             }
         };
         let slow = 1e-3 / velocity;
@@ -313,7 +343,10 @@ mod tests {
         close("tip=5e-9, tip_rate=2 mm/s", [2.5e-3, 0.0, slow, 0.0]);
         close("model_units=0.1,0.2,0.3,0.4", [0.1, 0.2, 0.3, 0.4]);
         let plain = case.in_model_units(true);
-        assert_eq!(read(&plain, "0.1,0.2,0.3,0.4").unwrap(), [0.1, 0.2, 0.3, 0.4]);
+        assert_eq!(
+            read(&plain, "0.1,0.2,0.3,0.4").unwrap(),
+            [0.1, 0.2, 0.3, 0.4]
+        );
     }
 
     #[test]
@@ -337,11 +370,20 @@ mod tests {
 
     #[test]
     fn every_way_of_writing_comes_back() {
-        for text in ["0.1, -0.02", "tip=5 nm, v1=0.001", "model_units=0.1, 1e-300", "1 nm, 2 mm/s"] {
+        for text in [
+            "0.1, -0.02",
+            "tip=5 nm, v1=0.001",
+            "model_units=0.1, 1e-300",
+            "1 nm, 2 mm/s",
+        ] {
             let state = WrittenState::parse(text).unwrap();
             assert_eq!(WrittenState::parse(&state.text()).unwrap(), state, "{text}");
             let json = serde_json::to_value(&state).unwrap();
-            assert_eq!(serde_json::from_value::<WrittenState>(json).unwrap(), state, "{text}");
+            assert_eq!(
+                serde_json::from_value::<WrittenState>(json).unwrap(),
+                state,
+                "{text}"
+            );
         }
         let row: WrittenState = serde_json::from_value(json!([0.1, "2 nm"])).unwrap();
         assert_eq!(row, WrittenState::parse("0.1, 2 nm").unwrap());

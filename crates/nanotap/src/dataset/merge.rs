@@ -7,7 +7,7 @@ use super::schema::Schema;
 use super::store::{Store, mismatch, same};
 
 /// Result of merging partial datasets into one store.
-#[derive(Clone, Debug, PartialEq, Eq, serde::Serialize)]
+#[derive(Clone, Debug, PartialEq, Eq, serde::Serialize, schemars::JsonSchema)]
 pub struct Merged {
     /// Path of the merged store.
     pub path: PathBuf,

@@ -19,6 +19,7 @@ use nanotap_volterra::{
     Coarse, Drive, Flow, ForceLaw, Guard, Kernel, Modes, Options, Parameter as Change, Remark,
     System, Tone, ToneChange, Trajectory, VolterraError,
 };
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::model::beam_equations::{Beam, BeamTangent};
@@ -302,7 +303,7 @@ fn remembered(memory: &[f64]) -> Option<usize> {
 }
 
 /// An equilibrium of the lever without a drive.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct Equilibrium {
     /// Gap between tip and sample, in units of g₀.
     pub gap: f64,

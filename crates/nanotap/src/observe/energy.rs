@@ -37,6 +37,16 @@ impl EnergyBalance {
         stored: f64::NAN,
         residual: f64::NAN,
     };
+
+    /// An energy of the balance, or 0 if it is not above the error of the balance: its imbalance, which
+    /// is that of the quadratures, and the rounding of the largest term.
+    pub fn resolved(&self, energy: f64) -> f64 {
+        /// Rounding of the sums over a recording, relative to the energy converted.
+        const ROUNDING: f64 = 1e-12;
+        let moved = self.drive_work.abs().max(self.beam_damping.abs());
+        let error = moved * self.residual.abs().max(ROUNDING);
+        if energy.abs() <= error { 0.0 } else { energy }
+    }
 }
 
 impl<D: Copy> EnergyBalance<D> {

@@ -20,6 +20,7 @@ use serde_json::json;
 
 use crate::Error;
 use crate::case::Case;
+use crate::case::state::WrittenState;
 use crate::case::units::Units;
 use crate::dataset::schema::Kind;
 use crate::dataset::{
@@ -194,8 +195,9 @@ impl Basin {
         }
         let model = case.model()?;
         let names = state_names(&model);
-        let rest = vec![0.0; model.dimension()];
-        let origin = starting_state(&model, Some(options.state.as_deref().unwrap_or(&rest)))?;
+        let rest = || vec![0.0; model.dimension()].into();
+        let given = case.state_of(options.state.as_ref())?;
+        let origin = starting_state(&model, Some(&given.unwrap_or_else(rest)))?;
         if x.name == y.name {
             return Err(axes(format!("both axes are `{}`", x.name)));
         }
@@ -203,7 +205,7 @@ impl Basin {
         let starts = match &options.attractors {
             Some(states) => {
                 for state in states {
-                    starting_state(&model, Some(state))?;
+                    starting_state(&model, Some(&state.clone().into()))?;
                 }
                 states.clone()
             }
@@ -634,9 +636,10 @@ options! {
         /// Vertical axis, in the same form
         #[schemars(extend("x-value" = "ENTRY=FROM:TO:COUNT", "x-required" = true))]
         pub y: String = String::new(),
-        /// State with the other entries: a1,…,aN,v1,…,vN; default: 0
-        #[schemars(extend("x-value" = "A1,…"))]
-        pub state: Option<Vec<f64>> = None,
+        /// State with the other entries: a1,…,aN,v1,…,vN, or some by name, as in
+        /// tip=5nm; of a physical case in m and m/s, or with units; default: 0
+        #[schemars(extend("x-value" = "STATE"))]
+        pub state: Option<WrittenState> = None,
         /// States on the attractors, or the result of a census; default: a census in the slice
         #[schemars(extend("x-own" = true))]
         pub attractors: Option<Vec<Vec<f64>>> = None,

@@ -3,15 +3,16 @@
 
 use nanotap_dynamics::{
     AttractorContinuationOptions, AttractorKind, Bifurcation, BifurcationKind, Branch, BranchEnd,
-    BranchPoint, CensusOptions, ClassifyOptions, ContinuationOptions, ContinuedAttractor, Control,
-    Criticality, CurveOptions, Diagram, DiagramBranch, DiagramOptions, Direction, LyapunovOptions,
-    PeriodicOrbit, ShootingOptions, StartSet, assemble_diagram, continue_attractors,
-    continue_orbit, trace_curve,
+    BranchPoint, CensusOptions, ClassifyOptions, ContinuationError, ContinuationOptions,
+    ContinuedAttractor, Control, Criticality, CurveOptions, Diagram, DiagramBranch, DiagramOptions,
+    Direction, LyapunovOptions, PeriodicOrbit, ShootingOptions, StartSet, assemble_diagram,
+    continue_attractors, continue_orbit, trace_curve,
 };
 use rayon::prelude::*;
 use schemars::JsonSchema;
 use serde::Serialize;
 
+use crate::case::state::WrittenState;
 use crate::case::{Case, Held, Key, ParameterUnit, PlaneFamily};
 use crate::model::Model;
 use crate::model::model_map::ModelMap;
@@ -45,9 +46,10 @@ impl Range {
         if !(from.is_finite() && to.is_finite() && from != to) {
             return Err(Error::input(
                 format!(
-                    "{} cannot be followed from {from} to {to}: two different, finite values are \
-                     needed",
-                    key.path()
+                    "{} cannot be followed from {} to {}: two different, finite values are needed",
+                    key.path(),
+                    case.shown(key, from),
+                    case.shown(key, to),
                 ),
                 "change {from} or {to}",
             ));
@@ -60,7 +62,7 @@ impl Range {
     fn model(self, case: &Case, value: f64) -> Result<Model, Error> {
         case.with(self.key, value).model().map_err(|error| {
             Error::input(
-                format!("at {} = {value}: {error}", self.key.path()),
+                format!("at {}: {error}", case.named(self.key, value)),
                 "keep {from}, {to} and {second} where the model makes sense",
             )
         })
@@ -468,7 +470,8 @@ pub fn branch(
             direction,
             &range.continuation(options),
             control,
-        )?;
+        )
+        .map_err(|error| no_branch(case, range.key, error))?;
         Diagram {
             branches: vec![DiagramBranch {
                 branch,
@@ -528,14 +531,13 @@ fn first_orbit(case: &Case, range: Range, options: &BranchOptions) -> Result<Per
     let model = range.model(case, range.from)?;
     let options = OrbitOptions {
         period: options.period,
-        state: options.state.clone(),
+        state: case.state_of(options.state.as_ref())?,
         ..OrbitOptions::default()
     };
     let failed = |error: Error| {
         let message = format!(
-            "at {} = {}: {}",
-            range.key.path(),
-            range.from,
+            "at {}: {}",
+            case.named(range.key, range.from),
             error.message()
         );
         match error.kind {
@@ -758,6 +760,17 @@ fn described(
         }
     }
     report
+}
+
+/// The error of a branch that could not be started.
+fn no_branch(case: &Case, key: Key, error: ContinuationError) -> Error {
+    match error {
+        ContinuationError::NoStart { parameter, reason } => Error::numerics(format!(
+            "the corrector found no orbit at {}: {reason}",
+            case.named(key, parameter)
+        )),
+        other => other.into(),
+    }
 }
 
 /// Reason of a branch's end, in words.
@@ -1037,9 +1050,10 @@ options! {
         /// Period of the orbit at the start; default: that of the motion to which a run converges
         #[schemars(range(min = 1, max = MAX_PERIOD), extend("x-value" = "N"))]
         pub period: Option<usize> = None,
-        /// State near the orbit at the start: a1,…,aN,v1,…,vN
-        #[schemars(extend("x-value" = "A1,…"))]
-        pub state: Option<Vec<f64>> = None,
+        /// State near the orbit at the start: a1,…,aN,v1,…,vN, or some by name, as in
+        /// tip=5nm; of a physical case in m and m/s, or with units
+        #[schemars(extend("x-value" = "STATE"))]
+        pub state: Option<WrittenState> = None,
         /// Also follow doubled branches at flips, up to this number of doublings
         #[schemars(range(min = 0, max = MAX_DOUBLINGS), extend("x-value" = "DEPTH", "x-bare" = "1"))]
         pub switch: Option<usize> = None,

@@ -112,7 +112,7 @@ pub fn convergence(
     for (modes, model) in (1..).zip(&models) {
         let guess = OrbitOptions {
             period: options.period,
-            state: carried(orbits.last(), modes),
+            state: carried(orbits.last(), modes).map(Into::into),
             ..OrbitOptions::default()
         };
         let found = orbit(model, &guess).or_else(|_| {

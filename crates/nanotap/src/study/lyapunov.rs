@@ -9,6 +9,7 @@ pub use nanotap_dynamics::LyapunovOptions as SpectrumOptions;
 
 use crate::Error;
 use crate::case::Case;
+use crate::case::state::WrittenState;
 use crate::control::Control;
 use crate::model::model_map::ModelMap;
 use crate::model::{Model, MotionError};
@@ -101,7 +102,7 @@ pub fn lyapunov(
     options: &LyapunovOptions,
     control: &Control<'_>,
 ) -> Result<LyapunovReport, Error> {
-    let mut state = starting_state(model, options.state.as_deref())?;
+    let mut state = starting_state(model, options.state.as_ref())?;
     check_periods(options.periods)?;
     check_states(model, options.points, "points")?;
     let model = &model.clone().cancelled_by(&control.flag());
@@ -226,9 +227,10 @@ options! {
         /// Drive periods of the discarded transient
         #[schemars(range(min = 0, max = MAX_PERIODS), extend("x-value" = "T"))]
         pub transient: usize = 1000,
-        /// Initial state at drive phase 0: a1,…,aN,v1,…,vN (oscillator: x,v); default: rest
-        #[schemars(extend("x-value" = "A1,…"))]
-        pub state: Option<Vec<f64>> = None,
+        /// Initial state at drive phase 0: a1,…,aN,v1,…,vN (oscillator: x,v), or some by name, as in
+        /// tip=5nm; of a physical case in m and m/s, or with units; default: rest
+        #[schemars(extend("x-value" = "STATE"))]
+        pub state: Option<WrittenState> = None,
         /// Poincaré section
         pub section: SectionKind = SectionKind::default(),
         /// Drive phase of the section in degrees
@@ -266,6 +268,10 @@ impl Study for LyapunovStudy {
         options: &LyapunovOptions,
         control: &Control<'_>,
     ) -> Result<LyapunovReport, Error> {
-        lyapunov(&case.model()?, options, control)
+        let options = LyapunovOptions {
+            state: case.state_of(options.state.as_ref())?,
+            ..options.clone()
+        };
+        lyapunov(&case.model()?, &options, control)
     }
 }

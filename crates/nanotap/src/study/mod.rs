@@ -52,7 +52,6 @@ use nanotap_dynamics::Control;
 use schemars::JsonSchema;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
-use serde_json::{Map, Value};
 
 pub use free_motion::FreeMotion;
 pub use simulate::fixed_step;
@@ -232,7 +231,6 @@ pub struct Document<'a, R: Serialize> {
     /// The version of the program.
     pub version: &'static str,
     /// Case on which the study was run.
-    #[schemars(with = "Map<String, Value>")]
     pub case: CaseDocument,
 }
 

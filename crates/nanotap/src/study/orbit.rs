@@ -15,6 +15,7 @@ use serde::Serialize;
 
 use crate::Error;
 use crate::case::Case;
+use crate::case::state::WrittenState;
 use crate::model::model_map::ModelMap;
 use crate::model::recording::{NonlinearRecording, Recording};
 use crate::model::{MemoryReset, Model};
@@ -151,7 +152,7 @@ pub fn orbit(model: &Model, options: &OrbitOptions) -> Result<OrbitReport, Error
         ));
     }
     check_size(model.dimension(), options.period.unwrap_or(1))?;
-    let start = starting_state(model, options.state.as_deref())?;
+    let start = starting_state(model, options.state.as_ref())?;
     let mut map = ModelMap::new(model);
     let found = match (options.period, &options.state) {
         (Some(period), Some(_)) => {
@@ -521,9 +522,10 @@ options! {
         /// Period in drive periods; default: that of the motion to which a run converges
         #[schemars(range(min = 1, max = MAX_PERIOD), extend("x-value" = "N"))]
         pub period: Option<usize> = None,
-        /// State near the orbit, at drive phase 0: a1,…,aN,v1,…,vN (oscillator: x,v)
-        #[schemars(extend("x-value" = "A1,…"))]
-        pub state: Option<Vec<f64>> = None,
+        /// State near the orbit, at drive phase 0: a1,…,aN,v1,…,vN (oscillator: x,v), or some by name, as in
+        /// tip=5nm; of a physical case in m and m/s, or with units
+        #[schemars(extend("x-value" = "STATE"))]
+        pub state: Option<WrittenState> = None,
         /// Number of reported harmonics of the drive frequency
         #[schemars(range(min = 0, max = MAX_HARMONICS), extend("x-value" = "H"))]
         pub harmonics: usize = 20,
@@ -565,6 +567,10 @@ impl Study for OrbitStudy {
             .collect::<Result<Vec<_>, _>>()?;
         let model = case.model()?;
         let observables = options.observables.unwrap_or(ObservableSet::ALL);
+        let options = &OrbitOptions {
+            state: case.state_of(options.state.as_ref())?,
+            ..options.clone()
+        };
         let mut found = orbit(&model, options)?;
         for key in keys {
             let at = (found.state.as_slice(), found.period);

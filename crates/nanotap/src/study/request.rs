@@ -12,9 +12,10 @@ use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use schemars::generate::SchemaSettings;
+use schemars::transform::transform_subschemas;
 use schemars::{JsonSchema, Schema};
 use serde::de::DeserializeOwned;
-use serde_json::{Map, Value};
+use serde_json::{Map, Value, json};
 
 use crate::Error;
 use crate::case::near_name::near_name;
@@ -47,10 +48,31 @@ macro_rules! options {
 }
 pub(crate) use options;
 
-/// The JSON schema of what a study answers: what recurs stands under `$defs`.
+/// The JSON schema of a document: what recurs is under `$defs`.
+///
+/// JSON has neither infinity nor NaN, and a number of a computation may not exist: it is undefined (a
+/// ratio to an amplitude of 0, the exponent of a motion that sticks), infinite, or too large for a
+/// double. Such a number is `null`, so every real number of a document is a number or null. Counts always
+/// exist.
 pub fn answer_schema<T: JsonSchema>() -> Schema {
     let settings = SchemaSettings::draft2020_12().for_serialize();
+    let settings = settings.with_transform(numbers_may_not_exist);
     settings.into_generator().into_root_schema_for::<T>()
+}
+
+/// Allows null for every real number of a schema.
+fn numbers_may_not_exist(schema: &mut Schema) {
+    transform_subschemas(&mut numbers_may_not_exist, schema);
+    match schema.get_mut("type") {
+        Some(kind) if kind == "number" => *kind = json!(["number", "null"]),
+        Some(Value::Array(kinds)) => {
+            let null = Value::from("null");
+            if kinds.iter().any(|kind| kind == "number") && !kinds.contains(&null) {
+                kinds.push(null);
+            }
+        }
+        _ => {}
+    }
 }
 
 /// The JSON schema of a request, without references to definitions elsewhere.
@@ -364,11 +386,9 @@ fn whole_numbers(schema: &Schema, mut given: Map<String, Value>) -> Map<String, 
 
 #[cfg(test)]
 mod tests {
+    use super::*;
     use schemars::JsonSchema;
     use serde::{Deserialize, Serialize};
-    use serde_json::json;
-
-    use super::*;
 
     /// A request with an option of every kind.
     #[derive(Debug, PartialEq, Serialize, Deserialize, JsonSchema)]

@@ -27,6 +27,7 @@ use nanotap_dynamics::{
     assemble_diagram, close_orbit_from_points,
 };
 use rayon::prelude::*;
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::FreeMotion;
@@ -39,14 +40,14 @@ use super::value::Amount;
 use crate::case::document::{CaseDocument, PhysicalSummary};
 use crate::case::physical::{Held, Kind, Remark};
 use crate::case::{Case, Key};
+use crate::error::ErrorDocument;
 use crate::model::model_map::ModelMap;
 use crate::observe::table::{Observable, shown_phase};
 use crate::observe::{ObservableSet, Observables, OutOfRange, PhysicalMotion, measure};
-use crate::error::ErrorDocument;
 use crate::{Error, ErrorKind};
 
 /// A distance at which an orbit has the setpoint amplitude.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct SetpointSolution {
     /// The distance, in the model's unit of length.
     pub gap: f64,
@@ -73,7 +74,7 @@ pub struct SetpointSolution {
 }
 
 /// Another stable orbit at the chosen distance.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct SetpointState {
     /// Period of the orbit, in drive periods.
     pub period: usize,
@@ -90,7 +91,7 @@ pub struct SetpointState {
 }
 
 /// The drive that keeps amplitude and phase at a frequency shift.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct SetpointDrive {
     /// Frequency of the drive, Hz.
     pub frequency: f64,
@@ -101,7 +102,7 @@ pub struct SetpointDrive {
 }
 
 /// Solution of a setpoint for the distance.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct SetpointReport {
     /// Quantity that is held: `amplitude`, `peak_force`, `phase` or `frequency_shift`.
     pub held: &'static str,
@@ -566,7 +567,7 @@ fn cancelled() -> Error {
 }
 
 /// A case as a document, with how its setpoint was solved for the distance.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct SolvedCase {
     /// Document of the case, with its physical quantities and the numbers of the equations.
     #[serde(flatten)]
@@ -581,7 +582,7 @@ pub struct SolvedCase {
 
 /// A case whose distance is left to a setpoint that was not solved for: what does not depend on the
 /// distance.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct UnsolvedCase {
     /// The word `cantilever`.
     pub kind: &'static str,
@@ -598,7 +599,7 @@ pub struct UnsolvedCase {
 }
 
 /// A case as a document, at its setpoint or without a distance.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, JsonSchema)]
 #[serde(untagged)]
 pub enum CaseReport {
     /// A case with its distance.
@@ -623,7 +624,9 @@ impl UnsolvedCase {
 /// Why the setpoint of a case is not solved for where nothing else needs its distance: a drive with
 /// several tones has loops for them. `None` for a case with a distance or one tone.
 pub fn note_of_several_tones(case: &Case) -> Option<String> {
-    let tones = case.cantilever().map_or(0, |lever| lever.further_tones.len());
+    let tones = case
+        .cantilever()
+        .map_or(0, |lever| lever.further_tones.len());
     let is_left = case.leaves_distance_to_setpoint() && tones > 0;
     is_left.then(|| {
         "the distance is left to the setpoint and the drive has several tones: `bimodal` follows \

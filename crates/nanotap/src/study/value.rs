@@ -298,6 +298,17 @@ impl Axes {
         self.0.iter().map(|axis| name_of(axis)).collect()
     }
 
+    /// The first value of each parameter, as `key=value` words: what a case may leave out that does not
+    /// state the parameter.
+    pub fn first_values(&self) -> Vec<String> {
+        let word = |axis: &String| {
+            let (name, values) = axis.split_once('=')?;
+            let first = values.split([':', ',']).next()?;
+            Some(format!("{}={}", name.trim(), first.trim()))
+        };
+        self.0.iter().filter_map(word).collect()
+    }
+
     /// Whether a setpoint varies, so that its distances are solved for.
     pub fn solves_distance(&self) -> bool {
         self.names().contains(&Key::DriveSetpoint.path())

@@ -213,7 +213,7 @@ fn a_coarse_curve_agrees_with_a_slow_run() {
         let mut map = ModelMap::new(&model);
         map.advance_by(&mut here, 4000).unwrap();
         let run = SimulateOptions {
-            state: Some(here.clone()),
+            state: Some(here.clone().into()),
             transient: Some(0),
             periods: 1,
             ..SimulateOptions::default()

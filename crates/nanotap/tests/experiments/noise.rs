@@ -259,7 +259,7 @@ fn the_saddle_comes_nearer_as_towards_a_fold() {
         });
         let options = NoiseOptions {
             temperature,
-            state: Some(tapping.unwrap().state.clone()),
+            state: Some(tapping.unwrap().state.clone().into()),
             ..NoiseOptions::default()
         };
         let found = NoiseStudy::run(&case, &options, &Control::default()).unwrap();

@@ -28,7 +28,7 @@ fn every_solution_has_the_amplitude_of_the_setpoint() {
         let model = lever.with(lever.gap_key(), solution.gap).model().unwrap();
         let options = OrbitOptions {
             period: Some(solution.period),
-            state: Some(solution.state.clone()),
+            state: Some(solution.state.clone().into()),
             ..OrbitOptions::default()
         };
         let found = orbit(&model, &options).unwrap();

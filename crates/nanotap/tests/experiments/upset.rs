@@ -44,7 +44,7 @@ fn tapping(case: &Case) -> Vec<f64> {
 
 fn knocked(case: &Case, state: Option<&[f64]>) -> Result<OrbitReport, nanotap::Error> {
     let options = OrbitOptions {
-        state: state.map(<[f64]>::to_vec),
+        state: state.map(|state| state.to_vec().into()),
         upset: true,
         ..OrbitOptions::default()
     };

@@ -50,7 +50,7 @@ fn again(case: &Case, point: &ApproachPoint) -> OrbitReport {
         .with(Key::Alpha2, found.drive_strength);
     let options = OrbitOptions {
         period: Some(1),
-        state: Some(point.orbit.as_ref().unwrap().states[0].clone()),
+        state: Some(point.orbit.as_ref().unwrap().states[0].clone().into()),
         harmonics: 200,
         ..OrbitOptions::default()
     };

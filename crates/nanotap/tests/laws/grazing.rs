@@ -24,7 +24,7 @@ fn a_branch_over_a_bridge_ends_where_its_orbit_grazes_the_bridge() {
         let options = BranchOptions {
             period: Some(3),
             // Found by a census.
-            state: Some(vec![-0.000261168750597, -0.00149948655106, 0.0]),
+            state: Some(vec![-0.000261168750597, -0.00149948655106, 0.0].into()),
             ..BranchOptions::over(key, 10.5e-9, to)
         };
         let report = branch(&case, &options, &Control::default()).unwrap();

@@ -20,7 +20,7 @@ fn near(case: &Case, a: f64, phase: f64) -> OrbitReport {
     let omega = model.frequency();
     let options = OrbitOptions {
         period: Some(1),
-        state: Some(vec![-scale * sin, scale * omega * cos]),
+        state: Some(vec![-scale * sin, scale * omega * cos].into()),
         ..OrbitOptions::default()
     };
     orbit(&model, &options).unwrap()
@@ -144,7 +144,7 @@ fn the_repulsive_branch_ends_in_a_fold() {
     let metres = |nm: f64| nm * 1e-9;
     let options = BranchOptions {
         period: Some(1),
-        state: Some(repulsive.state),
+        state: Some(repulsive.state.into()),
         ..BranchOptions::over(Key::GapTip, metres(18.0), metres(20.0))
     };
     assert_eq!(model.dimension(), 2);

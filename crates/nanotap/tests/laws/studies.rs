@@ -91,7 +91,7 @@ fn a_setpoint_is_reached_at_its_distances() {
         let here = held.with(held.gap_key(), solution.gap);
         let options = OrbitOptions {
             period: Some(solution.period),
-            state: Some(solution.state.clone()),
+            state: Some(solution.state.clone().into()),
             ..OrbitOptions::default()
         };
         let found = orbit(&here.model().unwrap(), &options).unwrap();
@@ -152,7 +152,7 @@ fn observed(case: &Case, start: &[f64]) -> (Vec<f64>, Observables) {
     let model = case.model().unwrap();
     let options = OrbitOptions {
         period: Some(1),
-        state: Some(start.to_vec()),
+        state: Some(start.to_vec().into()),
         ..OrbitOptions::default()
     };
     let found = orbit(&model, &options).unwrap();
@@ -178,7 +178,7 @@ fn an_orbit_is_followed_where_its_neck_appears_at_the_strobe() {
     let here = orbit(&at(22.0), &OrbitOptions::default()).unwrap();
     let options = OrbitOptions {
         period: Some(1),
-        state: Some(here.state.clone()),
+        state: Some(here.state.clone().into()),
         ..OrbitOptions::default()
     };
     let there = orbit(&at(22.1), &options).unwrap();

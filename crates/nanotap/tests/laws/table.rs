@@ -21,7 +21,7 @@ fn table(rows: impl IntoIterator<Item = (f64, f64)>) -> String {
 fn near(case: &Case, state: &[f64]) -> OrbitReport {
     let options = OrbitOptions {
         period: Some(1),
-        state: Some(state.to_vec()),
+        state: Some(state.to_vec().into()),
         ..OrbitOptions::default()
     };
     orbit(&case.model().unwrap(), &options).unwrap()

@@ -157,7 +157,7 @@ fn free_lever_moves_as_the_exact_beam() {
         &model,
         &OrbitOptions {
             period: Some(1),
-            state: Some(vec![0.0; 40]),
+            state: Some(vec![0.0; 40].into()),
             ..OrbitOptions::default()
         },
     );

@@ -69,7 +69,7 @@ fn the_linear_response_grazes_as_in_coco() {
             .unwrap();
             let start = OrbitOptions {
                 period: Some(1),
-                state: Some(vec![0.0, 0.0]),
+                state: Some(vec![0.0, 0.0].into()),
                 ..OrbitOptions::default()
             };
             orbit(&model, &start).unwrap().observables.tip_max
@@ -89,7 +89,7 @@ fn the_linear_response_grazes_as_in_coco() {
             .unwrap();
             let start = OrbitOptions {
                 period: Some(1),
-                state: Some(vec![0.0, 0.0]),
+                state: Some(vec![0.0, 0.0].into()),
                 ..OrbitOptions::default()
             };
             let free = orbit(&far, &start).unwrap();
@@ -483,7 +483,7 @@ fn a_branch_goes_on_where_an_impact_passes_phase_zero() {
         let model = cascade(point.parameter).model().unwrap();
         let near = vec![point.state[0] - 1e-4, 0.999 * point.state[1]];
         let options = OrbitOptions {
-            state: Some(near),
+            state: Some(near.into()),
             ..OrbitOptions::default()
         };
         let settled = orbit(&model, &options).unwrap();
@@ -536,7 +536,7 @@ fn chatter_to_rest_is_one_motion() {
     let model = chatter.model().unwrap();
     let end = |start: [f64; 2]| {
         let options = OrbitOptions {
-            state: Some(start.to_vec()),
+            state: Some(start.to_vec().into()),
             ..OrbitOptions::default()
         };
         orbit(&model, &options).unwrap()

@@ -229,7 +229,7 @@ fn exponents_sum_to_the_trace() {
     let options = LyapunovOptions {
         transient: 0,
         periods: 200,
-        state: Some(found.state.clone()),
+        state: Some(found.state.clone().into()),
         points: 0,
         ..LyapunovOptions::default()
     };
@@ -346,7 +346,7 @@ fn a_long_period_of_one_mode_is_not_a_torus() {
     let model = Model::cantilever(&case).unwrap();
     // Near one of its points.
     let options = SimulateOptions {
-        state: Some(vec![-0.19771, -0.124605]),
+        state: Some(vec![-0.19771, -0.124605].into()),
         ..SimulateOptions::default()
     };
     let found = simulate(&model, &options).unwrap();

@@ -208,7 +208,7 @@ fn a_given_transient_is_run_unchanged() {
         &nanotap::study::simulate::SimulateOptions {
             periods: 20,
             transient: Some(7),
-            state: Some(vec![0.1, 0.0, 0.0, -0.2, 0.0, 0.0]),
+            state: Some(vec![0.1, 0.0, 0.0, -0.2, 0.0, 0.0].into()),
             strobe: 20,
             ..Default::default()
         },

@@ -28,8 +28,8 @@ pub use writer::{scan_table, to_toml};
 
 use toml::de::{DeTable, DeValue};
 
-use super::force_table::file_named;
 use super::Value;
+use super::force_table::file_named;
 use crate::case::key::{Key, Takes};
 use crate::input::{self, MAX_CASE_BYTES, Origin};
 

@@ -59,6 +59,8 @@ pub struct Problem {
     pub help: Option<String>,
     /// The key concerned, as `section.key` for a physical case.
     pub key: Option<&'static str>,
+    /// Whether the key is needed and not stated.
+    pub is_missing: bool,
     /// `key=value` words that solve the problem, shown after the help.
     pub words: Vec<String>,
 }
@@ -72,6 +74,7 @@ impl Problem {
             label: String::new(),
             help: None,
             key: None,
+            is_missing: false,
             words: Vec::new(),
         }
     }
@@ -117,6 +120,16 @@ pub struct CaseFileError {
     pub problems: Vec<Problem>,
     /// Number of problems beyond [`SHOWN`], which are not listed.
     pub more: usize,
+}
+
+impl CaseFileError {
+    /// The key of a physical case that is missing, if nothing else is wrong.
+    pub fn missing(&self) -> Option<&'static str> {
+        match self.problems.as_slice() {
+            [problem] => problem.key.filter(|_| problem.is_missing),
+            _ => None,
+        }
+    }
 }
 
 /// Problems in the order of discovery; those beyond [`SHOWN`] are only counted.

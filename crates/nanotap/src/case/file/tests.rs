@@ -2,6 +2,7 @@ use proptest::prelude::*;
 
 use super::*;
 use crate::case::Case;
+use crate::model::cantilever::{Cantilever, CosineTerm};
 use crate::model::contact::ContactLaw;
 use crate::model::drive_form::Actuation;
 use crate::model::oscillator::{Oscillator, Stop};

@@ -156,20 +156,38 @@ fn without_catalogue<'a>(stated: &'a Stated, catalogue: &Catalogue) -> Cow<'a, S
         && builtin.lever(key, name) != Ok(lever)
     {
         own.to_mut().remove(key);
-        put(&mut own, Key::LeverK, Some(lever.k).filter(|_| !stated.has(Key::LeverK1)));
+        put(
+            &mut own,
+            Key::LeverK,
+            Some(lever.k).filter(|_| !stated.has(Key::LeverK1)),
+        );
         put(&mut own, Key::LeverF0, Some(lever.f0));
         put(&mut own, Key::TipRadius, lever.tip_radius);
         put(&mut own, Key::TipHeight, lever.tip_height);
         let sides = [Key::LeverLength, Key::LeverWidth, Key::LeverThickness];
-        if let Some(beam) = lever.geometry.filter(|_| !sides.iter().any(|key| stated.has(*key))) {
-            for (key, value) in sides.into_iter().zip([beam.length, beam.width, beam.thickness]) {
+        if let Some(beam) = lever
+            .geometry
+            .filter(|_| !sides.iter().any(|key| stated.has(*key)))
+        {
+            for (key, value) in sides
+                .into_iter()
+                .zip([beam.length, beam.width, beam.thickness])
+            {
                 put(&mut own, key, Some(value));
             }
         }
     }
     for (key, [modulus, poisson], density) in [
-        (Key::SampleMaterial, [Key::SampleModulus, Key::SamplePoisson], None),
-        (Key::TipMaterial, [Key::TipModulus, Key::TipPoisson], Some(Key::TipDensity)),
+        (
+            Key::SampleMaterial,
+            [Key::SampleModulus, Key::SamplePoisson],
+            None,
+        ),
+        (
+            Key::TipMaterial,
+            [Key::TipModulus, Key::TipPoisson],
+            Some(Key::TipDensity),
+        ),
     ] {
         if let Some(name) = name(key)
             && let Ok(material) = catalogue.material(key, name)

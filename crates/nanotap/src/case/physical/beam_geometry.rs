@@ -1,9 +1,10 @@
 //! Dimensions of a beam.
 
+use schemars::JsonSchema;
 use serde::Serialize;
 
 /// Dimensions of a beam of rectangular cross-section, in m.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
 pub struct BeamGeometry {
     /// Length L of the beam, m.
     pub length: f64,

@@ -19,6 +19,7 @@ use std::fmt;
 use std::path::Path;
 use std::sync::{Arc, LazyLock};
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::beam_geometry::BeamGeometry;
@@ -31,7 +32,7 @@ use crate::input::{self, MAX_CASE_BYTES, Origin};
 
 /// A lever as in its data sheet. The quality factor is not included, because it depends on the
 /// medium.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct Lever {
     /// Name of the lever in the catalogue.
     pub name: String,
@@ -53,7 +54,7 @@ pub struct Lever {
 }
 
 /// A material of samples and tips.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct Material {
     /// Name of the material in the catalogue.
     pub name: String,

@@ -1,9 +1,10 @@
 //! Elastic constants.
 
+use schemars::JsonSchema;
 use serde::Serialize;
 
 /// Elastic constants of an isotropic solid.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
 pub struct Elastic {
     /// Young's modulus in Pa, above zero.
     pub modulus: f64,

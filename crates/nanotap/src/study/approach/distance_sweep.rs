@@ -496,7 +496,7 @@ impl<'a> DistanceSweep<'a> {
         let control = self.limited();
         let (points, mut end) =
             match continue_orbit(&self.family, gap, orbit, direction, &options, &control) {
-                Ok(branch) => stable_part(branch),
+                Ok(branch) => stable_part(branch, &|gap| self.case.shown(self.case.gap_key(), gap)),
                 Err(error) => (Vec::new(), (gap, End::Lost(error.to_string()))),
             };
         if let Some(steps) = self.spent_budget() {
@@ -811,7 +811,8 @@ impl<'a> DistanceSweep<'a> {
             return known;
         }
         let branch = switch_at_flip(&self.family, flip, &self.options(), &self.limited()).ok()?;
-        let (mut points, end) = stable_part(branch);
+        let shown = |gap| self.case.shown(self.case.gap_key(), gap);
+        let (mut points, end) = stable_part(branch, &shown);
         let side = sign(direction);
         let first = points.first()?;
         let last = points.last()?;
@@ -991,7 +992,10 @@ const fn is_continuous(end: &End) -> bool {
 }
 
 /// The stable points of a branch in the order in which it was followed, and its end.
-fn stable_part(mut branch: Branch) -> (Vec<BranchPoint>, (f64, End)) {
+fn stable_part(
+    mut branch: Branch,
+    shown: &dyn Fn(f64) -> String,
+) -> (Vec<BranchPoint>, (f64, End)) {
     let first = branch.points.first().map_or(f64::NAN, |p| p.parameter);
     let last_of = |points: &[BranchPoint]| points.last().map_or(first, |p| p.parameter);
     let end = match &branch.end {
@@ -1026,11 +1030,11 @@ fn stable_part(mut branch: Branch) -> (Vec<BranchPoint>, (f64, End)) {
                     at: Box::new(found.clone()),
                     unstable: None,
                 },
-                None => End::Lost(branch.end.to_string()),
+                None => End::Lost(branch.end.words(shown)),
             };
             (*parameter, end)
         }
-        other => (last_of(&branch.points), End::Lost(other.to_string())),
+        other => (last_of(&branch.points), End::Lost(other.words(shown))),
     };
     (branch.points, end)
 }

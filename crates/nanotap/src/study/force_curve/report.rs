@@ -259,14 +259,14 @@ pub(super) fn report(plan: &Plan<'_>, statics: &StaticsFound, run: &Run) -> Forc
     if run.ends_in_contact {
         warnings.push(
             "the tip still touches at the end of the retract: the adhesion force and the energies \
-             are those of an open curve; give a larger {from}"
+             are those of an open curve; give a larger `from`"
                 .to_owned(),
         );
     }
     if fits.is_empty() && !plan.driven && radius.is_some() && peak > 0.0 {
         warnings.push(
-            "no fits: the forces of the unloading part do not span the range of {fit_from} to \
-             {fit_to}"
+            "no fits: the forces of the unloading part do not span the range of `fit_from` to \
+             `fit_to`"
                 .to_owned(),
         );
     }

@@ -19,6 +19,7 @@ use crate::Error;
 use crate::case::Case;
 use crate::case::key::Key;
 use crate::case::physical::Kind;
+use crate::case::state::WrittenState;
 use crate::control::Control;
 use crate::model::cantilever::Cantilever;
 use crate::model::galerkin::Galerkin;
@@ -96,9 +97,10 @@ options! {
         /// Noise bandwidth of the lock-in amplifier, 1 over four time constants, in place of it
         #[schemars(extend("x-value" = "FREQUENCY"))]
         pub bandwidth: Option<Amount> = None,
-        /// State near the orbit, at drive phase 0: a1,…,aN,v1,…,vN
-        #[schemars(extend("x-value" = "A1,…"))]
-        pub state: Option<Vec<f64>> = None,
+        /// State near the orbit, at drive phase 0: a1,…,aN,v1,…,vN, or some by name, as in
+        /// tip=5nm; of a physical case in m and m/s, or with units
+        #[schemars(extend("x-value" = "STATE"))]
+        pub state: Option<WrittenState> = None,
     }
 }
 
@@ -208,7 +210,7 @@ impl Study for NoiseStudy {
         let lock_in = LockIn {
             time_constant: time_constant / scales.time,
         };
-        let tapping = thermal.reading(case, options.state.as_deref(), lock_in, control)?;
+        let tapping = thermal.reading(case, options.state.as_ref(), lock_in, control)?;
         let free = thermal.reading(&free(lever), None, lock_in, control)?;
         let orbit = &tapping.orbit;
         let held_rms = thermal.held_frequency_rms(lever, &tapping, lock_in, control)?;
@@ -360,12 +362,12 @@ impl Thermal {
     fn reading(
         &self,
         case: &Case,
-        state: Option<&[f64]>,
+        state: Option<&WrittenState>,
         lock_in: LockIn,
         control: &Control<'_>,
     ) -> Result<Reading, Error> {
         let options = OrbitOptions {
-            state: state.map(<[f64]>::to_vec),
+            state: state.cloned(),
             harmonics: 0,
             observables: Some(ObservableSet::FIRST_HARMONIC),
             ..OrbitOptions::default()

@@ -111,7 +111,7 @@ const CURVE_POINTS: usize = 2_000_000;
 /// # Errors
 /// When the start does not fit, the stop is rigid, or the run overflows.
 pub fn fixed_step_run(model: &Model, options: &SimulateOptions) -> Result<FixedStepRun, Error> {
-    let state = starting_state(model, options.state.as_deref())?;
+    let state = starting_state(model, options.state.as_ref())?;
     let transient = options.transient.unwrap_or(TRANSIENT);
     let refused = |message| {
         Err(Error::input(
@@ -364,7 +364,7 @@ mod tests {
         let steps = 4000;
         let options = SimulateOptions {
             steps: Steps([steps; 2]),
-            state: Some(exact.state.clone()),
+            state: Some(exact.state.clone().into()),
             transient: Some(0),
             periods: 2,
             ..Default::default()

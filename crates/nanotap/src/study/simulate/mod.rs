@@ -13,6 +13,8 @@ use serde::{Deserialize, Serialize};
 
 use crate::Error;
 use crate::case::Case;
+use crate::case::state::WrittenState;
+use crate::case::units::Units;
 use crate::control::Control;
 use crate::model::model_map::ModelMap;
 use crate::model::recording::Recording;
@@ -138,7 +140,7 @@ const ARRIVED: f64 = 1e-11;
 /// # Errors
 /// When the state does not fit or the flow fails.
 pub fn simulate(model: &Model, options: &SimulateOptions) -> Result<Simulation, Error> {
-    let mut state = starting_state(model, options.state.as_deref())?;
+    let mut state = starting_state(model, options.state.as_ref())?;
     check_periods(options.periods)?;
     check_states(model, options.strobe.min(options.periods), "strobe")?;
     let how = options.classify();
@@ -214,18 +216,20 @@ pub(in crate::study) fn check_states(
     Ok(())
 }
 
-/// The state to start from: as given, or that of the model ([`Model::start`]), or rest. A sample
+/// The state to start from: as given, numbers in the model's units, or that of the model
+/// ([`Model::start`]), or rest. A sample
 /// with a memory is relaxed where the state does not say otherwise.
 ///
 /// # Errors
 /// When its length does not fit, a number is not finite, or it lies behind a rigid stop.
-pub fn starting_state(model: &Model, state: Option<&[f64]>) -> Result<Vec<f64>, Error> {
+pub fn starting_state(model: &Model, state: Option<&WrittenState>) -> Result<Vec<f64>, Error> {
     let refused = |message| Err(Error::input(message, "count the numbers of {state}"));
     let n = model.dimension();
     let Some(state) = state else {
         return Ok(model.first_state());
     };
-    let mut state = state.to_vec();
+    let read = state.read(model, &Units::Model);
+    let mut state = read.map_err(|error| error.at("state"))?;
     if state.len() + model.memory == n {
         state.resize(n, 0.0);
     }
@@ -440,9 +444,10 @@ options! {
         /// Drive periods of the discarded transient; default: until the motion has settled; 0: none
         #[schemars(range(min = 0, max = MAX_PERIODS), extend("x-value" = "T"))]
         pub transient: Option<usize> = None,
-        /// Initial state at drive phase 0: a1,…,aN,v1,…,vN (oscillator: x,v); default: rest
-        #[schemars(extend("x-value" = "A1,…"))]
-        pub state: Option<Vec<f64>> = None,
+        /// Initial state at drive phase 0: a1,…,aN,v1,…,vN (oscillator: x,v), or some by name, as in
+        /// tip=5nm; of a physical case in m and m/s, or with units; default: rest
+        #[schemars(extend("x-value" = "STATE"))]
+        pub state: Option<WrittenState> = None,
         /// Number of last states at drive phase 0 to keep
         #[schemars(range(min = 0, max = MAX_LISTED), extend("x-value" = "K"))]
         pub strobe: usize = 1,
@@ -508,6 +513,10 @@ impl Study for SimulateStudy {
         options: &SimulateOptions,
         _: &Control<'_>,
     ) -> Result<SimulateReport, Error> {
+        let options = &SimulateOptions {
+            state: case.state_of(options.state.as_ref())?,
+            ..options.clone()
+        };
         let model = case.model()?;
         if options.method == Method::Rk4 {
             let run = fixed_step_run(&model, options)?;

@@ -119,11 +119,11 @@ fn corners(case: &Case, over: &[Over]) -> Result<(), Error> {
     let second = over.get(1).map_or(vec![0], ends);
     for first in ends(&over[0]) {
         for &second in &second {
-            let mut place = format!("{} = {}", over[0].key.path(), over[0].value(first));
+            let mut place = over[0].named(case, first);
             let mut corner = over[0].apply(case, first);
             if let Some(range) = over.get(1) {
                 corner = range.apply(&corner, second);
-                place = format!("{place}, {} = {}", range.key.path(), range.value(second));
+                place = format!("{place}, {}", range.named(case, second));
             }
             model(&corner, &place)?;
         }
@@ -146,7 +146,7 @@ fn fits(case: &Case, over: &[Over], starts: &Starts) -> Result<(), Error> {
         let sides: &[_] = match starts {
             Starts::Rest => continue,
             Starts::Given(state) => {
-                starting_state(&model, Some(state))?;
+                starting_state(&model, Some(&state.clone().into()))?;
                 continue;
             }
             Starts::Seeded { sides, .. } => sides,

@@ -94,7 +94,7 @@ impl Sweep {
         options: SweepOptions,
         control: &Control<'_>,
     ) -> Result<Self, Error> {
-        let starts = options.starts(&case.units())?;
+        let starts = options.starts(case)?;
         Self::from(case, options, starts, control)
     }
 

@@ -5,6 +5,7 @@ use nanotap_dynamics::Control;
 use super::{Follow, Over, Starts, Summary, Sweep};
 use crate::Error;
 use crate::case::Case;
+use crate::case::state::WrittenState;
 use crate::case::units::Units;
 use crate::dataset::{Store, StoreError};
 use crate::study::attractors::MAX_STARTS;
@@ -34,9 +35,10 @@ options! {
         #[serde(rename = "box")]
         #[schemars(extend("x-value" = "COORDINATE=LOW:HIGH"))]
         pub sides: Intervals = Intervals::default(),
-        /// Start from this state at drive phase 0: a1,…,aN,v1,…,vN (oscillator: x,v)
-        #[schemars(extend("x-value" = "A1,…"))]
-        pub state: Option<Vec<f64>> = None,
+        /// Start from this state at drive phase 0: a1,…,aN,v1,…,vN (oscillator: x,v), or some by name, as in
+        /// tip=5nm; of a physical case in m and m/s, or with units
+        #[schemars(extend("x-value" = "STATE"))]
+        pub state: Option<WrittenState> = None,
         /// Start each value from the last state of the previous one, along the first parameter: up,
         /// down or both. An interrupted line is lost
         #[schemars(extend("x-value" = "WAY"))]
@@ -77,7 +79,7 @@ impl SweepOptions {
     }
 
     /// Returns the initial states that the options request.
-    pub(super) fn starts(&self, units: &Units) -> Result<Starts, Error> {
+    pub(super) fn starts(&self, case: &Case) -> Result<Starts, Error> {
         match (self.starts, &self.state) {
             (Some(_), Some(_)) => Err(Error::input(
                 "starts and state: the starts are drawn, or given",
@@ -91,9 +93,13 @@ impl SweepOptions {
             (Some(count), None) => Ok(Starts::Seeded {
                 count,
                 seed: self.seed,
-                sides: self.sides.of_entries(units)?,
+                sides: self.sides.of_entries(&case.units())?,
             }),
-            (None, Some(state)) => Ok(Starts::Given(state.clone())),
+            (None, Some(state)) => {
+                let model = case.model()?;
+                let state = state.of_case(case)?;
+                Ok(Starts::Given(state.read(&model, &Units::Model)?))
+            }
             (None, None) => Ok(Starts::Rest),
         }
     }

@@ -209,6 +209,15 @@ impl Over {
         (0..self.count).map(|k| self.value(k)).collect()
     }
 
+    /// The parameter with its `index`-th value, in words.
+    pub(super) fn named(&self, case: &Case, index: usize) -> String {
+        let value = self.value(index);
+        if self.key == Key::DriveSetpoint {
+            return format!("{} = {}", self.key, self.kind.format(value));
+        }
+        case.named(self.key, value)
+    }
+
     /// `case` with the `index`-th value.
     pub fn apply(&self, case: &Case, index: usize) -> Case {
         let value = self.value(index);

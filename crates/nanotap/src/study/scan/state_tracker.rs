@@ -6,6 +6,7 @@
 //! its present state. A lever that flies behind an edge is governed by attraction, too, but off the
 //! setpoint.
 
+use std::collections::btree_map::Entry;
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::instrument::{Instrument, Interaction, Period};
@@ -158,14 +159,14 @@ impl<'a> StateTracker<'a> {
     fn confirm(&mut self, period: &Period, instrument: &Instrument<'_>) {
         let (to, here) = (period.interaction, period.material);
         let plan = self.plan;
-        if !self.known.contains_key(&key(here, to)) {
+        if let Entry::Vacant(unknown) = self.known.entry(key(here, to)) {
             let mut lever = instrument.lever_above(here);
             let gap = (period.z - period.surface) / plan.length_unit;
             let found = SetpointState::near(plan, &mut lever, instrument.lever_state(), gap);
             let Some(found) = found.filter(|found| found.interaction == to) else {
                 return;
             };
-            self.known.insert(key(here, to), found);
+            unknown.insert(found);
         }
         if let (Some((from, home)), Some(change)) = (self.established, self.departure.take()) {
             if let Some(last) = self.changes.last_mut() {

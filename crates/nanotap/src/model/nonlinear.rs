@@ -603,7 +603,9 @@ impl Variation {
         slopes: &[(Parameter, f64)],
         law: &[f64],
     ) -> Result<Self, ModelError> {
-        let of_modes = |p: Parameter| matches!(p, Parameter::Alpha1 | Parameter::Alpha3);
+        let of_modes = |p: Parameter| {
+            matches!(p, Parameter::Alpha1 | Parameter::Alpha3) || Parameter::MEASURED.contains(&p)
+        };
         if slopes
             .iter()
             .any(|(p, slope)| of_modes(*p) && *slope != 0.0)

@@ -2,6 +2,7 @@
 
 use super::reader::Reader;
 use super::remark::Remark;
+use super::tip::TipMass;
 use super::view::{Physical, USUAL_TIP_HEIGHT};
 use crate::case::key::{Key, Section};
 use crate::case::quantity::Kind;
@@ -40,14 +41,21 @@ impl Physical {
                  or tip.shape would tell it)",
             ));
         }
-        if self.tip.mass.is_some()
+        if !matches!(self.data.tip_mass, TipMass::SecondMode(_))
             && let Ok(Some(f2)) = reader.number(Key::LeverF2)
             && let Ok(beam) = exact_beam::frequencies(self.cantilever.alpha1, 0.0, 2)
         {
+            let share = f2 * beam[0] / (self.lever.f0 * beam[1]);
+            let why = if self.tip.mass.is_some() {
+                "f2 and the tip mass are both given"
+            } else if reader.has(Key::LeverK2) {
+                "f2 and k2 together state the second mode, and no tip mass follows"
+            } else {
+                "f2/f1 lies below that of a beam without a tip, and no tip mass follows"
+            };
             remarks.push(Remark::note(format!(
-                "f2 and the tip mass are both given: the second mode has the frequency f2, {} of the \
-                 uniform beam's",
-                Kind::Number.format_digits(f2 * beam[0] / (self.lever.f0 * beam[1]), 4)
+                "{why}: the second mode has the frequency f2, {} of the uniform beam's",
+                Kind::Number.format_digits(share, 4)
             )));
         }
         remarks.extend(self.lever.remarks(&self.data));

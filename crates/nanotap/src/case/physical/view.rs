@@ -279,7 +279,7 @@ fn mapped(reader: Reader<'_>, known: Option<Lever>) -> Result<Physical, Physical
     };
     // The free response does not depend on g0, so any length serves as unit here: g0 = 1 m,
     // in which a force is measured in k/3.
-    let measured = measured_modes(reader, &tip, &lever)?;
+    let measured = measured_modes(reader, &tip, &lever, data.fluid.is_some())?;
     let measured = match (data.fluid, data.geometry) {
         (Some(fluid), Some(beam)) => {
             let loaded = fluid.higher_modes(&lever, beam.width, beam.length, like.modes)?;
@@ -385,9 +385,13 @@ fn mapped(reader: Reader<'_>, known: Option<Lever>) -> Result<Physical, Physical
     })
 }
 
-/// Measured data of the second and third mode, in SI; 0 if there are none. Without a stated tip
-/// mass the second resonance determines it.
-fn measured_modes(reader: Reader<'_>, tip: &Tip, lever: &Lever) -> Result<Numbers, PhysicalError> {
+/// Measured data of the second and third mode, in SI; 0 if there are none.
+fn measured_modes(
+    reader: Reader<'_>,
+    tip: &Tip,
+    lever: &Lever,
+    in_fluid: bool,
+) -> Result<Numbers, PhysicalError> {
     let number = |key| reader.number(key).map(Option::unwrap_or_default);
     let beam = exact_beam::frequencies(lever.tip_mass_ratio, 0.0, 3)?;
     let frequency = |key, k: usize| {
@@ -405,7 +409,12 @@ fn measured_modes(reader: Reader<'_>, tip: &Tip, lever: &Lever) -> Result<Number
         }
         Ok(given)
     };
-    let second = tip.mass.map_or(Ok(0.0), |_| frequency(Key::LeverF2, 1))?;
+    // In a fluid f2 without a tip mass is that in vacuum.
+    let second = if in_fluid && tip.mass.is_none() {
+        0.0
+    } else {
+        frequency(Key::LeverF2, 1)?
+    };
     Ok(Numbers::ZERO
         .with(Parameter::Mode2Frequency, second)
         .with(Parameter::Mode3Frequency, frequency(Key::LeverF3, 2)?)

@@ -172,7 +172,7 @@ impl Lever {
     /// Returns the stiffness of the first mode at the tip, N/m; `None` if the mode cannot be
     /// computed.
     pub fn modal_stiffness(&self) -> Option<f64> {
-        let factor = modal_factor(TipMass::Ratio(self.tip_mass_ratio), None);
+        let factor = modal_factor(TipMass::Ratio(self.tip_mass_ratio), None, self.modes);
         Some(self.k * factor.ok()?)
     }
 
@@ -365,9 +365,23 @@ fn ratio_to_beam(tip: TipMass, beam_mass: f64) -> Result<f64, PhysicalError> {
     }
 }
 
-/// The first mode's stiffness at the tip over the static one, `(∫φ²/φ(1)² + α1) Ω₁²/3`: β₁⁴/12 =
-/// 1.0302 without a tip's mass, nearer to 1 with it.
-fn modal_factor(tip: TipMass, f0: Option<f64>) -> Result<f64, PhysicalError> {
+/// The tip mass that f₂ states where no other key states one. None follows from a ratio f₂/f₁ below
+/// that of the bare beam, or where k₂ is stated too, which with f₂ states the whole second mode. In a
+/// fluid f₂ is that in vacuum, so that only a tip mass can explain it.
+fn tip_mass_from(
+    f2: f64,
+    f0: Option<f64>,
+    in_fluid: bool,
+    has_stiffness: bool,
+) -> Result<Option<TipMass>, PhysicalError> {
+    let is_lower = |f0: f64| Ok::<_, PhysicalError>(f2 / f0 < frequency_ratio(0.0)?);
+    let is_measured = has_stiffness || f0.map(is_lower).transpose()?.unwrap_or(false);
+    Ok((in_fluid || !is_measured).then_some(TipMass::SecondMode(f2)))
+}
+
+/// Stiffness of the first mode of the model's `modes` at the tip over the static one,
+/// `(∫φ²/φ(1)² + α1) Ω₁²/3`: β₁⁴/12 = 1.0302 without a tip's mass, nearer to 1 with it.
+fn modal_factor(tip: TipMass, f0: Option<f64>, modes: usize) -> Result<f64, PhysicalError> {
     let ratio = match (tip, f0) {
         (TipMass::Ratio(ratio), _) => bounded(ratio)?,
         (TipMass::Absolute(0.0), _) => 0.0,
@@ -386,8 +400,8 @@ fn modal_factor(tip: TipMass, f0: Option<f64>) -> Result<f64, PhysicalError> {
             ));
         }
     };
-    let omega = exact_beam::frequencies(ratio, 0.0, 1)?[0];
-    let share = tip_share(omega.sqrt(), ratio);
+    let omega = first_frequency(ratio, &exact_beam::frequencies(0.0, 0.0, modes)?);
+    let share = model_tip_share(omega, ratio, modes);
     Ok((1.0 / share + ratio) * omega * omega / 3.0)
 }
 
@@ -420,10 +434,10 @@ fn ratio_from_second_mode(f2: f64, f0: f64) -> Result<f64, PhysicalError> {
     };
     if measured < bare {
         return Err(refused(format!(
-            "a uniform beam with a tip has f2/f1 of at least {bare:.4}, reached without tip \
-             mass; a smaller ratio would need a negative one (a tapered lever, or a torsional mode \
-             taken for the second?); leave f2 out if the difference is within its error, or give \
-             the tip's mass too (tip.mass_ratio): the second mode then has this frequency"
+            "in a fluid f2 tells the tip's mass, and a uniform beam with a tip has f2/f1 of at \
+             least {bare:.4}, reached without tip mass; leave f2 out if the difference is within \
+             its error, or give the tip's mass too (tip.mass_ratio): the second mode then has \
+             this frequency in the fluid"
         )));
     }
     ratio_where(|ratio| Ok(frequency_ratio(ratio)? >= measured))?.ok_or_else(|| {
@@ -535,7 +549,6 @@ impl LeverData {
         lever: Option<&super::catalogue::Lever>,
         tip_mass: Option<TipMass>,
     ) -> Result<Self, PhysicalError> {
-        let f2 = reader.number(Key::LeverF2)?.map(TipMass::SecondMode);
         let fluid = Fluid::read(reader)?;
         let quality_factor = reader.number(Key::LeverQ)?;
         if quality_factor.is_none() && fluid.is_none() {
@@ -548,10 +561,15 @@ impl LeverData {
         let f0 = reader
             .number(Key::LeverF0)?
             .or_else(|| lever.map(|lever| lever.f0));
-        let tip_mass = tip_mass.or(f2).unwrap_or(TipMass::Absolute(0.0));
+        let second = match reader.number(Key::LeverF2)? {
+            Some(f2) => tip_mass_from(f2, f0, fluid.is_some(), reader.has(Key::LeverK2))?,
+            None => None,
+        };
+        let tip_mass = tip_mass.or(second).unwrap_or(TipMass::Absolute(0.0));
+        let modes = crate::case::file::modes(reader.stated);
         let k1 = reader.number(Key::LeverK1)?;
         let from_modal = k1
-            .map(|k1| Ok::<_, PhysicalError>(k1 / modal_factor(tip_mass, f0)?))
+            .map(|k1| Ok::<_, PhysicalError>(k1 / modal_factor(tip_mass, f0, modes)?))
             .transpose()?;
         Ok(Self {
             fluid,
@@ -566,7 +584,7 @@ impl LeverData {
             modulus: reader.number(Key::LeverModulus)?,
             density: reader.number(Key::LeverDensity)?,
             tip_mass,
-            modes: crate::case::file::modes(reader.stated),
+            modes,
         })
     }
 }

@@ -62,6 +62,25 @@ pub(crate) fn advance_each<M: StroboscopicMap>(
         .collect()
 }
 
+/// As [`advance_each`], and whether each was reset on the way ([`StroboscopicMap::resets`]).
+pub(crate) fn advance_each_until_reset<M: StroboscopicMap>(
+    map: &mut M,
+    states: &mut [f64],
+    periods: &[usize],
+) -> Vec<(Result<(), MapFailure>, bool)> {
+    if map.batch_size() > 1 {
+        let advanced = advance_each(map, states, periods).into_iter();
+        return advanced.map(|result| (result, false)).collect();
+    }
+    let each = states.chunks_exact_mut(map.dimension()).zip(periods);
+    each.map(|(state, &periods)| {
+        let before = map.resets();
+        let result = advance_by(map, state, periods);
+        (result, map.resets() > before)
+    })
+    .collect()
+}
+
 /// As [`advance`], with the Jacobian.
 #[inline]
 pub(crate) fn advance_with_jacobian<M: StroboscopicMap>(

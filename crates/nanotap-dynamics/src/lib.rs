@@ -37,6 +37,7 @@ pub mod lyapunov;
 pub mod map;
 pub mod neighbourhood;
 pub mod orbit;
+mod reset;
 mod same_motion;
 mod vector;
 
@@ -70,4 +71,5 @@ pub use orbit::{
     DivergenceReason, MultiplierError, Multipliers, OrbitSearch, PeriodicOrbit, ShootingError,
     ShootingOptions, Stability, check_size, close_orbit, close_orbit_from_points, find_orbits,
 };
+pub use reset::AfterReset;
 pub use same_motion::SameMotion;

@@ -1,7 +1,11 @@
 //! The interface between a system and its analysis: the stroboscopic map `P`, which takes the state
 //! at drive phase 0 to the state one drive period later.
 
+use std::sync::Arc;
+
 use nalgebra::DMatrix;
+
+use crate::reset::AfterReset;
 
 /// A local extremum of a switching function along one drive period.
 ///
@@ -159,6 +163,20 @@ pub trait StroboscopicMap: Scheduling + Clone + Send + Sync {
     /// there. So an orbit goes on where an impact passes drive phase 0 and its state there jumps.
     fn across_impact(&self, state: &[f64]) -> Option<Vec<f64>> {
         let _ = state;
+        None
+    }
+
+    /// Returns how often motions of this map have lost the memory of their past so far, as by coming to
+    /// rest in one known state: from there all go on alike ([`after_reset`](Self::after_reset)). A clone
+    /// goes on from the same number. A map with resets takes one state at a time
+    /// ([`batch_size`](Scheduling::batch_size) is 1), so that each belongs to one motion.
+    fn resets(&self) -> u64 {
+        0
+    }
+
+    /// Returns the motion that follows a reset; `None` for a map without resets. It may take long when
+    /// it is first called; clones share the result.
+    fn after_reset(&self) -> Option<Arc<AfterReset>> {
         None
     }
 

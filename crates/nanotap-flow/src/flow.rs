@@ -51,6 +51,11 @@ impl Flow {
         self.motion.switches
     }
 
+    /// Returns how often the motion came to rest on a rigid stop since the flow was created.
+    pub fn sticks(&self) -> u64 {
+        self.motion.sticks
+    }
+
     /// Returns the number of the present regime.
     pub fn regime(&self) -> usize {
         self.motion.regime

@@ -5,7 +5,7 @@ use nanotap::case::units::Units;
 use nanotap::figure::attractors::section_figure;
 use nanotap::model::Model;
 use nanotap::observe::time_series;
-use nanotap::study::lyapunov::{LyapunovReport, LyapunovStudy};
+use nanotap::study::lyapunov::{ExponentSource, LyapunovReport, LyapunovStudy};
 
 use crate::failure::Failure;
 use crate::given_case::GivenCase;
@@ -81,14 +81,36 @@ fn text(case: &GivenCase, report: &LyapunovReport) -> String {
         motion::paragraph(&report.evidence),
         table.render()
     );
+    let source = match report.source {
+        ExponentSource::Multipliers => format!(
+            "from the multipliers of the closed orbit, ln|μ| over its period of {}",
+            report.periods
+        ),
+        ExponentSource::Average => format!(
+            "over {} drive periods after {}",
+            report.periods, report.transient
+        ),
+        ExponentSource::Sticking => {
+            "the motion sticks to the rigid stop, where neighbouring motions meet \
+                                     exactly"
+                .to_owned()
+        }
+    };
     text.push_str(&motion::paragraph(&format!(
-        "over {} drive periods after {}; their sum {:.6}, from the trace of the equations and the time in \
-         contact {:.6}; Kaplan–Yorke dimension of the section {}",
-        report.periods,
-        report.transient,
-        report.sum,
-        report.sum_by_trace,
+        "{source}; their sum {}, from the trace of the equations and the time in \
+         contact {}; Kaplan–Yorke dimension of the section {}",
+        six_decimals(report.sum),
+        six_decimals(report.sum_by_trace),
         number::significant(report.kaplan_yorke_dimension, 4),
     )));
     text
+}
+
+/// A number with six decimals; what is not finite in words.
+fn six_decimals(value: f64) -> String {
+    if value.is_finite() {
+        format!("{value:.6}")
+    } else {
+        number::significant(value, 6)
+    }
 }

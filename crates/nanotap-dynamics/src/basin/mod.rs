@@ -10,10 +10,14 @@
 //! a chaotic attractor); starts that go to an attractor missing from the list stay unsettled; the
 //! label of a start within rounding of a basin boundary is arbitrary.
 
+use std::sync::OnceLock;
+
 use crate::census::{Attractor, AttractorKind};
-use crate::failure::{MapFailure, advance, advance_each};
+use crate::classify::{ClassifyOptions, KnownMotions, MotionKind, classify_reset};
+use crate::failure::{MapFailure, advance, advance_each_until_reset};
 use crate::map::StroboscopicMap;
 use crate::neighbourhood::Neighbourhood;
+use crate::orbit::PeriodicOrbit;
 use crate::vector::norm;
 
 /// One axis of a slice: a coordinate and its evenly spaced values.
@@ -162,6 +166,9 @@ pub struct Basins {
     options: BasinOptions,
     balls: Vec<(u32, Neighbourhood)>,
     boxes: Vec<(u32, Vec<f64>, Vec<f64>)>,
+    orbits: Vec<(u32, PeriodicOrbit)>,
+    /// Label of starts that are reset ([`StroboscopicMap::resets`]), once one was.
+    after_reset: OnceLock<Label>,
 }
 
 impl Basins {
@@ -186,15 +193,21 @@ impl Basins {
         let mut map = map.clone();
         let mut balls = Vec::new();
         let mut boxes = Vec::new();
+        let mut orbits = Vec::new();
         for (label, attractor) in attractors.iter().enumerate() {
             let label = label as u32;
-            let ball = match &attractor.kind {
-                AttractorKind::Periodic(orbit) => Neighbourhood::around(&mut map, orbit)?,
-                _ => None,
+            let (ball, is_superstable) = match &attractor.kind {
+                AttractorKind::Periodic(orbit) => {
+                    orbits.push((label, orbit.clone()));
+                    let is_superstable = orbit.is_superstable();
+                    (Neighbourhood::around(&mut map, orbit)?, is_superstable)
+                }
+                _ => (None, false),
             };
             if let Some(ball) = ball {
                 balls.push((label, ball));
-            } else {
+            } else if !is_superstable {
+                // Starts come to a superstable orbit by a reset, if not by its neighbourhood.
                 let (low, high) = bounding_box(&mut map, &attractor.state)?;
                 boxes.push((label, low, high));
             }
@@ -204,6 +217,23 @@ impl Basins {
             options,
             balls,
             boxes,
+            orbits,
+            after_reset: OnceLock::new(),
+        })
+    }
+
+    /// Label of a start that was reset: that of the motion that follows every reset.
+    fn label_after_reset<M: StroboscopicMap>(&self, map: &mut M) -> Label {
+        *self.after_reset.get_or_init(|| {
+            let options = ClassifyOptions::default();
+            match classify_reset(map, KnownMotions::default(), &options).kind {
+                MotionKind::Periodic(orbit) | MotionKind::TransientChaos { orbit, .. } => {
+                    let mut known = self.orbits.iter();
+                    let own = known.find(|(_, known)| known.is_same_as(&orbit));
+                    own.map_or(Label::Unsettled, |(label, _)| Label::Attractor(*label))
+                }
+                _ => Label::Unsettled,
+            }
         })
     }
 
@@ -265,11 +295,12 @@ impl Basins {
                     Err(failure) => labels[run.number] = label_of(&failure),
                 }
             }
-            let advanced = advance_each(map, &mut continuing, &periods);
+            let advanced = advance_each_until_reset(map, &mut continuing, &periods);
             (runs, states) = (Vec::with_capacity(remaining.len()), Vec::new());
             let each = remaining.into_iter().zip(continuing.chunks_exact(d));
-            for ((run, state), result) in each.zip(advanced) {
+            for ((run, state), (result, is_reset)) in each.zip(advanced) {
                 match result {
+                    Ok(()) if is_reset => labels[run.number] = self.label_after_reset(map),
                     Ok(()) => {
                         states.extend_from_slice(state);
                         runs.push(run);

@@ -77,7 +77,9 @@ pub(crate) fn assemble(
                 }
             }
             Outcome::Unbounded => unbounded.push(k),
-            Outcome::Undecided(reason) => undecided.push((k, reason.clone())),
+            Outcome::Undecided(reason) | Outcome::Reset { reason, .. } => {
+                undecided.push((k, reason.clone()));
+            }
         }
     }
     for group in &mut groups {
@@ -169,7 +171,7 @@ fn join(found: Option<&mut Group>, k: usize, state: &[f64]) -> Option<(Vec<usize
 
 pub(crate) fn periods_of(outcome: &Outcome) -> usize {
     match outcome {
-        Outcome::Orbit { periods, .. } => *periods,
+        Outcome::Orbit { periods, .. } | Outcome::Reset { periods, .. } => *periods,
         Outcome::Chaos(chaos, _) => chaos.observed,
         Outcome::Torus(torus, _) => torus.spectrum.periods,
         Outcome::Unbounded | Outcome::Undecided(_) => 0,

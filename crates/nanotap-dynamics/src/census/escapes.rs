@@ -13,6 +13,17 @@ pub(crate) struct Escapes {
     unescaped: Vec<usize>,
 }
 
+/// Periods after which a start left chaos, if that came `after` so many: it came to an orbit, or was
+/// reset.
+pub(super) fn escape_after(outcome: &Outcome, after: f64) -> Option<usize> {
+    match outcome {
+        Outcome::Orbit { periods, .. } | Outcome::Reset { periods, .. } => {
+            (*periods as f64 > after).then_some(*periods)
+        }
+        _ => None,
+    }
+}
+
 impl Escapes {
     /// Periods after which a start that is in no neighbourhood has outlived every linear
     /// transient.
@@ -25,13 +36,10 @@ impl Escapes {
         let mut escaped = Vec::new();
         let mut unescaped = Vec::new();
         for (k, outcome) in outcomes.iter().enumerate() {
-            match outcome {
-                Outcome::Orbit { periods, .. } if *periods as f64 > after => {
-                    escaped.push((k, *periods));
-                }
-                Outcome::Chaos(chaos, _) => unescaped.push(chaos.observed),
-                _ => {}
+            if let Outcome::Chaos(chaos, _) = outcome {
+                unescaped.push(chaos.observed);
             }
+            escaped.extend(escape_after(outcome, after).map(|periods| (k, periods)));
         }
         Self {
             after,

@@ -47,7 +47,7 @@ use std::sync::atomic::AtomicUsize;
 use rayon::prelude::*;
 
 use crate::census::batch::Batch;
-use crate::census::escapes::Escapes;
+use crate::census::escapes::{Escapes, escape_after};
 use crate::census::motions::Motions;
 use crate::classify::{
     Chaos, ClassifyOptions, KnownMotions, RECOGNISABLE, RunEnd, Torus, UndecidedReason,
@@ -278,11 +278,20 @@ pub enum StartOutcome {
 /// Outcome of one start, before starts are grouped into attractors.
 #[derive(Clone)]
 enum Outcome {
-    Orbit { index: usize, periods: usize },
+    Orbit {
+        index: usize,
+        periods: usize,
+    },
     Torus(Torus, Vec<f64>),
     Chaos(Chaos, Vec<f64>),
     Unbounded,
     Undecided(UndecidedReason),
+    /// It was reset after so many periods ([`StroboscopicMap::resets`]), and what follows is left
+    /// undecided.
+    Reset {
+        reason: UndecidedReason,
+        periods: usize,
+    },
 }
 
 /// Takes a census of `starts`, each of the map's dimension.
@@ -496,7 +505,7 @@ impl<'a, M: StroboscopicMap> Work<'a, M> {
                 || matches!(self.starts.origin(k), Some(StartOrigin::Drawn(_)));
             if self.motions.count() > before {
                 self.starts_since_discovery = 0;
-            } else if counts && !matches!(outcome, Outcome::Undecided(_)) {
+            } else if counts && !matches!(outcome, Outcome::Undecided(_) | Outcome::Reset { .. }) {
                 self.starts_since_discovery += 1;
             }
             self.outcomes.push(outcome);
@@ -571,6 +580,7 @@ impl<'a, M: StroboscopicMap> Work<'a, M> {
             None => Outcome::Undecided(UndecidedReason::Cancelled),
             Some(RunEnd::Entered { index, periods }) => self.motions.arrival(known[index], periods),
             Some(RunEnd::Classified(classified)) => self.motions.outcome(*classified, start),
+            Some(RunEnd::Reset(reset)) => self.motions.reset_outcome(*reset),
         }
     }
 
@@ -699,7 +709,7 @@ impl<'a, M: StroboscopicMap> Work<'a, M> {
     /// may be in transit at all. Where one of them escapes,
     /// escapes count from when it was known to be chaotic.
     fn watch_chaos(&mut self, after: &mut f64) {
-        let escaped = |outcome: &Outcome| matches!(outcome, Outcome::Orbit { periods, .. } if *periods as f64 > *after);
+        let escaped = |outcome: &Outcome| escape_after(outcome, *after).is_some();
         let least = if self.outcomes.iter().any(escaped) {
             self.options.classify.max_transient
         } else {
@@ -783,7 +793,9 @@ impl<'a, M: StroboscopicMap> Work<'a, M> {
                     let (spectrum, observed) = (chaos.spectrum.clone(), chaos.observed);
                     let start = at.clone();
                     let mut outcome = self.outcome(Some(arrival), &known, &start);
-                    if let Outcome::Orbit { periods, .. } = &mut outcome {
+                    if let Outcome::Orbit { periods, .. } | Outcome::Reset { periods, .. } =
+                        &mut outcome
+                    {
                         *periods += observed;
                         self.motions.has_transient_chaos = true;
                         self.motions.transient_spectrum.get_or_insert(spectrum);

@@ -9,8 +9,8 @@
 
 use crate::census::Outcome;
 use crate::classify::{
-    Chaos, Classified, ClassifyOptions, KnownMotions, MotionKind, Torus, UndecidedReason,
-    classify_on, close_exactly,
+    Chaos, Classified, ClassifyOptions, KnownMotions, MotionKind, ResetRun, Torus, UndecidedReason,
+    classify_on, classify_reset, close_exactly,
 };
 use crate::control::CancelFlag;
 use crate::lyapunov::{LyapunovOptions, LyapunovSpectrum};
@@ -65,6 +65,8 @@ pub(super) struct Motions<'a, M> {
     pub(super) spectra: Vec<LyapunovSpectrum>,
     /// Kind of each of these motions on the exact map, in the same order.
     irregular: Vec<Irregular>,
+    /// The outcome of starts that are reset, once one was; periods count from the reset.
+    after_reset: Option<Outcome>,
     /// Whether a start escaped from chaos.
     pub(super) has_transient_chaos: bool,
     /// Spectrum of the transient chaos on the exact map.
@@ -136,6 +138,7 @@ impl<'a, M: StroboscopicMap> Motions<'a, M> {
             failed_retries: 0,
             spectra: Vec::new(),
             irregular: Vec::new(),
+            after_reset: None,
             has_transient_chaos: false,
             transient_spectrum: None,
         }
@@ -183,6 +186,55 @@ impl<'a, M: StroboscopicMap> Motions<'a, M> {
         }
         let outcome = self.outcome_on(found, is_exact);
         self.pair_orbits();
+        outcome
+    }
+
+    /// The outcome of a start that was reset: that of the motion that follows every reset, which is
+    /// classified once.
+    pub(super) fn reset_outcome(&mut self, reset: ResetRun) -> Outcome {
+        let ResetRun {
+            periods,
+            chaos,
+            met,
+        } = reset;
+        if let Some(spectrum) = chaos {
+            self.has_transient_chaos = true;
+            self.transient_spectrum.get_or_insert(spectrum);
+        }
+        for orbit in met {
+            self.orbit_outcome(orbit, 0, true);
+        }
+        let known = self.after_reset.clone();
+        let mut outcome = known.unwrap_or_else(|| {
+            let known = KnownMotions {
+                cancel: self.cancel,
+                ..KnownMotions::default()
+            };
+            let found = classify_reset(&mut self.exact, known, self.options);
+            let (after, is_cancelled) = (
+                found.periods,
+                self.cancel.is_some_and(CancelFlag::is_cancelled),
+            );
+            let outcome = match self.outcome_on(found, true) {
+                Outcome::Undecided(reason) => Outcome::Reset {
+                    reason,
+                    periods: after,
+                },
+                other => other,
+            };
+            if !is_cancelled {
+                self.after_reset = Some(outcome.clone());
+            }
+            outcome
+        });
+        self.pair_orbits();
+        match &mut outcome {
+            // The chaos before a reset ends with it, whatever follows.
+            Outcome::Orbit { periods: own, .. } | Outcome::Reset { periods: own, .. } => {
+                *own = periods;
+            }
+            _ => {}
+        }
         outcome
     }
 

@@ -43,7 +43,9 @@ pub use birkhoff::birkhoff_digits;
 pub use candidates::{Candidate, candidate_periods};
 pub(crate) use confirm::close_exactly;
 use confirm::confirm;
-pub(crate) use run::{KnownMotions, RECOGNISABLE, RunEnd, first_entry, follow_start, watch};
+pub(crate) use run::{
+    KnownMotions, RECOGNISABLE, ResetRun, RunEnd, classify_reset, first_entry, follow_start, watch,
+};
 pub use undecided::UndecidedReason;
 
 /// Limits and tolerances of [`classify`].
@@ -251,7 +253,10 @@ pub(crate) fn classify_on<M: StroboscopicMap>(
     known: KnownMotions<'_>,
     options: &ClassifyOptions,
 ) -> Classified {
-    let mut end = ended(follow_start(map, start, known, options), start);
+    let mut end = match ended(follow_start(map, start, known, options), start) {
+        Ok(end) => end,
+        Err(reset) => return after_reset(map, *reset, known, options),
+    };
     if let MotionKind::Chaotic(found) = &mut end.kind
         && known.chaos.contains(&found.spectrum)
     {
@@ -265,21 +270,49 @@ pub(crate) fn classify_on<M: StroboscopicMap>(
                 found.watched(end.periods);
             }
             Err(other) => {
-                let other = ended(other, start);
-                return Classified {
-                    periods: end.periods + other.periods,
-                    ..other
+                let mut other = match ended(other, start) {
+                    Ok(other) => other,
+                    Err(mut reset) => {
+                        reset.chaos.get_or_insert_with(|| found.spectrum.clone());
+                        after_reset(map, *reset, known, options)
+                    }
                 };
+                other.periods += end.periods;
+                if let MotionKind::TransientChaos { lasted, .. } = &mut other.kind {
+                    *lasted += end.periods;
+                }
+                return other;
             }
         }
     }
     end
 }
 
-/// What a run that knows no neighbourhood of an orbit ended with.
-fn ended(end: RunEnd, start: &[f64]) -> Classified {
-    match end {
+/// Classifies a motion that was reset: it comes to what follows every reset.
+fn after_reset<M: StroboscopicMap>(
+    map: &mut M,
+    reset: ResetRun,
+    known: KnownMotions<'_>,
+    options: &ClassifyOptions,
+) -> Classified {
+    let mut end = classify_reset(map, known, options);
+    end.periods += reset.periods;
+    end.met.extend(reset.met);
+    if let (MotionKind::Periodic(orbit), Some(spectrum)) = (&end.kind, reset.chaos) {
+        end.kind = MotionKind::TransientChaos {
+            orbit: orbit.clone(),
+            spectrum,
+            lasted: reset.periods,
+        };
+    }
+    end
+}
+
+/// What a run that knows no neighbourhood of an orbit ended with; `Err` if it was reset.
+fn ended(end: RunEnd, start: &[f64]) -> Result<Classified, Box<ResetRun>> {
+    Ok(match end {
         RunEnd::Classified(end) => *end,
+        RunEnd::Reset(reset) => return Err(reset),
         // No neighbourhood was given, so none can have been entered.
         RunEnd::Entered { periods, .. } => Classified {
             kind: MotionKind::Undecided {
@@ -290,5 +323,5 @@ fn ended(end: RunEnd, start: &[f64]) -> Classified {
             state: start.to_vec(),
             met: Vec::new(),
         },
-    }
+    })
 }

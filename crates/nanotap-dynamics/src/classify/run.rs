@@ -11,6 +11,7 @@ use crate::lyapunov::{LyapunovRun, LyapunovSpectrum, StrobeMeans};
 use crate::map::StroboscopicMap;
 use crate::neighbourhood::Neighbourhood;
 use crate::orbit::{PeriodicOrbit, ShootingOptions, close_orbit_from_points};
+use crate::reset::AfterReset;
 use crate::vector::{distance, norm};
 
 /// Number of standard errors by which a positive exponent must exceed zero.
@@ -68,6 +69,78 @@ pub(crate) enum RunEnd {
         periods: usize,
     },
     Classified(Box<Classified>),
+    /// It lost the memory of its past ([`StroboscopicMap::resets`]).
+    Reset(Box<ResetRun>),
+}
+
+/// A run that was reset.
+#[derive(Clone, Debug)]
+pub(crate) struct ResetRun {
+    /// Drive periods run.
+    pub(crate) periods: usize,
+    /// Exponents before the reset, if they were measured and show chaos.
+    pub(crate) chaos: Option<LyapunovSpectrum>,
+    /// Stable orbits that Newton closed on the way.
+    pub(crate) met: Vec<PeriodicOrbit>,
+}
+
+/// Classifies the motion that follows a reset: its orbit, or what a run from its first state comes to.
+pub(crate) fn classify_reset<M: StroboscopicMap>(
+    map: &mut M,
+    known: KnownMotions<'_>,
+    options: &ClassifyOptions,
+) -> Classified {
+    let after = map.after_reset();
+    let (state, is_reset_again, is_not_reset_again) = match after.as_deref() {
+        Some(AfterReset::Open {
+            state,
+            is_reset_again,
+            is_not_reset_again,
+        }) => (state, is_reset_again, is_not_reset_again),
+        Some(AfterReset::Closes(orbit)) => {
+            return Classified {
+                state: orbit.states[0].clone(),
+                kind: MotionKind::Periodic(orbit.clone()),
+                periods: 0,
+                met: Vec::new(),
+            };
+        }
+        None => {
+            let failure = MapFailure::NotFinite;
+            let reason = UndecidedReason::Map {
+                periods: 0,
+                failure,
+            };
+            return Classified {
+                kind: undecided(reason, None),
+                periods: 0,
+                state: Vec::new(),
+                met: Vec::new(),
+            };
+        }
+    };
+    let open = |reason: &String, periods, met| Classified {
+        kind: undecided(UndecidedReason::Reset(reason.clone()), None),
+        periods,
+        state: state.clone(),
+        met,
+    };
+    match follow_start(map, state, known, options) {
+        RunEnd::Reset(again) => open(is_reset_again, again.periods, again.met),
+        RunEnd::Classified(end) => match end.kind {
+            MotionKind::Chaotic(_)
+            | MotionKind::Undecided {
+                reason:
+                    UndecidedReason::NothingCloses { .. }
+                    | UndecidedReason::NoTorusHere { .. }
+                    | UndecidedReason::NoTorusOnALine { .. }
+                    | UndecidedReason::NeitherTorusNorChaos { .. },
+                ..
+            } => open(is_not_reset_again, end.periods, end.met),
+            _ => *end,
+        },
+        RunEnd::Entered { .. } => open(is_not_reset_again, 0, Vec::new()),
+    }
 }
 
 pub(crate) fn follow_start<M: StroboscopicMap>(
@@ -150,6 +223,7 @@ pub(super) enum Stop {
     Unbounded,
     Cancelled,
     Budget,
+    Reset,
     Failed(MapFailure),
 }
 
@@ -177,6 +251,8 @@ pub(super) struct Run<'a> {
     options: &'a ClassifyOptions,
     closing: ShootingOptions,
     met: Vec<PeriodicOrbit>,
+    /// Exponents measured so far, if they show chaos.
+    chaos_before: Option<LyapunovSpectrum>,
 }
 
 /// Guesses from which Newton's method has still to close orbits, and the closed orbits that are not
@@ -269,6 +345,7 @@ impl<'a> Run<'a> {
                 ..options.shooting.clone()
             },
             met: Vec::new(),
+            chaos_before: None,
         }
     }
 
@@ -298,6 +375,11 @@ impl<'a> Run<'a> {
                 let steps = self.options.max_steps;
                 self.classified(undecided(UndecidedReason::Budget { periods, steps }, None))
             }
+            Stop::Reset => RunEnd::Reset(Box::new(ResetRun {
+                periods,
+                chaos: self.chaos_before,
+                met: self.met,
+            })),
             Stop::Failed(failure) => {
                 let reason = UndecidedReason::Map { periods, failure };
                 self.classified(undecided(reason, None))
@@ -385,12 +467,23 @@ impl<'a> Run<'a> {
     }
 
     fn step<M: StroboscopicMap>(&mut self, map: &mut M) -> Result<(), Stop> {
+        let resets = map.resets();
         // A motion that runs off ends in an overflow; that is what it is.
         match advance(map, &mut self.state) {
             Err(MapFailure::NotFinite) => return Err(Stop::Unbounded),
             other => other?,
         }
-        self.after_period(map)
+        self.after_period(map)?;
+        self.check_reset(map, resets)
+    }
+
+    /// Ends the run if it was reset since there were `before` resets.
+    fn check_reset<M: StroboscopicMap>(&self, map: &M, before: u64) -> Result<(), Stop> {
+        if map.resets() == before {
+            Ok(())
+        } else {
+            Err(Stop::Reset)
+        }
     }
 
     /// Steps as [`Run::step`], to a state that is known already.
@@ -705,11 +798,18 @@ impl<'a> Run<'a> {
         map: &mut M,
         exponents: &mut LyapunovRun,
     ) -> Result<(), Stop> {
+        let resets = map.resets();
         match exponents.step(map, &mut self.state) {
             Err(MapFailure::NotFinite) => return Err(Stop::Unbounded),
             other => other?,
         }
-        self.after_period(map)
+        self.after_period(map)?;
+        if let Err(stop) = self.check_reset(map, resets) {
+            let spectrum = exponents.spectrum();
+            self.chaos_before = is_chaotic(&spectrum).then_some(spectrum);
+            return Err(stop);
+        }
+        Ok(())
     }
 
     /// A motion without a clearly positive exponent that did not close so far.

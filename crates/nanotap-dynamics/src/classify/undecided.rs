@@ -89,6 +89,10 @@ pub enum UndecidedReason {
         /// Number of decimal digits to which Birkhoff averages of two stretches agree.
         digits: f64,
     },
+    /// The motion is reset to one known state, and what follows is not known
+    /// ([`AfterReset::Open`](crate::AfterReset::Open)).
+    #[error("{0}")]
+    Reset(String),
     /// The exact map did not confirm the motion that its coarse map reached.
     #[error(
         "the approximate flow comes to a motion that the exact flow did not confirm from any state tried"

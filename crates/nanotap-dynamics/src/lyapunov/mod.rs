@@ -83,6 +83,10 @@ pub struct LyapunovSpectrum {
     /// computed independently of the Jacobian if the map can
     /// ([`StroboscopicMap::advance_with_jacobian_and_determinant`]), otherwise from LU factors.
     pub log_determinant: f64,
+    /// Largest difference in a period of the logarithms of the stretches, summed, from the independent
+    /// log|det DP|: the check of both. Only periods count in which no stretch is lost in the rounding of
+    /// the Jacobian; `None` without one, or without an independent value.
+    pub determinant_defect: Option<f64>,
 }
 
 impl LyapunovSpectrum {
@@ -177,6 +181,8 @@ pub(crate) struct LyapunovRun {
     average: BlockAverage,
     /// Averages since the last call of [`Self::begin_last_stretch`].
     last: BlockAverage,
+    /// See [`LyapunovSpectrum::determinant_defect`].
+    determinant_defect: Option<f64>,
 }
 
 impl LyapunovRun {
@@ -193,6 +199,7 @@ impl LyapunovRun {
             sample: vec![0.0; 3 * d + 1],
             average: BlockAverage::new(3 * d + 1),
             last: BlockAverage::new(3 * d + 1),
+            determinant_defect: None,
         }
     }
 
@@ -276,7 +283,13 @@ impl LyapunovRun {
             let hidden = self.jacobian.amax() * ROUNDING;
             if exact - others < nanotap_arithmetic::ln(hidden) {
                 self.sample[d - 1] = exact - others;
+                return Ok(());
             }
+        }
+        if let Some(exact) = exact {
+            let sum: f64 = self.sample[..d].iter().sum();
+            let largest = self.determinant_defect.unwrap_or(0.0);
+            self.determinant_defect = Some(largest.max((sum - exact).abs()));
         }
         Ok(())
     }
@@ -331,6 +344,7 @@ impl LyapunovRun {
                 periods: average.count(),
             },
             log_determinant: mean[3 * d],
+            determinant_defect: self.determinant_defect,
         }
     }
 }

@@ -63,6 +63,27 @@ impl PeriodicOrbit {
             .unwrap_or((&[], f64::NAN))
     }
 
+    /// The orbit with these states at drive phase 0, on which neighbouring motions meet exactly within
+    /// one repetition: all multipliers are zero. `residual` and `error` are those of the orbit.
+    pub fn superstable(states: Vec<Vec<f64>>, residual: f64, error: f64) -> Self {
+        let dimension = states.first().map_or(0, Vec::len);
+        Self {
+            period: states.len(),
+            states,
+            residual,
+            error,
+            multipliers: vec![Complex::new(0.0, 0.0); dimension],
+            log_determinant: f64::NEG_INFINITY,
+            stability: Stability::Stable,
+            discrete: 0,
+        }
+    }
+
+    /// Whether all multipliers are zero: neighbouring motions meet exactly.
+    pub fn is_superstable(&self) -> bool {
+        !self.multipliers.is_empty() && self.spectral_radius() == 0.0
+    }
+
     /// Largest modulus of a multiplier.
     pub fn spectral_radius(&self) -> f64 {
         self.multipliers.first().map_or(0.0, |m| m.modulus())

@@ -15,6 +15,7 @@ mod confirming;
 mod counting;
 mod exponents;
 mod properties;
+mod resetting;
 mod slicing;
 mod spreading;
 mod tracing;

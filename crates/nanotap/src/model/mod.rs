@@ -16,6 +16,7 @@ pub mod drive_form;
 #[cfg(feature = "proof")]
 pub mod enclosed;
 pub mod exact_beam;
+mod fixed_point;
 pub mod galerkin;
 mod grazed;
 mod measured_modes;
@@ -25,6 +26,7 @@ pub mod nonlinear;
 pub mod oscillator;
 pub mod parameter;
 pub mod recording;
+pub mod release;
 pub mod sample_law;
 pub mod spectrum;
 pub(crate) mod stepper;
@@ -98,6 +100,9 @@ pub struct Model {
     pub(crate) power: PowersOnDemand,
     /// The rigid stop, if there is one.
     pub rigid_stop: Option<RigidStop>,
+    /// The release from the rigid stop after sticking; `None` where motions do not stick, or do not
+    /// leave it in one known state.
+    pub release: Option<Arc<release::Release>>,
     /// The beam's modes, if it is a beam.
     pub beam: Option<BeamOutputs>,
     /// Number of entries at the end of the state that belong to the sample.
@@ -328,6 +333,7 @@ impl Model {
             force: outputs.force,
             power: PowersOnDemand::of(galerkin),
             rigid_stop: None,
+            release: None,
             beam: Some(outputs.beam),
             memory: law.internal,
             memory_reset: outputs.memory_reset,
@@ -378,6 +384,8 @@ impl Model {
         }
         if let Some(stop) = &mut self.rigid_stop {
             visit(&mut stop.tip);
+            let moved = self.release.take();
+            self.release = moved.and_then(|release| release.moved_to(stop.tip));
         }
         if self.power.equations.is_some() {
             return;

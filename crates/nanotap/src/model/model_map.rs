@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use nalgebra::DMatrix;
 use nanotap_dynamics::map::{in_sequence, in_sequence_through};
-use nanotap_dynamics::{Scheduling, StroboscopicMap, Tangency};
+use nanotap_dynamics::{AfterReset, PeriodicOrbit, Scheduling, StroboscopicMap, Tangency};
 use nanotap_flow::flow::{Observer, SegmentView, SwitchView};
 use nanotap_flow::jacobian::Jacobian;
 use nanotap_flow::search::sign_changes;
@@ -15,6 +15,7 @@ use nanotap_flow::system::{Switch, Transition};
 use nanotap_flow::{Ensemble, Flow, FlowError, Output, System};
 
 use crate::model::nonlinear::NonlinearMap;
+use crate::model::release::{Release, ReleaseMotion};
 use crate::model::{Model, MotionError, RigidStop, Tangent, TangentKind};
 
 /// The stroboscopic map as an engine computes it.
@@ -95,6 +96,14 @@ pub(crate) trait EngineMap: Debug + Send + Sync {
     /// Implements [`StroboscopicMap::across_impact`].
     fn across_impact(&self, state: &[f64]) -> Option<Vec<f64>> {
         let _ = state;
+        None
+    }
+    /// Implements [`StroboscopicMap::resets`].
+    fn resets(&self) -> u64 {
+        0
+    }
+    /// Implements [`StroboscopicMap::after_reset`].
+    fn after_reset(&self) -> Option<Arc<AfterReset>> {
         None
     }
     /// Implements [`StroboscopicMap::advance_with_tangencies`].
@@ -275,6 +284,14 @@ impl StroboscopicMap for ModelMap {
         self.0.across_impact(state)
     }
 
+    fn resets(&self) -> u64 {
+        self.0.resets()
+    }
+
+    fn after_reset(&self) -> Option<Arc<AfterReset>> {
+        self.0.after_reset()
+    }
+
     fn advance_with_tangencies(
         &mut self,
         state: &mut [f64],
@@ -319,6 +336,8 @@ struct ExactMap {
     parts_at_rest: bool,
     /// The rigid stop, if the sample is one.
     stop: Option<RigidStop>,
+    /// The release from it after sticking.
+    release: Option<Arc<Release>>,
     /// Derivatives of the system with respect to the parameters of a family.
     tangents: Arc<[SystemTangent]>,
 }
@@ -333,6 +352,7 @@ impl ExactMap {
             gap: Arc::new(model.gap.clone()),
             parts_at_rest: model.memory_reset.is_some(),
             stop: model.rigid_stop,
+            release: model.release.clone(),
             tangents: tangents.into(),
         }
     }
@@ -380,6 +400,57 @@ impl ExactMap {
         Ok(())
     }
 
+    /// What motions come to that stick to the rigid stop.
+    fn after_release(&self, motion: &ReleaseMotion) -> AfterReset {
+        let tip = self.stop.map_or(0.0, |stop| stop.tip);
+        let states = match motion {
+            ReleaseMotion::Rests => vec![vec![tip, 0.0]],
+            ReleaseMotion::Sticks { states, .. } => {
+                states.iter().map(|state| state.to_vec()).collect()
+            }
+            ReleaseMotion::Open {
+                periods,
+                is_resolved,
+                state,
+            } => {
+                let limit = if *is_resolved {
+                    "the longest that is followed"
+                } else {
+                    "beyond which its errors are too large even in twice double precision"
+                };
+                let sticks =
+                    "the motion sticks to the rigid stop, and leaves it in one known state";
+                return AfterReset::Open {
+                    state: state.to_vec(),
+                    is_reset_again: format!(
+                        "{sticks}: it is superstable, but its period is not determined (> {periods} drive                          periods, {limit})"
+                    ),
+                    is_not_reset_again: format!(
+                        "{sticks}; no second stick within {periods} drive periods, {limit}: undecided"
+                    ),
+                };
+            }
+        };
+        let mut map = self.clone();
+        let mut residual = 0.0_f64;
+        let mut scale = 0.0_f64;
+        for (k, state) in states.iter().enumerate() {
+            let mut end = state.clone();
+            // A state on the stop is followed like any other; where that fails there is no residual.
+            if map.advance(&mut end).is_ok() {
+                let next = &states[(k + 1) % states.len()];
+                let apart = end.iter().zip(next).map(|(a, b)| (a - b).abs());
+                residual = residual.max(apart.fold(0.0, f64::max));
+            }
+            scale = state.iter().fold(scale, |most, x| most.max(x.abs()));
+        }
+        AfterReset::Closes(PeriodicOrbit::superstable(
+            states,
+            residual,
+            f64::EPSILON * scale,
+        ))
+    }
+
     /// Writes the state that the flow has reached to `state`, and remembers it in `last`.
     fn end(&mut self, state: &mut [f64]) {
         self.flow.state(state);
@@ -407,7 +478,13 @@ impl EngineMap for ExactMap {
         self.last.clear();
         self.ensemble = None;
         self.flow.system_mut().each_constant(visit);
-        visit(&mut Arc::make_mut(&mut self.gap).constant);
+        let constant = &mut Arc::make_mut(&mut self.gap).constant;
+        visit(constant);
+        if let Some(stop) = &mut self.stop {
+            stop.tip = *constant;
+            let moved = self.release.take();
+            self.release = moved.and_then(|release| release.moved_to(stop.tip));
+        }
         Ok(())
     }
 
@@ -521,6 +598,19 @@ impl EngineMap for ExactMap {
         };
         let is_near = behind > 0.0 && behind <= IMPACT_AT_STROBE * v.abs() * self.period();
         (is_near && factor.is_finite()).then(|| vec![stop.tip - factor * behind, -factor * v])
+    }
+
+    fn resets(&self) -> u64 {
+        if self.release.is_some() {
+            self.flow.sticks()
+        } else {
+            0
+        }
+    }
+
+    fn after_reset(&self) -> Option<Arc<AfterReset>> {
+        let release = self.release.as_ref()?;
+        Some(release.outcome(|| self.after_release(release.motion())))
     }
 
     fn advance_with_tangencies(

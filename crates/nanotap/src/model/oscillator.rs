@@ -11,6 +11,7 @@ use nanotap_flow::{Drive, HarmonicVector, Output, Reset, Sticking, System, Trans
 use serde::Serialize;
 
 use crate::model::contact::dual::Dual;
+use crate::model::release::Release;
 use crate::model::{Model, ModelError, ModelTangent, Powers, Product, RigidStop};
 use crate::number::shortest;
 
@@ -302,6 +303,7 @@ impl Oscillator {
             force: vec![zero, force],
             power: vec![power(0.0, 0.0), power(contact_stiffness, contact_damping)].into(),
             rigid_stop,
+            release: Release::new(self),
             beam: None,
             memory: 0,
             memory_reset: None,

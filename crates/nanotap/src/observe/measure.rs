@@ -113,6 +113,15 @@ impl Run for ExactRun<'_> {
         Ok(self.flow.run_period(&mut self.measurement)?)
     }
 
+    fn continue_from(&mut self, state: &[f64]) -> Result<(), MotionError> {
+        let mut other = self.flow.clone();
+        other.start(state, 0.0)?;
+        if other.regime() == self.flow.regime() {
+            self.flow = other;
+        }
+        Ok(())
+    }
+
     fn state(&self) -> Vec<f64> {
         let mut state = vec![0.0; self.flow.system().dimension()];
         self.flow.state(&mut state);

@@ -1,5 +1,7 @@
 //! Recording of motions.
 
+use nanotap_dynamics::PeriodicOrbit;
+
 use super::clearance::Clearance;
 use super::contact_event::ContactEvent;
 use super::measure::PiecewiseLinear;
@@ -56,6 +58,12 @@ pub(super) trait Engine {
 pub(super) trait Run {
     /// Runs one drive period and records it if `record`.
     fn period(&mut self, record: bool) -> Result<(), MotionError>;
+    /// Goes on from another state at the end of a period, if it is in the same regime. A run that does
+    /// not need it goes on as it is.
+    fn continue_from(&mut self, state: &[f64]) -> Result<(), MotionError> {
+        let _ = state;
+        Ok(())
+    }
     /// Returns the present state, in model units.
     fn state(&self) -> Vec<f64>;
     /// The measurements over the periods so far.
@@ -102,9 +110,48 @@ impl<'a> Recorder<'a> {
         periods: usize,
         options: RecordOptions,
     ) -> Result<Recorded, MotionError> {
+        self.record_along(start, &[], periods, options)
+    }
+
+    /// Records one repetition of an orbit from its state number `first`. Along a superstable orbit,
+    /// errors may grow by many powers of ten before they vanish, so each period begins with the orbit's own
+    /// state.
+    ///
+    /// # Errors
+    /// If the flow fails, or the orbit has no such state.
+    pub fn record_orbit(
+        &self,
+        orbit: &PeriodicOrbit,
+        first: usize,
+        options: RecordOptions,
+    ) -> Result<Recorded, MotionError> {
+        let mut states = orbit.states.clone();
+        let count = states.len();
+        states.rotate_left(first.min(count));
+        let start = states.first().cloned().unwrap_or_default();
+        let along = if orbit.is_superstable() {
+            &states[..]
+        } else {
+            &[]
+        };
+        self.record_along(&start, along, orbit.period, options)
+    }
+
+    /// Records `periods` drive periods from `start`, each of which begins with its state of `along`, where
+    /// there is one.
+    fn record_along(
+        &self,
+        start: &[f64],
+        along: &[Vec<f64>],
+        periods: usize,
+        options: RecordOptions,
+    ) -> Result<Recorded, MotionError> {
         let mut run = self.engine.start(start, options)?;
         let mut states = Vec::new();
         for k in 0..periods {
+            if let Some(state) = along.get(k).filter(|_| k > 0) {
+                run.continue_from(state)?;
+            }
             run.period(k < options.recorded)?;
             if k + 1 + options.states > periods {
                 states.push(run.state());

@@ -178,7 +178,9 @@ pub struct AttractorReport {
     /// Share of the initial states that reach the attractor.
     #[serde(flatten)]
     pub share: Share,
-    /// Lyapunov exponents per drive period, largest first; of an orbit from its multipliers.
+    /// Lyapunov exponents per drive period, largest first; of an orbit from its multipliers. Null for a
+    /// multiplier of 0: the exponent is −∞.
+    #[schemars(with = "Vec<Option<f64>>")]
     pub lyapunov: Vec<f64>,
     /// Standard error of each exponent, per drive period; `None` where they were not measured.
     #[serde(skip_serializing_if = "Option::is_none")]

@@ -1,6 +1,9 @@
 //! Lyapunov spectrum and Poincaré section of any motion.
 
-use nanotap_dynamics::{ClassifyOptions, StroboscopicMap as _, classify, lyapunov_spectrum};
+use nanotap_dynamics::{
+    ClassifyOptions, LyapunovSpectrum, PeriodicOrbit, StroboscopicMap as _, classify,
+    lyapunov_spectrum,
+};
 use nanotap_flow::FlowError;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -15,7 +18,9 @@ use crate::model::model_map::ModelMap;
 use crate::model::{Model, MotionError};
 use crate::observe::begins_contact;
 use crate::study::Study;
+use crate::study::attractors::orbit_exponents;
 use crate::study::limits::MAX_PERIODS;
+use crate::study::orbit::log_determinant_by_trace;
 use crate::study::request::options;
 use crate::study::simulate::{Classification, Named, check_periods, check_states, starting_state};
 
@@ -56,17 +61,29 @@ pub struct LyapunovReport {
     pub evidence: String,
     /// Drive periods of the discarded transient.
     pub transient: usize,
-    /// Drive periods of the average.
+    /// Drive periods of the average; of a closed orbit its period.
     pub periods: usize,
-    /// Exponents, natural logarithm per drive period, largest first.
+    /// How the exponents were obtained.
+    pub source: ExponentSource,
+    /// Exponents, natural logarithm per drive period, largest first. Null where neighbouring motions meet
+    /// exactly, as where the motion sticks to a rigid stop: the exponent is −∞.
+    #[schemars(with = "Vec<Option<f64>>")]
     pub exponents: Vec<f64>,
-    /// Standard error of each exponent, per drive period, in the order of `exponents`.
+    /// Standard error of each exponent, per drive period, in the order of `exponents`; 0 of a closed
+    /// orbit, whose exponents are not averages.
     pub errors: Vec<f64>,
-    /// Sum of the exponents per drive period: contraction rate of volumes in state space.
+    /// Sum of the exponents per drive period: contraction rate of volumes in state space. Null: −∞.
+    #[schemars(with = "Option<f64>")]
     pub sum: f64,
     /// The same from the trace of the equations and the time in each regime, with twice the
-    /// logarithm of the restitution at every impact, over the same periods: the check.
+    /// logarithm of the restitution at every impact, over the same periods: the check. Null: −∞, or not
+    /// defined where a memory of the sample is reset.
+    #[schemars(with = "Option<f64>")]
     pub sum_by_trace: f64,
+    /// Largest difference between the Jacobian's stretches and the trace, natural logarithms: of a closed
+    /// orbit over its repetition, else of a drive period. Rounding only, if both are right. `None` where
+    /// the trace gives no value, or rounding hides a stretch in every period.
+    pub determinant_defect: Option<f64>,
     /// Kaplan–Yorke dimension of the strobe points, dimensionless; for a torus, its dimension.
     pub kaplan_yorke_dimension: f64,
     /// Mean of the states at drive phase 0, in the model's units. Its entries are a_1 … a_N (or x),
@@ -77,6 +94,83 @@ pub struct LyapunovReport {
     pub section: Vec<SectionPoint>,
     /// Where the section was taken.
     pub section_at: Section,
+}
+
+/// How Lyapunov exponents were obtained.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum ExponentSource {
+    /// ln|μ| of the multipliers μ of the closed orbit to which the motion goes, over its period.
+    Multipliers,
+    /// Averages of the growth of tangent vectors along the motion.
+    Average,
+    /// The motion sticks to a rigid stop, where all tangent vectors vanish: every exponent is −∞.
+    Sticking,
+}
+
+/// Exponents with the evidence for them.
+struct Exponents {
+    source: ExponentSource,
+    periods: usize,
+    exponents: Vec<f64>,
+    errors: Vec<f64>,
+    sum_by_trace: f64,
+    determinant_defect: Option<f64>,
+    kaplan_yorke_dimension: f64,
+    mean: Vec<f64>,
+}
+
+impl Exponents {
+    /// The exponents of a closed orbit.
+    fn of_orbit(model: &Model, orbit: &PeriodicOrbit) -> Result<Self, Error> {
+        let period = orbit.period as f64;
+        let by_trace = log_determinant_by_trace(model, orbit)?;
+        let defect = by_trace.map(|by_trace| (orbit.log_determinant - by_trace).abs());
+        let dimension = orbit.dimension();
+        let mean = (0..dimension).map(|k| orbit.states.iter().map(|x| x[k]).sum::<f64>() / period);
+        Ok(Self {
+            source: ExponentSource::Multipliers,
+            periods: orbit.period,
+            exponents: orbit_exponents(orbit),
+            errors: vec![0.0; dimension],
+            sum_by_trace: by_trace.map_or(f64::NAN, |sum| sum / period),
+            // Both are −∞ where the orbit sticks.
+            determinant_defect: defect.filter(|defect| defect.is_finite()),
+            kaplan_yorke_dimension: 0.0,
+            mean: mean.collect(),
+        })
+    }
+
+    /// The averages over a run.
+    fn of_run(spectrum: LyapunovSpectrum, classification: Classification, sticks: bool) -> Self {
+        let dimension = match classification {
+            Classification::QuasiPeriodic => spectrum.neutral_directions() as f64,
+            _ => spectrum.kaplan_yorke_dimension(),
+        };
+        let all = spectrum.exponents.len();
+        let averages = Self {
+            source: ExponentSource::Average,
+            periods: spectrum.periods,
+            mean: spectrum.strobe.mean_state().to_vec(),
+            exponents: spectrum.exponents,
+            errors: spectrum.errors,
+            sum_by_trace: spectrum.log_determinant,
+            determinant_defect: spectrum.determinant_defect,
+            kaplan_yorke_dimension: dimension,
+        };
+        if !sticks {
+            return averages;
+        }
+        Self {
+            source: ExponentSource::Sticking,
+            exponents: vec![f64::NEG_INFINITY; all],
+            errors: vec![0.0; all],
+            sum_by_trace: f64::NEG_INFINITY,
+            determinant_defect: None,
+            kaplan_yorke_dimension: 0.0,
+            ..averages
+        }
+    }
 }
 
 /// Computes the Lyapunov spectrum and a Poincaré section of the motion of `model`.
@@ -113,23 +207,29 @@ pub fn lyapunov(
     map.advance_by(&mut state, options.transient - alignment)?;
     let mut start = state.clone();
     map.advance_by(&mut start, alignment)?;
-    let fixed = SpectrumOptions {
-        alignment,
-        min_periods: options.periods,
-        max_periods: options.periods,
-        ..defaults
-    };
-    let spectrum = lyapunov_spectrum(&mut map, &mut state, &fixed).map_err(|_| {
-        if control.is_cancelled() {
-            return Error::stopped();
-        }
-        let what = "the tangent vectors of the motion";
-        FlowError::NotFinite { what }.into()
-    })?;
     let named = Named::of(&classify(&mut map, &start, &ClassifyOptions::default()).kind);
     if control.is_cancelled() {
         return Err(Error::stopped());
     }
+    let found = if let Some(orbit) = &named.orbit {
+        Exponents::of_orbit(model, orbit)?
+    } else {
+        let fixed = SpectrumOptions {
+            alignment,
+            min_periods: options.periods,
+            max_periods: options.periods,
+            ..defaults
+        };
+        let before = map.resets();
+        let spectrum = lyapunov_spectrum(&mut map, &mut state, &fixed).map_err(|_| {
+            if control.is_cancelled() {
+                return Error::stopped();
+            }
+            let what = "the tangent vectors of the motion";
+            FlowError::NotFinite { what }.into()
+        })?;
+        Exponents::of_run(spectrum, named.classification, map.resets() > before)
+    };
     let section_at = options.section_at();
     let section = section(model, &start, section_at, options.points)?;
     Ok(LyapunovReport {
@@ -137,16 +237,15 @@ pub fn lyapunov(
         period: named.orbit.map(|o| o.period),
         evidence: named.evidence,
         transient: options.transient,
-        periods: spectrum.periods,
-        sum: spectrum.exponents.iter().sum(),
-        sum_by_trace: spectrum.log_determinant,
-        kaplan_yorke_dimension: match named.classification {
-            Classification::QuasiPeriodic => spectrum.neutral_directions() as f64,
-            _ => spectrum.kaplan_yorke_dimension(),
-        },
-        exponents: spectrum.exponents,
-        errors: spectrum.errors,
-        mean: spectrum.strobe.mean_state().to_vec(),
+        periods: found.periods,
+        source: found.source,
+        sum: found.exponents.iter().sum(),
+        sum_by_trace: found.sum_by_trace,
+        determinant_defect: found.determinant_defect,
+        kaplan_yorke_dimension: found.kaplan_yorke_dimension,
+        exponents: found.exponents,
+        errors: found.errors,
+        mean: found.mean,
         section,
         section_at,
     })

@@ -21,8 +21,8 @@ use crate::model::recording::{NonlinearRecording, Recording};
 use crate::model::{MemoryReset, Model};
 use crate::observe::PhysicalMotion;
 use crate::observe::{
-    ContactEvent, Derivative, ObservableSet, Observables, OutOfRange, RecordOptions, Spectrum,
-    record,
+    ContactEvent, Derivative, ObservableSet, Observables, OutOfRange, RecordOptions, Recorder,
+    Spectrum,
 };
 use crate::study::Study;
 use crate::study::approach::SETPOINT_PERIODS;
@@ -338,7 +338,7 @@ fn report_on(
         ..RecordOptions::default()
     };
     let observed = OutOfRange::observed_with(model, observables);
-    let seen = record(model, &start, orbit.period, observed, kept)?;
+    let seen = Recorder::new(model, observed)?.record_orbit(orbit, 0, kept)?;
     let determinant_defect = match &seen.recording {
         Recording::PiecewiseLinear(trajectory) => determinant_defect(model, orbit, trajectory),
         Recording::Nonlinear(recording) => nonlinear_defect(orbit, recording),
@@ -476,6 +476,36 @@ fn flights(model: &Model, trajectory: &Trajectory) -> impl Iterator<Item = f64> 
         })
         .collect::<Vec<_>>()
         .into_iter()
+}
+
+/// log|det DPⁿ| of an orbit from the trace of the equations, integrated along it, and its switches;
+/// `None` where a memory of the sample is reset, whose multiplier is zero.
+///
+/// # Errors
+/// When the flow along it fails.
+pub(in crate::study) fn log_determinant_by_trace(
+    model: &Model,
+    orbit: &PeriodicOrbit,
+) -> Result<Option<f64>, Error> {
+    let kept = RecordOptions {
+        recorded: orbit.period,
+        ..RecordOptions::default()
+    };
+    let recorder = Recorder::new(model, ObservableSet::COMMON)?;
+    Ok(match recorder.record_orbit(orbit, 0, kept)?.recording {
+        Recording::PiecewiseLinear(trajectory) => model
+            .memory_reset
+            .is_none()
+            .then(|| log_determinant(model, &trajectory)),
+        Recording::Nonlinear(recording) => {
+            let nonlinear = recording.nonlinear();
+            let periods = recording.periods().iter();
+            let sum = periods
+                .map(|period| nonlinear.log_determinant(period))
+                .sum();
+            (!nonlinear.remembers).then_some(sum)
+        }
+    })
 }
 
 /// log|det DPⁿ| from Liouville's formula: every impact has determinant ±(product of the

@@ -22,6 +22,7 @@ mod orbit_derivatives;
 mod references;
 mod short_contacts;
 mod standard_linear_solid;
+mod sticking;
 mod taylor;
 
 use nanotap::case::Case;

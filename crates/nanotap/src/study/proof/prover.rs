@@ -22,6 +22,12 @@ pub enum NotProved {
     /// The case has no equations in intervals.
     #[error(transparent)]
     Equations(#[from] EnclosureError),
+    /// The orbit sticks to a rigid stop.
+    #[error(
+        "the orbit sticks to the rigid stop: the impacts that end in sticking are infinitely many, and the \
+         test encloses finitely many switches"
+    )]
+    Sticks,
     /// The test of the proof failed, for the reason given.
     #[error(transparent)]
     Test(#[from] ProofError),
@@ -59,6 +65,10 @@ impl Prover {
         let Recording::PiecewiseLinear(trajectory) = orbit else {
             return Err(EnclosureError::NotPiecewiseLinear.into());
         };
+        let mut segments = trajectory.segments().iter();
+        if segments.any(|segment| trajectory.system().sticks(segment.regime)) {
+            return Err(NotProved::Sticks);
+        }
         Ok(prove(system, &candidate(trajectory, period))?)
     }
 

@@ -321,6 +321,13 @@ pub(crate) fn largest_exponent(spectrum: &LyapunovSpectrum) -> String {
 
 /// Why a motion is periodic, in words.
 pub(crate) fn orbit_evidence(orbit: &PeriodicOrbit) -> String {
+    if orbit.is_superstable() {
+        return format!(
+            "the motion sticks to the stop, and one known motion follows every stick: the period-{} orbit \
+             is superstable, its multipliers are 0 and its Lyapunov exponents −∞",
+            orbit.period
+        );
+    }
     format!(
         "Newton closed a period-{} orbit (residual {:.1e}); largest |multiplier| {:.6}",
         orbit.period,

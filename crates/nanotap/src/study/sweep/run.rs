@@ -281,7 +281,7 @@ impl<'a> Runner<'a> {
         match &named.orbit {
             Some(orbit) => {
                 let from = orbit.nearest(&classified.state).0;
-                self.recorded(outcome, from, Some(orbit.period))
+                self.recorded(outcome, from, Some(orbit))
             }
             None if named.classification == Classification::Unbounded => (outcome, None),
             None => self.recorded(outcome, &classified.state, None),
@@ -346,7 +346,7 @@ impl<'a> Runner<'a> {
             // What repeats is recorded once.
             Some(orbit) if is_on(orbit, state) => {
                 let from = orbit.nearest(state).0;
-                self.recorded(outcome, from, Some(orbit.period))
+                self.recorded(outcome, from, Some(orbit))
             }
             _ => self.recorded(outcome, state, None),
         }
@@ -378,23 +378,28 @@ impl<'a> Runner<'a> {
     fn watch(
         &self,
         from: &[f64],
+        orbit: Option<&PeriodicOrbit>,
         periods: usize,
         kept: RecordOptions,
     ) -> Result<Recorded, MotionError> {
         let recorder = self.recorder.as_ref().map_err(Clone::clone)?;
-        recorder.record(from, periods, kept)
+        let first = orbit.and_then(|orbit| orbit.states.iter().position(|state| state == from));
+        match orbit.zip(first) {
+            Some((orbit, first)) => recorder.record_orbit(orbit, first, kept),
+            None => recorder.record(from, periods, kept),
+        }
     }
 
-    /// Records the motion from `from`; with `period`, one repetition of that orbit is recorded and
-    /// used for all periods.
+    /// Records the motion from `from`; with `orbit`, of which that is a state, one repetition is recorded
+    /// and used for all periods.
     fn recorded(
         &self,
         mut outcome: Outcome,
         from: &[f64],
-        period: Option<usize>,
+        orbit: Option<&PeriodicOrbit>,
     ) -> (Outcome, Option<Vec<f64>>) {
         let periods = self.options.periods;
-        let turn = period.unwrap_or(periods);
+        let turn = orbit.map_or(periods, |orbit| orbit.period);
         let kept = RecordOptions {
             states: turn,
             each_period: true,
@@ -406,7 +411,7 @@ impl<'a> Runner<'a> {
             lows,
             highs,
             ..
-        } = match self.watch(from, turn, kept) {
+        } = match self.watch(from, orbit, turn, kept) {
             Ok(watched) => watched,
             Err(error) => return (Outcome::unknown(class_of(&error), outcome.transient), None),
         };

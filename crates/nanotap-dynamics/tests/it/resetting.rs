@@ -156,13 +156,17 @@ fn resets_are_escapes_from_transient_chaos() {
             &CensusOptions::default(),
             &Control::default(),
         );
-        let is_chaos = |a: &nanotap_dynamics::Attractor| matches!(a.kind, AttractorKind::Chaotic { .. });
+        let is_chaos =
+            |a: &nanotap_dynamics::Attractor| matches!(a.kind, AttractorKind::Chaotic { .. });
         assert!(!found.attractors.iter().any(is_chaos));
         let transient = found.transient_chaos.unwrap();
         let lifetime = transient.lifetime;
         assert!(lifetime.escapes > 15, "{lifetime:?}");
         // Within six standard errors.
         let allowed = 6.0 / (lifetime.escapes as f64).sqrt();
-        assert!((lifetime.mean / LIFETIME).ln().abs() < allowed, "{lifetime:?}");
+        assert!(
+            (lifetime.mean / LIFETIME).ln().abs() < allowed,
+            "{lifetime:?}"
+        );
     }
 }

@@ -632,8 +632,9 @@ class Lyapunov(Result):
 
     Attributes:
         classification: Kind of the motion.
-        exponents: Exponents per drive period, largest first (n).
-        errors: Standard errors of the exponents (n).
+        exponents: Exponents per drive period, largest first (n); NaN where one is −∞, as of a
+            motion that sticks to a rigid stop.
+        errors: Standard errors of the exponents (n); 0 of a closed orbit.
         sum: Sum of the exponents.
         sum_by_trace: The same from the trace of the equations and the time in contact.
         kaplan_yorke_dimension: Kaplan–Yorke dimension of the attractor's section.

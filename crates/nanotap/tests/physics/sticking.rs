@@ -92,7 +92,10 @@ fn motions_that_stick_are_on_the_superstable_orbit() {
         assert_eq!(only.lyapunov, [f64::NEG_INFINITY; 2]);
         let report = only.orbit.as_ref().unwrap();
         assert_eq!(report.period, period);
-        assert_eq!((report.stability, report.determinant_defect), ("stable", 0.0));
+        assert_eq!(
+            (report.stability, report.determinant_defect),
+            ("stable", 0.0)
+        );
         assert_eq!(report.multipliers, [[0.0; 2]; 2]);
         // A period's rounding only, though errors grow by 1e39 over the orbit.
         assert!(report.residual < 1e-11, "{}", report.residual);

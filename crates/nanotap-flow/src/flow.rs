@@ -51,9 +51,9 @@ impl Flow {
         self.motion.switches
     }
 
-    /// Returns how often the motion came to rest on a rigid stop since the flow was created.
-    pub fn sticks(&self) -> u64 {
-        self.motion.sticks
+    /// Returns how often the motion was released from rest on a rigid stop since the flow was created.
+    pub fn releases(&self) -> u64 {
+        self.motion.releases
     }
 
     /// Returns the number of the present regime.

@@ -33,8 +33,8 @@ pub(crate) struct Motion {
     scratch: Vec<f64>,
     pub(crate) statistics: Statistics,
     pub(crate) switches: u64,
-    /// How often it came to rest on a rigid stop.
-    pub(crate) sticks: u64,
+    /// How often it was released from rest on a rigid stop.
+    pub(crate) releases: u64,
     /// Longest touch of a rigid stop that is ignored, in the system's unit of time; 0 for none.
     pub(crate) longest_passed_touch: f64,
 }
@@ -73,7 +73,7 @@ impl Motion {
             scratch: vec![0.0; system.dimension()],
             statistics: Statistics::default(),
             switches: 0,
-            sticks: 0,
+            releases: 0,
             longest_passed_touch: 0.0,
         }
     }
@@ -483,7 +483,7 @@ impl Motion {
         let prepared = &system.prepared(self.regime)[transition];
         let stuck =
             prepared.acceleration.is_some() && self.chatter_ends(system, transition, crossing);
-        self.sticks += u64::from(stuck);
+        self.releases += u64::from(description.release);
         let (switch, reverse) = match (&prepared.sticking, stuck) {
             (Some(sticking), true) => (sticking, prepared.sticking_reverse),
             _ => (&prepared.switch, prepared.reverse),

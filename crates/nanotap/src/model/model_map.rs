@@ -602,7 +602,7 @@ impl EngineMap for ExactMap {
 
     fn resets(&self) -> u64 {
         if self.release.is_some() {
-            self.flow.sticks()
+            self.flow.releases()
         } else {
             0
         }

@@ -59,9 +59,11 @@ fn physical_and_dimensionless_values_are_shown() {
 fn a_physical_case_written_out_is_its_dimensionless_self() {
     let folder = Folder::new();
     folder.write("lever.toml", LEVER);
+    let arguments = ["case", "lever.toml", "--out", "plain.toml", "--json"];
     let written = folder
-        .run(&["case", "lever.toml", "--out", "plain.toml", "--json"])
+        .run(&[&arguments[..], &["--model-units"]].concat())
         .json();
+    assert!(folder.read("plain.toml").contains("alpha4 = "));
     let again = folder.run(&["case", "plain.toml", "--json"]).json();
     for key in [
         "alpha1", "alpha2", "alpha3", "alpha4", "alpha5", "alpha6", "omega", "modes",

@@ -223,7 +223,13 @@ pub(super) fn report(plan: &Plan<'_>, statics: &StaticsFound, run: &Run) -> Forc
     let span = peak + adhesion;
     let [low, high] = plan.fit.map(|part| part * span - adhesion);
     let in_si = |signals: &Signals| (signals.gap * scales.length, signals.force * scales.force);
-    let unloading = run.unloading.iter().filter(|signals| signals.contact);
+    // Up to the lowest force: beyond it the neck is unstable, and the lever jumps and rings.
+    let forces = run.unloading.iter().map(|signals| signals.force);
+    let numbered = forces.enumerate();
+    let lowest = numbered.min_by(|a, b| a.1.total_cmp(&b.1));
+    let unloading = run.unloading.iter();
+    let unloading = unloading.take(lowest.map_or(0, |(k, _)| k + 1));
+    let unloading = unloading.filter(|signals| signals.contact);
     let unloading: Vec<(f64, f64)> = unloading
         .map(in_si)
         .filter(|(_, force)| (low..=high).contains(force))

@@ -6,7 +6,8 @@ use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, OnceLock, PoisonError};
 
 use nanotap::case::Case;
-use nanotap::dataset::{Share, Store, Work, table};
+use nanotap::dataset::merge::MAX_LISTED;
+use nanotap::dataset::{Share, Store, Work, merge, table};
 use nanotap::model::cantilever::Cantilever;
 use nanotap::study::Computation as _;
 use nanotap::study::sweep::{Summary, Sweep, SweepOptions};
@@ -69,6 +70,28 @@ fn links_inside_a_store_are_refused() {
     let refused = Store::create_or_resume(&store, schema).unwrap_err();
     assert!(refused.to_string().contains("symbolic link"), "{refused}");
     assert_eq!(std::fs::read_to_string(&target).unwrap(), "untouched");
+}
+
+/// A chunk that is only declared costs nothing: ten million of them took minutes when each was looked
+/// for.
+#[test]
+fn declared_chunks_cost_nothing() {
+    let folder = Folder::new();
+    let (source, target) = (folder.join("declared.zarr"), folder.join("merged.zarr"));
+    small(&source);
+    let document = source.join(".zmetadata");
+    let text = std::fs::read_to_string(&document).unwrap();
+    let mut header: Value = serde_json::from_str(&text).unwrap();
+    let layout = &mut header["metadata"][".zattrs"]["chunk_layout"];
+    let mut axes: Value = serde_json::from_str(layout.as_str().unwrap()).unwrap();
+    assert_eq!(axes["axes"][0], json!(["omega", 2, 1]));
+    axes["axes"][0][1] = json!(10_000_000);
+    *layout = axes.to_string().into();
+    std::fs::write(&document, header.to_string()).unwrap();
+    let merged = merge(&[source], &target).unwrap();
+    assert_eq!((merged.chunks, merged.copied), (10_000_000, 2));
+    assert_eq!(merged.missing_count, 9_999_998);
+    assert_eq!((merged.missing.len(), merged.missing[0]), (MAX_LISTED, 2));
 }
 
 /// Values that may replace a value of a header.

@@ -99,7 +99,7 @@ impl From<CaseError> for ApiError {
     fn from(error: CaseError) -> Self {
         match error {
             CaseError::Stated(error) => (*error).into(),
-            error @ CaseError::Model(_) => Self::of(error),
+            error @ (CaseError::Model(_) | CaseError::Tones(_)) => Self::of(error),
         }
     }
 }

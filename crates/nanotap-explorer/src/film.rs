@@ -3,7 +3,6 @@
 use nanotap::case::Case;
 use nanotap::case::quantity::Kind;
 use nanotap::model::Model;
-use nanotap::model::beam::Modes;
 use nanotap::observe::time_series;
 use serde::Serialize;
 
@@ -49,12 +48,8 @@ pub(crate) fn film(
     periods: usize,
 ) -> Result<Film, ApiError> {
     let is_beam = model.beam.is_some();
-    let modes = if is_beam {
-        (model.dimension() - model.memory) / 2
-    } else {
-        0
-    };
-    let shapes = shapes(modes)?;
+    let modes = model.beam.as_ref().map_or(0, |beam| beam.modes.count());
+    let shapes = shapes(model);
     let (mut beam, mut apex, mut surface, mut contact) = (vec![], vec![], vec![], vec![]);
     let (mut low, mut high) = (0.0_f64, f64::NEG_INFINITY);
     let mut base = (0.0, 0.0);
@@ -114,16 +109,13 @@ pub(crate) fn film(
 }
 
 /// φ_1 … φ_N at points along the beam; empty for an oscillator.
-fn shapes(modes: usize) -> Result<Vec<Vec<f64>>, ApiError> {
-    if modes == 0 {
-        return Ok(vec![Vec::new(); ALONG]);
-    }
-    let beam = Modes::new(modes).map_err(|error| ApiError::failed(error.to_string()))?;
-    Ok((0..ALONG)
-        .map(|k| {
-            beam.shapes(k as f64 / (ALONG - 1) as f64)
-                .as_slice()
-                .to_vec()
-        })
-        .collect())
+fn shapes(model: &Model) -> Vec<Vec<f64>> {
+    let at = |k: usize| match &model.beam {
+        None => Vec::new(),
+        Some(beam) => {
+            let shapes = beam.modes.shapes(k as f64 / (ALONG - 1) as f64);
+            shapes.as_slice().to_vec()
+        }
+    };
+    (0..ALONG).map(at).collect()
 }

@@ -121,10 +121,8 @@ pub(crate) fn keys(case: &Case) -> impl Iterator<Item = Key> {
         // Another kind of model is a separate case.
         let takes = key.entry().models.contains(&kind) && *key != Key::Kind;
         // A table or a state has no control.
-        let curve = matches!(
-            key.entry().takes,
-            Takes::Table | Takes::Arms | Takes::Springs | Takes::ModelArms | Takes::State
-        );
+        let takes_rows = key.entry().takes.is_table();
+        let curve = takes_rows || key.entry().takes == Takes::State;
         let in_addition = [Key::Modes, Key::CosineTerm].contains(key);
         if physical {
             key.is_physical() && !curve || in_addition

@@ -53,7 +53,7 @@ fn changes(app: &App, request: &LawRequest) -> Result<Value, ApiError> {
     for (key, value) in &change.added {
         let text = value.text();
         let shown = match value {
-            Written::Table(_) | Written::Arms(_) => "rows to begin with",
+            Written::Table(_) | Written::Arms(_) | Written::LeverModes(_) => "rows to begin with",
             _ => &text,
         };
         words.push(format!("with {key} = {shown}, a usual value"));

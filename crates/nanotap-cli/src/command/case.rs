@@ -199,6 +199,9 @@ fn cantilever(title: &str, case: &Cantilever) -> String {
     let period = number::significant(case.period(), 7);
     let formula = match case.further_tones.len() {
         0 => "2π/Ω".to_owned(),
+        _ if !case.further_tones.iter().all(|tone| tone.repeats()) => {
+            "2π/Ω of the first tone (both never repeat together)".to_owned()
+        }
         tones => format!(
             "{}·2π/Ω, after which {} tones repeat,",
             case.repetition(),
@@ -216,56 +219,11 @@ fn cantilever(title: &str, case: &Cantilever) -> String {
 fn physical(title: &str, view: &Physical, solved: bool) -> String {
     let Physical {
         cantilever: case,
-        lever,
         scales,
         ..
     } = view;
     let mut given = Table::new([("", Align::Left), ("", Align::Left), ("", Align::Left)]);
-    given.row([
-        "k",
-        &Kind::Stiffness.format(lever.k),
-        &format!(
-            "static spring constant at the tip, 3EI/L³; {} {} % stiffer",
-            if case.modes == 1 {
-                "1 mode is".to_owned()
-            } else {
-                format!("{} modes are", case.modes)
-            },
-            number::significant(100.0 * static_excess(case.modes), 2)
-        ),
-    ]);
-    given.row([
-        "f0",
-        &Kind::Frequency.format(lever.f0),
-        "first resonance, with the tip",
-    ]);
-    given.row([
-        "Q",
-        &number::significant(lever.quality_factor, 4),
-        "quality factor of the first mode",
-    ]);
-    if let Some(quality) = ModeTable::new(case).ok().and_then(|table| table.quality) {
-        let measured = [Parameter::Mode2Quality, Parameter::Mode3Quality].map(|of| case.get(of));
-        for (k, quality) in quality.iter().enumerate().skip(1).take(2) {
-            let source = if measured[k - 1] > 0.0 && view.is_in_fluid() {
-                "in the fluid, at its own frequency"
-            } else if measured[k - 1] > 0.0 {
-                "as given"
-            } else {
-                "by damping in proportion to mass, several times that of real levers in air"
-            };
-            given.row([
-                &format!("Q{}", k + 1),
-                &number::significant(*quality, 4),
-                source,
-            ]);
-        }
-    }
-    given.row([
-        "mL",
-        &Kind::Mass.format(lever.beam_mass),
-        "mass of the beam",
-    ]);
+    lever_rows(&mut given, view);
     let free = Kind::Length.format(view.free_amplitude);
     let phase = format!(
         "free amplitude of the tip, {}",
@@ -348,6 +306,73 @@ fn physical(title: &str, view: &Physical, solved: bool) -> String {
         return format!("{heading}\n\n{}", given.render());
     }
     format!("{heading}\n\n{}\n{}", given.render(), mapping.render())
+}
+
+/// The rows of the lever: of a beam, or of the modes that were measured.
+fn lever_rows(given: &mut Table, view: &Physical) {
+    let (lever, case) = (&view.lever, &view.cantilever);
+    let measured = view.lever_modes();
+    if !measured.is_empty() {
+        let count = number::counted(measured.len(), "measured mode", "measured modes");
+        given.row([
+            "k",
+            &Kind::Stiffness.format(lever.k),
+            &format!("static spring constant at the tip, of {count} together"),
+        ]);
+        for (j, mode) in measured.iter().enumerate() {
+            let j = j + 1;
+            let [f, k, q] = ["f", "k", "Q"].map(|name| format!("{name}{j}"));
+            given.row([&f, &Kind::Frequency.format(mode.frequency), "as measured"]);
+            given.row([&k, &Kind::Stiffness.format(mode.stiffness), "at the tip"]);
+            given.row([&q, &number::significant(mode.quality, 4), "quality factor"]);
+        }
+        return;
+    }
+    given.row([
+        "k",
+        &Kind::Stiffness.format(lever.k),
+        &format!(
+            "static spring constant at the tip, 3EI/L³; {} {} % stiffer",
+            if case.modes == 1 {
+                "1 mode is".to_owned()
+            } else {
+                format!("{} modes are", case.modes)
+            },
+            number::significant(100.0 * static_excess(case.modes), 2)
+        ),
+    ]);
+    given.row([
+        "f0",
+        &Kind::Frequency.format(lever.f0),
+        "first resonance, with the tip",
+    ]);
+    given.row([
+        "Q",
+        &number::significant(lever.quality_factor, 4),
+        "quality factor of the first mode",
+    ]);
+    if let Some(quality) = ModeTable::new(case).ok().and_then(|table| table.quality) {
+        let measured = [Parameter::Mode2Quality, Parameter::Mode3Quality].map(|of| case.get(of));
+        for (k, quality) in quality.iter().enumerate().skip(1).take(2) {
+            let source = if measured[k - 1] > 0.0 && view.is_in_fluid() {
+                "in the fluid, at its own frequency"
+            } else if measured[k - 1] > 0.0 {
+                "as given"
+            } else {
+                "by damping in proportion to mass, several times that of real levers in air"
+            };
+            given.row([
+                &format!("Q{}", k + 1),
+                &number::significant(*quality, 4),
+                source,
+            ]);
+        }
+    }
+    given.row([
+        "mL",
+        &Kind::Mass.format(lever.beam_mass),
+        "mass of the beam",
+    ]);
 }
 
 /// By how much so many modes are stiffer than the beam, see [`Modes::static_excess`].

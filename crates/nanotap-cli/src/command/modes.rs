@@ -87,6 +87,12 @@ fn text(case: &GivenCase, table: &ModeTable) -> String {
         );
     }
     text.push('\n');
+    if table.exact_free.is_empty() {
+        text.push_str(&motion::paragraph(
+            "Galerkin: the modes as they were measured, undamped; a lever so given is not a beam.",
+        ));
+        return text;
+    }
     text.push_str(&motion::paragraph(
         "Galerkin: these modes of the bare beam, undamped; exact: the uniform beam itself.",
     ));
@@ -133,13 +139,13 @@ fn frequencies(
         (damped, Align::Point),
         ("damping ζ", Align::Point),
     ]);
-    for (index, (galerkin, exact)) in galerkin.iter().zip(exact).enumerate() {
-        let mut row = vec![
-            (index + 1).to_string(),
-            frequency(*galerkin),
-            frequency(*exact),
-            number::percent(galerkin / exact - 1.0),
-        ];
+    for (index, galerkin) in galerkin.iter().enumerate() {
+        // A lever whose modes were measured is not a uniform beam.
+        let [exact, difference] = match exact.get(index) {
+            Some(exact) => [frequency(*exact), number::percent(galerkin / exact - 1.0)],
+            None => [String::new(), String::new()],
+        };
+        let mut row = vec![(index + 1).to_string(), frequency(*galerkin), exact, difference];
         if let Some(eigenvalue) = paired.map(|list| list[index]) {
             row.push(frequency(eigenvalue[1]));
             row.push(number::significant(damping_ratio(eigenvalue), 4));

@@ -233,7 +233,7 @@ follows! {
     the_frequency_sweep: "frequency-sweep.md", 2 commands, 6 numbers;
     the_kelvin_probe: "kelvin-probe.md", 2 commands, 8 numbers;
     the_liquid: "liquid.md", 6 commands, 27 numbers;
-    the_measured_modes: "measured-modes.md", 2 commands, 6 numbers;
+    the_measured_modes: "measured-modes.md", 4 commands, 14 numbers;
     the_moving_surface: "moving-surface.md", 7 commands, 26 numbers;
     the_period_doubling: "period-doubling.md", 2 commands, 6 numbers;
     the_polymer: "polymer.md", 9 commands, 25 numbers;

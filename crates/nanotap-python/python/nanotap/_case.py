@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import numpy as np
 
 from . import _nanotap
-from ._quantity import in_si, si_unit, text
+from ._quantity import in_si, si_unit, text, written
 from ._record import Record
 
 if TYPE_CHECKING:
@@ -47,7 +47,8 @@ class Case:
     as dictionaries, with quantities and their units: texts (`"10 nm"`), numbers in SI (`1e-8`), or
     quantities of pint, astropy or unyt. A force curve, `sample={"law": "table", "table": …}`,
     is the path of a CSV file, or its columns as a dictionary or a pandas table with units in the
-    names: `{"gap (nm)": […], "force (nN)": […]}`; so are relaxing arms (`arms`, `relaxation_arms`).
+    names: `{"gap (nm)": […], "force (nN)": […]}`; so are relaxing arms (`arms`, `relaxation_arms`). Measured
+    modes are dictionaries: `cantilever={"mode": [{"f": "48.9 kHz", "k": "0.9 N/m", "Q": 255}, …]}`.
 
     >>> Case(alpha1=0.1, alpha2=0.1, alpha3=0.1, alpha4=20, alpha6=0.2, omega=2.6).omega
     2.6
@@ -441,6 +442,8 @@ TABLES = {
     "sample.prony",
     "sample.relaxation_arms",
     "relaxation_arms",
+    "cantilever.mode",
+    "lever_modes",
 }
 
 
@@ -458,10 +461,40 @@ def _written(name: str, value: Any) -> str:
         return json.dumps(value, ensure_ascii=False)
     if isinstance(value, int | float) and not isinstance(value, bool):
         return json.dumps(text(name, value)) if si_unit(name) else repr(value)
-    if name in TABLES:
+    if name in TABLES and not isinstance(value, bool):
+        if isinstance(value, list | tuple) and any(hasattr(row, "items") for row in value):
+            return _tables(name, value)
         return json.dumps(_rows(value))
     message = f"{name}: expected a number or a text, got {value!r}"
     raise TypeError(message)
+
+
+#: Units of the numbers of a mode that are given in SI.
+_OF_MODES = {"f": "Hz", "frequency": "Hz", "k": "N/m", "stiffness": "N/m"}
+
+
+def _tables(name: str, tables: Any) -> str:
+    """A list of dictionaries as an array of tables; numbers of a physical case are in SI."""
+    units = _OF_MODES if "." in name else {}
+
+    def entry(key: str, value: Any) -> str:
+        if isinstance(value, np.generic | np.ndarray) and np.ndim(value) == 0:
+            value = value.item()
+        if not isinstance(value, str | int | float) or isinstance(value, bool):
+            written_value = written(value)
+            if not isinstance(written_value, str):
+                message = f"{name}: expected a number or a text for {key!r}, got {value!r}"
+                raise TypeError(message)
+            value = written_value
+        if key in units and not isinstance(value, str):
+            value = f"{value!r} {units[key]}"
+        return f"{json.dumps(key)} = {json.dumps(value, ensure_ascii=False)}"
+
+    rows = (
+        ", ".join(entry(str(key), value) for key, value in table.items() if value is not None)
+        for table in tables
+    )
+    return "[" + ", ".join(f"{{{row}}}" for row in rows) + "]"
 
 
 def _rows(table: Any) -> list[list[float | str]]:

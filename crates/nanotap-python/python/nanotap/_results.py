@@ -262,8 +262,9 @@ class Modes(Result):
         modes: Number of modes.
         free: Frequencies in free flight (N, Ω).
         contact: Frequencies in contact (N, Ω).
-        exact_free: Those of the beam itself, in free flight (N, Ω).
-        exact_contact: Those of the beam itself, in contact (N, Ω).
+        exact_free: Those of the beam itself, in free flight (N, Ω); empty where the modes of the
+            lever were measured.
+        exact_contact: Those of the beam itself, in contact (N, Ω); empty likewise.
         shapes: The mode shapes φ_j(ξ) of the bare beam, over `xi` and `mode`.
     """
 
@@ -283,6 +284,7 @@ class Modes(Result):
         columns = {
             name: self[name]
             for name in ("free", "exact_free", "contact", "exact_contact")
+            if len(self[name]) == self.modes
         }
         return pd.DataFrame(
             columns, index=pd.RangeIndex(1, self.modes + 1, name="mode")

@@ -55,8 +55,12 @@ pub struct PhysicalSummary {
     /// Quality factor of the first free resonance, dimensionless.
     #[serde(rename = "Q")]
     pub quality_factor: f64,
-    /// Mass of the beam, kg.
+    /// Mass of the beam, kg: of a lever whose modes were measured that of the uniform beam with its k
+    /// and f0.
     pub beam_mass: f64,
+    /// Measured modes of the lever, if it is not a beam.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub mode: Vec<LeverModeDocument>,
     /// Mass of the tip, kg.
     pub tip_mass: f64,
     /// Amplitude of the base, m, or of the force on the lever, N.
@@ -131,6 +135,35 @@ pub struct PhysicalSummary {
     pub energy_unit: Option<f64>,
 }
 
+/// A measured mode of a lever, as the case states it.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct LeverModeDocument {
+    /// Undamped frequency of the free mode, Hz.
+    pub f: f64,
+    /// Stiffness at the tip, N/m.
+    pub k: f64,
+    /// Quality factor of the free mode, dimensionless.
+    #[serde(rename = "Q")]
+    pub quality_factor: f64,
+    /// Participation in the motion of the base, stated or that of the uniform beam, dimensionless.
+    pub participation: f64,
+}
+
+impl LeverModeDocument {
+    /// The measured modes of a physical case; none for a beam.
+    fn all(view: &Physical) -> Vec<Self> {
+        let modes = view.lever_modes().iter().enumerate();
+        modes
+            .map(|(j, mode)| Self {
+                f: mode.frequency,
+                k: mode.stiffness,
+                quality_factor: mode.quality,
+                participation: mode.participation_of(j + 1).unwrap_or(f64::NAN),
+            })
+            .collect()
+    }
+}
+
 /// Young's modulus of a sample that relaxes under a small oscillation at the drive frequency.
 #[derive(Clone, Copy, Debug, Serialize, JsonSchema)]
 pub struct DynamicModulus {
@@ -177,6 +210,7 @@ impl PhysicalSummary {
             f0: lever.f0,
             quality_factor: lever.quality_factor,
             beam_mass: lever.beam_mass,
+            mode: LeverModeDocument::all(view),
             tip_mass: quantity(Parameter::Alpha1),
             drive_amplitude: quantity(Parameter::Alpha2),
             drive_frequency: quantity(Parameter::Omega),

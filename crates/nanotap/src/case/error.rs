@@ -5,6 +5,7 @@ use super::key::Key;
 use super::quantity::QuantityError;
 use crate::model::ModelError;
 use crate::model::cantilever::CantileverError;
+use crate::model::drive_form::RatioError;
 
 /// Why a case has no model.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -15,6 +16,9 @@ pub enum CaseError {
     /// The numbers are invalid, or have no solution in closed form.
     #[error(transparent)]
     Model(#[from] ModelError),
+    /// The tones of the drive never repeat together.
+    #[error(transparent)]
+    Tones(#[from] RatioError),
 }
 
 impl From<CantileverError> for CaseError {
@@ -70,6 +74,19 @@ impl From<CaseError> for crate::Error {
         match error {
             CaseError::Stated(error) => (*error).into(),
             CaseError::Model(error) => error.into(),
+            CaseError::Tones(error) => {
+                let nearest = match &error {
+                    RatioError::Irrational { nearest, .. } => format!(": {nearest}"),
+                    _ => String::new(),
+                };
+                Self::input(
+                    error.to_string(),
+                    format!(
+                        "take `bimodal`, whose two tones need no common period, or a ratio of whole \
+                         numbers{nearest}"
+                    ),
+                )
+            }
         }
     }
 }

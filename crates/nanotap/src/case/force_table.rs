@@ -14,6 +14,7 @@ use nanotap_volterra::laws::table::Rows;
 use toml::de::DeValue;
 
 use super::key::Takes;
+use super::lever_modes::{self, LeverModes};
 use super::quantity::Kind;
 use super::stated::Value;
 use crate::Error;
@@ -49,7 +50,7 @@ impl From<Error> for ForceTableError {
 }
 
 impl ForceTableError {
-    fn new(message: impl Into<String>, remedy: impl Into<String>) -> Self {
+    pub(crate) fn new(message: impl Into<String>, remedy: impl Into<String>) -> Self {
         Self {
             message: message.into(),
             remedy: remedy.into(),
@@ -320,6 +321,8 @@ impl Takes {
             Self::Arms => Value::Arms(ArmTable::of(table, Strength::Modulus)?),
             Self::Springs => Value::Arms(ArmTable::of(table, Strength::Stiffness)?),
             Self::ModelArms => Value::Arms(ArmTable::of(table, Strength::Number)?),
+            Self::LeverModes => Value::LeverModes(LeverModes::of(table, true)?),
+            Self::ModelLeverModes => Value::LeverModes(LeverModes::of(table, false)?),
             _ => Value::Table(ForceTable::of(table)?),
         })
     }
@@ -341,6 +344,8 @@ impl Takes {
             Self::Arms => ARMS_SHAPE,
             Self::Springs => SPRINGS_SHAPE,
             Self::ModelArms => MODEL_ARMS_SHAPE,
+            Self::LeverModes => lever_modes::SHAPE,
+            Self::ModelLeverModes => lever_modes::MODEL_SHAPE,
             _ => SHAPE,
         };
         if let Some(name) = file_named(text) {
@@ -365,22 +370,20 @@ pub(crate) fn file_named(text: &str) -> Option<&str> {
     (!name.is_empty() && !name.contains('\n') && !name.starts_with('[')).then_some(name)
 }
 
-/// Converts an array of rows, of which the first contains the names of the columns.
+/// Converts an array of rows, of which the first contains the names of the columns, or an array of tables
+/// whose keys are the columns.
 pub(crate) fn table_of(value: &DeValue<'_>) -> Option<Table> {
     let DeValue::Array(rows) = value else {
         return None;
     };
+    if let Some(DeValue::Table(_)) = rows.first().map(toml::Spanned::get_ref) {
+        return table_of_tables(rows);
+    }
     let fields = |row: &toml::Spanned<DeValue<'_>>| -> Option<Vec<String>> {
         let DeValue::Array(fields) = row.get_ref() else {
             return None;
         };
-        let field = |field: &toml::Spanned<DeValue<'_>>| match field.get_ref() {
-            DeValue::Integer(integer) => Some(integer.as_str().to_owned()),
-            DeValue::Float(float) => Some(float.as_str().to_owned()),
-            DeValue::String(text) => Some(text.clone().into_owned()),
-            _ => None,
-        };
-        fields.iter().map(field).collect()
+        fields.iter().map(|field| text_of(field.get_ref())).collect()
     };
     let (first, rest) = rows.split_first()?;
     let header = fields(first)?;
@@ -394,6 +397,45 @@ pub(crate) fn table_of(value: &DeValue<'_>) -> Option<Table> {
         for ((_, column), field) in table.columns.iter_mut().zip(fields) {
             column.push(Entry::of(&field));
         }
+    }
+    Some(table)
+}
+
+/// An entry of a table as text.
+fn text_of(field: &DeValue<'_>) -> Option<String> {
+    match field {
+        DeValue::Integer(integer) => Some(integer.as_str().to_owned()),
+        DeValue::Float(float) => Some(float.as_str().to_owned()),
+        DeValue::String(text) => Some(text.clone().into_owned()),
+        _ => None,
+    }
+}
+
+/// Converts an array of tables: a column a key, in the order in which the keys first occur.
+fn table_of_tables(rows: &[toml::Spanned<DeValue<'_>>]) -> Option<Table> {
+    let mut table = Table {
+        name: "the table".to_owned(),
+        ..Table::default()
+    };
+    for (row, fields) in rows.iter().enumerate() {
+        let DeValue::Table(fields) = fields.get_ref() else {
+            return None;
+        };
+        for (name, value) in fields {
+            let entry = Entry::of(&text_of(value.get_ref())?);
+            let name: &str = name.get_ref();
+            let known = table.columns.iter().position(|(other, _)| other == name);
+            let place = known.unwrap_or_else(|| {
+                table.columns.push((name.to_owned(), Vec::new()));
+                table.columns.len() - 1
+            });
+            let column = &mut table.columns[place].1;
+            column.resize(row, Entry::Missing);
+            column.push(entry);
+        }
+    }
+    for (_, column) in &mut table.columns {
+        column.resize(rows.len(), Entry::Missing);
     }
     Some(table)
 }

@@ -23,6 +23,7 @@ mod family;
 pub mod file;
 pub mod force_table;
 pub mod key;
+pub mod lever_modes;
 mod moving_gap;
 pub mod near_name;
 pub mod physical;
@@ -64,6 +65,7 @@ use stated::Replaced;
 use units::Units;
 
 use crate::model::cantilever::Cantilever;
+use crate::model::drive_form::FrequencyRatio;
 use crate::model::oscillator::{Oscillator, OscillatorParameter, Stop};
 use crate::model::{Model, ModelTangent, Tangent, cantilever_model_tangent};
 use crate::number::shortest;
@@ -527,11 +529,24 @@ impl Case {
             .collect()
     }
 
+    /// Checks that the tones of the drive repeat together.
+    ///
+    /// # Errors
+    /// [`CaseError::Tones`] with the nearest ratio at which they do.
+    pub fn repeats(&self) -> Result<(), CaseError> {
+        let tones = self.cantilever().map_or(&[][..], |case| &case.further_tones);
+        for ratio in tones.iter().filter(|ratio| !ratio.repeats()) {
+            FrequencyRatio::of(ratio.value())?;
+        }
+        Ok(())
+    }
+
     /// Builds the model of the case.
     ///
     /// # Errors
-    /// If the case is invalid or has no solution in closed form.
+    /// If the case is invalid or has no solution in closed form, or its tones never repeat together.
     pub fn model(&self) -> Result<Model, CaseError> {
+        self.repeats()?;
         let model = match &self.what {
             CaseKind::Cantilever(cantilever) => Model::cantilever(cantilever)?,
             CaseKind::Oscillator(oscillator) => oscillator.model()?,

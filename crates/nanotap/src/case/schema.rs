@@ -144,6 +144,16 @@ fn taken(key: Key, entry: &Entry) -> Map<String, Value> {
             );
             return schema;
         }
+        Takes::LeverModes | Takes::ModelLeverModes => {
+            say("type", json!(["string", "array"]));
+            let example = if key.is_physical() {
+                json!([{"f": "48.913 kHz", "k": "0.9 N/m", "Q": 255}, {"f": "306.194 kHz", "k": "35.2 N/m", "Q": 1002}])
+            } else {
+                json!([{"frequency": 3.516, "stiffness": 3.09, "quality": 255}])
+            };
+            say("examples", json!([example]));
+            return schema;
+        }
         Takes::FrequencyRatio => {
             say("type", json!(["string", "number"]));
             say("examples", json!(["25/4", 6.25]));

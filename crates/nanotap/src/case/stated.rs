@@ -5,6 +5,7 @@ use std::sync::Arc;
 use super::file::{CaseFileError, Header, Place, Problem, Source};
 use super::force_table::{ArmTable, ForceTable, ForceTableError};
 use super::key::{Key, Takes};
+use super::lever_modes::LeverModes;
 use super::quantity::{Kind, Quantity, QuantityError};
 use super::state::WrittenState;
 use nanotap_volterra::VolterraError;
@@ -31,6 +32,8 @@ pub enum Value {
     Arms(ArmTable),
     /// A state at drive phase 0.
     State(WrittenState),
+    /// Measured modes of a lever.
+    LeverModes(LeverModes),
 }
 
 impl Value {
@@ -44,6 +47,7 @@ impl Value {
             Self::Table(table) => table.text(),
             Self::Arms(arms) => arms.text(),
             Self::State(state) => state.text(),
+            Self::LeverModes(modes) => modes.text(),
         }
     }
 }
@@ -136,9 +140,12 @@ impl Key {
             Takes::LeverName | Takes::MaterialName => Value::Name(text.into()),
             Takes::FrequencyRatio => Value::Ratio(text.parse()?),
             Takes::State => Value::State(WrittenState::parse(text)?),
-            takes @ (Takes::Table | Takes::Arms | Takes::Springs | Takes::ModelArms) => {
-                takes.parse_table(text)?
-            }
+            takes @ (Takes::Table
+            | Takes::Arms
+            | Takes::Springs
+            | Takes::ModelArms
+            | Takes::LeverModes
+            | Takes::ModelLeverModes) => takes.parse_table(text)?,
         })
     }
 }

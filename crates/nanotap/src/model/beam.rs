@@ -9,6 +9,9 @@ use std::sync::{Arc, OnceLock};
 
 use nalgebra::DVector;
 
+use crate::model::cantilever::Cantilever;
+use crate::model::lever_mode::LeverMode;
+
 /// The largest number of modes this crate works with.
 pub const MAX_MODES: usize = 50;
 
@@ -200,8 +203,14 @@ pub struct Modes {
     pub tip: DVector<f64>,
     /// Tip slopes φ_j′(1) = dφ_j/dξ at ξ = 1, dimensionless, length N.
     pub tip_slope: DVector<f64>,
-    /// Integrals I_j = ∫₀¹φ_j dξ over the beam, dimensionless, length N.
+    /// Integrals I_j = ∫₀¹φ_j dξ over the beam, dimensionless, length N: the modes' part in the motion
+    /// of the base.
     pub integral: DVector<f64>,
+    /// Generalised forces L_j of a unit force that is spread evenly over the beam, length N: I_j, except
+    /// for a lever whose modes were measured.
+    pub even_load: DVector<f64>,
+    /// Factors of the uniform beam's shapes φ_j, length N: 1, except for a lever whose modes were measured.
+    scale: Vec<f64>,
 }
 
 impl Modes {
@@ -222,17 +231,48 @@ impl Modes {
             tip: vector(Mode::tip),
             tip_slope: vector(Mode::tip_slope),
             integral: vector(Mode::integral),
+            even_load: vector(Mode::integral),
+            scale: vec![1.0; count],
             all: modes,
         })
+    }
+
+    /// Returns the modes of a lever as they were measured, frequency and stiffness in model units, in
+    /// coordinates with a modal mass of 1; see [`lever_mode`](crate::model::lever_mode).
+    ///
+    /// # Errors
+    /// As [`Modes::new`].
+    pub fn measured(measured: &[LeverMode]) -> Result<Self, ModeCountError> {
+        let mut modes = Self::new(measured.len())?;
+        for (j, mode) in measured.iter().enumerate() {
+            let deflection = mode.frequency / mode.stiffness.sqrt();
+            let scale = deflection / modes.tip[j].abs();
+            modes.stiffness[j] = mode.frequency * mode.frequency;
+            modes.tip[j] = deflection.copysign(modes.tip[j]);
+            modes.tip_slope[j] *= scale;
+            modes.integral[j] = mode.participation_of(j + 1)? / modes.tip[j];
+            modes.even_load[j] *= scale;
+            modes.scale[j] = scale;
+        }
+        Ok(modes)
+    }
+
+    /// Returns the modes of a case: those of the uniform beam, or of a lever whose modes were measured.
+    ///
+    /// # Errors
+    /// As [`Modes::new`].
+    pub fn of(case: &Cantilever) -> Result<Arc<Self>, ModeCountError> {
+        match case.lever_modes.get(..case.modes) {
+            Some(measured) if !case.lever_modes.is_empty() => Self::measured(measured).map(Arc::new),
+            _ => Self::shared(case.modes),
+        }
     }
 
     /// Returns by which fraction these modes are stiffer than the beam against a static force at
     /// the tip: EI/L³ over Σφ_j(1)²/β_j⁴, relative to 3EI/L³, less 1.
     pub fn static_excess(&self) -> f64 {
-        let give: f64 = self
-            .iter()
-            .map(|mode| mode.tip().powi(2) / mode.stiffness())
-            .sum();
+        let modes = self.tip.iter().zip(&self.stiffness);
+        let give: f64 = modes.map(|(tip, stiffness)| tip.powi(2) / stiffness).sum();
         1.0 / (3.0 * give) - 1.0
     }
 
@@ -265,16 +305,28 @@ impl Modes {
 
     /// (φ_1(ξ) … φ_N(ξ)); NaN where ξ is outside [0, 1].
     pub fn shapes(&self, xi: f64) -> DVector<f64> {
-        DVector::from_iterator(self.count(), self.iter().map(|mode| mode.shape(xi)))
+        let scaled = self.iter().zip(&self.scale);
+        DVector::from_iterator(
+            self.count(),
+            scaled.map(|(mode, scale)| mode.shape(xi) * scale),
+        )
+    }
+
+    /// (φ_1′(ξ) … φ_N′(ξ)); NaN where ξ is outside [0, 1].
+    pub fn slopes(&self, xi: f64) -> DVector<f64> {
+        let scaled = self.iter().zip(&self.scale);
+        DVector::from_iterator(
+            self.count(),
+            scaled.map(|(mode, scale)| mode.slope(xi) * scale),
+        )
     }
 
     /// The deflection Σ a_j φ_j(ξ) for modal amplitudes a_1 …; amplitudes beyond the
     /// N-th are ignored, missing ones are zero.
     pub fn deflection(&self, amplitudes: &[f64], xi: f64) -> f64 {
-        self.iter()
-            .zip(amplitudes)
-            .map(|(mode, amplitude)| amplitude * mode.shape(xi))
-            .sum()
+        let shapes = self.shapes(xi);
+        let parts = shapes.iter().zip(amplitudes);
+        parts.map(|(shape, amplitude)| amplitude * shape).sum()
     }
 }
 

@@ -393,7 +393,10 @@ impl<'a> Beam<'a> {
         let mut drive = vec![match case.actuation {
             Actuation::Base => product(1.0, &clamp, &base_rate),
             Actuation::Tip => product(1.0, &self.drive_output(), &tip_rate),
-            Actuation::Distributed => product(1.0, &self.drive_output(), &integral),
+            Actuation::Distributed => {
+                let rate = self.layout.row(&modes.even_load, 1);
+                product(1.0, &self.drive_output(), &rate)
+            }
         }];
         if case.cosine_term == CosineTerm::Printed && case.actuation == Actuation::Base {
             // Printed minus corrected: of each tone −A α3 (1 − w) I cos(wτ + θ), acting on ȧ.

@@ -1,5 +1,6 @@
 //! One dimensionless case of the model: how many modes and which parameters.
 
+use std::cmp::Ordering;
 use std::fmt;
 
 use serde::ser::SerializeMap as _;
@@ -11,6 +12,7 @@ use crate::model::contact::entry::Damper;
 use crate::model::contact::law::Law;
 use crate::model::contact::{ContactLaw, MAX_ARMS};
 use crate::model::drive_form::{Actuation, FrequencyRatio, LARGEST, MAX_TONES, repetition};
+use crate::model::lever_mode::LeverMode;
 use crate::model::parameter::{Applies, LARGEST_ALPHA, Numbers, OMEGA_RANGE, Parameter, Unit};
 use crate::model::sample_law::SampleLaw;
 use crate::model::words::words;
@@ -62,6 +64,9 @@ pub struct Cantilever {
     /// Relaxing arms, each `[time, stiffness]` in units of √(mL⁴/(EI)) and EI/L³; empty for a
     /// contact law without a list of arms.
     pub arms: Vec<[f64; 2]>,
+    /// Modes of a lever that was measured as a whole, by ascending frequency, in place of those of the
+    /// uniform beam; empty for the uniform beam. A quality factor of 0 stands for that of α₃.
+    pub lever_modes: Vec<LeverMode>,
     /// Parameters that only some laws, drives and levers have; see [`get`](Self::get).
     pub further: Numbers,
 }
@@ -84,6 +89,7 @@ impl Cantilever {
             actuation: Actuation::Base,
             further_tones: Vec::new(),
             arms: Vec::new(),
+            lever_modes: Vec::new(),
             further: Numbers::ZERO,
         }
     }
@@ -180,9 +186,10 @@ impl Cantilever {
         self.written().filter(|of| is_of_law(*of))
     }
 
-    /// Returns true if a frequency, quality factor or stiffness of a higher mode was measured.
+    /// Returns true if a frequency, quality factor or stiffness of a higher mode was measured, or the
+    /// lever as a whole.
     pub fn has_measured_modes(&self) -> bool {
-        Parameter::MEASURED.iter().any(|of| self.has(*of))
+        !self.lever_modes.is_empty() || Parameter::MEASURED.iter().any(|of| self.has(*of))
     }
 
     /// Returns the values of the parameters that only the contact law has.
@@ -212,7 +219,7 @@ impl Cantilever {
     }
 
     /// Returns the period of the drive, in units of √(mL⁴/(EI)): 2π/Ω, or with several tones the
-    /// time after which all repeat.
+    /// time after which all repeat; that of the first tone where they never repeat together.
     pub fn period(&self) -> f64 {
         f64::from(self.repetition()) * std::f64::consts::TAU / self.omega
     }
@@ -274,7 +281,54 @@ impl Cantilever {
             }
         }
         self.check_tones()?;
+        self.check_lever_modes()?;
         self.check_arms()
+    }
+
+    /// Checks the measured modes of the lever.
+    ///
+    /// # Errors
+    /// [`CantileverError`] for the first invalid value.
+    pub(crate) fn check_lever_modes(&self) -> Result<(), CantileverError> {
+        let refuse = |key, value, reason| Err(CantileverError { key, value, reason });
+        let count = self.lever_modes.len();
+        if count == 0 {
+            return Ok(());
+        }
+        if count > MAX_MODES {
+            return refuse("lever_modes", count as f64, Reason::Modes);
+        }
+        if self.modes > count {
+            return refuse("modes", self.modes as f64, Reason::LeverModes(count));
+        }
+        let twice = std::iter::once(Parameter::Alpha1).chain(Parameter::MEASURED);
+        for parameter in twice {
+            let value = self.get(parameter);
+            if value != 0.0 {
+                return refuse(parameter.name(), value, Reason::OfLeverModes);
+            }
+        }
+        let mut last = 0.0;
+        for mode in &self.lever_modes {
+            for value in [mode.frequency, mode.stiffness] {
+                if !(value > 0.0 && value <= LARGEST_ALPHA) {
+                    return refuse("lever_modes", value, Reason::LeverMode);
+                }
+            }
+            if !(0.0..=LARGEST_ALPHA).contains(&mode.quality) {
+                return refuse("lever_modes", mode.quality, Reason::LeverMode);
+            }
+            if let Some(participation) = mode.participation
+                && participation.abs().partial_cmp(&LARGEST_ALPHA) != Some(Ordering::Less)
+            {
+                return refuse("lever_modes", participation, Reason::LeverMode);
+            }
+            if mode.frequency <= last {
+                return refuse("lever_modes", mode.frequency, Reason::LeverModeOrder);
+            }
+            last = mode.frequency;
+        }
+        Ok(())
     }
 
     /// Checks the relaxing arms.
@@ -322,7 +376,8 @@ impl Cantilever {
             })
         };
         for (k, ratio) in self.further_tones.iter().enumerate() {
-            if k + 2 > MAX_TONES || k > 0 && !ratio.repeats() {
+            let is_alone = self.further_tones.len() == 1;
+            if k + 2 > MAX_TONES || !is_alone && !ratio.repeats() {
                 return refuse(k, Reason::Tones);
             }
             if self.further_tones[..k].contains(ratio) {
@@ -418,6 +473,9 @@ impl Serialize for Cantilever {
         if !self.arms.is_empty() {
             map.serialize_entry("relaxation_arms", &self.arms)?;
         }
+        if !self.lever_modes.is_empty() {
+            map.serialize_entry("lever_modes", &self.lever_modes)?;
+        }
         for parameter in self.written_law_numbers() {
             map.serialize_entry(parameter.name(), &self.get(parameter))?;
         }
@@ -466,6 +524,14 @@ pub enum Reason {
     Arms,
     /// An arm's time that is not positive and finite.
     ArmTime,
+    /// More modes than the measured ones of the lever, by their number.
+    LeverModes(usize),
+    /// A frequency, stiffness, quality factor or participation of a measured mode that is not allowed.
+    LeverMode,
+    /// Measured modes that are not in the order of their frequencies.
+    LeverModeOrder,
+    /// A mass or a number of a mode in addition to the measured modes of the lever.
+    OfLeverModes,
     /// A spring or a damper in addition to a nonlinear law.
     SpringOfLaw,
     /// A number that only this other law has.
@@ -513,6 +579,22 @@ impl fmt::Display for Reason {
             Self::ArmTime => write!(
                 formatter,
                 "the time of an arm must be above 0 and at most {LARGEST_ALPHA:e}"
+            ),
+            Self::LeverModes(count) => write!(
+                formatter,
+                "must be at most {count}, the number of the lever's measured modes"
+            ),
+            Self::LeverMode => write!(
+                formatter,
+                "frequency and stiffness of a mode must be above 0, its quality factor 0 or more, \
+                 and all of its numbers at most {LARGEST_ALPHA:e} in size"
+            ),
+            Self::LeverModeOrder => formatter.write_str(
+                "the modes must be in the order of their frequencies, each different from the others",
+            ),
+            Self::OfLeverModes => formatter.write_str(
+                "must be 0 for a lever whose modes were measured: they contain the tip's mass and \
+                 each mode's own numbers",
             ),
             Self::SpringOfLaw => formatter.write_str(
                 "must be 0 with a nonlinear force law, which describes the whole sample",

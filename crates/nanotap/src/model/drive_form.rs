@@ -8,7 +8,8 @@
 //!
 //! A second tone, and a third, has p/q of the first one's frequency. All repeat after as many
 //! periods of the first as the least common multiple of the q, and the stroboscopic map is of that
-//! period.
+//! period. Two tones of any other ratio never repeat together: their motion is a torus, and only
+//! `bimodal` computes it.
 
 use std::fmt;
 use std::str::FromStr;
@@ -16,6 +17,7 @@ use std::str::FromStr;
 use serde::{Serialize, Serializer};
 
 use crate::model::words::words;
+use crate::number::shortest;
 
 words! {
     /// Where the drive acts: at the clamped end, at the tip, or along the beam.
@@ -50,7 +52,7 @@ impl Actuation {
     }
 }
 
-/// A ratio of two frequencies, in lowest terms and not 1.
+/// A ratio of two frequencies, not 1: of whole numbers in lowest terms, or another number.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FrequencyRatio {
     numerator: u32,
@@ -147,8 +149,23 @@ impl FrequencyRatio {
         }
     }
 
+    /// Returns a ratio of whole numbers where `ratio` equals one within a relative 10⁻⁹, and otherwise
+    /// the ratio of two tones that never repeat together.
+    ///
+    /// # Errors
+    /// [`RatioError`] where `ratio` is not within the range of the ratios of whole numbers.
+    pub fn any(ratio: f64) -> Result<Self, RatioError> {
+        let range = 1.0 / f64::from(LARGEST.0)..=f64::from(LARGEST.1);
+        match Self::of(ratio) {
+            Err(RatioError::Irrational { .. }) if range.contains(&ratio) => {
+                Ok(Self::unlocked(ratio))
+            }
+            read => read,
+        }
+    }
+
     /// Whether both tones repeat after [`denominator`](Self::denominator) periods of the first.
-    pub(crate) const fn repeats(self) -> bool {
+    pub const fn repeats(self) -> bool {
         self.numerator > 0
     }
 
@@ -178,7 +195,8 @@ impl FrequencyRatio {
         })
     }
 
-    /// Returns p, the number of periods of the tone in one repetition of it and the first.
+    /// Returns p, the number of periods of the tone in one repetition of it and the first; 0 if the
+    /// two never repeat together.
     pub const fn numerator(self) -> u32 {
         self.numerator
     }
@@ -211,7 +229,11 @@ const fn greatest_divisor(mut a: u64, mut b: u64) -> u64 {
 
 impl fmt::Display for FrequencyRatio {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(formatter, "{}/{}", self.numerator, self.denominator)
+        if self.repeats() {
+            write!(formatter, "{}/{}", self.numerator, self.denominator)
+        } else {
+            formatter.write_str(&shortest(self.value))
+        }
     }
 }
 
@@ -224,7 +246,7 @@ impl Serialize for FrequencyRatio {
 impl FromStr for FrequencyRatio {
     type Err = RatioError;
 
-    /// Reads `25/4`, `6` or `6.25`.
+    /// Reads `25/4`, `6`, `6.25`, or a number that is not a ratio of whole numbers: `6.2599718`.
     fn from_str(given: &str) -> Result<Self, RatioError> {
         let form = || RatioError::Form {
             given: given.to_owned(),
@@ -234,7 +256,7 @@ impl FromStr for FrequencyRatio {
             return Self::new(whole(numerator)?, whole(denominator)?);
         }
         match given.trim().parse::<f64>() {
-            Ok(ratio) if ratio.is_finite() && ratio > 0.0 => Self::of(ratio),
+            Ok(ratio) if ratio.is_finite() && ratio > 0.0 => Self::any(ratio),
             _ => Err(form()),
         }
     }
@@ -266,7 +288,8 @@ mod tests {
     /// 179/57 3.140351; the nearest of all is 201/64 … 22/7; found by looking at each.
     #[test]
     fn what_is_no_ratio_is_refused_with_the_nearest() {
-        let refused = "3.141592653589793".parse::<FrequencyRatio>().unwrap_err();
+        let pi = std::f64::consts::PI;
+        let refused = FrequencyRatio::of(pi).unwrap_err();
         let best = (1..=LARGEST.0)
             .map(|q| ((std::f64::consts::PI * f64::from(q)).round(), q))
             .min_by(|a, b| {
@@ -279,8 +302,11 @@ mod tests {
                 .to_string()
                 .ends_with(&format!("{}/{}", best.0, best.1))
         );
+        let unlocked: FrequencyRatio = "3.141592653589793".parse().unwrap();
+        assert!(!unlocked.repeats() && unlocked.value() == pi);
+        assert_eq!(unlocked.to_string().parse(), Ok(unlocked));
         for given in [
-            "", "x", "1/0", "0/3", "-2", "2/2", "1", "1/2001", "nan", "1e300", "20001/2",
+            "0.000123", "31415.9265", "", "x", "1/0", "0/3", "-2", "2/2", "1", "1/2001", "nan", "1e300", "20001/2",
         ] {
             assert!(given.parse::<FrequencyRatio>().is_err(), "{given}");
         }

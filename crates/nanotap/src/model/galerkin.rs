@@ -109,7 +109,7 @@ impl Galerkin {
     /// [`CantileverError`] if the case is not valid.
     pub fn new(case: &Cantilever) -> Result<Self, CantileverError> {
         case.validate()?;
-        let modes = Modes::shared(case.modes)?;
+        let modes = Modes::of(case)?;
         let corrections = Correction::all(case, &modes, None);
         let mut equations = Coefficients::of(case).assemble(&modes);
         equations.correct(case, &corrections, None);
@@ -194,7 +194,7 @@ impl Forcing {
 struct Tone<N> {
     /// Force along p: sine, cosine.
     tip: [N; 2],
-    /// Force along I, spread over the beam: sine, cosine.
+    /// Force along I, or along L where the drive is spread over the beam: sine, cosine.
     spread: [N; 2],
     /// Contribution to the gap V_T: sine, cosine.
     gap: [N; 2],
@@ -290,6 +290,8 @@ struct Coefficients {
     beam_stiffness: f64,
     contact_stiffness: f64,
     tones: Vec<Tone<f64>>,
+    /// Whether the drive is spread over the beam.
+    is_distributed: bool,
     /// Constant force that contact adds along p.
     contact_constant: f64,
     gap_tip: f64,
@@ -320,6 +322,7 @@ impl Coefficients {
             tones: Which::all(case)
                 .map(|which| Tone::new(case, &dual, which).map(number))
                 .collect(),
+            is_distributed: case.actuation == Actuation::Distributed,
             contact_constant: number(-(dual(Parameter::Alpha4) * dual(Parameter::Alpha5))),
             gap_tip: number(one),
             gap_constant: number(dual(Parameter::Alpha5)),
@@ -328,7 +331,12 @@ impl Coefficients {
 
     fn assemble(&self, modes: &Modes) -> GalerkinDerivative {
         let count = modes.count();
-        let (p, i) = (&modes.tip, &modes.integral);
+        let p = &modes.tip;
+        let i = if self.is_distributed {
+            &modes.even_load
+        } else {
+            &modes.integral
+        };
         // diag(d) + load ppᵀ
         let loaded = |diagonal: &dyn Fn(usize) -> f64, load: f64| {
             DMatrix::from_fn(count, count, |row, column| {

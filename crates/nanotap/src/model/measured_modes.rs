@@ -16,12 +16,16 @@
 //! moves by y carries the mode along by (α₁p + I)·v y: mass and damping act on the sum.
 //!
 //! Limitation: measured numbers of a mode that the case does not have are ignored.
+//!
+//! The modes of a lever that was measured as a whole (see [`lever_mode`](crate::model::lever_mode)) are
+//! already those of the equations; only the damping of each is corrected here.
 
 use nalgebra::{DMatrix, DVector};
 
 use crate::model::beam::Modes;
 use crate::model::cantilever::Cantilever;
 use crate::model::contact::dual::Dual;
+use crate::model::lever_mode::LeverMode;
 use crate::model::parameter::Parameter;
 use nanotap_arithmetic::Scalar as _;
 
@@ -48,8 +52,16 @@ impl Correction {
         if !case.has_measured_modes() {
             return Vec::new();
         }
-        let free = FreeModes::of(case, beam);
         let dual = |number| case.dual(number, parameter);
+        if !case.lever_modes.is_empty() {
+            let modes = case.lever_modes.iter().take(case.modes).enumerate();
+            let damped = modes.filter(|(_, mode)| mode.quality > 0.0);
+            let correction = |(j, mode): (usize, &LeverMode)| {
+                Self::of_damping(beam, j, mode, dual(Parameter::Alpha3))
+            };
+            return damped.map(correction).collect();
+        }
+        let free = FreeModes::of(case, beam);
         let measured = |p| Some(dual(p)).filter(|number| number.value != 0.0);
         let of_mode = |k: usize, [frequency, quality]: [Parameter; 2], stiffness: Option<Dual>| {
             let frequency = measured(frequency);
@@ -73,6 +85,20 @@ impl Correction {
         .into_iter()
         .flatten()
         .collect()
+    }
+
+    /// The damping of mode `j` of a measured lever, in place of α₃.
+    fn of_damping(beam: &Modes, j: usize, mode: &LeverMode, alpha3: Dual) -> Self {
+        let mut row = DVector::zeros(beam.count());
+        row[j] = 1.0;
+        Self {
+            row_change: DVector::zeros(beam.count()),
+            row,
+            base: Dual::constant(beam.integral[j]),
+            mass: Dual::constant(0.0),
+            damping: Dual::constant(mode.frequency / mode.quality) - alpha3,
+            stiffness: Dual::constant(0.0),
+        }
     }
 
     /// `number` times uuᵀ, or the derivative of that.

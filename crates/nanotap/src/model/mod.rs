@@ -19,6 +19,7 @@ pub mod exact_beam;
 mod fixed_point;
 pub mod galerkin;
 mod grazed;
+pub mod lever_mode;
 mod measured_modes;
 pub mod model_map;
 mod motion_error;

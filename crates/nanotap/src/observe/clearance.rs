@@ -217,8 +217,8 @@ impl RecordedBeam<'_> {
     fn slope(&self, lowest: &Clearance) -> Option<f64> {
         let time = lowest.period * self.model.period();
         let state = self.recording.state_at(time)?;
-        let slopes = self.beam.modes.iter().map(|mode| mode.slope(lowest.xi));
-        Some(slopes.zip(&state).map(|(slope, a)| slope * a).sum())
+        let slopes = self.beam.modes.slopes(lowest.xi);
+        Some(slopes.iter().zip(&state).map(|(slope, a)| slope * a).sum())
     }
 }
 

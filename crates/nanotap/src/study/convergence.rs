@@ -100,7 +100,12 @@ pub fn convergence(
     options: &ConvergenceOptions,
     control: &Control<'_>,
 ) -> Result<Convergence, ModelError> {
-    let (largest, tolerance) = (options.largest, options.tolerance);
+    let tolerance = options.tolerance;
+    // A lever whose modes were measured has no further ones.
+    let largest = match case.lever_modes.len() {
+        0 => options.largest,
+        measured => options.largest.min(measured),
+    };
     let mut orbits: Vec<Option<OrbitReport>> = Vec::new();
     let mut motions = Vec::new();
     let models: Vec<Model> = (1..=largest)

@@ -116,6 +116,8 @@ pub trait Study {
     const COUNTED: &'static str = "steps";
     /// Whether the study chooses distances itself, so that none is solved for a setpoint.
     const ANY_DISTANCE: bool = false;
+    /// Whether the tones of the drive may have any ratio, so that they never repeat together.
+    const ANY_RATIO: bool = false;
     /// Whether the report of cancelled work holds the finished part, and states that it is a part.
     const PARTIAL: bool = false;
 
@@ -139,6 +141,9 @@ pub trait Study {
         options: &Self::Options,
         control: &Control<'_>,
     ) -> Result<Self::Report, Error> {
+        if !Self::ANY_RATIO {
+            case.repeats()?;
+        }
         let report = Self::compute(&case.cancelled_by(control), options, control);
         if control.is_cancelled() && !(Self::PARTIAL && report.is_ok()) {
             return Err(Error::stopped());
@@ -187,6 +192,7 @@ pub trait DatasetStudy {
         options: &Self::Options,
         control: &Control<'_>,
     ) -> Result<DatasetPlan, Error> {
+        case.repeats()?;
         let plan = Self::prepare(&case.cancelled_by(control), options, control);
         if control.is_cancelled() {
             return Err(Error::stopped());

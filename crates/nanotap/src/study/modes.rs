@@ -32,9 +32,10 @@ pub struct ModeTable {
     pub free: Vec<f64>,
     /// Frequencies Ω of the Galerkin equations in contact, dimensionless.
     pub contact: Vec<f64>,
-    /// Frequencies Ω of the exact beam in free flight, dimensionless.
+    /// Frequencies Ω of the exact beam in free flight, dimensionless; empty for a lever whose modes
+    /// were measured, which is not a uniform beam.
     pub exact_free: Vec<f64>,
-    /// Frequencies Ω of the exact beam in contact, dimensionless.
+    /// Frequencies Ω of the exact beam in contact, dimensionless; empty as those in free flight.
     pub exact_contact: Vec<f64>,
     /// Quality factors of the free modes, |λ|/(2 |Re λ|); infinite (`null`) without damping,
     /// `None` where not every mode oscillates.
@@ -67,7 +68,15 @@ impl ModeTable {
     /// When the case is not valid.
     pub fn new(case: &Cantilever) -> Result<Self, Error> {
         case.validate()?;
-        let beam = Modes::new(case.modes).map_err(CantileverError::from)?;
+        let beam = Modes::of(case).map_err(CantileverError::from)?;
+        // Nothing tells of more modes of a lever than were measured.
+        let exact = |stiffness| {
+            if case.lever_modes.is_empty() {
+                exact_beam::frequencies(case.alpha1, stiffness, case.modes)
+            } else {
+                Ok(Vec::new())
+            }
+        };
         // Measured modes fill the matrices.
         let dense = if case.has_measured_modes() {
             Some(Galerkin::new(case)?)
@@ -100,8 +109,8 @@ impl ModeTable {
             quality,
             free: galerkin(Regime::Free)?,
             contact: galerkin(Regime::Contact)?,
-            exact_free: exact_beam::frequencies(case.alpha1, 0.0, case.modes)?,
-            exact_contact: exact_beam::frequencies(case.alpha1, case.alpha4, case.modes)?,
+            exact_free: exact(0.0)?,
+            exact_contact: exact(case.alpha4)?,
             free_eigenvalues,
             contact_eigenvalues: eigenvalues(Regime::Contact),
             physical: None,
@@ -137,6 +146,7 @@ impl Study for ModesStudy {
     const NAME: &'static str = "modes";
     const ABOUT: &'static str =
         "Compute mode shapes and frequencies, in free flight and in contact";
+    const ANY_RATIO: bool = true;
     type Options = ModesOptions;
     type Report = ModeTable;
 

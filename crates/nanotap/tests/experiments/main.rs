@@ -13,6 +13,7 @@ mod fit;
 mod force_curve_fit;
 mod identities;
 mod levers;
+mod measured_modes;
 mod modes_that_matter;
 mod noise;
 mod physical_quantities;

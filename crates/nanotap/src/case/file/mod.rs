@@ -34,7 +34,9 @@ use crate::case::key::{Key, Takes};
 use crate::input::{self, MAX_CASE_BYTES, Origin};
 
 /// The keys that take a table.
-const TABLES: [Key; 4] = [
+const TABLES: [Key; 6] = [
+    Key::LeverModes,
+    Key::ModelLeverModes,
     Key::SampleTable,
     Key::SampleArms,
     Key::SampleRelaxationArms,
@@ -95,6 +97,10 @@ fn table(key: Key, path: &Path, origin: Origin, place: Place) -> Result<Value, P
                 Takes::Arms => "name a CSV file with columns of time and modulus",
                 Takes::Springs | Takes::ModelArms => {
                     "name a CSV file with columns of time and stiffness"
+                }
+                Takes::LeverModes => "name a CSV file with columns f (kHz), k (N/m) and Q",
+                Takes::ModelLeverModes => {
+                    "name a CSV file with columns of frequency, stiffness and quality"
                 }
                 _ => "name a CSV file with columns of gap and force",
             }

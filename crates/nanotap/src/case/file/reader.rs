@@ -12,6 +12,7 @@ use crate::case::stated::{Origin, Replaced, Said, Stated, Value};
 use crate::model::cantilever::{self, Cantilever, CosineTerm};
 use crate::model::contact::ContactLaw;
 use crate::model::drive_form::Actuation;
+use crate::model::lever_mode::LeverMode;
 use crate::model::oscillator::{Oscillator, OscillatorParameter, Stop};
 use crate::model::parameter::Parameter;
 
@@ -221,7 +222,7 @@ fn value(key: Key, entry: &Entry) -> Result<Value, Problem> {
         Takes::Word(words) => key
             .read(text)
             .map_err(|_| refusal::not_among(entry, text, words)),
-        takes @ Takes::ModelArms => {
+        takes @ (Takes::ModelArms | Takes::ModelLeverModes) => {
             let read = match &entry.value {
                 Written::Rows(rows) => takes.of_table(rows),
                 _ => takes.parse_table(text),
@@ -246,17 +247,19 @@ fn value(key: Key, entry: &Entry) -> Result<Value, Problem> {
 
 fn physical_value(key: Key, entry: &Entry) -> Result<Value, Problem> {
     let at = |message: String| Problem::new(entry.value_place.clone(), message);
-    if let (takes @ (Takes::Table | Takes::Arms | Takes::Springs), Written::Rows(rows)) =
-        (key.entry().takes, &entry.value)
-    {
+    let takes = key.entry().takes;
+    if let (true, Written::Rows(rows)) = (takes.is_table(), &entry.value) {
         return takes
             .of_table(rows)
             .map_err(|error| at(format!("{key}: {error}")).help(error.remedy));
     }
     let Some(text) = entry.text() else {
         let what = entry.value.noun();
-        return Err(at(format!("`{key}` = {} is {what}", entry.written))
-            .help("write a quantity with its unit, in quotes, or a plain number"));
+        let help = match takes {
+            Takes::LeverModes => crate::case::lever_modes::SHAPE,
+            _ => "write a quantity with its unit, in quotes, or a plain number",
+        };
+        return Err(at(format!("`{key}` = {} is {what}", entry.written)).help(help));
     };
     let value = key.read(&text).map_err(|error| {
         use crate::case::stated::ValueError;
@@ -317,11 +320,21 @@ pub(crate) fn word<T: core::default::Default + std::str::FromStr>(
     }
 }
 
-/// Number of beam modes, stated or default.
+/// Number of modes: stated, that of the measured modes, or the default for a beam.
 pub(crate) fn modes(stated: &Stated) -> usize {
-    stated
-        .number(Key::Modes)
-        .map_or(crate::case::DEFAULT_MODES, |modes| modes as usize)
+    let measured = lever_modes(stated).map(<[LeverMode]>::len);
+    let default = || measured.unwrap_or(crate::case::DEFAULT_MODES);
+    let number = stated.number(Key::Modes);
+    number.map_or_else(default, |modes| modes as usize)
+}
+
+/// The measured modes of the lever, if they are stated.
+fn lever_modes(stated: &Stated) -> Option<&[LeverMode]> {
+    let keys = [Key::LeverModes, Key::ModelLeverModes];
+    keys.into_iter().find_map(|key| match stated.get(key)? {
+        Value::LeverModes(modes) => Some(modes.modes()),
+        _ => None,
+    })
 }
 
 fn cantilever(
@@ -379,7 +392,8 @@ fn cantilever(
         let points = arms.arms().points().iter();
         case.arms = points.map(|&(time, stiffness)| [time, stiffness]).collect();
     }
-    for error in [case.check_arms(), case.check_tones()]
+    case.lever_modes = lever_modes(stated).unwrap_or_default().to_vec();
+    for error in [case.check_arms(), case.check_tones(), case.check_lever_modes()]
         .into_iter()
         .filter_map(Result::err)
     {

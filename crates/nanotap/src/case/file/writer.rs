@@ -8,6 +8,7 @@ use toml::de::DeTable;
 
 use super::json;
 use crate::case::key::{Key, Section};
+use crate::case::lever_modes::LeverModes;
 use crate::case::physical::Catalogue;
 use crate::case::quantity::Kind;
 use crate::case::stated::{Stated, Value};
@@ -44,6 +45,10 @@ pub fn to_toml(case: &Cantilever) -> String {
             case.contact,
             case.contact.meaning()
         );
+    }
+    if let Some(modes) = LeverModes::of_model(&case.lever_modes) {
+        let key = Key::ModelLeverModes;
+        let _ = writeln!(text, "{key} = {}", modes.text());
     }
     if !case.arms.is_empty() {
         let arms = case.arms.iter();
@@ -126,7 +131,10 @@ fn quantities_text(stated: &Stated) -> String {
         }
         let plain = matches!(
             value,
-            Value::Number(_, Kind::Number) | Value::Table(_) | Value::Arms(_)
+            Value::Number(_, Kind::Number)
+                | Value::Table(_)
+                | Value::Arms(_)
+                | Value::LeverModes(_)
         );
         let value = value.text();
         let value = if plain { value } else { quoted(&value) };

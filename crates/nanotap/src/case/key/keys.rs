@@ -315,13 +315,22 @@ Before from Parameter::COUNT => {
         ..PLAIN
     };
 
+    ModelLeverModes = Entry {
+        name: "lever_modes",
+        takes: Takes::ModelLeverModes,
+        models: CANTILEVER,
+        meaning: "measured modes of the lever in place of the uniform beam's: frequency, as omega, stiffness at the tip k·L³/(EI), and quality factor (0: as beam_damping has it) of each, and its participation in the motion of the base",
+        ..PLAIN
+    };
+
+    LeverModes = other(Cantilever, "mode", Takes::LeverModes, "measured modes of the lever in place of a beam: a table with f, k at the tip, Q and, if it is known, participation in the motion of the base for each");
     LeverName = other(Cantilever, "lever", Takes::LeverName, "a lever of the catalogue, whose values hold where none are given");
     LeverK = quantity(Cantilever, "k", Stiffness, R::POSITIVE, "static spring constant at the tip, 3EI/L³")
         .label("spring constant $k$");
     LeverK1 = quantity(Cantilever, "k1", Stiffness, R::POSITIVE, "stiffness of the first mode at the tip, as thermal tunes and point-mass models give it: 1.0302 k without a tip's mass");
     LeverF0 = quantity(Cantilever, "f0", Frequency, R::POSITIVE, "first free resonance, with the tip")
         .label("resonance frequency $f_0$");
-    LeverF2 = quantity(Cantilever, "f2", Frequency, R::POSITIVE, "second free resonance, from which a tip mass that is not given follows")
+    LeverF2 = quantity(Cantilever, "f2", Frequency, R::POSITIVE, "second free resonance: the frequency of the second mode, from which the tip's mass follows where neither that nor k2 is given")
         .feeds(Parameter::Mode2Frequency);
     LeverF3 = quantity(Cantilever, "f3", Frequency, R::POSITIVE, "third free resonance")
         .feeds(Parameter::Mode3Frequency);
@@ -540,6 +549,35 @@ After from AFTER_LAWS => {
 
 /// Groups of keys that exclude each other, because each determines the same quantity.
 pub(super) static ALTERNATIVES: &[Alternatives] = &[
+    Alternatives {
+        ways: &[
+            &[Key::LeverModes],
+            &[
+                Key::LeverName,
+                Key::LeverK,
+                Key::LeverK1,
+                Key::LeverF0,
+                Key::LeverF2,
+                Key::LeverF3,
+                Key::LeverQ,
+                Key::LeverQ2,
+                Key::LeverQ3,
+                Key::LeverK2,
+                Key::LeverK3,
+                Key::FluidDensity,
+                Key::FluidViscosity,
+                Key::LeverHeight,
+                Key::LeverWidth,
+                Key::LeverThickness,
+                Key::LeverModulus,
+                Key::LeverDensity,
+                Key::TipMass,
+                Key::TipMassRatio,
+                Key::TipShape,
+            ],
+        ],
+        reason: "a lever is either a beam with its tip or the modes that were measured with the tip on it",
+    },
     Alternatives {
         ways: &[&[Key::LeverQ], &[Key::FluidDensity, Key::FluidViscosity]],
         reason: "the fluid tells the quality factor",

@@ -156,6 +156,25 @@ pub enum Takes {
     Springs,
     /// Rows of time and stiffness as numbers of the model.
     ModelArms,
+    /// Measured modes of a lever, or the name of a CSV file of them.
+    LeverModes,
+    /// Measured modes of a lever as numbers of the model.
+    ModelLeverModes,
+}
+
+impl Takes {
+    /// Whether the value is a table of rows.
+    pub const fn is_table(self) -> bool {
+        matches!(
+            self,
+            Self::Table
+                | Self::Arms
+                | Self::Springs
+                | Self::ModelArms
+                | Self::LeverModes
+                | Self::ModelLeverModes
+        )
+    }
 }
 
 /// Range of the values of a key.
@@ -492,6 +511,7 @@ impl Key {
             Takes::Springs | Takes::ModelArms => {
                 Some("it is a table; vary relaxation_stiffness_factor or relaxation_time_factor")
             }
+            Takes::LeverModes | Takes::ModelLeverModes => Some("it is a table"),
             Takes::Word(_) | Takes::Law | Takes::LeverName | Takes::MaterialName => {
                 Some("it is a name, not a quantity")
             }

@@ -5,7 +5,7 @@ use super::reader::Reader;
 use crate::case::key::Key;
 use crate::case::quantity::Kind;
 use crate::case::stated::Value;
-use crate::model::drive_form::{Actuation, FrequencyRatio, MAX_TONES, RatioError};
+use crate::model::drive_form::{Actuation, FrequencyRatio, MAX_TONES};
 
 /// A quantity that one of several keys states: the key, and its value in SI.
 pub(crate) type Given = (Key, f64);
@@ -82,7 +82,7 @@ pub(crate) struct FurtherTone {
 /// The frequency of a further tone.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum ToneFrequency {
-    /// Frequency, Hz; it must have a ratio of small whole numbers to that of the first tone.
+    /// Frequency, Hz.
     Hertz(f64),
     /// Ratio to the frequency of the first tone.
     Ratio(FrequencyRatio),
@@ -95,22 +95,11 @@ impl FurtherTone {
             ToneFrequency::Ratio(ratio) => return Ok(ratio),
             ToneFrequency::Hertz(own) => own,
         };
-        FrequencyRatio::of(own / frequency).map_err(|error| {
-            let nearest = match &error {
-                RatioError::Irrational { nearest, .. } => format!(
-                    ", or drive.{}_frequency = {}",
-                    self.keys.word,
-                    Kind::Frequency.format_digits(nearest.value() * frequency, 12)
-                ),
-                _ => String::new(),
-            };
+        FrequencyRatio::any(own / frequency).map_err(|error| {
             PhysicalError::impossible(
                 self.keys.frequency,
                 Kind::Frequency.format_digits(own, 12),
-                format!(
-                    "{error}; say that by drive.{}_ratio{nearest}",
-                    self.keys.word
-                ),
+                error.to_string(),
             )
         })
     }

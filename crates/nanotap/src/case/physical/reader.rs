@@ -5,6 +5,7 @@ use super::elastic::Elastic;
 use super::error::PhysicalError;
 use crate::case::force_table::{ArmTable, ForceTable};
 use crate::case::key::Key;
+use crate::case::lever_modes::LeverModes;
 use crate::case::stated::{Stated, Value};
 use crate::model::drive_form::FrequencyRatio;
 
@@ -69,6 +70,14 @@ impl<'a> Reader<'a> {
     pub(crate) fn arms(self, key: Key) -> Option<&'a ArmTable> {
         match self.stated.get(key)? {
             Value::Arms(arms) => Some(arms),
+            _ => None,
+        }
+    }
+
+    /// The measured modes of the lever; `None` if there are none.
+    pub(crate) fn lever_modes(self) -> Option<&'a LeverModes> {
+        match self.stated.get(Key::LeverModes)? {
+            Value::LeverModes(modes) => Some(modes),
             _ => None,
         }
     }

@@ -35,7 +35,8 @@ impl Physical {
                 known.name, known.source
             )));
         }
-        if self.tip.mass.is_none() && !reader.has(Key::LeverF2) {
+        let is_beam = self.lever_modes().is_empty();
+        if is_beam && self.tip.mass.is_none() && !reader.has(Key::LeverF2) {
             remarks.push(Remark::note(
                 "no tip mass is given: taken as zero (cantilever.f2, tip.mass, tip.mass_ratio \
                  or tip.shape would tell it)",
@@ -56,6 +57,23 @@ impl Physical {
             remarks.push(Remark::note(format!(
                 "{why}: the second mode has the frequency f2, {} of the uniform beam's",
                 Kind::Number.format_digits(share, 4)
+            )));
+        }
+        let modes = self.lever_modes().iter().take(self.cantilever.modes);
+        let unknown = modes.filter(|mode| mode.participation.is_none()).count();
+        let drive = match self.cantilever.actuation {
+            Actuation::Base => "the motion of the base",
+            Actuation::Distributed => "a force spread over the lever",
+            Actuation::Tip => "",
+        };
+        let is_assumed = match self.cantilever.actuation {
+            Actuation::Base => unknown > 0,
+            Actuation::Distributed => true,
+            Actuation::Tip => false,
+        };
+        if !is_beam && is_assumed {
+            remarks.push(Remark::note(format!(
+                "the measured modes take part in {drive} like those of a uniform beam"
             )));
         }
         remarks.extend(self.lever.remarks(&self.data));

@@ -101,6 +101,7 @@ fn data(tip_mass: TipMass) -> LeverData {
         modulus: None,
         density: None,
         tip_mass,
+        length: None,
         modes: 3,
     }
 }
@@ -1230,8 +1231,10 @@ fn laws_and_drives_are_refused_with_what_would_be_right() {
             &[
                 ("drive", "second_frequency", "411.5237 kHz"),
                 ("drive", "second_amplitude", "1 nm"),
+                ("drive", "third_ratio", "3"),
+                ("drive", "third_amplitude", "1 nm"),
             ],
-            "the nearest is",
+            "ratios of whole numbers for all of three",
         ),
         (
             &[("drive", "second_ratio", "25/4")],

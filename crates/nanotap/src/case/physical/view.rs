@@ -15,11 +15,13 @@ use super::sample::Sample;
 use super::tip::Tip;
 use crate::case::file::{modes, word};
 use crate::case::key::{Key, Laws, ModelKind};
+use crate::case::lever_modes::LeverModes;
 use crate::case::quantity::Kind;
 use crate::case::stated::{Stated, Value};
 use crate::model::cantilever::Cantilever;
 use crate::model::drive_form::{Actuation, Hold};
 use crate::model::exact_beam;
+use crate::model::lever_mode::LeverMode;
 use crate::model::parameter::{Numbers, Parameter, Unit};
 
 /// Default height of the tip; tips of silicon levers are 10 to 15 µm high.
@@ -67,6 +69,8 @@ pub struct Physical {
     /// Stated data of the lever, from which `lever` was determined.
     pub(super) data: LeverData,
     pub(super) tip: Tip,
+    /// Measured modes of the lever in Hz and N/m, if they replace the beam.
+    lever_modes: Option<LeverModes>,
 }
 
 impl Physical {
@@ -115,6 +119,11 @@ impl Physical {
             Actuation::Tip => "force at the tip",
             Actuation::Distributed => "force on the lever",
         }
+    }
+
+    /// Returns the measured modes of the lever in Hz and N/m; none for a beam.
+    pub fn lever_modes(&self) -> &[LeverMode] {
+        self.lever_modes.as_ref().map_or(&[], LeverModes::modes)
     }
 
     /// True if a fluid determines mass and damping.
@@ -168,10 +177,13 @@ impl Physical {
         }
         Some(match key {
             Key::LeverK => self.lever.k,
-            Key::LeverK1 => self.lever.modal_stiffness()?,
+            Key::LeverK1 => match self.lever_modes().first() {
+                Some(first) => first.stiffness,
+                None => self.lever.modal_stiffness()?,
+            },
             Key::LeverF0 => self.lever.f0,
             Key::LeverQ => self.lever.quality_factor,
-            Key::LeverLength => self.data.geometry?.length,
+            Key::LeverLength => self.lever.length?,
             Key::LeverWidth => self.data.geometry?.width,
             Key::LeverThickness => self.data.geometry?.thickness,
             Key::TipMass => quantity(Parameter::Alpha1),
@@ -275,6 +287,7 @@ fn mapped(reader: Reader<'_>, known: Option<Lever>) -> Result<Physical, Physical
         contact: sample.law,
         actuation: drive.actuation,
         further_tones: ratios.collect::<Result<_, _>>()?,
+        lever_modes: lever_modes(reader, &lever),
         ..Cantilever::paper()
     };
     // The free response does not depend on g0, so any length serves as unit here: g0 = 1 m,
@@ -382,7 +395,20 @@ fn mapped(reader: Reader<'_>, known: Option<Lever>) -> Result<Physical, Physical
         tip_height: beam_gap - tip_gap,
         data,
         tip,
+        lever_modes: reader.lever_modes().cloned(),
     })
+}
+
+/// The measured modes of the lever in the units of the model. The damping of the first is that of α₃.
+fn lever_modes(reader: Reader<'_>, lever: &Lever) -> Vec<LeverMode> {
+    let modes = reader.lever_modes().map_or(&[][..], LeverModes::modes);
+    let in_model = |(j, mode): (usize, &LeverMode)| LeverMode {
+        frequency: TAU * mode.frequency * lever.time_unit(),
+        stiffness: 3.0 * mode.stiffness / lever.k,
+        quality: if j == 0 { 0.0 } else { mode.quality },
+        participation: mode.participation,
+    };
+    modes.iter().enumerate().map(in_model).collect()
 }
 
 /// Measured data of the second and third mode, in SI; 0 if there are none.
@@ -401,8 +427,8 @@ fn measured_modes(
             return Err(reader.impossible(
                 key,
                 format!(
-                    "no lever is so far from a uniform beam, whose frequency is {}: it must lie \
-                     within a factor of two of that",
+                    "the uniform beam's frequency is {}: it must lie within a factor of two of \
+                     that; state the modes of another lever by [[cantilever.mode]]",
                     Kind::Frequency.format_digits(own, 4)
                 ),
             ));
@@ -437,6 +463,7 @@ fn free_case(lever: &Lever, frequency: f64, like: &Cantilever) -> Cantilever {
         omega: TAU * frequency * lever.time_unit(),
         cosine_term: like.cosine_term,
         actuation: like.actuation,
+        lever_modes: like.lever_modes.clone(),
         ..Cantilever::paper()
     }
 }

@@ -275,6 +275,7 @@ impl Study for BimodalStudy {
         "Follow AM–FM, FM–FM and other bimodal operation against the distance";
     const COUNTED: &'static str = "distances";
     const ANY_DISTANCE: bool = true;
+    const ANY_RATIO: bool = true;
     type Options = BimodalOptions;
     type Report = BimodalReport;
 

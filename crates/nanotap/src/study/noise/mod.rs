@@ -24,7 +24,7 @@ use crate::control::Control;
 use crate::model::cantilever::Cantilever;
 use crate::model::galerkin::Galerkin;
 use crate::model::parameter::Parameter;
-use crate::model::{Model, beam::Modes};
+use crate::model::Model;
 use crate::observe::{Derivative, ObservableSet};
 use crate::study::orbit::{OrbitOptions, OrbitReport, OrbitStudy};
 use crate::study::request::options;
@@ -199,13 +199,12 @@ impl Study for NoiseStudy {
         }
         let scales = view.scales;
         let time_constant = options.time_constant()?;
+        let equations = Galerkin::new(lever)
+            .map_err(|error| Error::input(error.to_string(), "change the case"))?;
         let thermal = Thermal {
-            equations: Galerkin::new(lever)
-                .map_err(|error| Error::input(error.to_string(), "change the case"))?,
             energy: BOLTZMANN * options.temperature / scales.energy,
-            tip: Modes::new(lever.modes)
-                .map_err(|error| Error::input(error.to_string(), "change {modes}"))?
-                .shapes(1.0),
+            tip: equations.modes.shapes(1.0),
+            equations,
         };
         let lock_in = LockIn {
             time_constant: time_constant / scales.time,

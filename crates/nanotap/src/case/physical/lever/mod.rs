@@ -14,6 +14,7 @@ use std::f64::consts::TAU;
 use serde::Serialize;
 
 use crate::case::key::Key;
+use crate::case::lever_modes::LeverModes;
 pub use crate::case::physical::beam_geometry::BeamGeometry;
 use crate::case::physical::error::PhysicalError;
 use crate::case::physical::fluid::Fluid;
@@ -45,11 +46,32 @@ pub struct LeverData {
     pub density: Option<f64>,
     /// Mass at the end of the beam.
     pub tip_mass: TipMass,
+    /// Length of the lever, m, where it is known without the other dimensions.
+    pub length: Option<f64>,
     /// Number of beam modes of the model.
     pub modes: usize,
 }
 
 impl LeverData {
+    /// The data of a lever whose modes were measured: its model has the units of the uniform beam with its
+    /// static spring constant and first resonance.
+    fn of_modes(modes: &LeverModes, length: Option<f64>) -> Self {
+        let first = modes.modes().first();
+        Self {
+            k: Some(modes.static_stiffness()),
+            k1: None,
+            f0: first.map(|mode| mode.frequency),
+            quality_factor: first.map(|mode| mode.quality),
+            fluid: None,
+            geometry: None,
+            modulus: None,
+            density: None,
+            tip_mass: TipMass::Absolute(0.0),
+            length,
+            modes: modes.modes().len(),
+        }
+    }
+
     /// The spring constant that follows from dimensions and modulus, N/m.
     fn bending(&self) -> Option<f64> {
         Some(self.geometry?.stiffness(self.modulus?))
@@ -145,7 +167,7 @@ impl Lever {
                 .f0
                 .unwrap_or(first_frequency(ratio, &bare) / (TAU * time)),
             quality_factor: data.quality_factor.unwrap_or(f64::INFINITY),
-            length: data.geometry.map(|geometry| geometry.length),
+            length: data.length.or(data.geometry.map(|geometry| geometry.length)),
             modes,
         };
         match (data.fluid, data.geometry) {
@@ -549,6 +571,9 @@ impl LeverData {
         lever: Option<&super::catalogue::Lever>,
         tip_mass: Option<TipMass>,
     ) -> Result<Self, PhysicalError> {
+        if let Some(modes) = reader.lever_modes() {
+            return Ok(Self::of_modes(modes, reader.number(Key::LeverLength)?));
+        }
         let fluid = Fluid::read(reader)?;
         let quality_factor = reader.number(Key::LeverQ)?;
         if quality_factor.is_none() && fluid.is_none() {
@@ -584,6 +609,7 @@ impl LeverData {
             modulus: reader.number(Key::LeverModulus)?,
             density: reader.number(Key::LeverDensity)?,
             tip_mass,
+            length: None,
             modes,
         })
     }

@@ -145,7 +145,12 @@ fn frequencies(
             Some(exact) => [frequency(*exact), number::percent(galerkin / exact - 1.0)],
             None => [String::new(), String::new()],
         };
-        let mut row = vec![(index + 1).to_string(), frequency(*galerkin), exact, difference];
+        let mut row = vec![
+            (index + 1).to_string(),
+            frequency(*galerkin),
+            exact,
+            difference,
+        ];
         if let Some(eigenvalue) = paired.map(|list| list[index]) {
             row.push(frequency(eigenvalue[1]));
             row.push(number::significant(damping_ratio(eigenvalue), 4));

@@ -136,7 +136,7 @@ pub struct PhysicalSummary {
 }
 
 /// A measured mode of a lever, as the case states it.
-#[derive(Clone, Copy, Debug, Serialize)]
+#[derive(Clone, Copy, Debug, Serialize, JsonSchema)]
 pub struct LeverModeDocument {
     /// Undamped frequency of the free mode, Hz.
     pub f: f64,

@@ -383,7 +383,10 @@ pub(crate) fn table_of(value: &DeValue<'_>) -> Option<Table> {
         let DeValue::Array(fields) = row.get_ref() else {
             return None;
         };
-        fields.iter().map(|field| text_of(field.get_ref())).collect()
+        fields
+            .iter()
+            .map(|field| text_of(field.get_ref()))
+            .collect()
     };
     let (first, rest) = rows.split_first()?;
     let header = fields(first)?;

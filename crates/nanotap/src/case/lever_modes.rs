@@ -24,8 +24,7 @@ use crate::model::beam::MAX_MODES;
 use crate::model::lever_mode::LeverMode;
 
 /// Syntax of the modes of a physical lever, for remedies.
-pub(crate) const SHAPE: &str =
-    "write each mode as in mode = [{f = \"75 kHz\", k = \"2.8 N/m\", Q = 200}], or as a table \
+pub(crate) const SHAPE: &str = "write each mode as in mode = [{f = \"75 kHz\", k = \"2.8 N/m\", Q = 200}], or as a table \
      [[cantilever.mode]] with f, k and Q";
 /// Syntax of the modes of a dimensionless lever, for remedies.
 pub(crate) const MODEL_SHAPE: &str =
@@ -77,7 +76,11 @@ impl LeverModes {
         [
             number(&["f", "frequency"], Kind::Frequency, true),
             number(&["k", "stiffness"], Kind::Stiffness, true),
-            number(&["Q", "quality", "quality factor"], Kind::Number, is_physical),
+            number(
+                &["Q", "quality", "quality factor"],
+                Kind::Number,
+                is_physical,
+            ),
             number(&["participation"], Kind::Number, false),
         ]
     }
@@ -90,24 +93,37 @@ impl LeverModes {
         let shape = if is_physical { SHAPE } else { MODEL_SHAPE };
         let refuse = |message: String| ForceTableError::new(message, shape);
         let columns = Self::columns(is_physical);
-        let headers: Vec<Header> = table.columns.iter().map(|(name, _)| Header::of(name)).collect();
+        let headers: Vec<Header> = table
+            .columns
+            .iter()
+            .map(|(name, _)| Header::of(name))
+            .collect();
         let is = |column: &Column, header: &Header| {
             let name = header.name.to_lowercase();
-            column.names.iter().any(|other| other.to_lowercase() == name)
+            column
+                .names
+                .iter()
+                .any(|other| other.to_lowercase() == name)
         };
         for (header, (written, _)) in headers.iter().zip(&table.columns) {
             if !columns.iter().any(|column| is(column, header)) {
-                let names = columns.iter().map(|column| column.names[usize::from(!is_physical)
-                    .min(column.names.len() - 1)]);
+                let names = columns.iter().map(|column| {
+                    column.names[usize::from(!is_physical).min(column.names.len() - 1)]
+                });
                 let meant = near_name(&header.name, names.clone());
                 let hint = meant.map_or_else(
                     || format!("it has {}", names.collect::<Vec<_>>().join(", ")),
                     |meant| format!("did you mean `{meant}`?"),
                 );
-                return Err(refuse(format!("`{written}` is not a number of a mode; {hint}")));
+                return Err(refuse(format!(
+                    "`{written}` is not a number of a mode; {hint}"
+                )));
             }
         }
-        let count = table.columns.first().map_or(0, |(_, entries)| entries.len());
+        let count = table
+            .columns
+            .first()
+            .map_or(0, |(_, entries)| entries.len());
         if !(1..=MAX_MODES).contains(&count) {
             return Err(refuse(format!("{count} modes; expected 1 to {MAX_MODES}")));
         }
@@ -132,7 +148,8 @@ impl LeverModes {
                 }
             };
             let read = column.kind.parse(&text);
-            read.map(Some).map_err(|error| at(format!("{name}: {error}")))
+            read.map(Some)
+                .map_err(|error| at(format!("{name}: {error}")))
         };
         let [frequency, stiffness, quality, participation] = &columns;
         let mode = |row: usize| {
@@ -144,7 +161,10 @@ impl LeverModes {
             };
             let positive = [mode.frequency, mode.stiffness];
             let has_quality = mode.quality > 0.0 || !is_physical && mode.quality == 0.0;
-            let finite = positive.iter().chain([&mode.quality]).chain(&mode.participation);
+            let finite = positive
+                .iter()
+                .chain([&mode.quality])
+                .chain(&mode.participation);
             let is_allowed = positive.iter().all(|value| *value > 0.0)
                 && has_quality
                 && finite.copied().all(f64::is_finite);
@@ -157,9 +177,16 @@ impl LeverModes {
             Ok(mode)
         };
         let modes = (0..count).map(mode).collect::<Result<Vec<_>, _>>()?;
-        if let Some(row) = modes.windows(2).position(|pair| pair[1].frequency <= pair[0].frequency) {
+        if let Some(row) = modes
+            .windows(2)
+            .position(|pair| pair[1].frequency <= pair[0].frequency)
+        {
             return Err(ForceTableError::new(
-                format!("the frequency of mode {} is not above that of mode {}", row + 2, row + 1),
+                format!(
+                    "the frequency of mode {} is not above that of mode {}",
+                    row + 2,
+                    row + 1
+                ),
                 "give the modes in the order of their frequencies",
             ));
         }
@@ -236,7 +263,10 @@ mod tests {
             ("[{f = 1000, k = \"1 N/m\", Q = 3}]", "mode 1: f"),
             ("[{f = \"1 kHz\", k = \"-1 N/m\", Q = 3}]", "above zero"),
             ("[{f = \"1 kHz\", k = \"1 N/m\", Q = 0}]", "above zero"),
-            ("[{f = \"1 kHz\", k = \"1 N/m\", Q = 3, particpation = 1}]", "did you mean `participation`"),
+            (
+                "[{f = \"1 kHz\", k = \"1 N/m\", Q = 3, particpation = 1}]",
+                "did you mean `participation`",
+            ),
             (
                 "[{f = \"2 kHz\", k = \"1 N/m\", Q = 3}, {f = \"1 kHz\", k = \"1 N/m\", Q = 3}]",
                 "mode 2 is not above that of mode 1",

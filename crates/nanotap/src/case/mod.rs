@@ -534,7 +534,9 @@ impl Case {
     /// # Errors
     /// [`CaseError::Tones`] with the nearest ratio at which they do.
     pub fn repeats(&self) -> Result<(), CaseError> {
-        let tones = self.cantilever().map_or(&[][..], |case| &case.further_tones);
+        let tones = self
+            .cantilever()
+            .map_or(&[][..], |case| &case.further_tones);
         for ratio in tones.iter().filter(|ratio| !ratio.repeats()) {
             FrequencyRatio::of(ratio.value())?;
         }

@@ -263,7 +263,9 @@ impl Modes {
     /// As [`Modes::new`].
     pub fn of(case: &Cantilever) -> Result<Arc<Self>, ModeCountError> {
         match case.lever_modes.get(..case.modes) {
-            Some(measured) if !case.lever_modes.is_empty() => Self::measured(measured).map(Arc::new),
+            Some(measured) if !case.lever_modes.is_empty() => {
+                Self::measured(measured).map(Arc::new)
+            }
             _ => Self::shared(case.modes),
         }
     }

@@ -306,7 +306,19 @@ mod tests {
         assert!(!unlocked.repeats() && unlocked.value() == pi);
         assert_eq!(unlocked.to_string().parse(), Ok(unlocked));
         for given in [
-            "0.000123", "31415.9265", "", "x", "1/0", "0/3", "-2", "2/2", "1", "1/2001", "nan", "1e300", "20001/2",
+            "0.000123",
+            "31415.9265",
+            "",
+            "x",
+            "1/0",
+            "0/3",
+            "-2",
+            "2/2",
+            "1",
+            "1/2001",
+            "nan",
+            "1e300",
+            "20001/2",
         ] {
             assert!(given.parse::<FrequencyRatio>().is_err(), "{given}");
         }

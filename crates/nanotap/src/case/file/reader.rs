@@ -393,9 +393,13 @@ fn cantilever(
         case.arms = points.map(|&(time, stiffness)| [time, stiffness]).collect();
     }
     case.lever_modes = lever_modes(stated).unwrap_or_default().to_vec();
-    for error in [case.check_arms(), case.check_tones(), case.check_lever_modes()]
-        .into_iter()
-        .filter_map(Result::err)
+    for error in [
+        case.check_arms(),
+        case.check_tones(),
+        case.check_lever_modes(),
+    ]
+    .into_iter()
+    .filter_map(Result::err)
     {
         let key = ModelKind::Cantilever.key(error.key);
         let entry = key.and_then(|key| known.get(&key));

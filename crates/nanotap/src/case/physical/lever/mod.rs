@@ -167,7 +167,9 @@ impl Lever {
                 .f0
                 .unwrap_or(first_frequency(ratio, &bare) / (TAU * time)),
             quality_factor: data.quality_factor.unwrap_or(f64::INFINITY),
-            length: data.length.or(data.geometry.map(|geometry| geometry.length)),
+            length: data
+                .length
+                .or(data.geometry.map(|geometry| geometry.length)),
             modes,
         };
         match (data.fluid, data.geometry) {

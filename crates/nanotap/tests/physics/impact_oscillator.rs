@@ -450,7 +450,7 @@ fn a_cascade_is_followed_to_its_end() {
         });
         let options = OrbitOptions {
             period: Some(period),
-            state: near.map(|p| p.state.clone()),
+            state: near.map(|p| p.state.clone().into()),
             ..OrbitOptions::default()
         };
         let here = orbit(&Oscillator { omega, ..cascade }.model().unwrap(), &options).unwrap();

@@ -130,7 +130,7 @@ fn exponents_of_a_closed_orbit_are_those_of_its_multipliers() {
         ..rigid(2.4, 0.7)
     };
     let options = LyapunovOptions {
-        state: Some(vec![0.0, 0.0]),
+        state: Some(vec![0.0, 0.0].into()),
         points: 10,
         ..LyapunovOptions::default()
     };
@@ -185,7 +185,7 @@ fn motions_that_stick_are_never_called_chaotic() {
         };
         // At the stop, at rest, pressed on it at drive phase 0.
         let options = SimulateOptions {
-            state: Some(vec![gap, 0.0]),
+            state: Some(vec![gap, 0.0].into()),
             periods: 4,
             ..SimulateOptions::default()
         };

@@ -59,12 +59,10 @@ fn text(case: &GivenCase, report: &ReconstructReport) -> String {
             number::significant(value, digits)
         }
     };
-    let energy = |value: f64| {
-        if report.physical {
-            format_electronvolts(value)
-        } else {
-            number::significant(value, 4)
-        }
+    let energy = |value: Option<f64>| match value {
+        None => String::new(),
+        Some(value) if report.physical => format_electronvolts(value),
+        Some(value) => number::significant(value, 4),
     };
     let method = match report.method {
         ReconstructMethod::AmplitudeModulation => "amplitude and phase",
@@ -111,10 +109,16 @@ fn text(case: &GivenCase, report: &ReconstructReport) -> String {
         "closest approach: {}; largest dissipation: {}",
         shown(Kind::Length, report.closest, 4),
         if report.has_damping {
-            let largest = report.rows.iter().map(|row| row.dissipation);
-            energy(largest.fold(0.0, f64::max))
+            let largest = report.rows.iter().filter_map(|row| row.dissipation);
+            energy(Some(largest.fold(0.0, f64::max)))
         } else {
-            "not determined".to_owned()
+            let measured = report.table.dissipation.iter().any(Option::is_some);
+            if measured {
+                "not determined"
+            } else {
+                "not measured"
+            }
+            .to_owned()
         }
     ));
     let source = match (report.method, report.free_rows) {

@@ -127,7 +127,11 @@ impl Studied<'_> {
             ReconstructMethod::FrequencyModulation => "frequency shift",
         };
         let set = self.table_law(case, &report);
-        let negative = report.table.damping.iter().any(|damping| *damping < 0.0);
+        let negative = report
+            .table
+            .damping
+            .iter()
+            .any(|damping| damping.is_some_and(|value| value < 0.0));
         let none = "as a law the force has no damping where it is negative";
         let notes = report.remarks.iter().map(String::as_str);
         let notes = notes.chain((set.is_some() && negative).then_some(none));
@@ -311,8 +315,8 @@ fn force_values(report: &ReconstructReport) -> Value {
             format!("{force} ± {error} at {at}"),
         ]);
     }
-    let dissipated = report.rows.iter().map(|row| row.dissipation);
-    let dissipated = dissipated.fold(0.0, f64::max);
+    let dissipated = report.rows.iter().filter_map(|row| row.dissipation);
+    let dissipated = dissipated.reduce(f64::max);
     values.extend([
         [
             "closest approach".to_owned(),
@@ -320,10 +324,10 @@ fn force_values(report: &ReconstructReport) -> Value {
         ],
         [
             "largest dissipation".to_owned(),
-            if report.has_damping {
-                energy(dissipated)
-            } else {
-                "not determined".to_owned()
+            match dissipated {
+                None => "not measured".to_owned(),
+                Some(_) if !report.has_damping => "not determined".to_owned(),
+                Some(energies) => energy(energies),
             },
         ],
         [

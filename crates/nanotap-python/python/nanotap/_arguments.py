@@ -15,7 +15,7 @@ import numpy.typing as npt
 from . import _nanotap
 from ._case import existing
 from ._describe import name_in_si
-from ._quantity import Range, in_si, many, si_unit, text, written
+from ._quantity import Range, in_si, many, si_unit, text, unmasked, written
 from ._record import Record
 
 if TYPE_CHECKING:
@@ -62,6 +62,14 @@ def optional_count(name: str, value: Any, least: int = 0) -> int | None:
 def seed(value: Any) -> int:
     """A seed, from 0 to 2⁶³ − 1."""
     return count("seed", value)
+
+
+def flag(name: str, value: Any) -> bool:
+    """True or False, not a text or number that Python would take for one of them."""
+    if isinstance(value, bool | np.bool_):
+        return bool(value)
+    message = f"{name}: expected True or False, got {value!r}"
+    raise TypeError(message)
 
 
 def number(name: str, value: Any) -> float:
@@ -119,9 +127,9 @@ def row(name: str, value: Any) -> Floats:
 def real(value: Any, name: str) -> Floats:
     """Real numbers as an aligned, contiguous array, which other packages may not provide."""
     try:
-        array = np.asarray(value)
-    except ValueError as error:  # rows of different lengths
-        message = f"{name}: {error}"
+        array = np.asarray(unmasked(name, value))
+    except ValueError as error:  # rows of different lengths, or a mask
+        message = str(error) if str(error).startswith(name) else f"{name}: {error}"
         raise ValueError(message) from None
     if array.dtype.kind not in "iuf" and array.size:
         message = f"{name}: expected real numbers, got {array.dtype}"
@@ -289,7 +297,7 @@ def _plain(name: str, value: Any, takes: _Option) -> Any:
     if "string" in kinds:
         value = written(value)
     if "boolean" in kinds:
-        return bool(value)
+        return flag(name, value)
     if "object" in kinds:
         if isinstance(value, str | list) and "string" in kinds:
             return value
@@ -306,7 +314,11 @@ def _plain(name: str, value: Any, takes: _Option) -> Any:
             return value
         return _finite(number(name, value))
     if "integer" in kinds:
-        return whole(name, value)
+        number_of = whole(name, value)
+        if not -_MOST <= number_of <= _MOST:
+            message = f"{name}: {number_of} is out of range; expected a whole number below 2⁶³"
+            raise ValueError(message)
+        return number_of
     return str(value)
 
 
@@ -361,6 +373,9 @@ def tables(data: Any) -> list[dict[str, Any]]:
                 {**tables(table)[0], "name": str(name)} for name, table in data.items()
             ]
         return [{"columns": {str(c): column(str(c), v) for c, v in data.items()}}]
+    if isinstance(data, np.ndarray):
+        message = "data: an array has no names of columns; pass a mapping, {name: values}"
+        raise TypeError(message)
     if isinstance(data, Iterable):
         many = [table for one in data for table in tables(one)]
         return [
@@ -419,18 +434,29 @@ def _of_dataset(data: "xr.Dataset") -> dict[str, list[Any]]:
 
 
 def column(name: str, values: Any) -> list[Any]:
-    """Entries of a column: numbers or texts; `None` for NaN."""
+    """Entries of a column: numbers or texts; `None` where one is missing: NaN, masked, or empty."""
     array = np.asarray(values)
+    masked = np.ma.getmaskarray(values) if np.ma.isMaskedArray(values) else None
     if array.ndim != 1:
         message = f"{name}: expected a row of entries, got an array with {array.ndim} dimensions"
         raise ValueError(message)
+    entries = array.tolist()
+    if masked is not None:
+        entries = [None if gone else v for gone, v in zip(masked, entries, strict=True)]
     if array.dtype.kind in "iuf":
-        return [None if math.isnan(v) else _finite(v) for v in array.tolist()]
-    missing = (None, "")
-    return [
-        None if v in missing or (isinstance(v, float) and math.isnan(v)) else v
-        for v in array.tolist()
-    ]
+        return [None if v is None or math.isnan(v) else _finite(v) for v in entries]
+    return [None if _is_missing(v) else v for v in entries]
+
+
+def _is_missing(value: Any) -> bool:
+    """Whether an entry of a column is missing: `None`, an empty text, NaN, masked, or the missing
+    values of pandas, which do not compare.
+    """
+    if value is None or value is np.ma.masked:
+        return True
+    if isinstance(value, str | float):
+        return value == "" or value != value
+    return type(value).__name__ in ("NAType", "NaTType")
 
 
 def _sides(name: str, value: Any) -> list[tuple[str, Any, Any]]:

@@ -3,8 +3,8 @@
 import json
 import os
 import tempfile
-from collections.abc import Hashable, Iterable, Mapping
-from contextlib import suppress
+from collections.abc import Hashable, Iterable, Iterator, Mapping
+from contextlib import contextmanager, suppress
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -12,7 +12,7 @@ import numpy as np
 from . import _arguments, _nanotap
 from ._arguments import Progress
 from ._case import Case, Path, missing
-from ._interrupt import Interrupted
+from ._interrupt import Interrupted, stoppable
 from ._motions import _cased
 from ._progress import bar
 from ._record import Record
@@ -41,15 +41,10 @@ def sweep(
     plan = ("sweep", _cased(case), request)
     if not options["where"] or chunk != "1/1":
         return computed(plan, noun, out, chunk, threads, client, progress)
-    with tempfile.TemporaryDirectory(prefix="nanotap-") as folder:
-        store = (
-            os.path.join(folder, "sweep.zarr") if out is None else _ending(out, "out")
-        )
+    with _stored(out, "sweep") as store:
         ds = computed(plan, noun, store, chunk, threads, client, progress)
         targets = json.loads(_nanotap.summary(store))["targets"]
-        if out is None:
-            ds = ds.load()
-            del ds.attrs["path"]
+        ds = _kept(ds, out)
     return _judged(ds, ds.classification.dims[:-1], targets)
 
 
@@ -183,15 +178,10 @@ def window(
         "window", {**options, "over": _arguments.axes(options["over"])}
     )
     plan = ("window", _cased(case), request)
-    with tempfile.TemporaryDirectory(prefix="nanotap-") as folder:
-        store = (
-            os.path.join(folder, "window.zarr") if out is None else _ending(out, "out")
-        )
+    with _stored(out, "window") as store:
         ds = computed(plan, "values", store, "1/1", threads, client, progress)
         found = json.loads(_nanotap.window(store))
-        if out is None:
-            ds = ds.load()
-            del ds.attrs["path"]
+        ds = _kept(ds, out)
     dims = ds.classification.dims[:2]
     shares = found["shares"]
     if (targets := found.get("targets")) is not None:
@@ -236,6 +226,34 @@ def _path_of(ds: "xr.Dataset | Path") -> str:
     return str(path)
 
 
+@contextmanager
+def _stored(out: Path | None, noun: str) -> Iterator[str]:
+    """The store of a dataset that is summarised: `out`, or one in a folder that is deleted afterwards,
+    so that the finished part of stopped work is loaded before.
+    """
+    if out is not None:
+        yield _ending(out, "out")
+        return
+    with tempfile.TemporaryDirectory(prefix="nanotap-") as folder:
+        try:
+            yield os.path.join(folder, f"{noun}.zarr")
+        except Interrupted as stopped:
+            if stopped.result is None:
+                raise
+            raise Interrupted(_STOPPED, _kept(stopped.result, None)) from None
+
+
+def _kept(ds: "xr.Dataset", out: Path | None) -> "xr.Dataset":
+    """The dataset, in memory if no store was requested."""
+    if out is not None:
+        return ds
+    path = ds.attrs.pop("path", None)
+    return ds if path is None else ds.load()
+
+
+_STOPPED = "stopped; unfinished values are missing"
+
+
 def _ending(path: Path, name: str) -> str:
     text = os.fspath(path)
     if not text.endswith(".zarr"):
@@ -244,6 +262,7 @@ def _ending(path: Path, name: str) -> str:
     return text
 
 
+@stoppable()
 def computed(
     plan: "Plan",
     noun: str,
@@ -279,8 +298,7 @@ def computed(
             usual, recipe, plan, noun, chunk, threads, client, progress
         )
     if stopped:
-        message = "stopped; unfinished values are missing"
-        raise Interrupted(message, ds)
+        raise Interrupted(_STOPPED, ds)
     return ds
 
 

@@ -11,7 +11,7 @@ from . import _arguments, _nanotap
 from ._arguments import Floats, Progress
 from ._case import Case, key_words
 from ._describe import case_attributes, dataset
-from ._interrupt import Interrupted
+from ._interrupt import Interrupted, stoppable
 from ._progress import bar
 from ._quantity import Range, in_si, many, si_unit
 from ._results import Modes, Orbit
@@ -26,6 +26,7 @@ _SHOWN_PERIODS = 100
 _MAX_ROWS = 8_000_000
 
 
+@stoppable()
 def modes(case: Case, options: Mapping[str, Any]) -> Modes:
     """Frequencies, and the mode shapes as a DataArray."""
     import xarray as xr
@@ -45,6 +46,7 @@ def modes(case: Case, options: Mapping[str, Any]) -> Modes:
     return Modes.of(_document(document), shapes=table)
 
 
+@stoppable()
 def simulate(
     case: Case,
     options: Mapping[str, Any],
@@ -55,6 +57,7 @@ def simulate(
 ) -> "xr.Dataset":
     """One run, or one for each value of the arrays in `parameters`."""
     case, varied = _split(case, options, parameters)
+    _arguments.optional_count("threads", threads)
     states = _states(options)
     if varied or states is not None:
         if options["method"] == "rk4":
@@ -75,6 +78,7 @@ def simulate(
     return _run_dataset(case, document, names, values)
 
 
+@stoppable()
 def orbit(
     case: Case,
     options: Mapping[str, Any],
@@ -84,6 +88,7 @@ def orbit(
 ) -> "Orbit | xr.Dataset":
     """A periodic orbit, or one for each value of the arrays in `parameters`."""
     case, varied = _split(case, options, parameters)
+    _arguments.optional_count("threads", threads)
     states = _states(options)
     if varied or states is not None:
         return _over(case, varied, "orbit", options, states, threads, progress)
@@ -284,6 +289,7 @@ def _states(options: Mapping[str, Any]) -> Floats | None:
     return states
 
 
+@stoppable()
 def _over(
     case: Case,
     varied: Mapping[str, Any],

@@ -90,4 +90,13 @@ def many(key: str, value: Any) -> Any:
         return value.values(key)
     if isinstance(value, list | tuple) and any(hasattr(one, "to") for one in value):
         value = [in_si(key, one) for one in value]
-    return np.asarray(in_si(key, value))
+    return np.asarray(unmasked(key, in_si(key, value)))
+
+
+def unmasked(name: str, value: Any) -> Any:
+    """The value, refused if an entry is masked: numpy's conversions drop masks."""
+    if np.ma.is_masked(value):
+        place = int(np.flatnonzero(np.ma.getmaskarray(value).ravel())[0])
+        message = f"{name}: entry {place} is masked, and all entries are needed"
+        raise ValueError(message)
+    return value

@@ -10,7 +10,7 @@ from . import _arguments, _datasets, _nanotap
 from ._arguments import Progress
 from ._case import Case, Path
 from ._describe import case_attributes, describe
-from ._interrupt import Interrupted
+from ._interrupt import Interrupted, part_of, stoppable
 from ._motions import _cased, _document, words
 from ._progress import bar
 from ._record import Record
@@ -31,6 +31,7 @@ if TYPE_CHECKING:
 Found = TypeVar("Found")
 
 
+@stoppable()
 def _run(
     name: str,
     case: Case,
@@ -61,11 +62,12 @@ def attractors(
     return found
 
 
-def _finished(found: Found, interrupted: bool) -> Found:
-    """The result of a study; raises `Interrupted` if it was stopped."""
+def _finished(found: Found, interrupted: bool, *, part: bool = True) -> Found:
+    """The result of a study; raises `Interrupted` if it was stopped, with the result where it has a
+    finished part.
+    """
     if interrupted:
-        message = "stopped before it was finished"
-        raise Interrupted(message, found)
+        raise part_of(found, part)
     return found
 
 
@@ -204,6 +206,8 @@ def approach(
 ) -> "xr.Dataset":
     """An approach curve over `way` and distance; the finished part if Ctrl-C stopped it."""
     document, interrupted = _run("approach", case, options, threads, progress)
+    if not document["table"]:
+        return _finished(None, interrupted, part=False)
     return _finished(_approach_dataset(case, document), interrupted)
 
 
@@ -317,7 +321,8 @@ def scan(
     """Height, error, phase … over direction, line and pixel; the finished part if Ctrl-C stopped it."""
     if out is None and chunk == "1/1" and client is None:
         document, interrupted = _run("scan", case, options, threads, progress)
-        return _finished(_scan_dataset(case, document), interrupted)
+        found = _scan_dataset(case, document)
+        return _finished(found, interrupted, part=bool(found.sizes["y"]))
     plan = ("scan", case, _arguments.request("scan", options))
     ds = _datasets.computed(plan, "lines", out, chunk, threads, client, progress)
     if out is None or chunk != "1/1":
@@ -331,8 +336,9 @@ def _scan_dataset(case: Case, report: dict[str, Any]) -> "xr.Dataset":
 
     ways = [way for way in ("trace", "retrace") if report.get(way)]
     variables: dict[str, Any] = {}
+    lines = max((len(report[way]["height"]) for way in ways), default=0)
     for name in report[ways[0]] if ways else ():
-        rows = np.array([report[way][name] for way in ways])
+        rows = np.array([_padded(report[way][name], lines) for way in ways])
         if rows.dtype.kind == "O":
             rows = rows.astype(float)
         words_, unit = _SCANNED.get(name, (name, "1"))
@@ -367,6 +373,13 @@ def _scan_dataset(case: Case, report: dict[str, Any]) -> "xr.Dataset":
     return ds
 
 
+def _padded(rows: list[Any], lines: int) -> list[Any]:
+    """Rows of pixels, with missing values for the lines that a stopped scan has in one direction only."""
+    missing = ["" if isinstance(value, str) else None for value in rows[0]] if rows else []
+    return rows + [missing] * (lines - len(rows))
+
+
+@stoppable()
 def lyapunov(case: Case, options: Mapping[str, Any]) -> Lyapunov:
     """The exponents, and the points of the section as a Dataset."""
     import xarray as xr
@@ -395,7 +408,8 @@ def lyapunov(case: Case, options: Mapping[str, Any]) -> Lyapunov:
 
 def convergence(case: Case, options: Mapping[str, Any]) -> Convergence:
     """The motion for each number of modes."""
-    return Convergence.of(_run("convergence", case, options)[0])
+    document, interrupted = _run("convergence", case, options)
+    return _finished(Convergence.of(document), interrupted)
 
 
 def document(
@@ -528,11 +542,11 @@ def paper(
         Interrupted: Ctrl-C; its `result` is the report of the finished sections.
     """
     sections = [only] if isinstance(only, str) else [str(name) for name in only]
-    with bar(progress, "%") as hears:
+    with bar(progress, "%") as hears, stoppable():
         text, interrupted = _nanotap.paper(
             out=out,
             only=sections,
-            quick=bool(quick),
+            quick=_arguments.flag("quick", quick),
             threads=_arguments.optional_count("threads", threads),
             progress=hears,
         )

@@ -77,12 +77,12 @@ impl ForceTable {
     pub fn of(table: &Table) -> Result<Self, ForceTableError> {
         let gaps = column(table, &["gap", "distance", "d"], Kind::Length, "gap (nm)")?;
         let forces = column(table, &["force", "f"], Kind::Force, "force (nN)")?;
-        let mut damping = if has(table, DAMPING) {
+        let mut damping = if has_values(table, DAMPING) {
             column(table, DAMPING, Kind::Damping, "damping (N s/m)")?
         } else {
             Vec::new()
         };
-        if has(table, &["damping error"]) {
+        if has_values(table, &["damping error"]) {
             for value in &mut damping {
                 *value = value.max(0.0);
             }
@@ -124,10 +124,13 @@ impl ForceTable {
 /// Names of a column of damping.
 const DAMPING: &[&str] = &["damping", "gamma", "γ"];
 
-/// Whether a table has a column of one of these names.
-fn has(table: &Table, names: &[&str]) -> bool {
-    let mut headers = table.columns.iter().map(|(written, _)| Header::of(written));
-    headers.any(|header| names.contains(&header.name.to_lowercase().as_str()))
+/// Whether a table has a column of one of these names with a value: a damping that was not measured is
+/// a column of empty fields.
+fn has_values(table: &Table, names: &[&str]) -> bool {
+    table.columns.iter().any(|(written, entries)| {
+        let name = Header::of(written).name.to_lowercase();
+        names.contains(&name.as_str()) && entries.iter().any(|entry| *entry != Entry::Missing)
+    })
 }
 
 /// A column of a table, by one of its names, in SI.
@@ -241,7 +244,7 @@ impl ArmTable {
     /// # Errors
     /// If they are missing, have no unit, or a value makes no sense.
     fn of(table: &Table, strength: Strength) -> Result<Self, ForceTableError> {
-        let shear = strength == Strength::Modulus && has(table, SHEAR);
+        let shear = strength == Strength::Modulus && has_values(table, SHEAR);
         let points = if let Some(points) = Self::quantities(table, strength.kind()) {
             points
         } else {

@@ -217,6 +217,31 @@ impl Table {
         }
     }
 
+    /// Returns the table if all columns have one length, which a program may get wrong.
+    ///
+    /// # Errors
+    /// If two columns have different lengths, or there are more than [`MAX_ROWS`] rows.
+    pub fn checked(self) -> Result<Self, Error> {
+        let lengths = || self.columns.iter().map(|(header, c)| (header, c.len()));
+        let mut pairs = lengths().zip(lengths().skip(1));
+        if let Some(((one, rows), (other, others))) = pairs.find(|((_, a), (_, b))| a != b) {
+            return Err(Error::input(
+                format!(
+                    "{}: column `{one}` has {rows} entries, column `{other}` has {others}",
+                    self.name
+                ),
+                "give all columns one length, with a missing value where nothing was measured",
+            ));
+        }
+        if self.rows() > MAX_ROWS {
+            return Err(Error::input(
+                format!("{} has more than {MAX_ROWS} rows", self.name),
+                "keep fewer",
+            ));
+        }
+        Ok(self)
+    }
+
     /// Returns the number of rows: the length of the longest column.
     pub fn rows(&self) -> usize {
         self.columns.iter().map(|(_, c)| c.len()).max().unwrap_or(0)
@@ -396,12 +421,13 @@ impl<'de> Deserialize<'de> for Table {
             Ok((header, entries))
         };
         let columns = given.columns.into_iter().map(column);
-        Ok(Self {
+        let table = Self {
             name: given.name.unwrap_or_else(|| "data".to_owned()),
             columns: columns.collect::<Result<_, D::Error>>()?,
             lines: Vec::new(),
             notes: given.notes.into_iter().collect(),
-        })
+        };
+        table.checked().map_err(D::Error::custom)
     }
 }
 

@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use nanotap_figures::{
-    Axis, Colour, DOUBLE_COLUMN, Dash, Figure, Legend, Line, Markers, Panel, Rule,
+    Axis, Colour, DOUBLE_COLUMN, Dash, Figure, Legend, Line, Markers, Panel, Rule, SINGLE_COLUMN,
 };
 
 use crate::case::physical::Kind;
@@ -15,9 +15,13 @@ use crate::study::reconstruct::{ForceCurve, ReconstructReport};
 /// Half length of a bar in standard errors.
 const STANDARD_ERRORS: f64 = 2.0;
 
-/// Force with bars of two standard errors, and the dissipated energy of each row against its
-/// closest approach.
+/// Force with bars of two standard errors, and, if it was measured, the dissipated energy of each row
+/// against its closest approach.
 pub fn reconstruct_figure(report: &ReconstructReport) -> Figure {
+    if report.table.dissipation.iter().all(Option::is_none) {
+        let figure = Figure::new(1, 1).width(SINGLE_COLUMN).height(72.0);
+        return figure.with(force_panel(report));
+    }
     Figure::new(1, 2)
         .width(DOUBLE_COLUMN)
         .height(72.0)
@@ -138,25 +142,20 @@ fn dissipation_panel(report: &ReconstructReport) -> Panel {
     for way in [Some(Way::Approach), Some(Way::Retract), None] {
         let rows = report.rows.iter().filter(|row| row.way == way);
         let rows = rows.filter(|row| (range[0]..=range[1]).contains(&row.closest));
+        let rows = rows.filter_map(|row| {
+            let (value, error) = row.dissipation.zip(row.dissipation_error)?;
+            Some((along * row.closest, factor * value, factor * error))
+        });
         let rows: Vec<_> = rows.collect();
         if rows.is_empty() {
             continue;
         }
-        let bars = rows.iter().flat_map(|row| {
-            let half = STANDARD_ERRORS * row.dissipation_error;
-            let end = |side: f64| {
-                (
-                    along * row.closest,
-                    factor * (row.dissipation + side * half),
-                )
-            };
+        let bars = rows.iter().flat_map(|(x, value, error)| {
+            let end = |side: f64| (*x, value + side * STANDARD_ERRORS * error);
             [end(-1.0), end(1.0), (f64::NAN, f64::NAN)]
         });
         let bars: Vec<_> = bars.collect();
-        let points = rows
-            .iter()
-            .map(|row| (along * row.closest, factor * row.dissipation));
-        let points: Vec<_> = points.collect();
+        let points: Vec<_> = rows.iter().map(|(x, value, _)| (*x, *value)).collect();
         panel = panel.with(Line::new(bars).colour(Colour::GREY).width(0.6));
         let label = way.map_or("rows", Way::name);
         let markers = Markers::new(points)

@@ -216,7 +216,10 @@ impl<'a> Property<'a> {
             Value::Array(_) if self.allows("array") => self.check_elements(value),
             Value::Object(_) if self.allows("object") => Ok(()),
             Value::Number(number) => {
-                let whole = number.as_f64().is_some_and(|x| x.fract() == 0.0);
+                // As 1e3 or 20.0 only where every whole number is a different double.
+                let is_exact = |x: f64| x.fract() == 0.0 && x.abs() <= 9_007_199_254_740_992.0;
+                let whole =
+                    number.is_u64() || number.is_i64() || number.as_f64().is_some_and(is_exact);
                 let fits = self.allows("number") || (self.allows("integer") && whole);
                 if !fits {
                     return refuse(self.wanted());

@@ -2,6 +2,7 @@
 
 use nanotap::case::Case;
 use nanotap::case::file::Source;
+use nanotap::case::force_table::ForceTable;
 use nanotap::control::{CancelFlag, Control};
 use nanotap::study::approach::{ApproachOptions, Way, approach};
 use nanotap::study::fit::{Entry, Table};
@@ -133,7 +134,7 @@ fn references_are_met_within_their_tolerance() {
         let dissipated = report
             .rows
             .iter()
-            .map(|row| row.dissipation)
+            .filter_map(|row| row.dissipation)
             .fold(0.0, f64::max);
         let truth = number(&reference["truth"]["max_dissipation_J"]);
         let tolerance = |name: &str| reference["tolerance"][name].as_f64();
@@ -235,6 +236,101 @@ fn frequency_shifts_give_the_force_of_the_law() {
     assert!(rms < 0.03 * largest, "{rms:e} of {largest:e}");
     assert_eq!(report.sader_jarvis.unwrap().force.len(), points.len());
     assert!(report.inflections.is_empty());
+}
+
+/// Frequency shifts of a qPlus sensor without noise, from 3 to 0.7 nm: `/findings/qplus.toml` of the
+/// report on version 0.2. The force has its minimum, −4.6105 nN, at 278.5 pm: (2/15 repulsion / H)^⅙.
+fn qplus_curve(points: usize, measured: &[&str]) -> (Case, Table) {
+    let words = [
+        "modes=1",
+        "cantilever.k1=1800 N/m",
+        "cantilever.f0=19796.5 Hz",
+        "cantilever.Q=20000",
+        "tip.radius=10 nm",
+        "sample.law=lennard-jones",
+        "sample.hamaker=2.86e-19 J",
+        "sample.repulsion=1e-75 J m^6",
+        "drive.actuation=tip",
+        "drive.frequency_ratio=1",
+        "drive.free_amplitude=0.5 nm",
+        "gap.tip=5 nm",
+    ];
+    let case = Case::parse(None, &words.map(str::to_owned)).unwrap();
+    let options = ApproachOptions {
+        from: Some((3e-9).into()),
+        to: Some((0.7e-9).into()),
+        points,
+        fm: true,
+        branches: false,
+        ..ApproachOptions::default()
+    };
+    let curve = approach(&case, &options, &Control::default()).unwrap();
+    let rows = curve.table.iter().filter(|p| p.way == Way::Approach);
+    let rows: Vec<_> = rows
+        .map(|p| (p.zc.unwrap(), p.modulation.unwrap()))
+        .collect();
+    let column = |of: &dyn Fn(&(f64, Modulated)) -> f64| rows.iter().map(of).collect();
+    let columns = [
+        ("distance (nm)", column(&|p| 1e9 * p.0)),
+        ("relative_shift", column(&|p| p.1.relative_shift)),
+        ("drive_ratio", column(&|p| p.1.drive_ratio)),
+    ];
+    let is_measured = |name: &str| measured.contains(&name);
+    let columns: Vec<_> = columns
+        .into_iter()
+        .filter(|(name, _)| is_measured(name))
+        .collect();
+    (case, table(&columns))
+}
+
+/// Force of this sample, N.
+fn lennard_jones(d: f64) -> f64 {
+    10e-9 * (1e-75 / (180.0 * d.powi(8)) - 2.86e-19 / (6.0 * d * d))
+}
+
+#[test]
+fn a_curve_without_noise_is_as_exact_as_its_discretisation() {
+    for points in [120, 240] {
+        let names = ["distance (nm)", "relative_shift", "drive_ratio"];
+        let (case, data) = qplus_curve(points, &names);
+        let report = reconstructed(&case, data, ReconstructOptions::default());
+        let minimum = report.minimum.unwrap();
+        let [truth, place] = [-4.6105e-9, 278.5e-12];
+        assert!((minimum.force - truth).abs() < 2.0 * minimum.force_error);
+        assert!(minimum.force_error < 0.03 * truth.abs(), "{minimum:?}");
+        assert!((minimum.distance - place).abs() < 5e-12, "{minimum:?}");
+        // Every value, but at the wall and in the tail, where the force is assumed.
+        let table = &report.table;
+        let resolved = (0..table.distance.len()).filter(|k| table.distance[*k] < 1.5e-9);
+        let deviations: Vec<f64> = resolved
+            .map(|k| {
+                (table.force[k] - lennard_jones(table.distance[k])).abs() / table.force_error[k]
+            })
+            .collect();
+        let covered = deviations.iter().filter(|one| **one < 2.0).count();
+        assert!(
+            covered as f64 > 0.95 * deviations.len() as f64,
+            "{deviations:?}"
+        );
+    }
+}
+
+#[test]
+fn a_dissipation_that_was_not_measured_is_empty() {
+    let (case, data) = qplus_curve(120, &["distance (nm)", "relative_shift"]);
+    let report = reconstructed(&case, data, ReconstructOptions::default());
+    assert!(!report.has_damping);
+    assert!(report.table.dissipation.iter().all(Option::is_none));
+    assert!(report.rows.iter().all(|row| row.dissipation.is_none()));
+    let csv = report.csv();
+    assert!(csv.lines().skip(1).all(|line| line.ends_with(",,,,")));
+    let document = serde_json::to_value(&report).unwrap();
+    assert!(document["table"]["damping"][0].is_null());
+    // The file is still a law, without damping.
+    let law = ForceTable::of(&Table::parse("force.csv", &csv).unwrap()).unwrap();
+    assert!(!law.text().contains("damping"));
+    let figure = nanotap::figure::reconstruct::reconstruct_figure(&report);
+    assert!(!figure.to_svg().unwrap().contains("dissipation"));
 }
 
 #[test]

@@ -97,7 +97,8 @@ pub(crate) fn prepared(
     conversions: &[String],
     columns: &[String],
 ) -> Result<Prepared, Error> {
-    let mut tables = tables.to_vec();
+    let tables = tables.iter().cloned().map(Table::checked);
+    let mut tables = tables.collect::<Result<Vec<Table>, Error>>()?;
     let mut columns = columns.to_vec();
     let mut stated = vec![Stated::default(); tables.len()];
     let mut notes = Vec::new();

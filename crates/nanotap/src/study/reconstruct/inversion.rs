@@ -8,6 +8,9 @@
 //! errors and thereby justify itself. Once the force is stable, each row's measured values are moved
 //! towards it, by their share of the residual (orthogonal distance regression).
 //!
+//! A force that is linear between nodes is an approximation. Its error is part of each row's standard
+//! error; where it would exceed the measurement's, the nodes are closer together.
+//!
 //! Where the force is much steeper than the lever is stiff, the fixed point of the motion does not
 //! converge. A force that still changes in the last pass is refused.
 
@@ -43,6 +46,8 @@ const MAX_MOVED_RESIDUAL: f64 = 3.0;
 /// Distance over which slopes are averaged for the errors: in spacings of the nodes plus in standard
 /// errors of the amplitude.
 const AVERAGED_SLOPES: [f64; 2] = [2.0, 3.0];
+/// Upper limit of the number by which the spacing of the nodes is divided for exact data.
+const MAX_REFINEMENT: f64 = 8.0;
 /// Change of the force in the last pass, in standard errors, above which it has not converged.
 const CONVERGED: f64 = 2.0;
 /// Mean squared residual, in standard errors, above which no force describes the rows.
@@ -209,6 +214,7 @@ impl Inversion<'_> {
         let mut weights: Vec<Weights> = Vec::new();
         let mut residuals = Vec::new();
         let mut before = Vec::new();
+        let mut widest = self.widest;
         for pass in 0..PASSES {
             if control.is_cancelled() {
                 return Err(Error::stopped());
@@ -244,7 +250,7 @@ impl Inversion<'_> {
                 }
             }
             if pass < ADAPTED {
-                nodes = self.nodes(&rows);
+                nodes = self.nodes(&rows, widest);
             }
             weights = if harmonic {
                 let of = |estimate: &Estimate| sinusoidal(&nodes, estimate);
@@ -259,7 +265,8 @@ impl Inversion<'_> {
             if damping.coefficients.len() != nodes.unknowns() {
                 damping = Smooth::zero(nodes.unknowns());
             }
-            let observed = self.observed(&rows);
+            let discretised = nodes.interpolation_errors(&force.coefficients);
+            let observed = self.observed(&rows, &weights, &discretised);
             let mut roughness = nodes.roughness();
             if pass >= ADAPTED {
                 adapt(&mut roughness, &force.coefficients);
@@ -268,6 +275,10 @@ impl Inversion<'_> {
             force = solve_force(&observed, &weights, &roughness, &damping)?;
             if self.has_damping {
                 damping = self.solve_damping(&rows, &weights, &nodes, &force)?;
+            }
+            if harmonic {
+                let discretised = nodes.interpolation_errors(&force.coefficients);
+                widest /= self.refinement(&observed, &weights, &discretised);
             }
             let unexplained = |(row, weights): (&[f64; 2], &Weights)| {
                 let conservative = dot(&weights.cosine, &force.coefficients);
@@ -297,6 +308,7 @@ impl Inversion<'_> {
         let low = self.resolved(&rows);
         let noise = (0..before.len()).map(|k| force.error(k)).collect();
         bias::widen(&mut force, &nodes, &closest);
+        bias::add_tail(&mut force, &nodes, closest[closest.len() - 1]);
         let inside = (0..before.len()).filter(|k| nodes.0[*k] >= low);
         let changes = inside.map(|k| {
             (force.coefficients[k] - before[k]).abs() / force.error(k).max(f64::MIN_POSITIVE)
@@ -373,8 +385,8 @@ impl Inversion<'_> {
         }
     }
 
-    /// Nodes for the range of the closest approaches.
-    fn nodes(&self, rows: &[Estimate]) -> Nodes {
+    /// Nodes for the range of the closest approaches, at most `widest` apart where the sample is felt.
+    fn nodes(&self, rows: &[Estimate], widest: f64) -> Nodes {
         let closest = || rows.iter().map(|row| row.closest);
         let low = closest().fold(f64::INFINITY, f64::min);
         let felt = rows
@@ -386,19 +398,38 @@ impl Inversion<'_> {
             let at_rest = row.distance - estimate.at.amplitude;
             at_rest.max(estimate.closest)
         });
-        Nodes::new(low, fine, far.fold(fine, f64::max), self.widest)
+        Nodes::new(low, fine, far.fold(fine, f64::max), widest)
     }
 
-    /// Returns the conservative part of each row at its measured values, with its standard error.
-    fn observed(&self, rows: &[Estimate]) -> Vec<[f64; 2]> {
-        let both = rows.iter().zip(self.rows);
-        both.map(|(estimate, row)| {
+    /// Returns the conservative part of each row at its measured values, with its standard error: that
+    /// of the measurement, and that of a force which is linear between the nodes.
+    fn observed(
+        &self,
+        rows: &[Estimate],
+        weights: &[Weights],
+        discretised: &[f64],
+    ) -> Vec<[f64; 2]> {
+        let all = rows.iter().zip(self.rows).zip(weights);
+        all.map(|((estimate, row), weights)| {
             let by = estimate.by();
             let back = [0, 1].map(|k| by[k] * (row.values[k] - estimate.values[k]));
             let conservative = estimate.at.conservative + back[0] + back[1];
-            [conservative, spread(by, row.errors)]
+            let discretisation = interpolation_error(&weights.cosine, discretised);
+            [conservative, spread(by, row.errors).hypot(discretisation)]
         })
         .collect()
+    }
+
+    /// Returns the number by which the spacing of the nodes is to be divided, so that the interpolation
+    /// errs by no more than the measurement in half of the rows that feel the sample. The error goes
+    /// as the square of the spacing.
+    fn refinement(&self, observed: &[[f64; 2]], weights: &[Weights], discretised: &[f64]) -> f64 {
+        let all = observed.iter().zip(weights).zip(self.rows);
+        let felt = all.filter(|(_, row)| row.informative);
+        let ratios = felt.map(|(([_, error], weights), _)| {
+            interpolation_error(&weights.cosine, discretised) / error
+        });
+        median(ratios.collect()).sqrt().clamp(1.0, MAX_REFINEMENT)
     }
 
     /// Solves for the damping, with the force known.
@@ -543,6 +574,13 @@ fn adapt(roughness: &mut DMatrix<f64>, force: &[f64]) {
     for (mut row, logarithm) in roughness.row_iter_mut().zip(logarithms) {
         row *= exp(logarithm - middle);
     }
+}
+
+/// Error of a row's average that the interpolation between nodes causes: its leading order, and at the
+/// turning point, where the weights vary within a spacing, that of a single node.
+fn interpolation_error(weights: &[f64], errors: &[f64]) -> f64 {
+    let terms = || weights.iter().zip(errors).map(|(w, e)| w * e);
+    terms().sum::<f64>().abs() + terms().fold(0.0, |largest: f64, term| largest.max(term.abs()))
 }
 
 /// Solves for the force, from the conservative parts less the share of the known damping.

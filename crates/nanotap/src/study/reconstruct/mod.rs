@@ -481,16 +481,22 @@ impl Prepared {
             |of: &smooth::Smooth, k: usize| of.coefficients.get(k).copied().unwrap_or(0.0);
         let error = |of: &smooth::Smooth, k: usize| if k + 1 < count { of.error(k) } else { 0.0 };
         let unit = 1.0 / self.angular_frequency;
+        // A quantity that was not measured has no values.
+        let measured = |values: Vec<f64>| -> Vec<Option<f64>> {
+            let values = values.into_iter();
+            values
+                .map(|value| self.has_damping.then_some(value))
+                .collect()
+        };
+        let along = |of: &dyn Fn(usize) -> f64| -> Vec<f64> { (first..count).map(of).collect() };
         ForceCurve {
             distance: nodes.0[first..].to_vec(),
-            force: (first..count).map(|k| coefficient(force, k)).collect(),
-            force_error: (first..count).map(|k| error(force, k)).collect(),
-            dissipation: dissipated.iter().map(|pair| pair[0]).collect(),
-            dissipation_error: dissipated.iter().map(|pair| pair[1]).collect(),
-            damping: (first..count)
-                .map(|k| unit * coefficient(damping, k))
-                .collect(),
-            damping_error: (first..count).map(|k| unit * error(damping, k)).collect(),
+            force: along(&|k| coefficient(force, k)),
+            force_error: along(&|k| error(force, k)),
+            dissipation: measured(dissipated.iter().map(|pair| pair[0]).collect()),
+            dissipation_error: measured(dissipated.iter().map(|pair| pair[1]).collect()),
+            damping: measured(along(&|k| unit * coefficient(damping, k))),
+            damping_error: measured(along(&|k| unit * error(damping, k))),
         }
     }
 
@@ -556,8 +562,8 @@ impl Prepared {
             distance: row.distance,
             closest: inverted.closest,
             amplitude: inverted.amplitude,
-            dissipation: inverted.dissipated[0],
-            dissipation_error: inverted.dissipated[1],
+            dissipation: self.has_damping.then_some(inverted.dissipated[0]),
+            dissipation_error: self.has_damping.then_some(inverted.dissipated[1]),
             residual: inverted.residual,
         });
         let rows: Vec<ReconstructedRow> = rows.collect();
@@ -677,18 +683,37 @@ fn minimum(table: &ForceCurve, inverted: &Inverted) -> Option<ForceMinimum> {
     let (force, force_error) = (table.force[least], table.force_error[least]);
     let beyond = inverted.nodes.0.len() - table.force.len();
     let noise = inverted.noise.get(beyond + least)?;
-    (force < -force_error && force < -SIGNIFICANT * noise).then(|| ForceMinimum {
+    let [distance, force] = vertex(table, least).unwrap_or([table.distance[least], force]);
+    (force < -force_error && force < -SIGNIFICANT * noise).then_some(ForceMinimum {
         force,
         force_error,
-        distance: table.distance[least],
+        distance,
     })
+}
+
+/// Returns distance and force of the vertex of the parabola through a lowest node and its neighbours, so
+/// that the minimum does not depend on where the nodes are.
+fn vertex(table: &ForceCurve, least: usize) -> Option<[f64; 2]> {
+    let (before, after) = (least.checked_sub(1)?, least + 1);
+    let (x, y) = (&table.distance, &table.force);
+    let slope = |a: usize, b: usize| Some((y.get(b)? - y[a]) / (x[b] - x[a]));
+    let (low, high) = (slope(before, least)?, slope(least, after)?);
+    let curvature = (high - low) / (x[after] - x[before]);
+    if curvature <= 0.0 {
+        return None;
+    }
+    // Newton's form: y = y0 + low (x − x0) + curvature (x − x0)(x − x1).
+    let distance = 0.5 * (x[before] + x[least] - low / curvature);
+    let from = distance - x[before];
+    let force = y[before] + low * from + curvature * from * (distance - x[least]);
+    Some([distance, force])
 }
 
 /// Returns whether the dissipation is above three standard errors somewhere.
 fn damped(table: &ForceCurve) -> bool {
     let both = table.dissipation.iter().zip(&table.dissipation_error);
-    both.into_iter()
-        .any(|(value, error)| *error > 0.0 && *value > 3.0 * error)
+    both.flat_map(|(value, error)| value.zip(*error))
+        .any(|(value, error)| error > 0.0 && value > 3.0 * error)
 }
 
 /// Averages curves that are longer than `rows`, and adds a remark.

@@ -71,6 +71,19 @@ impl Nodes {
         (1.0 - weight) * coefficient(at) + weight * coefficient(at + 1)
     }
 
+    /// Mean error of the linear interpolation about each node, F″h²/12, of a function with these
+    /// coefficients.
+    pub(super) fn interpolation_errors(&self, coefficients: &[f64]) -> Vec<f64> {
+        let nodes = &self.0;
+        let value = |k: usize| coefficients.get(k).copied().unwrap_or(0.0);
+        let slope = |k: usize| (value(k + 1) - value(k)) / (nodes[k + 1] - nodes[k]);
+        let inner = (1..self.unknowns()).map(|k| {
+            let width = 0.5 * (nodes[k + 1] - nodes[k - 1]);
+            (slope(k) - slope(k - 1)) * width / 12.0
+        });
+        std::iter::once(0.0).chain(inner).collect()
+    }
+
     /// Second differences times the product of the neighbouring spacings.
     pub(super) fn roughness(&self) -> DMatrix<f64> {
         let (nodes, count) = (&self.0, self.unknowns());

@@ -76,14 +76,16 @@ pub struct ForceCurve {
     /// Standard errors of the force, N or model units.
     pub force_error: Vec<f64>,
     /// Energy that a sinusoidal oscillation with the free amplitude loses in a period when its
-    /// closest approach is this distance, J or model units.
-    pub dissipation: Vec<f64>,
-    /// Standard errors of the dissipation, J or model units.
-    pub dissipation_error: Vec<f64>,
-    /// Damping coefficient of the force against the tip's velocity, N s/m or model units.
-    pub damping: Vec<f64>,
-    /// Standard errors of the damping coefficient, N s/m or model units.
-    pub damping_error: Vec<f64>,
+    /// closest approach is this distance, J or model units; `None` (JSON: null) at all distances if
+    /// no column has the phase or the excitation.
+    pub dissipation: Vec<Option<f64>>,
+    /// Standard errors of the dissipation, J or model units; `None` like it.
+    pub dissipation_error: Vec<Option<f64>>,
+    /// Damping coefficient of the force against the tip's velocity, N s/m or model units; `None` like
+    /// the dissipation.
+    pub damping: Vec<Option<f64>>,
+    /// Standard errors of the damping coefficient, N s/m or model units; `None` like it.
+    pub damping_error: Vec<Option<f64>>,
 }
 
 /// The lowest force of a curve, which is attractive.
@@ -116,10 +118,11 @@ pub struct ReconstructedRow {
     pub closest: f64,
     /// Amplitude of the tip, m or model units, a driven base's motion included.
     pub amplitude: f64,
-    /// Energy that the sample takes in a period, J or model units.
-    pub dissipation: f64,
-    /// Standard error of this energy, J or model units.
-    pub dissipation_error: f64,
+    /// Energy that the sample takes in a period, J or model units; `None` (JSON: null) if it was not
+    /// measured.
+    pub dissipation: Option<f64>,
+    /// Standard error of this energy, J or model units; `None` like it.
+    pub dissipation_error: Option<f64>,
     /// Residual of the force's in-phase part, in standard errors.
     pub residual: f64,
 }
@@ -196,15 +199,16 @@ impl ReconstructReport {
         let table = &self.table;
         for k in 0..table.distance.len() {
             let cells = [
-                length.0 * table.distance[k],
-                force.0 * table.force[k],
-                force.0 * table.force_error[k],
-                energy.0 * table.dissipation[k],
-                energy.0 * table.dissipation_error[k],
+                Some(length.0 * table.distance[k]),
+                Some(force.0 * table.force[k]),
+                Some(force.0 * table.force_error[k]),
+                table.dissipation[k].map(|value| energy.0 * value),
+                table.dissipation_error[k].map(|value| energy.0 * value),
                 table.damping[k],
                 table.damping_error[k],
             ];
-            let _ = writeln!(csv, "{}", cells.map(shortest).join(","));
+            let cells = cells.map(|cell| cell.map(shortest).unwrap_or_default());
+            let _ = writeln!(csv, "{}", cells.join(","));
         }
         csv
     }

@@ -363,6 +363,10 @@ impl NonlinearRecording {
         };
         let mut rows = vec![vec![Complex::new(0.0, 0.0); outputs.len()]; multiples.len()];
         for (weight, sample) in samples.iter().filter(|(weight, _)| *weight != 0.0) {
+            // A sum over many lines takes long; the study reports that it was cancelled.
+            if self.nonlinear.system.cancel().is_cancelled() {
+                break;
+            }
             let values: Vec<f64> = outputs.iter().map(|o| self.read(o, sample)).collect();
             let small: Vec<Complex> = (0..stride).map(|j| turned(j, sample.time)).collect();
             let large: Vec<Complex> = (0..=largest / stride)

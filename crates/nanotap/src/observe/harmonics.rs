@@ -38,7 +38,8 @@ pub struct Harmonic {
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct Spectrum {
     /// Components at `j Ω/n`, `j = 1, 2, …`, for a motion of period `n`. Under several tones that repeat
-    /// after more than 64 periods of the first, those where products of the tones lie.
+    /// after more than 64 periods of the first, those where products of the tones lie; of a long
+    /// motion, the products of the lowest orders.
     pub harmonics: Vec<Harmonic>,
     /// Fraction of the tip deflection's power (variance) outside the drive frequency, 0 … 1: the
     /// paper's total harmonic distortion, from the exact variance and not from a truncated sum.
@@ -60,6 +61,9 @@ const DENSE: usize = 64;
 const MIXING: i32 = 40;
 /// Largest number of components that are listed.
 const MAX_LINES: usize = 40_000;
+/// Largest number of listed products, times the periods of the first tone in the motion: the work grows
+/// with both, and some seconds are enough.
+const MAX_PRODUCT_PERIODS: usize = 1_000_000;
 
 /// A multiple of a motion's fundamental frequency, and the product of several tones that lies there.
 type Line = (usize, Option<Vec<i32>>);
@@ -103,8 +107,13 @@ fn lines(model: &Model, period: usize, orders: usize) -> Vec<Line> {
             }
         });
     }
-    if model.repetition() > DENSE && period == 1 {
-        return named.into_iter().map(|(j, of)| (j, Some(of))).collect();
+    if model.repetition() > DENSE {
+        let mut products: Vec<(usize, Vec<i32>)> = named.into_iter().collect();
+        let order = |product: &[i32]| product.iter().map(|a| a.unsigned_abs()).sum::<u32>();
+        products.sort_by_key(|(multiple, product)| (order(product), *multiple));
+        products.truncate(MAX_PRODUCT_PERIODS / (model.repetition() * period));
+        products.sort_unstable();
+        return products.into_iter().map(|(j, of)| (j, Some(of))).collect();
     }
     (1..=count.min(MAX_LINES))
         .map(|multiple| (multiple, named.get(&multiple).cloned()))

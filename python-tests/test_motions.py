@@ -179,9 +179,21 @@ def test_an_orbit_says_which_knock_upsets_it(regular):
     bistable = nanotap.Case.from_file(ROOT / "docs" / "cases" / "bistable-lever.toml")
     found = nanotap.orbit(bistable, upset=True).upset.smallest
     # docs/cases/bistable.md
-    assert found.physical.tip_speed == pytest.approx(1.442e-3, rel=0.01)
+    assert found.physical.tip_speed == pytest.approx(1.437e-3, rel=0.01)
     assert found.leads_to == "periodic" and found.period == 1
     assert nanotap.orbit(regular).upset is None
+
+
+def test_a_motion_says_from_which_start_it_follows(regular):
+    for found in (
+        nanotap.orbit(regular),
+        nanotap.simulate(regular),
+        nanotap.lyapunov(regular, periods=10, transient=10),
+    ):
+        assert "from rest" in found.notes[0] and "`attractors`" in found.notes[0]
+        assert found.to_dict()["notes"] == found.notes
+    given = nanotap.orbit(regular, state=nanotap.orbit(regular).state)
+    assert "from the given state" in given.notes[0]
 
 
 def test_where_there_is_no_orbit_the_reason_stands(regular):

@@ -100,6 +100,13 @@ impl Output {
         }
     }
 
+    /// Prints the notes of a report, as [`note`](Self::note); its JSON document holds them itself.
+    pub(crate) fn notes(&self, notes: &[String]) {
+        for note in notes.iter().filter(|_| !self.json) {
+            self.note(note);
+        }
+    }
+
     /// Prints a warning on standard error, which `--quiet` does not suppress: the result is
     /// doubtful.
     #[expect(

@@ -53,7 +53,7 @@ pub use census::{
 };
 pub use classify::{
     Candidate, Chaos, Classified, ClassifyOptions, MotionKind, Torus, UndecidedReason,
-    birkhoff_digits, candidate_periods, classify, classify_beside,
+    birkhoff_digits, candidate_periods, classify, classify_beside, classify_exactly,
 };
 pub use codim1_curves::{BifurcationCurve, CurveEnd, CurveOptions, CurvePoint, trace_curve};
 pub use continuation::{

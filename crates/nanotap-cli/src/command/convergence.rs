@@ -26,6 +26,7 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     arguments
         .plot
         .draw(|| convergence_figure(&result, &case.units()))?;
+    output.notes(&result.notes);
     output.study(&case, &result, |result| text(&case, result))
 }
 

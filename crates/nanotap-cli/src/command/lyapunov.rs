@@ -35,6 +35,7 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     arguments
         .plot
         .draw(|| section_figure(&model, &report, &case.units()))?;
+    output.notes(&report.notes);
     output.study(&case, &report, |report| text(&case, report))
 }
 

@@ -34,6 +34,7 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     let case = GivenCase::of(&arguments.case, output)?;
     let report = progress::study::<NoiseStudy>(&case, &request, &ThreadsArgument::default())?;
     arguments.out.write(|| spectrum_csv(&report.spectrum))?;
+    output.notes(&report.notes);
     output.study(&case, &report, |report| text(&case, report))
 }
 

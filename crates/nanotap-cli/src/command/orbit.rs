@@ -10,7 +10,7 @@ use nanotap::figure::motion::orbit_figure;
 use nanotap::model::Model;
 use nanotap::observe::{ObservableSet, time_series};
 use nanotap::study::orbit::{MAX_DETERMINANT_DEFECT, OrbitOptions, OrbitReport, OrbitStudy};
-use nanotap::study::upset::{INSTANTS, Knocks};
+use nanotap::study::upset::Knocks;
 
 use crate::arguments::{CaseArguments, OutArgument, PlotArgument};
 use crate::failure::Failure;
@@ -87,6 +87,7 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
         "",
         output,
     );
+    output.notes(&orbit.notes);
     output.study(&case, found, |found| {
         text(&case, &model, &found.motion, request.observables)
     })
@@ -132,10 +133,14 @@ fn harmonics_csv(orbit: &OrbitReport, units: &Units, omega: f64) -> String {
 /// another.
 fn upset(knocks: &Knocks, units: &Units) -> String {
     let speed = |value: f64| number::quantity(units, Kind::Velocity, value, [4, 4]);
+    let apart = || number::significant(100.0 * (knocks.size_ratio - 1.0), 2);
     let Some(found) = &knocks.smallest else {
         return format!(
-            "no knock on the tip was found that upsets it: of those tried, at {INSTANTS} instants and \
-             with changes of the tip's speed of up to {}, none is followed by another motion",
+            "no knock on the tip was found that upsets it: {} were tried, at {} instants in sizes {} % \
+             apart, with changes of the tip's speed of up to {}",
+            knocks.smaller_tried,
+            knocks.instants,
+            apart(),
             speed(knocks.largest_tried)
         );
     };
@@ -167,10 +172,14 @@ fn upset(knocks: &Knocks, units: &Units) -> String {
         );
     }
     format!(
-        "the smallest knock that upsets it changes the tip's speed by {} {way} ({size}) at {}° of \
-         the drive, and another motion follows: {motion}",
+        "the smallest knock found that upsets it changes the tip's speed by {} {way} ({size}) at {}° of \
+         the drive, and another motion follows: {motion}; {} smaller ones were tried, at {} instants in \
+         sizes {} % apart and around it, and upset nothing",
         speed(found.tip_speed.abs()),
         number::significant(found.drive_phase, 4),
+        knocks.smaller_tried,
+        knocks.instants,
+        apart(),
     )
 }
 

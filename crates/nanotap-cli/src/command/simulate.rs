@@ -39,12 +39,14 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
                 .draw(|| simulation_figure(&model, run, &units))?;
             let (seen, physical) = (&run.observables, report.physical.as_ref());
             motion::warn(seen, physical, &run.out_of_range, "", output);
+            output.notes(&run.notes);
         }
         SimulateReport::FixedStep(run) => {
             arguments.out.write(|| curve(run, &units))?;
             arguments
                 .plot
                 .draw(|| fixed_step_figure(&model, run, &units))?;
+            output.notes(&run.notes);
             output.note(
                 "rk4 is the paper's method, kept to show the effect of a time step; its results are not certified",
             );

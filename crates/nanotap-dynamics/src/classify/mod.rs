@@ -246,6 +246,16 @@ pub fn classify_beside<M: StroboscopicMap>(
     confirm(map, found, start, known, options)
 }
 
+/// As [`classify`], on the map itself from the start on: where it matters to which of several
+/// motions a start close to a basin's boundary leads.
+pub fn classify_exactly<M: StroboscopicMap>(
+    map: &mut M,
+    start: &[f64],
+    options: &ClassifyOptions,
+) -> Classified {
+    classify_on(map, start, KnownMotions::default(), options)
+}
+
 /// As [`classify_beside`], on the given map alone. No neighbourhood is `known`.
 pub(crate) fn classify_on<M: StroboscopicMap>(
     map: &mut M,

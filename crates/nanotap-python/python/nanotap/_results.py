@@ -197,9 +197,12 @@ class Result:
 
     Attributes:
         document: The whole document, as in the terminal's JSON.
+        notes: Notes on the result, such as the initial state that was followed and how to list
+            the motions that others lead to.
     """
 
     document: Record = field(kw_only=True)
+    notes: list[str] = field(default_factory=list, kw_only=True)
 
     _arrays: ClassVar[frozenset[str]] = frozenset()
     _complex: ClassVar[frozenset[str]] = frozenset()
@@ -372,9 +375,9 @@ class Orbit(_Observed, Result):
         physical: Observables in SI, if the case is physical.
         derivatives: Derivatives by the requested keys: `state`, the
             observables, `physical`.
-        upset: The smallest knock on the tip that upsets it, if requested: `smallest`
+        upset: The smallest knock found on the tip that upsets it, if requested: `smallest`
             (`tip_speed`, `impulse`, `energy`, `drive_phase`, `leads_to`, `physical` in SI, or
-            None) and `largest_tried`.
+            None), `smaller_tried`, `size_ratio`, `instants` and `largest_tried`.
         proof: Result of the proof, if requested: `proved`, `statement`, and if proved
             enclosures of `state`, `switches` and `multipliers`, `stability`,
             `unique_within`.

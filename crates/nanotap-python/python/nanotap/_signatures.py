@@ -234,7 +234,7 @@ def orbit(
         Keys of the case for derivatives of the orbit and its observables; the same
         quantities stay constant as in a sweep.
     upset : bool
-        Find the smallest knock on the tip after which the lever goes to another
+        Look for the smallest knock on the tip after which the lever goes to another
         motion.
     prove : bool
         Prove existence, local uniqueness and stability by interval arithmetic.

@@ -12,6 +12,7 @@ use crate::model::beam::MAX_MODES;
 use crate::model::cantilever::Cantilever;
 use crate::model::{Model, ModelError};
 use crate::observe::time_series::with_modes;
+use crate::study::initial_state::initial_state_note;
 use crate::study::limits::MAX_PERIOD;
 use crate::study::mode_share::ReadingsReport;
 use crate::study::orbit::{OrbitOptions, OrbitReport, orbit, spectral_radius};
@@ -39,6 +40,9 @@ pub struct Convergence {
     /// Instrument readings, their errors with each number of modes, and the share of each mode.
     #[serde(flatten)]
     pub readings: ReadingsReport,
+    /// Which initial state was followed, and how to list the motions that others lead to.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub notes: Vec<String>,
     /// Orbit with each number of modes, for figures; `None` where none was found.
     #[serde(skip)]
     pub orbits: Vec<Option<OrbitReport>>,
@@ -144,6 +148,7 @@ pub fn convergence(
         tolerance,
         verdict,
         readings,
+        notes: Vec::new(),
         orbits,
         models,
     })
@@ -285,6 +290,11 @@ impl Study for ConvergenceStudy {
         control: &Control<'_>,
     ) -> Result<Convergence, Error> {
         let mut found = convergence(cantilever(case, Self::NAME)?, options, control)?;
+        if let Some((orbit, model)) = found.orbits.iter().zip(&found.models).next_back() {
+            let state = orbit.as_ref().map(|orbit| &*orbit.state);
+            let note = initial_state_note(model, false, state);
+            found.notes.push(note);
+        }
         let units = case.units();
         for motion in &mut found.motions {
             if let (Some(high), Some(low)) = (motion.tip_max, motion.tip_min) {

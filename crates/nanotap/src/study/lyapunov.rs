@@ -19,6 +19,7 @@ use crate::model::{Model, MotionError};
 use crate::observe::begins_contact;
 use crate::study::Study;
 use crate::study::attractors::orbit_exponents;
+use crate::study::initial_state::initial_state_note;
 use crate::study::limits::MAX_PERIODS;
 use crate::study::orbit::log_determinant_by_trace;
 use crate::study::request::options;
@@ -89,6 +90,9 @@ pub struct LyapunovReport {
     /// Mean of the states at drive phase 0, in the model's units. Its entries are a_1 … a_N (or x),
     /// their rates, then any memory of the sample.
     pub mean: Vec<f64>,
+    /// Which initial state was followed, and how to list the motions that others lead to.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub notes: Vec<String>,
     /// The section, for files and figures.
     #[serde(skip)]
     pub section: Vec<SectionPoint>,
@@ -246,6 +250,7 @@ pub fn lyapunov(
         exponents: found.exponents,
         errors: found.errors,
         mean: found.mean,
+        notes: Vec::new(),
         section,
         section_at,
     })
@@ -371,6 +376,10 @@ impl Study for LyapunovStudy {
             state: case.state_of(options.state.as_ref())?,
             ..options.clone()
         };
-        lyapunov(&case.model()?, &options, control)
+        let model = case.model()?;
+        let mut report = lyapunov(&model, &options, control)?;
+        let given = options.state.is_some();
+        report.notes.push(initial_state_note(&model, given, None));
+        Ok(report)
     }
 }

@@ -18,6 +18,7 @@ pub mod force_curve;
 mod free_motion;
 pub mod frequency_modulation;
 pub mod in_si;
+mod initial_state;
 pub mod lever;
 pub mod limits;
 pub mod lyapunov;

@@ -27,6 +27,7 @@ use crate::observe::{
 use crate::study::Study;
 use crate::study::approach::SETPOINT_PERIODS;
 use crate::study::in_si::InSi;
+use crate::study::initial_state::initial_state_note;
 use crate::study::limits::{MAX_PERIOD, MAX_SAMPLES};
 use crate::study::proof::{ProofReport, Prover};
 use crate::study::request::options;
@@ -78,12 +79,15 @@ pub struct OrbitReport {
     /// Excursions beyond the range of a nonlinear force law.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub out_of_range: Vec<OutOfRange>,
-    /// The smallest knock on the tip that upsets it, if requested.
+    /// The smallest knock found on the tip that upsets it, if requested.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub upset: Option<Knocks>,
     /// Result of the proof by interval arithmetic, if requested.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub proof: Option<ProofReport>,
+    /// Which initial state was followed, and how to list the motions that others lead to.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub notes: Vec<String>,
     /// Recording of one repetition of the orbit, for figures.
     #[serde(skip)]
     pub trajectory: Recording,
@@ -366,6 +370,7 @@ fn report_on(
         derivatives: BTreeMap::new(),
         upset: None,
         proof: None,
+        notes: Vec::new(),
         trajectory: seen.recording,
     })
 }
@@ -569,7 +574,7 @@ options! {
         /// stay constant as in a sweep
         #[schemars(extend("x-value" = "KEY,…"))]
         pub derivatives: Vec<String> = Vec::new(),
-        /// Find the smallest knock on the tip after which the lever goes to another motion
+        /// Look for the smallest knock on the tip after which the lever goes to another motion
         pub upset: bool = false,
         /// Prove existence, local uniqueness and stability by interval arithmetic
         pub prove: bool = false,
@@ -602,6 +607,9 @@ impl Study for OrbitStudy {
             ..options.clone()
         };
         let mut found = orbit(&model, options)?;
+        let given = options.state.is_some();
+        let note = initial_state_note(&model, given, Some(&found.state));
+        found.notes.push(note);
         for key in keys {
             let at = (found.state.as_slice(), found.period);
             let derivative =

@@ -20,5 +20,6 @@ mod physical_quantities;
 mod reconstruct;
 mod requests;
 mod setpoint;
+mod tones;
 mod units;
 mod upset;

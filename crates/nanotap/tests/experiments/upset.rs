@@ -1,4 +1,5 @@
-//! The smallest knock that upsets an orbit: its law next to a fold, and knocks followed by hand.
+//! The smallest knock found that upsets an orbit: its law next to a fold, thin basins, and knocks
+//! followed by hand.
 
 use nanotap::case::Case;
 use nanotap::control::Control;
@@ -7,7 +8,7 @@ use nanotap::model::model_map::ModelMap;
 use nanotap::study::Study as _;
 use nanotap::study::attractors::{AttractorsOptions, AttractorsStudy};
 use nanotap::study::orbit::{OrbitOptions, OrbitReport, OrbitStudy};
-use nanotap_dynamics::{ClassifyOptions, MotionKind, classify};
+use nanotap_dynamics::{ClassifyOptions, MotionKind, classify_exactly};
 use nanotap_flow::Flow;
 
 /// The lever whose tapping state ends at 14.073965664877789 nm (fold of `nanotap approach`).
@@ -64,20 +65,35 @@ fn returns(case: &Case, state: &[f64], part: f64, tip_speed: f64) -> bool {
         .solve(&equations.modes.tip)
         .unwrap();
     let of_tip = moved.dot(&equations.modes.tip);
-    let mut flow = Flow::new(model.system.clone());
-    let mut at = state.to_vec();
     let time = part * model.period();
-    flow.start(state, 0.0).unwrap();
-    flow.run_until(time, &mut ()).unwrap();
-    flow.state(&mut at);
-    let modes = moved.len();
-    for (speed, part) in at[modes..].iter_mut().zip(&moved) {
-        *speed += tip_speed * part / of_tip;
+    let knock = |at: &mut [f64]| {
+        let modes = moved.len();
+        for (speed, part) in at[modes..].iter_mut().zip(&moved) {
+            *speed += tip_speed * part / of_tip;
+        }
+    };
+    let mut at = state.to_vec();
+    if let Some(nonlinear) = &model.nonlinear {
+        let mut flow = nanotap_volterra::Flow::new(nonlinear.system.clone());
+        flow.start(state, 0.0).unwrap();
+        flow.run_until(time).unwrap();
+        flow.state(&mut at);
+        knock(&mut at);
+        flow.start(&at, time).unwrap();
+        flow.run_until(model.period()).unwrap();
+        flow.state(&mut at);
+    } else {
+        let mut flow = Flow::new(model.system.clone());
+        flow.start(state, 0.0).unwrap();
+        flow.run_until(time, &mut ()).unwrap();
+        flow.state(&mut at);
+        knock(&mut at);
+        flow.start(&at, time).unwrap();
+        flow.run_period(&mut ()).unwrap();
+        flow.state(&mut at);
     }
-    flow.start(&at, time).unwrap();
-    flow.run_period(&mut ()).unwrap();
-    flow.state(&mut at);
-    let end = classify(&mut ModelMap::new(&model), &at, &ClassifyOptions::default());
+    let options = ClassifyOptions::default();
+    let end = classify_exactly(&mut ModelMap::new(&model), &at, &options);
     match end.kind {
         MotionKind::Periodic(orbit) => {
             let size = state.iter().fold(0.0, |m: f64, x| m.max(x.abs()));
@@ -117,6 +133,79 @@ fn next_to_a_fold_the_knock_goes_as_the_root_of_the_distance() {
     };
     let [near, far] = [1e-4, 4e-4].map(of);
     assert!((far / near - 2.0).abs() < 0.06, "{near} {far}");
+}
+
+/// The repulsive state of a lever over a DMT sample, of amplitude 15 nm at 14.438 nm, and the smallest
+/// knock found that upsets it.
+fn on_dmt(gap: f64) -> (Case, OrbitReport) {
+    let words = [
+        "modes=1",
+        "cantilever.k=0.8736193621040327 N/m",
+        "cantilever.f0=100 kHz",
+        "cantilever.Q=200",
+        "tip.radius=5 nm",
+        "tip.modulus=160 GPa",
+        "tip.poisson=0.3",
+        "sample.law=dmt",
+        "sample.modulus=1 GPa",
+        "sample.poisson=0.3",
+        "sample.hamaker=3e-20 J",
+        "sample.intermolecular_distance=0.169 nm",
+        "drive.actuation=tip",
+        "drive.frequency=100 kHz",
+        "drive.free_amplitude=20 nm",
+        &format!("gap.tip={gap} nm"),
+    ]
+    .map(str::to_owned);
+    let case = Case::parse(None, &words).unwrap();
+    let options = OrbitOptions {
+        // At 14.438 nm, by a census.
+        state: Some(vec![-0.000_559_601_374_754_950_3, 0.001_750_078_017_744_779_6].into()),
+        period: Some(1),
+        upset: true,
+        ..OrbitOptions::default()
+    };
+    let found = OrbitStudy::run(&case, &options, &Control::default()).unwrap();
+    (case, found.motion)
+}
+
+/// The attractive state's basin reaches the repulsive one in arms whose width is 0.7 % of their
+/// distance. A scan of every instant in steps of 0.1 mm/s upsets it at 3.1 mm/s and above.
+#[test]
+fn a_thin_basin_is_not_passed_over() {
+    let (case, orbit) = on_dmt(14.438_126_105_449_122);
+    let knocks = orbit.upset.unwrap();
+    let found = knocks.smallest.unwrap();
+    let physical = found.physical.unwrap();
+    let speed = physical.tip_speed.abs();
+    assert!(speed <= 3.1e-3 && speed > 2.9e-3, "{speed}");
+    // What follows is the attractive state, of 14.267 nm by a census.
+    assert!((physical.amplitude.unwrap() / 14.267e-9 - 1.0).abs() < 1e-4);
+    let part = found.drive_phase / 360.0;
+    let upsets = |part: f64, size: f64| !returns(&case, &orbit.state, part, size);
+    assert!(upsets(part, found.tip_speed));
+    assert!(!upsets(part, 0.998 * found.tip_speed));
+    // Smaller knocks, all over the period, by the exact flow.
+    for k in 1..=100 {
+        let [part, size] = [0.754_877_666_246_693, 0.569_840_290_998_053]
+            .map(|step: f64| (step * f64::from(k)).fract());
+        let size = if k % 2 == 0 { size } else { -size };
+        assert!(
+            !upsets(part, 0.998 * size * found.tip_speed),
+            "{part} {size}"
+        );
+    }
+    assert!(knocks.smaller_tried > 1000 && knocks.size_ratio < 1.05);
+}
+
+/// The smallest knock changes with the distance as the orbits do: by a few percent here.
+#[test]
+fn the_smallest_knock_changes_smoothly_with_the_distance() {
+    let [near, far] = [14.35, 14.5].map(|gap| {
+        let (_, orbit) = on_dmt(gap);
+        orbit.upset.unwrap().smallest.unwrap().tip_speed.abs()
+    });
+    assert!((near / far - 1.0).abs() < 0.1, "{near} {far}");
 }
 
 /// A linear lever comes back from any knock, and so does a tapping one without another state.

@@ -83,6 +83,9 @@ pub struct NoiseReport {
     pub calibrations: Option<Calibrations>,
     /// Thermal spectrum of the free lever.
     pub spectrum: ThermalSpectrum,
+    /// Which initial state was followed, and how to list the motions that others lead to.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub notes: Vec<String>,
 }
 
 options! {
@@ -242,6 +245,7 @@ impl Study for NoiseStudy {
             reading_spectrum: tapping.spectrum.in_si(scales.length, scales.time),
             calibrations: thermal.calibrations(view),
             spectrum: thermal.spectrum(view),
+            notes: orbit.notes.clone(),
         })
     }
 }

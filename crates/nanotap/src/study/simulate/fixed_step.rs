@@ -79,6 +79,9 @@ pub struct FixedStepRun {
     pub periods_per_second: f64,
     /// The exact flow from the last state.
     pub exact: ExactVerdict,
+    /// Which initial state was followed, and how to list the motions that others lead to.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub notes: Vec<String>,
     /// Time, tip displacement and its rate, for figures: the first recorded periods.
     #[serde(skip)]
     pub curve: Vec<[f64; 3]>,
@@ -199,6 +202,7 @@ pub fn fixed_step_run(model: &Model, options: &SimulateOptions) -> Result<FixedS
             period: named.orbit.map(|o| o.period),
             evidence: named.evidence,
         },
+        notes: Vec::new(),
         curve: grid.curve,
     })
 }

@@ -23,6 +23,7 @@ use crate::observe::PhysicalMotion;
 use crate::observe::{ContactEvent, ObservableSet, Observables, OutOfRange, RecordOptions, record};
 use crate::study::Study;
 use crate::study::in_si::InSi;
+use crate::study::initial_state::initial_state_note;
 use crate::study::limits::{MAX_PERIOD, MAX_PERIODS, MAX_SAMPLES, MAX_STATE_NUMBERS};
 use crate::study::request::options;
 use crate::study::value::Steps;
@@ -100,6 +101,9 @@ pub struct Simulation {
     pub periods_per_second: f64,
     /// Evaluations of the gap a drive period; of the force under a nonlinear law.
     pub evaluations_per_period: f64,
+    /// Which initial state was followed, and how to list the motions that others lead to.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub notes: Vec<String>,
     /// The stable orbit to which the motion converges, if periodic.
     #[serde(skip)]
     pub orbit: Option<PeriodicOrbit>,
@@ -183,6 +187,7 @@ pub fn simulate(model: &Model, options: &SimulateOptions) -> Result<Simulation, 
         observables: record.observables,
         periods_per_second,
         evaluations_per_period,
+        notes: Vec::new(),
         orbit: named.orbit,
         trajectory: record.recording,
     })
@@ -525,11 +530,16 @@ impl Study for SimulateStudy {
             ..options.clone()
         };
         let model = case.model()?;
+        let given = options.state.is_some();
         if options.method == Method::Rk4 {
-            let run = fixed_step_run(&model, options)?;
+            let mut run = fixed_step_run(&model, options)?;
+            run.notes.push(initial_state_note(&model, given, None));
             return Ok(SimulateReport::FixedStep(Box::new(run)));
         }
-        let motion = simulate(&model, options)?;
+        let mut motion = simulate(&model, options)?;
+        let found = motion.orbit.as_ref().map(|orbit| &*orbit.states[0]);
+        let note = initial_state_note(&model, given, found);
+        motion.notes.push(note);
         let physical = case
             .physical()
             .map(|resolved| PhysicalMotion::alone(&motion.observables, None, resolved));

@@ -4,7 +4,7 @@
 //! after 2 s and then at growing intervals.
 
 use std::io::{IsTerminal as _, Write as _};
-use std::sync::{LazyLock, Mutex, MutexGuard, PoisonError};
+use std::sync::{LazyLock, Mutex, MutexGuard, OnceLock, PoisonError};
 use std::thread;
 use std::time::{Duration, Instant};
 
@@ -61,7 +61,9 @@ struct Counted {
     noun: &'static str,
     /// Whether finished results are kept when it is cancelled.
     keeps: bool,
+    /// Time from which the items are counted, and the number of them that were done then.
     begun: Instant,
+    first: usize,
     done: usize,
     total: usize,
 }
@@ -122,20 +124,24 @@ pub(crate) fn watched<R>(
     keeps: bool,
     work: impl FnOnce(&Control<'_>) -> R,
 ) -> R {
-    let begun = Instant::now();
-    let counted = |done: usize, total: usize| Counted {
+    let counted = |(begun, first): (Instant, usize), done: usize, total: usize| Counted {
         what,
         noun,
         keeps,
         begun,
+        first,
         done,
         total,
     };
-    line().work = Some(counted(0, 0));
+    line().work = Some(counted((Instant::now(), 0), 0, 0));
+    // What precedes the first item, such as the search for known states, says nothing about the
+    // time of the others.
+    let first = OnceLock::new();
     let report = |done: usize, total: usize| {
+        let since = *first.get_or_init(|| (Instant::now(), done));
         // A thread that does not get the line at once skips this report.
         if let Ok(mut line) = LINE.try_lock() {
-            line.work = Some(counted(done, total));
+            line.work = Some(counted(since, done, total));
         }
     };
     let control = Control {
@@ -240,9 +246,9 @@ fn words(work: Option<(Counted, Duration)>, elapsed: Duration, stopping: bool) -
     let words = match work {
         Some((work, spent)) if work.done > 0 => {
             let left = work.total.saturating_sub(work.done);
-            let left = spent.as_secs_f64() * left as f64 / work.done as f64;
             let Counted {
                 what,
+                first,
                 done,
                 total,
                 noun,
@@ -251,7 +257,11 @@ fn words(work: Option<(Counted, Duration)>, elapsed: Duration, stopping: bool) -
             let left = match done {
                 // What follows on all of them is not counted.
                 done if done >= total => format!("finishing, {so_far}"),
-                _ => format!("about {} left", duration(left)),
+                done if done <= first => so_far,
+                done => {
+                    let left = spent.as_secs_f64() * left as f64 / (done - first) as f64;
+                    format!("about {} left", duration(left))
+                }
             };
             format!("{what}: {done} of {total} {noun}, {left}")
         }
@@ -300,8 +310,13 @@ mod tests {
             noun: "starts",
             keeps: true,
             begun: Instant::now(),
+            first: 0,
             done,
             total,
+        };
+        let second = |done, total| Counted {
+            first: 5,
+            ..counted(done, total)
         };
         for (work, said) in [
             (None, "working, 12 s so far"),
@@ -314,6 +329,15 @@ mod tests {
             (
                 Some(counted(10, 40)),
                 "attractors: 10 of 40 starts, about 12 s left",
+            ),
+            // Before the fifth something else was done: 5 of 40 in 4 s, 30 are left.
+            (
+                Some(second(10, 40)),
+                "attractors: 10 of 40 starts, about 24 s left",
+            ),
+            (
+                Some(second(5, 40)),
+                "attractors: 5 of 40 starts, 12 s so far",
             ),
             (
                 Some(counted(40, 40)),

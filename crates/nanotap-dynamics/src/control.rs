@@ -39,9 +39,13 @@ impl Control<'_> {
     }
 
     pub(crate) fn report(&self, done: &AtomicUsize, total: usize) {
-        let count = done.fetch_add(1, Ordering::Relaxed) + 1;
+        self.report_count(done.fetch_add(1, Ordering::Relaxed) + 1, total);
+    }
+
+    /// Reports the number of finished items and their total.
+    pub(crate) fn report_count(&self, done: usize, total: usize) {
         if let Some(progress) = self.progress {
-            progress(count, total);
+            progress(done, total);
         }
     }
 }

@@ -47,9 +47,9 @@ pub use attractor_continuation::{
 };
 pub use basin::{BasinError, BasinOptions, Basins, Label, Slice, SliceAxis};
 pub use census::{
-    Attractor, AttractorKind, Census, CensusEnd, CensusOptions, Fraction, Lifetime, SizeCount,
-    StartBox, StartBoxError, StartOrigin, StartOutcome, StartSet, TransientChaos,
-    UndiscoveredFraction, census, census_of,
+    Attractor, AttractorKind, Census, CensusEnd, CensusOptions, CheckedStart, ExactOutcome,
+    Fraction, Lifetime, SizeCount, StartBox, StartBoxError, StartOrigin, StartOutcome, StartSet,
+    TransientChaos, UndiscoveredFraction, Wall, census, census_of, check_starts,
 };
 pub use classify::{
     Candidate, Chaos, Classified, ClassifyOptions, MotionKind, Torus, UndecidedReason,

@@ -33,6 +33,9 @@ const MAX_ITERATIONS: usize = 12;
 const MAX_RESIDUAL: f64 = 0.5;
 /// Largest shift of the mean gap by the force, as a multiple of the size of gaps and amplitudes.
 const MAX_SHIFT: f64 = 3.0;
+/// Distance of the least gap from a pole at which the search for the mean gap begins at least, as a
+/// fraction of the size of gaps and amplitudes.
+const FROM_POLE: f64 = 1e-3;
 /// Number of halvings of an interval that contains a root.
 const BISECTIONS: usize = 30;
 
@@ -56,6 +59,8 @@ struct Averaging<'a> {
     compliance: f64,
     receptance: Complex,
     table: GapTable,
+    /// Pole of the force, which no motion passes; −∞ if there is none.
+    pole: f64,
     /// Phases and weights over one oscillation from the far turning point.
     phases: Vec<Phase>,
 }
@@ -110,6 +115,7 @@ impl<'a> Averaging<'a> {
             compliance: unit(0.0)?.re,
             receptance: unit(tone.frequency)?,
             table: GapTable::new(system),
+            pole: pole(system),
             phases: phases.collect(),
         })
         .filter(|averaging| averaging.drive.modulus() > 0.0)
@@ -175,7 +181,10 @@ impl<'a> Averaging<'a> {
     /// Returns the mean gap at this amplitude, near a guess; NaN if it diverges.
     fn mean_gap(&self, amplitude: f64, guess: f64, size: f64) -> (f64, Average) {
         let rest = self.system.gap_constant;
-        let (mut mean, mut average) = (guess, Average::default());
+        // The least gap stays in front of a pole.
+        let least = self.pole + amplitude;
+        let mut mean = guess.max(least + FROM_POLE * size);
+        let mut average = Average::default();
         for _ in 0..MAX_ITERATIONS {
             average = self.average_with_slope(mean, amplitude, 1e-6 * size);
             let excess = mean - rest - self.compliance * average.mean;
@@ -184,7 +193,11 @@ impl<'a> Averaging<'a> {
             if !change.is_finite() {
                 break;
             }
-            mean += change;
+            mean = if mean + change > least {
+                mean + change
+            } else {
+                0.5 * (mean + least)
+            };
             if (mean - rest).abs() > MAX_SHIFT * size {
                 mean = f64::NAN;
                 break;
@@ -203,6 +216,9 @@ impl<'a> Averaging<'a> {
 
     /// Returns the motion with this mean gap and amplitude, with its state at phase 0.
     fn motion(&self, mean: f64, amplitude: f64) -> Option<AveragedMotion> {
+        if mean - amplitude <= self.pole {
+            return None;
+        }
         let average = self.average(mean, amplitude);
         // The residual may also change sign where the force jumps.
         if self.residual(amplitude, &average).abs() > MAX_RESIDUAL * self.drive.modulus() {
@@ -254,6 +270,14 @@ impl<'a> Averaging<'a> {
     fn size(&self) -> f64 {
         self.drive.modulus().max(self.system.gap_constant.abs())
     }
+}
+
+/// Returns the wall of the law if the force is infinite there, else −∞: a table goes on beyond its
+/// first row.
+fn pole(system: &System) -> f64 {
+    let law = system.law();
+    let is_pole = |wall: &f64| !law.value(law.branch_at(*wall, 0.0), *wall, 0.0).is_finite();
+    law.wall().filter(is_pole).unwrap_or(f64::NEG_INFINITY)
 }
 
 /// Computes the modal response to a unit force at a frequency.

@@ -9,7 +9,10 @@
 //!
 //! The step is chosen by how far the values of the force in it differ, which overestimates the
 //! error: at the default tolerance one period is off by some 1e-7 of the amplitude, near grazing
-//! by up to 1e-4. A switch of the law is located on partial steps. The motion at the end is a
+//! by up to 1e-4. Near a pole of the force all its values in a step may be small although the step
+//! leads through the pole: a step of which a stage, the end or the least gap between them lies at or
+//! behind the [wall](crate::ForceLaw::wall) of the law has an infinite error. A switch of the law is
+//! located on partial steps. The motion at the end is a
 //! smooth function of the start only to that error. Nothing is certified here; results are
 //! computed by [`Flow`](crate::Flow).
 
@@ -108,6 +111,8 @@ struct Tables {
     frequency: f64,
     /// Lowest and highest gap of each branch.
     bounds: Vec<[f64; 2]>,
+    /// Gap at and behind which the law does not hold; −∞ if it holds at every gap.
+    wall: f64,
     /// Exits of each branch; empty if switches are not located.
     exits: Vec<Vec<CoarseExit>>,
     /// Whether the exits of each branch depend on the gap alone.
@@ -486,6 +491,7 @@ impl Tables {
             forced,
             frequency,
             bounds,
+            wall: law.wall().unwrap_or(f64::NEG_INFINITY),
             by_gap_alone: exits
                 .iter()
                 .map(|exits: &Vec<CoarseExit>| {
@@ -531,6 +537,11 @@ impl Tables {
         let [low, high] = self.bounds[branch];
         self.table
             .slopes(&self.system, branch, gap.max(low).min(high), rate)
+    }
+
+    /// Reports whether the law holds at all of these gaps.
+    fn holds_at(&self, gaps: &[f64]) -> bool {
+        gaps.iter().all(|gap| *gap > self.wall)
     }
 
     fn guard(&self, guard: Guard, gap: f64, rate: f64) -> f64 {
@@ -594,7 +605,8 @@ impl Tables {
     }
 
     /// Computes an implicit step as [`step`](Self::step) does an explicit one, with the two forces
-    /// of [`ImplicitLevel`] by Newton's method. The error is infinite if that does not converge.
+    /// of [`ImplicitLevel`] by Newton's method. The error is infinite if that does not converge, or
+    /// if the law does not hold at one of the gaps.
     fn implicit_step(
         &self,
         level: &Level,
@@ -693,13 +705,17 @@ impl Tables {
             implicit: true,
             evaluations: stages.evaluations + 1,
         };
+        if !self.holds_at(&stages.gaps[1..]) {
+            return f64::INFINITY;
+        }
         // What the line misses of the force at the start, as far as the damping leaves it.
         let missed = from.force - 1.5 * forces[0] + 0.5 * forces[1];
         let [_, by_rate] = self.slopes(branch, end[0], end[1]);
         unit * missed.abs() / (6.0 * (1.0 + unit * by_rate.abs()))
     }
 
-    /// Computes one explicit step; returns the estimate of its error in the gap's rate.
+    /// Computes one explicit step; returns the estimate of its error in the gap's rate, infinite if
+    /// the law does not hold at one of the gaps.
     #[inline]
     fn step(&self, level: &Level, from: &Motion, to: &mut Motion, stages: &mut Stages) -> f64 {
         let constant = self.system.gap_constant;
@@ -752,6 +768,9 @@ impl Tables {
             implicit: false,
             evaluations: 3,
         };
+        if !self.holds_at(&stages.gaps[1..]) || gap <= self.wall {
+            return f64::INFINITY;
+        }
         level.length * self.mobility * ((k1 - k2 - k3 + k4).abs() + (k2 - k3).abs()) / 6.0
     }
 
@@ -1104,6 +1123,13 @@ impl Work {
         }
         self.now.branch = 0;
         self.rewind(tables);
+        if !tables.holds_at(&[self.now.gap]) {
+            return Err(VolterraError::Uncertified {
+                time: 0.0,
+                gap: self.now.gap,
+                reason: Refusal::Wall,
+            });
+        }
         if !tables.by_lookup {
             let (gap, rate) = (self.now.gap, self.now.rate);
             let possible = |b: &usize| {
@@ -1212,7 +1238,7 @@ impl Work {
                 } else {
                     &self.part
                 };
-                let error =
+                let mut error =
                     tables.step_by(implicit, level, &self.now, &mut self.next, &mut self.stages);
                 self.statistics.evaluations += self.stages.evaluations;
                 let mut refused = error > allowed || error.is_nan();
@@ -1227,6 +1253,7 @@ impl Work {
                         allowed,
                     ) {
                         Search::Refused => refused = true,
+                        Search::BehindWall => (refused, error) = (true, f64::INFINITY),
                         Search::Fall(found) => fall = Some(found),
                         Search::None => {}
                     }
@@ -1248,7 +1275,7 @@ impl Work {
                     self.statistics.refused += 1;
                     continue;
                 }
-                if error.is_infinite() {
+                if !error.is_finite() {
                     return Err(VolterraError::Uncertified {
                         time: self.now.time,
                         gap: self.now.gap,
@@ -1332,13 +1359,14 @@ impl Work {
             let mut at_low = value(&self.now).max(0.0);
             let mut at_high = None;
             let mut time = fall.time;
+            let mut error = 0.0;
             for count in 0..MAX_BISECTIONS {
                 self.part.set(&tables.system, &tables.readouts(), time);
                 if implicit {
                     self.part.set_implicit(&tables.system, &tables.readouts());
                 }
                 let (part, stages) = (&self.part, &mut self.stages);
-                tables.step_by(implicit, part, &self.now, &mut self.next, stages);
+                error = tables.step_by(implicit, part, &self.now, &mut self.next, stages);
                 self.statistics.evaluations += self.stages.evaluations;
                 let found = value(&self.next);
                 fell = found <= 0.5 * beyond;
@@ -1367,7 +1395,8 @@ impl Work {
                     }
                 };
             }
-            if self.next.modal.iter().flatten().any(|y| !y.is_finite()) {
+            let is_finite = self.next.modal.iter().flatten().all(|y| y.is_finite());
+            if !(is_finite && error < f64::INFINITY) {
                 return Err(VolterraError::Uncertified {
                     time: self.now.time,
                     gap: self.now.gap,
@@ -1413,6 +1442,8 @@ enum Search {
     None,
     Fall(Fall),
     Refused,
+    /// The least gap lies at or behind the wall of the law.
+    BehindWall,
 }
 
 /// Searches for the first fall of a guard on a step, and reports whether the least gap on it meets
@@ -1450,6 +1481,9 @@ fn search(
     });
     if let Some((k, x, gap)) = minimum {
         least = least.min(gap);
+        if gap <= tables.wall {
+            return Search::BehindWall;
+        }
         let force = tables.force(from.branch, gap, 0.0);
         let [k1, k2, k3, k4] = stages.forces;
         let (u, middle) = (0.5 * (k as f64 + x), 0.5 * (k2 + k3));

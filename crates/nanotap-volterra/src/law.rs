@@ -167,6 +167,13 @@ pub trait ForceLaw: Debug + Send + Sync {
     /// Returns the exits of a branch.
     fn exits(&self, branch: usize) -> Vec<Exit>;
 
+    /// Returns the gap at and behind which the law does not hold, in the unit of the gap: the
+    /// largest pole of the force on a branch that reaches it, or the first row of a table. `None`
+    /// if it holds at every gap.
+    fn wall(&self) -> Option<f64> {
+        None
+    }
+
     /// Returns the law's own guard number `index`.
     fn guard(&self, index: usize, gap: f64, rate: f64) -> Force {
         let _ = (index, gap, rate);

@@ -4,9 +4,10 @@ mod common;
 
 use common::{Lever, beam, dmt, table_law};
 use nalgebra::{DMatrix, DVector, RowDVector};
-use nanotap_volterra::laws::TABLE;
+use nanotap_volterra::laws::table::Rows;
+use nanotap_volterra::laws::{self, TABLE};
 use nanotap_volterra::{
-    Coarse, Complex, Drive, Flow, Kernel, Modes, Options, System, Tone, VolterraError,
+    Coarse, Complex, Drive, Flow, Kernel, Modes, Options, Refusal, System, Tone, VolterraError,
 };
 use std::f64::consts::TAU;
 use std::sync::Arc;
@@ -67,6 +68,11 @@ fn compare(system: &Arc<System>, name: &str, period: f64, states: usize) -> [f64
     let mut differences = Vec::new();
     for _ in 0..states {
         let mut x = random.state(modes);
+        let gap = system.gap(0.0, &x).0;
+        if system.law().wall().is_some_and(|wall| gap <= wall) {
+            assert!(coarse.run_periods(&mut x, None, 1).is_err(), "{name}");
+            continue;
+        }
         // The exact flow refuses starts deep inside the repulsive wall of Lennard-Jones.
         let Ok((end, branch)) = exact(&mut flow, &x, period) else {
             assert_eq!(name, "lennard-jones");
@@ -98,6 +104,108 @@ fn every_law_is_followed() {
             assert!(largest < 1e-4, "{name}, {modes} modes: {largest:.1e}");
         }
     }
+}
+
+/// A lever of 1 N/m and Q 100 with a free amplitude of 100 nm, 90 nm above a Lennard-Jones sample
+/// (Basso, Giarré, Dahleh, Mezić, ACC 1998; S = 3 nm), from deflections at which a step of the
+/// approximate flow once led through the pole: the force is even in the gap, and tiny a few
+/// nanometres from it. Every motion stays in front, near the exact one.
+#[test]
+fn no_step_passes_a_pole() {
+    let (attraction, radius) = (6.0 * 5.36, 1.0);
+    let repulsion = 180.0 * 5.36 * 3.0_f64.powi(6) / 30.0;
+    let law = laws::build(
+        "lennard-jones",
+        &[
+            ("repulsion", repulsion),
+            ("attraction", attraction),
+            ("radius", radius),
+        ],
+    );
+    let lever = Lever {
+        k: 1.0,
+        q: 100.0,
+        amplitude: 100.0,
+        zc: 90.0,
+    };
+    let system = Arc::new(lever.system(law.unwrap(), 20));
+    let mut coarse = Coarse::new(&system, TAU).unwrap();
+    let mut flow = Flow::new(Arc::clone(&system));
+    for deflection in [
+        -85.0, -60.0, -20.0, 20.0, 60.0, 100.0, 150.0, 200.0, 300.0, 400.0, 500.0,
+    ] {
+        let mut x = vec![deflection, 0.0];
+        let (end, _) = exact(&mut flow, &x, TAU).unwrap();
+        coarse.run_periods(&mut x, None, 1).unwrap();
+        assert!(system.gap(TAU, &x).0 > 0.0, "{deflection}: {x:?}");
+        let apart = (x[0] - end[0]).abs().max((x[1] - end[1]).abs());
+        assert!(
+            apart < 1e-3 * (100.0 + deflection.abs()),
+            "{deflection}: {apart:e}"
+        );
+    }
+    for deflection in [-90.0, -91.0, -300.0] {
+        let refused = coarse.run_periods(&mut [deflection, 0.0], None, 1);
+        let Err(VolterraError::Uncertified { reason, .. }) = refused else {
+            panic!("{deflection} is behind the pole: {refused:?}")
+        };
+        assert_eq!(reason, Refusal::Wall);
+    }
+}
+
+/// Laws whose force is infinite at a gap that a motion reaches: where a branch without contact goes
+/// on to a pole, and the first row of a table.
+#[test]
+fn laws_declare_where_they_end() {
+    for index in 0..TABLE.len() {
+        let name = TABLE[index].entry.name;
+        // All others touch before their pole.
+        let expected = (name == "lennard-jones").then_some(0.0);
+        assert_eq!(table_law(index, None).wall(), expected, "{name}");
+    }
+    let wall = |name: &str, contact_distance: f64| {
+        let entry = laws::law(name).unwrap().entry;
+        let values: Vec<(&str, f64)> = entry
+            .parameters
+            .iter()
+            .map(|parameter| match parameter.name {
+                "contact_distance" => ("contact_distance", contact_distance),
+                "film_thickness" => ("film_thickness", 0.3),
+                name => (name, common::value(name)),
+            })
+            .collect();
+        laws::build(name, &values).unwrap().wall()
+    };
+    for name in [
+        "dmt",
+        "van-der-waals",
+        "van-der-waals-cone",
+        "van-der-waals-punch",
+        "electrostatic",
+        "electrostatic-ac",
+        "dlvo",
+    ] {
+        assert_eq!(wall(name, 0.1), None, "{name}");
+        assert_eq!(wall(name, 0.0), Some(0.0), "{name}");
+        assert_eq!(wall(name, -0.1), Some(0.0), "{name}");
+    }
+    // −4πγR/(1 + d/h) with h = 0.3.
+    assert_eq!(wall("capillary", -0.2), None);
+    assert!((wall("capillary", -0.4).unwrap() + 0.3).abs() < 1e-15);
+    for name in ["hertz", "jkr", "power-damping", "solvation", "voigt-sphere"] {
+        assert_eq!(wall(name, -0.1), None, "{name}");
+    }
+    let rows = Rows::new(&[(0.4, 9.0), (0.6, -1.0), (1.5, 0.0)]).unwrap();
+    let table = laws::law("table").unwrap();
+    let law = table.through(&rows, &[0.0, 2.0, 1.0, 1.0]).unwrap();
+    assert_eq!(law.wall(), Some(0.8), "gaps are doubled");
+    // A sum holds where all of its laws do.
+    let jones = laws::law("lennard-jones").unwrap();
+    let one = jones.with(&[1.0, 1.0, 1.0]).unwrap();
+    let damping = laws::law("exponential-damping").unwrap();
+    let other = damping.with(&[1.0, 1.0]).unwrap();
+    let sum = laws::build_sum(&[(damping.entry, other), (jones.entry, one)]).unwrap();
+    assert_eq!(sum.wall(), Some(0.0));
 }
 
 #[test]

@@ -9,7 +9,7 @@ use nanotap::figure::attractors::attractors_figure;
 use nanotap::model::Model;
 use nanotap::observe::time_series;
 use nanotap::study::attractors::{
-    AttractorReport, Attractors, AttractorsStudy, EndReport, UnseenReport,
+    AttractorReport, Attractors, AttractorsStudy, CheckReport, EndReport, UnseenReport,
 };
 use nanotap::study::orbit::spectral_radius;
 use nanotap::study::proof::ProofReport;
@@ -224,6 +224,37 @@ fn text(case: &GivenCase, found: &Attractors) -> String {
         text.push_str(&motion::paragraph(&format!(
             "starts were followed at {tolerance:e}, by an approximate flow: fractions and bounds are of that flow. Every orbit \
              is closed by the exact flow, which also gives multipliers and exponents."
+        )));
+    }
+    if let Some(check) = &found.check {
+        text.push_str(&checked(check));
+    }
+    text
+}
+
+/// Starts that were followed again on the exact flow.
+fn checked(check: &CheckReport) -> String {
+    const SHOWN: usize = 5;
+    let undecided = match check.undecided {
+        0 => String::new(),
+        count => format!(", {count} undecided in one of the two"),
+    };
+    let mut text = motion::paragraph(&format!(
+        "{} followed again on the exact flow: {} to the same motion, {} to another{undecided}",
+        number::counted(check.starts, "start", "starts"),
+        check.agreed,
+        check.disagreements.len(),
+    ));
+    for other in check.disagreements.iter().take(SHOWN) {
+        text.push_str(&motion::paragraph(&format!(
+            "start {}: {} in the census, {} on the exact flow",
+            other.start, other.census, other.exact
+        )));
+    }
+    if check.disagreements.len() > SHOWN {
+        text.push_str(&motion::paragraph(&format!(
+            "and {} more (--json has all)",
+            check.disagreements.len() - SHOWN
         )));
     }
     text

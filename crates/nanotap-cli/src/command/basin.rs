@@ -122,6 +122,7 @@ fn parts(shares: &Shares) -> String {
         ("none within the periods", shares.unsettled),
         ("left every bound", shares.unbounded),
         ("could not be followed", shares.failed),
+        ("behind the surface", shares.behind),
     ] {
         if part > 0.0 {
             table.row([String::new(), name.to_owned(), percent(part)]);

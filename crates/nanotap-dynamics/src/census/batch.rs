@@ -4,7 +4,7 @@
 //! A run that does not close is measured by any thread that is free. The outcome of a start does not
 //! depend on the thread that follows it, nor on the others of its group.
 
-use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
 use std::sync::mpsc::{Sender, channel};
 
 use rayon::Scope;
@@ -28,8 +28,37 @@ pub(super) struct Batch<'a, M> {
     pub(super) known: KnownMotions<'a>,
     pub(super) options: &'a ClassifyOptions,
     pub(super) control: &'a Control<'a>,
-    /// Starts followed by the whole census, and how many these are at most.
-    pub(super) progress: (&'a AtomicUsize, usize),
+    pub(super) progress: Progress<'a>,
+}
+
+/// Starts that the whole census has followed, and what they tell of those that it will follow.
+#[derive(Clone, Copy)]
+pub(super) struct Progress<'a> {
+    /// Number of starts that are done.
+    pub(super) done: &'a AtomicUsize,
+    /// Cost of the work so far, in steps.
+    pub(super) cost: &'a AtomicU64,
+    /// Number of starts that are followed if the cost does not end the census before.
+    pub(super) most: usize,
+    /// Cost at which the census ends; `None` if it follows all its starts.
+    pub(super) budget: Option<u64>,
+}
+
+impl Progress<'_> {
+    /// Counts a start that took this cost; returns the number of starts that are done, and how many
+    /// are expected at the present cost of a start.
+    fn count(&self, cost: u64) -> (usize, usize) {
+        let spent = self.cost.fetch_add(cost, Ordering::Relaxed) + cost;
+        let done = self.done.fetch_add(1, Ordering::Relaxed) + 1;
+        let affordable = self.budget.filter(|_| spent > 0).map(|budget| {
+            let starts = done as f64 * budget as f64 / spent as f64;
+            (starts.ceil() as usize).max(done)
+        });
+        (
+            done,
+            affordable.map_or(self.most, |starts| starts.min(self.most)),
+        )
+    }
 }
 
 impl<M: StroboscopicMap> Batch<'_, M> {
@@ -129,8 +158,8 @@ impl<'s, 'a: 's, M: StroboscopicMap> Turn<'s, 'a, M> {
         if self.batch.control.is_cancelled() {
             return;
         }
-        let (done, all) = self.batch.progress;
-        self.batch.control.report(done, all);
+        let (done, all) = self.batch.progress.count(cost);
+        self.batch.control.report_count(done, all);
         // The receiver outlives every sender.
         let _ = self.sender.send((place, end, cost));
     }

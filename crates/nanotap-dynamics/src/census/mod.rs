@@ -35,6 +35,7 @@
 
 mod assemble;
 mod batch;
+mod check;
 mod confidence;
 mod escapes;
 mod motions;
@@ -42,11 +43,11 @@ mod start_box;
 mod start_set;
 mod undiscovered;
 
-use std::sync::atomic::AtomicUsize;
+use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
 
 use rayon::prelude::*;
 
-use crate::census::batch::Batch;
+use crate::census::batch::{Batch, Progress};
 use crate::census::escapes::{Escapes, escape_after};
 use crate::census::motions::Motions;
 use crate::classify::{
@@ -59,8 +60,9 @@ use crate::map::StroboscopicMap;
 use crate::neighbourhood::Neighbourhood;
 use crate::orbit::PeriodicOrbit;
 
+pub use check::{CheckedStart, ExactOutcome, check_starts};
 pub use confidence::{Fraction, Lifetime};
-pub use start_box::{StartBox, StartBoxError};
+pub use start_box::{StartBox, StartBoxError, Wall};
 pub use start_set::{StartOrigin, StartSet};
 pub use undiscovered::UndiscoveredFraction;
 
@@ -329,6 +331,8 @@ struct Work<'a, M> {
     options: &'a CensusOptions,
     control: &'a Control<'a>,
     done: AtomicUsize,
+    /// Cost of all the work so far, as the starts that are being followed add to it.
+    spent: AtomicU64,
     /// Largest number of starts.
     last: usize,
     outcomes: Vec<Outcome>,
@@ -368,6 +372,7 @@ impl<'a, M: StroboscopicMap> Work<'a, M> {
             options,
             control,
             done: AtomicUsize::new(0),
+            spent: AtomicU64::new(0),
             last,
             outcomes: Vec::new(),
             ends: Vec::new(),
@@ -392,7 +397,13 @@ impl<'a, M: StroboscopicMap> Work<'a, M> {
         };
         // Chaos that the first of the pilots are on need not be measured again by the others.
         let mut pilots = work.follow(count.clamp(1, FIRST_PILOTS));
-        pilots.extend(work.follow(count.saturating_sub(FIRST_PILOTS)));
+        let more = count.saturating_sub(FIRST_PILOTS);
+        let more = if starts.len().is_some() {
+            more
+        } else {
+            more.min(work.affordable_starts())
+        };
+        pilots.extend(work.follow(more));
         work.update_trapping_regions(&pilots);
         work
     }
@@ -469,9 +480,14 @@ impl<'a, M: StroboscopicMap> Work<'a, M> {
             size = size.min(bound).min(budget.ceil() as usize);
         }
         let size = size.div_ceil(BATCH).max(1) * BATCH;
+        size.min(self.affordable_starts().max(FIRST_PILOTS))
+    }
+
+    /// Number of further starts that the budget of steps suffices for, at the cost of those so far.
+    fn affordable_starts(&self) -> usize {
         let steps = self.options.max_steps.saturating_sub(self.total_cost());
-        let affordable = steps.saturating_mul(self.outcomes.len() as u64) / self.cost.max(1);
-        size.min((affordable as usize).max(FIRST_PILOTS))
+        let starts = steps.saturating_mul(self.outcomes.len() as u64) / self.cost.max(1);
+        usize::try_from(starts).unwrap_or(usize::MAX)
     }
 
     /// Follows the next `size` starts; returns those that were classified.
@@ -561,7 +577,27 @@ impl<'a, M: StroboscopicMap> Work<'a, M> {
         }
     }
 
+    /// Number of starts at which the census ends if no other motion is found, and if the work does
+    /// not take all its steps before.
+    fn expected_starts(&self) -> usize {
+        if self.starts.len().is_some() {
+            return self.last;
+        }
+        let followed = self.outcomes.len();
+        let needed = UndiscoveredFraction::starts_needed(self.motions.count(), self.options.unseen)
+            .saturating_sub(self.starts_since_discovery);
+        let bound = followed.max(self.starts.given_count()) + needed;
+        let in_periods = followed as f64 * self.options.max_periods as f64;
+        let affordable = match self.periods {
+            0 => usize::MAX,
+            periods => (in_periods / periods as f64) as usize,
+        };
+        bound.min(affordable).min(self.last).max(followed)
+    }
+
     fn run(&self, starts: &[Vec<f64>]) -> Vec<Option<(RunEnd, u64)>> {
+        self.spent.store(self.total_cost(), Ordering::Relaxed);
+        let is_drawn = self.starts.len().is_none();
         let trapping_regions = self.trapping_regions();
         let batch = Batch {
             map: &self.motions.followed,
@@ -569,7 +605,14 @@ impl<'a, M: StroboscopicMap> Work<'a, M> {
             known: self.known(&trapping_regions),
             options: &self.followed_options,
             control: self.control,
-            progress: (&self.done, self.last),
+            progress: Progress {
+                done: &self.done,
+                cost: &self.spent,
+                most: self
+                    .expected_starts()
+                    .max(self.outcomes.len() + starts.len()),
+                budget: is_drawn.then_some(self.options.max_steps),
+            },
         };
         batch.followed()
     }

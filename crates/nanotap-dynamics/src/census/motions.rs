@@ -170,13 +170,16 @@ impl<'a, M: StroboscopicMap> Motions<'a, M> {
         self.pair_orbits();
     }
 
-    /// The outcome of a start that was followed to its end; where the coarse map failed, the start
-    /// is followed again on the exact map.
+    /// The outcome of a start that was followed to its end; where the coarse map failed or left every
+    /// bound, the start is followed again on the exact map: only that one says that a motion is
+    /// unbounded.
     pub(super) fn outcome(&mut self, mut found: Classified, start: &[f64]) -> Outcome {
         let mut is_exact = !self.is_coarse;
+        let is_unbounded = matches!(found.kind, MotionKind::Unbounded);
         let may_retry = self.retries < MAX_RETRIES && self.failed_retries < MAX_FAILED_RETRIES;
-        if !is_exact && is_map_failure(&found.kind) && may_retry {
-            self.retries += 1;
+        let retries = is_unbounded || is_map_failure(&found.kind) && may_retry;
+        if !is_exact && retries {
+            self.retries += usize::from(!is_unbounded);
             let exact = self.classify_exactly(start, 0, self.options.max_steps);
             self.failed_retries += usize::from(is_map_failure(&exact.kind));
             for orbit in std::mem::replace(&mut found, exact).met {

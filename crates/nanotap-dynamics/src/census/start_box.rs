@@ -11,12 +11,38 @@
 use crate::control::Control;
 use crate::vector::mix;
 
-/// A box of initial states, from a lower to an upper corner.
+/// A box of initial states, from a lower to an upper corner, or the part of it in front of a wall.
 #[derive(Clone, Debug, PartialEq)]
 pub struct StartBox {
     lower: Vec<f64>,
     upper: Vec<f64>,
+    wall: Option<Wall>,
 }
+
+/// A plane behind which no motion starts: states `x` are in front where `row · x > least`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Wall {
+    /// Coefficients of the distance from the wall, one per coordinate.
+    pub row: Vec<f64>,
+    /// Value of `row · x` at the wall, in its unit.
+    pub least: f64,
+}
+
+impl Wall {
+    /// Returns whether a state is in front of the wall.
+    pub fn is_before(&self, state: &[f64]) -> bool {
+        self.distance(state) > 0.0
+    }
+
+    /// Returns `row · x − least`.
+    pub fn distance(&self, state: &[f64]) -> f64 {
+        let products = self.row.iter().zip(state).map(|(a, x)| a * x);
+        products.sum::<f64>() - self.least
+    }
+}
+
+/// Number of draws before a start is moved out of the part behind a wall.
+const DRAWS: u64 = 64;
 
 /// The reason why a box is invalid.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -40,6 +66,9 @@ pub enum StartBoxError {
     /// No scale is given.
     #[error("expected one scale of the box or more, got none")]
     NoScale,
+    /// No state of the box is in front of the wall.
+    #[error("no state of the box is in front of the wall")]
+    BehindWall,
     /// A side that does not run upwards between finite numbers.
     #[error(
         "side {index} of the box runs from {lower} to {upper}; it must run upwards, between finite numbers"
@@ -75,7 +104,47 @@ impl StartBox {
                 });
             }
         }
-        Ok(Self { lower, upper })
+        Ok(Self {
+            lower,
+            upper,
+            wall: None,
+        })
+    }
+
+    /// Returns the part of the box in front of a wall, within the smallest box around it.
+    ///
+    /// # Errors
+    /// [`StartBoxError::BehindWall`] if there is none.
+    pub fn before(mut self, wall: Wall) -> Result<Self, StartBoxError> {
+        let most = wall.distance(&self.farthest(&wall.row));
+        if most.is_nan() || most <= 0.0 {
+            return Err(StartBoxError::BehindWall);
+        }
+        for (i, &slope) in wall.row.iter().enumerate() {
+            // With the other coordinates where they are farthest from the wall.
+            let (from, end) = if slope > 0.0 {
+                (self.upper[i], &mut self.lower[i])
+            } else {
+                (self.lower[i], &mut self.upper[i])
+            };
+            if (from - *end).abs() * slope.abs() > most {
+                *end = from - most / slope;
+            }
+        }
+        self.wall = Some(wall);
+        Ok(self)
+    }
+
+    /// Returns the corner with the greatest `row · x`.
+    fn farthest(&self, row: &[f64]) -> Vec<f64> {
+        let ends = self.lower.iter().zip(&self.upper).zip(row);
+        ends.map(|((l, u), slope)| if *slope > 0.0 { *u } else { *l })
+            .collect()
+    }
+
+    /// Returns the wall in front of which the starts are, if there is one.
+    pub fn wall(&self) -> Option<&Wall> {
+        self.wall.as_ref()
     }
 
     /// Returns the dimension of the states, at least 1.
@@ -93,8 +162,28 @@ impl StartBox {
         &self.upper
     }
 
-    /// Returns start number `index` of the sequence with this seed.
+    /// Returns start number `index` of the sequence with this seed. A draw behind the wall is
+    /// replaced by one from another sequence.
     pub fn start(&self, seed: u64, index: u64) -> Vec<f64> {
+        let start = self.point(seed, index);
+        let Some(wall) = self.wall.as_ref().filter(|wall| !wall.is_before(&start)) else {
+            return start;
+        };
+        let mut others = (1..DRAWS).map(|draw| self.point(mix(seed ^ mix(!draw)), index));
+        others
+            .find(|other| wall.is_before(other))
+            .unwrap_or_else(|| {
+                // Half-way from the wall towards the corner that is farthest from it.
+                let corner = self.farthest(&wall.row);
+                let (near, far) = (wall.distance(&start), wall.distance(&corner));
+                let part = 0.5 * far / (far - near);
+                let ends = corner.iter().zip(&start);
+                ends.map(|(c, x)| c + part * (x - c)).collect()
+            })
+    }
+
+    /// Returns point number `index` of the sequence with this seed in the whole box.
+    fn point(&self, seed: u64, index: u64) -> Vec<f64> {
         let mut base = 1;
         self.lower
             .iter()
@@ -189,6 +278,37 @@ mod tests {
             / n as f64;
         let deviation = ((1.0f64 / 3.0).powi(4) - 0.25f64.powi(4)).sqrt() / (n as f64).sqrt();
         assert!((mean - 0.0625).abs() < 0.3 * deviation);
+    }
+
+    /// A third of the square is in front, or a tiny corner of it; all starts are there, and in the
+    /// first case they are spread evenly.
+    #[test]
+    fn starts_are_before_the_wall() {
+        let square = StartBox::new(vec![-1.0; 2], vec![1.0; 2]).unwrap();
+        let wall = |least| Wall {
+            row: vec![1.0, 0.5],
+            least,
+        };
+        for least in [0.3, 1.499, 1.499_999_9] {
+            let part = square.clone().before(wall(least)).unwrap();
+            let starts = part.starts(4, 500);
+            assert!(starts.iter().all(|x| wall(least).is_before(x)), "{least}");
+            let inside = |x: &f64| (-1.0..=1.0).contains(x);
+            assert!(starts.iter().flatten().all(inside), "{least}");
+        }
+        let part = square.clone().before(wall(0.3)).unwrap();
+        assert!((part.lower()[0] + 0.2).abs() < 1e-15 && part.lower()[1] == -1.0);
+        let starts = part.starts(4, 2000);
+        let share = starts.iter().filter(|x| x[0] < 0.3).count() as f64 / 2000.0;
+        // The area with x + y/2 > 0.3: a triangle up to x = 0.8 and a rectangle; a quarter of the
+        // triangle is at x < 0.3.
+        let (left, all) = (0.25, 1.0 + 0.4);
+        assert!((share - left / all).abs() < 0.03, "{share}");
+        assert_eq!(
+            square.before(wall(1.5)),
+            Err(StartBoxError::BehindWall),
+            "only the corner itself is at the wall"
+        );
     }
 
     #[test]

@@ -80,9 +80,13 @@ impl StartSet {
             .iter()
             .map(|&scale| {
                 let (lower, upper) = (towards(sides.lower(), scale), towards(sides.upper(), scale));
+                let mut shrunk = StartBox::new(lower, upper)?;
+                if let Some(wall) = sides.wall() {
+                    shrunk = shrunk.before(wall.clone())?;
+                }
                 Ok(Size {
                     scale,
-                    sides: StartBox::new(lower, upper)?,
+                    sides: shrunk,
                 })
             })
             .collect::<Result<_, StartBoxError>>()?;

@@ -113,6 +113,11 @@ impl Formula for Capillary {
         }
     }
 
+    /// Returns `−h`, where the force of a bridge has its pole.
+    fn pole(&self, c: &[f64]) -> Option<f64> {
+        Some(-c[4].recip())
+    }
+
     /// Reports contact on branch 2 only: across the bridge of branch 1, tip and sample do not
     /// touch.
     fn touches(&self, branch: usize) -> bool {

@@ -64,6 +64,10 @@ impl Formula for Dmt {
         contact_ways(branch, Approach::ThreeHalves)
     }
 
+    fn pole(&self, _c: &[f64]) -> Option<f64> {
+        Some(0.0)
+    }
+
     fn energy(&self, c: &[f64], branch: usize, gap: f64) -> Option<f64> {
         let delta = c[0] - gap;
         Some(if branch == 0 {

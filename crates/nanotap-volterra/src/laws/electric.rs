@@ -71,6 +71,10 @@ impl Formula for Electrostatic {
         contact_ways(branch, Approach::Analytic)
     }
 
+    fn pole(&self, _c: &[f64]) -> Option<f64> {
+        Some(0.0)
+    }
+
     fn energy(&self, c: &[f64], branch: usize, gap: f64) -> Option<f64> {
         let away = |d: f64| c[1] / c[2] * nanotap_arithmetic::ln_1p(c[2] / d);
         Some(if branch == 0 {
@@ -168,6 +172,10 @@ impl Formula for ElectrostaticAc {
     fn ways(&self, branch: usize) -> Vec<Way> {
         contact_ways(branch, Approach::Analytic)
     }
+
+    fn pole(&self, _c: &[f64]) -> Option<f64> {
+        Some(0.0)
+    }
 }
 
 /// Formula of double-layer force and van der Waals attraction in an electrolyte.
@@ -241,6 +249,10 @@ impl Formula for Dlvo {
 
     fn ways(&self, branch: usize) -> Vec<Way> {
         contact_ways(branch, Approach::Analytic)
+    }
+
+    fn pole(&self, _c: &[f64]) -> Option<f64> {
+        Some(0.0)
     }
 
     fn energy(&self, c: &[f64], branch: usize, gap: f64) -> Option<f64> {

@@ -101,6 +101,12 @@ pub trait Formula: Clone + Debug + Send + Sync + 'static {
     }
     /// Returns the exits of a branch.
     fn ways(&self, branch: usize) -> Vec<Way>;
+    /// Returns the largest gap at which the force of a branch across the gap has a pole, also if
+    /// the branch ends before it; see [`ForceLaw::wall`].
+    fn pole(&self, c: &[f64]) -> Option<f64> {
+        let _ = c;
+        None
+    }
     /// Returns the law's own guard number `index`.
     fn guard<S: Scalar>(&self, c: &[S], index: usize, gap: S, rate: S) -> S {
         let _ = (c, index, rate);
@@ -295,6 +301,21 @@ impl<F: Formula> ForceLaw for Law<F> {
                 Exit::new(guard, way.target).with(way.before, way.after)
             })
             .collect()
+    }
+
+    /// Returns the pole if a branch without contact reaches it: contact that begins at a larger gap
+    /// keeps every motion away from it.
+    fn wall(&self) -> Option<f64> {
+        let pole = self.formula.pole(&self.constants)?;
+        let reaches = |branch: usize| {
+            let ends = self.exits(branch).into_iter();
+            let mut ends = ends.filter_map(|exit| match exit.guard {
+                Guard::Falls(level) => Some(level),
+                _ => None,
+            });
+            !self.touches(branch) && ends.all(|level| level <= pole)
+        };
+        (0..self.branches()).any(reaches).then_some(pole)
     }
 
     fn guard(&self, index: usize, gap: f64, rate: f64) -> Force {

@@ -66,6 +66,10 @@ impl Formula for LennardJones {
         Vec::new()
     }
 
+    fn pole(&self, _c: &[f64]) -> Option<f64> {
+        Some(0.0)
+    }
+
     fn energy(&self, c: &[f64], _branch: usize, gap: f64) -> Option<f64> {
         Some(c[0] / (7.0 * gap.powi(7)) - c[1] / gap)
     }

@@ -494,6 +494,11 @@ impl ForceLaw for Prony {
         }
     }
 
+    /// Returns the wall of the attraction, as if the surface were undeformed.
+    fn wall(&self) -> Option<f64> {
+        self.attraction.as_ref()?.law.wall()
+    }
+
     fn exits(&self, branch: usize) -> Vec<Exit> {
         // Of a virgin surface the force sets in like the power of the law.
         let onset = self.shape.approach();

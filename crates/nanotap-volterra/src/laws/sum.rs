@@ -161,6 +161,11 @@ impl ForceLaw for Sum {
             .collect()
     }
 
+    fn wall(&self) -> Option<f64> {
+        let walls = self.terms.iter().filter_map(|t| t.wall());
+        walls.reduce(f64::max)
+    }
+
     fn guard(&self, index: usize, gap: f64, rate: f64) -> Force {
         let k = self.guards.partition_point(|first| *first <= index) - 1;
         self.terms[k].guard(index - self.guards[k], gap, rate)

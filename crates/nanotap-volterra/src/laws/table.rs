@@ -459,6 +459,11 @@ impl ForceLaw for ForceTable {
         down.into_iter().chain(up).collect()
     }
 
+    /// Returns the gap of the first row: below it the straight line is only an assumption.
+    fn wall(&self) -> Option<f64> {
+        Some(self.ends[0])
+    }
+
     /// Differentiates `F = force_factor P(d / gap_factor) − damping_factor γ(d / gap_factor) ḋ`
     /// with the table's own curves `P` and `γ`.
     fn by_parameters(&self, branch: usize, gap: f64, rate: f64, out: &mut [f64]) {

@@ -89,6 +89,10 @@ impl Formula for VanDerWaals {
         contact_ways(branch, Approach::Analytic)
     }
 
+    fn pole(&self, _c: &[f64]) -> Option<f64> {
+        Some(0.0)
+    }
+
     fn energy(&self, c: &[f64], branch: usize, gap: f64) -> Option<f64> {
         let away = |d: f64| match self.0 {
             Shape::Sphere => -c[1] / d,

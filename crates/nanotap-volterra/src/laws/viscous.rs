@@ -197,4 +197,9 @@ impl Formula for PowerDamping {
     fn ways(&self, branch: usize) -> Vec<Way> {
         contact_ways(branch, Approach::Analytic)
     }
+
+    /// Returns `a0 − d0`, which lies in contact.
+    fn pole(&self, c: &[f64]) -> Option<f64> {
+        Some(c[0] - c[2])
+    }
 }

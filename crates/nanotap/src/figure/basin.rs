@@ -12,7 +12,7 @@ use crate::case::physical::Kind;
 use crate::case::units::prefixed;
 use crate::dataset::{Store, StoreError};
 use crate::figure::panels::motion_of;
-use crate::study::basin::{FAILED, Known, UNBOUNDED, UNSETTLED, entries, known, labels};
+use crate::study::basin::{BEHIND, FAILED, Known, UNBOUNDED, UNSETTLED, entries, known, labels};
 
 /// The attractors that are reached from the points of a slice of states.
 #[derive(Clone, Debug, Deserialize)]
@@ -87,6 +87,7 @@ impl BasinTable {
             (UNSETTLED, "unsettled", Motion::Undecided.colour()),
             (UNBOUNDED, "unbounded", Motion::Unbounded.colour()),
             (FAILED, "not followed", Colour::rgb(120, 120, 120)),
+            (BEHIND, "behind the surface", Colour::rgb(225, 225, 225)),
         ]
         .into_iter()
         .filter(|(label, ..)| present.contains(label))

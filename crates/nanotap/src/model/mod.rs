@@ -38,6 +38,7 @@ use std::sync::{Arc, OnceLock};
 
 pub use motion_error::MotionError;
 use nanotap_arithmetic::CancelFlag;
+use nanotap_dynamics::Wall;
 use nanotap_flow::sensitivity::SystemTangent;
 use nanotap_flow::{Drive, Output, System};
 pub use nanotap_flow::{FlowError, vector_instructions};
@@ -276,6 +277,12 @@ impl Model {
     /// if it is given, else the state at rest.
     pub fn first_state(&self) -> Vec<f64> {
         self.start.clone().unwrap_or_else(|| self.rest())
+    }
+
+    /// Returns the states at drive phase 0 in which the tip is where the contact law ends, at a pole or
+    /// at the first row of a table; `None` if the law holds at every gap.
+    pub fn wall(&self) -> Option<Wall> {
+        self.nonlinear.as_ref()?.wall()
     }
 
     /// Moves a state that lies behind a rigid stop onto the stop.

@@ -12,7 +12,7 @@ use std::f64::consts::TAU;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use nalgebra::{DMatrix, DVector, RowDVector};
-use nanotap_dynamics::Tangency;
+use nanotap_dynamics::{Tangency, Wall};
 use nanotap_flow::{Output, Regime};
 use nanotap_volterra::averaging::{about_rest, motions};
 use nanotap_volterra::{
@@ -264,6 +264,18 @@ impl Nonlinear {
         }
     }
 
+    /// Returns the states of the model at drive phase 0 in which the gap is at the
+    /// [wall](ForceLaw::wall) of the law; `None` if the law holds at every gap. Distances from it
+    /// are those of the gap, in units of g₀.
+    pub(crate) fn wall(&self) -> Option<Wall> {
+        let wall = self.system.law().wall()?;
+        let n = self.system.dimension();
+        let mut row = self.system.kernel().row().as_slice().to_vec();
+        row.resize(self.dimension(), 0.0);
+        let least = wall - self.system.gap(0.0, &vec![0.0; n]).0;
+        Some(Wall { row, least })
+    }
+
     /// Returns the gap at which contact begins from outside, in units of g₀; `None` if there is
     /// none.
     pub(crate) fn contact_gap(&self) -> Option<f64> {
@@ -326,7 +338,8 @@ const EQUILIBRIUM_POINTS: i32 = 600;
 
 impl Nonlinear {
     /// The equilibria of the undriven lever, those with the tip farthest away first: zeros of
-    /// `d − d₀ − c F(d)`, with the lever's static compliance `c`.
+    /// `d − d₀ − c F(d)`, with the lever's static compliance `c`, in front of the
+    /// [wall](ForceLaw::wall) of the law.
     pub fn equilibria(&self) -> Vec<Equilibrium> {
         let law = self.static_law();
         let (rest, compliance) = (self.system.drive().offset, self.compliance());
@@ -338,6 +351,7 @@ impl Nonlinear {
         let ladder = |k: i32| {
             reach * nanotap_arithmetic::powf(1e-9, f64::from(k) / f64::from(EQUILIBRIUM_POINTS))
         };
+        let wall = law.wall().unwrap_or(f64::NEG_INFINITY);
         let steps: Vec<f64> = (0..=EQUILIBRIUM_POINTS).map(ladder).collect();
         let inwards = steps.iter().rev().map(|step| contact - step);
         let points: Vec<f64> = steps
@@ -346,7 +360,8 @@ impl Nonlinear {
             .chain(inwards)
             .collect();
         for branch in 0..law.branches() {
-            let (mut low, mut high) = (f64::NEG_INFINITY, f64::INFINITY);
+            // None is behind the wall of the law.
+            let (mut low, mut high) = (wall, f64::INFINITY);
             for exit in law.exits(branch) {
                 match exit.guard {
                     Guard::Falls(level) => low = low.max(level),
@@ -833,6 +848,7 @@ impl EngineMap for NonlinearMap {
         // None of a surface that relaxes.
         Some(Box::new(CoarseMap {
             coarse: Coarse::new(&self.nonlinear.system, self.nonlinear.period).ok()?,
+            exact: Self::new(&self.nonlinear, Vec::new()),
             nonlinear: Arc::clone(&self.nonlinear),
         }))
     }
@@ -885,11 +901,32 @@ impl EngineMap for NonlinearMap {
     }
 }
 
-/// The approximate map of a lever under a nonlinear force, for transients.
+/// The approximate map of a lever under a nonlinear force, for transients. A period that the
+/// approximate flow cannot follow is computed by the exact one, so that nothing is reported of a
+/// failure of the approximation.
 #[derive(Clone, Debug)]
 struct CoarseMap {
     nonlinear: Arc<Nonlinear>,
     coarse: Coarse,
+    exact: NonlinearMap,
+}
+
+impl CoarseMap {
+    /// Replaces `state` by its image under the approximate map `coarse`, or else under the exact one.
+    fn try_period(
+        &mut self,
+        state: &mut [f64],
+        coarse: impl FnOnce(&mut Self, &mut [f64]) -> Result<(), MotionError>,
+        exact: impl FnOnce(&mut NonlinearMap, &mut [f64]) -> Result<(), MotionError>,
+    ) -> Result<(), MotionError> {
+        let start = state.to_vec();
+        let result = coarse(self, state);
+        if result.is_ok() || self.nonlinear.system.cancel().is_cancelled() {
+            return result;
+        }
+        state.copy_from_slice(&start);
+        exact(&mut self.exact, state)
+    }
 }
 
 impl EngineMap for CoarseMap {
@@ -908,15 +945,15 @@ impl EngineMap for CoarseMap {
     fn move_gap(&mut self, gap: f64, _: &mut dyn FnMut(&mut f64)) -> Result<(), MotionError> {
         Arc::make_mut(&mut self.nonlinear).set_gap(gap)?;
         self.coarse = Coarse::new(&self.nonlinear.system, self.nonlinear.period)?;
-        Ok(())
+        self.exact.move_gap(gap, &mut |_| {})
     }
 
     fn evaluations(&self) -> u64 {
-        self.coarse.statistics().evaluations
+        self.coarse.statistics().evaluations + self.exact.evaluations()
     }
 
     fn cost(&self) -> u64 {
-        self.coarse.cost()
+        self.coarse.cost() + self.exact.cost()
     }
 
     fn discrete_entries(&self) -> usize {
@@ -924,10 +961,19 @@ impl EngineMap for CoarseMap {
     }
 
     fn advance_by(&mut self, state: &mut [f64], periods: usize) -> Result<(), MotionError> {
-        let (lever, memory) = self.nonlinear.split(state)?;
-        let branch = remembered(memory);
-        let reached = self.coarse.run_periods(lever, branch, periods)?;
-        memory.fill(reached as f64);
+        for _ in 0..periods {
+            self.try_period(
+                state,
+                |map, state| {
+                    let (lever, memory) = map.nonlinear.split(state)?;
+                    let branch = remembered(memory);
+                    let reached = map.coarse.run_periods(lever, branch, 1)?;
+                    memory.fill(reached as f64);
+                    Ok(())
+                },
+                |map, state| map.advance_by(state, 1),
+            )?;
+        }
         Ok(())
     }
 
@@ -937,12 +983,23 @@ impl EngineMap for CoarseMap {
         jacobian: &mut DMatrix<f64>,
     ) -> Result<(), MotionError> {
         let (n, whole) = (self.nonlinear.system.dimension(), state.len());
-        let (lever, memory) = self.nonlinear.split(state)?;
-        let mut own = DMatrix::zeros(n, n);
-        let branch = remembered(memory);
-        let reached = self.coarse.run_with_jacobian(lever, branch, &mut own)?;
-        memory.fill(reached as f64);
-        *jacobian = own.resize(whole, whole, 0.0);
+        let mut by_exact = DMatrix::zeros(0, 0);
+        self.try_period(
+            state,
+            |map, state| {
+                let (lever, memory) = map.nonlinear.split(state)?;
+                let mut own = DMatrix::zeros(n, n);
+                let branch = remembered(memory);
+                let reached = map.coarse.run_with_jacobian(lever, branch, &mut own)?;
+                memory.fill(reached as f64);
+                *jacobian = own.resize(whole, whole, 0.0);
+                Ok(())
+            },
+            |map, state| map.advance_with_jacobian(state, &mut by_exact),
+        )?;
+        if by_exact.nrows() > 0 {
+            *jacobian = by_exact;
+        }
         Ok(())
     }
 

@@ -2,8 +2,9 @@
 
 use nanotap_arithmetic::ComplexFunctions as _;
 use nanotap_dynamics::{
-    AttractorKind, Census, CensusEnd, CensusOptions, ClassifyOptions, Control, Fraction,
-    OrbitSearch, PeriodicOrbit, Stability, StartBox, StartSet, census_of, find_orbits,
+    AttractorKind, Census, CensusEnd, CensusOptions, CheckedStart, ClassifyOptions, Control,
+    ExactOutcome, Fraction, OrbitSearch, PeriodicOrbit, Stability, StartBox, StartOutcome,
+    StartSet, census_of, check_starts, find_orbits,
 };
 use nanotap_volterra::coarse;
 use schemars::JsonSchema;
@@ -67,8 +68,76 @@ pub struct Attractors {
     /// Unstable periodic orbits, if they were requested.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub unstable: Option<Vec<InSi<OrbitReport>>>,
+    /// Initial states that were followed again on the exact flow, if that was requested.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub check: Option<CheckReport>,
     /// Whether the work was stopped before all starts were done.
     pub cancelled: bool,
+}
+
+/// Comparison of initial states of a census with the exact flow.
+#[derive(Clone, Debug, Serialize, JsonSchema)]
+pub struct CheckReport {
+    /// Number of initial states that were followed again.
+    pub starts: usize,
+    /// Number of them that go to the same motion.
+    pub agreed: usize,
+    /// Number of them that are undecided in the census or on the exact flow.
+    pub undecided: usize,
+    /// Those that go to another motion.
+    pub disagreements: Vec<Disagreement>,
+}
+
+/// An initial state that goes to another motion on the exact flow than in the census.
+#[derive(Clone, Debug, Serialize, JsonSchema)]
+pub struct Disagreement {
+    /// Index of the initial state in the order of sampling, from 0.
+    pub start: usize,
+    /// Initial state at drive phase 0, in the model's units. Its entries are a_1 … a_N (or x),
+    /// their rates, then any memory of the sample.
+    pub state: Vec<f64>,
+    /// Motion that the census reports, in words; attractors are numbered from 1.
+    pub census: String,
+    /// Motion on the exact flow, in words.
+    pub exact: String,
+}
+
+impl CheckReport {
+    fn new(checked: &[CheckedStart], set: &StartSet) -> Self {
+        let count = |agrees| checked.iter().filter(|one| one.agrees == agrees).count();
+        let other = checked.iter().filter(|one| one.agrees == Some(false));
+        Self {
+            starts: checked.len(),
+            agreed: count(Some(true)),
+            undecided: count(None),
+            disagreements: other
+                .map(|one| Disagreement {
+                    start: one.start,
+                    state: set.start(one.start).unwrap_or_default(),
+                    census: match one.outcome {
+                        StartOutcome::Attractor { index, .. } => attractor_number(index),
+                        StartOutcome::TransientChaos { .. } => "transient chaos".into(),
+                        StartOutcome::Unbounded => "left every bound".into(),
+                        StartOutcome::Undecided => "undecided".into(),
+                    },
+                    exact: match &one.exact {
+                        ExactOutcome::Attractor(index) => attractor_number(*index),
+                        ExactOutcome::OtherOrbit(period) => {
+                            format!("an orbit of period {period} that is not listed")
+                        }
+                        ExactOutcome::QuasiPeriodic => "quasi-periodic".into(),
+                        ExactOutcome::Chaotic => "chaotic".into(),
+                        ExactOutcome::Unbounded => "left every bound".into(),
+                        ExactOutcome::Undecided(reason) => format!("undecided: {reason}"),
+                    },
+                })
+                .collect(),
+        }
+    }
+}
+
+fn attractor_number(index: usize) -> String {
+    format!("attractor {}", index + 1)
 }
 
 /// Results of the initial states of one size.
@@ -367,6 +436,11 @@ pub fn attractors(
     } else {
         None
     };
+    let check = (options.check > 0).then(|| {
+        let chosen = (options.check, options.seed);
+        let checked = check_starts(&map, &set, &found, chosen, &budgets.classify, control);
+        CheckReport::new(&checked, &set)
+    });
     let sides = state_names(model)
         .into_iter()
         .zip(start_box.lower().iter().zip(start_box.upper()))
@@ -377,7 +451,10 @@ pub fn attractors(
             physical: None,
         })
         .collect();
-    described(model, &found, &set, (options, &budgets), sides, unstable)
+    Ok(Attractors {
+        check,
+        ..described(model, &found, &set, (options, &budgets), sides, unstable)?
+    })
 }
 
 /// Returns the options of the census; a smaller bound than the default has larger budgets.
@@ -499,6 +576,7 @@ fn described(
         unbounded: found.unbounded.into(),
         transient_chaos,
         unstable,
+        check: None,
         cancelled: found.cancelled,
     })
 }
@@ -658,6 +736,10 @@ options! {
         /// Also list unstable orbits up to this period
         #[schemars(range(min = 0, max = MAX_PERIOD), extend("x-value" = "N", "x-bare" = "4"))]
         pub unstable: usize = 0,
+        /// Follow this many of the initial states, chosen at random, again on the exact flow, and
+        /// report those that go to another motion
+        #[schemars(range(min = 0, max = MAX_STARTS), extend("x-value" = "K", "x-bare" = "32"))]
+        pub check: usize = 0,
         /// Prove existence, local uniqueness and stability of each orbit by interval arithmetic
         pub prove: bool = false,
         /// Periods in drive periods and states at drive phase 0 of orbits that are known near the model, in

@@ -11,7 +11,8 @@
 
 use nanotap_dynamics::{
     Attractor, AttractorKind, BasinOptions as Budget, Basins, CensusOptions, ClassifyOptions,
-    Control, Label, LyapunovOptions, Slice, SliceAxis, StartBox, StroboscopicMap, census,
+    Control, Label, LyapunovOptions, Slice, SliceAxis, StartBox, StartBoxError, StroboscopicMap,
+    Wall, census,
 };
 use rayon::prelude::*;
 use schemars::JsonSchema;
@@ -34,6 +35,7 @@ use crate::study::attractors::MAX_STARTS;
 use crate::study::limits::{MAX_PERIOD, MAX_PERIODS};
 use crate::study::request::options;
 use crate::study::simulate::{Classification, starting_state};
+use crate::study::start_box::before_wall;
 use crate::study::{Computation, DatasetPlan, DatasetStudy};
 
 /// Most points along an axis, and of a slice.
@@ -52,6 +54,8 @@ const SHOWN: usize = 512;
 pub(crate) const UNSETTLED: i32 = -1;
 pub(crate) const UNBOUNDED: i32 = -2;
 pub(crate) const FAILED: i32 = -3;
+/// Label of points at or behind the wall of the contact law.
+pub(crate) const BEHIND: i32 = -4;
 /// The computed variable, and the attribute with the list of attractors.
 const VARIABLE: &str = "attractor";
 const ATTRACTORS: &str = "attractors";
@@ -157,6 +161,9 @@ pub struct Known {
 #[derive(Debug)]
 pub struct Basin {
     model: Model,
+    slice: Slice,
+    /// Wall of the contact law; points behind it are not followed.
+    wall: Option<Wall>,
     basins: Basins,
     schema: Schema,
     known: Vec<Known>,
@@ -209,8 +216,9 @@ impl Basin {
                 }
                 states.clone()
             }
-            None => starts_in(&slice, model.dimension(), options, control)?,
+            None => starts_in(&slice, &model, options, control)?,
         };
+        let wall = model.wall();
         let map = ModelMap::new(&model);
         let how = CensusOptions {
             classify: options.classify(),
@@ -241,7 +249,7 @@ impl Basin {
         let mut basins = Basins::new(&map, slice.clone(), &attractors, budget.clone())?;
         // Given states are the only attractors that points are assigned to.
         while !given && !control.is_cancelled() {
-            let strangers = strangers(&map, &slice, &basins);
+            let strangers = strangers(&map, &slice, wall.as_ref(), &basins);
             let taken = census(&map, &strangers, &how, control).attractors;
             let before = attractors.len();
             for attractor in taken {
@@ -267,6 +275,8 @@ impl Basin {
         let schema = schema(case, options, [x, y], &names, &basins, &known);
         Ok(Self {
             model,
+            slice,
+            wall,
             basins,
             schema,
             known,
@@ -288,14 +298,14 @@ impl Basin {
         ModelMap::new(&self.model.clone().cancelled_by(&control.flag()))
     }
 
-    /// The labels of one row of the slice; `None` when it was stopped.
+    /// The labels of one row of the slice, as they are stored; `None` when it was stopped.
     fn row(
         &self,
         map: &ModelMap,
         block: &Block,
         item: usize,
         control: &Control<'_>,
-    ) -> Option<Vec<Label>> {
+    ) -> Option<Vec<i32>> {
         let length = self.schema.grid.axes[1].length;
         let y = block.ranges[0].start + item;
         let end = (y + 1) * length;
@@ -307,11 +317,36 @@ impl Basin {
                 return None;
             }
             let range = start..end.min(start + UNSTOPPED);
-            labels.append(&mut self.basins.chunk(&mut map, range));
+            labels.append(&mut self.labels(&mut map, range));
         }
         // The map may have ended the last of them.
         (!control.is_cancelled()).then_some(labels)
     }
+}
+
+impl Basin {
+    /// The labels of a range of points, as they are stored.
+    fn labels(&self, map: &mut ModelMap, range: std::ops::Range<usize>) -> Vec<i32> {
+        let mut labels = vec![BEHIND; range.len()];
+        let mut state = vec![0.0; map.dimension()];
+        let points: Vec<usize> = range
+            .clone()
+            .filter(|&point| is_before(&self.slice, self.wall.as_ref(), point, &mut state))
+            .collect();
+        let followed = self.basins.labels(map, &points);
+        for (point, label) in points.into_iter().zip(followed) {
+            labels[point - range.start] = number(label);
+        }
+        labels
+    }
+}
+
+/// Whether a point of a slice is in front of the wall of the law, if there is one; `state` is
+/// overwritten.
+fn is_before(slice: &Slice, wall: Option<&Wall>, point: usize, state: &mut [f64]) -> bool {
+    let Some(wall) = wall else { return true };
+    slice.state(point, state);
+    wall.is_before(state)
 }
 
 impl Computation for Basin {
@@ -349,14 +384,13 @@ fn rows(block: &Block) -> usize {
     block.ranges[0].len()
 }
 
-fn columns(rows: &[Vec<Label>]) -> Vec<Values> {
-    vec![Values::Whole(
-        rows.iter().flatten().copied().map(number).collect(),
-    )]
+fn columns(rows: &[Vec<i32>]) -> Vec<Values> {
+    vec![Values::Whole(rows.concat())]
 }
 
 /// States among a coarse grid of the slice that come to none of the attractors.
-fn strangers(map: &ModelMap, slice: &Slice, basins: &Basins) -> Vec<Vec<f64>> {
+fn strangers(map: &ModelMap, slice: &Slice, wall: Option<&Wall>, basins: &Basins) -> Vec<Vec<f64>> {
+    let mut state = vec![0.0; map.dimension()];
     let (x, y) = slice.axes();
     let some = |count: usize| {
         let many = COARSE.min(count);
@@ -364,6 +398,7 @@ fn strangers(map: &ModelMap, slice: &Slice, basins: &Basins) -> Vec<Vec<f64>> {
     };
     let points: Vec<usize> = some(y.count)
         .flat_map(|row| some(x.count).map(move |column| row * x.count + column))
+        .filter(|&point| is_before(slice, wall, point, &mut state))
         .collect();
     let labels: Vec<Vec<Label>> = points
         .par_chunks(together(map, points.len()))
@@ -382,18 +417,25 @@ fn strangers(map: &ModelMap, slice: &Slice, basins: &Basins) -> Vec<Vec<f64>> {
         .collect()
 }
 
-/// Quasi-random starts in the slice.
+/// Quasi-random starts in the slice, in front of the wall of the law.
 fn starts_in(
     slice: &Slice,
-    dimension: usize,
+    model: &Model,
     options: &BasinOptions,
     control: &Control<'_>,
 ) -> Result<Vec<Vec<f64>>, Error> {
     // The first point has the least values along both axes, the last the greatest.
-    let (mut lower, mut upper) = (vec![0.0; dimension], vec![0.0; dimension]);
+    let mut lower = vec![0.0; model.dimension()];
+    let mut upper = lower.clone();
     slice.state(0, &mut lower);
     slice.state(slice.len() - 1, &mut upper);
-    let sides = StartBox::new(lower, upper).map_err(|error| axes(error.to_string()))?;
+    let sides = StartBox::new(lower, upper).and_then(|sides| before_wall(model, sides));
+    let sides = sides.map_err(|error| {
+        axes(match error {
+            StartBoxError::BehindWall => "the whole slice lies behind the surface".to_owned(),
+            error => error.to_string(),
+        })
+    })?;
     Ok(sides.starts_until(options.seed, options.starts, control))
 }
 
@@ -503,7 +545,8 @@ fn schema(
         )
     };
     let comment = "index into the attribute `attractors` (JSON); -1: none within the periods, \
-                   -2: left every bound, -3: could not be followed";
+                   -2: left every bound, -3: could not be followed, -4: behind the surface, where the \
+                   contact law does not hold";
     Schema {
         grid,
         variables: vec![
@@ -533,6 +576,9 @@ pub struct Shares {
     pub unbounded: f64,
     /// Fraction of the points that could not be computed, 0 to 1.
     pub failed: f64,
+    /// Fraction of the points that lie behind the surface, at or behind a pole of the contact law or
+    /// the first row of its table, 0 to 1; they are not followed.
+    pub behind: f64,
 }
 
 /// An attractor and its fraction of a slice.
@@ -583,13 +629,14 @@ pub fn shares(store: &Store) -> Result<Shares, StoreError> {
     store.require_all()?;
     let known = known(store)?;
     let mut counts = vec![0usize; known.len()];
-    let [mut unsettled, mut unbounded, mut failed] = [0usize; 3];
+    let [mut unsettled, mut unbounded, mut failed, mut behind] = [0usize; 4];
     for chunk in 0..store.chunks() {
         for label in labels(store, &store.schema().grid.block(chunk))? {
             match usize::try_from(label).ok().and_then(|k| counts.get_mut(k)) {
                 Some(count) => *count += 1,
                 None if label == UNBOUNDED => unbounded += 1,
                 None if label == FAILED => failed += 1,
+                None if label == BEHIND => behind += 1,
                 None => unsettled += 1,
             }
         }
@@ -612,6 +659,7 @@ pub fn shares(store: &Store) -> Result<Shares, StoreError> {
         unsettled: part(unsettled),
         unbounded: part(unbounded),
         failed: part(failed),
+        behind: part(behind),
     })
 }
 

@@ -15,8 +15,9 @@
 //! below. Constant parts of the response add to it, and the tip must be able to start
 //! twice as far off as the sample is.
 //!
-//! Of a rigid stop the part behind the stop is cut off. A sample with a memory starts
-//! relaxed: it would forget within a contact or two.
+//! Of a rigid stop the part behind the stop is cut off, and so is the part behind the wall of a
+//! nonlinear law, its pole or the first row of a table. A sample with a memory starts relaxed: it
+//! would forget within a contact or two.
 
 use nanotap_arithmetic::ComplexFunctions as _;
 use nanotap_dynamics::{StartBox, StartBoxError, StartSet};
@@ -76,7 +77,15 @@ pub fn default_box(model: &Model) -> Result<StartBox, StartBoxError> {
             lower[0] = upper[0] - width.max(f64::MIN_POSITIVE);
         }
     }
-    StartBox::new(lower, upper)
+    before_wall(model, StartBox::new(lower, upper)?)
+}
+
+/// The part of a box in front of the wall of the law, if it has one.
+pub(crate) fn before_wall(model: &Model, sides: StartBox) -> Result<StartBox, StartBoxError> {
+    match model.wall() {
+        Some(wall) => sides.before(wall),
+        None => Ok(sides),
+    }
 }
 
 /// Sizes of the default set of starts, as parts of the default box: from the resonant
@@ -91,12 +100,22 @@ const SIZES: [f64; 7] = [1.0, 0.316, 0.1, 0.0316, 0.01, 0.00316, 0.001];
 /// [`StartBoxError`] if the response is beyond the range of floats.
 pub fn default_starts(model: &Model, seed: u64) -> Result<StartSet, StartBoxError> {
     let sides = default_box(model)?;
-    let centre: Vec<f64> = sides
+    let mut centre: Vec<f64> = sides
         .lower()
         .iter()
         .zip(sides.upper())
         .map(|(&low, &high)| 0.0f64.clamp(low, high))
         .collect();
+    let wall = sides.wall();
+    if let Some(wall) = wall.filter(|wall| !wall.is_before(&centre)) {
+        // As far in front of it as rest is behind it, as far as the box reaches.
+        let behind = wall.distance(&centre).abs();
+        let square: f64 = wall.row.iter().map(|a| a * a).sum();
+        let ends = sides.lower().iter().zip(sides.upper());
+        for ((x, slope), (&low, &high)) in centre.iter_mut().zip(&wall.row).zip(ends) {
+            *x = (*x + 2.0 * behind * slope / square).clamp(low, high);
+        }
+    }
     let drive = model.system.drive();
     let responses = model
         .system
@@ -108,7 +127,8 @@ pub fn default_starts(model: &Model, seed: u64) -> Result<StartSet, StartBoxErro
         .map(|mut state| {
             model.stop_at_wall(&mut state);
             state
-        });
+        })
+        .filter(|state| wall.is_none_or(|wall| wall.is_before(state)));
     let given = std::iter::once(centre.clone()).chain(responses);
     Ok(StartSet::spread(&sides, &centre, &SIZES, seed)?.with_given(given))
 }
@@ -118,7 +138,8 @@ pub fn default_starts(model: &Model, seed: u64) -> Result<StartSet, StartBoxErro
 fn reach(model: &Model, j: usize) -> f64 {
     let slope = model.height.row[j].abs();
     if j == 0 && slope > 0.0 {
-        2.0 * model.height.constant.abs() / slope
+        let to_wall = model.wall().map_or(0.0, |wall| wall.least.abs());
+        2.0 * model.height.constant.abs().max(to_wall) / slope
     } else {
         0.0
     }
@@ -161,7 +182,15 @@ pub fn box_with(model: &Model, sides: &[(String, f64, f64)]) -> Result<StartBox,
         }
         (lower[index], upper[index]) = (*low, *high);
     }
-    StartBox::new(lower, upper).map_err(|error| wrong(error.to_string()))
+    let sides = StartBox::new(lower, upper).and_then(|sides| before_wall(model, sides));
+    sides.map_err(|error| match error {
+        StartBoxError::BehindWall => Error::option(
+            "box",
+            "the whole box lies behind the surface, where the contact law does not hold",
+            "move it to larger gaps",
+        ),
+        error => wrong(error.to_string()),
+    })
 }
 
 #[cfg(test)]

@@ -211,6 +211,9 @@ def test_a_census_has_the_terminals_numbers(bistable, tmp_path):
     assert found[0].states.shape == (found[0].period, 6)
     assert len(found.attractors) == len(found) == 2 and not found.undecided
     assert list(found.table().period) == [one.period for one in found]
+    check = nanotap.attractors(bistable, starts=24, check=5).check
+    assert (check.starts, check.agreed, check.disagreements) == (5, 5, [])
+    assert found.check is None
     fixed = nanotap.attractors(
         bistable, starts=8, box={name: (0, 0) for name in bistable.state_names}
     )

@@ -115,7 +115,7 @@ impl<'a> Averaging<'a> {
             compliance: unit(0.0)?.re,
             receptance: unit(tone.frequency)?,
             table: GapTable::new(system),
-            pole: pole(system),
+            pole: system.law().pole().unwrap_or(f64::NEG_INFINITY),
             phases: phases.collect(),
         })
         .filter(|averaging| averaging.drive.modulus() > 0.0)
@@ -270,14 +270,6 @@ impl<'a> Averaging<'a> {
     fn size(&self) -> f64 {
         self.drive.modulus().max(self.system.gap_constant.abs())
     }
-}
-
-/// Returns the wall of the law if the force is infinite there, else −∞: a table goes on beyond its
-/// first row.
-fn pole(system: &System) -> f64 {
-    let law = system.law();
-    let is_pole = |wall: &f64| !law.value(law.branch_at(*wall, 0.0), *wall, 0.0).is_finite();
-    law.wall().filter(is_pole).unwrap_or(f64::NEG_INFINITY)
 }
 
 /// Computes the modal response to a unit force at a frequency.

@@ -11,7 +11,7 @@
 //! error: at the default tolerance one period is off by some 1e-7 of the amplitude, near grazing
 //! by up to 1e-4. Near a pole of the force all its values in a step may be small although the step
 //! leads through the pole: a step of which a stage, the end or the least gap between them lies at or
-//! behind the [wall](crate::ForceLaw::wall) of the law has an infinite error. A switch of the law is
+//! behind the pole has an infinite error. A switch of the law is
 //! located on partial steps. The motion at the end is a
 //! smooth function of the start only to that error. Nothing is certified here; results are
 //! computed by [`Flow`](crate::Flow).
@@ -111,8 +111,9 @@ struct Tables {
     frequency: f64,
     /// Lowest and highest gap of each branch.
     bounds: Vec<[f64; 2]>,
-    /// Gap at and behind which the law does not hold; −∞ if it holds at every gap.
-    wall: f64,
+    /// Gap at and behind which the law does not hold, because the force has a pole there; −∞ if it
+    /// has none.
+    pole: f64,
     /// Exits of each branch; empty if switches are not located.
     exits: Vec<Vec<CoarseExit>>,
     /// Whether the exits of each branch depend on the gap alone.
@@ -491,7 +492,7 @@ impl Tables {
             forced,
             frequency,
             bounds,
-            wall: law.wall().unwrap_or(f64::NEG_INFINITY),
+            pole: law.pole().unwrap_or(f64::NEG_INFINITY),
             by_gap_alone: exits
                 .iter()
                 .map(|exits: &Vec<CoarseExit>| {
@@ -541,7 +542,7 @@ impl Tables {
 
     /// Reports whether the law holds at all of these gaps.
     fn holds_at(&self, gaps: &[f64]) -> bool {
-        gaps.iter().all(|gap| *gap > self.wall)
+        gaps.iter().all(|gap| *gap > self.pole)
     }
 
     fn guard(&self, guard: Guard, gap: f64, rate: f64) -> f64 {
@@ -768,7 +769,7 @@ impl Tables {
             implicit: false,
             evaluations: 3,
         };
-        if !self.holds_at(&stages.gaps[1..]) || gap <= self.wall {
+        if !self.holds_at(&stages.gaps[1..]) || gap <= self.pole {
             return f64::INFINITY;
         }
         level.length * self.mobility * ((k1 - k2 - k3 + k4).abs() + (k2 - k3).abs()) / 6.0
@@ -1253,7 +1254,7 @@ impl Work {
                         allowed,
                     ) {
                         Search::Refused => refused = true,
-                        Search::BehindWall => (refused, error) = (true, f64::INFINITY),
+                        Search::BehindPole => (refused, error) = (true, f64::INFINITY),
                         Search::Fall(found) => fall = Some(found),
                         Search::None => {}
                     }
@@ -1442,8 +1443,8 @@ enum Search {
     None,
     Fall(Fall),
     Refused,
-    /// The least gap lies at or behind the wall of the law.
-    BehindWall,
+    /// The least gap lies at or behind a pole of the force.
+    BehindPole,
 }
 
 /// Searches for the first fall of a guard on a step, and reports whether the least gap on it meets
@@ -1481,8 +1482,8 @@ fn search(
     });
     if let Some((k, x, gap)) = minimum {
         least = least.min(gap);
-        if gap <= tables.wall {
-            return Search::BehindWall;
+        if gap <= tables.pole {
+            return Search::BehindPole;
         }
         let force = tables.force(from.branch, gap, 0.0);
         let [k1, k2, k3, k4] = stages.forces;

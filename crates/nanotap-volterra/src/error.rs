@@ -159,7 +159,7 @@ pub enum Refusal {
     /// A guard is too close to zero to decide whether the law switches.
     #[error("the law's switch cannot be bracketed")]
     Switch,
-    /// The gap is at or behind the [wall](crate::ForceLaw::wall) of the law.
+    /// The gap is at or behind a pole of the force.
     #[error("the gap is at or behind the surface, where the law does not hold")]
     Wall,
 }

@@ -187,7 +187,7 @@ impl Curve {
         let by_rate = match &self.values {
             Values::OfGap(_) => 0.0,
             Values::OfRate(pairs) => {
-                let near = pairs.get(k..k + 4)?.iter().zip(weights(t));
+                let near = pairs.get(k..)?.get(..4)?.iter().zip(weights(t));
                 near.map(|([_, by_rate], weight)| by_rate * weight).sum()
             }
         };
@@ -195,7 +195,8 @@ impl Curve {
         Some([by_root * self.side * self.density / (2.0 * root), by_rate])
     }
 
-    /// Returns the interval of a gap, and the fraction within it.
+    /// Returns the interval of a gap, and the fraction within it; an interval beyond every table if
+    /// the gap is infinite.
     #[inline]
     fn place(&self, gap: f64) -> (usize, f64) {
         let x = (self.side * (gap - self.level)).max(0.0).sqrt() * self.density;
@@ -208,11 +209,11 @@ impl Curve {
     fn read(&self, k: usize, weights: [f64; 4], rate: f64) -> Option<f64> {
         match &self.values {
             Values::OfGap(values) => {
-                let near = values.get(k..k + 4)?.iter().zip(weights);
+                let near = values.get(k..)?.get(..4)?.iter().zip(weights);
                 Some(near.map(|(value, weight)| value * weight).sum())
             }
             Values::OfRate(pairs) => {
-                let near = pairs.get(k..k + 4)?.iter().zip(weights);
+                let near = pairs.get(k..)?.get(..4)?.iter().zip(weights);
                 Some(near.map(|([a, b], weight)| (a + rate * b) * weight).sum())
             }
         }

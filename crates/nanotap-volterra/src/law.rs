@@ -171,6 +171,12 @@ pub trait ForceLaw: Debug + Send + Sync {
     /// largest pole of the force on a branch that reaches it, or the first row of a table. `None`
     /// if it holds at every gap.
     fn wall(&self) -> Option<f64> {
+        self.pole()
+    }
+
+    /// Returns the gap of the largest pole of the force on a branch that reaches it: no motion
+    /// passes it. A table has none, since it goes straight on below its first row.
+    fn pole(&self) -> Option<f64> {
         None
     }
 

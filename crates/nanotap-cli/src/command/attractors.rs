@@ -240,7 +240,8 @@ fn checked(check: &CheckReport) -> String {
         count => format!(", {count} undecided in one of the two"),
     };
     let mut text = motion::paragraph(&format!(
-        "{} followed again on the exact flow: {} to the same motion, {} to another{undecided}",
+        "{} followed again on the exact flow: {} to the same motion, {} to another{undecided} (starts near \
+         the boundary of two basins, or on a chaotic transient, may go to either)",
         number::counted(check.starts, "start", "starts"),
         check.agreed,
         check.disagreements.len(),

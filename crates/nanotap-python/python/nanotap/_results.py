@@ -589,6 +589,12 @@ class Attractors(Sequence[Attractor]):
         return list(self.document["undecided"])
 
     @property
+    def check(self) -> Record | None:
+        """Initial states that were followed again on the exact flow, if requested: `starts`,
+        `agreed`, `undecided`, `disagreements`."""
+        return self.document.get("check")
+
+    @property
     def unstable(self) -> list[Orbit]:
         """Unstable orbits, if requested."""
         return [Orbit.of(entry) for entry in self.document.get("unstable") or []]

@@ -279,6 +279,7 @@ def attractors(
     box: Box = None,
     max_period: int = 64,
     unstable: int = 0,
+    check: int = 0,
     prove: bool = False,
     threads: int | None = None,
     progress: Progress = None,
@@ -295,8 +296,8 @@ def attractors(
         until the share that may lead to undiscovered motions is below `unseen`, or
         5000 initial states or 2,000,000 drive periods (600,000 under a nonlinear
         law) are reached. Under a nonlinear law an initial state is followed for at
-        most 4 million steps of the approximate flow, and all together for 60
-        million, or 120 where chaos is watched; two evaluations of the force in the
+        most 2 million steps of the approximate flow, and all together for 12
+        million, or 24 where chaos is watched; two evaluations of the force in the
         exact flow count as a step (1 to 1000000).
     unseen : float | None
         Share of initial states that may lead to undiscovered motions, with 95 %
@@ -313,6 +314,9 @@ def attractors(
         Longest period of orbits, in drive periods (1 to 10000).
     unstable : int
         Also list unstable orbits up to this period (0 to 10000).
+    check : int
+        Follow this many of the initial states, chosen at random, again on the exact
+        flow, and report those that go to another motion (0 to 1000000).
     prove : bool
         Prove existence, local uniqueness and stability of each orbit by interval
         arithmetic.

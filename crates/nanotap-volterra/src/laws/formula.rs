@@ -102,7 +102,7 @@ pub trait Formula: Clone + Debug + Send + Sync + 'static {
     /// Returns the exits of a branch.
     fn ways(&self, branch: usize) -> Vec<Way>;
     /// Returns the largest gap at which the force of a branch across the gap has a pole, also if
-    /// the branch ends before it; see [`ForceLaw::wall`].
+    /// the branch ends before it; see [`ForceLaw::pole`].
     fn pole(&self, c: &[f64]) -> Option<f64> {
         let _ = c;
         None
@@ -305,7 +305,7 @@ impl<F: Formula> ForceLaw for Law<F> {
 
     /// Returns the pole if a branch without contact reaches it: contact that begins at a larger gap
     /// keeps every motion away from it.
-    fn wall(&self) -> Option<f64> {
+    fn pole(&self) -> Option<f64> {
         let pole = self.formula.pole(&self.constants)?;
         let reaches = |branch: usize| {
             let ends = self.exits(branch).into_iter();

@@ -499,6 +499,10 @@ impl ForceLaw for Prony {
         self.attraction.as_ref()?.law.wall()
     }
 
+    fn pole(&self) -> Option<f64> {
+        self.attraction.as_ref()?.law.pole()
+    }
+
     fn exits(&self, branch: usize) -> Vec<Exit> {
         // Of a virgin surface the force sets in like the power of the law.
         let onset = self.shape.approach();

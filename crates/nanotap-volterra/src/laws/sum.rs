@@ -166,6 +166,11 @@ impl ForceLaw for Sum {
         walls.reduce(f64::max)
     }
 
+    fn pole(&self) -> Option<f64> {
+        let poles = self.terms.iter().filter_map(|t| t.pole());
+        poles.reduce(f64::max)
+    }
+
     fn guard(&self, index: usize, gap: f64, rate: f64) -> Force {
         let k = self.guards.partition_point(|first| *first <= index) - 1;
         self.terms[k].guard(index - self.guards[k], gap, rate)

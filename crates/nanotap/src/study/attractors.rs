@@ -368,7 +368,10 @@ const HARMONICS: usize = 20;
 /// Drive periods over which a motion that does not repeat is observed.
 pub const OBSERVED_PERIODS: usize = 512;
 /// Steps of the approximate flow after which a start is left undecided.
-const MAX_START_STEPS: u64 = 4_000_000;
+const MAX_START_STEPS: u64 = 2_000_000;
+/// Steps of the approximate flow of all initial states together after which sampling ends under a
+/// nonlinear law: some two seconds.
+const NONLINEAR_STEPS: u64 = 12_000_000;
 /// Factor over the largest coordinate of the box above which a state counts as unbounded.
 const OUT_OF_BOUNDS: f64 = 1e6;
 
@@ -460,10 +463,10 @@ pub fn attractors(
 /// Returns the options of the census; a smaller bound than the default has larger budgets.
 fn budgets(model: &Model, options: &AttractorsOptions, start_box: &StartBox) -> CensusOptions {
     let default = CensusOptions::default();
-    let (usual, periods) = if model.nonlinear.is_some() {
-        (NONLINEAR_UNSEEN, NONLINEAR_PERIODS)
+    let (usual, periods, steps) = if model.nonlinear.is_some() {
+        (NONLINEAR_UNSEEN, NONLINEAR_PERIODS, NONLINEAR_STEPS)
     } else {
-        (default.unseen, default.max_periods)
+        (default.unseen, default.max_periods, default.max_steps)
     };
     let unseen = options.unseen.unwrap_or(usual);
     let times = (usual / unseen).max(1.0);
@@ -472,7 +475,7 @@ fn budgets(model: &Model, options: &AttractorsOptions, start_box: &StartBox) -> 
         unseen,
         max_starts: ((times * default.max_starts as f64) as usize).min(MAX_STARTS),
         max_periods: (times * periods as f64) as usize,
-        max_steps: (times * default.max_steps as f64) as u64,
+        max_steps: (times * steps as f64) as u64,
         ..default
     }
 }
@@ -711,8 +714,8 @@ options! {
         /// amplitudes, from the resonant response down to below the gap, until the share that may
         /// lead to undiscovered motions is below {unseen}, or 5000 initial states or 2,000,000
         /// drive periods (600,000 under a nonlinear law) are reached. Under a nonlinear law an initial
-        /// state is followed for at most 4 million steps of the approximate flow, and all together
-        /// for 60 million, or 120 where chaos is watched; two evaluations of the force in the exact
+        /// state is followed for at most 2 million steps of the approximate flow, and all together
+        /// for 12 million, or 24 where chaos is watched; two evaluations of the force in the exact
         /// flow count as a step
         #[schemars(range(min = 1, max = MAX_STARTS), extend("x-value" = "S"))]
         pub starts: Option<usize> = None,

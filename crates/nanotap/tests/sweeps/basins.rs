@@ -246,3 +246,54 @@ fn invalid_slices_are_refused() {
     let stopped = Basin::new(&bistable(), &slice(5, 5), &control).unwrap_err();
     assert_eq!(stopped.kind, ErrorKind::Stopped);
 }
+
+/// Under Lennard-Jones the tip starts behind the surface where the gap at drive phase 0 is not
+/// positive; those points are labelled so, and all others go to the one motion.
+#[test]
+fn points_behind_the_surface_are_labelled_so() {
+    let words = [
+        "modes=1",
+        "cantilever.k1=1 N/m",
+        "cantilever.f0=10 kHz",
+        "cantilever.Q=25",
+        "tip.radius=100 nm",
+        "sample.law=lennard-jones",
+        "sample.hamaker=8.888888888888889e-18 J",
+        "sample.repulsion=6.48e-69 J m^6",
+        "drive.actuation=tip",
+        "drive.frequency_ratio=1",
+        "drive.force=10 nN",
+        "gap.tip=8 nm",
+    ];
+    let case = Case::parse(None, &words.map(str::to_owned)).unwrap();
+    let model = case.model().unwrap();
+    let wall = model.wall().unwrap();
+    let at_wall = wall.least / wall.row[0];
+    let speed = at_wall.abs() * model.frequency();
+    let folder = Folder::new();
+    let options = BasinOptions {
+        starts: 8,
+        ..BasinOptions::default()
+    };
+    // The surface is between the second and the third of eight columns.
+    let scales = case.physical().unwrap().scales;
+    let (length, velocity) = (scales.length, scales.velocity);
+    let options = BasinOptions {
+        x: format!(
+            "a1={}:{}:8",
+            1.6 * at_wall * length,
+            -1.9 * at_wall * length
+        ),
+        y: format!("v1={}:{}:3", -speed * velocity, speed * velocity),
+        ..options
+    };
+    let store = computed(&case, &options, &folder.join("basin"), 2);
+    let found = shares(&store).unwrap();
+    assert_eq!(found.points, 24);
+    assert_eq!(found.behind, 6.0 / 24.0);
+    assert_eq!(
+        (found.unsettled, found.unbounded, found.failed),
+        (0.0, 0.0, 0.0)
+    );
+    assert!(figure(&store).is_ok());
+}

@@ -8,11 +8,14 @@
 use rayon::prelude::*;
 
 use crate::census::{AttractorKind, Census, StartOutcome, StartSet};
-use crate::classify::{ClassifyOptions, KnownMotions, MotionKind, RunEnd, follow_start};
+use crate::classify::{
+    ClassifyOptions, KnownMotions, MotionKind, RunEnd, after_reset, follow_start,
+};
 use crate::control::Control;
 use crate::lyapunov::LyapunovSpectrum;
 use crate::map::StroboscopicMap;
 use crate::neighbourhood::Neighbourhood;
+use crate::orbit::PeriodicOrbit;
 use crate::vector::mix;
 
 /// A start of a census that was followed again on the map itself.
@@ -86,21 +89,15 @@ pub fn check_starts<M: StroboscopicMap>(
             }
             let exact = match follow_start(map, &state, known, options) {
                 RunEnd::Entered { index, .. } => ExactOutcome::Attractor(owners[index]),
-                RunEnd::Classified(found) => match found.kind {
-                    MotionKind::Periodic(orbit) | MotionKind::TransientChaos { orbit, .. } => {
-                        let mut listed = orbits.iter();
-                        let listed = listed.find(|(_, other)| other.is_same_as(&orbit));
-                        listed.map_or(ExactOutcome::OtherOrbit(orbit.period), |(index, _)| {
-                            ExactOutcome::Attractor(*index)
-                        })
-                    }
-                    MotionKind::QuasiPeriodic(_) => ExactOutcome::QuasiPeriodic,
-                    MotionKind::Chaotic(_) => ExactOutcome::Chaotic,
-                    MotionKind::Unbounded => ExactOutcome::Unbounded,
-                    MotionKind::Undecided { reason, .. } => {
-                        ExactOutcome::Undecided(reason.to_string())
-                    }
-                },
+                RunEnd::Classified(found) => exact_outcome(found.kind, &orbits),
+                // What follows a reset is one motion, known or not.
+                RunEnd::Reset(reset) => {
+                    let known = KnownMotions {
+                        trapping_regions: &[],
+                        ..known
+                    };
+                    exact_outcome(after_reset(map, *reset, known, options).kind, &orbits)
+                }
             };
             let outcome = census.outcomes_by_start[start];
             let agrees = agree(census, outcome, &exact);
@@ -115,6 +112,23 @@ pub fn check_starts<M: StroboscopicMap>(
     );
     let checked: Vec<Option<CheckedStart>> = checked.collect();
     checked.into_iter().flatten().collect()
+}
+
+/// Returns the outcome of a start with this motion, among the listed `orbits` with their indices.
+fn exact_outcome(kind: MotionKind, orbits: &[(usize, &PeriodicOrbit)]) -> ExactOutcome {
+    match kind {
+        MotionKind::Periodic(orbit) | MotionKind::TransientChaos { orbit, .. } => {
+            let mut listed = orbits.iter();
+            let listed = listed.find(|(_, other)| other.is_same_as(&orbit));
+            listed.map_or(ExactOutcome::OtherOrbit(orbit.period), |(index, _)| {
+                ExactOutcome::Attractor(*index)
+            })
+        }
+        MotionKind::QuasiPeriodic(_) => ExactOutcome::QuasiPeriodic,
+        MotionKind::Chaotic(_) => ExactOutcome::Chaotic,
+        MotionKind::Unbounded => ExactOutcome::Unbounded,
+        MotionKind::Undecided { reason, .. } => ExactOutcome::Undecided(reason.to_string()),
+    }
 }
 
 /// Chooses `count` different numbers below `all`, in ascending order.

@@ -299,7 +299,7 @@ pub(crate) fn classify_on<M: StroboscopicMap>(
 }
 
 /// Classifies a motion that was reset: it comes to what follows every reset.
-fn after_reset<M: StroboscopicMap>(
+pub(crate) fn after_reset<M: StroboscopicMap>(
     map: &mut M,
     reset: ResetRun,
     known: KnownMotions<'_>,

@@ -69,9 +69,7 @@ CALLS = {
     "convergence": lambda: nanotap.convergence(
         nanotap.Case.paper(omega=2.6), largest=50
     ),
-    "scan": lambda: nanotap.scan(
-        load("scan-step.toml"), **{"lines": 200, "size": "500 nm"}
-    ),
+    "scan": lambda: nanotap.scan(load("scan-step.toml"), lines=200, size="500 nm"),
     "force_curve": lambda: nanotap.force_curve(
         load("force-curve.toml"), speed="10 nm/s", points=5000
     ),

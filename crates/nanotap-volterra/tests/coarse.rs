@@ -198,7 +198,11 @@ fn laws_declare_where_they_end() {
     let rows = Rows::new(&[(0.4, 9.0), (0.6, -1.0), (1.5, 0.0)]).unwrap();
     let table = laws::law("table").unwrap();
     let law = table.through(&rows, &[0.0, 2.0, 1.0, 1.0]).unwrap();
-    assert_eq!((law.wall(), law.pole()), (Some(0.8), None), "gaps are doubled");
+    assert_eq!(
+        (law.wall(), law.pole()),
+        (Some(0.8), None),
+        "gaps are doubled"
+    );
     // A sum holds where all of its laws do.
     let jones = laws::law("lennard-jones").unwrap();
     let one = jones.with(&[1.0, 1.0, 1.0]).unwrap();

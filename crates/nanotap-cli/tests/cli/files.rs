@@ -345,3 +345,43 @@ fn arithmetics_are_not_mixed() {
     let again = folder.run(&[&sweep[..], &["b.zarr"]].concat());
     again.refused(&["belongs to another case", "arithmetic", "another-"]);
 }
+
+/// A device has no end: every file that a user, a case or a dataset names is refused if it is one.
+#[cfg(unix)]
+#[test]
+fn devices_are_not_read() {
+    let folder = Folder::with_paper_case();
+    let zero = "/dev/zero";
+    let case = include_str!("../../../../docs/cases/dmt-table.toml");
+    folder.write("table.toml", case.replace("dmt-curve.csv", zero));
+    let lever = include_str!("../../../../docs/cases/stiff-lever.toml");
+    folder.write("lever.toml", lever);
+    let scan = include_str!("../../../../docs/cases/scan-step.toml");
+    let of_file = |key: &str| format!("{scan}\n{key} = \"{zero}\"\nimage_height = \"1 nm\"\n");
+    folder.write("image.toml", of_file("image"));
+    let slice = ["--x", "a1=-1:1:2", "--y", "v1=-1:1:2"];
+    let commands: [&[&str]; 8] = [
+        &["case", zero],
+        &["case", "table.toml"],
+        &["case", "table.toml", "--set", "sample.table=/dev/zero"],
+        &["fit", zero, "lever.toml", "--free", "sample.modulus"],
+        &["reconstruct", zero, "lever.toml"],
+        &["catalogue", "--catalogue", zero],
+        &["scan", "image.toml"],
+        &[&["basin", "case.toml", "--attractors", zero][..], &slice].concat(),
+    ];
+    for command in commands {
+        folder
+            .run(command)
+            .refused(&["/dev/zero", "is not a regular file"]);
+    }
+    std::fs::create_dir(folder.path().join("a.zarr")).unwrap();
+    std::os::unix::fs::symlink(zero, folder.path().join("a.zarr/.zmetadata")).unwrap();
+    let merged = folder.run(&["merge", "a.zarr", "--out", "b.zarr"]);
+    assert_eq!(merged.code, 1, "{}", merged.stderr);
+    assert!(
+        merged.stderr.contains("is not a regular file"),
+        "{}",
+        merged.stderr
+    );
+}

@@ -15,7 +15,16 @@ import numpy.typing as npt
 from . import _nanotap
 from ._case import existing
 from ._describe import name_in_si
-from ._quantity import Range, in_si, many, si_unit, text, unmasked, written
+from ._quantity import (
+    Range,
+    in_si,
+    many,
+    mask_of,
+    si_unit,
+    text,
+    unmasked,
+    written,
+)
 from ._record import Record
 
 if TYPE_CHECKING:
@@ -374,7 +383,9 @@ def tables(data: Any) -> list[dict[str, Any]]:
             ]
         return [{"columns": {str(c): column(str(c), v) for c, v in data.items()}}]
     if isinstance(data, np.ndarray):
-        message = "data: an array has no names of columns; pass a mapping, {name: values}"
+        message = (
+            "data: an array has no names of columns; pass a mapping, {name: values}"
+        )
         raise TypeError(message)
     if isinstance(data, Iterable):
         many = [table for one in data for table in tables(one)]
@@ -436,7 +447,7 @@ def _of_dataset(data: "xr.Dataset") -> dict[str, list[Any]]:
 def column(name: str, values: Any) -> list[Any]:
     """Entries of a column: numbers or texts; `None` where one is missing: NaN, masked, or empty."""
     array = np.asarray(values)
-    masked = np.ma.getmaskarray(values) if np.ma.isMaskedArray(values) else None
+    masked = mask_of(values)
     if array.ndim != 1:
         message = f"{name}: expected a row of entries, got an array with {array.ndim} dimensions"
         raise ValueError(message)
@@ -454,8 +465,10 @@ def _is_missing(value: Any) -> bool:
     """
     if value is None or value is np.ma.masked:
         return True
-    if isinstance(value, str | float):
-        return value == "" or value != value
+    if isinstance(value, str):
+        return not value
+    if isinstance(value, float):
+        return math.isnan(value)
     return type(value).__name__ in ("NAType", "NaTType")
 
 

@@ -462,7 +462,9 @@ def _written(name: str, value: Any) -> str:
     if isinstance(value, int | float) and not isinstance(value, bool):
         return json.dumps(text(name, value)) if si_unit(name) else repr(value)
     if name in TABLES and not isinstance(value, bool):
-        if isinstance(value, list | tuple) and any(hasattr(row, "items") for row in value):
+        if isinstance(value, list | tuple) and any(
+            hasattr(row, "items") for row in value
+        ):
             return _tables(name, value)
         return json.dumps(_rows(value))
     message = f"{name}: expected a number or a text, got {value!r}"
@@ -483,7 +485,9 @@ def _tables(name: str, tables: Any) -> str:
         if not isinstance(value, str | int | float) or isinstance(value, bool):
             written_value = written(value)
             if not isinstance(written_value, str):
-                message = f"{name}: expected a number or a text for {key!r}, got {value!r}"
+                message = (
+                    f"{name}: expected a number or a text for {key!r}, got {value!r}"
+                )
                 raise TypeError(message)
             value = written_value
         if key in units and not isinstance(value, str):
@@ -491,7 +495,9 @@ def _tables(name: str, tables: Any) -> str:
         return f"{json.dumps(key)} = {json.dumps(value, ensure_ascii=False)}"
 
     rows = (
-        ", ".join(entry(str(key), value) for key, value in table.items() if value is not None)
+        ", ".join(
+            entry(str(key), value) for key, value in table.items() if value is not None
+        )
         for table in tables
     )
     return "[" + ", ".join(f"{{{row}}}" for row in rows) + "]"

@@ -35,4 +35,8 @@ def _nothing() -> "Interrupted[None]":
 
 def part_of(result: R, finished: bool) -> "Interrupted[R] | Interrupted[None]":
     """What a study raises that Ctrl-C stopped: `finished` says whether `result` contains anything."""
-    return Interrupted("stopped before it was finished", result) if finished else _nothing()
+    return (
+        Interrupted("stopped before it was finished", result)
+        if finished
+        else _nothing()
+    )

@@ -93,10 +93,18 @@ def many(key: str, value: Any) -> Any:
     return np.asarray(unmasked(key, in_si(key, value)))
 
 
+def mask_of(value: Any) -> "np.typing.NDArray[np.bool_] | None":
+    """The mask of a masked array, in its shape; `None` for anything else."""
+    if not isinstance(value, np.ma.MaskedArray):
+        return None
+    return np.broadcast_to(np.asarray(value.mask, dtype=bool), value.shape)
+
+
 def unmasked(name: str, value: Any) -> Any:
     """The value, refused if an entry is masked: numpy's conversions drop masks."""
-    if np.ma.is_masked(value):
-        place = int(np.flatnonzero(np.ma.getmaskarray(value).ravel())[0])
+    mask = mask_of(value)
+    if mask is not None and mask.any():
+        place = int(np.flatnonzero(mask)[0])
         message = f"{name}: entry {place} is masked, and all entries are needed"
         raise ValueError(message)
     return value

@@ -78,7 +78,7 @@ def simulate(
     *,
     periods: int = 50,
     transient: int | None = None,
-    state: Mapping[str, tuple[float | str, float | str]] | str | None = None,
+    state: Any = None,
     strobe: int = 1,
     events: int = 50_000,
     max_period: int = 64,
@@ -103,7 +103,7 @@ def simulate(
     transient : int | None
         Drive periods of the discarded transient; default: until the motion has
         settled; 0: none (0 to 100000000).
-    state : Mapping[str, tuple[float | str, float | str]] | str | None
+    state : Any
         Initial state at drive phase 0: a1,…,aN,v1,…,vN (oscillator: x,v), or some
         by name, as in tip=5nm; of a physical case in m and m/s, or with units;
         default: rest.
@@ -169,7 +169,7 @@ def orbit(  # type: ignore[overload-overlap]
     case: Case,
     *,
     period: int | None = None,
-    state: Mapping[str, tuple[float | str, float | str]] | str | None = None,
+    state: Any = None,
     harmonics: int = 20,
     observables: Sequence[str] | None = None,
     resolution: int = 200,
@@ -185,7 +185,7 @@ def orbit(
     case: Case,
     *,
     period: int | None = None,
-    state: Mapping[str, tuple[float | str, float | str]] | str | None = None,
+    state: Any = None,
     harmonics: int = 20,
     observables: Sequence[str] | None = None,
     resolution: int = 200,
@@ -200,7 +200,7 @@ def orbit(
     case: Case,
     *,
     period: int | None = None,
-    state: Mapping[str, tuple[float | str, float | str]] | str | None = None,
+    state: Any = None,
     harmonics: int = 20,
     observables: Sequence[str] | None = None,
     resolution: int = 200,
@@ -220,7 +220,7 @@ def orbit(
     period : int | None
         Period in drive periods; default: that of the motion to which a run
         converges (1 to 10000).
-    state : Mapping[str, tuple[float | str, float | str]] | str | None
+    state : Any
         State near the orbit, at drive phase 0: a1,…,aN,v1,…,vN (oscillator: x,v),
         or some by name, as in tip=5nm; of a physical case in m and m/s, or with
         units.
@@ -354,7 +354,7 @@ def branch(
     from_: float | str,
     to: float | str,
     period: int | None = None,
-    state: Mapping[str, tuple[float | str, float | str]] | str | None = None,
+    state: Any = None,
     switch: int | None = None,
     diagram: bool = False,
     values: int = 65,
@@ -385,7 +385,7 @@ def branch(
     period : int | None
         Period of the orbit at the start; default: that of the motion to which a run
         converges (1 to 10000).
-    state : Mapping[str, tuple[float | str, float | str]] | str | None
+    state : Any
         State near the orbit at the start: a1,…,aN,v1,…,vN, or some by name, as in
         tip=5nm; of a physical case in m and m/s, or with units.
     switch : int | None
@@ -761,7 +761,7 @@ def sweep(
     starts: int | None = None,
     seed: int = 1,
     box: Box = None,
-    state: Mapping[str, tuple[float | str, float | str]] | str | None = None,
+    state: Any = None,
     follow: Literal["off", "up", "down", "both"] = "off",
     periods: int = 100,
     strobe: int | None = None,
@@ -795,7 +795,7 @@ def sweep(
     box : Box
         Sides of the box, as in {"a1": (-1, 1)} or {"v2": (-4, 4)}; other sides
         follow from the linear response to the drive.
-    state : Mapping[str, tuple[float | str, float | str]] | str | None
+    state : Any
         Start from this state at drive phase 0: a1,…,aN,v1,…,vN (oscillator: x,v),
         or some by name, as in tip=5nm; of a physical case in m and m/s, or with
         units.
@@ -929,7 +929,7 @@ def basin(
     *,
     x: str | Mapping[str, Any],
     y: str | Mapping[str, Any],
-    state: Mapping[str, tuple[float | str, float | str]] | str | None = None,
+    state: Any = None,
     attractors: Iterable[Any] | None = None,
     starts: int = 64,
     seed: int = 1,
@@ -952,7 +952,7 @@ def basin(
         the state (a1…aN, v1…vN; oscillator: x, v), first value, last value, count.
     y : str | Mapping[str, Any]
         Vertical axis, in the same form.
-    state : Mapping[str, tuple[float | str, float | str]] | str | None
+    state : Any
         State with the other entries: a1,…,aN,v1,…,vN, or some by name, as in
         tip=5nm; of a physical case in m and m/s, or with units; default: 0.
     attractors : Iterable[Any] | None
@@ -1006,7 +1006,7 @@ def lyapunov(
     *,
     periods: int = 20_000,
     transient: int = 1000,
-    state: Mapping[str, tuple[float | str, float | str]] | str | None = None,
+    state: Any = None,
     section: Literal["phase", "contact"] = "phase",
     phase: float = 0.0,
     points: int = 5000,
@@ -1021,7 +1021,7 @@ def lyapunov(
         Drive periods of the average (1 to 100000000).
     transient : int
         Drive periods of the discarded transient (0 to 100000000).
-    state : Mapping[str, tuple[float | str, float | str]] | str | None
+    state : Any
         Initial state at drive phase 0: a1,…,aN,v1,…,vN (oscillator: x,v), or some
         by name, as in tip=5nm; of a physical case in m and m/s, or with units;
         default: rest.
@@ -1150,7 +1150,7 @@ def noise(
     temperature: float = 295.0,
     time_constant: float | str | None = None,
     bandwidth: float | str | None = None,
-    state: Mapping[str, tuple[float | str, float | str]] | str | None = None,
+    state: Any = None,
     threads: int | None = None,
     progress: Progress = None,
 ) -> Record:
@@ -1168,7 +1168,7 @@ def noise(
     bandwidth : float | str | None
         Noise bandwidth of the lock-in amplifier, 1 over four time constants, in
         place of it.
-    state : Mapping[str, tuple[float | str, float | str]] | str | None
+    state : Any
         State near the orbit, at drive phase 0: a1,…,aN,v1,…,vN, or some by name, as
         in tip=5nm; of a physical case in m and m/s, or with units.
     threads : int | None

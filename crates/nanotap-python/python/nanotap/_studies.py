@@ -206,8 +206,8 @@ def approach(
 ) -> "xr.Dataset":
     """An approach curve over `way` and distance; the finished part if Ctrl-C stopped it."""
     document, interrupted = _run("approach", case, options, threads, progress)
-    if not document["table"]:
-        return _finished(None, interrupted, part=False)
+    if interrupted and not document["table"]:
+        raise part_of(None, finished=False)
     return _finished(_approach_dataset(case, document), interrupted)
 
 
@@ -375,7 +375,9 @@ def _scan_dataset(case: Case, report: dict[str, Any]) -> "xr.Dataset":
 
 def _padded(rows: list[Any], lines: int) -> list[Any]:
     """Rows of pixels, with missing values for the lines that a stopped scan has in one direction only."""
-    missing = ["" if isinstance(value, str) else None for value in rows[0]] if rows else []
+    missing = (
+        ["" if isinstance(value, str) else None for value in rows[0]] if rows else []
+    )
     return rows + [missing] * (lines - len(rows))
 
 

@@ -100,6 +100,15 @@ const NEAR: f64 = 1e-9;
 /// Two ends meet within this part of the range.
 const MEET: f64 = 1e-9;
 
+/// Static compliance of the whole lever at its tip: of all measured modes, or of the beam.
+fn lever_compliance(case: &Case) -> f64 {
+    let measured = case.cantilever().map(|lever| &lever.lever_modes);
+    match measured.filter(|modes| !modes.is_empty()) {
+        None => BEAM_COMPLIANCE,
+        Some(modes) => modes.iter().map(|mode| 1.0 / mode.stiffness).sum(),
+    }
+}
+
 impl StaticCurve {
     /// The rests of the lever of `case` with its model: with the compliance of the whole beam, or of
     /// the modes alone, as it moves.
@@ -107,7 +116,7 @@ impl StaticCurve {
     /// # Errors
     /// When the case has no model at another distance, or the lever does not restore.
     pub(super) fn new(case: &Case, model: &Model, whole: bool) -> Result<Self, Error> {
-        let beam = if whole { BEAM_COMPLIANCE } else { 0.0 };
+        let beam = if whole { lever_compliance(case) } else { 0.0 };
         let origin = case.get(case.gap_key());
         if let Some(nonlinear) = &model.nonlinear {
             let system = &nonlinear.system;

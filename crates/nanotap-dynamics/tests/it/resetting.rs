@@ -41,7 +41,7 @@ impl Holed {
         Self::new(2.0, AfterReset::Closes(orbit))
     }
 
-    /// It goes on from 0.3, and nobody knows how.
+    /// It goes on from 0.3 in an unknown way.
     fn open() -> Self {
         let outcome = AfterReset::Open {
             state: vec![0.3],

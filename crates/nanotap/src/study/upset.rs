@@ -517,7 +517,7 @@ impl Knocked<'_> {
 }
 
 /// Knocks at all instants, in both directions, of the sizes at one step above `first` of the scan:
-/// each instant and direction has sizes of its own, [`SIZE_RATIO`] apart.
+/// each instant and direction has separate sizes, [`SIZE_RATIO`] apart.
 fn scan(first: f64, step: usize) -> Vec<Knock> {
     let knock = |k: usize| {
         let within = (GOLDEN * k as f64).fract();

@@ -1,4 +1,4 @@
-//! Sticking at a rigid stop: the one motion that follows it, and what is said about motions that stick.
+//! Sticking at a rigid stop: the one motion that follows it, and what is reported about motions that stick.
 
 use nanotap::control::Control;
 use nanotap::model::oscillator::{Oscillator, Stop};

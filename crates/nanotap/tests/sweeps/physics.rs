@@ -200,7 +200,7 @@ fn a_given_transient_is_run_unchanged() {
     let subject = paper(2.6, 0.1);
     let swept = Swept::of(&subject, &["omega=2.6:2.6:1"], |o| {
         o.transient = Some(7);
-        o.state = Some(vec![0.1, 0.0, 0.0, -0.2, 0.0, 0.0]);
+        o.state = Some(vec![0.1, 0.0, 0.0, -0.2, 0.0, 0.0].into());
     });
     let model = subject.model().unwrap();
     let run = nanotap::study::simulate::simulate(
@@ -241,7 +241,7 @@ fn following_stays_on_its_motion() {
     let state = seeds.row("strobe", &[0, on_four]);
     let both = Swept::of(&subject, &["alpha2=0.1:0.12:5"], |o| {
         o.follow = Follow::Both;
-        o.state = Some(state);
+        o.state = Some(state.into());
     });
     // α5 = 0: the model is homogeneous, so the motion scales with α2 and remains period 4 if the
     // start leads there; upwards it is followed from its own orbit.
@@ -345,11 +345,11 @@ fn invalid_sweeps_are_refused_before_any_computation() {
         (refused(omega(), &|o| o.max_period = 0), "longest period"),
         (refused(omega(), &|o| o.starts = Some(0)), "0 starts"),
         (
-            refused(omega(), &|o| o.state = Some(vec![0.0; 5])),
+            refused(omega(), &|o| o.state = Some(vec![0.0; 5].into())),
             "5 numbers where 6",
         ),
         (
-            refused(omega(), &|o| o.state = Some(vec![f64::NAN; 6])),
+            refused(omega(), &|o| o.state = Some(vec![f64::NAN; 6].into())),
             "finite",
         ),
         (
@@ -361,7 +361,7 @@ fn invalid_sweeps_are_refused_before_any_computation() {
         ),
         (
             refused(&["modes=1:3:3"], &|o| {
-                o.state = Some(vec![0.0; 6]);
+                o.state = Some(vec![0.0; 6].into());
             }),
             "number of modes",
         ),

@@ -35,7 +35,7 @@ pub(crate) struct Packed {
     pub(crate) deflated: bool,
     /// Length that the archive states.
     pub(crate) stated: usize,
-    /// Where the directory says that it is, if it has no bytes of its own.
+    /// Where the directory says that it is, if it has no separate bytes.
     pub(crate) at: Option<usize>,
 }
 

@@ -188,7 +188,14 @@ fn theorems_enclose_the_orbits_to_60_digits() {
         let case = case(&[&modes, &format!("omega={}", reference.omega)]);
         let options = OrbitOptions {
             period: Some(reference.period),
-            state: Some(reference.state.iter().map(|x| x.0).collect::<Vec<f64>>().into()),
+            state: Some(
+                reference
+                    .state
+                    .iter()
+                    .map(|x| x.0)
+                    .collect::<Vec<f64>>()
+                    .into(),
+            ),
             ..OrbitOptions::default()
         };
         let (_, proof) = found(&case, &options);

@@ -301,7 +301,7 @@ fn unstable_orbits_are_reported_in_si() {
     let state = orbit["state"].as_array().unwrap().iter();
     let state: Vec<String> = state.map(ToString::to_string).collect();
     let alone = folder
-        .run(&[&alone[..], &[&state.join(",")]].concat())
+        .run(&[&alone[..], &[&format!("model_units={}", state.join(","))]].concat())
         .json();
     assert_eq!(
         alone["physical"]["harmonics"][0]["frequency"],

@@ -53,7 +53,11 @@ fn every_shipped_case_is_the_same_after_saving() {
         if text.contains("second_f") && text.contains("setpoint") {
             continue;
         }
-        let studies: &[&[&str]] = if text.contains("law =") || text.contains("prony") {
+        let is_nonlinear = text.contains("law =") || text.contains("prony");
+        let studies: &[&[&str]] = if is_nonlinear && text.contains("setpoint") {
+            // `modes` does not solve for the distance, which the saved case has.
+            &[&["orbit", "--harmonics", "2"]]
+        } else if is_nonlinear {
             &[&["orbit", "--harmonics", "2"], &["modes"]]
         } else {
             &[
@@ -238,10 +242,18 @@ fn a_state_of_a_physical_case_is_in_si() {
         folder.run(&[&arguments[..], &more].concat())
     };
     // φ₁(1) = 2: a tip deflection of 5 nm is an amplitude a₁ of 2.5 nm.
-    let tip = run("tip=5nm");
-    assert_eq!(tip.code, 0, "{}", tip.stderr);
+    // Without the speed of this run, which is never the same.
+    let motion = |state: &str| {
+        let done = run(state);
+        assert_eq!(done.code, 0, "{}", done.stderr);
+        let mut document: serde_json::Value = serde_json::from_str(&done.stdout).unwrap();
+        let speed = document.as_object_mut().unwrap();
+        assert!(speed.remove("periods_per_second").is_some());
+        document
+    };
+    let tip = motion("tip=5nm");
     for same in ["2.5e-9,0", "a1=2.5 nm", "2.5 nm, 0 m/s"] {
-        assert_eq!(run(same).stdout, tip.stdout, "{same}");
+        assert_eq!(motion(same), tip, "{same}");
     }
     run("0.1,0").refused(&["--state", "write the unit"]);
     run("tip=5 kHz").refused(&["--state", "expected a length"]);

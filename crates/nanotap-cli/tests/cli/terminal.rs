@@ -217,10 +217,10 @@ fn long_work_reports_progress() {
     // until the work is long enough for a progress report.
     let said = (0..10)
         .map(|doubled| printed_on_a_terminal(200_000 << doubled))
-        .find(|text| !text.is_empty())
+        .find(|text| text.contains("so far"))
         .expect("a hundred million periods take longer than any machine keeps silent");
     assert!(said.contains("lyapunov: 1 s so far"), "{said:?}");
-    assert!(said.ends_with("\r\u{1b}[K"), "{said:?}");
+    assert!(said.contains("\r\u{1b}[K"), "{said:?}");
 }
 
 /// Output of `lyapunov` over this many periods on a terminal.

@@ -239,7 +239,7 @@ follows! {
     the_polymer: "polymer.md", 9 commands, 25 numbers;
     the_samples: "samples.md", 5 commands, 30 numbers;
     the_reconstruction: "reconstruct.md", 1 commands, 0 numbers;
-    the_force_curve: "force-curve.md", 3 commands, 23 numbers;
+    the_force_curve: "force-curve.md", 4 commands, 27 numbers;
     the_limit_of_the_force: "force-limit.md", 6 commands, 29 numbers;
     the_thermal_noise: "noise.md", 3 commands, 13 numbers;
     bimodal_operation: "bimodal.md", 5 commands, 18 numbers;

@@ -30,7 +30,7 @@ const MAX_RETRIES: usize = 64;
 const MAX_FAILED_RETRIES: usize = 4;
 /// Budget of all runs on the map itself that confirm motions, as a multiple of the steps of one
 /// start: each run serves all starts that reach the motion.
-const EXACT_RUN_STEPS: u64 = 3;
+const EXACT_RUN_STEPS: u64 = 4;
 /// Largest number of periods over which exponents are measured on the map itself.
 const MAX_EXACT_PERIODS: usize = 4000;
 

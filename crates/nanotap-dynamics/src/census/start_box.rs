@@ -163,13 +163,13 @@ impl StartBox {
     }
 
     /// Returns start number `index` of the sequence with this seed. A draw behind the wall is
-    /// replaced by one from another sequence.
+    /// replaced by a random one: points of other sequences with the same index are not independent.
     pub fn start(&self, seed: u64, index: u64) -> Vec<f64> {
         let start = self.point(seed, index);
         let Some(wall) = self.wall.as_ref().filter(|wall| !wall.is_before(&start)) else {
             return start;
         };
-        let mut others = (1..DRAWS).map(|draw| self.point(mix(seed ^ mix(!draw)), index));
+        let mut others = (1..DRAWS).map(|draw| self.point(seed, mix(index ^ mix(!draw))));
         others
             .find(|other| wall.is_before(other))
             .unwrap_or_else(|| {

@@ -296,8 +296,8 @@ def attractors(
         until the share that may lead to undiscovered motions is below `unseen`, or
         5000 initial states or 2,000,000 drive periods (600,000 under a nonlinear
         law) are reached. Under a nonlinear law an initial state is followed for at
-        most 2 million steps of the approximate flow, and all together for 12
-        million, or 24 where chaos is watched; two evaluations of the force in the
+        most 4 million steps of the approximate flow, and all together for 30
+        million, or 60 where chaos is watched; two evaluations of the force in the
         exact flow count as a step (1 to 1000000).
     unseen : float | None
         Share of initial states that may lead to undiscovered motions, with 95 %

@@ -368,10 +368,10 @@ const HARMONICS: usize = 20;
 /// Drive periods over which a motion that does not repeat is observed.
 pub const OBSERVED_PERIODS: usize = 512;
 /// Steps of the approximate flow after which a start is left undecided.
-const MAX_START_STEPS: u64 = 2_000_000;
+const MAX_START_STEPS: u64 = 4_000_000;
 /// Steps of the approximate flow of all initial states together after which sampling ends under a
-/// nonlinear law: some two seconds.
-const NONLINEAR_STEPS: u64 = 12_000_000;
+/// nonlinear law: some four seconds.
+const NONLINEAR_STEPS: u64 = 30_000_000;
 /// Factor over the largest coordinate of the box above which a state counts as unbounded.
 const OUT_OF_BOUNDS: f64 = 1e6;
 
@@ -644,11 +644,23 @@ fn one(
 
 /// Lyapunov exponents of an orbit: log|μ| a drive period.
 pub fn orbit_exponents(orbit: &PeriodicOrbit) -> Vec<f64> {
-    orbit
+    let period = orbit.period as f64;
+    let of_one = orbit
         .multipliers
         .iter()
-        .map(|m| nanotap_arithmetic::ln(m.modulus()) / orbit.period as f64)
-        .collect()
+        .map(|m| nanotap_arithmetic::ln(m.modulus()) / period);
+    let mut exponents: Vec<f64> = of_one.collect();
+    // A multiplier below the rounding of the largest is known from the determinant alone.
+    let rounding = nanotap_arithmetic::ln(f64::EPSILON) / period;
+    if let [first, .., last] = &mut exponents[..]
+        && *last < *first + rounding
+        && orbit.log_determinant.is_finite()
+    {
+        *last = 0.0;
+        exponents[orbit.dimension() - 1] =
+            orbit.log_determinant / period - exponents.iter().sum::<f64>();
+    }
+    exponents
 }
 
 /// Starts from which unstable orbits are looked for.
@@ -714,8 +726,8 @@ options! {
         /// amplitudes, from the resonant response down to below the gap, until the share that may
         /// lead to undiscovered motions is below {unseen}, or 5000 initial states or 2,000,000
         /// drive periods (600,000 under a nonlinear law) are reached. Under a nonlinear law an initial
-        /// state is followed for at most 2 million steps of the approximate flow, and all together
-        /// for 12 million, or 24 where chaos is watched; two evaluations of the force in the exact
+        /// state is followed for at most 4 million steps of the approximate flow, and all together
+        /// for 30 million, or 60 where chaos is watched; two evaluations of the force in the exact
         /// flow count as a step
         #[schemars(range(min = 1, max = MAX_STARTS), extend("x-value" = "S"))]
         pub starts: Option<usize> = None,

@@ -70,7 +70,7 @@ fn the_release_orbits_are_those_of_the_reference() {
             (other, _) => panic!("{other:?} {case}"),
         }
     }
-    assert_eq!(closed, 10);
+    assert_eq!(closed, 9);
 }
 
 /// At ω = 2.9 and 2.87 all starts come to the superstable orbit of the reference, in every study; none is
@@ -195,12 +195,16 @@ fn motions_that_stick_are_never_called_chaotic() {
             Release::new(&oscillator).unwrap().motion(),
             ReleaseMotion::Sticks { .. }
         );
-        let expected = if sticks_again {
-            Classification::Periodic
+        let allowed: &[Classification] = if sticks_again {
+            &[Classification::Periodic]
         } else {
-            run.classification
+            // It may leave the stop for a stable orbit.
+            &[Classification::Undecided, Classification::Periodic]
         };
-        assert_eq!(run.classification, expected, "{omega}");
-        assert_ne!(run.classification, Classification::Chaotic, "{omega}");
+        assert!(
+            allowed.contains(&run.classification),
+            "{omega}: {:?}",
+            run.classification
+        );
     }
 }

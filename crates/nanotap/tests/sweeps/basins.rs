@@ -225,7 +225,9 @@ fn invalid_slices_are_refused() {
             "0 periods",
         ),
         (
-            refused("a1=0:1:5", "v1=0:1:5", &|o| o.state = Some(vec![0.0; 3].into())),
+            refused("a1=0:1:5", "v1=0:1:5", &|o| {
+                o.state = Some(vec![0.0; 3].into())
+            }),
             "3 numbers where 6",
         ),
         (

@@ -443,7 +443,6 @@ fn laws_and_drives_are_read_and_checked() {
             &["tone2_ratio=601/599", "tone3_ratio=603/601"],
             "after more than 2000 periods",
         ),
-        (&["tone2_ratio=3.14159"], "the nearest is"),
         (&["tone2_ratio=two"], "is not a ratio of frequencies"),
         (&["tone2_ratio=1"], "the same frequency"),
         (&["actuation=magnet"], "\"base\", \"tip\", \"distributed\""),
@@ -455,6 +454,8 @@ fn laws_and_drives_are_read_and_checked() {
         let refused = refusal(PAPER, words);
         assert!(refused.contains(refusal_words), "{words:?}: {refused}");
     }
+    // `bimodal` needs no fraction with a small denominator.
+    assert!(parse(PAPER, &["tone2_ratio=3.14159"]).is_ok());
 }
 
 #[test]

@@ -42,7 +42,7 @@ const USUAL_POINTS: usize = 1000;
 /// Points to which each branch may always be followed.
 const MIN_POINTS: usize = 16;
 /// Steps after which no more states are looked for from which a census starts.
-const SEED_STEPS: u64 = 3_000_000;
+const SEED_STEPS: u64 = 10_000_000;
 /// Rows that are measured before it is seen whether the budget is spent.
 const ROWS_AT_ONCE: usize = 16;
 

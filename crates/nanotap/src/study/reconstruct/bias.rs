@@ -16,27 +16,28 @@ const DECAY: f64 = 1.0 / 3.0;
 /// Standard errors of a decrease of the force at the far end above which it is significant.
 const SIGNIFICANT: f64 = 2.0;
 
-/// Adds the error of the level. A constant force has no first harmonic, so the rows determine the force
-/// up to a constant, and it is taken as zero beyond the last node. If the force still decreases
+/// Error of the level of the force. A constant force has no first harmonic, so the rows determine the
+/// force up to a constant, and it is taken as zero beyond the last node. If the force still falls off
 /// at `far`, the closest approach of the farthest row, the constant is that of a tail: of the slowest
 /// of the usual ones, the van der Waals force of a sphere, which goes as the distance to the power −2.
-pub(super) fn add_tail(force: &mut Smooth, nodes: &Nodes, far: f64) {
+pub(super) fn level(force: &Smooth, nodes: &Nodes, far: f64) -> f64 {
+    // The tail halves between these distances.
     let near = far / std::f64::consts::SQRT_2;
     if near <= nodes.0[0] {
-        return;
+        return 0.0;
     }
     let at = |x: f64| {
         let (k, weight) = nodes.place(x);
-        let k = if weight < 0.5 { k } else { k + 1 };
-        let k = k.min(force.coefficients.len() - 1);
-        [nodes.value(&force.coefficients, x), force.error(k)]
+        let nearest = if weight < 0.5 { k } else { k + 1 };
+        let nearest = nearest.min(force.coefficients.len() - 1);
+        [nodes.value(&force.coefficients, x), force.error(nearest)]
     };
     let ([inner, inner_error], [outer, outer_error]) = (at(near), at(far));
     let decrease = inner - outer;
     if decrease.abs() > SIGNIFICANT * inner_error.hypot(outer_error) {
-        // The tail halves between these distances.
-        let level = decrease - outer;
-        force.covariance.add_scalar_mut(level * level);
+        decrease - outer
+    } else {
+        0.0
     }
 }
 

@@ -307,8 +307,9 @@ impl Inversion<'_> {
         closest.sort_by(f64::total_cmp);
         let low = self.resolved(&rows);
         let noise = (0..before.len()).map(|k| force.error(k)).collect();
+        let level = bias::level(&force, &nodes, closest[closest.len() - 1]);
         bias::widen(&mut force, &nodes, &closest);
-        bias::add_tail(&mut force, &nodes, closest[closest.len() - 1]);
+        force.covariance.add_scalar_mut(level * level);
         let inside = (0..before.len()).filter(|k| nodes.0[*k] >= low);
         let changes = inside.map(|k| {
             (force.coefficients[k] - before[k]).abs() / force.error(k).max(f64::MIN_POSITIVE)
@@ -395,8 +396,9 @@ impl Inversion<'_> {
             .filter(|(_, row)| row.informative);
         let fine = felt.map(|(row, _)| row.closest).fold(low, f64::max);
         let far = rows.iter().zip(self.rows).map(|(estimate, row)| {
-            let at_rest = row.distance - estimate.at.amplitude;
-            at_rest.max(estimate.closest)
+            // As far as the tip moves: the force there is felt, too.
+            let reach = row.distance + estimate.at.amplitude;
+            reach.max(estimate.closest)
         });
         Nodes::new(low, fine, far.fold(fine, f64::max), widest)
     }

@@ -113,7 +113,7 @@ impl Default for ReconstructOptions {
             amplitude_error: None,
             phase_error: None,
             phase: 90.0,
-            rows: 240,
+            rows: 500,
         }
     }
 }

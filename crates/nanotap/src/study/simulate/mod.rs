@@ -149,9 +149,9 @@ pub fn simulate(model: &Model, options: &SimulateOptions) -> Result<Simulation, 
     check_states(model, options.strobe.min(options.periods), "strobe")?;
     let how = options.classify();
     let mut map = ModelMap::new(model);
-    let transient = if let Some(transient) = options.transient {
+    let (transient, undecided) = if let Some(transient) = options.transient {
         map.advance_by(&mut state, transient)?;
-        transient
+        (transient, None)
     } else {
         measured_transient(&mut map, &mut state, &how)
     };
@@ -167,7 +167,8 @@ pub fn simulate(model: &Model, options: &SimulateOptions) -> Result<Simulation, 
     let mut record = record(model, &state, options.periods, observed, kept)?;
     let events_left_out = record.events.len().saturating_sub(options.events);
     record.events.truncate(options.events);
-    let named = Named::of(&classify(&mut map, &state, &how).kind);
+    let kind = undecided.unwrap_or_else(|| classify(&mut map, &state, &how).kind);
+    let named = Named::of(&kind);
     Ok(Simulation {
         periods: options.periods,
         transient,
@@ -265,7 +266,7 @@ pub fn starting_state(model: &Model, state: Option<&WrittenState>) -> Result<Vec
                 "the state's x = {} lies behind the rigid stop at {stop}",
                 state[0]
             ),
-            "give a {state} in front of the stop",
+            "give a state in front of the stop",
         ));
     }
     Ok(state)
@@ -276,13 +277,19 @@ const BEHIND_STOP: f64 = 1e-9;
 
 /// Runs until the motion has been named. If it goes to a periodic orbit, the state becomes
 /// the orbit's own and the rest of the decay, which the multipliers tell, counts as waited
-/// for: near a multiplier of modulus one it takes longer than anyone would run.
-fn measured_transient(map: &mut ModelMap, state: &mut [f64], options: &ClassifyOptions) -> usize {
+/// for: near a multiplier of modulus one it takes longer than anyone would run. A motion that is
+/// undecided remains so, whatever a run from its last state would show: the second value.
+fn measured_transient(
+    map: &mut ModelMap,
+    state: &mut [f64],
+    options: &ClassifyOptions,
+) -> (usize, Option<MotionKind>) {
     let classified = classify(map, state, options);
     state.copy_from_slice(&classified.state);
-    let (MotionKind::Periodic(orbit) | MotionKind::TransientChaos { orbit, .. }) = &classified.kind
-    else {
-        return classified.periods;
+    let orbit = match classified.kind {
+        MotionKind::Periodic(orbit) | MotionKind::TransientChaos { orbit, .. } => orbit,
+        kind @ MotionKind::Undecided { .. } => return (classified.periods, Some(kind)),
+        _ => return (classified.periods, None),
     };
     let (nearest, distance) = orbit.nearest(&classified.state);
     let near = (ARRIVED * orbit.scale()).max(10.0 * orbit.error);
@@ -293,7 +300,10 @@ fn measured_transient(map: &mut ModelMap, state: &mut [f64], options: &ClassifyO
     if !nearest.is_empty() {
         state.copy_from_slice(nearest);
     }
-    classified.periods + rest.next_multiple_of(orbit.period)
+    (
+        classified.periods + rest.next_multiple_of(orbit.period),
+        None,
+    )
 }
 
 /// Measures the speed of the propagation alone, in drive periods per second, and the evaluations of

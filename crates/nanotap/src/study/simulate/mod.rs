@@ -266,7 +266,7 @@ pub fn starting_state(model: &Model, state: Option<&WrittenState>) -> Result<Vec
                 "the state's x = {} lies behind the rigid stop at {stop}",
                 state[0]
             ),
-            "give a state in front of the stop",
+            "give a {state} in front of the stop",
         ));
     }
     Ok(state)

@@ -479,7 +479,7 @@ def annotation(option: str, declared: dict[str, Any], default: str | None) -> st
         return "str | Mapping[str, Any]"
     elif option == "attractors":
         return "Iterable[Any] | None"
-    elif "object" in known and "array" in known:
+    elif option == "state":
         return "Any"
     elif "object" in known:
         kind = "Mapping[str, tuple[float | str, float | str]] | str"

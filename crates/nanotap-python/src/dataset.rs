@@ -252,6 +252,24 @@ fn drawn(figure: &Figure, format: &str) -> Result<Vec<u8>, Failure> {
     })
 }
 
+/// Error of a table that is written: of its file, or of the store.
+enum TableError {
+    System(std::io::Error),
+    Store(StoreError),
+}
+
+impl From<std::io::Error> for TableError {
+    fn from(error: std::io::Error) -> Self {
+        Self::System(error)
+    }
+}
+
+impl From<StoreError> for TableError {
+    fn from(error: StoreError) -> Self {
+        Self::Store(error)
+    }
+}
+
 /// Writes the table of a finished dataset as CSV; the file appears whole or not at all.
 #[pyfunction]
 pub(crate) fn write_table(path: PathBuf, out: PathBuf) -> PyResult<()> {
@@ -260,29 +278,14 @@ pub(crate) fn write_table(path: PathBuf, out: PathBuf) -> PyResult<()> {
         let refuse = |error: std::io::Error| -> Failure {
             nanotap::Error::files(format!("cannot write {}: {error}", out.display())).into()
         };
-        // Its errors and those of the store.
-        enum Stopped {
-            System(std::io::Error),
-            Store(StoreError),
-        }
-        impl From<std::io::Error> for Stopped {
-            fn from(error: std::io::Error) -> Self {
-                Self::System(error)
-            }
-        }
-        impl From<StoreError> for Stopped {
-            fn from(error: StoreError) -> Self {
-                Self::Store(error)
-            }
-        }
         let written = files::write_with(&out, |file| {
             table::csv(&store, |piece| {
-                Ok::<_, Stopped>(file.write_all(piece.as_bytes())?)
+                Ok::<_, TableError>(file.write_all(piece.as_bytes())?)
             })
         });
-        written.map_err(|stopped| match stopped {
-            Stopped::System(error) => refuse(error),
-            Stopped::Store(error) => error.into(),
+        written.map_err(|error| match error {
+            TableError::System(error) => refuse(error),
+            TableError::Store(error) => error.into(),
         })
     };
     Ok(write()?)

@@ -13,8 +13,11 @@ use super::catalogue::Listed;
 use crate::failure::Failure;
 use crate::output::{self, FailureDocument};
 
-/// Documents that are not those of a study: name, description and schema.
-const COMMANDS: &[(&str, &str, fn() -> Schema)] = &[
+/// A document's name, description and schema.
+type Described = (&'static str, &'static str, fn() -> Schema);
+
+/// Documents that are not those of a study.
+const COMMANDS: &[Described] = &[
     (
         "case-report",
         "The document of the command `case`",

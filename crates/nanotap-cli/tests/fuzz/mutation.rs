@@ -76,7 +76,7 @@ pub(crate) fn case(random: &mut Random, text: &str) -> String {
         match random.below(8) {
             0 => drop(lines.remove(at)),
             1 => lines.insert(at, lines[at].clone()),
-            2 => lines[at] = VALUES[random.below(VALUES.len())].to_owned(),
+            2 => VALUES[random.below(VALUES.len())].clone_into(&mut lines[at]),
             _ => {
                 let values: Vec<usize> = (0..lines.len())
                     .filter(|k| lines[*k].contains('='))
@@ -104,11 +104,11 @@ pub(crate) fn table(random: &mut Random, text: &str) -> Vec<u8> {
             0 => rows[at].push("1".to_owned()),
             1 => drop(rows[at].pop()),
             2 => rows.insert(at, rows[at].clone()),
-            3 => rows[0][0] = "x (y)".to_owned(),
+            3 => "x (y)".clone_into(&mut rows[0][0]),
             _ if rows[at].is_empty() => {}
             _ => {
                 let field = random.below(rows[at].len());
-                rows[at][field] = random.one(VALUES).to_owned();
+                random.one(VALUES).clone_into(&mut rows[at][field]);
             }
         }
     }

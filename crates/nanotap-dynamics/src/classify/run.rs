@@ -474,11 +474,11 @@ impl<'a> Run<'a> {
             other => other?,
         }
         self.after_period(map)?;
-        self.check_reset(map, resets)
+        Self::check_reset(map, resets)
     }
 
     /// Ends the run if it was reset since there were `before` resets.
-    fn check_reset<M: StroboscopicMap>(&self, map: &M, before: u64) -> Result<(), Stop> {
+    fn check_reset<M: StroboscopicMap>(map: &M, before: u64) -> Result<(), Stop> {
         if map.resets() == before {
             Ok(())
         } else {
@@ -804,7 +804,7 @@ impl<'a> Run<'a> {
             other => other?,
         }
         self.after_period(map)?;
-        if let Err(stop) = self.check_reset(map, resets) {
+        if let Err(stop) = Self::check_reset(map, resets) {
             let spectrum = exponents.spectrum();
             self.chaos_before = is_chaotic(&spectrum).then_some(spectrum);
             return Err(stop);

@@ -606,7 +606,7 @@ def fit(
     per_curve: Sequence[str] | None = None,
     convert: Sequence[str] | None = None,
     start: Sequence[str] | None = None,
-    bounds: Any = None,
+    bounds: Mapping[str, tuple[float | str, float | str]] | str | None = None,
     columns: Sequence[str] | None = None,
     pixels: Sequence[str] | None = None,
     laws: Sequence[str] | None = None,
@@ -640,7 +640,7 @@ def fit(
     start : Sequence[str] | None
         Initial values of free parameters, and fixed corrections of columns, as in
         gap.offset="10.3 nm".
-    bounds : Any
+    bounds : Mapping[str, tuple[float | str, float | str]] | str | None
         Bounds of parameters, as in {"sample.stiffness": ("1 N/m", "100 N/m")}.
     columns : Sequence[str] | None
         Columns of the data to use; default: all.

@@ -644,23 +644,11 @@ fn one(
 
 /// Lyapunov exponents of an orbit: log|μ| a drive period.
 pub fn orbit_exponents(orbit: &PeriodicOrbit) -> Vec<f64> {
-    let period = orbit.period as f64;
-    let of_one = orbit
+    orbit
         .multipliers
         .iter()
-        .map(|m| nanotap_arithmetic::ln(m.modulus()) / period);
-    let mut exponents: Vec<f64> = of_one.collect();
-    // A multiplier below the rounding of the largest is known from the determinant alone.
-    let rounding = nanotap_arithmetic::ln(f64::EPSILON) / period;
-    if let [first, .., last] = &mut exponents[..]
-        && *last < *first + rounding
-        && orbit.log_determinant.is_finite()
-    {
-        *last = 0.0;
-        exponents[orbit.dimension() - 1] =
-            orbit.log_determinant / period - exponents.iter().sum::<f64>();
-    }
-    exponents
+        .map(|m| nanotap_arithmetic::ln(m.modulus()) / orbit.period as f64)
+        .collect()
 }
 
 /// Starts from which unstable orbits are looked for.

@@ -113,7 +113,7 @@ pub enum ExponentSource {
 }
 
 /// Exponents with the evidence for them.
-struct Exponents {
+struct Spectrum {
     source: ExponentSource,
     periods: usize,
     exponents: Vec<f64>,
@@ -124,18 +124,29 @@ struct Exponents {
     mean: Vec<f64>,
 }
 
-impl Exponents {
+impl Spectrum {
     /// The exponents of a closed orbit.
     fn of_orbit(model: &Model, orbit: &PeriodicOrbit) -> Result<Self, Error> {
         let period = orbit.period as f64;
         let by_trace = log_determinant_by_trace(model, orbit)?;
-        let defect = by_trace.map(|by_trace| (orbit.log_determinant - by_trace).abs());
+        let mut defect = by_trace.map(|by_trace| (orbit.log_determinant - by_trace).abs());
         let dimension = orbit.dimension();
+        let mut exponents = orbit_exponents(orbit);
+        // A multiplier below the rounding of the largest is lost in the Jacobian: its exponent is the
+        // remainder of the trace, which then checks nothing.
+        let rounding = nanotap_arithmetic::ln(f64::EPSILON) / period;
+        if let (Some(by_trace), [first, others @ .., last]) = (by_trace, &mut exponents[..])
+            && *last < *first + rounding
+            && by_trace.is_finite()
+        {
+            *last = by_trace / period - *first - others.iter().sum::<f64>();
+            defect = None;
+        }
         let mean = (0..dimension).map(|k| orbit.states.iter().map(|x| x[k]).sum::<f64>() / period);
         Ok(Self {
             source: ExponentSource::Multipliers,
             periods: orbit.period,
-            exponents: orbit_exponents(orbit),
+            exponents,
             errors: vec![0.0; dimension],
             sum_by_trace: by_trace.map_or(f64::NAN, |sum| sum / period),
             // Both are −∞ where the orbit sticks.
@@ -216,7 +227,7 @@ pub fn lyapunov(
         return Err(Error::stopped());
     }
     let found = if let Some(orbit) = &named.orbit {
-        Exponents::of_orbit(model, orbit)?
+        Spectrum::of_orbit(model, orbit)?
     } else {
         let fixed = SpectrumOptions {
             alignment,
@@ -232,7 +243,7 @@ pub fn lyapunov(
             let what = "the tangent vectors of the motion";
             FlowError::NotFinite { what }.into()
         })?;
-        Exponents::of_run(spectrum, named.classification, map.resets() > before)
+        Spectrum::of_run(spectrum, named.classification, map.resets() > before)
     };
     let section_at = options.section_at();
     let section = section(model, &start, section_at, options.points)?;

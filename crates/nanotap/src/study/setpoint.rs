@@ -603,7 +603,7 @@ pub struct UnsolvedCase {
 #[serde(untagged)]
 pub enum CaseReport {
     /// A case with its distance.
-    Solved(SolvedCase),
+    Solved(Box<SolvedCase>),
     /// A case whose setpoint was not solved for.
     Unsolved(UnsolvedCase),
 }

@@ -371,7 +371,7 @@ impl Knocked<'_> {
             let smaller: Vec<Knock> = (1..=SMALLER)
                 .map(|k| {
                     let [instant, size] = PLASTIC.map(|part| (part * k as f64).fract());
-                    let sign = if k % 2 == 0 { 1.0 } else { -1.0 };
+                    let sign = if k.is_multiple_of(2) { 1.0 } else { -1.0 };
                     Knock {
                         instant,
                         tip_speed: sign * found.size() * nanotap_arithmetic::exp2(-size),
@@ -524,7 +524,7 @@ fn scan(first: f64, step: usize) -> Vec<Knock> {
         let larger = nanotap_arithmetic::powf(SIZE_RATIO, step as f64 + within);
         Knock {
             instant: (k / 2) as f64 / INSTANTS as f64,
-            tip_speed: if k % 2 == 0 { first } else { -first } * larger,
+            tip_speed: if k.is_multiple_of(2) { first } else { -first } * larger,
         }
     };
     (0..2 * INSTANTS).map(knock).collect()

@@ -226,7 +226,7 @@ fn invalid_slices_are_refused() {
         ),
         (
             refused("a1=0:1:5", "v1=0:1:5", &|o| {
-                o.state = Some(vec![0.0; 3].into())
+                o.state = Some(vec![0.0; 3].into());
             }),
             "3 numbers where 6",
         ),

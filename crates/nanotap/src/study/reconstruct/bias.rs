@@ -16,7 +16,7 @@ const DECAY: f64 = 1.0 / 3.0;
 /// Standard errors of a decrease of the force at the far end above which it is significant.
 const SIGNIFICANT: f64 = 2.0;
 
-/// Error of the level of the force. A constant force has no first harmonic, so the rows determine the
+/// Upper estimate of the error of the level of the force. A constant force has no first harmonic, so the rows determine the
 /// force up to a constant, and it is taken as zero beyond the last node. If the force still falls off
 /// at `far`, the closest approach of the farthest row, the constant is that of a tail: of the slowest
 /// of the usual ones, the van der Waals force of a sphere, which goes as the distance to the power −2.
@@ -34,8 +34,9 @@ pub(super) fn level(force: &Smooth, nodes: &Nodes, far: f64) -> f64 {
     };
     let ([inner, inner_error], [outer, outer_error]) = (at(near), at(far));
     let decrease = inner - outer;
-    if decrease.abs() > SIGNIFICANT * inner_error.hypot(outer_error) {
-        decrease - outer
+    if decrease.abs() > SIGNIFICANT * (inner_error * inner_error + outer_error * outer_error).sqrt()
+    {
+        decrease.abs() + outer.abs()
     } else {
         0.0
     }

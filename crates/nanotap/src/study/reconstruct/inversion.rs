@@ -396,8 +396,11 @@ impl Inversion<'_> {
             .filter(|(_, row)| row.informative);
         let fine = felt.map(|(row, _)| row.closest).fold(low, f64::max);
         let far = rows.iter().zip(self.rows).map(|(estimate, row)| {
-            // As far as the tip moves: the force there is felt, too.
-            let reach = row.distance + estimate.at.amplitude;
+            let reach = match self.method {
+                Method::Amplitude { .. } => row.distance - estimate.at.amplitude,
+                // A small oscillation also feels the force at its far end.
+                Method::Frequency { .. } => row.distance + estimate.at.amplitude,
+            };
             reach.max(estimate.closest)
         });
         Nodes::new(low, fine, far.fold(fine, f64::max), widest)
@@ -417,7 +420,11 @@ impl Inversion<'_> {
             let back = [0, 1].map(|k| by[k] * (row.values[k] - estimate.values[k]));
             let conservative = estimate.at.conservative + back[0] + back[1];
             let discretisation = interpolation_error(&weights.cosine, discretised);
-            [conservative, spread(by, row.errors).hypot(discretisation)]
+            let measured = spread(by, row.errors);
+            [
+                conservative,
+                (measured * measured + discretisation * discretisation).sqrt(),
+            ]
         })
         .collect()
     }

@@ -712,7 +712,7 @@ fn vertex(table: &ForceCurve, least: usize) -> Option<[f64; 2]> {
 /// Returns whether the dissipation is above three standard errors somewhere.
 fn damped(table: &ForceCurve) -> bool {
     let both = table.dissipation.iter().zip(&table.dissipation_error);
-    both.flat_map(|(value, error)| value.zip(*error))
+    both.filter_map(|(value, error)| value.zip(*error))
         .any(|(value, error)| error > 0.0 && value > 3.0 * error)
 }
 

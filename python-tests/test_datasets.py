@@ -219,6 +219,7 @@ def test_an_image_is_written_line_by_line(tmp_path):
         "direction": 2,
         "x": 12,
         "flight": 8,
+        "off": 8,
         "jump": 8,
     }
     with pytest.raises(ValueError, match="line_settle"):

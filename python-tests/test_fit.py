@@ -118,8 +118,9 @@ def test_a_computed_force_curve_is_a_table() -> None:
     ramp = {"to": "-5 nm", "speed": "1 um/s", "points": 60}
     curve = nanotap.force_curve(case("500 MPa"), **ramp)
     found = nanotap.fit(case("50 MPa"), data=curve, free=["sample.modulus"])
-    # The static branch differs from the motion by the ringing after jumps alone.
-    assert found.best["sample.modulus"] == pytest.approx(500e6, rel=1e-3)
+    # The static branch has the compliance of all modes, the motion that of three: 0.4 % at this
+    # stiffness (docs/cases/fit.md).
+    assert found.best["sample.modulus"] == pytest.approx(500e6, rel=5e-3)
     driven = nanotap.force_curve(case("500 MPa", "5 nm"), **ramp)
     with pytest.raises(ValueError, match="driven"):
         nanotap.fit(case("50 MPa"), data=driven, free=["sample.modulus"])

@@ -110,7 +110,7 @@ fn unsolved(
 ) -> Result<(), Failure> {
     write_out(arguments, case)?;
     remarks(case, output);
-    output.result(&CaseReport::Unsolved(document), |_| {
+    output.result(&CaseReport::Unsolved(Box::new(document)), |_| {
         let view = case.physical();
         view.map_or_else(String::new, |view| physical(case.title(), view, false))
     })

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from ._cluster import Plan
 
 
+@stoppable()
 def sweep(
     case: Case,
     options: Mapping[str, Any],
@@ -48,6 +49,7 @@ def sweep(
     return _judged(ds, ds.classification.dims[:-1], targets)
 
 
+@stoppable()
 def basin(
     case: Case,
     options: Mapping[str, Any],
@@ -163,6 +165,7 @@ def summary(ds: "xr.Dataset | Path") -> Record:
     return Record(json.loads(_nanotap.summary(_path_of(ds))))
 
 
+@stoppable()
 def window(
     case: Case,
     options: Mapping[str, Any],

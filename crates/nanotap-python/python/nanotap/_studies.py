@@ -50,6 +50,7 @@ def _run(
     return _document(text), interrupted
 
 
+@stoppable()
 def attractors(
     case: Case, options: Mapping[str, Any], threads: int | None, progress: Progress
 ) -> Attractors:
@@ -71,6 +72,7 @@ def _finished(found: Found, interrupted: bool, *, part: bool = True) -> Found:
     return found
 
 
+@stoppable()
 def branch(
     case: Case, options: Mapping[str, Any], threads: int | None, progress: Progress
 ) -> "xr.Dataset":
@@ -201,6 +203,7 @@ def _columns(
     return columns
 
 
+@stoppable()
 def approach(
     case: Case, options: Mapping[str, Any], threads: int | None, progress: Progress
 ) -> "xr.Dataset":
@@ -309,6 +312,7 @@ _LISTED = {
 }
 
 
+@stoppable()
 def scan(
     case: Case,
     options: Mapping[str, Any],
@@ -336,9 +340,8 @@ def _scan_dataset(case: Case, report: dict[str, Any]) -> "xr.Dataset":
 
     ways = [way for way in ("trace", "retrace") if report.get(way)]
     variables: dict[str, Any] = {}
-    lines = max((len(report[way]["height"]) for way in ways), default=0)
     for name in report[ways[0]] if ways else ():
-        rows = np.array([_padded(report[way][name], lines) for way in ways])
+        rows = np.array(_of_ways(report, ways, name))
         if rows.dtype.kind == "O":
             rows = rows.astype(float)
         words_, unit = _SCANNED.get(name, (name, "1"))
@@ -373,12 +376,20 @@ def _scan_dataset(case: Case, report: dict[str, Any]) -> "xr.Dataset":
     return ds
 
 
-def _padded(rows: list[Any], lines: int) -> list[Any]:
-    """Rows of pixels, with missing values for the lines that a stopped scan has in one direction only."""
-    missing = (
-        ["" if isinstance(value, str) else None for value in rows[0]] if rows else []
-    )
-    return rows + [missing] * (lines - len(rows))
+def _of_ways(report: Mapping[str, Any], ways: list[str], name: str) -> list[Any]:
+    """A channel by direction, line and pixel; missing for the lines that a stopped scan has in one
+    direction only.
+    """
+    known = [row for way in ways for row in report[way][name]]
+    lines = max(len(report[way][name]) for way in ways)
+    missing = "" if any(isinstance(v, str) for row in known for v in row) else None
+    width = len(known[0]) if known else 0
+
+    def padded(rows: list[Any]) -> list[Any]:
+        filled = [[missing if v is None else v for v in row] for row in rows]
+        return filled + [[missing] * width] * (lines - len(rows))
+
+    return [padded(report[way][name]) for way in ways]
 
 
 @stoppable()
@@ -408,12 +419,14 @@ def lyapunov(case: Case, options: Mapping[str, Any]) -> Lyapunov:
     return Lyapunov.of(_document(text), section=answered(case, describe(cut)))
 
 
+@stoppable()
 def convergence(case: Case, options: Mapping[str, Any]) -> Convergence:
     """The motion for each number of modes."""
     document, interrupted = _run("convergence", case, options)
     return _finished(Convergence.of(document), interrupted)
 
 
+@stoppable()
 def document(
     name: str,
     case: Case,
@@ -426,6 +439,7 @@ def document(
     return _finished(Record(found), interrupted)
 
 
+@stoppable()
 def fit(
     case: Case, options: Mapping[str, Any], threads: int | None, progress: Progress
 ) -> Fit:
@@ -443,6 +457,7 @@ def fit(
     return _finished(Fit(document), interrupted)
 
 
+@stoppable()
 def fit_map(
     case: Case,
     data: Any,
@@ -505,6 +520,7 @@ def fit_map(
     return ds.assign(result=_datasets.in_words(ds.result))
 
 
+@stoppable()
 def reconstruct(
     case: Case, options: Mapping[str, Any], threads: int | None, progress: Progress
 ) -> Reconstruction:

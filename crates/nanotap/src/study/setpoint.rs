@@ -605,7 +605,7 @@ pub enum CaseReport {
     /// A case with its distance.
     Solved(Box<SolvedCase>),
     /// A case whose setpoint was not solved for.
-    Unsolved(UnsolvedCase),
+    Unsolved(Box<UnsolvedCase>),
 }
 
 impl UnsolvedCase {

@@ -74,7 +74,7 @@ CALLS = {
     "fit": lambda: nanotap.fit(
         load("stiff-lever.toml"),
         data=curve(),
-        free=["sample.modulus", "sample.hamaker", "gap.offset"],
+        free=["sample.modulus", "gap.offset"],
         starts=200,
     ),
     "reconstruct": lambda: nanotap.reconstruct(

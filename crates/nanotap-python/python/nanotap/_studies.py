@@ -349,7 +349,7 @@ def _scan_dataset(case: Case, report: dict[str, Any]) -> "xr.Dataset":
         variables[name] = (("direction", "y", "x"), rows, attrs)
     length = report["size"][0]
     pixels = variables["height"][1].shape[-1] if variables else 0
-    y = [line["y"] for line in report["lines"] if line["direction"] == "trace"]
+    y = [line["y"] for line in report["lines"] if line["direction"] == ways[0]]
     metres = {"units": "m"}
     coords: dict[str, Any] = {
         "direction": words(ways),
@@ -377,19 +377,22 @@ def _scan_dataset(case: Case, report: dict[str, Any]) -> "xr.Dataset":
 
 
 def _of_ways(report: Mapping[str, Any], ways: list[str], name: str) -> list[Any]:
-    """A channel by direction, line and pixel; missing for the lines that a stopped scan has in one
-    direction only.
+    """A channel by direction, line and pixel, of the lines whose trace is finished; missing where a
+    stopped scan has no retrace.
     """
     known = [row for way in ways for row in report[way][name]]
-    lines = max(len(report[way][name]) for way in ways)
     missing = "" if any(isinstance(v, str) for row in known for v in row) else None
-    width = len(known[0]) if known else 0
+    empty = [missing] * max((len(row) for row in known), default=0)
+    finished = [
+        line["line"] for line in report["lines"] if line["direction"] == ways[0]
+    ]
 
-    def padded(rows: list[Any]) -> list[Any]:
-        filled = [[missing if v is None else v for v in row] for row in rows]
-        return filled + [[missing] * width] * (lines - len(rows))
+    def row(way: str, line: int) -> list[Any]:
+        rows = report[way][name]
+        values = rows[line] if line < len(rows) else empty
+        return [missing if v is None else v for v in values]
 
-    return [padded(report[way][name]) for way in ways]
+    return [[row(way, line) for line in finished] for way in ways]
 
 
 @stoppable()

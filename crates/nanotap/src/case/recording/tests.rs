@@ -163,9 +163,9 @@ fn stated_sizes_take_no_memory() {
     let refused = parse("a.ibw", &wave).unwrap().unwrap_err();
     assert!(refused.contains("more than 1000000 rows"), "{refused}");
     let mut text = String::from("[DataSet]\nGroupCount=1000\n");
-    for group in 0..1000 {
-        text += &format!("Gr{group}-Count=1000\nGr{group}-Ch0=E\nGr{group}-Ch1=E\n");
-    }
+    let groups =
+        (0..1000).map(|group| format!("Gr{group}-Count=1000\nGr{group}-Ch0=E\nGr{group}-Ch1=E\n"));
+    text.extend(groups);
     text += "[E]\nPoints=0\nLines=0\nSaveBits=16\n#!";
     let refused = parse("a.nid", text.as_bytes()).unwrap().unwrap_err();
     assert!(refused.contains("more than 1000 channels"), "{refused}");

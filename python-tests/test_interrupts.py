@@ -47,13 +47,6 @@ CALLS = {
     ),
     "approach": lambda: nanotap.approach(lever(), points=20_000),
     "fm": lambda: nanotap.fm(load("fm-lever.toml"), points=20_000),
-    "window": lambda: nanotap.window(
-        lever(),
-        over={
-            "gap.tip": nanotap.range(7e-9, 9e-9, 100),
-            "drive.free_amplitude": nanotap.range(9e-9, 11e-9, 100),
-        },
-    ),
     "basin": lambda: nanotap.basin(
         nanotap.Case.paper(omega=20, alpha1=0), x="a1=-1:1:2000", y="v1=-4:4:2000"
     ),

@@ -187,11 +187,12 @@ def test_an_orbit_says_which_knock_upsets_it(regular):
 def test_a_motion_says_from_which_start_it_follows(regular):
     for found in (
         nanotap.orbit(regular),
-        nanotap.simulate(regular),
         nanotap.lyapunov(regular, periods=10, transient=10),
     ):
         assert "from rest" in found.notes[0] and "`attractors`" in found.notes[0]
         assert found.to_dict()["notes"] == found.notes
+    run = nanotap.simulate(regular)
+    assert "from rest" in run.attrs["notes"] and "`attractors`" in run.attrs["notes"]
     given = nanotap.orbit(regular, state=nanotap.orbit(regular).state)
     assert "from the given state" in given.notes[0]
 

@@ -253,7 +253,7 @@ array([0.0149, 2.8522, 4.4282])
 """,
     "lyapunov": """
 >>> nanotap.lyapunov(case).exponents[:2].round(4).tolist()
-[-0.1409, -0.141]
+[-0.1409, -0.1409]
 """,
     "convergence": """
 >>> nanotap.convergence(case, largest=4).enough

@@ -324,8 +324,8 @@ def _plain(name: str, value: Any, takes: _Option) -> Any:
         return _finite(number(name, value))
     if "integer" in kinds:
         number_of = whole(name, value)
-        if not -_MOST <= number_of <= _MOST:
-            message = f"{name}: {number_of} is out of range; expected a whole number below 2⁶³"
+        if not -(2**63) <= number_of < 2**64:
+            message = f"{name}: {number_of} is out of range; expected a whole number of 64 bits"
             raise ValueError(message)
         return number_of
     return str(value)

@@ -214,6 +214,8 @@ def _variables(
     for name, value in document.items():
         if name == "evidence":
             attributes[name] = value
+        elif name == "notes":
+            attributes[name] = "\n".join(value)
         elif name == "energy_balance":
             names = list(value)
             index = ("energy", words(names))

@@ -1048,7 +1048,7 @@ def lyapunov(
     --------
     >>> case = nanotap.Case.paper(omega=3)
     >>> nanotap.lyapunov(case).exponents[:2].round(4).tolist()
-    [-0.1409, -0.141]
+    [-0.1409, -0.1409]
     """
     options = _arguments.options("lyapunov", locals())
     return _studies.lyapunov(case, options)

@@ -219,6 +219,8 @@ export function follow(next) {
 /** Removes the figure. */
 function forget() {
   stop("study");
+  // Its end is not reported over the words of what follows.
+  asking = null;
   drawn = null;
   found = null;
   number = 0;

@@ -1,4 +1,4 @@
-"""Ctrl-C during every function: `Interrupted` within a second or two, with the finished part."""
+"""Ctrl-C during functions that take seconds: `Interrupted` within a second or two, with the finished part."""
 
 import os
 import pathlib
@@ -64,12 +64,6 @@ CALLS = {
         load("bimodal-polymer.toml"), first="am", second="fm", points=5000
     ),
     "lever": lambda: nanotap.lever(lever(**{"drive.setpoint": 0.8, "gap.tip": None})),
-    "fit": lambda: nanotap.fit(
-        load("stiff-lever.toml"),
-        data=curve(),
-        free=["sample.modulus", "gap.offset"],
-        starts=200,
-    ),
     "reconstruct": lambda: nanotap.reconstruct(
         load("stiff-lever.toml"), data=[curve()] * 40, rows=2000
     ),

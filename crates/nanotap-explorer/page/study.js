@@ -205,7 +205,11 @@ export function fill(next) {
   mark();
   clearTimeout(timer);
   if (same(asking, subject(asking?.clicks)) || isCurrent()) return;
-  if (asking) stop("study");
+  if (asking) {
+    stop("study");
+    asking = null;
+    $("progress").textContent = hint();
+  }
   if (state.ran === "yes") compute(false);
   else if (state.tab === "approach") timer = setTimeout(() => { if (!isCurrent()) compute(true); }, PAUSE);
 }

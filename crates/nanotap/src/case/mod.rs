@@ -29,7 +29,6 @@ pub mod near_name;
 pub mod physical;
 mod quantities;
 pub mod quantity;
-#[cfg(feature = "fit")]
 mod recording;
 pub mod schema;
 pub mod state;

@@ -10,7 +10,6 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use serde_json::{Map, Value, json};
 
 use super::quantity::Quantity;
-#[cfg(feature = "fit")]
 use super::recording::{self, Recording};
 use crate::Error;
 use crate::input::{self, MAX_TABLE_BYTES, Origin};
@@ -62,7 +61,6 @@ impl Table {
     pub(crate) fn read_from(path: &Path, origin: Origin) -> Result<Self, Error> {
         let name = path.display().to_string();
         let bytes = input::read(path, MAX_TABLE_BYTES, origin)?;
-        #[cfg(feature = "fit")]
         if let Some(recorded) = recording::parse(&name, &bytes) {
             return recorded
                 .map(|recorded| Self::of_recording(&name, recorded))
@@ -83,7 +81,6 @@ impl Table {
     }
 
     /// The table of an instrument's file.
-    #[cfg(feature = "fit")]
     pub(super) fn of_recording(name: &str, recorded: Recording) -> Self {
         let column = |(header, numbers): (String, Vec<f64>)| {
             (header, numbers.into_iter().map(Entry::Number).collect())

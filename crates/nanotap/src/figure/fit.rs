@@ -7,7 +7,6 @@ use nanotap_figures::{
 use crate::case::Key;
 use crate::case::physical::Kind;
 use crate::case::units::prefixed;
-#[cfg(feature = "dataset")]
 use crate::dataset::{Store, StoreError};
 use crate::figure::shown::Shown;
 use crate::observe::table::shown_phase;
@@ -22,7 +21,6 @@ const ACROSS: usize = 3;
 ///
 /// # Errors
 /// When a chunk is missing or damaged.
-#[cfg(feature = "dataset")]
 pub fn fit_map_figure(store: &Store) -> Result<Figure, StoreError> {
     store.require_all()?;
     let schema = store.schema();

@@ -6,16 +6,13 @@ use serde_json::Value;
 
 use crate::Error;
 use crate::case::Case;
-#[cfg(feature = "dataset")]
 use crate::dataset::{Store, StoreError};
 use crate::figure;
 use crate::model::beam::Modes;
-#[cfg(all(feature = "dataset", feature = "fit"))]
 use crate::study::fit;
 use crate::study::registry::{Document, Study, StudyEntry};
 use crate::study::request::read;
 use crate::study::setpoint::at_setpoint;
-#[cfg(feature = "dataset")]
 use crate::study::{DatasetStudy as _, basin, scan, sweep, window};
 use crate::study::{contact_laws, convergence, force_curve, lyapunov, modes};
 
@@ -59,12 +56,10 @@ pub fn document_and_figure(
                 Ok(figure::force_curve::force_curve_figure(report))
             })
         }
-        #[cfg(feature = "fm")]
         "fm" => drawn::<crate::study::frequency_modulation::FrequencyModulationStudy>(
             given,
             |case, report| Ok(figure::approach::approach_figure(report, &case.units())),
         ),
-        #[cfg(feature = "fm")]
         "bimodal" => drawn::<crate::study::bimodal::BimodalStudy>(given, |_, report| {
             Ok(figure::bimodal::bimodal_figure(report))
         }),
@@ -80,14 +75,12 @@ pub fn document_and_figure(
 ///
 /// # Errors
 /// When a chunk is missing or damaged.
-#[cfg(feature = "dataset")]
 pub fn dataset_figure(study: &str, store: &Store) -> Result<Option<Figure>, StoreError> {
     Ok(Some(match study {
         sweep::SweepStudy::NAME => figure::sweep::figure(store)?,
         window::WindowStudy::NAME => figure::window::figure(store)?,
         basin::BasinStudy::NAME => figure::basin::figure(store)?,
         scan::ScanLines::NAME => figure::scan::scan_figure(&scan::ScanLines::report(store)?),
-        #[cfg(feature = "fit")]
         fit::FitMap::NAME => figure::fit::fit_map_figure(store)?,
         _ => return Ok(None),
     }))

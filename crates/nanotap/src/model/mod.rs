@@ -13,7 +13,6 @@ mod beam_equations;
 pub mod cantilever;
 pub mod contact;
 pub mod drive_form;
-#[cfg(feature = "proof")]
 pub mod enclosed;
 pub mod exact_beam;
 mod fixed_point;

@@ -4,15 +4,12 @@
 pub mod approach;
 pub mod attractors;
 pub mod averaged_orbits;
-#[cfg(feature = "dataset")]
 pub mod basin;
-#[cfg(feature = "fm")]
 pub mod bimodal;
 pub mod branch;
 pub mod contact_laws;
 pub mod convergence;
 pub mod event;
-#[cfg(feature = "fit")]
 pub mod fit;
 pub mod force_curve;
 mod free_motion;
@@ -28,7 +25,6 @@ mod moving_sample;
 pub mod noise;
 pub mod orbit;
 pub mod proof;
-#[cfg(feature = "fit")]
 pub mod reconstruct;
 pub mod registry;
 pub mod request;
@@ -37,16 +33,13 @@ pub mod setpoint;
 mod short_run;
 pub mod simulate;
 pub mod start_box;
-#[cfg(feature = "dataset")]
 pub mod sweep;
 pub mod target;
 pub mod threads;
 pub mod upset;
 pub mod value;
-#[cfg(feature = "dataset")]
 pub mod window;
 
-#[cfg(feature = "dataset")]
 use std::fmt::Debug;
 
 use nanotap_dynamics::Control;
@@ -60,13 +53,12 @@ pub use simulate::fixed_step;
 use crate::Error;
 use crate::case::Case;
 use crate::case::document::CaseDocument;
-#[cfg(feature = "dataset")]
 use crate::dataset::{Schema, Store, StoreError, Work, WorkError};
 use crate::model::cantilever::Cantilever;
 use crate::model::sample_law::SampleLaw;
 use registry::StudyEntry;
 
-/// All studies that the enabled features contain, in the order in which front ends list them.
+/// All studies, in the order in which front ends list them.
 pub static STUDIES: &[StudyEntry] = &[
     StudyEntry::of::<modes::ModesStudy>(),
     StudyEntry::of::<simulate::SimulateStudy>(),
@@ -74,29 +66,17 @@ pub static STUDIES: &[StudyEntry] = &[
     StudyEntry::of::<attractors::AttractorsStudy>(),
     StudyEntry::of::<branch::BranchStudy>(),
     StudyEntry::of::<approach::ApproachStudy>(),
-    #[cfg(feature = "fm")]
     StudyEntry::of::<frequency_modulation::FrequencyModulationStudy>(),
-    #[cfg(all(feature = "fit", not(feature = "dataset")))]
-    StudyEntry::of::<fit::FitStudy>(),
-    #[cfg(all(feature = "fit", feature = "dataset"))]
     StudyEntry::of::<fit::FitStudy>().or_dataset::<fit::FitMap>(),
-    #[cfg(feature = "fit")]
     StudyEntry::of::<reconstruct::ReconstructStudy>(),
-    #[cfg(feature = "dataset")]
     StudyEntry::dataset::<sweep::SweepStudy>(),
-    #[cfg(feature = "dataset")]
     StudyEntry::dataset::<window::WindowStudy>(),
-    #[cfg(feature = "dataset")]
     StudyEntry::dataset::<basin::BasinStudy>(),
     StudyEntry::of::<lyapunov::LyapunovStudy>(),
     StudyEntry::of::<convergence::ConvergenceStudy>(),
     StudyEntry::of::<contact_laws::ContactLawsStudy>(),
     StudyEntry::of::<noise::NoiseStudy>(),
-    #[cfg(feature = "fm")]
     StudyEntry::of::<bimodal::BimodalStudy>(),
-    #[cfg(not(feature = "dataset"))]
-    StudyEntry::of::<scan::ScanStudy>(),
-    #[cfg(feature = "dataset")]
     StudyEntry::of::<scan::ScanStudy>().or_dataset::<scan::ScanLines>(),
     StudyEntry::of::<force_curve::ForceCurveStudy>(),
     StudyEntry::of::<lever::LeverStudy>(),
@@ -154,7 +134,6 @@ pub trait Study {
 }
 
 /// A study whose report is a dataset, computed chunk by chunk.
-#[cfg(feature = "dataset")]
 pub trait DatasetStudy {
     /// Name in every front end.
     const NAME: &'static str;
@@ -209,11 +188,9 @@ pub trait DatasetStudy {
 }
 
 /// The checked computation of a dataset: its chunks are pure functions of it.
-#[cfg(feature = "dataset")]
 pub type DatasetPlan = Box<dyn Computation>;
 
 /// The computation of a dataset.
-#[cfg(feature = "dataset")]
 pub trait Computation: Debug + Send + Sync {
     /// Returns the schema of the dataset: its grid, variables and attributes.
     fn schema(&self) -> &Schema;

@@ -32,7 +32,7 @@
 //!
 //! A sweep, a window and basins leave a dataset, and so does a scan of independent lines: [`StudyEntry::plan`] gives what computes it
 //! chunk by chunk. A figure is drawn from the report itself, by the study's function in
-//! `figure`.
+//! [`figure`](crate::figure).
 
 use nanotap_dynamics::Control;
 use schemars::Schema;
@@ -40,11 +40,9 @@ use serde_json::Value;
 
 use crate::Error;
 use crate::case::Case;
-#[cfg(feature = "dataset")]
 use crate::dataset::Store;
 use crate::study::request::{answer_schema, read, schema};
 use crate::study::setpoint::at_setpoint;
-#[cfg(feature = "dataset")]
 pub use crate::study::{DatasetPlan, DatasetStudy};
 pub use crate::study::{Document, STUDIES, Study};
 
@@ -68,15 +66,12 @@ pub struct StudyEntry {
     /// Runs it to the JSON of its document, if it leaves one.
     pub document: Option<Run<String>>,
     /// Plans what is to be computed into a dataset, if it leaves one.
-    #[cfg(feature = "dataset")]
     pub dataset: Option<Run<DatasetPlan>>,
     /// The JSON of the summary of its finished dataset, if it leaves one.
-    #[cfg(feature = "dataset")]
     pub summary: Option<Summarise>,
 }
 
 /// What summarises a finished dataset, as JSON.
-#[cfg(feature = "dataset")]
 pub type Summarise = fn(&Store) -> Result<Value, Error>;
 
 /// What runs a study on a case, from the JSON of its request.
@@ -102,15 +97,12 @@ impl StudyEntry {
                 let report = S::run(&case, &request, control)?;
                 Ok(serde_json::to_string(&Document::new(&report, &case))?)
             }),
-            #[cfg(feature = "dataset")]
             dataset: None,
-            #[cfg(feature = "dataset")]
             summary: None,
         }
     }
 
     /// The same study, whose report can be a dataset, too.
-    #[cfg(feature = "dataset")]
     pub(super) const fn or_dataset<S: DatasetStudy>(self) -> Self {
         let Self {
             dataset, summary, ..
@@ -122,7 +114,6 @@ impl StudyEntry {
         }
     }
 
-    #[cfg(feature = "dataset")]
     pub(super) const fn dataset<S: DatasetStudy>() -> Self {
         Self {
             name: S::NAME,
@@ -169,7 +160,6 @@ impl StudyEntry {
     ///
     /// # Errors
     /// Those of the study; and when its report is a document.
-    #[cfg(feature = "dataset")]
     pub fn plan(
         &self,
         case: &Case,

@@ -307,7 +307,6 @@ fn solve_shift(
     control: &Control<'_>,
 ) -> Result<SetpointReport, Error> {
     // What depends on the frequency, as a loss tangent, is that of the frequency with the shift.
-    #[cfg(feature = "fm")]
     let case = &at_shift(case, shift, free)?;
     let options = FrequencyModulationOptions {
         shift: Some(Amount::from(format!("{shift} Hz").as_str())),
@@ -385,7 +384,6 @@ fn solve_shift(
 }
 
 /// The case at the frequency of the free lever with a shift, in Hz, with the same free amplitude.
-#[cfg(feature = "fm")]
 fn at_shift(case: &Case, shift: f64, free: &FreeMotion) -> Result<Case, Error> {
     let held = frequency_modulation::Held {
         amplitude: free.amplitude,

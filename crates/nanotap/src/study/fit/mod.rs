@@ -29,7 +29,6 @@ mod guess;
 pub(crate) mod instrument;
 mod jumps;
 mod laws;
-#[cfg(feature = "dataset")]
 mod map;
 mod parameters;
 mod problem;
@@ -47,7 +46,6 @@ use nanotap_dynamics::Control;
 pub use crate::case::table::{Entry, MAX_ROWS, Table};
 pub(crate) use data::is_distance;
 pub use data::{Column, Curve, Data, Row, SweptKey};
-#[cfg(feature = "dataset")]
 pub use map::{FitMap, FitMapReport, MappedParameter};
 pub use quantity::Quantity;
 pub use report::{

@@ -9,24 +9,15 @@
 //! [`Averages`] are the usual approximations of the shift, and
 //! [`sader_jarvis`](average::sader_jarvis) gives the force back from a curve of shifts.
 
-#[cfg(feature = "fm")]
 pub mod average;
-#[cfg(feature = "fm")]
 mod curve;
-#[cfg(feature = "fm")]
 pub mod free;
-#[cfg(feature = "fm")]
 pub mod held;
-#[cfg(feature = "fm")]
 pub(crate) mod walk;
 
-#[cfg(feature = "fm")]
 pub use average::Averages;
-#[cfg(feature = "fm")]
 pub use curve::frequency_modulation;
-#[cfg(feature = "fm")]
 pub use free::FreeOscillation;
-#[cfg(feature = "fm")]
 pub use held::{Driven, Held, HeldOrbit};
 
 use nanotap_dynamics::Control;
@@ -80,7 +71,6 @@ pub struct Modulated {
     pub sader_jarvis_force: Option<f64>,
 }
 
-#[cfg(feature = "fm")]
 impl Modulated {
     /// Computes the readings of an orbit with the tip at rest at `gap`, model units.
     pub fn of(
@@ -322,22 +312,6 @@ options! {
         #[schemars(extend("x-value" = "DISTANCE"))]
         pub closest: Option<Amount> = None,
     }
-}
-
-/// Stands for the curve of a build without the feature `fm`.
-///
-/// # Errors
-/// Always.
-#[cfg(not(feature = "fm"))]
-pub fn frequency_modulation(
-    _: &Case,
-    _: &FrequencyModulationOptions,
-    _: &Control<'_>,
-) -> Result<ApproachReport, Error> {
-    Err(Error::input(
-        "this program was built without frequency modulation",
-        "build it with the feature `fm`",
-    ))
 }
 
 /// Study of approach and retract curves under frequency modulation.

@@ -3,15 +3,13 @@
 //!
 //! A proof is about the model's dimensionless numbers, each standing for every decimal number
 //! that is read as it; see [`enclosed`](crate::model::enclosed) for the equations and nanotap-proof
-//! for the method. Without the feature `proof` no orbit is proved, and the report states why.
+//! for the method.
 
-#[cfg(feature = "proof")]
 mod prover;
 
 use schemars::JsonSchema;
 use serde::Serialize;
 
-#[cfg(feature = "proof")]
 pub use prover::{NotProved, Prover, candidate};
 
 /// Result of a proof about a periodic orbit.
@@ -74,26 +72,4 @@ pub struct DiscReport {
     pub radius: f64,
     /// How many multipliers it holds.
     pub count: usize,
-}
-
-/// Stands for the prover of a build without the feature `proof`.
-#[cfg(not(feature = "proof"))]
-#[derive(Debug)]
-pub struct Prover;
-
-#[cfg(not(feature = "proof"))]
-impl Prover {
-    /// The prover of any case.
-    pub fn new(_: &crate::case::Case) -> Self {
-        Self
-    }
-
-    /// A report without a theorem.
-    pub fn report(&self, _: &crate::model::recording::Recording, _: usize) -> ProofReport {
-        ProofReport {
-            proved: false,
-            statement: "not proved: this program was built without the feature `proof`".into(),
-            theorem: None,
-        }
-    }
 }

@@ -16,7 +16,6 @@ mod feedback;
 mod image;
 mod instrument;
 mod lever;
-#[cfg(feature = "dataset")]
 mod lines;
 mod loop_response;
 pub mod options;
@@ -33,7 +32,6 @@ mod verdict;
 use nanotap_dynamics::Control;
 
 pub use instrument::Interaction;
-#[cfg(feature = "dataset")]
 pub use lines::ScanLines;
 pub use options::{Method, Mode, ScanOptions};
 pub use report::{

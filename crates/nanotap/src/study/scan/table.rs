@@ -3,7 +3,6 @@
 use std::fmt::Write as _;
 
 use super::report::{Channels, ScanReport};
-#[cfg(feature = "dataset")]
 use crate::dataset::gsf::Field;
 use crate::number::shortest;
 
@@ -97,7 +96,6 @@ impl ScanReport {
     }
 
     /// Returns a channel of the trace as a field for programs for AFM data.
-    #[cfg(feature = "dataset")]
     pub fn field(&self, channel: &Channel) -> Field {
         let rows = (channel.values)(&self.trace);
         Field {

@@ -21,12 +21,6 @@ pub enum FigureError {
         /// Error of the operating system.
         source: std::io::Error,
     },
-    /// The figure's SVG could not be converted to PNG or PDF.
-    #[error("cannot convert the figure from SVG: {reason}")]
-    Conversion {
-        /// Message of the converter.
-        reason: String,
-    },
     /// A figure could not be read from JSON or written as JSON.
     #[error("cannot read or write the figure as JSON: {0}")]
     Json(serde_json::Error),

@@ -34,9 +34,9 @@
 )]
 
 mod axis;
+mod canvas;
 mod cloud;
 mod colour;
-mod convert;
 mod draw;
 mod error;
 mod figure;
@@ -50,6 +50,8 @@ mod note;
 mod numbers;
 mod page;
 mod panel;
+mod pdf;
+mod pixels;
 mod polyline;
 mod prepared;
 mod raster;

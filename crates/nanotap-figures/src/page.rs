@@ -5,18 +5,19 @@ use std::fs;
 use std::hash::{BuildHasher as _, RandomState};
 use std::path::{Path, PathBuf};
 
-use crate::convert;
 use crate::draw;
 use crate::error::FigureError;
 use crate::figure::Figure;
 use crate::layout::{self, Grid};
 use crate::map::{AxisMap, PanelMap};
+use crate::pdf;
+use crate::pixels;
 use crate::prepared::Prepared;
 use crate::resolve;
 use crate::scene::Scene;
 use crate::shape::{Point, Rect};
 use crate::style::{EDGE, INK, Style};
-use crate::svg::{self, Target};
+use crate::svg;
 use crate::text::{Across, Upright, Words};
 
 /// Resolution of PNG files, dots per inch.
@@ -63,7 +64,7 @@ impl Figure {
     /// # Errors
     /// If the figure cannot be drawn.
     pub fn to_svg(&self) -> Result<String, FigureError> {
-        Ok(svg::write(&self.scene()?.0, Target::Svg))
+        Ok(svg::write(&self.scene()?.0))
     }
 
     /// The figure as SVG, with the positions of its panels and axes. A page needs them to find the
@@ -73,7 +74,7 @@ impl Figure {
     /// If the figure cannot be drawn.
     pub fn to_svg_with_map(&self) -> Result<(String, Vec<PanelMap>), FigureError> {
         let (scene, map) = self.scene()?;
-        Ok((svg::write(&scene, Target::Svg), map))
+        Ok((svg::write(&scene), map))
     }
 
     /// The figure as JSON, with everything resolved that does not depend on its size: the range of
@@ -106,7 +107,7 @@ impl Figure {
         if !(10.0..=2400.0).contains(&dpi) || count > MAX_PIXELS {
             return Err(FigureError::Resolution { dpi });
         }
-        convert::png(&scene, dpi).map_err(|reason| FigureError::Conversion { reason })
+        pixels::png(&scene, dpi).ok_or(FigureError::Resolution { dpi })
     }
 
     /// The figure as PDF of one page, to be included in a paper.
@@ -114,7 +115,7 @@ impl Figure {
     /// # Errors
     /// If the figure cannot be drawn.
     pub fn to_pdf(&self) -> Result<Vec<u8>, FigureError> {
-        convert::pdf(&self.scene()?.0).map_err(|reason| FigureError::Conversion { reason })
+        Ok(pdf::write(&self.scene()?.0))
     }
 
     fn scene(&self) -> Result<(Scene, Vec<PanelMap>), FigureError> {

@@ -2,6 +2,16 @@
 
 use crate::colour::Colour;
 
+/// A length in mm as whole micrometres, the grid on which every format draws.
+pub(crate) fn micrometres(length: f64) -> i64 {
+    (length * 1000.0).round() as i64
+}
+
+/// A length in mm, rounded to micrometres.
+pub(crate) fn on_grid(length: f64) -> f32 {
+    micrometres(length) as f32 / 1000.0
+}
+
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Point {
     pub(crate) x: f64,

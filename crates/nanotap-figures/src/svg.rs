@@ -10,51 +10,20 @@ use std::fmt::Write as _;
 use base64::Engine as _;
 
 use crate::MADE_BY;
+use crate::canvas::{self, Canvas};
 use crate::colour::Colour;
-use crate::convert;
 use crate::font::Glyph;
-use crate::raster::{EMBEDDED_DPI, Raster};
-use crate::scene::{Item, Scene};
-use crate::shape::{Path, Point, Rect, Segment, Stroke};
+use crate::raster::Raster;
+use crate::scene::Scene;
+use crate::shape::{Path, Point, Rect, Segment, micrometres};
 use crate::text::PlacedWords;
 
 /// Placeholder for the page's own prefix of identifiers until the whole page is known.
 const PREFIX: char = '\u{1}';
-/// Lines with more corners are drawn in pieces on a layer where they become pixels: the time to
-/// stroke a path grows with the square of the number of its corners.
-const LONG_STROKE: usize = 500;
 
-/// What the SVG is written for.
-#[derive(Clone, Copy, PartialEq)]
-pub(crate) enum Target {
-    /// An SVG file. Shapes that are too heavy become pixels of 600 dots per inch.
-    Svg,
-    /// Conversion to PDF: the same, with each text as one shape.
-    Pdf,
-    /// Conversion to pixels of this resolution, which have their ground.
-    Pixels { dpi: f64 },
-}
-
-impl Target {
-    /// Resolution of the pixels; `None` for a vector format.
-    fn dpi(self) -> Option<f64> {
-        match self {
-            Target::Pixels { dpi } => Some(dpi),
-            Target::Svg | Target::Pdf => None,
-        }
-    }
-}
-
-pub(crate) fn write(scene: &Scene, target: Target) -> String {
-    let mut page = Page {
-        target,
-        body: String::new(),
-        glyphs: BTreeSet::new(),
-        clips: Vec::new(),
-    };
-    for item in &scene.items {
-        page.item(item);
-    }
+pub(crate) fn write(scene: &Scene) -> String {
+    let mut page = Page::default();
+    canvas::draw(scene, &mut page);
     let mut svg = String::new();
     let (width, height) = (number(scene.width), number(scene.height));
     let _ = writeln!(
@@ -69,12 +38,10 @@ pub(crate) fn write(scene: &Scene, target: Target) -> String {
     svg.push_str("<defs>\n");
     svg.push_str(&page.definitions());
     svg.push_str("</defs>\n");
-    if target.dpi().is_none() {
-        let _ = writeln!(
-            svg,
-            "<rect width=\"{width}\" height=\"{height}\" fill=\"#fff\"/>"
-        );
-    }
+    let _ = writeln!(
+        svg,
+        "<rect width=\"{width}\" height=\"{height}\" fill=\"#fff\"/>"
+    );
     svg.push_str(&page.body);
     svg.push_str("</svg>\n");
     // Several figures in one HTML page must not share identifiers.
@@ -90,8 +57,8 @@ fn fingerprint(bytes: &[u8]) -> u32 {
     })
 }
 
+#[derive(Default)]
 struct Page {
-    target: Target,
     body: String,
     glyphs: BTreeSet<Glyph>,
     clips: Vec<Rect>,
@@ -123,37 +90,6 @@ impl Page {
         text
     }
 
-    fn item(&mut self, item: &Item) {
-        match item {
-            Item::Open { class, label } => {
-                let _ = write!(self.body, "<g class=\"{class}\"");
-                if !label.is_empty() {
-                    let _ = write!(self.body, " aria-label=\"{}\"", escaped(label));
-                }
-                self.body.push_str(">\n");
-            }
-            Item::Close => self.body.push_str("</g>\n"),
-            Item::Path(path) => self.long_or_short(path),
-            Item::Words(words) if self.target == Target::Svg => self.words(words),
-            Item::Words(words) => self.path(&Path {
-                segments: words.outline(),
-                fill: Some(words.colour),
-                stroke: None,
-                clip: None,
-            }),
-            Item::Raster(raster) if self.target.dpi().is_some() => self.raster(raster),
-            Item::Raster(raster) => self.raster(&raster.magnified()),
-            Item::Cloud(cloud) => {
-                let dpi = self.target.dpi();
-                if let Some(path) = cloud.path().filter(|_| dpi.is_none()) {
-                    self.path(&path);
-                } else if let Some(raster) = cloud.raster(dpi.unwrap_or(EMBEDDED_DPI)) {
-                    self.raster(&raster);
-                }
-            }
-        }
-    }
-
     fn clip(&mut self, rect: Rect) -> String {
         let index = self
             .clips
@@ -166,40 +102,32 @@ impl Page {
         format!(" clip-path=\"url(#{PREFIX}c{index})\"")
     }
 
-    /// Draws a path: one with many corners as pixels or in pieces.
-    fn long_or_short(&mut self, path: &Path) {
-        if self.target.dpi().is_none() {
-            match path.is_heavy().then(|| convert::path_raster(path)) {
-                Some(Some(raster)) => self.raster(&raster),
-                _ => self.path(path),
-            }
-        } else if let Some(stroke) = &path.stroke
-            && path.segments.len() > LONG_STROKE
-        {
-            self.in_pieces(path, stroke);
-        } else {
-            self.path(path);
+    fn paint(&mut self, what: &str, colour: Colour) {
+        let _ = write!(
+            self.body,
+            " {what}=\"#{:02x}{:02x}{:02x}\"",
+            colour.r, colour.g, colour.b
+        );
+        if colour.a < 255 {
+            let _ = write!(
+                self.body,
+                " {what}-opacity=\"{}\"",
+                number(colour.opacity())
+            );
         }
     }
+}
 
-    fn in_pieces(&mut self, path: &Path, stroke: &Stroke) {
-        let clip = path.clip.map(|rect| self.clip(rect)).unwrap_or_default();
-        let _ = writeln!(
-            self.body,
-            "<g{clip} opacity=\"{}\">",
-            number(stroke.colour.opacity())
-        );
-        for segments in pieces(&path.segments) {
-            self.path(&Path {
-                segments,
-                fill: None,
-                stroke: Some(Stroke {
-                    colour: stroke.colour.alpha(1.0),
-                    ..stroke.clone()
-                }),
-                clip: None,
-            });
+impl Canvas for Page {
+    fn open(&mut self, class: &str, label: &str) {
+        let _ = write!(self.body, "<g class=\"{class}\"");
+        if !label.is_empty() {
+            let _ = write!(self.body, " aria-label=\"{}\"", escaped(label));
         }
+        self.body.push_str(">\n");
+    }
+
+    fn close(&mut self) {
         self.body.push_str("</g>\n");
     }
 
@@ -230,21 +158,6 @@ impl Page {
             self.body.push_str(" stroke-linejoin=\"round\"");
         }
         self.body.push_str("/>\n");
-    }
-
-    fn paint(&mut self, what: &str, colour: Colour) {
-        let _ = write!(
-            self.body,
-            " {what}=\"#{:02x}{:02x}{:02x}\"",
-            colour.r, colour.g, colour.b
-        );
-        if colour.a < 255 {
-            let _ = write!(
-                self.body,
-                " {what}-opacity=\"{}\"",
-                number(colour.opacity())
-            );
-        }
     }
 
     fn words(&mut self, placed: &PlacedWords) {
@@ -309,26 +222,9 @@ fn glyph_name(glyph: Glyph) -> String {
     format!("{PREFIX}{}{}", glyph.cut.letter(), glyph.id)
 }
 
-/// A long line as lines of at most [`LONG_STROKE`] corners.
-fn pieces(segments: &[Segment]) -> Vec<Vec<Segment>> {
-    let mut all: Vec<Vec<Segment>> = vec![Vec::new()];
-    for segment in segments {
-        let piece = all.last().map_or(&[][..], Vec::as_slice);
-        if let (true, Segment::Line(_), Some(Segment::Move(last) | Segment::Line(last))) =
-            (piece.len() >= LONG_STROKE, segment, piece.last())
-        {
-            all.push(vec![Segment::Move(*last)]);
-        }
-        if let Some(piece) = all.last_mut() {
-            piece.push(*segment);
-        }
-    }
-    all
-}
-
 /// A length in mm, to the micrometre.
 fn number(value: f64) -> String {
-    decimal((value * 1000.0).round() as i64, 3)
+    decimal(micrometres(value), 3)
 }
 
 /// A whole number of 10^−`places`, without unnecessary digits.

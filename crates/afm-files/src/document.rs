@@ -1,0 +1,385 @@
+//! What a file holds: curves, images and spectra, in SI units.
+
+use std::fmt;
+
+use serde::Serialize;
+
+use crate::{Error, Format, Limits};
+
+/// The content of a file. Images and spectra are decoded when the file is opened, curves one by one on
+/// request: a map of any number of curves needs little memory.
+#[derive(Debug)]
+pub struct Document {
+    /// The file's format.
+    pub format: Format,
+    /// What the instrument calls the file, such as `quantitative-imaging-map`; empty if nothing.
+    pub kind: String,
+    /// The grid of a map's curves.
+    pub grid: Option<Grid>,
+    /// Images, in the order of the file.
+    pub images: Vec<Image>,
+    /// Spectra, in the order of the file.
+    pub spectra: Vec<Spectrum>,
+    /// What a reader of the numbers should know.
+    pub notes: Vec<String>,
+    /// The instrument's settings: name and value as in the file.
+    pub settings: Vec<(String, String)>,
+    pub(crate) curves: Box<dyn CurveSource>,
+    pub(crate) limits: Limits,
+}
+
+/// Where the curves of a document come from.
+pub(crate) trait CurveSource: fmt::Debug + Send + Sync {
+    /// How many curves there are.
+    fn count(&self) -> usize;
+    /// Decodes one of them.
+    fn curve(&self, number: usize, limits: Limits) -> Result<Curve, Error>;
+}
+
+impl CurveSource for Vec<Curve> {
+    fn count(&self) -> usize {
+        self.len()
+    }
+
+    fn curve(&self, number: usize, _: Limits) -> Result<Curve, Error> {
+        Ok(self[number].clone())
+    }
+}
+
+impl Document {
+    /// A document without content.
+    pub(crate) fn new(format: Format, limits: Limits) -> Self {
+        Self {
+            format,
+            kind: String::new(),
+            grid: None,
+            images: Vec::new(),
+            spectra: Vec::new(),
+            notes: Vec::new(),
+            settings: Vec::new(),
+            curves: Box::new(Vec::new()),
+            limits,
+        }
+    }
+
+    /// How many curves the file has.
+    pub fn curve_count(&self) -> usize {
+        self.curves.count()
+    }
+
+    /// Decodes a curve, counted from 0.
+    ///
+    /// # Errors
+    ///
+    /// If the curve does not exist, is damaged or exceeds the limits.
+    pub fn curve(&self, number: usize) -> Result<Curve, Error> {
+        let count = self.curve_count();
+        if number >= count {
+            return Err(Error::NoCurve { number, count });
+        }
+        self.curves.curve(number, self.limits)
+    }
+
+    /// Decodes all curves in sequence.
+    pub fn curves(&self) -> impl Iterator<Item = Result<Curve, Error>> + '_ {
+        (0..self.curve_count()).map(|number| self.curve(number))
+    }
+}
+
+/// A force curve: segments in the order of time.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Curve {
+    /// The curve's number in the file as the instrument counts.
+    pub index: usize,
+    /// The file in an archive that it comes from; empty if the file is no archive of files.
+    pub file: String,
+    /// Lateral position x, y (m).
+    pub position: Option<[f64; 2]>,
+    /// Number of its place in the grid of the map.
+    pub pixel: Option<usize>,
+    /// Spring constant k of the lever (N/m).
+    pub spring_constant: Option<f64>,
+    /// Inverse optical lever sensitivity InvOLS (m/V).
+    pub sensitivity: Option<f64>,
+    /// Segments in the order of time.
+    pub segments: Vec<Segment>,
+    /// The channel that is the distance, one for the whole curve.
+    pub distance: Option<Distance>,
+    /// Name of the channel that is the deflection; its unit says whether the sensitivity is applied.
+    pub deflection: Option<String>,
+    /// What a reader of the numbers should know.
+    pub notes: Vec<String>,
+}
+
+/// A part of a curve.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Segment {
+    /// What the instrument does.
+    pub style: Style,
+    /// The instrument's word for the kind of segment, such as `constant-height-pause`; may be empty.
+    pub label: String,
+    /// Duration (s).
+    pub duration: Option<f64>,
+    /// Channels, all of one length.
+    pub channels: Vec<Channel>,
+}
+
+/// What the instrument does in a segment.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Style {
+    /// The tip moves towards the sample.
+    Approach,
+    /// The tip waits, at constant height or force.
+    Pause,
+    /// The tip moves away from the sample.
+    Retract,
+    /// The height or the force oscillates.
+    Modulation,
+    /// The file does not say where segments begin and end.
+    Unsplit,
+}
+
+impl fmt::Display for Style {
+    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
+        out.write_str(match self {
+            Self::Approach => "approach",
+            Self::Pause => "pause",
+            Self::Retract => "retract",
+            Self::Modulation => "modulation",
+            Self::Unsplit => "unsplit",
+        })
+    }
+}
+
+/// Numbers that were recorded together under one name.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Channel {
+    /// Name in the file.
+    pub name: String,
+    /// SI unit; the file's own unit if it is not known; may be empty.
+    pub unit: String,
+    /// Values in that unit.
+    pub values: Vec<f64>,
+}
+
+impl Channel {
+    /// A channel of values in a unit of a file, converted to SI.
+    pub(crate) fn new(name: impl Into<String>, unit: &str, mut values: Vec<f64>) -> Self {
+        let (factor, unit) = crate::text::si(unit);
+        if factor != 1.0 {
+            for value in &mut values {
+                *value *= factor;
+            }
+        }
+        Self {
+            name: name.into(),
+            unit: unit.to_owned(),
+            values,
+        }
+    }
+}
+
+impl Segment {
+    /// How many points each channel has.
+    pub fn points(&self) -> usize {
+        self.channels.first().map_or(0, |of| of.values.len())
+    }
+
+    /// The channel of this name.
+    pub fn channel(&self, name: &str) -> Option<&Channel> {
+        self.channels.iter().find(|of| of.name == name)
+    }
+}
+
+/// The channel that is a curve's distance.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct Distance {
+    /// Name of the channel.
+    pub channel: String,
+    /// How the distance is known.
+    pub source: DistanceSource,
+    /// The commanded or computed height of the same curve, if the distance is another channel.
+    pub commanded: Option<String>,
+    /// Whether it grows when the tip moves towards the sample.
+    pub grows_toward_surface: bool,
+}
+
+/// How a distance is known; a measured one is preferred, then a commanded one.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum DistanceSource {
+    /// A sensor measured the height.
+    Measured,
+    /// The height that the instrument commanded: creep and hysteresis of the scanner are in it.
+    Commanded,
+    /// Equal steps computed from the header.
+    Ramp,
+}
+
+impl fmt::Display for DistanceSource {
+    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
+        out.write_str(match self {
+            Self::Measured => "measured",
+            Self::Commanded => "commanded",
+            Self::Ramp => "computed ramp",
+        })
+    }
+}
+
+impl Curve {
+    /// A curve without segments.
+    pub(crate) fn empty(index: usize) -> Self {
+        Self {
+            index,
+            file: String::new(),
+            position: None,
+            pixel: None,
+            spring_constant: None,
+            sensitivity: None,
+            segments: Vec::new(),
+            distance: None,
+            deflection: None,
+            notes: Vec::new(),
+        }
+    }
+
+    /// The distance in a segment (m).
+    pub fn distance_in<'a>(&self, segment: &'a Segment) -> Option<&'a Channel> {
+        segment.channel(&self.distance.as_ref()?.channel)
+    }
+
+    /// The deflection in a segment (m, or V, A or N if the file has no sensitivity).
+    pub fn deflection_in<'a>(&self, segment: &'a Segment) -> Option<&'a Channel> {
+        segment.channel(self.deflection.as_ref()?)
+    }
+}
+
+/// The grid of a map: `nx` × `ny` places, row after row from the lower left.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Grid {
+    /// Places in a row, and rows.
+    pub shape: [usize; 2],
+    /// Width and height (m); each place is the middle of its share.
+    pub size: [f64; 2],
+    /// Position of the centre (m).
+    pub centre: [f64; 2],
+    /// Angle by which the grid is turned about its centre (rad).
+    pub angle: f64,
+    /// Whether every second row runs backwards.
+    pub back_and_forth: bool,
+}
+
+impl Grid {
+    /// Column and row of a place, by its number in the order of recording.
+    pub fn cell(&self, pixel: usize) -> Option<[usize; 2]> {
+        let (row, column) = (
+            pixel.checked_div(self.shape[0])?,
+            pixel.checked_rem(self.shape[0])?,
+        );
+        let is_reversed = self.back_and_forth && row % 2 == 1;
+        let column = if is_reversed {
+            self.shape[0] - 1 - column
+        } else {
+            column
+        };
+        (row < self.shape[1]).then_some([column, row])
+    }
+
+    /// Position of a place (m), by its number in the order of recording.
+    pub fn position(&self, pixel: usize) -> Option<[f64; 2]> {
+        let cell = self.cell(pixel)?;
+        let along = |k: usize| ((cell[k] as f64 + 0.5) / self.shape[k] as f64 - 0.5) * self.size[k];
+        let (u, v) = (along(0), along(1));
+        let (sin, cos) = libm::sincos(self.angle);
+        Some([
+            self.centre[0] + u * cos - v * sin,
+            self.centre[1] + u * sin + v * cos,
+        ])
+    }
+}
+
+/// An image: a number for each point of a raster.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Image {
+    /// Name in the file, with the direction of the scan where it says it.
+    pub name: String,
+    /// SI unit; the file's own unit if it is not known; may be empty.
+    pub unit: String,
+    /// Points in a line, and lines.
+    pub shape: [usize; 2],
+    /// Width and height (m).
+    pub size: Option<[f64; 2]>,
+    /// Values, line after line from the top one as the instrument shows it, each from the left.
+    pub values: Vec<f64>,
+}
+
+impl Image {
+    /// Values in a unit of a file, converted to SI; `values` are lines from the top one on.
+    pub(crate) fn new(
+        name: impl Into<String>,
+        unit: &str,
+        shape: [usize; 2],
+        size: Option<[f64; 2]>,
+        values: Vec<f64>,
+    ) -> Self {
+        let Channel { name, unit, values } = Channel::new(name, unit, values);
+        Self {
+            name,
+            unit,
+            shape,
+            size: size.filter(|of| of.iter().all(|side| side.is_finite() && *side > 0.0)),
+            values,
+        }
+    }
+
+    /// Exchanges top and bottom.
+    pub(crate) fn flipped(mut self) -> Self {
+        let lines = self.values.chunks(self.shape[0].max(1)).rev();
+        self.values = lines.flatten().copied().collect();
+        self
+    }
+}
+
+/// A spectrum: an amplitude or power density over frequency.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Spectrum {
+    /// Name in the file.
+    pub name: String,
+    /// Unit of the values, such as `V²/Hz` or `m/sqrt(Hz)`.
+    pub unit: String,
+    /// Frequencies (Hz).
+    pub frequency: Vec<f64>,
+    /// A value for each frequency.
+    pub values: Vec<f64>,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn positions_of_a_turned_grid_run_back_and_forth() {
+        let grid = Grid {
+            shape: [2, 2],
+            size: [2.0, 4.0],
+            centre: [10.0, 0.0],
+            angle: std::f64::consts::FRAC_PI_2,
+            back_and_forth: true,
+        };
+        assert_eq!(grid.cell(2), Some([1, 1]));
+        assert_eq!(grid.cell(4), None);
+        let [x, y] = grid.position(0).expect("a place of the grid");
+        assert!(
+            (x - 11.0).abs() < 1e-12 && (y + 0.5).abs() < 1e-12,
+            "{x} {y}"
+        );
+    }
+
+    #[test]
+    fn flipping_an_image_exchanges_its_lines() {
+        let image = Image::new("h", "mm", [2, 2], None, vec![1.0, 2.0, 3.0, 4.0]).flipped();
+        assert_eq!(image.unit, "m");
+        assert_eq!(image.values, [3e-3, 4e-3, 1e-3, 2e-3]);
+    }
+}

@@ -6,8 +6,8 @@
 //! its multipliers lie in stated discs.
 //!
 //! [`interval`] has intervals of real numbers and their elementary functions, [`system`] the system
-//! and its flow, [`orbit`] existence and uniqueness by Krawczyk's operator, and [`multipliers`]
-//! stability.
+//! and its flow, [`orbit`] existence and uniqueness by Krawczyk's operator, [`multipliers`]
+//! stability, and [`sticking`] the orbits that come to rest on a rigid stop.
 
 // With NaN nothing may be proved: `!(a < b)` is then true, while `a >= b` is not.
 #![allow(clippy::neg_cmp_op_on_partial_ord)]
@@ -19,6 +19,7 @@ pub mod interval;
 pub mod matrix;
 pub mod multipliers;
 pub mod orbit;
+pub mod sticking;
 pub mod system;
 
 pub use complex::Rectangle;
@@ -26,6 +27,7 @@ pub use interval::Interval;
 pub use matrix::Matrix;
 pub use multipliers::{Disc, Multipliers, Stability};
 pub use orbit::{Candidate, EnclosedSwitch, Isolation, Switch, Theorem, prove};
+pub use sticking::{EnclosedRest, RigidStop, prove_sticking};
 pub use system::{HarmonicVector, Output, RegimeParts, Reset, System, Transition};
 
 /// The reason why an orbit could not be proved. It may exist nevertheless.
@@ -65,6 +67,9 @@ pub enum ProofError {
         /// The shorter period, in drive periods.
         period: usize,
     },
+    /// The chatter before a rest could not be enclosed.
+    #[error("its impacts could not be shown to end in sticking")]
+    NoRest,
     /// The number of equations exceeds the limit.
     #[error("its switches give {unknowns} equations; the limit is {limit}")]
     TooLarge {

@@ -19,6 +19,7 @@ use crate::flight::{Ends, stays_positive};
 use crate::interval::Interval;
 use crate::matrix::{Matrix, dot};
 use crate::multipliers::{self, Multipliers};
+use crate::sticking::EnclosedRest;
 use crate::system::{HarmonicVector, Reset, System, Transition};
 
 /// An approximate periodic orbit, near which a proof is attempted.
@@ -59,6 +60,9 @@ pub struct Theorem {
     pub isolation: Option<Isolation>,
     /// Enclosures of the multipliers of the orbit.
     pub multipliers: Multipliers,
+    /// How the orbit sticks to a rigid stop, if it does. Then `switches` has the impacts from the
+    /// release up to the first one of the chatter.
+    pub rest: Option<EnclosedRest>,
 }
 
 /// A switch of a proved orbit.
@@ -93,17 +97,29 @@ struct Leg {
     periods: f64,
 }
 
+/// A known state at a known time from which a motion begins that need not close.
+pub(crate) struct Origin {
+    pub(crate) state: Vec<Interval>,
+    /// Time within its drive period.
+    pub(crate) phase: Interval,
+    /// Number of derivatives of the exit's guard, including the guard itself, that are zero there.
+    pub(crate) zeros: usize,
+}
+
 /// The unknowns of the equations: each switch's state and its time within its drive period.
-struct Equations<'a> {
+pub(crate) struct Equations<'a> {
     system: &'a System,
     legs: Vec<Leg>,
+    /// The start of a motion that does not close, instead of the first switch; the flight after the
+    /// last switch is left out.
+    origin: Option<Origin>,
 }
 
 /// A box of the unknowns.
 #[derive(Clone)]
-struct Unknowns {
-    states: Vec<Vec<Interval>>,
-    phases: Vec<Interval>,
+pub(crate) struct Unknowns {
+    pub(crate) states: Vec<Vec<Interval>>,
+    pub(crate) phases: Vec<Interval>,
 }
 
 /// Largest number of equations; their matrix grows with the square.
@@ -142,41 +158,11 @@ fn prove_candidate(system: &System, candidate: &Candidate) -> Result<Theorem, Pr
         return prove_without_switches(system, candidate);
     }
     let d = system.dimension;
-    let count = candidate.switches.len() * (d + 1);
-    if count > MAX_UNKNOWNS {
-        return Err(ProofError::TooLarge {
-            unknowns: count,
-            limit: MAX_UNKNOWNS,
-        });
-    }
-    let (equations, offsets) = Equations::of(system, candidate)?;
-    let period = system.period.middle();
-    let mut center: Vec<f64> = Vec::with_capacity(count);
-    for (switch, offset) in candidate.switches.iter().zip(&offsets) {
-        center.extend(&switch.state);
-        center.push(switch.time - offset * period);
-    }
-    let weights = equations.weights(&center, period);
-    let (isolation, enclosure) = equations.enclose_zero(&center, &weights)?;
-    let enclosed = equations.unknowns(&enclosure);
-    equations.check_flights(&enclosed)?;
+    let (equations, offsets) = Equations::of(system, candidate, None)?;
+    let (isolation, enclosed, weights) = equations.solve(candidate, &offsets)?;
     let states = equations.states_at_phase_zero(&enclosed, &offsets, candidate.period)?;
     check_minimal_period(&states)?;
-    let switches = candidate
-        .switches
-        .iter()
-        .zip(enclosed.states.iter().zip(&enclosed.phases))
-        .zip(&offsets)
-        .zip(&equations.legs)
-        .map(
-            |(((switch, (state, &phase)), &offset), leg)| EnclosedSwitch {
-                time: phase + Interval::point(offset) * system.period,
-                from: switch.from,
-                to: leg.regime,
-                state: state.clone(),
-            },
-        )
-        .collect();
+    let switches = equations.switches(candidate, &enclosed, &offsets);
     Ok(Theorem {
         period: candidate.period,
         states,
@@ -189,13 +175,25 @@ fn prove_candidate(system: &System, candidate: &Candidate) -> Result<Theorem, Pr
                 .collect(),
         }),
         multipliers: multipliers::enclosed(&equations.monodromy(&enclosed)?, &weights[..d]),
+        rest: None,
     })
 }
 
 impl<'a> Equations<'a> {
     /// The equations of an orbit with the switches of `candidate`, and the drive period of each
-    /// switch.
-    fn of(system: &'a System, candidate: &Candidate) -> Result<(Self, Vec<f64>), ProofError> {
+    /// switch. With an `origin` the first switch is that, and the motion need not close.
+    pub(crate) fn of(
+        system: &'a System,
+        candidate: &Candidate,
+        origin: Option<Origin>,
+    ) -> Result<(Self, Vec<f64>), ProofError> {
+        let unknowns = candidate.switches.len() * (system.dimension + 1);
+        if unknowns > MAX_UNKNOWNS {
+            return Err(ProofError::TooLarge {
+                unknowns,
+                limit: MAX_UNKNOWNS,
+            });
+        }
         let wrong = |what| Err(ProofError::Candidate { what });
         let period = system.period.middle();
         let (mut offsets, mut targets) = (Vec::new(), Vec::new());
@@ -239,7 +237,60 @@ impl<'a> Equations<'a> {
                 );
             }
         }
-        Ok((Self { system, legs }, offsets))
+        let equations = Self {
+            system,
+            legs,
+            origin,
+        };
+        Ok((equations, offsets))
+    }
+
+    /// Encloses the only solution near `candidate` and proves that no flight has another switch.
+    /// Returns the size of the largest box, relative to the weights, that contains no other
+    /// solution, the enclosure, and the weights.
+    pub(crate) fn solve(
+        &self,
+        candidate: &Candidate,
+        offsets: &[f64],
+    ) -> Result<(f64, Unknowns, Vec<f64>), ProofError> {
+        let period = self.system.period.middle();
+        let mut center: Vec<f64> = Vec::with_capacity(self.size());
+        for (switch, offset) in candidate.switches.iter().zip(offsets) {
+            center.extend(&switch.state);
+            center.push(switch.time - offset * period);
+        }
+        let weights = self.weights(&center, period);
+        let (isolation, enclosure) = self.enclose_zero(&center, &weights)?;
+        let enclosed = self.unknowns(&enclosure);
+        self.check_flights(&enclosed)?;
+        Ok((isolation, enclosed, weights))
+    }
+
+    /// The enclosed switches of `candidate`.
+    pub(crate) fn switches(
+        &self,
+        candidate: &Candidate,
+        enclosed: &Unknowns,
+        offsets: &[f64],
+    ) -> Vec<EnclosedSwitch> {
+        let enclosed = enclosed.states.iter().zip(&enclosed.phases);
+        let switches = candidate.switches.iter().zip(enclosed).zip(offsets);
+        switches
+            .zip(&self.legs)
+            .map(
+                |(((switch, (state, &phase)), &offset), leg)| EnclosedSwitch {
+                    time: phase + Interval::point(offset) * self.system.period,
+                    from: switch.from,
+                    to: leg.regime,
+                    state: state.clone(),
+                },
+            )
+            .collect()
+    }
+
+    /// Number of flights in the equations.
+    fn flights(&self) -> usize {
+        self.legs.len() - usize::from(self.origin.is_some())
     }
 
     fn size(&self) -> usize {
@@ -294,7 +345,7 @@ impl<'a> Equations<'a> {
     /// The residual F of the equations at `at`; zero for an orbit.
     fn residual(&self, at: &Unknowns) -> Vec<Interval> {
         let mut all = Vec::with_capacity(self.size());
-        for s in 0..self.legs.len() {
+        for s in 0..self.flights() {
             let e = self.next(s);
             let flown = self.fly(s, at);
             let exit = self.exit(s);
@@ -306,6 +357,11 @@ impl<'a> Equations<'a> {
                 &at.states[e]
             };
             all.push(exit.guard.at(before, &flown.phasors));
+        }
+        if let Some(origin) = &self.origin {
+            let known = origin.state.iter().chain([&origin.phase]);
+            let first = at.states[0].iter().chain([&at.phases[0]]);
+            all.extend(first.zip(known).map(|(&x, &origin)| x - origin));
         }
         all
     }
@@ -339,7 +395,12 @@ impl<'a> Equations<'a> {
                 None => column.push((row, x)),
             }
         };
-        for s in 0..self.legs.len() {
+        if self.origin.is_some() {
+            for k in 0..=d {
+                add(self.flights() * (d + 1) + k, k, Interval::ONE);
+            }
+        }
+        for s in 0..self.flights() {
             let e = self.next(s);
             let (rows, here, there) = (s * (d + 1), s * (d + 1), e * (d + 1));
             let flown = self.fly(s, at);
@@ -519,7 +580,7 @@ impl<'a> Equations<'a> {
 
     /// Proves that no flight has a switch before its end.
     fn check_flights(&self, at: &Unknowns) -> Result<(), ProofError> {
-        for (s, leg) in self.legs.iter().enumerate() {
+        for (s, leg) in self.legs[..self.flights()].iter().enumerate() {
             let regime = &self.system.regimes[leg.regime];
             let duration = self.duration(s, &at.phases);
             if !duration.is_positive() {
@@ -530,10 +591,11 @@ impl<'a> Equations<'a> {
             let before = (s + self.legs.len() - 1) % self.legs.len();
             let known = &self.exit(before).starts_at_zero;
             for guard in 0..regime.guards.len() {
-                let zeros_at_start = known
-                    .iter()
-                    .find(|(transition, _)| *transition == guard)
-                    .map_or(0, |&(_, zeros)| zeros);
+                let known = known.iter().find(|(transition, _)| *transition == guard);
+                let zeros_at_start = match &self.origin {
+                    Some(origin) if s == 0 => origin.zeros,
+                    _ => known.map_or(0, |&(_, zeros)| zeros),
+                };
                 let ends = Ends {
                     zeros_at_start,
                     zero_at_end: guard == leg.exit,
@@ -574,11 +636,7 @@ impl<'a> Equations<'a> {
                     }
                     let regime = &self.system.regimes[leg.regime];
                     let start = self.system.phasors(at.phases[s]);
-                    let mut modal = regime.modal(&at.states[s], &start);
-                    for (q, factor) in modal.iter_mut().zip(regime.factors(since)) {
-                        *q = *q * factor;
-                    }
-                    let here = regime.state(&modal, &phasors);
+                    let here = regime.after((&at.states[s], &start), (since, &phasors));
                     state = Some(match state {
                         None => here,
                         Some(other) => here.iter().zip(other).map(|(a, b)| a.hull(b)).collect(),
@@ -740,5 +798,6 @@ fn prove_without_switches(system: &System, candidate: &Candidate) -> Result<Theo
         switches: Vec::new(),
         isolation: None,
         multipliers: Multipliers::of_each(&multipliers),
+        rest: None,
     })
 }

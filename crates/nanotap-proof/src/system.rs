@@ -278,6 +278,20 @@ impl Regime {
             .collect()
     }
 
+    /// The state a time `since` after `state`, if no guard falls to zero between, with the phasors
+    /// of both times.
+    pub(crate) fn after(
+        &self,
+        (state, start): (&[Interval], &[Rectangle]),
+        (since, end): (Interval, &[Rectangle]),
+    ) -> Vec<Interval> {
+        let mut modal = self.modal(state, start);
+        for (q, factor) in modal.iter_mut().zip(self.factors(since)) {
+            *q = *q * factor;
+        }
+        self.state(&modal, end)
+    }
+
     /// The derivative of the state after a time by the initial state, Re(R e^{λs} L).
     pub(crate) fn propagator(&self, factors: &[Rectangle]) -> Matrix<Interval> {
         let (n, m) = (self.basis.right.rows(), factors.len());

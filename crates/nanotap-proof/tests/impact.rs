@@ -3,7 +3,7 @@
 
 use nanotap_proof::{
     Candidate, HarmonicVector, Interval, Matrix, Output, ProofError, Rectangle, RegimeParts, Reset,
-    Stability, Switch, System, Transition, prove,
+    RigidStop, Stability, Switch, System, Transition, prove, prove_sticking,
 };
 
 const RESTITUTION: f64 = 0.8;
@@ -262,4 +262,98 @@ fn critical_damping_is_refused_with_a_reason() {
     };
     let system = System::new(one, vec![one], vec![parts]);
     assert_eq!(system.unwrap_err(), ProofError::Eigenvalues { regime: 0 });
+}
+
+/// The stop of an oscillator at 0, without damping.
+fn stop() -> RigidStop {
+    RigidStop {
+        place: Interval::ZERO,
+        restitution: Interval::decimal(RESTITUTION),
+        pressure: Output {
+            row: vec![-Interval::ONE, Interval::ZERO],
+            constant: Interval::ZERO,
+            tones: vec![Rectangle::ONE],
+        },
+    }
+}
+
+/// The impacts after the release from a stop at 0, without damping: ẍ + x = cos ωt has the solutions
+/// a cos t + b sin t + cos ωt/(1 − ω²).
+fn impacts_after_release(omega: f64, count: usize) -> Vec<Switch> {
+    let forced = 1.0 / (1.0 - omega * omega);
+    let mut time = std::f64::consts::FRAC_PI_2 / omega;
+    let mut speed = 0.0;
+    let mut impacts = Vec::new();
+    while impacts.len() < count {
+        let (sin, cos) = time.sin_cos();
+        let own = -forced * (omega * time).cos();
+        let rate = speed + forced * omega * (omega * time).sin();
+        let (a, b) = (own * cos - rate * sin, own * sin + rate * cos);
+        let place = |t: f64| a * t.cos() + b * t.sin() + forced * (omega * t).cos();
+        let velocity = |t: f64| b * t.cos() - a * t.sin() - forced * omega * (omega * t).sin();
+        // The first zero of the place: steps of a thousandth of a radian, then bisection. Just after
+        // an impact the mass moves away.
+        let step = 1e-3_f64.min(0.1 * speed.abs().max(0.1));
+        let mut from = time + step;
+        while place(from + step) < 0.0 {
+            from += step;
+        }
+        let mut to = from + step;
+        for _ in 0..60 {
+            let middle = 0.5 * (from + to);
+            if place(middle) < 0.0 {
+                from = middle;
+            } else {
+                to = middle;
+            }
+        }
+        time = to;
+        speed = -RESTITUTION * velocity(time);
+        impacts.push(Switch {
+            time,
+            from: 0,
+            transition: 0,
+            state: vec![0.0, speed],
+        });
+    }
+    impacts
+}
+
+/// At ω = 2.86 and 2.885 the mass comes to rest again after 6.92666651404872 and 6.86893152874926
+/// drive periods, so that the periods are 7 (`stick_reference.json`, mpmath with 50 and 80 digits).
+#[test]
+fn orbits_that_stick_are_proved() {
+    for (omega, count, rests_after) in [(2.86, 30, 6.92666651404872), (2.885, 30, 6.86893152874926)]
+    {
+        let system = oscillator(omega, 0.0, 0.0);
+        let release = std::f64::consts::FRAC_PI_2 / omega;
+        let impacts = impacts_after_release(omega, count);
+        let theorem = prove_sticking(&system, &stop(), release, &impacts).unwrap();
+        assert_eq!(theorem.period, 7);
+        let rest = theorem.rest.unwrap();
+        let rests = (rest.since - rest.release) / system.period();
+        assert!(rests.contains(rests_after), "{rests:?}");
+        assert!(rests.radius() < 0.1);
+        assert_eq!(theorem.multipliers.stability(), Stability::Stable);
+        let [both] = &theorem.multipliers.discs[..] else {
+            panic!("{:?}", theorem.multipliers)
+        };
+        assert_eq!(both.count, 2);
+        assert!(both.center.norm() + both.radius < 1e-300, "{both:?}");
+        // A mass that is pressed does not leave; two impacts are no chatter.
+        assert!(prove_sticking(&system, &stop(), release + 0.1, &impacts).is_err());
+        assert_eq!(
+            prove_sticking(&system, &stop(), release, &impacts[..2]),
+            Err(ProofError::NoRest)
+        );
+    }
+}
+
+/// The growth of errors over 75 periods at ω = 2.87 is beyond intervals of double precision.
+#[test]
+fn an_orbit_that_forgets_its_release_is_not_proved() {
+    let impacts = impacts_after_release(2.87, 200);
+    let release = std::f64::consts::FRAC_PI_2 / 2.87;
+    let open = prove_sticking(&oscillator(2.87, 0.0, 0.0), &stop(), release, &impacts);
+    assert!(open.is_err(), "{open:?}");
 }

@@ -472,6 +472,55 @@ fn oscillators_with_a_stop_are_proved() {
     let speed = theorem.switches[0].state[1];
     assert!((speed.middle() / -0.8 - 0.645_352_178_4).abs() < 1e-9 && speed.radius() < 1e-12);
     assert_eq!(theorem.multipliers.stability(), Stability::Stable);
+    // At ω = 2.86 it comes to rest after 6.92666651404872 drive periods, at gap 0.25, ω = 2.5, c = 0.05
+    // and restitution 0.7 after 9.91806229791744 (`stick_reference.json`), from releases at the phases
+    // π/2 and arccos 0.25. Negative forces are the same half a period later.
+    let damped = Oscillator {
+        damping: 0.05,
+        gap: 0.25,
+        stop: Stop::Rigid { restitution: 0.7 },
+        ..rigid
+    };
+    let resting = [
+        (
+            Oscillator {
+                omega: 2.86,
+                ..rigid
+            },
+            7,
+            0.25 + 6.92666651404872,
+        ),
+        (
+            damped,
+            10,
+            0.25_f64.acos() / std::f64::consts::TAU + 9.91806229791744,
+        ),
+        (
+            Oscillator {
+                omega: 2.86,
+                forcing: -1.0,
+                ..rigid
+            },
+            7,
+            0.75 + 6.92666651404872,
+        ),
+    ];
+    for (oscillator, period, rests) in resting {
+        let case = Case::from(oscillator);
+        let (orbit, proof) = found(&case, &OrbitOptions::default());
+        assert!(proof.proved, "{}", proof.statement);
+        let theorem = Prover::new(&case)
+            .theorem(&orbit.trajectory, orbit.period)
+            .unwrap();
+        assert_eq!((orbit.period, theorem.period), (period, period));
+        let since =
+            theorem.rest.unwrap().since.middle() / (std::f64::consts::TAU / oscillator.omega);
+        assert!((since - rests).abs() < 0.05, "{since} {rests}");
+        for (entry, seen) in theorem.states[0].iter().zip(&orbit.states[0]) {
+            assert!((entry.middle() - seen).abs() <= entry.radius() + 1e-9);
+        }
+        assert!(orbit.stable && proof.theorem.unwrap().stability == "stable");
+    }
     let soft = Oscillator {
         damping: 0.1,
         stop: Stop::Soft {

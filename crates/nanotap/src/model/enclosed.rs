@@ -6,8 +6,8 @@
 //! plain ones, Eqs. (8)–(18), rounded outwards.
 
 use nanotap_proof::{
-    HarmonicVector, Interval, Matrix, Output, ProofError, Rectangle, RegimeParts, Reset, System,
-    Transition,
+    HarmonicVector, Interval, Matrix, Output, ProofError, Rectangle, RegimeParts, Reset, RigidStop,
+    System, Transition,
 };
 
 use crate::model::beam::Modes;
@@ -132,8 +132,8 @@ pub fn enclosed(case: &Cantilever) -> Result<System, EnclosureError> {
 }
 
 /// Builds the system of an oscillator in intervals: mẍ + cẋ + kx = F cos ωt before the stop, and
-/// behind a soft one its spring and damper too. A rigid stop has impacts; a mass that sticks to it
-/// is not covered.
+/// behind a soft one its spring and damper too. A rigid stop has impacts; for a mass that sticks to it
+/// see [`enclosed_stop`].
 ///
 /// # Errors
 /// [`EnclosureError::Flow`] where its flow cannot be enclosed.
@@ -192,6 +192,29 @@ pub fn enclosed_oscillator(oscillator: &Oscillator) -> Result<System, EnclosureE
     let omega = typed(oscillator.omega);
     let period = Interval::point(2.0) * Interval::pi() / omega;
     Ok(System::new(period, vec![omega], regimes)?)
+}
+
+/// Builds the rigid stop of an oscillator in intervals, for orbits that come to rest on it; `None` for
+/// a soft one.
+pub fn enclosed_stop(oscillator: &Oscillator) -> Option<RigidStop> {
+    let Stop::Rigid { restitution } = oscillator.stop else {
+        return None;
+    };
+    let typed = Interval::decimal;
+    let mass = typed(oscillator.mass);
+    let over_mass = |x: f64| typed(x) / mass;
+    Some(RigidStop {
+        place: typed(oscillator.gap),
+        restitution: typed(restitution),
+        pressure: Output {
+            row: vec![
+                -over_mass(oscillator.stiffness),
+                -over_mass(oscillator.damping),
+            ],
+            constant: Interval::ZERO,
+            tones: vec![Rectangle::real(over_mass(oscillator.forcing))],
+        },
+    })
 }
 
 /// β_j: Newton's operator maps an interval around the computed root into itself, so that it

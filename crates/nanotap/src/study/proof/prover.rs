@@ -3,13 +3,16 @@
 use std::fmt::Write as _;
 
 use nanotap_flow::Trajectory;
-use nanotap_proof::{Candidate, Interval, ProofError, Stability, Switch, System, Theorem, prove};
+use nanotap_proof::{
+    Candidate, Interval, ProofError, RigidStop, Stability, Switch, System, Theorem, prove,
+    prove_sticking,
+};
 
 use crate::case::{Case, Key};
 use crate::model::cantilever::{Cantilever, CosineTerm};
 use crate::model::contact::ContactLaw;
 use crate::model::drive_form::Actuation;
-use crate::model::enclosed::{EnclosureError, enclosed, enclosed_oscillator};
+use crate::model::enclosed::{EnclosureError, enclosed, enclosed_oscillator, enclosed_stop};
 use crate::model::oscillator::{Oscillator, OscillatorParameter};
 use crate::model::recording::Recording;
 use crate::number::shortest;
@@ -22,12 +25,6 @@ pub enum NotProved {
     /// The case has no equations in intervals.
     #[error(transparent)]
     Equations(#[from] EnclosureError),
-    /// The orbit sticks to a rigid stop.
-    #[error(
-        "the orbit sticks to the rigid stop: the impacts that end in sticking are infinitely many, and the \
-         test encloses finitely many switches"
-    )]
-    Sticks,
     /// The test of the proof failed, for the reason given.
     #[error(transparent)]
     Test(#[from] ProofError),
@@ -37,6 +34,8 @@ pub enum NotProved {
 #[derive(Debug)]
 pub struct Prover {
     system: Result<System, EnclosureError>,
+    /// The rigid stop on which an orbit may rest.
+    stop: Option<RigidStop>,
     /// Parameters of the case with which a theorem begins, as text.
     about: String,
 }
@@ -53,7 +52,12 @@ impl Prover {
             (None, None) => (Err(EnclosureError::NotPiecewiseLinear), String::new()),
         };
         let system = system.map(|system| system.cancelled_by(case.cancel().clone()));
-        Self { system, about }
+        let stop = case.oscillator().and_then(enclosed_stop);
+        Self {
+            system,
+            stop,
+            about,
+        }
     }
 
     /// Proves one orbit of this period, of which `orbit` is the recording.
@@ -65,11 +69,18 @@ impl Prover {
         let Recording::PiecewiseLinear(trajectory) = orbit else {
             return Err(EnclosureError::NotPiecewiseLinear.into());
         };
-        let mut segments = trajectory.segments().iter();
-        if segments.any(|segment| trajectory.system().sticks(segment.regime)) {
-            return Err(NotProved::Sticks);
-        }
-        Ok(prove(system, &candidate(trajectory, period))?)
+        let candidate = candidate(trajectory, period);
+        let released = trajectory
+            .events()
+            .iter()
+            .rposition(|event| trajectory.system().sticks(event.from));
+        Ok(match (&self.stop, released) {
+            (Some(stop), Some(released)) => {
+                let (release, impacts) = since_release(system, &candidate, released);
+                prove_sticking(system, stop, release, &impacts)?
+            }
+            _ => prove(system, &candidate)?,
+        })
     }
 
     /// Proves one orbit of this period and returns the theorem, or the reason why it failed, as a
@@ -111,6 +122,23 @@ pub fn candidate(trajectory: &Trajectory, period: usize) -> Candidate {
         regime: trajectory.segments().first().map_or(0, |s| s.regime),
         switches,
     }
+}
+
+/// The time of the switch number `released`, by which the mass leaves its stop, within its drive
+/// period, and the switches that follow it until that time comes again.
+fn since_release(system: &System, candidate: &Candidate, released: usize) -> (f64, Vec<Switch>) {
+    let period = system.period().middle();
+    let release = candidate.switches[released].time;
+    let phase = release.rem_euclid(period);
+    let (before, after) = candidate.switches.split_at(released);
+    let whole = candidate.period as f64 * period;
+    let later = |switch: &Switch, turn: f64| Switch {
+        time: switch.time - release + phase + turn,
+        ..switch.clone()
+    };
+    let following = after[1..].iter().map(|switch| later(switch, 0.0));
+    let around = before.iter().map(|switch| later(switch, whole));
+    (phase, following.chain(around).collect())
 }
 
 /// Returns the proved stability of an orbit in a word: stable, unstable or undecided.
@@ -164,8 +192,20 @@ fn statement(theorem: &Theorem, about: &str) -> String {
          exists; its states at drive phase 0 are known to {state:.1e}",
         theorem.period
     );
-    match &theorem.isolation {
-        Some(alone) => {
+    match (&theorem.isolation, &theorem.rest) {
+        (_, Some(rest)) => {
+            let _ = write!(
+                text,
+                "; the mass leaves its stop at the time {:.6}, and {} impacts later, each enclosed to {:.1e}, it is \
+                 so slow and so pressed that infinitely many further ones are over by the time {:.6}, where it \
+                 rests until it is released again",
+                rest.release.middle(),
+                theorem.switches.len(),
+                largest(&mut theorem.switches.iter().map(|s| s.time.radius())),
+                rest.since.hi(),
+            );
+        }
+        (Some(alone), None) => {
             let time = largest(&mut theorem.switches.iter().map(|s| s.time.radius()));
             let _ = write!(
                 text,
@@ -176,13 +216,17 @@ fn statement(theorem: &Theorem, about: &str) -> String {
                 alone.time,
             );
         }
-        None => text.push_str(
+        (None, None) => text.push_str(
             ", and it never switches; no other orbit of that period stays in the same regime",
         ),
     }
     let discs = &theorem.multipliers.discs;
     let reach = largest(&mut discs.iter().map(|d| d.radius));
     let _ = match theorem.multipliers.stability() {
+        Stability::Stable if theorem.rest.is_some() => write!(
+            text,
+            "; every motion near it comes to rest with it and is the same from then on: its multipliers are exactly 0"
+        ),
         Stability::Stable => write!(
             text,
             "; its multipliers, with an error below {reach:.1e}, are all inside the unit circle: it is asymptotically stable"

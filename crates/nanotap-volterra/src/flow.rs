@@ -17,6 +17,9 @@ const MOST_SWITCHES_AT_ONCE: usize = 64;
 /// flow; below it, the cost of a factorisation in such steps.
 const STEP_EVALUATIONS: u64 = 2;
 const FACTORISATION_COST: u64 = 8;
+/// Number of modal coordinates whose linear part of an evaluation costs as much as a force in closed
+/// form.
+const COORDINATES_PER_FORCE: u64 = 6;
 /// Length number of the first step of a run: a quarter of the longest step.
 const FIRST_INDEX: usize = 4;
 /// Length of a step that is to pass the end of a piece of a curve, as a multiple of the time to
@@ -223,7 +226,8 @@ impl Flow {
     /// Returns the cost of the runs so far, in steps of the approximate flow.
     pub fn cost(&self) -> u64 {
         let statistics = self.solver.statistics;
-        let evaluations = self.system.law().cost() * statistics.evaluations;
+        let linear = self.system.dimension() as u64 / COORDINATES_PER_FORCE;
+        let evaluations = self.system.law().cost().max(linear) * statistics.evaluations;
         evaluations / STEP_EVALUATIONS
             + FACTORISATION_COST * statistics.factorisations
             + self.added_cost

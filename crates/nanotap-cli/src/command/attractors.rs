@@ -57,6 +57,7 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
             motion::warn(observables, physical, beyond, &which, output);
         }
     }
+    output.notes(&found.notes);
     output.study(&case, &found, |found| text(&case, found))
 }
 
@@ -239,17 +240,35 @@ fn checked(check: &CheckReport) -> String {
         0 => String::new(),
         count => format!(", {count} undecided in one of the two"),
     };
+    let other = check.disagreements.len();
+    let sensitive = check
+        .disagreements
+        .iter()
+        .filter(|one| one.sensitive)
+        .count();
     let mut text = motion::paragraph(&format!(
-        "{} followed again on the exact flow: {} to the same motion, {} to another{undecided} (starts near \
-         the boundary of two basins, or on a chaotic transient, may go to either)",
+        "{} followed again on the exact flow: {} to the same motion, {other} to another{undecided}",
         number::counted(check.starts, "start", "starts"),
         check.agreed,
-        check.disagreements.len(),
     ));
+    if other > 0 {
+        text.push_str(&motion::paragraph(&format!(
+            "{sensitive} of these {other} lie near a boundary of basins or on a chaotic transient: on the exact flow, \
+             too, starts that differ by a few hundred-thousandths go to different motions{}",
+            if sensitive == other {
+                ""
+            } else {
+                "; the others are not explained by that, so the fractions may be wrong"
+            }
+        )));
+    }
     for other in check.disagreements.iter().take(SHOWN) {
         text.push_str(&motion::paragraph(&format!(
-            "start {}: {} in the census, {} on the exact flow",
-            other.start, other.census, other.exact
+            "start {}: {} in the census, {} on the exact flow{}",
+            other.start,
+            other.census,
+            other.exact,
+            if other.sensitive { ", sensitive" } else { "" }
         )));
     }
     if check.disagreements.len() > SHOWN {

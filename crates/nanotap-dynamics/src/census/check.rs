@@ -29,7 +29,16 @@ pub struct CheckedStart {
     pub exact: ExactOutcome,
     /// Whether both are the same motion; `None` if one of them is undecided.
     pub agrees: Option<bool>,
+    /// Whether a neighbour within [`NEIGHBOUR`] goes to another motion on the map itself than this
+    /// start; followed only where the two outcomes differ.
+    pub is_sensitive: bool,
 }
+
+/// Distance of the neighbours of a start, as a fraction of each of its entries: the error that a
+/// coarse map may have in a drive period.
+pub const NEIGHBOUR: f64 = 2e-5;
+/// Number of neighbours that are followed at most, until one goes elsewhere.
+const NEIGHBOURS: u64 = 8;
 
 /// Where a start goes on the map itself.
 #[derive(Clone, Debug, PartialEq)]
@@ -80,6 +89,18 @@ pub fn check_starts<M: StroboscopicMap>(
         cancel: control.cancel,
         ..KnownMotions::default()
     };
+    let follow = |map: &mut M, state: &[f64]| match follow_start(map, state, known, options) {
+        RunEnd::Entered { index, .. } => ExactOutcome::Attractor(owners[index]),
+        RunEnd::Classified(found) => exact_outcome(found.kind, &orbits),
+        // What follows a reset is one motion, known or not.
+        RunEnd::Reset(reset) => {
+            let known = KnownMotions {
+                trapping_regions: &[],
+                ..known
+            };
+            exact_outcome(after_reset(map, *reset, known, options).kind, &orbits)
+        }
+    };
     let checked = chosen.par_iter().with_max_len(1).map_init(
         || map.clone(),
         |map, &start| {
@@ -87,26 +108,21 @@ pub fn check_starts<M: StroboscopicMap>(
             if control.is_cancelled() {
                 return None;
             }
-            let exact = match follow_start(map, &state, known, options) {
-                RunEnd::Entered { index, .. } => ExactOutcome::Attractor(owners[index]),
-                RunEnd::Classified(found) => exact_outcome(found.kind, &orbits),
-                // What follows a reset is one motion, known or not.
-                RunEnd::Reset(reset) => {
-                    let known = KnownMotions {
-                        trapping_regions: &[],
-                        ..known
-                    };
-                    exact_outcome(after_reset(map, *reset, known, options).kind, &orbits)
-                }
-            };
+            let exact = follow(map, &state);
             let outcome = census.outcomes_by_start[start];
             let agrees = agree(census, outcome, &exact);
+            let is_sensitive = agrees == Some(false)
+                && (0..NEIGHBOURS).any(|number| {
+                    let other = follow(map, &neighbour(&state, seed ^ number));
+                    !control.is_cancelled() && other != exact
+                });
             // The map may have ended a run that was under way.
             (!control.is_cancelled()).then_some(CheckedStart {
                 start,
                 outcome,
                 exact,
                 agrees,
+                is_sensitive,
             })
         },
     );
@@ -129,6 +145,17 @@ fn exact_outcome(kind: MotionKind, orbits: &[(usize, &PeriodicOrbit)]) -> ExactO
         MotionKind::Unbounded => ExactOutcome::Unbounded,
         MotionKind::Undecided { reason, .. } => ExactOutcome::Undecided(reason.to_string()),
     }
+}
+
+/// A state whose entries differ from those of `state` by up to [`NEIGHBOUR`] of each.
+fn neighbour(state: &[f64], seed: u64) -> Vec<f64> {
+    let entries = state.iter().zip(0_u64..);
+    entries
+        .map(|(x, k)| {
+            let drawn = mix(seed ^ mix(k)) as f64 / u64::MAX as f64;
+            x * (1.0 + NEIGHBOUR * (2.0 * drawn - 1.0))
+        })
+        .collect()
 }
 
 /// Chooses `count` different numbers below `all`, in ascending order.

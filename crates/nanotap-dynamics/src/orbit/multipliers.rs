@@ -16,10 +16,12 @@ use nanotap_arithmetic::ComplexFunctions as _;
 use crate::map::StroboscopicMap;
 use crate::vector::unit;
 
-/// A multiplier whose modulus is within this of 1 is marginal: the motion needs ten million periods
-/// to grow or decay by a factor e. A double multiplier on the unit circle (an undamped system) is
-/// known to about this accuracy.
+/// A multiplier whose modulus is within this of 1 is marginal, unless its condition shows that it is
+/// known more precisely. A double multiplier on the unit circle (an undamped system) is known to
+/// about this accuracy.
 pub const MARGIN: f64 = 1e-7;
+/// Error of the entries of a balanced product, relative to the largest: the accuracy of Jacobians.
+const ENTRY_ERROR: f64 = 1e-12;
 
 /// Largest span (natural logarithm) of the factors' diagonal for which the plain product is used: a
 /// factor of 1e5, which leaves ten digits to small multipliers.
@@ -31,15 +33,15 @@ const MAX_SWEEPS: usize = 80;
 /// Stability of an orbit according to its multipliers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Stability {
-    /// Every multiplier is inside the unit circle by more than [`MARGIN`].
+    /// Every multiplier is inside the unit circle by more than [`MARGIN`], or by more than its error.
     Stable,
     /// Some multipliers are outside the unit circle by more than [`MARGIN`].
     Unstable {
         /// Number of unstable multipliers; a pair counts twice.
         unstable_dimension: usize,
     },
-    /// No multiplier is outside, but some are on the unit circle within [`MARGIN`]: an undamped
-    /// system, or a bifurcation.
+    /// No multiplier is outside, but some are on the unit circle within [`MARGIN`] and their error:
+    /// an undamped system, or a bifurcation.
     Marginal,
 }
 
@@ -63,6 +65,9 @@ pub struct Multipliers {
     pub log_determinant: f64,
     /// |Σ log|μ| − log|det||: the difference between the two computations; 0 for a singular product.
     pub determinant_defect: f64,
+    /// Distance from the unit circle within which the side of a multiplier is not known: [`MARGIN`],
+    /// or less where the condition of those in it is better.
+    pub margin: f64,
 }
 
 /// Why the multipliers could not be computed.
@@ -118,6 +123,7 @@ impl Multipliers {
             .sum();
         let defect = (sum - log_determinant).abs();
         Ok(Self {
+            margin: margin_of(&product, &values),
             values,
             log_determinant,
             determinant_defect: if defect.is_finite() { defect } else { 0.0 },
@@ -126,8 +132,32 @@ impl Multipliers {
 
     /// Stability according to the moduli.
     pub fn stability(&self) -> Stability {
-        stability_of(&self.values)
+        stability_of(&self.values, self.margin)
     }
+}
+
+/// The largest error of the eigenvalues within [`MARGIN`] of the unit circle, that bound at most.
+/// The error of a simple one is that of the matrix times its condition 1/|yᴴx|, with its right and
+/// left eigenvectors x and y of unit length, in the scales that balance the matrix.
+fn margin_of(product: &Scaled, values: &[Complex<f64>]) -> f64 {
+    let near = |value: &&Complex<f64>| (value.modulus() - 1.0).abs() <= MARGIN;
+    let mut near = values.iter().filter(near).peekable();
+    if near.peek().is_none() {
+        return MARGIN;
+    }
+    let mut balanced = &product.matrix * 2f64.powi(product.exponent.clamp(-1000, 1000) as i32);
+    balance_parlett_reinsch(&mut balanced);
+    let transposed = balanced.transpose();
+    let error = ENTRY_ERROR * balanced.norm();
+    near.map(|&value| {
+        let right = eigenvector(&balanced, value)?;
+        let left = eigenvector(&transposed, value)?;
+        // Of the transposed matrix, so that no conjugate is taken.
+        let overlap = right.iter().zip(&left).map(|(x, y)| x * y);
+        Some(error / overlap.sum::<Complex<f64>>().modulus())
+    })
+    .map(|error| error.filter(|error| *error < MARGIN).unwrap_or(MARGIN))
+    .fold(0.0, f64::max)
 }
 
 /// Jacobian of the continuous entries over `periods` of a map from `state`; `None` where the map fails
@@ -176,17 +206,17 @@ pub fn eigenvector(
         .then_some(vector)
 }
 
-/// Stability of an orbit with these multipliers.
-pub fn stability_of(multipliers: &[Complex<f64>]) -> Stability {
+/// Stability of an orbit with these multipliers, whose moduli are known to `margin`.
+pub fn stability_of(multipliers: &[Complex<f64>], margin: f64) -> Stability {
     let outside = multipliers
         .iter()
-        .filter(|m| m.modulus() > 1.0 + MARGIN)
+        .filter(|m| m.modulus() > 1.0 + margin)
         .count();
     if outside > 0 {
         Stability::Unstable {
             unstable_dimension: outside,
         }
-    } else if multipliers.iter().all(|m| m.modulus() < 1.0 - MARGIN) {
+    } else if multipliers.iter().all(|m| m.modulus() < 1.0 - margin) {
         Stability::Stable
     } else {
         Stability::Marginal
@@ -490,9 +520,44 @@ mod tests {
     #[test]
     fn the_margin_itself_is_marginal() {
         for modulus in [1.0 + MARGIN, 1.0, 1.0 - MARGIN] {
-            let found = stability_of(&[Complex::new(modulus, 0.0)]);
+            let found = stability_of(&[Complex::new(modulus, 0.0)], MARGIN);
             assert_eq!(found, Stability::Marginal, "{modulus}");
         }
+    }
+
+    /// Slow arms of a polymer, weakly coupled to a fast mode and in units far apart, are known to be
+    /// stable; a double multiplier on the unit circle, with one eigenvector, is not.
+    #[test]
+    fn the_condition_of_a_multiplier_decides_near_the_circle() {
+        let slow = DMatrix::from_row_slice(
+            3,
+            3,
+            &[
+                0.5,
+                1e-3,
+                1e-3,
+                1e-9,
+                1.0 - 2e-10,
+                0.0,
+                1e-9,
+                0.0,
+                1.0 - 2e-9,
+            ],
+        );
+        let found = Multipliers::of_product(&[slow.clone()]).unwrap();
+        assert!(found.margin < 1e-11, "{}", found.margin);
+        assert_eq!(found.stability(), Stability::Stable);
+        let grows = Multipliers::of_product(&[slow * (1.0 + 1e-9)]).unwrap();
+        let unstable = Stability::Unstable {
+            unstable_dimension: 1,
+        };
+        assert_eq!(grows.stability(), unstable);
+        let undamped = DMatrix::from_row_slice(2, 2, &[1.0, 1.0, 0.0, 1.0]);
+        let found = Multipliers::of_product(&[undamped]).unwrap();
+        assert_eq!(
+            (found.margin, found.stability()),
+            (MARGIN, Stability::Marginal)
+        );
     }
 
     #[test]

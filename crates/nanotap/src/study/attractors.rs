@@ -71,6 +71,9 @@ pub struct Attractors {
     /// Initial states that were followed again on the exact flow, if that was requested.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub check: Option<CheckReport>,
+    /// What limits these results, in sentences.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub notes: Vec<String>,
     /// Whether the work was stopped before all starts were done.
     pub cancelled: bool,
 }
@@ -100,6 +103,9 @@ pub struct Disagreement {
     pub census: String,
     /// Motion on the exact flow, in words.
     pub exact: String,
+    /// Whether the exact flow takes an initial state that differs by a few hundred-thousandths to
+    /// another motion than this one: it lies near a boundary of basins, or on transient chaos.
+    pub sensitive: bool,
 }
 
 impl CheckReport {
@@ -130,6 +136,7 @@ impl CheckReport {
                         ExactOutcome::Unbounded => "left every bound".into(),
                         ExactOutcome::Undecided(reason) => format!("undecided: {reason}"),
                     },
+                    sensitive: one.is_sensitive,
                 })
                 .collect(),
         }
@@ -372,6 +379,8 @@ const MAX_START_STEPS: u64 = 4_000_000;
 /// Steps of the approximate flow of all initial states together after which sampling ends under a
 /// nonlinear law: some four seconds.
 const NONLINEAR_STEPS: u64 = 30_000_000;
+/// Drive periods of decay above which no start is followed until it has arrived.
+const SLOW_PERIODS: f64 = 1e6;
 /// Factor over the largest coordinate of the box above which a state counts as unbounded.
 const OUT_OF_BOUNDS: f64 = 1e6;
 
@@ -510,11 +519,13 @@ fn described(
     unstable: Option<Vec<InSi<OrbitReport>>>,
 ) -> Result<Attractors, Error> {
     let starts = found.outcomes_by_start.len();
-    let attractors = found
+    let attractors: Vec<_> = found
         .attractors
         .iter()
         .map(|a| one(model, &a.kind, &a.state, a.fraction))
         .collect::<Result<_, _>>()?;
+    let notes = attractors.iter().enumerate().filter_map(slow_note);
+    let notes = notes.collect();
     let transient_chaos = found
         .transient_chaos
         .as_ref()
@@ -580,8 +591,20 @@ fn described(
         transient_chaos,
         unstable,
         check: None,
+        notes,
         cancelled: found.cancelled,
     })
+}
+
+/// A note about an attractor that no start can be seen to reach.
+fn slow_note((index, attractor): (usize, &AttractorReport)) -> Option<String> {
+    let orbit = attractor.orbit.as_ref()?;
+    let decay = orbit.decay_periods.filter(|decay| *decay > SLOW_PERIODS)?;
+    Some(format!(
+        "neighbouring motions approach attractor {} over {decay:.1e} drive periods, longer than starts \
+         are followed: the fraction that goes to it is not known",
+        index + 1
+    ))
 }
 
 fn one(

@@ -150,6 +150,9 @@ fn no_start_is_lost_behind_a_pole() {
         }
         let lost = |other: &Disagreement| other.exact.contains("bound");
         assert!(!check.disagreements.iter().any(lost));
+        // Neighbours part on the exact flow too.
+        let explained = check.disagreements.iter().all(|other| other.sensitive);
+        assert!(explained, "{:?}", check.disagreements);
         // The box ends at the wall.
         let lower = [found.sides[0].lower, 0.0];
         assert!(wall.distance(&lower).abs() < 1e-12, "{:?}", found.sides[0]);

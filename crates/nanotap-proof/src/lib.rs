@@ -48,7 +48,8 @@ pub enum ProofError {
     /// The existence test does not contract: there is no orbit nearby, it is not isolated (at a
     /// fold), or it is too sensitive to rounding.
     #[error(
-        "no isolated orbit was found near the computed one: it may not exist, or a fold is near"
+        "no isolated orbit was found near the computed one: it may not exist, a fold may be near, or errors may \
+         grow too fast along it"
     )]
     NoIsolatedOrbit,
     /// A guard could not be shown to keep its sign.

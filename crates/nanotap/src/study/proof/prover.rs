@@ -4,8 +4,8 @@ use std::fmt::Write as _;
 
 use nanotap_flow::Trajectory;
 use nanotap_proof::{
-    Candidate, Interval, ProofError, RigidStop, Stability, Switch, System, Theorem, prove,
-    prove_sticking,
+    Candidate, EnclosedRest, Interval, ProofError, RigidStop, Stability, Switch, System, Theorem,
+    prove, prove_sticking,
 };
 
 use crate::case::{Case, Key};
@@ -76,8 +76,9 @@ impl Prover {
             .rposition(|event| trajectory.system().sticks(event.from));
         Ok(match (&self.stop, released) {
             (Some(stop), Some(released)) => {
-                let (release, impacts) = since_release(system, &candidate, released);
-                prove_sticking(system, stop, release, &impacts)?
+                let (before, release, impacts) = since_release(system, &candidate, released);
+                let theorem = prove_sticking(system, stop, release, &impacts)?;
+                counted_from(system, theorem, before)
             }
             _ => prove(system, &candidate)?,
         })
@@ -124,12 +125,17 @@ pub fn candidate(trajectory: &Trajectory, period: usize) -> Candidate {
     }
 }
 
-/// The time of the switch number `released`, by which the mass leaves its stop, within its drive
-/// period, and the switches that follow it until that time comes again.
-fn since_release(system: &System, candidate: &Candidate, released: usize) -> (f64, Vec<Switch>) {
+/// The number of whole drive periods before the switch number `released`, by which the mass leaves
+/// its stop, its time within its drive period, and the switches that follow it until it comes again.
+fn since_release(
+    system: &System,
+    candidate: &Candidate,
+    released: usize,
+) -> (usize, f64, Vec<Switch>) {
     let period = system.period().middle();
     let release = candidate.switches[released].time;
     let phase = release.rem_euclid(period);
+    let periods_before = ((release - phase) / period).round() as usize;
     let (before, after) = candidate.switches.split_at(released);
     let whole = candidate.period as f64 * period;
     let later = |switch: &Switch, turn: f64| Switch {
@@ -138,7 +144,37 @@ fn since_release(system: &System, candidate: &Candidate, released: usize) -> (f6
     };
     let following = after[1..].iter().map(|switch| later(switch, 0.0));
     let around = before.iter().map(|switch| later(switch, whole));
-    (phase, following.chain(around).collect())
+    (periods_before, phase, following.chain(around).collect())
+}
+
+/// The theorem about an orbit that sticks with its times and states counted from `before` drive
+/// periods earlier, where the recorded orbit begins.
+fn counted_from(system: &System, theorem: Theorem, before: usize) -> Theorem {
+    let whole = Interval::point(theorem.period as f64) * system.period();
+    let later = |time: Interval| {
+        let time = time + Interval::point(before as f64) * system.period();
+        if time.middle() < whole.middle() {
+            time
+        } else {
+            time - whole
+        }
+    };
+    let mut switches = theorem.switches;
+    for switch in &mut switches {
+        switch.time = later(switch.time);
+    }
+    switches.sort_by(|a, b| a.time.middle().total_cmp(&b.time.middle()));
+    let mut states = theorem.states;
+    states.rotate_right(before % theorem.period);
+    Theorem {
+        switches,
+        states,
+        rest: theorem.rest.map(|rest| EnclosedRest {
+            release: later(rest.release),
+            since: later(rest.since),
+        }),
+        ..theorem
+    }
 }
 
 /// Returns the proved stability of an orbit in a word: stable, unstable or undecided.
@@ -196,9 +232,9 @@ fn statement(theorem: &Theorem, about: &str) -> String {
         (_, Some(rest)) => {
             let _ = write!(
                 text,
-                "; the mass leaves its stop at the time {:.6}, and {} impacts later, each enclosed to {:.1e}, it is \
-                 so slow and so pressed that infinitely many further ones are over by the time {:.6}, where it \
-                 rests until it is released again",
+                "; the mass leaves its stop at the time {:.6}; {} impacts later, whose times are known to {:.1e}, it is \
+                 so slow and pressed so hard that infinitely many more are over by the time {:.6}; then it rests \
+                 until it is released again",
                 rest.release.middle(),
                 theorem.switches.len(),
                 largest(&mut theorem.switches.iter().map(|s| s.time.radius())),

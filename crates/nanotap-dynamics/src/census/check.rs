@@ -29,14 +29,14 @@ pub struct CheckedStart {
     pub exact: ExactOutcome,
     /// Whether both are the same motion; `None` if one of them is undecided.
     pub agrees: Option<bool>,
-    /// Whether a neighbour within [`NEIGHBOUR`] goes to another motion on the map itself than this
-    /// start; followed only where the two outcomes differ.
+    /// Whether a neighbour, within 2e-5 of each entry, goes to another motion on the map itself than
+    /// this start; followed only where the two outcomes differ.
     pub is_sensitive: bool,
 }
 
 /// Distance of the neighbours of a start, as a fraction of each of its entries: the error that a
 /// coarse map may have in a drive period.
-pub const NEIGHBOUR: f64 = 2e-5;
+const NEIGHBOUR: f64 = 2e-5;
 /// Number of neighbours that are followed at most, until one goes elsewhere.
 const NEIGHBOURS: u64 = 8;
 

@@ -2,6 +2,7 @@
 //!
 //! Reference orbits: an independent program in extended precision, closed to 4e-15.
 
+use nanotap::case::file::Source;
 use nanotap::case::{Case, Key};
 use nanotap::control::Control;
 use nanotap::study::attractors::{AttractorsOptions, attractors};
@@ -292,6 +293,31 @@ fn arms_over_many_decades() {
         };
         assert!(found.iter().any(is_there), "{words:?}: {found:?}");
     }
+}
+
+/// Arms of up to 1e5 s at 46 kHz decay over 1e5 s · 46 kHz = 4.6e9 drive periods, a little more slowly
+/// where the tip touches. The motion is stable all the same and is listed; no start is seen to arrive.
+#[test]
+fn a_motion_that_slow_arms_approach_is_listed_as_stable() {
+    let source = Source {
+        name: "epoxy.toml".into(),
+        text: include_str!("../../../../docs/cases/epoxy.toml").into(),
+    };
+    let case = Case::parse(Some(source), &[]).unwrap();
+    let model = case.model().unwrap();
+    let options = AttractorsOptions {
+        starts: Some(1),
+        ..AttractorsOptions::default()
+    };
+    let found = attractors(&model, &options, &Control::default()).unwrap();
+    let [only] = &found.attractors[..] else {
+        panic!("{} attractors", found.attractors.len())
+    };
+    let motion = only.orbit.as_ref().unwrap();
+    assert_eq!((motion.stability, only.share.count), ("stable", 0));
+    let decay = motion.decay_periods.unwrap();
+    assert!((4.6e9..5.2e9).contains(&decay), "{decay:e}");
+    assert!(found.notes[0].contains("attractor 1"), "{:?}", found.notes);
 }
 
 #[test]

@@ -343,11 +343,15 @@ pub(crate) fn orbit_evidence(orbit: &PeriodicOrbit) -> String {
             orbit.period
         );
     }
+    let largest = orbit.spectral_radius();
+    // Six digits would hide on which side of 1 it is.
+    let largest = match 1.0 - largest {
+        inside if (0.0..5e-6).contains(&inside) => format!("1 − {inside:.1e}"),
+        _ => format!("{largest:.6}"),
+    };
     format!(
-        "Newton closed a period-{} orbit (residual {:.1e}); largest |multiplier| {:.6}",
-        orbit.period,
-        orbit.residual,
-        orbit.spectral_radius()
+        "Newton closed a period-{} orbit (residual {:.1e}); largest |multiplier| {largest}",
+        orbit.period, orbit.residual,
     )
 }
 

@@ -29,7 +29,6 @@ pub mod recording;
 pub mod release;
 pub mod sample_law;
 pub mod spectrum;
-pub(crate) mod stepper;
 mod tangent;
 pub mod words;
 

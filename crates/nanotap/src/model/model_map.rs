@@ -64,6 +64,8 @@ pub(crate) trait EngineMap: Debug + Send + Sync {
     }
     /// Implements [`StroboscopicMap::advance_by`].
     fn advance_by(&mut self, state: &mut [f64], periods: usize) -> Result<(), MotionError>;
+    /// Implements [`ModelMap::advance_between`].
+    fn advance_between(&mut self, state: &mut [f64], span: [f64; 2]) -> Result<(), MotionError>;
     /// Implements [`StroboscopicMap::advance_with_jacobian`].
     fn advance_with_jacobian(
         &mut self,
@@ -165,6 +167,19 @@ impl ModelMap {
     /// Evaluations so far: of the gap in searches for switches, or of a nonlinear force.
     pub fn evaluations(&self) -> u64 {
         self.0.evaluations()
+    }
+
+    /// Replaces the state at the first of two times after drive phase 0, at most a drive period, by
+    /// the state at the second.
+    ///
+    /// # Errors
+    /// When the flow fails.
+    pub(crate) fn advance_between(
+        &mut self,
+        state: &mut [f64],
+        span: [f64; 2],
+    ) -> Result<(), MotionError> {
+        self.0.advance_between(state, span)
     }
 
     /// Replaces `state` by `P(state)`, `jacobian` by `∂P/∂state` and `derivatives`
@@ -516,6 +531,22 @@ impl EngineMap for ExactMap {
 
     fn advance_by(&mut self, state: &mut [f64], periods: usize) -> Result<(), MotionError> {
         self.run(state, |map| map.flow.run_periods(periods))
+    }
+
+    fn advance_between(
+        &mut self,
+        state: &mut [f64],
+        [from, to]: [f64; 2],
+    ) -> Result<(), MotionError> {
+        self.last.clear();
+        self.flow.start(state, from)?;
+        if to < self.period() {
+            self.flow.run_until(to, &mut ())?;
+        } else {
+            self.flow.run_period(&mut ())?;
+        }
+        self.flow.state(state);
+        Ok(())
     }
 
     fn advance_with_jacobian(

@@ -255,6 +255,23 @@ impl Nonlinear {
         Ok(())
     }
 
+    /// Puts `flow` at a state of the model at `time`: on the branch that the state remembers, or
+    /// else on that of its gap.
+    pub(crate) fn resume(
+        &self,
+        flow: &mut Flow,
+        state: &[f64],
+        time: f64,
+    ) -> Result<(), MotionError> {
+        self.check_length(state)?;
+        let (lever, memory) = state.split_at(self.system.dimension());
+        match memory.first().filter(|branch| **branch >= 0.0) {
+            Some(branch) => flow.start_on(lever, time, branch.round() as usize)?,
+            None => flow.start(lever, time)?,
+        }
+        Ok(())
+    }
+
     /// Writes the state that `flow` has reached to `state`.
     pub(crate) fn end(&self, flow: &Flow, state: &mut [f64]) {
         let n = self.system.dimension();
@@ -862,6 +879,17 @@ impl EngineMap for NonlinearMap {
         Ok(())
     }
 
+    fn advance_between(
+        &mut self,
+        state: &mut [f64],
+        [from, to]: [f64; 2],
+    ) -> Result<(), MotionError> {
+        self.nonlinear.resume(&mut self.flow, state, from)?;
+        self.flow.run_until(to)?;
+        self.nonlinear.end(&self.flow, state);
+        Ok(())
+    }
+
     fn advance_with_jacobian(
         &mut self,
         state: &mut [f64],
@@ -975,6 +1003,10 @@ impl EngineMap for CoarseMap {
             )?;
         }
         Ok(())
+    }
+
+    fn advance_between(&mut self, state: &mut [f64], span: [f64; 2]) -> Result<(), MotionError> {
+        self.exact.advance_between(state, span)
     }
 
     fn advance_with_jacobian(

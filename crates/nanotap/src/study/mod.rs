@@ -21,6 +21,7 @@ pub mod limits;
 pub mod lyapunov;
 pub mod mode_share;
 pub mod modes;
+mod moving_lever;
 mod moving_sample;
 pub mod noise;
 pub mod orbit;

@@ -406,44 +406,24 @@ impl LinearSums {
                 rates,
             })
         });
+        let heights = moved.regimes().iter().map(|regime| regime.project(&height));
         Self {
             regimes: regimes.collect(),
             terms: Vec::new(),
             sums: ForceSums::default(),
-            surface: None,
-        }
-    }
-
-    /// Adds [`SurfaceSums`] of a surface that moves at an angular frequency.
-    pub(super) fn over_surface(
-        self,
-        model: &Model,
-        moved: &System,
-        motion: SampleMotion,
-        frequency: f64,
-    ) -> Self {
-        let height = motion.output(model, &model.height, 1.0);
-        let regimes = moved.regimes().iter();
-        Self {
-            surface: Some(MovingSurface {
-                heights: regimes.map(|regime| regime.project(&height)).collect(),
+            surface: motion.omega.map(|frequency| MovingSurface {
+                heights: heights.collect(),
                 frequency,
                 amplitude: Complex::new(0.0, 0.0),
                 sums: SurfaceSums::default(),
             }),
-            ..self
         }
     }
 
-    /// Sets all sums to zero before a run.
-    pub(super) fn begin(&mut self) {
+    /// Sets all sums to zero before a run over a surface that moves with this complex amplitude,
+    /// counted from drive phase 0.
+    pub(super) fn begin(&mut self, amplitude: Complex) {
         self.sums = ForceSums::default();
-    }
-
-    /// As [`Self::begin`], over a surface that moves with this complex amplitude, counted from drive
-    /// phase 0.
-    pub(super) fn begin_over(&mut self, amplitude: Complex) {
-        self.begin();
         if let Some(surface) = &mut self.surface {
             surface.sums = SurfaceSums::default();
             surface.amplitude = amplitude;

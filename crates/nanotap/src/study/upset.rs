@@ -25,7 +25,6 @@ use crate::case::Case;
 use crate::case::physical::quantity::JOULES_PER_ELECTRONVOLT;
 use crate::model::galerkin::Galerkin;
 use crate::model::model_map::ModelMap;
-use crate::model::stepper::Stepper;
 use crate::model::{Model, MotionError};
 use crate::observe::{ObservableSet, measure};
 use crate::study::simulate::{Classification, Named};
@@ -170,7 +169,6 @@ struct Knocked<'a> {
     model: &'a Model,
     orbit: PeriodicOrbit,
     map: ModelMap,
-    stepper: Stepper,
     /// Changes of the modes' speeds by a change of the tip's speed of 1 away from the sample.
     speeds: Vec<f64>,
     /// Change of the tip's speed by an impulse of 1.
@@ -209,7 +207,6 @@ pub fn upset(
         model,
         orbit,
         map,
-        stepper: Stepper::new(model),
         speeds,
         mobility,
         rounds: 0,
@@ -450,13 +447,13 @@ impl Knocked<'_> {
         let (pass, time) = self.moment(knock.instant);
         let period = self.model.period();
         let modes = self.speeds.len();
-        let (state, branch) = self.model.split(&self.orbit.states[pass]);
-        let (mut state, branch) = self.stepper.step(&state, branch, [0.0, time, period])?;
+        let mut state = self.orbit.states[pass].clone();
+        self.map.advance_between(&mut state, [0.0, time])?;
         for (speed, part) in state[modes..].iter_mut().zip(&self.speeds) {
             *speed += knock.tip_speed * part;
         }
-        let (state, branch) = self.stepper.step(&state, branch, [time, period, period])?;
-        Ok(self.model.joined(state, branch))
+        self.map.advance_between(&mut state, [time, period])?;
+        Ok(state)
     }
 
     /// The pass through the drive period in which an instant of the orbit lies, and its time there.

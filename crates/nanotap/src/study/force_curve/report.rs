@@ -7,7 +7,6 @@ use serde::{Deserialize, Serialize};
 
 use super::Way;
 use super::fits::{ContactFit, fits};
-use super::lever::Signals;
 use super::path::Plan;
 use super::run::Run;
 use super::statics::{Rest, StaticCurve, StaticsFound};
@@ -16,6 +15,7 @@ use crate::case::physical::force::SampleForce;
 use crate::case::physical::sample::Elastic;
 use crate::number::shortest;
 use crate::observe::OutOfRange;
+use crate::study::moving_lever::Signals;
 
 /// Waveform of the distance against time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]

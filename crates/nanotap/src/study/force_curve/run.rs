@@ -6,11 +6,12 @@ use nanotap_dynamics::Control;
 use nanotap_volterra::ForceSums;
 
 use super::Way;
-use super::lever::{Lever, Signals, Sums};
+use super::lever::Lever;
 use super::path::{Plan, Stretch};
 use crate::Error;
 use crate::model::MotionError;
 use crate::observe::lag;
+use crate::study::moving_lever::{Signals, Sums};
 
 /// Number of instants between the turn and the end of contact to which the fits go.
 const FIT_POINTS: usize = 500;

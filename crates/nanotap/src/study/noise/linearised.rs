@@ -8,14 +8,15 @@
 
 use nalgebra::{Complex, DMatrix, DVector, Matrix2};
 use nanotap_arithmetic::ComplexFunctions as _;
+use nanotap_dynamics::StroboscopicMap as _;
 use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::Thermal;
 use crate::Error;
 use crate::control::Control;
-use crate::model::Model;
-use crate::model::stepper::Stepper;
+use crate::model::model_map::ModelMap;
+use crate::model::{Model, MotionError};
 use crate::study::orbit::OrbitReport;
 
 /// Smallest number of instants in a drive period.
@@ -98,8 +99,10 @@ impl Linearised {
         let omega = model.frequency();
         let diffusion = thermal.diffusion();
         let modes = diffusion.nrows();
-        let (mut state, mut branch) = model.split(&orbit.state);
-        let n = state.len();
+        let mut map = ModelMap::new(model);
+        let mut state = orbit.state.clone();
+        // Entries that vary continuously.
+        let n = state.len() - map.discrete_entries();
         let steps = steps_of(thermal.fastest() / omega);
         let h = period / steps as f64;
         let tau = lock_in.time_constant;
@@ -118,7 +121,6 @@ impl Linearised {
             .view_mut((modes, modes), (modes, modes))
             .copy_from(&diffusion);
         let sizes = sizes(orbit, omega, n, modes);
-        let mut stepper = Stepper::new(model);
         let mut factor = DMatrix::identity(n + 2, n + 2);
         let mut added = DMatrix::zeros(n + 2, n + 2);
         let mut read = Complex::new(0.0, 0.0);
@@ -127,16 +129,18 @@ impl Linearised {
                 if control.is_cancelled() {
                     return Err(Error::stopped());
                 }
-                let times = [step as f64 * h, (step + 1) as f64 * h, period];
-                let (after, next) = stepper.step(&state, branch, times)?;
+                let times = [step as f64 * h, (step + 1) as f64 * h];
+                let mut after = state.clone();
+                map.advance_between(&mut after, times)?;
                 let mut carried = DMatrix::zeros(n, n);
                 for column in 0..n {
                     let mut side = |sign: f64| {
                         let mut moved = state.clone();
                         moved[column] += sign * sizes[column];
-                        stepper.step(&moved, branch, times)
+                        map.advance_between(&mut moved, times)?;
+                        Ok::<_, MotionError>(moved)
                     };
-                    let ((high, _), (low, _)) = (side(1.0)?, side(-1.0)?);
+                    let (high, low) = (side(1.0)?, side(-1.0)?);
                     for row in 0..n {
                         carried[(row, column)] = 0.5 * (high[row] - low[row]) / sizes[column];
                     }
@@ -168,7 +172,7 @@ impl Linearised {
                 }
                 factor = &one * factor;
                 added = &one * added * one.transpose() + &enters * noise * enters.transpose();
-                (state, branch) = (after, next);
+                state = after;
             }
         }
         let left = nanotap_arithmetic::exp(-period * orbit.period as f64 / tau);

@@ -13,15 +13,13 @@ use std::sync::Arc;
 
 use nalgebra::{DMatrix, DVector};
 use nanotap_arithmetic::ComplexFunctions as _;
-use nanotap_flow::{Complex, Flow};
-use nanotap_volterra::ForceSums;
+use nanotap_flow::Complex;
 
 use crate::Error;
 use crate::case::Case;
-use crate::model::nonlinear::Nonlinear;
-use crate::model::parameter::Parameter;
-use crate::model::{MotionError, cantilever_model_tangent};
-use crate::study::moving_sample::{LinearSums, Readout, SampleMotion, moved_system};
+use crate::model::MotionError;
+use crate::study::moving_lever::MovingLever;
+use crate::study::moving_sample::{Readout, SampleMotion};
 
 /// Signals of one drive period, in the model's units.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -47,7 +45,9 @@ pub(super) struct PeriodSignals {
 /// The lever above one material.
 #[derive(Clone, Debug)]
 pub(super) struct Lever {
-    flow: LeverFlow,
+    moving: MovingLever,
+    /// Whether the sample is a nonlinear law.
+    is_nonlinear: bool,
     readout: Readout,
     /// State entries of the beam; the rest is the sample's.
     beam: usize,
@@ -58,61 +58,13 @@ pub(super) struct Lever {
     free_deflection: Complex,
 }
 
-#[derive(Clone, Debug)]
-enum LeverFlow {
-    Linear(Box<LinearLever>),
-    Nonlinear(Box<NonlinearLever>),
-}
-
-/// A piecewise-linear sample: the change of the gap is one more state, which stays constant.
-#[derive(Clone, Debug)]
-struct LinearLever {
-    flow: Flow,
-    sums: LinearSums,
-    state: Vec<f64>,
-    /// Gap of the model, model units, from which its change is counted.
-    gap: f64,
-}
-
-/// A lever under a nonlinear law, with the exact flow.
-#[derive(Clone, Debug)]
-struct NonlinearLever {
-    flow: nanotap_volterra::Flow,
-    law: LawState,
-    /// Offset of the gap at distance 0, model units.
-    offset: f64,
-}
-
-/// Properties of a nonlinear model that a step of one period uses.
-#[derive(Clone, Copy, Debug)]
-struct LawState {
-    dimension: usize,
-    remembers: bool,
-    period: f64,
-    omega: f64,
-}
-
-impl LawState {
-    /// The branch that the law remembers, after the beam's part of a state.
-    fn branch(self, state: &[f64]) -> Option<usize> {
-        let memory = state.get(self.dimension).filter(|_| self.remembers)?;
-        (*memory >= 0.0).then_some(memory.round() as usize)
-    }
-
-    fn remember(self, state: &mut [f64], branch: usize) {
-        if self.remembers {
-            state[self.dimension] = branch as f64;
-        }
-    }
-}
-
 impl Lever {
     /// Creates the lever of `case`.
     ///
     /// # Errors
     /// When the case has no model, a second tone, or a rigid sample.
     pub(super) fn new(case: &Case) -> Result<Self, Error> {
-        let model = case.model()?;
+        let model = Arc::new(case.model()?);
         let cantilever = crate::study::cantilever(case, "scan")?;
         crate::study::without_signal(case, "a scan")?;
         if model.system.drive().frequencies().len() != 1 {
@@ -127,43 +79,18 @@ impl Lever {
         let response = model.system.regimes()[0].response();
         let free: DVector<f64> = &response.constant - response.tones[0].map(|z| z.re);
         let free_deflection = model.system.regimes()[0].project(&model.tip).tones[0];
-        let flow = match &model.nonlinear {
-            None => {
-                let tangent = cantilever_model_tangent(cantilever, &model, Parameter::Alpha5)?;
-                let motion = SampleMotion {
-                    sign: -1.0,
-                    omega: None,
-                };
-                let system = moved_system(&model, &tangent.system, motion)?;
-                let forces: Vec<f64> = tangent.force.iter().map(|f| f.constant).collect();
-                LeverFlow::Linear(Box::new(LinearLever {
-                    sums: LinearSums::new(&model, &system, &forces, motion),
-                    flow: Flow::new(Arc::new(system)),
-                    state: vec![0.0; model.dimension() + 1],
-                    gap,
-                }))
-            }
-            Some(nonlinear) => {
-                let system = turned_system(nonlinear)?;
-                let law = LawState {
-                    dimension: system.dimension(),
-                    remembers: nonlinear.remembers,
-                    period: nonlinear.period,
-                    omega: model.frequency(),
-                };
-                LeverFlow::Nonlinear(Box::new(NonlinearLever {
-                    offset: system.drive().offset - gap,
-                    flow: nanotap_volterra::Flow::new(system),
-                    law,
-                }))
-            }
+        let motion = SampleMotion {
+            sign: -1.0,
+            omega: None,
         };
         Ok(Self {
-            continuous: match flow {
-                LeverFlow::Linear(_) => model.dimension(),
-                LeverFlow::Nonlinear(_) => beam,
+            continuous: if model.nonlinear.is_some() {
+                beam
+            } else {
+                model.dimension()
             },
-            flow,
+            is_nonlinear: model.nonlinear.is_some(),
+            moving: MovingLever::new(cantilever, Arc::clone(&model), gap, motion)?,
             readout,
             beam,
             dimension: model.dimension(),
@@ -193,11 +120,8 @@ impl Lever {
     pub(super) fn take_over(&self, state: &mut Vec<f64>) {
         let beam = self.beam;
         state.resize(self.dimension, 0.0);
-        let memory = match &self.flow {
-            LeverFlow::Linear(_) => 0.0,
-            // No branch is remembered.
-            LeverFlow::Nonlinear(_) => -1.0,
-        };
+        // Under a law no branch is remembered.
+        let memory = if self.is_nonlinear { -1.0 } else { 0.0 };
         state[beam..].fill(memory);
     }
 
@@ -214,15 +138,14 @@ impl Lever {
         let mut change: [f64; MAX_CHANGE] = [0.0; MAX_CHANGE];
         let change = &mut change[..self.beam];
         change.copy_from_slice(&state[..self.beam]);
-        let sums = match &mut self.flow {
-            LeverFlow::Linear(lever) => lever.advance(state, gap)?,
-            LeverFlow::Nonlinear(lever) => lever.advance(state, gap)?,
-        };
+        let period = self.readout.period();
+        let distance = [gap, 0.0, 0.0];
+        let sums = self.moving.advance(state, [0.0, period], distance, &[])?;
+        let sums = sums.force;
         for (before, after) in change.iter_mut().zip(&*state) {
             *before = after - *before;
         }
         let (deflection, mean_deflection) = self.readout.deflection(change, &sums);
-        let period = self.readout.period();
         Ok(PeriodSignals {
             deflection,
             mean_deflection,
@@ -277,45 +200,3 @@ impl Lever {
 const DIFFERENCE: f64 = 1e-6;
 /// Entries of the largest beam's state.
 const MAX_CHANGE: usize = 2 * crate::model::beam::MAX_MODES;
-
-/// The law's system with the drive half a period later.
-fn turned_system(nonlinear: &Nonlinear) -> Result<Arc<nanotap_volterra::System>, Error> {
-    let system = &nonlinear.system;
-    let mut drive = system.drive().clone();
-    for tone in &mut drive.tones {
-        tone.forcing.neg_mut();
-        tone.gap = -tone.gap;
-    }
-    let turned = system.driven_by(drive).map_err(MotionError::from)?;
-    Ok(Arc::new(turned))
-}
-
-impl LinearLever {
-    fn advance(&mut self, state: &mut [f64], gap: f64) -> Result<ForceSums, MotionError> {
-        let n = state.len();
-        self.state[..n].copy_from_slice(state);
-        self.state[n] = gap - self.gap;
-        self.flow.start(&self.state, 0.0)?;
-        self.sums.begin();
-        self.flow.run_period(&mut self.sums)?;
-        self.flow.state(&mut self.state);
-        state.copy_from_slice(&self.state[..n]);
-        Ok(self.sums.sums)
-    }
-}
-
-impl NonlinearLever {
-    fn advance(&mut self, state: &mut [f64], gap: f64) -> Result<ForceSums, MotionError> {
-        let law = self.law;
-        self.flow.system_mut().set_offset(self.offset + gap)?;
-        let beam = &state[..law.dimension];
-        match law.branch(state) {
-            Some(branch) => self.flow.start_on(beam, 0.0, branch)?,
-            None => self.flow.start(beam, 0.0)?,
-        }
-        let sums = self.flow.run_with_force_sums(law.period, law.omega)?;
-        self.flow.state(&mut state[..law.dimension]);
-        law.remember(state, self.flow.branch());
-        Ok(sums)
-    }
-}

@@ -4,39 +4,7 @@ use nanotap::case::physical::Kind;
 use nanotap::case::quantity::format_electronvolts;
 use nanotap::case::units::Units;
 use nanotap::number::shortest;
-
-/// `value` with `digits` significant digits: `0.1447`, `20.34`, `3.113e-8`.
-///
-/// Plain where that is short, with an exponent where zeros would have to be
-/// counted. Trailing zeros stay: they say how much is known.
-pub(crate) fn significant(value: f64, digits: usize) -> String {
-    let digits = digits.clamp(1, 17);
-    if value == 0.0 {
-        // Without the sign of a negative zero.
-        return "0".into();
-    }
-    if !value.is_finite() {
-        return if value.is_nan() {
-            "undefined".into()
-        } else if value > 0.0 {
-            "∞".into()
-        } else {
-            "−∞".into()
-        };
-    }
-    let scientific = format!("{:.*e}", digits - 1, value);
-    // The exponent after rounding: 9.999 with two digits is 1.0e1.
-    let exponent: i32 = scientific
-        .rsplit_once('e')
-        .and_then(|(_, power)| power.parse().ok())
-        .unwrap_or(0);
-    if (-4..digits.max(5) as i32 + 1).contains(&exponent) {
-        let decimals = (digits as i32 - 1 - exponent).max(0) as usize;
-        format!("{value:.decimals$}")
-    } else {
-        scientific
-    }
-}
+pub(crate) use nanotap::number::significant;
 
 /// A number of the model with so many digits; where the case has SI, the quantity with so many.
 pub(crate) fn quantity(units: &Units, kind: Kind, value: f64, [model, si]: [usize; 2]) -> String {
@@ -60,17 +28,6 @@ pub(crate) fn chosen(value: f64) -> String {
     }
 }
 
-/// A relative difference in percent, signed, two digits: `+0.18 %`, `−3e-8 %`.
-pub(crate) fn percent(ratio: f64) -> String {
-    let percent = 100.0 * ratio;
-    if percent == 0.0 {
-        return "0 %".into();
-    }
-    let digits = significant(percent.abs(), 2);
-    let sign = if percent > 0.0 { '+' } else { '−' };
-    format!("{sign}{digits} %")
-}
-
 /// `count` with the right form of its noun.
 pub(crate) fn counted(count: usize, one: &str, many: &str) -> String {
     format!("{count} {}", if count == 1 { one } else { many })
@@ -85,27 +42,6 @@ pub(crate) fn row(values: impl IntoIterator<Item = f64>) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn significant_digits_survive_every_size() {
-        for (value, digits, text) in [
-            (0.144_744, 4, "0.1447"),
-            (20.337_21, 4, "20.34"),
-            (-1.391_7, 3, "-1.39"),
-            (3.112_9e-8, 4, "3.113e-8"),
-            (9.999, 2, "10"),
-            (0.000_123_4, 2, "0.00012"),
-            (190_000.0, 3, "190000"),
-            (6.02e23, 3, "6.02e23"),
-            (0.0, 4, "0"),
-            (-0.0, 4, "0"),
-            (f64::NAN, 4, "undefined"),
-            (f64::INFINITY, 4, "∞"),
-            (f64::MIN_POSITIVE, 2, "2.2e-308"),
-        ] {
-            assert_eq!(significant(value, digits), text);
-        }
-    }
 
     #[test]
     fn chosen_numbers_come_back_unchanged() {
@@ -126,12 +62,5 @@ mod tests {
         );
         let read = text.split(',').map(|cell| cell.parse::<f64>().unwrap());
         assert!(read.eq(values));
-    }
-
-    #[test]
-    fn percentages_carry_their_sign() {
-        assert_eq!(percent(0.0018), "+0.18 %");
-        assert_eq!(percent(-0.0018), "−0.18 %");
-        assert_eq!(percent(0.0), "0 %");
     }
 }

@@ -4,23 +4,15 @@ use std::ops::Range;
 
 use unicode_width::UnicodeWidthStr;
 
+pub(crate) use nanotap::frame::Align;
+use nanotap::frame::Frame;
+
 use crate::{page, style};
 
 /// Number of blanks between two columns.
 const BETWEEN: usize = 2;
 /// Smallest width of a column in which words are broken, in characters.
 const NARROWEST: usize = 14;
-
-/// Alignment of the cells of a column.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Align {
-    /// To the left, for words.
-    Left,
-    /// To the right, for whole numbers.
-    Right,
-    /// At the decimal point, for other numbers.
-    Point,
-}
 
 /// A table that is being filled.
 pub(crate) struct Table {
@@ -41,6 +33,42 @@ impl Table {
             rows: Vec::new(),
             indent: 2,
         }
+    }
+
+    /// Creates the table of these rows of a frame.
+    pub(crate) fn of(frame: &Frame<'_>, rows: impl IntoIterator<Item = usize>) -> Self {
+        let columns = frame.shown_columns();
+        let heads: Vec<String> = columns.iter().map(|column| frame.head(column)).collect();
+        let aligned = columns.iter().map(|column| frame.align(column));
+        let mut table = Self::new(heads.iter().map(String::as_str).zip(aligned));
+        for row in rows {
+            table.row(columns.iter().map(|column| frame.text(column, row)));
+        }
+        table
+    }
+
+    /// Creates the table of all rows of a frame.
+    pub(crate) fn all(frame: &Frame<'_>) -> Self {
+        Self::of(frame, 0..frame.rows)
+    }
+
+    /// Creates the table of the first row of a frame: a line a column, with its head, its value and
+    /// what the label adds. Columns that are only shown are left out where they have no value.
+    pub(crate) fn record(frame: &Frame<'_>) -> Self {
+        let mut table = Self::new([("", Align::Left); 3]);
+        for column in frame.shown_columns() {
+            let words = if column.label == column.head {
+                ""
+            } else {
+                &*column.label
+            };
+            match frame.text(column, 0) {
+                text if !text.is_empty() => table.row([&*column.head, &*text, words]),
+                _ if column.name.is_empty() => {}
+                _ => table.row([&*column.head, "none", words]),
+            }
+        }
+        table
     }
 
     /// Adds a row; missing cells are empty.

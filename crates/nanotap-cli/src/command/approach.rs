@@ -8,12 +8,9 @@ use clap::Args;
 use nanotap::case::physical::Kind;
 use nanotap::case::units::Units;
 use nanotap::figure::approach::approach_figure;
-use nanotap::number::shortest;
-use nanotap::observe::table::shown_phase;
-use nanotap::observe::{ObservableSet, Observables, columns};
 use nanotap::study::Study;
-use nanotap::study::approach::{ApproachPoint, ApproachReport, ApproachStudy};
-use nanotap::study::frequency_modulation::{COLUMNS, ModulatedColumn, ModulationReport};
+use nanotap::study::approach::{ApproachReport, ApproachStudy};
+use nanotap::study::frequency_modulation::ModulationReport;
 use nanotap::study::simulate::Classification;
 use serde::Serialize;
 
@@ -22,7 +19,7 @@ use crate::failure::Failure;
 use crate::given_case::GivenCase;
 use crate::output::Output;
 use crate::study_arguments::StudyArguments;
-use crate::table::{Align, Table};
+use crate::table::Table;
 use crate::threads::ThreadsArgument;
 use crate::{motion, number, progress, style};
 
@@ -74,7 +71,9 @@ pub(super) fn print<S: Study>(
              sample: the model does not hold there",
         );
     }
-    study.out.write(|| csv(&report, &case.units()))?;
+    study
+        .out
+        .write(|| report.motion_table(case.units()).csv())?;
     study
         .plot
         .draw(|| approach_figure(&report, &case.units()))?;
@@ -86,60 +85,6 @@ pub(super) fn print<S: Study>(
         report: &report,
     };
     output.study(case, &written, |_| text(case, &report))
-}
-
-/// The table as CSV: one row per distance in both directions, then the coexisting motions.
-fn csv(report: &ApproachReport, units: &Units) -> String {
-    let si = matches!(units, Units::Si(_));
-    let distance = if si { "zc (m)" } else { report.parameter };
-    let first = [
-        "way",
-        distance,
-        "classification",
-        "period",
-        "spectral_radius",
-    ];
-    let mut header = first.map(str::to_owned).to_vec();
-    header.extend(columns::columns(ObservableSet::COMMON, si));
-    if report.modulation.is_some() {
-        header.extend(COLUMNS.iter().map(|column| match si_of(column, units) {
-            Some((kind, _)) => format!("{} ({})", column.name, kind.si_unit()),
-            None => column.name.to_owned(),
-        }));
-    }
-    let mut csv = header.join(",") + "\n";
-    for p in report.table.iter().chain(&report.coexisting) {
-        let mut row = vec![p.spectral_radius];
-        row.extend(if si {
-            columns::cells_in_si(ObservableSet::COMMON, p.physical.as_ref())
-        } else {
-            columns::cells(ObservableSet::COMMON, p.observables.as_ref())
-        });
-        if report.modulation.is_some() {
-            row.extend(COLUMNS.iter().map(|column| {
-                let unit = si_of(column, units).map_or(1.0, |(_, unit)| unit);
-                Some(unit * (column.of)(p.modulation.as_ref()?)?)
-            }));
-        }
-        let period = p.period.map_or_else(String::new, |n| n.to_string());
-        let _ = write!(
-            csv,
-            "{},{},{},{period}",
-            p.way.name(),
-            shortest(p.zc.filter(|_| si).unwrap_or(p.gap)),
-            p.classification.name()
-        );
-        for value in row {
-            let _ = write!(csv, ",{}", value.map_or_else(String::new, shortest));
-        }
-        csv.push('\n');
-    }
-    csv
-}
-
-/// Quantity of a column and its SI unit, if it has one.
-fn si_of(column: &ModulatedColumn, units: &Units) -> Option<(Kind, f64)> {
-    column.kind.and_then(|kind| Some((kind, units.si(kind)?)))
 }
 
 /// Number of rows that a terminal shows in each direction.
@@ -182,40 +127,13 @@ fn text(case: &GivenCase, report: &ApproachReport) -> String {
         motion::lag(report.free_phase, "the drive", 4),
         shown(Kind::Length, report.free_reach)
     )));
-    let mut table = Table::new([
-        ("way", Align::Left),
-        ("distance", Align::Right),
-        ("motion", Align::Left),
-        ("A", Align::Right),
-        ("A/A0", Align::Point),
-        ("phase (°)", Align::Point),
-        ("E_dis", Align::Right),
-        ("F_max", Align::Right),
-        ("contact (%)", Align::Point),
-    ]);
     let step = step_of(report);
-    let row = |p: &ApproachPoint| {
-        let what = motion_of(p);
-        let of = |value: &dyn Fn(&Observables) -> String| {
-            p.observables.as_ref().map_or_else(String::new, value)
-        };
-        [
-            p.way.name().to_owned(),
-            shown(Kind::Length, p.gap),
-            what,
-            of(&|s| shown(Kind::Length, s.first_harmonic)),
-            of(&|s| number::significant(s.first_harmonic / report.free_amplitude, 4)),
-            of(&|s| number::significant(shown_phase(s.phase), 4)),
-            of(&|s| energy(s.dissipation, &units)),
-            of(&|s| shown(Kind::Force, s.peak_force)),
-            of(&|s| number::significant(100.0 * s.contact_fraction, 3)),
-        ]
-    };
-    for p in report.table.iter().step_by(step) {
-        table.row(row(p));
-    }
+    let rows = (0..report.table.len()).step_by(step);
+    let table = Table::of(&report.motion_table(units), rows);
     text.push_str(&thinned(&table, step, report));
-    text.push_str(&jumps(report, &shown));
+    if !report.jumps.is_empty() {
+        text.push_str(&(Table::all(&report.jump_table(units)).render() + "\n"));
+    }
     let settles = !report
         .table
         .iter()
@@ -260,23 +178,7 @@ fn text(case: &GivenCase, report: &ApproachReport) -> String {
         && !branches.bifurcations.is_empty()
     {
         let _ = writeln!(text, "\n  {}", style::bold("bifurcations of the branches"));
-        let mut table = Table::new([
-            ("", Align::Left),
-            ("distance", Align::Right),
-            ("period", Align::Right),
-            ("A", Align::Right),
-            ("phase (°)", Align::Point),
-        ]);
-        for b in &branches.bifurcations {
-            table.row([
-                b.kind.to_owned(),
-                shown(Kind::Length, b.parameter),
-                b.period.to_string(),
-                shown(Kind::Length, b.observables.first_harmonic),
-                number::significant(shown_phase(b.observables.phase), 4),
-            ]);
-        }
-        text.push_str(&table.render());
+        text.push_str(&Table::all(&report.bifurcation_table(units)).render());
     }
     if let Some(branches) = &report.branches {
         let at = |value| shown(Kind::Length, value);
@@ -291,65 +193,6 @@ fn text(case: &GivenCase, report: &ApproachReport) -> String {
         )));
     }
     text
-}
-
-/// Smallest relative uncertainty of a distance that is shown.
-const SHOWN_UNCERTAINTY: f64 = 1e-9;
-
-/// Formats the table of the distances at which the motion jumps; empty if it does not.
-fn jumps(report: &ApproachReport, shown: &dyn Fn(Kind, f64) -> String) -> String {
-    if report.jumps.is_empty() {
-        return String::new();
-    }
-    let mut table = Table::new([
-        ("jump on", Align::Left),
-        ("distance", Align::Right),
-        ("at", Align::Left),
-        ("from", Align::Left),
-        ("A/A0", Align::Point),
-        ("phase (°)", Align::Point),
-        ("to", Align::Left),
-        ("A/A0", Align::Point),
-        ("phase (°)", Align::Point),
-    ]);
-    for jump in &report.jumps {
-        let of = |p: &ApproachPoint| {
-            let [ratio, phase] = p.observables.as_ref().map_or_else(Default::default, |s| {
-                [
-                    number::significant(s.first_harmonic / report.free_amplitude, 4),
-                    number::significant(shown_phase(s.phase), 4),
-                ]
-            });
-            [motion_of(p), ratio, phase]
-        };
-        let ([what, ratio, phase], [then, later, after]) = (of(&jump.before), of(&jump.after));
-        let reason = if jump.uncertainty > SHOWN_UNCERTAINTY * jump.gap.abs() {
-            let within = shown(Kind::Length, jump.uncertainty);
-            format!("{} (within {within})", jump.reason)
-        } else {
-            jump.reason.clone()
-        };
-        table.row([
-            jump.way.name().to_owned(),
-            shown(Kind::Length, jump.gap),
-            reason,
-            what,
-            ratio,
-            phase,
-            then,
-            later,
-            after,
-        ]);
-    }
-    table.render() + "\n"
-}
-
-/// Name of the motion of a row: its period, or its classification.
-fn motion_of(p: &ApproachPoint) -> String {
-    p.period.map_or_else(
-        || p.classification.name().to_owned(),
-        |n| format!("period {n}"),
-    )
 }
 
 /// Formats the set values and the results of frequency modulation.
@@ -373,50 +216,12 @@ fn modulated(
         shown(Kind::Frequency, modulation.free_frequency),
         energy(modulation.free_loss, units),
     ));
-    let mut table = Table::new([
-        ("way", Align::Left),
-        (
-            if modulation.closest.is_some() {
-                "A"
-            } else {
-                "distance"
-            },
-            Align::Right,
-        ),
-        ("Δf", Align::Right),
-        ("Δf/f0", Align::Right),
-        ("first order", Align::Right),
-        ("drive/free", Align::Point),
-        ("E_dis", Align::Right),
-        ("F_max", Align::Right),
-        ("contact (%)", Align::Point),
-        ("open loop", Align::Left),
-    ]);
     let step = step_of(report);
-    for p in report.table.iter().step_by(step) {
-        let (Some(found), Some(seen)) = (&p.modulation, &p.observables) else {
-            continue;
-        };
-        table.row([
-            p.way.name().to_owned(),
-            shown(
-                Kind::Length,
-                modulation.closest.map_or(p.gap, |_| seen.first_harmonic),
-            ),
-            shown(Kind::Frequency, found.frequency_shift),
-            number::significant(found.relative_shift, 5),
-            found
-                .first_order_shift
-                .map_or_else(String::new, |shift| number::significant(shift, 5)),
-            number::significant(found.drive_ratio, 5),
-            energy(seen.dissipation, units),
-            shown(Kind::Force, seen.peak_force),
-            number::significant(100.0 * seen.contact_fraction, 3),
-            p.orbit
-                .as_ref()
-                .map_or_else(String::new, |orbit| orbit.stability.name().to_owned()),
-        ]);
-    }
+    let rows = (0..report.table.len()).step_by(step).filter(|k| {
+        let p = &report.table[*k];
+        p.modulation.is_some() && p.observables.is_some()
+    });
+    let table = Table::of(&report.motion_table(*units), rows);
     text.push_str(&thinned(&table, step, report));
     text.push_str(&motion::paragraph(modulation.multipliers));
     for setpoint in modulation.setpoints.iter().flatten() {

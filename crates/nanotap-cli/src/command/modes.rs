@@ -3,12 +3,11 @@
 use std::fmt::Write as _;
 
 use nanotap::case::Key;
-use nanotap::case::physical::Kind;
 use nanotap::case::units::Units;
 use nanotap::figure::modes::shapes_figure;
 use nanotap::model::beam::Modes;
 use nanotap::model::parameter::Parameter;
-use nanotap::study::modes::{ModeTable, ModesStudy, damping_ratio};
+use nanotap::study::modes::{ModeTable, ModesStudy, shape_table};
 
 use crate::failure::Failure;
 use crate::given_case::GivenCase;
@@ -25,27 +24,11 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     let (request, case) = arguments.read(output)?;
     let table = progress::study::<ModesStudy>(&case, &request, &ThreadsArgument::default())?;
     let beam = Modes::new(table.modes).map_err(|error| Failure::numerics(error.to_string()))?;
-    arguments.out.write(|| shapes(&beam, request.points))?;
+    arguments
+        .out
+        .write(|| shape_table(&beam, request.points).csv())?;
     arguments.plot.draw(|| shapes_figure(&beam))?;
     output.study(&case, &table, |table| text(&case, table))
-}
-
-/// The mode shapes φ_j(ξ) as CSV, a row a point.
-fn shapes(beam: &Modes, points: usize) -> String {
-    let names: Vec<String> = beam
-        .iter()
-        .map(|mode| format!("phi{}", mode.number))
-        .collect();
-    let mut csv = format!("xi,{}\n", names.join(","));
-    for point in 0..points {
-        let xi = point as f64 / (points - 1) as f64;
-        let shapes = beam.shapes(xi);
-        csv.push_str(&number::row(
-            std::iter::once(xi).chain(shapes.iter().copied()),
-        ));
-        csv.push('\n');
-    }
-    csv
 }
 
 fn text(case: &GivenCase, table: &ModeTable) -> String {
@@ -65,25 +48,17 @@ fn text(case: &GivenCase, table: &ModeTable) -> String {
         parameter(Parameter::Alpha1),
     ));
     text.push('\n');
-    let regimes = [
-        (
-            "free flight".to_owned(),
-            &table.free,
-            &table.exact_free,
-            &table.free_eigenvalues,
-        ),
-        (
-            format!("in contact, stiffness {}", parameter(Parameter::Alpha4)),
-            &table.contact,
-            &table.exact_contact,
-            &table.contact_eigenvalues,
-        ),
-    ];
-    for (name, galerkin, exact, eigenvalues) in regimes {
+    let contact = format!("in contact, stiffness {}", parameter(Parameter::Alpha4));
+    let free = ("free flight".to_owned(), &table.free_eigenvalues);
+    for (k, (name, eigenvalues)) in [free, (contact, &table.contact_eigenvalues)]
+        .into_iter()
+        .enumerate()
+    {
         let _ = write!(
             text,
-            "\n  {name}\n{}",
-            frequencies(galerkin, exact, eigenvalues.as_deref(), &units)
+            "\n  {name}\n{}{}",
+            Table::all(&table.frequency_table(k == 1, units)).render(),
+            without_frequencies(eigenvalues.as_deref(), table.modes)
         );
     }
     text.push('\n');
@@ -118,59 +93,18 @@ fn text(case: &GivenCase, table: &ModeTable) -> String {
     text
 }
 
-fn frequencies(
-    galerkin: &[f64],
-    exact: &[f64],
-    eigenvalues: Option<&[[f64; 2]]>,
-    units: &Units,
-) -> String {
-    let frequency = |value| number::quantity(units, Kind::Frequency, value, [7, 7]);
-    let [of_modes, of_beam, damped] = match units {
-        Units::Model => ["Ω Galerkin", "Ω exact", "Ω damped"],
-        Units::Si(_) => ["f Galerkin", "f exact", "f damped"],
-    };
-    // Where each mode oscillates there is one eigenvalue a mode, shown in its row.
-    let paired = eigenvalues.filter(|list| list.len() == galerkin.len());
-    let mut table = Table::new([
-        ("mode", Align::Right),
-        (of_modes, Align::Point),
-        (of_beam, Align::Point),
-        ("difference", Align::Point),
-        (damped, Align::Point),
-        ("damping ζ", Align::Point),
-    ]);
-    for (index, galerkin) in galerkin.iter().enumerate() {
-        // A lever whose modes were measured is not a uniform beam.
-        let [exact, difference] = match exact.get(index) {
-            Some(exact) => [frequency(*exact), number::percent(galerkin / exact - 1.0)],
-            None => [String::new(), String::new()],
-        };
-        let mut row = vec![
-            (index + 1).to_string(),
-            frequency(*galerkin),
-            exact,
-            difference,
-        ];
-        if let Some(eigenvalue) = paired.map(|list| list[index]) {
-            row.push(frequency(eigenvalue[1]));
-            row.push(number::significant(damping_ratio(eigenvalue), 4));
-        }
-        table.row(row);
-    }
-    let mut text = table.render();
+/// What is said, and listed, where not every mode oscillates.
+fn without_frequencies(eigenvalues: Option<&[[f64; 2]]>, modes: usize) -> String {
     match eigenvalues {
-        None => {
-            text.push_str("  damped: eigenvalues too close to critical damping to distinguish\n");
-        }
-        Some(list) if paired.is_none() => {
-            text.push_str("  overdamped: not every mode oscillates; the eigenvalues are\n");
+        None => "  damped: eigenvalues too close to critical damping to distinguish\n".to_owned(),
+        Some(list) if list.len() != modes => {
             let mut table = Table::new([("Re λ", Align::Point), ("Im λ", Align::Point)]);
             for [re, im] in list {
                 table.row([number::significant(*re, 7), number::significant(*im, 7)]);
             }
-            text.push_str(&table.render());
+            let words = "  overdamped: not every mode oscillates; the eigenvalues are\n";
+            words.to_owned() + &table.render()
         }
-        Some(_) => {}
+        Some(_) => String::new(),
     }
-    text
 }

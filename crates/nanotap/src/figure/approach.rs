@@ -12,10 +12,11 @@ use crate::case::units::Units;
 use crate::figure::branch::{
     BranchMark, BranchPoint, Shown, natural_of, runs, scale_of, with_corners, with_marks,
 };
+use crate::frame::{Declared, Row as _};
 use crate::observe::Observables;
 use crate::study::approach::{ApproachReport, Way};
 use crate::study::branch::BifurcationReport;
-use crate::study::frequency_modulation::{COLUMNS, Modulated, ModulatedColumn};
+use crate::study::frequency_modulation::Modulated;
 
 /// Amplitude, phase, dissipation and peak force against the distance; under frequency modulation the
 /// frequency shift, drive, dissipation and the force by Sader and Jarvis. Motions on approach and
@@ -41,7 +42,7 @@ pub fn approach_figure(report: &ApproachReport, units: &Units) -> Figure {
     // Amplitude and phase are constant: frequency shift and drive are drawn instead.
     let modulated = report.modulation.is_some();
     let of_drive = |names: &[&str]| -> Vec<ApproachPanel> {
-        let columns = COLUMNS
+        let columns = Modulated::COLUMNS
             .iter()
             .filter(|c| modulated && names.contains(&c.name));
         let panel = |column| ApproachPanel::of_drive(report, column, units, x_factor);
@@ -157,7 +158,7 @@ impl ApproachPanel {
     /// A column of frequency modulation; the frequency shift with the first-order one as a line.
     fn of_drive(
         report: &ApproachReport,
-        column: &ModulatedColumn,
+        column: &Declared<Modulated>,
         units: &Units,
         x_factor: f64,
     ) -> Self {
@@ -166,10 +167,11 @@ impl ApproachPanel {
             met.filter_map(|p| Some((x_factor * p.gap, of(p.modulation.as_ref()?)?)))
                 .collect()
         };
-        let [approach, retract] = [Way::Approach, Way::Retract].map(|way| values(way, &column.of));
+        let [approach, retract] =
+            [Way::Approach, Way::Retract].map(|way| values(way, &|m| column.number(m)));
         let met = approach.iter().chain(&retract);
         let size = met.fold(0.0, |m: f64, (_, y)| m.max(y.abs()));
-        let (factor, unit) = match column.kind {
+        let (factor, unit) = match column.dimension.kind() {
             Some(kind) => units.axis(kind, size),
             None => (1.0, String::new()),
         };

@@ -9,10 +9,11 @@ use crate::case::physical::Kind;
 use crate::case::units::prefixed;
 use crate::dataset::{Store, StoreError};
 use crate::figure::shown::Shown;
+use crate::frame::Row as _;
 use crate::observe::table::shown_phase;
 use crate::study::approach::Way;
 use crate::study::fit::{FitReport, FittedColumn, FittedRow, Reading};
-use crate::study::frequency_modulation::COLUMNS;
+use crate::study::frequency_modulation::Modulated;
 
 /// Number of panels side by side.
 const ACROSS: usize = 3;
@@ -182,9 +183,11 @@ fn readings(report: &FitReport, column: &FittedColumn) -> Panel {
         .filter_map(|reading| reading.measured)
         .fold(0.0, |size: f64, value| size.max(value.abs()));
     let si = |_| (column.unit != "1" && Key::find(&report.swept).is_some()).then_some(1.0);
-    let modulated = COLUMNS.iter().find(|c| c.name == column.observable);
+    let modulated = Modulated::COLUMNS
+        .iter()
+        .find(|c| c.name == column.observable);
     let name = modulated.map_or(column.name.as_str(), |c| c.label);
-    let kind = modulated.map_or_else(|| Kind::of_si_unit(&column.unit), |c| c.kind);
+    let kind = modulated.map_or_else(|| Kind::of_si_unit(&column.unit), |c| c.dimension.kind());
     let (label, factor) = match (shown, kind) {
         (Some(shown), _) => shown.axis(true, si, size),
         (None, Some(kind)) if column.unit != "1" => {

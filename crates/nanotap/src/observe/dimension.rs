@@ -15,6 +15,8 @@ pub enum Dimension {
     Force,
     /// Energy; the model's unit is EI g₀²/L³, the SI unit J.
     Energy,
+    /// Frequency; the model's unit √(EI/(mL⁴)) is that of an angular frequency, the SI unit Hz.
+    Frequency,
     /// Power; the model's unit is that of energy over that of time, the SI unit W.
     Power,
     /// Slope; dW/dξ in the model with the unit g₀/L, the pure number dw/dx in SI.
@@ -31,6 +33,10 @@ pub enum Dimension {
     Periods,
     /// A position along the beam as a fraction of its length, 0 (clamp) to 1 (tip).
     Place,
+    /// A quantity of this kind, in SI everywhere.
+    Si(Kind),
+    /// A quantity with this unit everywhere, which takes no prefixes.
+    Unit(&'static str),
 }
 
 impl Dimension {
@@ -43,8 +49,10 @@ impl Dimension {
             Self::Force => "EI g0/L^3",
             Self::Energy => "EI g0^2/L^3",
             Self::Power => "EI g0^2/L^3 sqrt(EI/(m L^4))",
+            Self::Frequency => "sqrt(EI/(m L^4))",
             Self::Slope => "g0/L",
             Self::Place => "L",
+            Self::Si(kind) => kind.si_unit(),
             _ => self.fixed_unit(),
         }
     }
@@ -57,12 +65,23 @@ impl Dimension {
         }
     }
 
+    /// The SI unit in the heads of files; empty for a pure number and for counts.
+    pub const fn file_unit(self) -> &'static str {
+        match (self, self.kind()) {
+            (Self::Unit(unit), _) => unit,
+            (Self::Angle, _) => "deg",
+            (_, Some(kind)) => kind.si_unit(),
+            _ => "",
+        }
+    }
+
     /// The unit of quantities that are the same in the model and in SI.
     const fn fixed_unit(self) -> &'static str {
         match self {
             Self::Angle => "degree",
             Self::PerPeriod => "1/drive period",
             Self::Periods => "drive periods",
+            Self::Unit(unit) => unit,
             _ => "1",
         }
     }
@@ -77,6 +96,8 @@ impl Dimension {
             Self::Force => Kind::Force,
             Self::Energy => Kind::Energy,
             Self::Power => Kind::Power,
+            Self::Frequency => Kind::Frequency,
+            Self::Si(kind) => kind,
             _ => return None,
         })
     }
@@ -90,6 +111,7 @@ impl Dimension {
             Self::Force => scales.force,
             Self::Energy => scales.energy,
             Self::Power => scales.power,
+            Self::Frequency => scales.frequency,
             Self::Slope => return scales.slope,
             _ => 1.0,
         })

@@ -32,6 +32,8 @@ pub struct Observable {
     pub name: &'static str,
     /// Name among quantities in SI, if experimenters use another one.
     pub si_name: &'static str,
+    /// Head of tables that are read, of a fraction in percent; None: the SI name.
+    pub head: Option<&'static str>,
     /// Dimension of the value, from which its units follow.
     pub dimension: Dimension,
     /// Short description and symbol (between `$`): the label of an axis.
@@ -117,13 +119,14 @@ pub fn shown_phase(degrees: f64) -> f64 {
 
 macro_rules! observables {
     ($(
-        $name:ident $(as $si_name:literal)?: $type:ty, $dimension:ident, $where:ident,
+        $name:ident $(as $si_name:literal)? $(headed $head:literal)?: $type:ty, $dimension:ident, $where:ident,
         $label:literal, $words:literal, $read:expr;
     )*) => {
         /// The table of all observables, in the order of output.
         pub static OBSERVABLES: &[Observable] = &[$(Observable {
             name: stringify!($name),
             si_name: observables!(@si $name $($si_name)?),
+            head: observables!(@head $($head)?),
             dimension: Dimension::$dimension,
             label: $label,
             words: $words,
@@ -212,6 +215,8 @@ macro_rules! observables {
             );
         }
     };
+    (@head) => { None };
+    (@head $head:literal) => { Some($head) };
     (@si $name:ident) => { stringify!($name) };
     (@si $name:ident $si_name:literal) => { $si_name };
     (@common $name:ident) => { 1 << Row::$name as usize };
@@ -251,7 +256,7 @@ observables! {
     virial: f64, Energy, common,
         "virial ⟨$F W$⟩", "time mean of force times tip deflection; sign: along the deflection",
         |m| m.virial();
-    contact_fraction: f64, Number, common,
+    contact_fraction headed "contact": f64, Number, common,
         "contact time / period", "contact time / period",
         |m| m.contact_time() / m.duration();
     contacts_per_period: f64, PerPeriod, common,

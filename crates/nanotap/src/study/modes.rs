@@ -10,12 +10,15 @@ use serde::Serialize;
 use crate::Error;
 use crate::case::Case;
 use crate::case::physical::Kind;
+use crate::case::units::Units;
 use crate::control::Control;
+use crate::frame::{Align, Form, Frame, Rows, columns};
 use crate::model::beam::Modes;
 use crate::model::cantilever::{Cantilever, CantileverError};
 use crate::model::exact_beam;
 use crate::model::galerkin::{Galerkin, Regime};
 use crate::model::spectrum::{self, Spectrum, TipLoad};
+use crate::number::percent;
 use crate::study::limits::MAX_POINTS;
 use crate::study::request::options;
 use crate::study::{Study, cantilever};
@@ -115,6 +118,57 @@ impl ModeTable {
             contact_eigenvalues: eigenvalues(Regime::Contact),
             physical: None,
         })
+    }
+}
+
+/// The shapes φ_j(ξ) of modes at so many points along the beam, as a table.
+pub fn shape_table<'a>(modes: &'a Modes, points: usize) -> Frame<'a> {
+    let xi = move |point| point as f64 / (points - 1) as f64;
+    let rows = Rows::new("shapes", 0..points, None).column("xi", "ξ", Form::Digits(5), xi);
+    let with = |rows: Rows<'a, usize>, (k, number)| {
+        let shape = move |point| modes.shapes(xi(point))[k];
+        let [name, head] = [format!("phi{number}"), format!("φ{number}")];
+        rows.column(name, head, Form::Digits(5), shape)
+    };
+    let numbers = modes.iter().map(|mode| mode.number).enumerate();
+    numbers.fold(rows, with).frame()
+}
+
+impl ModeTable {
+    /// The frequencies in free flight or in contact: of the equations, of the exact beam, and with
+    /// damping where every mode oscillates.
+    pub fn frequency_table(&self, in_contact: bool, units: Units) -> Frame<'_> {
+        let (galerkin, exact, eigenvalues) = if in_contact {
+            (
+                &self.contact,
+                &self.exact_contact,
+                &self.contact_eigenvalues,
+            )
+        } else {
+            (&self.free, &self.exact_free, &self.free_eigenvalues)
+        };
+        let symbol = if matches!(units, Units::Si(_)) {
+            "f"
+        } else {
+            "Ω"
+        };
+        let paired = eigenvalues.as_ref();
+        let paired = paired.filter(|list| list.len() == galerkin.len());
+        let damped = move |k: usize| Some(paired?[k]);
+        let difference = |k: usize| Some(percent(galerkin[k] / exact.get(k)? - 1.0));
+        let rows = columns! { Rows::new("frequencies", 0..galerkin.len(), Some(units));
+            "mode", "mode", Plain => |k| k + 1;
+            "galerkin", format!("{symbol} Galerkin"), (Frequency, Quantity([7, 7])) =>
+                |k| galerkin[k];
+            "exact", format!("{symbol} exact"), (Frequency, Quantity([7, 7])) =>
+                |k| exact.get(k).copied();
+            "difference", "difference", Plain => difference;
+            .align(Align::Point);
+            "damped", format!("{symbol} damped"), (Frequency, Quantity([7, 7])) =>
+                move |k| Some(damped(k)?[1]);
+            "damping", "damping ζ", Digits(4) => move |k| damped(k).map(damping_ratio);
+        };
+        rows.frame().aligned(Align::Point, Align::Point)
     }
 }
 

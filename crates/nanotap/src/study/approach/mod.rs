@@ -19,6 +19,7 @@
 //! Limits: branches that no motion of approach or retract lies on are not found.
 
 pub(in crate::study) mod distance_sweep;
+mod frames;
 pub(in crate::study) mod quasistatic;
 mod ramp;
 

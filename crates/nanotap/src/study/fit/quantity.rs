@@ -2,8 +2,9 @@
 //! frequency modulation loop, or a reading of a force curve.
 
 use crate::case::physical::Kind;
+use crate::frame::{Declared, Row as _};
 use crate::observe::{Dimension, OBSERVABLES, Observable};
-use crate::study::frequency_modulation::{COLUMNS, ModulatedColumn};
+use crate::study::frequency_modulation::Modulated;
 
 /// A quantity in a column of measured values.
 #[derive(Clone, Copy, Debug)]
@@ -11,7 +12,7 @@ pub enum Quantity {
     /// An observable of a periodic orbit.
     Observed(&'static Observable),
     /// A reading of frequency modulation.
-    Modulated(&'static ModulatedColumn),
+    Modulated(&'static Declared<Modulated>),
     /// A reading of a force curve.
     Rest(RestQuantity),
 }
@@ -43,7 +44,7 @@ impl Quantity {
             "amplitude" if !own_amplitude => "first_harmonic",
             other => other,
         };
-        let modulated = COLUMNS
+        let modulated = Modulated::COLUMNS
             .iter()
             .find(|c| c.name == name && RECORDED.contains(&c.name));
         let rest = match name {
@@ -86,7 +87,7 @@ impl Quantity {
     }
 
     /// The reading of frequency modulation, if it is one.
-    pub const fn modulated(self) -> Option<&'static ModulatedColumn> {
+    pub const fn modulated(self) -> Option<&'static Declared<Modulated>> {
         match self {
             Self::Modulated(column) => Some(column),
             Self::Observed(_) | Self::Rest(_) => None,
@@ -111,7 +112,7 @@ impl Quantity {
     pub const fn kind(self) -> Option<Kind> {
         match self {
             Self::Observed(observable) => observable.dimension.kind(),
-            Self::Modulated(column) => column.kind,
+            Self::Modulated(column) => column.dimension.kind(),
             Self::Rest(RestQuantity::Deflection) => Some(Kind::Length),
             Self::Rest(RestQuantity::Force) => Some(Kind::Force),
         }

@@ -26,8 +26,9 @@ use serde::Serialize;
 
 use crate::Error;
 use crate::case::Case;
+use crate::case::physical::Physical;
 use crate::case::physical::quantity::JOULES_PER_ELECTRONVOLT;
-use crate::case::physical::{Kind, Physical};
+use crate::frame::rows;
 use crate::model::parameter::Parameter;
 use crate::study::Study;
 use crate::study::approach::{ApproachPoint, ApproachReport, Way};
@@ -35,40 +36,43 @@ use crate::study::limits::MAX_DISTANCES;
 use crate::study::request::options;
 use crate::study::value::Amount;
 
-/// Readings of frequency modulation at one distance, in model units.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
-pub struct Modulated {
-    /// Angular frequency of the drive, model units.
-    pub drive_frequency: f64,
-    /// Strength of the drive, model units: its force, or a driven base's amplitude.
-    pub drive_strength: f64,
-    /// Shift 2πΔf of the angular frequency from that of the free lever, model units.
-    pub frequency_shift: f64,
-    /// Frequency shift Δf over the free lever's frequency f₀, dimensionless.
-    pub relative_shift: f64,
-    /// Strength of the drive over that of the free lever, dimensionless: the excitation channel.
-    pub drive_ratio: f64,
-    /// Energy that the sample takes in a period, from the excitation: E₀ (drive ratio − f/f₀) with
-    /// the loss E₀ of the free lever in a period, model units.
-    pub drive_dissipation: f64,
-    /// Least distance of a sinusoidal oscillation, a driven base's motion included, model units.
-    pub closest: f64,
-    /// Relative shift Δf/f₀ to first order in the law's static force, dimensionless; None for a
-    /// rigid stop and a surface that moves, which have no static force.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub first_order_shift: Option<f64>,
-    /// Relative shift Δf/f₀ by Giessibl's formula for an amplitude that is large against the
-    /// force's range, dimensionless.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub giessibl_shift: Option<f64>,
-    /// Static force of the law where the oscillation is closest, model units; positive if it
-    /// repels.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub static_force: Option<f64>,
-    /// Force where the oscillation is closest, by the formula of Sader and Jarvis from the shifts
-    /// of the curve, model units; positive if it repels.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub sader_jarvis_force: Option<f64>,
+rows! {
+    in model_unit
+    /// Readings of frequency modulation at one distance, in model units.
+    #[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
+    pub struct Modulated {
+        /// Angular frequency of the drive, model units.
+        pub drive_frequency: f64,
+        /// Strength of the drive, model units: its force, or a driven base's amplitude.
+        pub drive_strength: f64,
+        /// Shift 2πΔf of the angular frequency from that of the free lever, model units.
+        pub frequency_shift: f64 = Frequency, "frequency shift $Δf$", "Δf", Quantity([5, 4]),
+        /// Frequency shift Δf over the free lever's frequency f₀, dimensionless.
+        pub relative_shift: f64 = Number, "relative shift $Δf/f_0$", "Δf/f0", Digits(5),
+        /// Strength of the drive over that of the free lever, dimensionless: the excitation channel.
+        pub drive_ratio: f64 = Number, "drive / free drive", "drive/free", Digits(5),
+        /// Energy that the sample takes in a period, from the excitation: E₀ (drive ratio − f/f₀) with
+        /// the loss E₀ of the free lever in a period, model units.
+        pub drive_dissipation: f64 = Energy, "dissipation from the drive", "E_drive", Quantity([4, 4]),
+        /// Least distance of a sinusoidal oscillation, a driven base's motion included, model units.
+        pub closest: f64,
+        /// Relative shift Δf/f₀ to first order in the law's static force, dimensionless; None for a
+        /// rigid stop and a surface that moves, which have no static force.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        pub first_order_shift: Option<f64> = Number, "$Δf/f_0$ to first order", "first order", Digits(5),
+        /// Relative shift Δf/f₀ by Giessibl's formula for an amplitude that is large against the
+        /// force's range, dimensionless.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        pub giessibl_shift: Option<f64> = Number, "$Δf/f_0$ for a large amplitude",
+        /// Static force of the law where the oscillation is closest, model units; positive if it
+        /// repels.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        pub static_force: Option<f64> = Force, "force", "force", Quantity([5, 4]),
+        /// Force where the oscillation is closest, by the formula of Sader and Jarvis from the shifts
+        /// of the curve, model units; positive if it repels.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        pub sader_jarvis_force: Option<f64> = Force, "force (Sader–Jarvis)", "force", Quantity([5, 4]),
+    }
 }
 
 impl Modulated {
@@ -114,29 +118,32 @@ impl Modulated {
     }
 }
 
-/// Readings of frequency modulation at one distance, in SI.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
-pub struct ModulatedInSi {
-    /// Frequency of the drive, Hz.
-    pub frequency: f64,
-    /// Strength of the drive: its force, N, or a driven base's amplitude, m.
-    pub drive_strength: f64,
-    /// Frequency shift Δf from the free lever, Hz.
-    pub frequency_shift: f64,
-    /// Energy dissipated in the sample per period, from the excitation, J.
-    pub drive_dissipation: f64,
-    /// Energy dissipated in the sample per period, from the excitation, eV.
-    #[serde(rename = "drive_dissipation_eV")]
-    pub drive_dissipation_ev: f64,
-    /// Least distance of a sinusoidal oscillation, m.
-    pub closest: f64,
-    /// Static force of the law where the oscillation is closest, N; positive if it repels.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub static_force: Option<f64>,
-    /// Force where the oscillation is closest, by the formula of Sader and Jarvis, N; positive if
-    /// it repels.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub sader_jarvis_force: Option<f64>,
+rows! {
+    in si_unit
+    /// Readings of frequency modulation at one distance, in SI.
+    #[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
+    pub struct ModulatedInSi {
+        /// Frequency of the drive, Hz.
+        pub frequency: f64 = Frequency, "drive frequency",
+        /// Strength of the drive: its force, N, or a driven base's amplitude, m.
+        pub drive_strength: f64,
+        /// Frequency shift Δf from the free lever, Hz.
+        pub frequency_shift: f64 = Frequency, "frequency shift $Δf$",
+        /// Energy dissipated in the sample per period, from the excitation, J.
+        pub drive_dissipation: f64 = Energy, "dissipation from the drive",
+        /// Energy dissipated in the sample per period, from the excitation, eV.
+        #[serde(rename = "drive_dissipation_eV")]
+        pub drive_dissipation_ev: f64,
+        /// Least distance of a sinusoidal oscillation, m.
+        pub closest: f64 = Length, "least distance",
+        /// Static force of the law where the oscillation is closest, N; positive if it repels.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        pub static_force: Option<f64> = Force, "force",
+        /// Force where the oscillation is closest, by the formula of Sader and Jarvis, N; positive if
+        /// it repels.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        pub sader_jarvis_force: Option<f64> = Force, "force (Sader–Jarvis)",
+    }
 }
 
 impl Modulated {
@@ -157,71 +164,6 @@ impl Modulated {
         }
     }
 }
-
-/// A reading of frequency modulation, as a column of a table or an axis.
-#[derive(Clone, Copy, Debug)]
-pub struct ModulatedColumn {
-    /// Name of the column in tables.
-    pub name: &'static str,
-    /// Label of an axis, without unit.
-    pub label: &'static str,
-    /// Kind of quantity that the column contains; None for a ratio.
-    pub kind: Option<Kind>,
-    /// Returns the value of the column in model units, if there is one.
-    pub of: fn(&Modulated) -> Option<f64>,
-}
-
-/// Columns of a curve under frequency modulation.
-pub const COLUMNS: [ModulatedColumn; 8] = [
-    ModulatedColumn {
-        name: "frequency_shift",
-        label: "frequency shift $Δf$",
-        kind: Some(Kind::Frequency),
-        of: |m| Some(m.frequency_shift),
-    },
-    ModulatedColumn {
-        name: "relative_shift",
-        label: "relative shift $Δf/f_0$",
-        kind: None,
-        of: |m| Some(m.relative_shift),
-    },
-    ModulatedColumn {
-        name: "drive_ratio",
-        label: "drive / free drive",
-        kind: None,
-        of: |m| Some(m.drive_ratio),
-    },
-    ModulatedColumn {
-        name: "drive_dissipation",
-        label: "dissipation from the drive",
-        kind: Some(Kind::Energy),
-        of: |m| Some(m.drive_dissipation),
-    },
-    ModulatedColumn {
-        name: "first_order_shift",
-        label: "$Δf/f_0$ to first order",
-        kind: None,
-        of: |m| m.first_order_shift,
-    },
-    ModulatedColumn {
-        name: "giessibl_shift",
-        label: "$Δf/f_0$ for a large amplitude",
-        kind: None,
-        of: |m| m.giessibl_shift,
-    },
-    ModulatedColumn {
-        name: "static_force",
-        label: "force",
-        kind: Some(Kind::Force),
-        of: |m| m.static_force,
-    },
-    ModulatedColumn {
-        name: "sader_jarvis_force",
-        label: "force (Sader–Jarvis)",
-        kind: Some(Kind::Force),
-        of: |m| m.sader_jarvis_force,
-    },
-];
 
 /// Frequency modulation along a curve.
 #[derive(Clone, Debug, Serialize, JsonSchema)]

@@ -254,7 +254,7 @@ impl Loop {
         let driven = orbit.driven();
         let found = modulated(case, free, &driven)?;
         let columns = problem.data.columns.iter();
-        let values = columns.map(|column| (column.quantity.modulated()?.of)(&found));
+        let values = columns.map(|column| column.quantity.modulated()?.number(&found));
         Some(RowPoint {
             orbit: Some(orbit.orbit),
             lost: false,
@@ -355,7 +355,7 @@ impl Loop {
                     .zip(changes)
                     .for_each(|(sum, part)| *sum += weight * part);
                 for (column, of) in columns.iter().enumerate() {
-                    let number = (of.quantity.modulated()?.of)(found)?;
+                    let number = of.quantity.modulated()?.number(found)?;
                     by[column] += weight * problem.scale(x, curve, column) * number;
                 }
             }

@@ -8,10 +8,7 @@ use nanotap::dataset::Share;
 use nanotap::figure::scan::scan_figure;
 use nanotap::study::DatasetStudy as _;
 use nanotap::study::scan::report::LoopReport;
-use nanotap::study::scan::{
-    CHANNELS, Direction, LineStatistics, Method, ScanLines, ScanOptions, ScanReport, ScanStudy,
-    pixels_csv,
-};
+use nanotap::study::scan::{CHANNELS, Method, ScanLines, ScanOptions, ScanReport, ScanStudy};
 
 use crate::arguments::{CaseArguments, PlotArgument};
 use crate::dataset::DatasetArguments;
@@ -19,7 +16,7 @@ use crate::failure::Failure;
 use crate::given_case::GivenCase;
 use crate::output::Output;
 use crate::request::Request;
-use crate::table::{Align, Table};
+use crate::table::Table;
 use crate::threads::ThreadsArgument;
 use crate::{file, motion, number, progress, style};
 
@@ -79,12 +76,12 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     if let Some(path) = &arguments.out {
         if ending == Some("gsf") {
             for channel in CHANNELS {
-                let bytes = report.field(&channel).to_gsf();
+                let bytes = report.field(channel).to_gsf();
                 let bytes = bytes.map_err(nanotap::Error::from)?;
                 file::write(&of_channel(path, channel.name), &bytes)?;
             }
         } else {
-            file::write(path, pixels_csv(&report).as_bytes())?;
+            file::write(path, report.pixel_table().csv().as_bytes())?;
         }
     }
     arguments.plot.draw(|| scan_figure(&report))?;
@@ -147,19 +144,8 @@ fn text(case: &GivenCase, report: &ScanReport) -> String {
         nm(report.size[0], 6),
         number::significant(report.line_rate, 4),
     );
-    let mut table = Table::new([
-        ("line", Align::Right),
-        ("", Align::Left),
-        ("height rms (nm)", Align::Point),
-        ("error rms (nm)", Align::Point),
-        ("tracking rms (nm)", Align::Point),
-        ("largest peak force (nN)", Align::Point),
-        ("parachuting (nm)", Align::Point),
-        ("overshoot (nm)", Align::Point),
-    ]);
-    for line in report.lines.iter().take(SHOWN) {
-        table.row(row(line));
-    }
+    let lines = report.line_table();
+    let table = Table::of(&lines, 0..lines.rows.min(SHOWN));
     let mut text = format!(
         "{}\n\n{}\n{}",
         style::bold(&heading),
@@ -173,23 +159,6 @@ fn text(case: &GivenCase, report: &ScanReport) -> String {
         text.push_str(&motion::paragraph(&loop_text(feedback)));
     }
     text
-}
-
-fn row(line: &LineStatistics) -> [String; 8] {
-    let flights = line.parachuting.iter().map(|flight| flight.length);
-    [
-        line.line.to_string(),
-        match line.direction {
-            Direction::Trace => "trace".to_owned(),
-            Direction::Retrace => "retrace".to_owned(),
-        },
-        nm(line.height_rms, 4),
-        nm(line.error_rms, 4),
-        nm(line.tracking_rms, 4),
-        number::significant(1e9 * line.peak_force_max, 4),
-        nm(flights.fold(0.0, f64::max), 3),
-        nm(line.overshoot, 3),
-    ]
 }
 
 fn loop_text(feedback: &LoopReport) -> String {

@@ -5,17 +5,16 @@ use nanotap_figures::{
     Panel, Rule,
 };
 
-use crate::study::scan::{Channels, Interaction, Mode, ScanReport};
+use crate::study::scan::{CHANNELS, Channel, Interaction, Mode, ScanReport};
 
-/// A channel with its label and the factor from SI to the unit shown.
-type Shown = (&'static str, f64, fn(&Channels) -> &Vec<Vec<f64>>);
-
-const HEIGHT: Shown = ("height $z$ (nm)", 1e9, |image| &image.height);
-const ERROR: Shown = ("amplitude error (nm)", 1e9, |image| &image.amplitude_error);
-const PHASE: Shown = ("phase lag (°)", 1.0, |image| &image.phase);
-const FORCE: Shown = ("largest peak force (nN)", 1e9, |image| {
-    &image.peak_force_max
-});
+/// Channels that are drawn: label, factor from SI, and values.
+fn drawn() -> impl Iterator<Item = (String, f64, &'static Channel)> {
+    let names = ["height", "amplitude_error", "phase", "peak_force_max"];
+    let channels = CHANNELS
+        .iter()
+        .filter(move |channel| names.contains(&channel.name));
+    channels.map(|channel| (channel.axis().0, channel.axis().1, channel))
+}
 
 /// Height, amplitude error, phase and largest peak force: of one line against the position, in both
 /// directions; of more lines as pictures of the trace. The caption is the verdict.
@@ -49,7 +48,7 @@ fn line_figure(report: &ScanReport) -> Figure {
         .height(180.0)
         .row_heights([1.6, 1.0, 1.0, 1.3])
         .share_x();
-    for (k, (title, scale, values)) in [HEIGHT, ERROR, PHASE, FORCE].into_iter().enumerate() {
+    for (k, (title, scale, channel)) in drawn().enumerate() {
         let x = Axis::linear(label).range(0.0, factor * report.size[0]);
         let mut panel = Panel::new(x, Axis::linear(title));
         for change in &report.branch_changes {
@@ -71,7 +70,7 @@ fn line_figure(report: &ScanReport) -> Figure {
         }
         let colours = [Colour::BLUE, Colour::VERMILLION];
         for ((name, image), colour) in report.directions().zip(colours) {
-            let line = Line::new(of(&values(image)[0], scale)).colour(colour);
+            let line = Line::new(of(&(channel.values)(image)[0], scale)).colour(colour);
             panel = panel.with(if k == 0 { line.label(name) } else { line });
         }
         figure = figure.with(panel.legend(if k == 0 {
@@ -118,8 +117,8 @@ fn image_figure(report: &ScanReport) -> Figure {
     let (factor, label) = along(report);
     let size = report.size.map(|size| factor * size);
     let mut figure = Figure::new(2, 2).width(DOUBLE_COLUMN).height(150.0);
-    for (title, scale, values) in [HEIGHT, ERROR, PHASE, FORCE] {
-        let rows = values(&report.trace);
+    for (title, scale, channel) in drawn() {
+        let rows = (channel.values)(&report.trace);
         let x = Axis::linear(label).tight();
         let y = Axis::linear(label.replace("$x$", "$y$")).tight();
         let pixels = rows.iter().flatten().map(|value| scale * value);

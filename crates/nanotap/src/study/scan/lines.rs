@@ -6,7 +6,7 @@
 //! whole report again.
 
 use std::collections::HashMap;
-use std::sync::OnceLock;
+use std::sync::{LazyLock, OnceLock};
 
 use nanotap_dynamics::Control;
 use serde::Serialize;
@@ -16,10 +16,13 @@ use serde_json::{Value, json};
 use super::instrument::Interaction;
 use super::options::ScanOptions;
 use super::plan::Plan;
-use super::recorder::{KEPT, LineRecord, PixelRow};
-use super::report::{Channels, Direction, LineStatistics, OffSetpoint, Parachuting, ScanReport};
+use super::recorder::{KEPT, LineRecord};
+use super::report::{
+    BranchChange, CHANNELS, Channels, Direction, LineStatistics, OffSetpoint, Parachuting,
+    PixelRow, ScanReport,
+};
 use super::run::{Recorded, Settled};
-use super::table::{CHANNELS, centres};
+use super::table::centres;
 use super::{ScanStudy, header, lever_memory, with_lines};
 use crate::Error;
 use crate::case::Case;
@@ -28,6 +31,7 @@ use crate::dataset::{
     Axis, Block, Coordinate, Grid, Schema, Store, StoreError, Values, Variable, Work, WorkError,
     attributes, chunk_files, work,
 };
+use crate::frame::Row;
 use crate::study::{Computation, DatasetPlan, DatasetStudy, Study as _};
 
 /// Attribute with the report before its lines, as JSON.
@@ -40,60 +44,30 @@ const STATES: [Interaction; 4] = [
     Interaction::Irregular,
 ];
 
-/// The statistics of a line that are numbers, with their units.
-const STATISTICS: [(&str, &str); 16] = [
-    ("first_period", PERIODS),
-    ("height_mean", "m"),
-    ("height_rms", "m"),
-    ("height_max", "m"),
-    ("height_min", "m"),
-    ("error_rms", "m"),
-    ("error_max", "m"),
-    ("error_min", "m"),
-    ("peak_force_max", "N"),
-    ("peak_force_max_period", PERIODS),
-    ("peak_force_max_x", "m"),
-    ("peak_force_mean", "N"),
-    ("dissipation_mean", "J"),
-    ("tracking_rms", "m"),
-    ("surface_rms", "m"),
-    ("overshoot", "m"),
-];
+/// Names and units of the numbers that are stored of a line, of a flight, of a stretch off the
+/// setpoint and of a change of the state.
+static STATISTICS: LazyLock<Stored> = LazyLock::new(stored::<LineStatistics>);
+static FLIGHT: LazyLock<Stored> = LazyLock::new(stored::<Parachuting>);
+static OFF: LazyLock<Stored> = LazyLock::new(stored::<OffSetpoint>);
+static JUMP: LazyLock<Stored> = LazyLock::new(stored::<BranchChange>);
+
+type Stored = Vec<(&'static str, &'static str)>;
+
+/// Names and units of the columns of rows, except those that are coordinates of the dataset.
+fn stored<R: Row>() -> Stored {
+    let columns = R::COLUMNS
+        .iter()
+        .filter(|c| !["line", "y"].contains(&c.name));
+    columns
+        .map(|column| (column.name, column.dimension.si_unit()))
+        .collect()
+}
+
 const PERIODS: &str = "drive periods";
 
 /// Number of periods at an end of the range of z.
 const SUMS: [(&str, &str); 1] = [("at_range", PERIODS)];
 
-/// The numbers of a flight, of a stretch off the setpoint, and of a change of the state, with their
-/// units.
-const FLIGHT: [(&str, &str); 4] = [
-    ("first_period", PERIODS),
-    ("periods", PERIODS),
-    ("time", "s"),
-    ("length", "m"),
-];
-const OFF: [(&str, &str); 8] = [
-    ("first_period", PERIODS),
-    ("periods", PERIODS),
-    ("x", "m"),
-    ("until_x", "m"),
-    ("error", "m"),
-    ("height", "m"),
-    ("material", NUMBER),
-    ("moved", FLAG),
-];
-const JUMP: [(&str, &str); 10] = [
-    ("k", PERIODS),
-    ("x", "m"),
-    ("from", STATE),
-    ("to", STATE),
-    ("height_change", "m"),
-    ("distance_from", "m"),
-    ("distance_to", "m"),
-    ("material", NUMBER),
-    ("until_k", PERIODS),
-    ("until_x", "m"),
-];
 /// The unit of a governing force, stored as its code, and of a number of a list.
 const STATE: &str = "1";
 const NUMBER: &str = "count";
@@ -416,18 +390,8 @@ fn line_of(numbers: &Numbers, line: usize, y: f64, directions: usize) -> Option<
             recorded.changes.push(entry(&JUMP, row.into_iter(), more)?);
         }
         let channel = |name: &str| part(name, at).map(<[f64]>::to_vec).unwrap_or_default();
-        let pixels = PixelRow {
-            surface: channel("surface"),
-            height: channel("height"),
-            amplitude_error: channel("amplitude_error"),
-            phase: channel("phase"),
-            peak_force: channel("peak_force"),
-            peak_force_max: channel("peak_force_max"),
-            dissipation: channel("dissipation"),
-            contact_fraction: channel("contact_fraction"),
-            mean_deflection: channel("mean_deflection"),
-            state: part("state", at)?.iter().map(|code| state(*code)).collect(),
-        };
+        let states = part("state", at)?.iter().map(|code| state(*code)).collect();
+        let pixels = PixelRow::read(channel, states);
         let sums = rows("sums", &SUMS, at)?.into_iter().next()?;
         let [at_range] = sums[..] else {
             return None;
@@ -455,10 +419,9 @@ fn schema(
     let mut variables: Vec<Variable> = CHANNELS
         .iter()
         .map(|channel| {
-            let unit = if channel.unit.is_empty() {
-                "1"
-            } else {
-                channel.unit
+            let unit = match channel.unit() {
+                "" => "1",
+                unit => unit,
             };
             Variable::new(channel.name, Kind::Real, channel.title, unit).along("x", plan.pixels)
         })

@@ -35,10 +35,9 @@ pub use instrument::Interaction;
 pub use lines::ScanLines;
 pub use options::{Method, Mode, ScanOptions};
 pub use report::{
-    BranchChange, Cause, Channels, Direction, ImageCause, LineStatistics, ListedPeriod,
-    OffSetpoint, ScanReport,
+    BranchChange, CHANNELS, Cause, Channel, Channels, Direction, ImageCause, LineStatistics,
+    ListedPeriod, OffSetpoint, ScanReport,
 };
-pub use table::{CHANNELS, Channel, pixels_csv};
 
 use crate::Error;
 use crate::case::Case;

@@ -6,7 +6,7 @@ use nanotap_flow::Complex;
 use super::instrument::{Interaction, Period, lag};
 use super::options::Mode;
 use super::plan::Plan;
-use super::report::{Direction, LineStatistics, ListedPeriod, OffSetpoint, Parachuting};
+use super::report::{Direction, LineStatistics, ListedPeriod, OffSetpoint, Parachuting, PixelRow};
 use super::state_tracker::StateTracker;
 
 /// Sums over the periods of a pixel.
@@ -25,21 +25,6 @@ struct PixelSums {
     attractive: u32,
     repulsive: u32,
     irregular: u32,
-}
-
-/// Pixels of a line in one direction, by channel.
-#[derive(Clone, Debug, Default)]
-pub(super) struct PixelRow {
-    pub(super) surface: Vec<f64>,
-    pub(super) height: Vec<f64>,
-    pub(super) amplitude_error: Vec<f64>,
-    pub(super) phase: Vec<f64>,
-    pub(super) peak_force: Vec<f64>,
-    pub(super) peak_force_max: Vec<f64>,
-    pub(super) dissipation: Vec<f64>,
-    pub(super) contact_fraction: Vec<f64>,
-    pub(super) mean_deflection: Vec<f64>,
-    pub(super) state: Vec<Option<Interaction>>,
 }
 
 /// A line in one direction.

@@ -1,87 +1,58 @@
-//! Channels of an image by name, and its pixels as a table.
+//! Pixels and lines of a scan as tables.
 
-use std::fmt::Write as _;
-
-use super::report::{Channels, ScanReport};
+use super::instrument::Interaction;
+use super::report::{CHANNELS, Channel, Channels, Direction, LineStatistics, ScanReport};
+use crate::case::quantity::prefix_of;
 use crate::dataset::gsf::Field;
-use crate::number::shortest;
+use crate::frame::{AsCell, Cell, Form, Frame, Rows, columns, finite};
 
-/// A channel of an image.
-#[derive(Clone, Copy, Debug)]
-pub struct Channel {
-    /// Name in tables, files and Python.
-    pub name: &'static str,
-    /// Title of the channel, without the unit.
-    pub title: &'static str,
-    /// SI unit; empty for a number without unit.
-    pub unit: &'static str,
-    /// Returns the values from the channels of an image: one vector per line, one entry per pixel.
-    pub values: fn(&Channels) -> &Vec<Vec<f64>>,
+impl Channel {
+    /// SI unit in files; empty for a number without unit.
+    pub const fn unit(&self) -> &'static str {
+        self.dimension.file_unit()
+    }
+
+    /// Label of an axis with its unit, the factor from SI to it, and the values.
+    pub fn axis(&self) -> (String, f64) {
+        let prefix = prefix_of(self.power).unwrap_or_default();
+        let label = match self.power {
+            0 => self.label.to_owned(),
+            _ => format!("{} ({prefix}{})", self.label, self.unit()),
+        };
+        (label, 10f64.powi(-self.power))
+    }
 }
 
-/// All channels except the state.
-pub const CHANNELS: [Channel; 9] = [
-    Channel {
-        name: "surface",
-        title: "surface",
-        unit: "m",
-        values: |image| &image.surface,
-    },
-    Channel {
-        name: "height",
-        title: "height",
-        unit: "m",
-        values: |image| &image.height,
-    },
-    Channel {
-        name: "amplitude_error",
-        title: "amplitude error",
-        unit: "m",
-        values: |image| &image.amplitude_error,
-    },
-    Channel {
-        name: "phase",
-        title: "phase lag",
-        unit: "deg",
-        values: |image| &image.phase,
-    },
-    Channel {
-        name: "peak_force",
-        title: "mean peak force",
-        unit: "N",
-        values: |image| &image.peak_force,
-    },
-    Channel {
-        name: "peak_force_max",
-        title: "largest peak force",
-        unit: "N",
-        values: |image| &image.peak_force_max,
-    },
-    Channel {
-        name: "dissipation",
-        title: "dissipated energy",
-        unit: "J",
-        values: |image| &image.dissipation,
-    },
-    Channel {
-        name: "contact_fraction",
-        title: "contact time / period",
-        unit: "",
-        values: |image| &image.contact_fraction,
-    },
-    Channel {
-        name: "mean_deflection",
-        title: "mean deflection",
-        unit: "m",
-        values: |image| &image.mean_deflection,
-    },
-];
+impl AsCell for Interaction {
+    fn cell(&self) -> Cell {
+        let name = match self {
+            Self::Free => "free",
+            Self::Attractive => "attractive",
+            Self::Repulsive => "repulsive",
+            Self::Irregular => "irregular",
+        };
+        name.cell()
+    }
+}
+
+impl Direction {
+    /// Name in documents.
+    const fn name(self) -> &'static str {
+        match self {
+            Self::Trace => "trace",
+            Self::Retrace => "retrace",
+        }
+    }
+}
 
 /// Returns the centres of `count` pixels over a length, along or across the lines.
 pub(super) fn centres(count: usize, size: f64) -> Vec<f64> {
     let step = size / count.max(1) as f64;
     (0..count).map(|k| (k as f64 + 0.5) * step).collect()
 }
+
+/// A pixel: line, direction and image, its number in the line, and its position, m.
+type Pixel<'a> = ((usize, &'static str, &'a Channels), usize, f64);
 
 impl ScanReport {
     /// Returns the positions of the pixels along a line, m.
@@ -104,44 +75,64 @@ impl ScanReport {
             y: centres(rows.len(), self.size[1]),
             values: rows.iter().flatten().copied().collect(),
             axis_unit: "m".into(),
-            value_unit: channel.unit.into(),
+            value_unit: channel.unit().into(),
         }
+    }
+
+    /// The pixels: line, direction, position and every channel.
+    pub fn pixel_table<'a>(&'a self) -> Frame<'a> {
+        let positions = self.pixel_positions();
+        let lines = 0..self.trace.height.len();
+        let images = lines.flat_map(|line| {
+            self.directions()
+                .map(move |(name, image)| (line, name, image))
+        });
+        let pixels = images.flat_map(|image| {
+            let numbered = positions.iter().enumerate();
+            numbered.map(move |(k, x)| (image, k, *x))
+        });
+        let rows = columns! { Rows::new("pixels", pixels, None);
+            "line", "line", Plain => |((line, ..), ..)| line;
+            "direction", "direction", Plain => |((_, direction, _), ..)| direction;
+            "x", "x", (Length, Prefixed(5)) => |(.., x)| x;
+        };
+        let with = |rows: Rows<'a, Pixel<'a>>, channel: &'static Channel| {
+            let shown = (channel.dimension, Form::Scaled(channel.power, 4));
+            let value = |((line, _, image), k, _): Pixel<'a>| (channel.values)(image)[line][k];
+            let rows = rows.column(channel.name, channel.title, shown, move |at| {
+                finite(value(at))
+            });
+            rows.label(channel.label)
+        };
+        let rows = columns! { CHANNELS.iter().fold(rows, with);
+            "state", "state", Plain => |((line, _, image), k, _)| image.state[line][k];
+        };
+        rows.frame()
+    }
+
+    /// The statistics of the lines.
+    pub fn line_table(&self) -> Frame<'_> {
+        let longest = |line: &'_ LineStatistics| {
+            let lengths = line.parachuting.iter().map(|flight| flight.length);
+            lengths.fold(0.0, f64::max)
+        };
+        let rows = columns! { Rows::new("lines", &self.lines, None);
+            "direction", "", Plain => |line| line.direction.name();
+            .fields(Some);
+            "", "parachuting", (Length, Scaled(-9, 3)) => longest;
+        };
+        rows.frame().shown(&LINES[..])
     }
 }
 
-/// Formats the pixels as CSV, a row per pixel: line, direction, position and every channel, in SI.
-pub fn pixels_csv(report: &ScanReport) -> String {
-    let mut csv = String::from("line,direction,x (m)");
-    for channel in CHANNELS {
-        csv.push(',');
-        csv.push_str(channel.name);
-        if !channel.unit.is_empty() {
-            // Writing to a string does not fail.
-            let _ = write!(csv, " ({})", channel.unit);
-        }
-    }
-    csv.push_str(",state\n");
-    let positions = report.pixel_positions();
-    for line in 0..report.trace.height.len() {
-        for (direction, image) in report.directions() {
-            for (pixel, x) in positions.iter().enumerate() {
-                let _ = write!(csv, "{line},{direction},{}", shortest(*x));
-                for channel in CHANNELS {
-                    let value = (channel.values)(image)[line][pixel];
-                    csv.push(',');
-                    if value.is_finite() {
-                        csv.push_str(&shortest(value));
-                    }
-                }
-                let state = image.state[line][pixel];
-                let state = state.map(|state| serde_json::to_value(state).unwrap_or_default());
-                let _ = writeln!(
-                    csv,
-                    ",{}",
-                    state.as_ref().and_then(|s| s.as_str()).unwrap_or("")
-                );
-            }
-        }
-    }
-    csv
-}
+/// Columns of the lines that are shown.
+const LINES: [&str; 8] = [
+    "line",
+    "direction",
+    "height_rms",
+    "error_rms",
+    "tracking_rms",
+    "peak_force_max",
+    "parachuting",
+    "overshoot",
+];

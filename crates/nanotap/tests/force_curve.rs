@@ -14,7 +14,7 @@ use nanotap::control::Control;
 use nanotap::study::Study as _;
 use nanotap::study::approach::Way;
 use nanotap::study::force_curve::{
-    ContactModel, ForceCurveOptions, ForceCurveReport, ForceCurveStudy, points_csv,
+    ContactModel, ForceCurveOptions, ForceCurveReport, ForceCurveStudy,
 };
 use nanotap::study::orbit::{OrbitOptions, OrbitStudy};
 use serde_json::{Value, json};
@@ -680,7 +680,7 @@ fn the_table_has_every_point() {
         1,
         json!({"to": "-1 nm", "speed": "0.2 mm/s", "points": 20}),
     );
-    let table = points_csv(&report);
+    let table = report.point_table().csv();
     assert_eq!(table.lines().count(), 41);
     let last: Vec<&str> = table.lines().last().unwrap().split(',').collect();
     assert_eq!(last[0], "retract");

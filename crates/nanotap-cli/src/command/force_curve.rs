@@ -4,17 +4,15 @@ use clap::Args;
 use nanotap::case::physical::Kind;
 use nanotap::figure::force_curve::force_curve_figure;
 use nanotap::study::approach::Way;
-use nanotap::study::force_curve::{
-    ForceCurveReport, ForceCurveStudy, StaticJump, Waveform, points_csv,
-};
+use nanotap::study::force_curve::{ForceCurveReport, ForceCurveStudy, StaticJump, Waveform};
 
 use crate::failure::Failure;
 use crate::given_case::GivenCase;
 use crate::output::Output;
 use crate::study_arguments::StudyArguments;
-use crate::table::{Align, Table};
+use crate::table::Table;
 use crate::threads::ThreadsArgument;
-use crate::{motion, number, progress, style};
+use crate::{motion, progress, style};
 
 /// A force curve at a finite speed: snap-in, contact, pull-off and ringing, with the branches on
 /// which the lever would rest, adhesion, work, indentation and the moduli of contact fits.
@@ -32,7 +30,7 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     for warning in &report.warnings {
         output.warning(warning);
     }
-    arguments.study.out.write(|| points_csv(&report))?;
+    arguments.study.out.write(|| report.point_table().csv())?;
     arguments.study.plot.draw(|| force_curve_figure(&report))?;
     output.study(&case, &report, |report| text(&case, report))
 }
@@ -56,86 +54,13 @@ fn text(case: &GivenCase, report: &ForceCurveReport) -> String {
         length(report.from),
         length(report.to),
     );
-    let none = || "none".to_owned();
-    let summary = &report.summary;
-    let energy = |value: f64| in_units(Kind::Energy, value);
-    let mut table = Table::new([("", Align::Left), ("", Align::Left), ("", Align::Left)]);
-    let mut row = |name: &str, value: String, meaning: &str| {
-        table.row([name.to_owned(), value, meaning.to_owned()]);
-    };
-    row(
-        "contact begins",
-        summary.contact_begin.map_or_else(none, length),
-        "distance at which the tip first touches on the approach",
-    );
-    row(
-        "contact ends",
-        summary.contact_end.map_or_else(none, length),
-        "distance at which the tip last touches on the retract",
-    );
-    row("peak force", in_units(Kind::Force, summary.peak_force), "");
-    row(
-        "adhesion force",
-        in_units(Kind::Force, summary.adhesion_force),
-        "minus the lowest force of the retract",
-    );
-    if let Some(point) = &report.statics.pull_off {
-        row(
-            "  at rest",
-            in_units(Kind::Force, -point.force),
-            "the same without inertia, until the lever jumps off",
-        );
-    }
-    row(
-        "indentation",
-        length(summary.indentation),
-        "minus the least separation",
-    );
-    row(
-        "work of adhesion",
-        energy(summary.adhesion_energy),
-        "area between the retract and zero force where the sample attracts",
-    );
-    row(
-        "energy lost",
-        energy(summary.energy_lost),
-        "area between approach and retract",
-    );
-    row(
-        "  in the sample",
-        energy(summary.dissipation),
-        "the rest rings down in the lever",
-    );
+    let table = Table::record(&report.result_table());
     let mut text = format!("{}\n\n{}", style::bold(&heading), table.render());
     for jump in &report.statics.jumps {
         text.push_str(&motion::paragraph(&jump_text(jump)));
     }
     if !report.fits.is_empty() {
-        let mut table = Table::new([
-            ("fit of the unloading", Align::Left),
-            ("E*", Align::Left),
-            ("E of the sample", Align::Left),
-            ("rms (pm)", Align::Point),
-        ]);
-        for fit in &report.fits {
-            table.row([
-                fit.model.name().to_owned(),
-                in_units(Kind::Pressure, fit.reduced_modulus),
-                fit.modulus
-                    .map_or_else(none, |e| in_units(Kind::Pressure, e)),
-                number::significant(1e12 * fit.residual, 3),
-            ]);
-        }
-        if let Some(reduced) = report.reduced_modulus {
-            table.row([
-                "of the case".to_owned(),
-                in_units(Kind::Pressure, reduced),
-                report
-                    .modulus
-                    .map_or_else(none, |e| in_units(Kind::Pressure, e)),
-                String::new(),
-            ]);
-        }
+        let table = Table::all(&report.fit_table());
         text.push('\n');
         text.push_str(&table.render());
     }

@@ -6,9 +6,7 @@ use nanotap::control::Control;
 use nanotap::figure::fit::fit_figure;
 use nanotap::study::Study as _;
 use nanotap::study::fit::{Entry, FitOptions, FitReport, Table, fit};
-use nanotap::study::force_curve::{
-    ForceCurveOptions, ForceCurveReport, ForceCurveStudy, points_csv,
-};
+use nanotap::study::force_curve::{ForceCurveOptions, ForceCurveReport, ForceCurveStudy};
 
 use super::fit::Noise;
 
@@ -200,7 +198,7 @@ fn a_curve_of_another_law_is_a_misfit() {
 fn a_table_of_the_study_is_read_as_it_is() {
     let case = case("dmt", DMT);
     let curve = curve(&case);
-    let table = Table::parse("curve.csv", &points_csv(&curve)).unwrap();
+    let table = Table::parse("curve.csv", &curve.point_table().csv()).unwrap();
     let found = fitted(&case, table.clone(), &["sample.modulus", "sample.hamaker"]);
     let truth = [20e6, 7e-20];
     for (parameter, truth) in found.parameters.iter().zip(truth) {

@@ -32,7 +32,7 @@ use nanotap_dynamics::Control;
 pub use fits::{ContactFit, ContactModel};
 pub use report::{
     CurvePoint, ForceCurveReport, ForceCurveSummary, StaticBranch, StaticJump, StaticPoint,
-    Statics, Waveform, points_csv,
+    Statics, Waveform,
 };
 
 pub(crate) use path::physical;

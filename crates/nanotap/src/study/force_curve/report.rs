@@ -1,7 +1,5 @@
 //! The report of a force curve, in SI.
 
-use std::fmt::Write as _;
-
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -13,7 +11,7 @@ use super::statics::{Rest, StaticCurve, StaticsFound};
 use crate::case::key::Key;
 use crate::case::physical::force::SampleForce;
 use crate::case::physical::sample::Elastic;
-use crate::number::shortest;
+use crate::frame::{Align, AsCell as _, Frame, Rows, columns, rows};
 use crate::observe::OutOfRange;
 use crate::study::moving_lever::Signals;
 
@@ -27,30 +25,33 @@ pub enum Waveform {
     Cosine,
 }
 
-/// A point of the force curve, in SI. Of a driven lever separation, deflection and force are means
-/// over the drive period before, as the slow channels of an instrument show them.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
-pub struct CurvePoint {
-    /// Direction of the motion at this point.
-    pub way: Way,
-    /// Time from the start, s.
-    pub time: f64,
-    /// Distance z between tip and undeformed surface with the lever at deflection 0, m.
-    pub distance: f64,
-    /// Separation of tip and undeformed surface, z + deflection, m; minus the indentation in contact.
-    pub separation: f64,
-    /// Deflection of the tip, positive away from the sample, m.
-    pub deflection: f64,
-    /// Force of the sample on the tip, positive if it repels, N.
-    pub force: f64,
-    /// Whether tip and sample touch; of a driven lever, at any time of the drive period before.
-    pub contact: bool,
-    /// Amplitude of the deflection at the drive's frequency over the drive period before, m.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub amplitude: Option<f64>,
-    /// Phase lag of the deflection behind the drive over the drive period before, degrees.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub phase: Option<f64>,
+rows! {
+    in si_unit
+    /// A point of the force curve, in SI. Of a driven lever separation, deflection and force are means
+    /// over the drive period before, as the slow channels of an instrument show them.
+    #[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
+    pub struct CurvePoint {
+        /// Direction of the motion at this point.
+        pub way: Way,
+        /// Time from the start, s.
+        pub time: f64 = Time, "time",
+        /// Distance z between tip and undeformed surface with the lever at deflection 0, m.
+        pub distance: f64 = Length, "distance",
+        /// Separation of tip and undeformed surface, z + deflection, m; minus the indentation in contact.
+        pub separation: f64 = Length, "separation",
+        /// Deflection of the tip, positive away from the sample, m.
+        pub deflection: f64 = Length, "deflection",
+        /// Force of the sample on the tip, positive if it repels, N.
+        pub force: f64 = Force, "force",
+        /// Whether tip and sample touch; of a driven lever, at any time of the drive period before.
+        pub contact: bool = Count, "contact",
+        /// Amplitude of the deflection at the drive's frequency over the drive period before, m.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        pub amplitude: Option<f64> = Length, "amplitude",
+        /// Phase lag of the deflection behind the drive over the drive period before, degrees.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        pub phase: Option<f64> = Angle, "phase lag",
+    }
 }
 
 /// An equilibrium of the lever against the sample, in SI.
@@ -100,29 +101,32 @@ pub struct Statics {
     pub pull_off: Option<StaticPoint>,
 }
 
-/// Results of a force curve, in SI.
-#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
-pub struct ForceCurveSummary {
-    /// Distance at which the tip first touches on the approach, m.
-    pub contact_begin: Option<f64>,
-    /// Distance at which the tip last touches on the retract, m.
-    pub contact_end: Option<f64>,
-    /// Largest force of the sample on the tip, N; 0 if it never repels.
-    pub peak_force: f64,
-    /// Adhesion force: minus the lowest force of the retract, N.
-    pub adhesion_force: f64,
-    /// Minus the lowest force of the approach, N.
-    pub attraction: f64,
-    /// Indentation: minus the least separation, m.
-    pub indentation: f64,
-    /// Work of adhesion of the curve, −∫F dz over the parts of the retract where the sample
-    /// attracts, J; of a driven lever over the drive periods in which it attracts on the mean.
-    pub adhesion_energy: f64,
-    /// Energy lost in the cycle, −∮F dz, J.
-    pub energy_lost: f64,
-    /// Part of the lost energy that the tip gives to the sample, J; the rest rings down in the
-    /// lever.
-    pub dissipation: f64,
+rows! {
+    in si_unit
+    /// Results of a force curve, in SI.
+    #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+    pub struct ForceCurveSummary {
+        /// Distance at which the tip first touches on the approach, m.
+        pub contact_begin: Option<f64> = Length, "distance at which the tip first touches on the approach", "contact begins", Prefixed(5),
+        /// Distance at which the tip last touches on the retract, m.
+        pub contact_end: Option<f64> = Length, "distance at which the tip last touches on the retract", "contact ends", Prefixed(5),
+        /// Largest force of the sample on the tip, N; 0 if it never repels.
+        pub peak_force: f64 = Force, "peak force", "peak force", Prefixed(5),
+        /// Adhesion force: minus the lowest force of the retract, N.
+        pub adhesion_force: f64 = Force, "minus the lowest force of the retract", "adhesion force", Prefixed(5),
+        /// Minus the lowest force of the approach, N.
+        pub attraction: f64 = Force, "minus the lowest force of the approach", "attraction", Prefixed(5),
+        /// Indentation: minus the least separation, m.
+        pub indentation: f64 = Length, "minus the least separation", "indentation", Prefixed(5),
+        /// Work of adhesion of the curve, −∫F dz over the parts of the retract where the sample
+        /// attracts, J; of a driven lever over the drive periods in which it attracts on the mean.
+        pub adhesion_energy: f64 = Energy, "area between the retract and zero force where the sample attracts", "work of adhesion", Prefixed(5),
+        /// Energy lost in the cycle, −∮F dz, J.
+        pub energy_lost: f64 = Energy, "area between approach and retract", "energy lost", Prefixed(5),
+        /// Part of the lost energy that the tip gives to the sample, J; the rest rings down in the
+        /// lever.
+        pub dissipation: f64 = Energy, "the rest rings down in the lever", "  in the sample", Prefixed(5),
+    }
 }
 
 /// A force curve with its static branches.
@@ -166,6 +170,69 @@ pub struct ForceCurveReport {
     /// Sentences on what makes the results doubtful.
     pub warnings: Vec<String>,
 }
+
+impl ForceCurveReport {
+    /// The points of approach and retract.
+    pub fn point_table(&self) -> Frame<'_> {
+        let rows = columns! { Rows::new("table", &self.points, None);
+            "way", "way", Plain => |p| p.way.name();
+            .fields(Some);
+        };
+        let undriven = if self.driven {
+            &[][..]
+        } else {
+            &["amplitude", "phase"]
+        };
+        rows.frame().without(undriven)
+    }
+
+    /// The results.
+    pub fn result_table(&self) -> Frame<'_> {
+        let at_rest = |report: &'_ Self| Some(-report.statics.pull_off?.force);
+        let rows = columns! { Rows::new("summary", [self], None);
+            .fields(|report| Some(&report.summary));
+            "", "  at rest", (Force, Prefixed(5)) => at_rest;
+            .label("the same without inertia, until the lever jumps off");
+        };
+        rows.frame().shown(&RESULTS[..])
+    }
+
+    /// The fits of contact models to the unloading part, and the moduli of the case.
+    pub fn fit_table(&self) -> Frame<'_> {
+        let fits = self.fits.iter();
+        let fits = fits.map(|f| {
+            (
+                f.model.name(),
+                f.reduced_modulus,
+                f.modulus,
+                Some(f.residual),
+            )
+        });
+        let own = self.reduced_modulus.filter(|_| !self.fits.is_empty());
+        let own = own.map(|reduced| ("of the case", reduced, self.modulus, None));
+        let modulus = |e: Option<f64>| e.map_or_else(|| "none".cell(), |e| e.cell());
+        let rows = columns! { Rows::new("fits", fits.chain(own), None);
+            "model", "fit of the unloading", Plain => |f| f.0;
+            "reduced_modulus", "E*", (Si(Kind::Pressure), Prefixed(5)) => |f| f.1;
+            "modulus", "E of the sample", (Si(Kind::Pressure), Prefixed(5)) => move |f| modulus(f.2);
+            "residual", "rms", (Length, Scaled(-12, 3)) => |f| f.3;
+        };
+        rows.frame().aligned(Align::Left, Align::Point)
+    }
+}
+
+/// Results that are shown, in this order.
+const RESULTS: [&str; 9] = [
+    "contact_begin",
+    "contact_end",
+    "peak_force",
+    "adhesion_force",
+    "  at rest",
+    "indentation",
+    "adhesion_energy",
+    "energy_lost",
+    "dissipation",
+];
 
 /// Fraction of the resonance frequency above which the inertia of a moving base matters.
 const FAST: f64 = 0.1;
@@ -333,36 +400,4 @@ pub(super) fn report(plan: &Plan<'_>, statics: &StaticsFound, run: &Run) -> Forc
         points,
         warnings,
     }
-}
-
-/// Formats the points as CSV, one row per point, in SI.
-pub fn points_csv(report: &ForceCurveReport) -> String {
-    let mut csv =
-        String::from("way,time (s),distance (m),separation (m),deflection (m),force (N),contact");
-    if report.driven {
-        csv.push_str(",amplitude (m),phase (deg)");
-    }
-    csv.push('\n');
-    for point in &report.points {
-        let values = [
-            point.time,
-            point.distance,
-            point.separation,
-            point.deflection,
-            point.force,
-        ];
-        csv.push_str(point.way.name());
-        for value in values {
-            // Writing to a string does not fail.
-            let _ = write!(csv, ",{}", shortest(value));
-        }
-        let _ = write!(csv, ",{}", u8::from(point.contact));
-        if report.driven {
-            for value in [point.amplitude, point.phase] {
-                let _ = write!(csv, ",{}", value.map(shortest).unwrap_or_default());
-            }
-        }
-        csv.push('\n');
-    }
-    csv
 }

@@ -2,7 +2,7 @@
 
 use nanotap::case::physical::Kind;
 use nanotap::figure::bimodal::bimodal_figure;
-use nanotap::study::bimodal::{BimodalPoint, BimodalReport, BimodalStudy, Loop, points_csv};
+use nanotap::study::bimodal::{BimodalPoint, BimodalReport, BimodalStudy};
 
 use crate::failure::Failure;
 use crate::given_case::GivenCase;
@@ -20,7 +20,7 @@ pub(crate) type Arguments = StudyArguments<BimodalStudy>;
 pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure> {
     let (request, case) = arguments.read(output)?;
     let report = progress::study::<BimodalStudy>(&case, &request, &ThreadsArgument::default())?;
-    arguments.out.write(|| points_csv(&report))?;
+    arguments.out.write(|| report.point_table().csv())?;
     arguments.plot.draw(|| bimodal_figure(&report))?;
     output.study(&case, &report, |report| text(&case, report))
 }
@@ -28,37 +28,6 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
 fn length(value: f64) -> String {
     Kind::Length.format_digits(value, 4)
 }
-
-/// A column of a tone: heading, whether the loops show it, and text of a cell.
-type Column = (
-    &'static str,
-    fn(Loop) -> bool,
-    fn(&BimodalPoint, usize) -> String,
-);
-
-/// The columns shown for a tone; a loop decides which of its quantities vary.
-const COLUMNS: [Column; 4] = [
-    (
-        "A",
-        |kind| !kind.holds_amplitude(),
-        |p, k| length(p.tones[k].amplitude),
-    ),
-    (
-        "lag (°)",
-        |kind| !kind.holds_phase(),
-        |p, k| format!("{:.2}", p.tones[k].phase),
-    ),
-    (
-        "Δf",
-        |kind| kind.holds_phase(),
-        |p, k| Kind::Frequency.format_digits(p.tones[k].frequency_shift, 4),
-    ),
-    (
-        "drive",
-        |kind| kind.holds_amplitude(),
-        |p, k| number::significant(p.tones[k].drive_ratio, 4),
-    ),
-];
 
 fn text(case: &GivenCase, report: &BimodalReport) -> String {
     let heading = format!(
@@ -69,9 +38,9 @@ fn text(case: &GivenCase, report: &BimodalReport) -> String {
         report.loops[1].name()
     );
     let mut text = format!("{}\n\n", style::bold(&heading));
-    text.push_str(&free(report).render());
+    text.push_str(&Table::all(&report.free_table()).render());
     text.push('\n');
-    text.push_str(&curve(report).render());
+    text.push_str(&Table::all(&report.point_table()).render());
     for jump in &report.jumps {
         text.push_str(&motion::paragraph(&format!(
             "Between {} and {} the motion jumps to another.",
@@ -87,52 +56,6 @@ fn text(case: &GivenCase, report: &BimodalReport) -> String {
         text.push_str(&at(last, report));
     }
     text
-}
-
-/// The table of the free lever at both tones: amplitude, phase lag, frequency and stiffness.
-fn free(report: &BimodalReport) -> Table {
-    let mut table = Table::new([
-        ("free lever", Align::Left),
-        ("A", Align::Left),
-        ("lag (°)", Align::Point),
-        ("frequency", Align::Left),
-        ("stiffness", Align::Left),
-    ]);
-    for (name, tone) in ["first tone", "second tone"].into_iter().zip(&report.free) {
-        table.row([
-            name.to_owned(),
-            length(tone.amplitude),
-            format!("{:.2}", tone.phase),
-            Kind::Frequency.format_digits(tone.frequency, 7),
-            Kind::Stiffness.format_digits(tone.stiffness, 4),
-        ]);
-    }
-    table
-}
-
-/// The table against the distance, one row per distance.
-fn curve(report: &BimodalReport) -> Table {
-    let shown: Vec<(String, usize, &Column)> = [0, 1]
-        .into_iter()
-        .flat_map(|k| COLUMNS.iter().map(move |column| (k, column)))
-        .filter(|(k, (_, shows, _))| shows(report.loops[*k]))
-        .map(|(k, column)| (format!("{} {}", column.0, k + 1), k, column))
-        .collect();
-    let names = shown.iter().map(|(name, ..)| (name.as_str(), Align::Left));
-    let ends = [("F_max", Align::Left), ("E* by formula", Align::Left)];
-    let columns = std::iter::once(("distance", Align::Left))
-        .chain(names)
-        .chain(ends);
-    let mut table = Table::new(columns);
-    for point in &report.table {
-        let modulus = point.estimates.reduced_modulus;
-        let mut row = vec![length(point.zc)];
-        row.extend(shown.iter().map(|(_, k, column)| (column.2)(point, *k)));
-        row.push(Kind::Force.format_digits(point.peak_force, 4));
-        row.push(modulus.map_or_else(String::new, |value| Kind::Pressure.format_digits(value, 4)));
-        table.row(row);
-    }
-    table
 }
 
 /// The last motion, and the values of the formulas.

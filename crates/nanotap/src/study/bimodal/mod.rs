@@ -22,7 +22,7 @@ pub use formulas::{Estimates, ToneEstimates};
 use crate::Error;
 use crate::case::Case;
 use crate::control::Control;
-use crate::number::shortest;
+use crate::frame::{Align, Frame, Rows, columns, rows};
 use crate::study::limits::MAX_DISTANCES;
 use crate::study::request::options;
 use crate::study::value::Amount;
@@ -90,73 +90,82 @@ options! {
     }
 }
 
-/// The free lever at a tone. All quantities are in SI.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
-pub struct FreeTone {
-    /// Amplitude of the tip deflection in m.
-    #[serde(rename = "A")]
-    pub amplitude: f64,
-    /// Phase lag behind the drive in degrees.
-    pub phase: f64,
-    /// Frequency of the drive, Hz.
-    pub frequency: f64,
-    /// Strength of the drive: its force in N, or a driven base's amplitude in m.
-    pub drive_strength: f64,
-    /// Stiffness of the mode at the tip in N/m.
-    pub stiffness: f64,
-    /// Frequency at which the free lever lags by the phase of the loop, by default 90°, in Hz.
-    pub resonance: f64,
+rows! {
+    in si_unit
+    /// The free lever at a tone. All quantities are in SI.
+    #[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
+    pub struct FreeTone {
+        /// Amplitude of the tip deflection in m.
+        #[serde(rename = "A")]
+        pub amplitude: f64 = Length, "amplitude $A$", "A", Prefixed(4),
+        /// Phase lag behind the drive in degrees.
+        pub phase: f64 = Angle, "phase lag", "lag (°)", Decimals(2),
+        /// Frequency of the drive, Hz.
+        pub frequency: f64 = Frequency, "frequency", "frequency", Prefixed(7),
+        /// Strength of the drive: its force in N, or a driven base's amplitude in m.
+        pub drive_strength: f64,
+        /// Stiffness of the mode at the tip in N/m.
+        pub stiffness: f64 = Si(Kind::Stiffness), "stiffness of the mode", "stiffness", Prefixed(4),
+        /// Frequency at which the free lever lags by the phase of the loop, by default 90°, in Hz.
+        pub resonance: f64,
+    }
 }
 
-/// Readings of one tone. All quantities are in SI.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
-pub struct ToneReading {
-    /// Amplitude of the tip deflection in m.
-    #[serde(rename = "A")]
-    pub amplitude: f64,
-    /// Phase lag behind the drive in degrees.
-    pub phase: f64,
-    /// Frequency of the drive, Hz.
-    pub frequency: f64,
-    /// Frequency less that of the free lever in Hz.
-    pub frequency_shift: f64,
-    /// Strength of the drive: its force in N, or a driven base's amplitude in m.
-    pub drive_strength: f64,
-    /// Strength of the drive over that of the free lever, dimensionless.
-    pub drive_ratio: f64,
-    /// Mean of the force times the tone's part of the deflection, in J.
-    pub virial: f64,
-    /// Energy that the force takes from the tone's part of the motion in a period of the tone, in J.
-    #[serde(rename = "E_dis")]
-    pub dissipation: f64,
-    /// Virial and dissipation that the usual formulas give for this tone.
-    pub estimates: ToneEstimates,
+rows! {
+    in si_unit
+    /// Readings of one tone. All quantities are in SI.
+    #[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
+    pub struct ToneReading {
+        /// Amplitude of the tip deflection in m.
+        #[serde(rename = "A")]
+        pub amplitude: f64 = Length, "amplitude $A$", "A", Prefixed(4),
+        /// Phase lag behind the drive in degrees.
+        pub phase: f64 = Angle, "phase lag", "lag (°)", Decimals(2),
+        /// Frequency of the drive, Hz.
+        pub frequency: f64,
+        /// Frequency less that of the free lever in Hz.
+        pub frequency_shift: f64 = Frequency, "frequency shift $Δf$", "Δf", Prefixed(4),
+        /// Strength of the drive: its force in N, or a driven base's amplitude in m.
+        pub drive_strength: f64,
+        /// Strength of the drive over that of the free lever, dimensionless.
+        pub drive_ratio: f64 = Number, "drive / free drive", "drive", Digits(4),
+        /// Mean of the force times the tone's part of the deflection, in J.
+        pub virial: f64 = Energy, "virial",
+        /// Energy that the force takes from the tone's part of the motion in a period of the tone, in J.
+        #[serde(rename = "E_dis")]
+        pub dissipation: f64 = Energy, "dissipation $E_{dis}$",
+        /// Virial and dissipation that the usual formulas give for this tone.
+        pub estimates: ToneEstimates,
+    }
 }
 
-/// The motion at one distance. All quantities are in SI.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
-pub struct BimodalPoint {
-    /// Distance of the tip at rest from the sample in m.
-    pub zc: f64,
-    /// The readings of both tones.
-    pub tones: [ToneReading; 2],
-    /// Time mean of the force on the tip in N.
-    pub mean_force: f64,
-    /// Largest force on the tip in N.
-    #[serde(rename = "F_max")]
-    pub peak_force: f64,
-    /// Lowest force on the tip in N.
-    #[serde(rename = "F_min")]
-    pub least_force: f64,
-    /// Least height of the tip over the undeformed surface in m.
-    pub closest: f64,
-    /// Factor by which a small disturbance grows in a period of the first tone at constant drives.
-    pub growth: f64,
-    /// Largest of the last two harmonics of the second tone's phase, relative to the motion: an
-    /// estimate of the truncation error.
-    pub error: f64,
-    /// Sample properties that the usual formulas give at this distance.
-    pub estimates: Estimates,
+rows! {
+    in si_unit
+    /// The motion at one distance. All quantities are in SI.
+    #[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
+    pub struct BimodalPoint {
+        /// Distance of the tip at rest from the sample in m.
+        pub zc: f64,
+        /// The readings of both tones.
+        pub tones: [ToneReading; 2],
+        /// Time mean of the force on the tip in N.
+        pub mean_force: f64,
+        /// Largest force on the tip in N.
+        #[serde(rename = "F_max")]
+        pub peak_force: f64 = Force, "peak force $F_{max}$", "F_max", Prefixed(4),
+        /// Lowest force on the tip in N.
+        #[serde(rename = "F_min")]
+        pub least_force: f64,
+        /// Least height of the tip over the undeformed surface in m.
+        pub closest: f64,
+        /// Factor by which a small disturbance grows in a period of the first tone at constant drives.
+        pub growth: f64 = Number, "growth of a small disturbance",
+        /// Largest of the last two harmonics of the second tone's phase, relative to the motion: an
+        /// estimate of the truncation error.
+        pub error: f64 = Number, "truncation error",
+        /// Sample properties that the usual formulas give at this distance.
+        pub estimates: Estimates,
+    }
 }
 
 /// A jump from one motion to another. All quantities are in SI.
@@ -196,48 +205,46 @@ pub struct BimodalReport {
     pub stability: &'static str,
 }
 
-/// The table as CSV in SI, a row a distance.
-pub fn points_csv(report: &BimodalReport) -> String {
-    let tone = |k: usize| {
-        [
-            format!("amplitude_{k} (m)"),
-            format!("phase_{k} (deg)"),
-            format!("frequency_shift_{k} (Hz)"),
-            format!("drive_ratio_{k}"),
-            format!("virial_{k} (J)"),
-            format!("dissipation_{k} (J)"),
-        ]
-    };
-    let ends = ["peak_force (N)", "growth", "error", "formula_modulus (Pa)"];
-    let mut names = vec!["distance (m)".to_owned()];
-    names.extend([1, 2].map(tone).concat());
-    names.extend(ends.map(str::to_owned));
-    let mut csv = names.join(",") + "\n";
-    for point in &report.table {
-        let readings = point.tones.iter().flat_map(|tone| {
-            [
-                tone.amplitude,
-                tone.phase,
-                tone.frequency_shift,
-                tone.drive_ratio,
-                tone.virial,
-                tone.dissipation,
-            ]
-        });
-        let mut row = vec![shortest(point.zc)];
-        row.extend(readings.map(shortest));
-        row.extend([point.peak_force, point.growth, point.error].map(shortest));
-        row.push(
-            point
-                .estimates
-                .reduced_modulus
-                .map(shortest)
-                .unwrap_or_default(),
-        );
-        csv.push_str(&row.join(","));
-        csv.push('\n');
+impl BimodalReport {
+    /// The free lever at both tones.
+    pub fn free_table(&self) -> Frame<'_> {
+        let tones = ["first tone", "second tone"].into_iter().zip(&self.free);
+        let rows = columns! { Rows::new("free", tones, None);
+            "tone", "free lever", Plain => |(name, _)| name;
+            .fields(|(_, tone)| Some(tone));
+        };
+        rows.frame().aligned(Align::Left, Align::Point)
     }
-    csv
+
+    /// The motion at each distance. A loop decides which quantities of a tone vary and are shown.
+    pub fn point_table(&self) -> Frame<'_> {
+        let varying = |k: usize| {
+            let own = self.loops[k];
+            let all = [
+                (!own.holds_amplitude(), ["amplitude_1", "amplitude_2"]),
+                (!own.holds_phase(), ["phase_1", "phase_2"]),
+                (
+                    own.holds_phase(),
+                    ["frequency_shift_1", "frequency_shift_2"],
+                ),
+                (own.holds_amplitude(), ["drive_ratio_1", "drive_ratio_2"]),
+            ];
+            all.into_iter()
+                .filter(|(varies, _)| *varies)
+                .map(move |(_, names)| names[k])
+        };
+        let shown = ["distance"].into_iter().chain(varying(0)).chain(varying(1));
+        let shown: Vec<&str> = shown.chain(["peak_force", "formula_modulus"]).collect();
+        let rows = columns! { Rows::new("table", &self.table, None);
+            "distance", "distance", (Length, Prefixed(4)) => |p| p.zc;
+            .fields_of(0, |p| Some(&p.tones[0]));
+            .fields_of(1, |p| Some(&p.tones[1]));
+            .fields(Some);
+            "formula_modulus", "E* by formula", (Si(Kind::Pressure), Prefixed(4)) =>
+                |p| p.estimates.reduced_modulus;
+        };
+        rows.frame().shown(shown).aligned(Align::Left, Align::Left)
+    }
 }
 
 /// Explanation of [`BimodalPoint::growth`], for reports.

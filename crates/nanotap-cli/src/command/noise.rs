@@ -2,7 +2,7 @@
 
 use clap::Args;
 use nanotap::case::physical::Kind;
-use nanotap::study::noise::{NoiseOptions, NoiseReport, NoiseStudy, spectrum_csv};
+use nanotap::study::noise::{NoiseOptions, NoiseReport, NoiseStudy};
 
 use crate::arguments::{CaseArguments, OutArgument};
 use crate::failure::Failure;
@@ -33,7 +33,7 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     arguments.out.check()?;
     let case = GivenCase::of(&arguments.case, output)?;
     let report = progress::study::<NoiseStudy>(&case, &request, &ThreadsArgument::default())?;
-    arguments.out.write(|| spectrum_csv(&report.spectrum))?;
+    arguments.out.write(|| report.spectrum.table().csv())?;
     output.notes(&report.notes);
     output.study(&case, &report, |report| text(&case, report))
 }

@@ -9,6 +9,7 @@ use super::Thermal;
 use crate::case::key::Key;
 use crate::case::physical::Physical;
 use crate::case::physical::fluid::{Fluid, hydrodynamic_function};
+use crate::frame::{Frame, Rows, columns};
 
 /// Density and viscosity of air at 300 K, as Sader, Chon and Mulvaney take them (Rev. Sci. Instrum. 70,
 /// 3967, 1999).
@@ -50,6 +51,18 @@ struct Resonance {
     omega: f64,
     quality: f64,
     shape: DVector<f64>,
+}
+
+impl ThermalSpectrum {
+    /// The spectrum as a table.
+    pub fn table(&self) -> Frame<'_> {
+        let rows = self.frequency.iter().zip(&self.density);
+        let rows = columns! { Rows::new("spectrum", rows, None);
+            "frequency", "frequency", (Frequency, Digits(5)) => |(frequency, _)| frequency;
+            "density", "density", (Unit("m^2/Hz"), Digits(5)) => |(_, density)| density;
+        };
+        rows.frame()
+    }
 }
 
 impl Thermal {
@@ -155,17 +168,4 @@ impl Thermal {
 /// Returns the quadratic form vᵀ A v.
 fn product(matrix: &DMatrix<f64>, vector: &DVector<f64>) -> f64 {
     vector.dot(&(matrix * vector))
-}
-
-/// Formats the spectrum as CSV, with frequency in Hz and density in m²/Hz.
-pub fn spectrum_csv(spectrum: &ThermalSpectrum) -> String {
-    use crate::number::shortest;
-    let mut csv = String::from("frequency (Hz),density (m^2/Hz)\n");
-    for (frequency, density) in spectrum.frequency.iter().zip(&spectrum.density) {
-        csv.push_str(&shortest(*frequency));
-        csv.push(',');
-        csv.push_str(&shortest(*density));
-        csv.push('\n');
-    }
-    csv
 }

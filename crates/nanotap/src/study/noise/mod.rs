@@ -30,7 +30,7 @@ use crate::study::orbit::{OrbitOptions, OrbitReport, OrbitStudy};
 use crate::study::request::options;
 use crate::study::value::Amount;
 use crate::study::{Study, cantilever};
-pub use free_lever::{Calibrations, ThermalSpectrum, spectrum_csv};
+pub use free_lever::{Calibrations, ThermalSpectrum};
 pub use linearised::ReadingSpectrum;
 use linearised::{Linearised, LockIn};
 pub use saddle::SaddleDistance;

@@ -13,7 +13,7 @@ use crate::failure::Failure;
 use crate::given_case::GivenCase;
 use crate::output::Output;
 use crate::study_arguments::StudyArguments;
-use crate::table::{Align, Table};
+use crate::table::Table;
 use crate::threads::ThreadsArgument;
 use crate::{motion, number, progress, style};
 
@@ -43,7 +43,7 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     let (mut options, case) = arguments.study.read(output)?;
     options.data = measured(&arguments.data, &arguments.also, "reconstruct")?;
     let report = progress::study::<ReconstructStudy>(&case, &options, &arguments.threads)?;
-    arguments.study.out.write(|| report.csv())?;
+    arguments.study.out.write(|| report.force_table().csv())?;
     arguments.study.plot.draw(|| reconstruct_figure(&report))?;
     for remark in &report.remarks {
         output.warning(remark);
@@ -73,28 +73,9 @@ fn text(case: &GivenCase, report: &ReconstructReport) -> String {
         case.title(),
         number::counted(report.rows.len(), "row", "rows")
     );
-    let mut table = Table::new([
-        ("distance", Align::Point),
-        ("force", Align::Point),
-        ("standard error", Align::Point),
-        ("dissipation", Align::Point),
-        ("standard error", Align::Point),
-    ]);
-    let curve = &report.table;
     let end = report.shown_rows();
-    for k in (0..end).step_by(end.div_ceil(SHOWN).max(1)) {
-        let mut cells = vec![
-            shown(Kind::Length, curve.distance[k], 4),
-            shown(Kind::Force, curve.force[k], 4),
-            shown(Kind::Force, curve.force_error[k], 2),
-        ];
-        if report.has_damping {
-            cells.push(energy(curve.dissipation[k]));
-            cells.push(energy(curve.dissipation_error[k]));
-        }
-        cells.resize(5, String::new());
-        table.row(cells);
-    }
+    let rows = (0..end).step_by(end.div_ceil(SHOWN).max(1));
+    let table = Table::of(&report.force_table(), rows);
     let mut text = format!("{}\n\n{}\n", style::bold(&heading), table.render());
     let mut say = |words: String| text.push_str(&motion::paragraph(&words));
     if let Some(minimum) = &report.minimum {

@@ -147,7 +147,7 @@ impl Studied<'_> {
             found: Some(Found {
                 set,
                 take: "Use as the sample's force table",
-                file: report.csv(),
+                file: report.force_table().csv(),
                 save: "Force curve (CSV)",
                 name: "force.csv",
             }),
@@ -162,7 +162,7 @@ impl Studied<'_> {
         for key in &change.dropped {
             set.insert(key.path().into(), "".into());
         }
-        let force = Table::parse("the reconstructed force", &report.csv()).ok()?;
+        let force = Table::parse("the reconstructed force", &report.force_table().csv()).ok()?;
         let force = ForceTable::of(&force).ok()?.text();
         set.insert(Key::SampleTable.path().into(), force.into());
         let mut spec = self.request.case.clone();

@@ -322,7 +322,7 @@ fn a_dissipation_that_was_not_measured_is_empty() {
     assert!(!report.has_damping);
     assert!(report.table.dissipation.iter().all(Option::is_none));
     assert!(report.rows.iter().all(|row| row.dissipation.is_none()));
-    let csv = report.csv();
+    let csv = report.force_table().csv();
     assert!(csv.lines().skip(1).all(|line| line.ends_with(",,,,")));
     let document = serde_json::to_value(&report).unwrap();
     assert!(document["table"]["damping"][0].is_null());
@@ -353,7 +353,7 @@ fn the_table_is_a_law_that_gives_the_curve_back() {
         "drive.frequency_ratio=1".to_owned(),
         format!("drive.free_amplitude={} m", of("free_amplitude_m")),
         "sample.law=table".to_owned(),
-        format!("sample.table={}", report.csv()),
+        format!("sample.table={}", report.force_table().csv()),
         "gap.tip=6 nm".to_owned(),
     ];
     let again = Case::parse(None, &words).unwrap();

@@ -1,12 +1,11 @@
 //! Report of a reconstruction.
 
-use std::fmt::Write as _;
-
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::case::physical::quantity::JOULES_PER_ELECTRONVOLT;
-use crate::number::shortest;
+use crate::case::units::Units;
+use crate::frame::{Align, FileUnit, Frame, Rows, columns};
 use crate::study::approach::Way;
 
 /// Force and dissipation from a measured curve. Values are in SI for a physical case, otherwise in
@@ -178,39 +177,36 @@ impl ReconstructReport {
         last.max(even).min(table.distance.len())
     }
 
-    /// Formats the table as CSV, which `sample.law = "table"` reads: in nm, nN, eV and N s/m, or in
-    /// model units.
-    pub fn csv(&self) -> String {
-        let (length, force, energy) = if self.physical {
-            (
-                (1e9, " (nm)"),
-                (1e9, " (nN)"),
-                (1.0 / JOULES_PER_ELECTRONVOLT, " (eV)"),
-            )
-        } else {
-            ((1.0, ""), (1.0, ""), (1.0, ""))
+    /// The force against the distance; in files in nm, nN, eV and N s/m, as `sample.law = "table"`
+    /// reads it, or in model units.
+    pub fn force_table(&self) -> Frame<'_> {
+        let curve = &self.table;
+        let clear = |list: &'_ [Option<f64>], k: usize| list[k].filter(|_| self.has_damping);
+        let nano: fn(f64) -> f64 = |value| 1e9 * value;
+        let ev: FileUnit = (|joules| 1.0 / JOULES_PER_ELECTRONVOLT * joules, "eV");
+        let units = (!self.physical).then_some(Units::Model);
+        let rows = columns! { Rows::new("table", 0..curve.distance.len(), units);
+            "distance", "distance", (Length, Quantity([4, 4])) => |k| curve.distance[k];
+            .in_files((nano, "nm"));
+            "force", "force", (Force, Quantity([4, 4])) => |k| curve.force[k];
+            .in_files((nano, "nN"));
+            "force error", "standard error", (Force, Quantity([2, 2])) => |k| curve.force_error[k];
+            .in_files((nano, "nN"));
+            "dissipation", "", (Energy, Plain) => |k| curve.dissipation[k];
+            .in_files(ev);
+            .only_in_files();
+            "dissipation error", "", (Energy, Plain) => |k| curve.dissipation_error[k];
+            .in_files(ev);
+            .only_in_files();
+            "damping", "", (Unit("N s/m"), Plain) => |k| curve.damping[k];
+            .only_in_files();
+            "damping error", "", (Unit("N s/m"), Plain) => |k| curve.damping_error[k];
+            .only_in_files();
+            "", "dissipation", (Energy, Quantity([4, 4])) => move |k| clear(&curve.dissipation, k);
+            "", "standard error", (Energy, Quantity([4, 4])) =>
+                move |k| clear(&curve.dissipation_error, k);
         };
-        let damping = if self.physical { " (N s/m)" } else { "" };
-        let mut csv = format!(
-            "distance{0},force{1},force error{1},dissipation{2},dissipation error{2},\
-             damping{3},damping error{3}\n",
-            length.1, force.1, energy.1, damping
-        );
-        let table = &self.table;
-        for k in 0..table.distance.len() {
-            let cells = [
-                Some(length.0 * table.distance[k]),
-                Some(force.0 * table.force[k]),
-                Some(force.0 * table.force_error[k]),
-                table.dissipation[k].map(|value| energy.0 * value),
-                table.dissipation_error[k].map(|value| energy.0 * value),
-                table.damping[k],
-                table.damping_error[k],
-            ];
-            let cells = cells.map(|cell| cell.map(shortest).unwrap_or_default());
-            let _ = writeln!(csv, "{}", cells.join(","));
-        }
-        csv
+        rows.frame().aligned(Align::Point, Align::Point)
     }
 }
 

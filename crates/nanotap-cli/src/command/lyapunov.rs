@@ -1,9 +1,6 @@
 //! `nanotap lyapunov`: Lyapunov spectrum and Poincaré section of any motion.
 
-use nanotap::case::physical::Kind;
-use nanotap::case::units::Units;
 use nanotap::figure::attractors::section_figure;
-use nanotap::model::Model;
 use nanotap::observe::time_series;
 use nanotap::study::lyapunov::{ExponentSource, LyapunovReport, LyapunovStudy};
 
@@ -11,7 +8,7 @@ use crate::failure::Failure;
 use crate::given_case::GivenCase;
 use crate::output::Output;
 use crate::study_arguments::StudyArguments;
-use crate::table::{Align, Table};
+use crate::table::Table;
 use crate::threads::ThreadsArgument;
 use crate::{motion, number, progress, style};
 
@@ -29,9 +26,10 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     if wanted && report.section.is_empty() {
         output.warning("the section is empty: the motion begins no contact");
     }
-    arguments
-        .out
-        .write(|| csv(&model, &report, &case.units()))?;
+    arguments.out.write(|| {
+        let names = time_series::state_names(&model);
+        report.section_table(names, case.units()).csv()
+    })?;
     arguments
         .plot
         .draw(|| section_figure(&model, &report, &case.units()))?;
@@ -39,42 +37,9 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     output.study(&case, &report, |report| text(&case, report))
 }
 
-/// A row a point of the section.
-fn csv(model: &Model, report: &LyapunovReport, units: &Units) -> String {
-    let shown = [
-        ("tip", Kind::Length),
-        ("tip_rate", Kind::Velocity),
-        ("gap_rate", Kind::Velocity),
-    ];
-    let mut header = vec!["phase_degrees".to_owned()];
-    header.extend(shown.iter().map(|(name, kind)| units.column(name, *kind)));
-    let names = time_series::state_names(model);
-    header.extend(names.iter().map(|name| units.state_column(name)));
-    let mut csv = header.join(",") + "\n";
-    for p in &report.section {
-        let speed = |value| units.scaled(Kind::Velocity, value);
-        let tip = units.scaled(Kind::Length, p.tip);
-        let cells = [360.0 * p.phase, tip, speed(p.tip_rate), speed(p.gap_rate)];
-        csv.push_str(&number::row(cells.iter().chain(&p.state).copied()));
-        csv.push('\n');
-    }
-    csv
-}
-
 fn text(case: &GivenCase, report: &LyapunovReport) -> String {
     let heading = format!("{}: {}", case.title(), case.summary());
-    let mut table = Table::new([
-        ("", Align::Right),
-        ("exponent per drive period", Align::Point),
-        ("± standard error", Align::Point),
-    ]);
-    for (k, (exponent, error)) in report.exponents.iter().zip(&report.errors).enumerate() {
-        table.row([
-            (k + 1).to_string(),
-            number::significant(*exponent, 5),
-            number::significant(*error, 2),
-        ]);
-    }
+    let table = Table::all(&report.exponent_table());
     let mut text = format!(
         "{}\n\n  {}\n{}\n{}\n",
         style::bold(&heading),

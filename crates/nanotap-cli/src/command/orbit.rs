@@ -9,7 +9,9 @@ use nanotap::case::units::Units;
 use nanotap::figure::motion::orbit_figure;
 use nanotap::model::Model;
 use nanotap::observe::{ObservableSet, time_series};
-use nanotap::study::orbit::{MAX_DETERMINANT_DEFECT, OrbitOptions, OrbitReport, OrbitStudy};
+use nanotap::study::orbit::{
+    MAX_DETERMINANT_DEFECT, OrbitOptions, OrbitReport, OrbitStudy, harmonic_table,
+};
 use nanotap::study::upset::Knocks;
 
 use crate::arguments::{CaseArguments, OutArgument, PlotArgument};
@@ -71,10 +73,8 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
         )?;
     }
     if let Some(path) = &arguments.harmonics_out {
-        file::write(
-            path,
-            harmonics_csv(orbit, &case.units(), case.omega()).as_bytes(),
-        )?;
+        let harmonics = harmonic_table(&orbit.spectrum, case.omega(), case.units());
+        file::write(path, harmonics.csv().as_bytes())?;
     }
     arguments
         .plot
@@ -91,42 +91,6 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     output.study(&case, found, |found| {
         text(&case, &model, &found.motion, request.observables)
     })
-}
-
-/// The harmonics as CSV, one row per harmonic; in SI units for a physical case.
-fn harmonics_csv(orbit: &OrbitReport, units: &Units, omega: f64) -> String {
-    let harmonics = &orbit.spectrum.harmonics;
-    let si = matches!(units, Units::Si(_));
-    let mut header = vec!["order".to_owned()];
-    if si {
-        header.push("frequency (Hz)".to_owned());
-    }
-    header.extend([
-        units.column("tip", Kind::Length),
-        "tip_lag_degrees".to_owned(),
-        units.column("force", Kind::Force),
-        "force_lag_degrees".to_owned(),
-    ]);
-    if harmonics.iter().any(|h| h.slope.is_some()) {
-        header.push("slope".to_owned());
-    }
-    let mut csv = header.join(",") + "\n";
-    for h in harmonics {
-        let mut cells = vec![h.order];
-        if si {
-            cells.push(units.scaled(Kind::Frequency, h.order * omega));
-        }
-        cells.extend([
-            units.scaled(Kind::Length, h.tip),
-            h.tip_phase,
-            units.scaled(Kind::Force, h.force),
-            h.force_phase,
-        ]);
-        cells.extend(h.slope);
-        csv.push_str(&number::row(cells));
-        csv.push('\n');
-    }
-    csv
 }
 
 /// Describes the smallest change of the tip's speed after which the motion leaves the orbit for

@@ -13,7 +13,9 @@ pub use nanotap_dynamics::LyapunovOptions as SpectrumOptions;
 use crate::Error;
 use crate::case::Case;
 use crate::case::state::WrittenState;
+use crate::case::units::Units;
 use crate::control::Control;
+use crate::frame::{Frame, Rows, columns};
 use crate::model::model_map::ModelMap;
 use crate::model::{Model, MotionError};
 use crate::observe::begins_contact;
@@ -328,6 +330,31 @@ pub enum SectionKind {
     Phase,
     /// At the beginning of every contact
     Contact,
+}
+
+impl LyapunovReport {
+    /// The section, with the names of the entries of a state.
+    pub fn section_table(&self, names: Vec<String>, units: Units) -> Frame<'_> {
+        let rows = columns! { Rows::new("section", &self.section, Some(units));
+            "phase_degrees", "", Digits(5) => |p| 360.0 * p.phase;
+            "tip", "", (Length, Digits(5)) => |p| p.tip;
+            "tip_rate", "", (Velocity, Digits(5)) => |p| p.tip_rate;
+            "gap_rate", "", (Velocity, Digits(5)) => |p| p.gap_rate;
+            .states(names, |p| &p.state);
+        };
+        rows.frame()
+    }
+
+    /// The exponents, largest first.
+    pub fn exponent_table(&self) -> Frame<'_> {
+        let rows = self.exponents.iter().zip(&self.errors).enumerate();
+        let rows = columns! { Rows::new("exponents", rows, None);
+            "number", "", Plain => |(k, _)| k + 1;
+            "exponent", "exponent per drive period", Digits(5) => |(_, (exponent, _))| exponent;
+            "error", "± standard error", Digits(2) => |(_, (_, error))| error;
+        };
+        rows.frame()
+    }
 }
 
 /// Most points of a section: 300 MB with three modes.

@@ -16,6 +16,8 @@ use serde::Serialize;
 use crate::Error;
 use crate::case::Case;
 use crate::case::state::WrittenState;
+use crate::case::units::Units;
+use crate::frame::{Frame, Rows, columns};
 use crate::model::model_map::ModelMap;
 use crate::model::recording::{NonlinearRecording, Recording};
 use crate::model::{MemoryReset, Model};
@@ -91,6 +93,27 @@ pub struct OrbitReport {
     /// Recording of one repetition of the orbit, for figures.
     #[serde(skip)]
     pub trajectory: Recording,
+}
+
+/// The harmonics of an orbit as a table, for the drive frequency `omega` in the model's units.
+pub fn harmonic_table(spectrum: &Spectrum, omega: f64, units: Units) -> Frame<'_> {
+    let mut unknown = Vec::new();
+    if units == Units::Model {
+        unknown.push("frequency");
+    }
+    if spectrum.harmonics.iter().all(|h| h.slope.is_none()) {
+        unknown.push("slope");
+    }
+    let rows = columns! { Rows::new("harmonics", &spectrum.harmonics, Some(units));
+        "order", "order", Digits(5) => |h| h.order;
+        "frequency", "frequency", (Frequency, Digits(5)) => move |h| h.order * omega;
+        "tip", "tip", (Length, Digits(5)) => |h| h.tip;
+        "tip_lag_degrees", "lag", Digits(5) => |h| h.tip_phase;
+        "force", "force", (Force, Digits(5)) => |h| h.force;
+        "force_lag_degrees", "lag", Digits(5) => |h| h.force_phase;
+        "slope", "slope", Digits(5) => |h| h.slope;
+    };
+    rows.frame().without(&unknown)
 }
 
 impl OrbitReport {

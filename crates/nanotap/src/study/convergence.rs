@@ -7,7 +7,8 @@ use serde::Serialize;
 use crate::Error;
 use crate::case::Case;
 use crate::case::physical::Kind;
-use crate::case::units::NumbersInSi;
+use crate::case::units::{NumbersInSi, Units};
+use crate::frame::{Align, Frame, Rows, columns};
 use crate::model::beam::MAX_MODES;
 use crate::model::cantilever::Cantilever;
 use crate::model::{Model, ModelError};
@@ -76,6 +77,46 @@ pub struct Motion {
     /// Reason why no orbit was found.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub reason: Option<String>,
+}
+
+impl Convergence {
+    /// The motion with each number of modes.
+    pub fn motion_table(&self, units: Units) -> Frame<'_> {
+        let motion = |(m, _): (&'_ Motion, _)| match (m.period, &m.reason) {
+            (Some(n), _) => format!("period {n}"),
+            (None, Some(_)) => "no orbit".to_owned(),
+            (None, None) => m.classification.name().to_owned(),
+        };
+        let rows = self.motions.iter().zip(&self.difference);
+        let rows = columns! { Rows::new("motions", rows, Some(units));
+            "modes", "modes", Plain => |(m, _)| m.modes;
+            "difference", "", Plain => |(_, difference)| difference;
+            .only_in_files();
+            "", "difference", Digits(3) => |(_, difference)| difference.filter(|d| *d > 0.0);
+            "", "motion", Plain => motion;
+            "period", "", Plain => |(m, _)| m.period;
+            .only_in_files();
+            "tip_max", "W max", (Length, Quantity([6, 5])) => |(m, _)| m.tip_max;
+            "tip_min", "W min", (Length, Quantity([6, 5])) => |(m, _)| m.tip_min;
+            "contact_fraction", "contact", Percent(4) => |(m, _)| m.contact_fraction;
+            "spectral_radius", "largest |μ|", Digits(6) => |(m, _)| m.spectral_radius;
+        };
+        rows.frame().aligned(Align::Point, Align::Point)
+    }
+
+    /// What an experimenter reads with each number of modes, and the share of each mode.
+    pub fn reading_table(&self, units: Units) -> Frame<'_> {
+        let report = &self.readings;
+        let share = |k: usize| report.mode_shares.get(k);
+        let rows = columns! { Rows::new("readings", 0..report.readings.len(), Some(units));
+            "modes", "modes", Plain => |k| k + 1;
+            .fields(|k: usize| report.readings[k].as_ref());
+            "energy_share", "share of the mode: energy", Percent(3) => move |k| Some(share(k)?.energy);
+            "tip_share", "tip", Percent(3) => move |k| Some(share(k)?.tip);
+            "force_share", "force", Percent(3) => move |k| share(k)?.force;
+        };
+        rows.frame()
+    }
 }
 
 /// Points of an orbit at which two motions are compared.

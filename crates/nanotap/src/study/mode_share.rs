@@ -6,24 +6,28 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::case::units::NumbersInSi;
+use crate::frame::rows;
 use crate::model::Model;
 use crate::model::recording::Recording;
 use crate::study::orbit::OrbitReport;
 
-/// Instrument readings of an orbit, in the model's units.
-#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
-pub struct Reading {
-    /// Amplitude A at the drive frequency, in the model's unit of length.
-    pub first_harmonic: f64,
-    /// Phase lag of the tip behind the drive, degrees.
-    pub phase: f64,
-    /// Energy E_dis dissipated in the sample per drive period, in the model's unit of energy.
-    pub dissipation: f64,
-    /// Largest force F_max of the sample on the tip, in the model's unit of force.
-    pub peak_force: f64,
-    /// The same in SI, for a physical case.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub physical: Option<NumbersInSi>,
+rows! {
+    in model_unit
+    /// Instrument readings of an orbit, in the model's units.
+    #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+    pub struct Reading {
+        /// Amplitude A at the drive frequency, in the model's unit of length.
+        pub first_harmonic: f64 = Length, "amplitude $A$", "A", Quantity([5, 4]),
+        /// Phase lag of the tip behind the drive, degrees.
+        pub phase: f64 = Angle, "phase lag", "phase", Digits(5),
+        /// Energy E_dis dissipated in the sample per drive period, in the model's unit of energy.
+        pub dissipation: f64 = Energy, "dissipation $E_{dis}$", "E_dis", Quantity([5, 4]),
+        /// Largest force F_max of the sample on the tip, in the model's unit of force.
+        pub peak_force: f64 = Force, "peak force $F_{max}$", "F_max", Quantity([5, 4]),
+        /// The same in SI, for a physical case.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        pub physical: Option<NumbersInSi>,
+    }
 }
 
 /// Differences of a reading to that with the most modes.

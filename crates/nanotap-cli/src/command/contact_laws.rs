@@ -1,10 +1,7 @@
 //! `nanotap contact-laws`: the same lever and drive on every contact law.
 
-use std::fmt::Write as _;
-
 use nanotap::case::key::kind_of;
 use nanotap::case::physical::Kind;
-use nanotap::case::units::Units;
 use nanotap::figure::contact_laws::sample_figure;
 use nanotap::model::parameter::Parameter;
 use nanotap::study::contact_laws::{Comparison, ContactLawsStudy, SampleMotion};
@@ -13,7 +10,7 @@ use crate::failure::Failure;
 use crate::given_case::GivenCase;
 use crate::output::Output;
 use crate::study_arguments::StudyArguments;
-use crate::table::{Align, Table};
+use crate::table::Table;
 use crate::threads::ThreadsArgument;
 use crate::{motion, number, progress, style};
 
@@ -23,31 +20,17 @@ pub(crate) type Arguments = StudyArguments<ContactLawsStudy>;
 pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure> {
     let (request, case) = arguments.read(output)?;
     let result = progress::study::<ContactLawsStudy>(&case, &request, &ThreadsArgument::default())?;
-    arguments.out.write(|| csv(&result, &case.units()))?;
+    arguments
+        .out
+        .write(|| result.loop_table(case.units()).csv())?;
     arguments
         .plot
         .draw(|| sample_figure(&result, &case.units()))?;
     output.study(&case, &result, |result| text(&case, result))
 }
 
-/// The loops, a row a point.
-fn csv(result: &Comparison, units: &Units) -> String {
-    let shown = [("indentation", Kind::Length), ("force", Kind::Force)];
-    let [indentation, force] = shown.map(|(name, kind)| units.column(name, kind));
-    let mut csv = format!("contact,{indentation},{force}\n");
-    for sample in &result.samples {
-        for point in sample.orbit.iter().flat_map(|o| &o.force_loop) {
-            let cells = shown.iter().zip(point);
-            let row = number::row(cells.map(|((_, kind), value)| units.scaled(*kind, *value)));
-            let _ = writeln!(csv, "{},{row}", sample.contact);
-        }
-    }
-    csv
-}
-
 fn text(case: &GivenCase, result: &Comparison) -> String {
     let units = case.units();
-    let shown = |kind: Kind, value: f64| number::quantity(&units, kind, value, [5, 5]);
     let heading = format!(
         "{}: the period-{} orbit on each sample at {}",
         case.title(),
@@ -57,40 +40,7 @@ fn text(case: &GivenCase, result: &Comparison) -> String {
             None => format!("Ω = {}", number::significant(result.omega, 6)),
         }
     );
-    let mut table = Table::new([
-        ("sample", Align::Left),
-        ("from rest", Align::Left),
-        ("largest |μ|", Align::Point),
-        ("amplitude", Align::Point),
-        ("E_dis", Align::Point),
-        ("F max", Align::Point),
-        ("F min", Align::Point),
-        ("indentation", Align::Point),
-        ("contact (%)", Align::Point),
-    ]);
-    for sample in &result.samples {
-        let mut cells = vec![sample.contact.clone(), from_rest(sample)];
-        if let Some(orbit) = &sample.orbit {
-            let o = &orbit.observables;
-            // What is not above rounding is no force.
-            let least = if o.least_force.abs() < 1e-10 * o.peak_force {
-                0.0
-            } else {
-                o.least_force
-            };
-            cells.extend([
-                number::significant(orbit.spectral_radius, 5),
-                shown(Kind::Length, o.first_harmonic),
-                shown(Kind::Energy, o.dissipation),
-                shown(Kind::Force, o.peak_force),
-                shown(Kind::Force, least),
-                shown(Kind::Length, o.indentation),
-                number::significant(100.0 * o.contact_fraction, 5),
-            ]);
-        }
-        cells.resize(9, String::new());
-        table.row(cells);
-    }
+    let table = Table::all(&result.sample_table(units));
     let mut text = format!("{}\n\n{}\n", style::bold(&heading), table.render());
     text.push_str(&followed(case, result));
     let linear = result.samples.iter().all(|s| s.case.law.is_none());
@@ -164,11 +114,4 @@ fn followed(case: &GivenCase, result: &Comparison) -> String {
         )));
     }
     text
-}
-
-fn from_rest(sample: &SampleMotion) -> String {
-    match sample.from_rest_period {
-        Some(n) => format!("period {n}"),
-        None => sample.from_rest.name().to_owned(),
-    }
 }

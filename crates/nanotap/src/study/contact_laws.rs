@@ -16,6 +16,8 @@ use serde_json::{Map, Value};
 use crate::Error;
 use crate::case::Case;
 use crate::case::Key;
+use crate::case::units::Units;
+use crate::frame::{Align, Frame, Rows, columns};
 use crate::model::Model;
 use crate::model::cantilever::Cantilever;
 use crate::model::contact::ContactLaw;
@@ -23,8 +25,7 @@ use crate::model::model_map::ModelMap;
 use crate::model::parameter::Parameter;
 use crate::model::recording::Curve;
 use crate::model::sample_law::SampleLaw;
-use crate::observe::Observables;
-use crate::observe::PhysicalMotion;
+use crate::observe::{Observables, PhysicalMotion};
 use crate::study::branch::{BranchOptions, BranchReport, Range, branches_through};
 use crate::study::limits::MAX_PERIOD;
 use crate::study::orbit::{OrbitOptions, OrbitReport, no_period, orbit, spectral_radius};
@@ -93,6 +94,54 @@ pub struct Comparison {
     /// The motions, in the order of [`ContactLaw::ALL`].
     pub samples: Vec<SampleMotion>,
 }
+
+impl Comparison {
+    /// The loops of force and indentation, a row a point.
+    pub fn loop_table(&self, units: Units) -> Frame<'_> {
+        let points = self.samples.iter().flat_map(|sample| {
+            let points = sample.orbit.iter().flat_map(|orbit| &orbit.force_loop);
+            points.map(move |point| (&*sample.contact, point))
+        });
+        let rows = columns! { Rows::new("loops", points, Some(units));
+            "contact", "contact", Plain => |(contact, _)| contact;
+            "indentation", "indentation", (Length, Digits(5)) => |(_, [indentation, _])| indentation;
+            "force", "force", (Force, Digits(5)) => |(_, [_, force])| force;
+        };
+        rows.frame()
+    }
+
+    /// The orbit on each sample.
+    pub fn sample_table<'a>(&'a self, units: Units) -> Frame<'a> {
+        let from_rest = |s: &'_ SampleMotion| match s.from_rest_period {
+            Some(n) => format!("period {n}"),
+            None => s.from_rest.name().to_owned(),
+        };
+        let seen = |s: &'a SampleMotion| Some(&s.orbit.as_ref()?.observables);
+        // What is not above rounding is no force.
+        let least = move |s| {
+            let o = seen(s)?;
+            let is_zero = o.least_force.abs() < ROUNDING * o.peak_force;
+            Some(if is_zero { 0.0 } else { o.least_force })
+        };
+        let radius = |s: &'_ SampleMotion| Some(s.orbit.as_ref()?.spectral_radius);
+        let rows = columns! { Rows::new("samples", &self.samples, Some(units));
+            "contact", "sample", Plain => |s| &s.contact;
+            "from_rest", "from rest", Plain => from_rest;
+            "spectral_radius", "largest |μ|", Digits(5) => radius;
+            "A", "amplitude", (Length, Quantity([5, 5])) => move |s| Some(seen(s)?.first_harmonic);
+            "E_dis", "E_dis", (Energy, Quantity([5, 5])) => move |s| Some(seen(s)?.dissipation);
+            "F_max", "F max", (Force, Quantity([5, 5])) => move |s| Some(seen(s)?.peak_force);
+            "F_min", "F min", (Force, Quantity([5, 5])) => least;
+            "indentation", "indentation", (Length, Quantity([5, 5])) =>
+                move |s| Some(seen(s)?.indentation);
+            "contact_fraction", "contact", Percent(5) => move |s| Some(seen(s)?.contact_fraction);
+        };
+        rows.frame().aligned(Align::Point, Align::Point)
+    }
+}
+
+/// Least force over the peak force below which it is rounding.
+const ROUNDING: f64 = 1e-10;
 
 /// The case with each law, spring and damper the same; see the module.
 ///

@@ -2,8 +2,7 @@
 
 use clap::Args;
 use nanotap::case::physical::Kind;
-use nanotap::observe::table::shown_phase;
-use nanotap::study::lever::{LeverOptions, LeverReport, LeverRow, LeverStudy, QualityFactorSource};
+use nanotap::study::lever::{LeverOptions, LeverReport, LeverStudy, QualityFactorSource};
 
 use crate::arguments::CaseArguments;
 use crate::failure::Failure;
@@ -11,7 +10,7 @@ use crate::given_case::GivenCase;
 use crate::output::Output;
 use crate::page::paragraph;
 use crate::request::Request;
-use crate::table::{Align, Table};
+use crate::table::Table;
 use crate::threads::ThreadsArgument;
 use crate::{number, progress, style};
 
@@ -44,34 +43,7 @@ fn text(case: &GivenCase, report: &LeverReport) -> String {
         number::significant(report.frequency_ratio, 5)
     );
     let fits = !report.conditions.is_empty();
-    let mut heads = vec![
-        ("lever", Align::Left),
-        ("k", Align::Point),
-        ("f0", Align::Point),
-        ("Q", Align::Point),
-        ("radius", Align::Point),
-        ("F_max", Align::Point),
-        ("indentation", Align::Point),
-        ("regime", Align::Left),
-        ("states", Align::Right),
-        ("A", Align::Point),
-        ("phase (°)", Align::Point),
-        ("τ", Align::Point),
-    ];
-    if fits {
-        heads.insert(1, ("fits", Align::Left));
-    }
-    let mut table = Table::new(heads);
-    for row in &report.levers {
-        let mut cells = cells(row);
-        if fits {
-            let word = row
-                .holds
-                .map_or("unknown", |holds| if holds { "yes" } else { "no" });
-            cells.insert(1, word.to_owned());
-        }
-        table.row(cells);
-    }
+    let table = Table::all(&report.lever_table());
     let mut text = format!("{}\n\n{}\n", style::bold(&heading), table.render());
     if fits {
         let holding = report.levers.iter().filter(|row| row.holds == Some(true));
@@ -139,40 +111,4 @@ fn quality_factors(report: &LeverReport) -> String {
         text.push_str(&hint);
     }
     text
-}
-
-fn cells(row: &LeverRow) -> Vec<String> {
-    let shown = |kind: Kind, value: f64| {
-        if value.is_finite() {
-            kind.format_digits(value, 4)
-        } else {
-            String::new()
-        }
-    };
-    let mut cells = vec![
-        row.lever.clone(),
-        shown(Kind::Stiffness, row.k),
-        shown(Kind::Frequency, row.f0),
-        shown(Kind::Number, row.quality_factor),
-        shown(Kind::Length, row.tip_radius.unwrap_or(f64::NAN)),
-    ];
-    match &row.motion {
-        Some(motion) => {
-            let seen = &motion.physical.observables;
-            cells.extend([
-                shown(Kind::Force, seen.peak_force),
-                shown(Kind::Length, seen.indentation),
-                motion.regime.to_owned(),
-                motion.states.to_string(),
-                shown(Kind::Length, seen.first_harmonic),
-                number::significant(shown_phase(seen.phase), 4),
-            ]);
-        }
-        None if row.k.is_finite() => {
-            cells.extend(["", "", "not reached", "", "", ""].map(str::to_owned));
-        }
-        None => cells.extend([""; 6].map(str::to_owned)),
-    }
-    cells.push(shown(Kind::Time, row.time_constant));
-    cells
 }

@@ -19,7 +19,8 @@ use serde::{Deserialize, Serialize};
 
 use crate::Error;
 use crate::case::{Case, Key};
-use crate::observe::{Observable, ObservableSet, Observables, PhysicalMotion};
+use crate::frame::{Align, Form, Frame, Rows, columns, finite};
+use crate::observe::{Dimension, Observable, ObservableSet, Observables, PhysicalMotion};
 use crate::study::Study;
 use crate::study::request::options;
 use crate::study::setpoint::solve_setpoint;
@@ -160,6 +161,47 @@ pub struct LeverReport {
     /// The levers: those for which the conditions hold first, then those for which that is not known;
     /// in each group by peak force.
     pub levers: Vec<LeverRow>,
+}
+
+impl LeverReport {
+    /// The levers with their motions.
+    pub fn lever_table<'a>(&'a self) -> Frame<'a> {
+        let four = |kind| (Dimension::Si(kind), Form::Prefixed(4));
+        let motion = |row: &'a LeverRow| Some(&row.motion.as_ref()?.physical.observables);
+        let holds = |row: &'_ LeverRow| match row.holds {
+            Some(true) => "yes",
+            Some(false) => "no",
+            None => "unknown",
+        };
+        let regime = |row: &'_ LeverRow| match &row.motion {
+            Some(motion) => motion.regime,
+            None if row.k.is_finite() => "not reached",
+            None => "",
+        };
+        let rows = columns! { Rows::new("levers", &self.levers, None);
+            "lever", "lever", Plain => |row| &row.lever;
+            "holds", "fits", Plain => holds;
+            "k", "k", four(Kind::Stiffness) => |row| finite(row.k);
+            "f0", "f0", four(Kind::Frequency) => |row| finite(row.f0);
+            "Q", "Q", four(Kind::Number) => |row| finite(row.quality_factor);
+            "tip_radius", "radius", four(Kind::Length) => |row| row.tip_radius.and_then(finite);
+            "F_max", "F_max", four(Kind::Force) => move |row| finite(motion(row)?.peak_force);
+            "indentation", "indentation", four(Kind::Length) =>
+                move |row| finite(motion(row)?.indentation);
+            "regime", "regime", Plain => regime;
+            "states", "states", Plain => |row| Some(row.motion.as_ref()?.states);
+            "A", "A", four(Kind::Length) => move |row| finite(motion(row)?.first_harmonic);
+            "phase", "phase", (Angle, Digits(4)) => move |row| Some(motion(row)?.phase);
+            "time_constant", "τ", four(Kind::Time) => |row| finite(row.time_constant);
+        };
+        let unconditional = if self.conditions.is_empty() {
+            &["holds"][..]
+        } else {
+            &[]
+        };
+        let frame = rows.frame().without(unconditional);
+        frame.aligned(Align::Point, Align::Point)
+    }
 }
 
 /// Compares levers of the catalogue.

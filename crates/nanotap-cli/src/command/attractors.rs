@@ -3,15 +3,11 @@
 use std::fmt::Write as _;
 
 use clap::Args;
-use nanotap::case::physical::Kind;
-use nanotap::case::units::Units;
 use nanotap::figure::attractors::attractors_figure;
-use nanotap::model::Model;
 use nanotap::observe::time_series;
 use nanotap::study::attractors::{
-    AttractorReport, Attractors, AttractorsStudy, CheckReport, EndReport, UnseenReport,
+    Attractors, AttractorsStudy, CheckReport, EndReport, UnseenReport,
 };
-use nanotap::study::orbit::spectral_radius;
 use nanotap::study::proof::ProofReport;
 
 use crate::failure::Failure;
@@ -35,10 +31,11 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     let (request, case) = arguments.study.read(output)?;
     let model = case.model()?;
     let found = progress::study::<AttractorsStudy>(&case, &request, &arguments.threads)?;
-    arguments
-        .study
-        .out
-        .write(|| csv(&model, &found, &case.units()))?;
+    arguments.study.out.write(|| {
+        found
+            .state_table(time_series::state_names(&model), case.units())
+            .csv()
+    })?;
     arguments
         .study
         .plot
@@ -61,39 +58,6 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     output.study(&case, &found, |found| text(&case, found))
 }
 
-/// A row a strobe point of each attractor (of one that does not repeat, one point).
-fn csv(model: &Model, found: &Attractors, units: &Units) -> String {
-    let names = time_series::state_names(model);
-    let names: Vec<String> = names.iter().map(|name| units.state_column(name)).collect();
-    let mut csv = format!(
-        "attractor,classification,period,fraction,point,{}\n",
-        names.join(",")
-    );
-    for (k, attractor) in found.attractors.iter().enumerate() {
-        let period = attractor
-            .orbit
-            .as_ref()
-            .map_or_else(String::new, |o| o.period.to_string());
-        let states = match (&attractor.orbit, &attractor.non_periodic) {
-            (Some(orbit), _) => orbit.states.clone(),
-            (None, Some(non_periodic)) => vec![non_periodic.state.clone()],
-            (None, None) => Vec::new(),
-        };
-        for (point, state) in states.iter().enumerate() {
-            let numbers: Vec<String> = state.iter().map(f64::to_string).collect();
-            let _ = writeln!(
-                csv,
-                "{},{},{period},{},{point},{}",
-                k + 1,
-                attractor.classification.name(),
-                attractor.share.fraction,
-                numbers.join(",")
-            );
-        }
-    }
-    csv
-}
-
 fn text(case: &GivenCase, found: &Attractors) -> String {
     let units = case.units();
     let heading = format!(
@@ -107,7 +71,7 @@ fn text(case: &GivenCase, found: &Attractors) -> String {
     if found.attractors.is_empty() {
         text.push_str("  no attractor was shown\n");
     } else {
-        text.push_str(&table(&found.attractors, &units));
+        text.push_str(&Table::all(&found.attractor_table(units)).render());
         text.push('\n');
     }
     for (k, attractor) in found.attractors.iter().enumerate() {
@@ -170,27 +134,7 @@ fn text(case: &GivenCase, found: &Attractors) -> String {
             "\n  {}",
             style::bold("unstable orbits (a list that is never proved complete)")
         );
-        let mut table = Table::new([
-            ("period", Align::Right),
-            ("|μ|", Align::Point),
-            ("unstable directions", Align::Right),
-            ("tip", Align::Left),
-            ("contact (%)", Align::Point),
-        ]);
-        for orbit in &orbits {
-            let moduli = orbit
-                .multipliers
-                .iter()
-                .map(|[re, im]| nanotap_arithmetic::hypot(*re, *im));
-            table.row([
-                orbit.period.to_string(),
-                number::significant(spectral_radius(&orbit.multipliers), 6),
-                moduli.filter(|m| *m > 1.0).count().to_string(),
-                tip(orbit.observables.tip_min, orbit.observables.tip_max, &units),
-                number::significant(100.0 * orbit.observables.contact_fraction, 4),
-            ]);
-        }
-        text.push_str(&table.render());
+        text.push_str(&Table::all(&found.unstable_table(units)).render());
         for (k, orbit) in orbits.iter().enumerate() {
             if let Some(proof) = &orbit.proof {
                 text.push_str(&motion::paragraph(&format!(
@@ -321,53 +265,6 @@ fn unseen_paragraphs(found: &Attractors, unseen: &UnseenReport) -> String {
     }
     text.push_str(&table.render());
     text
-}
-
-fn table(attractors: &[AttractorReport], units: &Units) -> String {
-    let mut table = Table::new([
-        ("", Align::Right),
-        ("motion", Align::Left),
-        ("starts (%)", Align::Point),
-        ("95 %", Align::Left),
-        ("λ₁", Align::Point),
-        ("tip", Align::Left),
-        ("contact (%)", Align::Point),
-        ("contacts/period", Align::Point),
-    ]);
-    for (k, attractor) in attractors.iter().enumerate() {
-        let what = attractor.orbit.as_ref().map_or_else(
-            || attractor.classification.name().to_owned(),
-            |o| format!("period {}", o.period),
-        );
-        let observables = attractor
-            .orbit
-            .as_ref()
-            .map(|o| &o.observables)
-            .or(attractor.non_periodic.as_ref().map(|w| &w.observables));
-        let percent = |part: f64| number::significant(100.0 * part, 3);
-        let [low, high] = attractor.share.fraction_interval;
-        table.row([
-            (k + 1).to_string(),
-            what,
-            percent(attractor.share.fraction),
-            format!("{} … {}", percent(low), percent(high)),
-            attractor
-                .lyapunov
-                .first()
-                .map_or_else(String::new, |l| number::significant(*l, 3)),
-            observables.map_or_else(String::new, |o| tip(o.tip_min, o.tip_max, units)),
-            observables.map_or_else(String::new, |o| percent(o.contact_fraction)),
-            observables.map_or_else(String::new, |o| {
-                number::significant(o.contacts_per_period, 3)
-            }),
-        ]);
-    }
-    table.render()
-}
-
-fn tip(low: f64, high: f64, units: &Units) -> String {
-    let [low, high] = [low, high].map(|v| number::quantity(units, Kind::Length, v, [5, 4]));
-    format!("{low} … {high}")
 }
 
 /// Starts without a verdict, those with one reason together.

@@ -14,16 +14,18 @@ use crate::Error;
 use crate::case::Case;
 use crate::case::physical::Physical;
 use crate::case::units::Units;
+use crate::frame::{Form, Frame, Rows, columns};
 use crate::model::Model;
 use crate::model::model_map::ModelMap;
+use crate::number::significant;
 use crate::observe::time_series::state_names;
-use crate::observe::{ObservableSet, Observables, PhysicalMotion, measure};
+use crate::observe::{Dimension, ObservableSet, Observables, PhysicalMotion, measure};
 use crate::study::Study;
 use crate::study::approach::states_near;
 use crate::study::averaged_orbits::averaged_orbits;
 use crate::study::in_si::InSi;
 use crate::study::limits::MAX_PERIOD;
-use crate::study::orbit::{OrbitReport, report};
+use crate::study::orbit::{OrbitReport, report, spectral_radius};
 use crate::study::proof::Prover;
 use crate::study::request::options;
 use crate::study::simulate::{Classification, largest_exponent, orbit_evidence, torus_evidence};
@@ -274,7 +276,87 @@ pub struct AttractorReport {
     pub physical: Option<PhysicalMotion>,
 }
 
+impl AttractorReport {
+    /// Observables of the orbit, or of the recording.
+    fn observables(&self) -> Option<&Observables> {
+        let orbit = self.orbit.as_ref().map(|orbit| &orbit.observables);
+        orbit.or_else(|| Some(&self.non_periodic.as_ref()?.observables))
+    }
+
+    /// States at drive phase 0: all of an orbit, one of another motion.
+    fn states(&self) -> &[Vec<f64>] {
+        match (&self.orbit, &self.non_periodic) {
+            (Some(orbit), _) => &orbit.states,
+            (None, Some(recording)) => std::slice::from_ref(&recording.state),
+            (None, None) => &[],
+        }
+    }
+}
+
 impl Attractors {
+    /// The states of each attractor at drive phase 0, with the names of their entries.
+    pub fn state_table(&self, names: Vec<String>, units: Units) -> Frame<'_> {
+        let states = self.attractors.iter().enumerate().flat_map(|(k, one)| {
+            let states = one.states().iter().enumerate();
+            states.map(move |(point, state)| (k, one, point, state))
+        });
+        let rows = columns! { Rows::new("states", states, Some(units));
+            "attractor", "", Plain => |(k, ..)| k + 1;
+            "classification", "", Plain => |(_, one, ..)| one.classification.name();
+            "period", "", Plain => |(_, one, ..)| Some(one.orbit.as_ref()?.period);
+            "fraction", "", Digits(5) => |(_, one, ..)| one.share.fraction;
+            "point", "", Plain => |(_, _, point, _)| point;
+            .states(names, |(.., state)| state);
+        };
+        rows.frame()
+    }
+
+    /// The attractors with their shares of the initial states.
+    pub fn attractor_table(&self, units: Units) -> Frame<'_> {
+        let motion = |a: &'_ AttractorReport| match &a.orbit {
+            Some(orbit) => format!("period {}", orbit.period),
+            None => a.classification.name().to_owned(),
+        };
+        let interval = |a: &'_ AttractorReport| {
+            let [low, high] = a
+                .share
+                .fraction_interval
+                .map(|end| significant(100.0 * end, 3));
+            format!("{low} … {high}")
+        };
+        let rows = columns! { Rows::new("attractors", self.attractors.iter().enumerate(), Some(units));
+            "attractor", "", Plain => |(k, _)| k + 1;
+            "motion", "motion", Plain => move |(_, a)| motion(a);
+            "fraction", "starts", Percent(3) => |(_, a)| a.share.fraction;
+            "interval", "95 %", Plain => move |(_, a)| interval(a);
+            "exponent", "λ₁", Digits(3) => |(_, a)| a.lyapunov.first().copied();
+            "tip", "tip", Plain => move |(_, a)| Some(tip_range(a.observables()?, units, 4));
+            "contact_fraction", "contact", Percent(3) =>
+                |(_, a)| Some(a.observables()?.contact_fraction);
+            "contacts_per_period", "contacts/period", Digits(3) =>
+                |(_, a)| Some(a.observables()?.contacts_per_period);
+        };
+        rows.frame()
+    }
+
+    /// The unstable orbits.
+    pub fn unstable_table(&self, units: Units) -> Frame<'_> {
+        let orbits = self.unstable.iter().flatten().map(|orbit| &orbit.motion);
+        let modulus = |[re, im]: &[f64; 2]| nanotap_arithmetic::hypot(*re, *im);
+        let directions = move |o: &'_ OrbitReport| {
+            let moduli = o.multipliers.iter().map(modulus);
+            moduli.filter(|m| *m > 1.0).count()
+        };
+        let rows = columns! { Rows::new("unstable", orbits, Some(units));
+            "period", "period", Plain => |o| o.period;
+            "spectral_radius", "|μ|", Digits(6) => |o| spectral_radius(&o.multipliers);
+            "directions", "unstable directions", Plain => directions;
+            "tip", "tip", Plain => move |o| tip_range(&o.observables, units, 4);
+            "contact_fraction", "contact", Percent(4) => |o| o.observables.contact_fraction;
+        };
+        rows.frame()
+    }
+
     /// Proves the reported orbits by interval arithmetic where possible.
     fn prove(&mut self, case: &Case) {
         let prover = Prover::new(case);
@@ -326,6 +408,17 @@ pub struct NonPeriodic {
     /// Observables over [`OBSERVED_PERIODS`] drive periods, in the model's units.
     #[serde(flatten)]
     pub observables: Observables,
+}
+
+/// The range of the tip deflection in words, in SI with so many digits.
+pub(in crate::study) fn tip_range(
+    observables: &Observables,
+    units: Units,
+    digits: usize,
+) -> String {
+    let ends = [observables.tip_min, observables.tip_max];
+    let [low, high] = ends.map(|w| Form::Quantity([5, digits]).shown(Dimension::Length, units, w));
+    format!("{low} … {high}")
 }
 
 /// An initial state whose motion was left undecided.

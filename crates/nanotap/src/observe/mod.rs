@@ -4,7 +4,6 @@
 
 mod choice;
 mod clearance;
-pub mod columns;
 mod contact_event;
 mod derivative;
 mod dimension;

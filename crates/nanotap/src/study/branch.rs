@@ -129,6 +129,9 @@ pub struct BranchReport {
     pub held: Held,
     /// Whether the work was stopped before it was done.
     pub cancelled: bool,
+    /// Observables that were recorded.
+    #[serde(skip)]
+    pub observed: ObservableSet,
     /// Key of the parameter, for figures; not in documents.
     #[serde(skip)]
     pub key: Key,
@@ -712,6 +715,7 @@ fn described(
             .collect(),
         held: case.held(&[key]),
         cancelled: false,
+        observed: observables,
         key,
         parameter_unit: None,
     };

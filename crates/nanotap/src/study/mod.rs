@@ -7,6 +7,7 @@ pub mod averaged_orbits;
 pub mod basin;
 pub mod bimodal;
 pub mod branch;
+mod branch_frames;
 pub mod contact_laws;
 pub mod convergence;
 pub mod event;

@@ -4,6 +4,9 @@ use std::fmt::Write;
 
 use crate::document::{Curve, Distance, DistanceSource, Segment, Style};
 
+/// A channel that is a force by its name.
+const FORCE: &str = "Force";
+
 /// Names of a format's channels, by preference.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Names {
@@ -72,7 +75,7 @@ pub(crate) fn finish(curve: &mut Curve, names: &Names) {
     if let Some(name) = &curve.deflection
         && let Some(channel) = recorded.iter().find_map(|of| of.channel(name))
     {
-        if channel.unit != "m" {
+        if channel.unit != "m" && channel.name != FORCE {
             let (unit, missing) = match channel.unit.as_str() {
                 "N" => ("N", "spring constant"),
                 "" => ("no unit", "sensitivity (InvOLS)"),
@@ -102,14 +105,15 @@ pub(crate) fn finish(curve: &mut Curve, names: &Names) {
     curve.notes.append(&mut notes);
 }
 
-/// Converts a deflection in V by the sensitivity, one in N by the spring constant.
+/// Converts a deflection in V by the sensitivity, one in N by the spring constant. What is called a
+/// force stays one.
 fn deflection_to_length(curve: &mut Curve, names: &Names) {
     let (sensitivity, spring_constant) = (curve.sensitivity, curve.spring_constant);
     let channels = curve.segments.iter_mut().flat_map(|of| &mut of.channels);
     for channel in channels.filter(|of| names.deflection.contains(&of.name.as_str())) {
         let factor = match channel.unit.as_str() {
             "V" => sensitivity,
-            "N" => spring_constant.map(|of| 1.0 / of),
+            "N" if channel.name != FORCE => spring_constant.map(|of| 1.0 / of),
             _ => None,
         };
         if let Some(factor) = factor {

@@ -22,7 +22,7 @@ use crate::{Error, Format, Limits};
 const AXIS: &str = "commanded Z";
 const NAMES: Names = Names {
     measured: &["Z-Axis Sensor"],
-    commanded: &[AXIS],
+    commanded: &["Z-Axis", AXIS],
     ramp: &[],
     deflection: &["Deflection"],
     grows_toward_surface: true,
@@ -118,9 +118,13 @@ pub(crate) fn read(bytes: Vec<u8>, limits: Limits) -> Result<Document, Error> {
     let budget = &mut Budget::new(limits);
     let mut spectroscopy = Vec::new();
     for data in channels {
-        let group = data.group.to_lowercase();
-        if group.starts_with("spec ") && data.text("Dim0Name").starts_with('Z') {
-            let style = match group.as_str() {
+        let frame = match data.text("Frame") {
+            "" => data.group.to_lowercase(),
+            frame => frame.to_lowercase(),
+        };
+        let is_height = data.text("Dim0Name").starts_with('Z') || data.text("Dim0Unit") == "m";
+        if frame.starts_with("spec ") && is_height {
+            let style = match frame.as_str() {
                 "spec forward" => Style::Approach,
                 "spec backward" => Style::Retract,
                 _ => Style::Pause,

@@ -253,3 +253,46 @@ fn objects_within_objects_end() {
         "{error}"
     );
 }
+
+/// Archives that would take much more memory or time than their length suggests.
+#[test]
+fn bombs_cost_little() {
+    let shared = "shared-data/header.properties".to_owned();
+    let header = "segments/0/segment-header.properties".to_owned();
+    let encoder = "lcd-info.0.encoder.type=signedshort\nlcd-info.0.encoder.scaling.multiplier=1\n";
+    let lines = |line: &dyn Fn(usize) -> String| -> Vec<u8> {
+        (0..20_000).flat_map(|k| line(k).into_bytes()).collect()
+    };
+    let file = |channel: usize| format!("segments/0/channels/c{channel}.dat");
+    // 20,000 references to 20,000 properties, at one place and at many.
+    let product = |place: &dyn Fn(usize) -> String| {
+        vec![
+            (shared.clone(), lines(&|k| format!("a.0.k{k}=1\n"))),
+            (header.clone(), lines(&|k| format!("{}.*=0\n", place(k)))),
+            (file(0), vec![0; 100]),
+        ]
+    };
+    // 100 channels of 100,000 points.
+    let mut wide = vec![
+        (shared.clone(), encoder.as_bytes().to_vec()),
+        (
+            header.clone(),
+            lines(&|k| format!("channel.c{k}.lcd-info.*=0\n")),
+        ),
+    ];
+    wide.extend((0..100).map(|channel| (file(channel), vec![0; 200_000])));
+    // Properties of 30 MiB.
+    let heading = vec![
+        (shared.clone(), b"a=\n".repeat(10 << 20)),
+        (file(0), Vec::new()),
+    ];
+    let bombs = [
+        ("product at many places", product(&|k| format!("p{k}.a"))),
+        ("product at one place", product(&|k| format!("p.a{k}"))),
+        ("wide", wide),
+        ("heading", heading),
+    ];
+    for (name, files) in bombs {
+        exhaust(name, samples::zip(&files));
+    }
+}

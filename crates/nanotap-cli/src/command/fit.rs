@@ -25,7 +25,7 @@ use crate::{file, motion, number, progress, style};
 /// Fit parameters of lever and sample to measured curves.
 #[derive(Args, Debug)]
 pub(crate) struct Arguments {
-    /// The measured curve (CSV, .ibw, .jpk-force or .nid), its columns named as in `distance (nm)`,
+    /// The measured curve (CSV or an instrument's file), its columns named as in `distance (nm)`,
     /// `amplitude (nm)`, `phase (deg)`
     #[arg(value_name = "DATA")]
     data: PathBuf,

@@ -23,7 +23,7 @@ const SHOWN: usize = 15;
 /// Force and dissipation against distance from a measured curve.
 #[derive(Args, Debug)]
 pub(crate) struct Arguments {
-    /// The measured curve (CSV, .ibw, .jpk-force or .nid), its columns named as in `distance (nm)`,
+    /// The measured curve (CSV or an instrument's file), its columns named as in `distance (nm)`,
     /// `amplitude (nm)`, `phase (deg)`, or `frequency_shift (Hz)`
     #[arg(value_name = "DATA")]
     data: PathBuf,

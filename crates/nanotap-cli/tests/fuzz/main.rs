@@ -11,7 +11,7 @@
 mod mutation;
 mod page;
 mod program;
-#[path = "../../../nanotap/src/case/recording/samples.rs"]
+#[path = "../../../afm-files/tests/samples/mod.rs"]
 mod samples;
 #[allow(dead_code, reason = "shared with other tests")]
 #[path = "../cli/util.rs"]
@@ -291,9 +291,11 @@ fn recordings() {
             .to_vec()
     };
     let files = [
-        ("a.ibw", samples::ibw()),
-        ("a.jpk-force", samples::jpk()),
-        ("a.nid", samples::nid()),
+        ("a.ibw", samples::igor_curve()),
+        ("a.jpk-force", samples::zip(&samples::jpk_force())),
+        ("a.nid", samples::nanosurf()),
+        ("a.spm", samples::bruker_curve()),
+        ("a.csv", samples::workshop(1)),
     ];
     for seed in seeds(RECORDINGS) {
         let random = &mut Random::new(seed);
@@ -302,22 +304,6 @@ fn recordings() {
         mutation::bytes(random, &mut file);
         folder.write(name, file);
         found.extend(run(&folder, &fit(name), PATIENCE));
-    }
-    for (name, bomb) in samples::bombs() {
-        folder.write("bomb.jpk-force", bomb);
-        let refused = folder.run(&[
-            "fit",
-            "bomb.jpk-force",
-            "case.toml",
-            "--free",
-            "sample.modulus",
-        ]);
-        assert_eq!(refused.code, 2, "{name}: {}", refused.stderr);
-        found.extend(run(
-            &folder,
-            &fit("bomb.jpk-force"),
-            Duration::from_secs(60),
-        ));
     }
     none_wrong(&found);
 }

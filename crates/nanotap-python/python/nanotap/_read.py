@@ -14,16 +14,15 @@ if TYPE_CHECKING:
 _OTHERS = {
     ".gwy": "gwyfile",
     ".nhf": "NSFopen",
-    ".spm": "afmformats",
 }
 
 
 def read(path: Path) -> "pd.DataFrame":
     """A measured curve from a file, with the instrument's names of its channels and their units.
 
-    Asylum Research's `.ibw`, JPK's `.jpk-force` and Nanosurf's `.nid` are read as they are; every
-    other file is read as text in columns. `fit` and `reconstruct` take the result as it is: they
-    know the usual names, and say what they guess.
+    Curves of JPK, Bruker, Asylum Research, Nanosurf, AFM Workshop, NT-MDT and Optics11 are read as
+    they are, of a map the first one; every other file is read as text in columns. `fit` and
+    `reconstruct` take the result as it is: they know the usual names, and say what they guess.
 
     Returns:
         A data frame with one column per channel. `attrs` has the notes of the file, such as

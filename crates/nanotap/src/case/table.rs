@@ -42,10 +42,12 @@ pub struct Table {
     pub lines: Vec<u64>,
     /// Notes on the measurement from the file of an instrument: name and text.
     pub notes: Vec<(String, String)>,
+    /// What the reader of an instrument's file says of it, such as which height is the distance.
+    pub remarks: Vec<String>,
 }
 
 impl Table {
-    /// Reads an instrument's file (`.ibw`, `.jpk-force`, `.nid`) or a CSV file, in UTF-8, in
+    /// Reads the first curve of an instrument's file (all formats of `afm-files`) or a CSV file, in UTF-8, in
     /// UTF-16 with a byte order mark, or in Latin-1. Fields of a CSV file are separated by commas, semicolons or
     /// tabs, its first line names the columns, the next may contain their units, and lines that
     /// begin with `#` are skipped. Where commas in numbers cannot be separators, they are decimal
@@ -61,7 +63,8 @@ impl Table {
     pub(crate) fn read_from(path: &Path, origin: Origin) -> Result<Self, Error> {
         let name = path.display().to_string();
         let bytes = input::read(path, MAX_TABLE_BYTES, origin)?;
-        if let Some(recorded) = recording::parse(&name, &bytes) {
+        if recording::is_recording(&name, &bytes) {
+            let recorded = recording::parse(&name, bytes);
             return recorded
                 .map(|recorded| Self::of_recording(&name, recorded))
                 .map_err(|error| {
@@ -96,6 +99,7 @@ impl Table {
             columns,
             lines: Vec::new(),
             notes: recorded.notes,
+            remarks: recorded.remarks,
         }
     }
 
@@ -423,6 +427,7 @@ impl<'de> Deserialize<'de> for Table {
             columns: columns.collect::<Result<_, D::Error>>()?,
             lines: Vec::new(),
             notes: given.notes.into_iter().collect(),
+            remarks: Vec::new(),
         };
         table.checked().map_err(D::Error::custom)
     }

@@ -18,7 +18,7 @@ use super::quantity::Quantity;
 
 /// Names of instruments' columns, in lower case without blanks, and what they are called here. Of
 /// several with the same meaning the first counts.
-const NAMES: [(&str, &str); 33] = [
+const NAMES: [(&str, &str); 43] = [
     ("amp", "amplitude"),
     ("amp1", "amplitude"),
     ("amplitude1", "amplitude"),
@@ -33,7 +33,10 @@ const NAMES: [(&str, &str); 33] = [
     ("zsnsr", "distance"),
     ("zsensor", "distance"),
     ("heightsensor", "distance"),
+    ("capacitivesensorheight", "distance"),
     ("measuredheight", "distance"),
+    ("straingaugeheight", "distance"),
+    ("z-sense", "distance"),
     ("height(measured)", "distance"),
     ("zpiezo", "distance"),
     ("piezo", "distance"),
@@ -42,6 +45,9 @@ const NAMES: [(&str, &str); 33] = [
     ("z-axis", "distance"),
     ("z", "distance"),
     ("zposition", "distance"),
+    ("commandedz", "distance"),
+    ("ramp", "distance"),
+    ("displacement", "distance"),
     ("separation", "distance"),
     ("df", "frequency_shift"),
     ("freqshift", "frequency_shift"),
@@ -52,6 +58,10 @@ const NAMES: [(&str, &str); 33] = [
     ("vdeflection", "deflection"),
     ("cantileverdeflection", "deflection"),
     ("tipdeflection", "deflection"),
+    ("deflectionerror", "deflection"),
+    ("cantilever", "deflection"),
+    ("t-b", "deflection"),
+    ("dfl", "deflection"),
 ];
 /// Columns that a force curve does not need.
 const OF_FORCE_CURVE: [&str; 3] = ["separation", "time", "contact"];
@@ -132,6 +142,8 @@ pub(crate) fn prepared(
     for (table, stated) in tables.iter_mut().zip(stated) {
         let comma = table.notes.iter().find(|(name, _)| name == DECIMAL_COMMAS);
         notes.extend(comma.map(|(_, note)| format!("{}: {note}", table.name)));
+        let remarks = table.remarks.iter();
+        notes.extend(remarks.map(|remark| format!("{}: {remark}", table.name)));
         let renamed = rename(table, &mut columns, &mut notes);
         let foreign = !renamed.is_empty() || stated.any;
         from_header(case, table, &mut notes);

@@ -279,6 +279,7 @@ impl Map {
             columns: columns.collect(),
             lines: lines.copied().collect(),
             notes: self.table.notes.clone(),
+            remarks: Vec::new(),
         };
         let turned = before.map_or(self.turned, |before| before.turned);
         let mut options = FitOptions {

@@ -18,6 +18,7 @@ pub mod case;
 pub mod dataset;
 pub mod error;
 pub mod figure;
+pub mod files;
 pub mod frame;
 pub mod input;
 pub mod map;

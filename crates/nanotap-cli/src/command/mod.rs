@@ -10,6 +10,7 @@ mod catalogue;
 mod contact_laws;
 mod convergence;
 mod explore;
+mod files;
 mod fit;
 mod fm;
 mod force_curve;
@@ -130,6 +131,8 @@ pub(crate) enum Own {
     Bimodal(bimodal::Arguments),
     /// Simulate a line or an image under feedback
     Scan(scan::Arguments),
+    /// List what the files of instruments hold
+    Files(files::Arguments),
     /// Fit parameters of lever and sample to measured curves
     Fit(fit::Arguments),
     /// Reconstruct force and dissipation against distance from a measured curve
@@ -181,6 +184,7 @@ pub(crate) fn run(command: &Command, output: &Output) -> Result<(), Failure> {
         Own::Noise(arguments) => noise::run(arguments, output),
         Own::Bimodal(arguments) => bimodal::run(arguments, output),
         Own::Scan(arguments) => scan::run(arguments, output),
+        Own::Files(arguments) => files::run(arguments, output),
         Own::Fit(arguments) => fit::run(arguments, output),
         Own::Reconstruct(arguments) => reconstruct::run(arguments, output),
         Own::Sweep(arguments) => sweep::run(arguments, output),

@@ -3,6 +3,7 @@
 use clap::Args;
 use nanotap::case::schema;
 use nanotap::dataset::Merged;
+use nanotap::files::FileList;
 use nanotap::study::registry::{STUDIES, StudyEntry};
 use nanotap::study::request::answer_schema;
 use nanotap::study::setpoint::CaseReport;
@@ -27,6 +28,11 @@ const COMMANDS: &[Described] = &[
         "catalogue",
         "List the levers and materials that a case can name",
         answer_schema::<Listed<'static>>,
+    ),
+    (
+        "files",
+        "List what the files of instruments hold",
+        answer_schema::<FileList>,
     ),
     (
         "merge",

@@ -11,6 +11,7 @@ mod existing_motions;
 mod experiments;
 mod files;
 mod front_page;
+mod instrument_files;
 #[cfg(unix)]
 mod interruptions;
 #[cfg(unix)]

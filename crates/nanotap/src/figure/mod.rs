@@ -7,6 +7,7 @@ pub mod bimodal;
 pub mod branch;
 pub mod contact;
 pub mod contact_laws;
+pub mod files;
 pub mod fit;
 pub mod force_curve;
 pub mod modes;

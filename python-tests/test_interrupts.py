@@ -11,6 +11,7 @@ import time
 import nanotap
 import numpy as np
 import pytest
+import xarray as xr
 
 CASES = pathlib.Path(__file__).parents[1] / "docs" / "cases"
 # Seconds until the signal, and from then to the exception: one for the work itself, the rest for a
@@ -49,6 +50,25 @@ CALLS = {
     "fm": lambda: nanotap.fm(load("fm-lever.toml"), points=20_000),
     "basin": lambda: nanotap.basin(
         nanotap.Case.paper(omega=20, alpha1=0), x="a1=-1:1:2000", y="v1=-4:4:2000"
+    ),
+    "sweep": lambda: nanotap.sweep(
+        nanotap.Case.paper(), over="omega=2:4:100000", periods=20
+    ),
+    "sweep of many periods": lambda: nanotap.sweep(
+        nanotap.Case.paper(), over="omega=2:4:2000", periods=20_000
+    ),
+    "sweep with a condition": lambda: nanotap.sweep(
+        nanotap.Case.paper(), over="omega=2:4:100000", where="period = 1", periods=20
+    ),
+    "window": lambda: nanotap.window(
+        nanotap.Case.paper(), over=["omega=2:4:100", "alpha4=10:30:100"]
+    ),
+    "fit": lambda: nanotap.fit(
+        load("stiff-lever.toml"),
+        data=[curve()] * 20,
+        free=["sample.modulus", "sample.loss_tangent", "gap.offset"],
+        rows=0,
+        starts=1000,
     ),
     "lyapunov": lambda: nanotap.lyapunov(
         nanotap.Case.paper(omega=2.6), periods=100_000_000
@@ -126,6 +146,17 @@ def test_partial_results_say_what_is_missing():
     ds = stopped.value.result
     assert 0 < ds.sizes["zc"] < 4000
     assert ds.amplitude.attrs["units"] == "m"
+    sweep = {"over": "omega=2.9:3.1:640", "periods": 3}
+    with pytest.raises(nanotap.Interrupted) as stopped:
+        nanotap.sweep(nanotap.Case.paper(), **sweep, threads=1, progress=stop_at(100))
+    part = stopped.value.result
+    whole = nanotap.sweep(nanotap.Case.paper(), **sweep)
+    finished = part.sizes["omega"]
+    assert 100 <= finished < 640
+    xr.testing.assert_identical(
+        part.drop_attrs(), whole.isel(omega=slice(finished)).drop_attrs()
+    )
+    assert "path" not in part.attrs
     with pytest.raises(nanotap.Interrupted) as stopped:
         nanotap.scan(load("scan-step.toml"), lines=50, threads=1, progress=stop_at(2))
     part = stopped.value.result

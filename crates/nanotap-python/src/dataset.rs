@@ -7,7 +7,7 @@ use std::sync::Arc;
 
 use nanotap::control::Control;
 use nanotap::dataset::gsf::Field;
-use nanotap::dataset::{self, Share, Store, StoreError, Work, WorkError, files, table};
+use nanotap::dataset::{self, Share, Store, StoreError, Values, Work, WorkError, files, table};
 use nanotap::figure as figures;
 use nanotap::study::DatasetStudy as _;
 use nanotap::study::basin;
@@ -18,7 +18,8 @@ use nanotap::study::sweep::Summary;
 use nanotap::study::threads::{checked, install};
 use nanotap::study::window::Window;
 use nanotap_figures::Figure;
-use numpy::PyReadonlyArray1;
+use numpy::{PyArray1, PyReadonlyArray1};
+use pyo3::IntoPyObjectExt as _;
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 
@@ -183,6 +184,51 @@ pub(crate) fn merge(py: Python<'_>, sources: Vec<PathBuf>, out: PathBuf) -> PyRe
         Ok(serde_json::to_string(&dataset::merge(&sources, &out)?)?)
     })?;
     Ok(done.result)
+}
+
+/// The values of a dataset in memory.
+type Loaded = (Vec<(String, usize, usize)>, Vec<(String, Py<PyAny>)>);
+
+/// The values of the variables of a dataset, row-major, after the range of entries along each axis;
+/// `None` if no chunk is finished. With `part` only the entries up to the last finished chunk.
+#[pyfunction]
+pub(crate) fn load(py: Python<'_>, path: PathBuf, part: bool) -> PyResult<Option<Loaded>> {
+    let done = watched(py, None, move |_| {
+        let store = Store::open(&path)?;
+        let grid = &store.schema().grid;
+        let block = if part {
+            dataset::finished_block(&store)
+        } else {
+            Some(grid.whole())
+        };
+        let Some(block) = block else {
+            return Ok(None);
+        };
+        let variables = store.schema().variables.iter().enumerate();
+        let column = |(k, variable): (usize, &dataset::Variable)| {
+            Ok((variable.name.clone(), dataset::column(&store, &block, k)?))
+        };
+        let columns = variables
+            .map(column)
+            .collect::<Result<Vec<_>, StoreError>>()?;
+        let axes = grid.axes.iter().zip(&block.ranges);
+        let ranges = axes.map(|(axis, range)| (axis.name.clone(), range.start, range.end));
+        Ok(Some((ranges.collect::<Vec<_>>(), columns)))
+    })?;
+    let Some((ranges, columns)) = done.result else {
+        return Ok(None);
+    };
+    let array = |(name, values)| {
+        let array = match values {
+            Values::Real(values) => PyArray1::from_vec(py, values).into_py_any(py)?,
+            Values::Whole(values) => PyArray1::from_vec(py, values).into_py_any(py)?,
+            Values::Code(values) => PyArray1::from_vec(py, values).into_py_any(py)?,
+            Values::Text(words) => words.into_py_any(py)?,
+        };
+        Ok((name, array))
+    };
+    let columns = columns.into_iter().map(array).collect::<PyResult<_>>()?;
+    Ok(Some((ranges, columns)))
 }
 
 fn opened(path: &Path) -> Result<(Store, String), Failure> {

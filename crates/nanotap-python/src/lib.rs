@@ -56,6 +56,7 @@ fn _nanotap(module: &Bound<'_, PyModule>) -> PyResult<()> {
         wrap_pyfunction!(study::paper, module)?,
         wrap_pyfunction!(study::paper_sections, module)?,
         wrap_pyfunction!(dataset::merge, module)?,
+        wrap_pyfunction!(dataset::load, module)?,
         wrap_pyfunction!(dataset::summary, module)?,
         wrap_pyfunction!(dataset::window, module)?,
         wrap_pyfunction!(dataset::figure, module)?,

@@ -3,7 +3,7 @@
 import json
 import os
 import tempfile
-from collections.abc import Hashable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from typing import TYPE_CHECKING, Any
 
@@ -12,7 +12,7 @@ import numpy as np
 from . import _arguments, _nanotap
 from ._arguments import Progress
 from ._case import Case, Path, missing
-from ._interrupt import Interrupted, stoppable
+from ._interrupt import Interrupted, nothing, stoppable
 from ._motions import _cased
 from ._progress import bar
 from ._record import Record
@@ -42,10 +42,11 @@ def sweep(
     plan = ("sweep", _cased(case), request)
     if not options["where"] or chunk != "1/1":
         return computed(plan, noun, out, chunk, threads, client, progress)
-    with _stored(out, "sweep") as store:
-        ds = computed(plan, noun, store, chunk, threads, client, progress)
+    with _stored(out) as (store, read):
+        recipe = _recipe(plan, threads, progress)
+        stopped = _work(recipe, plan, noun, store, chunk, threads, client, progress)
+        ds = read(store, stopped)
         targets = json.loads(_nanotap.summary(store))["targets"]
-        ds = _kept(ds, out)
     return _judged(ds, ds.classification.dims[:-1], targets)
 
 
@@ -101,10 +102,6 @@ def open(path: Path) -> "xr.Dataset":
         import dask.array as _  # noqa: F401
     except ImportError:
         chunks = None
-    return _opened(name, chunks)
-
-
-def _opened(name: str, chunks: Any) -> "xr.Dataset":
     import xarray as xr
 
     ds: xr.Dataset = xr.open_zarr(name, chunks=chunks, consolidated=True)
@@ -181,10 +178,11 @@ def window(
         "window", {**options, "over": _arguments.axes(options["over"])}
     )
     plan = ("window", _cased(case), request)
-    with _stored(out, "window") as store:
-        ds = computed(plan, "values", store, "1/1", threads, client, progress)
+    with _stored(out) as (store, read):
+        recipe = _recipe(plan, threads, progress)
+        stopped = _work(recipe, plan, "values", store, "1/1", threads, client, progress)
+        ds = read(store, stopped)
         found = json.loads(_nanotap.window(store))
-        ds = _kept(ds, out)
     dims = ds.classification.dims[:2]
     shares = found["shares"]
     if (targets := found.get("targets")) is not None:
@@ -230,31 +228,44 @@ def _path_of(ds: "xr.Dataset | Path") -> str:
 
 
 @contextmanager
-def _stored(out: Path | None, noun: str) -> Iterator[str]:
-    """The store of a dataset that is summarised: `out`, or one in a folder that is deleted afterwards,
-    so that the finished part of stopped work is loaded before.
+def _stored(
+    out: Path | None, parent: str | None = None
+) -> "Iterator[tuple[str, Callable[[str, bool], xr.Dataset]]]":
+    """The store of a dataset, `out` or one in a folder that is deleted afterwards, and what reads
+    it: from the store and whether the work was stopped.
     """
     if out is not None:
-        yield _ending(out, "out")
+        yield _ending(out, "out"), _lazy
         return
-    with tempfile.TemporaryDirectory(prefix="nanotap-") as folder:
-        try:
-            yield os.path.join(folder, f"{noun}.zarr")
-        except Interrupted as stopped:
-            if stopped.result is None:
-                raise
-            raise Interrupted(_STOPPED, _kept(stopped.result, None)) from None
+    with tempfile.TemporaryDirectory(prefix="nanotap-", dir=parent) as folder:
+        yield os.path.join(folder, "dataset.zarr"), _in_memory
 
 
-def _kept(ds: "xr.Dataset", out: Path | None) -> "xr.Dataset":
-    """The dataset, in memory if no store was requested."""
-    if out is not None:
-        return ds
-    path = ds.attrs.pop("path", None)
-    return ds if path is None else ds.load()
+def _lazy(store: str, stopped: bool) -> "xr.Dataset":
+    ds = open(store)
+    if stopped:
+        message = f"stopped; the finished part is in {store}; the same call resumes"
+        raise Interrupted(message, ds)
+    return ds
 
 
-_STOPPED = "stopped; unfinished values are missing"
+def _in_memory(store: str, stopped: bool) -> "xr.Dataset":
+    """The values of a store; of stopped work, those up to the last finished chunk."""
+    import xarray as xr
+
+    found = _nanotap.load(store, part=stopped)
+    if found is None:
+        raise nothing()
+    ranges, columns = found
+    with xr.open_zarr(store, chunks=None, consolidated=True) as whole:
+        ds = whole.isel({name: slice(start, end) for name, start, end in ranges})
+        for name, values in columns:
+            old = ds[name]
+            ds[name] = old.copy(data=np.reshape(values, old.shape))
+        ds = _worded(ds.load().drop_encoding())
+    if stopped:
+        raise Interrupted("stopped; unfinished values are missing", ds)
+    return ds
 
 
 def _ending(path: Path, name: str) -> str:
@@ -280,29 +291,18 @@ def computed(
         message = f"chunk {chunk}: a client computes all chunks; omit one of the two"
         raise ValueError(message)
     recipe = _recipe(plan, threads, progress)
-    if out is not None:
-        store = _ending(out, "out")
-        stopped = _work(recipe, plan, noun, store, chunk, threads, client, progress)
-        ds = open(store)
-        if stopped:
-            message = f"stopped; the finished part is in {store}; the same call resumes"
-            raise Interrupted(message, ds)
-        return ds
-    *faster, usual = _temporary_folders()
+
+    def run(parent: str | None) -> "xr.Dataset":
+        with _stored(out, parent) as (store, read):
+            stopped = _work(recipe, plan, noun, store, chunk, threads, client, progress)
+            return read(store, stopped)
+
+    *faster, usual = [None] if out is not None else _temporary_folders()
     for parent in faster:
         # It may be too small.
         with suppress(OSError):
-            ds, stopped = _in_memory(
-                parent, recipe, plan, noun, chunk, threads, client, progress
-            )
-            break
-    else:
-        ds, stopped = _in_memory(
-            usual, recipe, plan, noun, chunk, threads, client, progress
-        )
-    if stopped:
-        raise Interrupted(_STOPPED, ds)
-    return ds
+            return run(parent)
+    return run(usual)
 
 
 def _temporary_folders() -> list[str | None]:
@@ -310,26 +310,6 @@ def _temporary_folders() -> list[str | None]:
     else where temporary files are (`None`)."""
     memory = "/dev/shm"
     return [memory, None] if os.access(memory, os.W_OK | os.X_OK) else [None]
-
-
-def _in_memory(
-    parent: str | None,
-    recipe: "_nanotap.Recipe",
-    plan: "Plan",
-    noun: str,
-    chunk: str,
-    threads: int | None,
-    client: "Client | None",
-    progress: Progress,
-) -> "tuple[xr.Dataset, bool]":
-    """The loaded Dataset of a store in a temporary folder, and whether it was stopped."""
-    with tempfile.TemporaryDirectory(prefix="nanotap-", dir=parent) as folder:
-        store = os.path.join(folder, "dataset.zarr")
-        stopped = _work(recipe, plan, noun, store, chunk, threads, client, progress)
-        ds = _opened(store, None).load()
-        ds.close()
-    del ds.attrs["path"]
-    return ds, stopped
 
 
 def _recipe(plan: "Plan", threads: int | None, progress: Progress) -> "_nanotap.Recipe":

@@ -26,17 +26,15 @@ def stoppable() -> Iterator[None]:
     except Interrupted:
         raise
     except KeyboardInterrupt:
-        raise _nothing() from None
+        raise nothing() from None
 
 
-def _nothing() -> "Interrupted[None]":
+def nothing() -> "Interrupted[None]":
     return Interrupted("stopped before a part was finished", None)
 
 
 def part_of(result: R, finished: bool) -> "Interrupted[R] | Interrupted[None]":
     """What a study raises that Ctrl-C stopped: `finished` says whether `result` contains anything."""
     return (
-        Interrupted("stopped before it was finished", result)
-        if finished
-        else _nothing()
+        Interrupted("stopped before it was finished", result) if finished else nothing()
     )

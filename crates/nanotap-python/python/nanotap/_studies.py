@@ -498,7 +498,8 @@ def fit_map(
 
     Raises:
         ValueError: an option or the table is not valid.
-        Interrupted: Ctrl-C; its `result` is the dataset with the rest missing.
+        Interrupted: Ctrl-C; its `result` is the dataset up to the last finished pixels, or with `out`
+            the whole dataset with the rest missing.
 
     Example:
         >>> import nanotap

@@ -123,6 +123,13 @@ impl Grid {
         }
     }
 
+    /// All entries as one block, the chunk of a grid that is not divided.
+    pub fn whole(&self) -> Block {
+        let whole = |axis: &Axis| Axis::new(&axis.name, axis.length, axis.length);
+        let axes = self.axes.iter().map(whole).collect();
+        Self { axes }.block(0)
+    }
+
     /// Position in a full chunk of the entry with row-major index `index` of `block`.
     pub(crate) fn slot(&self, block: &Block, index: usize) -> usize {
         block

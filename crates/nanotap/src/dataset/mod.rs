@@ -38,7 +38,7 @@ mod zarr;
 pub use error::StoreError;
 pub use grid::{Axis, Block, Grid};
 pub use merge::{Merged, merge};
-pub use pack::finish;
+pub use pack::{column, finish, finished_block};
 pub use schema::{Coordinate, Schema, Values, Variable};
 pub use share::{Share, ShareError};
 pub use store::{Store, chunk_files};

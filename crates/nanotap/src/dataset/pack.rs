@@ -13,6 +13,8 @@ use std::fs;
 use std::ops::Range;
 use std::path::Path;
 
+use rayon::prelude::*;
+
 use super::error::StoreError;
 use super::grid::{Axis, Block};
 use super::schema::{Schema, Values};
@@ -108,36 +110,63 @@ fn parts<'a>(store: &'a Store, block: &'a Block) -> impl Iterator<Item = Block> 
     })
 }
 
-/// The values of a variable for the entries of a block of another division into chunks.
+/// The smallest block that contains all finished chunks of a dataset, numbered as the first of them;
+/// `None` if no chunk is finished.
+pub fn finished_block(store: &Store) -> Option<Block> {
+    let grid = &store.schema().grid;
+    let finished = (0..store.chunks()).filter(|chunk| store.is_finished(*chunk));
+    let hull = |mut hull: Block, block: Block| {
+        for (range, other) in hull.ranges.iter_mut().zip(block.ranges) {
+            *range = range.start.min(other.start)..range.end.max(other.end);
+        }
+        hull
+    };
+    finished.map(|chunk| grid.block(chunk)).reduce(hull)
+}
+
+/// The values of a variable, by its index in the schema, for the entries of any block, row-major;
+/// those of unfinished chunks are missing values.
 ///
 /// # Errors
 /// If a chunk cannot be read or is damaged.
-pub(super) fn column(store: &Store, block: &Block, variable: usize) -> Result<Values, StoreError> {
+pub fn column(store: &Store, block: &Block, variable: usize) -> Result<Values, StoreError> {
     let schema = store.schema();
     let stride = schema.variables[variable].stride();
     let mut column = schema.variables[variable]
         .kind
         .missing(block.len() * stride);
-    for part in parts(store, block) {
-        let values = store.read_chunk(&part, variable)?;
-        let (Some(own), Some(other)) = (part.ranges.last(), block.ranges.last()) else {
-            continue;
-        };
-        // Entries along the last axis are neighbours in both.
-        let start = own.start.max(other.start);
-        let run = own.end.min(other.end).saturating_sub(start);
-        for row in (0..part.len()).step_by(own.len()) {
-            let mut entry = part.entry(row);
-            if let Some(last) = entry.last_mut() {
-                *last = start;
-            }
-            if let Some(at) = block.position(&entry) {
-                let from = row + (start - own.start);
-                column.copy_from(at * stride, &values, from * stride, run * stride);
-            }
+    let finished: Vec<Block> = parts(store, block)
+        .filter(|part| store.is_finished(part.chunk))
+        .collect();
+    // As many chunks as threads are in memory.
+    for parts in finished.chunks(rayon::current_num_threads()) {
+        let read = |part: &Block| store.read_chunk(part, variable);
+        let values: Result<Vec<Values>, StoreError> = parts.par_iter().map(read).collect();
+        for (part, values) in parts.iter().zip(values?) {
+            copy_part(&mut column, block, part, &values, stride);
         }
     }
     Ok(column)
+}
+
+/// Copies the values of a chunk to those of a block of another division into chunks.
+fn copy_part(column: &mut Values, block: &Block, part: &Block, values: &Values, stride: usize) {
+    let (Some(own), Some(other)) = (part.ranges.last(), block.ranges.last()) else {
+        return;
+    };
+    // Entries along the last axis are neighbours in both.
+    let start = own.start.max(other.start);
+    let run = own.end.min(other.end).saturating_sub(start);
+    for row in (0..part.len()).step_by(own.len()) {
+        let mut entry = part.entry(row);
+        if let Some(last) = entry.last_mut() {
+            *last = start;
+        }
+        if let Some(at) = block.position(&entry) {
+            let from = row + (start - own.start);
+            column.copy_from(at * stride, values, from * stride, run * stride);
+        }
+    }
 }
 
 /// Removes a file or a folder that may not exist.

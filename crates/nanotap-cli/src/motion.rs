@@ -374,7 +374,7 @@ const SWITCHES_SHOWN: usize = 12;
 
 /// The derivatives of what is observed of an orbit with respect to a key: of a physical case in
 /// SI units.
-pub(crate) fn derivative(key: &str, derivative: &Derivative) -> String {
+pub(crate) fn derivative(key: &str, derivative: &Derivative, is_beam: bool) -> String {
     let mut table = Table::new([("", Align::Left), ("", Align::Point), ("", Align::Left)]);
     let physical = derivative.physical.as_ref();
     for (observable, change) in physical.unwrap_or(&derivative.observables) {
@@ -383,6 +383,8 @@ pub(crate) fn derivative(key: &str, derivative: &Derivative) -> String {
         };
         let (name, unit) = match physical {
             Some(_) => (observable.si_name, observable.dimension.si_unit()),
+            // An oscillator has the units of its file.
+            None if !is_beam && observable.dimension.kind().is_some() => (observable.name, ""),
             None => (observable.name, observable.dimension.model_unit()),
         };
         let per = derivative

@@ -17,7 +17,6 @@ use nanotap::model::nonlinear::Equilibrium;
 use nanotap::model::oscillator::{Oscillator, Stop};
 use nanotap::model::parameter::Parameter;
 use nanotap::observe::table::shown_phase;
-use nanotap::study::cantilever as cantilever_of;
 use nanotap::study::modes::ModeTable;
 use nanotap::study::setpoint::{
     CaseReport, SetpointReport, SolvedCase, UnsolvedCase, note_of_several_tones,
@@ -77,27 +76,27 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
         }
         Err(other) => return Err(other),
     };
-    let document = SolvedCase::of(&case, setpoint_solved);
     write_out(arguments, &case)?;
-    if let Some(given) = case.oscillator() {
-        return output.result(&document, |_| oscillator(&case, given));
+    let solved = setpoint_solved.as_ref().map_or_else(String::new, setpoint);
+    let document = SolvedCase::of(&case, setpoint_solved);
+    if let Some(numbers) = case.cantilever() {
+        remarks(&case, output);
+        remark(numbers, output);
     }
-    let numbers = cantilever_of(&case, "nanotap case")?;
-    remarks(&case, output);
-    remark(numbers, output);
     for beyond in &document.out_of_range {
         output.warning(&format!("where the lever rests, {beyond}"));
     }
-    output.result(&document, |document| {
-        case.physical().map_or_else(
-            || cantilever(case.title(), numbers),
-            |view| {
-                let solved = &document.setpoint_solved;
-                let solved = solved.as_ref().map_or_else(String::new, setpoint);
+    output.result(&CaseReport::Solved(Box::new(document)), |_| {
+        match (case.cantilever(), case.physical()) {
+            (_, Some(view)) => {
                 let rest = equilibria_table(&equilibria(&case), view);
                 format!("{}{rest}{solved}", physical(case.title(), view, true))
-            },
-        )
+            }
+            (Some(numbers), None) => cantilever(case.title(), numbers),
+            (None, None) => case
+                .oscillator()
+                .map_or_else(String::new, |given| oscillator(&case, given)),
+        }
     })
 }
 

@@ -7,6 +7,7 @@ use nanotap::case::units::Units;
 use nanotap::figure::modes::shapes_figure;
 use nanotap::model::beam::Modes;
 use nanotap::model::parameter::Parameter;
+use nanotap::study::Document;
 use nanotap::study::modes::{ModeTable, ModesStudy, shape_table};
 
 use crate::failure::Failure;
@@ -28,7 +29,8 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
         .out
         .write(|| shape_table(&beam, request.points).csv())?;
     arguments.plot.draw(|| shapes_figure(&beam))?;
-    output.study(&case, &table, |table| text(&case, table))
+    let document = Document::of::<ModesStudy>(&table, &case);
+    output.result(&document, |_| text(&case, &table))
 }
 
 fn text(case: &GivenCase, table: &ModeTable) -> String {

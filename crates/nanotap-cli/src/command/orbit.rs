@@ -181,13 +181,19 @@ fn text(
         orbit.residual, orbit.error
     )));
     let heading = match units {
-        Units::Model => "state at drive phase 0",
-        Units::Si(_) => "state at drive phase 0, in units of g0 and g0/T",
+        Units::Si(_) if model.memory > 0 => {
+            "state at drive phase 0, the sample's memory in the model's units"
+        }
+        _ => "state at drive phase 0",
     };
     let _ = writeln!(text, "\n  {}", style::bold(heading));
     let mut table = Table::new([("", Align::Left), ("", Align::Point)]);
     for (name, value) in time_series::state_names(model).iter().zip(&orbit.state) {
-        table.row([name.clone(), number::significant(*value, 12)]);
+        let shown = match units.of_entry(name) {
+            Some(_) => units.shown_entry(name, *value, 12),
+            None => number::significant(*value, 12),
+        };
+        table.row([name.clone(), shown]);
     }
     text.push_str(&table.render());
     text.push('\n');
@@ -216,7 +222,7 @@ fn text(
     }
     for (key, derivative) in &orbit.derivatives {
         text.push('\n');
-        text.push_str(&motion::derivative(key, derivative));
+        text.push_str(&motion::derivative(key, derivative, model.beam.is_some()));
     }
     text
 }

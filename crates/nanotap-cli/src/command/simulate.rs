@@ -6,9 +6,10 @@ use nanotap::case::physical::Kind;
 use nanotap::case::units::Units;
 use nanotap::figure::motion::{fixed_step_figure, simulation_figure};
 use nanotap::model::Model;
-use nanotap::observe::ObservableSet;
 use nanotap::study::fixed_step::FixedStepRun;
-use nanotap::study::simulate::{Classification, SimulateReport, SimulateStudy, Simulation};
+use nanotap::study::simulate::{
+    Classification, SimulateOptions, SimulateReport, SimulateStudy, Simulation,
+};
 
 use crate::failure::Failure;
 use crate::given_case::GivenCase;
@@ -53,17 +54,12 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
         }
     }
     output.study(&case, &report, |report| match report {
-        SimulateReport::Exact(run) => text(&case, &model, &run.motion, request.observables),
+        SimulateReport::Exact(run) => text(&case, &model, &run.motion, &request),
         SimulateReport::FixedStep(run) => rk4_text(&case, run),
     })
 }
 
-fn text(
-    case: &GivenCase,
-    model: &Model,
-    run: &Simulation,
-    chosen: Option<ObservableSet>,
-) -> String {
+fn text(case: &GivenCase, model: &Model, run: &Simulation, request: &SimulateOptions) -> String {
     let units = case.units();
     let heading = format!("{}: {}", case.title(), case.summary());
     let mut text = format!("{}\n\n", style::bold(&heading));
@@ -80,11 +76,18 @@ fn text(
     }
     // Far above rounding and what Newton leaves.
     if let Some(distance) = run.distance_to_orbit.filter(|d| *d > 1e-6) {
-        text.push_str(&motion::paragraph(&format!(
-            "The following describes the transient, not yet the orbit: at its end the state is still {} % of the orbit's \
-             size away. Without --transient the orbit itself is shown.",
-            number::significant(100.0 * distance, 2)
-        )));
+        let distance = number::significant(100.0 * distance, 2);
+        text.push_str(&motion::paragraph(&if request.transient.is_some() {
+            format!(
+                "The following describes the transient, not yet the orbit: at its end the state is still \
+                 {distance} % of the orbit's size away. Without --transient the orbit itself is shown."
+            )
+        } else {
+            format!(
+                "The following describes a run from the orbit whose rounding errors grow: at its end the \
+                 state is {distance} % of the orbit's size away. `orbit` describes the orbit itself."
+            )
+        }));
     }
     if let Some(exponents) = &run.lyapunov {
         text.push_str(&motion::paragraph(&format!(
@@ -108,7 +111,7 @@ fn text(
     );
     text.push_str(&motion::observed(
         &run.observables,
-        chosen,
+        request.observables,
         &units,
         model.beam.is_some(),
     ));

@@ -118,3 +118,26 @@ fn an_oscillator_has_no_modes() {
         .refused(&["impact.toml", "needs a cantilever"]);
     folder.run(&["modes"]).refused(&["no case was given"]);
 }
+
+/// The frequencies do not depend on the distance, so that it is not solved for.
+#[test]
+fn a_distance_that_is_left_to_a_setpoint_is_not_in_the_document() {
+    let folder = Folder::new();
+    let case = &crate::util::shipped_case("stiff-lever.toml");
+    let json = folder.run(&["modes", case, "--json"]).json();
+    let physical = &json["case"]["physical"];
+    for key in ["tip_gap", "beam_gap", "length_unit", "force_unit"] {
+        assert!(physical[key].is_null(), "{key}: {}", physical[key]);
+    }
+    assert!(
+        json["case"]["alpha5"].is_null() && json["case"]["gap"].is_null(),
+        "{}",
+        json["case"]
+    );
+    assert_eq!(json["case"]["modes"], 2);
+    let given = ["--set", "gap.tip=15 nm"];
+    let json = folder
+        .run(&[&["modes", case, "--json"], &given[..]].concat())
+        .json();
+    assert_eq!(json["case"]["physical"]["tip_gap"], 15e-9);
+}

@@ -472,3 +472,98 @@ fn extreme_cases_finish() {
         assert!(json["classification"].is_string(), "{extreme}: {json}");
     }
 }
+
+#[test]
+fn states_of_a_physical_case_are_in_si_too() {
+    let folder = Folder::new();
+    let case = &crate::util::shipped_case("stiff-lever.toml");
+    let set = ["--set", "drive.setpoint=", "--set", "gap.tip=15 nm"];
+    let run = |words: &[&str]| folder.run(&[words, &set].concat());
+    // The units of the model: the beam's distance, and that by the unit of time.
+    let si = |document: &Value, state: &Value| -> Vec<f64> {
+        let physical = &document["case"]["physical"];
+        let length = number(physical, "length_unit");
+        let velocity = length / number(physical, "time_unit");
+        let units = [length, length, velocity, velocity];
+        let entries = vector(state).into_iter().zip(units);
+        entries.map(|(value, unit)| unit * value).collect()
+    };
+    let same = |found: &Value, expected: &[f64]| {
+        let found = vector(found);
+        assert_eq!(found.len(), 4);
+        for (found, expected) in found.iter().zip(expected) {
+            assert!((found - expected).abs() <= 1e-14 * expected.abs());
+        }
+    };
+    let orbit = run(&["orbit", case, "--json"]).json();
+    same(&orbit["physical"]["state"], &si(&orbit, &orbit["state"]));
+    let run_on = run(&["simulate", case, "--strobe", "2", "--json"]).json();
+    for k in 0..2 {
+        let expected = si(&run_on, &run_on["strobe"][k]);
+        same(&run_on["physical"]["strobe"][k], &expected);
+    }
+    let census = run(&["attractors", case, "--starts", "2", "--json"]).json();
+    let found = &census["attractors"][0];
+    same(&found["physical"]["state"], &si(&census, &found["state"]));
+    let range = [
+        "--parameter",
+        "gap.tip",
+        "--from",
+        "15 nm",
+        "--to",
+        "14.9 nm",
+    ];
+    let branch = run(&[&["branch", case, "--json"], &range[..]].concat()).json();
+    let point = &branch["points"][0];
+    same(&point["physical"]["state"], &si(&branch, &point["state"]));
+    let text = run(&["orbit", case]).stdout;
+    let row = |name: &str| {
+        let is_row = |line: &&str| line.trim_start().starts_with(name);
+        text.lines().find(is_row).unwrap_or_default().to_owned()
+    };
+    assert!(
+        row("a1 ").ends_with(" nm") && row("v1 ").ends_with("m/s"),
+        "{text}"
+    );
+    assert!(!text.contains("g0"), "{text}");
+}
+
+#[test]
+fn a_state_behind_a_pole_of_the_law_is_refused() {
+    let folder = Folder::new();
+    folder.write(
+        "case.toml",
+        "[model]\nmodes = 1\n[cantilever]\nk = \"40 N/m\"\nf0 = \"100 kHz\"\nQ = 100\n\
+         [tip]\nradius = \"10 nm\"\n\
+         [sample]\nlaw = \"lennard-jones\"\nhamaker = \"1e-19 J\"\nrepulsion = \"1e-76 J m^6\"\n\
+         [drive]\nfrequency = \"100 kHz\"\nfree_amplitude = \"2 nm\"\n[gap]\ntip = \"10 nm\"\n",
+    );
+    for study in ["orbit", "simulate", "lyapunov"] {
+        let outcome = folder.run(&[study, "case.toml", "--state", "tip=-12 nm"]);
+        outcome.refused(&["lies in the surface", "--state in front of the surface"]);
+    }
+}
+
+/// Between two sticks neighbouring motions part, so that a run leaves the orbit by its rounding errors.
+#[test]
+fn a_run_from_a_sticking_orbit_is_no_transient() {
+    let folder = Folder::new();
+    folder.write("case.toml", IMPACT.replace("2.5", "2.9"));
+    let run = |more: &[&str]| folder.run(&[&["simulate", "case.toml"], more].concat());
+    let text = run(&["--periods", "200"]).stdout;
+    assert!(text.contains("rounding errors grow") && !text.contains("the transient, not"));
+    let set = ["--set", "omega=2.5", "--transient", "3", "--periods", "5"];
+    let text = run(&set).stdout;
+    assert!(text.contains("the transient, not"), "{text}");
+}
+
+#[test]
+fn derivatives_of_an_oscillator_have_no_unit_of_a_beam() {
+    let folder = Folder::new();
+    folder.write("case.toml", IMPACT.replace("gap = 0", "gap = -0.2"));
+    let text = folder
+        .run(&["orbit", "case.toml", "--derivatives", "forcing"])
+        .stdout;
+    assert!(text.contains("derivatives by forcing"), "{text}");
+    assert!(!text.contains("g0") && text.contains("degree"), "{text}");
+}

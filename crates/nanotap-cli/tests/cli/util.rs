@@ -123,6 +123,12 @@ impl Drop for Folder {
     }
 }
 
+/// The path of a case in the documents.
+pub(crate) fn shipped_case(name: &str) -> String {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/cases");
+    folder.join(name).to_str().unwrap().to_owned()
+}
+
 /// Runs `nanotap case` on `text`.
 pub(crate) fn case(text: impl AsRef<[u8]>, more: &[&str]) -> Outcome {
     let folder = Folder::new();

@@ -23,6 +23,31 @@ pub enum CaseDocument {
     Cantilever(Box<CantileverDocument>),
     /// An oscillator: `kind`, the keys of its case file, `period`.
     Oscillator(OscillatorDocument),
+    /// A cantilever whose distance is left to a setpoint that was not solved for: `kind`, `modes` and
+    /// `physical` without what depends on the distance.
+    WithoutDistance(Box<WithoutDistanceDocument>),
+}
+
+/// The case of a cantilever whose distance is left to a setpoint that was not solved for.
+#[derive(Clone, Debug, Serialize, JsonSchema)]
+pub struct WithoutDistanceDocument {
+    /// The word `cantilever`.
+    pub kind: &'static str,
+    /// Number of modes.
+    pub modes: usize,
+    /// Quantities in SI, without those that depend on the distance.
+    pub physical: Option<PhysicalSummary>,
+}
+
+impl WithoutDistanceDocument {
+    /// The document of a cantilever without its distance.
+    pub fn of(case: &Case) -> Self {
+        Self {
+            kind: "cantilever",
+            modes: case.cantilever().map_or(0, |cantilever| cantilever.modes),
+            physical: case.physical().map(PhysicalSummary::without_distance),
+        }
+    }
 }
 
 /// The case of a cantilever as a document.
@@ -323,6 +348,16 @@ impl CaseDocument {
         match case.oscillator() {
             Some(oscillator) => Self::Oscillator(OscillatorDocument::of(oscillator)),
             None => Self::Cantilever(Box::new(CantileverDocument::of(case))),
+        }
+    }
+
+    /// The document of a case for a result that does not depend on the distance: without it while it is
+    /// left to a setpoint.
+    pub fn at_any_distance(case: &Case) -> Self {
+        if case.leaves_distance_to_setpoint() {
+            Self::WithoutDistance(Box::new(WithoutDistanceDocument::of(case)))
+        } else {
+            Self::of(case)
         }
     }
 }

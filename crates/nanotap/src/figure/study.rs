@@ -97,6 +97,6 @@ fn drawn<S: Study>(
         at_setpoint(case.clone(), control)?.0
     };
     let report = S::run(&case, &options, control)?;
-    let document = serde_json::to_value(Document::new(&report, &case))?;
+    let document = serde_json::to_value(Document::of::<S>(&report, &case))?;
     Ok((document, Some(draw(&case, &report)?)))
 }

@@ -285,12 +285,22 @@ impl Nonlinear {
     /// [wall](ForceLaw::wall) of the law; `None` if the law holds at every gap. Distances from it
     /// are those of the gap, in units of g₀.
     pub(crate) fn wall(&self) -> Option<Wall> {
-        let wall = self.system.law().wall()?;
+        Some(self.at_gap(self.system.law().wall()?))
+    }
+
+    /// Returns the states at drive phase 0 in which the tip is at a pole of the law; `None` if it has
+    /// none.
+    pub(crate) fn pole(&self) -> Option<Wall> {
+        Some(self.at_gap(self.system.law().pole()?))
+    }
+
+    /// Returns the states at drive phase 0 with this gap.
+    fn at_gap(&self, gap: f64) -> Wall {
         let n = self.system.dimension();
         let mut row = self.system.kernel().row().as_slice().to_vec();
         row.resize(self.dimension(), 0.0);
-        let least = wall - self.system.gap(0.0, &vec![0.0; n]).0;
-        Some(Wall { row, least })
+        let least = gap - self.system.gap(0.0, &vec![0.0; n]).0;
+        Wall { row, least }
     }
 
     /// Returns the gap at which contact begins from outside, in units of g₀; `None` if there is

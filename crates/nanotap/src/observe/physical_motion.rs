@@ -25,6 +25,11 @@ pub struct PhysicalMotion {
     pub amplitude_ratio: f64,
     /// Further entries if the motion is reported alone.
     pub setting: Option<Setting>,
+    /// State at drive phase 0, if it is reported: a_1 … a_N in m, their rates in m/s, then any memory of
+    /// the sample in the model's units.
+    pub state: Vec<f64>,
+    /// States at the ends of the last periods, if they are reported, in the units of `state`.
+    pub strobe: Vec<Vec<f64>>,
 }
 
 /// Entries that belong to the case, and the harmonics of the motion.
@@ -74,7 +79,27 @@ impl PhysicalMotion {
             amplitude_ratio: observables.first_harmonic / view.free_amplitude,
             observables,
             setting: None,
+            state: Vec::new(),
+            strobe: Vec::new(),
         }
+    }
+
+    /// The same motion with its state at drive phase 0, which is given in the model's units.
+    #[must_use]
+    pub fn with_state(mut self, state: &[f64], view: &Physical) -> Self {
+        self.state = state_in_si(state, view);
+        self
+    }
+
+    /// The same motion with its states at the ends of the last periods, which are given in the model's
+    /// units.
+    #[must_use]
+    pub fn with_strobe(mut self, strobe: &[Vec<f64>], view: &Physical) -> Self {
+        self.strobe = strobe
+            .iter()
+            .map(|state| state_in_si(state, view))
+            .collect();
+        self
     }
 
     /// Converts a single motion, with its setting and, with `spectrum`, its harmonics.
@@ -99,6 +124,18 @@ impl PhysicalMotion {
             ..Self::of(observables, view)
         }
     }
+}
+
+/// A state in SI, as a case and `state` options take it.
+fn state_in_si(state: &[f64], view: &Physical) -> Vec<f64> {
+    let modes = view.cantilever.modes.max(1);
+    let unit = |k: usize| match k / modes {
+        0 => view.scales.length,
+        1 => view.scales.velocity,
+        _ => 1.0,
+    };
+    let entries = state.iter().enumerate();
+    entries.map(|(k, value)| unit(k) * value).collect()
 }
 
 impl Serialize for PhysicalMotion {
@@ -128,9 +165,19 @@ impl Serialize for PhysicalMotion {
                 map.serialize_entry("harmonics", &setting.harmonics)?;
             }
         }
+        if !self.state.is_empty() {
+            map.serialize_entry("state", &self.state)?;
+        }
+        if !self.strobe.is_empty() {
+            map.serialize_entry("strobe", &self.strobe)?;
+        }
         map.end()
     }
 }
+
+/// Units of the entries of a state in SI, for the schema.
+const STATE_UNITS: &str = "a_1 … a_N in m, their rates in m/s, then any memory of the sample in the \
+                           model's units";
 
 impl JsonSchema for PhysicalMotion {
     fn schema_name() -> Cow<'static, str> {
@@ -150,6 +197,19 @@ impl JsonSchema for PhysicalMotion {
         }
         let ratio = json!({"type": "number", "description": "A over the free amplitude"});
         properties.insert("A_ratio".to_owned(), ratio);
+        let numbers = Vec::<f64>::json_schema(generator).to_value();
+        let rows = Vec::<Vec<f64>>::json_schema(generator).to_value();
+        for (name, mut schema, what) in [
+            ("state", numbers, "State at drive phase 0"),
+            (
+                "strobe",
+                rows,
+                "States at the ends of the last requested periods",
+            ),
+        ] {
+            schema["description"] = format!("{what}: {STATE_UNITS}").into();
+            properties.insert(name.to_owned(), schema);
+        }
         let setting = Setting::json_schema(generator).to_value();
         if let Some(Json::Object(entries)) = setting.get("properties") {
             properties.extend(entries.clone());

@@ -293,6 +293,12 @@ impl AttractorReport {
     }
 }
 
+/// An orbit in the SI units of `view`.
+fn orbit_in_si(orbit: &OrbitReport, view: &Physical) -> PhysicalMotion {
+    PhysicalMotion::alone(&orbit.observables, Some(&orbit.spectrum), view)
+        .with_state(&orbit.state, view)
+}
+
 impl Attractors {
     /// The states of each attractor at drive phase 0, with the names of their entries.
     pub fn state_table(&self, names: Vec<String>, units: Units) -> Frame<'_> {
@@ -372,12 +378,11 @@ impl Attractors {
     pub fn in_si(mut self, view: &Physical) -> Self {
         for attractor in &mut self.attractors {
             attractor.physical = match (&attractor.orbit, &attractor.non_periodic) {
-                (Some(orbit), _) => Some(PhysicalMotion::alone(
-                    &orbit.observables,
-                    Some(&orbit.spectrum),
-                    view,
-                )),
-                (None, Some(seen)) => Some(PhysicalMotion::alone(&seen.observables, None, view)),
+                (Some(orbit), _) => Some(orbit_in_si(orbit, view)),
+                (None, Some(seen)) => Some(
+                    PhysicalMotion::alone(&seen.observables, None, view)
+                        .with_state(&seen.state, view),
+                ),
                 (None, None) => None,
             };
         }
@@ -390,8 +395,7 @@ impl Attractors {
             });
         }
         for orbit in self.unstable.iter_mut().flatten() {
-            let (observables, spectrum) = (&orbit.motion.observables, &orbit.motion.spectrum);
-            orbit.physical = Some(PhysicalMotion::alone(observables, Some(spectrum), view));
+            orbit.physical = Some(orbit_in_si(&orbit.motion, view));
         }
         self
     }

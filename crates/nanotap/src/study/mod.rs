@@ -99,6 +99,9 @@ pub trait Study {
     const COUNTED: &'static str = "steps";
     /// Whether the study chooses distances itself, so that none is solved for a setpoint.
     const ANY_DISTANCE: bool = false;
+    /// Whether nothing of the report depends on the distance, so that its document lacks one that is
+    /// left to a setpoint.
+    const WITHOUT_DISTANCE: bool = false;
     /// Whether the tones of the drive may have any ratio, so that they never repeat together.
     const ANY_RATIO: bool = false;
     /// Whether the report of cancelled work holds the finished part, and states that it is a part.
@@ -228,6 +231,15 @@ impl<'a, R: Serialize> Document<'a, R> {
             version: env!("CARGO_PKG_VERSION"),
             case: CaseDocument::of(case),
         }
+    }
+
+    /// The document of the report of a study on `case`.
+    pub fn of<S: Study<Report = R>>(report: &'a R, case: &'a Case) -> Self {
+        let mut document = Self::new(report, case);
+        if S::WITHOUT_DISTANCE {
+            document.case = CaseDocument::at_any_distance(case);
+        }
+        document
     }
 }
 

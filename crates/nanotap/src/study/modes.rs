@@ -206,6 +206,7 @@ impl Study for ModesStudy {
 
     // The frequencies do not depend on it.
     const ANY_DISTANCE: bool = true;
+    const WITHOUT_DISTANCE: bool = true;
 
     fn compute(case: &Case, _: &ModesOptions, _: &Control<'_>) -> Result<ModeTable, Error> {
         let mut table = ModeTable::new(cantilever(case, Self::NAME)?)?;

@@ -648,6 +648,7 @@ impl Study for OrbitStudy {
         }
         let physical = case.physical().map(|resolved| {
             PhysicalMotion::alone(&found.observables, Some(&found.spectrum), resolved)
+                .with_state(&found.state, resolved)
         });
         Ok(InSi {
             motion: found,

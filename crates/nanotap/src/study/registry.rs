@@ -95,7 +95,7 @@ impl StudyEntry {
                     at_setpoint(case.clone(), control)?.0
                 };
                 let report = S::run(&case, &request, control)?;
-                Ok(serde_json::to_string(&Document::new(&report, &case))?)
+                Ok(serde_json::to_string(&Document::of::<S>(&report, &case))?)
             }),
             dataset: None,
             summary: None,

@@ -37,7 +37,7 @@ use super::approach::distance_sweep::{
 use super::approach::{MAX_MULTIPLIER, SETPOINT_PERIODS, Way};
 use super::frequency_modulation::{self, FrequencyModulationOptions};
 use super::value::Amount;
-use crate::case::document::{CaseDocument, PhysicalSummary};
+use crate::case::document::{CaseDocument, WithoutDistanceDocument};
 use crate::case::physical::{Held, Kind, Remark};
 use crate::case::{Case, Key};
 use crate::error::ErrorDocument;
@@ -582,12 +582,9 @@ pub struct SolvedCase {
 /// distance.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct UnsolvedCase {
-    /// The word `cantilever`.
-    pub kind: &'static str,
-    /// Number of beam modes.
-    pub modes: usize,
-    /// Quantities in SI, without those that depend on the distance.
-    pub physical: Option<PhysicalSummary>,
+    /// Document of the case without its distance.
+    #[serde(flatten)]
+    pub case: WithoutDistanceDocument,
     /// Why the setpoint is not solved for here.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub note: Option<String>,
@@ -610,9 +607,7 @@ impl UnsolvedCase {
     /// The document of a case whose setpoint is not solved for, with the reason.
     pub fn of(case: &Case) -> Self {
         Self {
-            kind: "cantilever",
-            modes: case.cantilever().map_or(0, |cantilever| cantilever.modes),
-            physical: case.physical().map(PhysicalSummary::without_distance),
+            case: WithoutDistanceDocument::of(case),
             note: None,
             error: None,
         }
@@ -1091,8 +1086,8 @@ impl Search<'_> {
         Some(SetpointState {
             period: orbit.period,
             spectral_radius: orbit.spectral_radius(),
+            physical: PhysicalMotion::of(&observables, view).with_state(&state, view),
             state,
-            physical: PhysicalMotion::of(&observables, view),
             observables,
         })
     }
@@ -1139,6 +1134,7 @@ impl Search<'_> {
         if (self.held.of(&observables) - target).abs() > 1e-6 * target.abs() {
             return None;
         }
+        let state = orbit.states.first().cloned().unwrap_or_default();
         Some(SetpointSolution {
             gap,
             zc: gap * view.scales.length,
@@ -1147,8 +1143,8 @@ impl Search<'_> {
             spectral_radius: orbit.spectral_radius(),
             reached: false,
             branch: branch_of(&observables),
-            state: orbit.states.first().cloned().unwrap_or_default(),
-            physical: PhysicalMotion::of(&observables, view),
+            physical: PhysicalMotion::of(&observables, view).with_state(&state, view),
+            state,
             observables,
         })
     }

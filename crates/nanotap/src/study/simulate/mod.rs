@@ -227,7 +227,8 @@ pub(in crate::study) fn check_states(
 /// with a memory is relaxed where the state does not say otherwise.
 ///
 /// # Errors
-/// When its length does not fit, a number is not finite, or it lies behind a rigid stop.
+/// When its length does not fit, a number is not finite, or it lies behind a rigid stop or a pole of
+/// the force law.
 pub fn starting_state(model: &Model, state: Option<&WrittenState>) -> Result<Vec<f64>, Error> {
     let refused = |message| Err(Error::input(message, "count the numbers of {state}"));
     let n = model.dimension();
@@ -267,6 +268,13 @@ pub fn starting_state(model: &Model, state: Option<&WrittenState>) -> Result<Vec
                 state[0]
             ),
             "give a {state} in front of the stop",
+        ));
+    }
+    let pole = model.nonlinear.as_ref().and_then(|law| law.pole());
+    if pole.is_some_and(|pole| !pole.is_before(&state)) {
+        return Err(Error::input(
+            "the state's tip lies in the surface, where the force law has a pole and does not hold",
+            "give a {state} in front of the surface",
         ));
     }
     Ok(state)
@@ -554,9 +562,10 @@ impl Study for SimulateStudy {
         let found = motion.orbit.as_ref().map(|orbit| &*orbit.states[0]);
         let note = initial_state_note(&model, given, found);
         motion.notes.push(note);
-        let physical = case
-            .physical()
-            .map(|resolved| PhysicalMotion::alone(&motion.observables, None, resolved));
+        let physical = case.physical().map(|resolved| {
+            PhysicalMotion::alone(&motion.observables, None, resolved)
+                .with_strobe(&motion.strobe, resolved)
+        });
         Ok(SimulateReport::Exact(Box::new(InSi { motion, physical })))
     }
 }

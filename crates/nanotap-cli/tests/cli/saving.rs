@@ -258,3 +258,38 @@ fn a_state_of_a_physical_case_is_in_si() {
     run("0.1,0").refused(&["--state", "write the unit"]);
     run("tip=5 kHz").refused(&["--state", "expected a length"]);
 }
+
+/// The distance and the motion that a saved case has for its setpoint are those of the case as it was.
+#[test]
+fn a_saved_distance_is_solved_for_again_where_the_case_changes() {
+    let folder = Folder::new();
+    let file = repository("docs/cases/stiff-lever.toml");
+    let file = file.to_str().unwrap();
+    let saved = folder.run(&["-q", "case", file, "--out", "saved.toml"]);
+    assert_eq!(saved.code, 0, "{}", saved.stderr);
+    let run = |study: &str, case: &str, set: &str| {
+        folder
+            .run(&["-q", study, case, "--json", "--set", set])
+            .json()
+    };
+    for study in ["orbit", "case"] {
+        let changed = |case| run(study, case, "sample.modulus=3 GPa");
+        let (mut original, mut read) = (changed(file), changed("saved.toml"));
+        for document in [&mut original, &mut read] {
+            // Distances of the case as it is before its setpoint is solved for.
+            document.as_object_mut().unwrap().remove("case");
+        }
+        assert_eq!(original, read);
+    }
+    let nearer = run("orbit", "saved.toml", "drive.setpoint=0.7");
+    let ratio = nearer["physical"]["A_ratio"].as_f64().unwrap();
+    assert!((ratio - 0.7).abs() < 1e-6, "{ratio}");
+    // A distance that is given takes the place of the setpoint.
+    let there = run("orbit", "saved.toml", "gap.tip=17 nm");
+    assert!(there["case"]["physical"]["setpoint"].is_null());
+    assert!(
+        there["notes"][0].as_str().unwrap().contains("from rest"),
+        "{}",
+        there["notes"]
+    );
+}

@@ -1,6 +1,6 @@
 //! Interpretation of a document, key by key.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use super::document::{Document, Entry, Value as Written};
@@ -114,9 +114,11 @@ fn kind_of(document: &Document, problems: &mut Problems) -> ModelKind {
 }
 
 /// The entries by key. Overrides replace the entries of the file and alternatives of their keys;
-/// one key under two names is refused.
+/// one key under two names is refused. A distance that the file solved for its setpoint, and the
+/// motion there, are those of the case without overrides: with one they are left to the setpoint.
 fn known<'a>(document: &'a Document, kind: ModelKind, problems: &mut Problems) -> Known<'a> {
     let mut known = Known::new();
+    let (mut of_file, mut is_changed) = (BTreeSet::new(), false);
     for entry in &document.entries {
         let Some(section) = Section::find(&entry.table) else {
             continue;
@@ -132,6 +134,11 @@ fn known<'a>(document: &'a Document, kind: ModelKind, problems: &mut Problems) -
             });
             continue;
         };
+        if entry.is_override() {
+            is_changed |= key != Key::DriveStart;
+        } else {
+            of_file.insert(key);
+        }
         if entry.is_nothing() {
             known.remove(&key);
             continue;
@@ -153,6 +160,12 @@ fn known<'a>(document: &'a Document, kind: ModelKind, problems: &mut Problems) -
         if overrides || !entry.is_override() {
             problems.add(|| refusal::same_key(before, entry));
         }
+    }
+    let solved = [Key::DriveSetpoint, Key::GapTip, Key::DriveStart];
+    if is_changed && solved.iter().all(|key| of_file.contains(key)) {
+        known.retain(|key, entry| {
+            entry.is_override() || ![Key::GapTip, Key::DriveStart].contains(key)
+        });
     }
     known
 }

@@ -27,10 +27,28 @@ pub(crate) struct StudyArguments<S: Study> {
 impl<S: Study> StudyArguments<S> {
     /// The options and the case, once it is known that table and picture can be written.
     pub(crate) fn read(&self, output: &Output) -> Result<(S::Options, GivenCase), Failure> {
+        let options = self.options()?;
+        let case = GivenCase::for_study(&self.case, S::ANY_DISTANCE, output)?;
+        Ok((options, case))
+    }
+
+    /// As [`read`](Self::read), for a study that varies a key, which the case may lack: `first` returns
+    /// its first value as a `key=value` word.
+    pub(crate) fn read_varied(
+        &self,
+        first: impl FnOnce(&S::Options) -> String,
+        output: &Output,
+    ) -> Result<(S::Options, GivenCase), Failure> {
+        let options = self.options()?;
+        let first = [first(&options)];
+        let case = GivenCase::with_implied(&self.case, &first, S::ANY_DISTANCE, output)?;
+        Ok((options, case))
+    }
+
+    fn options(&self) -> Result<S::Options, Failure> {
         let options = self.request.read()?;
         self.out.check()?;
         self.plot.check()?;
-        let case = GivenCase::for_study(&self.case, S::ANY_DISTANCE, output)?;
-        Ok((options, case))
+        Ok(options)
     }
 }

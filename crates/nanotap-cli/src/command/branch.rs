@@ -6,7 +6,7 @@ use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use nanotap::figure::branch::{Shown, case_figure};
 use nanotap::observe::time_series;
-use nanotap::study::branch::{BranchReport, BranchStudy};
+use nanotap::study::branch::{BranchOptions, BranchReport, BranchStudy};
 
 use crate::failure::Failure;
 use crate::given_case::GivenCase;
@@ -43,7 +43,9 @@ fn shown() -> impl TypedValueParser<Value = Shown> {
 }
 
 pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure> {
-    let (mut options, case) = arguments.study.read(output)?;
+    let (mut options, case) = arguments
+        .study
+        .read_varied(BranchOptions::first_value, output)?;
     case.note_constants(&[options.range(&case)?.key], output);
     if let Some(shown) = arguments.show.and_then(Shown::observable) {
         options.observables = options.observables.with(shown);

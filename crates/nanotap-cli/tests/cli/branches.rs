@@ -2,7 +2,7 @@
 
 use serde_json::Value;
 
-use crate::util::Folder;
+use crate::util::{Folder, shipped_case};
 
 fn number(json: &Value, key: &str) -> f64 {
     json[key]
@@ -416,4 +416,47 @@ fn invalid_requests_are_refused() {
         &["--values", "from 2 to"],
     );
     refused(&["--parameter", "omega", "--from", "3"], &["--to"]);
+}
+
+#[test]
+fn the_varied_key_may_be_missing() {
+    let folder = Folder::new();
+    let text = std::fs::read_to_string(shipped_case("stiff-lever.toml")).unwrap();
+    folder.write("case.toml", text.replace("setpoint = 0.8", ""));
+    let range = [
+        "--parameter",
+        "gap.tip",
+        "--from",
+        "15 nm",
+        "--to",
+        "14.5 nm",
+    ];
+    let run = |case: &str, set: &[&str]| {
+        let words = [&["branch", case, "--json"], &range[..], set].concat();
+        folder.run(&words).json()
+    };
+    let found = run("case.toml", &[]);
+    let given = run("case.toml", &["--set", "gap.tip=15 nm"]);
+    assert_eq!(found["points"], given["points"]);
+    // With a setpoint, from the distance that is solved for it.
+    let found = run(&shipped_case("stiff-lever.toml"), &[]);
+    assert_eq!(found["branches"][0]["complete"], true, "{found}");
+}
+
+#[test]
+fn a_sticking_orbit_is_not_followed() {
+    let folder = Folder::new();
+    folder.write(
+        "case.toml",
+        "[model]\nkind = \"impact\"\nstiffness = 1\ndamping = 0\nforcing = 1\nomega = 2.9\n\
+         gap = 0\nrestitution = 0.8\n",
+    );
+    let range = ["--parameter", "omega", "--from", "2.9", "--to", "2.95"];
+    let outcome = folder.run(&[&["branch", "case.toml"], &range[..]].concat());
+    assert_eq!(outcome.code, 1, "{}", outcome.stdout);
+    assert!(
+        outcome.stderr.contains("sticks to the rigid stop"),
+        "{}",
+        outcome.stderr
+    );
 }

@@ -21,7 +21,7 @@ use crate::observe::{ObservableSet, Observables, PhysicalMotion, measure};
 use crate::study::Study;
 use crate::study::event::{Event, EventReport, Window, along};
 use crate::study::limits::{MAX_DOUBLINGS, MAX_PERIOD, MAX_SEED_STARTS};
-use crate::study::orbit::{OrbitOptions, orbit, pairs};
+use crate::study::orbit::{OrbitOptions, orbit, pairs, spectral_radius};
 use crate::study::request::options;
 use crate::study::simulate::Classification;
 use crate::study::start_box::default_starts;
@@ -549,6 +549,15 @@ fn first_orbit(case: &Case, range: Range, options: &BranchOptions) -> Result<Per
         }
     };
     let found = orbit(&model, &options).map_err(failed)?;
+    if model.rigid_stop.is_some() && spectral_radius(&found.multipliers) == 0.0 {
+        return Err(Error::numerics(format!(
+            "at {}: the motion sticks to the rigid stop; its period-{} orbit is superstable, and such \
+             orbits are not followed",
+            case.named(range.key, range.from),
+            found.period
+        ))
+        .remedy("list the motions at several values with `sweep`, or give a {state} near another orbit"));
+    }
     // Newton again, from where it is, for the orbit itself.
     nanotap_dynamics::close_orbit_from_points(
         &mut ModelMap::new(&model),
@@ -887,7 +896,7 @@ impl Measured<'_> {
         let observables = measure(&model, start, orbit.period, self.observables)?;
         let physical = here
             .physical()
-            .map(|view| PhysicalMotion::of(&observables, view));
+            .map(|view| PhysicalMotion::of(&observables, view).with_state(start, view));
         Ok((observables, physical))
     }
 
@@ -1120,6 +1129,11 @@ impl BranchOptions {
         let key = case.key(self.parameter.trim())?;
         let [from, to] = values(case, key, [("from", &self.from), ("to", &self.to)])?;
         Ok(Range { key, from, to })
+    }
+
+    /// The first value of the parameter as a `key=value` word, for a case that lacks the key.
+    pub fn first_value(&self) -> String {
+        format!("{}={}", self.parameter.trim(), self.from.text())
     }
 
     fn second_range(&self, case: &Case) -> Result<Option<Range>, Error> {

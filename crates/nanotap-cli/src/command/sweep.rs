@@ -87,6 +87,9 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
         drawn,
         output,
     )?;
+    if let Some(summary) = &done.summary {
+        output.notes(&summary.notes);
+    }
     output.study(&case, &done, |done| text(&case, &options, &over, done))
 }
 

@@ -451,3 +451,47 @@ fn invalid_basin_requests_are_refused() {
         .refused(&["--y"]);
     assert_eq!(folder.names(), ["case.toml", "strange.json"]);
 }
+
+/// Runs from one state say which it is, and how to list what others lead to.
+#[test]
+fn a_sweep_says_from_which_state_its_runs_start() {
+    let folder = Folder::with_paper_case();
+    let sweep = [
+        "-q",
+        "sweep",
+        "case.toml",
+        "--over",
+        "omega=3,3.1",
+        "--periods",
+        "2",
+        "--json",
+    ];
+    let notes = |more: &[&str], out: &str| {
+        let words = [&sweep[..], more, &["--out", out]].concat();
+        folder.run(&words).json()["notes"].clone()
+    };
+    let from = |notes: serde_json::Value, start: &str| {
+        let note = notes[0].as_str().unwrap();
+        let expected = format!("the runs start from {start}; other initial states may lead to");
+        assert!(
+            note.starts_with(&expected) && note.contains("`attractors`"),
+            "{note}"
+        );
+    };
+    from(notes(&[], "rest.zarr"), "rest");
+    let state = ["--state", "0.1,0,0,0,0,0"];
+    from(notes(&state, "state.zarr"), "the given state");
+    assert!(notes(&["--starts", "2"], "starts.zarr").is_null());
+    let lever = crate::util::shipped_case("stiff-lever.toml");
+    let over = [
+        "--over",
+        "sample.loss_tangent=0.1,0.11",
+        "--json",
+        "--out",
+        "lever.zarr",
+    ];
+    let lever = folder
+        .run(&[&["-q", "sweep", &lever], &over[..]].concat())
+        .json();
+    from(lever["notes"].clone(), "the motion at the setpoint");
+}

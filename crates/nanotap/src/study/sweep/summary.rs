@@ -4,9 +4,11 @@ use std::collections::BTreeMap;
 
 use schemars::JsonSchema;
 use serde::Serialize;
+use serde_json::Value;
 
 use super::dataset::{CLASSES, DISTANCE, HELD, UNREACHED, class_of};
 use super::{FromNeighbour, from_neighbours};
+use crate::case::Key;
 use crate::dataset::{Store, StoreError};
 use crate::observe::ObservableSet;
 use crate::study::simulate::Classification;
@@ -34,6 +36,10 @@ pub struct Summary {
     /// Values at which a setpoint is not reached, with the reason.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub unreached: Vec<Unreached>,
+    /// Which initial state the runs started from, if all started from one, and how to list the motions
+    /// that others lead to.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub notes: Vec<String>,
 }
 
 /// Values of the parameters at which the setpoint is not reached.
@@ -174,6 +180,30 @@ pub(crate) fn held(store: &Store) -> BTreeMap<String, f64> {
         .unwrap_or_default()
 }
 
+/// States from which initial state the runs of a sweep started, unless they started from several.
+fn initial_state_note(store: &Store) -> Option<String> {
+    let attribute = |name: &str| {
+        let text = store.schema().attributes.get(name)?.as_str()?;
+        serde_json::from_str::<Value>(text).ok()
+    };
+    let starts = &attribute("sweep")?["starts"];
+    let at_setpoint = || {
+        let case = attribute("case").unwrap_or_default();
+        let start = &case[Key::DriveStart.path()];
+        store.schema().index_of(DISTANCE).is_some() || !start.is_null()
+    };
+    let start = match starts {
+        Value::Object(given) if given.contains_key("state") => "the given state",
+        Value::String(_) if at_setpoint() => "the motion at the setpoint",
+        Value::String(_) => "rest",
+        _ => return None,
+    };
+    Some(format!(
+        "the runs start from {start}; other initial states may lead to other motions: with a number of \
+         starts a sweep follows several at each value, and `attractors` lists the motions at one"
+    ))
+}
+
 impl Summary {
     /// Counts the runs of a finished dataset.
     ///
@@ -186,6 +216,7 @@ impl Summary {
             held: held(store),
             targets: target_report(store)?,
             unreached: unreached(store),
+            notes: initial_state_note(store).into_iter().collect(),
             ..Self::default()
         };
         summary.counts.extend(CLASSES.iter().map(|c| (c.name(), 0)));

@@ -1,9 +1,10 @@
 //! A statement of the paper and the corresponding result of this program.
 
+use schemars::JsonSchema;
 use serde::Serialize;
 
 /// Verdict on a statement of the paper.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Verdict {
     /// The statement holds for this program's result.
@@ -39,7 +40,7 @@ impl Verdict {
 }
 
 /// Subject of a statement of the paper.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum About {
     /// A formula, a number or a caption as printed.
@@ -49,7 +50,7 @@ pub enum About {
 }
 
 /// A statement of the paper, the result of this program, and how to reproduce it.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct Check {
     /// Identifier, such as `eq25` or `fig8-amplitude`.
     pub id: String,

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 
 use nanotap::dataset::files;
 use rayon::prelude::*;
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::section::Picture;
@@ -25,20 +26,29 @@ pub struct Written {
 }
 
 /// Counts of the report and paths of its files, for the terminal's JSON.
-#[derive(Debug, Serialize)]
+#[derive(Debug, Serialize, JsonSchema)]
 pub struct Document<'a> {
+    /// Folder of the report.
     out: &'a Path,
+    /// Path of the page with the whole report.
     html: &'a Path,
+    /// Path of the Markdown table of all statements.
     markdown: &'a Path,
+    /// Paths of the pictures, SVG and PNG alternately.
     pictures: &'a [PathBuf],
+    /// Whether fewer starts and parameter values were used.
     quick: bool,
+    /// Number of statements that hold.
     reproduced: usize,
+    /// Number of statements that do not hold.
     differs: usize,
+    /// Number of statements for which the paper's information is insufficient or contradictory.
     ambiguous: usize,
     /// Number of differing formulas, numbers and captions as printed.
     differs_in_print: usize,
     /// Number of differing statements about motions.
     differs_in_motion: usize,
+    /// The statements with their verdicts.
     checks: Vec<&'a Check>,
 }
 

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use clap::{Args, CommandFactory as _, ValueEnum};
 use clap_complete::Shell;
 use clap_mangen::Man;
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::failure::Failure;
@@ -41,9 +42,9 @@ enum What {
 }
 
 /// The generated output: text, or files.
-#[derive(Serialize)]
+#[derive(Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
-enum Made {
+pub(super) enum Made {
     /// Text for standard output, such as a completion script.
     Text(String),
     /// Paths of the manual pages that were written.

@@ -4,13 +4,18 @@ use clap::Args;
 use nanotap::case::schema;
 use nanotap::dataset::Merged;
 use nanotap::files::FileList;
+use nanotap::study::DatasetStudy;
+use nanotap::study::fit::FitMap;
 use nanotap::study::registry::{STUDIES, StudyEntry};
 use nanotap::study::request::answer_schema;
+use nanotap::study::scan::ScanLines;
 use nanotap::study::setpoint::CaseReport;
+use nanotap_paper::Document;
 use schemars::Schema;
 use serde_json::{Map, Value, json};
 
 use super::catalogue::Listed;
+use super::generate::Made;
 use crate::failure::Failure;
 use crate::output::{self, FailureDocument};
 
@@ -38,6 +43,26 @@ const COMMANDS: &[Described] = &[
         "merge",
         "Merge partial datasets of a sweep or basin",
         answer_schema::<Merged>,
+    ),
+    (
+        "fit-map",
+        "The document of `fit --pixels`",
+        answer_schema::<<FitMap as DatasetStudy>::Report>,
+    ),
+    (
+        "scan-lines",
+        "The document of a `scan` whose lines go into a dataset",
+        answer_schema::<<ScanLines as DatasetStudy>::Report>,
+    ),
+    (
+        "paper",
+        "The report on the figures and numbers of the paper",
+        answer_schema::<Document<'static>>,
+    ),
+    (
+        "generate",
+        "Generate shell completions and manual pages",
+        answer_schema::<Made>,
     ),
     (
         "failure",

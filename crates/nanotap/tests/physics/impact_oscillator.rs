@@ -12,7 +12,8 @@ use nanotap::study::orbit::{OrbitOptions, OrbitReport, orbit};
 use nanotap::study::value::Interval;
 use nanotap_flow::Trajectory;
 
-fn rigid(omega: f64, restitution: f64) -> Oscillator {
+/// ẍ + x = cos ωt with a stop at 0.
+pub(crate) fn rigid(omega: f64, restitution: f64) -> Oscillator {
     Oscillator {
         mass: 1.0,
         stiffness: 1.0,

@@ -8,18 +8,7 @@ use nanotap::study::lyapunov::{ExponentSource, LyapunovOptions, lyapunov};
 use nanotap::study::orbit::{OrbitOptions, orbit};
 use nanotap::study::simulate::{Classification, SimulateOptions, simulate};
 
-/// ẍ + x = cos ωt with a stop at 0.
-fn rigid(omega: f64, restitution: f64) -> Oscillator {
-    Oscillator {
-        mass: 1.0,
-        stiffness: 1.0,
-        damping: 0.0,
-        forcing: 1.0,
-        omega,
-        gap: 0.0,
-        stop: Stop::Rigid { restitution },
-    }
-}
+use crate::impact_oscillator::rigid;
 
 /// The release orbits of `stick_reference.json`: mpmath 1.3 at the two numbers of digits that each case
 /// states, which agree. Where the reference finds no stick within its search, none may be claimed there.

@@ -14,7 +14,7 @@ const GAP: f64 = 0.6;
 const DECAY: f64 = 1.0 / 3.0;
 
 /// Standard errors of a decrease of the force at the far end above which it is significant.
-const SIGNIFICANT: f64 = 2.0;
+const SIGNIFICANT_DECREASE: f64 = 2.0;
 
 /// Upper estimate of the error of the level of the force. A constant force has no first harmonic, so the rows determine the
 /// force up to a constant, and it is taken as zero beyond the last node. If the force still falls off
@@ -34,7 +34,8 @@ pub(super) fn level(force: &Smooth, nodes: &Nodes, far: f64) -> f64 {
     };
     let ([inner, inner_error], [outer, outer_error]) = (at(near), at(far));
     let decrease = inner - outer;
-    if decrease.abs() > SIGNIFICANT * (inner_error * inner_error + outer_error * outer_error).sqrt()
+    if decrease.abs()
+        > SIGNIFICANT_DECREASE * (inner_error * inner_error + outer_error * outer_error).sqrt()
     {
         decrease.abs() + outer.abs()
     } else {

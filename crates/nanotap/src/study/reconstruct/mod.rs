@@ -58,7 +58,7 @@ const ROWS_OF_A_WAY: usize = 15;
 /// Mean squared residual, in standard errors, above which a warning is given.
 const WORST_CHI2: f64 = 4.0;
 /// Least force, in standard errors of the noise, above which it is reported as a minimum.
-const SIGNIFICANT: f64 = 3.0;
+const SIGNIFICANT_MINIMUM: f64 = 3.0;
 /// Range of distances without a row, in spacings of the nodes, that is a gap.
 const GAP: f64 = 8.0;
 /// Least number of rows of a bin in which approach and retract are compared.
@@ -684,7 +684,7 @@ fn minimum(table: &ForceCurve, inverted: &Inverted) -> Option<ForceMinimum> {
     let beyond = inverted.nodes.0.len() - table.force.len();
     let noise = inverted.noise.get(beyond + least)?;
     let [distance, force] = vertex(table, least).unwrap_or([table.distance[least], force]);
-    (force < -force_error && force < -SIGNIFICANT * noise).then_some(ForceMinimum {
+    (force < -force_error && force < -SIGNIFICANT_MINIMUM * noise).then_some(ForceMinimum {
         force,
         force_error,
         distance,

@@ -8,16 +8,30 @@
 
 use crate::laws::elastic::reduced_modulus;
 use crate::laws::entry::{
-    CONTACT_DISTANCE, Dimension, Entry, MODULUS, POISSON, RADIUS, Range, TIP_MODULUS, TIP_POISSON,
-    own,
+    CONTACT_DISTANCE, Entry, MODULUS, POISSON, ParameterEntry, RADIUS, Range, TIP_MODULUS,
+    TIP_POISSON, own, parameters,
 };
 use crate::laws::formula::{Edge, Formula, Way};
 use nanotap_arithmetic::Scalar;
+use nanotap_quantity::Kind;
 use std::f64::consts::PI;
 
 /// Formula of a capillary bridge between a sphere and the sample; see the module.
 #[derive(Clone, Copy, Debug)]
 pub struct Capillary;
+
+parameters! {
+    /// Surface tension of the liquid, N/m.
+    pub const SURFACE_TENSION = own("surface_tension", "surface tension γ of the liquid",
+        Kind::SurfaceEnergy, Some(0.072), Range::Positive, "surface tension of the liquid (capillary)",
+        0.072).assumed();
+    /// Thickness of the adsorbed film, m.
+    pub const FILM_THICKNESS = own("film_thickness", "thickness h of the adsorbed film", Kind::Length, None,
+        Range::Positive, "thickness of the adsorbed film (capillary)", 3e-10);
+    /// Surface energy of the solid, J/m².
+    pub const SURFACE_ENERGY = own("surface_energy", "surface energy γ_sv of the solid",
+        Kind::SurfaceEnergy, None, Range::Positive, "surface energy of the solid (capillary)", 0.07);
+}
 
 /// Table entry `capillary`: the bridge between a sphere and the sample.
 pub static CAPILLARY: Entry = Entry {
@@ -32,29 +46,12 @@ pub static CAPILLARY: Entry = Entry {
         TIP_POISSON,
         RADIUS,
         CONTACT_DISTANCE,
-        own(
-            "surface_tension",
-            "surface tension γ of the liquid",
-            Dimension::SURFACE_ENERGY,
-            Some(0.072),
-            Range::Positive,
-        ),
-        own(
-            "film_thickness",
-            "thickness h of the adsorbed film",
-            Dimension::LENGTH,
-            None,
-            Range::Positive,
-        ),
-        own(
-            "surface_energy",
-            "surface energy γ_sv of the solid",
-            Dimension::SURFACE_ENERGY,
-            None,
-            Range::Positive,
-        ),
+        SURFACE_TENSION,
+        FILM_THICKNESS,
+        SURFACE_ENERGY,
     ],
     parts: &[],
+    attracts: true,
     conservative: false,
 };
 

@@ -6,9 +6,10 @@
 //! `γ = H/(24π a0²)`.
 
 use crate::law::{Approach, Remark};
+use crate::laws::adhesion::HAMAKER_OF_STIFF_SPHERE;
 use crate::laws::elastic::{Shape, contact_ways, deep, reduced_modulus};
 use crate::laws::entry::{
-    CONTACT_DISTANCE, Entry, HAMAKER, MODULUS, POISSON, Part, RADIUS, TIP_MODULUS, TIP_POISSON,
+    CONTACT_DISTANCE, Entry, MODULUS, POISSON, Part, RADIUS, TIP_MODULUS, TIP_POISSON,
 };
 use crate::laws::formula::{Formula, Way};
 use nanotap_arithmetic::Scalar;
@@ -30,9 +31,10 @@ pub static DMT: Entry = Entry {
         TIP_POISSON,
         RADIUS,
         CONTACT_DISTANCE,
-        HAMAKER,
+        HAMAKER_OF_STIFF_SPHERE,
     ],
     parts: &[Part::Elasticity, Part::Adhesion],
+    attracts: true,
     conservative: true,
 };
 

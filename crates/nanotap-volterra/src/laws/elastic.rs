@@ -101,6 +101,7 @@ pub static HERTZ: Entry = Entry {
     source: "H. Hertz, J. reine angew. Math. 92, 156 (1881)",
     parameters: ROUND,
     parts: &[Part::Elasticity],
+    attracts: false,
     conservative: true,
 };
 
@@ -119,6 +120,7 @@ pub static CONE: Entry = Entry {
         CONTACT_DISTANCE,
     ],
     parts: &[Part::Elasticity],
+    attracts: false,
     conservative: true,
 };
 
@@ -130,6 +132,7 @@ pub static PUNCH: Entry = Entry {
     source: "I. N. Sneddon, Int. J. Eng. Sci. 3, 47 (1965)",
     parameters: ROUND,
     parts: &[Part::Elasticity],
+    attracts: false,
     conservative: true,
 };
 

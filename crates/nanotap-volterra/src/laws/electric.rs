@@ -6,22 +6,74 @@
 //! is at `a0`, so that neither jumps there.
 
 use crate::law::{Approach, ForceLaw};
+use crate::laws::adhesion::HAMAKER;
 use crate::laws::elastic::contact_ways;
 use crate::laws::entry::{
-    CONTACT_DISTANCE, Dimension, Entry, HAMAKER, ParameterEntry, Part, RADIUS, Range, own,
+    CONTACT_DISTANCE, CaseKey, Entry, KeyEntry, ParameterEntry, Part, RADIUS, Range, own,
+    parameters, stated_by,
 };
 use crate::laws::formula::{Formula, Law, Way};
 use nanotap_arithmetic::Scalar;
+use nanotap_quantity::{Dimension, Display, Kind, KindEntry};
 use std::f64::consts::PI;
 use std::sync::Arc;
 
-const PERMITTIVITY: ParameterEntry = own(
+/// Permittivity of free space, F/m.
+const VACUUM: f64 = 8.854_187_812_8e-12;
+
+parameters! {
+    /// Voltage between tip and sample, V.
+    pub const VOLTAGE = own("voltage", "voltage U between tip and sample", Kind::Voltage, None,
+        Range::Finite, "dc voltage between tip and sample (electrostatic, electrostatic-ac)", 1.0);
+}
+
+/// Absolute permittivity of the medium, F/m.
+pub const PERMITTIVITY: ParameterEntry = stated_by(
     "permittivity",
     "absolute permittivity of the medium",
-    Dimension::PERMITTIVITY,
-    Some(8.854_187_812_8e-12),
+    Kind::new(&KindEntry {
+        name: "permittivity",
+        dimension: Dimension::new(-1, -3, 2).charged(2),
+        si_unit: "F/m",
+        display: Display::Unit,
+        noun: "a permittivity",
+        example: "8.85e-12 C^2/(N m^2)",
+        model_unit: None,
+    }),
+    Some(VACUUM),
     Range::Positive,
-);
+    CaseKey::Own(
+        KeyEntry::new(
+            "permittivity",
+            Kind::Number,
+            Range::Positive,
+            "permittivity of the medium over that of free space",
+            1.0,
+        )
+        .multiple_of(VACUUM),
+    ),
+)
+.assumed();
+
+const fn charge(
+    name: &'static str,
+    words: &'static str,
+    of_tip: bool,
+    meaning: &'static str,
+) -> ParameterEntry {
+    let key = KeyEntry {
+        of_tip,
+        ..KeyEntry::new("charge", Kind::ChargeDensity, Range::Finite, meaning, -0.02)
+    };
+    stated_by(
+        name,
+        words,
+        Kind::ChargeDensity,
+        None,
+        Range::Finite,
+        CaseKey::Own(key),
+    )
+}
 
 /// Formula of the electrostatic attraction of a biased sphere; see the module.
 #[derive(Clone, Copy, Debug)]
@@ -33,19 +85,9 @@ pub static ELECTROSTATIC: Entry = Entry {
     words: "electrostatic attraction of a biased sphere and a conducting sample",
     formula: "−π ε U² R²/(d (d + R)) for d > a0, its value at a0 in contact",
     source: "Hudlet, Saint Jean, Guthmann, Berger, Eur. Phys. J. B 2, 5 (1998)",
-    parameters: &[
-        own(
-            "voltage",
-            "voltage U between tip and sample",
-            Dimension::VOLTAGE,
-            None,
-            Range::Finite,
-        ),
-        RADIUS,
-        CONTACT_DISTANCE,
-        PERMITTIVITY,
-    ],
+    parameters: &[VOLTAGE, RADIUS, CONTACT_DISTANCE, PERMITTIVITY],
     parts: &[],
+    attracts: true,
     conservative: true,
 };
 
@@ -92,6 +134,18 @@ pub struct ElectrostaticAc {
     pub averaged: bool,
 }
 
+parameters! {
+    /// Amplitude of the ac voltage, V.
+    pub const AC_VOLTAGE = own("ac_voltage", "amplitude V of the ac voltage", Kind::Voltage, None,
+        Range::Finite,
+        "amplitude of an ac voltage between tip and sample at the frequency of the second tone of the drive (electrostatic-ac)",
+        1.0);
+    /// Contact potential difference, V.
+    pub const CONTACT_POTENTIAL = own("contact_potential", "contact potential difference U_c",
+        Kind::Voltage, Some(0.0), Range::Finite,
+        "contact potential difference, which the voltage compensates (electrostatic-ac)", 1.0);
+}
+
 /// Table entry `electrostatic-ac`: a sphere under dc and ac voltage.
 pub static ELECTROSTATIC_AC: Entry = Entry {
     name: "electrostatic-ac",
@@ -101,32 +155,15 @@ pub static ELECTROSTATIC_AC: Entry = Entry {
     source: "Hudlet, Saint Jean, Guthmann, Berger, Eur. Phys. J. B 2, 5 (1998); Nonnenmacher, O'Boyle, \
              Wickramasinghe, Appl. Phys. Lett. 58, 2921 (1991)",
     parameters: &[
-        own(
-            "voltage",
-            "voltage U between tip and sample",
-            Dimension::VOLTAGE,
-            None,
-            Range::Finite,
-        ),
-        own(
-            "ac_voltage",
-            "amplitude V of the ac voltage",
-            Dimension::VOLTAGE,
-            None,
-            Range::Finite,
-        ),
-        own(
-            "contact_potential",
-            "contact potential difference U_c",
-            Dimension::VOLTAGE,
-            Some(0.0),
-            Range::Finite,
-        ),
+        VOLTAGE,
+        AC_VOLTAGE,
+        CONTACT_POTENTIAL,
         RADIUS,
         CONTACT_DISTANCE,
         PERMITTIVITY,
     ],
     parts: &[],
+    attracts: false,
     conservative: false,
 };
 
@@ -182,6 +219,18 @@ impl Formula for ElectrostaticAc {
 #[derive(Clone, Copy, Debug)]
 pub struct Dlvo;
 
+parameters! {
+    /// Surface charge density of the tip, C/m².
+    pub const TIP_CHARGE = charge("tip_charge", "surface charge density of the tip", true,
+        "surface charge density of the tip (dlvo)");
+    /// Surface charge density of the sample, C/m².
+    pub const SAMPLE_CHARGE = charge("sample_charge", "surface charge density of the sample", false,
+        "surface charge density of the sample (dlvo)");
+    /// Debye length of the electrolyte, m.
+    pub const DEBYE_LENGTH = own("debye_length", "Debye length λ_D", Kind::Length, None, Range::Positive,
+        "Debye length of the electrolyte (dlvo)", 3e-9);
+}
+
 /// Table entry `dlvo`: a sphere in an electrolyte.
 pub static DLVO: Entry = Entry {
     name: "dlvo",
@@ -192,30 +241,13 @@ pub static DLVO: Entry = Entry {
         HAMAKER,
         RADIUS,
         CONTACT_DISTANCE,
-        own(
-            "tip_charge",
-            "surface charge density of the tip",
-            Dimension::CHARGE_DENSITY,
-            None,
-            Range::Finite,
-        ),
-        own(
-            "sample_charge",
-            "surface charge density of the sample",
-            Dimension::CHARGE_DENSITY,
-            None,
-            Range::Finite,
-        ),
-        own(
-            "debye_length",
-            "Debye length λ_D",
-            Dimension::LENGTH,
-            None,
-            Range::Positive,
-        ),
+        TIP_CHARGE,
+        SAMPLE_CHARGE,
+        DEBYE_LENGTH,
         PERMITTIVITY,
     ],
     parts: &[Part::Adhesion],
+    attracts: true,
     conservative: true,
 };
 

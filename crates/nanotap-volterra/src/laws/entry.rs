@@ -1,75 +1,148 @@
 //! The description of a law, for case files, help, schema and figures.
 
-/// Exponents of mass, length, time and electric charge, with the SI unit.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Dimension {
-    /// Exponent of mass.
-    pub mass: i8,
-    /// Exponent of length.
-    pub length: i8,
-    /// Exponent of time.
-    pub time: i8,
-    /// Exponent of electric charge.
-    pub charge: i8,
-    /// Symbol of the SI unit, empty for a pure number.
-    pub unit: &'static str,
-}
+use nanotap_quantity::Kind;
 
-impl Dimension {
-    const fn new(mass: i8, length: i8, time: i8, charge: i8, unit: &'static str) -> Self {
-        Self {
-            mass,
-            length,
-            time,
-            charge,
-            unit,
-        }
-    }
-    /// A pure number, without a unit.
-    pub const NUMBER: Self = Self::new(0, 0, 0, 0, "");
-    /// A time, s.
-    pub const TIME: Self = Self::new(0, 0, 1, 0, "s");
-    /// An angle, rad.
-    pub const ANGLE: Self = Self::new(0, 0, 0, 0, "rad");
-    /// A length, m.
-    pub const LENGTH: Self = Self::new(0, 1, 0, 0, "m");
-    /// A pressure or modulus, Pa.
-    pub const PRESSURE: Self = Self::new(1, -1, -2, 0, "Pa");
-    /// An energy, J.
-    pub const ENERGY: Self = Self::new(1, 2, -2, 0, "J");
-    /// An energy per area or a force per length, J/m².
-    pub const SURFACE_ENERGY: Self = Self::new(1, 0, -2, 0, "J/m²");
-    /// A force per length, N/m.
-    pub const STIFFNESS: Self = Self::new(1, 0, -2, 0, "N/m");
-    /// A force, N.
-    pub const FORCE: Self = Self::new(1, 1, -2, 0, "N");
-    /// A force per velocity, N s/m.
-    pub const DAMPING: Self = Self::new(1, 0, -1, 0, "N s/m");
-    /// A dynamic viscosity, Pa s.
-    pub const VISCOSITY: Self = Self::new(1, -1, -1, 0, "Pa s");
-    /// A repulsive Lennard-Jones constant, J m⁶.
-    pub const REPULSION: Self = Self::new(1, 8, -2, 0, "J m⁶");
-    /// A voltage, V.
-    pub const VOLTAGE: Self = Self::new(1, 2, -2, -1, "V");
-    /// A permittivity, F/m.
-    pub const PERMITTIVITY: Self = Self::new(-1, -3, 2, 2, "F/m");
-    /// A charge per area, C/m².
-    pub const CHARGE_DENSITY: Self = Self::new(0, -2, 0, 1, "C/m²");
+/// Declares parameters, one a paragraph.
+macro_rules! parameters {
+    ($($(#[$doc:meta])* $visible:vis const $name:ident = $value:expr;)*) => {
+        $($(#[$doc])* $visible const $name: ParameterEntry = $value;)*
+    };
 }
+pub(crate) use parameters;
 
-/// A parameter of a law, with its unit, default and range.
-#[derive(Clone, Copy, Debug, PartialEq)]
+/// A parameter of a law, with its unit, default and range, and the keys of a case that state it.
+#[derive(Clone, Copy, Debug)]
 pub struct ParameterEntry {
-    /// Key in case files and messages.
+    /// Name in messages and data.
     pub name: &'static str,
     /// Description in a few words, without a unit.
     pub words: &'static str,
-    /// Physical dimension, with its SI unit.
-    pub dimension: Dimension,
+    /// Kind of quantity, with its SI unit.
+    pub kind: Kind,
     /// Default value in SI units; `None` if a value is required.
     pub default: Option<f64>,
     /// Range of the values that are accepted.
     pub range: Range,
+    /// Key of a case that states the parameter.
+    pub key: CaseKey,
+    /// Other keys, any of which states the parameter in place of its own.
+    pub alternatives: Alternatives,
+    /// Whether the default is an assumption about the sample that a case reports.
+    pub assumed: bool,
+}
+
+/// The key of a case that states a parameter.
+#[derive(Clone, Copy, Debug)]
+pub enum CaseKey {
+    /// A quantity of tip or sample that a case has without the law, by its path: `tip.radius`.
+    Body(&'static str),
+    /// A key that cases have because of the law.
+    Own(KeyEntry),
+}
+
+/// Description of a key of a case.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct KeyEntry {
+    /// Whether the key is one of the tip; else of the sample.
+    pub of_tip: bool,
+    /// Name of the key in its table.
+    pub name: &'static str,
+    /// Alternative name of the key, if it has one.
+    pub alias: Option<&'static str>,
+    /// Kind of the values.
+    pub kind: Kind,
+    /// Range of the values.
+    pub range: Range,
+    /// SI value of 1, if values are multiples of it without a unit.
+    pub multiple_of: Option<f64>,
+    /// Default value, listed with the key.
+    pub default: Option<f64>,
+    /// Value for examples in messages and forms.
+    pub example: f64,
+    /// Description of the key in one line.
+    pub meaning: &'static str,
+    /// Words and symbol on the axis of a figure; if empty, the path of the key in words.
+    pub label: &'static str,
+}
+
+/// Keys that state a parameter in place of its own key.
+#[derive(Clone, Copy, Debug)]
+pub struct Alternatives {
+    /// Why only one of the keys may be stated.
+    pub reason: &'static str,
+    /// The other keys.
+    pub ways: &'static [Alternative],
+}
+
+/// Another key that states a parameter, and the conversion.
+#[derive(Clone, Copy, Debug)]
+pub struct Alternative {
+    /// The other key.
+    pub key: KeyEntry,
+    /// Names of further parameters of the law that the conversion needs.
+    pub needs: &'static [&'static str],
+    /// Converts the value of the key, with those of the further parameters, all in SI.
+    pub convert: fn(f64, &[f64]) -> f64,
+}
+
+impl ParameterEntry {
+    /// Sets the alternatives.
+    #[must_use]
+    pub const fn or_by(self, alternatives: Alternatives) -> Self {
+        Self {
+            alternatives,
+            ..self
+        }
+    }
+
+    /// Marks the default as an assumption about the sample.
+    #[must_use]
+    pub const fn assumed(self) -> Self {
+        Self {
+            assumed: true,
+            ..self
+        }
+    }
+}
+
+impl KeyEntry {
+    /// Creates a key of the sample from its name, kind and range, with description and example.
+    pub const fn new(
+        name: &'static str,
+        kind: Kind,
+        range: Range,
+        meaning: &'static str,
+        example: f64,
+    ) -> Self {
+        Self {
+            of_tip: false,
+            name,
+            alias: None,
+            kind,
+            range,
+            multiple_of: None,
+            default: None,
+            example,
+            meaning,
+            label: "",
+        }
+    }
+
+    /// Sets words and symbol on the axis of a figure.
+    #[must_use]
+    pub const fn label(self, label: &'static str) -> Self {
+        Self { label, ..self }
+    }
+
+    /// Makes the values multiples of an SI value, without a unit.
+    #[must_use]
+    pub const fn multiple_of(self, unit: f64) -> Self {
+        Self {
+            kind: Kind::Number,
+            multiple_of: Some(unit),
+            ..self
+        }
+    }
 }
 
 /// The values that a parameter accepts.
@@ -125,7 +198,7 @@ pub enum Part {
 }
 
 /// The description of a law in the table of laws.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug)]
 pub struct Entry {
     /// Name in case files.
     pub name: &'static str,
@@ -139,112 +212,127 @@ pub struct Entry {
     pub parameters: &'static [ParameterEntry],
     /// Parts of the interaction that must not be counted twice in a sum of laws.
     pub parts: &'static [Part],
+    /// Whether the law attracts across a gap down to the contact distance, which then is not 0.
+    pub attracts: bool,
     /// Whether the force depends on the gap alone, without a memory.
     pub conservative: bool,
 }
 
-/// Creates an entry for a parameter.
+impl Entry {
+    /// Returns the keys that cases have because of the law.
+    pub fn keys(&self) -> impl Iterator<Item = KeyEntry> {
+        self.parameters.iter().flat_map(|parameter| {
+            let own = match parameter.key {
+                CaseKey::Own(key) => Some(key),
+                CaseKey::Body(_) => None,
+            };
+            let others = parameter.alternatives.ways.iter().map(|way| way.key);
+            own.into_iter().chain(others)
+        })
+    }
+}
+
+/// Creates a parameter that a case states by a key of this name, with the key's description and
+/// an example of its value.
 pub const fn own(
     name: &'static str,
     words: &'static str,
-    dimension: Dimension,
+    kind: Kind,
     default: Option<f64>,
     range: Range,
+    meaning: &'static str,
+    example: f64,
+) -> ParameterEntry {
+    let key = KeyEntry::new(name, kind, range, meaning, example);
+    stated_by(name, words, kind, default, range, CaseKey::Own(key))
+}
+
+/// Creates a parameter that a case states by this key.
+pub const fn stated_by(
+    name: &'static str,
+    words: &'static str,
+    kind: Kind,
+    default: Option<f64>,
+    range: Range,
+    key: CaseKey,
 ) -> ParameterEntry {
     ParameterEntry {
         name,
         words,
-        dimension,
+        kind,
         default,
         range,
+        key,
+        alternatives: Alternatives {
+            reason: "",
+            ways: &[],
+        },
+        assumed: false,
     }
 }
 
-/// Young's modulus of the sample, Pa.
-pub const MODULUS: ParameterEntry = own(
-    "modulus",
-    "Young's modulus of the sample",
-    Dimension::PRESSURE,
-    None,
-    Range::Positive,
-);
-/// Poisson's ratio of the sample, dimensionless.
-pub const POISSON: ParameterEntry = own(
-    "poisson",
-    "Poisson's ratio of the sample",
-    Dimension::NUMBER,
-    Some(0.3),
-    Range::Poisson,
-);
-/// Young's modulus of the tip, Pa; infinite for a rigid tip.
-pub const TIP_MODULUS: ParameterEntry = own(
-    "tip_modulus",
-    "Young's modulus of the tip",
-    Dimension::PRESSURE,
-    Some(f64::INFINITY),
-    Range::PositiveOrInfinite,
-);
-/// Poisson's ratio of the tip, dimensionless.
-pub const TIP_POISSON: ParameterEntry = own(
-    "tip_poisson",
-    "Poisson's ratio of the tip",
-    Dimension::NUMBER,
-    Some(0.3),
-    Range::Poisson,
-);
-/// Radius of a spherical tip or of a flat punch, m.
-pub const RADIUS: ParameterEntry = own(
-    "radius",
-    "radius of the tip",
-    Dimension::LENGTH,
-    None,
-    Range::Positive,
-);
-/// Half angle of a conical tip, rad.
-pub const HALF_ANGLE: ParameterEntry = own(
-    "half_angle",
-    "half angle of the conical tip",
-    Dimension::ANGLE,
-    None,
-    Range::Angle,
-);
+/// Creates a factor of rows or arms whose unit is 1 of `kind` in SI.
+pub const fn factor(
+    name: &'static str,
+    words: &'static str,
+    kind: Kind,
+    range: Range,
+    meaning: &'static str,
+) -> ParameterEntry {
+    let key = KeyEntry {
+        default: Some(1.0),
+        ..KeyEntry::new(name, kind, range, meaning, 1.0).multiple_of(1.0)
+    };
+    stated_by(name, words, kind, Some(1.0), range, CaseKey::Own(key))
+}
+
+parameters! {
+    /// Young's modulus of the sample, Pa.
+    pub const MODULUS = stated_by("modulus", "Young's modulus of the sample", Kind::Pressure, None,
+        Range::Positive, CaseKey::Body("sample.modulus"));
+    /// Poisson's ratio of the sample, dimensionless.
+    pub const POISSON = stated_by("poisson", "Poisson's ratio of the sample", Kind::Number, Some(0.3),
+        Range::Poisson, CaseKey::Body("sample.poisson")).assumed();
+    /// Young's modulus of the tip, Pa; infinite for a rigid tip.
+    pub const TIP_MODULUS = stated_by("tip_modulus", "Young's modulus of the tip", Kind::Pressure,
+        Some(f64::INFINITY), Range::PositiveOrInfinite, CaseKey::Body("tip.modulus"));
+    /// Poisson's ratio of the tip, dimensionless.
+    pub const TIP_POISSON = stated_by("tip_poisson", "Poisson's ratio of the tip", Kind::Number, Some(0.3),
+        Range::Poisson, CaseKey::Body("tip.poisson"));
+    /// Radius of a spherical tip or of a flat punch, m.
+    pub const RADIUS = stated_by("radius", "radius of the tip", Kind::Length, None, Range::Positive,
+        CaseKey::Body("tip.radius"));
+    /// Half angle of a conical tip, rad.
+    pub const HALF_ANGLE = stated_by("half_angle", "half angle of the conical tip", Kind::Angle, None,
+        Range::Angle, CaseKey::Body("tip.half_angle"));
+}
+
 /// Gap at which contact begins, m.
-pub const CONTACT_DISTANCE: ParameterEntry = own(
+pub const CONTACT_DISTANCE: ParameterEntry = stated_by(
     "contact_distance",
     "intermolecular distance a0, the gap at which contact begins",
-    Dimension::LENGTH,
+    Kind::Length,
     Some(0.165e-9),
     Range::Finite,
-);
-/// Hamaker constant of tip, medium and sample, J.
-pub const HAMAKER: ParameterEntry = own(
-    "hamaker",
-    "Hamaker constant of tip, medium and sample",
-    Dimension::ENERGY,
-    None,
-    Range::Finite,
-);
-/// Work of adhesion per area, J/m².
-pub const WORK_OF_ADHESION: ParameterEntry = own(
-    "work_of_adhesion",
-    "work of adhesion",
-    Dimension::SURFACE_ENERGY,
-    None,
-    Range::Positive,
-);
+    CaseKey::Own(KeyEntry {
+        alias: Some("contact_distance"),
+        label: "intermolecular distance $a_0$",
+        ..KeyEntry::new(
+            "intermolecular_distance",
+            Kind::Length,
+            Range::Positive,
+            "intermolecular distance a0, the gap at which contact begins",
+            1.65e-10,
+        )
+    }),
+)
+.assumed();
+
 /// Dynamic viscosity of the sample, Pa s.
-pub const VISCOSITY: ParameterEntry = own(
-    "viscosity",
-    "viscosity of the sample",
-    Dimension::VISCOSITY,
-    None,
-    Range::NotNegative,
-);
-/// Thickness of the sample, m.
-pub const THICKNESS: ParameterEntry = own(
-    "thickness",
-    "thickness of the sample on its rigid support",
-    Dimension::LENGTH,
-    None,
-    Range::Positive,
-);
+pub const VISCOSITY: ParameterEntry = stated_by("viscosity", "viscosity of the sample", Kind::Viscosity, None, Range::NotNegative, CaseKey::Own(KeyEntry::new("viscosity", Kind::Viscosity, Range::NotNegative, "viscosity of the sample: elongational of a Kelvin–Voigt solid, García's η of viscous-contact", 1.0).label("sample viscosity $η$")));
+
+parameters! {
+    /// Thickness of the sample, m.
+    pub const THICKNESS = own("thickness", "thickness of the sample on its rigid support", Kind::Length,
+        None, Range::Positive, "thickness of a thin sample on its support", 2e-8);
+}

@@ -6,14 +6,25 @@
 //! state, not the sign of the velocity: a tip that turns again before it has left stays on
 //! `w_r`.
 
-use crate::laws::entry::{CONTACT_DISTANCE, Dimension, Entry, Part, RADIUS, Range, own};
+use crate::laws::adhesion::WORK_OF_ADHESION;
+use crate::laws::entry::{
+    CONTACT_DISTANCE, Entry, ParameterEntry, Part, RADIUS, Range, own, parameters,
+};
 use crate::laws::formula::{Edge, Formula, Way};
 use nanotap_arithmetic::Scalar;
+use nanotap_quantity::Kind;
 use std::f64::consts::PI;
 
 /// Formula of adhesion with hysteresis; see the module.
 #[derive(Clone, Copy, Debug)]
 pub struct AdhesionHysteresis;
+
+parameters! {
+    /// Work of adhesion on retraction, J/m².
+    pub const WORK_OF_RETRACTION = own("work_of_retraction", "work of adhesion on retraction",
+        Kind::SurfaceEnergy, None, Range::NotNegative,
+        "work of adhesion on retraction (adhesion-hysteresis)", 0.03);
+}
 
 /// Table entry `adhesion-hysteresis`: constant adhesion, larger on retraction.
 pub static ADHESION_HYSTERESIS: Entry = Entry {
@@ -22,24 +33,17 @@ pub static ADHESION_HYSTERESIS: Entry = Entry {
     formula: "−2πR w_a until the contact's turning point, −2πR w_r from there to d = a0",
     source: "García, Gómez et al., Phys. Rev. Lett. 97, 016103 (2006)",
     parameters: &[
-        own(
-            "work_of_adhesion",
-            "work of adhesion on approach",
-            Dimension::SURFACE_ENERGY,
-            None,
-            Range::NotNegative,
-        ),
-        own(
-            "work_of_retraction",
-            "work of adhesion on retraction",
-            Dimension::SURFACE_ENERGY,
-            None,
-            Range::NotNegative,
-        ),
+        ParameterEntry {
+            words: "work of adhesion on approach",
+            range: Range::NotNegative,
+            ..WORK_OF_ADHESION
+        },
+        WORK_OF_RETRACTION,
         RADIUS,
         CONTACT_DISTANCE,
     ],
     parts: &[Part::Adhesion],
+    attracts: true,
     conservative: false,
 };
 

@@ -6,10 +6,10 @@
 //! tip is attached is a state, and no force acts while it is not.
 
 use crate::law::{Approach, Remark};
+use crate::laws::adhesion::WORK_OF_SOFT_SPHERE;
 use crate::laws::elastic::{deep, reduced_modulus};
 use crate::laws::entry::{
     CONTACT_DISTANCE, Entry, MODULUS, POISSON, Part, RADIUS, TIP_MODULUS, TIP_POISSON,
-    WORK_OF_ADHESION,
 };
 use crate::laws::formula::{Edge, Formula, Way};
 use nanotap_arithmetic::Scalar;
@@ -32,9 +32,10 @@ pub static JKR: Entry = Entry {
         TIP_POISSON,
         RADIUS,
         CONTACT_DISTANCE,
-        WORK_OF_ADHESION,
+        WORK_OF_SOFT_SPHERE,
     ],
     parts: &[Part::Elasticity, Part::Adhesion],
+    attracts: true,
     conservative: false,
 };
 

@@ -50,6 +50,7 @@ const fn entry(
         source: SOURCE,
         parameters,
         parts: &[Part::Elasticity],
+        attracts: false,
         conservative: false,
     }
 }

@@ -46,6 +46,7 @@ const fn entry(
         source: "R. S. Dhaliwal and I. S. Rau, Int. J. Eng. Sci. 8, 843 (1970)",
         parameters,
         parts: &[Part::Elasticity],
+        attracts: false,
         conservative: true,
     }
 }

@@ -4,13 +4,21 @@
 //! Derjaguin's approximation (Israelachvili, Intermolecular and Surface Forces; Basso,
 //! Giarré, Dahleh, Mezić, ACC 1998).
 
-use crate::laws::entry::{Dimension, Entry, Part, RADIUS, Range, own};
+use crate::laws::adhesion::HAMAKER;
+use crate::laws::entry::{Entry, ParameterEntry, Part, RADIUS, Range, own, parameters};
 use crate::laws::formula::{Formula, Way};
 use nanotap_arithmetic::Scalar;
+use nanotap_quantity::Kind;
 
 /// Formula of the Lennard-Jones interaction of a sphere with a half-space; see the module.
 #[derive(Clone, Copy, Debug)]
 pub struct LennardJones;
+
+parameters! {
+    /// Constant of the repulsion, J m⁶.
+    pub const REPULSION = own("repulsion", "constant A₁ of the repulsion", Kind::Repulsion, None,
+        Range::NotNegative, "constant of the repulsion (lennard-jones)", 1e-78);
+}
 
 /// Table entry `lennard-jones`: a sphere above a flat sample.
 pub static LENNARD_JONES: Entry = Entry {
@@ -19,23 +27,17 @@ pub static LENNARD_JONES: Entry = Entry {
     formula: "A₁R/(180 d⁸) − A₂R/(6 d²)",
     source: "J. N. Israelachvili, Intermolecular and Surface Forces",
     parameters: &[
-        own(
-            "repulsion",
-            "constant A₁ of the repulsion",
-            Dimension::REPULSION,
-            None,
-            Range::NotNegative,
-        ),
-        own(
-            "attraction",
-            "constant A₂ of the attraction (Hamaker)",
-            Dimension::ENERGY,
-            None,
-            Range::NotNegative,
-        ),
+        REPULSION,
+        ParameterEntry {
+            name: "attraction",
+            words: "constant A₂ of the attraction (Hamaker)",
+            range: Range::NotNegative,
+            ..HAMAKER
+        },
         RADIUS,
     ],
     parts: &[Part::Elasticity, Part::Adhesion],
+    attracts: true,
     conservative: true,
 };
 

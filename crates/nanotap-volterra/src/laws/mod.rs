@@ -4,6 +4,7 @@
 //!
 //! All quantities may be in any consistent units; the defaults are SI.
 
+pub mod adhesion;
 pub mod capillary;
 pub mod curve;
 pub mod dmt;

@@ -20,11 +20,12 @@ use crate::error::VolterraError;
 use crate::law::{Approach, Exit, Force, ForceLaw, Guard, Remark, Surface};
 use crate::laws::elastic::{Elastic, Shape, deep};
 use crate::laws::entry::{
-    CONTACT_DISTANCE, Dimension, Entry, HALF_ANGLE, POISSON, ParameterEntry, Part, RADIUS, Range,
-    own,
+    CONTACT_DISTANCE, CaseKey, Entry, HALF_ANGLE, POISSON, ParameterEntry, Part, RADIUS, Range,
+    factor, own, parameters, stated_by,
 };
 use crate::laws::formula::Law;
 use crate::laws::{Make, TableLaw};
+use nanotap_quantity::Kind;
 use std::sync::Arc;
 
 /// Largest number of arms.
@@ -32,34 +33,21 @@ pub const MAX_ARMS: usize = 100;
 /// Relative difference of two relaxation times below which they count as one.
 const SAME_TIME: f64 = 1e-9;
 
-const MODULUS: ParameterEntry = own(
-    "modulus",
-    "Young's modulus of the sample at rest, when it has relaxed",
-    Dimension::PRESSURE,
-    Some(0.0),
-    Range::NotNegative,
-);
-const ARM_MODULUS_FACTOR: ParameterEntry = own(
-    "arm_modulus_factor",
-    "factor of the arms' moduli",
-    Dimension::PRESSURE,
-    Some(1.0),
-    Range::Positive,
-);
-const ARM_TIME_FACTOR: ParameterEntry = own(
-    "arm_time_factor",
-    "factor of the arms' times, as the shift of a time–temperature superposition",
-    Dimension::TIME,
-    Some(1.0),
-    Range::Positive,
-);
-const HORIZON: ParameterEntry = own(
-    "horizon",
-    "time beyond which slower arms count as elastic",
-    Dimension::TIME,
-    Some(f64::INFINITY),
-    Range::PositiveOrInfinite,
-);
+parameters! {
+    const MODULUS = stated_by("modulus", "Young's modulus of the sample at rest, when it has relaxed",
+        Kind::Pressure, Some(0.0), Range::NotNegative, CaseKey::Body("sample.modulus"));
+    /// Factor of the arms' moduli.
+    pub const ARM_MODULUS_FACTOR = factor("arm_modulus_factor", "factor of the arms' moduli",
+        Kind::Pressure, Range::Positive, "factor of the moduli of all arms");
+    /// Factor of the arms' times.
+    pub const ARM_TIME_FACTOR = factor("arm_time_factor",
+        "factor of the arms' times, as the shift of a time–temperature superposition", Kind::Time,
+        Range::Positive, "factor of the times of all arms: the shift of a time–temperature superposition");
+    /// Time beyond which slower arms count as elastic, s.
+    pub const HORIZON = own("horizon", "time beyond which slower arms count as elastic", Kind::Time,
+        Some(f64::INFINITY), Range::PositiveOrInfinite, "time of observation: slower arms count as elastic",
+        1.0);
+}
 
 const fn parameters(size: ParameterEntry) -> [ParameterEntry; 7] {
     [
@@ -89,6 +77,7 @@ const fn entry(
         source: "E. H. Lee, J. R. M. Radok, J. Appl. Mech. 27, 438 (1960)",
         parameters,
         parts: &[Part::Elasticity],
+        attracts: false,
         conservative: false,
     }
 }

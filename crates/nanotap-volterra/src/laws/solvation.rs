@@ -6,14 +6,27 @@
 
 use crate::law::Approach;
 use crate::laws::elastic::contact_ways;
-use crate::laws::entry::{CONTACT_DISTANCE, Dimension, Entry, Range, own};
+use crate::laws::entry::{CONTACT_DISTANCE, Entry, ParameterEntry, Range, own, parameters};
 use crate::laws::formula::{Formula, Way};
 use nanotap_arithmetic::Scalar;
+use nanotap_quantity::Kind;
 use std::f64::consts::TAU;
 
 /// Formula of an oscillating solvation force; see the module.
 #[derive(Clone, Copy, Debug)]
 pub struct Solvation;
+
+parameters! {
+    /// Solvation force at contact, N.
+    pub const SOLVATION_FORCE = own("solvation_force", "solvation force F0 at contact", Kind::Force, None,
+        Range::Finite, "solvation force at contact (solvation)", 1e-9);
+    /// Period of the solvation force, m.
+    pub const SOLVATION_PERIOD = own("solvation_period", "period σ of the solvation force", Kind::Length,
+        None, Range::Positive, "period of the solvation force (solvation)", 3e-10);
+    /// Decay length of the solvation force, m.
+    pub const SOLVATION_DECAY = own("solvation_decay", "decay length λ of the solvation force",
+        Kind::Length, None, Range::Positive, "decay length of the solvation force (solvation)", 3e-10);
+}
 
 /// Table entry `solvation`: molecular layers of a liquid between tip and sample.
 pub static SOLVATION: Entry = Entry {
@@ -22,30 +35,13 @@ pub static SOLVATION: Entry = Entry {
     formula: "F0 cos(2π(d − a0)/σ) e^(−(d − a0)/λ) for d > a0, F0 in contact",
     source: "J. N. Israelachvili, Intermolecular and Surface Forces, 3rd ed., ch. 15 (2011)",
     parameters: &[
-        own(
-            "solvation_force",
-            "solvation force F0 at contact",
-            Dimension::FORCE,
-            None,
-            Range::Finite,
-        ),
-        own(
-            "solvation_period",
-            "period σ of the solvation force",
-            Dimension::LENGTH,
-            None,
-            Range::Positive,
-        ),
-        own(
-            "solvation_decay",
-            "decay length λ of the solvation force",
-            Dimension::LENGTH,
-            None,
-            Range::Positive,
-        ),
+        SOLVATION_FORCE,
+        SOLVATION_PERIOD,
+        SOLVATION_DECAY,
         CONTACT_DISTANCE,
     ],
     parts: &[],
+    attracts: false,
     conservative: true,
 };
 

@@ -5,9 +5,10 @@
 
 use crate::law::Approach;
 use crate::laws::elastic::contact_ways;
-use crate::laws::entry::{CONTACT_DISTANCE, Dimension, Entry, Part, Range, own};
+use crate::laws::entry::{CONTACT_DISTANCE, CaseKey, Entry, Part, Range, stated_by};
 use crate::laws::formula::{Formula, Way};
 use nanotap_arithmetic::Scalar;
+use nanotap_quantity::Kind;
 
 /// Formula of a spring and a damper in contact; see the module.
 #[derive(Clone, Copy, Debug)]
@@ -20,23 +21,26 @@ pub static SPRING_DAMPER: Entry = Entry {
     formula: "k δ − c ḋ for δ = a0 − d > 0",
     source: "the piecewise-linear model",
     parameters: &[
-        own(
+        stated_by(
             "stiffness",
             "contact stiffness k",
-            Dimension::STIFFNESS,
+            Kind::Stiffness,
             None,
             Range::NotNegative,
+            CaseKey::Body("sample.stiffness"),
         ),
-        own(
+        stated_by(
             "damping",
             "contact damping c",
-            Dimension::DAMPING,
+            Kind::Damping,
             Some(0.0),
             Range::NotNegative,
+            CaseKey::Body("sample.damping"),
         ),
         CONTACT_DISTANCE,
     ],
     parts: &[Part::Elasticity],
+    attracts: false,
     conservative: false,
 };
 

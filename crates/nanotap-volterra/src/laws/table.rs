@@ -11,15 +11,30 @@
 use crate::error::VolterraError;
 use crate::law::{Exit, Force, ForceLaw, Guard, Remark};
 use crate::laws::curve::{self, Interpolation, LANES, Piece};
-use crate::laws::entry::{Dimension, Entry, Part, Range, own};
+use crate::laws::entry::{
+    CONTACT_DISTANCE, Entry, ParameterEntry, Part, Range, factor, parameters,
+};
 use crate::laws::{Make, TableLaw};
 use crate::linear::wide_registers;
 use crate::system::MAX_BRANCHES;
+use nanotap_quantity::Kind;
 use std::sync::Arc;
 
 /// Largest number of rows: each row is a branch, as is the range below the first, and contact may
 /// begin between two of them.
 pub const MAX_ROWS: usize = MAX_BRANCHES - 2;
+
+parameters! {
+    /// Factor of the table's gaps.
+    pub const GAP_FACTOR = factor("gap_factor", "factor of the table's gaps", Kind::Length, Range::Positive,
+        "factor by which a table's gaps are stretched");
+    /// Factor of the table's forces.
+    pub const FORCE_FACTOR = factor("force_factor", "factor of the table's forces", Kind::Force,
+        Range::NotNegative, "factor of a table's forces");
+    /// Factor of the table's damping.
+    pub const DAMPING_FACTOR = factor("damping_factor", "factor of the table's damping", Kind::Damping,
+        Range::NotNegative, "factor of a table's damping");
+}
 
 /// Table entry of a force given by rows, which are given in addition to the parameters.
 pub static TABLE: TableLaw = TableLaw {
@@ -29,36 +44,17 @@ pub static TABLE: TableLaw = TableLaw {
         formula: "P(d) − γ(d) ḋ, straight lines or a spline through the rows of the table",
         source: "the table",
         parameters: &[
-            own(
-                "contact_distance",
-                "gap at which tip and sample touch",
-                Dimension::LENGTH,
-                Some(0.0),
-                Range::Finite,
-            ),
-            own(
-                "gap_factor",
-                "factor of the table's gaps",
-                Dimension::LENGTH,
-                Some(1.0),
-                Range::Positive,
-            ),
-            own(
-                "force_factor",
-                "factor of the table's forces",
-                Dimension::FORCE,
-                Some(1.0),
-                Range::NotNegative,
-            ),
-            own(
-                "damping_factor",
-                "factor of the table's damping",
-                Dimension::DAMPING,
-                Some(1.0),
-                Range::NotNegative,
-            ),
+            ParameterEntry {
+                words: "gap at which tip and sample touch",
+                default: Some(0.0),
+                ..CONTACT_DISTANCE
+            },
+            GAP_FACTOR,
+            FORCE_FACTOR,
+            DAMPING_FACTOR,
         ],
         parts: &[Part::Elasticity, Part::Adhesion],
+        attracts: true,
         conservative: true,
     },
     make: Make::Rows,

@@ -33,6 +33,7 @@ const fn entry(
         source: "P. D. García and R. García, Biophys. J. 114, 2923 (2018)",
         parameters,
         parts: &[Part::Elasticity],
+        attracts: false,
         conservative: true,
     }
 }

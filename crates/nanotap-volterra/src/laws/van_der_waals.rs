@@ -5,8 +5,9 @@
 //! (`d < a0`) the force is that at `a0`.
 
 use crate::law::Approach;
+use crate::laws::adhesion::{HAMAKER, HAMAKER_OF_STIFF_SPHERE};
 use crate::laws::elastic::{Shape, contact_ways};
-use crate::laws::entry::{CONTACT_DISTANCE, Entry, HALF_ANGLE, HAMAKER, Part, RADIUS};
+use crate::laws::entry::{CONTACT_DISTANCE, Entry, HALF_ANGLE, Part, RADIUS};
 use crate::laws::formula::{Formula, Way};
 use nanotap_arithmetic::Scalar;
 
@@ -20,8 +21,9 @@ pub static SPHERE: Entry = Entry {
     words: "van der Waals attraction of a sphere",
     formula: "−H R/(6 d²) for d > a0, −H R/(6 a0²) in contact",
     source: "H. C. Hamaker, Physica 4, 1058 (1937)",
-    parameters: &[HAMAKER, RADIUS, CONTACT_DISTANCE],
+    parameters: &[HAMAKER_OF_STIFF_SPHERE, RADIUS, CONTACT_DISTANCE],
     parts: &[Part::Adhesion],
+    attracts: true,
     conservative: true,
 };
 
@@ -33,6 +35,7 @@ pub static CONE: Entry = Entry {
     source: "H. C. Hamaker, Physica 4, 1058 (1937)",
     parameters: &[HAMAKER, HALF_ANGLE, CONTACT_DISTANCE],
     parts: &[Part::Adhesion],
+    attracts: true,
     conservative: true,
 };
 
@@ -44,6 +47,7 @@ pub static PUNCH: Entry = Entry {
     source: "H. C. Hamaker, Physica 4, 1058 (1937)",
     parameters: &[HAMAKER, RADIUS, CONTACT_DISTANCE],
     parts: &[Part::Adhesion],
+    attracts: true,
     conservative: true,
 };
 

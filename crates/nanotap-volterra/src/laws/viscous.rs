@@ -9,9 +9,13 @@
 
 use crate::law::{Approach, Remark};
 use crate::laws::elastic::contact_ways;
-use crate::laws::entry::{CONTACT_DISTANCE, Dimension, Entry, RADIUS, Range, VISCOSITY, own};
+use crate::laws::entry::{
+    CONTACT_DISTANCE, CaseKey, Entry, ParameterEntry, RADIUS, Range, VISCOSITY, own, parameters,
+    stated_by,
+};
 use crate::laws::formula::{Formula, Way};
 use nanotap_arithmetic::Scalar;
+use nanotap_quantity::Kind;
 
 /// Formula `−η √(Rδ) ḋ` of a viscosity in contact; see the module.
 #[derive(Clone, Copy, Debug)]
@@ -25,6 +29,7 @@ pub static ROOT_VISCOSITY: Entry = Entry {
     source: "García, Gómez et al., Phys. Rev. Lett. 97, 016103 (2006)",
     parameters: &[VISCOSITY, RADIUS, CONTACT_DISTANCE],
     parts: &[],
+    attracts: false,
     conservative: false,
 };
 
@@ -65,6 +70,12 @@ const DEEPEST: f64 = 3.0;
 #[derive(Clone, Copy, Debug)]
 pub struct ExponentialDamping;
 
+parameters! {
+    /// Distance in which the damping decays, m.
+    pub const DECAY_LENGTH = own("decay_length", "decay length x", Kind::Length, None, Range::Positive,
+        "distance in which exponential damping decays", 5e-10);
+}
+
 /// Table entry `exponential-damping`: damping that decays exponentially with the gap.
 pub static EXPONENTIAL_DAMPING: Entry = Entry {
     name: "exponential-damping",
@@ -72,22 +83,18 @@ pub static EXPONENTIAL_DAMPING: Entry = Entry {
     formula: "−γ₀ e^(−d/x) ḋ",
     source: "Gotsmann, Seidel, Anczykowski, Fuchs, Phys. Rev. B 60, 11051 (1999)",
     parameters: &[
-        own(
+        stated_by(
             "damping",
             "damping γ₀ at zero gap",
-            Dimension::DAMPING,
+            Kind::Damping,
             None,
             Range::NotNegative,
+            CaseKey::Body("sample.damping"),
         ),
-        own(
-            "decay_length",
-            "decay length x",
-            Dimension::LENGTH,
-            None,
-            Range::Positive,
-        ),
+        DECAY_LENGTH,
     ],
     parts: &[],
+    attracts: false,
     conservative: false,
 };
 
@@ -137,6 +144,16 @@ impl Formula for ExponentialDamping {
 #[derive(Clone, Copy, Debug)]
 pub struct PowerDamping;
 
+parameters! {
+    /// Distance over which the damping falls, m.
+    pub const DAMPING_DISTANCE = own("damping_distance", "distance d0 over which the damping falls",
+        Kind::Length, None, Range::Positive,
+        "distance over which damping falls as a power of the gap (power-damping)", 1e-9);
+    /// Power by which the damping falls, dimensionless.
+    pub const DAMPING_EXPONENT = own("damping_exponent", "power n by which the damping falls", Kind::Number,
+        None, Range::NotNegative, "power by which damping falls with the gap (power-damping)", 3.0);
+}
+
 /// Table entry `power-damping`: damping that falls like a power of the gap.
 pub static POWER_DAMPING: Entry = Entry {
     name: "power-damping",
@@ -144,30 +161,20 @@ pub static POWER_DAMPING: Entry = Entry {
     formula: "−γ (d0/(d − a0 + d0))^n ḋ for d > a0, −γ ḋ in contact",
     source: "B. C. Stipe et al., Phys. Rev. Lett. 87, 096801 (2001)",
     parameters: &[
-        own(
+        stated_by(
             "damping",
             "damping γ at contact",
-            Dimension::DAMPING,
+            Kind::Damping,
             None,
             Range::NotNegative,
+            CaseKey::Body("sample.damping"),
         ),
-        own(
-            "damping_distance",
-            "distance d0 over which the damping falls",
-            Dimension::LENGTH,
-            None,
-            Range::Positive,
-        ),
-        own(
-            "damping_exponent",
-            "power n by which the damping falls",
-            Dimension::NUMBER,
-            None,
-            Range::NotNegative,
-        ),
+        DAMPING_DISTANCE,
+        DAMPING_EXPONENT,
         CONTACT_DISTANCE,
     ],
     parts: &[],
+    attracts: false,
     conservative: false,
 };
 

@@ -25,10 +25,8 @@ pub mod force_table;
 pub mod key;
 pub mod lever_modes;
 mod moving_gap;
-pub mod near_name;
 pub mod physical;
 mod quantities;
-pub mod quantity;
 mod recording;
 pub mod schema;
 pub mod state;
@@ -45,6 +43,8 @@ use std::sync::Arc;
 use nanotap_dynamics::{CancelFlag, Control};
 use schemars::JsonSchema;
 use serde::{Serialize, Serializer};
+
+pub use nanotap_quantity::{self as quantity, near_name};
 
 pub use error::{CaseError, NoSuchKey, ValueOfKeyError};
 pub use family::{Family, PlaneFamily};

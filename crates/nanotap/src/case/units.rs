@@ -30,16 +30,8 @@ impl Units {
     /// for kinds that motions do not have.
     pub fn si(&self, kind: Kind) -> Option<f64> {
         let Self::Si(scales) = self else { return None };
-        Some(match kind {
-            Kind::Length => scales.length,
-            Kind::Time => scales.time,
-            Kind::Velocity => scales.velocity,
-            Kind::Force => scales.force,
-            Kind::Energy => scales.energy,
-            Kind::Power => scales.power,
-            Kind::Frequency => scales.frequency,
-            _ => return None,
-        })
+        kind.model_unit().and(kind.dimensional())?;
+        scales.si(kind)
     }
 
     /// A number of the model in these units.

@@ -108,6 +108,8 @@ pub enum SampleKey {
         meaning: &'static str,
         /// Whether the value 0 is allowed for the key.
         zero: bool,
+        /// Value for examples in messages and forms, in SI.
+        example: f64,
     },
     /// A key that nonlinear laws have, too.
     Shared,

@@ -1,25 +1,26 @@
-//! Dimensions of observables, with units of the model and of SI.
+//! Dimensions of observables and of columns: kinds of quantities, with the unit in which a result
+//! holds them.
 
 use crate::case::physical::{Kind, Scales};
 
 /// The dimension of an observable.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Dimension {
-    /// Deflection, gap or depth; the model's unit is g₀, the SI unit m.
+    /// Deflection, gap or depth.
     Length,
-    /// Time; the model's unit is √(mL⁴/(EI)), the SI unit s.
+    /// Time.
     Time,
-    /// Velocity; the model's unit is g₀ √(EI/(mL⁴)), the SI unit m/s.
+    /// Velocity.
     Velocity,
-    /// Force; the model's unit is EI g₀/L³, the SI unit N.
+    /// Force.
     Force,
-    /// Energy; the model's unit is EI g₀²/L³, the SI unit J.
+    /// Energy.
     Energy,
-    /// Frequency; the model's unit √(EI/(mL⁴)) is that of an angular frequency, the SI unit Hz.
+    /// Frequency; the model's unit is that of an angular frequency.
     Frequency,
-    /// Power; the model's unit is that of energy over that of time, the SI unit W.
+    /// Power.
     Power,
-    /// Slope; dW/dξ in the model with the unit g₀/L, the pure number dw/dx in SI.
+    /// Slope; dW/dξ in the model, the pure number dw/dx in SI.
     Slope,
     /// Angle in degrees, in the model and in SI.
     Angle,
@@ -40,28 +41,41 @@ pub enum Dimension {
 }
 
 impl Dimension {
+    /// The entry in the table of kinds.
+    const fn entry(self) -> Kind {
+        match self {
+            Self::Length => Kind::Length,
+            Self::Time => Kind::Time,
+            Self::Velocity => Kind::Velocity,
+            Self::Force => Kind::Force,
+            Self::Energy => Kind::Energy,
+            Self::Frequency => Kind::Frequency,
+            Self::Power => Kind::Power,
+            Self::Slope => Kind::Slope,
+            Self::Angle => Kind::Degrees,
+            Self::Count => Kind::Count,
+            Self::PerPeriod => Kind::PerPeriod,
+            Self::Periods => Kind::Periods,
+            Self::Place => Kind::Place,
+            Self::Si(kind) => kind,
+            Self::Number | Self::Unit(_) => Kind::Number,
+        }
+    }
+
     /// Returns the name of the model's unit.
     pub const fn model_unit(self) -> &'static str {
         match self {
-            Self::Length => "g0",
-            Self::Time => "sqrt(m L^4/EI)",
-            Self::Velocity => "g0 sqrt(EI/(m L^4))",
-            Self::Force => "EI g0/L^3",
-            Self::Energy => "EI g0^2/L^3",
-            Self::Power => "EI g0^2/L^3 sqrt(EI/(m L^4))",
-            Self::Frequency => "sqrt(EI/(m L^4))",
-            Self::Slope => "g0/L",
-            Self::Place => "L",
+            Self::Unit(unit) => unit,
             Self::Si(kind) => kind.si_unit(),
-            _ => self.fixed_unit(),
+            _ => self.entry().result_unit(),
         }
     }
 
     /// Returns the name of the SI unit.
     pub const fn si_unit(self) -> &'static str {
-        match self.kind() {
-            Some(kind) => kind.si_unit(),
-            None => self.fixed_unit(),
+        match self {
+            Self::Unit(unit) => unit,
+            _ => self.entry().si_unit(),
         }
     }
 
@@ -75,45 +89,20 @@ impl Dimension {
         }
     }
 
-    /// The unit of quantities that are the same in the model and in SI.
-    const fn fixed_unit(self) -> &'static str {
-        match self {
-            Self::Angle => "degree",
-            Self::PerPeriod => "1/drive period",
-            Self::Periods => "drive periods",
-            Self::Unit(unit) => unit,
-            _ => "1",
-        }
-    }
-
     /// The kind of quantity, for SI prefixes; `None` if the value is the same in the model and in
     /// SI.
     pub const fn kind(self) -> Option<Kind> {
-        Some(match self {
-            Self::Length => Kind::Length,
-            Self::Time => Kind::Time,
-            Self::Velocity => Kind::Velocity,
-            Self::Force => Kind::Force,
-            Self::Energy => Kind::Energy,
-            Self::Power => Kind::Power,
-            Self::Frequency => Kind::Frequency,
-            Self::Si(kind) => kind,
-            _ => return None,
-        })
+        match self {
+            Self::Si(kind) => Some(kind),
+            _ => self.entry().dimensional(),
+        }
     }
 
     /// SI value of the model's unit; `None` for a slope if the lever's length is unknown.
-    pub const fn si(self, scales: &Scales) -> Option<f64> {
-        Some(match self {
-            Self::Length => scales.length,
-            Self::Time => scales.time,
-            Self::Velocity => scales.velocity,
-            Self::Force => scales.force,
-            Self::Energy => scales.energy,
-            Self::Power => scales.power,
-            Self::Frequency => scales.frequency,
-            Self::Slope => return scales.slope,
-            _ => 1.0,
-        })
+    pub fn si(self, scales: &Scales) -> Option<f64> {
+        match self {
+            Self::Si(_) => Some(1.0),
+            _ => scales.si(self.entry()),
+        }
     }
 }

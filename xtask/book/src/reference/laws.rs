@@ -2,6 +2,7 @@
 
 use std::fmt::Write as _;
 
+use nanotap::case::physical::Kind;
 use nanotap::model::contact::ContactLaw;
 use nanotap_volterra::laws::all;
 
@@ -58,11 +59,19 @@ pub(super) fn page() -> String {
             text += &row(&[
                 code(parameter.name),
                 parameter.words.to_owned(),
-                parameter.dimension.unit.to_owned(),
+                unit(parameter.kind),
                 parameter.range.words().to_owned(),
                 default,
             ]);
         }
     }
     text
+}
+
+/// The SI unit with raised powers; empty for a pure number.
+fn unit(kind: Kind) -> String {
+    match kind {
+        Kind::Number => String::new(),
+        kind => kind.si_unit().replace("^2", "²").replace("^6", "⁶"),
+    }
 }

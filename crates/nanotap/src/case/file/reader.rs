@@ -306,7 +306,7 @@ impl Key {
             return None;
         };
         if self.entry().takes == Takes::Setpoint {
-            let right = match kind {
+            let right = match *kind {
                 Kind::Frequency => *number != 0.0,
                 Kind::Number => *number > 0.0 && *number < 1.0,
                 _ => *number > 0.0,

@@ -3,10 +3,17 @@
 //! schema and the explorer's controls read this table.
 //!
 //! Keys of a cantilever's numbers come from the table of
-//! [parameters](crate::model::parameter), keys of a contact law from the law's file. A new
-//! physical quantity is an entry here, and the line of the mapping that reads it.
+//! [parameters](crate::model::parameter), keys of a contact law from the law's file; a line here
+//! gives such a key its place among the others and its name in this crate, and without one it is
+//! listed last. A new physical quantity is an entry here, and the line of the mapping that reads it.
 
 use std::sync::LazyLock;
+
+use nanotap_volterra::laws::entry::{self, CaseKey, KeyEntry, ParameterEntry};
+use nanotap_volterra::laws::{
+    self, adhesion, capillary, electric, hysteresis, lennard_jones, prony, solvation, table,
+    viscous,
+};
 
 use super::{
     Alternatives, Default, Entry, Key, Laws, Means, ModelKind, Range, Section, Takes, kind_of,
@@ -39,7 +46,6 @@ const PLAIN: Entry = Entry {
     means: Means::Nothing,
     feeds: None,
     laws: Laws::All,
-    law_parameter: None,
     meaning: "",
 };
 
@@ -65,7 +71,12 @@ fn number(parameter: Parameter) -> Entry {
 /// The key of `[sample]` for a number that belongs to one contact law.
 fn of_law(parameter: Parameter) -> Option<Entry> {
     let entry = parameter.entry();
-    let Some(SampleKey::Own { meaning, zero }) = entry.stated_by else {
+    let Some(SampleKey::Own {
+        meaning,
+        zero,
+        example,
+    }) = entry.stated_by
+    else {
         return None;
     };
     let range = if zero { R::NOT_NEGATIVE } else { R::POSITIVE };
@@ -74,13 +85,45 @@ fn of_law(parameter: Parameter) -> Option<Entry> {
         quantity(Sample, entry.name, kind, range, meaning)
             .feeds(parameter)
             .under(Laws::Some)
-            .such_as(match kind {
-                Kind::Damping => 1e-7,
-                Kind::Time => 1e-6,
-                Kind::Force => 1e-9,
-                _ => 1.0,
-            }),
+            .such_as(example),
     )
+}
+
+/// The key of a contact law alone.
+const fn of_laws(key: &KeyEntry) -> Entry {
+    Entry {
+        alias: key.alias,
+        label: key.label,
+        range: match key.range {
+            entry::Range::Positive | entry::Range::PositiveOrInfinite => R::POSITIVE,
+            entry::Range::NotNegative => R::NOT_NEGATIVE,
+            entry::Range::Poisson => POISSON,
+            entry::Range::Angle => FLANK,
+            entry::Range::Finite => R::ANY,
+        },
+        default: match key.default {
+            None => Default::None,
+            Some(value) => Default::Number(value),
+        },
+        example: key.example,
+        laws: Laws::Nonlinear,
+        ..quantity(
+            if key.of_tip { Tip } else { Sample },
+            key.name,
+            key.kind,
+            R::ANY,
+            key.meaning,
+        )
+    }
+}
+
+/// The key that states a parameter of contact laws. It is evaluated while compiling: a parameter
+/// without a key of its own is an error there.
+const fn of_parameter(parameter: &ParameterEntry) -> Entry {
+    match parameter.key {
+        CaseKey::Own(key) => of_laws(&key),
+        CaseKey::Body(_) => panic!("tip or sample have this key without the law"),
+    }
 }
 
 /// A parameter of an oscillator.
@@ -179,13 +222,6 @@ impl Entry {
     const fn under(self, laws: Laws) -> Self {
         Self { laws, ..self }
     }
-
-    const fn called(self, law_parameter: &'static str) -> Self {
-        Self {
-            law_parameter: Some(law_parameter),
-            ..self
-        }
-    }
 }
 
 const POISSON: Range = Range {
@@ -253,14 +289,25 @@ const AFTER_LAWS: usize = Parameter::COUNT + Before::ENTRIES.len() + OWN_KEYS;
 pub(super) static TABLE: LazyLock<Vec<Entry>> = LazyLock::new(|| {
     let numbers = Parameter::every().map(number);
     let before = numbers.chain(Before::ENTRIES.iter().copied());
-    let of_laws = before.chain(Parameter::every().filter_map(of_law));
-    of_laws.chain(After::ENTRIES.iter().copied()).collect()
+    let linear = before.chain(Parameter::every().filter_map(of_law));
+    let mut table: Vec<Entry> = linear.chain(After::ENTRIES.iter().copied()).collect();
+    // The other keys of contact laws, which are not named in this file.
+    for key in laws::all().flat_map(|law| law.entry.keys()) {
+        let entry = of_laws(&key);
+        let is_new = |old: &Entry| (old.section, old.name) != (entry.section, entry.name);
+        if table.iter().all(is_new) {
+            table.push(entry);
+        }
+    }
+    // Kinds of one dimension, as a force per length and an energy per area, are read and shown alike.
+    for entry in &mut table {
+        if let Takes::Quantity(kind) = &mut entry.takes {
+            *kind = kind.dimension().kind().unwrap_or(*kind);
+        }
+    }
+    table
 });
 
-use Kind::{
-    Angle, ChargeDensity, Damping, Density, Energy, Force, Frequency, Length, Mass, Number,
-    Pressure, Repulsion, Stiffness, Time, Viscosity, Voltage,
-};
 use Range as R;
 use Section::{Cantilever, Drive, Gap, Sample, Tip};
 
@@ -325,58 +372,57 @@ Before from Parameter::COUNT => {
 
     LeverModes = other(Cantilever, "mode", Takes::LeverModes, "measured modes of the lever in place of a beam: a table with f, k at the tip, Q and, if it is known, participation in the motion of the base for each");
     LeverName = other(Cantilever, "lever", Takes::LeverName, "a lever of the catalogue, whose values hold where none are given");
-    LeverK = quantity(Cantilever, "k", Stiffness, R::POSITIVE, "static spring constant at the tip, 3EI/L³")
+    LeverK = quantity(Cantilever, "k", Kind::Stiffness, R::POSITIVE, "static spring constant at the tip, 3EI/L³")
         .label("spring constant $k$");
-    LeverK1 = quantity(Cantilever, "k1", Stiffness, R::POSITIVE, "stiffness of the first mode at the tip, as thermal tunes and point-mass models give it: 1.0302 k without a tip's mass");
-    LeverF0 = quantity(Cantilever, "f0", Frequency, R::POSITIVE, "first free resonance, with the tip")
+    LeverK1 = quantity(Cantilever, "k1", Kind::Stiffness, R::POSITIVE, "stiffness of the first mode at the tip, as thermal tunes and point-mass models give it: 1.0302 k without a tip's mass");
+    LeverF0 = quantity(Cantilever, "f0", Kind::Frequency, R::POSITIVE, "first free resonance, with the tip")
         .label("resonance frequency $f_0$");
-    LeverF2 = quantity(Cantilever, "f2", Frequency, R::POSITIVE, "second free resonance: the frequency of the second mode, from which the tip's mass follows where neither that nor k2 is given")
+    LeverF2 = quantity(Cantilever, "f2", Kind::Frequency, R::POSITIVE, "second free resonance: the frequency of the second mode, from which the tip's mass follows where neither that nor k2 is given")
         .feeds(Parameter::Mode2Frequency);
-    LeverF3 = quantity(Cantilever, "f3", Frequency, R::POSITIVE, "third free resonance")
+    LeverF3 = quantity(Cantilever, "f3", Kind::Frequency, R::POSITIVE, "third free resonance")
         .feeds(Parameter::Mode3Frequency);
-    LeverQ = quantity(Cantilever, "Q", Number, R::POSITIVE, "quality factor of the first free resonance")
+    LeverQ = quantity(Cantilever, "Q", Kind::Number, R::POSITIVE, "quality factor of the first free resonance")
         .feeds(Parameter::Alpha3)
         .label("quality factor $Q$");
-    LeverQ2 = quantity(Cantilever, "Q2", Number, R::POSITIVE, "quality factor of the second free resonance")
+    LeverQ2 = quantity(Cantilever, "Q2", Kind::Number, R::POSITIVE, "quality factor of the second free resonance")
         .feeds(Parameter::Mode2Quality);
-    LeverQ3 = quantity(Cantilever, "Q3", Number, R::POSITIVE, "quality factor of the third free resonance")
+    LeverQ3 = quantity(Cantilever, "Q3", Kind::Number, R::POSITIVE, "quality factor of the third free resonance")
         .feeds(Parameter::Mode3Quality);
-    LeverK2 = quantity(Cantilever, "k2", Stiffness, R::POSITIVE, "stiffness of the second mode at the tip")
+    LeverK2 = quantity(Cantilever, "k2", Kind::Stiffness, R::POSITIVE, "stiffness of the second mode at the tip")
         .feeds(Parameter::Mode2Stiffness);
-    LeverK3 = quantity(Cantilever, "k3", Stiffness, R::POSITIVE, "stiffness of the third mode at the tip")
+    LeverK3 = quantity(Cantilever, "k3", Kind::Stiffness, R::POSITIVE, "stiffness of the third mode at the tip")
         .feeds(Parameter::Mode3Stiffness);
-    FluidDensity = quantity(Cantilever, "fluid_density", Density, R::POSITIVE, "density of the fluid around a rectangular lever, with fluid_viscosity in place of Q; a given f0 is then that in vacuum")
+    FluidDensity = quantity(Cantilever, "fluid_density", Kind::Density, R::POSITIVE, "density of the fluid around a rectangular lever, with fluid_viscosity in place of Q; a given f0 is then that in vacuum")
         .feeds(Parameter::Alpha3);
-    FluidViscosity = quantity(Cantilever, "fluid_viscosity", Viscosity, R::POSITIVE, "viscosity of the fluid around the lever")
+    FluidViscosity = quantity(Cantilever, "fluid_viscosity", Kind::Viscosity, R::POSITIVE, "viscosity of the fluid around the lever")
         .feeds(Parameter::Alpha3);
-    LeverHeight = quantity(Cantilever, "height", Length, R::POSITIVE, "height of the lever over the surface, which adds mass and damping by the fluid between, with fluid_density and fluid_viscosity; at least 0.025 of the width")
+    LeverHeight = quantity(Cantilever, "height", Kind::Length, R::POSITIVE, "height of the lever over the surface, which adds mass and damping by the fluid between, with fluid_density and fluid_viscosity; at least 0.025 of the width")
         .feeds(Parameter::Alpha3);
-    LeverLength = quantity(Cantilever, "length", Length, R::POSITIVE, "length of the beam");
-    LeverWidth = quantity(Cantilever, "width", Length, R::POSITIVE, "width of the beam");
-    LeverThickness = quantity(Cantilever, "thickness", Length, R::POSITIVE, "thickness in the direction of bending");
-    LeverModulus = quantity(Cantilever, "modulus", Pressure, R::POSITIVE, "Young's modulus along the beam");
-    LeverDensity = quantity(Cantilever, "density", Density, R::POSITIVE, "density of the beam");
+    LeverLength = quantity(Cantilever, "length", Kind::Length, R::POSITIVE, "length of the beam");
+    LeverWidth = quantity(Cantilever, "width", Kind::Length, R::POSITIVE, "width of the beam");
+    LeverThickness = quantity(Cantilever, "thickness", Kind::Length, R::POSITIVE, "thickness in the direction of bending");
+    LeverModulus = quantity(Cantilever, "modulus", Kind::Pressure, R::POSITIVE, "Young's modulus along the beam");
+    LeverDensity = quantity(Cantilever, "density", Kind::Density, R::POSITIVE, "density of the beam");
 
-    TipMass = quantity(Tip, "mass", Mass, R::NOT_NEGATIVE, "mass of the tip").feeds(Parameter::Alpha1);
-    TipMassRatio = quantity(Tip, "mass_ratio", Number, R::NOT_NEGATIVE, "mass of the tip over that of the beam")
+    TipMass = quantity(Tip, "mass", Kind::Mass, R::NOT_NEGATIVE, "mass of the tip").feeds(Parameter::Alpha1);
+    TipMassRatio = quantity(Tip, "mass_ratio", Kind::Number, R::NOT_NEGATIVE, "mass of the tip over that of the beam")
         .feeds(Parameter::Alpha1);
     TipShape = other(Tip, "shape", Takes::Word(&["cone", "pyramid", "sphere"]), "a solid tip, whose mass follows from its density")
         .feeds(Parameter::Alpha1);
-    TipHeight = quantity(Tip, "height", Length, R::POSITIVE, "height of the tip, which separates beam and sample when the tip touches");
-    TipHalfAngle = quantity(Tip, "half_angle", Angle, FLANK, "angle between the tip's axis and its flank").called("half_angle")
+    TipHeight = quantity(Tip, "height", Kind::Length, R::POSITIVE, "height of the tip, which separates beam and sample when the tip touches");
+    TipHalfAngle = quantity(Tip, "half_angle", Kind::Angle, FLANK, "angle between the tip's axis and its flank")
         .such_as(0.35);
-    TipDensity = quantity(Tip, "density", Density, R::POSITIVE, "density of the tip");
-    TipRadius = quantity(Tip, "radius", Length, R::POSITIVE, "radius of curvature of the apex").called("radius")
+    TipDensity = quantity(Tip, "density", Kind::Density, R::POSITIVE, "density of the tip");
+    TipRadius = quantity(Tip, "radius", Kind::Length, R::POSITIVE, "radius of curvature of the apex")
         .label("tip radius $R$")
         .such_as(1e-8);
     TipMaterial = other(Tip, "material", Takes::MaterialName, "a material of the catalogue");
-    TipModulus = quantity(Tip, "modulus", Pressure, R::POSITIVE, "Young's modulus of the tip").called("tip_modulus")
+    TipModulus = quantity(Tip, "modulus", Kind::Pressure, R::POSITIVE, "Young's modulus of the tip")
         .such_as(1.7e11);
-    TipPoisson = quantity(Tip, "poisson", Number, POISSON, "Poisson's ratio of the tip").called("tip_poisson")
+    TipPoisson = quantity(Tip, "poisson", Kind::Number, POISSON, "Poisson's ratio of the tip")
         .such_as(0.28);
 
-    TipCharge = quantity(Tip, "charge", ChargeDensity, R::ANY, "surface charge density of the tip (dlvo)").under(Laws::Nonlinear).called("tip_charge")
-        .such_as(-0.02);
+    TipCharge = of_parameter(&electric::TIP_CHARGE);
 
     SampleLaw = other(
         Sample, "law", Takes::Law,
@@ -386,91 +432,60 @@ Before from Parameter::COUNT => {
         Sample, "table", Takes::Table,
         "force curve of sample.law = \"table\": rows of gap, force and, if there is one, damping, or a CSV file of them",
     ).under(Laws::Nonlinear);
-    SampleGapFactor = quantity(Sample, "gap_factor", Number, R::POSITIVE, "factor by which a table's gaps are stretched").or(1.0).under(Laws::Nonlinear);
-    SampleForceFactor = quantity(Sample, "force_factor", Number, R::NOT_NEGATIVE, "factor of a table's forces").or(1.0).under(Laws::Nonlinear);
-    SampleDampingFactor = quantity(Sample, "damping_factor", Number, R::NOT_NEGATIVE, "factor of a table's damping").or(1.0).under(Laws::Nonlinear);
+    SampleGapFactor = of_parameter(&table::GAP_FACTOR);
+    SampleForceFactor = of_parameter(&table::FORCE_FACTOR);
+    SampleDampingFactor = of_parameter(&table::DAMPING_FACTOR);
     SampleInterpolation = other(
         Sample, "interpolation", Takes::Word(&["linear", "monotone", "natural"]),
         "curve between a table's rows: straight lines (default), a cubic spline that stays between them, or a natural cubic spline",
     ).under(Laws::Nonlinear);
     SampleMaterial = other(Sample, "material", Takes::MaterialName, "a material of the catalogue").under(Laws::Some);
-    SampleStiffness = quantity(Sample, "stiffness", Stiffness, R::NOT_NEGATIVE, "contact stiffness K1")
+    SampleStiffness = quantity(Sample, "stiffness", Kind::Stiffness, R::NOT_NEGATIVE, "contact stiffness K1")
         .feeds(Parameter::Alpha4).under(Laws::Some)
         .label("sample stiffness")
         .such_as(10.0);
-    SampleDamping = quantity(Sample, "damping", Damping, R::NOT_NEGATIVE, "contact damping C1")
+    SampleDamping = quantity(Sample, "damping", Kind::Damping, R::NOT_NEGATIVE, "contact damping C1")
         .feeds(Parameter::Alpha6).under(Laws::Some)
         .such_as(1e-7);
-    SampleLossTangent = quantity(Sample, "loss_tangent", Number, R::NOT_NEGATIVE, "C1 ω/K1 at the drive frequency")
+    SampleLossTangent = quantity(Sample, "loss_tangent", Kind::Number, R::NOT_NEGATIVE, "C1 ω/K1 at the drive frequency")
         .feeds(Parameter::Alpha6).under(Laws::Some);
 }
 After from AFTER_LAWS => {
-    SampleModulus = quantity(Sample, "modulus", Pressure, R::POSITIVE, "Young's modulus of the sample")
+    SampleModulus = quantity(Sample, "modulus", Kind::Pressure, R::POSITIVE, "Young's modulus of the sample")
         .feeds(Parameter::Alpha4).under(Laws::Some)
         .label("sample modulus $E$")
         .such_as(1e9);
-    SamplePoisson = quantity(Sample, "poisson", Number, POISSON, "Poisson's ratio of the sample").under(Laws::Some)
+    SamplePoisson = quantity(Sample, "poisson", Kind::Number, POISSON, "Poisson's ratio of the sample").under(Laws::Some)
         .such_as(0.3);
     SampleIndentation = quantity(
-        Sample, "indentation", Length, R::POSITIVE, "indentation at which Hertz's stiffness is taken",
+        Sample, "indentation", Kind::Length, R::POSITIVE, "indentation at which Hertz's stiffness is taken",
     ).feeds(Parameter::Alpha4).under(Laws::Some)
         .such_as(1e-9);
 
-    SampleHamaker = quantity(Sample, "hamaker", Energy, R::ANY, "Hamaker constant of tip, medium and sample").under(Laws::Nonlinear).called("attraction")
-        .label("Hamaker constant $H$")
-        .such_as(6e-20);
-    SampleWorkOfAdhesion = quantity(Sample, "work_of_adhesion", Stiffness, R::NOT_NEGATIVE, "work of adhesion, an energy per area").under(Laws::Nonlinear)
-        .label("work of adhesion $w$")
-        .such_as(0.02);
-    SampleWorkOfRetraction = quantity(
-        Sample, "work_of_retraction", Stiffness, R::NOT_NEGATIVE, "work of adhesion on retraction (adhesion-hysteresis)",
-    ).under(Laws::Nonlinear)
-        .such_as(0.03);
-    SampleAdhesionForce = quantity(Sample, "adhesion_force", Force, R::NOT_NEGATIVE, "force that pulls the tip off")
-        .under(Laws::Nonlinear)
-        .label("adhesion force")
-        .such_as(1e-9);
-    SampleIntermolecularDistance = quantity(
-        Sample, "intermolecular_distance", Length, R::POSITIVE, "intermolecular distance a0, the gap at which contact begins",
-    ).under(Laws::Nonlinear).called("contact_distance").alias("contact_distance")
-        .label("intermolecular distance $a_0$")
-        .such_as(1.65e-10);
-    SampleViscosity = quantity(Sample, "viscosity", Viscosity, R::NOT_NEGATIVE, "viscosity of the sample: elongational of a Kelvin–Voigt solid, García's η of viscous-contact").under(Laws::Nonlinear)
-        .label("sample viscosity $η$")
-        .such_as(1.0);
-    SampleThickness = quantity(Sample, "thickness", Length, R::POSITIVE, "thickness of a thin sample on its support").under(Laws::Nonlinear)
-        .such_as(2e-8);
-    SampleDecayLength = quantity(Sample, "decay_length", Length, R::POSITIVE, "distance in which exponential damping decays").under(Laws::Nonlinear)
-        .such_as(5e-10);
-    SampleSurfaceTension = quantity(Sample, "surface_tension", Stiffness, R::POSITIVE, "surface tension of the liquid (capillary)").under(Laws::Nonlinear)
-        .such_as(0.072);
-    SampleFilmThickness = quantity(Sample, "film_thickness", Length, R::POSITIVE, "thickness of the adsorbed film (capillary)").under(Laws::Nonlinear)
-        .such_as(3e-10);
-    SampleSurfaceEnergy = quantity(Sample, "surface_energy", Stiffness, R::POSITIVE, "surface energy of the solid (capillary)").under(Laws::Nonlinear)
-        .such_as(0.07);
-    SampleVoltage = quantity(Sample, "voltage", Voltage, R::ANY, "dc voltage between tip and sample (electrostatic, electrostatic-ac)").under(Laws::Nonlinear)
-        .such_as(1.0);
-    SampleAcVoltage = quantity(Sample, "ac_voltage", Voltage, R::ANY, "amplitude of an ac voltage between tip and sample at the frequency of the second tone of the drive (electrostatic-ac)").under(Laws::Nonlinear)
-        .such_as(1.0);
-    SampleContactPotential = quantity(Sample, "contact_potential", Voltage, R::ANY, "contact potential difference, which the voltage compensates (electrostatic-ac)").under(Laws::Nonlinear);
-    SamplePermittivity = quantity(Sample, "permittivity", Number, R::POSITIVE, "permittivity of the medium over that of free space").under(Laws::Nonlinear);
-    SampleDebyeLength = quantity(Sample, "debye_length", Length, R::POSITIVE, "Debye length of the electrolyte (dlvo)").under(Laws::Nonlinear)
-        .such_as(3e-9);
-    SampleCharge = quantity(Sample, "charge", ChargeDensity, R::ANY, "surface charge density of the sample (dlvo)").under(Laws::Nonlinear).called("sample_charge")
-        .such_as(-0.02);
-    SampleRepulsion = quantity(Sample, "repulsion", Repulsion, R::NOT_NEGATIVE, "constant of the repulsion (lennard-jones)").under(Laws::Nonlinear)
-        .such_as(1e-78);
+    SampleHamaker = of_parameter(&adhesion::HAMAKER);
+    SampleWorkOfAdhesion = of_parameter(&adhesion::WORK_OF_ADHESION);
+    SampleWorkOfRetraction = of_parameter(&hysteresis::WORK_OF_RETRACTION);
+    SampleAdhesionForce = of_laws(&adhesion::PULL_OFF_FORCE);
+    SampleIntermolecularDistance = of_parameter(&entry::CONTACT_DISTANCE);
+    SampleViscosity = of_parameter(&entry::VISCOSITY);
+    SampleThickness = of_parameter(&entry::THICKNESS);
+    SampleDecayLength = of_parameter(&viscous::DECAY_LENGTH);
+    SampleSurfaceTension = of_parameter(&capillary::SURFACE_TENSION);
+    SampleFilmThickness = of_parameter(&capillary::FILM_THICKNESS);
+    SampleSurfaceEnergy = of_parameter(&capillary::SURFACE_ENERGY);
+    SampleVoltage = of_parameter(&electric::VOLTAGE);
+    SampleAcVoltage = of_parameter(&electric::AC_VOLTAGE);
+    SampleContactPotential = of_parameter(&electric::CONTACT_POTENTIAL);
+    SamplePermittivity = of_parameter(&electric::PERMITTIVITY);
+    SampleDebyeLength = of_parameter(&electric::DEBYE_LENGTH);
+    SampleCharge = of_parameter(&electric::SAMPLE_CHARGE);
+    SampleRepulsion = of_parameter(&lennard_jones::REPULSION);
 
-    SampleDampingDistance = quantity(Sample, "damping_distance", Length, R::POSITIVE, "distance over which damping falls as a power of the gap (power-damping)").under(Laws::Nonlinear)
-        .such_as(1e-9);
-    SampleDampingExponent = quantity(Sample, "damping_exponent", Number, R::NOT_NEGATIVE, "power by which damping falls with the gap (power-damping)").under(Laws::Nonlinear)
-        .such_as(3.0);
-    SampleSolvationForce = quantity(Sample, "solvation_force", Force, R::ANY, "solvation force at contact (solvation)").under(Laws::Nonlinear)
-        .such_as(1e-9);
-    SampleSolvationPeriod = quantity(Sample, "solvation_period", Length, R::POSITIVE, "period of the solvation force (solvation)").under(Laws::Nonlinear)
-        .such_as(3e-10);
-    SampleSolvationDecay = quantity(Sample, "solvation_decay", Length, R::POSITIVE, "decay length of the solvation force (solvation)").under(Laws::Nonlinear)
-        .such_as(3e-10);
+    SampleDampingDistance = of_parameter(&viscous::DAMPING_DISTANCE);
+    SampleDampingExponent = of_parameter(&viscous::DAMPING_EXPONENT);
+    SampleSolvationForce = of_parameter(&solvation::SOLVATION_FORCE);
+    SampleSolvationPeriod = of_parameter(&solvation::SOLVATION_PERIOD);
+    SampleSolvationDecay = of_parameter(&solvation::SOLVATION_DECAY);
     SampleArms = other(
         Sample, "arms", Takes::Arms,
         "relaxing arms of a Prony series (prony-sphere, prony-cone, prony-punch): rows of time and modulus, or a CSV file of them",
@@ -479,24 +494,24 @@ After from AFTER_LAWS => {
         Sample, "relaxation_arms", Takes::Springs,
         "relaxing arms of a generalised Maxwell sample (generalised-maxwell): rows of time and stiffness, or a CSV file of them",
     ).under(Laws::Nonlinear);
-    SampleArmModulusFactor = quantity(Sample, "arm_modulus_factor", Number, R::POSITIVE, "factor of the moduli of all arms").or(1.0).under(Laws::Nonlinear);
-    SampleArmTimeFactor = quantity(Sample, "arm_time_factor", Number, R::POSITIVE, "factor of the times of all arms: the shift of a time–temperature superposition").or(1.0).under(Laws::Nonlinear);
-    SampleHorizon = quantity(Sample, "horizon", Time, R::POSITIVE, "time of observation: slower arms count as elastic").under(Laws::Nonlinear);
+    SampleArmModulusFactor = of_parameter(&prony::ARM_MODULUS_FACTOR);
+    SampleArmTimeFactor = of_parameter(&prony::ARM_TIME_FACTOR);
+    SampleHorizon = of_parameter(&prony::HORIZON);
 
-    DriveFrequency = quantity(Drive, "frequency", Frequency, R::POSITIVE, "frequency of the drive")
+    DriveFrequency = quantity(Drive, "frequency", Kind::Frequency, R::POSITIVE, "frequency of the drive")
         .feeds(Parameter::Omega)
         .label("drive frequency $f$");
-    DriveFrequencyRatio = quantity(Drive, "frequency_ratio", Number, R::POSITIVE, "frequency of the drive over f0")
+    DriveFrequencyRatio = quantity(Drive, "frequency_ratio", Kind::Number, R::POSITIVE, "frequency of the drive over f0")
         .feeds(Parameter::Omega)
         .label("drive frequency $f/f_0$");
-    DriveAmplitude = quantity(Drive, "amplitude", Length, R::NOT_NEGATIVE, "amplitude of the clamped end's motion")
+    DriveAmplitude = quantity(Drive, "amplitude", Kind::Length, R::NOT_NEGATIVE, "amplitude of the clamped end's motion")
         .feeds(Parameter::Alpha2)
         .label("base amplitude");
-    DriveForce = quantity(Drive, "force", Force, R::NOT_NEGATIVE, "amplitude of the force on the lever")
+    DriveForce = quantity(Drive, "force", Kind::Force, R::NOT_NEGATIVE, "amplitude of the force on the lever")
         .feeds(Parameter::Alpha2)
         .label("drive force");
     DriveFreeAmplitude = quantity(
-        Drive, "free_amplitude", Length, R::NOT_NEGATIVE,
+        Drive, "free_amplitude", Kind::Length, R::NOT_NEGATIVE,
         "amplitude of the tip's deflection far from the sample, A0",
     ).feeds(Parameter::Alpha2)
         .label("free amplitude $A_0$");
@@ -516,33 +531,33 @@ After from AFTER_LAWS => {
         Drive, "hold", Takes::Word(words!(Hold)),
         "what stays while another key varies: the drive's own amplitude or force (default), or the free amplitude",
     );
-    SecondFrequency = quantity(Drive, "second_frequency", Frequency, R::POSITIVE, "frequency of a second tone");
+    SecondFrequency = quantity(Drive, "second_frequency", Kind::Frequency, R::POSITIVE, "frequency of a second tone");
     SecondRatio = other(Drive, "second_ratio", Takes::FrequencyRatio, "frequency of a second tone over that of the first");
-    SecondAmplitude = quantity(Drive, "second_amplitude", Length, R::NOT_NEGATIVE, "amplitude of the second tone's motion of the clamped end")
+    SecondAmplitude = quantity(Drive, "second_amplitude", Kind::Length, R::NOT_NEGATIVE, "amplitude of the second tone's motion of the clamped end")
         .feeds(Parameter::Tone2Amplitude);
-    SecondForce = quantity(Drive, "second_force", Force, R::NOT_NEGATIVE, "amplitude of the second tone's force on the lever")
+    SecondForce = quantity(Drive, "second_force", Kind::Force, R::NOT_NEGATIVE, "amplitude of the second tone's force on the lever")
         .feeds(Parameter::Tone2Amplitude);
-    SecondFreeAmplitude = quantity(Drive, "second_free_amplitude", Length, R::NOT_NEGATIVE, "free amplitude of the tip at the second tone")
+    SecondFreeAmplitude = quantity(Drive, "second_free_amplitude", Kind::Length, R::NOT_NEGATIVE, "free amplitude of the tip at the second tone")
         .feeds(Parameter::Tone2Amplitude)
         .label("free amplitude at the second tone");
-    SecondPhase = quantity(Drive, "second_phase", Angle, R::ANY, "phase of the second tone")
+    SecondPhase = quantity(Drive, "second_phase", Kind::Angle, R::ANY, "phase of the second tone")
         .feeds(Parameter::Tone2Phase);
-    ThirdFrequency = quantity(Drive, "third_frequency", Frequency, R::POSITIVE, "frequency of a third tone");
+    ThirdFrequency = quantity(Drive, "third_frequency", Kind::Frequency, R::POSITIVE, "frequency of a third tone");
     ThirdRatio = other(Drive, "third_ratio", Takes::FrequencyRatio, "frequency of a third tone over that of the first");
-    ThirdAmplitude = quantity(Drive, "third_amplitude", Length, R::NOT_NEGATIVE, "amplitude of the third tone's motion of the clamped end")
+    ThirdAmplitude = quantity(Drive, "third_amplitude", Kind::Length, R::NOT_NEGATIVE, "amplitude of the third tone's motion of the clamped end")
         .feeds(Parameter::Tone3Amplitude);
-    ThirdForce = quantity(Drive, "third_force", Force, R::NOT_NEGATIVE, "amplitude of the third tone's force on the lever")
+    ThirdForce = quantity(Drive, "third_force", Kind::Force, R::NOT_NEGATIVE, "amplitude of the third tone's force on the lever")
         .feeds(Parameter::Tone3Amplitude);
-    ThirdFreeAmplitude = quantity(Drive, "third_free_amplitude", Length, R::NOT_NEGATIVE, "free amplitude of the tip at the third tone")
+    ThirdFreeAmplitude = quantity(Drive, "third_free_amplitude", Kind::Length, R::NOT_NEGATIVE, "free amplitude of the tip at the third tone")
         .feeds(Parameter::Tone3Amplitude)
         .label("free amplitude at the third tone");
-    ThirdPhase = quantity(Drive, "third_phase", Angle, R::ANY, "phase of the third tone")
+    ThirdPhase = quantity(Drive, "third_phase", Kind::Angle, R::ANY, "phase of the third tone")
         .feeds(Parameter::Tone3Phase);
 
-    GapTip = quantity(Gap, "tip", Length, R::ANY, "gap between tip and sample at rest, g1; negative: pressed in")
+    GapTip = quantity(Gap, "tip", Kind::Length, R::ANY, "gap between tip and sample at rest, g1; negative: pressed in")
         .feeds(Parameter::Alpha5)
         .label("distance $z_c$");
-    GapBeam = quantity(Gap, "beam", Length, R::POSITIVE, "gap between beam and sample at rest, g0, the unit of length")
+    GapBeam = quantity(Gap, "beam", Kind::Length, R::POSITIVE, "gap between beam and sample at rest, g0, the unit of length")
         .label("beam gap $g_0$");
 }
 }
@@ -638,14 +653,6 @@ pub(super) static ALTERNATIVES: &[Alternatives] = &[
             ],
         ],
         reason: "the stiffness is either given or Hertz's",
-    },
-    Alternatives {
-        ways: &[
-            &[Key::SampleHamaker],
-            &[Key::SampleWorkOfAdhesion],
-            &[Key::SampleAdhesionForce],
-        ],
-        reason: "each gives the adhesion, which would be counted twice or contradict itself",
     },
     Alternatives {
         ways: &[&[Key::GapTip], &[Key::DriveSetpoint]],

@@ -11,6 +11,9 @@ use std::sync::LazyLock;
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::{Serialize, Serializer};
 
+use nanotap_volterra::laws;
+use nanotap_volterra::laws::entry::{CaseKey, KeyEntry, ParameterEntry};
+
 use super::near_name::near_name;
 use super::quantity::Kind;
 use crate::model::contact::ContactLaw;
@@ -282,9 +285,6 @@ pub struct Entry {
     pub feeds: Option<Parameter>,
     /// Contact laws that have the key, for a quantity of tip or sample.
     pub laws: Laws,
-    /// Name of the parameter of nonlinear laws that the key states, if it differs from its own
-    /// name.
-    pub law_parameter: Option<&'static str>,
     /// Description of the key in one line.
     pub meaning: &'static str,
 }
@@ -324,6 +324,26 @@ pub struct Alternatives {
     /// Why two exclude each other.
     pub reason: &'static str,
 }
+
+/// Keys of nonlinear laws that exclude each other, each group in the order of the table, with the
+/// reason.
+static LAW_ALTERNATIVES: LazyLock<Vec<(Vec<Key>, &str)>> = LazyLock::new(|| {
+    let mut groups: Vec<(Vec<Key>, &str)> = Vec::new();
+    for parameter in laws::all().flat_map(|law| law.entry.parameters) {
+        let ways = parameter.alternatives.ways.iter();
+        let others = ways.filter_map(|way| Key::of_law(&way.key));
+        let mut keys: Vec<Key> = Key::of_law_parameter(parameter)
+            .into_iter()
+            .chain(others)
+            .collect();
+        keys.sort_unstable();
+        let group = (keys, parameter.alternatives.reason);
+        if group.0.len() > 1 && !groups.contains(&group) {
+            groups.push(group);
+        }
+    }
+    groups
+});
 
 /// Paths of all keys, such as `cantilever.k`.
 static PATHS: LazyLock<Vec<String>> = LazyLock::new(|| {
@@ -439,12 +459,21 @@ impl Key {
     }
 
     /// The key that states a parameter of nonlinear laws.
-    pub(crate) fn of_law_parameter(name: &str) -> Option<Self> {
-        let is = |key: &Self| match key.entry().law_parameter {
-            Some(other) if other == name => true,
-            _ => key.section() == Section::Sample && key.name() == name,
+    pub(crate) fn of_law_parameter(parameter: &ParameterEntry) -> Option<Self> {
+        match &parameter.key {
+            CaseKey::Body(path) => Self::find(path),
+            CaseKey::Own(key) => Self::of_law(key),
+        }
+    }
+
+    /// The key with this description in the file of a nonlinear law.
+    pub(crate) fn of_law(key: &KeyEntry) -> Option<Self> {
+        let section = if key.of_tip {
+            Section::Tip
+        } else {
+            Section::Sample
         };
-        Self::all().find(is)
+        section.key(key.name)
     }
 
     /// The key of `[sample]` that states a number of a linear contact law.
@@ -520,13 +549,19 @@ impl Key {
 
     /// Returns the keys that exclude this one, each with the reason.
     pub fn alternatives(self) -> impl Iterator<Item = (Self, &'static str)> {
-        ALTERNATIVES
+        let own = ALTERNATIVES
             .iter()
             .filter(move |group| group.ways.iter().any(|way| way.contains(&self)))
             .flat_map(move |group| {
                 let others = group.ways.iter().filter(move |way| !way.contains(&self));
                 others.flat_map(|way| way.iter().map(|key| (*key, group.reason)))
-            })
+            });
+        let of_laws = LAW_ALTERNATIVES.iter();
+        let of_laws = of_laws.filter(move |(keys, _)| keys.contains(&self));
+        own.chain(of_laws.flat_map(move |(keys, reason)| {
+            let others = keys.iter().filter(move |key| **key != self);
+            others.map(|key| (*key, *reason))
+        }))
     }
 
     /// The default value of the key for a sample with this law.

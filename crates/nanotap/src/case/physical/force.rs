@@ -5,10 +5,10 @@ use std::sync::Arc;
 
 use nanotap_volterra::VolterraError;
 use nanotap_volterra::laws::curve::Interpolation;
-use nanotap_volterra::laws::entry::{Dimension, ParameterEntry, Part};
+use nanotap_volterra::laws::entry::{CONTACT_DISTANCE, CaseKey, ParameterEntry};
 use nanotap_volterra::laws::prony::Arms;
 use nanotap_volterra::laws::table::Rows;
-use nanotap_volterra::laws::{self, TableLaw};
+use nanotap_volterra::laws::{self, TableLaw, adhesion};
 
 use super::elastic::Elastic;
 use super::error::PhysicalError;
@@ -23,9 +23,6 @@ use crate::case::quantity::Kind;
 use crate::model::contact::ContactLaw;
 use crate::model::parameter::Applies;
 use crate::model::sample_law::SampleLaw;
-
-/// Permittivity of free space, F/m.
-const VACUUM: f64 = 8.854_187_812_8e-12;
 
 /// A law, or a sum of laws, with its parameters in SI.
 #[derive(Debug, Clone)]
@@ -62,12 +59,13 @@ pub(crate) fn keys_of_contacts() -> impl Iterator<Item = Key> {
 /// True if these nonlinear laws have a key of [`keys_of_contacts`].
 pub(crate) fn takes(terms: &[&'static TableLaw], key: Key) -> bool {
     let mut parameters = terms.iter().flat_map(|term| term.entry.parameters);
+    let mut keys = terms.iter().flat_map(|term| term.entry.keys());
     parameters.clone().any(|p| key_of(p) == key)
+        || keys.any(|own| Key::of_law(&own) == Some(key))
         || [Key::SampleTable, Key::SampleInterpolation].contains(&key)
             && terms.iter().any(|term| term.has_rows())
         || key == Key::SampleArms && terms.iter().any(|term| term.has_arms())
         || key == Key::SampleMaterial && parameters.any(|p| p.name == "modulus")
-        || ADHESION.contains(&key) && adhesion_of(terms).is_some()
 }
 
 /// True if a linear contact has a key of [`keys_of_contacts`].
@@ -95,14 +93,14 @@ fn laws_with(key: Key) -> String {
 /// The key that states a parameter of a law.
 fn key_of(parameter: &ParameterEntry) -> Key {
     // A test sees that every parameter has its key.
-    Key::of_law_parameter(parameter.name).unwrap_or(Key::SampleLaw)
+    Key::of_law_parameter(parameter).unwrap_or(Key::SampleLaw)
 }
 
-/// The factor from SI to the key's own unit.
-fn unit(key: Key) -> f64 {
-    match key {
-        Key::SamplePermittivity => VACUUM,
-        _ => 1.0,
+/// The factor from the key's own unit to SI.
+fn unit(parameter: &ParameterEntry) -> f64 {
+    match parameter.key {
+        CaseKey::Own(key) => key.multiple_of.unwrap_or(1.0),
+        CaseKey::Body(_) => 1.0,
     }
 }
 
@@ -213,7 +211,7 @@ impl SampleForce {
     ) -> Result<f64, PhysicalError> {
         let key = key_of(parameter);
         if let Some(stated) = reader.number(key)? {
-            return Ok(stated * unit(key));
+            return Ok(stated * unit(parameter));
         }
         let material = || reader.material(Key::SampleMaterial);
         let known = match key {
@@ -222,8 +220,7 @@ impl SampleForce {
             Key::TipModulus => tip.elastic.map(|e| e.modulus),
             Key::TipPoisson => tip.elastic.map(|e| e.poisson),
             Key::TipRadius => tip.radius,
-            Key::SampleHamaker | Key::SampleWorkOfAdhesion => self.adhesion(reader, tip, key)?,
-            _ => None,
+            _ => self.converted(reader, tip, parameter)?,
         };
         // Without an attraction contact begins where the surfaces meet.
         let touching = key == Key::SampleIntermolecularDistance && !self.attracts();
@@ -234,14 +231,8 @@ impl SampleForce {
         };
         known.or(default).ok_or_else(|| {
             let ways = match key {
-                Key::SampleHamaker | Key::SampleWorkOfAdhesion
-                    if adhesion_of(&self.terms).is_some() =>
-                {
-                    " (or another of sample.hamaker, sample.work_of_adhesion and \
-                     sample.adhesion_force)"
-                }
-                Key::SampleModulus => " (or sample.material)",
-                _ => "",
+                Key::SampleModulus => " (or sample.material)".to_owned(),
+                _ => other_ways(parameter, key),
             };
             let reason = format!(
                 "sample.law = \"{}\" needs the {}{ways}",
@@ -252,61 +243,51 @@ impl SampleForce {
         })
     }
 
-    /// Whether one of the laws attracts.
-    fn attracts(&self) -> bool {
-        self.terms.iter().any(|term| {
-            let entry = term.entry;
-            entry.parts.contains(&Part::Adhesion)
-                || ["electrostatic", "capillary"].contains(&entry.name)
-        })
-    }
-
-    /// Hamaker constant or work of adhesion, from the stated one of three quantities.
-    fn adhesion(
+    /// The value of a parameter from the stated one of its alternatives.
+    fn converted(
         &self,
         reader: Reader<'_>,
         tip: &Tip,
-        wanted: Key,
+        parameter: &ParameterEntry,
     ) -> Result<Option<f64>, PhysicalError> {
-        let Some(pull_off) = adhesion_of(&self.terms) else {
-            return Ok(None);
-        };
-        let distance = reader
-            .number(Key::SampleIntermolecularDistance)?
-            .unwrap_or(DISTANCE);
-        // w = 2γ with γ = H/(24π a0²).
-        let square = 12.0 * PI * distance * distance;
-        let work = if let Some(hamaker) = reader.number(Key::SampleHamaker)? {
-            Some(hamaker / square)
-        } else if let Some(work) = reader.number(Key::SampleWorkOfAdhesion)? {
-            Some(work)
-        } else if let (Some(force), Some(radius)) =
-            (reader.number(Key::SampleAdhesionForce)?, tip.radius)
-        {
-            Some(force / (pull_off * PI * radius))
-        } else {
-            None
-        };
-        Ok(work.map(|work| match wanted {
-            Key::SampleHamaker => work * square,
-            _ => work,
-        }))
+        for way in parameter.alternatives.ways {
+            let Some(stated) = Key::of_law(&way.key).map_or(Ok(None), |key| reader.number(key))?
+            else {
+                continue;
+            };
+            let others = way.needs.iter().filter_map(|name| {
+                let mut entries = self.terms.iter().flat_map(|term| term.entry.parameters);
+                entries.find(|other| other.name == *name)
+            });
+            let others: Vec<f64> = others
+                .map(|other| self.value(reader, tip, other))
+                .collect::<Result<_, _>>()?;
+            return Ok(Some((way.convert)(stated, &others)));
+        }
+        Ok(None)
+    }
+
+    /// Whether one of the laws attracts across the gap.
+    fn attracts(&self) -> bool {
+        self.terms.iter().any(|term| term.entry.attracts)
     }
 
     /// The same contact under other laws whose parameters are known; the present laws come first.
     pub fn others(&self) -> Vec<Self> {
-        let known = |key: Key| self.get(key).map(|value| value * unit(key));
-        let distance = known(Key::SampleIntermolecularDistance).unwrap_or(DISTANCE);
-        let square = 12.0 * PI * distance * distance;
+        let distance = self
+            .get(Key::SampleIntermolecularDistance)
+            .or(CONTACT_DISTANCE.default)
+            .unwrap_or_default();
         let work = self.work_of_adhesion();
         let value = |parameter: &ParameterEntry| {
             let key = key_of(parameter);
+            let known = self.get(key).map(|value| value * unit(parameter));
             let adhesion = match key {
-                Key::SampleHamaker => work.map(|work| work * square),
+                Key::SampleHamaker => work.map(|work| adhesion::hamaker(work, distance)),
                 Key::SampleWorkOfAdhesion => work,
                 _ => None,
             };
-            known(key).or(adhesion).or(parameter.default)
+            known.or(adhesion).or(parameter.default)
         };
         let mut all = vec![self.clone()];
         for name in COMPARED {
@@ -334,7 +315,8 @@ impl SampleForce {
     fn work_of_adhesion(&self) -> Option<f64> {
         self.get(Key::SampleWorkOfAdhesion).or_else(|| {
             let distance = self.get(Key::SampleIntermolecularDistance)?;
-            Some(self.get(Key::SampleHamaker)? / (12.0 * PI * distance * distance))
+            let hamaker = self.get(Key::SampleHamaker)?;
+            Some(adhesion::work_of_adhesion(hamaker, distance))
         })
     }
 
@@ -415,7 +397,7 @@ impl SampleForce {
         let entries = self.terms.iter().flat_map(|term| term.entry.parameters);
         entries.zip(&self.values).map(|(parameter, value)| {
             let key = key_of(parameter);
-            (parameter, key, value / unit(key))
+            (parameter, key, value / unit(parameter))
         })
     }
 
@@ -429,7 +411,7 @@ impl SampleForce {
     pub(crate) fn in_model(&self, scales: &Scales) -> Result<SampleLaw, PhysicalError> {
         let entries = self.terms.iter().flat_map(|term| term.entry.parameters);
         let values = entries.zip(&self.values);
-        let values = values.map(|(p, value)| value / size(p.dimension, scales));
+        let values = values.map(|(p, value)| value / size(p.kind, scales));
         SampleLaw::new(
             self.terms.clone(),
             values.collect(),
@@ -453,16 +435,14 @@ impl SampleForce {
                 material.name, material.source
             )));
         }
-        let assumed = [
-            Key::SamplePoisson,
-            Key::SampleIntermolecularDistance,
-            Key::SampleSurfaceTension,
-            Key::SamplePermittivity,
-        ];
-        for key in assumed {
-            let Some(value) = self.get(key).filter(|_| !reader.has(key)) else {
-                continue;
-            };
+        let mut assumed: Vec<(Key, f64)> = self
+            .parameters()
+            .filter(|(parameter, key, _)| parameter.assumed && !reader.has(*key))
+            .map(|(_, key, value)| (key, value))
+            .collect();
+        assumed.sort_by_key(|(key, _)| *key);
+        assumed.dedup_by_key(|(key, _)| *key);
+        for (key, value) in assumed {
             if key == Key::SamplePoisson && reader.has(Key::SampleMaterial) {
                 continue;
             }
@@ -512,12 +492,6 @@ impl SampleForce {
     }
 }
 
-/// Alternatives for the strength of the adhesion.
-const ADHESION: [Key; 3] = [
-    Key::SampleHamaker,
-    Key::SampleWorkOfAdhesion,
-    Key::SampleAdhesionForce,
-];
 /// The laws of a sphere that are compared with each other.
 const COMPARED: [&str; 6] = [
     "hertz",
@@ -529,25 +503,27 @@ const COMPARED: [&str; 6] = [
 ];
 /// Tabor's parameter between the limits of stiff and of soft contacts.
 const TABOR_LIMIT: f64 = 1.0;
-/// Intermolecular distance where none is given.
-const DISTANCE: f64 = 0.165e-9;
-
-/// The pull-off force over πRw of a law with such an adhesion: 2 in Derjaguin, Muller and
-/// Toporov's limit of stiff contacts, as of any rigid sphere, 3/2 in Johnson, Kendall and
-/// Roberts' of soft ones.
-fn adhesion_of(terms: &[&'static TableLaw]) -> Option<f64> {
-    terms.iter().find_map(|term| match term.entry.name {
-        "dmt" | "van-der-waals" => Some(2.0),
-        "jkr" => Some(1.5),
-        _ => None,
-    })
+/// The keys that state a parameter, in brackets; empty if there is only its own.
+fn other_ways(parameter: &ParameterEntry, key: Key) -> String {
+    let others = parameter.alternatives.ways.iter();
+    let others = others.filter_map(|way| Key::of_law(&way.key));
+    let mut keys: Vec<Key> = std::iter::once(key).chain(others).collect();
+    keys.sort_unstable();
+    let paths: Vec<&str> = keys.into_iter().map(Key::path).collect();
+    match paths.as_slice() {
+        [before @ .., last] if !before.is_empty() => {
+            format!(" (or another of {} and {last})", before.join(", "))
+        }
+        _ => String::new(),
+    }
 }
 
-/// The model's unit of a dimension, in SI; that of charge is 1 C.
-fn size(dimension: Dimension, scales: &Scales) -> f64 {
-    scales.mass.powi(i32::from(dimension.mass))
-        * scales.length.powi(i32::from(dimension.length))
-        * scales.time.powi(i32::from(dimension.time))
+/// The model's unit of a kind, in SI; that of charge is 1 C.
+fn size(kind: Kind, scales: &Scales) -> f64 {
+    let dimension = kind.dimension();
+    scales.mass.powi(dimension.mass)
+        * scales.length.powi(dimension.length)
+        * scales.time.powi(dimension.time)
 }
 
 #[cfg(test)]
@@ -556,10 +532,17 @@ mod tests {
     use nanotap_volterra::laws::all;
 
     #[test]
-    fn every_parameter_of_every_law_has_its_key() {
+    fn every_parameter_of_every_law_has_its_keys() {
         for law in all() {
-            for p in law.entry.parameters {
-                assert!(Key::of_law_parameter(p.name).is_some(), "{}", p.name);
+            let parameters = law.entry.parameters;
+            for p in parameters {
+                assert!(Key::of_law_parameter(p).is_some(), "{}", p.name);
+                for way in p.alternatives.ways {
+                    assert!(Key::of_law(&way.key).is_some(), "{}", way.key.name);
+                    for name in way.needs {
+                        assert!(parameters.iter().any(|p| p.name == *name), "{name}");
+                    }
+                }
             }
         }
     }

@@ -62,6 +62,25 @@ impl Scales {
         }
     }
 
+    /// SI value of the model's unit of a kind of result: powers of force, length and time, and 1 for
+    /// a kind without a dimension. A frequency counts the cycles of Ω. `None` for a slope if the
+    /// lever's length is unknown.
+    pub fn si(&self, kind: Kind) -> Option<f64> {
+        if kind == Kind::Slope {
+            return self.slope;
+        }
+        let time = match kind {
+            Kind::Frequency => std::f64::consts::TAU * self.time,
+            _ => self.time,
+        };
+        let [forces, lengths, times] = kind.dimension().of_force();
+        let unit = self.force.powi(forces) * self.length.powi(lengths);
+        Some(match times {
+            0.. => unit * time.powi(times),
+            _ => unit / time.powi(-times),
+        })
+    }
+
     /// SI value of 1 of a dimensionless parameter: of α5 in m, of α2 and a second tone in m
     /// or N as the drive acts, of Ω in Hz, of the relaxation time in s, of an angle in rad.
     pub fn of(&self, parameter: Parameter, actuation: Actuation) -> f64 {

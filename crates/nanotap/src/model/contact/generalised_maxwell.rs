@@ -34,11 +34,11 @@ pub(super) static ENTRY: Entry = Entry {
         ParameterEntry::new("relaxation_stiffness_factor", "cₖ", "factor of the stiffness of all relaxing arms")
             .or(1.0)
             .of(Unit::Number, "factor of the stiffness of all arms", "as given")
-            .stated_by(SampleKey::Own { meaning: "factor of the stiffness of all relaxation_arms", zero: true }),
+            .stated_by(SampleKey::Own { meaning: "factor of the stiffness of all relaxation_arms", zero: true, example: 1.0 }),
         ParameterEntry::new("relaxation_time_factor", "cₜ", "factor of the times of all relaxing arms")
             .or(1.0)
             .of(Unit::Number, "factor of the times of all arms", "as given")
-            .stated_by(SampleKey::Own { meaning: "factor of the times of all relaxation_arms", zero: false }),
+            .stated_by(SampleKey::Own { meaning: "factor of the times of all relaxation_arms", zero: false, example: 1.0 }),
     ],
     needs: "",
     arms: true,

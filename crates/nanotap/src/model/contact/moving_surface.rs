@@ -40,10 +40,10 @@ pub(super) static ENTRY: Entry = Entry {
         ParameterEntry::new("surface_stiffness", "kₛ", "a moving surface's own stiffness over bending stiffness, ks·L³/(EI)")
             .such_as(10.0)
             .of(Unit::Stiffness, "the surface's own stiffness ks", "ks L^3/(EI) = 3 ks/k")
-            .stated_by(SampleKey::Own { meaning: "a moving surface's own stiffness", zero: false }),
+            .stated_by(SampleKey::Own { meaning: "a moving surface's own stiffness", zero: false, example: 1.0 }),
         ParameterEntry::new("surface_damping", "ηₛ", "a moving surface's own damping, (ηs/L)·√(L⁴/(m·EI))")
             .of(Unit::Damping, "the surface's own damping etas", "(etas/L) sqrt(L^4/(m EI)) = etas T/(m L)")
-            .stated_by(SampleKey::Own { meaning: "a moving surface's own damping", zero: false }),
+            .stated_by(SampleKey::Own { meaning: "a moving surface's own damping", zero: false, example: 1e-7 }),
         ParameterEntry::new("adhesion_force", "F", "force that pulls a touching tip to a moving surface, F·L³/(EI·g0)")
             .or(0.0)
             .of(Unit::Force, "adhesion force F", "F L^3/(EI g0) = 3 F/(k g0)")

@@ -32,11 +32,11 @@ pub(super) static ENTRY: Entry = Entry {
         ParameterEntry::new("relaxation_stiffness", "kₘ", "stiffness of the relaxing arm over bending stiffness, km·L³/(EI)")
             .such_as(20.0).always_written()
             .of(Unit::Stiffness, "stiffness of the relaxing arm km", "km L^3/(EI) = 3 km/k")
-            .stated_by(SampleKey::Own { meaning: "stiffness of a standard linear solid's relaxing arm", zero: true }),
+            .stated_by(SampleKey::Own { meaning: "stiffness of a standard linear solid's relaxing arm", zero: true, example: 1.0 }),
         ParameterEntry::new("relaxation_time", "τₘ", "time in which the arm's force decays, over √(mL⁴/(EI))")
             .such_as(0.1).always_written()
             .of(Unit::Time, "relaxation time of the arm", "time/T")
-            .stated_by(SampleKey::Own { meaning: "time in which the arm's force decays", zero: true }),
+            .stated_by(SampleKey::Own { meaning: "time in which the arm's force decays", zero: true, example: 1e-6 }),
     ],
     needs: "a standard linear solid has a relaxing arm of this stiffness, as in \
             relaxation_stiffness = \"50 N/m\", and time, as in relaxation_time = \"0.5 us\"",

@@ -49,8 +49,8 @@ pub(super) fn engineering(
     join(&format!("{sign}{number}"), &prefix)
 }
 
-/// The SI prefix of a power of ten, empty for 0.
-pub(crate) fn prefix_of(power: i32) -> Option<String> {
+/// Returns the SI prefix of a power of ten, empty for 0; `None` if there is none.
+pub fn prefix_of(power: i32) -> Option<String> {
     if power == 0 {
         return Some(String::new());
     }

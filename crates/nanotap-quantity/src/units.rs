@@ -1,7 +1,7 @@
 //! The units that are known, their prefixes, and the nearest to one that is not.
 
 use super::{Dimension, JOULES_PER_ELECTRONVOLT, Kind};
-use crate::case::near_name::near_names;
+use crate::near_name::near_names;
 
 /// Symbol, power of ten and further factor to SI, dimension, whether prefixes go with it.
 struct Unit {
